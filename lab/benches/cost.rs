@@ -1,0 +1,58 @@
+//! One cost, one set of margins, one optimum, one step response.
+
+use divan::{Bencher, black_box};
+use onecycle_lab::{ise, margins, pd, pd_at_phase_margin, step_response};
+use onecycle_onboard::{Pd, Process};
+
+/// The paper's hover process and, with its floor inactive, a process that is mostly dead time.
+const HOVER: (f64, f64, f64) = (0.0321, 1.6886, 0.0237);
+const DELAYED: (f64, f64, f64) = (0.015, 0.2, 0.1);
+
+const PHASE_MARGIN_RAD: f64 = std::f64::consts::PI / 9.0;
+
+fn main() {
+    divan::main();
+}
+
+fn process((t_prop_s, t_body_s, tau_s): (f64, f64, f64)) -> Process {
+    Process::new(1.0, t_prop_s, t_body_s, tau_s).expect("the times are positive")
+}
+
+fn best(process: &Process) -> Pd {
+    pd_at_phase_margin(process, PHASE_MARGIN_RAD)
+        .expect("20 deg is a margin")
+        .pd
+}
+
+#[divan::bench]
+fn ise_of_a_pd(bencher: Bencher) {
+    let process = process(HOVER);
+    let pd = best(&process);
+    bencher.bench(|| ise(black_box(&process), black_box(pd)));
+}
+
+#[divan::bench]
+fn margins_of_a_pd(bencher: Bencher) {
+    let process = process(HOVER);
+    let pd = best(&process);
+    bencher.bench(|| margins(black_box(&process), black_box(pd)));
+}
+
+#[divan::bench(args = [HOVER, DELAYED])]
+fn optimum_at_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
+    let process = process(times);
+    bencher.bench(|| pd_at_phase_margin(black_box(&process), PHASE_MARGIN_RAD));
+}
+
+#[divan::bench(args = [HOVER, DELAYED])]
+fn optimum_above_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
+    let process = process(times);
+    bencher.bench(|| pd(black_box(&process), PHASE_MARGIN_RAD));
+}
+
+#[divan::bench(args = [HOVER, DELAYED])]
+fn step_response_until_settled(bencher: Bencher, times: (f64, f64, f64)) {
+    let process = process(times);
+    let pd = best(&process);
+    bencher.bench(|| step_response(black_box(&process), black_box(pd)));
+}

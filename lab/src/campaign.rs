@@ -1,0 +1,261 @@
+//! Campaigns: many random relay experiments, each with its seed, and what became of them.
+//!
+//! A case is a process of the domain, an input bias, a noise; the experiment runs the relay of the
+//! board on the exact process. Case `n` of seed `s` is the same whatever else is run.
+
+use std::f64::consts::TAU;
+
+use onecycle_onboard::cycle::{CycleDetector, SteadyRun};
+use onecycle_onboard::process::{Process, ProcessError};
+use onecycle_onboard::relay::{Relay, RelayError, RelaySettings};
+use onecycle_plant::{Experiment, Trace};
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use crate::identify::{Identification, Options, Signals, identify};
+use crate::optimum::pd_at_phase_margin;
+use crate::{Deterioration, deterioration};
+
+/// The multirotor domain of the paper's equation 3 (s), lowest and highest.
+pub const MULTIROTOR: [(f64, f64); 3] = [(0.015, 0.3), (0.2, 2.0), (0.0005, 0.1)];
+
+/// A campaign as a file describes it.
+#[derive(Clone, Debug, PartialEq, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Campaign {
+    /// What is measured.
+    pub measure: Measure,
+    /// Number of cases.
+    pub cases: u64,
+    /// Seed of the first case; the others follow.
+    pub seed: u64,
+    /// Input bias, uniform between plus and minus this part of the relay's amplitude.
+    pub bias: f64,
+    /// Noise, as a part of the amplitude of the noise-free oscillation: this, or uniform up to it.
+    pub sigma: f64,
+    /// Whether the noise is uniform from zero.
+    #[serde(default)]
+    pub sigma_uniform: bool,
+    /// Offset at the start, in amplitudes of the oscillation.
+    #[serde(default)]
+    pub offset: f64,
+    /// Whether the relay follows the bias.
+    pub trim: bool,
+    /// Cycles to fit.
+    #[serde(default = "one")]
+    pub cycles: usize,
+}
+
+fn one() -> usize {
+    1
+}
+
+/// What a campaign measures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Measure {
+    /// Whether the relay comes to a steady oscillation.
+    Relay,
+    /// Errors, intervals and deterioration of the identified process.
+    Identification,
+}
+
+/// One experiment, before it is run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Case {
+    /// The process, with a velocity gain of one.
+    pub process: Process,
+    /// Constant added to the input; the relay's amplitude is one.
+    pub bias: f64,
+    /// Noise of the sensor (output unit).
+    pub sigma: f64,
+    /// Period of the oscillation by the describing function (s).
+    pub period_s: f64,
+    /// Amplitude of its steady oscillation without noise and bias (output unit).
+    pub amplitude: f64,
+    seed: u64,
+}
+
+/// Sample period of all experiments (s): the paper's.
+const SAMPLE_S: f64 = 1e-3;
+/// Periods after which a perfect oscillation has settled, with a few to spare.
+const SETTLING_PERIODS: f64 = 15.0;
+/// The relay measures its noise for this long (s).
+const PREROLL_S: f64 = 0.1;
+
+/// Why a case cannot be run; none of the domain's cases ever fails so.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum CaseError {
+    /// The drawn parameters are no process.
+    #[error("{0}")]
+    Process(#[from] ProcessError),
+    /// The relay's settings are out of range.
+    #[error("{0}")]
+    Relay(#[from] RelayError),
+    /// No oscillation by the describing function.
+    #[error("the process has no oscillation at this phase")]
+    NoOscillation,
+}
+
+impl Campaign {
+    /// Case number `n`.
+    ///
+    /// # Errors
+    /// A [`CaseError`] for parameters outside their physical range.
+    pub fn case(&self, n: u64) -> Result<Case, CaseError> {
+        let seed = self.seed + n;
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
+        let [t_prop_s, t_body_s, tau_s] = MULTIROTOR.map(|(low, high)| rng.random_range(low..high));
+        let bias = rng.random_range(-1.0..1.0) * self.bias;
+        let part = if self.sigma_uniform { rng.random_range(0.0..1.0) } else { 1.0 };
+        let process = Process::new(1.0, t_prop_s, t_body_s, tau_s)?;
+        let beta = f64::from(RelaySettings::DISTINGUISHING_BETA);
+        let (omega, _) =
+            process.describing_function_oscillation(1.0, beta).ok_or(CaseError::NoOscillation)?;
+        let mut case =
+            Case { process, bias: 0.0, sigma: 0.0, period_s: TAU / omega, amplitude: 0.0, seed };
+        case.amplitude = self.noise_free_amplitude(&case)?;
+        case.bias = bias;
+        case.sigma = part * self.sigma * case.amplitude;
+        Ok(case)
+    }
+
+    /// Half the peak-to-peak output over the last two periods of a perfect experiment.
+    fn noise_free_amplitude(&self, case: &Case) -> Result<f64, CaseError> {
+        let (trace, _) = self.run(case, SETTLING_PERIODS)?;
+        let tail = &trace.true_output[trace.len() - (2.0 * case.period_s / SAMPLE_S) as usize..];
+        let (low, high) = tail
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| (low.min(y), high.max(y)));
+        Ok(0.5 * (high - low))
+    }
+
+    /// The relay experiment of a case over so many periods of the describing function, and the
+    /// relay after it.
+    ///
+    /// # Errors
+    /// A [`CaseError`] for settings outside their range.
+    pub fn run(&self, case: &Case, periods: f64) -> Result<(Trace, Relay), CaseError> {
+        let mut settings = RelaySettings::new(1.0, RelaySettings::DISTINGUISHING_BETA);
+        settings.preroll_s = PREROLL_S as f32;
+        settings.trim_gain = if self.trim { RelaySettings::TRIM_GAIN } else { 0.0 };
+        let mut relay = Relay::new(settings)?;
+        let duration_s = PREROLL_S + periods * case.period_s;
+        let mut experiment = Experiment::new(case.process, SAMPLE_S, duration_s);
+        experiment.input_bias = case.bias;
+        experiment.sensor.noise_sigma = case.sigma;
+        experiment.initial_output = self.offset * case.amplitude;
+        // The noise has a stream of its own: cases differ in it, not in their draws.
+        let mut rng = Pcg64Mcg::seed_from_u64(!case.seed);
+        let trace = experiment.run(&mut relay, &mut rng);
+        Ok((trace, relay))
+    }
+}
+
+/// What became of the relay.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelayOutcome {
+    /// Cycle at which three had been alike, if ever.
+    pub steady_at: Option<u32>,
+    /// Largest excursion over the amplitude of the oscillation by the describing function.
+    pub excursion: f64,
+    /// Period at the end over that of the describing function.
+    pub period_ratio: f64,
+    /// Whether the relay was still switching at the end: not run away.
+    pub alive: bool,
+    /// Switches taken back.
+    pub undone: u32,
+}
+
+/// Periods of the describing function that a relay is given: twice what the slowest ones take.
+const RELAY_PERIODS: f64 = 40.0;
+/// A relay that has not switched for this many periods has run away.
+const DEAD_PERIODS: f64 = 8.0;
+
+/// Runs the relay of a case.
+///
+/// # Errors
+/// A [`CaseError`] for parameters outside their range.
+pub fn relay_outcome(campaign: &Campaign, case: &Case) -> Result<RelayOutcome, CaseError> {
+    let (trace, relay) = campaign.run(case, RELAY_PERIODS)?;
+    let mut detector = CycleDetector::new();
+    let mut run = SteadyRun::default();
+    let (mut cycles, mut steady_at, mut last_end_s) = (0, None, 0.0);
+    let mut high = false;
+    for index in 1..trace.len() {
+        let jump = trace.input[index] - trace.input[index - 1];
+        // Between the trim's small moves and the relay's own jump of two.
+        if jump.abs() > 0.5 {
+            high = jump > 0.0;
+        }
+        let Some(cycle) = detector.push(trace.time_s[index], high, trace.true_output[index]) else {
+            continue;
+        };
+        cycles += 1;
+        run.push(&cycle);
+        last_end_s = cycle.start_s + cycle.period_s;
+        if run.is_steady() {
+            steady_at = steady_at.or(Some(cycles));
+        }
+    }
+    let end_s = trace.time_s.last().copied().unwrap_or(0.0);
+    let farthest = trace.true_output.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    Ok(RelayOutcome {
+        steady_at,
+        excursion: farthest / case.amplitude,
+        period_ratio: run.period_s / case.period_s,
+        alive: end_s - last_end_s < DEAD_PERIODS * case.period_s,
+        undone: relay.undone(),
+    })
+}
+
+/// How the identified process compares with the true one.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IdentificationOutcome {
+    /// What was identified.
+    pub found: Identification,
+    /// The true process, lags in order.
+    pub truth: Process,
+    /// The bias there was (input unit).
+    pub bias: f64,
+    /// Cost of the identified process's controller on the true one.
+    pub deterioration: Option<Deterioration>,
+}
+
+/// Periods for an identification: the transient and the cycles to fit.
+const IDENTIFICATION_PERIODS: f64 = 30.0;
+
+/// Runs the relay of a case and identifies the process from its recording.
+///
+/// The controllers compared have exactly the paper's 20 degrees of phase margin, as its do.
+///
+/// # Errors
+/// A [`CaseError`] for parameters outside their range.
+pub fn identification_outcome(
+    campaign: &Campaign,
+    case: &Case,
+) -> Result<IdentificationOutcome, CaseError> {
+    let (trace, _) = campaign.run(case, IDENTIFICATION_PERIODS)?;
+    let signals = Signals {
+        time_s: &trace.time_s,
+        input: &trace.input,
+        output: &trace.output,
+        samples_per_point: 1,
+        sample_period_s: SAMPLE_S,
+        breaks: &[],
+    };
+    let options = Options { cycles: campaign.cycles, ..Options::default() };
+    let found = identify(&signals, &options);
+    // The same process with its lags in order.
+    let (sum, ratio) = case.process.pole_sum();
+    let jerk_gain = case.process.k_over_t_body() / case.process.t_prop_s();
+    let ordered = Process::from_pole_sum(1.0, sum, ratio, case.process.tau_s())?;
+    let truth = ordered.with_gain_scaled(jerk_gain * ordered.t_prop_s())?;
+    let margin = options.phase_margin_rad;
+    let deterioration = found.outcome.as_ref().ok().and_then(|identified| {
+        let made = pd_at_phase_margin(&identified.refined.process, margin).ok()?;
+        let best = pd_at_phase_margin(&truth, margin).ok()?;
+        Some(deterioration(made.pd, &truth, &best))
+    });
+    Ok(IdentificationOutcome { found, truth, bias: case.bias, deterioration })
+}

@@ -1,0 +1,211 @@
+//! The road from a recording to a controller: find the relay and its steady oscillation, fit the
+//! process to the last cycles, judge the fit, design.
+//!
+//! Every way of not knowing is a [`Verdict`] with a sentence of advice, never a number.
+
+mod oscillation;
+mod posterior;
+mod relay_input;
+mod remark;
+mod saturation;
+mod verdict;
+
+use onecycle_onboard::refine::{RefineError, Refined, refine};
+
+use self::oscillation::{FitWindow, Oscillation};
+pub use self::posterior::{Interval, ProcessEstimate, intervals};
+use self::relay_input::{InputKind, RelayInput};
+pub use self::remark::Remark;
+pub use self::verdict::Verdict;
+use crate::optimum::{Optimum, pd};
+use crate::step_metrics::StepMetrics;
+use crate::step_response::step_response;
+
+/// A recording as columns of equal length, at least two points, time increasing, all finite.
+#[derive(Clone, Copy, Debug)]
+pub struct Signals<'a> {
+    /// Beginning of each point (s).
+    pub time_s: &'a [f64],
+    /// Input held from each point to the next (input unit).
+    pub input: &'a [f64],
+    /// Output: mean of the point's samples (output unit).
+    pub output: &'a [f64],
+    /// Samples averaged into a point, 1 for a plain recording.
+    pub samples_per_point: u32,
+    /// Sample period (s).
+    pub sample_period_s: f64,
+    /// Index of the first point behind each gap, in order.
+    pub breaks: &'a [usize],
+}
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Options {
+    /// Most cycles to fit; [`MOST_CYCLES`] is the limit.
+    pub cycles: usize,
+    /// Least phase margin of the controller (rad).
+    pub phase_margin_rad: f64,
+}
+
+/// Most cycles that the window holds.
+pub const MOST_CYCLES: usize = 50;
+
+impl Default for Options {
+    /// Eight cycles; the paper's phase margin of 20 degrees.
+    fn default() -> Self {
+        Self {
+            cycles: 8,
+            phase_margin_rad: 20_f64.to_radians(),
+        }
+    }
+}
+
+/// The oscillation that was found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OscillationFound {
+    /// Mean period of the cycles used (s).
+    pub period_s: f64,
+    /// Half the peak-to-peak output, mean of the cycles used (output unit).
+    pub amplitude: f64,
+    /// Cycles used for the fit.
+    pub cycles_used: usize,
+    /// Cycles of the steady run they were taken from.
+    pub cycles_steady: usize,
+    /// Beginning and end of the cycles used (s).
+    pub start_s: f64,
+    /// End of the cycles used (s).
+    pub end_s: f64,
+    /// Mean part of the period with the relay high.
+    pub duty: f64,
+    /// Half the distance of the relay's levels (input unit).
+    pub relay_amplitude: f64,
+    /// Standard deviation of the noise on a sample (output unit).
+    pub noise_sigma: f64,
+}
+
+/// The process and the controller made for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Identified {
+    /// The fit behind the estimate.
+    pub refined: Refined,
+    /// Parameters with their intervals.
+    pub process: ProcessEstimate,
+    /// Controller of least squared error at the phase margin asked for, and its margins.
+    pub optimum: Optimum,
+    /// Predicted response to a unit step of the reference; `None` where it is too slow to simulate.
+    pub step: Option<StepMetrics>,
+    /// Root mean square of what the model leaves unexplained, over that of the oscillation.
+    pub misfit: f64,
+}
+
+/// All that a recording tells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Identification {
+    /// The oscillation, where there is one.
+    pub oscillation: Option<OscillationFound>,
+    /// The process, or why there is none.
+    pub outcome: Result<Identified, Verdict>,
+    /// What a user should know beside the numbers.
+    pub remarks: Vec<Remark>,
+}
+
+/// Identifies the process behind a recorded relay test.
+#[must_use]
+pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
+    let mut found = Identification {
+        oscillation: None,
+        outcome: Err(Verdict::NoFit),
+        remarks: vec![],
+    };
+    found.outcome = find_relay(signals).and_then(|relay| {
+        let oscillation = oscillation::find(signals, &relay, options.cycles.clamp(1, MOST_CYCLES))?;
+        let window = oscillation.window(signals, &relay);
+        found.oscillation = Some(describe(&oscillation, &relay, &window));
+        if let Some(part) = saturation::flat_part(
+            &signals.output[oscillation.points(signals)],
+            oscillation.cycles.len(),
+        ) {
+            return Err(Verdict::Saturated { part });
+        }
+        let refined = refine(&window, oscillation.period_s).map_err(|error| match error {
+            RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
+            RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
+        })?;
+        design(&refined, &window, options)
+    });
+    found.remarks = remark::remarks(&found, options);
+    found
+}
+
+fn find_relay(signals: &Signals<'_>) -> Result<RelayInput, Verdict> {
+    match relay_input::find(signals.input) {
+        InputKind::Relay(relay) => Ok(relay),
+        InputKind::Constant => Err(Verdict::ConstantInput),
+        InputKind::NotTwoLevels => {
+            let output_is_relay = matches!(relay_input::find(signals.output), InputKind::Relay(_));
+            Err(Verdict::NoRelay { output_is_relay })
+        }
+    }
+}
+
+fn describe(oscillation: &Oscillation, relay: &RelayInput, window: &FitWindow) -> OscillationFound {
+    let cycles = &oscillation.cycles;
+    let mean = |of: fn(&onecycle_onboard::cycle::Cycle) -> f64| {
+        cycles.iter().map(of).sum::<f64>() / cycles.len() as f64
+    };
+    OscillationFound {
+        period_s: oscillation.period_s,
+        amplitude: mean(|cycle| cycle.amplitude),
+        cycles_used: cycles.len(),
+        cycles_steady: oscillation.steady,
+        start_s: cycles[0].start_s,
+        end_s: cycles[cycles.len() - 1].start_s + cycles[cycles.len() - 1].period_s,
+        duty: mean(|cycle| cycle.duty),
+        relay_amplitude: 0.5 * (relay.high - relay.low),
+        noise_sigma: window.noise_sigma(),
+    }
+}
+
+/// Part of the oscillation that a process of this kind never leaves unexplained.
+const MOST_MISFIT: f64 = 0.05;
+
+fn design(refined: &Refined, window: &FitWindow, options: &Options) -> Result<Identified, Verdict> {
+    let misfit = misfit(refined, window);
+    if misfit > MOST_MISFIT {
+        return Err(Verdict::NotThisProcess { misfit });
+    }
+    if let Some(edge) = refined.edge {
+        return Err(Verdict::EdgeOfDomain(edge));
+    }
+    let optimum = pd(&refined.process, options.phase_margin_rad)
+        .map_err(|error| Verdict::NoController(error.to_string()))?;
+    Ok(Identified {
+        refined: *refined,
+        process: intervals(refined, window.sample_s()),
+        optimum,
+        step: step_response(&refined.process, optimum.pd)
+            .ok()
+            .map(|step| step.metrics),
+        misfit,
+    })
+}
+
+/// Residual beyond the noise, over the oscillation: root mean squares of the bins.
+fn misfit(refined: &Refined, window: &FitWindow) -> f64 {
+    let means: Vec<f64> = window
+        .bins()
+        .iter()
+        .filter(|bin| bin.count > 0)
+        .map(|bin| bin.output_sum / f64::from(bin.count))
+        .collect();
+    let count = means.len() as f64;
+    let mean = means.iter().sum::<f64>() / count;
+    let variance = means
+        .iter()
+        .map(|value| (value - mean) * (value - mean))
+        .sum::<f64>()
+        / count;
+    let noise = refined.noise_sigma * refined.noise_sigma / f64::from(window.per_bin());
+    let excess = (refined.residual_rms * refined.residual_rms - noise).max(0.0);
+    (excess / variance).sqrt()
+}

@@ -1,0 +1,59 @@
+//! Clipped outputs: a sensor or a signal at its limit stays at one exact value.
+
+/// Part of a cycle at one exact extreme that no oscillation spends there; the top of a sine within
+/// one of a hundred quanta of its amplitude takes 4.5 %.
+const MOST_FLAT: f64 = 0.06;
+/// Fewer equal samples in a row are chance.
+const FEWEST_EQUAL: usize = 4;
+
+/// Part of the cycles that the output spends in flat stretches at its exact maximum or minimum;
+/// `None` where that is no more than a quantised sensor would show.
+pub(super) fn flat_part(output: &[f64], cycles: usize) -> Option<f64> {
+    let most = output.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let least = output.iter().copied().fold(f64::INFINITY, f64::min);
+    let quantum = smallest_step(output);
+    // Time that a sine of this amplitude spends within a quantum of each of its extremes.
+    let quantised = (1.0 - quantum / (0.5 * (most - least)))
+        .clamp(-1.0, 1.0)
+        .acos()
+        / std::f64::consts::PI;
+    [most, least].into_iter().find_map(|extreme| {
+        let flat: usize = output
+            .chunk_by(|a, b| a == b)
+            .filter(|stretch| stretch[0] == extreme && stretch.len() >= FEWEST_EQUAL)
+            .map(<[f64]>::len)
+            .sum();
+        let part = flat as f64 / output.len() as f64;
+        let stretches = flat >= FEWEST_EQUAL * cycles;
+        (stretches && part > MOST_FLAT && part > 2.0 * quantised).then_some(part)
+    })
+}
+
+/// Smallest change between neighbouring samples: at most the sensor's quantum.
+fn smallest_step(output: &[f64]) -> f64 {
+    output
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .filter(|&step| step > 0.0)
+        .fold(f64::INFINITY, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn sine(map: impl Fn(f64) -> f64) -> Vec<f64> {
+        (0..2000)
+            .map(|i| map((f64::from(i) * std::f64::consts::TAU / 500.0).sin()))
+            .collect()
+    }
+
+    #[test]
+    fn clipping_is_seen_and_quantisation_is_not() {
+        assert_eq!(flat_part(&sine(|y| y), 4), None);
+        assert_eq!(flat_part(&sine(|y| (y / 0.05).round() * 0.05), 4), None);
+        // A sine clipped at 0.8 stays there acos(0.8)/pi = 20.5 % of the time.
+        let part = flat_part(&sine(|y| y.min(0.8)), 4).unwrap();
+        assert!((part - 0.205).abs() < 0.005, "{part}");
+    }
+}

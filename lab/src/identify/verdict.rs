@@ -1,0 +1,174 @@
+//! Why there is no process: each reason with a sentence of advice.
+
+use std::fmt;
+
+use onecycle_onboard::refine::DomainEdge;
+
+/// A refusal. Displays as what was seen; [`Verdict::advice`] says what to do.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Verdict {
+    /// The input is the same throughout.
+    ConstantInput,
+    /// The input changes, but not between two levels.
+    NoRelay {
+        /// Whether the output does: the columns are swapped.
+        output_is_relay: bool,
+    },
+    /// Not enough complete cycles.
+    TooShort {
+        /// Complete cycles that there are.
+        cycles: usize,
+    },
+    /// The cycles differ too much from each other.
+    NotSteady {
+        /// Complete cycles that there are.
+        cycles: usize,
+        /// Most consecutive ones that are alike.
+        alike: usize,
+    },
+    /// Too few samples in the cycles.
+    TooCoarse {
+        /// Samples that there are.
+        points: usize,
+    },
+    /// The output is clipped.
+    Saturated {
+        /// Part of the time it is at its limit.
+        part: f64,
+    },
+    /// The fit leaves too much unexplained.
+    NotThisProcess {
+        /// What it leaves, over the oscillation (root mean squares).
+        misfit: f64,
+    },
+    /// The best fit lies on a limit of the domain.
+    EdgeOfDomain(DomainEdge),
+    /// The output does not follow the input.
+    NoFit,
+    /// The process was found, but no controller exists for it: why.
+    NoController(String),
+}
+
+impl Verdict {
+    /// A fixed name for programs: the JSON report's `verdict.kind`.
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::ConstantInput | Self::NoRelay { .. } => "no_relay",
+            Self::TooShort { .. } | Self::TooCoarse { .. } => "too_short",
+            Self::NotSteady { .. } => "not_steady",
+            Self::Saturated { .. } => "saturated",
+            Self::NotThisProcess { .. } | Self::NoFit => "not_this_process",
+            Self::EdgeOfDomain(_) => "edge_of_domain",
+            Self::NoController(_) => "no_controller",
+        }
+    }
+
+    /// What to do about it, in one sentence.
+    #[must_use]
+    pub fn advice(&self) -> &'static str {
+        match self {
+            Self::ConstantInput => {
+                "Choose the column that holds the relay's output with --input, or record a relay \
+                 test."
+            }
+            Self::NoRelay {
+                output_is_relay: true,
+            } => {
+                "Swap the columns: give the relay's column with --input and the measurement with \
+                 --output."
+            }
+            Self::NoRelay {
+                output_is_relay: false,
+            } => {
+                "Record the relay's own output, before any filter or rate limit, and choose it \
+                 with --input."
+            }
+            Self::TooShort { .. } => "Record at least four cycles of steady oscillation.",
+            Self::NotSteady { .. } => {
+                "Let the oscillation settle, keep gusts and set-point changes out of the test, or \
+                 raise the relay's amplitude above the noise."
+            }
+            Self::TooCoarse { .. } => {
+                "Record at a higher rate: 16 samples a cycle at the least, 50 or more are better."
+            }
+            Self::Saturated { .. } => {
+                "Lower the relay's amplitude or widen the sensor's range, and repeat the test."
+            }
+            Self::NotThisProcess { .. } => {
+                "Look for a resonance, friction, wind or another loop at work: the process is not \
+                 an integrator with two lags and a delay."
+            }
+            Self::EdgeOfDomain(DomainEdge::SlowLags) => {
+                "Check that the output is a position and not its rate: both lags seem longer than \
+                 the period."
+            }
+            Self::EdgeOfDomain(DomainEdge::FastLag) => {
+                "Check that the output is a position and not its rate, and that it is recorded \
+                 fast enough: no actuator lag is seen."
+            }
+            Self::EdgeOfDomain(DomainEdge::LongDelay) => {
+                "Check that input and output share one clock: the delay seems longer than half a \
+                 period."
+            }
+            Self::NoFit => "Check the column choice: the output does not follow the input.",
+            Self::NoController(_) => "Choose a smaller phase margin with --phase-margin.",
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::ConstantInput => write!(f, "no relay in the input: it never changes"),
+            Self::NoRelay { output_is_relay } => {
+                write!(
+                    f,
+                    "no relay in the input: it does not switch between two levels"
+                )?;
+                if *output_is_relay {
+                    write!(f, ", but the output does")
+                } else {
+                    Ok(())
+                }
+            }
+            Self::TooShort { cycles } => {
+                write!(
+                    f,
+                    "too short: {cycles} complete cycles of the relay, at least 3 are needed"
+                )
+            }
+            Self::NotSteady { cycles, alike } => write!(
+                f,
+                "no steady oscillation: of {cycles} cycles at most {alike} in a row are alike"
+            ),
+            Self::TooCoarse { points } => {
+                write!(
+                    f,
+                    "too short: the cycles hold {points} samples, at least 16 are needed"
+                )
+            }
+            Self::Saturated { part } => write!(
+                f,
+                "saturated: the output stays at one exact limit for {:.0} % of the time",
+                100.0 * part
+            ),
+            Self::NotThisProcess { misfit } => write!(
+                f,
+                "not this kind of process: the best fit leaves {:.1} % of the oscillation \
+                 unexplained, far above the noise",
+                100.0 * misfit
+            ),
+            Self::EdgeOfDomain(edge) => {
+                let what = match edge {
+                    DomainEdge::SlowLags => "lags as slow as the oscillation allows",
+                    DomainEdge::FastLag => "an actuator lag too fast to be seen",
+                    DomainEdge::LongDelay => "a delay as long as the oscillation allows",
+                };
+                write!(f, "at the edge of the domain: the best fit has {what}")
+            }
+            Self::NoFit => write!(f, "not this kind of process: no fit at all"),
+            Self::NoController(why) => write!(f, "no controller: {why}"),
+        }
+    }
+}

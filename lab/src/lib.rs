@@ -1,0 +1,51 @@
+//! How the identifier is made and judged: exact cost, margins and optimal controllers.
+//!
+//! Everything here is off board and exact: no time simulation is needed for a cost, no grid for an
+//! optimum, and a dead time is a dead time, not a Pade fraction.
+//!
+//! | question                                         | answer                               |
+//! |--------------------------------------------------|--------------------------------------|
+//! | what does a PD cost on a process?                | [`ise`], in closed form              |
+//! | how far is it from instability?                  | [`margins()`]                        |
+//! | what is the best PD, at or above a phase margin? | [`pd_at_phase_margin`], [`pd`]       |
+//! | which relay and tuning rule give that PD?        | [`TuningRule`]                       |
+//! | what does one process's PD cost on another?      | [`deterioration()`]                  |
+//! | what will the step look like?                    | [`step_response()`]                  |
+//!
+//! The method is that of A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, "Real-time system
+//! identification using deep learning for linear processes with application to unmanned aerial
+//! vehicles", IEEE Access 8 (2020): "the paper" throughout.
+//!
+//! ```
+//! use onecycle_lab::{ise, pd_at_phase_margin};
+//! use onecycle_onboard::Process;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let process = Process::new(1.0, 0.3, 2.0, 0.1)?;
+//! let best = pd_at_phase_margin(&process, 20_f64.to_radians())?;
+//! assert!((best.lead_rad.to_degrees() - 66.877).abs() < 0.001);
+//! assert_eq!(ise(&process, best.pd).is_some(), best.margins.is_stable());
+//! # Ok(())
+//! # }
+//! ```
+
+pub mod campaign;
+pub mod cost;
+pub mod deterioration;
+pub mod identify;
+pub mod margins;
+mod open_loop;
+pub mod optimum;
+mod propagation;
+mod roots;
+pub mod rule;
+mod step_metrics;
+pub mod step_response;
+
+pub use cost::ise;
+pub use deterioration::{Deterioration, deterioration};
+pub use margins::{Margins, margins};
+pub use optimum::{Optimum, OptimumError, pd, pd_at_phase_margin};
+pub use rule::TuningRule;
+pub use step_metrics::StepMetrics;
+pub use step_response::{Sample, StepResponse, StepResponseError, step_response};

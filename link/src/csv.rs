@@ -1,0 +1,322 @@
+//! A forgiving reader of text tables.
+//!
+//! ```text
+//! bytes -> text      byte order marks, UTF-16; refuses what is not text     text.rs
+//! text -> lines      line endings, comments, runs of blanks                 lines.rs
+//! lines -> rows      quotes, separators                                     records.rs
+//! first rows         separator, header, units, which column is which        dialect.rs, preview.rs,
+//!                                                                           names.rs, columns.rs
+//! rows -> samples    numbers, stamps                                        number.rs, clock.rs
+//! ```
+
+mod clock;
+mod columns;
+mod dialect;
+mod error;
+mod lines;
+mod names;
+mod number;
+mod preview;
+mod records;
+mod text;
+mod write;
+
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+use ::csv::ByteRecord;
+
+use self::clock::{Clock, Stamp};
+use self::columns::Choice;
+use self::dialect::Separator;
+use self::error::quoted;
+use self::number::{Cell, Mark};
+use self::preview::Preview;
+use self::records::{Records, Row};
+use self::text::Text;
+use crate::recording::{
+    Column, Columns, MAX_POINTS, Note, Position, Recording, RecordingBuilder, RecordingError,
+};
+
+pub use columns::ColumnRef;
+pub use error::ReadError;
+pub use names::TimeUnit;
+pub use write::write_csv;
+
+/// Slowest and fastest sample rate that a caller may give, in hertz.
+const SAMPLE_RATES_HZ: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
+
+/// What the caller knows of a file; by default nothing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CsvOptions {
+    /// Column of the time stamps.
+    pub time_column: Option<ColumnRef>,
+    /// Column of the input.
+    pub input_column: Option<ColumnRef>,
+    /// Column of the output.
+    pub output_column: Option<ColumnRef>,
+    /// Sample rate in hertz; time is then counted by rows, and no time column is read.
+    pub sample_rate_hz: Option<f64>,
+    /// Unit of the time column, whatever its header says.
+    pub time_unit: Option<TimeUnit>,
+    /// Most points to keep; [`MAX_POINTS`] unless a test wants less.
+    pub max_points: usize,
+}
+
+impl Default for CsvOptions {
+    fn default() -> Self {
+        Self {
+            time_column: None,
+            input_column: None,
+            output_column: None,
+            sample_rate_hz: None,
+            time_unit: None,
+            max_points: MAX_POINTS,
+        }
+    }
+}
+
+/// Reads a recording from a file.
+///
+/// # Errors
+/// A [`ReadError`] says why the file is no recording, where, and what to do.
+pub fn read(path: impl AsRef<Path>, options: &CsvOptions) -> Result<Recording, ReadError> {
+    let path = path.as_ref();
+    let unopened = |reason| ReadError::Open {
+        path: path.to_owned(),
+        reason,
+    };
+    let file = File::open(path).map_err(unopened)?;
+    match read_from(file, options) {
+        // A folder opens, but does not read.
+        Err(ReadError::Interrupted { line: 0, reason }) => Err(unopened(reason)),
+        result => result,
+    }
+}
+
+/// Reads a recording from bytes, in one pass and in bounded memory. Needs no buffered reader.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, ReadError> {
+    if let Some(rate_hz) = options
+        .sample_rate_hz
+        .filter(|rate| !SAMPLE_RATES_HZ.contains(rate))
+    {
+        return Err(ReadError::BadSampleRate { rate_hz });
+    }
+    let text = Text::open(bytes)?;
+    let separator = Separator::detect(&text.head, text.whole)?;
+    let preview = Preview::of(&text, separator)?;
+    let choice = columns::choose(&preview, options)?;
+    let mut table = Table::new(&preview, choice, options);
+    if text.utf16 {
+        table.builder.note(Note::Utf16);
+    }
+
+    let mut records = Records::new(text.head.as_slice().chain(text.rest), separator);
+    while let Some(row) = records.next()? {
+        if row.line < preview.first_line {
+            continue;
+        }
+        let line = row.line;
+        if let Err(fault) = table.add(&row) {
+            forgive_last_line(&mut records, line, fault)?;
+            table.builder.note(Note::LastLineIncomplete { line });
+        }
+    }
+    if let Some(line) = records.state().cut_line {
+        table.builder.note(Note::LastLineIncomplete { line });
+    }
+    Ok(table.builder.finish()?)
+}
+
+/// Forgives a last line that lacks cells, or whose last cell was cut off.
+fn forgive_last_line(
+    records: &mut Records<impl Read>,
+    line: u64,
+    fault: ReadError,
+) -> Result<(), ReadError> {
+    let is_last = records.next()?.is_none();
+    let ends_open = records.state().ends_open && records.state().lines == line;
+    match fault {
+        ReadError::RaggedRow {
+            expected, found, ..
+        } if is_last && found < expected => Ok(()),
+        ReadError::NotANumber { .. } if is_last && ends_open => Ok(()),
+        _ => Err(fault),
+    }
+}
+
+/// Turns rows into samples.
+struct Table<'a> {
+    preview: &'a Preview,
+    choice: Choice,
+    builder: RecordingBuilder,
+    clock: Clock,
+    sample_rate_hz: f64,
+    /// Rows so far.
+    rows: u64,
+    /// The last stamp, for the sentence that says time goes back.
+    last_stamp: Stamp,
+    /// How the numbers of this file write their decimals.
+    mark: Mark,
+}
+
+impl<'a> Table<'a> {
+    fn new(preview: &'a Preview, choice: Choice, options: &CsvOptions) -> Self {
+        let column = |column: usize| match &preview.names {
+            Some(names) => names[column].column(),
+            None => Column::named(&preview.label(column)),
+        };
+        let rows = Column {
+            name: "row".to_owned(),
+            unit: None,
+        };
+        let mut builder = RecordingBuilder::new(Columns {
+            time: choice.time.map_or(rows, column),
+            input: column(choice.input),
+            output: column(choice.output),
+        })
+        .with_max_points(options.max_points);
+
+        builder.note(choice.note(preview));
+        if let Some(line) = preview.comment_line {
+            builder.note(Note::HeaderInComment { line });
+        }
+        if preview.skipped > 0 {
+            builder.note(Note::LinesSkipped {
+                count: preview.skipped,
+            });
+        }
+        let mut unit = TimeUnit::Seconds;
+        if let Some(time) = choice.time {
+            let (found, note) = clock::unit_of(preview, time, options.time_unit);
+            unit = found;
+            note.into_iter().for_each(|note| builder.note(note));
+        }
+        let sample_rate_hz = options.sample_rate_hz.unwrap_or(1.0);
+        if let Some(time) = choice.ignored {
+            let name = preview.label(time);
+            builder.note(Note::TimeIgnored {
+                name,
+                sample_rate_hz,
+            });
+        }
+        Self {
+            preview,
+            choice,
+            builder,
+            clock: Clock::new(unit),
+            sample_rate_hz,
+            rows: 0,
+            last_stamp: Stamp::Whole(0),
+            mark: Mark::None,
+        }
+    }
+
+    /// Adds a row.
+    fn add(&mut self, row: &Row<'_>) -> Result<(), ReadError> {
+        let width = self.preview.width;
+        if row.cells.len() != width && !fits(row.cells, width) {
+            let (line, found) = (row.line, row.cells.len());
+            return Err(ReadError::RaggedRow {
+                line,
+                expected: width,
+                found,
+            });
+        }
+        let input = self.number(row, self.choice.input)?;
+        let output = self.number(row, self.choice.output)?;
+        let (stamp, time_s) = match self.choice.time {
+            Some(column) => self.time(row, column)?,
+            None => (Stamp::Whole(0), self.rows as f64 / self.sample_rate_hz),
+        };
+        self.rows += 1;
+        match self
+            .builder
+            .push(Position::Line(row.line), time_s, input, output)
+        {
+            Ok(()) => {}
+            Err(RecordingError::TimeGoesBack { .. }) => {
+                let (before, after) = (self.last_stamp.to_string(), stamp.to_string());
+                return Err(ReadError::TimeGoesBack {
+                    line: row.line,
+                    before,
+                    after,
+                });
+            }
+            Err(error) => return Err(error.into()),
+        }
+        if (time_s + input + output).is_finite() {
+            self.last_stamp = stamp;
+        }
+        Ok(())
+    }
+
+    /// The stamp in a column, as in the file and in seconds.
+    fn time(&mut self, row: &Row<'_>, column: usize) -> Result<(Stamp, f64), ReadError> {
+        let cell = &row.cells[column];
+        let Some((stamp, mark)) = clock::parse(cell) else {
+            let (line, column) = (row.line, self.preview.label(column));
+            let text = quoted(cell);
+            return Err(match number::is_clock_time(cell) {
+                true => ReadError::ClockTime { line, column, text },
+                false => ReadError::NotANumber { line, column, text },
+            });
+        };
+        self.check_mark(mark, row, column)?;
+        let missing = matches!(stamp, Stamp::Real(stamp) if stamp.is_nan());
+        if !missing && let Some(note) = self.clock.start(stamp) {
+            self.builder.note(note);
+        }
+        Ok((stamp, self.clock.seconds(stamp)))
+    }
+
+    /// The number in a column; NaN if it is missing.
+    fn number(&mut self, row: &Row<'_>, column: usize) -> Result<f64, ReadError> {
+        match number::parse(&row.cells[column]) {
+            Cell::Number(value, mark) => {
+                self.check_mark(mark, row, column)?;
+                Ok(value)
+            }
+            Cell::Missing => Ok(f64::NAN),
+            Cell::Text => {
+                let (line, column, text) = self.place(row, column);
+                Err(ReadError::NotANumber { line, column, text })
+            }
+        }
+    }
+
+    /// Refuses decimal points beside decimal commas: one of them separates thousands.
+    fn check_mark(&mut self, mark: Mark, row: &Row<'_>, column: usize) -> Result<(), ReadError> {
+        if mark == Mark::None || mark == self.mark {
+            return Ok(());
+        }
+        if self.mark == Mark::None {
+            self.mark = mark;
+            return Ok(());
+        }
+        let (line, column, text) = self.place(row, column);
+        Err(ReadError::MixedDecimals { line, column, text })
+    }
+
+    /// Line, column and cell as a sentence names them.
+    fn place(&self, row: &Row<'_>, column: usize) -> (u64, String, String) {
+        (
+            row.line,
+            self.preview.label(column),
+            quoted(&row.cells[column]),
+        )
+    }
+}
+
+/// Whether a row fits, its empty cells at the end aside.
+fn fits(cells: &ByteRecord, width: usize) -> bool {
+    cells.len() > width
+        && cells
+            .iter()
+            .skip(width)
+            .all(|cell| number::bare(cell).is_empty())
+}

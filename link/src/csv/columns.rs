@@ -1,0 +1,274 @@
+//! Which column holds which signal.
+//!
+//! 1. What the options say.
+//! 2. Names: `t`, `time`, ...; `u`, `input`, `relay`, ...; `y`, `pv`, `output`, ...
+//! 3. Without any names, time is the first column.
+//! 4. A single signal and a single column left over belong together.
+//! 5. If input and output are left over with two columns, the input of a relay test is the column
+//!    with 2 to 8 different values, when the other has at least three times as many.
+
+use std::collections::HashSet;
+
+use super::CsvOptions;
+use super::error::{ReadError, quoted};
+use super::names::{Name, key};
+use super::preview::Preview;
+use crate::recording::{Note, Role};
+
+/// Most different values of a relay: two levels, with some for its start, its end and its bias.
+const MOST_LEVELS: usize = 8;
+
+/// How many more values the output must take.
+const MORE_VALUES: usize = 3;
+
+/// A column chosen by the caller.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum ColumnRef {
+    /// By name, with or without its unit, in any case.
+    Name(String),
+    /// By number, from 1.
+    Number(usize),
+}
+
+impl From<&str> for ColumnRef {
+    /// A number if it is one, else a name.
+    fn from(text: &str) -> Self {
+        text.trim()
+            .parse()
+            .map_or_else(|_| Self::Name(text.trim().to_owned()), Self::Number)
+    }
+}
+
+/// The columns to read, from 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Choice {
+    /// None when the sample rate is given.
+    pub(super) time: Option<usize>,
+    pub(super) input: usize,
+    pub(super) output: usize,
+    /// A time column that is not read because the sample rate is given.
+    pub(super) ignored: Option<usize>,
+    how: &'static str,
+}
+
+impl Choice {
+    pub(super) fn note(&self, preview: &Preview) -> Note {
+        Note::ColumnsChosen {
+            time: self.time.map(|column| preview.label(column)),
+            input: preview.label(self.input),
+            output: preview.label(self.output),
+            how: self.how,
+        }
+    }
+}
+
+/// Chooses the columns.
+pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, ReadError> {
+    let timed = options.sample_rate_hz.is_none();
+    let by_option = |wanted: &Option<ColumnRef>, role| {
+        wanted
+            .as_ref()
+            .map(|wanted| find(wanted, role, preview))
+            .transpose()
+    };
+    let mut time = if timed {
+        by_option(&options.time_column, Role::Time)?
+    } else {
+        None
+    };
+    let mut input = by_option(&options.input_column, Role::Input)?;
+    let mut output = by_option(&options.output_column, Role::Output)?;
+    check_distinct(time, input, output, preview)?;
+    let all_given = input.is_some() && output.is_some() && (time.is_some() || !timed);
+
+    let given = [time, input, output];
+    let by_name = |role| named(preview, role, &given);
+    if input.is_none() {
+        input = single(by_name(Role::Input), Role::Input, preview)?;
+    }
+    if output.is_none() {
+        output = single(by_name(Role::Output), Role::Output, preview)?;
+    }
+    let first = first_is_time(preview, input, output);
+    let mut ignored = None;
+    if !timed {
+        ignored = by_name(Role::Time).first().copied().or(first);
+    } else if time.is_none() {
+        time = single(by_name(Role::Time), Role::Time, preview)?.or(first);
+    }
+    if timed {
+        check_clock_time(preview, time)?;
+    }
+
+    let taken = [time, input, output, ignored];
+    let left: Vec<usize> = (0..preview.width)
+        .filter(|&column| !taken.contains(&Some(column)))
+        .collect();
+    let mut by_values = false;
+    match (timed && time.is_none(), input, output, left.as_slice()) {
+        (true, Some(_), Some(_), &[only]) => time = Some(only),
+        (false, None, Some(_), &[only]) => input = Some(only),
+        (false, Some(_), None, &[only]) => output = Some(only),
+        (false, None, None, &[a, b]) => {
+            let (relay, other) = tell_apart(preview, a, b)?;
+            (input, output) = (Some(relay), Some(other));
+            by_values = true;
+        }
+        _ => {}
+    }
+    let unknown = |role| ReadError::UnknownColumn {
+        role,
+        columns: all_labels(preview),
+    };
+    if timed && (time.is_none() || (preview.width == 2 && preview.names.is_none())) {
+        return Err(unknown(Role::Time));
+    }
+    Ok(Choice {
+        time,
+        input: input.ok_or_else(|| unknown(Role::Input))?,
+        output: output.ok_or_else(|| unknown(Role::Output))?,
+        ignored,
+        how: match preview.names {
+            _ if all_given => "as the options say",
+            _ if by_values => "by how few values the input takes",
+            Some(_) => "by name",
+            None => "by position",
+        },
+    })
+}
+
+/// Refuses dates and times of day as time, and where no time is found, as what should be.
+fn check_clock_time(preview: &Preview, time: Option<usize>) -> Result<(), ReadError> {
+    match &preview.clock_time {
+        Some((column, text)) if time.is_none_or(|time| time == *column) => {
+            let (line, column) = (preview.first_line, preview.label(*column));
+            Err(ReadError::ClockTime {
+                line,
+                column,
+                text: text.clone(),
+            })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The column that the caller names.
+fn find(wanted: &ColumnRef, role: Role, preview: &Preview) -> Result<usize, ReadError> {
+    let missing = |wanted| {
+        Err(ReadError::NoSuchColumn {
+            role,
+            wanted,
+            columns: all_labels(preview),
+        })
+    };
+    match wanted {
+        ColumnRef::Number(number) => match number.checked_sub(1) {
+            Some(column) if column < preview.width => Ok(column),
+            _ => missing(format!("number {number}")),
+        },
+        ColumnRef::Name(wanted) => {
+            let names = preview.names.as_deref().unwrap_or_default();
+            let exact = |name: &Name| name.full == *wanted || name.bare == *wanted;
+            let alike = |name: &Name| {
+                [&name.full, &name.bare]
+                    .map(|n| key(n))
+                    .contains(&key(wanted))
+            };
+            let all = |is: &dyn Fn(&Name) -> bool| -> Vec<usize> {
+                (0..names.len())
+                    .filter(|&column| is(&names[column]))
+                    .collect()
+            };
+            let found = Some(all(&exact)).filter(|found| !found.is_empty());
+            let found = found.unwrap_or_else(|| all(&alike));
+            match single(found, role, preview)? {
+                Some(column) => Ok(column),
+                None => missing(format!("\"{}\"", quoted(wanted.as_bytes()))),
+            }
+        }
+    }
+}
+
+fn check_distinct(
+    time: Option<usize>,
+    input: Option<usize>,
+    output: Option<usize>,
+    preview: &Preview,
+) -> Result<(), ReadError> {
+    let pairs = [
+        (time, Role::Time, input, Role::Input),
+        (time, Role::Time, output, Role::Output),
+        (input, Role::Input, output, Role::Output),
+    ];
+    for (a, first, b, second) in pairs {
+        if let Some(column) = a.filter(|_| a == b) {
+            let column = preview.label(column);
+            return Err(ReadError::SameColumn {
+                column,
+                first,
+                second,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Columns that are named for a role and not given to another.
+fn named(preview: &Preview, role: Role, given: &[Option<usize>]) -> Vec<usize> {
+    let names = preview.names.as_deref().unwrap_or_default();
+    (0..names.len())
+        .filter(|&column| names[column].role() == Some(role) && !given.contains(&Some(column)))
+        .collect()
+}
+
+/// The only candidate, or none.
+fn single(found: Vec<usize>, role: Role, preview: &Preview) -> Result<Option<usize>, ReadError> {
+    match *found {
+        [] => Ok(None),
+        [only] => Ok(Some(only)),
+        _ => {
+            let candidates = found
+                .into_iter()
+                .map(|column| preview.label(column))
+                .collect();
+            Err(ReadError::AmbiguousColumn { role, candidates })
+        }
+    }
+}
+
+/// The first column, if there are no names, it is free, and it never goes back.
+fn first_is_time(preview: &Preview, input: Option<usize>, output: Option<usize>) -> Option<usize> {
+    let free = preview.names.is_none() && input != Some(0) && output != Some(0);
+    let stamps = preview.column(0).filter(|stamp| !stamp.is_nan());
+    let rises = stamps.clone().is_sorted();
+    let changes = preview.width > 2 || stamps.clone().min_by(f64::total_cmp) != stamps.last();
+    (free && rises && changes).then_some(0)
+}
+
+/// Input and output of two columns, by the number of their values.
+fn tell_apart(preview: &Preview, a: usize, b: usize) -> Result<(usize, usize), ReadError> {
+    let values = |column| {
+        let bits = preview
+            .column(column)
+            .filter(|value| !value.is_nan())
+            .map(f64::to_bits);
+        bits.collect::<HashSet<u64>>().len()
+    };
+    let (values_a, values_b) = (values(a), values(b));
+    let is_relay = |few, many| (2..=MOST_LEVELS).contains(&few) && many >= MORE_VALUES * few;
+    if is_relay(values_a, values_b) {
+        Ok((a, b))
+    } else if is_relay(values_b, values_a) {
+        Ok((b, a))
+    } else {
+        Err(ReadError::InputOrOutput {
+            columns: [preview.label(a), preview.label(b)],
+        })
+    }
+}
+
+fn all_labels(preview: &Preview) -> Vec<String> {
+    (0..preview.width)
+        .map(|column| preview.label(column))
+        .collect()
+}

@@ -1,0 +1,246 @@
+//! Text to clean lines, which a record reader can take as they are.
+//!
+//! Every line of the file becomes one line that ends in LF, so line numbers stay true. Comments
+//! and blank lines become empty lines. Where blanks separate columns, every run of them becomes
+//! one blank. A line keeps its quotes, and must close them: a cell that ran on over lines would
+//! swallow the file.
+
+use std::io::{self, Read};
+
+use super::dialect::Separator;
+use super::error::ReadError;
+
+/// How much is read at a time.
+const PIECE_BYTES: u64 = 1 << 15;
+
+/// Longest line; a row of ten thousand short cells.
+const LONGEST_LINE: usize = 1 << 16;
+
+/// A reader of clean lines.
+pub(super) struct Lines<R> {
+    text: R,
+    separator: Separator,
+    /// Read and not yet cleaned: part of one line.
+    raw: Vec<u8>,
+    /// Clean lines, handed out up to `sent`.
+    clean: Vec<u8>,
+    sent: usize,
+    state: State,
+}
+
+/// What is known of the lines so far.
+#[derive(Default)]
+pub(super) struct State {
+    /// Number of lines read.
+    pub(super) lines: u64,
+    /// The last comment before the first line that is not one, without its mark.
+    pub(super) comment: Option<(u64, Vec<u8>)>,
+    /// Whether the text ended without a line ending.
+    pub(super) ends_open: bool,
+    /// The last line, if it was dropped because it ends within quotes.
+    pub(super) cut_line: Option<u64>,
+    /// Why reading stopped, if not for the operating system.
+    pub(super) fault: Option<ReadError>,
+    preface_over: bool,
+    after_cr: bool,
+    ended: bool,
+}
+
+impl<R: Read> Lines<R> {
+    pub(super) fn new(text: R, separator: Separator) -> Self {
+        let (raw, clean) = (Vec::new(), Vec::new());
+        Self {
+            text,
+            separator,
+            raw,
+            clean,
+            sent: 0,
+            state: State::default(),
+        }
+    }
+
+    pub(super) fn state(&mut self) -> &mut State {
+        &mut self.state
+    }
+
+    /// Reads a piece and cleans the lines that it completes.
+    fn refill(&mut self) -> io::Result<()> {
+        self.clean.clear();
+        self.sent = 0;
+        let mut raw = std::mem::take(&mut self.raw);
+        let searched = raw.len();
+        let count = self.text.by_ref().take(PIECE_BYTES).read_to_end(&mut raw)?;
+        self.state.ended = count == 0;
+
+        let mut start = 0;
+        let mut from = searched;
+        while let Some(length) = raw[from..]
+            .iter()
+            .position(|&byte| byte == b'\n' || byte == b'\r')
+        {
+            let end = from + length;
+            let second_half = self.state.after_cr && start == end && raw[end] == b'\n';
+            self.state.after_cr = raw[end] == b'\r';
+            if !second_half {
+                self.finish_line(&raw[start..end])?;
+            }
+            start = end + 1;
+            from = start;
+        }
+        self.state.after_cr &= start == raw.len();
+        if self.state.ended && start < raw.len() {
+            self.state.ends_open = true;
+            self.finish_line(&raw[start..])?;
+            start = raw.len();
+        }
+        raw.drain(..start);
+        if raw.len() > LONGEST_LINE {
+            let line = self.state.lines + 1;
+            return self.fail(ReadError::LineTooLong {
+                line,
+                limit: LONGEST_LINE,
+            });
+        }
+        self.raw = raw;
+        Ok(())
+    }
+
+    /// Cleans one line.
+    fn finish_line(&mut self, line: &[u8]) -> io::Result<()> {
+        self.state.lines += 1;
+        let number = self.state.lines;
+        if line.contains(&0) {
+            return self.fail(ReadError::NulByte { line: number });
+        }
+        let text = line.trim_ascii_start();
+        if let Some(comment) = self.comment(text) {
+            if !self.state.preface_over {
+                self.state.comment = Some((number, comment.to_vec()));
+            }
+        } else if !matches!(text, [] | [0x1a, ..]) {
+            self.state.preface_over = true;
+            if line.contains(&b'"') && line.iter().filter(|&&byte| byte == b'"').count() % 2 == 1 {
+                if !self.state.ends_open {
+                    return self.fail(ReadError::UnclosedQuote { line: number });
+                }
+                self.state.cut_line = Some(number);
+            } else if self.separator == Separator::Blanks {
+                for word in text
+                    .split(u8::is_ascii_whitespace)
+                    .filter(|word| !word.is_empty())
+                {
+                    self.clean.extend_from_slice(word);
+                    self.clean.push(b' ');
+                }
+                self.clean.pop();
+            } else {
+                self.clean.extend_from_slice(line);
+            }
+        }
+        self.clean.push(b'\n');
+        Ok(())
+    }
+
+    /// The text of a comment line without its mark.
+    fn comment<'a>(&self, text: &'a [u8]) -> Option<&'a [u8]> {
+        match text {
+            [b'/', b'/', comment @ ..] | [b'#' | b'%', comment @ ..] => Some(comment),
+            [b';', comment @ ..] if self.separator != Separator::Semicolon => Some(comment),
+            _ => None,
+        }
+    }
+
+    fn fail(&mut self, fault: ReadError) -> io::Result<()> {
+        let message = fault.to_string();
+        self.state.fault = Some(fault);
+        Err(io::Error::other(message))
+    }
+}
+
+impl<R: Read> Read for Lines<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        while self.sent == self.clean.len() && !self.state.ended {
+            self.refill()?;
+        }
+        let count = out.len().min(self.clean.len() - self.sent);
+        out[..count].copy_from_slice(&self.clean[self.sent..self.sent + count]);
+        self.sent += count;
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Hands out one byte at a time, so that every boundary is tried.
+    struct Drip<'a>(&'a [u8]);
+
+    impl Read for Drip<'_> {
+        fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+            let count = self.0.len().min(1);
+            out[..count].copy_from_slice(&self.0[..count]);
+            self.0 = &self.0[count..];
+            Ok(count)
+        }
+    }
+
+    fn clean(text: &str, separator: Separator) -> String {
+        let mut whole = String::new();
+        Lines::new(text.as_bytes(), separator)
+            .read_to_string(&mut whole)
+            .unwrap();
+        let mut dripped = String::new();
+        Lines::new(Drip(text.as_bytes()), separator)
+            .read_to_string(&mut dripped)
+            .unwrap();
+        assert_eq!(whole, dripped);
+        whole
+    }
+
+    #[test]
+    fn all_line_endings() {
+        let expected = "1,2\n\n3,4\n";
+        assert_eq!(clean("1,2\n\n3,4\n", Separator::Comma), expected);
+        assert_eq!(clean("1,2\r\n\r\n3,4\r\n", Separator::Comma), expected);
+        assert_eq!(clean("1,2\r\r3,4", Separator::Comma), expected);
+    }
+
+    #[test]
+    fn comments_leave_their_line() {
+        let text = "# a\n% \"b\n // c\n;d\n1;2\n#e\n";
+        assert_eq!(clean(text, Separator::Comma), "\n\n\n\n1;2\n\n");
+        assert_eq!(clean(text, Separator::Semicolon), "\n\n\n;d\n1;2\n\n");
+    }
+
+    #[test]
+    fn runs_of_blanks_become_one() {
+        assert_eq!(
+            clean("  1   2\t 3  \n4 5", Separator::Blanks),
+            "1 2 3\n4 5\n"
+        );
+    }
+
+    #[test]
+    fn the_comment_before_the_table_is_kept() {
+        let mut lines = Lines::new("# a\n# t, u\n\n1,2\n# b\n".as_bytes(), Separator::Comma);
+        io::copy(&mut lines, &mut io::sink()).unwrap();
+        assert_eq!(lines.state().comment, Some((2, b" t, u".to_vec())));
+        assert_eq!(lines.state().lines, 5);
+    }
+
+    #[test]
+    fn faults_are_found() {
+        let fault = |text: &[u8]| {
+            let mut lines = Lines::new(text, Separator::Comma);
+            io::copy(&mut lines, &mut io::sink()).unwrap_err();
+            lines.state().fault.take().unwrap().to_string()
+        };
+        assert!(fault(b"1,2\n3,\0\n").contains("line 2"));
+        assert!(fault(b"1,2\n\n\"3,4\n5\n").contains("line 3"));
+        assert!(fault(&[b'1'; 3 << 20]).contains("line 1"));
+        let mut lines = Lines::new("1,2\n3,\"4".as_bytes(), Separator::Comma);
+        io::copy(&mut lines, &mut io::sink()).unwrap();
+        assert_eq!(lines.state().cut_line, Some(2));
+    }
+}

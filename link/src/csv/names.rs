@@ -1,0 +1,350 @@
+//! Names of columns, their units, and what they stand for.
+
+use crate::recording::{Column, Role};
+
+/// What people call the time, lower case, words joined by `_`, without unit.
+const TIME: [&str; 15] = [
+    "t",
+    "time",
+    "timestamp",
+    "time_stamp",
+    "stamp",
+    "ts",
+    "tick",
+    "ticks",
+    "elapsed",
+    "elapsed_time",
+    "time_elapsed",
+    "time_since_boot",
+    "seconds",
+    "millis",
+    "micros",
+];
+
+/// What people call the input of the process.
+const INPUT: [&str; 37] = [
+    "u",
+    "input",
+    "relay",
+    "relay_output",
+    "relay_out",
+    "control",
+    "ctrl",
+    "cmd",
+    "command",
+    "commanded",
+    "actuator",
+    "actuation",
+    "actuator_command",
+    "mv",
+    "co",
+    "op",
+    "cv",
+    "in",
+    "u_cmd",
+    "control_output",
+    "controller_output",
+    "control_signal",
+    "control_input",
+    "control_action",
+    "controloutput",
+    "manipulated_variable",
+    "process_input",
+    "plant_input",
+    "plant_in",
+    "torque",
+    "thrust",
+    "torque_cmd",
+    "thrust_cmd",
+    "pwm",
+    "voltage_cmd",
+    "drive",
+    "excitation",
+];
+
+/// What people call the output of the process.
+const OUTPUT: [&str; 25] = [
+    "y",
+    "pv",
+    "output",
+    "out",
+    "measurement",
+    "measured",
+    "meas",
+    "measured_output",
+    "y_meas",
+    "value",
+    "process_variable",
+    "process_value",
+    "processvariable",
+    "process_output",
+    "plant_output",
+    "plant_out",
+    "response",
+    "feedback",
+    "sensor",
+    "sensor_value",
+    "reading",
+    "state",
+    "position",
+    "controlled_variable",
+    "pv_value",
+];
+
+/// Units that a name may end in after `_`, or a row of units may hold, besides those of time.
+const UNITS: [&str; 58] = [
+    "rad", "deg", "rad/s", "deg/s", "rad_s", "deg_s", "rads", "degs", "rpm", "m", "mm", "cm", "km",
+    "m/s", "m_s", "m/s2", "m/s^2", "n", "nm", "n.m", "n*m", "kn", "v", "mv", "a", "ma", "w", "kw",
+    "k", "c", "degc", "\u{b0}c", "\u{b0}", "f", "degf", "pa", "kpa", "mpa", "bar", "mbar", "psi",
+    "kg", "g", "l", "l/min", "l/s", "m3/h", "hz", "khz", "%", "pct", "percent", "-", "1", "norm",
+    "counts", "raw", "none",
+];
+
+/// A unit of time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeUnit {
+    /// 3600 s.
+    Hours,
+    /// 60 s.
+    Minutes,
+    /// s.
+    Seconds,
+    /// 1e-3 s.
+    Milliseconds,
+    /// 1e-6 s.
+    Microseconds,
+    /// 1e-9 s.
+    Nanoseconds,
+}
+
+impl TimeUnit {
+    /// The unit that people write so: `s`, `ms`, `usec`, `minutes`, ... in any case.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Some(match name.trim().to_lowercase().as_str() {
+            "h" | "hr" | "hrs" | "hour" | "hours" => Self::Hours,
+            "min" | "mins" | "minute" | "minutes" => Self::Minutes,
+            "s" | "sec" | "secs" | "second" | "seconds" => Self::Seconds,
+            "ms" | "msec" | "msecs" | "millis" | "millisecond" | "milliseconds" => {
+                Self::Milliseconds
+            }
+            "us" | "\u{b5}s" | "\u{3bc}s" | "\u{fffd}s" | "usec" | "usecs" | "micros"
+            | "microsecond" | "microseconds" => Self::Microseconds,
+            "ns" | "nsec" | "nsecs" | "nanos" | "nanosecond" | "nanoseconds" => Self::Nanoseconds,
+            _ => return None,
+        })
+    }
+
+    /// Its symbol.
+    pub fn symbol(self) -> &'static str {
+        match self {
+            Self::Hours => "h",
+            Self::Minutes => "min",
+            Self::Seconds => "s",
+            Self::Milliseconds => "ms",
+            Self::Microseconds => "us",
+            Self::Nanoseconds => "ns",
+        }
+    }
+
+    /// A time in this unit, in seconds.
+    pub fn seconds(self, time: f64) -> f64 {
+        // Division by a whole number is rounded once; the factor 1e-3 would be rounded twice.
+        match self {
+            Self::Hours => time * 3600.0,
+            Self::Minutes => time * 60.0,
+            Self::Seconds => time,
+            Self::Milliseconds => time / 1e3,
+            Self::Microseconds => time / 1e6,
+            Self::Nanoseconds => time / 1e9,
+        }
+    }
+}
+
+/// A name in a header.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Name {
+    /// As in the file.
+    pub(super) full: String,
+    /// Without the unit.
+    pub(super) bare: String,
+    /// The unit as in the file.
+    pub(super) unit: Option<String>,
+}
+
+impl Name {
+    /// Takes `pv [rad]`, `time (ms)`, `t / s`, `u_N` or `TimeUS` apart.
+    pub(super) fn parse(cell: &str) -> Self {
+        let full = cell.trim().trim_matches(['"', '\'']).trim().to_owned();
+        let (bare, unit) = match in_brackets(&full).or_else(|| after_mark(&full)) {
+            Some((bare, unit)) => (
+                bare.to_owned(),
+                Some(unit.to_owned()).filter(|u| !u.is_empty()),
+            ),
+            None => (full.clone(), None),
+        };
+        Self { full, bare, unit }
+    }
+
+    /// The name with the unit that a second row gives.
+    pub(super) fn with_unit(mut self, unit: &str) -> Self {
+        let unit = unit
+            .trim()
+            .trim_matches(['"', '\'', '(', ')', '[', ']', '<', '>'])
+            .trim();
+        if self.unit.is_none() && !unit.is_empty() {
+            self.unit = Some(unit.to_owned());
+        }
+        self
+    }
+
+    /// What the name stands for, if it is a usual one.
+    pub(super) fn role(&self) -> Option<Role> {
+        let keys = [key(&self.full), key(&self.bare)];
+        let is_one_of = |names: &[&str]| keys.iter().any(|key| names.contains(&key.as_str()));
+        if is_one_of(&TIME) {
+            Some(Role::Time)
+        } else if is_one_of(&INPUT) {
+            Some(Role::Input)
+        } else if is_one_of(&OUTPUT) {
+            Some(Role::Output)
+        } else {
+            None
+        }
+    }
+
+    /// The unit of time that the name gives, be it `seconds` or `millis`.
+    pub(super) fn time_unit(&self) -> Option<TimeUnit> {
+        match &self.unit {
+            Some(unit) => TimeUnit::from_name(unit),
+            None if self.bare.len() > 2 => TimeUnit::from_name(&self.bare),
+            None => None,
+        }
+    }
+
+    pub(super) fn column(&self) -> Column {
+        Column {
+            name: self.bare.clone(),
+            unit: self.unit.clone(),
+        }
+    }
+}
+
+/// Whether a cell of a second header row is a unit.
+pub(super) fn is_unit(cell: &str) -> bool {
+    let cell = cell.trim().trim_matches(['"', '\'']).trim();
+    let inner = cell.trim_matches(['(', ')', '[', ']', '<', '>']).trim();
+    inner.len() < cell.len() || is_known_unit(inner)
+}
+
+/// Lower case, words joined by `_`.
+pub(super) fn key(name: &str) -> String {
+    let name = name.to_lowercase();
+    let words = name
+        .split(|c: char| !c.is_alphanumeric())
+        .filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join("_")
+}
+
+fn is_known_unit(unit: &str) -> bool {
+    TimeUnit::from_name(unit).is_some() || UNITS.contains(&unit.to_lowercase().as_str())
+}
+
+/// `pv [rad]`, `time (ms)`.
+fn in_brackets(name: &str) -> Option<(&str, &str)> {
+    [('(', ')'), ('[', ']'), ('<', '>'), ('{', '}')]
+        .into_iter()
+        .find_map(|(open, close)| {
+            let (bare, unit) = name.strip_suffix(close)?.rsplit_once(open)?;
+            Some((bare.trim(), unit.trim())).filter(|(bare, _)| !bare.is_empty())
+        })
+}
+
+/// `t / s`, `pv, rad`, `u_N`, `TimeUS`: only before a known unit.
+fn after_mark(name: &str) -> Option<(&str, &str)> {
+    let split =
+        |(bare, unit): (&'_ str, &'_ str)| !bare.trim().is_empty() && is_known_unit(unit.trim());
+    let marks = name
+        .char_indices()
+        .filter(|(_, c)| matches!(c, '/' | ',' | '_' | ' ' | '.'));
+    for (at, mark) in marks {
+        let parts = (&name[..at], &name[at + mark.len_utf8()..]);
+        if split(parts) {
+            return Some((parts.0.trim(), parts.1.trim()));
+        }
+    }
+    ["us", "ms", "ns"].into_iter().find_map(|unit| {
+        let at = name
+            .len()
+            .checked_sub(unit.len())
+            .filter(|&at| name.is_char_boundary(at))?;
+        let (bare, end) = name.split_at(at);
+        let is_time = ["time", "timestamp"].contains(&bare.to_lowercase().as_str());
+        (is_time && end.eq_ignore_ascii_case(unit)).then_some((bare, end))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_and_units_come_apart() {
+        for (text, bare, unit) in [
+            ("time (ms)", "time", Some("ms")),
+            ("t[s]", "t", Some("s")),
+            ("u_N", "u", Some("N")),
+            ("time_us", "time", Some("us")),
+            ("pv [rad]", "pv", Some("rad")),
+            ("\"pv [rad]\"", "pv", Some("rad")),
+            ("rate_rad_s", "rate", Some("rad_s")),
+            ("t / s", "t", Some("s")),
+            ("rate / rad/s", "rate", Some("rad/s")),
+            ("TimeUS", "Time", Some("US")),
+            ("pv", "pv", None),
+            ("y_meas", "y_meas", None),
+            ("pv []", "pv", None),
+            ("", "", None),
+            ("(s)", "(s)", None),
+        ] {
+            let name = Name::parse(text);
+            assert_eq!(
+                (name.bare.as_str(), name.unit.as_deref()),
+                (bare, unit),
+                "{text}"
+            );
+        }
+    }
+
+    #[test]
+    fn roles_by_name() {
+        for (text, role) in [
+            ("Time", Some(Role::Time)),
+            ("TIMESTAMP_US", Some(Role::Time)),
+            ("TimeUS", Some(Role::Time)),
+            ("U", Some(Role::Input)),
+            ("Controller Output [%]", Some(Role::Input)),
+            ("mv", Some(Role::Input)),
+            ("Process Variable (degC)", Some(Role::Output)),
+            ("y_m", Some(Role::Output)),
+            ("y_meas", Some(Role::Output)),
+            ("setpoint", None),
+        ] {
+            assert_eq!(Name::parse(text).role(), role, "{text}");
+        }
+    }
+
+    #[test]
+    fn units_of_time() {
+        assert_eq!(
+            Name::parse("time (\u{b5}s)").time_unit(),
+            Some(TimeUnit::Microseconds)
+        );
+        assert_eq!(
+            Name::parse("millis").time_unit(),
+            Some(TimeUnit::Milliseconds)
+        );
+        assert_eq!(Name::parse("t").time_unit(), None);
+        assert_eq!(TimeUnit::Microseconds.seconds(1.0), 1e-6);
+        assert_eq!(TimeUnit::Minutes.seconds(1.5), 90.0);
+    }
+}

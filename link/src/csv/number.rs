@@ -1,0 +1,310 @@
+//! One cell to one number.
+//!
+//! A decimal is `m * 10^e` with whole `m`. When `m <= 2^53` and `|e| <= 22`, both `m` and
+//! `10^|e|` are exact doubles, so one multiplication or division rounds correctly (Clinger 1990,
+//! "How to read floating point numbers accurately"). Everything else goes to the standard parser.
+
+/// What a cell holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Cell {
+    /// A finite number, and how it writes its decimals.
+    Number(f64, Mark),
+    /// Nothing, or a word that logs write for no number; also an infinity.
+    Missing,
+    /// Anything else.
+    Text,
+}
+
+/// How a number writes its decimals.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Mark {
+    None,
+    Point,
+    Comma,
+}
+
+/// What logs write where there is no number, in lower case.
+const MISSING: [&str; 17] = [
+    "",
+    "nan",
+    "+nan",
+    "-nan",
+    "nan(ind)",
+    "-nan(ind)",
+    "na",
+    "n/a",
+    "#n/a",
+    "null",
+    "none",
+    "nil",
+    "inf",
+    "+inf",
+    "-inf",
+    "infinity",
+    "-infinity",
+];
+
+/// Longest number, in bytes; no logger writes a longer one.
+const LONGEST: usize = 128;
+
+/// Powers of ten that a double holds exactly.
+const POWERS: [f64; 23] = [
+    1e0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12, 1e13, 1e14, 1e15, 1e16,
+    1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
+];
+
+/// Reads a cell, blanks and left-over quotes around it aside.
+pub(super) fn parse(cell: &[u8]) -> Cell {
+    let cell = bare(cell);
+    let Some(decimal) = Decimal::scan(cell) else {
+        return if is_missing(cell) {
+            Cell::Missing
+        } else {
+            Cell::Text
+        };
+    };
+    match decimal.fast_value().or_else(|| slow_value(cell)) {
+        Some(value) if value.is_finite() => Cell::Number(value, decimal.mark),
+        Some(_) => Cell::Missing,
+        None => Cell::Text,
+    }
+}
+
+/// Reads a cell of digits alone, exactly.
+pub(super) fn parse_whole(cell: &[u8]) -> Option<i64> {
+    let cell = bare(cell);
+    let (negative, digits) = signed(cell);
+    if digits.is_empty() || !digits.iter().all(u8::is_ascii_digit) {
+        return None;
+    }
+    let size = digits.iter().try_fold(0_i64, |sum, digit| {
+        sum.checked_mul(10)?.checked_add(i64::from(digit - b'0'))
+    })?;
+    Some(if negative { -size } else { size })
+}
+
+/// Whether a cell looks like a date or a time of day.
+pub(super) fn is_clock_time(cell: &[u8]) -> bool {
+    let cell = bare(cell);
+    let digits = cell.iter().filter(|byte| byte.is_ascii_digit()).count();
+    let mut marks = cell
+        .iter()
+        .filter(|&byte| matches!(byte, b':' | b'-' | b'/'));
+    let dots = cell.iter().filter(|&byte| *byte == b'.').count();
+    digits >= 3
+        && cell.first().is_some_and(u8::is_ascii_digit)
+        && (marks.next().is_some() || dots >= 2)
+        && cell
+            .iter()
+            .all(|byte| byte.is_ascii_digit() || b":-/.,TZ+ APMapm".contains(byte))
+}
+
+/// The cell without blanks and quotes around it.
+pub(super) fn bare(cell: &[u8]) -> &[u8] {
+    let cell = cell.trim_ascii();
+    match cell {
+        [b'"', inner @ .., b'"'] | [b'\'', inner @ .., b'\''] => inner.trim_ascii(),
+        _ => cell,
+    }
+}
+
+fn is_missing(cell: &[u8]) -> bool {
+    MISSING
+        .iter()
+        .any(|word| cell.eq_ignore_ascii_case(word.as_bytes()))
+        || cell.starts_with(b"1.#")
+        || cell.starts_with(b"-1.#")
+}
+
+fn signed(cell: &[u8]) -> (bool, &[u8]) {
+    match cell {
+        [b'-', rest @ ..] => (true, rest),
+        [b'+', rest @ ..] => (false, rest),
+        _ => (false, cell),
+    }
+}
+
+/// A decimal number taken apart.
+struct Decimal {
+    negative: bool,
+    /// All digits as one number, as long as they fit.
+    digits: u64,
+    /// Whether they did.
+    fits: bool,
+    /// Power of ten.
+    exponent: i32,
+    mark: Mark,
+}
+
+impl Decimal {
+    /// Takes `+12,5e-3` apart; `None` if it is not a decimal number.
+    fn scan(cell: &[u8]) -> Option<Self> {
+        if cell.len() > LONGEST {
+            return None;
+        }
+        let (negative, mut rest) = signed(cell);
+        let mut number = Self {
+            negative,
+            digits: 0,
+            fits: true,
+            exponent: 0,
+            mark: Mark::None,
+        };
+        let mut any = false;
+        while let [byte, after @ ..] = rest {
+            match byte {
+                b'0'..=b'9' => {
+                    any = true;
+                    number.fits &= number.digits < 1_000_000_000_000_000_000;
+                    if number.fits {
+                        number.digits = 10 * number.digits + u64::from(byte - b'0');
+                    }
+                    number.exponent -= i32::from(number.mark != Mark::None);
+                }
+                b'.' if number.mark == Mark::None => number.mark = Mark::Point,
+                b',' if number.mark == Mark::None => number.mark = Mark::Comma,
+                b'e' | b'E' | b'd' | b'D' if any => {
+                    number.exponent = number.exponent.saturating_add(power(after)?);
+                    rest = &[];
+                    continue;
+                }
+                _ => return None,
+            }
+            rest = after;
+        }
+        any.then_some(number)
+    }
+
+    fn fast_value(&self) -> Option<f64> {
+        let power = POWERS.get(usize::try_from(self.exponent.unsigned_abs()).ok()?)?;
+        if !self.fits || self.digits > 1 << 53 {
+            return None;
+        }
+        let digits = self.digits as f64;
+        let size = if self.exponent < 0 {
+            digits / power
+        } else {
+            digits * power
+        };
+        Some(if self.negative { -size } else { size })
+    }
+}
+
+/// The digits after the `e` of a number.
+fn power(cell: &[u8]) -> Option<i32> {
+    let (negative, digits) = signed(cell);
+    if digits.is_empty() || !digits.iter().all(u8::is_ascii_digit) {
+        return None;
+    }
+    let size = digits.iter().fold(0_i32, |sum, digit| {
+        sum.saturating_mul(10)
+            .saturating_add(i32::from(digit - b'0'))
+    });
+    Some(if negative { -size } else { size })
+}
+
+/// The standard parser, after writing the number in its dialect.
+fn slow_value(cell: &[u8]) -> Option<f64> {
+    let mut plain = [0; LONGEST];
+    let plain = plain.get_mut(..cell.len())?;
+    for (to, &from) in plain.iter_mut().zip(cell) {
+        *to = match from {
+            b',' => b'.',
+            b'd' | b'D' => b'e',
+            _ => from,
+        };
+    }
+    std::str::from_utf8(plain).ok()?.parse().ok()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn number(cell: &str) -> f64 {
+        match parse(cell.as_bytes()) {
+            Cell::Number(value, _) => value,
+            other => panic!("{cell}: {other:?}"),
+        }
+    }
+
+    #[test]
+    fn reads_the_usual_forms() {
+        assert_eq!(number(" 1.5 "), 1.5);
+        assert_eq!(number("+1.5"), 1.5);
+        assert_eq!(number("-.5"), -0.5);
+        assert_eq!(number("5."), 5.0);
+        assert_eq!(number("1,5"), 1.5);
+        assert_eq!(number("1.5e-3"), 0.0015);
+        assert_eq!(number("1.5D+03"), 1500.0);
+        assert_eq!(number("\"2.5\""), 2.5);
+        assert_eq!(number("-3.85696249e-14"), -3.85696249e-14);
+        assert_eq!(number("0.1000000000000000055511151231257827"), 0.1);
+        assert_eq!(number("1e-400"), 0.0);
+        assert_eq!(number("-0").to_bits(), (-0.0_f64).to_bits());
+        assert_eq!(parse(b"1,5"), Cell::Number(1.5, Mark::Comma));
+        assert_eq!(parse(b"15"), Cell::Number(15.0, Mark::None));
+    }
+
+    #[test]
+    fn tells_nothing_from_text() {
+        for missing in [
+            "", "  ", "nan", "NaN", "NA", "null", "-inf", "1e999", "-1.#IND",
+        ] {
+            assert_eq!(parse(missing.as_bytes()), Cell::Missing, "{missing}");
+        }
+        let texts = [
+            "1,234.5", "1.2.3", "e5", ".", "-", "1e", "0x10", "1 2", "abc", "--1", "1e5.0",
+        ];
+        for text in texts {
+            assert_eq!(parse(text.as_bytes()), Cell::Text, "{text}");
+        }
+        assert_eq!(parse(&[b'1'; 200]), Cell::Text);
+    }
+
+    #[test]
+    fn whole_numbers_are_exact() {
+        assert_eq!(
+            parse_whole(b"1700000000123456789"),
+            Some(1_700_000_000_123_456_789)
+        );
+        assert_eq!(parse_whole(b"9999999999999999999"), None);
+        assert_eq!(parse_whole(b" -12 "), Some(-12));
+        assert_eq!(parse_whole(b"12.0"), None);
+        assert_eq!(parse_whole(b"-"), None);
+    }
+
+    #[test]
+    fn knows_a_clock() {
+        for clock in [
+            "12:00:01.5",
+            "2024-01-31",
+            "2024-01-31T12:00:00Z",
+            "31.01.2024",
+            "1/2/2024",
+        ] {
+            assert!(is_clock_time(clock.as_bytes()), "{clock}");
+        }
+        for other in ["12.5", "-12", "abc", "", "time"] {
+            assert!(!is_clock_time(other.as_bytes()), "{other}");
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(4096))]
+
+        #[test]
+        fn agrees_with_the_standard_parser(digits in "[-+]?[0-9]{1,20}(\\.[0-9]{0,20})?(e[-+]?[0-9]{1,2})?") {
+            let expected: f64 = digits.parse().unwrap();
+            prop_assert_eq!(number(&digits).to_bits(), expected.to_bits());
+        }
+
+        #[test]
+        fn every_double_survives(bits: u64) {
+            let value = f64::from_bits(bits);
+            prop_assume!(value.is_finite());
+            prop_assert_eq!(number(&format!("{value:?}")).to_bits(), bits);
+        }
+    }
+}

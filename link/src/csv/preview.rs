@@ -1,0 +1,245 @@
+//! A first look at a table: its header and its first rows.
+
+use super::dialect::Separator;
+use super::error::{ReadError, quoted};
+use super::names::{Name, is_unit};
+use super::number::{self, Cell};
+use super::records::Records;
+use super::text::Text;
+
+/// Lines before the first numbers that may be a header or words before it.
+const MOST_LEADING: usize = 100;
+
+/// Rows kept; enough to see the relay switch.
+const MOST_ROWS: usize = 50_000;
+
+/// What the first look finds.
+pub(super) struct Preview {
+    /// Names of the columns, if the file gives any; as many as `width`.
+    pub(super) names: Option<Vec<Name>>,
+    /// Line of the names, if they come from a comment.
+    pub(super) comment_line: Option<u64>,
+    /// Lines of words before the header.
+    pub(super) skipped: usize,
+    /// Number of columns.
+    pub(super) width: usize,
+    /// First line of numbers.
+    pub(super) first_line: u64,
+    /// Column and text of the first cell on that line that is a date or a time of day.
+    pub(super) clock_time: Option<(usize, String)>,
+    /// First rows, one after the other, NaN where there is no number.
+    cells: Vec<f64>,
+    /// For each column, whether all its numbers are digits only.
+    whole: Vec<bool>,
+}
+
+impl Preview {
+    /// Looks at the head of a text.
+    pub(super) fn of(text: &Text<'_>, separator: Separator) -> Result<Self, ReadError> {
+        let mut records = Records::new(text.head.as_slice(), separator);
+        let mut leading: Vec<Leading> = Vec::new();
+        let mut preview: Option<Self> = None;
+        while let Some(row) = records.next()? {
+            if let Some(preview) = &mut preview {
+                // A row cut by the end of the head is ragged, or its last cell is short.
+                if preview.cells.len() < MOST_ROWS * preview.width {
+                    preview.add(row.cells.iter());
+                }
+            } else if is_data(row.cells.iter()) {
+                let cells: Vec<&[u8]> = row.cells.iter().collect();
+                preview = Some(Self::start(row.line, &cells, &leading)?);
+            } else if !fits(&row.cells.iter().collect::<Vec<_>>(), 0) {
+                check_leading(row.line, row.cells.get(0))?;
+                leading.push(Leading::of(row.cells.iter()));
+                if leading.len() > MOST_LEADING {
+                    break;
+                }
+            }
+        }
+        let lines = records.state().lines;
+        let mut preview = preview.ok_or(ReadError::NoData { lines })?;
+        if preview.names.is_none()
+            && let Some((line, comment)) = records.state().comment.take()
+        {
+            preview.take_comment(line, &comment, separator);
+        }
+        Ok(preview)
+    }
+
+    /// The preview with its first row of numbers, after lines of words.
+    fn start(line: u64, cells: &[&[u8]], leading: &[Leading]) -> Result<Self, ReadError> {
+        let fitting = |row: &Leading| row.width() > 1 && fits(cells, row.width());
+        let header = leading
+            .iter()
+            .rposition(|row| fitting(row) && !row.is_units())
+            .or_else(|| leading.iter().rposition(fitting));
+        let width = match (header, leading.last()) {
+            (Some(at), _) => leading[at].width(),
+            (None, Some(row)) if row.width() > 1 => {
+                let (expected, found) = (row.width(), cells.len());
+                return Err(ReadError::RaggedRow {
+                    line,
+                    expected,
+                    found,
+                });
+            }
+            _ => cells.len(),
+        };
+        let names = header.map(|at| leading[at].names(width, leading.get(at + 1)));
+        let skipped = header.unwrap_or(leading.len());
+        if width < 2 {
+            return Err(ReadError::OneColumn { line });
+        }
+        let mut preview = Self {
+            names,
+            comment_line: None,
+            skipped,
+            width,
+            first_line: line,
+            clock_time: cells[..width]
+                .iter()
+                .position(|cell| number::is_clock_time(cell))
+                .map(|column| (column, quoted(cells[column]))),
+            cells: Vec::new(),
+            whole: vec![true; width],
+        };
+        preview.add(cells.iter().copied());
+        Ok(preview)
+    }
+
+    fn add<'a>(&mut self, cells: impl Iterator<Item = &'a [u8]>) {
+        let mut column = 0;
+        for cell in cells.take(self.width) {
+            let value = match number::parse(cell) {
+                Cell::Number(value, _) => value,
+                Cell::Missing | Cell::Text => f64::NAN,
+            };
+            self.whole[column] &= value.is_nan() || number::parse_whole(cell).is_some();
+            self.cells.push(value);
+            column += 1;
+        }
+        self.cells.truncate(self.cells.len() - column % self.width);
+    }
+
+    /// Takes the names from a comment, if it has as many words as there are columns.
+    fn take_comment(&mut self, line: u64, comment: &[u8], separator: Separator) {
+        let comment = comment.trim_ascii();
+        let cells: Vec<&[u8]> = match separator {
+            Separator::Blanks => comment
+                .split(u8::is_ascii_whitespace)
+                .filter(|cell| !cell.is_empty())
+                .collect(),
+            _ => comment.split(|&byte| byte == separator.byte()).collect(),
+        };
+        if cells.len() != self.width || cells.iter().any(|cell| is_number(cell)) {
+            return;
+        }
+        let names: Vec<Name> = cells.iter().map(|cell| Name::parse(&words(cell))).collect();
+        if names.iter().any(|name| name.role().is_some()) {
+            self.names = Some(names);
+            self.comment_line = Some(line);
+        }
+    }
+
+    /// Column as a sentence names it.
+    pub(super) fn label(&self, column: usize) -> String {
+        let number = column + 1;
+        match self.names.as_ref().and_then(|names| names.get(column)) {
+            Some(name) if !name.full.is_empty() => {
+                format!("\"{}\" (column {number})", quoted(name.full.as_bytes()))
+            }
+            _ => format!("column {number}"),
+        }
+    }
+
+    /// Numbers of a column in the first rows, NaN where there are none.
+    pub(super) fn column(&self, column: usize) -> impl Iterator<Item = f64> + Clone {
+        self.cells.iter().skip(column).step_by(self.width).copied()
+    }
+
+    /// Whether the numbers of a column are digits only.
+    pub(super) fn is_whole(&self, column: usize) -> bool {
+        self.whole[column]
+    }
+}
+
+/// Whether a row fits a number of columns; empty cells at its end do not count.
+pub(super) fn fits<T: AsRef<[u8]>>(cells: &[T], width: usize) -> bool {
+    cells.len() >= width
+        && cells[width..]
+            .iter()
+            .all(|cell| number::bare(cell.as_ref()).is_empty())
+}
+
+/// A line of words before the numbers.
+struct Leading {
+    cells: Vec<String>,
+}
+
+impl Leading {
+    fn of<'a>(cells: impl Iterator<Item = &'a [u8]>) -> Self {
+        Self {
+            cells: cells.map(words).collect(),
+        }
+    }
+
+    /// The names in the first cells, with the units of the next line if it has any.
+    fn names(&self, width: usize, next: Option<&Self>) -> Vec<Name> {
+        let units = next.filter(|next| next.is_units());
+        let unit = |column| units.and_then(|units| units.cells.get(column));
+        let names = self.cells.iter().take(width).map(|cell| Name::parse(cell));
+        let with_units = names.enumerate().map(|(column, name)| match unit(column) {
+            Some(unit) => name.with_unit(unit),
+            None => name,
+        });
+        with_units.collect()
+    }
+
+    /// Cells up to the last that is not empty.
+    fn width(&self) -> usize {
+        self.cells
+            .iter()
+            .rposition(|cell| !cell.trim().is_empty())
+            .map_or(0, |last| last + 1)
+    }
+
+    /// Whether it is a row of units: all units, or some with the others empty.
+    fn is_units(&self) -> bool {
+        let mut cells = self
+            .cells
+            .iter()
+            .filter(|cell| !cell.trim().is_empty())
+            .peekable();
+        cells.peek().is_some() && cells.all(|cell| is_unit(cell))
+    }
+}
+
+fn words(cell: &[u8]) -> String {
+    String::from_utf8_lossy(cell).into_owned()
+}
+
+fn is_number(cell: &[u8]) -> bool {
+    matches!(number::parse(cell), Cell::Number(..))
+}
+
+/// Whether a row holds a number, or NaN and the like and not one word.
+fn is_data<'a>(cells: impl Iterator<Item = &'a [u8]> + Clone) -> bool {
+    let filled = cells
+        .filter(|cell| !number::bare(cell).is_empty())
+        .map(number::parse);
+    let words = filled.clone().filter(|cell| *cell == Cell::Text).count();
+    filled.clone().any(|cell| matches!(cell, Cell::Number(..)))
+        || (words == 0 && filled.count() > 0)
+}
+
+/// A file of clock times has no numbers in the first column, and often nothing but words in the
+/// first rows.
+fn check_leading(line: u64, first: Option<&[u8]>) -> Result<(), ReadError> {
+    match first {
+        Some(cell) if number::is_clock_time(cell) => {
+            let (column, text) = ("1".to_owned(), quoted(cell));
+            Err(ReadError::ClockTime { line, column, text })
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,290 @@
+//! The one type that every reader yields.
+//!
+//! A recording is a sequence of points. Point `i` starts at `time_s[i]`; `input[i]` is held from
+//! there until `time_s[i + 1]`; `output[i]` is measured there. A recording too long to keep is
+//! averaged in groups of `n = samples_per_point` consecutive samples as it is read: `output[i]`
+//! is then the mean of `n` samples, so it belongs to the time `time_s[i] + (n - 1) / 2 * T` with
+//! `T = sample_period_s`, and `input[i]` is the mean over time of the held input.
+//!
+//! No group reaches across a gap. The samples left over before a gap, and after the last full
+//! group, are fewer than `n`; they are dropped and counted in a note, so that every point has
+//! exactly `n` samples. Across a gap the input is not known.
+
+mod builder;
+mod error;
+mod note;
+mod rhythm;
+
+use std::fmt;
+
+pub(crate) use builder::FAR_START_S;
+pub use builder::RecordingBuilder;
+pub use error::RecordingError;
+pub use note::Note;
+
+/// Most points that a recording keeps: 2^22, three columns of which take 96 MiB.
+pub const MAX_POINTS: usize = 1 << 22;
+
+/// An increment of time longer than this many median increments is a gap.
+///
+/// Five: a logger that loses one or two samples in a row only jitters, and a logger that flushes
+/// to a card for longer has lost part of the cycle.
+pub const GAP_PERIODS: f64 = 5.0;
+
+/// Which of the three signals a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Time stamps.
+    Time,
+    /// What the relay commands.
+    Input,
+    /// What the sensor measures.
+    Output,
+}
+
+impl Role {
+    /// All roles, in the order of a sample.
+    pub const ALL: [Self; 3] = [Self::Time, Self::Input, Self::Output];
+}
+
+impl fmt::Display for Role {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Time => "time",
+            Self::Input => "input",
+            Self::Output => "output",
+        })
+    }
+}
+
+/// Where a sample stands in its source.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Position {
+    /// Line of a text file, from 1.
+    Line(u64),
+    /// Sample of a vector or of a log, from 0.
+    Sample(u64),
+}
+
+impl fmt::Display for Position {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Line(line) => write!(f, "line {line}"),
+            Self::Sample(index) => write!(f, "sample {index}"),
+        }
+    }
+}
+
+/// Name and unit of a column as the source gives them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Column {
+    /// Name, without the unit.
+    pub name: String,
+    /// Unit, if the source gives one. Values are never converted, except time, to seconds.
+    pub unit: Option<String>,
+}
+
+impl Column {
+    /// A column of this name, without a unit.
+    pub fn named(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            unit: None,
+        }
+    }
+}
+
+/// The three columns of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Columns {
+    /// Column of the time stamps.
+    pub time: Column,
+    /// Column of the input.
+    pub input: Column,
+    /// Column of the output.
+    pub output: Column,
+}
+
+/// A stretch without samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Index of the first point after the gap; at least 1.
+    pub index: usize,
+    /// Stamp of the last sample before the gap, in seconds. In an averaged recording: of the
+    /// first sample that was dropped because the gap left its group incomplete.
+    pub start_s: f64,
+    /// Stamp of the first sample after the gap, in seconds.
+    pub end_s: f64,
+}
+
+/// A recording of an experiment: time, held input, measured output.
+///
+/// At least two points; time strictly increasing; every number finite and at most 1e300 in size.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    time_s: Vec<f64>,
+    input: Vec<f64>,
+    output: Vec<f64>,
+    samples_per_point: usize,
+    sample_period_s: f64,
+    jitter: f64,
+    gaps: Vec<Gap>,
+    columns: Columns,
+    notes: Vec<Note>,
+}
+
+impl Recording {
+    /// A recording from three vectors of equal length, as a simulator has them.
+    ///
+    /// Stricter than a reader: nothing is dropped. More than [`MAX_POINTS`] samples are averaged,
+    /// and a time that starts beyond 1e7 s is counted from its first stamp, as in every recording.
+    ///
+    /// # Errors
+    /// Lengths that differ, fewer than two samples, a number that is not finite or beyond 1e300,
+    /// time that does not increase, or stamps too large to resolve their own increments.
+    pub fn from_samples(
+        time_s: &[f64],
+        input: &[f64],
+        output: &[f64],
+    ) -> Result<Self, RecordingError> {
+        if input.len() != time_s.len() || output.len() != time_s.len() {
+            return Err(RecordingError::LengthsDiffer {
+                time: time_s.len(),
+                input: input.len(),
+                output: output.len(),
+            });
+        }
+        let mut builder = RecordingBuilder::new(Columns {
+            time: Column {
+                name: "time".to_owned(),
+                unit: Some("s".to_owned()),
+            },
+            input: Column::named("input"),
+            output: Column::named("output"),
+        });
+        let mut before_s = f64::NEG_INFINITY;
+        for (index, ((&time_s, &input), &output)) in (0..).zip(time_s.iter().zip(input).zip(output))
+        {
+            let at = Position::Sample(index);
+            for (role, value) in Role::ALL.into_iter().zip([time_s, input, output]) {
+                if !value.is_finite() {
+                    return Err(RecordingError::NotFinite { at, role });
+                }
+            }
+            if time_s <= before_s {
+                return Err(RecordingError::TimeGoesBack {
+                    at,
+                    before_s,
+                    after_s: time_s,
+                });
+            }
+            before_s = time_s;
+            builder.push(at, time_s, input, output)?;
+        }
+        builder.finish()
+    }
+
+    /// Number of points; at least 2.
+    #[expect(clippy::len_without_is_empty, reason = "a recording is never empty")]
+    pub fn len(&self) -> usize {
+        self.time_s.len()
+    }
+
+    /// Start of each point, in seconds, strictly increasing.
+    pub fn time_s(&self) -> &[f64] {
+        &self.time_s
+    }
+
+    /// Input of each point, held from its start until the next, in the unit of its column.
+    pub fn input(&self) -> &[f64] {
+        &self.input
+    }
+
+    /// Measurement of each point, in the unit of its column.
+    pub fn output(&self) -> &[f64] {
+        &self.output
+    }
+
+    /// Consecutive samples averaged into each point: 1, or a power of two for a long recording.
+    pub fn samples_per_point(&self) -> usize {
+        self.samples_per_point
+    }
+
+    /// Sample period of the source in seconds: the mean of all increments that are not gaps.
+    ///
+    /// A point of an averaged recording spans [`Self::samples_per_point`] of these.
+    pub fn sample_period_s(&self) -> f64 {
+        self.sample_period_s
+    }
+
+    /// Delay from the start of a point to the mean time of its measurement, in seconds:
+    /// `(samples_per_point - 1) / 2 * sample_period_s`, so 0 unless averaged.
+    pub fn output_delay_s(&self) -> f64 {
+        (self.samples_per_point - 1) as f64 / 2.0 * self.sample_period_s
+    }
+
+    /// Standard deviation of the increments of time that are not gaps, over the sample period.
+    pub fn jitter(&self) -> f64 {
+        self.jitter
+    }
+
+    /// Stretches without samples, longer than [`GAP_PERIODS`] median increments, in order.
+    pub fn gaps(&self) -> &[Gap] {
+        &self.gaps
+    }
+
+    /// Names and units of the columns as found.
+    pub fn columns(&self) -> &Columns {
+        &self.columns
+    }
+
+    /// What the reader chose, forgave or dropped: one sentence each.
+    pub fn notes(&self) -> &[Note] {
+        &self.notes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn from_samples_keeps_every_bit() {
+        let time_s = [0.1, 0.2, 0.4];
+        let recording =
+            Recording::from_samples(&time_s, &[1.0, -1.0, 1.0], &[-0.0, 5e-324, 1e300]).unwrap();
+        assert_eq!(recording.time_s(), time_s);
+        assert_eq!(recording.output()[0].to_bits(), (-0.0_f64).to_bits());
+        assert_eq!(recording.output()[1..], [5e-324, 1e300]);
+        assert_eq!(recording.samples_per_point(), 1);
+        assert_eq!(recording.output_delay_s(), 0.0);
+    }
+
+    #[test]
+    fn from_samples_refuses_what_it_cannot_keep() {
+        let refusal = |time: &[f64], input: &[f64], output: &[f64]| {
+            Recording::from_samples(time, input, output)
+                .unwrap_err()
+                .to_string()
+        };
+        let ones = [1.0; 3];
+        assert!(refusal(&[0.0, 1.0], &ones, &ones).contains("2, 3 and 3"));
+        assert!(refusal(&[0.0, 2.0, 1.0], &ones, &ones).contains("sample 2"));
+        assert!(refusal(&[0.0, 1.0, 1.0], &ones, &ones).contains("sample 2"));
+        assert!(refusal(&[0.0, f64::NAN, 1.0], &ones, &ones).contains("time at sample 1"));
+        assert!(refusal(&[0.0, 1.0, 2.0], &[1.0, f64::INFINITY, 1.0], &ones).contains("input"));
+        assert!(refusal(&[0.0, 1.0, 2.0], &ones, &[1.0, 2.0, 1e301]).contains("1e301"));
+        assert!(refusal(&[0.0], &[1.0], &[1.0]).contains("only 1 row"));
+        assert!(refusal(&[], &[], &[]).contains("only 0 rows"));
+        // At 1e15 s neighbouring numbers are 0.125 s apart: 12.5 % of the increment.
+        assert!(refusal(&[1e15, 1e15 + 1.0, 1e15 + 2.0], &ones, &ones).contains("resolve"));
+    }
+
+    #[test]
+    fn a_far_start_is_counted_from_the_first_stamp() {
+        let time_s = [1.7e9, 1.7e9 + 0.5, 1.7e9 + 1.0];
+        let recording = Recording::from_samples(&time_s, &[1.0; 3], &[1.0; 3]).unwrap();
+        assert_eq!(recording.time_s(), [0.0, 0.5, 1.0]);
+        assert!(recording.notes()[0].to_string().contains("1700000000"));
+    }
+}

@@ -1,0 +1,98 @@
+//! The sample clock of a recording: period, jitter, and what counts as a gap.
+//!
+//! The median increment is robust against gaps but knows only the increments that occur (2 ms or
+//! 3 ms for 400 Hz in whole milliseconds). So it only tells gaps apart; the period is the mean of
+//! all increments that are not gaps, and the jitter is their standard deviation.
+
+use super::GAP_PERIODS;
+
+/// Increments that are not gaps, gathered one by one.
+#[derive(Debug, Clone)]
+pub(super) struct Rhythm {
+    median_s: f64,
+    count: f64,
+    /// Sum of `increment / median - 1`; every term is between -1 and `GAP_PERIODS - 1`.
+    sum: f64,
+    sum_of_squares: f64,
+}
+
+impl Rhythm {
+    /// Nothing gathered yet; the median is that of the given increments.
+    pub(super) fn around_median(mut increments_s: Vec<f64>) -> Self {
+        let middle = increments_s.len() / 2;
+        let median_s = if increments_s.is_empty() {
+            1.0
+        } else {
+            *increments_s
+                .select_nth_unstable_by(middle, f64::total_cmp)
+                .1
+        };
+        Self {
+            median_s,
+            count: 0.0,
+            sum: 0.0,
+            sum_of_squares: 0.0,
+        }
+    }
+
+    /// Gathers an increment, unless it is a gap; says whether it is.
+    pub(super) fn is_gap(&mut self, increment_s: f64) -> bool {
+        let ratio = increment_s / self.median_s;
+        if ratio > GAP_PERIODS {
+            return true;
+        }
+        self.count += 1.0;
+        self.sum += ratio - 1.0;
+        self.sum_of_squares += (ratio - 1.0) * (ratio - 1.0);
+        false
+    }
+
+    /// Median increment in seconds.
+    pub(super) fn median_s(&self) -> f64 {
+        self.median_s
+    }
+
+    /// Mean of the gathered increments in seconds.
+    pub(super) fn period_s(&self) -> f64 {
+        self.median_s * (1.0 + self.mean())
+    }
+
+    /// Standard deviation of the gathered increments over their mean.
+    pub(super) fn jitter(&self) -> f64 {
+        let variance = self.sum_of_squares / self.count.max(1.0) - self.mean() * self.mean();
+        variance.max(0.0).sqrt() / (1.0 + self.mean())
+    }
+
+    fn mean(&self) -> f64 {
+        self.sum / self.count.max(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_milliseconds_of_400_hz() {
+        // Increments 2, 3, 2, 3 ms: mean 2.5 ms, standard deviation 0.5 ms, jitter 0.2.
+        let increments: Vec<f64> = (0..1000).map(|i| [0.002, 0.003][i % 2]).collect();
+        let mut rhythm = Rhythm::around_median(increments.clone());
+        assert!(
+            increments
+                .iter()
+                .all(|&increment| !rhythm.is_gap(increment))
+        );
+        assert!((rhythm.period_s() - 0.0025).abs() < 1e-15);
+        assert!((rhythm.jitter() - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_gap_counts_for_nothing() {
+        let mut rhythm = Rhythm::around_median(vec![1.0, 1.0, 100.0, 1.0]);
+        assert!(rhythm.is_gap(100.0));
+        assert!(rhythm.is_gap(5.000_001));
+        assert!(!rhythm.is_gap(1.0));
+        assert_eq!(rhythm.period_s(), 1.0);
+        assert_eq!(rhythm.jitter(), 0.0);
+    }
+}

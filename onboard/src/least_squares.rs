@@ -1,0 +1,191 @@
+//! Least squares on a handful of columns by modified Gram-Schmidt.
+//!
+//! Orthogonalised in order, right-hand side last, it is as stable as Householder's method (Bjorck
+//! 1967) and leaves what the estimator needs next: an orthonormal basis to project onto.
+
+/// `M` columns of `N` rows, of which the first `rows` are used.
+#[derive(Clone, Debug)]
+pub(crate) struct Columns<const M: usize, const N: usize> {
+    pub(crate) column: [[f64; N]; M],
+    pub(crate) rows: usize,
+}
+
+/// Upper triangular factor: `r[i][j]` is the part of column `j` along basis vector `i`.
+pub(crate) type Triangle<const M: usize> = [[f64; M]; M];
+
+/// A column whose part outside the ones before it is smaller than this is their combination:
+/// a few hundred roundings of its own length.
+const DEPENDENT: f64 = 1e-13;
+
+impl<const M: usize, const N: usize> Columns<M, N> {
+    pub(crate) fn zero(rows: usize) -> Self {
+        Self { column: [[0.0; N]; M], rows }
+    }
+
+    /// Replaces the columns by an orthonormal basis of what they span; a column that depends on
+    /// those before it becomes zero, with a zero on the diagonal.
+    pub(crate) fn orthonormalise(&mut self) -> Triangle<M> {
+        let mut r = [[0.0; M]; M];
+        for j in 0..M {
+            let before = norm(&self.column[j][..self.rows]);
+            let (basis, rest) = self.column.split_at_mut(j);
+            for (i, q) in basis.iter().enumerate() {
+                r[i][j] = remove(&q[..self.rows], &mut rest[0][..self.rows]);
+            }
+            let length = norm(&rest[0][..self.rows]);
+            if length > DEPENDENT * before {
+                r[j][j] = length;
+                rest[0][..self.rows].iter_mut().for_each(|value| *value /= length);
+            } else {
+                rest[0][..self.rows].fill(0.0);
+            }
+        }
+        r
+    }
+
+    /// Takes the parts along the basis out of `vector` and returns them.
+    pub(crate) fn project_out(&self, vector: &mut [f64]) -> [f64; M] {
+        let mut parts = [0.0; M];
+        for (part, q) in parts.iter_mut().zip(&self.column) {
+            *part = remove(&q[..self.rows], vector);
+        }
+        parts
+    }
+}
+
+/// Takes the part along the unit vector `q` out of `vector` and returns its length.
+fn remove(q: &[f64], vector: &mut [f64]) -> f64 {
+    let part = dot(q, vector);
+    for (value, q) in vector.iter_mut().zip(q) {
+        *value -= part * q;
+    }
+    part
+}
+
+/// Inner product; four sums so that the processor need not wait for each.
+pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a4.zip(b4) {
+        for k in 0..4 {
+            sums[k] += x[k] * y[k];
+        }
+    }
+    (sums[0] + sums[2]) + (sums[1] + sums[3]) + tail
+}
+
+pub(crate) fn norm(vector: &[f64]) -> f64 {
+    libm::sqrt(dot(vector, vector))
+}
+
+/// Solves `r x = right` for upper triangular `r`; a zero on the diagonal gives a zero.
+pub(crate) fn back_substitute<const M: usize>(r: &Triangle<M>, right: &[f64; M]) -> [f64; M] {
+    let mut x = [0.0; M];
+    for i in (0..M).rev() {
+        let known: f64 = (i + 1..M).map(|j| r[i][j] * x[j]).sum();
+        x[i] = if r[i][i] == 0.0 { 0.0 } else { (right[i] - known) / r[i][i] };
+    }
+    x
+}
+
+/// `(r^T r)^-1` for upper triangular `r`: the covariance of the coefficients at unit noise.
+/// A column that is a combination of others (zero on the diagonal) has none: `None`.
+pub(crate) fn covariance<const M: usize>(r: &Triangle<M>) -> Option<[[f64; M]; M]> {
+    if (0..M).any(|i| r[i][i] == 0.0) {
+        return None;
+    }
+    // Columns of r^-1, then the products of its rows.
+    let mut inverse = [[0.0; M]; M];
+    for j in 0..M {
+        let mut unit = [0.0; M];
+        unit[j] = 1.0;
+        let x = back_substitute(r, &unit);
+        for i in 0..M {
+            inverse[i][j] = x[i];
+        }
+    }
+    let mut covariance = [[0.0; M]; M];
+    for i in 0..M {
+        for j in 0..M {
+            covariance[i][j] = (0..M).map(|k| inverse[i][k] * inverse[j][k]).sum();
+        }
+    }
+    Some(covariance)
+}
+
+/// Solves the symmetric positive definite `a x = right` by Cholesky's method; `None` if it is not.
+pub(crate) fn solve_symmetric(a: &[[f64; 3]; 3], right: &[f64; 3]) -> Option<[f64; 3]> {
+    let mut l = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..=i {
+            let known: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            if i == j {
+                let pivot = a[i][i] - known;
+                if pivot <= 0.0 || !pivot.is_finite() {
+                    return None;
+                }
+                l[i][i] = libm::sqrt(pivot);
+            } else {
+                l[i][j] = (a[i][j] - known) / l[j][j];
+            }
+        }
+    }
+    let mut y = [0.0; 3];
+    for i in 0..3 {
+        let known: f64 = (0..i).map(|k| l[i][k] * y[k]).sum();
+        y[i] = (right[i] - known) / l[i][i];
+    }
+    let mut x = [0.0; 3];
+    for i in (0..3).rev() {
+        let known: f64 = (i + 1..3).map(|k| l[k][i] * x[k]).sum();
+        x[i] = (y[i] - known) / l[i][i];
+    }
+    Some(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Fit of a + b t to 1, 3, 2, 5 at t = 0..3 by hand: b = 5.5/5 = 1.1, a = 2.75 - 1.65 = 1.1.
+    #[test]
+    fn straight_line_by_hand() {
+        let mut columns = Columns::<2, 8>::zero(4);
+        columns.column[0][..4].fill(1.0);
+        columns.column[1][..4].copy_from_slice(&[0.0, 1.0, 2.0, 3.0]);
+        let r = columns.orthonormalise();
+        let mut y = [1.0, 3.0, 2.0, 5.0];
+        let parts = columns.project_out(&mut y);
+        let [a, b] = back_substitute(&r, &parts);
+        assert!((a - 1.1).abs() < 1e-14 && (b - 1.1).abs() < 1e-14);
+        // Residual 0.8 - ... by hand: -0.1, 0.8, -1.3, 0.6: sum of squares 2.70.
+        assert!((dot(&y, &y) - 2.70).abs() < 1e-13);
+        // Covariance of (a, b): sum t^2 = 14, sum t = 6, det = 4*14-36 = 20: [0.7, -0.3; -0.3, 0.2].
+        let c = covariance(&r).unwrap();
+        assert!((c[0][0] - 0.7).abs() < 1e-14 && (c[0][1] + 0.3).abs() < 1e-14);
+        assert!((c[1][1] - 0.2).abs() < 1e-14);
+    }
+
+    #[test]
+    fn dependent_column_is_dropped() {
+        let mut columns = Columns::<2, 4>::zero(3);
+        columns.column[0][..3].copy_from_slice(&[1.0, 2.0, 3.0]);
+        columns.column[1][..3].copy_from_slice(&[2.0, 4.0, 6.0]);
+        let r = columns.orthonormalise();
+        assert_eq!(r[1][1], 0.0);
+        assert!(covariance(&r).is_none());
+        assert_eq!(back_substitute(&r, &[1.0, 1.0])[1], 0.0);
+    }
+
+    #[test]
+    fn symmetric_system_by_hand() {
+        // x = (1, -1, 2) in a = [[4,1,0],[1,3,1],[0,1,2]]: right = (3, 0, 3).
+        let a = [[4.0, 1.0, 0.0], [1.0, 3.0, 1.0], [0.0, 1.0, 2.0]];
+        let x = solve_symmetric(&a, &[3.0, 0.0, 3.0]).unwrap();
+        for (x, expected) in x.iter().zip([1.0, -1.0, 2.0]) {
+            assert!((x - expected).abs() < 1e-14);
+        }
+        assert!(solve_symmetric(&[[0.0; 3]; 3], &[1.0; 3]).is_none());
+    }
+}

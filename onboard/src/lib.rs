@@ -1,0 +1,20 @@
+//! What flies: the relay, cycle detection and the estimator.
+//!
+//! No standard library, no heap, no clock, no input or output: firmware links this crate, the
+//! simulator and the program run the very same code.
+#![no_std]
+
+pub mod control;
+pub mod cycle;
+mod least_squares;
+pub mod process;
+pub mod refine;
+pub mod relay;
+mod response;
+pub mod transition;
+pub mod window;
+
+pub use control::Pd;
+pub use process::{Process, ProcessError};
+pub use relay::{Relay, RelayError, RelayPhase, RelaySettings};
+pub use transition::Transition;

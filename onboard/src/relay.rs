@@ -1,0 +1,465 @@
+//! The modified relay feedback test (MRFT), noise-protected: error in, relay output out.
+//!
+//! `u = trim +/- h`. The oscillation it excites has the phase `asin(beta)` (the paper's equations
+//! 4 and 5): a negative `beta` switches before the error crosses zero, a positive one after.
+//! Equation 4 taken literally is no oscillator for `beta < 0`; the relay meant is: while `u` is
+//! high, follow the maximum of the error since the last switch; once the error has fallen back to
+//! `-beta` times that maximum, switch low; and mirrored.
+//!
+//! What a real, noisy, biased process needs beyond that equation:
+//!
+//! - **pre-roll**: output zero while the noise `sigma` is measured;
+//! - **kick**: high until the error leaves the noise (6 sigma);
+//! - **ramp**: the first switches at zero crossings, as a plain relay, then `beta` step by step:
+//!   from a large offset a leading relay need not cross zero at all;
+//! - **smoothing** of the error over a few per cent of the half period;
+//! - **dwell** and **stand-off**: an extremum counts when the signal has come back from it by
+//!   3 sigma, it stands 6 sigma off the opposite one, and part of a half period has passed;
+//! - **undo**: a signal that passes the extremum behind the last switch proves it false: the
+//!   switch is taken back and the old excursion goes on;
+//! - **turn-back**: a signal that turns back before it has reached zero shows that the switch came
+//!   too early, far out or under a bias: back, and this time switch at zero;
+//! - **trim**: the mean of `u` over a cycle is minus the input bias; following it makes the
+//!   oscillation symmetric.
+//!
+//! Noise protection after Abdul Hay, Chehadeh, Boiko et al. (2021), "Unsupervised tuning of
+//! multirotor dynamics".
+
+use core::fmt;
+
+use libm::sqrtf;
+
+/// Error leaves the noise, or two extrema stand apart, by this many sigma.
+const CLEAR_OF_NOISE_SIGMA: f32 = 6.0;
+/// An extremum is behind when the signal has come back from it by this many sigma.
+const COME_BACK_SIGMA: f32 = 3.0;
+/// An extremum is disproved when the signal passes it by this many sigma.
+const DISPROVED_SIGMA: f32 = 2.5;
+/// The trim stays below the relay's own amplitude: beyond it no switching could hold the process.
+const TRIM_LIMIT: f32 = 0.9;
+/// An excursion of this many half periods means that the trim has cost the relay its authority.
+const TRIM_LOST: f32 = 4.0;
+
+/// How the relay switches. Start from [`RelaySettings::new`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RelaySettings {
+    /// Half the jump of the output, `h` (input unit).
+    pub amplitude: f32,
+    /// Sine of the phase of the oscillation, between -1 and 1, both excluded.
+    pub beta: f32,
+    /// Time for which the noise is measured with zero output (s); 0 starts at once.
+    pub preroll_s: f32,
+    /// Standard deviation of the measurement noise, or its least value when there is a pre-roll
+    /// (output unit). A quantised sensor deserves its quantum here.
+    pub noise_sigma: f32,
+    /// Smoothing of the error: fraction of the half period; 0 switches it off.
+    pub smoothing: f32,
+    /// Least time between switches: fraction of the half period; 0 switches it off.
+    pub dwell: f32,
+    /// From an offset outside the noise: switches made as a plain relay (`beta = 0`) at first.
+    pub plain_switches: u16,
+    /// From such an offset: switches over which `beta` then goes from zero to its value.
+    pub ramp_switches: u16,
+    /// Share of the measured bias that the trim takes up each cycle; 0 switches it off.
+    pub trim_gain: f32,
+}
+
+impl RelaySettings {
+    /// Phase of the paper's distinguishing oscillation, `asin(beta) = -46.89` degrees.
+    pub const DISTINGUISHING_BETA: f32 = -0.73;
+
+    /// Share of the bias that a trim takes up each cycle: near all of it, short of overshooting.
+    pub const TRIM_GAIN: f32 = 0.8;
+
+    /// Noise-protected, without pre-roll and without trim.
+    #[must_use]
+    pub fn new(amplitude: f32, beta: f32) -> Self {
+        Self {
+            amplitude,
+            beta,
+            preroll_s: 0.0,
+            noise_sigma: 0.0,
+            smoothing: 0.03,
+            dwell: 0.3,
+            plain_switches: 3,
+            ramp_switches: 4,
+            trim_gain: 0.0,
+        }
+    }
+
+    /// Equation 4 as meant, with no protection: for noise-free comparisons.
+    #[must_use]
+    pub fn bare(amplitude: f32, beta: f32) -> Self {
+        Self { smoothing: 0.0, dwell: 0.0, ..Self::new(amplitude, beta) }
+    }
+}
+
+/// A setting out of its range, with its value.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RelayError {
+    /// The amplitude is not positive and finite.
+    Amplitude(f32),
+    /// `beta` is not between -1 and 1.
+    Beta(f32),
+    /// A time, a fraction or the noise is negative or not finite: its name and value.
+    Setting(&'static str, f32),
+}
+
+impl fmt::Display for RelayError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Amplitude(v) => write!(f, "the relay amplitude must be positive, but is {v}"),
+            Self::Beta(v) => write!(f, "beta must lie between -1 and 1, but is {v}"),
+            Self::Setting(name, v) => write!(f, "{name} must be zero or positive, but is {v}"),
+        }
+    }
+}
+
+impl core::error::Error for RelayError {}
+
+/// What the relay is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RelayPhase {
+    /// Output zero, noise being measured.
+    Preroll,
+    /// Output high until the error leaves the noise.
+    Kick,
+    /// Oscillating.
+    Oscillate,
+}
+
+/// One excursion of the error between two switches, in the sign that makes it positive.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Excursion {
+    /// Largest signed error since the switch.
+    peak: f32,
+    /// Largest signed error of the excursion before, in its own sign.
+    opposite_peak: f32,
+    /// Time since the switch (s).
+    elapsed_s: f32,
+    /// Duration of the excursion before (s).
+    previous_s: f32,
+    /// Duration of the one before that (s).
+    before_previous_s: f32,
+    /// Whether to switch at zero, whatever `beta`: the signal has turned back once.
+    to_zero: bool,
+    /// Time since the last rise (s), and the part of it with the output high less that with it low.
+    cycle_s: f32,
+    cycle_high_less_low_s: f32,
+    /// Centre of the relay's output when the excursion began.
+    trim: f32,
+}
+
+/// Noise measured from second differences, whose variance is six times that of white noise.
+#[derive(Clone, Copy, Debug, Default)]
+struct NoiseMeter {
+    last: [f32; 2],
+    seen: u32,
+    sum_of_squares: f32,
+}
+
+impl NoiseMeter {
+    fn push(&mut self, error: f32) {
+        if self.seen >= 2 {
+            let second_difference = error - 2.0 * self.last[0] + self.last[1];
+            self.sum_of_squares += second_difference * second_difference;
+        }
+        self.last = [error, self.last[0]];
+        self.seen += 1;
+    }
+
+    fn sigma(&self) -> f32 {
+        let differences = self.seen.saturating_sub(2);
+        if differences == 0 { 0.0 } else { sqrtf(self.sum_of_squares / (6.0 * differences as f32)) }
+    }
+}
+
+/// The relay: settings and state.
+#[derive(Clone, Debug)]
+pub struct Relay {
+    settings: RelaySettings,
+    phase: RelayPhase,
+    noise: NoiseMeter,
+    noise_sigma: f32,
+    preroll_left_s: f32,
+    /// +1 while the output is high, -1 while it is low.
+    sign: f32,
+    smoothed: f32,
+    smoothing_gain: f32,
+    smoothed_sigma: f32,
+    excursion: Excursion,
+    /// The last two excursions, latest first, while their switches can still be undone.
+    undoable: [Option<Excursion>; 2],
+    switches: u32,
+    undone: u32,
+    /// Share of `beta` used while the output is high, and while it is low: halved where the signal
+    /// turned back, whole again when the trim moves.
+    lead: [f32; 2],
+    /// Whether the process was at rest within the noise when the relay began.
+    from_rest: bool,
+}
+
+impl Relay {
+    /// # Errors
+    /// Names the setting that is out of range.
+    pub fn new(settings: RelaySettings) -> Result<Self, RelayError> {
+        let s = &settings;
+        if !(s.amplitude.is_finite() && s.amplitude > 0.0) {
+            return Err(RelayError::Amplitude(s.amplitude));
+        }
+        if !(s.beta > -1.0 && s.beta < 1.0) {
+            return Err(RelayError::Beta(s.beta));
+        }
+        for (name, value) in [
+            ("the pre-roll", s.preroll_s),
+            ("the noise sigma", s.noise_sigma),
+            ("the smoothing", s.smoothing),
+            ("the dwell", s.dwell),
+            ("the trim gain", s.trim_gain),
+        ] {
+            if !(value.is_finite() && value >= 0.0) {
+                return Err(RelayError::Setting(name, value));
+            }
+        }
+        let rest = Excursion {
+            peak: 0.0,
+            opposite_peak: 0.0,
+            elapsed_s: 0.0,
+            previous_s: 0.0,
+            before_previous_s: 0.0,
+            to_zero: false,
+            cycle_s: 0.0,
+            cycle_high_less_low_s: 0.0,
+            trim: 0.0,
+        };
+        Ok(Self {
+            settings,
+            phase: if s.preroll_s > 0.0 { RelayPhase::Preroll } else { RelayPhase::Kick },
+            noise: NoiseMeter::default(),
+            noise_sigma: s.noise_sigma,
+            preroll_left_s: s.preroll_s,
+            sign: 1.0,
+            smoothed: 0.0,
+            smoothing_gain: 1.0,
+            smoothed_sigma: s.noise_sigma,
+            excursion: rest,
+            undoable: [None; 2],
+            switches: 0,
+            undone: 0,
+            lead: [1.0; 2],
+            from_rest: false,
+        })
+    }
+
+    /// One tick: the error `reference - measurement` (output unit) and the time since the last
+    /// tick (s) give the output to hold until the next (input unit).
+    #[inline]
+    pub fn step(&mut self, error: f32, dt_s: f32) -> f32 {
+        match self.phase {
+            RelayPhase::Oscillate => {
+                self.follow(error, dt_s);
+                if self.is_disproved() {
+                    self.undo(false);
+                } else if self.has_turned_back() {
+                    self.undo(true);
+                } else if self.is_due() {
+                    self.switch(dt_s);
+                }
+            }
+            RelayPhase::Preroll => return self.preroll(error, dt_s),
+            RelayPhase::Kick => self.kick(error),
+        }
+        self.excursion.trim + self.sign * self.settings.amplitude
+    }
+
+    fn preroll(&mut self, error: f32, dt_s: f32) -> f32 {
+        self.noise.push(error);
+        self.preroll_left_s -= dt_s;
+        if self.preroll_left_s <= 0.0 {
+            self.noise_sigma = self.noise.sigma().max(self.settings.noise_sigma);
+            self.smoothed_sigma = self.noise_sigma;
+            self.phase = RelayPhase::Kick;
+        }
+        0.0
+    }
+
+    fn kick(&mut self, error: f32) {
+        if error.abs() > CLEAR_OF_NOISE_SIGMA * self.noise_sigma {
+            self.sign = if error > 0.0 { 1.0 } else { -1.0 };
+            self.smoothed = error;
+            self.excursion.peak = error.abs();
+            self.phase = RelayPhase::Oscillate;
+        } else {
+            self.from_rest = true;
+        }
+    }
+
+    fn follow(&mut self, error: f32, dt_s: f32) {
+        self.smoothed += self.smoothing_gain * (error - self.smoothed);
+        let (signed, half_period_s) = (self.signed(), self.half_period_s());
+        let excursion = &mut self.excursion;
+        excursion.elapsed_s += dt_s;
+        excursion.cycle_s += dt_s;
+        excursion.cycle_high_less_low_s += self.sign * dt_s;
+        excursion.peak = excursion.peak.max(signed);
+        if half_period_s > 0.0 && excursion.elapsed_s > TRIM_LOST * half_period_s {
+            excursion.trim = 0.0;
+        }
+    }
+
+    /// Smoothed error, positive on the side of the running excursion.
+    fn signed(&self) -> f32 {
+        self.sign * self.smoothed
+    }
+
+    /// Index of the output's level: 0 high, 1 low.
+    fn side(&self) -> usize {
+        usize::from(!self.is_high())
+    }
+
+    /// Whether the extremum behind the last switch was false: the signal has passed it.
+    fn is_disproved(&self) -> bool {
+        self.undoable[0].is_some_and(|last| {
+            -self.signed() > last.peak + DISPROVED_SIGMA * self.smoothed_sigma
+        })
+    }
+
+    /// Whether the signal, not yet at zero, goes away from it again.
+    fn has_turned_back(&self) -> bool {
+        let turned = self.excursion.peak - self.signed();
+        self.undoable[0].is_some()
+            && self.excursion.peak <= 0.0
+            && turned > CLEAR_OF_NOISE_SIGMA * self.smoothed_sigma
+    }
+
+    /// Whether the running excursion has a genuine extremum and has fallen back far enough.
+    fn is_due(&self) -> bool {
+        let Excursion { peak, opposite_peak, elapsed_s, to_zero, .. } = self.excursion;
+        let value = self.signed();
+        let beta = if to_zero { 0.0 } else { self.lead[self.side()] * self.beta() };
+        value <= -beta * peak
+            && peak > 0.0
+            && elapsed_s >= self.settings.dwell * self.half_period_s()
+            && peak - value >= COME_BACK_SIGMA * self.smoothed_sigma
+            && peak + opposite_peak >= CLEAR_OF_NOISE_SIGMA * self.smoothed_sigma
+    }
+
+    /// The phase asked for at this switch: a plain relay first, then `beta` in equal steps.
+    fn beta(&self) -> f32 {
+        let plain = u32::from(self.settings.plain_switches);
+        let ramp = u32::from(self.settings.ramp_switches);
+        if self.from_rest || self.switches >= plain + ramp {
+            self.settings.beta
+        } else {
+            let done = self.switches.saturating_sub(plain);
+            self.settings.beta * done as f32 / (ramp + 1) as f32
+        }
+    }
+
+    /// Mean of the last two excursions (s); zero until there are two.
+    fn half_period_s(&self) -> f32 {
+        let Excursion { previous_s, before_previous_s, .. } = self.excursion;
+        if before_previous_s > 0.0 { 0.5 * (previous_s + before_previous_s) } else { 0.0 }
+    }
+
+    fn switch(&mut self, dt_s: f32) {
+        let ended = self.excursion;
+        self.undoable = [Some(ended), self.undoable[0]];
+        self.sign = -self.sign;
+        self.switches += 1;
+        self.excursion = Excursion {
+            peak: self.signed(),
+            opposite_peak: ended.peak,
+            elapsed_s: 0.0,
+            previous_s: ended.elapsed_s,
+            before_previous_s: ended.previous_s,
+            to_zero: false,
+            ..ended
+        };
+        if self.sign > 0.0 {
+            self.begin_cycle();
+        }
+        self.set_smoothing(dt_s);
+    }
+
+    /// Moves the trim a share of the way to the mean of the output over the cycle that ended.
+    fn begin_cycle(&mut self) {
+        let h = self.settings.amplitude;
+        let Excursion { cycle_s, cycle_high_less_low_s, trim, .. } = self.excursion;
+        if self.switches >= 4 && cycle_s > 0.0 {
+            let moved = trim + self.settings.trim_gain * h * cycle_high_less_low_s / cycle_s;
+            self.excursion.trim = moved.clamp(-TRIM_LIMIT * h, TRIM_LIMIT * h);
+            if self.settings.trim_gain > 0.0 {
+                self.lead = [1.0; 2];
+            }
+        }
+        self.excursion.cycle_s = 0.0;
+        self.excursion.cycle_high_less_low_s = 0.0;
+    }
+
+    /// Takes the last switch back and goes on with the excursion before it.
+    fn undo(&mut self, to_zero: bool) {
+        if let Some(last) = self.undoable[0] {
+            let wrong_s = self.excursion.elapsed_s;
+            self.excursion = Excursion {
+                peak: last.peak.max(-self.signed()),
+                elapsed_s: last.elapsed_s + wrong_s,
+                to_zero,
+                cycle_s: last.cycle_s + wrong_s,
+                cycle_high_less_low_s: last.cycle_high_less_low_s + self.sign * wrong_s,
+                ..last
+            };
+            self.sign = -self.sign;
+            if to_zero {
+                self.lead[self.side()] *= 0.5;
+            }
+            self.undoable = [self.undoable[1], None];
+            self.switches -= 1;
+            self.undone += 1;
+        }
+    }
+
+    /// First-order smoothing with the variance and the mean delay of an average of `n` samples.
+    fn set_smoothing(&mut self, dt_s: f32) {
+        let span_s = self.settings.smoothing * self.half_period_s();
+        let n = (span_s / dt_s).max(1.0);
+        self.smoothing_gain = 2.0 / (n + 1.0);
+        self.smoothed_sigma = self.noise_sigma / sqrtf(n);
+    }
+
+    /// What the relay is doing.
+    #[must_use]
+    pub fn phase(&self) -> RelayPhase {
+        self.phase
+    }
+
+    /// Whether the output is high.
+    #[must_use]
+    pub fn is_high(&self) -> bool {
+        self.sign > 0.0
+    }
+
+    /// Switches made and not undone.
+    #[must_use]
+    pub fn switches(&self) -> u32 {
+        self.switches
+    }
+
+    /// Switches taken back.
+    #[must_use]
+    pub fn undone(&self) -> u32 {
+        self.undone
+    }
+
+    /// Centre of the output (input unit): minus the input bias, once settled.
+    #[must_use]
+    pub fn trim(&self) -> f32 {
+        self.excursion.trim
+    }
+
+    /// Standard deviation of the noise, measured or given (output unit).
+    #[must_use]
+    pub fn noise_sigma(&self) -> f32 {
+        self.noise_sigma
+    }
+}

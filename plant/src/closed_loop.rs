@@ -1,0 +1,142 @@
+//! Any controller around any process: one experiment, sample by sample.
+
+use onecycle_onboard::relay::Relay;
+use onecycle_onboard::{Pd, Process};
+use rand::{Rng, RngExt};
+
+use crate::{FixedStepProcess, Sensor, Trace, VariableStepProcess};
+
+/// What a controller sees at a sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensed {
+    /// Reading of the output (output unit).
+    pub output: f64,
+    /// Rate of the output from a sensor of its own, such as a gyroscope (output unit / s).
+    pub rate: f64,
+}
+
+/// A sampled controller.
+pub trait Controller {
+    /// The input to hold until the next sample (input unit), from the reference and what was
+    /// sensed (output unit), `dt_s` after the last call.
+    fn step(&mut self, dt_s: f64, reference: f64, sensed: Sensed) -> f64;
+}
+
+impl Controller for Relay {
+    #[inline]
+    fn step(&mut self, dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
+        f64::from(Self::step(self, (reference - sensed.output) as f32, dt_s as f32))
+    }
+}
+
+/// `u = kp (r - y) - kd dy/dt` at every sample, the rate from its own sensor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampledPd(
+    /// Its gains.
+    pub Pd,
+);
+
+impl Controller for SampledPd {
+    #[inline]
+    fn step(&mut self, _dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
+        self.0.kp * (reference - sensed.output) - self.0.kd * sensed.rate
+    }
+}
+
+/// The process and its surroundings. Start from [`Experiment::new`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Experiment {
+    /// The process.
+    pub process: Process,
+    /// Sample period (s).
+    pub sample_s: f64,
+    /// Duration (s).
+    pub duration_s: f64,
+    /// Reference of the output (output unit).
+    pub reference: f64,
+    /// Constant added to the input and not recorded (input unit).
+    pub input_bias: f64,
+    /// The sensor of the output.
+    pub sensor: Sensor,
+    /// Standard deviation of the sample period as a fraction of it; each increment is kept
+    /// between 0.1 and 1.9 periods.
+    pub jitter: f64,
+    /// Output at the start (output unit).
+    pub initial_output: f64,
+}
+
+impl Experiment {
+    /// A perfect sensor, no bias, no jitter, from rest at the reference zero.
+    #[must_use]
+    pub fn new(process: Process, sample_s: f64, duration_s: f64) -> Self {
+        Self {
+            process,
+            sample_s,
+            duration_s,
+            reference: 0.0,
+            input_bias: 0.0,
+            sensor: Sensor::default(),
+            jitter: 0.0,
+            initial_output: 0.0,
+        }
+    }
+
+    /// Number of samples in the duration.
+    #[must_use]
+    pub fn samples(&self) -> usize {
+        (self.duration_s / self.sample_s).round() as usize
+    }
+
+    /// Runs the experiment and keeps every sample.
+    #[must_use]
+    pub fn run(&self, controller: &mut impl Controller, rng: &mut impl Rng) -> Trace {
+        let mut trace = Trace::with_capacity(self.samples());
+        self.observe(controller, rng, |time_s, input, output, true_output| {
+            trace.push(time_s, input, output, true_output);
+        });
+        trace
+    }
+
+    /// Runs the experiment and hands every sample to `observer`: time (s), input as commanded,
+    /// output as measured, output as it was.
+    pub fn observe(
+        &self,
+        controller: &mut impl Controller,
+        rng: &mut impl Rng,
+        mut observer: impl FnMut(f64, f64, f64, f64),
+    ) {
+        if self.jitter > 0.0 {
+            return self.observe_jittered(controller, rng, observer);
+        }
+        let mut process = FixedStepProcess::new(&self.process, self.sample_s);
+        process.displace(self.initial_output, 0.0);
+        for sample in 0..self.samples() {
+            let output = process.output();
+            let sensed = Sensed { output: self.sensor.read(output, rng), rate: process.rate() };
+            let input = controller.step(self.sample_s, self.reference, sensed);
+            observer(sample as f64 * self.sample_s, input, sensed.output, output);
+            process.step(input + self.input_bias);
+        }
+    }
+
+    fn observe_jittered(
+        &self,
+        controller: &mut impl Controller,
+        rng: &mut impl Rng,
+        mut observer: impl FnMut(f64, f64, f64, f64),
+    ) {
+        let mut process = VariableStepProcess::new(&self.process);
+        process.displace(self.initial_output, 0.0);
+        let (mut time_s, mut dt_s) = (0.0, self.sample_s);
+        for _ in 0..self.samples() {
+            let output = process.output();
+            let sensed = Sensed { output: self.sensor.read(output, rng), rate: process.rate() };
+            let input = controller.step(dt_s, self.reference, sensed);
+            observer(time_s, input, sensed.output, output);
+            let normal: f64 = rng.sample(rand_distr::StandardNormal);
+            dt_s = self.sample_s * (1.0 + self.jitter * normal).clamp(0.1, 1.9);
+            process.advance(input + self.input_bias, dt_s);
+            time_s += dt_s;
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! The delayed process at steps of any length, through the history of its input.
+//!
+//! Slower than [`FixedStepProcess`](crate::FixedStepProcess) (a transition is computed for every
+//! stretch between events) and independent of it: jittered samples use it, and it checks the other.
+
+use std::collections::VecDeque;
+
+use onecycle_onboard::transition::{State, Transition};
+use onecycle_onboard::Process;
+
+/// A process at rest, advanced with a held input by any duration.
+#[derive(Clone, Debug)]
+pub struct VariableStepProcess {
+    process: Process,
+    time_s: f64,
+    state: State,
+    arrived: f64,
+    /// Inputs on their way: arrival time (s) and value.
+    under_way: VecDeque<(f64, f64)>,
+}
+
+impl VariableStepProcess {
+    /// The process at rest at time zero.
+    #[must_use]
+    pub fn new(process: &Process) -> Self {
+        Self {
+            process: *process,
+            time_s: 0.0,
+            state: State::default(),
+            arrived: 0.0,
+            under_way: VecDeque::new(),
+        }
+    }
+
+    /// Holds the input at `u` for `duration_s >= 0`.
+    pub fn advance(&mut self, u: f64, duration_s: f64) {
+        self.under_way.push_back((self.time_s + self.process.tau_s(), u));
+        let end_s = self.time_s + duration_s;
+        while let Some(&(arrival_s, value)) = self.under_way.front() {
+            if arrival_s >= end_s {
+                break;
+            }
+            self.propagate_to(arrival_s);
+            self.arrived = value;
+            self.under_way.pop_front();
+        }
+        self.propagate_to(end_s);
+    }
+
+    fn propagate_to(&mut self, time_s: f64) {
+        let transition = Transition::over(&self.process, (time_s - self.time_s).max(0.0));
+        self.state = transition.apply(&self.state, self.arrived);
+        self.time_s = time_s;
+    }
+
+    /// Output now (output unit).
+    #[must_use]
+    pub fn output(&self) -> f64 {
+        self.process.k_over_t_body() * self.state.y
+    }
+
+    /// Rate of the output now (output unit / s).
+    #[must_use]
+    pub fn rate(&self) -> f64 {
+        self.process.k_over_t_body() * self.state.v
+    }
+
+    /// Puts the output and its rate elsewhere, as a disturbance or an initial offset would.
+    pub fn displace(&mut self, output: f64, rate: f64) {
+        self.state.y += output / self.process.k_over_t_body();
+        self.state.v += rate / self.process.k_over_t_body();
+    }
+}

@@ -1,0 +1,16 @@
+//! What is flown: exact simulation of the delayed process and its closed loops.
+//!
+//! The input of a sampled loop is constant between samples, so propagation is exact: no ODE
+//! solver, no step-size error, and a delay of any length.
+
+pub mod closed_loop;
+pub mod delay;
+pub mod exact;
+pub mod sensor;
+pub mod trace;
+
+pub use closed_loop::{Controller, Experiment, SampledPd, Sensed};
+pub use delay::VariableStepProcess;
+pub use exact::FixedStepProcess;
+pub use sensor::Sensor;
+pub use trace::Trace;
