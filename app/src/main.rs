@@ -1,1 +1,30 @@
-fn main() {}
+//! `onecycle`: from one cycle of a relay test to the process and its optimal controller.
+//!
+//! In stages: arguments are parsed and typed (`args`), a command runs (`commands`), its result is
+//! printed (`report`), and what went wrong becomes one sentence and an exit code (`failure`).
+
+mod args;
+mod commands;
+mod failure;
+mod output;
+mod report;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::args::{Arguments, Command};
+
+fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match &arguments.command {
+        Command::Identify(identify) => commands::identify::run(identify),
+        Command::Simulate(simulate) => commands::simulate::run(simulate),
+        Command::Tune(tune) => commands::tune::run(tune),
+        Command::Campaign(campaign) => commands::campaign::run(campaign),
+    };
+    match result {
+        Ok(code) => code,
+        Err(failure) => failure.report(),
+    }
+}

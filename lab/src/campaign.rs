@@ -107,13 +107,24 @@ impl Campaign {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let [t_prop_s, t_body_s, tau_s] = MULTIROTOR.map(|(low, high)| rng.random_range(low..high));
         let bias = rng.random_range(-1.0..1.0) * self.bias;
-        let part = if self.sigma_uniform { rng.random_range(0.0..1.0) } else { 1.0 };
+        let part = if self.sigma_uniform {
+            rng.random_range(0.0..1.0)
+        } else {
+            1.0
+        };
         let process = Process::new(1.0, t_prop_s, t_body_s, tau_s)?;
         let beta = f64::from(RelaySettings::DISTINGUISHING_BETA);
-        let (omega, _) =
-            process.describing_function_oscillation(1.0, beta).ok_or(CaseError::NoOscillation)?;
-        let mut case =
-            Case { process, bias: 0.0, sigma: 0.0, period_s: TAU / omega, amplitude: 0.0, seed };
+        let (omega, _) = process
+            .describing_function_oscillation(1.0, beta)
+            .ok_or(CaseError::NoOscillation)?;
+        let mut case = Case {
+            process,
+            bias: 0.0,
+            sigma: 0.0,
+            period_s: TAU / omega,
+            amplitude: 0.0,
+            seed,
+        };
         case.amplitude = self.noise_free_amplitude(&case)?;
         case.bias = bias;
         case.sigma = part * self.sigma * case.amplitude;
@@ -126,7 +137,9 @@ impl Campaign {
         let tail = &trace.true_output[trace.len() - (2.0 * case.period_s / SAMPLE_S) as usize..];
         let (low, high) = tail
             .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| (low.min(y), high.max(y)));
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
+                (low.min(y), high.max(y))
+            });
         Ok(0.5 * (high - low))
     }
 
@@ -138,7 +151,11 @@ impl Campaign {
     pub fn run(&self, case: &Case, periods: f64) -> Result<(Trace, Relay), CaseError> {
         let mut settings = RelaySettings::new(1.0, RelaySettings::DISTINGUISHING_BETA);
         settings.preroll_s = PREROLL_S as f32;
-        settings.trim_gain = if self.trim { RelaySettings::TRIM_GAIN } else { 0.0 };
+        settings.trim_gain = if self.trim {
+            RelaySettings::TRIM_GAIN
+        } else {
+            0.0
+        };
         let mut relay = Relay::new(settings)?;
         let duration_s = PREROLL_S + periods * case.period_s;
         let mut experiment = Experiment::new(case.process, SAMPLE_S, duration_s);
@@ -199,7 +216,10 @@ pub fn relay_outcome(campaign: &Campaign, case: &Case) -> Result<RelayOutcome, C
         }
     }
     let end_s = trace.time_s.last().copied().unwrap_or(0.0);
-    let farthest = trace.true_output.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    let farthest = trace
+        .true_output
+        .iter()
+        .fold(0.0_f64, |most, y| most.max(y.abs()));
     Ok(RelayOutcome {
         steady_at,
         excursion: farthest / case.amplitude,
@@ -244,7 +264,10 @@ pub fn identification_outcome(
         sample_period_s: SAMPLE_S,
         breaks: &[],
     };
-    let options = Options { cycles: campaign.cycles, ..Options::default() };
+    let options = Options {
+        cycles: campaign.cycles,
+        ..Options::default()
+    };
     let found = identify(&signals, &options);
     // The same process with its lags in order.
     let (sum, ratio) = case.process.pole_sum();
@@ -257,5 +280,10 @@ pub fn identification_outcome(
         let best = pd_at_phase_margin(&truth, margin).ok()?;
         Some(deterioration(made.pd, &truth, &best))
     });
-    Ok(IdentificationOutcome { found, truth, bias: case.bias, deterioration })
+    Ok(IdentificationOutcome {
+        found,
+        truth,
+        bias: case.bias,
+        deterioration,
+    })
 }

@@ -13,7 +13,7 @@ mod verdict;
 use onecycle_onboard::refine::{RefineError, Refined, refine};
 
 use self::oscillation::{FitWindow, Oscillation};
-pub use self::posterior::{Interval, ProcessEstimate, intervals};
+pub use self::posterior::{Interval, Posterior, ProcessEstimate};
 use self::relay_input::{InputKind, RelayInput};
 pub use self::remark::Remark;
 pub use self::verdict::Verdict;
@@ -79,8 +79,12 @@ pub struct OscillationFound {
     pub duty: f64,
     /// Half the distance of the relay's levels (input unit).
     pub relay_amplitude: f64,
+    /// Middle of the relay's levels (input unit).
+    pub relay_centre: f64,
     /// Standard deviation of the noise on a sample (output unit).
     pub noise_sigma: f64,
+    /// Sample period (s).
+    pub sample_s: f64,
 }
 
 /// The process and the controller made for it.
@@ -90,8 +94,10 @@ pub struct Identified {
     pub refined: Refined,
     /// Parameters with their intervals.
     pub process: ProcessEstimate,
-    /// Controller of least squared error at the phase margin asked for, and its margins.
+    /// Controller of least squared error with the phase margin asked for, and its margins.
     pub optimum: Optimum,
+    /// Its phase margin (rad) with the interval that the process's intervals leave it.
+    pub phase_margin_rad: Interval,
     /// Predicted response to a unit step of the reference; `None` where it is too slow to simulate.
     pub step: Option<StepMetrics>,
     /// Root mean square of what the model leaves unexplained, over that of the oscillation.
@@ -162,7 +168,9 @@ fn describe(oscillation: &Oscillation, relay: &RelayInput, window: &FitWindow) -
         end_s: cycles[cycles.len() - 1].start_s + cycles[cycles.len() - 1].period_s,
         duty: mean(|cycle| cycle.duty),
         relay_amplitude: 0.5 * (relay.high - relay.low),
+        relay_centre: 0.5 * (relay.high + relay.low),
         noise_sigma: window.noise_sigma(),
+        sample_s: window.sample_s(),
     }
 }
 
@@ -179,9 +187,11 @@ fn design(refined: &Refined, window: &FitWindow, options: &Options) -> Result<Id
     }
     let optimum = pd(&refined.process, options.phase_margin_rad)
         .map_err(|error| Verdict::NoController(error.to_string()))?;
+    let posterior = Posterior::new(refined, window.sample_s());
     Ok(Identified {
         refined: *refined,
-        process: intervals(refined, window.sample_s()),
+        process: posterior.process(),
+        phase_margin_rad: posterior.phase_margin_rad(optimum.pd),
         optimum,
         step: step_response(&refined.process, optimum.pd)
             .ok()

@@ -111,7 +111,7 @@ fn many_mutations_at_once() {
         (state >> 33) as usize % below
     };
     let mut recordings = 0;
-    for _ in 0..300_000 {
+    for _ in 0..10_000 {
         let mut bytes = SEED.as_bytes().to_vec();
         for _ in 0..1 + random(6) {
             let at = random(bytes.len());

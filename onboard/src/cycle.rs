@@ -41,7 +41,11 @@ impl CycleDetector {
     /// No samples seen.
     #[must_use]
     pub fn new() -> Self {
-        Self { lowest: f64::INFINITY, highest: f64::NEG_INFINITY, ..Self::default() }
+        Self {
+            lowest: f64::INFINITY,
+            highest: f64::NEG_INFINITY,
+            ..Self::default()
+        }
     }
 
     /// A sample: its time (s), whether the relay is high from it on, and the output. Returns the
@@ -115,7 +119,10 @@ impl SteadyRun {
             && alike(cycle.period_s, self.period_s)
             && alike(cycle.amplitude, self.amplitude);
         if !goes_on {
-            *self = Self { start_s: cycle.start_s, ..Self::default() };
+            *self = Self {
+                start_s: cycle.start_s,
+                ..Self::default()
+            };
         }
         self.cycles += 1;
         let share = 1.0 / f64::from(self.cycles);

@@ -19,7 +19,10 @@ const DEPENDENT: f64 = 1e-13;
 
 impl<const M: usize, const N: usize> Columns<M, N> {
     pub(crate) fn zero(rows: usize) -> Self {
-        Self { column: [[0.0; N]; M], rows }
+        Self {
+            column: [[0.0; N]; M],
+            rows,
+        }
     }
 
     /// Replaces the columns by an orthonormal basis of what they span; a column that depends on
@@ -35,7 +38,9 @@ impl<const M: usize, const N: usize> Columns<M, N> {
             let length = norm(&rest[0][..self.rows]);
             if length > DEPENDENT * before {
                 r[j][j] = length;
-                rest[0][..self.rows].iter_mut().for_each(|value| *value /= length);
+                rest[0][..self.rows]
+                    .iter_mut()
+                    .for_each(|value| *value /= length);
             } else {
                 rest[0][..self.rows].fill(0.0);
             }
@@ -66,7 +71,12 @@ fn remove(q: &[f64], vector: &mut [f64]) -> f64 {
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let tail: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    let tail: f64 = a4
+        .remainder()
+        .iter()
+        .zip(b4.remainder())
+        .map(|(x, y)| x * y)
+        .sum();
     for (x, y) in a4.zip(b4) {
         for k in 0..4 {
             sums[k] += x[k] * y[k];
@@ -84,7 +94,11 @@ pub(crate) fn back_substitute<const M: usize>(r: &Triangle<M>, right: &[f64; M])
     let mut x = [0.0; M];
     for i in (0..M).rev() {
         let known: f64 = (i + 1..M).map(|j| r[i][j] * x[j]).sum();
-        x[i] = if r[i][i] == 0.0 { 0.0 } else { (right[i] - known) / r[i][i] };
+        x[i] = if r[i][i] == 0.0 {
+            0.0
+        } else {
+            (right[i] - known) / r[i][i]
+        };
     }
     x
 }

@@ -95,7 +95,12 @@ impl Process {
         if !(tau_s.is_finite() && tau_s >= 0.0) {
             return Err(ProcessError::Tau(tau_s));
         }
-        Ok(Self { k_over_t_body, t_prop_s, inv_t_body_per_s, tau_s })
+        Ok(Self {
+            k_over_t_body,
+            t_prop_s,
+            inv_t_body_per_s,
+            tau_s,
+        })
     }
 
     /// Acceleration gain `K/T_body`: output unit / (input unit s^2).
@@ -107,7 +112,8 @@ impl Process {
     /// Velocity gain `K`: output unit / (input unit s); `None` without damping.
     #[must_use]
     pub fn k(&self) -> Option<f64> {
-        self.t_body_s().map(|t_body_s| self.k_over_t_body * t_body_s)
+        self.t_body_s()
+            .map(|t_body_s| self.k_over_t_body * t_body_s)
     }
 
     /// Lag of the actuator (s).
@@ -152,7 +158,8 @@ impl Process {
     #[must_use]
     pub fn magnitude(&self, omega_rad_per_s: f64) -> f64 {
         let w = omega_rad_per_s;
-        self.k_over_t_body.abs() / (w * hypot(1.0, w * self.t_prop_s) * hypot(self.inv_t_body_per_s, w))
+        self.k_over_t_body.abs()
+            / (w * hypot(1.0, w * self.t_prop_s) * hypot(self.inv_t_body_per_s, w))
     }
 
     /// Unwrapped phase of `G(jw)` for a positive gain (rad): from `-pi/2` (or `-pi` without
@@ -173,14 +180,21 @@ impl Process {
     pub fn frequency_at_phase(&self, phase_rad: f64) -> Option<f64> {
         // The fastest time of the process bounds the frequency from above, the slowest from below.
         let sum_s = self.t_prop_s + self.tau_s;
-        let (mut low, mut high) = (log(1e-9 * (self.inv_t_body_per_s + 1.0 / sum_s)), log(1e9 / sum_s));
+        let (mut low, mut high) = (
+            log(1e-9 * (self.inv_t_body_per_s + 1.0 / sum_s)),
+            log(1e9 / sum_s),
+        );
         if self.phase_rad(exp(low)) < phase_rad || self.phase_rad(exp(high)) > phase_rad {
             return None;
         }
         // Bisection on log frequency: 64 halvings of 50 nepers end below one ulp.
         for _ in 0..64 {
             let middle = 0.5 * (low + high);
-            if self.phase_rad(exp(middle)) > phase_rad { low = middle } else { high = middle }
+            if self.phase_rad(exp(middle)) > phase_rad {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         Some(exp(0.5 * (low + high)))
     }
@@ -191,7 +205,11 @@ impl Process {
     /// Good to 5..30 % only: a scale for durations and starts, never the truth. `None` where the
     /// condition has no solution, such as a double integrator with `beta >= 0`.
     #[must_use]
-    pub fn describing_function_oscillation(&self, relay_amplitude: f64, beta: f64) -> Option<(f64, f64)> {
+    pub fn describing_function_oscillation(
+        &self,
+        relay_amplitude: f64,
+        beta: f64,
+    ) -> Option<(f64, f64)> {
         let omega = self.frequency_at_phase(-PI + asin(beta))?;
         Some((omega, 4.0 * relay_amplitude / PI * self.magnitude(omega)))
     }
@@ -245,7 +263,11 @@ mod tests {
         ] {
             let process = Process::new(1.0, t_prop, t_body, tau).unwrap();
             let (omega, a0) = process.describing_function_oscillation(1.0, -0.73).unwrap();
-            assert!((2.0 * PI / omega - period).abs() < 6e-5, "period {}", 2.0 * PI / omega);
+            assert!(
+                (2.0 * PI / omega - period).abs() < 6e-5,
+                "period {}",
+                2.0 * PI / omega
+            );
             assert!((a0 - amplitude).abs() < 6e-6, "amplitude {a0}");
         }
     }
@@ -254,13 +276,23 @@ mod tests {
     fn double_integrator_has_no_oscillation_without_lead() {
         let process = Process::from_acceleration_gain(1.0, 0.05, 0.0, 0.03).unwrap();
         assert!(process.describing_function_oscillation(1.0, 0.0).is_none());
-        assert!(process.describing_function_oscillation(1.0, -0.73).is_some());
+        assert!(
+            process
+                .describing_function_oscillation(1.0, -0.73)
+                .is_some()
+        );
         assert_eq!((process.k(), process.t_body_s()), (None, None));
     }
 
     #[test]
     fn pole_sum_is_a_round_trip() {
-        for (t_prop, inv_t_body) in [(0.05, 0.0), (0.05, 1e-9), (0.2, 5.0), (0.1, 10.0), (0.015, 0.5)] {
+        for (t_prop, inv_t_body) in [
+            (0.05, 0.0),
+            (0.05, 1e-9),
+            (0.2, 5.0),
+            (0.1, 10.0),
+            (0.015, 0.5),
+        ] {
             let process = Process::from_acceleration_gain(3.0, t_prop, inv_t_body, 0.02).unwrap();
             let (sum, ratio) = process.pole_sum();
             let back = Process::from_pole_sum(3.0, sum, ratio, 0.02).unwrap();
@@ -272,10 +304,25 @@ mod tests {
 
     #[test]
     fn errors_name_the_parameter() {
-        assert_eq!(Process::new(0.0, 0.1, 1.0, 0.0), Err(ProcessError::Gain(0.0)));
-        assert_eq!(Process::new(1.0, -0.1, 1.0, 0.0), Err(ProcessError::TProp(-0.1)));
-        assert_eq!(Process::new(1.0, 0.1, 0.0, 0.0), Err(ProcessError::TBody(0.0)));
-        assert_eq!(Process::new(1.0, 0.1, 1.0, -1.0), Err(ProcessError::Tau(-1.0)));
-        assert!(matches!(Process::new(f64::NAN, 0.1, 1.0, 0.0), Err(ProcessError::Gain(_))));
+        assert_eq!(
+            Process::new(0.0, 0.1, 1.0, 0.0),
+            Err(ProcessError::Gain(0.0))
+        );
+        assert_eq!(
+            Process::new(1.0, -0.1, 1.0, 0.0),
+            Err(ProcessError::TProp(-0.1))
+        );
+        assert_eq!(
+            Process::new(1.0, 0.1, 0.0, 0.0),
+            Err(ProcessError::TBody(0.0))
+        );
+        assert_eq!(
+            Process::new(1.0, 0.1, 1.0, -1.0),
+            Err(ProcessError::Tau(-1.0))
+        );
+        assert!(matches!(
+            Process::new(f64::NAN, 0.1, 1.0, 0.0),
+            Err(ProcessError::Gain(_))
+        ));
     }
 }

@@ -148,7 +148,9 @@ struct LinearFit<const BINS: usize> {
 
 impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
     fn new(window: &'a Window<BINS, EDGES>, period_s: f64) -> Result<Self, RefineError> {
-        let [first, later @ ..] = window.edges() else { return Err(RefineError::NoInput) };
+        let [first, later @ ..] = window.edges() else {
+            return Err(RefineError::NoInput);
+        };
         if later.is_empty() {
             return Err(RefineError::NoInput);
         }
@@ -176,7 +178,8 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         for (k, bin) in window.bins().iter().enumerate() {
             // A bin that lacks many of its samples, as the last one may, has another spread in time.
             let is_last = k + 1 == window.bins().len();
-            if bin.count == window.per_bin() || (!is_last && 8 * bin.count >= 7 * window.per_bin()) {
+            if bin.count == window.per_bin() || (!is_last && 8 * bin.count >= 7 * window.per_bin())
+            {
                 let count = f64::from(bin.count);
                 estimator.weight[k] = sqrt(count);
                 estimator.offset_s[k] = bin.time_sum_s / count - (k as f64 * bin_s + half_bin_s);
@@ -260,7 +263,10 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let (mut u_cos, mut u_sin, mut u_largest) = (0.0, 0.0, 0.0_f64);
         let edges = self.window.edges();
         for (k, edge) in edges.iter().enumerate() {
-            let to = edges.get(k + 1).map_or(end_s, |next| next.time_s - start_s).clamp(0.0, end_s);
+            let to = edges
+                .get(k + 1)
+                .map_or(end_s, |next| next.time_s - start_s)
+                .clamp(0.0, end_s);
             let from = (edge.time_s - start_s).clamp(0.0, end_s);
             u_cos += edge.input * (sin(omega * to) - sin(omega * from)) / omega;
             u_sin += edge.input * (cos(omega * from) - cos(omega * to)) / omega;
@@ -294,7 +300,11 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let [y, v, w, constant, recorded] = *of;
         // The acceleration, unlike the force, is a state whichever of the lags comes first.
         let f = w + response.process().inv_t_body_per_s() * v;
-        let drive = Drive { initial: State { y, v, f }, constant, recorded };
+        let drive = Drive {
+            initial: State { y, v, f },
+            constant,
+            recorded,
+        };
         response.means(&drive, &self.offset_s[..bins], &mut rows[..bins]);
         for (mean, weight) in rows.iter_mut().zip(&self.weight) {
             *mean *= weight;
@@ -320,7 +330,13 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let parts = basis.project_out(&mut residual[..self.rows]);
         let cost = dot(&residual[..self.rows], &residual[..self.rows]);
         let coefficients = back_substitute(&triangle, &parts);
-        cost.is_finite().then_some(LinearFit { basis, triangle, coefficients, residual, cost })
+        cost.is_finite().then_some(LinearFit {
+            basis,
+            triangle,
+            coefficients,
+            residual,
+            cost,
+        })
     }
 
     /// Derivatives of the fitted model by the shape, the coefficients held.
@@ -333,7 +349,11 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let mut jacobian = Columns::zero(self.rows);
         for (index, column) in jacobian.column.iter_mut().enumerate() {
             let mut moved = *shape;
-            let step = if shape[index] + STEP > HIGHEST[index] { -STEP } else { STEP };
+            let step = if shape[index] + STEP > HIGHEST[index] {
+                -STEP
+            } else {
+                STEP
+            };
             moved[index] += step;
             let response = Response::new(&self.process(&moved)?, self.grid, self.window.edges());
             self.model(&response, &fit.coefficients, column);
@@ -472,7 +492,8 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
             let pairs = (bins.len() - lag) as f64;
             let correlation = autocorrelation(bins, lag);
             // White noise alone has a mean square of one over the number of pairs.
-            redundancy += 2.0 * (correlation * correlation - 1.0 / pairs) * pairs / bins.len() as f64;
+            redundancy +=
+                2.0 * (correlation * correlation - 1.0 / pairs) * pairs / bins.len() as f64;
         }
         1.0 + unexplained * (redundancy.max(1.0) - 1.0)
     }
@@ -485,7 +506,11 @@ fn autocorrelation(values: &[f64], lag: usize) -> f64 {
     }
     let mean_square = dot(values, values) / values.len() as f64;
     let product = dot(&values[..values.len() - lag], &values[lag..]) / (values.len() - lag) as f64;
-    if mean_square > 0.0 { product / mean_square } else { 0.0 }
+    if mean_square > 0.0 {
+        product / mean_square
+    } else {
+        0.0
+    }
 }
 
 /// Gradient and curvature of the sum of squares in the free coordinates.
@@ -503,7 +528,11 @@ impl NormalEquations {
     ) -> Self {
         let rows = jacobian.rows;
         let column = |i: usize| &jacobian.column[i][..rows];
-        let mut this = Self { curvature: [[0.0; 3]; 3], gradient: [0.0; 3], free: [true; 3] };
+        let mut this = Self {
+            curvature: [[0.0; 3]; 3],
+            gradient: [0.0; 3],
+            free: [true; 3],
+        };
         for i in 0..3 {
             this.gradient[i] = dot(column(i), &residual[..rows]);
             let outwards = (shape[i] <= LOWEST[i] && this.gradient[i] < 0.0)

@@ -90,7 +90,11 @@ impl RelaySettings {
     /// Equation 4 as meant, with no protection: for noise-free comparisons.
     #[must_use]
     pub fn bare(amplitude: f32, beta: f32) -> Self {
-        Self { smoothing: 0.0, dwell: 0.0, ..Self::new(amplitude, beta) }
+        Self {
+            smoothing: 0.0,
+            dwell: 0.0,
+            ..Self::new(amplitude, beta)
+        }
     }
 }
 
@@ -170,7 +174,11 @@ impl NoiseMeter {
 
     fn sigma(&self) -> f32 {
         let differences = self.seen.saturating_sub(2);
-        if differences == 0 { 0.0 } else { sqrtf(self.sum_of_squares / (6.0 * differences as f32)) }
+        if differences == 0 {
+            0.0
+        } else {
+            sqrtf(self.sum_of_squares / (6.0 * differences as f32))
+        }
     }
 }
 
@@ -234,7 +242,11 @@ impl Relay {
         };
         Ok(Self {
             settings,
-            phase: if s.preroll_s > 0.0 { RelayPhase::Preroll } else { RelayPhase::Kick },
+            phase: if s.preroll_s > 0.0 {
+                RelayPhase::Preroll
+            } else {
+                RelayPhase::Kick
+            },
             noise: NoiseMeter::default(),
             noise_sigma: s.noise_sigma,
             preroll_left_s: s.preroll_s,
@@ -319,9 +331,8 @@ impl Relay {
 
     /// Whether the extremum behind the last switch was false: the signal has passed it.
     fn is_disproved(&self) -> bool {
-        self.undoable[0].is_some_and(|last| {
-            -self.signed() > last.peak + DISPROVED_SIGMA * self.smoothed_sigma
-        })
+        self.undoable[0]
+            .is_some_and(|last| -self.signed() > last.peak + DISPROVED_SIGMA * self.smoothed_sigma)
     }
 
     /// Whether the signal, not yet at zero, goes away from it again.
@@ -334,9 +345,19 @@ impl Relay {
 
     /// Whether the running excursion has a genuine extremum and has fallen back far enough.
     fn is_due(&self) -> bool {
-        let Excursion { peak, opposite_peak, elapsed_s, to_zero, .. } = self.excursion;
+        let Excursion {
+            peak,
+            opposite_peak,
+            elapsed_s,
+            to_zero,
+            ..
+        } = self.excursion;
         let value = self.signed();
-        let beta = if to_zero { 0.0 } else { self.lead[self.side()] * self.beta() };
+        let beta = if to_zero {
+            0.0
+        } else {
+            self.lead[self.side()] * self.beta()
+        };
         value <= -beta * peak
             && peak > 0.0
             && elapsed_s >= self.settings.dwell * self.half_period_s()
@@ -358,8 +379,16 @@ impl Relay {
 
     /// Mean of the last two excursions (s); zero until there are two.
     fn half_period_s(&self) -> f32 {
-        let Excursion { previous_s, before_previous_s, .. } = self.excursion;
-        if before_previous_s > 0.0 { 0.5 * (previous_s + before_previous_s) } else { 0.0 }
+        let Excursion {
+            previous_s,
+            before_previous_s,
+            ..
+        } = self.excursion;
+        if before_previous_s > 0.0 {
+            0.5 * (previous_s + before_previous_s)
+        } else {
+            0.0
+        }
     }
 
     fn switch(&mut self, dt_s: f32) {
@@ -385,7 +414,12 @@ impl Relay {
     /// Moves the trim a share of the way to the mean of the output over the cycle that ended.
     fn begin_cycle(&mut self) {
         let h = self.settings.amplitude;
-        let Excursion { cycle_s, cycle_high_less_low_s, trim, .. } = self.excursion;
+        let Excursion {
+            cycle_s,
+            cycle_high_less_low_s,
+            trim,
+            ..
+        } = self.excursion;
         if self.switches >= 4 && cycle_s > 0.0 {
             let moved = trim + self.settings.trim_gain * h * cycle_high_less_low_s / cycle_s;
             self.excursion.trim = moved.clamp(-TRIM_LIMIT * h, TRIM_LIMIT * h);

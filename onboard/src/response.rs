@@ -23,11 +23,20 @@ struct Stretch {
 }
 
 impl Stretch {
-    const NONE: Self =
-        Self { samples: 0.0, transition: Transition::IDENTITY, sum_v: 0.0, sum_f: 0.0, sum_u: 0.0 };
+    const NONE: Self = Self {
+        samples: 0.0,
+        transition: Transition::IDENTITY,
+        sum_v: 0.0,
+        sum_f: 0.0,
+        sum_u: 0.0,
+    };
 
     fn one(transition: Transition) -> Self {
-        Self { samples: 1.0, transition, ..Self::NONE }
+        Self {
+            samples: 1.0,
+            transition,
+            ..Self::NONE
+        }
     }
 
     /// Sum of the outputs over the stretch, from a state and under a constant input.
@@ -40,9 +49,33 @@ impl Stretch {
         Self {
             samples: self.samples + next.samples,
             transition: t.then(&next.transition),
-            sum_v: self.sum_v + next.sum(&State { y: t.y_v, v: t.v_v, f: 0.0 }, 0.0),
-            sum_f: self.sum_f + next.sum(&State { y: t.y_f, v: t.v_f, f: t.f_f }, 0.0),
-            sum_u: self.sum_u + next.sum(&State { y: t.y_u, v: t.v_u, f: t.f_u }, 1.0),
+            sum_v: self.sum_v
+                + next.sum(
+                    &State {
+                        y: t.y_v,
+                        v: t.v_v,
+                        f: 0.0,
+                    },
+                    0.0,
+                ),
+            sum_f: self.sum_f
+                + next.sum(
+                    &State {
+                        y: t.y_f,
+                        v: t.v_f,
+                        f: t.f_f,
+                    },
+                    0.0,
+                ),
+            sum_u: self.sum_u
+                + next.sum(
+                    &State {
+                        y: t.y_u,
+                        v: t.v_u,
+                        f: t.f_u,
+                    },
+                    1.0,
+                ),
         }
     }
 }
@@ -85,7 +118,13 @@ impl<'a> Response<'a> {
         for k in 1..needed.min(DOUBLINGS) {
             doublings[k] = doublings[k - 1].then(&doublings[k - 1]);
         }
-        let mut response = Self { process: *process, grid, edges, doublings, bin: Stretch::NONE };
+        let mut response = Self {
+            process: *process,
+            grid,
+            edges,
+            doublings,
+            bin: Stretch::NONE,
+        };
         response.bin = response.stretch(grid.per_bin);
         response
     }
@@ -114,7 +153,12 @@ impl<'a> Response<'a> {
             [] => (0.0, [].as_slice()),
             [first, later @ ..] => (first.input, later),
         };
-        let mut edges = if drive.recorded == 0.0 { [].iter() } else { later.iter() }.peekable();
+        let mut edges = if drive.recorded == 0.0 {
+            [].iter()
+        } else {
+            later.iter()
+        }
+        .peekable();
         let mut recorded = first;
         let mut level = drive.constant + drive.recorded * recorded;
         let mut state = drive.initial;
@@ -148,9 +192,17 @@ impl<'a> Response<'a> {
         let stretch = self.stretch(samples);
         let until_sample_s = (waits * self.grid.sample_s - after_s).max(0.0);
         let unit = Transition::over(&self.process, until_sample_s).step_response();
-        let from = State { y: step * unit.y, v: step * unit.v, f: step * unit.f };
+        let from = State {
+            y: step * unit.y,
+            v: step * unit.v,
+            f: step * unit.f,
+        };
         *sum += stretch.sum(&from, step);
         let end = stretch.transition.apply(&from, step);
-        *next = State { y: next.y + end.y, v: next.v + end.v, f: next.f + end.f };
+        *next = State {
+            y: next.y + end.y,
+            v: next.v + end.v,
+            f: next.f + end.f,
+        };
     }
 }

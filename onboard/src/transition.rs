@@ -51,13 +51,25 @@ pub struct Transition {
 
 impl Transition {
     /// No time passes.
-    pub const IDENTITY: Self =
-        Self { y_v: 0.0, y_f: 0.0, y_u: 0.0, v_v: 1.0, v_f: 0.0, v_u: 0.0, f_f: 1.0, f_u: 0.0 };
+    pub const IDENTITY: Self = Self {
+        y_v: 0.0,
+        y_f: 0.0,
+        y_u: 0.0,
+        v_v: 1.0,
+        v_f: 0.0,
+        v_u: 0.0,
+        f_f: 1.0,
+        f_u: 0.0,
+    };
 
     /// Over `duration_s >= 0` of the process (its gain and delay play no part).
     #[must_use]
     pub fn over(process: &Process, duration_s: f64) -> Self {
-        Self::of_poles(process.inv_t_body_per_s(), 1.0 / process.t_prop_s(), duration_s)
+        Self::of_poles(
+            process.inv_t_body_per_s(),
+            1.0 / process.t_prop_s(),
+            duration_s,
+        )
     }
 
     /// Over `duration_s` with the poles `-body`, `-prop` (1/s), both non-negative.
@@ -95,8 +107,11 @@ impl Transition {
                 (yv * dv + yy * d) * inverse,
                 yy * dy * inverse,
             );
-            (vu, vf, vv) =
-                ((vu * du + vf * prop * d) * inverse, (vf * df + vv * d) * inverse, vv * dv * inverse);
+            (vu, vf, vv) = (
+                (vu * du + vf * prop * d) * inverse,
+                (vf * df + vv * d) * inverse,
+                vv * dv * inverse,
+            );
             (fu, ff) = ((fu * du + ff * prop * d) * inverse, ff * df * inverse);
             sum.y_v += yv;
             sum.y_f += yf;
@@ -126,9 +141,7 @@ impl Transition {
     /// This duration followed by `next`'s, the input constant throughout.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
-        let end = |y: f64, v: f64, f: f64, u: f64| {
-            next.apply(&State { y, v, f }, u)
-        };
+        let end = |y: f64, v: f64, f: f64, u: f64| next.apply(&State { y, v, f }, u);
         let from_v = end(self.y_v, self.v_v, 0.0, 0.0);
         let from_f = end(self.y_f, self.v_f, self.f_f, 0.0);
         let from_u = end(self.y_u, self.v_u, self.f_u, 1.0);
@@ -158,7 +171,11 @@ impl Transition {
     /// State after the duration from rest under a unit input: the step response.
     #[must_use]
     pub fn step_response(&self) -> State {
-        State { y: self.y_u, v: self.v_u, f: self.f_u }
+        State {
+            y: self.y_u,
+            v: self.v_u,
+            f: self.f_u,
+        }
     }
 }
 
@@ -167,14 +184,22 @@ mod tests {
     use super::*;
 
     fn assert_close(a: f64, b: f64, tolerance: f64, what: &str) {
-        assert!((a - b).abs() <= tolerance * b.abs().max(1e-300), "{what}: {a} against {b}");
+        assert!(
+            (a - b).abs() <= tolerance * b.abs().max(1e-300),
+            "{what}: {a} against {b}"
+        );
     }
 
     // By partial fractions, which hold away from equal lags: with a = 1/T_body, p = 1/T_prop,
     // E(q) = (1 - e^(-q d))/q, step response of the rate: E(a) - (e^(-a d) - e^(-p d))/(p - a).
     #[test]
     fn agrees_with_partial_fractions() {
-        for (a, p, d) in [(0.5, 66.7, 1e-3), (2.0, 10.0, 0.3), (5.0, 3.3, 2.0), (0.1, 0.7, 40.0)] {
+        for (a, p, d) in [
+            (0.5, 66.7, 1e-3),
+            (2.0, 10.0, 0.3),
+            (5.0, 3.3, 2.0),
+            (0.1, 0.7, 40.0),
+        ] {
             let t = Transition::of_poles(a, p, d);
             let e = |q: f64| -libm::expm1(-q * d) / q;
             let (ea, ep) = (exp(-a * d), exp(-p * d));
@@ -219,7 +244,12 @@ mod tests {
         // Central difference over the meeting point: the response is smooth in the pole, so the
         // middle value is the mean of its neighbours to second order, 1e-12 here.
         let at = |p: f64| Transition::of_poles(4.0, p, 0.7).y_u;
-        assert_close(at(4.0), 0.5 * (at(4.0 - 1e-6) + at(4.0 + 1e-6)), 1e-12, "y_u");
+        assert_close(
+            at(4.0),
+            0.5 * (at(4.0 - 1e-6) + at(4.0 + 1e-6)),
+            1e-12,
+            "y_u",
+        );
     }
 
     #[test]

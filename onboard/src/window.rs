@@ -64,7 +64,10 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
             per_bin: group,
             used: 0,
             bins: [Bin::default(); BINS],
-            edges: [Edge { time_s: 0.0, input: 0.0 }; EDGES],
+            edges: [Edge {
+                time_s: 0.0,
+                input: 0.0,
+            }; EDGES],
             edge_count: 0,
             noise: NoiseMeter::default(),
         }

@@ -25,7 +25,11 @@ pub trait Controller {
 impl Controller for Relay {
     #[inline]
     fn step(&mut self, dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
-        f64::from(Self::step(self, (reference - sensed.output) as f32, dt_s as f32))
+        f64::from(Self::step(
+            self,
+            (reference - sensed.output) as f32,
+            dt_s as f32,
+        ))
     }
 }
 
@@ -112,7 +116,10 @@ impl Experiment {
         process.displace(self.initial_output, 0.0);
         for sample in 0..self.samples() {
             let output = process.output();
-            let sensed = Sensed { output: self.sensor.read(output, rng), rate: process.rate() };
+            let sensed = Sensed {
+                output: self.sensor.read(output, rng),
+                rate: process.rate(),
+            };
             let input = controller.step(self.sample_s, self.reference, sensed);
             observer(sample as f64 * self.sample_s, input, sensed.output, output);
             process.step(input + self.input_bias);
@@ -130,7 +137,10 @@ impl Experiment {
         let (mut time_s, mut dt_s) = (0.0, self.sample_s);
         for _ in 0..self.samples() {
             let output = process.output();
-            let sensed = Sensed { output: self.sensor.read(output, rng), rate: process.rate() };
+            let sensed = Sensed {
+                output: self.sensor.read(output, rng),
+                rate: process.rate(),
+            };
             let input = controller.step(dt_s, self.reference, sensed);
             observer(time_s, input, sensed.output, output);
             let normal: f64 = rng.sample(rand_distr::StandardNormal);

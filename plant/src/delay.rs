@@ -5,8 +5,8 @@
 
 use std::collections::VecDeque;
 
-use onecycle_onboard::transition::{State, Transition};
 use onecycle_onboard::Process;
+use onecycle_onboard::transition::{State, Transition};
 
 /// A process at rest, advanced with a held input by any duration.
 #[derive(Clone, Debug)]
@@ -34,7 +34,8 @@ impl VariableStepProcess {
 
     /// Holds the input at `u` for `duration_s >= 0`.
     pub fn advance(&mut self, u: f64, duration_s: f64) {
-        self.under_way.push_back((self.time_s + self.process.tau_s(), u));
+        self.under_way
+            .push_back((self.time_s + self.process.tau_s(), u));
         let end_s = self.time_s + duration_s;
         while let Some(&(arrival_s, value)) = self.under_way.front() {
             if arrival_s >= end_s {

@@ -4,8 +4,8 @@
 //! ago for `fraction * step` and the one from `n` steps ago for the rest: one transition and two
 //! input columns, computed once.
 
-use onecycle_onboard::transition::{State, Transition};
 use onecycle_onboard::Process;
+use onecycle_onboard::transition::{State, Transition};
 
 /// A process at rest, stepped with a held input. See the [module](self).
 #[derive(Clone, Debug)]

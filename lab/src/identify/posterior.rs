@@ -6,9 +6,12 @@
 //! inverse may be zero is unbounded above.
 
 use onecycle_onboard::refine::{Refined, coordinate};
+use onecycle_onboard::{Pd, Process};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
+
+use crate::margins::margins;
 
 /// Draws: the 5 % quantile of so many is known to 0.35 of a per cent point.
 const DRAWS: usize = 4000;
@@ -73,7 +76,7 @@ pub struct ProcessEstimate {
 }
 
 /// One draw, or the best point, in physical parameters.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Parameters {
     k: f64,
     k_over_t_body: f64,
@@ -101,58 +104,102 @@ impl Parameters {
             input_bias: at[coordinate::INPUT_BIAS],
         }
     }
+
+    fn process(&self) -> Option<Process> {
+        let damping_per_s = 1.0 / self.t_body_s;
+        let Self {
+            k_over_t_body,
+            t_prop_s,
+            tau_s,
+            ..
+        } = *self;
+        Process::from_acceleration_gain(k_over_t_body, t_prop_s, damping_per_s, tau_s).ok()
+    }
 }
 
-/// The estimate and its 90 % intervals, from samples every `sample_s`.
-///
-/// A recording does not say where within a sample its stamp stands: the delay is uncertain by a
-/// uniform error of one sample period on top of the estimator's.
-#[must_use]
-pub fn intervals(refined: &Refined, sample_s: f64) -> ProcessEstimate {
-    let process = &refined.process;
-    let sign = process.k_over_t_body().signum();
-    let (pole_sum, pole_ratio) = process.pole_sum();
-    let mut centre = [0.0; 5];
-    centre[coordinate::LN_POLE_SUM] = pole_sum.ln();
-    centre[coordinate::POLE_RATIO] = pole_ratio;
-    centre[coordinate::TAU_S] = process.tau_s();
-    centre[coordinate::LN_GAIN] = process.k_over_t_body().abs().ln();
-    centre[coordinate::INPUT_BIAS] = refined.input_bias;
-    let best = Parameters::of(&centre, sign);
-    let draws = refined.covariance.and_then(|covariance| {
-        let mut covariance = covariance.map(|row| row.map(|value| refined.inflation * value));
-        covariance[coordinate::TAU_S][coordinate::TAU_S] += sample_s * sample_s / 12.0;
-        let root = cholesky(&covariance)?;
+/// The estimate and draws from its distribution.
+#[derive(Clone, Debug)]
+pub struct Posterior {
+    best: Parameters,
+    /// Empty where the estimator gives no covariance.
+    draws: Vec<Parameters>,
+}
+
+impl Posterior {
+    /// From the estimator's result on samples every `sample_s`.
+    ///
+    /// A recording does not say where within a sample its stamp stands: the delay is uncertain by
+    /// a uniform error of one sample period on top of the estimator's.
+    #[must_use]
+    pub fn new(refined: &Refined, sample_s: f64) -> Self {
+        let process = &refined.process;
+        let sign = process.k_over_t_body().signum();
+        let (pole_sum, pole_ratio) = process.pole_sum();
+        let mut centre = [0.0; 5];
+        centre[coordinate::LN_POLE_SUM] = pole_sum.ln();
+        centre[coordinate::POLE_RATIO] = pole_ratio;
+        centre[coordinate::TAU_S] = process.tau_s();
+        centre[coordinate::LN_GAIN] = process.k_over_t_body().abs().ln();
+        centre[coordinate::INPUT_BIAS] = refined.input_bias;
+        let root = refined.covariance.and_then(|covariance| {
+            let mut covariance = covariance.map(|row| row.map(|value| refined.inflation * value));
+            covariance[coordinate::TAU_S][coordinate::TAU_S] += sample_s * sample_s / 12.0;
+            cholesky(&covariance)
+        });
         let mut rng = Pcg64Mcg::seed_from_u64(SEED);
-        let mut draw = || {
+        let mut draw = |root: &[[f64; 5]; 5]| {
             let normal: [f64; 5] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
             let at = std::array::from_fn(|i| {
                 centre[i] + (0..=i).map(|j| root[i][j] * normal[j]).sum::<f64>()
             });
             Parameters::of(&at, sign)
         };
-        Some((0..DRAWS).map(|_| draw()).collect::<Vec<_>>())
-    });
-    let interval = |parameter: fn(&Parameters) -> f64| {
-        let ends = draws
-            .as_ref()
-            .map(|draws| quantiles(draws.iter().map(parameter).collect()));
-        Interval::new(parameter(&best), ends)
-    };
-    ProcessEstimate {
-        k: interval(|p| p.k),
-        k_over_t_body: interval(|p| p.k_over_t_body),
-        t_prop_s: interval(|p| p.t_prop_s),
-        t_body_s: interval(|p| p.t_body_s),
-        tau_s: interval(|p| p.tau_s),
-        input_bias: interval(|p| p.input_bias),
+        let draws = root.map_or(vec![], |root| (0..DRAWS).map(|_| draw(&root)).collect());
+        Self {
+            best: Parameters::of(&centre, sign),
+            draws,
+        }
+    }
+
+    /// The parameters with their 90 % intervals.
+    #[must_use]
+    pub fn process(&self) -> ProcessEstimate {
+        let interval = |parameter: fn(&Parameters) -> f64| {
+            let values = self.draws.iter().map(parameter).collect();
+            Interval::new(parameter(&self.best), quantiles(values))
+        };
+        ProcessEstimate {
+            k: interval(|p| p.k),
+            k_over_t_body: interval(|p| p.k_over_t_body),
+            t_prop_s: interval(|p| p.t_prop_s),
+            t_body_s: interval(|p| p.t_body_s),
+            tau_s: interval(|p| p.tau_s),
+            input_bias: interval(|p| p.input_bias),
+        }
+    }
+
+    /// Phase margin (rad) that a controller leaves on the process, with its 90 % interval.
+    #[must_use]
+    pub fn phase_margin_rad(&self, pd: Pd) -> Interval {
+        let margin = |parameters: &Parameters| {
+            let margins = margins(&parameters.process()?, pd)?;
+            Some(margins.phase_margin_rad)
+        };
+        let values = self.draws.iter().filter_map(margin).collect();
+        Interval::new(
+            margin(&self.best).unwrap_or(f64::NEG_INFINITY),
+            quantiles(values),
+        )
     }
 }
 
-fn quantiles(mut values: Vec<f64>) -> (f64, f64) {
+fn quantiles(mut values: Vec<f64>) -> Option<(f64, f64)> {
+    if values.is_empty() {
+        return None;
+    }
     values.sort_unstable_by(f64::total_cmp);
     let at = |q: f64| values[((values.len() - 1) as f64 * q).round() as usize];
-    (at(QUANTILES.0), at(QUANTILES.1))
+    Some((at(QUANTILES.0), at(QUANTILES.1)))
 }
 
 /// Lower triangular root of `covariance`; `None` where rounding has made it indefinite.

@@ -136,7 +136,7 @@ mod tests {
             panic!("no relay")
         };
         assert!(relay.span.start >= 199 && relay.span.end <= 1202);
-        let switches = relay.levels(&input[relay.span]).collect::<Vec<_>>();
+        let switches = relay.levels(&input[relay.span.clone()]).collect::<Vec<_>>();
         assert_eq!(switches.windows(2).filter(|w| w[0] != w[1]).count(), 19);
     }
 

@@ -2,23 +2,184 @@
 
 use std::fmt;
 
-use super::{Identification, Options};
+use super::{Identification, Identified, Options, OscillationFound};
 
 /// Something weakly determined, or off.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Remark {
-    /// Damping cannot be told from none: `K` and `T_body` have no upper bound.
-    NoDampingSeen,
+    /// Fewer cycles than asked for, or than steadiness takes.
+    FewCycles {
+        /// Cycles used.
+        used: usize,
+    },
+    /// The gain is negative.
+    NegativeGain,
+    /// No upper bound for `T_body` and `K`; the lower one of `T_body` (s).
+    DampingNotSeen(Option<f64>),
+    /// An interval is wide: the parameter and the relative half width.
+    Weak(&'static str, f64),
+    /// The delay's interval reaches from this to that (s).
+    WeakDelay(f64, f64),
+    /// Noise over amplitude.
+    Noisy(f64),
+    /// Input bias less what the relay's centre makes up for, over the relay's amplitude.
+    Biased(f64),
+    /// Samples a cycle.
+    Coarse(f64),
+    /// Part of the oscillation that the model leaves unexplained.
+    Misfit(f64),
+    /// Lower end of the phase margin (rad).
+    MarginMayBeLess(f64),
+    /// Overshoot of the predicted step.
+    Overshoot(f64),
 }
 
 impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoDampingSeen => write!(f, "no damping seen"),
+        match *self {
+            Self::FewCycles { used } => {
+                write!(
+                    f,
+                    "Only {used} steady cycles could be used; more narrow the intervals."
+                )
+            }
+            Self::NegativeGain => write!(
+                f,
+                "The gain is negative: the output falls when the input rises, and the \
+                 controller's gains carry the sign."
+            ),
+            Self::DampingNotSeen(above_s) => {
+                write!(f, "The body's damping is hardly seen: ")?;
+                if let Some(above_s) = above_s {
+                    write!(f, "T_body is above {above_s:.2} s and may be infinite")?;
+                } else {
+                    write!(f, "T_body may be infinite")?;
+                }
+                write!(
+                    f,
+                    ", so K has no upper bound. The controller rests on K/T_body."
+                )
+            }
+            Self::Weak(what, width) => write!(
+                f,
+                "{what} is only known to about {:.0} %; use more cycles or a larger relay \
+                 amplitude.",
+                100.0 * width
+            ),
+            Self::WeakDelay(low_s, high_s) => write!(
+                f,
+                "The delay is only known to lie between {:.2} and {:.2} ms.",
+                1e3 * low_s,
+                1e3 * high_s
+            ),
+            Self::Noisy(part) => write!(
+                f,
+                "The noise is {:.0} % of the amplitude; a larger relay amplitude would help.",
+                100.0 * part
+            ),
+            Self::Biased(part) => write!(
+                f,
+                "The relay works against a bias of {:.0} % of its amplitude; trim it away or raise \
+                 the amplitude before the relay loses its authority.",
+                100.0 * part
+            ),
+            Self::Coarse(samples) => write!(
+                f,
+                "There are only {samples:.0} samples a cycle; record at a higher rate if you can."
+            ),
+            Self::Misfit(part) => write!(
+                f,
+                "The model leaves {:.1} % of the oscillation unexplained beyond the noise; the \
+                 intervals are widened for it.",
+                100.0 * part
+            ),
+            Self::MarginMayBeLess(margin_rad) => write!(
+                f,
+                "Within the intervals the phase margin may be as low as {:.1} deg; use more \
+                 cycles, or ask for more margin with --phase-margin.",
+                margin_rad.to_degrees()
+            ),
+            Self::Overshoot(part) => write!(
+                f,
+                "The step overshoots by {:.0} %, as the least squared error does at this phase \
+                 margin; --phase-margin 45 gives a calmer one, and a reference filter helps.",
+                100.0 * part
+            ),
         }
     }
 }
 
-pub(super) fn remarks(_found: &Identification, _options: &Options) -> Vec<Remark> {
-    vec![]
+pub(super) fn remarks(found: &Identification, options: &Options) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    if let Some(oscillation) = &found.oscillation {
+        of_oscillation(oscillation, options, &mut remarks);
+        if let Ok(identified) = &found.outcome {
+            of_process(identified, oscillation, &mut remarks);
+            of_controller(identified, options, &mut remarks);
+        }
+    }
+    remarks
+}
+
+fn of_oscillation(oscillation: &OscillationFound, options: &Options, remarks: &mut Vec<Remark>) {
+    let used = oscillation.cycles_used;
+    if oscillation.cycles_steady < 3 || (used < options.cycles && used < 4) {
+        remarks.push(Remark::FewCycles { used });
+    }
+    let noise = oscillation.noise_sigma / oscillation.amplitude;
+    // Where the relay's own protection begins to be needed.
+    if noise > 0.05 {
+        remarks.push(Remark::Noisy(noise));
+    }
+    let samples = oscillation.period_s / oscillation.sample_s;
+    // A sample is then over 10 degrees of the oscillation: half the phase margin of 20.
+    if samples < 360.0 / 10.0 {
+        remarks.push(Remark::Coarse(samples));
+    }
+}
+
+fn of_process(identified: &Identified, oscillation: &OscillationFound, remarks: &mut Vec<Remark>) {
+    let process = &identified.process;
+    if identified.refined.process.k_over_t_body() < 0.0 {
+        remarks.push(Remark::NegativeGain);
+    }
+    if process.t_body_s.high.is_none() {
+        remarks.push(Remark::DampingNotSeen(process.t_body_s.low));
+    }
+    for (what, interval, most) in [
+        ("K/T_body", process.k_over_t_body, 0.1),
+        ("T_prop", process.t_prop_s, 0.3),
+        ("T_body", process.t_body_s, 0.5),
+    ] {
+        if let Some(width) = interval.relative_half_width().filter(|&width| width > most) {
+            remarks.push(Remark::Weak(what, width));
+        }
+    }
+    // A delay is weakly known when its interval is a part of the period that costs phase margin.
+    if let (Some(low_s), Some(high_s)) = (process.tau_s.low, process.tau_s.high)
+        && high_s - low_s > 0.03 * oscillation.period_s
+    {
+        remarks.push(Remark::WeakDelay(low_s, high_s));
+    }
+    let untrimmed = identified.refined.input_bias + oscillation.relay_centre;
+    let bias = untrimmed.abs() / oscillation.relay_amplitude;
+    if bias > 0.2 {
+        remarks.push(Remark::Biased(bias));
+    }
+    if identified.misfit > 0.01 {
+        remarks.push(Remark::Misfit(identified.misfit));
+    }
+}
+
+fn of_controller(identified: &Identified, options: &Options, remarks: &mut Vec<Remark>) {
+    let margin = identified.phase_margin_rad;
+    if let Some(low) = margin
+        .low
+        .filter(|&low| low < 0.75 * options.phase_margin_rad)
+    {
+        remarks.push(Remark::MarginMayBeLess(low));
+    }
+    if let Some(step) = identified.step.filter(|step| step.overshoot > 0.4) {
+        remarks.push(Remark::Overshoot(step.overshoot));
+    }
 }

@@ -1,0 +1,266 @@
+//! Arguments, typed and documented; `--help` is generated from here.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Parser, Subcommand};
+use onecycle_lab::identify::MOST_CYCLES;
+use onecycle_link::TimeUnit;
+use onecycle_onboard::{Process, ProcessError, RelaySettings};
+
+use crate::failure::Failure;
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0  done (identify: a process was identified)
+  2  bad arguments
+  3  the input file cannot be read; the message says where and what to do
+  4  the recording tells no process; the verdict says why and what to do
+  5  the output cannot be written";
+
+/// From one cycle of a relay test to the process and its optimal controller.
+#[derive(Debug, Parser)]
+#[command(version, after_help = EXIT_CODES, max_term_width = 100)]
+pub(crate) struct Arguments {
+    #[command(subcommand)]
+    pub(crate) command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum Command {
+    Identify(Identify),
+    Simulate(Simulate),
+    Tune(Tune),
+    Campaign(Campaign),
+}
+
+/// Identify the process behind a recorded relay test, and design its controller.
+///
+/// The recording is a table of time, input (the relay's output) and output (the measurement):
+/// comma, semicolon, tab or blanks, with or without a header, time in s, ms, us or ns.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle identify examples/simulated_hover.csv\n",
+    "  onecycle identify log.csv --time t_ms --input 4 --output roll --cycles 4\n",
+    "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
+    "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process (see the verdict), ",
+    "5 output not written"
+))]
+pub(crate) struct Identify {
+    /// The recording; - reads the standard input
+    pub(crate) file: PathBuf,
+    /// Print the report as JSON (schema: docs/identify-json.md)
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Fit the last N steady cycles (1 to 50)
+    #[arg(long, value_name = "N", default_value_t = 8,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
+    pub(crate) cycles: u64,
+    /// Least phase margin of the controller, in degrees
+    #[arg(long, value_name = "DEG", default_value = "20", value_parser = phase_margin)]
+    pub(crate) phase_margin: f64,
+    /// Column of time, by name or by number from 1
+    #[arg(long, value_name = "COLUMN")]
+    pub(crate) time: Option<String>,
+    /// Column of the input, the relay's output
+    #[arg(long, value_name = "COLUMN")]
+    pub(crate) input: Option<String>,
+    /// Column of the output, the measurement
+    #[arg(long, value_name = "COLUMN")]
+    pub(crate) output: Option<String>,
+    /// Sample rate in hertz, for tables without time
+    #[arg(long, value_name = "HZ", conflicts_with_all = ["time", "time_unit"])]
+    pub(crate) sample_rate: Option<f64>,
+    /// Unit of the time column, whatever its header says: h, min, s, ms, us or ns
+    #[arg(long, value_name = "UNIT", value_parser = time_unit)]
+    pub(crate) time_unit: Option<TimeUnit>,
+}
+
+/// Parameters of a process `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`.
+#[derive(Debug, Args)]
+pub(crate) struct ProcessArguments {
+    /// Velocity gain K: output unit / (input unit s)
+    #[arg(
+        long,
+        value_name = "GAIN",
+        allow_negative_numbers = true,
+        required_unless_present = "k_over_t_body",
+        conflicts_with = "k_over_t_body"
+    )]
+    k: Option<f64>,
+    /// Acceleration gain K/T_body, instead of K: output unit / (input unit s^2)
+    #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
+    k_over_t_body: Option<f64>,
+    /// Lag of the actuator, in seconds
+    #[arg(long, value_name = "S")]
+    t_prop: f64,
+    /// Lag of the body, in seconds; inf for no damping (then give --k-over-t-body)
+    #[arg(long, value_name = "S")]
+    t_body: f64,
+    /// Dead time, in seconds
+    #[arg(long, value_name = "S")]
+    tau: f64,
+}
+
+impl ProcessArguments {
+    pub(crate) fn process(&self) -> Result<Process, Failure> {
+        let made = match (self.k, self.k_over_t_body) {
+            (_, Some(_)) if self.t_body.is_nan() || self.t_body <= 0.0 => {
+                Err(ProcessError::TBody(self.t_body))
+            }
+            (_, Some(gain)) => {
+                Process::from_acceleration_gain(gain, self.t_prop, 1.0 / self.t_body, self.tau)
+            }
+            (Some(_), None) if self.t_body.is_infinite() => {
+                return Err(Failure::usage(
+                    "with --t-body inf the velocity gain is infinite: give --k-over-t-body \
+                     instead of --k",
+                ));
+            }
+            (k, None) => Process::new(k.unwrap_or(0.0), self.t_prop, self.t_body, self.tau),
+        };
+        made.map_err(Failure::usage)
+    }
+}
+
+/// A value, or a percentage of something the help names.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Share {
+    Value(f64),
+    Percent(f64),
+}
+
+impl Share {
+    /// The value, percentages being of `whole`.
+    pub(crate) fn of(self, whole: f64) -> f64 {
+        match self {
+            Self::Value(value) => value,
+            Self::Percent(percent) => 0.01 * percent * whole,
+        }
+    }
+}
+
+impl FromStr for Share {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (number, share): (_, fn(f64) -> Self) = match text.strip_suffix('%') {
+            Some(number) => (number.trim_end(), Self::Percent),
+            None => (text, Self::Value),
+        };
+        number
+            .parse()
+            .ok()
+            .filter(|value: &f64| value.is_finite())
+            .map(share)
+            .ok_or_else(|| format!("'{text}' is neither a number nor a percentage such as 30%"))
+    }
+}
+
+/// Simulate a relay test and write its recording.
+///
+/// The process is propagated exactly and the relay is the one of the on-board library. Comments at
+/// the head of the file tell the truth behind it.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle simulate --k 1 --t-prop 0.0321 --t-body 1.6886 --tau 0.0237 --out hover.csv\n",
+    "  onecycle simulate --k-over-t-body 40 --t-prop 0.05 --t-body inf --tau 0.015 --noise 1% \\\n",
+    "      --bias 30% --seed 7 | onecycle identify -\n"
+))]
+pub(crate) struct Simulate {
+    #[command(flatten)]
+    pub(crate) process: ProcessArguments,
+    /// Amplitude h of the relay (input unit)
+    #[arg(long, value_name = "H", default_value_t = 1.0)]
+    pub(crate) amplitude: f64,
+    /// Sine of the phase of the oscillation
+    #[arg(long, value_name = "BETA", default_value_t = f64::from(RelaySettings::DISTINGUISHING_BETA),
+          allow_negative_numbers = true)]
+    pub(crate) beta: f64,
+    /// Let the relay keep its centre instead of following the input bias
+    #[arg(long)]
+    pub(crate) no_trim: bool,
+    /// Plain relay: no smoothing of the error and no dwell
+    #[arg(long)]
+    pub(crate) bare: bool,
+    /// Time for which the relay first measures the noise, in seconds
+    #[arg(long, value_name = "S", default_value_t = 0.1)]
+    pub(crate) preroll: f64,
+    /// Constant added to the input and not recorded (input unit, or % of the relay's amplitude)
+    #[arg(long, default_value = "0", allow_hyphen_values = true)]
+    pub(crate) bias: Share,
+    /// Standard deviation of the measurement noise (output unit, or % of the noise-free amplitude)
+    #[arg(long, default_value = "0")]
+    pub(crate) noise: Share,
+    /// Resolution of the sensor (output unit, or % of the noise-free amplitude)
+    #[arg(long, default_value = "0")]
+    pub(crate) quantum: Share,
+    /// Standard deviation of the sample period (s, or % of it)
+    #[arg(long, default_value = "0")]
+    pub(crate) jitter: Share,
+    /// Output at the start (output unit, or % of the noise-free amplitude)
+    #[arg(long, default_value = "0", allow_hyphen_values = true)]
+    pub(crate) offset: Share,
+    /// Reference of the output (output unit)
+    #[arg(
+        long,
+        value_name = "R",
+        default_value_t = 0.0,
+        allow_negative_numbers = true
+    )]
+    pub(crate) reference: f64,
+    /// Sample rate, in hertz
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    pub(crate) sample_rate: f64,
+    /// Duration, in seconds [default: 20 periods]
+    #[arg(long, value_name = "S")]
+    pub(crate) duration: Option<f64>,
+    /// Seed of noise and jitter: the same seed gives the same bits
+    #[arg(long, default_value_t = 0)]
+    pub(crate) seed: u64,
+    /// File to write, whole or not at all [default: the standard output]
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+/// Design the optimal controller of a process: gains, margins and the step to expect.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle tune --k 1 --t-prop 0.3 --t-body 2 --tau 0.1\n",
+    "  onecycle tune --k-over-t-body 40 --t-prop 0.05 --t-body inf --tau 0.015 --phase-margin 45\n"
+))]
+pub(crate) struct Tune {
+    #[command(flatten)]
+    pub(crate) process: ProcessArguments,
+    /// Least phase margin of the controller, in degrees
+    #[arg(long, value_name = "DEG", default_value = "20", value_parser = phase_margin)]
+    pub(crate) phase_margin: f64,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Run a campaign of random experiments that a TOML file describes (see experiments/).
+#[derive(Debug, Args)]
+pub(crate) struct Campaign {
+    /// The campaign
+    pub(crate) file: PathBuf,
+    /// Run this many cases instead of the file's number
+    #[arg(long, value_name = "N")]
+    pub(crate) cases: Option<u64>,
+}
+
+/// A phase margin in degrees, as radians.
+fn phase_margin(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(degrees) if degrees > 0.0 && degrees < 90.0 => Ok(degrees.to_radians()),
+        _ => Err("a phase margin lies between 0 and 90 degrees".to_owned()),
+    }
+}
+
+fn time_unit(text: &str) -> Result<TimeUnit, String> {
+    TimeUnit::from_name(text).ok_or_else(|| "a unit of time is h, min, s, ms, us or ns".to_owned())
+}

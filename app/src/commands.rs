@@ -1,0 +1,6 @@
+//! One file a command: arguments in, report out.
+
+pub(crate) mod campaign;
+pub(crate) mod identify;
+pub(crate) mod simulate;
+pub(crate) mod tune;

@@ -1,0 +1,183 @@
+//! `onecycle campaign`: many random experiments, and a table of what became of them.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use indicatif::{ProgressBar, ProgressStyle};
+use onecycle_lab::Deterioration;
+use onecycle_lab::campaign::{
+    Campaign, CaseError, IdentificationOutcome, Measure, RelayOutcome, identification_outcome,
+    relay_outcome,
+};
+use rayon::prelude::*;
+
+use crate::args;
+use crate::failure::{Failure, exit};
+use crate::output::print;
+
+pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
+    let mut campaign = read(&arguments.file)?;
+    campaign.cases = arguments.cases.unwrap_or(campaign.cases);
+    if campaign.cases == 0 {
+        return Err(Failure::usage("a campaign has at least one case"));
+    }
+    let table = match campaign.measure {
+        Measure::Relay => relay_table(&campaign, &all(&campaign, relay_outcome)?),
+        Measure::Identification => {
+            identification_table(&campaign, &all(&campaign, identification_outcome)?)
+        }
+    };
+    print(&table)?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+fn read(path: &Path) -> Result<Campaign, Failure> {
+    let failed = |reason: String| Failure::Settings {
+        path: path.to_owned(),
+        reason,
+    };
+    let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
+    toml::from_str(&text).map_err(|error| failed(error.to_string().trim_end().to_owned()))
+}
+
+/// Every case's outcome, in order whatever the number of threads.
+fn all<T: Send>(
+    campaign: &Campaign,
+    outcome: impl Fn(&Campaign, &onecycle_lab::campaign::Case) -> Result<T, CaseError> + Sync,
+) -> Result<Vec<T>, Failure> {
+    let bar = ProgressBar::new(campaign.cases);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}") {
+        bar.set_style(style);
+    }
+    let done = AtomicU64::new(0);
+    let outcomes = (0..campaign.cases)
+        .into_par_iter()
+        .map(|n| {
+            let result = campaign.case(n).and_then(|case| outcome(campaign, &case));
+            bar.set_position(done.fetch_add(1, Ordering::Relaxed) + 1);
+            result
+        })
+        .collect::<Result<_, _>>()
+        .map_err(Failure::usage);
+    bar.finish_and_clear();
+    outcomes
+}
+
+fn quantile(values: &mut [f64], q: f64) -> f64 {
+    values.sort_unstable_by(f64::total_cmp);
+    let index = ((values.len().max(1) - 1) as f64 * q).round() as usize;
+    values.get(index).copied().unwrap_or(f64::NAN)
+}
+
+fn relay_table(campaign: &Campaign, outcomes: &[RelayOutcome]) -> String {
+    let steady = outcomes
+        .iter()
+        .filter(|outcome| outcome.steady_at.is_some())
+        .count();
+    let run_away = outcomes.iter().filter(|outcome| !outcome.alive).count();
+    let undone: u32 = outcomes.iter().map(|outcome| outcome.undone).sum();
+    let mut at: Vec<f64> = outcomes
+        .iter()
+        .filter_map(|o| o.steady_at)
+        .map(f64::from)
+        .collect();
+    let mut ratio: Vec<f64> = outcomes
+        .iter()
+        .map(|outcome| outcome.period_ratio)
+        .collect();
+    let mut farthest: Vec<f64> = outcomes.iter().map(|outcome| outcome.excursion).collect();
+    format!(
+        "{} random processes, bias up to {} h, noise up to {} of the amplitude, offset {}, trim {}\n\
+         steady oscillation      {steady} ({:.2} %)\n\
+         run away                {run_away}\n\
+         cycles until steady     median {}, 99 % {}, most {}\n\
+         period / describing fn  {:.2} .. {:.2}, median {:.2}\n\
+         farthest / amplitude    median {:.1}, most {:.1}\n\
+         switches taken back     {undone}\n",
+        outcomes.len(),
+        campaign.bias,
+        campaign.sigma,
+        campaign.offset,
+        if campaign.trim { "on" } else { "off" },
+        100.0 * steady as f64 / outcomes.len() as f64,
+        quantile(&mut at, 0.5),
+        quantile(&mut at, 0.99),
+        quantile(&mut at, 1.0),
+        quantile(&mut ratio, 0.0),
+        quantile(&mut ratio, 1.0),
+        quantile(&mut ratio, 0.5),
+        quantile(&mut farthest, 0.5),
+        quantile(&mut farthest, 1.0),
+    )
+}
+
+fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome]) -> String {
+    let refused = outcomes
+        .iter()
+        .filter(|outcome| outcome.found.outcome.is_err())
+        .count();
+    let identified = outcomes.len() - refused;
+    let mut cost = Vec::new();
+    let (mut unstable, mut least_margin_rad) = (0, f64::INFINITY);
+    for outcome in outcomes {
+        match outcome.deterioration {
+            Some(Deterioration::Stable {
+                relative,
+                phase_margin_rad,
+            }) => {
+                cost.push(100.0 * relative.abs());
+                least_margin_rad = least_margin_rad.min(phase_margin_rad);
+            }
+            Some(Deterioration::Unstable) => unstable += 1,
+            None => {}
+        }
+    }
+    let mean = cost.iter().sum::<f64>() / cost.len().max(1) as f64;
+    let held = coverage(outcomes).map(|count| 100.0 * count as f64 / identified.max(1) as f64);
+    let [k, k_over_t_body, t_prop, t_body, tau, bias] = held;
+    format!(
+        "{} random processes, bias up to {} h, noise {}{} of the amplitude, trim {}, {} cycle(s)\n\
+         refused                 {refused}\n\
+         unstable                {unstable}\n\
+         deterioration |J| (%)   mean {mean:.3}, median {:.3}, 95 % {:.2}, 99 % {:.2}, worst {:.2}\n\
+         least phase margin      {:.1} deg\n\
+         90 % intervals hold (%) K {k:.1}, K/T_body {k_over_t_body:.1}, T_prop {t_prop:.1}, \
+         T_body {t_body:.1}, tau {tau:.1}, bias {bias:.1}\n",
+        outcomes.len(),
+        campaign.bias,
+        if campaign.sigma_uniform { "up to " } else { "" },
+        campaign.sigma,
+        if campaign.trim { "on" } else { "off" },
+        campaign.cycles,
+        quantile(&mut cost, 0.5),
+        quantile(&mut cost, 0.95),
+        quantile(&mut cost, 0.99),
+        quantile(&mut cost, 1.0),
+        least_margin_rad.to_degrees(),
+    )
+}
+
+/// Of each parameter, in how many cases the interval holds the truth.
+fn coverage(outcomes: &[IdentificationOutcome]) -> [usize; 6] {
+    let mut held = [0; 6];
+    for outcome in outcomes {
+        let Ok(identified) = &outcome.found.outcome else {
+            continue;
+        };
+        let (process, truth) = (&identified.process, &outcome.truth);
+        let unbounded = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
+        let inside = [
+            process.k.holds(unbounded(truth.k())),
+            process.k_over_t_body.holds(truth.k_over_t_body()),
+            process.t_prop_s.holds(truth.t_prop_s()),
+            process.t_body_s.holds(unbounded(truth.t_body_s())),
+            process.tau_s.holds(truth.tau_s()),
+            process.input_bias.holds(outcome.bias),
+        ];
+        for (count, inside) in held.iter_mut().zip(inside) {
+            *count += usize::from(inside);
+        }
+    }
+    held
+}

@@ -1,0 +1,62 @@
+//! `onecycle identify`: a recording in, the process and its controller out.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use onecycle_lab::identify::{Options, Signals, identify};
+use onecycle_link::{ColumnRef, CsvOptions, Recording};
+
+use crate::args::Identify;
+use crate::failure::{Failure, exit};
+use crate::output::print;
+use crate::report::{json, text};
+
+pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
+    let recording = read(arguments)?;
+    let breaks: Vec<usize> = recording.gaps().iter().map(|gap| gap.index).collect();
+    let signals = Signals {
+        time_s: recording.time_s(),
+        input: recording.input(),
+        output: recording.output(),
+        samples_per_point: recording.samples_per_point() as u32,
+        sample_period_s: recording.sample_period_s(),
+        breaks: &breaks,
+    };
+    let options = Options {
+        cycles: arguments.cycles as usize,
+        phase_margin_rad: arguments.phase_margin,
+    };
+    let found = identify(&signals, &options);
+    let name = arguments.file.display().to_string();
+    print(&if arguments.json {
+        json::identification(&name, &recording, &found)
+    } else {
+        text::identification(&name, &recording, &found)
+    })?;
+    Ok(ExitCode::from(if found.outcome.is_ok() {
+        exit::DONE
+    } else {
+        exit::NO_PROCESS
+    }))
+}
+
+fn read(arguments: &Identify) -> Result<Recording, Failure> {
+    let column = |name: &Option<String>| name.as_deref().map(ColumnRef::from);
+    let options = CsvOptions {
+        time_column: column(&arguments.time),
+        input_column: column(&arguments.input),
+        output_column: column(&arguments.output),
+        sample_rate_hz: arguments.sample_rate,
+        time_unit: arguments.time_unit,
+        ..CsvOptions::default()
+    };
+    let result = if arguments.file == Path::new("-") {
+        onecycle_link::read_from(std::io::stdin().lock(), &options)
+    } else {
+        onecycle_link::read(&arguments.file, &options)
+    };
+    result.map_err(|reason| Failure::Recording {
+        path: arguments.file.clone(),
+        reason: Box::new(reason),
+    })
+}

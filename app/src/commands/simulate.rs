@@ -1,0 +1,172 @@
+//! `onecycle simulate`: a process in, the recording of a relay test out.
+
+use std::f64::consts::TAU;
+use std::io::Write;
+use std::process::ExitCode;
+
+use onecycle_link::{Recording, write_csv};
+use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_plant::{Experiment, Trace};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+use crate::args::Simulate;
+use crate::failure::{Failure, exit};
+use crate::output::{print, write_file};
+
+/// Periods of the oscillation in a recording: some to settle, eight and more to fit.
+const PERIODS: f64 = 20.0;
+/// Most samples that a simulation makes: a day at 1 kHz fits in memory.
+const MOST_SAMPLES: f64 = 1e8;
+
+pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
+    let process = arguments.process.process()?;
+    let amplitude = noise_free_amplitude(arguments, &process)?;
+    let experiment = experiment(arguments, &process, amplitude)?;
+    let noise = experiment.sensor.noise_sigma.max(experiment.sensor.quantum);
+    let mut relay = relay(arguments, noise)?;
+    let trace = experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(arguments.seed));
+    let recording = Recording::from_samples(&trace.time_s, &trace.input, &trace.output)
+        .map_err(Failure::usage)?;
+    let head = head(arguments, &experiment);
+    let comments: Vec<&str> = head.lines().collect();
+    match &arguments.out {
+        Some(path) => write_file(path, |file| write_csv(file, &recording, &comments))?,
+        None => {
+            let mut table = Vec::new();
+            // Writing to memory does not fail.
+            let _ = write_csv(&mut table, &recording, &comments);
+            print(&String::from_utf8_lossy(&table))?;
+        }
+    }
+    Ok(ExitCode::from(exit::DONE))
+}
+
+fn relay(arguments: &Simulate, noise_sigma: f64) -> Result<Relay, Failure> {
+    let (amplitude, beta) = (arguments.amplitude as f32, arguments.beta as f32);
+    let settings = RelaySettings {
+        preroll_s: arguments.preroll as f32,
+        noise_sigma: noise_sigma as f32,
+        trim_gain: if arguments.no_trim {
+            0.0
+        } else {
+            RelaySettings::TRIM_GAIN
+        },
+        ..if arguments.bare {
+            RelaySettings::bare(amplitude, beta)
+        } else {
+            RelaySettings::new(amplitude, beta)
+        }
+    };
+    Relay::new(settings).map_err(Failure::usage)
+}
+
+fn experiment(
+    arguments: &Simulate,
+    process: &Process,
+    amplitude: f64,
+) -> Result<Experiment, Failure> {
+    let positive = |name: &str, value: f64| {
+        if value.is_finite() && value > 0.0 {
+            Ok(value)
+        } else {
+            Err(Failure::usage(format!(
+                "{name} must be positive, but is {value}"
+            )))
+        }
+    };
+    let not_negative = |name: &str, value: f64| {
+        if value.is_finite() && value >= 0.0 {
+            Ok(value)
+        } else {
+            Err(Failure::usage(format!(
+                "{name} must be zero or positive, but is {value}"
+            )))
+        }
+    };
+    let sample_s = 1.0 / positive("--sample-rate", arguments.sample_rate)?;
+    let duration_s = match arguments.duration {
+        Some(duration_s) => positive("--duration", duration_s)?,
+        None => arguments.preroll + PERIODS * period_s(arguments, process)?,
+    };
+    let samples = duration_s / sample_s;
+    if !(2.0..=MOST_SAMPLES).contains(&samples) {
+        return Err(Failure::usage(format!(
+            "{samples:.0} samples are not between 2 and {MOST_SAMPLES:.0}: change --duration or \
+             --sample-rate"
+        )));
+    }
+    let mut experiment = Experiment::new(*process, sample_s, duration_s);
+    experiment.reference = arguments.reference;
+    experiment.input_bias = arguments.bias.of(arguments.amplitude);
+    experiment.sensor.noise_sigma = not_negative("--noise", arguments.noise.of(amplitude))?;
+    experiment.sensor.quantum = not_negative("--quantum", arguments.quantum.of(amplitude))?;
+    experiment.jitter = not_negative("--jitter", arguments.jitter.of(sample_s) / sample_s)?;
+    experiment.initial_output = arguments.reference + arguments.offset.of(amplitude);
+    Ok(experiment)
+}
+
+fn period_s(arguments: &Simulate, process: &Process) -> Result<f64, Failure> {
+    let oscillation = process.describing_function_oscillation(arguments.amplitude, arguments.beta);
+    let (omega, _) = oscillation.ok_or_else(|| {
+        Failure::usage("the process has no oscillation at this phase: choose a smaller --beta")
+    })?;
+    Ok(TAU / omega)
+}
+
+/// Half the peak-to-peak output of the last two periods without bias, noise and jitter.
+fn noise_free_amplitude(arguments: &Simulate, process: &Process) -> Result<f64, Failure> {
+    let period_s = period_s(arguments, process)?;
+    // Fine enough for the peaks whatever the rate of the recording.
+    let sample_s = period_s / 1000.0;
+    let experiment = Experiment::new(*process, sample_s, PERIODS * period_s);
+    let mut relay = relay(arguments, 0.0)?;
+    let trace: Trace = experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(0));
+    let tail = &trace.true_output[trace.len() - 2000..];
+    let (low, high) = tail
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
+            (low.min(y), high.max(y))
+        });
+    Ok(0.5 * (high - low))
+}
+
+/// The truth behind the recording, as comment lines.
+fn head(arguments: &Simulate, experiment: &Experiment) -> String {
+    let mut text = Vec::new();
+    let process = &experiment.process;
+    let number =
+        |value: Option<f64>| value.map_or("infinite".to_owned(), |value| value.to_string());
+    // Writing to memory does not fail.
+    let _ = writeln!(
+        text,
+        "simulated relay test: onecycle {}",
+        env!("CARGO_PKG_VERSION")
+    );
+    let _ = writeln!(
+        text,
+        "process: k {}, k_over_t_body {}, t_prop_s {}, t_body_s {}, tau_s {}",
+        number(process.k()),
+        process.k_over_t_body(),
+        process.t_prop_s(),
+        number(process.t_body_s()),
+        process.tau_s()
+    );
+    let _ = writeln!(
+        text,
+        "relay: amplitude {}, beta {}, trim {}",
+        arguments.amplitude,
+        arguments.beta,
+        if arguments.no_trim { "off" } else { "on" }
+    );
+    let _ = writeln!(
+        text,
+        "input_bias {}, noise_sigma {}, quantum {}, jitter {}, seed {}",
+        experiment.input_bias,
+        experiment.sensor.noise_sigma,
+        experiment.sensor.quantum,
+        experiment.jitter,
+        arguments.seed
+    );
+    String::from_utf8_lossy(&text).into_owned()
+}

@@ -1,0 +1,24 @@
+//! `onecycle tune`: a process in, its controller out.
+
+use std::process::ExitCode;
+
+use onecycle_lab::{pd, step_response};
+
+use crate::args::Tune;
+use crate::failure::{Failure, exit};
+use crate::output::print;
+use crate::report::{json, text};
+
+pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
+    let process = arguments.process.process()?;
+    let optimum = pd(&process, arguments.phase_margin).map_err(Failure::usage)?;
+    let step = step_response(&process, optimum.pd)
+        .ok()
+        .map(|response| response.metrics);
+    print(&if arguments.json {
+        json::design(&process, &optimum, step.as_ref())
+    } else {
+        text::design(&process, &optimum, step.as_ref())
+    })?;
+    Ok(ExitCode::from(exit::DONE))
+}

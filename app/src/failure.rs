@@ -1,0 +1,73 @@
+//! What can go wrong, as one sentence on the error output and an exit code.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Exit codes, as `--help` lists them.
+pub(crate) mod exit {
+    /// A process was identified.
+    pub(crate) const DONE: u8 = 0;
+    /// Bad arguments; also what the argument parser itself uses.
+    pub(crate) const USAGE: u8 = 2;
+    /// The input cannot be read as a recording.
+    pub(crate) const INPUT: u8 = 3;
+    /// The recording was read, but tells no process: see the verdict.
+    pub(crate) const NO_PROCESS: u8 = 4;
+    /// The output cannot be written.
+    pub(crate) const OUTPUT: u8 = 5;
+}
+
+/// Why a command did not finish.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Failure {
+    /// Values of arguments that do not go together, or are no process.
+    #[error("{0}")]
+    Usage(String),
+    /// A recording that cannot be read.
+    #[error("{file}: {reason}", file = path.display())]
+    Recording {
+        path: PathBuf,
+        #[source]
+        reason: Box<onecycle_link::ReadError>,
+    },
+    /// A settings file that cannot be read.
+    #[error("{file}: {reason}", file = path.display())]
+    Settings { path: PathBuf, reason: String },
+    /// A file or the terminal that cannot be written.
+    #[error("cannot write {target}: {reason}")]
+    Output {
+        target: String,
+        #[source]
+        reason: io::Error,
+    },
+}
+
+impl Failure {
+    pub(crate) fn usage(reason: impl ToString) -> Self {
+        Self::Usage(reason.to_string())
+    }
+
+    pub(crate) fn output(target: &Path, reason: io::Error) -> Self {
+        Self::Output {
+            target: target.display().to_string(),
+            reason,
+        }
+    }
+
+    /// Prints the sentence and gives the exit code.
+    pub(crate) fn report(&self) -> ExitCode {
+        // A reader that stops listening, as `head` does, is no failure.
+        if let Self::Output { reason, .. } = self
+            && reason.kind() == io::ErrorKind::BrokenPipe
+        {
+            return ExitCode::from(exit::DONE);
+        }
+        crate::output::complain(&format!("onecycle: {self}"));
+        ExitCode::from(match self {
+            Self::Usage(_) => exit::USAGE,
+            Self::Recording { .. } | Self::Settings { .. } => exit::INPUT,
+            Self::Output { .. } => exit::OUTPUT,
+        })
+    }
+}
