@@ -87,8 +87,19 @@ pub struct OscillationFound {
     pub sample_s: f64,
 }
 
-/// The process and the controller made for it.
+/// One point of the fit: a bin of the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitPoint {
+    /// Mean time of its samples (s).
+    pub time_s: f64,
+    /// Mean of its samples (output unit).
+    pub measured: f64,
+    /// The model's mean over the same instants (output unit).
+    pub fitted: f64,
+}
+
+/// The process and the controller made for it.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Identified {
     /// The fit behind the estimate.
     pub refined: Refined,
@@ -102,6 +113,8 @@ pub struct Identified {
     pub step: Option<StepMetrics>,
     /// Root mean square of what the model leaves unexplained, over that of the oscillation.
     pub misfit: f64,
+    /// The fit over the cycles used.
+    pub fit: Vec<FitPoint>,
 }
 
 /// All that a recording tells.
@@ -126,7 +139,7 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
     found.outcome = find_relay(signals).and_then(|relay| {
         let oscillation = oscillation::find(signals, &relay, options.cycles.clamp(1, MOST_CYCLES))?;
         let window = oscillation.window(signals, &relay);
-        found.oscillation = Some(describe(&oscillation, &relay, &window));
+        found.oscillation = Some(describe(signals, &oscillation, &relay, &window));
         if let Some(part) = saturation::flat_part(
             &signals.output[oscillation.points(signals)],
             oscillation.cycles.len(),
@@ -137,7 +150,7 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
             RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
             RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
         })?;
-        design(&refined, &window, options)
+        design(&refined, &window, oscillation.period_s, options)
     });
     found.remarks = remark::remarks(&found, options);
     found
@@ -154,11 +167,17 @@ fn find_relay(signals: &Signals<'_>) -> Result<RelayInput, Verdict> {
     }
 }
 
-fn describe(oscillation: &Oscillation, relay: &RelayInput, window: &FitWindow) -> OscillationFound {
+fn describe(
+    signals: &Signals<'_>,
+    oscillation: &Oscillation,
+    relay: &RelayInput,
+    window: &FitWindow,
+) -> OscillationFound {
     let cycles = &oscillation.cycles;
     let mean = |of: fn(&onecycle_onboard::cycle::Cycle) -> f64| {
         cycles.iter().map(of).sum::<f64>() / cycles.len() as f64
     };
+    let (low, high) = relay.means(&signals.input[oscillation.points(signals)]);
     OscillationFound {
         period_s: oscillation.period_s,
         amplitude: mean(|cycle| cycle.amplitude),
@@ -167,8 +186,8 @@ fn describe(oscillation: &Oscillation, relay: &RelayInput, window: &FitWindow) -
         start_s: cycles[0].start_s,
         end_s: cycles[cycles.len() - 1].start_s + cycles[cycles.len() - 1].period_s,
         duty: mean(|cycle| cycle.duty),
-        relay_amplitude: 0.5 * (relay.high - relay.low),
-        relay_centre: 0.5 * (relay.high + relay.low),
+        relay_amplitude: 0.5 * (high - low),
+        relay_centre: 0.5 * (high + low),
         noise_sigma: window.noise_sigma(),
         sample_s: window.sample_s(),
     }
@@ -177,7 +196,12 @@ fn describe(oscillation: &Oscillation, relay: &RelayInput, window: &FitWindow) -
 /// Part of the oscillation that a process of this kind never leaves unexplained.
 const MOST_MISFIT: f64 = 0.05;
 
-fn design(refined: &Refined, window: &FitWindow, options: &Options) -> Result<Identified, Verdict> {
+fn design(
+    refined: &Refined,
+    window: &FitWindow,
+    period_s: f64,
+    options: &Options,
+) -> Result<Identified, Verdict> {
     let misfit = misfit(refined, window);
     if misfit > MOST_MISFIT {
         return Err(Verdict::NotThisProcess { misfit });
@@ -197,6 +221,7 @@ fn design(refined: &Refined, window: &FitWindow, options: &Options) -> Result<Id
             .ok()
             .map(|step| step.metrics),
         misfit,
+        fit: oscillation::fit_points(window, period_s, refined),
     })
 }
 

@@ -26,3 +26,19 @@ impl Pd {
         self.kd
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // u = 6 (2 - 0.5) - 1.5 * 0.8 = 7.8; as a cascade 1.5 (4 (2 - 0.5) - 0.8), the same.
+    #[test]
+    fn the_cascade_is_the_controller() {
+        let pd = Pd { kp: 6.0, kd: 1.5 };
+        let (error, rate) = (1.5, 0.8);
+        let cascade = pd.rate_p() * (pd.angle_p() * error - rate);
+        assert_eq!((pd.angle_p(), pd.rate_p()), (4.0, 1.5));
+        assert!((cascade - 7.8).abs() < 1e-14);
+        assert!((pd.kp * error - pd.kd * rate - 7.8).abs() < 1e-14);
+    }
+}

@@ -138,3 +138,97 @@ impl SteadyRun {
         self.cycles >= 3
     }
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
+    use super::*;
+
+    /// Cycles of levels and outputs at consecutive samples of 1/64 s: exact in binary.
+    fn cycles(samples: impl IntoIterator<Item = (bool, f64)>) -> Vec<Cycle> {
+        let mut detector = CycleDetector::new();
+        samples
+            .into_iter()
+            .enumerate()
+            .filter_map(|(k, (high, output))| detector.push(k as f64 / 64.0, high, output))
+            .collect()
+    }
+
+    /// High for 24 of 64 samples; the output a triangle from -1 to 3.
+    fn square(k: usize) -> (bool, f64) {
+        let phase = k % 64;
+        let triangle = if phase < 32 { phase as f64 } else { 64.0 - phase as f64 };
+        (phase < 24, triangle / 8.0 - 1.0)
+    }
+
+    // The detector waits for a quarter of the last half period, 24 or 40 samples, before a level
+    // counts, and then dates it back: nothing of that wait may show.
+    #[test]
+    fn square_wave_is_found_exactly() {
+        let found = cycles((0..64 * 6).map(square));
+        // The rise at sample 0 is not seen as one; rises at 1, 2, ... 5 s bound four cycles.
+        assert_eq!(found.len(), 4);
+        for (index, cycle) in found.iter().enumerate() {
+            assert_eq!(cycle.start_s, 1.0 + index as f64);
+            assert_eq!(cycle.period_s, 1.0);
+            assert_eq!(cycle.duty, 24.0 / 64.0);
+            assert_eq!(cycle.amplitude, 2.0);
+            assert_eq!(cycle.centre, 1.0);
+        }
+    }
+
+    // Levels of up to 5 samples (below a quarter of 24) leave no trace, wherever they fall.
+    #[test]
+    fn glitches_are_ignored() {
+        let clean = cycles((0..64 * 6).map(square));
+        for at in 0..64 {
+            let glitch = |k: usize| k > 128 && (0..5).contains(&((k + 64 - at) % 64));
+            let found = cycles((0..64 * 6).map(|k| {
+                let (high, output) = square(k);
+                // None up to the wait behind an edge (10 samples): the level has not lasted yet
+                // there, and counts from behind the glitch.
+                let edge = [0, 24].iter().any(|edge| (at + 69 - edge) % 64 < 16);
+                (high != (glitch(k) && !edge), output)
+            }));
+            assert_eq!(found, clean, "glitch at {at}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_found_where_nothing_switches() {
+        assert!(cycles((0..1000).map(|k| (true, k as f64))).is_empty());
+        assert!(cycles((0..1000).map(|k| (k > 500, k as f64))).is_empty());
+    }
+
+    fn cycle(start_s: f64, period_s: f64, amplitude: f64) -> Cycle {
+        Cycle { start_s, period_s, duty: 0.5, amplitude, centre: 0.0 }
+    }
+
+    // 1, 1.1, 1.2 are within a fifth of the running means 1 and 1.05; 1.4 is not within a fifth of
+    // 1.1 and begins a new run.
+    #[test]
+    fn steady_after_three_alike() {
+        let mut run = SteadyRun::default();
+        assert!(!run.push(&cycle(0.0, 1.0, 2.0)));
+        assert!(run.push(&cycle(1.0, 1.1, 2.1)) && !run.is_steady());
+        assert!(run.push(&cycle(2.1, 1.2, 2.2)) && run.is_steady());
+        assert!((run.period_s - 1.1).abs() < 1e-15 && (run.amplitude - 2.1).abs() < 1e-15);
+        assert_eq!((run.start_s, run.end_s), (0.0, 2.1 + 1.2));
+
+        assert!(!run.push(&cycle(3.3, 1.4, 2.1)));
+        assert_eq!((run.cycles, run.period_s, run.start_s), (1, 1.4, 3.3));
+        assert!(!run.is_steady());
+    }
+
+    #[test]
+    fn an_amplitude_that_jumps_is_not_steady() {
+        let mut run = SteadyRun::default();
+        for (k, amplitude) in [1.0, 1.0, 1.3, 1.0, 1.0].into_iter().enumerate() {
+            run.push(&cycle(k as f64, 1.0, amplitude));
+            assert!(!run.is_steady());
+        }
+    }
+}

@@ -103,31 +103,6 @@ pub(crate) fn back_substitute<const M: usize>(r: &Triangle<M>, right: &[f64; M])
     x
 }
 
-/// `(r^T r)^-1` for upper triangular `r`: the covariance of the coefficients at unit noise.
-/// A column that is a combination of others (zero on the diagonal) has none: `None`.
-pub(crate) fn covariance<const M: usize>(r: &Triangle<M>) -> Option<[[f64; M]; M]> {
-    if (0..M).any(|i| r[i][i] == 0.0) {
-        return None;
-    }
-    // Columns of r^-1, then the products of its rows.
-    let mut inverse = [[0.0; M]; M];
-    for j in 0..M {
-        let mut unit = [0.0; M];
-        unit[j] = 1.0;
-        let x = back_substitute(r, &unit);
-        for i in 0..M {
-            inverse[i][j] = x[i];
-        }
-    }
-    let mut covariance = [[0.0; M]; M];
-    for i in 0..M {
-        for j in 0..M {
-            covariance[i][j] = (0..M).map(|k| inverse[i][k] * inverse[j][k]).sum();
-        }
-    }
-    Some(covariance)
-}
-
 /// Solves the symmetric positive definite `a x = right` by Cholesky's method; `None` if it is not.
 pub(crate) fn solve_symmetric(a: &[[f64; 3]; 3], right: &[f64; 3]) -> Option<[f64; 3]> {
     let mut l = [[0.0; 3]; 3];
@@ -175,10 +150,6 @@ mod tests {
         assert!((a - 1.1).abs() < 1e-14 && (b - 1.1).abs() < 1e-14);
         // Residual 0.8 - ... by hand: -0.1, 0.8, -1.3, 0.6: sum of squares 2.70.
         assert!((dot(&y, &y) - 2.70).abs() < 1e-13);
-        // Covariance of (a, b): sum t^2 = 14, sum t = 6, det = 4*14-36 = 20: [0.7, -0.3; -0.3, 0.2].
-        let c = covariance(&r).unwrap();
-        assert!((c[0][0] - 0.7).abs() < 1e-14 && (c[0][1] + 0.3).abs() < 1e-14);
-        assert!((c[1][1] - 0.2).abs() < 1e-14);
     }
 
     #[test]
@@ -188,7 +159,6 @@ mod tests {
         columns.column[1][..3].copy_from_slice(&[2.0, 4.0, 6.0]);
         let r = columns.orthonormalise();
         assert_eq!(r[1][1], 0.0);
-        assert!(covariance(&r).is_none());
         assert_eq!(back_substitute(&r, &[1.0, 1.0])[1], 0.0);
     }
 

@@ -19,11 +19,16 @@
 //! of the sum, and the delay: regular where the lags are equal (1/4) and where damping vanishes
 //! (0), so the double integrator is an ordinary point of the domain's boundary.
 
-use core::f64::consts::{FRAC_PI_2, PI, TAU};
+mod fundamental;
+mod uncertainty;
 
-use libm::{atan, atan2, cos, exp, hypot, log, sin, sqrt, tan};
+use core::f64::consts::TAU;
 
-use crate::least_squares::{Columns, Triangle, back_substitute, covariance, dot, solve_symmetric};
+use libm::{exp, log, sqrt};
+
+use self::fundamental::Fundamental;
+use self::uncertainty::{Tangent, coordinate_map};
+use crate::least_squares::{Columns, Triangle, back_substitute, dot, solve_symmetric};
 use crate::process::Process;
 use crate::response::{Drive, Grid, Response};
 use crate::transition::State;
@@ -74,13 +79,11 @@ pub struct Refined {
     pub process: Process,
     /// Constant input that the recording does not show (input unit).
     pub input_bias: f64,
-    /// Covariance over the coordinates of [`coordinate`], for white residuals of
-    /// `residual_sigma`; `None` where a coordinate has no influence at all.
+    /// Covariance over the coordinates of [`coordinate`], from the noise and from the error of the
+    /// model that the residual betrays; `None` where a coordinate has no influence at all.
     pub covariance: Option<[[f64; 5]; 5]>,
     /// Standard deviation of the residual, for one sample (output unit).
     pub residual_sigma: f64,
-    /// How much less the residuals tell than white ones would: multiply the covariance by it.
-    pub inflation: f64,
     /// Standard deviation of white noise seen in the samples themselves (output unit).
     pub noise_sigma: f64,
     /// Root mean square of the residual bins (output unit).
@@ -122,6 +125,28 @@ pub fn refine<const BINS: usize, const EDGES: usize>(
     Estimator::new(window, period_s)?.run()
 }
 
+/// What the best linear fit at a given process leaves of each bin (output unit): measured less
+/// fitted; zero in a bin that is not fitted. Returns the number of bins.
+///
+/// # Errors
+/// As [`refine`].
+pub fn residuals<const BINS: usize, const EDGES: usize>(
+    window: &Window<BINS, EDGES>,
+    period_s: f64,
+    process: &Process,
+    residuals: &mut [f64; BINS],
+) -> Result<usize, RefineError> {
+    let estimator = Estimator::new(window, period_s)?;
+    let (sum_per_s, ratio) = process.pole_sum();
+    let shape = [log(sum_per_s * period_s), ratio, process.tau_s() / period_s];
+    let fit = estimator.fit(&shape).ok_or(RefineError::NoFit)?;
+    *residuals = fit.residual;
+    for (residual, weight) in residuals.iter_mut().zip(&estimator.weight) {
+        *residual = if *weight > 0.0 { *residual / weight } else { 0.0 };
+    }
+    Ok(window.bins().len())
+}
+
 struct Estimator<'a, const BINS: usize, const EDGES: usize> {
     window: &'a Window<BINS, EDGES>,
     grid: Grid,
@@ -134,7 +159,7 @@ struct Estimator<'a, const BINS: usize, const EDGES: usize> {
     used: usize,
     /// Standard deviation of a sample over that of the acceleration known beforehand.
     acceleration_row: f64,
-    lag_rad: f64,
+    fundamental: Fundamental,
 }
 
 /// The linear fit at one shape.
@@ -172,7 +197,7 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
             rows: window.bins().len() + 1,
             used: 0,
             acceleration_row: 0.0,
-            lag_rad: 0.0,
+            fundamental: Fundamental::of(window, period_s),
         };
         let half_bin_s = 0.5 * (bin_s - window.sample_s());
         for (k, bin) in window.bins().iter().enumerate() {
@@ -189,15 +214,19 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         if estimator.used < FEWEST_BINS {
             return Err(RefineError::TooFewBins(estimator.used));
         }
-        estimator.look_at_fundamental();
+        // A perfect recording leaves rounding of about a millionth.
+        let sigma = window.noise_sigma().max(1e-6 * estimator.fundamental.rms);
+        if estimator.fundamental.acceleration > 0.0 {
+            estimator.acceleration_row = sigma / estimator.fundamental.acceleration;
+        }
         Ok(estimator)
     }
 
     fn run(&self) -> Result<Refined, RefineError> {
-        let mut starts = self.starts();
-        for start in &mut starts {
-            start.1 = self.fit(&start.0).map_or(f64::INFINITY, |fit| fit.cost);
-        }
+        let mut starts = self.fundamental.starts().map(|start| {
+            let cost = self.fit(&start).map_or(f64::INFINITY, |fit| fit.cost);
+            (start, cost)
+        });
         starts.sort_unstable_by(|a, b| a.1.total_cmp(&b.1));
         let mut steps = 0;
         let mut best: Option<(Shape, LinearFit<BINS>)> = None;
@@ -220,72 +249,6 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
     fn cost_of_noise(&self) -> f64 {
         let sigma = self.window.noise_sigma();
         1.25 * sigma * sigma * self.used as f64
-    }
-
-    /// Starts on the surface of processes that have the phase measured at the fundamental:
-    /// damping from none to strong, the remaining lag shared between actuator and delay.
-    fn starts(&self) -> [(Shape, f64); 12] {
-        let omega = TAU / self.period_s;
-        let mut starts = [([0.0; 3], 0.0); 12];
-        for (i, damping) in [0.05, 0.5, 2.0, 5.0].into_iter().enumerate() {
-            for (j, share) in [0.15, 0.5, 0.85].into_iter().enumerate() {
-                let body = damping / self.period_s;
-                // What is left for actuator and delay once the body has taken its part.
-                let rest = (self.lag_rad - FRAC_PI_2 - atan(omega / body)).clamp(0.1, 1.4);
-                let prop = omega / tan(share * rest);
-                let sum = prop + body;
-                let shape = [
-                    log(sum * self.period_s),
-                    prop * body / (sum * sum),
-                    (1.0 - share) * rest / TAU,
-                ];
-                starts[3 * i + j] = (clamp(&shape), 0.0);
-            }
-        }
-        starts
-    }
-
-    /// Takes the lag of the process and the size of its acceleration from the fundamentals of input and
-    /// output.
-    fn look_at_fundamental(&mut self) {
-        let omega = TAU / self.period_s;
-        let start_s = self.window.start_s();
-        let (mut y_cos, mut y_sin, mut y_square) = (0.0, 0.0, 0.0);
-        for bin in self.window.bins() {
-            let mean = bin.output_sum / f64::from(bin.count).max(1.0);
-            let angle = omega * bin.time_sum_s / f64::from(bin.count).max(1.0);
-            y_cos += mean * cos(angle) * self.window.bin_s();
-            y_sin += mean * sin(angle) * self.window.bin_s();
-            y_square += bin.output_sum * mean;
-        }
-        // Integral of u e^(-i w t) over the window, piece by piece.
-        let end_s = self.window.bins().len() as f64 * self.window.bin_s();
-        let (mut u_cos, mut u_sin, mut u_largest) = (0.0, 0.0, 0.0_f64);
-        let edges = self.window.edges();
-        for (k, edge) in edges.iter().enumerate() {
-            let to = edges
-                .get(k + 1)
-                .map_or(end_s, |next| next.time_s - start_s)
-                .clamp(0.0, end_s);
-            let from = (edge.time_s - start_s).clamp(0.0, end_s);
-            u_cos += edge.input * (sin(omega * to) - sin(omega * from)) / omega;
-            u_sin += edge.input * (cos(omega * from) - cos(omega * to)) / omega;
-            u_largest = u_largest.max(edge.input.abs());
-        }
-        let lag = atan2(y_sin, y_cos) - atan2(u_sin, u_cos);
-        let lag = lag - TAU * libm::floor(lag / TAU);
-        // Every process lags by a quarter turn and more; less means a negative gain.
-        self.lag_rad = if lag < FRAC_PI_2 { lag + PI } else { lag };
-        // |G| is less than b / w^2, by less than two; the largest input takes b to the bound.
-        let magnitude = hypot(y_cos, y_sin) / hypot(u_cos, u_sin).max(f64::MIN_POSITIVE);
-        let acceleration = 2.0 * magnitude * omega * omega * u_largest;
-        let samples: u32 = self.window.bins().iter().map(|bin| bin.count).sum();
-        let rms = sqrt(y_square / f64::from(samples));
-        // A perfect recording leaves rounding of about a millionth.
-        let sigma = self.window.noise_sigma().max(1e-6 * rms);
-        if acceleration > 0.0 {
-            self.acceleration_row = sigma / acceleration;
-        }
     }
 
     fn process(&self, shape: &Shape) -> Option<Process> {
@@ -416,9 +379,8 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         Ok(Refined {
             process,
             input_bias: bias_gain / gain,
-            covariance: self.covariance(shape, fit, variance),
+            covariance: self.covariance(shape, fit),
             residual_sigma: sqrt(variance),
-            inflation: self.inflation(&fit.residual, variance),
             noise_sigma: self.window.noise_sigma(),
             residual_rms: sqrt(variance / mean_weight_2),
             edge: domain_edge(shape),
@@ -426,90 +388,41 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         })
     }
 
-    /// Covariance of all unknowns but the initial state, in the coordinates of [`coordinate`].
-    fn covariance(
-        &self,
-        shape: &Shape,
-        fit: &LinearFit<BINS>,
-        variance: f64,
-    ) -> Option<[[f64; 5]; 5]> {
+    /// The derivatives of the fitted model by all unknowns, orthonormalised.
+    fn tangent(&self, shape: &Shape, fit: &LinearFit<BINS>) -> Option<Tangent<BINS>> {
         let mut jacobian = self.jacobian(shape, fit)?;
-        let mut along = [[0.0; LINEAR]; 3];
-        for (column, along) in jacobian.column.iter_mut().zip(&mut along) {
-            *along = fit.basis.project_out(&mut column[..self.rows]);
+        let mut triangle = [[0.0; ALL]; ALL];
+        for (i, row) in fit.triangle.iter().enumerate() {
+            triangle[i][..LINEAR].copy_from_slice(row);
+        }
+        for (j, column) in jacobian.column.iter_mut().enumerate() {
+            let along = fit.basis.project_out(&mut column[..self.rows]);
+            for (i, part) in along.into_iter().enumerate() {
+                triangle[i][LINEAR + j] = part;
+            }
         }
         let inner = jacobian.orthonormalise();
-        // The triangle of bias, gain and shape; the initial state is eliminated before them.
-        let mut triangle = [[0.0; 5]; 5];
-        for i in 0..2 {
-            for j in i..2 {
-                triangle[i][j] = fit.triangle[LINEAR - 2 + i][LINEAR - 2 + j];
-            }
-            for j in 0..3 {
-                triangle[i][2 + j] = along[j][LINEAR - 2 + i];
+        for (i, row) in inner.iter().enumerate() {
+            triangle[LINEAR + i][LINEAR..].copy_from_slice(row);
+        }
+        let mut basis = Columns::zero(self.rows);
+        basis.column[..LINEAR].copy_from_slice(&fit.basis.column);
+        basis.column[LINEAR..].copy_from_slice(&jacobian.column);
+        let bin_rad = TAU * self.window.bin_s() / self.period_s;
+        Some(Tangent { basis, triangle, weight: self.weight, bin_rad })
+    }
+
+    fn covariance(&self, shape: &Shape, fit: &LinearFit<BINS>) -> Option<[[f64; 5]; 5]> {
+        let mut output = [0.0; BINS];
+        for (k, bin) in self.window.bins().iter().enumerate() {
+            if self.weight[k] > 0.0 {
+                output[k] = bin.output_sum / self.weight[k] - fit.residual[k];
             }
         }
-        for i in 0..3 {
-            for j in i..3 {
-                triangle[2 + i][2 + j] = inner[i][j];
-            }
-        }
-        let raw = covariance(&triangle)?;
-        // Linear map from (bias gain, gain, shape) to the coordinates.
         let [.., bias_gain, gain] = fit.coefficients;
-        let mut map = [[0.0; 5]; 5];
-        map[coordinate::LN_POLE_SUM][2] = 1.0;
-        map[coordinate::POLE_RATIO][3] = 1.0;
-        map[coordinate::TAU_S][4] = self.period_s;
-        map[coordinate::LN_GAIN][1] = 1.0 / gain;
-        map[coordinate::INPUT_BIAS][0] = 1.0 / gain;
-        map[coordinate::INPUT_BIAS][1] = -bias_gain / (gain * gain);
-        let mut mapped = [[0.0; 5]; 5];
-        for i in 0..5 {
-            for j in 0..5 {
-                let mut sum = 0.0;
-                for (k, row) in raw.iter().enumerate() {
-                    sum += map[i][k] * (0..5).map(|l| row[l] * map[j][l]).sum::<f64>();
-                }
-                mapped[i][j] = variance * sum;
-            }
-        }
-        Some(mapped)
-    }
-
-    /// How much less the residual tells than white noise of its size would.
-    ///
-    /// What the samples' own white noise does not explain is error of the model. It has few
-    /// degrees of freedom, some harmonics of the oscillation, the same in every cycle, and errs as
-    /// much along the parameters as along each of those: so it counts as that few, the number of
-    /// bins over the sum of the squared autocorrelations (a pure harmonic: two).
-    fn inflation(&self, residual: &[f64; BINS], variance: f64) -> f64 {
-        let noise = self.window.noise_sigma();
-        let unexplained = (1.0 - noise * noise / variance).max(0.0);
-        let bins = &residual[..self.rows - 1];
-        let mut redundancy = 1.0;
-        for lag in 1..bins.len() / 2 {
-            let pairs = (bins.len() - lag) as f64;
-            let correlation = autocorrelation(bins, lag);
-            // White noise alone has a mean square of one over the number of pairs.
-            redundancy +=
-                2.0 * (correlation * correlation - 1.0 / pairs) * pairs / bins.len() as f64;
-        }
-        1.0 + unexplained * (redundancy.max(1.0) - 1.0)
-    }
-}
-
-/// Mean product of values `lag` apart over the mean square; zero where there is nothing to compare.
-fn autocorrelation(values: &[f64], lag: usize) -> f64 {
-    if lag >= values.len() {
-        return 0.0;
-    }
-    let mean_square = dot(values, values) / values.len() as f64;
-    let product = dot(&values[..values.len() - lag], &values[lag..]) / (values.len() - lag) as f64;
-    if mean_square > 0.0 {
-        product / mean_square
-    } else {
-        0.0
+        let map = coordinate_map(bias_gain, gain, self.period_s);
+        let noise_sigma = self.window.noise_sigma();
+        self.tangent(shape, fit)?.covariance(&fit.residual, &output, noise_sigma, &map)
     }
 }
 

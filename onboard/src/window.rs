@@ -204,3 +204,135 @@ impl NoiseMeter {
         libm::sqrt(self.sum_of_squares / (20.0 * differences))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Outputs 0, 1, 4, 9, ... at samples of 1/1024 s from 2 s on: all sums exact in binary.
+    fn squares<const BINS: usize>(samples: usize) -> Window<BINS, 4> {
+        let mut window = Window::new(2.0, 1.0 / 1024.0);
+        for k in 0..samples {
+            window.push_output(2.0 + k as f64 / 1024.0, (k * k) as f64);
+        }
+        window
+    }
+
+    // Sums of the samples of every bin, whatever merging came before: an odd and an even number of
+    // bins, and as many samples as make the last bin whole, begun or single.
+    #[test]
+    fn merging_keeps_every_sum() {
+        fn check<const BINS: usize>(samples: usize) {
+            let window = squares::<BINS>(samples);
+            let per_bin = window.per_bin() as usize;
+            // The least power of two that leaves one bin free.
+            let needed = samples.div_ceil(BINS - 1).next_power_of_two();
+            assert_eq!(per_bin, needed);
+            assert_eq!(window.bins().len(), samples.div_ceil(per_bin));
+            for (index, bin) in window.bins().iter().enumerate() {
+                let members = index * per_bin..samples.min((index + 1) * per_bin);
+                assert_eq!(bin.count as usize, members.len());
+                assert_eq!(bin.output_sum, members.clone().map(|k| (k * k) as f64).sum());
+                assert_eq!(bin.time_sum_s, members.map(|k| k as f64 / 1024.0).sum());
+            }
+        }
+        for samples in [1, 7, 8, 9, 100, 127, 128, 129, 1000] {
+            check::<8>(samples);
+            check::<9>(samples);
+            check::<2>(samples);
+        }
+    }
+
+    // Means over groups of four samples stand for the samples themselves.
+    #[test]
+    fn groups_are_their_samples() {
+        let samples = 256;
+        let mut grouped = Window::<20, 4>::of_groups(2.0, 1.0 / 1024.0, 4);
+        for first in (0..samples).step_by(4) {
+            let mean = (first..first + 4).map(|k| (k * k) as f64).sum::<f64>() / 4.0;
+            grouped.push_output(2.0 + first as f64 / 1024.0, mean);
+        }
+        let single = squares::<20>(samples);
+        assert_eq!(grouped.per_bin(), 16);
+        assert_eq!(grouped.per_bin(), single.per_bin());
+        assert_eq!(grouped.bins().len(), single.bins().len());
+        for (grouped_bin, bin) in grouped.bins().iter().zip(single.bins()) {
+            let output_sum = |window: &Window<20, 4>, bin: &Bin| {
+                bin.output_sum + f64::from(bin.count) * window.first_output()
+            };
+            assert_eq!(grouped_bin.count, bin.count);
+            assert_eq!(output_sum(&grouped, grouped_bin), output_sum(&single, bin));
+            assert_eq!(grouped_bin.time_sum_s, bin.time_sum_s);
+        }
+    }
+
+    #[test]
+    fn a_gap_leaves_its_bins_empty() {
+        let mut window = Window::<16, 4>::new(0.0, 1.0);
+        for k in (0..10).chain(40..60) {
+            window.push_output(f64::from(k), 1.0);
+        }
+        // 60 instants in 15 bins of 4: bins 0 and 1 full, 2 half full, 3..10 empty.
+        let counts = [4, 4, 2, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4];
+        assert_eq!(window.per_bin(), 4);
+        assert!(window.bins().iter().map(|bin| bin.count).eq(counts));
+    }
+
+    #[test]
+    fn outputs_before_the_start_are_ignored() {
+        let mut window = Window::<16, 4>::new(10.0, 0.1);
+        window.push_output(9.9, 7.0);
+        assert!(window.bins().is_empty());
+        window.push_output(10.0, 8.0);
+        assert_eq!(window.bins().len(), 1);
+    }
+
+    #[test]
+    fn only_changes_of_the_input_take_room() {
+        let mut window = Window::<16, 3>::new(0.0, 0.1);
+        for (time_s, input) in [(0.0, 1.0), (0.1, 1.0), (0.2, -1.0), (0.3, -1.0), (0.4, 1.0)] {
+            assert_eq!(window.push_input(time_s, input), Ok(()));
+        }
+        assert_eq!(window.push_input(0.5, 1.0), Ok(()));
+        assert_eq!(window.push_input(0.6, -1.0), Err(WindowError::TooManyEdges(3)));
+        let times_s = [0.0, 0.2, 0.4];
+        assert!(window.edges().iter().map(|edge| edge.time_s).eq(times_s));
+    }
+
+    /// Uniform in -1..1, variance 1/3 (Knuth's MMIX generator, upper bits).
+    fn uniform(state: &mut u64) -> f64 {
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    // Third differences of white noise have the autocovariances 20, -15, 6, -1: the mean of n squares
+    // has a relative variance of (2 (400 + 2 (225 + 36 + 1)) / 400 + kurtosis) / n, the excess kurtosis
+    // of uniform noise -1.2, of a mean of five -0.24; sigma has half that relative error:
+    // 1.05 / sqrt(n), three of which are 1 % here.
+    #[test]
+    fn white_noise_is_measured() {
+        let expected = libm::sqrt(1.0 / 3.0);
+        for group in [1, 5] {
+            let mut window = Window::<64, 4>::of_groups(0.0, 1e-3, group);
+            let mut state = 1;
+            for k in 0..100_000_u32 {
+                let mean = (0..group).map(|_| uniform(&mut state)).sum::<f64>() / f64::from(group);
+                window.push_output(f64::from(k * group) * 1e-3, mean);
+            }
+            let sigma = window.noise_sigma();
+            assert!((sigma / expected - 1.0).abs() < 0.01, "{sigma} against {expected}");
+        }
+    }
+
+    // Third differences of A sin(w t) are A (w dt)^3: at 400 samples a period 3.9e-6 A, over
+    // sqrt(20) and a root mean square of 1/sqrt(2): 6.13e-7 A.
+    #[test]
+    fn a_smooth_oscillation_has_next_to_no_noise() {
+        let mut window = Window::<64, 4>::new(0.0, 1e-3);
+        for k in 0..4000 {
+            let angle = core::f64::consts::TAU * f64::from(k) / 400.0;
+            window.push_output(f64::from(k) * 1e-3, libm::sin(angle));
+        }
+        assert!((window.noise_sigma() - 6.13e-7).abs() < 1e-9, "{}", window.noise_sigma());
+    }
+}

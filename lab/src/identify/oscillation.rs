@@ -3,10 +3,11 @@
 use std::ops::Range;
 
 use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
+use onecycle_onboard::refine::{Refined, residuals};
 use onecycle_onboard::window::Window;
 
 use super::relay_input::RelayInput;
-use super::{Signals, Verdict};
+use super::{FitPoint, Signals, Verdict};
 
 /// Bins and edges of the window: with eight cycles, some 30 to 60 bins a cycle.
 pub(super) type FitWindow = Window<BINS, EDGES>;
@@ -102,6 +103,26 @@ fn longest_run(cycles: &[Cycle]) -> Range<usize> {
         }
     }
     longest
+}
+
+/// Measured and fitted outputs over the bins of the window.
+pub(super) fn fit_points(window: &FitWindow, period_s: f64, refined: &Refined) -> Vec<FitPoint> {
+    let mut residual = [0.0; BINS];
+    if residuals(window, period_s, &refined.process, &mut residual).is_err() {
+        return Vec::new();
+    }
+    let filled = window.bins().iter().zip(&residual).filter(|(bin, _)| bin.count > 0);
+    filled
+        .map(|(bin, residual)| {
+            let count = f64::from(bin.count);
+            let measured = window.first_output() + bin.output_sum / count;
+            FitPoint {
+                time_s: window.start_s() + bin.time_sum_s / count,
+                measured,
+                fitted: measured - residual,
+            }
+        })
+        .collect()
 }
 
 impl Oscillation {

@@ -141,8 +141,7 @@ impl Posterior {
         centre[coordinate::TAU_S] = process.tau_s();
         centre[coordinate::LN_GAIN] = process.k_over_t_body().abs().ln();
         centre[coordinate::INPUT_BIAS] = refined.input_bias;
-        let root = refined.covariance.and_then(|covariance| {
-            let mut covariance = covariance.map(|row| row.map(|value| refined.inflation * value));
+        let root = refined.covariance.and_then(|mut covariance| {
             covariance[coordinate::TAU_S][coordinate::TAU_S] += sample_s * sample_s / 12.0;
             cholesky(&covariance)
         });

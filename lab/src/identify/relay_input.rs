@@ -36,6 +36,18 @@ pub(super) struct RelayInput {
 }
 
 impl RelayInput {
+    /// Means of the low and of the high level over a part of the input (input unit).
+    pub(super) fn means(&self, input: &[f64]) -> (f64, f64) {
+        let mut sums = [(0.0, 0.0); 2];
+        for (&u, high) in input.iter().zip(self.levels(input)) {
+            let (sum, count) = &mut sums[usize::from(high)];
+            *sum += u;
+            *count += 1.0;
+        }
+        let [low, high] = sums.map(|(sum, count)| sum / f64::max(count, 1.0));
+        (low, high)
+    }
+
     /// Whether the relay is high at each point, with hysteresis about the middle of the levels.
     pub(super) fn levels<'a>(&self, input: &'a [f64]) -> impl Iterator<Item = bool> + use<'a> {
         let middle = 0.5 * (self.low + self.high);

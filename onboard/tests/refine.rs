@@ -1,0 +1,268 @@
+//! The estimator on noise-free experiments: what made them comes back.
+
+mod common;
+
+use common::{FitWindow, Simulation, every, last_cycles, run};
+use onecycle_onboard::refine::{DomainEdge, RefineError, Refined, refine};
+use onecycle_onboard::{Process, Relay, RelaySettings};
+
+fn relay() -> Relay {
+    let beta = RelaySettings::DISTINGUISHING_BETA;
+    Relay::new(RelaySettings::new(1.0, beta)).unwrap()
+}
+
+/// Period to expect (s), by the describing function.
+fn scale_s(process: &Process) -> f64 {
+    let (omega, _) = process.describing_function_oscillation(1.0, -0.73).unwrap();
+    std::f64::consts::TAU / omega
+}
+
+/// Sixteen periods of about 400 samples, of which the last `cycles` are fitted.
+fn refined(process: &Process, bias: f64, cycles: usize) -> Refined {
+    let sample_s = scale_s(process) / 400.0;
+    let run = run(process, &mut relay(), bias, every(sample_s, 16 * 400));
+    let (window, period_s) = last_cycles(&run, sample_s, cycles, |_| true);
+    refine(&window, period_s).unwrap()
+}
+
+/// Errors of what the response depends on, relative or in periods of the oscillation: gain over
+/// lag, sum of the poles, their ratio, delay.
+fn errors(found: &Process, process: &Process) -> [f64; 4] {
+    let relative = |a: f64, b: f64| (a / b - 1.0).abs();
+    let ((sum, ratio), (found_sum, found_ratio)) = (process.pole_sum(), found.pole_sum());
+    [
+        relative(found.k_over_t_body() / found.t_prop_s(), process.k_over_t_body() / process.t_prop_s()),
+        relative(found_sum, sum),
+        (found_ratio - ratio).abs(),
+        (found.tau_s() - process.tau_s()).abs() / scale_s(process),
+    ]
+}
+
+#[track_caller]
+fn assert_recovered(found: &Refined, process: &Process, bias: f64, tolerance: f64) {
+    let errors = errors(&found.process, process);
+    let bias_error = (found.input_bias - bias).abs();
+    assert!(
+        errors.iter().all(|error| *error < tolerance) && bias_error < tolerance,
+        "{errors:?}, bias off by {bias_error}: {:?} for {process:?}",
+        found.process
+    );
+    assert_eq!(found.edge, None);
+}
+
+fn new(t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Process {
+    Process::new(1.0, t_prop_s, t_body_s, tau_s).unwrap()
+}
+
+fn undamped(t_prop_s: f64, tau_s: f64) -> Process {
+    Process::from_acceleration_gain(2.0, t_prop_s, 0.0, tau_s).unwrap()
+}
+
+/// The corners of the multirotor domain, and beyond it.
+fn processes() -> [Process; 13] {
+    [
+        new(0.0321, 1.6886, 0.0237),
+        new(0.3, 2.0, 0.1),
+        new(0.3, 2.0, 0.0005),
+        new(0.015, 0.2, 0.1),
+        new(0.015, 0.2, 0.0005),
+        // No delay at all.
+        new(0.1, 0.3, 0.0),
+        // Double integrators with a lag.
+        undamped(0.05, 0.03),
+        undamped(0.05, 0.0),
+        // Equal lags.
+        new(0.2, 0.2, 0.05),
+        new(0.2, 0.2, 0.0),
+        // The actuator slower than the body: the same response as with the lags exchanged.
+        new(0.3, 0.2, 0.05),
+        // A lag of a 200th of the period.
+        new(0.002, 1.0, 0.1),
+        Process::from_acceleration_gain(-7.0, 0.05, 1.0, 0.03).unwrap(),
+    ]
+}
+
+// A perfect recording determines everything. What is left is rounding of the outputs, 1e-16,
+// against what one cycle tells about its least certain direction, the initial state against the
+// damping of a slow process: about 1e-9 of the size of either, and the knowledge of the initial
+// acceleration, a millionth of the output, that stands in the last row.
+#[test]
+fn perfect_recordings_are_recovered() {
+    for process in processes() {
+        for bias in [0.0, 0.2, -0.3] {
+            assert_recovered(&refined(&process, bias, 1), &process, bias, 1e-6);
+            assert_recovered(&refined(&process, bias, 2), &process, bias, 1e-7);
+            assert_recovered(&refined(&process, bias, 4), &process, bias, 1e-7);
+        }
+    }
+}
+
+// Away from equal lags the paper's parameters themselves are as certain.
+#[test]
+fn the_papers_parameters_come_back() {
+    let process = new(0.0321, 1.6886, 0.0237);
+    let found = refined(&process, 0.1, 2).process;
+    for (found, expected) in [
+        (found.k(), 1.0),
+        (found.t_body_s(), 1.6886),
+        (Some(found.t_prop_s()), 0.0321),
+        (Some(found.tau_s()), 0.0237),
+    ] {
+        assert!((found.unwrap() / expected - 1.0).abs() < 1e-8, "{found:?} for {expected}");
+    }
+}
+
+// The lags are equal at ratio 1/4; each is off by the root of the ratio's error. Of lags that are
+// exchanged the faster is called the actuator's, and the acceleration gain goes with it.
+#[test]
+fn lags_are_told_apart_by_their_speed() {
+    let equal = refined(&new(0.2, 0.2, 0.05), 0.0, 2).process;
+    assert!((equal.t_prop_s() / 0.2 - 1.0).abs() < 1e-3);
+    let exchanged = refined(&new(0.3, 0.2, 0.05), 0.0, 2).process;
+    assert!((exchanged.t_prop_s() / 0.2 - 1.0).abs() < 1e-6);
+    assert!((exchanged.k().unwrap() - 1.0).abs() < 1e-6);
+}
+
+// Periods from a millisecond to three hours. Scaled by powers of two, times and outputs are exact
+// multiples, so the estimator's every step is; scales of ten round differently, no more.
+#[test]
+fn time_has_no_scale() {
+    let base = [0.1, 1.3, 0.07];
+    let at = |scale: f64| {
+        let [lag, body, tau] = base.map(|time_s| time_s * scale);
+        let process = new(lag, body, tau);
+        (process, refined(&process, 0.1, 2))
+    };
+    for scale in [1e-3, 1e-2, 0.1, 1.0, 10.0, 1e2, 1e3, 1e4] {
+        let (process, found) = at(scale);
+        assert_recovered(&found, &process, 0.1, 1e-7);
+    }
+}
+
+/// Deterministic numbers in 0..1 (Knuth's MMIX generator, upper bits).
+struct Uniform(u64);
+
+impl Uniform {
+    fn next(&mut self) -> f64 {
+        let Self(state) = self;
+        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (*state >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Worst error over the processes, the sum of the poles left out where the lag is too short to be
+/// seen, of uneven samples: spread of the increments and share of samples lost.
+fn worst_of_uneven_samples(spread: f64, lost: f64, cycles: usize) -> f64 {
+    let mut worst = 0.0_f64;
+    for process in processes() {
+        let sample_s = scale_s(&process) / 400.0;
+        let mut uniform = Uniform(1);
+        let mut time_s = 0.0;
+        let times_s: Vec<f64> = (0..16 * 400)
+            .map(|_| {
+                let now_s = time_s;
+                // Uniform within +/- sqrt(3) standard deviations.
+                time_s += sample_s * (1.0 + spread * 12_f64.sqrt() * (uniform.next() - 0.5));
+                now_s
+            })
+            .collect();
+        let run = run(&process, &mut relay(), 0.1, times_s);
+        let (window, period_s) =
+            last_cycles(&run, sample_s, cycles, |_| uniform.next() >= lost);
+        let found = refine(&window, period_s).unwrap();
+        let [gain, sum, ratio, tau] = errors(&found.process, &process);
+        worst = worst.max(ratio).max(tau).max((found.input_bias - 0.1).abs());
+        if process.t_prop_s() > 0.01 * scale_s(&process) {
+            worst = worst.max(gain).max(sum);
+        }
+    }
+    worst
+}
+
+// Samples are compared with the model at their mean time, by its slope: what is left is of second
+// order, the variance of the times within a bin times half the acceleration, up to 2e-5 of the
+// amplitude here: a lag or a gain comes out a part in a thousand wrong at most.
+#[test]
+fn jittered_and_lost_samples_do_little_harm() {
+    for (spread, lost, most) in [(0.02, 0.0, 1e-3), (0.0, 0.1, 8e-4), (0.02, 0.1, 1.5e-3)] {
+        for cycles in [1, 2, 4] {
+            let worst = worst_of_uneven_samples(spread, lost, cycles);
+            assert!(worst < most, "{spread} {lost} {cycles}: {worst}");
+        }
+    }
+}
+
+#[test]
+fn a_window_without_a_relay_is_no_window() {
+    let mut window = FitWindow::new(0.0, 1e-3);
+    for k in 0..1000 {
+        window.push_output(f64::from(k) * 1e-3, f64::from(k));
+    }
+    assert_eq!(refine(&window, 0.4), Err(RefineError::NoInput));
+    window.push_input(-1.0, 1.0).unwrap();
+    assert_eq!(refine(&window, 0.4), Err(RefineError::NoInput));
+}
+
+// Eight unknowns ask for sixteen bins; 15 samples make 15.
+#[test]
+fn a_short_window_says_how_short() {
+    let mut window = FitWindow::new(0.0, 1e-3);
+    window.push_input(-1.0, 1.0).unwrap();
+    window.push_input(0.005, -1.0).unwrap();
+    for k in 0..15 {
+        assert_eq!(refine(&window, 0.02), Err(RefineError::TooFewBins(k as usize)));
+        window.push_output(f64::from(k) * 1e-3, f64::from(k * k));
+    }
+    window.push_output(0.015, 225.0);
+    assert!(!matches!(refine(&window, 0.02), Err(RefineError::TooFewBins(_))));
+}
+
+/// Two periods of a square wave of one second through the process, in open loop: it need not be one
+/// that a relay would make oscillate at that period.
+fn open_loop(process: &Process) -> Refined {
+    let sample_s = 1.0 / 256.0;
+    let mut simulation = Simulation::new(process);
+    let mut window = FitWindow::new(4.0, sample_s);
+    for k in 0..256 * 6 {
+        let time_s = f64::from(k) * sample_s;
+        let input = if k % 256 < 128 { 1.0 } else { -1.0 };
+        window.push_input(time_s, input).unwrap();
+        if k >= 256 * 4 {
+            window.push_output(time_s, simulation.output());
+        }
+        simulation.hold(input, time_s + sample_s);
+    }
+    refine(&window, 1.0).unwrap()
+}
+
+// The domain, in periods: sum of the poles from 1 to e^6.9 = 992 and delays up to a half. Beyond
+// it the best fit lies on the limit, and says so.
+#[test]
+fn the_limits_of_the_domain_are_named() {
+    // Poles 5/6 and 1/30: their sum is 0.867.
+    assert_eq!(open_loop(&new(1.2, 30.0, 0.02)).edge, Some(DomainEdge::SlowLags));
+    // A pole of 5000.
+    assert_eq!(open_loop(&new(2e-4, 1.0, 0.2)).edge, Some(DomainEdge::FastLag));
+    let late = open_loop(&new(0.05, 1.0, 0.6));
+    assert_eq!(late.edge, Some(DomainEdge::LongDelay));
+    assert!((late.process.tau_s() - 0.5).abs() < 1e-12);
+    // And inside, none.
+    let inside = new(0.1, 1.0, 0.3);
+    let found = open_loop(&inside);
+    assert_eq!(found.edge, None);
+    assert!((found.process.tau_s() - 0.3).abs() < 1e-6, "{found:?}");
+}
+
+// Nonsense in, an outcome out.
+#[test]
+fn a_period_that_is_none_is_no_fit() {
+    let process = new(0.05, 1.0, 0.03);
+    let sample_s = scale_s(&process) / 400.0;
+    let run = run(&process, &mut relay(), 0.0, every(sample_s, 4000));
+    let (window, _) = last_cycles(&run, sample_s, 2, |_| true);
+    for period_s in [f64::NAN, 0.0, f64::INFINITY, -1.0] {
+        if let Ok(found) = refine(&window, period_s) {
+            assert!(found.process.tau_s().is_finite() && found.residual_sigma.is_finite());
+        }
+    }
+}
