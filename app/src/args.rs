@@ -4,9 +4,10 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
+use onecycle_lab::campaign::MOST_CASES;
 use onecycle_lab::identify::MOST_CYCLES;
-use onecycle_link::TimeUnit;
-use onecycle_onboard::{Process, ProcessError, RelaySettings};
+use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
+use onecycle_onboard::{Process, ProcessError};
 
 use crate::failure::Failure;
 
@@ -58,7 +59,7 @@ pub(crate) struct Identify {
           value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
     pub(crate) cycles: u64,
     /// Least phase margin of the controller, in degrees
-    #[arg(long, value_name = "DEG", default_value = "20", value_parser = phase_margin)]
+    #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true, value_parser = phase_margin)]
     pub(crate) phase_margin: f64,
     /// Column of time, by name or by number from 1
     #[arg(long, value_name = "COLUMN")]
@@ -70,7 +71,8 @@ pub(crate) struct Identify {
     #[arg(long, value_name = "COLUMN")]
     pub(crate) output: Option<String>,
     /// Sample rate in hertz, for tables without time
-    #[arg(long, value_name = "HZ", conflicts_with_all = ["time", "time_unit"])]
+    #[arg(long, value_name = "HZ", conflicts_with_all = ["time", "time_unit"],
+          allow_negative_numbers = true, value_parser = sample_rate)]
     pub(crate) sample_rate: Option<f64>,
     /// Unit of the time column, whatever its header says: h, min, s, ms, us or ns
     #[arg(long, value_name = "UNIT", value_parser = time_unit)]
@@ -78,7 +80,7 @@ pub(crate) struct Identify {
 }
 
 /// Parameters of a process `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 pub(crate) struct ProcessArguments {
     /// Velocity gain K: output unit / (input unit s)
     #[arg(
@@ -93,13 +95,13 @@ pub(crate) struct ProcessArguments {
     #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
     k_over_t_body: Option<f64>,
     /// Lag of the actuator, in seconds
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     t_prop: f64,
     /// Lag of the body, in seconds; inf for no damping (then give --k-over-t-body)
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     t_body: f64,
     /// Dead time, in seconds
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     tau: f64,
 }
 
@@ -162,7 +164,7 @@ impl FromStr for Share {
 ///
 /// The process is propagated exactly and the relay is the one of the on-board library. Comments at
 /// the head of the file tell the truth behind it.
-#[derive(Debug, Args)]
+#[derive(Clone, Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle simulate --k 1 --t-prop 0.0321 --t-body 1.6886 --tau 0.0237 --out hover.csv\n",
@@ -173,11 +175,10 @@ pub(crate) struct Simulate {
     #[command(flatten)]
     pub(crate) process: ProcessArguments,
     /// Amplitude h of the relay (input unit)
-    #[arg(long, value_name = "H", default_value_t = 1.0)]
+    #[arg(long, value_name = "H", default_value_t = 1.0, allow_negative_numbers = true)]
     pub(crate) amplitude: f64,
     /// Sine of the phase of the oscillation
-    #[arg(long, value_name = "BETA", default_value_t = f64::from(RelaySettings::DISTINGUISHING_BETA),
-          allow_negative_numbers = true)]
+    #[arg(long, value_name = "BETA", default_value_t = -0.73, allow_negative_numbers = true)]
     pub(crate) beta: f64,
     /// Let the relay keep its centre instead of following the input bias
     #[arg(long)]
@@ -186,19 +187,19 @@ pub(crate) struct Simulate {
     #[arg(long)]
     pub(crate) bare: bool,
     /// Time for which the relay first measures the noise, in seconds
-    #[arg(long, value_name = "S", default_value_t = 0.1)]
+    #[arg(long, value_name = "S", default_value_t = 0.1, allow_negative_numbers = true)]
     pub(crate) preroll: f64,
     /// Constant added to the input and not recorded (input unit, or % of the relay's amplitude)
     #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) bias: Share,
     /// Standard deviation of the measurement noise (output unit, or % of the noise-free amplitude)
-    #[arg(long, default_value = "0")]
+    #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) noise: Share,
     /// Resolution of the sensor (output unit, or % of the noise-free amplitude)
-    #[arg(long, default_value = "0")]
+    #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) quantum: Share,
     /// Standard deviation of the sample period (s, or % of it)
-    #[arg(long, default_value = "0")]
+    #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) jitter: Share,
     /// Output at the start (output unit, or % of the noise-free amplitude)
     #[arg(long, default_value = "0", allow_hyphen_values = true)]
@@ -212,10 +213,10 @@ pub(crate) struct Simulate {
     )]
     pub(crate) reference: f64,
     /// Sample rate, in hertz
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0)]
+    #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
     pub(crate) sample_rate: f64,
     /// Duration, in seconds [default: 20 periods]
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) duration: Option<f64>,
     /// Seed of noise and jitter: the same seed gives the same bits
     #[arg(long, default_value_t = 0)]
@@ -236,7 +237,7 @@ pub(crate) struct Tune {
     #[command(flatten)]
     pub(crate) process: ProcessArguments,
     /// Least phase margin of the controller, in degrees
-    #[arg(long, value_name = "DEG", default_value = "20", value_parser = phase_margin)]
+    #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true, value_parser = phase_margin)]
     pub(crate) phase_margin: f64,
     /// Print the result as JSON
     #[arg(long)]
@@ -248,8 +249,8 @@ pub(crate) struct Tune {
 pub(crate) struct Campaign {
     /// The campaign
     pub(crate) file: PathBuf,
-    /// Run this many cases instead of the file's number
-    #[arg(long, value_name = "N")]
+    /// Run this many cases instead of the file's number, up to ten million
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_CASES))]
     pub(crate) cases: Option<u64>,
 }
 
@@ -258,6 +259,14 @@ fn phase_margin(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(degrees) if degrees > 0.0 && degrees < 90.0 => Ok(degrees.to_radians()),
         _ => Err("a phase margin lies between 0 and 90 degrees".to_owned()),
+    }
+}
+
+/// A sample rate in hertz, within what a recording can have.
+fn sample_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate_hz) if SAMPLE_RATES_HZ.contains(&rate_hz) => Ok(rate_hz),
+        _ => Err("a sample rate lies between 1e-6 and 1e9 Hz".to_owned()),
     }
 }
 

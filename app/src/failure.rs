@@ -4,6 +4,8 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use onecycle_link::ReadError;
+
 /// Exit codes, as `--help` lists them.
 pub(crate) mod exit {
     /// A process was identified.
@@ -25,11 +27,11 @@ pub(crate) enum Failure {
     #[error("{0}")]
     Usage(String),
     /// A recording that cannot be read.
-    #[error("{file}: {reason}", file = path.display())]
+    #[error("{}{reason}", located(path, reason))]
     Recording {
         path: PathBuf,
         #[source]
-        reason: Box<onecycle_link::ReadError>,
+        reason: Box<ReadError>,
     },
     /// A settings file that cannot be read.
     #[error("{file}: {reason}", file = path.display())]
@@ -43,7 +45,16 @@ pub(crate) enum Failure {
     },
 }
 
+/// The file, unless the reason names it itself.
+fn located(path: &Path, reason: &ReadError) -> String {
+    match reason {
+        ReadError::Open { .. } => String::new(),
+        _ => format!("{}: ", path.display()),
+    }
+}
+
 impl Failure {
+    #[expect(clippy::needless_pass_by_value, reason = "map_err hands errors over by value")]
     pub(crate) fn usage(reason: impl ToString) -> Self {
         Self::Usage(reason.to_string())
     }

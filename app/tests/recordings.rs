@@ -1,5 +1,5 @@
 //! The recordings of `examples/` against the truth beside each. Prints the README's table:
-//! `cargo test --release -p onecycle --test recordings -- --nocapture`.
+//! `cargo test -p onecycle --test recordings -- --nocapture`.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -14,10 +14,18 @@ struct Tolerance {
 }
 
 /// The project's target for recordings of simulators that others wrote.
-const TARGET: Tolerance = Tolerance { gain: 0.03, t_prop: 0.15, tau_s: 0.002 };
+const TARGET: Tolerance = Tolerance {
+    gain: 0.03,
+    t_prop: 0.15,
+    tau_s: 0.002,
+};
 /// JSBSim's brushless motor is no first-order lag, and its truth is a 63 % time of it and the delay
 /// that was added on top of the simulator's own frames: up to 4 % and 3 ms beyond the label.
-const JSBSIM: Tolerance = Tolerance { gain: 0.045, t_prop: 0.15, tau_s: 0.0035 };
+const JSBSIM: Tolerance = Tolerance {
+    gain: 0.045,
+    t_prop: 0.15,
+    tau_s: 0.0035,
+};
 
 const RECORDINGS: [(&str, &Tolerance); 8] = [
     ("rotorpy_sih_alt_clean", &TARGET),
@@ -31,7 +39,9 @@ const RECORDINGS: [(&str, &Tolerance); 8] = [
 ];
 
 fn example(name: &str, ending: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples").join(format!("{name}.{ending}"))
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../examples")
+        .join(format!("{name}.{ending}"))
 }
 
 fn identify(name: &str) -> (Option<i32>, Value) {
@@ -41,7 +51,10 @@ fn identify(name: &str) -> (Option<i32>, Value) {
         .arg("--json")
         .output()
         .unwrap();
-    (output.status.code(), serde_json::from_slice(&output.stdout).unwrap())
+    (
+        output.status.code(),
+        serde_json::from_slice(&output.stdout).unwrap(),
+    )
 }
 
 fn truth(name: &str) -> Value {
@@ -51,7 +64,8 @@ fn truth(name: &str) -> Value {
 /// Estimate, and whether its interval holds the truth.
 fn read(report: &Value, parameter: &str, truth: f64) -> (f64, bool) {
     let of = |end: &str| report["process"][parameter][end].as_f64();
-    let holds = of("low").is_none_or(|low| low <= truth) && of("high").is_none_or(|high| truth <= high);
+    let holds =
+        of("low").is_none_or(|low| low <= truth) && of("high").is_none_or(|high| truth <= high);
     (of("estimate").unwrap_or(f64::INFINITY), holds)
 }
 
@@ -83,9 +97,18 @@ fn recordings_of_other_simulators_give_their_truth() {
             mark(tau_held),
         );
         asked += 3;
-        held += [gain_held, t_prop_held, tau_held].into_iter().filter(|&held| held).count();
-        assert!((found_gain / gain - 1.0).abs() <= tolerance.gain, "{name}: gain {found_gain}");
-        assert!((found_t_prop / t_prop - 1.0).abs() <= tolerance.t_prop, "{name}: {found_t_prop}");
+        held += [gain_held, t_prop_held, tau_held]
+            .into_iter()
+            .filter(|&held| held)
+            .count();
+        assert!(
+            (found_gain / gain - 1.0).abs() <= tolerance.gain,
+            "{name}: gain {found_gain}"
+        );
+        assert!(
+            (found_t_prop / t_prop - 1.0).abs() <= tolerance.t_prop,
+            "{name}: {found_t_prop}"
+        );
         let most_s = tolerance.tau_s.max(0.1 * tau);
         assert!((found_tau - tau).abs() <= most_s, "{name}: tau {found_tau}");
         // No damping in any of these: the truth is infinite.
@@ -117,6 +140,10 @@ fn the_simulated_recording_gives_the_truth_in_its_head() {
         ("tau_s", 0.0237),
         ("input_bias", 0.3),
     ] {
-        assert!(read(&report, parameter, truth).1, "{parameter}: {}", report["process"][parameter]);
+        assert!(
+            read(&report, parameter, truth).1,
+            "{parameter}: {}",
+            report["process"][parameter]
+        );
     }
 }

@@ -28,7 +28,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             sample_period_s: 1e-3,
             breaks: &[],
         },
-        &Options { cycles: 3, ..Options::default() },
+        &Options {
+            cycles: 3,
+            ..Options::default()
+        },
     );
     let root = SVGBackend::new(OUT, SIZE).into_drawing_area();
     root.fill(&WHITE)?;
@@ -59,27 +62,50 @@ fn draw_cycle(
     trace: &Trace,
     found: &Identification,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let fit: &[FitPoint] = found.outcome.as_ref().map_or(&[], |identified| &identified.fit);
-    let (Some(first), Some(last)) = (fit.first(), fit.last()) else { return Ok(()) };
-    let period_s = found.oscillation.map_or(0.0, |oscillation| oscillation.period_s);
+    let fit: &[FitPoint] = found
+        .outcome
+        .as_ref()
+        .map_or(&[], |identified| &identified.fit);
+    let (Some(first), Some(last)) = (fit.first(), fit.last()) else {
+        return Ok(());
+    };
+    let period_s = found
+        .oscillation
+        .map_or(0.0, |oscillation| oscillation.period_s);
     let times = first.time_s - period_s..last.time_s + 0.25 * period_s;
     let inside = |t: &f64| times.contains(t);
     let mut chart = ChartBuilder::on(area)
-        .caption("A relay test, and the process fitted to three of its cycles", ("sans-serif", 17))
+        .caption(
+            "A relay test, and the process fitted to three of its cycles",
+            ("sans-serif", 17),
+        )
         .margin(10)
         .x_label_area_size(34)
         .y_label_area_size(16)
         .build_cartesian_2d(times.clone(), -7.6..5.2)?;
-    chart.configure_mesh().disable_mesh().x_desc("time (s)").y_labels(0).draw()?;
-    let measured = trace.time_s.iter().zip(&trace.output).filter(|(t, _)| inside(t)).step_by(2);
-    chart.draw_series(
-        measured.map(|(&t, &y)| Circle::new((t, 1e3 * y), 1.5, MEASURED.filled())),
-    )?;
+    chart
+        .configure_mesh()
+        .disable_mesh()
+        .x_desc("time (s)")
+        .y_labels(0)
+        .draw()?;
+    let measured = trace
+        .time_s
+        .iter()
+        .zip(&trace.output)
+        .filter(|(t, _)| inside(t))
+        .step_by(2);
+    chart
+        .draw_series(measured.map(|(&t, &y)| Circle::new((t, 1e3 * y), 1.5, MEASURED.filled())))?;
     chart.draw_series(LineSeries::new(
         fit.iter().map(|point| (point.time_s, 1e3 * point.fitted)),
         FITTED.stroke_width(2),
     ))?;
-    let relay = trace.time_s.iter().zip(&trace.input).filter(|(t, _)| inside(t));
+    let relay = trace
+        .time_s
+        .iter()
+        .zip(&trace.input)
+        .filter(|(t, _)| inside(t));
     chart.draw_series(LineSeries::new(
         relay.map(|(&t, &u)| (t, -5.9 + u)),
         RELAY.stroke_width(2),
@@ -95,21 +121,35 @@ fn draw_cycle(
     Ok(())
 }
 
-fn draw_step(
-    area: &Area<'_>,
-    found: &Identification,
-) -> Result<(), Box<dyn std::error::Error>> {
-    let Ok(identified) = &found.outcome else { return Ok(()) };
+fn draw_step(area: &Area<'_>, found: &Identification) -> Result<(), Box<dyn std::error::Error>> {
+    let Ok(identified) = &found.outcome else {
+        return Ok(());
+    };
     let response = step_response(&identified.refined.process, identified.optimum.pd)?;
     let mut chart = ChartBuilder::on(area)
-        .caption("The step its optimal controller will give", ("sans-serif", 17))
+        .caption(
+            "The step its optimal controller will give",
+            ("sans-serif", 17),
+        )
         .margin(10)
         .x_label_area_size(34)
         .y_label_area_size(30)
         .build_cartesian_2d(0.0..0.8, 0.0..1.25)?;
-    chart.configure_mesh().disable_mesh().x_desc("time (s)").x_labels(5).y_labels(6).draw()?;
-    chart.draw_series(LineSeries::new([(0.0, 1.0), (0.8, 1.0)], MEASURED.stroke_width(1)))?;
-    let points = response.samples.iter().take_while(|sample| sample.t_s <= 0.8);
+    chart
+        .configure_mesh()
+        .disable_mesh()
+        .x_desc("time (s)")
+        .x_labels(5)
+        .y_labels(6)
+        .draw()?;
+    chart.draw_series(LineSeries::new(
+        [(0.0, 1.0), (0.8, 1.0)],
+        MEASURED.stroke_width(1),
+    ))?;
+    let points = response
+        .samples
+        .iter()
+        .take_while(|sample| sample.t_s <= 0.8);
     chart.draw_series(LineSeries::new(
         points.map(|sample| (sample.t_s, sample.y)),
         FITTED.stroke_width(2),
@@ -117,7 +157,11 @@ fn draw_step(
     let process = &identified.refined.process;
     let pd = identified.optimum.pd;
     for (row, text) in [
-        format!("T_prop {:.1} ms, tau {:.1} ms", 1e3 * process.t_prop_s(), 1e3 * process.tau_s()),
+        format!(
+            "T_prop {:.1} ms, tau {:.1} ms",
+            1e3 * process.t_prop_s(),
+            1e3 * process.tau_s()
+        ),
         format!("K/T_body {:.3}", process.k_over_t_body()),
         format!("Kp {:.1}, Kd {:.1}", pd.kp, pd.kd),
     ]
@@ -125,7 +169,11 @@ fn draw_step(
     .enumerate()
     {
         let style = ("sans-serif", 14).into_font().color(&BLACK);
-        chart.draw_series(std::iter::once(Text::new(text, (0.33, 0.5 - 0.1 * row as f64), style)))?;
+        chart.draw_series(std::iter::once(Text::new(
+            text,
+            (0.33, 0.5 - 0.1 * row as f64),
+            style,
+        )))?;
     }
     Ok(())
 }

@@ -12,7 +12,7 @@ use onecycle_plant::{Experiment, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::identify::{Identification, Options, Signals, identify};
+use crate::identify::{Identification, MOST_CYCLES, Options, Signals, identify};
 use crate::optimum::pd_at_phase_margin;
 use crate::{Deterioration, deterioration};
 
@@ -44,6 +44,18 @@ pub struct Campaign {
     /// Cycles to fit.
     #[serde(default = "one")]
     pub cycles: usize,
+}
+
+/// Most cases of a campaign: a day's work.
+pub const MOST_CASES: u64 = 10_000_000;
+
+/// A field of a campaign that is out of its range.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error("{field} must be {range}, but is {value}")]
+pub struct FieldError {
+    field: &'static str,
+    range: &'static str,
+    value: f64,
 }
 
 fn one() -> usize {
@@ -98,6 +110,25 @@ pub enum CaseError {
 }
 
 impl Campaign {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field that is out of its range.
+    pub fn validate(&self) -> Result<(), FieldError> {
+        for (field, range, value, is_right) in [
+            ("cases", "1 to 10,000,000", self.cases as f64, (1..=MOST_CASES).contains(&self.cases)),
+            ("bias", "0 to 100", self.bias, (0.0..=100.0).contains(&self.bias)),
+            ("sigma", "0 to 100", self.sigma, (0.0..=100.0).contains(&self.sigma)),
+            ("offset", "-1e6 to 1e6", self.offset, (-1e6..=1e6).contains(&self.offset)),
+            ("cycles", "1 to 50", self.cycles as f64, (1..=MOST_CYCLES).contains(&self.cycles)),
+        ] {
+            if !is_right {
+                return Err(FieldError { field, range, value });
+            }
+        }
+        Ok(())
+    }
+
     /// Case number `n`.
     ///
     /// # Errors

@@ -137,23 +137,51 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
         remarks: vec![],
     };
     found.outcome = find_relay(signals).and_then(|relay| {
-        let oscillation = oscillation::find(signals, &relay, options.cycles.clamp(1, MOST_CYCLES))?;
-        let window = oscillation.window(signals, &relay);
-        found.oscillation = Some(describe(signals, &oscillation, &relay, &window));
-        if let Some(part) = saturation::flat_part(
-            &signals.output[oscillation.points(signals)],
-            oscillation.cycles.len(),
-        ) {
-            return Err(Verdict::Saturated { part });
+        let most = options.cycles.clamp(1, MOST_CYCLES);
+        let mut refusal = None;
+        for oscillation in oscillation::candidates(signals, &relay, most)? {
+            let (described, outcome) = attempt(signals, &relay, &oscillation, options);
+            match outcome {
+                Ok(identified) => {
+                    found.oscillation = Some(described);
+                    if let Some(Verdict::NotThisProcess { misfit }) = refusal {
+                        found.remarks.push(Remark::Disturbed(misfit));
+                    }
+                    return Ok(identified);
+                }
+                Err(verdict) => {
+                    found.oscillation.get_or_insert(described);
+                    refusal.get_or_insert(verdict);
+                }
+            }
         }
-        let refined = refine(&window, oscillation.period_s).map_err(|error| match error {
-            RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
-            RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
-        })?;
-        design(&refined, &window, oscillation.period_s, options)
+        Err(refusal.unwrap_or(Verdict::NoFit))
     });
-    found.remarks = remark::remarks(&found, options);
+    let remarks = remark::remarks(&found, options);
+    found.remarks.extend(remarks);
     found
+}
+
+/// Fits and judges one stretch of the recording.
+fn attempt(
+    signals: &Signals<'_>,
+    relay: &RelayInput,
+    oscillation: &Oscillation,
+    options: &Options,
+) -> (OscillationFound, Result<Identified, Verdict>) {
+    let window = oscillation.window(signals, relay);
+    let described = describe(signals, oscillation, relay, &window);
+    let output = &signals.output[oscillation.points(signals)];
+    let outcome = match saturation::flat_part(output, oscillation.cycles.len()) {
+        Some(part) => Err(Verdict::Saturated { part }),
+        None => refine(&window, oscillation.period_s)
+            .map_err(|error| match error {
+                RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
+                RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
+            })
+            .and_then(|refined| design(&refined, &window, oscillation.period_s, options)),
+    };
+    (described, outcome)
 }
 
 fn find_relay(signals: &Signals<'_>) -> Result<RelayInput, Verdict> {
@@ -195,6 +223,9 @@ fn describe(
 
 /// Part of the oscillation that a process of this kind never leaves unexplained.
 const MOST_MISFIT: f64 = 0.05;
+/// Relative error of the response that turns it by the paper's phase margin of 20 degrees: a model
+/// so wrong promises nothing.
+const MOST_RESPONSE_ERROR: f64 = 0.34;
 
 fn design(
     refined: &Refined,
@@ -203,7 +234,7 @@ fn design(
     options: &Options,
 ) -> Result<Identified, Verdict> {
     let misfit = misfit(refined, window);
-    if misfit > MOST_MISFIT {
+    if misfit > MOST_MISFIT || refined.response_error > MOST_RESPONSE_ERROR {
         return Err(Verdict::NotThisProcess { misfit });
     }
     if let Some(edge) = refined.edge {
@@ -212,10 +243,18 @@ fn design(
     let optimum = pd(&refined.process, options.phase_margin_rad)
         .map_err(|error| Verdict::NoController(error.to_string()))?;
     let posterior = Posterior::new(refined, window.sample_s());
+    let phase_margin_rad = posterior.phase_margin_rad(optimum.pd);
+    if phase_margin_rad.low.is_none_or(|low| low <= 0.0) {
+        return Err(if refined.response_error > 0.0 {
+            Verdict::NotThisProcess { misfit }
+        } else {
+            Verdict::TooUncertain
+        });
+    }
     Ok(Identified {
         refined: *refined,
         process: posterior.process(),
-        phase_margin_rad: posterior.phase_margin_rad(optimum.pd),
+        phase_margin_rad,
         optimum,
         step: step_response(&refined.process, optimum.pd)
             .ok()

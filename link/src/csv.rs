@@ -45,7 +45,7 @@ pub use names::TimeUnit;
 pub use write::write_csv;
 
 /// Slowest and fastest sample rate that a caller may give, in hertz.
-const SAMPLE_RATES_HZ: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
+pub const SAMPLE_RATES_HZ: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
 
 /// What the caller knows of a file; by default nothing.
 #[derive(Debug, Clone, PartialEq)]

@@ -105,6 +105,17 @@ pub struct Columns {
     pub output: Column,
 }
 
+impl Columns {
+    /// The column of a signal.
+    pub fn of(&self, role: Role) -> &Column {
+        match role {
+            Role::Time => &self.time,
+            Role::Input => &self.input,
+            Role::Output => &self.output,
+        }
+    }
+}
+
 /// A stretch without samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gap {

@@ -220,18 +220,18 @@ fn columns_that_are_not_there() {
     );
     assert_plainly_refused(
         "a,b,c\n0,0,0\n1,1,1\n",
-        &["the time", "`time_column`", "\"c\" (column 3)"],
+        &["the time", "--time", "\"c\" (column 3)"],
     );
     assert_plainly_refused(
         "t,a,b,u\n0,0,0,1\n1,1,1,1\n",
-        &["the output", "`output_column`"],
+        &["the output", "--output"],
     );
     assert_plainly_refused(
         "t,pv,a,b\n0,0,0,1\n1,1,1,1\n",
-        &["the input", "`input_column`"],
+        &["the input", "--input"],
     );
-    assert_plainly_refused("pv,u\n0,0\n1,1\n", &["the time", "`sample_rate_hz`"]);
-    assert_plainly_refused("0,1\n1,1\n2,-1\n", &["the time", "`sample_rate_hz`"]);
+    assert_plainly_refused("pv,u\n0,0\n1,1\n", &["the time", "--sample-rate"]);
+    assert_plainly_refused("0,1\n1,1\n2,-1\n", &["the time", "--sample-rate"]);
 }
 
 #[test]
@@ -239,16 +239,16 @@ fn columns_that_may_be_either() {
     let parts = [
         "\"y\" (column 2), \"pv\" (column 3)",
         "the output",
-        "`output_column`",
+        "--output",
     ];
     assert_plainly_refused("t,y,pv,u\n0,0,0,1\n1,1,1,1\n", &parts);
     assert_plainly_refused(
         "t,time,pv,u\n0,0,0,1\n1,1,1,1\n",
-        &["the time", "`time_column`"],
+        &["the time", "--time"],
     );
     let parts = [
         "column 2 and column 3",
-        "`input_column` and `output_column`",
+        "--input and --output",
     ];
     assert_plainly_refused("0,0,0\n0.1,1,1\n0.2,0,1\n", &parts);
 }

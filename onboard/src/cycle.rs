@@ -93,8 +93,9 @@ impl CycleDetector {
 }
 
 /// How far a cycle's period and amplitude may lie from the mean of the run it belongs to. Noise of
-/// 5 % of the amplitude moves them by up to 15 %; a relay that has not settled, or a gust, by more.
-const ALIKE: f64 = 0.2;
+/// 5 % of the amplitude moves them by up to 15 % under this relay and by twice that under one without
+/// its protection; a relay that has not settled, or a gust, by more.
+const ALIKE: f64 = 0.3;
 
 /// A run of consecutive cycles that are alike: the judgement of a steady oscillation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -160,7 +161,11 @@ mod tests {
     /// High for 24 of 64 samples; the output a triangle from -1 to 3.
     fn square(k: usize) -> (bool, f64) {
         let phase = k % 64;
-        let triangle = if phase < 32 { phase as f64 } else { 64.0 - phase as f64 };
+        let triangle = if phase < 32 {
+            phase as f64
+        } else {
+            64.0 - phase as f64
+        };
         (phase < 24, triangle / 8.0 - 1.0)
     }
 
@@ -204,7 +209,13 @@ mod tests {
     }
 
     fn cycle(start_s: f64, period_s: f64, amplitude: f64) -> Cycle {
-        Cycle { start_s, period_s, duty: 0.5, amplitude, centre: 0.0 }
+        Cycle {
+            start_s,
+            period_s,
+            duty: 0.5,
+            amplitude,
+            centre: 0.0,
+        }
     }
 
     // 1, 1.1, 1.2 are within a fifth of the running means 1 and 1.05; 1.4 is not within a fifth of

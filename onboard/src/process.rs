@@ -191,9 +191,9 @@ impl Process {
         for _ in 0..64 {
             let middle = 0.5 * (low + high);
             if self.phase_rad(exp(middle)) > phase_rad {
-                low = middle
+                low = middle;
             } else {
-                high = middle
+                high = middle;
             }
         }
         Some(exp(0.5 * (low + high)))

@@ -6,7 +6,7 @@
 //! y(t) = b g(t) + b u0 s(t) + y0 + v0 r(t) + w0 q(t)
 //! ```
 //!
-//! with `b = K/T_body`, `g` the response to the recorded input, `s` to a constant one (the unknown
+//! with `b` the gain, `g` the response to the recorded input, `s` to a constant one (the unknown
 //! input bias `u0`), and `r`, `q` to the unknown initial rate and acceleration. So a search over three
 //! unknowns (Levenberg-Marquardt, box-constrained) with the five linear ones solved inside it:
 //! Golub and Pereyra (1973), with Kaufman's (1975) Jacobian.
@@ -55,8 +55,9 @@ pub mod coordinate {
     pub const POLE_RATIO: usize = 1;
     /// Delay (s).
     pub const TAU_S: usize = 2;
-    /// Logarithm of the size of the acceleration gain `K/T_body`.
-    pub const LN_GAIN: usize = 3;
+    /// Logarithm of the size of `K/(T_body T_prop)`: unlike `K/T_body`, the same whichever lag comes
+    /// first, so regular where they meet.
+    pub const LN_JERK_GAIN: usize = 3;
     /// Input bias (input unit).
     pub const INPUT_BIAS: usize = 4;
 }
@@ -82,6 +83,9 @@ pub struct Refined {
     /// Covariance over the coordinates of [`coordinate`], from the noise and from the error of the
     /// model that the residual betrays; `None` where a coordinate has no influence at all.
     pub covariance: Option<[[f64; 5]; 5]>,
+    /// Relative error of the response at the harmonics of the oscillation that the residual betrays;
+    /// zero where noise explains it.
+    pub response_error: f64,
     /// Standard deviation of the residual, for one sample (output unit).
     pub residual_sigma: f64,
     /// Standard deviation of white noise seen in the samples themselves (output unit).
@@ -142,7 +146,11 @@ pub fn residuals<const BINS: usize, const EDGES: usize>(
     let fit = estimator.fit(&shape).ok_or(RefineError::NoFit)?;
     *residuals = fit.residual;
     for (residual, weight) in residuals.iter_mut().zip(&estimator.weight) {
-        *residual = if *weight > 0.0 { *residual / weight } else { 0.0 };
+        *residual = if *weight > 0.0 {
+            *residual / weight
+        } else {
+            0.0
+        };
     }
     Ok(window.bins().len())
 }
@@ -261,12 +269,15 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
     fn model(&self, response: &Response<'_>, of: &[f64; LINEAR], rows: &mut [f64; BINS]) {
         let bins = self.rows - 1;
         let [y, v, w, constant, recorded] = *of;
-        // The acceleration, unlike the force, is a state whichever of the lags comes first.
-        let f = w + response.process().inv_t_body_per_s() * v;
+        let process = response.process();
+        // The acceleration, unlike the force, is a state whichever of the lags comes first, as
+        // K/(T_body T_prop), unlike K/T_body, is a gain.
+        let f = w + process.inv_t_body_per_s() * v;
+        let unit = process.t_prop_s();
         let drive = Drive {
             initial: State { y, v, f },
-            constant,
-            recorded,
+            constant: unit * constant,
+            recorded: unit * recorded,
         };
         response.means(&drive, &self.offset_s[..bins], &mut rows[..bins]);
         for (mean, weight) in rows.iter_mut().zip(&self.weight) {
@@ -371,15 +382,17 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let [.., bias_gain, gain] = fit.coefficients;
         let process = self
             .process(shape)
-            .and_then(|unit| unit.with_gain_scaled(gain).ok())
+            .and_then(|unit| unit.with_gain_scaled(gain * unit.t_prop_s()).ok())
             .ok_or(RefineError::NoFit)?;
         let freedom = (self.used - ALL) as f64;
         let variance = fit.cost / freedom;
         let mean_weight_2 = self.weight.iter().map(|w| w * w).sum::<f64>() / self.used as f64;
+        let uncertainty = self.covariance(shape, fit);
         Ok(Refined {
             process,
             input_bias: bias_gain / gain,
-            covariance: self.covariance(shape, fit),
+            covariance: uncertainty.map(|(covariance, _)| covariance),
+            response_error: uncertainty.map_or(0.0, |(_, error)| error),
             residual_sigma: sqrt(variance),
             noise_sigma: self.window.noise_sigma(),
             residual_rms: sqrt(variance / mean_weight_2),
@@ -409,10 +422,16 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         basis.column[..LINEAR].copy_from_slice(&fit.basis.column);
         basis.column[LINEAR..].copy_from_slice(&jacobian.column);
         let bin_rad = TAU * self.window.bin_s() / self.period_s;
-        Some(Tangent { basis, triangle, weight: self.weight, bin_rad })
+        Some(Tangent {
+            basis,
+            triangle,
+            weight: self.weight,
+            bin_rad,
+        })
     }
 
-    fn covariance(&self, shape: &Shape, fit: &LinearFit<BINS>) -> Option<[[f64; 5]; 5]> {
+    /// Covariance of the coordinates, and relative error of the response.
+    fn covariance(&self, shape: &Shape, fit: &LinearFit<BINS>) -> Option<([[f64; 5]; 5], f64)> {
         let mut output = [0.0; BINS];
         for (k, bin) in self.window.bins().iter().enumerate() {
             if self.weight[k] > 0.0 {
@@ -422,7 +441,8 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let [.., bias_gain, gain] = fit.coefficients;
         let map = coordinate_map(bias_gain, gain, self.period_s);
         let noise_sigma = self.window.noise_sigma();
-        self.tangent(shape, fit)?.covariance(&fit.residual, &output, noise_sigma, &map)
+        self.tangent(shape, fit)?
+            .covariance(&fit.residual, &output, noise_sigma, &map)
     }
 }
 
@@ -492,12 +512,16 @@ fn clamp(shape: &Shape) -> Shape {
 }
 
 fn domain_edge(shape: &Shape) -> Option<DomainEdge> {
-    if shape[0] <= LOWEST[0] {
-        Some(DomainEdge::SlowLags)
-    } else if shape[0] >= HIGHEST[0] {
-        Some(DomainEdge::FastLag)
-    } else if shape[2] >= HIGHEST[2] {
+    // The search stops short of a limit that it creeps up to.
+    let near = |index: usize, limit: f64| {
+        (shape[index] - limit).abs() < 1e-3 * (HIGHEST[index] - LOWEST[index])
+    };
+    if near(2, HIGHEST[2]) {
         Some(DomainEdge::LongDelay)
+    } else if near(0, LOWEST[0]) {
+        Some(DomainEdge::SlowLags)
+    } else if near(0, HIGHEST[0]) {
+        Some(DomainEdge::FastLag)
     } else {
         None
     }

@@ -285,7 +285,9 @@ impl Relay {
     }
 
     fn preroll(&mut self, error: f32, dt_s: f32) -> f32 {
-        self.noise.push(error);
+        if error.is_finite() {
+            self.noise.push(error);
+        }
         self.preroll_left_s -= dt_s;
         if self.preroll_left_s <= 0.0 {
             self.noise_sigma = self.noise.sigma().max(self.settings.noise_sigma);
@@ -296,7 +298,7 @@ impl Relay {
     }
 
     fn kick(&mut self, error: f32) {
-        if error.abs() > CLEAR_OF_NOISE_SIGMA * self.noise_sigma {
+        if error.is_finite() && error.abs() > CLEAR_OF_NOISE_SIGMA * self.noise_sigma {
             self.sign = if error > 0.0 { 1.0 } else { -1.0 };
             self.smoothed = error;
             self.excursion.peak = error.abs();
@@ -307,7 +309,10 @@ impl Relay {
     }
 
     fn follow(&mut self, error: f32, dt_s: f32) {
-        self.smoothed += self.smoothing_gain * (error - self.smoothed);
+        // A sample that is no number, or no finite one, tells nothing: only time goes on.
+        if error.is_finite() {
+            self.smoothed += self.smoothing_gain * (error - self.smoothed);
+        }
         let (signed, half_period_s) = (self.signed(), self.half_period_s());
         let excursion = &mut self.excursion;
         excursion.elapsed_s += dt_s;
@@ -372,8 +377,8 @@ impl Relay {
         if self.from_rest || self.switches >= plain + ramp {
             self.settings.beta
         } else {
-            let done = self.switches.saturating_sub(plain);
-            self.settings.beta * done as f32 / (ramp + 1) as f32
+            let Some(done) = self.switches.checked_sub(plain) else { return 0.0 };
+            self.settings.beta * (done + 1) as f32 / (ramp + 1) as f32
         }
     }
 
@@ -456,7 +461,7 @@ impl Relay {
     /// First-order smoothing with the variance and the mean delay of an average of `n` samples.
     fn set_smoothing(&mut self, dt_s: f32) {
         let span_s = self.settings.smoothing * self.half_period_s();
-        let n = (span_s / dt_s).max(1.0);
+        let n = if dt_s > 0.0 { (span_s / dt_s).max(1.0) } else { 1.0 };
         self.smoothing_gain = 2.0 / (n + 1.0);
         self.smoothed_sigma = self.noise_sigma / sqrtf(n);
     }
@@ -517,7 +522,10 @@ mod tests {
 
     /// Levels of the output for every error in turn, 1 ms apart.
     fn levels(relay: &mut Relay, errors: impl IntoIterator<Item = f32>) -> Vec<bool> {
-        errors.into_iter().map(|error| relay.step(error, DT_S) > relay.trim()).collect()
+        errors
+            .into_iter()
+            .map(|error| relay.step(error, DT_S) > relay.trim())
+            .collect()
     }
 
     /// `A sin(2 pi t + phase)`, 1000 samples a period.
@@ -527,7 +535,9 @@ mod tests {
 
     /// Samples at which the level changes.
     fn switches(levels: &[bool]) -> Vec<usize> {
-        (1..levels.len()).filter(|&k| levels[k] != levels[k - 1]).collect()
+        (1..levels.len())
+            .filter(|&k| levels[k] != levels[k - 1])
+            .collect()
     }
 
     /// Straight lines through these errors, `samples` apart.
@@ -544,17 +554,50 @@ mod tests {
         let new = RelaySettings::new;
         let error = |settings| Relay::new(settings).unwrap_err();
         assert_eq!(error(new(0.0, -0.7)), RelayError::Amplitude(0.0));
-        assert_eq!(error(new(f32::INFINITY, -0.7)), RelayError::Amplitude(f32::INFINITY));
+        assert_eq!(
+            error(new(f32::INFINITY, -0.7)),
+            RelayError::Amplitude(f32::INFINITY)
+        );
         assert_eq!(error(new(1.0, -1.0)), RelayError::Beta(-1.0));
         assert_eq!(error(new(1.0, 1.0)), RelayError::Beta(1.0));
         assert!(matches!(error(new(1.0, f32::NAN)), RelayError::Beta(_)));
         let base = new(1.0, -0.73);
         for (settings, name) in [
-            (RelaySettings { preroll_s: -1.0, ..base }, "the pre-roll"),
-            (RelaySettings { noise_sigma: -1.0, ..base }, "the noise sigma"),
-            (RelaySettings { smoothing: -1.0, ..base }, "the smoothing"),
-            (RelaySettings { dwell: -1.0, ..base }, "the dwell"),
-            (RelaySettings { trim_gain: -1.0, ..base }, "the trim gain"),
+            (
+                RelaySettings {
+                    preroll_s: -1.0,
+                    ..base
+                },
+                "the pre-roll",
+            ),
+            (
+                RelaySettings {
+                    noise_sigma: -1.0,
+                    ..base
+                },
+                "the noise sigma",
+            ),
+            (
+                RelaySettings {
+                    smoothing: -1.0,
+                    ..base
+                },
+                "the smoothing",
+            ),
+            (
+                RelaySettings {
+                    dwell: -1.0,
+                    ..base
+                },
+                "the dwell",
+            ),
+            (
+                RelaySettings {
+                    trim_gain: -1.0,
+                    ..base
+                },
+                "the trim gain",
+            ),
         ] {
             assert_eq!(error(settings), RelayError::Setting(name, -1.0));
         }
@@ -564,7 +607,10 @@ mod tests {
     // over 6 the variance 1/3. With 2002 samples, 2000 differences.
     #[test]
     fn preroll_measures_the_noise_and_puts_out_nothing() {
-        let settings = RelaySettings { preroll_s: 2.0015, ..RelaySettings::new(1.0, -0.73) };
+        let settings = RelaySettings {
+            preroll_s: 2.0015,
+            ..RelaySettings::new(1.0, -0.73)
+        };
         let mut relay = relay(settings);
         for k in 0..2002 {
             assert_eq!(relay.phase(), RelayPhase::Preroll);
@@ -590,7 +636,10 @@ mod tests {
     #[test]
     fn kick_ends_outside_the_noise() {
         for (error, high) in [(-0.0601, false), (0.0601, true)] {
-            let settings = RelaySettings { noise_sigma: 0.01, ..RelaySettings::new(1.5, -0.73) };
+            let settings = RelaySettings {
+                noise_sigma: 0.01,
+                ..RelaySettings::new(1.5, -0.73)
+            };
             let mut relay = relay(settings);
             for quiet in [0.0, 0.0599, -0.0599] {
                 assert_eq!(relay.step(quiet, DT_S), 1.5);
@@ -613,7 +662,10 @@ mod tests {
             for (index, &at) in switches(&levels).iter().enumerate() {
                 let expected = due + 500.0 * index as f32;
                 let late = at as f32 - expected;
-                assert!((-0.01..1.01).contains(&late), "beta {beta}: {at} for {expected}");
+                assert!(
+                    (-0.01..1.01).contains(&late),
+                    "beta {beta}: {at} for {expected}"
+                );
             }
             assert!(switches(&levels).len() >= 7);
         }
@@ -640,10 +692,15 @@ mod tests {
     #[test]
     fn negated_errors_negate_the_output() {
         // From an offset, so that the first error tells the sign; without a trim, which moves at rises.
-        let settings = RelaySettings { noise_sigma: 0.01, ..RelaySettings::new(1.0, -0.73) };
+        let settings = RelaySettings {
+            noise_sigma: 0.01,
+            ..RelaySettings::new(1.0, -0.73)
+        };
         let wobble = |k: usize| 0.3 * sinf(0.037 * k as f32) + 0.02 * sinf(1.7 * k as f32);
-        let errors: Vec<f32> =
-            sine(12, 1.0, 1.0).enumerate().map(|(k, error)| error + wobble(k)).collect();
+        let errors: Vec<f32> = sine(12, 1.0, 1.0)
+            .enumerate()
+            .map(|(k, error)| error + wobble(k))
+            .collect();
         let mut up = relay(settings);
         let mut down = relay(settings);
         for error in errors {
@@ -667,8 +724,14 @@ mod tests {
             .collect();
         assert!(leads.len() >= 12);
         assert!(leads[..3].iter().all(|lead| lead.abs() <= 1.0), "{leads:?}");
-        assert!(leads.windows(2).all(|pair| pair[1] >= pair[0] - 1.0), "{leads:?}");
-        assert!(leads[7..].iter().all(|lead| (lead - 130.2).abs() <= 1.0), "{leads:?}");
+        assert!(
+            leads.windows(2).all(|pair| pair[1] >= pair[0] - 1.0),
+            "{leads:?}"
+        );
+        assert!(
+            leads[7..].iter().all(|lead| (lead - 130.2).abs() <= 1.0),
+            "{leads:?}"
+        );
     }
 
     // Sigma 0.1. Up to 1, back to 0.69: three sigma below the peak, 0.7, it counts and the relay
@@ -676,7 +739,10 @@ mod tests {
     // back by six sigma only at 1.29). The genuine fall is due at 0.73 of 2.
     #[test]
     fn a_false_extremum_is_undone() {
-        let settings = RelaySettings { noise_sigma: 0.1, ..RelaySettings::bare(1.0, -0.73) };
+        let settings = RelaySettings {
+            noise_sigma: 0.1,
+            ..RelaySettings::bare(1.0, -0.73)
+        };
         let mut relay = relay(settings);
         let errors = lines(&[0.0, 1.0, 0.69, 2.0, -2.0], 100);
         let levels = levels(&mut relay, errors.iter().copied());
@@ -707,7 +773,10 @@ mod tests {
     // before 150, 0.3 of the last half period, and each after it not before 0.3 of the mean of two.
     #[test]
     fn dwell_keeps_switches_apart() {
-        let settings = RelaySettings { dwell: 0.3, ..RelaySettings::bare(1.0, 0.0) };
+        let settings = RelaySettings {
+            dwell: 0.3,
+            ..RelaySettings::bare(1.0, 0.0)
+        };
         let mut relay = relay(settings);
         let jumpy = (0..1000).map(|k| if k / 20 % 2 == 0 { 1.0 } else { -1.0 });
         let levels = levels(&mut relay, sine(3, 1.0, 0.0).chain(jumpy));
@@ -726,8 +795,10 @@ mod tests {
     #[test]
     fn extrema_within_the_noise_do_not_switch() {
         for (peak_to_peak, some) in [(5.0, false), (7.0, true)] {
-            let settings =
-                RelaySettings { noise_sigma: 0.01, ..RelaySettings::bare(1.0, 0.0) };
+            let settings = RelaySettings {
+                noise_sigma: 0.01,
+                ..RelaySettings::bare(1.0, 0.0)
+            };
             let mut relay = relay(settings);
             relay.step(0.065, DT_S);
             // Forget the offset as a peak: a first crossing brings it down to the small signal.
@@ -746,7 +817,10 @@ mod tests {
     // periods of 500 samples, n = 15.
     #[test]
     fn smoothing_has_the_variance_and_delay_of_an_average() {
-        let settings = RelaySettings { noise_sigma: 0.01, ..RelaySettings::new(1.0, 0.0) };
+        let settings = RelaySettings {
+            noise_sigma: 0.01,
+            ..RelaySettings::new(1.0, 0.0)
+        };
         let mut relay = relay(settings);
         levels(&mut relay, sine(4, 1.0, 0.0));
         let half_period = relay.half_period_s() / DT_S;
@@ -770,7 +844,10 @@ mod tests {
     // every cycle, mean(u) = 0.2 h. The trim then moves by 0.8 of 0.2 h a cycle, up to its limit.
     #[test]
     fn trim_follows_the_mean_of_the_output() {
-        let settings = RelaySettings { trim_gain: 0.8, ..RelaySettings::bare(2.0, 0.0) };
+        let settings = RelaySettings {
+            trim_gain: 0.8,
+            ..RelaySettings::bare(2.0, 0.0)
+        };
         let mut relay = relay(settings);
         // Zero crossings at 0, 600, 1000, 1600, ...; extrema of one.
         let lopsided = lines(&[0.0, 1.0, 1.0, 0.0, -1.0, 0.0], 200);
@@ -784,12 +861,14 @@ mod tests {
         let mut moves: Vec<f32> = trims.windows(2).map(|pair| pair[1] - pair[0]).collect();
         moves.retain(|moved| *moved > 0.0);
         // The first moves are whole; the last is cut by the limit of 0.9 h.
-        assert!(moves[..4].iter().all(|moved| (moved - step).abs() < 0.01), "{trims:?}");
+        assert!(
+            moves[..4].iter().all(|moved| (moved - step).abs() < 0.01),
+            "{trims:?}"
+        );
         assert_eq!(relay.trim(), TRIM_LIMIT * 2.0);
     }
 
     #[test]
-    #[ignore = "one error that is no number poisons the smoothed error for good"]
     fn an_error_that_is_no_number_is_passed_over() {
         for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
             let mut relay = relay(RelaySettings::new(1.0, -0.73));
@@ -802,7 +881,6 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "no time between two ticks at a switch stops the smoothing until the next"]
     fn a_tick_without_time_is_harmless() {
         let mut relay = relay(RelaySettings::new(1.0, -0.73));
         for (k, error) in sine(8, 1.0, 0.0).enumerate() {

@@ -6,10 +6,10 @@
 
 use crate::process::Process;
 use crate::transition::{State, Transition};
-use crate::window::Edge;
+use crate::window::{Edge, MOST_PER_BIN};
 
-/// Bins of up to `2^20` samples.
-const DOUBLINGS: usize = 21;
+/// Doublings of one sample that make the largest bin.
+const DOUBLINGS: usize = MOST_PER_BIN.ilog2() as usize + 1;
 
 /// `samples` steps: the transition over them and the sum of the outputs at their beginnings.
 #[derive(Clone, Copy, Debug)]
@@ -220,7 +220,13 @@ mod tests {
 
     /// Outputs at the samples one by one: every stretch between an instant and an arriving edge has a
     /// transition of its own.
-    fn outputs(process: &Process, drive: &Drive, edges: &[Edge], begin_s: f64, count: usize) -> Vec<f64> {
+    fn outputs(
+        process: &Process,
+        drive: &Drive,
+        edges: &[Edge],
+        begin_s: f64,
+        count: usize,
+    ) -> Vec<f64> {
         let mut outputs = Vec::new();
         let mut state = drive.initial;
         let mut now_s = begin_s;
@@ -244,26 +250,68 @@ mod tests {
     }
 
     fn processes(tau_s: f64) -> [Process; 4] {
-        let new = |prop, damping| Process::from_acceleration_gain(1.0, prop, damping, tau_s).unwrap();
-        [new(0.032, 0.6), new(0.2, 5.0), new(0.05, 0.0), new(0.001, 0.1)]
+        let new =
+            |prop, damping| Process::from_acceleration_gain(1.0, prop, damping, tau_s).unwrap();
+        [
+            new(0.032, 0.6),
+            new(0.2, 5.0),
+            new(0.05, 0.0),
+            new(0.001, 0.1),
+        ]
     }
 
     const DRIVES: [Drive; 3] = [
-        Drive { initial: State { y: 0.0, v: 0.0, f: 0.0 }, constant: 0.0, recorded: 1.0 },
-        Drive { initial: State { y: 0.3, v: -0.5, f: 0.8 }, constant: 0.0, recorded: 0.0 },
-        Drive { initial: State { y: 0.3, v: -0.5, f: 0.8 }, constant: -0.4, recorded: 1.7 },
+        Drive {
+            initial: State {
+                y: 0.0,
+                v: 0.0,
+                f: 0.0,
+            },
+            constant: 0.0,
+            recorded: 1.0,
+        },
+        Drive {
+            initial: State {
+                y: 0.3,
+                v: -0.5,
+                f: 0.8,
+            },
+            constant: 0.0,
+            recorded: 0.0,
+        },
+        Drive {
+            initial: State {
+                y: 0.3,
+                v: -0.5,
+                f: 0.8,
+            },
+            constant: -0.4,
+            recorded: 1.7,
+        },
     ];
 
     fn edges() -> Vec<Edge> {
         // On an instant (0.30), between two, two in one sample, and later than the window's end.
-        [(-3.0, 1.0), (0.0553, -1.0), (0.30, 0.5), (0.4711, -1.0), (0.4737, 1.0), (0.9871, -1.0)]
-            .map(|(time_s, input)| Edge { time_s, input })
-            .to_vec()
+        [
+            (-3.0, 1.0),
+            (0.0553, -1.0),
+            (0.30, 0.5),
+            (0.4711, -1.0),
+            (0.4737, 1.0),
+            (0.9871, -1.0),
+        ]
+        .map(|(time_s, input)| Edge { time_s, input })
+        .to_vec()
     }
 
     fn check(per_bin: u32, past_bins: usize, tau_s: f64) {
         let bins = 128_usize.div_ceil(per_bin as usize);
-        let grid = Grid { sample_s: SAMPLE_S, per_bin, past_bins, start_s: 0.0 };
+        let grid = Grid {
+            sample_s: SAMPLE_S,
+            per_bin,
+            past_bins,
+            start_s: 0.0,
+        };
         let begin_s = -((past_bins * per_bin as usize) as f64) * SAMPLE_S;
         let edges = edges();
         for process in processes(tau_s) {
@@ -305,7 +353,12 @@ mod tests {
         let process = processes(0.0173)[0];
         let edges = edges();
         let means = |offset_s: f64| {
-            let grid = Grid { sample_s: SAMPLE_S, per_bin: 4, past_bins: 8, start_s: 0.0 };
+            let grid = Grid {
+                sample_s: SAMPLE_S,
+                per_bin: 4,
+                past_bins: 8,
+                start_s: 0.0,
+            };
             let mut means = [0.0; 24];
             Response::new(&process, grid, &edges).means(&DRIVES[0], &[offset_s; 24], &mut means);
             means
@@ -320,7 +373,12 @@ mod tests {
 
     #[test]
     fn no_edges_no_input() {
-        let grid = Grid { sample_s: SAMPLE_S, per_bin: 3, past_bins: 0, start_s: 0.0 };
+        let grid = Grid {
+            sample_s: SAMPLE_S,
+            per_bin: 3,
+            past_bins: 0,
+            start_s: 0.0,
+        };
         let process = processes(0.01)[0];
         let mut means = [1.0; 5];
         Response::new(&process, grid, &[]).means(&DRIVES[0], &[0.0; 5], &mut means);

@@ -31,6 +31,9 @@ pub enum WindowError {
     TooManyEdges(usize),
 }
 
+/// Most instants in a bin; samples beyond what the bins then hold are ignored.
+pub(crate) const MOST_PER_BIN: u32 = 1 << 20;
+
 /// Up to `BINS - 1` bins and `EDGES` edges; `BINS` of at least 2.
 #[derive(Clone, Debug)]
 pub struct Window<const BINS: usize, const EDGES: usize> {
@@ -39,6 +42,8 @@ pub struct Window<const BINS: usize, const EDGES: usize> {
     first_output: Option<f64>,
     group: u32,
     per_bin: u32,
+    /// Instant of the even grid at which the next sample follows without a gap.
+    next_instant: u64,
     used: usize,
     bins: [Bin; BINS],
     edges: [Edge; EDGES],
@@ -62,6 +67,7 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
             first_output: None,
             group,
             per_bin: group,
+            next_instant: 0,
             used: 0,
             bins: [Bin::default(); BINS],
             edges: [Edge {
@@ -96,15 +102,20 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         let first_output = *self.first_output.get_or_insert(output);
         let since_s = time_s - self.start_s;
         let instant = libm::round(since_s / self.sample_s);
-        if instant < 0.0 {
+        // The last row of the estimator is for what is known beforehand.
+        let room = (BINS - 1) as f64 * f64::from(MOST_PER_BIN);
+        if !(instant >= 0.0 && instant < room) {
             return;
         }
-        let mut index = instant as usize / self.per_bin as usize;
-        // The last row of the estimator is for what is known beforehand.
-        while index >= BINS - 1 {
+        let instant = instant as u64;
+        while instant / u64::from(self.per_bin) >= (BINS - 1) as u64 {
             self.merge();
-            index = instant as usize / self.per_bin as usize;
         }
+        let index = (instant / u64::from(self.per_bin)) as usize;
+        if instant != self.next_instant {
+            self.noise.restart();
+        }
+        self.next_instant = instant + u64::from(self.group);
         let samples = f64::from(self.group);
         let bin = &mut self.bins[index];
         bin.count += self.group;
@@ -184,23 +195,32 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
 #[derive(Clone, Copy, Debug, Default)]
 struct NoiseMeter {
     last: [f64; 3],
+    /// Samples since the last gap, up to three.
     seen: u32,
+    differences: u32,
     sum_of_squares: f64,
 }
 
 impl NoiseMeter {
     fn push(&mut self, output: f64) {
         let [a, b, c] = self.last;
-        if self.seen >= 3 {
+        if self.seen == 3 {
             let third_difference = output - 3.0 * (a - b) - c;
             self.sum_of_squares += third_difference * third_difference;
+            self.differences += 1;
+        } else {
+            self.seen += 1;
         }
         self.last = [output, a, b];
-        self.seen += 1;
+    }
+
+    /// Differences do not reach across a gap.
+    fn restart(&mut self) {
+        self.seen = 0;
     }
 
     fn sigma(&self) -> f64 {
-        let differences = f64::from(self.seen.saturating_sub(3).max(1));
+        let differences = f64::from(self.differences.max(1));
         libm::sqrt(self.sum_of_squares / (20.0 * differences))
     }
 }
@@ -232,7 +252,10 @@ mod tests {
             for (index, bin) in window.bins().iter().enumerate() {
                 let members = index * per_bin..samples.min((index + 1) * per_bin);
                 assert_eq!(bin.count as usize, members.len());
-                assert_eq!(bin.output_sum, members.clone().map(|k| (k * k) as f64).sum());
+                assert_eq!(
+                    bin.output_sum,
+                    members.clone().map(|k| (k * k) as f64).sum()
+                );
                 assert_eq!(bin.time_sum_s, members.map(|k| k as f64 / 1024.0).sum());
             }
         }
@@ -294,14 +317,19 @@ mod tests {
             assert_eq!(window.push_input(time_s, input), Ok(()));
         }
         assert_eq!(window.push_input(0.5, 1.0), Ok(()));
-        assert_eq!(window.push_input(0.6, -1.0), Err(WindowError::TooManyEdges(3)));
+        assert_eq!(
+            window.push_input(0.6, -1.0),
+            Err(WindowError::TooManyEdges(3))
+        );
         let times_s = [0.0, 0.2, 0.4];
         assert!(window.edges().iter().map(|edge| edge.time_s).eq(times_s));
     }
 
     /// Uniform in -1..1, variance 1/3 (Knuth's MMIX generator, upper bits).
     fn uniform(state: &mut u64) -> f64 {
-        *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        *state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
         (*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
@@ -320,7 +348,10 @@ mod tests {
                 window.push_output(f64::from(k * group) * 1e-3, mean);
             }
             let sigma = window.noise_sigma();
-            assert!((sigma / expected - 1.0).abs() < 0.01, "{sigma} against {expected}");
+            assert!(
+                (sigma / expected - 1.0).abs() < 0.01,
+                "{sigma} against {expected}"
+            );
         }
     }
 
@@ -333,6 +364,30 @@ mod tests {
             let angle = core::f64::consts::TAU * f64::from(k) / 400.0;
             window.push_output(f64::from(k) * 1e-3, libm::sin(angle));
         }
-        assert!((window.noise_sigma() - 6.13e-7).abs() < 1e-9, "{}", window.noise_sigma());
+        assert!(
+            (window.noise_sigma() - 6.13e-7).abs() < 1e-9,
+            "{}",
+            window.noise_sigma()
+        );
+    }
+
+    // 1e15 instants in 15 bins would take 2^46 a bin, more than the count can hold.
+    #[test]
+    fn a_time_far_ahead_is_survived() {
+        let mut window = Window::<16, 4>::new(0.0, 1e-3);
+        window.push_output(0.0, 1.0);
+        window.push_output(1e12, 1.0);
+        assert!(window.per_bin() > 0);
+    }
+
+    // A smooth oscillation with every tenth sample missing has no noise.
+    #[test]
+    fn lost_samples_are_no_noise() {
+        let mut window = Window::<64, 4>::new(0.0, 1e-3);
+        for k in (0..4000).filter(|k| k % 10 != 0) {
+            let angle = core::f64::consts::TAU * f64::from(k) / 400.0;
+            window.push_output(f64::from(k) * 1e-3, libm::sin(angle));
+        }
+        assert!(window.noise_sigma() < 1e-5, "{}", window.noise_sigma());
     }
 }

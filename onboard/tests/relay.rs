@@ -1,5 +1,8 @@
 //! The relay around processes, and under anything that a sensor may tell it.
 
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use common::{every, run};
@@ -20,7 +23,11 @@ fn trim_converges_to_minus_the_bias() {
         };
         let mut relay = Relay::new(settings).unwrap();
         run(&process, &mut relay, bias, every(1e-3, 15_000));
-        assert!((f64::from(relay.trim()) + bias).abs() < 0.005, "{bias}: {}", relay.trim());
+        assert!(
+            (f64::from(relay.trim()) + bias).abs() < 0.005,
+            "{bias}: {}",
+            relay.trim()
+        );
     }
 }
 
@@ -31,8 +38,9 @@ fn duty_carries_the_bias_without_a_trim() {
     let mut relay = Relay::new(RelaySettings::bare(1.0, -0.73)).unwrap();
     let bias = 0.2;
     let run = run(&process, &mut relay, bias, every(1e-3, 30_000));
-    let rises: Vec<usize> =
-        (1..run.input.len()).filter(|&k| run.input[k] > run.input[k - 1]).collect();
+    let rises: Vec<usize> = (1..run.input.len())
+        .filter(|&k| run.input[k] > run.input[k - 1])
+        .collect();
     let (first, last) = (rises[rises.len() - 11], rises[rises.len() - 1]);
     let mean = run.input[first..last].iter().sum::<f64>() / (last - first) as f64;
     assert!((mean + bias).abs() < 1e-3, "{mean}");

@@ -1,5 +1,8 @@
 //! Closed loops whose outcome can be predicted by hand.
 
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
 use onecycle_onboard::{Pd, Process, Relay, RelaySettings};
 use onecycle_plant::{Experiment, SampledPd, Sensor, Trace};
 use rand_pcg::Pcg64;

@@ -1,5 +1,8 @@
 //! Limit cycles of the bare relay against an independent prototype of the same loop.
 
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::{Process, Relay, RelaySettings};
 use onecycle_plant::Experiment;
@@ -27,10 +30,12 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     values.sum::<f64>() / count
 }
 
+type Row = ((f64, f64, f64), f64, (f64, f64));
+
 // h = 1, K = 1, beta = -0.73: T_prop, T_body, tau; steady period (s); amplitude and half a unit of its
 // last digit, as a prototype in another language found them at the same 1 ms. Periods here are whole
 // numbers of samples, cycle after cycle.
-const TABLE: [((f64, f64, f64), f64, (f64, f64)); 5] = [
+const TABLE: [Row; 5] = [
     ((0.3, 2.0, 0.1), 2.308, (0.0644, 5e-5)),
     ((0.3, 2.0, 0.0005), 1.496, (0.0221, 5e-5)),
     ((0.015, 0.2, 0.1), 0.576, (0.04731, 5e-6)),

@@ -19,9 +19,10 @@ use crate::output::print;
 pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
     let mut campaign = read(&arguments.file)?;
     campaign.cases = arguments.cases.unwrap_or(campaign.cases);
-    if campaign.cases == 0 {
-        return Err(Failure::usage("a campaign has at least one case"));
-    }
+    campaign.validate().map_err(|error| Failure::Settings {
+        path: arguments.file.clone(),
+        reason: error.to_string(),
+    })?;
     let table = match campaign.measure {
         Measure::Relay => relay_table(&campaign, &all(&campaign, relay_outcome)?),
         Measure::Identification => {
@@ -38,7 +39,12 @@ fn read(path: &Path) -> Result<Campaign, Failure> {
         reason,
     };
     let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
-    toml::from_str(&text).map_err(|error| failed(error.to_string().trim_end().to_owned()))
+    toml::from_str(&text).map_err(|error| {
+        // The parser's own report is a picture of several lines.
+        let begin = error.span().map_or(0, |span| span.start).min(text.len());
+        let line = text[..begin].lines().count().max(1);
+        failed(format!("line {line}: {}", error.message().replace('\n', ", ")))
+    })
 }
 
 /// Every case's outcome, in order whatever the number of threads.
@@ -64,10 +70,11 @@ fn all<T: Send>(
     outcomes
 }
 
-fn quantile(values: &mut [f64], q: f64) -> f64 {
+/// A quantile as text, `-` where there are no values.
+fn quantile(values: &mut [f64], q: f64, decimals: usize) -> String {
     values.sort_unstable_by(f64::total_cmp);
     let index = ((values.len().max(1) - 1) as f64 * q).round() as usize;
-    values.get(index).copied().unwrap_or(f64::NAN)
+    values.get(index).map_or("-".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
 fn relay_table(campaign: &Campaign, outcomes: &[RelayOutcome]) -> String {
@@ -92,8 +99,8 @@ fn relay_table(campaign: &Campaign, outcomes: &[RelayOutcome]) -> String {
          steady oscillation      {steady} ({:.2} %)\n\
          run away                {run_away}\n\
          cycles until steady     median {}, 99 % {}, most {}\n\
-         period / describing fn  {:.2} .. {:.2}, median {:.2}\n\
-         farthest / amplitude    median {:.1}, most {:.1}\n\
+         period / describing fn  {} .. {}, median {}\n\
+         farthest / amplitude    median {}, most {}\n\
          switches taken back     {undone}\n",
         outcomes.len(),
         campaign.bias,
@@ -101,14 +108,14 @@ fn relay_table(campaign: &Campaign, outcomes: &[RelayOutcome]) -> String {
         campaign.offset,
         if campaign.trim { "on" } else { "off" },
         100.0 * steady as f64 / outcomes.len() as f64,
-        quantile(&mut at, 0.5),
-        quantile(&mut at, 0.99),
-        quantile(&mut at, 1.0),
-        quantile(&mut ratio, 0.0),
-        quantile(&mut ratio, 1.0),
-        quantile(&mut ratio, 0.5),
-        quantile(&mut farthest, 0.5),
-        quantile(&mut farthest, 1.0),
+        quantile(&mut at, 0.5, 0),
+        quantile(&mut at, 0.99, 0),
+        quantile(&mut at, 1.0, 0),
+        quantile(&mut ratio, 0.0, 2),
+        quantile(&mut ratio, 1.0, 2),
+        quantile(&mut ratio, 0.5, 2),
+        quantile(&mut farthest, 0.5, 1),
+        quantile(&mut farthest, 1.0, 1),
     )
 }
 
@@ -119,7 +126,8 @@ fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome])
         .count();
     let identified = outcomes.len() - refused;
     let mut cost = Vec::new();
-    let (mut unstable, mut least_margin_rad) = (0, f64::INFINITY);
+    let mut margins_deg = Vec::new();
+    let mut unstable = 0;
     for outcome in outcomes {
         match outcome.deterioration {
             Some(Deterioration::Stable {
@@ -127,21 +135,24 @@ fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome])
                 phase_margin_rad,
             }) => {
                 cost.push(100.0 * relative.abs());
-                least_margin_rad = least_margin_rad.min(phase_margin_rad);
+                margins_deg.push(phase_margin_rad.to_degrees());
             }
             Some(Deterioration::Unstable) => unstable += 1,
             None => {}
         }
     }
-    let mean = cost.iter().sum::<f64>() / cost.len().max(1) as f64;
+    let mean = match cost.len() {
+        0 => "-".to_owned(),
+        count => format!("{:.3}", cost.iter().sum::<f64>() / count as f64),
+    };
     let held = coverage(outcomes).map(|count| 100.0 * count as f64 / identified.max(1) as f64);
     let [k, k_over_t_body, t_prop, t_body, tau, bias] = held;
     format!(
         "{} random processes, bias up to {} h, noise {}{} of the amplitude, trim {}, {} cycle(s)\n\
          refused                 {refused}\n\
          unstable                {unstable}\n\
-         deterioration |J| (%)   mean {mean:.3}, median {:.3}, 95 % {:.2}, 99 % {:.2}, worst {:.2}\n\
-         least phase margin      {:.1} deg\n\
+         deterioration |J| (%)   mean {mean}, median {}, 95 % {}, 99 % {}, worst {}\n\
+         least phase margin      {} deg\n\
          90 % intervals hold (%) K {k:.1}, K/T_body {k_over_t_body:.1}, T_prop {t_prop:.1}, \
          T_body {t_body:.1}, tau {tau:.1}, bias {bias:.1}\n",
         outcomes.len(),
@@ -150,11 +161,11 @@ fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome])
         campaign.sigma,
         if campaign.trim { "on" } else { "off" },
         campaign.cycles,
-        quantile(&mut cost, 0.5),
-        quantile(&mut cost, 0.95),
-        quantile(&mut cost, 0.99),
-        quantile(&mut cost, 1.0),
-        least_margin_rad.to_degrees(),
+        quantile(&mut cost, 0.5, 3),
+        quantile(&mut cost, 0.95, 2),
+        quantile(&mut cost, 0.99, 2),
+        quantile(&mut cost, 1.0, 2),
+        quantile(&mut margins_deg, 0.0, 1),
     )
 }
 

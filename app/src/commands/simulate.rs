@@ -4,9 +4,9 @@ use std::f64::consts::TAU;
 use std::io::Write;
 use std::process::ExitCode;
 
-use onecycle_link::{Recording, write_csv};
+use onecycle_link::{Column, Columns, Position, Recording, RecordingBuilder, write_csv};
 use onecycle_onboard::{Process, Relay, RelaySettings};
-use onecycle_plant::{Experiment, Trace};
+use onecycle_plant::{Controller, Experiment, Sensed, Trace};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
@@ -16,18 +16,18 @@ use crate::output::{print, write_file};
 
 /// Periods of the oscillation in a recording: some to settle, eight and more to fit.
 const PERIODS: f64 = 20.0;
-/// Most samples that a simulation makes: a day at 1 kHz fits in memory.
-const MOST_SAMPLES: f64 = 1e8;
+/// Most samples that a simulation makes, and that fit in its delay: half a day at 1 kHz.
+const MOST_SAMPLES: f64 = 5e7;
+/// Fewest samples in a period: a relay that is slower than that is none.
+const FEWEST_SAMPLES_A_PERIOD: f64 = 4.0;
 
 pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
     let process = arguments.process.process()?;
     let amplitude = noise_free_amplitude(arguments, &process)?;
     let experiment = experiment(arguments, &process, amplitude)?;
     let noise = experiment.sensor.noise_sigma.max(experiment.sensor.quantum);
-    let mut relay = relay(arguments, noise)?;
-    let trace = experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(arguments.seed));
-    let recording = Recording::from_samples(&trace.time_s, &trace.input, &trace.output)
-        .map_err(Failure::usage)?;
+    let trace = run_relay(&experiment, relay(arguments, noise)?, arguments.seed);
+    let recording = recording(&trace)?;
     let head = head(arguments, &experiment);
     let comments: Vec<&str> = head.lines().collect();
     match &arguments.out {
@@ -40,6 +40,38 @@ pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
         }
     }
     Ok(ExitCode::from(exit::DONE))
+}
+
+/// A relay for a process whose output falls when its input rises.
+struct Reversed(Relay);
+
+impl Controller for Reversed {
+    fn step(&mut self, dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
+        -Controller::step(&mut self.0, dt_s, reference, sensed)
+    }
+}
+
+fn run_relay(experiment: &Experiment, mut relay: Relay, seed: u64) -> Trace {
+    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    if experiment.process.k_over_t_body() > 0.0 {
+        experiment.run(&mut relay, &mut rng)
+    } else {
+        experiment.run(&mut Reversed(relay), &mut rng)
+    }
+}
+
+/// The trace with all its samples, however many.
+fn recording(trace: &Trace) -> Result<Recording, Failure> {
+    let column = |name: &str| Column { name: name.to_owned(), unit: None };
+    let columns = Columns { time: column("time"), input: column("input"), output: column("output") };
+    let mut builder = RecordingBuilder::new(columns).with_max_points(trace.len() + 2);
+    for (index, time_s) in (0..).zip(&trace.time_s) {
+        let (input, output) = (trace.input[index as usize], trace.output[index as usize]);
+        builder
+            .push(Position::Sample(index), *time_s, input, output)
+            .map_err(Failure::usage)?;
+    }
+    builder.finish().map_err(Failure::usage)
 }
 
 fn relay(arguments: &Simulate, noise_sigma: f64) -> Result<Relay, Failure> {
@@ -96,6 +128,17 @@ fn experiment(
              --sample-rate"
         )));
     }
+    if process.tau_s() / sample_s > MOST_SAMPLES {
+        return Err(Failure::usage(format!(
+            "--tau is over {MOST_SAMPLES:.0} samples: lower --sample-rate"
+        )));
+    }
+    if !arguments.reference.is_finite() {
+        return Err(Failure::usage(format!(
+            "--reference must be a number, but is {}",
+            arguments.reference
+        )));
+    }
     let mut experiment = Experiment::new(*process, sample_s, duration_s);
     experiment.reference = arguments.reference;
     experiment.input_bias = arguments.bias.of(arguments.amplitude);
@@ -111,7 +154,14 @@ fn period_s(arguments: &Simulate, process: &Process) -> Result<f64, Failure> {
     let (omega, _) = oscillation.ok_or_else(|| {
         Failure::usage("the process has no oscillation at this phase: choose a smaller --beta")
     })?;
-    Ok(TAU / omega)
+    let period_s = TAU / omega;
+    if period_s * arguments.sample_rate < FEWEST_SAMPLES_A_PERIOD {
+        return Err(Failure::usage(format!(
+            "the oscillation has a period of {period_s:.3e} s, less than {FEWEST_SAMPLES_A_PERIOD} \
+             samples: raise --sample-rate"
+        )));
+    }
+    Ok(period_s)
 }
 
 /// Half the peak-to-peak output of the last two periods without bias, noise and jitter.
@@ -120,9 +170,9 @@ fn noise_free_amplitude(arguments: &Simulate, process: &Process) -> Result<f64, 
     // Fine enough for the peaks whatever the rate of the recording.
     let sample_s = period_s / 1000.0;
     let experiment = Experiment::new(*process, sample_s, PERIODS * period_s);
-    let mut relay = relay(arguments, 0.0)?;
-    let trace: Trace = experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(0));
-    let tail = &trace.true_output[trace.len() - 2000..];
+    let undisturbed = Simulate { preroll: 0.0, ..arguments.clone() };
+    let trace = run_relay(&experiment, relay(&undisturbed, 0.0)?, 0);
+    let tail = &trace.true_output[trace.len().saturating_sub(2000)..];
     let (low, high) = tail
         .iter()
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {

@@ -100,6 +100,7 @@ struct Parameters {
 #[derive(Serialize)]
 struct Fit {
     misfit: f64,
+    response_error: f64,
     residual_sigma: f64,
     noise_sigma: f64,
 }
@@ -241,6 +242,7 @@ fn process(estimate: &ProcessEstimate) -> ProcessReport {
 fn fit(identified: &Identified) -> Fit {
     Fit {
         misfit: identified.misfit,
+        response_error: identified.refined.response_error,
         residual_sigma: identified.refined.residual_sigma,
         noise_sigma: identified.refined.noise_sigma,
     }

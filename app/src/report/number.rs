@@ -5,12 +5,13 @@ pub(crate) fn significant(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    let magnitude = value.abs().log10().floor();
-    if !(-4.0..6.0).contains(&magnitude) {
-        return format!("{value:.3e}");
+    // The power of ten after rounding: 0.99999 is 1.000.
+    let scientific = format!("{value:.3e}");
+    let power = scientific.split_once('e').and_then(|(_, power)| power.parse::<i32>().ok());
+    match power {
+        Some(power @ -4..=5) => format!("{value:.*}", (3 - power).max(0) as usize),
+        _ => scientific,
     }
-    let decimals = (3.0 - magnitude).max(0.0) as usize;
-    format!("{value:.decimals$}")
 }
 
 /// The same, or `unbounded`.
@@ -27,6 +28,8 @@ mod tests {
         for (value, text) in [
             (0.0, "0"),
             (1.0, "1.000"),
+            (0.99999, "1.000"),
+            (999999.9, "1.000e6"),
             (-12.3456, "-12.35"),
             (774.29, "774.3"),
             (123456.7, "123457"),

@@ -163,6 +163,26 @@ impl Outcome {
         assert_eq!(self.code, Some(0), "{}{}", self.stdout, self.stderr);
         let report = self.report();
         assert_eq!(report.kind(), "identified");
+        // What is not a number is null in JSON, and null is only for what is unbounded.
+        for pointer in [
+            "/oscillation/period_s",
+            "/oscillation/amplitude",
+            "/oscillation/noise_sigma",
+            "/process/k_over_t_body/estimate",
+            "/process/t_prop_s/estimate",
+            "/process/tau_s/estimate",
+            "/process/input_bias/estimate",
+            "/fit/misfit",
+            "/fit/residual_sigma",
+            "/controller/kp",
+            "/controller/kd",
+            "/controller/angle_p",
+            "/controller/rate_p",
+            "/margins/phase_margin_deg",
+            "/margins/delay_margin_s",
+        ] {
+            report.number(pointer);
+        }
         report
     }
 

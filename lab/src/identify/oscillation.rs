@@ -33,40 +33,43 @@ pub(super) struct Oscillation {
     pub(super) period_s: f64,
 }
 
-/// Finds the longest steady run and takes its last `most` cycles.
-pub(super) fn find(
+/// The oscillations to try, most cycles at most: the end of the longest steady run, then that of the
+/// last one; of each, half as many cycles and half again, as far as two.
+pub(super) fn candidates(
     signals: &Signals<'_>,
     relay: &RelayInput,
     most: usize,
-) -> Result<Oscillation, Verdict> {
+) -> Result<Vec<Oscillation>, Verdict> {
     let cycles = all_cycles(signals, relay);
-    let run = longest_run(&cycles);
-    if cycles.len() < 2 {
-        return Err(Verdict::TooShort {
-            cycles: cycles.len(),
-        });
+    let count = cycles.len();
+    if count < 2 {
+        return Err(Verdict::TooShort { cycles: count });
     }
-    let enough = run.len() >= 3 || (cycles.len() == 2 && run.len() == 2);
-    if !enough || (run.len() as f64) < LEAST_SHARE * cycles.len() as f64 {
-        return Err(if cycles.len() < 4 {
-            Verdict::TooShort {
-                cycles: cycles.len(),
-            }
-        } else {
-            Verdict::NotSteady {
-                cycles: cycles.len(),
-                alike: run.len(),
-            }
+    let runs = steady_runs(&cycles);
+    let alike = runs.iter().map(Range::len).max().unwrap_or(0);
+    // Two cycles that are alike have to do where there are no more.
+    let least = if count == 2 { 2 } else { ((LEAST_SHARE * count as f64).ceil() as usize).max(3) };
+    // Of equals the last: max_by_key returns it.
+    let longest = runs.iter().filter(|run| run.len() >= least).max_by_key(|run| run.len());
+    let Some(longest) = longest else {
+        return Err(match count {
+            0..4 => Verdict::TooShort { cycles: count },
+            _ => Verdict::NotSteady { cycles: count, alike },
         });
+    };
+    let last = runs.iter().rfind(|run| run.len() >= least).filter(|&last| last != longest);
+    let mut candidates = Vec::new();
+    for run in std::iter::once(longest).chain(last) {
+        let mut size = run.len().min(most);
+        loop {
+            candidates.push(Oscillation::of(&cycles[run.end - size..run.end], run.len()));
+            if size <= 2 {
+                break;
+            }
+            size = (size / 2).max(2);
+        }
     }
-    let steady = run.len();
-    let used = cycles[run.end - steady.min(most)..run.end].to_vec();
-    let period_s = used.iter().map(|cycle| cycle.period_s).sum::<f64>() / used.len() as f64;
-    Ok(Oscillation {
-        cycles: used,
-        steady,
-        period_s,
-    })
+    Ok(candidates)
 }
 
 /// Complete cycles of the relay, none across a break of the recording.
@@ -85,24 +88,25 @@ fn all_cycles(signals: &Signals<'_>, relay: &RelayInput) -> Vec<Cycle> {
     cycles
 }
 
-/// The longest run of consecutive cycles that are alike; of equals, the last.
-fn longest_run(cycles: &[Cycle]) -> Range<usize> {
-    let mut longest = 0..0;
+/// All runs of consecutive cycles that are alike.
+fn steady_runs(cycles: &[Cycle]) -> Vec<Range<usize>> {
+    let mut runs: Vec<Range<usize>> = Vec::new();
     let mut run = SteadyRun::default();
-    let mut start = 0;
     for (index, cycle) in cycles.iter().enumerate() {
         let follows = (cycle.start_s - run.end_s).abs() <= 1e-9 * cycle.start_s.abs().max(1.0);
         if !follows {
             run = SteadyRun::default();
         }
-        if !run.push(cycle) {
-            start = index;
-        }
-        if index + 1 - start >= longest.len() {
-            longest = start..index + 1;
+        match runs.last_mut() {
+            Some(last) if run.push(cycle) => last.end = index + 1,
+            Some(_) => runs.push(index..index + 1),
+            None => {
+                run.push(cycle);
+                runs.push(index..index + 1);
+            }
         }
     }
-    longest
+    runs
 }
 
 /// Measured and fitted outputs over the bins of the window.
@@ -111,7 +115,11 @@ pub(super) fn fit_points(window: &FitWindow, period_s: f64, refined: &Refined) -
     if residuals(window, period_s, &refined.process, &mut residual).is_err() {
         return Vec::new();
     }
-    let filled = window.bins().iter().zip(&residual).filter(|(bin, _)| bin.count > 0);
+    let filled = window
+        .bins()
+        .iter()
+        .zip(&residual)
+        .filter(|(bin, _)| bin.count > 0);
     filled
         .map(|(bin, residual)| {
             let count = f64::from(bin.count);
@@ -126,6 +134,11 @@ pub(super) fn fit_points(window: &FitWindow, period_s: f64, refined: &Refined) -
 }
 
 impl Oscillation {
+    fn of(cycles: &[Cycle], steady: usize) -> Self {
+        let period_s = cycles.iter().map(|cycle| cycle.period_s).sum::<f64>() / cycles.len() as f64;
+        Self { cycles: cycles.to_vec(), steady, period_s }
+    }
+
     /// The points of the recording from the first cycle's beginning to the last one's end.
     pub(super) fn points(&self, signals: &Signals<'_>) -> Range<usize> {
         let (first, last) = (self.cycles[0], self.cycles[self.cycles.len() - 1]);

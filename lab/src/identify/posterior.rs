@@ -94,7 +94,7 @@ impl Parameters {
         let fast_per_s = 0.5 * sum_per_s * (1.0 + (1.0 - 4.0 * ratio).max(0.0).sqrt());
         // No damping, or less than none: the body's lag is beyond all bounds.
         let slow_per_s = (ratio * sum_per_s * sum_per_s / fast_per_s).clamp(0.0, fast_per_s);
-        let k_over_t_body = sign * at[coordinate::LN_GAIN].exp();
+        let k_over_t_body = sign * at[coordinate::LN_JERK_GAIN].exp() / fast_per_s;
         Self {
             k: k_over_t_body / slow_per_s,
             k_over_t_body,
@@ -139,7 +139,8 @@ impl Posterior {
         centre[coordinate::LN_POLE_SUM] = pole_sum.ln();
         centre[coordinate::POLE_RATIO] = pole_ratio;
         centre[coordinate::TAU_S] = process.tau_s();
-        centre[coordinate::LN_GAIN] = process.k_over_t_body().abs().ln();
+        let jerk_gain = process.k_over_t_body() / process.t_prop_s();
+        centre[coordinate::LN_JERK_GAIN] = jerk_gain.abs().ln();
         centre[coordinate::INPUT_BIAS] = refined.input_bias;
         let root = refined.covariance.and_then(|mut covariance| {
             covariance[coordinate::TAU_S][coordinate::TAU_S] += sample_s * sample_s / 12.0;

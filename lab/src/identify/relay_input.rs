@@ -68,9 +68,9 @@ impl RelayInput {
 pub(super) fn find(input: &[f64]) -> InputKind {
     let mut sorted = input.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
-    // The outermost per cent may be spikes of the log.
-    let aside = sorted.len() / 100;
-    let (least, most) = (sorted[aside], sorted[sorted.len() - 1 - aside]);
+    let [least, .., most] = *without_spikes(&sorted) else {
+        return InputKind::Constant;
+    };
     let range = most - least;
     if range <= 1e-12 * least.abs().max(most.abs()) {
         return InputKind::Constant;
@@ -91,16 +91,24 @@ pub(super) fn find(input: &[f64]) -> InputKind {
         .take_while(|&&u| u == input[last])
         .count();
     let span = first - 1..last + held;
-    match two_levels(&input[span.clone()]) {
+    let mut sorted = input[span.clone()].to_vec();
+    sorted.sort_unstable_by(f64::total_cmp);
+    // One switch may leave a single sample on its level: spikes are put aside second.
+    match two_levels(&sorted).or_else(|| two_levels(without_spikes(&sorted))) {
         Some((low, high)) => InputKind::Relay(RelayInput { span, low, high }),
         None => InputKind::NotTwoLevels,
     }
 }
 
-/// Means of the two groups that differ most from each other (Otsu 1979), if they are levels.
-fn two_levels(input: &[f64]) -> Option<(f64, f64)> {
-    let mut sorted = input.to_vec();
-    sorted.sort_unstable_by(f64::total_cmp);
+/// All but the outermost per cent at either end, which may be spikes of the log.
+fn without_spikes(sorted: &[f64]) -> &[f64] {
+    let aside = sorted.len() / 100;
+    &sorted[aside..sorted.len() - aside]
+}
+
+/// Means of the two groups that differ most from each other (Otsu 1979), if they are levels; of
+/// values in ascending order.
+fn two_levels(sorted: &[f64]) -> Option<(f64, f64)> {
     let count = sorted.len() as f64;
     let total: f64 = sorted.iter().sum();
     let mut below = 0.0;

@@ -7,6 +7,8 @@ use super::{Identification, Identified, Options, OscillationFound};
 /// Something weakly determined, or off.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Remark {
+    /// More cycles could not be fitted: what they leave unexplained, as a part of the oscillation.
+    Disturbed(f64),
     /// Fewer cycles than asked for, or than steadiness takes.
     FewCycles {
         /// Cycles used.
@@ -37,6 +39,12 @@ pub enum Remark {
 impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match *self {
+            Self::Disturbed(part) => write!(
+                f,
+                "More cycles leave {:.1} % of the oscillation unexplained, as gusts or a moving bias \
+                 would: only the cycles named above were fitted.",
+                100.0 * part
+            ),
             Self::FewCycles { used } => {
                 write!(
                     f,

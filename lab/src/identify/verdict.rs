@@ -41,6 +41,8 @@ pub enum Verdict {
         /// What it leaves, over the oscillation (root mean squares).
         misfit: f64,
     },
+    /// The intervals hold processes on which the controller would be unstable.
+    TooUncertain,
     /// The best fit lies on a limit of the domain.
     EdgeOfDomain(DomainEdge),
     /// The output does not follow the input.
@@ -59,6 +61,7 @@ impl Verdict {
             Self::NotSteady { .. } => "not_steady",
             Self::Saturated { .. } => "saturated",
             Self::NotThisProcess { .. } | Self::NoFit => "not_this_process",
+            Self::TooUncertain => "too_uncertain",
             Self::EdgeOfDomain(_) => "edge_of_domain",
             Self::NoController(_) => "no_controller",
         }
@@ -99,6 +102,10 @@ impl Verdict {
                 "Look for a resonance, friction, wind or another loop at work: the process is not \
                  an integrator with two lags and a delay."
             }
+            Self::TooUncertain => {
+                "Use more cycles or a larger relay amplitude: too little is known for a controller \
+                 that is sure to be stable."
+            }
             Self::EdgeOfDomain(DomainEdge::SlowLags) => {
                 "Check that the output is a position and not its rate: both lags seem longer than \
                  the period."
@@ -133,9 +140,11 @@ impl fmt::Display for Verdict {
                 }
             }
             Self::TooShort { cycles } => {
+                let plural = if *cycles == 1 { "" } else { "s" };
                 write!(
                     f,
-                    "too short: {cycles} complete cycles of the relay, at least 3 are needed"
+                    "too short: {cycles} complete cycle{plural} of the relay, at least 2 that are \
+                     alike are needed"
                 )
             }
             Self::NotSteady { cycles, alike } => write!(
@@ -158,6 +167,10 @@ impl fmt::Display for Verdict {
                 "not this kind of process: the best fit leaves {:.1} % of the oscillation \
                  unexplained, far above the noise",
                 100.0 * misfit
+            ),
+            Self::TooUncertain => write!(
+                f,
+                "too uncertain: the intervals hold processes on which the controller is unstable"
             ),
             Self::EdgeOfDomain(edge) => {
                 let what = match edge {

@@ -60,7 +60,7 @@ pub enum ReadError {
     },
     /// Only a header, only comments, or no numbers at all.
     #[error(
-        "there is no row of numbers in the {lines} lines read; \
+        "there is no row of numbers in the first {lines} line(s); \
          expected rows of time, output and input"
     )]
     NoData {
@@ -118,7 +118,7 @@ pub enum ReadError {
     /// Time as a time of day or a date.
     #[error(
         "line {line}, column {column}: \"{text}\" is a date or a time of day; \
-         export seconds from the start instead, or give the sample rate (`sample_rate_hz`)"
+         export seconds from the start instead, or give the sample rate with --sample-rate"
     )]
     ClockTime {
         /// Where.
@@ -153,9 +153,9 @@ pub enum ReadError {
     },
     /// No column looks like this signal.
     #[error(
-        "no column is known to be the {role}; choose it with the option `{role}_column`{}: \
+        "no column is known to be the {role}; choose it with --{role}{}: \
          the columns are {}",
-        if *.role == Role::Time { ", or give the sample rate with `sample_rate_hz`" } else { "" },
+        if *.role == Role::Time { ", or give the sample rate with --sample-rate" } else { "" },
         listed(.columns)
     )]
     UnknownColumn {
@@ -166,7 +166,7 @@ pub enum ReadError {
     },
     /// Several columns may be this signal.
     #[error(
-        "{} may all be the {role}; choose one with the option `{role}_column`",
+        "{} may all be the {role}; choose one with --{role}",
         listed(.candidates)
     )]
     AmbiguousColumn {
@@ -177,8 +177,8 @@ pub enum ReadError {
     },
     /// Input and output cannot be told apart by their values.
     #[error(
-        "{} and {} cannot be told apart by their values; choose them with the options \
-         `input_column` and `output_column`",
+        "{} and {} cannot be told apart by their values; choose them with \
+         --input and --output",
         .columns[0], .columns[1]
     )]
     InputOrOutput {

@@ -200,7 +200,7 @@ impl RecordingBuilder {
             return Err(RecordingError::TooManyMissing {
                 count: missing,
                 rows,
-                role,
+                column: format!("the {role} ({})", self.columns.of(role).name),
                 first,
             });
         }

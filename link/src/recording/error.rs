@@ -54,7 +54,7 @@ pub enum RecordingError {
     /// All rows have the same stamp.
     #[error(
         "time does not change: all {rows} rows have the same stamp; \
-         choose another time column or give the sample rate"
+         choose another column with --time or give --sample-rate"
     )]
     TimeConstant {
         /// Number of rows.
@@ -68,7 +68,7 @@ pub enum RecordingError {
     },
     /// More than 1 % of the rows have no number in a column.
     #[error(
-        "{count} of {rows} rows have no number in the {role}, the first at {first}; \
+        "{count} of {rows} rows have no number in {column}, the first at {first}; \
          at most 1 % may be missing: choose another column or cut the recording"
     )]
     TooManyMissing {
@@ -76,15 +76,15 @@ pub enum RecordingError {
         count: u64,
         /// All rows.
         rows: u64,
-        /// The column that lacks most.
-        role: Role,
+        /// The column that lacks most, by role and name.
+        column: String,
         /// First row where it does.
         first: Position,
     },
     /// More than 5 % of the rows repeat the stamp before.
     #[error(
         "{count} of {rows} rows repeat the stamp of the row before, the first at {first}; \
-         at most 5 % may: the time column is too coarse, so give the sample rate instead"
+         at most 5 % may: the time column is too coarse, so give --sample-rate instead"
     )]
     TooManyDuplicates {
         /// Rows that repeat a stamp.
@@ -97,7 +97,7 @@ pub enum RecordingError {
     /// Stamps so large that their increment is rounded by more than 1 %.
     #[error(
         "stamps as large as {largest_s:e} s cannot resolve a sample period of {period_s:e} s; \
-         subtract the first stamp before writing the file, or give the sample rate"
+         subtract the first stamp before writing the file, or give the sample rate with --sample-rate"
     )]
     StampsTooCoarse {
         /// Largest stamp in seconds.

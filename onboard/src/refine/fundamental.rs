@@ -14,6 +14,9 @@ const DAMPINGS: [f64; 4] = [0.05, 0.5, 2.0, 5.0];
 /// Parts of the lag left beside the body's that the actuator takes; the delay takes the rest.
 const SHARES: [f64; 3] = [0.15, 0.5, 0.85];
 
+/// Largest lag of the actuator in the starts (rad).
+const MOST_ACTUATOR_RAD: f64 = 1.4;
+
 /// The oscillation at its fundamental frequency.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fundamental {
@@ -62,14 +65,16 @@ impl Fundamental {
         core::array::from_fn(|n| {
             let body_per_s = DAMPINGS[n / SHARES.len()] / self.period_s;
             let share = SHARES[n % SHARES.len()];
-            // What is left for actuator and delay once the body has taken its part.
-            let rest = (self.lag_rad - FRAC_PI_2 - atan(omega / body_per_s)).clamp(0.1, 1.4);
-            let prop_per_s = omega / tan(share * rest);
+            // What is left for actuator and delay once the body has taken its part; the actuator
+            // alone lags by less than a quarter turn.
+            let rest = (self.lag_rad - FRAC_PI_2 - atan(omega / body_per_s)).clamp(0.1, PI);
+            let actuator = (share * rest).min(MOST_ACTUATOR_RAD);
+            let prop_per_s = omega / tan(actuator);
             let sum_per_s = prop_per_s + body_per_s;
             clamp(&[
                 log(sum_per_s * self.period_s),
                 prop_per_s * body_per_s / (sum_per_s * sum_per_s),
-                (1.0 - share) * rest / TAU,
+                (rest - actuator) / TAU,
             ])
         })
     }

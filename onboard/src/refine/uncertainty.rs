@@ -7,7 +7,8 @@
 //! part `e` of its response at each harmonic of the oscillation. The unknowns take up nearly all of
 //! that at the large low harmonics, so the residual shows next to nothing of it: `e` is found from
 //! the little that is left at each harmonic, by maximum likelihood, and its full effect on the
-//! unknowns added. What else is in the residual and is not white counts by its degrees of freedom.
+//! unknowns added. An even harmonic that a symmetric relay does not excite is measured against its
+//! neighbours: what is found there is distortion. What else is in the residual and is not white counts by its degrees of freedom.
 
 use core::f64::consts::TAU;
 
@@ -46,19 +47,21 @@ struct Wave {
     /// Its amplitude in the output and in the residual (output unit).
     output: f64,
     residual: f64,
+    /// Root mean square of the amplitudes that an error of one would give it (output unit).
+    scale: f64,
 }
 
 impl<const BINS: usize> Tangent<BINS> {
-    /// Covariance over the coordinates of [`coordinate`]: `residual` and `output` are the weighted
-    /// rows of the fit, `noise_sigma` the white noise of a sample; `None` where an unknown has no
-    /// influence.
+    /// Covariance over the coordinates of [`coordinate`] and relative error of the response:
+    /// `residual` and `output` are the weighted rows of the fit, `noise_sigma` the white noise of a
+    /// sample; `None` where an unknown has no influence.
     pub(super) fn covariance(
         &self,
         residual: &[f64; BINS],
         output: &[f64; BINS],
         noise_sigma: f64,
         map: &[[f64; 5]; 5],
-    ) -> Option<[[f64; 5]; 5]> {
+    ) -> Option<([[f64; 5]; 5], f64)> {
         if (0..ALL).any(|i| self.triangle[i][i] == 0.0) {
             return None;
         }
@@ -70,10 +73,10 @@ impl<const BINS: usize> Tangent<BINS> {
         for (n, slot) in waves.iter_mut().enumerate() {
             *slot = self.wave(n, residual, output, &mut rest);
         }
+        set_scales(&mut waves);
         let error = self.response_error(&waves, noise);
         for (shift, wave) in shifts.iter_mut().zip(waves.iter().flatten()) {
-            let harmonic = wave.output * error;
-            *shift = wave.shift.map(|value| value * harmonic);
+            *shift = wave.shift.map(|value| value * error * wave.scale);
         }
         // Harmonics that are explained as error of the model are no noise any more.
         let rest = if error > 0.0 { &rest } else { residual };
@@ -88,7 +91,7 @@ impl<const BINS: usize> Tangent<BINS> {
         for shift in &shifts {
             add_square(&mut all, shift);
         }
-        Some(mapped(&all, map))
+        Some((mapped(&all, map), error))
     }
 
     /// Wave `n` (cosine and sine of each harmonic in turn); `None` beyond half the bins' rate. Takes
@@ -108,7 +111,12 @@ impl<const BINS: usize> Tangent<BINS> {
         let mut wave = [0.0; BINS];
         for (k, value) in wave[..rows].iter_mut().enumerate() {
             let angle = step_rad * k as f64;
-            *value = self.weight[k] * if n % 2 == 0 { cos(angle) } else { sin(angle) };
+            *value = self.weight[k]
+                * if n.is_multiple_of(2) {
+                    cos(angle)
+                } else {
+                    sin(angle)
+                };
         }
         let energy = dot(&wave[..rows], &wave[..rows]);
         let in_output = dot(&wave[..rows], &output[..rows]) / energy;
@@ -124,6 +132,7 @@ impl<const BINS: usize> Tangent<BINS> {
             left: kept / energy,
             output: in_output,
             residual: in_residual / energy,
+            scale: 0.0,
         })
     }
 
@@ -137,11 +146,13 @@ impl<const BINS: usize> Tangent<BINS> {
         let log_likelihood = |error: f64| {
             let mut sum = 0.0;
             for pair in waves.chunks_exact(2) {
-                let [Some(cosine), Some(sine)] = pair else { continue };
-                let size = cosine.output * cosine.output + sine.output * sine.output;
+                let [Some(cosine), Some(sine)] = pair else {
+                    continue;
+                };
                 for wave in [cosine, sine] {
                     if wave.left > LEAST_LEFT {
-                        let error_variance = wave.left * error * error * 0.5 * size;
+                        let size = wave.scale * wave.scale;
+                        let error_variance = wave.left * error * error * size;
                         let variance =
                             wave.left * (error_variance + 2.0 * noise / samples + floor * size);
                         sum -= 0.5 * (log(variance) + wave.residual * wave.residual / variance);
@@ -160,6 +171,26 @@ impl<const BINS: usize> Tangent<BINS> {
             }
         }
         best.1
+    }
+}
+
+/// The scale of a harmonic is its size in the output, or the geometric mean of its neighbours'
+/// sizes where that is larger; half of the energy for the cosine and half for the sine.
+fn set_scales(waves: &mut [Option<Wave>; 2 * HARMONICS]) {
+    let mut size = [0.0; HARMONICS];
+    for (size, pair) in size.iter_mut().zip(waves.chunks_exact(2)) {
+        if let [Some(cosine), Some(sine)] = pair {
+            *size = libm::hypot(cosine.output, sine.output);
+        }
+    }
+    for (k, pair) in waves.chunks_exact_mut(2).enumerate() {
+        let neighbours = match (k.checked_sub(1).map(|j| size[j]), size.get(k + 1)) {
+            (Some(before), Some(behind)) => libm::sqrt(before * behind),
+            _ => 0.0,
+        };
+        for wave in pair.iter_mut().flatten() {
+            wave.scale = size[k].max(neighbours) * core::f64::consts::FRAC_1_SQRT_2;
+        }
     }
 }
 
@@ -182,7 +213,11 @@ fn redundancy(residual: &[f64], noise_part: f64) -> f64 {
 fn autocorrelation(values: &[f64], lag: usize) -> f64 {
     let mean_square = dot(values, values) / values.len() as f64;
     let product = dot(&values[..values.len() - lag], &values[lag..]) / (values.len() - lag) as f64;
-    if mean_square > 0.0 { product / mean_square } else { 0.0 }
+    if mean_square > 0.0 {
+        product / mean_square
+    } else {
+        0.0
+    }
 }
 
 fn add_square(sum: &mut [[f64; ALL]; ALL], vector: &[f64; ALL]) {
@@ -215,7 +250,7 @@ pub(super) fn coordinate_map(bias_gain: f64, gain: f64, period_s: f64) -> [[f64;
     map[coordinate::LN_POLE_SUM][2] = 1.0;
     map[coordinate::POLE_RATIO][3] = 1.0;
     map[coordinate::TAU_S][4] = period_s;
-    map[coordinate::LN_GAIN][1] = 1.0 / gain;
+    map[coordinate::LN_JERK_GAIN][1] = 1.0 / gain;
     map[coordinate::INPUT_BIAS][0] = 1.0 / gain;
     map[coordinate::INPUT_BIAS][1] = -bias_gain / (gain * gain);
     map

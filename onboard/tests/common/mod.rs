@@ -30,7 +30,13 @@ pub struct Simulation {
 impl Simulation {
     pub fn new(process: &Process) -> Self {
         let under_way = std::collections::VecDeque::new();
-        Self { process: *process, state: State::default(), now_s: 0.0, arrived: 0.0, under_way }
+        Self {
+            process: *process,
+            state: State::default(),
+            now_s: 0.0,
+            arrived: 0.0,
+            under_way,
+        }
     }
 
     pub fn output(&self) -> f64 {
@@ -39,7 +45,8 @@ impl Simulation {
 
     /// Holds the input at `u` until `until_s`.
     pub fn hold(&mut self, u: f64, until_s: f64) {
-        self.under_way.push_back((self.now_s + self.process.tau_s(), u));
+        self.under_way
+            .push_back((self.now_s + self.process.tau_s(), u));
         while let Some((arrival_s, arriving)) = self.under_way.front().copied() {
             if arrival_s >= until_s {
                 break;

@@ -1,0 +1,567 @@
+//! The commands as they are meant to be used.
+
+mod common;
+
+use serde_json::Value;
+
+use common::{
+    HOVER, HOVER_K, HOVER_K_OVER_T_BODY, HOVER_T_BODY_S, HOVER_T_PROP_S, HOVER_TAU_S, Outcome,
+    Report, Scratch, Table, identify, identify_as_text, is_hover, run, run_with_input, simulate,
+};
+
+// ---------------------------------------------------------------- simulate, then identify
+
+#[test]
+fn a_round_trip_without_noise() {
+    let report = identify(simulate(&HOVER, &["--bias", "30%"]), &[]).identified();
+    report
+        .near("k", HOVER_K, 1e-3)
+        .near("k_over_t_body", HOVER_K_OVER_T_BODY, 1e-4)
+        .near("t_prop_s", HOVER_T_PROP_S, 1e-3)
+        .near("t_body_s", HOVER_T_BODY_S, 1e-3)
+        .near("tau_s", HOVER_TAU_S, 1e-3)
+        .near("input_bias", 0.3, 1e-4);
+    let noise = report.number("/oscillation/noise_sigma") / report.number("/oscillation/amplitude");
+    assert!(noise < 1e-3, "{noise}");
+    assert!((report.number("/oscillation/sample_s") - 1e-3).abs() < 1e-12);
+}
+
+#[test]
+fn a_round_trip_with_noise() {
+    let arguments = ["--noise", "1%", "--bias", "-20%", "--seed", "11"];
+    let report = identify(simulate(&HOVER, &arguments), &[]).identified();
+    report
+        .near("k_over_t_body", HOVER_K_OVER_T_BODY, 0.02)
+        .near("t_prop_s", HOVER_T_PROP_S, 0.1)
+        .near("t_body_s", HOVER_T_BODY_S, 0.5)
+        .near("tau_s", HOVER_TAU_S, 0.1)
+        .near("input_bias", -0.2, 0.02);
+    for (name, truth) in [
+        ("k", HOVER_K),
+        ("k_over_t_body", HOVER_K_OVER_T_BODY),
+        ("t_prop_s", HOVER_T_PROP_S),
+        ("t_body_s", HOVER_T_BODY_S),
+        ("tau_s", HOVER_TAU_S),
+        ("input_bias", -0.2),
+    ] {
+        assert!(
+            report.holds(name, truth),
+            "{name} {truth}: {}",
+            report.0["process"][name]
+        );
+    }
+    let noise = report.number("/oscillation/noise_sigma") / report.number("/oscillation/amplitude");
+    assert!((noise - 0.01).abs() < 0.002, "{noise}");
+}
+
+#[test]
+fn the_same_seed_gives_the_same_bytes() {
+    let seeded = |seed| simulate(&HOVER, &["--noise", "1%", "--jitter", "2%", "--seed", seed]);
+    let first = seeded("7");
+    assert!(first == seeded("7"), "the same seed gave other bytes");
+    assert!(first != seeded("8"), "another seed gave the same bytes");
+    // A file holds the same as the standard output.
+    let folder = Scratch::new();
+    let path = folder.name("out.csv");
+    let written = [
+        "--noise", "1%", "--jitter", "2%", "--seed", "7", "--out", &path,
+    ];
+    assert_eq!(simulate(&HOVER, &written), "");
+    assert!(
+        std::fs::read(&path).unwrap() == first.as_bytes(),
+        "the file differs"
+    );
+    assert_eq!(folder.files(), ["out.csv"]);
+}
+
+#[test]
+fn the_truth_stands_in_the_head() {
+    let text = simulate(
+        &HOVER,
+        &["--bias", "30%", "--seed", "9", "--sample-rate", "500"],
+    );
+    let head: String = text
+        .lines()
+        .take_while(|line| line.starts_with('#'))
+        .collect();
+    for truth in [
+        "k 1,",
+        "t_prop_s 0.0321",
+        "t_body_s 1.6886",
+        "tau_s 0.0237",
+        "seed 9",
+    ] {
+        assert!(head.contains(truth), "{truth}: {head}");
+    }
+    assert!(head.contains("input_bias 0.3"), "{head}");
+    let table = Table::parse(&text);
+    assert_eq!(table.0[1].time_s, 0.002);
+}
+
+// A simulation too long to keep must not quietly become means of samples: read back, their delay
+// of a sample and a half would be taken for the process's.
+#[test]
+fn a_long_simulation_reads_back_unbiased() {
+    let process = [
+        "--k", "1", "--t-prop", "0.0321", "--t-body", "1.6886", "--tau", "0.0237",
+    ];
+    let duration = ["--sample-rate", "1000", "--duration", "4200"];
+    let report = identify(simulate(&process, &duration), &[]).identified();
+    report.near("k_over_t_body", HOVER_K_OVER_T_BODY, 1e-3);
+    report.near("tau_s", HOVER_TAU_S, 0.01);
+}
+
+#[test]
+fn a_negative_gain() {
+    let recording = Table::clean()
+        .map(|_, sample| sample.input = -sample.input)
+        .csv();
+    let report = identify(&recording, &[]).identified();
+    report.near("k_over_t_body", -HOVER_K_OVER_T_BODY, 0.01);
+    report.near("k", -HOVER_K, 0.02);
+    report.remarked(&["gain is negative"]);
+    let [kp, kd] = ["/controller/kp", "/controller/kd"].map(|name| report.number(name));
+    assert!(kp < 0.0 && kd < 0.0, "{kp} {kd}");
+    let angle_p = report.number("/controller/angle_p");
+    assert!((angle_p - kp / kd).abs() < 1e-9 * angle_p);
+    let ordered = |name: &str| {
+        let side = |side: &str| report.number(&format!("/process/{name}/{side}"));
+        side("low") <= side("estimate") && side("estimate") <= side("high")
+    };
+    assert!(
+        ordered("k_over_t_body") && ordered("k"),
+        "{}",
+        report.0["process"]
+    );
+}
+
+// A relay drives a negative gain away unless its own sign follows: oscillate, or refuse.
+#[test]
+fn a_negative_gain_is_simulated_or_refused() {
+    let process = [&["simulate", "--k", "-1"], &HOVER[2..]].concat();
+    let simulated = run(&process);
+    if simulated.code == Some(0) {
+        let report = identify(&simulated.stdout, &[]).identified();
+        report.near("k_over_t_body", -HOVER_K_OVER_T_BODY, 0.01);
+    } else {
+        simulated.misused(&["gain"]);
+    }
+}
+
+#[test]
+fn a_double_integrator() {
+    let process = [
+        "--k-over-t-body",
+        "40",
+        "--t-prop",
+        "0.05",
+        "--t-body",
+        "inf",
+        "--tau",
+        "0.015",
+    ];
+    let recording = simulate(&process, &["--noise", "1%", "--bias", "30%", "--seed", "7"]);
+    let report = identify(&recording, &[]).identified();
+    report.near("k_over_t_body", 40.0, 0.03);
+    for name in ["k", "t_body_s"] {
+        assert_eq!(report.0["process"][name]["high"], Value::Null, "{name}");
+    }
+    report.remarked(&["T_body"]);
+    let text = identify_as_text(&recording, &[]);
+    assert!(
+        text.without_nan().stdout.contains("unbounded"),
+        "{}",
+        text.stdout
+    );
+}
+
+#[test]
+fn a_slow_thermal_process() {
+    let process = [
+        "--k", "0.02", "--t-prop", "60", "--t-body", "300", "--tau", "20",
+    ];
+    let arguments = [
+        "--sample-rate",
+        "1",
+        "--amplitude",
+        "50",
+        "--noise",
+        "1%",
+        "--seed",
+        "2",
+    ];
+    let report = identify(simulate(&process, &arguments), &[]).identified();
+    report
+        .near("k_over_t_body", 0.02 / 300.0, 0.05)
+        .near("t_prop_s", 60.0, 0.1)
+        .near("t_body_s", 300.0, 0.2)
+        .near("tau_s", 20.0, 0.1);
+    assert!(report.number("/oscillation/period_s") > 300.0);
+}
+
+const FAST: [&str; 8] = [
+    "--k", "1", "--t-prop", "0.0004", "--t-body", "0.025", "--tau", "0.00025",
+];
+
+#[test]
+fn a_fast_process() {
+    let report = identify(simulate(&FAST, &["--sample-rate", "100000"]), &[]).identified();
+    let period_s = report.number("/oscillation/period_s");
+    assert!((0.004..0.006).contains(&period_s), "{period_s}");
+    report
+        .near("k_over_t_body", 40.0, 0.01)
+        .near("t_prop_s", 0.0004, 0.02)
+        .near("tau_s", 0.00025, 0.02);
+}
+
+// Noise is a part of the amplitude, however short the period beside the pre-roll.
+#[test]
+fn a_fast_process_with_noise() {
+    let arguments = ["--sample-rate", "100000", "--noise", "1%", "--seed", "3"];
+    let report = identify(simulate(&FAST, &arguments), &[]).identified();
+    let noise = report.number("/oscillation/noise_sigma") / report.number("/oscillation/amplitude");
+    assert!((noise - 0.01).abs() < 0.003, "{noise}");
+    report.near("k_over_t_body", 40.0, 0.05);
+}
+
+// ---------------------------------------------------------------- identify
+
+fn keys(value: &Value) -> Vec<&str> {
+    let mut keys: Vec<&str> = value
+        .as_object()
+        .map(|object| object.keys().map(String::as_str).collect())
+        .unwrap_or_default();
+    keys.sort_unstable();
+    keys
+}
+
+/// The parts of the report and their keys, both in order.
+const PARTS: [(&str, &str); 9] = [
+    (
+        "",
+        "columns controller file fit margins notes oscillation process remarks schema step verdict",
+    ),
+    ("/columns", "input output time"),
+    ("/verdict", "advice kind message"),
+    (
+        "/process",
+        "input_bias k k_over_t_body t_body_s t_prop_s tau_s",
+    ),
+    ("/controller", "angle_p kd kp rate_p"),
+    ("/fit", "misfit noise_sigma residual_sigma"),
+    (
+        "/oscillation",
+        "amplitude cycles_steady cycles_used duty end_s noise_sigma period_s relay_amplitude \
+         relay_centre sample_s start_s",
+    ),
+    (
+        "/margins",
+        "delay_margin_s gain_crossover_rad_per_s gain_margin phase_crossover_rad_per_s \
+         phase_margin_deg phase_margin_deg_interval",
+    ),
+    (
+        "/step",
+        "overshoot peak_input peak_time_s rise_time_s settling_time_s",
+    ),
+];
+
+#[test]
+fn the_json_report_has_every_key() {
+    let report = identify(Table::noisy().csv(), &[]).identified().0;
+    assert_eq!(report["schema"], "onecycle.identify/1");
+    for (part, expected) in PARTS {
+        let found = report.pointer(part).map(keys).unwrap_or_default();
+        // Keys may be added; none may go.
+        for key in expected.split(' ') {
+            assert!(found.contains(&key), "{key} is not in {part}: {found:?}");
+        }
+    }
+    for name in keys(&report["process"]) {
+        let range = &report["process"][name];
+        assert_eq!(keys(range), ["estimate", "high", "low"], "{name}");
+        let [low, estimate, high] = ["low", "estimate", "high"].map(|side| range[side].as_f64());
+        assert!(
+            low <= estimate && estimate <= high && low.is_some(),
+            "{name}: {range}"
+        );
+    }
+    assert_eq!(report["verdict"]["advice"], Value::Null);
+    assert_eq!(report["columns"]["time"]["name"], "time");
+    assert_eq!(report["columns"]["time"]["unit"], "s");
+    assert_eq!(report["columns"]["output"]["name"], "pv");
+    assert!(
+        report["notes"]
+            .as_array()
+            .is_some_and(|notes| !notes.is_empty())
+    );
+}
+
+#[test]
+fn the_controller_is_consistent() {
+    let report = identify(Table::clean().csv(), &[]).identified();
+    let [kp, kd, angle_p, rate_p] =
+        ["kp", "kd", "angle_p", "rate_p"].map(|name| report.number(&format!("/controller/{name}")));
+    assert!((angle_p - kp / kd).abs() < 1e-9 * angle_p);
+    assert!((rate_p - kd).abs() < 1e-9 * kd);
+    assert!((report.number("/margins/phase_margin_deg") - 20.0).abs() < 0.1);
+    // The same as tune gives for the true process.
+    let tuned = tune(&HOVER, &[]);
+    assert!((kp / tuned.number("/controller/kp") - 1.0).abs() < 0.01);
+    let calm = identify(Table::clean().csv(), &["--phase-margin", "45"]).identified();
+    assert!((calm.number("/margins/phase_margin_deg") - 45.0).abs() < 0.1);
+    assert!(calm.number("/controller/kp") < kp);
+}
+
+#[test]
+fn as_many_cycles_as_asked_for() {
+    for cycles in [1, 2, 4] {
+        let asked = cycles.to_string();
+        let report = identify(Table::clean().csv(), &["--cycles", &asked]).identified();
+        assert_eq!(report.number("/oscillation/cycles_used"), f64::from(cycles));
+        let [start_s, end_s, period_s] = ["start_s", "end_s", "period_s"]
+            .map(|name| report.number(&format!("/oscillation/{name}")));
+        assert!((end_s - start_s - f64::from(cycles) * period_s).abs() < 1e-9);
+        is_hover(&report, 0.01);
+    }
+    let all = identify(Table::clean().csv(), &["--cycles", "50"]).identified();
+    assert_eq!(
+        all.number("/oscillation/cycles_used"),
+        all.number("/oscillation/cycles_steady")
+    );
+}
+
+#[test]
+fn columns_by_name_and_by_number() {
+    let table = Table::clean();
+    let text: String = std::iter::once("stamp,altitude,roll,battery,servo\n".to_owned())
+        .chain(table.0.iter().map(|sample| {
+            let common::Sample {
+                time_s,
+                output,
+                input,
+            } = sample;
+            format!("{time_s:?},12.5,{output:?},11.1,{input:?}\n")
+        }))
+        .collect();
+    for chosen in [
+        ["--time", "stamp", "--input", "servo", "--output", "roll"],
+        ["--time", "1", "--input", "5", "--output", "3"],
+        ["--time", "STAMP", "--input", "5", "--output", "Roll"],
+    ] {
+        let report = identify(&text, &chosen).identified();
+        assert_eq!(report.0["columns"]["input"]["name"], "servo");
+        assert_eq!(report.0["columns"]["output"]["name"], "roll");
+        is_hover(&report, 0.01);
+    }
+    // What is left to guess is refused with the names to choose from.
+    identify(&text, &[]).refused(3, &["altitude", "roll", "battery", "servo"]);
+}
+
+#[test]
+fn the_standard_input_is_a_file_too() {
+    let bytes = Table::noisy().csv();
+    let from_file = identify(&bytes, &[]).identified();
+    let from_input = run_with_input(&["identify", "-", "--json"], bytes.as_bytes()).identified();
+    for part in ["process", "controller", "oscillation", "verdict", "notes"] {
+        assert_eq!(from_file.0[part], from_input.0[part], "{part}");
+    }
+    assert_eq!(from_input.0["file"], "-");
+}
+
+#[test]
+fn the_report_for_people() {
+    let outcome = identify_as_text(Table::noisy().csv(), &[]);
+    assert_eq!(outcome.code, Some(0));
+    assert_eq!(outcome.stderr, "");
+    let text = &outcome.without_nan().stdout;
+    for part in [
+        "Oscillation",
+        "Process",
+        "K/T_body",
+        "T_prop",
+        "T_body",
+        "tau",
+        "input bias",
+        "Controller",
+        "Kp",
+        "phase margin",
+        "Predicted step",
+        "90 % interval",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    // The first line is the name of the file, as long as it is.
+    let widest = text.lines().skip(1).map(|line| line.chars().count()).max();
+    assert!(widest <= Some(130), "{text}");
+    let refused = identify_as_text(
+        Table::clean().map(|_, sample| sample.input = 1.0).csv(),
+        &[],
+    );
+    assert_eq!(refused.code, Some(4));
+    assert!(
+        refused.stdout.contains("No process identified"),
+        "{}",
+        refused.stdout
+    );
+    assert!(refused.stdout.contains("--input"), "{}", refused.stdout);
+}
+
+// A number just below a power of ten is rounded like its neighbours above.
+#[test]
+fn four_digits_are_four_digits() {
+    let text = identify_as_text(Table::clean().csv(), &[]).stdout;
+    assert!(!text.contains("1.0000"), "{text}");
+}
+
+// ---------------------------------------------------------------- tune
+
+fn tune(process: &[&str], arguments: &[&str]) -> Report {
+    let outcome = run(&[&["tune", "--json"], process, arguments].concat());
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    outcome.report()
+}
+
+#[test]
+fn tune_gives_the_published_gains() {
+    let process = [
+        "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
+    ];
+    let report = tune(&process, &[]);
+    let [kp, kd, angle_p] =
+        ["kp", "kd", "angle_p"].map(|name| report.number(&format!("/controller/{name}")));
+    assert!((kp - 8.5096).abs() < 1e-3, "{kp}");
+    assert!((kd - 6.9966).abs() < 1e-3, "{kd}");
+    assert!((angle_p - kp / kd).abs() < 1e-12);
+    assert_eq!(report.0["schema"], "onecycle.tune/1");
+    assert!((report.number("/margins/phase_margin_deg") - 20.0).abs() < 1e-6);
+    // Twice the gain takes half the controller.
+    let double = [
+        "--k", "2", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
+    ];
+    assert!((tune(&double, &[]).number("/controller/kp") - 0.5 * kp).abs() < 1e-3);
+    let text = run(&[&["tune"], &process[..]].concat());
+    assert!(
+        text.without_nan().stdout.contains("Kp 8.510   Kd 6.997"),
+        "{}",
+        text.stdout
+    );
+}
+
+#[test]
+fn tune_by_either_gain() {
+    let by_k = tune(
+        &[
+            "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
+        ],
+        &[],
+    );
+    let by_acceleration = tune(
+        &[
+            "--k-over-t-body",
+            "0.5",
+            "--t-prop",
+            "0.3",
+            "--t-body",
+            "2",
+            "--tau",
+            "0.1",
+        ],
+        &[],
+    );
+    assert_eq!(by_k.0, by_acceleration.0);
+}
+
+#[test]
+fn tune_a_double_integrator() {
+    let process = [
+        "--k-over-t-body",
+        "40",
+        "--t-prop",
+        "0.05",
+        "--t-body",
+        "inf",
+        "--tau",
+        "0.015",
+    ];
+    let report = tune(&process, &["--phase-margin", "45"]);
+    assert_eq!(report.0["process"]["k"], Value::Null);
+    assert_eq!(report.0["process"]["t_body_s"], Value::Null);
+    assert!((report.number("/margins/phase_margin_deg") - 45.0).abs() < 1e-3);
+    run(&[&["tune"], &process[..]].concat()).without_nan();
+}
+
+#[test]
+fn tune_a_negative_gain() {
+    let report = tune(
+        &[
+            "--k", "-1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
+        ],
+        &[],
+    );
+    assert!((report.number("/controller/kp") + 8.5096).abs() < 1e-3);
+    assert!((report.number("/controller/kd") + 6.9966).abs() < 1e-3);
+    assert!(report.number("/controller/angle_p") > 0.0);
+}
+
+// ---------------------------------------------------------------- campaign, help
+
+#[test]
+fn a_small_campaign() {
+    let folder = Scratch::new();
+    let text = "measure = \"relay\"\ncases = 4\nseed = 1\nbias = 0.3\nsigma = 0.01\ntrim = true\n";
+    let path = folder.write("relay.toml", text.as_bytes());
+    let table = run(&["campaign", &path]);
+    assert_eq!(table.code, Some(0), "{table:?}");
+    assert!(
+        table.without_nan().stdout.contains("4 random processes"),
+        "{}",
+        table.stdout
+    );
+    assert!(
+        table.stdout.contains("steady oscillation      4"),
+        "{}",
+        table.stdout
+    );
+    assert_eq!(run(&["campaign", &path]).stdout, table.stdout);
+    let fewer = run(&["campaign", &path, "--cases", "2"]);
+    assert!(
+        fewer.stdout.contains("2 random processes"),
+        "{}",
+        fewer.stdout
+    );
+    let text = text.replace("relay", "identification");
+    let path = folder.write("identification.toml", text.as_bytes());
+    let table = run(&["campaign", &path]);
+    assert_eq!(table.code, Some(0), "{table:?}");
+    assert!(
+        table
+            .without_nan()
+            .stdout
+            .contains("refused                 0"),
+        "{}",
+        table.stdout
+    );
+}
+
+#[test]
+fn help_lists_commands_and_exit_codes() {
+    let help = |arguments: &[&str]| -> Outcome {
+        let outcome = run(arguments);
+        assert_eq!(outcome.code, Some(0), "{arguments:?}");
+        assert_eq!(outcome.stderr, "");
+        outcome
+    };
+    let all = help(&["--help"]).stdout;
+    for command in ["identify", "simulate", "tune", "campaign"] {
+        assert!(all.contains(command), "{command}: {all}");
+        let own = help(&[command, "--help"]).stdout;
+        assert!(own.contains("Usage: onecycle"), "{own}");
+    }
+    let codes = all.split("Exit codes:").nth(1).unwrap_or_default();
+    for code in ["0  ", "2  ", "3  ", "4  ", "5  "] {
+        assert!(codes.contains(code), "{code}: {all}");
+    }
+    let identify = help(&["identify", "--help"]).stdout;
+    assert!(identify.contains("Exit codes: 0"), "{identify}");
+    assert!(help(&["--version"]).stdout.starts_with("onecycle "));
+}
