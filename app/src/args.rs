@@ -175,7 +175,12 @@ pub(crate) struct Simulate {
     #[command(flatten)]
     pub(crate) process: ProcessArguments,
     /// Amplitude h of the relay (input unit)
-    #[arg(long, value_name = "H", default_value_t = 1.0, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "H",
+        default_value_t = 1.0,
+        allow_negative_numbers = true
+    )]
     pub(crate) amplitude: f64,
     /// Sine of the phase of the oscillation
     #[arg(long, value_name = "BETA", default_value_t = -0.73, allow_negative_numbers = true)]
@@ -187,7 +192,12 @@ pub(crate) struct Simulate {
     #[arg(long)]
     pub(crate) bare: bool,
     /// Time for which the relay first measures the noise, in seconds
-    #[arg(long, value_name = "S", default_value_t = 0.1, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "S",
+        default_value_t = 0.1,
+        allow_negative_numbers = true
+    )]
     pub(crate) preroll: f64,
     /// Constant added to the input and not recorded (input unit, or % of the relay's amplitude)
     #[arg(long, default_value = "0", allow_hyphen_values = true)]
@@ -213,7 +223,12 @@ pub(crate) struct Simulate {
     )]
     pub(crate) reference: f64,
     /// Sample rate, in hertz
-    #[arg(long, value_name = "HZ", default_value_t = 1000.0, allow_negative_numbers = true)]
+    #[arg(
+        long,
+        value_name = "HZ",
+        default_value_t = 1000.0,
+        allow_negative_numbers = true
+    )]
     pub(crate) sample_rate: f64,
     /// Duration, in seconds [default: 20 periods]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]

@@ -54,7 +54,10 @@ fn located(path: &Path, reason: &ReadError) -> String {
 }
 
 impl Failure {
-    #[expect(clippy::needless_pass_by_value, reason = "map_err hands errors over by value")]
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "map_err hands errors over by value"
+    )]
     pub(crate) fn usage(reason: impl ToString) -> Self {
         Self::Usage(reason.to_string())
     }

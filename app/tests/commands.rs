@@ -1,5 +1,8 @@
 //! The commands as they are meant to be used.
 
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
 mod common;
 
 use serde_json::Value;

@@ -1,6 +1,9 @@
 //! The recordings of `examples/` against the truth beside each. Prints the README's table:
 //! `cargo test -p onecycle --test recordings -- --nocapture`.
 
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -116,14 +116,43 @@ impl Campaign {
     /// Names the first field that is out of its range.
     pub fn validate(&self) -> Result<(), FieldError> {
         for (field, range, value, is_right) in [
-            ("cases", "1 to 10,000,000", self.cases as f64, (1..=MOST_CASES).contains(&self.cases)),
-            ("bias", "0 to 100", self.bias, (0.0..=100.0).contains(&self.bias)),
-            ("sigma", "0 to 100", self.sigma, (0.0..=100.0).contains(&self.sigma)),
-            ("offset", "-1e6 to 1e6", self.offset, (-1e6..=1e6).contains(&self.offset)),
-            ("cycles", "1 to 50", self.cycles as f64, (1..=MOST_CYCLES).contains(&self.cycles)),
+            (
+                "cases",
+                "1 to 10,000,000",
+                self.cases as f64,
+                (1..=MOST_CASES).contains(&self.cases),
+            ),
+            (
+                "bias",
+                "0 to 100",
+                self.bias,
+                (0.0..=100.0).contains(&self.bias),
+            ),
+            (
+                "sigma",
+                "0 to 100",
+                self.sigma,
+                (0.0..=100.0).contains(&self.sigma),
+            ),
+            (
+                "offset",
+                "-1e6 to 1e6",
+                self.offset,
+                (-1e6..=1e6).contains(&self.offset),
+            ),
+            (
+                "cycles",
+                "1 to 50",
+                self.cycles as f64,
+                (1..=MOST_CYCLES).contains(&self.cycles),
+            ),
         ] {
             if !is_right {
-                return Err(FieldError { field, range, value });
+                return Err(FieldError {
+                    field,
+                    range,
+                    value,
+                });
             }
         }
         Ok(())

@@ -184,7 +184,18 @@ fn attempt(
     (described, outcome)
 }
 
+/// Sizes of signals whose squares and their sums are far from the limits of f64.
+const SIZES: std::ops::Range<f64> = 1e-100..1e100;
+
 fn find_relay(signals: &Signals<'_>) -> Result<RelayInput, Verdict> {
+    for signal in [signals.input, signals.output] {
+        let size = signal
+            .iter()
+            .fold(0.0_f64, |most, value| most.max(value.abs()));
+        if size != 0.0 && !SIZES.contains(&size) {
+            return Err(Verdict::Units);
+        }
+    }
     match relay_input::find(signals.input) {
         InputKind::Relay(relay) => Ok(relay),
         InputKind::Constant => Err(Verdict::ConstantInput),

@@ -18,7 +18,9 @@
 mod csv;
 mod recording;
 
-pub use csv::{ColumnRef, CsvOptions, ReadError, SAMPLE_RATES_HZ, TimeUnit, read, read_from, write_csv};
+pub use csv::{
+    ColumnRef, CsvOptions, ReadError, SAMPLE_RATES_HZ, TimeUnit, read, read_from, write_csv,
+};
 pub use recording::{
     Column, Columns, GAP_PERIODS, Gap, MAX_POINTS, Note, Position, Recording, RecordingBuilder,
     RecordingError, Role,

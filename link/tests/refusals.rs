@@ -41,8 +41,8 @@ fn table_with(row: usize, text: &str) -> String {
 #[test]
 fn nothing_to_read() {
     assert_plainly_refused("", &["the file is empty"]);
-    assert_plainly_refused("\n\n\n", &["no row of numbers", "3 lines"]);
-    assert_plainly_refused("t,pv,u\n", &["no row of numbers", "1 lines"]);
+    assert_plainly_refused("\n\n\n", &["no row of numbers", "first 3 line(s)"]);
+    assert_plainly_refused("t,pv,u\n", &["no row of numbers", "first 1 line(s)"]);
     assert_plainly_refused("# t,pv,u\n# a\n", &["no row of numbers"]);
     assert_plainly_refused("t,pv,u\n0,1,2\n", &["only 1 row", "at least 2"]);
     assert_plainly_refused("fn main() {\n    run();\n}\n", &["no row of numbers"]);
@@ -222,14 +222,8 @@ fn columns_that_are_not_there() {
         "a,b,c\n0,0,0\n1,1,1\n",
         &["the time", "--time", "\"c\" (column 3)"],
     );
-    assert_plainly_refused(
-        "t,a,b,u\n0,0,0,1\n1,1,1,1\n",
-        &["the output", "--output"],
-    );
-    assert_plainly_refused(
-        "t,pv,a,b\n0,0,0,1\n1,1,1,1\n",
-        &["the input", "--input"],
-    );
+    assert_plainly_refused("t,a,b,u\n0,0,0,1\n1,1,1,1\n", &["the output", "--output"]);
+    assert_plainly_refused("t,pv,a,b\n0,0,0,1\n1,1,1,1\n", &["the input", "--input"]);
     assert_plainly_refused("pv,u\n0,0\n1,1\n", &["the time", "--sample-rate"]);
     assert_plainly_refused("0,1\n1,1\n2,-1\n", &["the time", "--sample-rate"]);
 }
@@ -242,14 +236,8 @@ fn columns_that_may_be_either() {
         "--output",
     ];
     assert_plainly_refused("t,y,pv,u\n0,0,0,1\n1,1,1,1\n", &parts);
-    assert_plainly_refused(
-        "t,time,pv,u\n0,0,0,1\n1,1,1,1\n",
-        &["the time", "--time"],
-    );
-    let parts = [
-        "column 2 and column 3",
-        "--input and --output",
-    ];
+    assert_plainly_refused("t,time,pv,u\n0,0,0,1\n1,1,1,1\n", &["the time", "--time"]);
+    let parts = ["column 2 and column 3", "--input and --output"];
     assert_plainly_refused("0,0,0\n0.1,1,1\n0.2,0,1\n", &parts);
 }
 

@@ -377,7 +377,9 @@ impl Relay {
         if self.from_rest || self.switches >= plain + ramp {
             self.settings.beta
         } else {
-            let Some(done) = self.switches.checked_sub(plain) else { return 0.0 };
+            let Some(done) = self.switches.checked_sub(plain) else {
+                return 0.0;
+            };
             self.settings.beta * (done + 1) as f32 / (ramp + 1) as f32
         }
     }
@@ -461,7 +463,11 @@ impl Relay {
     /// First-order smoothing with the variance and the mean delay of an average of `n` samples.
     fn set_smoothing(&mut self, dt_s: f32) {
         let span_s = self.settings.smoothing * self.half_period_s();
-        let n = if dt_s > 0.0 { (span_s / dt_s).max(1.0) } else { 1.0 };
+        let n = if dt_s > 0.0 {
+            (span_s / dt_s).max(1.0)
+        } else {
+            1.0
+        };
         self.smoothing_gain = 2.0 / (n + 1.0);
         self.smoothed_sigma = self.noise_sigma / sqrtf(n);
     }

@@ -276,27 +276,6 @@ fn the_limits_of_the_domain_are_named() {
     assert!((found.process.tau_s() - 0.1).abs() < 1e-6, "{found:?}");
 }
 
-// Inside every limit, but lagging by 311 deg at the fundamental, which no relay makes of a process
-// with this gain: 270 is the most.
-#[test]
-fn a_long_delay_in_open_loop_is_recovered() {
-    let process = new(0.1, 1.0, 0.3);
-    assert_recovered(&open_loop(&process), &process, 0.0, 1e-6);
-}
-
-#[test]
-fn a_delay_beyond_the_domain_is_named() {
-    for tau_s in [0.52, 0.6] {
-        let found = open_loop(&new(0.05, 1.0, tau_s));
-        assert_eq!(
-            found.edge,
-            Some(DomainEdge::LongDelay),
-            "{:?}",
-            found.process
-        );
-    }
-}
-
 // Here the search ends a ten-thousandth short of the limit: the fit is as good, the verdict missing.
 #[test]
 fn a_lag_too_fast_to_be_seen_is_always_named() {

@@ -78,33 +78,18 @@ fn window(trace: &Trace, cycles: usize) -> (FitWindow, f64) {
     (window, period_s)
 }
 
-/// Errors in the coordinates of the covariance, but for the gain, and that covariance.
-///
-/// `K/T_body` turns sharply where the lags meet (the faster one is the actuator's), so no Gaussian
-/// describes it there. The gain that the response has itself, `(K/T_body)/T_prop`, is regular:
-/// `ln(b p)` with the fast pole `p = sum (1 + s)/2`, `s = sqrt(1 - 4 ratio)`, and its derivatives
-/// `1` by `ln b`, `1` by `ln sum`, `-2 / (s (1 + s))` by the ratio.
+/// Errors in the coordinates of the covariance, and that covariance.
 fn errors(found: &Refined, process: &Process, bias: f64) -> ([f64; 5], [[f64; 5]; 5]) {
-    use coordinate::{INPUT_BIAS, LN_GAIN, LN_POLE_SUM, POLE_RATIO, TAU_S};
+    use coordinate::{INPUT_BIAS, LN_JERK_GAIN, LN_POLE_SUM, POLE_RATIO, TAU_S};
     let ((sum, ratio), (found_sum, found_ratio)) = (process.pole_sum(), found.process.pole_sum());
     let gain = |process: &Process| process.k_over_t_body() / process.t_prop_s();
     let mut errors = [0.0; 5];
     errors[LN_POLE_SUM] = (found_sum / sum).ln();
     errors[POLE_RATIO] = found_ratio - ratio;
     errors[TAU_S] = found.process.tau_s() - process.tau_s();
-    errors[LN_GAIN] = (gain(&found.process) / gain(process)).ln();
+    errors[LN_JERK_GAIN] = (gain(&found.process) / gain(process)).ln();
     errors[INPUT_BIAS] = found.input_bias - bias;
-
-    let mut covariance = found.covariance.unwrap();
-    let spread = (1.0 - 4.0 * found_ratio).sqrt();
-    let by_ratio = -2.0 / (spread * (1.0 + spread));
-    for k in 0..5 {
-        covariance[LN_GAIN][k] += covariance[LN_POLE_SUM][k] + by_ratio * covariance[POLE_RATIO][k];
-    }
-    for row in &mut covariance {
-        row[LN_GAIN] += row[LN_POLE_SUM] + by_ratio * row[POLE_RATIO];
-    }
-    (errors, covariance)
+    (errors, found.covariance.unwrap())
 }
 
 /// `e^T C^-1 e` by Cholesky's factor.
@@ -192,7 +177,7 @@ fn errors_are_as_large_as_stated_jointly() {
 }
 
 // At one per cent the region of equal likelihood is curved, but each coordinate by itself is still
-// as certain as stated; the gain is left out, see above.
+// as certain as stated.
 #[test]
 fn errors_are_as_large_as_stated_one_by_one() {
     use coordinate::{INPUT_BIAS, LN_POLE_SUM, POLE_RATIO, TAU_S};

@@ -42,8 +42,11 @@ fn read(path: &Path) -> Result<Campaign, Failure> {
     toml::from_str(&text).map_err(|error| {
         // The parser's own report is a picture of several lines.
         let begin = error.span().map_or(0, |span| span.start).min(text.len());
-        let line = text[..begin].lines().count().max(1);
-        failed(format!("line {line}: {}", error.message().replace('\n', ", ")))
+        let line = text[..begin].matches('\n').count() + 1;
+        failed(format!(
+            "line {line}: {}",
+            error.message().replace('\n', ", ")
+        ))
     })
 }
 
@@ -74,7 +77,9 @@ fn all<T: Send>(
 fn quantile(values: &mut [f64], q: f64, decimals: usize) -> String {
     values.sort_unstable_by(f64::total_cmp);
     let index = ((values.len().max(1) - 1) as f64 * q).round() as usize;
-    values.get(index).map_or("-".to_owned(), |value| format!("{value:.decimals$}"))
+    values
+        .get(index)
+        .map_or("-".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
 fn relay_table(campaign: &Campaign, outcomes: &[RelayOutcome]) -> String {

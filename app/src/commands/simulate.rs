@@ -23,6 +23,9 @@ const FEWEST_SAMPLES_A_PERIOD: f64 = 4.0;
 
 pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
     let process = arguments.process.process()?;
+    positive("--sample-rate", arguments.sample_rate)?;
+    positive("--amplitude", arguments.amplitude)?;
+    not_negative("the pre-roll", arguments.preroll)?;
     let amplitude = noise_free_amplitude(arguments, &process)?;
     let experiment = experiment(arguments, &process, amplitude)?;
     let noise = experiment.sensor.noise_sigma.max(experiment.sensor.quantum);
@@ -62,8 +65,15 @@ fn run_relay(experiment: &Experiment, mut relay: Relay, seed: u64) -> Trace {
 
 /// The trace with all its samples, however many.
 fn recording(trace: &Trace) -> Result<Recording, Failure> {
-    let column = |name: &str| Column { name: name.to_owned(), unit: None };
-    let columns = Columns { time: column("time"), input: column("input"), output: column("output") };
+    let column = |name: &str| Column {
+        name: name.to_owned(),
+        unit: None,
+    };
+    let columns = Columns {
+        time: column("time"),
+        input: column("input"),
+        output: column("output"),
+    };
     let mut builder = RecordingBuilder::new(columns).with_max_points(trace.len() + 2);
     for (index, time_s) in (0..).zip(&trace.time_s) {
         let (input, output) = (trace.input[index as usize], trace.output[index as usize]);
@@ -93,30 +103,30 @@ fn relay(arguments: &Simulate, noise_sigma: f64) -> Result<Relay, Failure> {
     Relay::new(settings).map_err(Failure::usage)
 }
 
+fn positive(name: &str, value: f64) -> Result<f64, Failure> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(value);
+    }
+    Err(Failure::usage(format!(
+        "{name} must be positive, but is {value}"
+    )))
+}
+
+fn not_negative(name: &str, value: f64) -> Result<f64, Failure> {
+    if value.is_finite() && value >= 0.0 {
+        return Ok(value);
+    }
+    Err(Failure::usage(format!(
+        "{name} must be zero or positive, but is {value}"
+    )))
+}
+
 fn experiment(
     arguments: &Simulate,
     process: &Process,
     amplitude: f64,
 ) -> Result<Experiment, Failure> {
-    let positive = |name: &str, value: f64| {
-        if value.is_finite() && value > 0.0 {
-            Ok(value)
-        } else {
-            Err(Failure::usage(format!(
-                "{name} must be positive, but is {value}"
-            )))
-        }
-    };
-    let not_negative = |name: &str, value: f64| {
-        if value.is_finite() && value >= 0.0 {
-            Ok(value)
-        } else {
-            Err(Failure::usage(format!(
-                "{name} must be zero or positive, but is {value}"
-            )))
-        }
-    };
-    let sample_s = 1.0 / positive("--sample-rate", arguments.sample_rate)?;
+    let sample_s = 1.0 / arguments.sample_rate;
     let duration_s = match arguments.duration {
         Some(duration_s) => positive("--duration", duration_s)?,
         None => arguments.preroll + PERIODS * period_s(arguments, process)?,
@@ -170,7 +180,10 @@ fn noise_free_amplitude(arguments: &Simulate, process: &Process) -> Result<f64, 
     // Fine enough for the peaks whatever the rate of the recording.
     let sample_s = period_s / 1000.0;
     let experiment = Experiment::new(*process, sample_s, PERIODS * period_s);
-    let undisturbed = Simulate { preroll: 0.0, ..arguments.clone() };
+    let undisturbed = Simulate {
+        preroll: 0.0,
+        ..arguments.clone()
+    };
     let trace = run_relay(&experiment, relay(&undisturbed, 0.0)?, 0);
     let tail = &trace.true_output[trace.len().saturating_sub(2000)..];
     let (low, high) = tail

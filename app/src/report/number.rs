@@ -7,7 +7,9 @@ pub(crate) fn significant(value: f64) -> String {
     }
     // The power of ten after rounding: 0.99999 is 1.000.
     let scientific = format!("{value:.3e}");
-    let power = scientific.split_once('e').and_then(|(_, power)| power.parse::<i32>().ok());
+    let power = scientific
+        .split_once('e')
+        .and_then(|(_, power)| power.parse::<i32>().ok());
     match power {
         Some(power @ -4..=5) => format!("{value:.*}", (3 - power).max(0) as usize),
         _ => scientific,

@@ -48,16 +48,29 @@ pub(super) fn candidates(
     let runs = steady_runs(&cycles);
     let alike = runs.iter().map(Range::len).max().unwrap_or(0);
     // Two cycles that are alike have to do where there are no more.
-    let least = if count == 2 { 2 } else { ((LEAST_SHARE * count as f64).ceil() as usize).max(3) };
+    let least = if count == 2 {
+        2
+    } else {
+        ((LEAST_SHARE * count as f64).ceil() as usize).max(3)
+    };
     // Of equals the last: max_by_key returns it.
-    let longest = runs.iter().filter(|run| run.len() >= least).max_by_key(|run| run.len());
+    let longest = runs
+        .iter()
+        .filter(|run| run.len() >= least)
+        .max_by_key(|run| run.len());
     let Some(longest) = longest else {
         return Err(match count {
             0..4 => Verdict::TooShort { cycles: count },
-            _ => Verdict::NotSteady { cycles: count, alike },
+            _ => Verdict::NotSteady {
+                cycles: count,
+                alike,
+            },
         });
     };
-    let last = runs.iter().rfind(|run| run.len() >= least).filter(|&last| last != longest);
+    let last = runs
+        .iter()
+        .rfind(|run| run.len() >= least)
+        .filter(|&last| last != longest);
     let mut candidates = Vec::new();
     for run in std::iter::once(longest).chain(last) {
         let mut size = run.len().min(most);
@@ -136,7 +149,11 @@ pub(super) fn fit_points(window: &FitWindow, period_s: f64, refined: &Refined) -
 impl Oscillation {
     fn of(cycles: &[Cycle], steady: usize) -> Self {
         let period_s = cycles.iter().map(|cycle| cycle.period_s).sum::<f64>() / cycles.len() as f64;
-        Self { cycles: cycles.to_vec(), steady, period_s }
+        Self {
+            cycles: cycles.to_vec(),
+            steady,
+            period_s,
+        }
     }
 
     /// The points of the recording from the first cycle's beginning to the last one's end.

@@ -157,7 +157,8 @@ mod tests {
         };
         assert!(relay.span.start >= 199 && relay.span.end <= 1202);
         let switches = relay.levels(&input[relay.span.clone()]).collect::<Vec<_>>();
-        assert_eq!(switches.windows(2).filter(|w| w[0] != w[1]).count(), 19);
+        // The rise out of the pause, and the nineteen edges inside the wave.
+        assert_eq!(switches.windows(2).filter(|w| w[0] != w[1]).count(), 20);
     }
 
     #[test]

@@ -38,82 +38,85 @@ pub enum Remark {
 
 impl fmt::Display for Remark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Disturbed(part) => write!(
-                f,
+        f.write_str(
+            &self
+                .of_oscillation()
+                .or_else(|| self.of_result())
+                .unwrap_or_default(),
+        )
+    }
+}
+
+impl Remark {
+    fn of_oscillation(&self) -> Option<String> {
+        Some(match *self {
+            Self::Disturbed(part) => format!(
                 "More cycles leave {:.1} % of the oscillation unexplained, as gusts or a moving bias \
                  would: only the cycles named above were fitted.",
                 100.0 * part
             ),
             Self::FewCycles { used } => {
-                write!(
-                    f,
-                    "Only {used} steady cycles could be used; more narrow the intervals."
-                )
+                format!("Only {used} steady cycles could be used; more narrow the intervals.")
             }
-            Self::NegativeGain => write!(
-                f,
-                "The gain is negative: the output falls when the input rises, and the \
-                 controller's gains carry the sign."
-            ),
-            Self::DampingNotSeen(above_s) => {
-                write!(f, "The body's damping is hardly seen: ")?;
-                if let Some(above_s) = above_s {
-                    write!(f, "T_body is above {above_s:.2} s and may be infinite")?;
-                } else {
-                    write!(f, "T_body may be infinite")?;
-                }
-                write!(
-                    f,
-                    ", so K has no upper bound. The controller rests on K/T_body."
-                )
-            }
-            Self::Weak(what, width) => write!(
-                f,
-                "{what} is only known to about {:.0} %; use more cycles or a larger relay \
-                 amplitude.",
-                100.0 * width
-            ),
-            Self::WeakDelay(low_s, high_s) => write!(
-                f,
-                "The delay is only known to lie between {:.2} and {:.2} ms.",
-                1e3 * low_s,
-                1e3 * high_s
-            ),
-            Self::Noisy(part) => write!(
-                f,
+            Self::Noisy(part) => format!(
                 "The noise is {:.0} % of the amplitude; a larger relay amplitude would help.",
                 100.0 * part
             ),
-            Self::Biased(part) => write!(
-                f,
+            Self::Biased(part) => format!(
                 "The relay works against a bias of {:.0} % of its amplitude; trim it away or raise \
                  the amplitude before the relay loses its authority.",
                 100.0 * part
             ),
-            Self::Coarse(samples) => write!(
-                f,
+            Self::Coarse(samples) => format!(
                 "There are only {samples:.0} samples a cycle; record at a higher rate if you can."
             ),
-            Self::Misfit(part) => write!(
-                f,
+            _ => return None,
+        })
+    }
+
+    fn of_result(&self) -> Option<String> {
+        Some(match *self {
+            Self::NegativeGain => {
+                "The gain is negative: the output falls when the input rises, and \
+                                   the controller's gains carry the sign."
+                    .to_owned()
+            }
+            Self::DampingNotSeen(above_s) => {
+                let above = above_s.map_or("T_body may be infinite".to_owned(), |above_s| {
+                    format!("T_body is above {above_s:.2} s and may be infinite")
+                });
+                format!(
+                    "The body's damping is hardly seen: {above}, so K has no upper bound. The \
+                     controller rests on K/T_body."
+                )
+            }
+            Self::Weak(what, width) => format!(
+                "{what} is only known to about {:.0} %; use more cycles or a larger relay \
+                 amplitude.",
+                100.0 * width
+            ),
+            Self::WeakDelay(low_s, high_s) => format!(
+                "The delay is only known to lie between {:.2} and {:.2} ms.",
+                1e3 * low_s,
+                1e3 * high_s
+            ),
+            Self::Misfit(part) => format!(
                 "The model leaves {:.1} % of the oscillation unexplained beyond the noise; the \
                  intervals are widened for it.",
                 100.0 * part
             ),
-            Self::MarginMayBeLess(margin_rad) => write!(
-                f,
+            Self::MarginMayBeLess(margin_rad) => format!(
                 "Within the intervals the phase margin may be as low as {:.1} deg; use more \
                  cycles, or ask for more margin with --phase-margin.",
                 margin_rad.to_degrees()
             ),
-            Self::Overshoot(part) => write!(
-                f,
+            Self::Overshoot(part) => format!(
                 "The step overshoots by {:.0} %, as the least squared error does at this phase \
                  margin; --phase-margin 45 gives a calmer one, and a reference filter helps.",
                 100.0 * part
             ),
-        }
+            _ => return None,
+        })
     }
 }
 

@@ -9,6 +9,8 @@ use onecycle_onboard::refine::DomainEdge;
 pub enum Verdict {
     /// The input is the same throughout.
     ConstantInput,
+    /// Values so large or small that their squares cannot be computed.
+    Units,
     /// The input changes, but not between two levels.
     NoRelay {
         /// Whether the output does: the columns are swapped.
@@ -57,6 +59,7 @@ impl Verdict {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::ConstantInput | Self::NoRelay { .. } => "no_relay",
+            Self::Units => "unusable_units",
             Self::TooShort { .. } | Self::TooCoarse { .. } => "too_short",
             Self::NotSteady { .. } => "not_steady",
             Self::Saturated { .. } => "saturated",
@@ -75,6 +78,7 @@ impl Verdict {
                 "Choose the column that holds the relay's output with --input, or record a relay \
                  test."
             }
+            Self::Units => "Write the recording in other units.",
             Self::NoRelay {
                 output_is_relay: true,
             } => {
@@ -128,6 +132,7 @@ impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ConstantInput => write!(f, "no relay in the input: it never changes"),
+            Self::Units => write!(f, "the values are too large or too small to compute with"),
             Self::NoRelay { output_is_relay } => {
                 write!(
                     f,

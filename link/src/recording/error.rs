@@ -54,7 +54,7 @@ pub enum RecordingError {
     /// All rows have the same stamp.
     #[error(
         "time does not change: all {rows} rows have the same stamp; \
-         choose another column with --time or give --sample-rate"
+         choose another column with --time or give the sample rate with --sample-rate"
     )]
     TimeConstant {
         /// Number of rows.
@@ -84,7 +84,7 @@ pub enum RecordingError {
     /// More than 5 % of the rows repeat the stamp before.
     #[error(
         "{count} of {rows} rows repeat the stamp of the row before, the first at {first}; \
-         at most 5 % may: the time column is too coarse, so give --sample-rate instead"
+         at most 5 % may: the time column is too coarse, so give the sample rate with --sample-rate"
     )]
     TooManyDuplicates {
         /// Rows that repeat a stamp.

@@ -52,8 +52,15 @@ impl Fundamental {
         let magnitude = hypot(y_cos, y_sin) / hypot(u_cos, u_sin).max(f64::MIN_POSITIVE);
         Self {
             period_s,
-            // Every process lags by a quarter turn and more; less means a negative gain.
-            lag_rad: if lag < FRAC_PI_2 { lag + PI } else { lag },
+            // Under a relay a process lags by one to three quarters of a turn: `pi - asin(beta)`.
+            // Anything else is the lag of one whose gain is negative.
+            lag_rad: if lag < FRAC_PI_2 {
+                lag + PI
+            } else if lag > 3.0 * FRAC_PI_2 {
+                lag - PI
+            } else {
+                lag
+            },
             acceleration: 2.0 * magnitude * omega * omega * u_largest,
             rms: sqrt(y_square / f64::max(samples, 1.0)),
         }
@@ -67,7 +74,7 @@ impl Fundamental {
             let share = SHARES[n % SHARES.len()];
             // What is left for actuator and delay once the body has taken its part; the actuator
             // alone lags by less than a quarter turn.
-            let rest = (self.lag_rad - FRAC_PI_2 - atan(omega / body_per_s)).clamp(0.1, PI);
+            let rest = (self.lag_rad - FRAC_PI_2 - atan(omega / body_per_s)).clamp(0.1, FRAC_PI_2);
             let actuator = (share * rest).min(MOST_ACTUATOR_RAD);
             let prop_per_s = omega / tan(actuator);
             let sum_per_s = prop_per_s + body_per_s;
