@@ -13,6 +13,10 @@ use std::sync::OnceLock;
 use serde_json::Value;
 use tempfile::TempDir;
 
+/// Exit codes: an input that cannot be read, an output that cannot be written.
+pub(crate) const UNREADABLE: i32 = 3;
+pub(crate) const NOT_WRITTEN: i32 = 5;
+
 /// A multirotor's attitude: oscillates with a period of 0.44 s and an amplitude of 3.3e-3.
 pub(crate) const HOVER: [&str; 8] = [
     "--k", "1", "--t-prop", "0.0321", "--t-body", "1.6886", "--tau", "0.0237",

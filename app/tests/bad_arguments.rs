@@ -1,0 +1,366 @@
+//! Arguments, campaigns and outputs that are impossible: an exit code and one sentence.
+
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::process::Stdio;
+
+use common::{HOVER, NOT_WRITTEN, Outcome, Scratch, Table, UNREADABLE, names_in, onecycle, run};
+
+// ---------------------------------------------------------------- arguments
+
+#[test]
+fn unusable_options_of_identify() {
+    let file = Scratch::new();
+    let path = file.write("clean.csv", Table::clean().csv().as_bytes());
+    let with = |arguments: &[&str]| run(&[&["identify", path.as_str()], arguments].concat());
+    with(&["--time", "nosuch"]).refused(UNREADABLE, &["nosuch", "time", "pv", "u"]);
+    with(&["--input", "9"]).refused(UNREADABLE, &["number 9", "input", "pv"]);
+    with(&["--output", "0"]).refused(UNREADABLE, &["number 0", "output", "pv"]);
+    with(&["--cycles", "0"]).misused(&["--cycles", "0", "1..=50"]);
+    with(&["--cycles", "51"]).misused(&["--cycles", "51", "1..=50"]);
+    with(&["--cycles", "two"]).misused(&["--cycles", "two"]);
+    with(&["--phase-margin", "95"]).misused(&["--phase-margin", "95", "between 0 and 90"]);
+    with(&["--phase-margin", "nan"]).misused(&["--phase-margin", "between 0 and 90"]);
+    with(&["--time-unit", "parsec"]).misused(&["--time-unit", "parsec", "ms, us or ns"]);
+    with(&["--sample-rate", "fast"]).misused(&["--sample-rate", "fast"]);
+    with(&["--sample-rate", "1000", "--time", "1"]).misused(&["--sample-rate", "--time"]);
+    with(&["--nosuch"]).misused(&["--nosuch"]);
+    run(&["identify"]).misused(&["required"]);
+}
+
+// A bad argument is 2, and the sentence says which.
+#[test]
+fn a_sample_rate_out_of_range() {
+    let file = Scratch::new();
+    let path = file.write("clean.csv", Table::clean().csv().as_bytes());
+    for rate in ["--sample-rate=-5", "--sample-rate=0", "--sample-rate=nan"] {
+        run(&["identify", &path, rate]).misused(&["sample", "rate"]);
+    }
+}
+
+#[test]
+fn negative_numbers_are_values_of_their_options() {
+    let file = Scratch::new();
+    let path = file.write("clean.csv", Table::clean().csv().as_bytes());
+    run(&["identify", &path, "--sample-rate", "-5"]).misused(&["sample", "rate"]);
+    let process = ["--k", "1", "--t-prop", "0.1", "--tau", "0.1"];
+    run(&[&["tune"], &process[..], &["--t-body", "-1"]].concat()).misused(&["T_body", "-1"]);
+    let body = ["--t-body", "1", "--duration", "-1"];
+    run(&[&["simulate"], &process[..], &body].concat()).misused(&["--duration", "-1"]);
+    let body = ["--t-body", "1", "--noise", "-1%"];
+    run(&[&["simulate"], &process[..], &body].concat()).misused(&["--noise"]);
+}
+
+#[test]
+fn impossible_simulations() {
+    let with = |changes: &[(&str, &str)]| {
+        let mut arguments = vec!["simulate".to_owned()];
+        let process = [
+            ("--k", "1"),
+            ("--t-prop", "0.1"),
+            ("--t-body", "1"),
+            ("--tau", "0.05"),
+        ];
+        let is_changed = |name: &str| changes.iter().any(|(changed, _)| *changed == name);
+        let kept = process.into_iter().filter(|(name, _)| !is_changed(name));
+        arguments.extend(
+            kept.chain(changes.iter().copied())
+                .map(|(a, b)| format!("{a}={b}")),
+        );
+        run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    };
+    with(&[("--t-prop", "0")]).misused(&["T_prop", "positive", "0"]);
+    with(&[("--t-prop", "-1")]).misused(&["T_prop", "positive", "-1"]);
+    with(&[("--t-body", "0")]).misused(&["T_body", "positive", "0"]);
+    with(&[("--t-body", "-1")]).misused(&["T_body", "positive", "-1"]);
+    with(&[("--t-body", "nan")]).misused(&["T_body", "positive"]);
+    with(&[("--t-body", "inf")]).misused(&["--t-body", "--k-over-t-body"]);
+    with(&[("--tau", "-0.1")]).misused(&["tau", "zero or", "-0.1"]);
+    with(&[("--k", "0")]).misused(&["gain", "not zero"]);
+    with(&[("--k", "one")]).misused(&["--k", "one"]);
+    with(&[("--beta", "1.5")]).misused(&["beta", "between -1 and 1", "1.5"]);
+    with(&[("--beta", "nan")]).misused(&["beta"]);
+    with(&[("--amplitude", "0")]).misused(&["amplitude", "positive"]);
+    with(&[("--duration", "0")]).misused(&["--duration", "positive", "0"]);
+    with(&[("--duration", "1e300")]).misused(&["--duration", "--sample-rate"]);
+    with(&[("--sample-rate", "0")]).misused(&["--sample-rate", "positive"]);
+    with(&[("--sample-rate", "-5")]).misused(&["--sample-rate", "positive", "-5"]);
+    with(&[("--noise", "-1%")]).misused(&["--noise", "zero or positive"]);
+    with(&[("--noise", "loud")]).misused(&["--noise", "loud", "percentage"]);
+    with(&[("--jitter", "inf")]).misused(&["--jitter", "inf"]);
+    with(&[("--preroll", "nan")]).misused(&["pre-roll"]);
+    with(&[("--seed", "-1")]).misused(&["--seed"]);
+}
+
+// The reference is an argument, and neither a recording nor a row.
+#[test]
+fn a_reference_that_is_no_number() {
+    let reference = [&["simulate"], &HOVER[..], &["--reference", "nan"]].concat();
+    run(&reference).misused(&["--reference"]);
+}
+
+#[test]
+fn extreme_simulations_do_not_crash() {
+    let process = |t_prop: &str, tau: &str, more: &[&str]| {
+        let arguments = [
+            "simulate", "--k", "1", "--t-body", "1", "--t-prop", t_prop, "--tau", tau,
+        ];
+        run(&[&arguments, more].concat())
+    };
+    // A delay of 1e10 samples.
+    process("0.1", "1e7", &["--duration", "1"]).misused(&[]);
+    // A period too short for a thousandth of it.
+    process("1e-300", "0", &[]).misused(&[]);
+}
+
+#[test]
+fn impossible_processes_for_tune() {
+    let tune = |k: &str, t_prop: &str, t_body: &str, tau: &str| {
+        let [k, t_prop] = [format!("--k={k}"), format!("--t-prop={t_prop}")];
+        let [t_body, tau] = [format!("--t-body={t_body}"), format!("--tau={tau}")];
+        run(&["tune", "--json", &k, &t_prop, &t_body, &tau])
+    };
+    tune("0", "0.3", "2", "0.1").misused(&["gain", "not zero"]);
+    tune("nan", "0.3", "2", "0.1").misused(&["gain", "finite"]);
+    tune("inf", "0.3", "2", "0.1").misused(&["gain", "finite"]);
+    tune("1", "0", "2", "0.1").misused(&["T_prop", "positive"]);
+    tune("1", "inf", "2", "0.1").misused(&["T_prop", "positive"]);
+    tune("1", "0.3", "-2", "0.1").misused(&["T_body", "positive"]);
+    tune("1", "0.3", "inf", "0.1").misused(&["--k-over-t-body"]);
+    tune("1", "0.3", "2", "-0.1").misused(&["tau", "positive"]);
+    tune("1", "0.3", "2", "nan").misused(&["tau", "positive"]);
+    tune("1", "1e-300", "2", "1e-300").misused(&["too extreme"]);
+    tune("1", "0.3", "1e300", "0.1").without_nan();
+    tune("1", "1e9", "1e9", "1e9").without_nan();
+    let both = [
+        "tune",
+        "--k",
+        "1",
+        "--k-over-t-body",
+        "1",
+        "--t-prop",
+        "1",
+        "--tau",
+        "1",
+    ];
+    run(&both).misused(&["--k", "--k-over-t-body"]);
+    run(&["tune", "--k", "1"]).misused(&["required"]);
+    run(&[]).misused_without_command();
+}
+
+impl Outcome {
+    /// Without a command the help is the answer, on the error output.
+    fn misused_without_command(&self) {
+        assert_eq!(self.code, Some(2));
+        assert_eq!(self.stdout, "");
+        assert!(self.stderr.contains("Usage: onecycle"), "{}", self.stderr);
+    }
+}
+
+// ---------------------------------------------------------------- campaigns
+
+fn campaign(text: &str) -> Outcome {
+    let folder = Scratch::new();
+    run(&["campaign", &folder.write("campaign.toml", text.as_bytes())])
+}
+
+/// A campaign of one case of no noise, and more lines.
+fn campaign_with(lines: &str) -> Outcome {
+    let head = "measure = \"identification\"\ncases = 1\nseed = 1\ntrim = true\n";
+    campaign(&format!("{head}{lines}\n"))
+}
+
+#[test]
+fn unreadable_campaigns() {
+    let folder = Scratch::new();
+    let missing = run(&["campaign", &folder.name("nosuch.toml")]);
+    missing.refused(UNREADABLE, &["nosuch.toml", "No such file"]);
+    run(&["campaign", &folder.name("")]).refused(UNREADABLE, &["directory"]);
+
+    let names = |outcome: &Outcome, words: &[&str]| {
+        assert_eq!(outcome.code, Some(UNREADABLE), "{outcome:?}");
+        assert_eq!(outcome.stdout, "");
+        for word in words {
+            assert!(outcome.stderr.contains(word), "{word}: {}", outcome.stderr);
+        }
+    };
+    names(&campaign("measure = \"relay\ncases = 1\n"), &["line 1"]);
+    names(
+        &campaign("measure = \"relay\"\n"),
+        &["missing field `cases`"],
+    );
+    names(
+        &campaign_with("bias = 0\nsigma = 0\nbogus = 3"),
+        &["line 7", "unknown field `bogus`"],
+    );
+    names(
+        &campaign_with("bias = \"much\"\nsigma = 0"),
+        &["line 5", "much"],
+    );
+    names(
+        &campaign("measure = \"luck\"\n"),
+        &["line 1", "luck", "relay"],
+    );
+    names(
+        &campaign_with("bias = 0\nsigma = 0\ncycles = -1"),
+        &["line 7", "-1"],
+    );
+    names(&campaign("\u{0}\u{1}\u{2}"), &["line 1"]);
+}
+
+// Everything that goes wrong is one sentence, as for recordings.
+#[test]
+fn a_malformed_campaign_is_one_sentence() {
+    campaign_with("bias = 0\nsigma = 0\nbogus = 3").refused(UNREADABLE, &["line 7", "`bogus`"]);
+}
+
+#[test]
+fn a_campaign_without_cases() {
+    let text = "measure = \"relay\"\ncases = 0\nseed = 1\nbias = 0\nsigma = 0\ntrim = true\n";
+    campaign(text).refused(UNREADABLE, &["cases", "1 to"]);
+}
+
+// Numbers out of their range are refused, whatever TOML allows.
+#[test]
+fn campaigns_of_impossible_numbers() {
+    for (line, field) in [
+        ("bias = nan\nsigma = 0", "bias"),
+        ("bias = inf\nsigma = 0", "bias"),
+        ("bias = 0\nsigma = -1", "sigma"),
+        ("bias = 0\nsigma = nan", "sigma"),
+        ("bias = 0\nsigma = 0\noffset = nan", "offset"),
+        ("bias = 0\nsigma = 0\ncycles = 0", "cycles"),
+        ("bias = 0\nsigma = 0\ncycles = 100000", "cycles"),
+    ] {
+        let outcome = campaign_with(line);
+        let is_refusal = [Some(2), Some(UNREADABLE)].contains(&outcome.code);
+        assert!(
+            is_refusal && outcome.stderr.contains(field),
+            "{line}: {outcome:?}"
+        );
+    }
+}
+
+#[test]
+fn a_campaign_that_identifies_nothing_has_no_nan() {
+    let outcome = campaign_with("bias = 0.5\nsigma = 5");
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    outcome.without_nan();
+}
+
+#[test]
+fn a_campaign_without_a_steady_oscillation_has_no_nan() {
+    let text = "measure = \"relay\"\ncases = 2\nseed = 1\nbias = 50\nsigma = 0.5\ntrim = true\n";
+    let outcome = campaign(text);
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    outcome.without_nan();
+}
+
+// ---------------------------------------------------------------- outputs
+
+#[test]
+fn an_output_that_cannot_be_written() {
+    let folder = Scratch::new();
+    folder.write("file", b"kept");
+    std::fs::create_dir(folder.path("folder")).unwrap();
+    for target in ["nosuch/out.csv", "file/out.csv", "folder"] {
+        let path = folder.name(target);
+        let outcome = run(&[&["simulate"], &HOVER[..], &["--out", &path]].concat());
+        outcome.refused(NOT_WRITTEN, &["cannot write", target]);
+    }
+    let mut left = folder.files();
+    left.sort();
+    assert_eq!(left, ["file", "folder"]);
+    assert!(names_in(&folder.path("folder")).is_empty());
+    assert_eq!(std::fs::read(folder.path("file")).unwrap(), b"kept");
+}
+
+#[test]
+fn a_refused_simulation_leaves_the_file_as_it_was() {
+    let folder = Scratch::new();
+    let path = folder.write("out.csv", b"kept");
+    run(&[
+        &["simulate"],
+        &HOVER[..],
+        &["--out", &path, "--duration", "0"],
+    ]
+    .concat())
+    .misused(&["--duration"]);
+    assert_eq!(std::fs::read(&path).unwrap(), b"kept");
+    assert_eq!(folder.files(), ["out.csv"]);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk() {
+    let full = || {
+        std::fs::OpenOptions::new()
+            .write(true)
+            .open("/dev/full")
+            .unwrap()
+    };
+    let output = onecycle()
+        .arg("simulate")
+        .args(HOVER)
+        .stdout(full())
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(NOT_WRITTEN));
+    let sentence = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        sentence.contains("cannot write to the standard output"),
+        "{sentence}"
+    );
+    assert_eq!(sentence.lines().count(), 1);
+}
+
+// As `onecycle simulate ... | head -1`.
+#[test]
+fn a_reader_that_stops_reading() {
+    let mut command = onecycle();
+    let simulate = command.arg("simulate").args(HOVER);
+    let mut child = simulate
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut line = String::new();
+    let mut reader = BufReader::with_capacity(64, child.stdout.take().unwrap());
+    reader.read_line(&mut line).unwrap();
+    assert!(line.starts_with("# simulated relay test"), "{line}");
+    drop(reader);
+    let output = child.wait_with_output().unwrap();
+    assert_eq!(String::from_utf8_lossy(&output.stderr), "");
+    assert_eq!(output.status.code(), Some(0));
+}
+
+// As `onecycle identify - | true`.
+#[test]
+fn a_reader_that_never_reads() {
+    for arguments in [&["identify", "-"][..], &["identify", "-", "--json"]] {
+        let mut command = onecycle();
+        let identify = command.args(arguments).stdin(Stdio::piped());
+        let mut child = identify
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        drop(child.stdout.take());
+        let mut input = child.stdin.take().unwrap();
+        input.write_all(Table::clean().csv().as_bytes()).unwrap();
+        drop(input);
+        let mut complaint = String::new();
+        child
+            .stderr
+            .take()
+            .unwrap()
+            .read_to_string(&mut complaint)
+            .unwrap();
+        assert_eq!(complaint, "");
+        assert_eq!(child.wait().unwrap().code(), Some(0));
+    }
+}
