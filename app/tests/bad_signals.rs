@@ -7,7 +7,6 @@ mod common;
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
-use std::io::BufRead;
 
 use onecycle_onboard::{Relay, RelaySettings};
 
