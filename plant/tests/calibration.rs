@@ -28,7 +28,7 @@ fn noisy_relay(process: &Process, sigma: f64, bias: f64, rng: &mut Pcg64) -> (Tr
             quantum: 0.0,
         },
         input_bias: bias,
-        ..Experiment::new(*process, 1e-3, 0.2 + 16.0 * period_s)
+        ..Experiment::new(*process, 1e-3, 0.2 + 30.0 * period_s)
     };
     (
         experiment.run(&mut Relay::new(settings).unwrap(), rng),

@@ -25,6 +25,8 @@ pub(super) struct Fundamental {
     lag_rad: f64,
     /// Bound of the acceleration that the input can produce (output unit / s^2).
     pub(super) acceleration: f64,
+    /// What half the range of the input accelerates the process by, from below (output unit / s^2).
+    pub(super) relay_acceleration: f64,
     /// Root mean square of the output about its first value (output unit).
     pub(super) rms: f64,
 }
@@ -45,7 +47,11 @@ impl Fundamental {
             y_square += bin.output_sum * mean;
             samples += count;
         }
-        let (u_cos, u_sin, u_largest) = input_fundamental(window, omega);
+        let (u_cos, u_sin) = input_fundamental(window, omega);
+        let inputs = window.edges().iter().map(|edge| edge.input);
+        let (low, high) = inputs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), input| {
+            (low.min(input), high.max(input))
+        });
         let lag = atan2(y_sin, y_cos) - atan2(u_sin, u_cos);
         let lag = lag - TAU * floor(lag / TAU);
         // |G| is less than b / w^2, by less than two; the largest input takes b to the bound.
@@ -61,7 +67,8 @@ impl Fundamental {
             } else {
                 lag
             },
-            acceleration: 2.0 * magnitude * omega * omega * u_largest,
+            acceleration: 2.0 * magnitude * omega * omega * high.abs().max(low.abs()),
+            relay_acceleration: magnitude * omega * omega * 0.5 * (high - low),
             rms: sqrt(y_square / f64::max(samples, 1.0)),
         }
     }
@@ -87,21 +94,20 @@ impl Fundamental {
     }
 }
 
-/// Integrals of `u cos` and `u sin` over the window, piece by piece, and the largest `|u|`.
+/// Integrals of `u cos` and `u sin` over the window, piece by piece.
 fn input_fundamental<const BINS: usize, const EDGES: usize>(
     window: &Window<BINS, EDGES>,
     omega: f64,
-) -> (f64, f64, f64) {
+) -> (f64, f64) {
     let end_s = window.bins().len() as f64 * window.bin_s();
     let inside = |time_s: f64| (time_s - window.start_s()).clamp(0.0, end_s);
     let edges = window.edges();
-    let (mut u_cos, mut u_sin, mut u_largest) = (0.0, 0.0, 0.0_f64);
+    let (mut u_cos, mut u_sin) = (0.0, 0.0);
     for (k, edge) in edges.iter().enumerate() {
         let from = inside(edge.time_s);
         let to = edges.get(k + 1).map_or(end_s, |next| inside(next.time_s));
         u_cos += edge.input * (sin(omega * to) - sin(omega * from)) / omega;
         u_sin += edge.input * (cos(omega * from) - cos(omega * to)) / omega;
-        u_largest = u_largest.max(edge.input.abs());
     }
-    (u_cos, u_sin, u_largest)
+    (u_cos, u_sin)
 }

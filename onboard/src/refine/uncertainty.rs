@@ -14,7 +14,7 @@ use core::f64::consts::TAU;
 
 use libm::{cos, log, sin};
 
-use super::{ALL, LINEAR, coordinate};
+use super::{ALL, KNOWN, LINEAR, coordinate};
 use crate::least_squares::{Columns, Triangle, back_substitute, dot};
 
 /// Harmonics that are looked at; beyond them a relay oscillation has less than 1/1000 of its
@@ -65,7 +65,7 @@ impl<const BINS: usize> Tangent<BINS> {
         if (0..ALL).any(|i| self.triangle[i][i] == 0.0) {
             return None;
         }
-        let rows = self.basis.rows - 1;
+        let rows = self.basis.rows - KNOWN;
         let noise = noise_sigma * noise_sigma;
         let mut rest = *residual;
         let mut shifts = [[0.0; ALL]; 2 * HARMONICS];
@@ -103,7 +103,7 @@ impl<const BINS: usize> Tangent<BINS> {
         output: &[f64; BINS],
         rest: &mut [f64; BINS],
     ) -> Option<Wave> {
-        let rows = self.basis.rows - 1;
+        let rows = self.basis.rows - KNOWN;
         let step_rad = (n / 2 + 1) as f64 * self.bin_rad;
         if step_rad > 0.25 * TAU {
             return None;
@@ -120,7 +120,7 @@ impl<const BINS: usize> Tangent<BINS> {
         }
         let energy = dot(&wave[..rows], &wave[..rows]);
         let in_output = dot(&wave[..rows], &output[..rows]) / energy;
-        let parts = self.basis.project_out(&mut wave[..=rows]);
+        let parts = self.basis.project_out(&mut wave[..rows + KNOWN]);
         let kept = dot(&wave[..rows], &wave[..rows]);
         let in_residual = dot(&wave[..rows], &residual[..rows]);
         let again = dot(&wave[..rows], &rest[..rows]) / kept.max(f64::MIN_POSITIVE);
@@ -139,7 +139,7 @@ impl<const BINS: usize> Tangent<BINS> {
     /// Relative error of the response that the harmonics left in the residual speak for; zero where
     /// noise explains them.
     fn response_error(&self, waves: &[Option<Wave>; 2 * HARMONICS], noise: f64) -> f64 {
-        let rows = self.basis.rows - 1;
+        let rows = self.basis.rows - KNOWN;
         let samples = dot(&self.weight[..rows], &self.weight[..rows]);
         // Rounding of the fit itself, for recordings without any noise.
         let floor = 1e-12;
