@@ -45,8 +45,8 @@ pub(crate) enum Command {
     "  onecycle identify examples/simulated_hover.csv\n",
     "  onecycle identify log.csv --time t_ms --input 4 --output roll --cycles 4\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
-    "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process (see the verdict), ",
-    "5 output not written"
+    "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process (see the ",
+    "verdict), 5 output not written"
 ))]
 pub(crate) struct Identify {
     /// The recording; - reads the standard input
@@ -59,7 +59,8 @@ pub(crate) struct Identify {
           value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
     pub(crate) cycles: u64,
     /// Least phase margin of the controller, in degrees
-    #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true, value_parser = phase_margin)]
+    #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true,
+          value_parser = phase_margin)]
     pub(crate) phase_margin: f64,
     /// Column of time, by name or by number from 1
     #[arg(long, value_name = "COLUMN")]
@@ -252,7 +253,8 @@ pub(crate) struct Tune {
     #[command(flatten)]
     pub(crate) process: ProcessArguments,
     /// Least phase margin of the controller, in degrees
-    #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true, value_parser = phase_margin)]
+    #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true,
+          value_parser = phase_margin)]
     pub(crate) phase_margin: f64,
     /// Print the result as JSON
     #[arg(long)]

@@ -7,15 +7,14 @@
 //! ```
 //!
 //! with `b` the gain, `g` the response to the recorded input, `s` to a constant one (the unknown
-//! input bias `u0`), `r`, `q` to the unknown initial rate and acceleration, and `d` to
-//! the even part of the actuator's force (`distortion.rs`). So a search over three
-//! unknowns (Levenberg-Marquardt, box-constrained) with the six linear ones solved inside it:
-//! Golub and Pereyra (1973), with Kaufman's (1975) Jacobian.
+//! input bias `u0`), `r`, `q` to the unknown initial rate and acceleration, and `d` to the even part
+//! of the actuator's force (`distortion.rs`). So a search over three unknowns (Levenberg-Marquardt,
+//! box-constrained) with the six linear ones solved inside it: Golub and Pereyra (1973), with
+//! Kaufman's (1975) Jacobian.
 //!
-//! Two things are known beforehand. One: the acceleration at the beginning of the past cannot exceed what
-//! the relay can produce. It stands as a row of the equations; without it one that has died
-//! away before the window begins would be undetermined. Another says how large the even part of a
-//! force may be.
+//! Two things are known beforehand and stand as rows of the equations. The acceleration at the
+//! beginning of the past cannot exceed what the relay can produce: without that, one that has died
+//! away before the window begins would be undetermined. And the even part of the force is small.
 //!
 //! The three unknowns are the sum of the two poles (its logarithm), their product over the square
 //! of the sum, and the delay: regular where the lags are equal (1/4) and where damping vanishes
@@ -50,8 +49,8 @@ const LINEAR: usize = 6;
 /// Rows for what is known beforehand: of the acceleration and of the distortion.
 const KNOWN: usize = 2;
 /// Standard deviation of the distortion known beforehand, as a part of the force: that of a thrust
-/// quadratic in the rotor's speed under a relay of a fifth of hover.
-const DISTORTION: f64 = 0.05;
+/// quadratic in the rotor's speed under a relay of a twelfth of hover is 0.02.
+const DISTORTION: f64 = 0.02;
 /// All unknowns.
 const ALL: usize = LINEAR + 3;
 

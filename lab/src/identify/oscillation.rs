@@ -33,8 +33,8 @@ pub(super) struct Oscillation {
     pub(super) period_s: f64,
 }
 
-/// The oscillations to try, most cycles at most: the end of the longest steady run, then that of the
-/// last one; of each, half as many cycles and half again, as far as two.
+/// The oscillations to try, `most` cycles at most: the end of the longest steady run, then that of
+/// the last one; of each, half as many cycles and half again, as far as two.
 pub(super) fn candidates(
     signals: &Signals<'_>,
     relay: &RelayInput,
