@@ -20,6 +20,7 @@
 //! of the sum, and the delay: regular where the lags are equal (1/4) and where damping vanishes
 //! (0), so the double integrator is an ordinary point of the domain's boundary.
 
+mod descent;
 mod fundamental;
 mod uncertainty;
 
@@ -27,10 +28,11 @@ use core::f64::consts::TAU;
 
 use libm::{exp, log, sqrt};
 
+use self::descent::NormalEquations;
 use self::fundamental::Fundamental;
 use self::uncertainty::{Tangent, coordinate_map};
 use crate::distortion;
-use crate::least_squares::{Columns, Triangle, back_substitute, dot, solve_symmetric};
+use crate::least_squares::{Columns, Triangle, back_substitute, dot};
 use crate::process::Process;
 use crate::response::{Drive, Grid, Response};
 use crate::transition::State;
@@ -463,63 +465,6 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let noise_sigma = self.window.noise_sigma();
         self.tangent(shape, fit)?
             .covariance(&fit.residual, &output, noise_sigma, &map)
-    }
-}
-
-/// Gradient and curvature of the sum of squares in the free coordinates.
-struct NormalEquations {
-    curvature: [[f64; 3]; 3],
-    gradient: [f64; 3],
-    free: [bool; 3],
-}
-
-impl NormalEquations {
-    fn new<const BINS: usize>(
-        jacobian: &Columns<3, BINS>,
-        residual: &[f64; BINS],
-        shape: &Shape,
-    ) -> Self {
-        let rows = jacobian.rows;
-        let column = |i: usize| &jacobian.column[i][..rows];
-        let mut this = Self {
-            curvature: [[0.0; 3]; 3],
-            gradient: [0.0; 3],
-            free: [true; 3],
-        };
-        for i in 0..3 {
-            this.gradient[i] = dot(column(i), &residual[..rows]);
-            let outwards = (shape[i] <= LOWEST[i] && this.gradient[i] < 0.0)
-                || (shape[i] >= HIGHEST[i] && this.gradient[i] > 0.0);
-            this.free[i] = !outwards;
-            for j in 0..3 {
-                this.curvature[i][j] = dot(column(i), column(j));
-            }
-        }
-        this
-    }
-
-    /// The shape after a damped step (Marquardt's scaling) of the free coordinates.
-    fn step(&self, shape: &Shape, damping: f64) -> Shape {
-        let mut matrix = self.curvature;
-        let mut right = self.gradient;
-        for i in 0..3 {
-            matrix[i][i] += damping * self.curvature[i][i] + f64::MIN_POSITIVE;
-            if !self.free[i] {
-                for j in 0..3 {
-                    matrix[i][j] = 0.0;
-                    matrix[j][i] = 0.0;
-                }
-                matrix[i][i] = 1.0;
-                right[i] = 0.0;
-            }
-        }
-        let step = solve_symmetric(&matrix, &right).unwrap_or([0.0; 3]);
-        [shape[0] + step[0], shape[1] + step[1], shape[2] + step[2]]
-    }
-
-    fn step_is_negligible(&self, damping: f64) -> bool {
-        let moved = self.step(&[0.0; 3], damping);
-        moved.iter().all(|step| step.abs() < 1e-12)
     }
 }
 

@@ -1,0 +1,61 @@
+//! One step of the search: Levenberg-Marquardt in a box, with Marquardt's scaling.
+
+use super::{HIGHEST, LOWEST, Shape};
+use crate::least_squares::{Columns, dot, solve_symmetric};
+
+/// Gradient and curvature of the sum of squares in the free coordinates.
+pub(super) struct NormalEquations {
+    curvature: [[f64; 3]; 3],
+    gradient: [f64; 3],
+    free: [bool; 3],
+}
+
+impl NormalEquations {
+    pub(super) fn new<const BINS: usize>(
+        jacobian: &Columns<3, BINS>,
+        residual: &[f64; BINS],
+        shape: &Shape,
+    ) -> Self {
+        let rows = jacobian.rows;
+        let column = |i: usize| &jacobian.column[i][..rows];
+        let mut this = Self {
+            curvature: [[0.0; 3]; 3],
+            gradient: [0.0; 3],
+            free: [true; 3],
+        };
+        for i in 0..3 {
+            this.gradient[i] = dot(column(i), &residual[..rows]);
+            let outwards = (shape[i] <= LOWEST[i] && this.gradient[i] < 0.0)
+                || (shape[i] >= HIGHEST[i] && this.gradient[i] > 0.0);
+            this.free[i] = !outwards;
+            for j in 0..3 {
+                this.curvature[i][j] = dot(column(i), column(j));
+            }
+        }
+        this
+    }
+
+    /// The shape after a damped step (Marquardt's scaling) of the free coordinates.
+    pub(super) fn step(&self, shape: &Shape, damping: f64) -> Shape {
+        let mut matrix = self.curvature;
+        let mut right = self.gradient;
+        for i in 0..3 {
+            matrix[i][i] += damping * self.curvature[i][i] + f64::MIN_POSITIVE;
+            if !self.free[i] {
+                for j in 0..3 {
+                    matrix[i][j] = 0.0;
+                    matrix[j][i] = 0.0;
+                }
+                matrix[i][i] = 1.0;
+                right[i] = 0.0;
+            }
+        }
+        let step = solve_symmetric(&matrix, &right).unwrap_or([0.0; 3]);
+        [shape[0] + step[0], shape[1] + step[1], shape[2] + step[2]]
+    }
+
+    pub(super) fn step_is_negligible(&self, damping: f64) -> bool {
+        let moved = self.step(&[0.0; 3], damping);
+        moved.iter().all(|step| step.abs() < 1e-12)
+    }
+}
