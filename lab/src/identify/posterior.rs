@@ -20,6 +20,10 @@ const SEED: u64 = 0x1c7c_1e00;
 /// Quantiles of a 90 % interval.
 const QUANTILES: (f64, f64) = (0.05, 0.95);
 
+/// Standard deviation of an instrument's scale and clock: better ones are rare, and a perfect fit
+/// promises no more.
+const INSTRUMENT: f64 = 1e-3;
+
 /// An estimate and the interval that holds the truth with a probability of 90 %; `None` stands
 /// for unbounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,7 +133,8 @@ impl Posterior {
     /// From the estimator's result on samples every `sample_s`.
     ///
     /// A recording does not say where within a sample its stamp stands: the delay is uncertain by
-    /// a uniform error of one sample period on top of the estimator's.
+    /// a uniform error of one sample period on top of the estimator's. Gain and poles are uncertain by
+    /// the scale and the clock of the instruments.
     #[must_use]
     pub fn new(refined: &Refined, sample_s: f64) -> Self {
         let process = &refined.process;
@@ -144,6 +149,9 @@ impl Posterior {
         centre[coordinate::INPUT_BIAS] = refined.input_bias;
         let root = refined.covariance.and_then(|mut covariance| {
             covariance[coordinate::TAU_S][coordinate::TAU_S] += sample_s * sample_s / 12.0;
+            for index in [coordinate::LN_POLE_SUM, coordinate::LN_JERK_GAIN] {
+                covariance[index][index] += INSTRUMENT * INSTRUMENT;
+            }
             cholesky(&covariance)
         });
         let mut rng = Pcg64Mcg::seed_from_u64(SEED);
