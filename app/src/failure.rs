@@ -2,7 +2,6 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
 
 use onecycle_link::ReadError;
 
@@ -69,19 +68,16 @@ impl Failure {
         }
     }
 
-    /// Prints the sentence and gives the exit code.
-    pub(crate) fn report(&self) -> ExitCode {
-        // A reader that stops listening, as `head` does, is no failure.
-        if let Self::Output { reason, .. } = self
-            && reason.kind() == io::ErrorKind::BrokenPipe
-        {
-            return ExitCode::from(exit::DONE);
-        }
-        crate::output::complain(&format!("onecycle: {self}"));
-        ExitCode::from(match self {
+    /// Whether only the reader of the output has gone, as `head` does: no failure.
+    pub(crate) fn is_closed_pipe(&self) -> bool {
+        matches!(self, Self::Output { reason, .. } if reason.kind() == io::ErrorKind::BrokenPipe)
+    }
+
+    pub(crate) fn exit_code(&self) -> u8 {
+        match self {
             Self::Usage(_) => exit::USAGE,
             Self::Recording { .. } | Self::Settings { .. } => exit::INPUT,
             Self::Output { .. } => exit::OUTPUT,
-        })
+        }
     }
 }

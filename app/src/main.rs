@@ -14,6 +14,8 @@ use std::process::ExitCode;
 use clap::Parser;
 
 use crate::args::{Arguments, Command};
+use crate::failure::exit;
+use crate::output::complain;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
@@ -25,6 +27,10 @@ fn main() -> ExitCode {
     };
     match result {
         Ok(code) => code,
-        Err(failure) => failure.report(),
+        Err(failure) if failure.is_closed_pipe() => ExitCode::from(exit::DONE),
+        Err(failure) => {
+            complain(&format!("onecycle: {failure}"));
+            ExitCode::from(failure.exit_code())
+        }
     }
 }
