@@ -141,6 +141,15 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
         let mut refusal = None;
         for oscillation in oscillation::candidates(signals, &relay, most)? {
             let (described, outcome) = attempt(signals, &relay, &oscillation, options);
+            // A stretch that fits where a longer one did not is believed when it is a good one.
+            let outcome = outcome.and_then(|identified| match &refusal {
+                Some(_) if identified.refined.response_error > MOST_ERROR_OF_SECOND_CHOICE => {
+                    Err(Verdict::NotThisProcess {
+                        misfit: identified.misfit,
+                    })
+                }
+                _ => Ok(identified),
+            });
             match outcome {
                 Ok(identified) => {
                     found.oscillation = Some(described);
@@ -161,6 +170,10 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
     found.remarks.extend(remarks);
     found
 }
+
+/// Relative error of the response above which a stretch is no second choice: a gust leaves the short
+/// stretch between two a good one, a resonance is in every stretch.
+const MOST_ERROR_OF_SECOND_CHOICE: f64 = 0.05;
 
 /// Fits and judges one stretch of the recording.
 fn attempt(

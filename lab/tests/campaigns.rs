@@ -82,7 +82,7 @@ fn two_cycles_give_the_optimal_controller() {
     }
 }
 
-// Of 1,000 cases 89 to 93 % hold (experiments/intervals.toml). Of 200, an honest 90 % scatters by
+// Of 1,000 cases 90 to 92 % hold (experiments/intervals.toml). Of 200, an honest 90 % scatters by
 // 2.1 %: three of that either way.
 #[test]
 fn intervals_hold_the_truth_nine_times_in_ten() {

@@ -37,6 +37,9 @@ const COME_BACK_SIGMA: f32 = 3.0;
 const DISPROVED_SIGMA: f32 = 2.5;
 /// The trim stays below the relay's own amplitude: beyond it no switching could hold the process.
 const TRIM_LIMIT: f32 = 0.9;
+/// The trim moves from the first cycle on that has been high and low: under a large bias there may be
+/// no second one.
+const TRIM_FROM_SWITCH: u32 = 2;
 /// An excursion of this many half periods means that the trim has cost the relay its authority.
 const TRIM_LOST: f32 = 4.0;
 
@@ -427,7 +430,7 @@ impl Relay {
             trim,
             ..
         } = self.excursion;
-        if self.switches >= 4 && cycle_s > 0.0 {
+        if self.switches >= TRIM_FROM_SWITCH && cycle_s > 0.0 {
             let moved = trim + self.settings.trim_gain * h * cycle_high_less_low_s / cycle_s;
             self.excursion.trim = moved.clamp(-TRIM_LIMIT * h, TRIM_LIMIT * h);
             if self.settings.trim_gain > 0.0 {
