@@ -1,4 +1,4 @@
-//! The commands as they are meant to be used.
+//! Good paths of `simulate` and `identify`.
 
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
@@ -8,8 +8,9 @@ mod common;
 use serde_json::Value;
 
 use common::{
-    HOVER, HOVER_K, HOVER_K_OVER_T_BODY, HOVER_T_BODY_S, HOVER_T_PROP_S, HOVER_TAU_S, Outcome,
-    Report, Scratch, Table, identify, identify_as_text, is_hover, run, run_with_input, simulate,
+    DOUBLE_INTEGRATOR, HOVER, HOVER_K, HOVER_K_OVER_T_BODY, HOVER_T_BODY_S, HOVER_T_PROP_S,
+    HOVER_TAU_S, Scratch, Table, identify, identify_as_text, is_hover, run, run_with_input,
+    simulate, tune,
 };
 
 // ---------------------------------------------------------------- simulate, then identify
@@ -153,17 +154,10 @@ fn a_negative_gain_is_simulated_or_refused() {
 
 #[test]
 fn a_double_integrator() {
-    let process = [
-        "--k-over-t-body",
-        "40",
-        "--t-prop",
-        "0.05",
-        "--t-body",
-        "inf",
-        "--tau",
-        "0.015",
-    ];
-    let recording = simulate(&process, &["--noise", "1%", "--bias", "30%", "--seed", "7"]);
+    let recording = simulate(
+        &DOUBLE_INTEGRATOR,
+        &["--noise", "1%", "--bias", "30%", "--seed", "7"],
+    );
     let report = identify(&recording, &[]).identified();
     report.near("k_over_t_body", 40.0, 0.03);
     for name in ["k", "t_body_s"] {
@@ -414,157 +408,4 @@ fn the_report_for_people() {
 fn four_digits_are_four_digits() {
     let text = identify_as_text(Table::clean().csv(), &[]).stdout;
     assert!(!text.contains("1.0000"), "{text}");
-}
-
-// ---------------------------------------------------------------- tune
-
-fn tune(process: &[&str], arguments: &[&str]) -> Report {
-    let outcome = run(&[&["tune", "--json"], process, arguments].concat());
-    assert_eq!(outcome.code, Some(0), "{outcome:?}");
-    outcome.report()
-}
-
-#[test]
-fn tune_gives_the_published_gains() {
-    let process = [
-        "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
-    ];
-    let report = tune(&process, &[]);
-    let [kp, kd, angle_p] =
-        ["kp", "kd", "angle_p"].map(|name| report.number(&format!("/controller/{name}")));
-    assert!((kp - 8.5096).abs() < 1e-3, "{kp}");
-    assert!((kd - 6.9966).abs() < 1e-3, "{kd}");
-    assert!((angle_p - kp / kd).abs() < 1e-12);
-    assert_eq!(report.0["schema"], "onecycle.tune/1");
-    assert!((report.number("/margins/phase_margin_deg") - 20.0).abs() < 1e-6);
-    // Twice the gain takes half the controller.
-    let double = [
-        "--k", "2", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
-    ];
-    assert!((tune(&double, &[]).number("/controller/kp") - 0.5 * kp).abs() < 1e-3);
-    let text = run(&[&["tune"], &process[..]].concat());
-    assert!(
-        text.without_nan().stdout.contains("Kp 8.510   Kd 6.997"),
-        "{}",
-        text.stdout
-    );
-}
-
-#[test]
-fn tune_by_either_gain() {
-    let by_k = tune(
-        &[
-            "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
-        ],
-        &[],
-    );
-    let by_acceleration = tune(
-        &[
-            "--k-over-t-body",
-            "0.5",
-            "--t-prop",
-            "0.3",
-            "--t-body",
-            "2",
-            "--tau",
-            "0.1",
-        ],
-        &[],
-    );
-    assert_eq!(by_k.0, by_acceleration.0);
-}
-
-#[test]
-fn tune_a_double_integrator() {
-    let process = [
-        "--k-over-t-body",
-        "40",
-        "--t-prop",
-        "0.05",
-        "--t-body",
-        "inf",
-        "--tau",
-        "0.015",
-    ];
-    let report = tune(&process, &["--phase-margin", "45"]);
-    assert_eq!(report.0["process"]["k"], Value::Null);
-    assert_eq!(report.0["process"]["t_body_s"], Value::Null);
-    assert!((report.number("/margins/phase_margin_deg") - 45.0).abs() < 1e-3);
-    run(&[&["tune"], &process[..]].concat()).without_nan();
-}
-
-#[test]
-fn tune_a_negative_gain() {
-    let report = tune(
-        &[
-            "--k", "-1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
-        ],
-        &[],
-    );
-    assert!((report.number("/controller/kp") + 8.5096).abs() < 1e-3);
-    assert!((report.number("/controller/kd") + 6.9966).abs() < 1e-3);
-    assert!(report.number("/controller/angle_p") > 0.0);
-}
-
-// ---------------------------------------------------------------- campaign, help
-
-#[test]
-fn a_small_campaign() {
-    let folder = Scratch::new();
-    let text = "measure = \"relay\"\ncases = 4\nseed = 1\nbias = 0.3\nsigma = 0.01\ntrim = true\n";
-    let path = folder.write("relay.toml", text.as_bytes());
-    let table = run(&["campaign", &path]);
-    assert_eq!(table.code, Some(0), "{table:?}");
-    assert!(
-        table.without_nan().stdout.contains("4 random processes"),
-        "{}",
-        table.stdout
-    );
-    assert!(
-        table.stdout.contains("steady oscillation      4"),
-        "{}",
-        table.stdout
-    );
-    assert_eq!(run(&["campaign", &path]).stdout, table.stdout);
-    let fewer = run(&["campaign", &path, "--cases", "2"]);
-    assert!(
-        fewer.stdout.contains("2 random processes"),
-        "{}",
-        fewer.stdout
-    );
-    let text = text.replace("relay", "identification");
-    let path = folder.write("identification.toml", text.as_bytes());
-    let table = run(&["campaign", &path]);
-    assert_eq!(table.code, Some(0), "{table:?}");
-    assert!(
-        table
-            .without_nan()
-            .stdout
-            .contains("refused                 0"),
-        "{}",
-        table.stdout
-    );
-}
-
-#[test]
-fn help_lists_commands_and_exit_codes() {
-    let help = |arguments: &[&str]| -> Outcome {
-        let outcome = run(arguments);
-        assert_eq!(outcome.code, Some(0), "{arguments:?}");
-        assert_eq!(outcome.stderr, "");
-        outcome
-    };
-    let all = help(&["--help"]).stdout;
-    for command in ["identify", "simulate", "tune", "campaign"] {
-        assert!(all.contains(command), "{command}: {all}");
-        let own = help(&[command, "--help"]).stdout;
-        assert!(own.contains("Usage: onecycle"), "{own}");
-    }
-    let codes = all.split("Exit codes:").nth(1).unwrap_or_default();
-    for code in ["0  ", "2  ", "3  ", "4  ", "5  "] {
-        assert!(codes.contains(code), "{code}: {all}");
-    }
-    let identify = help(&["identify", "--help"]).stdout;
-    assert!(identify.contains("Exit codes: 0"), "{identify}");
-    assert!(help(&["--version"]).stdout.starts_with("onecycle "));
 }

@@ -194,13 +194,7 @@ impl Campaign {
     /// Half the peak-to-peak output over the last two periods of a perfect experiment.
     fn noise_free_amplitude(&self, case: &Case) -> Result<f64, CaseError> {
         let (trace, _) = self.run(case, SETTLING_PERIODS)?;
-        let tail = &trace.true_output[trace.len() - (2.0 * case.period_s / SAMPLE_S) as usize..];
-        let (low, high) = tail
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
-                (low.min(y), high.max(y))
-            });
-        Ok(0.5 * (high - low))
+        Ok(trace.amplitude_of_last((2.0 * case.period_s / SAMPLE_S) as usize))
     }
 
     /// The relay experiment of a case over so many periods of the describing function, and the

@@ -71,7 +71,7 @@ pub struct OscillationFound {
     pub cycles_used: usize,
     /// Cycles of the steady run they were taken from.
     pub cycles_steady: usize,
-    /// Beginning and end of the cycles used (s).
+    /// Beginning of the cycles used (s).
     pub start_s: f64,
     /// End of the cycles used (s).
     pub end_s: f64,

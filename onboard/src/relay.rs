@@ -25,9 +25,11 @@
 //! Noise protection after Abdul Hay, Chehadeh, Boiko et al. (2021), "Unsupervised tuning of
 //! multirotor dynamics".
 
-use core::fmt;
+mod settings;
 
 use libm::sqrtf;
+
+pub use self::settings::{RelayError, RelaySettings};
 
 /// Error leaves the noise, or two extrema stand apart, by this many sigma.
 const CLEAR_OF_NOISE_SIGMA: f32 = 6.0;
@@ -42,87 +44,6 @@ const TRIM_LIMIT: f32 = 0.9;
 const TRIM_FROM_SWITCH: u32 = 2;
 /// An excursion of this many half periods means that the trim has cost the relay its authority.
 const TRIM_LOST: f32 = 4.0;
-
-/// How the relay switches. Start from [`RelaySettings::new`].
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RelaySettings {
-    /// Half the jump of the output, `h` (input unit).
-    pub amplitude: f32,
-    /// Sine of the phase of the oscillation, between -1 and 1, both excluded.
-    pub beta: f32,
-    /// Time for which the noise is measured with zero output (s); 0 starts at once.
-    pub preroll_s: f32,
-    /// Standard deviation of the measurement noise, or its least value when there is a pre-roll
-    /// (output unit). A quantised sensor deserves its quantum here.
-    pub noise_sigma: f32,
-    /// Smoothing of the error: fraction of the half period; 0 switches it off.
-    pub smoothing: f32,
-    /// Least time between switches: fraction of the half period; 0 switches it off.
-    pub dwell: f32,
-    /// From an offset outside the noise: switches made as a plain relay (`beta = 0`) at first.
-    pub plain_switches: u16,
-    /// From such an offset: switches over which `beta` then goes from zero to its value.
-    pub ramp_switches: u16,
-    /// Share of the measured bias that the trim takes up each cycle; 0 switches it off.
-    pub trim_gain: f32,
-}
-
-impl RelaySettings {
-    /// Phase of the paper's distinguishing oscillation, `asin(beta) = -46.89` degrees.
-    pub const DISTINGUISHING_BETA: f32 = -0.73;
-
-    /// Share of the bias that a trim takes up each cycle: near all of it, short of overshooting.
-    pub const TRIM_GAIN: f32 = 0.8;
-
-    /// Noise-protected, without pre-roll and without trim.
-    #[must_use]
-    pub fn new(amplitude: f32, beta: f32) -> Self {
-        Self {
-            amplitude,
-            beta,
-            preroll_s: 0.0,
-            noise_sigma: 0.0,
-            smoothing: 0.03,
-            dwell: 0.3,
-            plain_switches: 3,
-            ramp_switches: 4,
-            trim_gain: 0.0,
-        }
-    }
-
-    /// Equation 4 as meant, with no protection: for noise-free comparisons.
-    #[must_use]
-    pub fn bare(amplitude: f32, beta: f32) -> Self {
-        Self {
-            smoothing: 0.0,
-            dwell: 0.0,
-            ..Self::new(amplitude, beta)
-        }
-    }
-}
-
-/// A setting out of its range, with its value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum RelayError {
-    /// The amplitude is not positive and finite.
-    Amplitude(f32),
-    /// `beta` is not between -1 and 1.
-    Beta(f32),
-    /// A time, a fraction or the noise is negative or not finite: its name and value.
-    Setting(&'static str, f32),
-}
-
-impl fmt::Display for RelayError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Amplitude(v) => write!(f, "the relay amplitude must be positive, but is {v}"),
-            Self::Beta(v) => write!(f, "beta must lie between -1 and 1, but is {v}"),
-            Self::Setting(name, v) => write!(f, "{name} must be zero or positive, but is {v}"),
-        }
-    }
-}
-
-impl core::error::Error for RelayError {}
 
 /// What the relay is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -214,24 +135,7 @@ impl Relay {
     /// # Errors
     /// Names the setting that is out of range.
     pub fn new(settings: RelaySettings) -> Result<Self, RelayError> {
-        let s = &settings;
-        if !(s.amplitude.is_finite() && s.amplitude > 0.0) {
-            return Err(RelayError::Amplitude(s.amplitude));
-        }
-        if !(s.beta > -1.0 && s.beta < 1.0) {
-            return Err(RelayError::Beta(s.beta));
-        }
-        for (name, value) in [
-            ("the pre-roll", s.preroll_s),
-            ("the noise sigma", s.noise_sigma),
-            ("the smoothing", s.smoothing),
-            ("the dwell", s.dwell),
-            ("the trim gain", s.trim_gain),
-        ] {
-            if !(value.is_finite() && value >= 0.0) {
-                return Err(RelayError::Setting(name, value));
-            }
-        }
+        settings.validate()?;
         let rest = Excursion {
             peak: 0.0,
             opposite_peak: 0.0,
@@ -245,18 +149,18 @@ impl Relay {
         };
         Ok(Self {
             settings,
-            phase: if s.preroll_s > 0.0 {
+            phase: if settings.preroll_s > 0.0 {
                 RelayPhase::Preroll
             } else {
                 RelayPhase::Kick
             },
             noise: NoiseMeter::default(),
-            noise_sigma: s.noise_sigma,
-            preroll_left_s: s.preroll_s,
+            noise_sigma: settings.noise_sigma,
+            preroll_left_s: settings.preroll_s,
             sign: 1.0,
             smoothed: 0.0,
             smoothing_gain: 1.0,
-            smoothed_sigma: s.noise_sigma,
+            smoothed_sigma: settings.noise_sigma,
             excursion: rest,
             undoable: [None; 2],
             switches: 0,

@@ -47,11 +47,42 @@ impl Trace {
         self.true_output.push(true_output);
     }
 
+    /// Half the peak-to-peak true output of the last `samples` samples, or of all if there are fewer
+    /// (output unit); zero of none.
+    #[must_use]
+    pub fn amplitude_of_last(&self, samples: usize) -> f64 {
+        let tail = &self.true_output[self.len().saturating_sub(samples)..];
+        let Some(&first) = tail.first() else {
+            return 0.0;
+        };
+        let (low, high) = tail
+            .iter()
+            .fold((first, first), |(low, high), &y| (low.min(y), high.max(y)));
+        0.5 * (high - low)
+    }
+
     /// Removes all samples and keeps the room.
     pub fn clear(&mut self) {
         self.time_s.clear();
         self.input.clear();
         self.output.clear();
         self.true_output.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Of 9, -1, 3, 2: the last three span from -1 to 3, all from -1 to 9.
+    #[test]
+    fn amplitude_is_half_the_span_of_the_tail() {
+        let mut trace = Trace::default();
+        assert_eq!(trace.amplitude_of_last(3), 0.0);
+        for (k, y) in [9.0, -1.0, 3.0, 2.0].into_iter().enumerate() {
+            trace.push(k as f64, 0.0, 0.0, y);
+        }
+        assert_eq!(trace.amplitude_of_last(3), 2.0);
+        assert_eq!(trace.amplitude_of_last(100), 5.0);
     }
 }

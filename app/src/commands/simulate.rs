@@ -21,6 +21,10 @@ const MOST_SAMPLES: f64 = 5e7;
 /// Fewest samples in a period: a relay that is slower than that is none.
 const FEWEST_SAMPLES_A_PERIOD: f64 = 4.0;
 
+/// Samples in a period where the amplitude is measured: fine enough for the peaks whatever the rate of
+/// the recording.
+const SAMPLES_A_PERIOD: usize = 1000;
+
 pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
     let process = arguments.process.process()?;
     positive("--sample-rate", arguments.sample_rate)?;
@@ -177,21 +181,14 @@ fn period_s(arguments: &Simulate, process: &Process) -> Result<f64, Failure> {
 /// Half the peak-to-peak output of the last two periods without bias, noise and jitter.
 fn noise_free_amplitude(arguments: &Simulate, process: &Process) -> Result<f64, Failure> {
     let period_s = period_s(arguments, process)?;
-    // Fine enough for the peaks whatever the rate of the recording.
-    let sample_s = period_s / 1000.0;
+    let sample_s = period_s / SAMPLES_A_PERIOD as f64;
     let experiment = Experiment::new(*process, sample_s, PERIODS * period_s);
     let undisturbed = Simulate {
         preroll: 0.0,
         ..arguments.clone()
     };
     let trace = run_relay(&experiment, relay(&undisturbed, 0.0)?, 0);
-    let tail = &trace.true_output[trace.len().saturating_sub(2000)..];
-    let (low, high) = tail
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), &y| {
-            (low.min(y), high.max(y))
-        });
-    Ok(0.5 * (high - low))
+    Ok(trace.amplitude_of_last(2 * SAMPLES_A_PERIOD))
 }
 
 /// The truth behind the recording, as comment lines.

@@ -28,6 +28,18 @@ pub(crate) const HOVER_T_PROP_S: f64 = 0.0321;
 pub(crate) const HOVER_T_BODY_S: f64 = 1.6886;
 pub(crate) const HOVER_TAU_S: f64 = 0.0237;
 
+/// A drone's roll without damping.
+pub(crate) const DOUBLE_INTEGRATOR: [&str; 8] = [
+    "--k-over-t-body",
+    "40",
+    "--t-prop",
+    "0.05",
+    "--t-body",
+    "inf",
+    "--tau",
+    "0.015",
+];
+
 /// What a run left behind.
 #[derive(Debug)]
 pub(crate) struct Outcome {
@@ -398,4 +410,11 @@ pub(crate) fn is_hover(report: &Report, part: f64) {
         .near("k_over_t_body", HOVER_K_OVER_T_BODY, part)
         .near("t_prop_s", HOVER_T_PROP_S, 5.0 * part)
         .near("tau_s", HOVER_TAU_S, 5.0 * part);
+}
+
+/// What `tune` makes of a process.
+pub(crate) fn tune(process: &[&str], arguments: &[&str]) -> Report {
+    let outcome = run(&[&["tune", "--json"], process, arguments].concat());
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    outcome.report()
 }

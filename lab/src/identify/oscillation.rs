@@ -170,7 +170,8 @@ impl Oscillation {
             .unwrap_or_else(|| self.two_level_window(signals, &points, relay))
     }
 
-    fn empty_window(&self, signals: &Signals<'_>, points: &Range<usize>) -> FitWindow {
+    /// The outputs of the cycles, without any input yet.
+    fn output_window(&self, signals: &Signals<'_>, points: &Range<usize>) -> FitWindow {
         let times_s = &signals.time_s[points.clone()];
         // The mean increment here, so that stamps do not drift off the even grid.
         let whole_s = times_s[times_s.len() - 1] - times_s[0];
@@ -195,7 +196,7 @@ impl Oscillation {
 
     /// The window with every change of the input; `None` where it changes too often.
     fn exact_window(&self, signals: &Signals<'_>, points: &Range<usize>) -> Option<FitWindow> {
-        let mut window = self.empty_window(signals, points);
+        let mut window = self.output_window(signals, points);
         for index in self.past(signals, points)..points.end {
             window
                 .push_input(signals.time_s[index], signals.input[index])
@@ -211,7 +212,7 @@ impl Oscillation {
         points: &Range<usize>,
         relay: &RelayInput,
     ) -> FitWindow {
-        let mut window = self.empty_window(signals, points);
+        let mut window = self.output_window(signals, points);
         let past = self.past(signals, points);
         let input = &signals.input[past..points.end];
         let levels: Vec<bool> = relay.levels(input).collect();
