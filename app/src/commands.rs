@@ -1,6 +1,8 @@
 //! One file a command: arguments in, report out.
 
 pub(crate) mod campaign;
+pub(crate) mod certify;
 pub(crate) mod identify;
+pub(crate) mod phase;
 pub(crate) mod simulate;
 pub(crate) mod tune;

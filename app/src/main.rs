@@ -7,7 +7,9 @@ mod args;
 mod commands;
 mod failure;
 mod output;
+mod pictures;
 mod report;
+mod settings;
 
 use std::process::ExitCode;
 
@@ -24,6 +26,8 @@ fn main() -> ExitCode {
         Command::Simulate(simulate) => commands::simulate::run(simulate),
         Command::Tune(tune) => commands::tune::run(tune),
         Command::Campaign(campaign) => commands::campaign::run(campaign),
+        Command::Phase(phase) => commands::phase::run(phase),
+        Command::Certify(certify) => commands::certify::run(certify),
     };
     match result {
         Ok(code) => code,

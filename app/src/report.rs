@@ -1,5 +1,7 @@
 //! Results as text for people and as JSON for programs.
 
+pub(crate) mod certificate;
 pub(crate) mod json;
 pub(crate) mod number;
+pub(crate) mod phase;
 pub(crate) mod text;

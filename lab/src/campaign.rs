@@ -14,10 +14,8 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::identify::{Identification, MOST_CYCLES, Options, Signals, identify};
 use crate::optimum::pd_at_phase_margin;
+use crate::space::{FieldError, Space};
 use crate::{Deterioration, deterioration};
-
-/// The multirotor domain of the paper's equation 3 (s), lowest and highest.
-pub const MULTIROTOR: [(f64, f64); 3] = [(0.015, 0.3), (0.2, 2.0), (0.0005, 0.1)];
 
 /// A campaign as a file describes it.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
@@ -44,22 +42,20 @@ pub struct Campaign {
     /// Cycles to fit.
     #[serde(default = "one")]
     pub cycles: usize,
+    /// Parameter of the relay.
+    #[serde(default = "distinguishing_beta")]
+    pub beta: f64,
 }
 
 /// Most cases of a campaign: a day's work.
 pub const MOST_CASES: u64 = 10_000_000;
 
-/// A field of a campaign that is out of its range.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("{field} must be {range}, but is {value}")]
-pub struct FieldError {
-    field: &'static str,
-    range: &'static str,
-    value: f64,
-}
-
 fn one() -> usize {
     1
+}
+
+fn distinguishing_beta() -> f64 {
+    Space::MULTIROTOR.beta
 }
 
 /// What a campaign measures.
@@ -141,6 +137,12 @@ impl Campaign {
                 (-1e6..=1e6).contains(&self.offset),
             ),
             (
+                "beta",
+                "-0.95 to 0.95",
+                self.beta,
+                (-0.95..=0.95).contains(&self.beta),
+            ),
+            (
                 "cycles",
                 "1 to 50",
                 self.cycles as f64,
@@ -165,7 +167,7 @@ impl Campaign {
     pub fn case(&self, n: u64) -> Result<Case, CaseError> {
         let seed = self.seed + n;
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        let [t_prop_s, t_body_s, tau_s] = MULTIROTOR.map(|(low, high)| rng.random_range(low..high));
+        let [t_prop_s, t_body_s, tau_s] = Space::MULTIROTOR.random(&mut rng);
         let bias = rng.random_range(-1.0..1.0) * self.bias;
         let part = if self.sigma_uniform {
             rng.random_range(0.0..1.0)
@@ -173,9 +175,19 @@ impl Campaign {
             1.0
         };
         let process = Process::new(1.0, t_prop_s, t_body_s, tau_s)?;
-        let beta = f64::from(RelaySettings::DISTINGUISHING_BETA);
+        let mut case = self.quiet_case(process, seed)?;
+        case.bias = bias;
+        case.sigma = part * self.sigma * case.amplitude;
+        Ok(case)
+    }
+
+    /// A process with neither bias nor noise; the noise of `seed` is there to be turned up.
+    ///
+    /// # Errors
+    /// [`CaseError::NoOscillation`] where the describing function has none.
+    pub fn quiet_case(&self, process: Process, seed: u64) -> Result<Case, CaseError> {
         let (omega, _) = process
-            .describing_function_oscillation(1.0, beta)
+            .describing_function_oscillation(1.0, self.beta)
             .ok_or(CaseError::NoOscillation)?;
         let mut case = Case {
             process,
@@ -186,8 +198,6 @@ impl Campaign {
             seed,
         };
         case.amplitude = self.noise_free_amplitude(&case)?;
-        case.bias = bias;
-        case.sigma = part * self.sigma * case.amplitude;
         Ok(case)
     }
 
@@ -203,7 +213,7 @@ impl Campaign {
     /// # Errors
     /// A [`CaseError`] for settings outside their range.
     pub fn run(&self, case: &Case, periods: f64) -> Result<(Trace, Relay), CaseError> {
-        let mut settings = RelaySettings::new(1.0, RelaySettings::DISTINGUISHING_BETA);
+        let mut settings = RelaySettings::new(1.0, self.beta as f32);
         settings.preroll_s = PREROLL_S as f32;
         settings.trim_gain = if self.trim {
             RelaySettings::TRIM_GAIN

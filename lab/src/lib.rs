@@ -30,22 +30,33 @@
 //! ```
 
 pub mod campaign;
+pub mod candidate;
+pub mod certificate;
 pub mod cost;
 pub mod deterioration;
 pub mod identify;
+pub mod limit_cycle;
 pub mod margins;
 mod open_loop;
 pub mod optimum;
+pub mod phase;
 mod propagation;
 mod roots;
 pub mod rule;
+pub mod space;
 mod step_metrics;
 pub mod step_response;
+pub mod surface;
 
+pub use candidate::{Candidate, CandidateError, Gains};
 pub use cost::ise;
 pub use deterioration::{Deterioration, deterioration};
+pub use limit_cycle::LimitCycle;
 pub use margins::{Margins, margins};
 pub use optimum::{Optimum, OptimumError, pd, pd_at_phase_margin};
+pub use phase::{DistinguishingPhase, LocalOptima, distinguishing_phase};
 pub use rule::TuningRule;
+pub use space::{FieldError, Space};
 pub use step_metrics::StepMetrics;
 pub use step_response::{Sample, StepResponse, StepResponseError, step_response};
+pub use surface::Direction;

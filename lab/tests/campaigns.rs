@@ -19,6 +19,7 @@ fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
         offset: 0.0,
         trim,
         cycles: 2,
+        beta: -0.73,
     }
 }
 

@@ -56,10 +56,10 @@ fn derivative_times_match_the_paper() {
     }
 }
 
-// The slowest process of the paper's domain is the one that sets its distinguishing phase:
-// asin(beta) = -46.89 deg in the paper (beta = -0.73), -46.88 deg here.
+// The rule of the slowest process of the paper's space has the phase of the paper's relay, beta =
+// -0.73: asin(beta) = -46.88 deg.
 #[test]
-fn distinguishing_phase_matches_the_paper() {
+fn slowest_process_has_the_paper_s_phase() {
     let rule = TuningRule::from_lead(optimum(0.3, 2.0, 0.1).lead_rad, PHASE_MARGIN_RAD);
     assert!(prints_as(rule.beta.asin().to_degrees(), -46.88, 0.01));
     assert!(prints_as(rule.beta, -0.73, 0.01));

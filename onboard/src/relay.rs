@@ -37,8 +37,6 @@ const CLEAR_OF_NOISE_SIGMA: f32 = 6.0;
 const COME_BACK_SIGMA: f32 = 3.0;
 /// An extremum is disproved when the signal passes it by this many sigma.
 const DISPROVED_SIGMA: f32 = 2.5;
-/// The trim stays below the relay's own amplitude: beyond it no switching could hold the process.
-const TRIM_LIMIT: f32 = 0.9;
 /// The trim moves from the first cycle on that has been high and low: under a large bias there may be
 /// no second one.
 const TRIM_FROM_SWITCH: u32 = 2;
@@ -336,7 +334,8 @@ impl Relay {
         } = self.excursion;
         if self.switches >= TRIM_FROM_SWITCH && cycle_s > 0.0 {
             let moved = trim + self.settings.trim_gain * h * cycle_high_less_low_s / cycle_s;
-            self.excursion.trim = moved.clamp(-TRIM_LIMIT * h, TRIM_LIMIT * h);
+            let limit = RelaySettings::TRIM_LIMIT * h;
+            self.excursion.trim = moved.clamp(-limit, limit);
             if self.settings.trim_gain > 0.0 {
                 self.lead = [1.0; 2];
             }

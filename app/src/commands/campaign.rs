@@ -1,6 +1,5 @@
 //! `onecycle campaign`: many random experiments, and a table of what became of them.
 
-use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -12,17 +11,16 @@ use onecycle_lab::campaign::{
 };
 use rayon::prelude::*;
 
-use crate::args;
 use crate::failure::{Failure, exit};
 use crate::output::print;
+use crate::{args, settings};
 
 pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
-    let mut campaign = read(&arguments.file)?;
+    let mut campaign: Campaign = settings::read(&arguments.file)?;
     campaign.cases = arguments.cases.unwrap_or(campaign.cases);
-    campaign.validate().map_err(|error| Failure::Settings {
-        path: arguments.file.clone(),
-        reason: error.to_string(),
-    })?;
+    campaign
+        .validate()
+        .map_err(|error| settings::out_of_range(&arguments.file, error))?;
     let table = match campaign.measure {
         Measure::Relay => relay_table(&campaign, &all(&campaign, relay_outcome)?),
         Measure::Identification => {
@@ -31,23 +29,6 @@ pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
     };
     print(&table)?;
     Ok(ExitCode::from(exit::DONE))
-}
-
-fn read(path: &Path) -> Result<Campaign, Failure> {
-    let failed = |reason: String| Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    };
-    let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
-    toml::from_str(&text).map_err(|error| {
-        // The parser's own report is a picture of several lines.
-        let begin = error.span().map_or(0, |span| span.start).min(text.len());
-        let line = text[..begin].matches('\n').count() + 1;
-        failed(format!(
-            "line {line}: {}",
-            error.message().replace('\n', ", ")
-        ))
-    })
 }
 
 /// Every case's outcome, in order whatever the number of threads.

@@ -418,3 +418,20 @@ pub(crate) fn tune(process: &[&str], arguments: &[&str]) -> Report {
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     outcome.report()
 }
+
+/// Asserts that every element of the text is closed, and that it is numbers that it draws.
+pub(crate) fn is_svg(text: &str) {
+    assert!(text.starts_with("<svg "), "{}", &text[..80]);
+    assert!(text.trim_end().ends_with("</svg>"));
+    let mut open = Vec::new();
+    for element in text.split('<').skip(1) {
+        let (tag, _) = element.split_once('>').expect("a tag ends");
+        if let Some(name) = tag.strip_prefix('/') {
+            assert_eq!(open.pop(), Some(name.trim()));
+        } else if !tag.ends_with('/') {
+            open.push(tag.split_whitespace().next().unwrap());
+        }
+    }
+    assert!(open.is_empty(), "{open:?}");
+    assert!(!text.contains("NaN") && !text.contains("inf"));
+}

@@ -33,6 +33,10 @@ impl RelaySettings {
     /// Share of the bias that a trim takes up each cycle: near all of it, short of overshooting.
     pub const TRIM_GAIN: f32 = 0.8;
 
+    /// The trim stays within this part of the relay's amplitude: at the whole of it no switching could
+    /// hold the process.
+    pub const TRIM_LIMIT: f32 = 0.9;
+
     /// Checks every setting.
     pub(super) fn validate(&self) -> Result<(), RelayError> {
         if !(self.amplitude.is_finite() && self.amplitude > 0.0) {

@@ -360,7 +360,7 @@ fn trim_follows_the_mean_of_the_output() {
         moves[..4].iter().all(|moved| (moved - step).abs() < 0.01),
         "{trims:?}"
     );
-    assert_eq!(relay.trim(), TRIM_LIMIT * 2.0);
+    assert_eq!(relay.trim(), RelaySettings::TRIM_LIMIT * 2.0);
 }
 
 #[test]

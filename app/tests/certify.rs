@@ -1,0 +1,123 @@
+//! `certify`: its reports, its picture, its verdicts, and what it refuses.
+
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{NOT_WRITTEN, Scratch, UNREADABLE, is_svg, run};
+
+/// The exit code of a space that is not certified.
+const NOT_CERTIFIED: i32 = 4;
+
+// Fewer shapes and biases than by default, and the same verdicts: stable without bias and with the
+// trim; the bare relay has lost its cycle at 0.5; simulations settle there.
+#[test]
+fn multirotors_are_certified() {
+    let outcome = run(&["certify", "--shapes", "4", "--bias", "0,0.3,50%", "--json"]);
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    let found = outcome.report();
+    assert_eq!(found.0["schema"], "onecycle.certificate/1");
+    assert_eq!(found.0["holds"], true);
+    assert!((found.number("/least_stable/spectral_radius") - 0.2119).abs() < 1e-4);
+    assert_eq!(found.0["corners"].as_array().map(Vec::len), Some(8));
+    assert!((found.number("/corners/7/period_s") - 2.306).abs() < 1e-3);
+    assert!((found.number("/corners/7/describing_function/period_s") - 2.2055).abs() < 1e-4);
+    for (row, stable, no_cycle) in [(0, 16.0, 0.0), (1, 16.0, 0.0), (2, 0.0, 16.0)] {
+        let number = |name: &str| found.number(&format!("/biases/{row}/{name}"));
+        assert_eq!(number("certified/bare/stable"), stable);
+        assert_eq!(number("certified/bare/no_cycle"), no_cycle);
+        assert_eq!(number("certified/trimmed"), 16.0);
+        assert_eq!(number("simulated_settled/untrimmed"), 16.0);
+        assert_eq!(number("simulated_settled/trimmed"), 16.0);
+    }
+}
+
+#[test]
+fn the_report_for_people_fits_a_terminal() {
+    let folder = Scratch::new();
+    let picture = folder.name("out.svg");
+    let arguments = ["certify", "--shapes", "3", "--bias", "0,-0.4"];
+    let outcome = run(&[&arguments[..], &["--picture", &picture]].concat());
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    let text = &outcome.without_nan().stdout;
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 100),
+        "{text}"
+    );
+    for words in [
+        "exactly one stable limit cycle: 9 of 9",
+        "21.2 % of a deviation is left",
+        "Certified: stable without bias, and with the trim",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    is_svg(&std::fs::read_to_string(picture).unwrap());
+    assert_eq!(folder.files(), ["out.svg"]);
+}
+
+// A relay that lags by 50 degrees needs damping, of which there is none here.
+#[test]
+fn a_relay_without_oscillation_is_not_certified() {
+    let folder = Scratch::new();
+    let space = folder.write(
+        "space.toml",
+        b"t_prop_s = [0.01, 0.1]\nt_body_s = [1e8, 1e9]\ntau_s = [0.01, 0.05]\nbeta = 0.76\n",
+    );
+    let outcome = run(&["certify", &space, "--shapes", "2", "--bias", "0"]);
+    assert_eq!(outcome.code, Some(NOT_CERTIFIED), "{outcome:?}");
+    let text = &outcome.without_nan().stdout;
+    assert!(text.contains("Not certified"), "{text}");
+    assert!(text.contains("no limit cycle"), "{text}");
+}
+
+// The values of the library's tests: one exact cycle at 2.306 s, three sampled ones from 2.308 s; a
+// pattern of one cycle at a bias of 0.25; no cycle at 0.5 and a relay that stops switching.
+#[test]
+fn single_processes() {
+    let arguments = ["certify", "--process", "0.3,2,0.1", "--bias", "0,25%,0.5"];
+    let outcome = run(&[&arguments[..], &["--sample-rate", "1000"]].concat());
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    let text = &outcome.without_nan().stdout;
+    for words in [
+        "describing function  period 2.206 s, amplitude 0.05873",
+        "bare relay           period 2.306 s (high 1.153 s), amplitude 0.06427, 4.2 % left",
+        "sampled              period 2.308 s (2308 samples)",
+        "sampled              period 2.312 s (2312 samples)",
+        "a pattern of 1 cycle(s), mean period 2.216 s",
+        "turned back, 1/2     period 3.440 s",
+        "bare relay           no limit cycle of two switches",
+        "the bare relay stops switching",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+}
+
+#[test]
+fn arguments_that_are_none() {
+    for (arguments, words) in [
+        (
+            &["--process", "0.3,2"][..],
+            &["--process", "three times"][..],
+        ),
+        (&["--process", "0.3,two,1"], &["--process", "three times"]),
+        (&["--process", "0.3,-2,0.1"], &["--process", "T_body"]),
+        (&["--bias", "1"], &["--bias", "between -1 and 1"]),
+        (&["--bias", "0,x"], &["--bias", "'x'"]),
+        (&["--shapes", "1"], &["--shapes"]),
+        (&["--sample-rate", "1000"], &["required arguments"]),
+        (&["--process", "0.3,2,0.1", "--json"], &["--json"]),
+        (
+            &["--process", "0.3,2,0.1", "--sample-rate", "0"],
+            &["--sample-rate"],
+        ),
+    ] {
+        run(&[&["certify"], arguments].concat()).misused(words);
+    }
+    let folder = Scratch::new();
+    let missing = folder.name("nosuch.toml");
+    run(&["certify", &missing]).refused(UNREADABLE, &["nosuch.toml", "No such file"]);
+    let picture = folder.name("nosuch/out.svg");
+    let arguments = ["certify", "--shapes", "2", "--bias", "0", "--picture"];
+    run(&[&arguments[..], &[&picture]].concat()).refused(NOT_WRITTEN, &["out.svg"]);
+}
