@@ -35,6 +35,7 @@ pub(crate) enum Command {
     Campaign(Campaign),
     Phase(Phase),
     Certify(Certify),
+    Grid(Grid),
 }
 
 /// Identify the process behind a recorded relay test, and design its controller.
@@ -358,6 +359,72 @@ impl Certify {
     }
 }
 
+/// Choose processes that stand for a space, so that one of them is near every process of it.
+///
+/// Processes are J apart when neither one's optimal controller costs more than J on the other above
+/// that one's own. Neighbours are laid J apart along rows, rays and radii; with --fewest there are
+/// only as many as leave no process farther than J from one of them.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle grid --check 10000\n",
+    "  onecycle grid space.toml --deterioration 5% --out grid.json --picture grid.svg\n",
+    "  onecycle grid --from grid.json --check 100000 --seed 2\n\n",
+    "With --out, what is done is kept in GRID.json.part: the same command goes on from there.\n\n",
+    "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 4 the check found a process farther ",
+    "than J from every member, 5 output not written"
+))]
+pub(crate) struct Grid {
+    /// The space, in TOML (see experiments/) [default: the paper's multirotors]
+    #[arg(value_name = "FILE")]
+    pub(crate) space: Option<PathBuf>,
+    /// How far apart neighbours are, 0.1 % to 100 %: such as 10% or 0.1
+    #[arg(long, value_name = "J", default_value = "10%", allow_hyphen_values = true,
+          value_parser = deterioration)]
+    pub(crate) deterioration: f64,
+    /// As few members as possible instead of neighbours J apart
+    #[arg(long)]
+    pub(crate) fewest: bool,
+    /// Compare at equal velocity gains instead of the same amplitude, to see what it takes
+    #[arg(long)]
+    pub(crate) equal_gains: bool,
+    /// Write the grid to this file, as JSON
+    #[arg(long, short, value_name = "GRID.json")]
+    pub(crate) out: Option<PathBuf>,
+    /// Write the matrix of costs however large it is, not only up to 2000 members
+    #[arg(long, requires = "out")]
+    pub(crate) matrix: bool,
+    /// Begin anew, whatever an interrupted run has left
+    #[arg(long, requires = "out")]
+    pub(crate) restart: bool,
+    /// Check that this many random processes have a member near (1 to 10,000,000)
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_CHECKED))]
+    pub(crate) check: Option<u64>,
+    /// Seed of the random processes
+    #[arg(long, value_name = "S", default_value_t = 1, requires = "check")]
+    pub(crate) seed: u64,
+    /// Read the grid from this file instead of making it
+    #[arg(long, value_name = "GRID.json",
+          conflicts_with_all = ["space", "deterioration", "fewest", "equal_gains", "out"])]
+    pub(crate) from: Option<PathBuf>,
+    /// Draw the grid in this file, as SVG
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
+    pub(crate) threads: Option<u64>,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Most random processes of a check, all of which are kept.
+const MOST_CHECKED: u64 = 10_000_000;
+/// More threads than any machine has cores.
+const MOST_THREADS: u64 = 1024;
+
 /// `T_prop`, `T_body`, `tau` (s), separated by commas.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Times(pub(crate) [f64; 3]);
@@ -390,6 +457,16 @@ fn bias(text: &str) -> Result<f64, String> {
         Ok(bias)
     } else {
         Err("a bias lies between -1 and 1 amplitudes of the relay".to_owned())
+    }
+}
+
+/// A deterioration as a fraction, within what a grid can be laid for.
+fn deterioration(text: &str) -> Result<f64, String> {
+    let deterioration = text.trim().parse::<Share>()?.of(1.0);
+    if (0.001..=1.0).contains(&deterioration) {
+        Ok(deterioration)
+    } else {
+        Err("a deterioration lies between 0.1 % and 100 %, such as 10% or 0.1".to_owned())
     }
 }
 

@@ -2,6 +2,7 @@
 
 pub(crate) mod campaign;
 pub(crate) mod certify;
+pub(crate) mod grid;
 pub(crate) mod identify;
 pub(crate) mod phase;
 pub(crate) mod simulate;

@@ -28,6 +28,7 @@ fn main() -> ExitCode {
         Command::Campaign(campaign) => commands::campaign::run(campaign),
         Command::Phase(phase) => commands::phase::run(phase),
         Command::Certify(certify) => commands::certify::run(certify),
+        Command::Grid(grid) => commands::grid::run(grid),
     };
     match result {
         Ok(code) => code,

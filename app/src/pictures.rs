@@ -1,6 +1,7 @@
 //! Pictures: SVG that needs no installed font, written whole or not at all.
 
 pub(crate) mod certify;
+pub(crate) mod grid;
 pub(crate) mod phase;
 
 use std::path::Path;

@@ -132,7 +132,9 @@ fn help_lists_commands_and_exit_codes() {
         outcome
     };
     let all = help(&["--help"]).stdout;
-    for command in ["identify", "simulate", "tune", "campaign"] {
+    for command in [
+        "identify", "simulate", "tune", "campaign", "phase", "grid", "certify",
+    ] {
         assert!(all.contains(command), "{command}: {all}");
         let own = help(&[command, "--help"]).stdout;
         assert!(own.contains("Usage: onecycle"), "{own}");

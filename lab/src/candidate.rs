@@ -176,3 +176,47 @@ impl Candidate {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Twice the times: with the same amplitude a quarter of the acceleration gain and twice Kd;
+    // with equal gains half of it (K is the same) and half of Kp. Factors of two are exact.
+    #[test]
+    fn twice_as_slow() {
+        let times_s = [0.05, 1.0, 0.02];
+        for (gains, gain, kp) in [(Gains::SameAmplitude, 0.25, 1.0), (Gains::Equal, 0.5, 0.5)] {
+            let one = Candidate::new(&Space::MULTIROTOR, gains, times_s).unwrap();
+            let two = one.scaled(2.0).unwrap();
+            assert_eq!(two.times_s(), [0.1, 2.0, 0.04]);
+            assert_eq!(
+                two.process.k_over_t_body(),
+                gain * one.process.k_over_t_body()
+            );
+            let (a, b) = (&one.optimum, &two.optimum);
+            assert_eq!((b.pd.kp, b.pd.kd), (kp * a.pd.kp, 2.0 * kp * a.pd.kd));
+            assert_eq!(b.ise, 2.0 * a.ise);
+            assert_eq!(b.margins.phase_margin_rad, a.margins.phase_margin_rad);
+        }
+    }
+
+    // A distance is the larger of both costs, below any bound above it and below none under it. The
+    // controller made for a process ten times as slow has a Kd ten times as large: unstable.
+    #[test]
+    fn distances() {
+        let new =
+            |times_s| Candidate::new(&Space::MULTIROTOR, Gains::SameAmplitude, times_s).unwrap();
+        let (one, other) = (new([0.05, 1.0, 0.02]), new([0.06, 1.0, 0.03]));
+        let distance = one.distance(&other);
+        assert_eq!(distance, one.cost_on(&other).max(other.cost_on(&one)));
+        assert_eq!(distance, other.distance(&one));
+        assert_eq!(one.on(&other).relative(), Some(one.cost_on(&other)));
+        assert_eq!(one.distance_below(&other, 1.01 * distance), Some(distance));
+        assert_eq!(one.distance_below(&other, distance), None);
+        assert!(one.distance(&one) < 1e-13);
+        let fast = one.scaled(0.1).unwrap();
+        assert_eq!(one.cost_on(&fast), f64::INFINITY);
+        assert_eq!(fast.distance(&one), f64::INFINITY);
+    }
+}

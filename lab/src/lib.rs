@@ -34,6 +34,7 @@ pub mod candidate;
 pub mod certificate;
 pub mod cost;
 pub mod deterioration;
+pub mod grid;
 pub mod identify;
 pub mod limit_cycle;
 pub mod margins;

@@ -241,7 +241,7 @@ fn sentence(text: &str) -> String {
 }
 
 /// Writes `words` behind `lead`, in lines as wide as a terminal, indented like the first.
-fn wrapped(text: &mut String, lead: &str, words: &str) {
+pub(super) fn wrapped(text: &mut String, lead: &str, words: &str) {
     let mut line = lead.to_owned();
     let mut is_first = true;
     for word in words.split_whitespace() {

@@ -17,6 +17,12 @@ use onecycle_onboard::transition::{State, Transition};
 
 use crate::roots::root;
 
+/// Of a turn, as a part of its piece: the output there is flat, so that its error is the square.
+const TURN_TOLERANCE: f64 = 1e-9;
+
+/// Of the bend of the rate, which only has to lie between two turns.
+const BEND_TOLERANCE: f64 = 1e-3;
+
 /// A rectangular wave and the process's periodic response to it.
 #[derive(Clone, Debug)]
 pub(super) struct Waveform {
@@ -147,13 +153,13 @@ impl Waveform {
         };
         let length_s = piece.length_s;
         let bend_s = if acceleration(0.0) * acceleration(length_s) < 0.0 {
-            root(acceleration, 0.0, length_s, 0.0)
+            root(acceleration, 0.0, length_s, BEND_TOLERANCE * length_s)
         } else {
             length_s
         };
         let turn = move |from_s: f64, to_s: f64| {
             (from_s < to_s && rate(from_s) * rate(to_s) < 0.0)
-                .then(|| root(rate, from_s, to_s, 0.0))
+                .then(|| root(rate, from_s, to_s, TURN_TOLERANCE * length_s))
         };
         [turn(0.0, bend_s), turn(bend_s, length_s)]
             .into_iter()

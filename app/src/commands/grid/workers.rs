@@ -1,0 +1,66 @@
+//! Threads that work on pieces, and a bar that shows how far they are.
+
+use indicatif::{ProgressBar, ProgressStyle};
+use onecycle_lab::grid::Pieces;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::failure::Failure;
+
+pub(super) struct Workers {
+    pool: ThreadPool,
+    bar: ProgressBar,
+}
+
+impl Workers {
+    /// So many threads, or as many as there are cores.
+    pub(super) fn new(threads: Option<u64>) -> Result<Self, Failure> {
+        // Zero is the builder's word for as many as there are cores.
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads.unwrap_or(0) as usize)
+            .build()
+            .map_err(|error| Failure::usage(format!("cannot start the threads: {error}")))?;
+        let bar = ProgressBar::new(0);
+        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}") {
+            bar.set_style(style);
+        }
+        Ok(Self { pool, bar })
+    }
+
+    pub(super) fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// The bar is about so many pieces from now on, some of them done.
+    pub(super) fn expect(&self, count: usize, done: usize) {
+        self.bar.reset();
+        self.bar.set_length(count as u64);
+        self.bar.set_position(done as u64);
+    }
+
+    /// Runs pieces that the bar expects; their results are in order.
+    pub(super) fn run<T: Send>(
+        &self,
+        count: usize,
+        piece: impl Fn(usize) -> T + Send + Sync,
+    ) -> Vec<T> {
+        let piece = |k| {
+            let result = piece(k);
+            self.bar.inc(1);
+            result
+        };
+        self.pool
+            .install(|| (0..count).into_par_iter().map(piece).collect())
+    }
+
+    pub(super) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Pieces for Workers {
+    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+        self.expect(count, 0);
+        self.run(count, piece)
+    }
+}

@@ -1,0 +1,175 @@
+//! What a grid is made of, and how near its members are to random processes.
+
+use std::fmt::Write;
+
+use onecycle_lab::Gains;
+use onecycle_lab::grid::{Check, Grid, Layout, Settings};
+use serde::Serialize;
+
+use super::json::to_text;
+use super::number::significant;
+use super::text::wrapped;
+use crate::commands::grid::Done;
+
+/// Changes with every change that a reader of the summary could notice.
+const SCHEMA: &str = "onecycle.grid.summary/1";
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    schema: &'static str,
+    settings: &'a Settings,
+    members: usize,
+    members_per_row: Vec<usize>,
+    alpha: Option<Alpha>,
+    has_matrix: bool,
+    check: Option<&'a Check>,
+    holds: Option<bool>,
+    seconds: f64,
+}
+
+/// Ratio of neighbouring radii.
+#[derive(Serialize)]
+struct Alpha {
+    least: f64,
+    most: f64,
+}
+
+impl Alpha {
+    fn of(grid: &Grid) -> Option<Self> {
+        let alphas = || {
+            let places = grid.members.iter().filter_map(|member| member.place);
+            places.map(|place| place.alpha)
+        };
+        Some(Self {
+            least: alphas().reduce(f64::min)?,
+            most: alphas().reduce(f64::max)?,
+        })
+    }
+}
+
+fn members_per_row(grid: &Grid) -> Vec<usize> {
+    let mut counts = Vec::new();
+    for place in grid.members.iter().filter_map(|member| member.place) {
+        if counts.len() <= place.row {
+            counts.resize(place.row + 1, 0);
+        }
+        counts[place.row] += 1;
+    }
+    counts
+}
+
+/// The summary for programs.
+pub(crate) fn json(done: &Done) -> String {
+    to_text(&Summary {
+        schema: SCHEMA,
+        settings: &done.grid.settings,
+        members: done.grid.members.len(),
+        members_per_row: members_per_row(&done.grid),
+        alpha: Alpha::of(&done.grid),
+        has_matrix: done.has_matrix,
+        check: done.check.as_ref(),
+        holds: done.check.map(|_| done.holds()),
+        seconds: done.took.as_secs_f64(),
+    })
+}
+
+/// The summary for people.
+pub(crate) fn text(done: &Done) -> String {
+    let mut text = String::new();
+    let Settings {
+        space,
+        deterioration,
+        layout,
+        gains,
+    } = &done.grid.settings;
+    let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
+    let _ = writeln!(
+        text,
+        "Space    T_prop {}, T_body {}, tau {}\n         phase margin at least {} deg, relay beta {}",
+        range(space.t_prop_s),
+        range(space.t_body_s),
+        range(space.tau_s),
+        space.phase_margin_deg,
+        space.beta,
+    );
+    let limit = percent(*deterioration);
+    let _ = writeln!(
+        text,
+        "Grid     {}, {}",
+        match layout {
+            Layout::Rays => format!("neighbours {limit} apart"),
+            Layout::Fewest => format!("the fewest within {limit} of every process"),
+        },
+        match gains {
+            Gains::SameAmplitude => "gains by the amplitude",
+            Gains::Equal => "equal velocity gains",
+        }
+    );
+    members(&mut text, &done.grid);
+    let _ = writeln!(text, "Time     {} s", significant(done.took.as_secs_f64()));
+    if let Some(check) = &done.check {
+        describe(&mut text, check, &limit);
+    }
+    text
+}
+
+fn members(text: &mut String, grid: &Grid) {
+    let counts = members_per_row(grid);
+    let count = grid.members.len();
+    if counts.is_empty() {
+        let _ = writeln!(text, "Members  {count}");
+        return;
+    }
+    let rows: Vec<String> = counts.iter().map(ToString::to_string).collect();
+    let rows = format!("{count} in {} rows: {}", rows.len(), rows.join(" "));
+    wrapped(text, "Members  ", &rows);
+    let alone = grid.members.iter().filter(|member| member.place.is_none());
+    match alone.count() {
+        0 => {}
+        alone => {
+            let _ = writeln!(text, "         and {alone} where the rows left holes");
+        }
+    }
+    if let Some(Alpha { least, most }) = Alpha::of(grid) {
+        let _ = writeln!(
+            text,
+            "         radii of a ray at ratios of {least:.3} to {most:.3}"
+        );
+    }
+}
+
+fn describe(text: &mut String, check: &Check, limit: &str) {
+    let [t_prop, t_body, tau] = check.worst_at_s.map(significant);
+    let cost = |cost: Option<f64>| cost.map_or("unstable".to_owned(), percent);
+    let _ = writeln!(
+        text,
+        "\nCheck    {} random processes, seed {}\n  \
+         from the best member        worst {}, mean {}\n  \
+         its controller on them      worst {}, mean {}\n  \
+         least phase margin left     {}\n  \
+         farthest is                 T_prop {t_prop} s, T_body {t_body} s, tau {tau} s\n",
+        check.processes,
+        check.seed,
+        cost(check.worst),
+        cost(check.mean),
+        cost(check.worst_cost),
+        cost(check.mean_cost),
+        check
+            .least_margin_rad
+            .map_or("unstable".to_owned(), |margin| format!(
+                "{:.1} deg",
+                margin.to_degrees()
+            )),
+    );
+    let _ = match check.beyond {
+        0 => writeln!(text, "Every one of them is within {limit} of a member."),
+        beyond => writeln!(
+            text,
+            "{beyond} of them are farther than {limit} from every member."
+        ),
+    };
+}
+
+fn percent(fraction: f64) -> String {
+    format!("{} %", significant(100.0 * fraction))
+}

@@ -1,0 +1,399 @@
+//! `grid`: its reports and files, stopped and gone on with, and what it refuses.
+
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, is_svg, onecycle, run};
+use serde_json::Value;
+
+/// A part of the paper's space.
+const SPACE: &str = "t_prop_s = [0.03, 0.1]\nt_body_s = [0.5, 1.0]\ntau_s = [0.005, 0.05]\n";
+
+/// A folder with [`SPACE`] in it, and its path.
+fn space() -> (Scratch, String) {
+    let folder = Scratch::new();
+    let path = folder.write("space.toml", SPACE.as_bytes());
+    (folder, path)
+}
+
+fn grid(arguments: &[&str]) -> Outcome {
+    let outcome = run(&[&["grid"], arguments].concat());
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    outcome
+}
+
+fn read(path: &str) -> Value {
+    serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap()
+}
+
+// ---------------------------------------------------------------- reports and files
+
+// One command from end to end: made, checked, written, drawn; then read and checked again.
+#[test]
+fn from_space_to_file_and_back() {
+    let (folder, space) = space();
+    let [out, picture] = ["grid.json", "grid.svg"].map(|name| folder.name(name));
+    let files = ["--out", &out, "--picture", &picture];
+    let made = grid(&[&[space.as_str(), "--check", "500"], &files[..]].concat());
+    assert_eq!(made.stderr, "");
+    made.without_nan();
+    for words in [
+        "T_prop 0.03 .. 0.1 s",
+        "neighbours 10.00 % apart, gains by the amplitude",
+        "Members  ",
+        "500 random processes, seed 1",
+        "Every one of them is within 10.00 % of a member.",
+    ] {
+        assert!(made.stdout.contains(words), "{words}: {}", made.stdout);
+    }
+    assert_eq!(folder.files().len(), 3, "{:?}", folder.files());
+    is_svg(&std::fs::read_to_string(folder.path("grid.svg")).unwrap());
+
+    let file = read(&out);
+    assert_eq!(file["format"], "onecycle.grid/1");
+    assert_eq!(file["settings"]["deterioration"], 0.1);
+    assert_eq!(file["settings"]["layout"], "rays");
+    assert_eq!(file["settings"]["gains"], "same_amplitude");
+    assert_eq!(file["settings"]["space"]["beta"], -0.73);
+    assert_eq!(file["check"]["processes"], 500);
+    let members = file["members"].as_array().unwrap();
+    assert!((10..100).contains(&members.len()), "{}", members.len());
+    let matrix = file["matrix"].as_array().unwrap();
+    assert_eq!(matrix.len(), members.len());
+    assert!((0..members.len()).all(|i| matrix[i][i] == 0.0));
+
+    let again = grid(&["--from", &out, "--check", "500", "--json"]).report();
+    assert_eq!(again.0["schema"], "onecycle.grid.summary/1");
+    assert_eq!(again.0["members"], members.len());
+    assert_eq!(
+        (&again.0["holds"], &again.0["has_matrix"]),
+        (&true.into(), &true.into())
+    );
+    let rows = again.0["members_per_row"].as_array().unwrap();
+    let total: u64 = rows.iter().filter_map(Value::as_u64).sum();
+    assert_eq!(total, members.len() as u64);
+    // Members made afresh are the same to 1e-9 or so.
+    let worst = file["check"]["worst"].as_f64().unwrap();
+    assert!((again.number("/check/worst") - worst).abs() < 1e-9);
+    assert!(again.number("/alpha/least") > 1.1);
+    assert!(again.number("/alpha/most") >= again.number("/alpha/least"));
+    // Another seed draws others; without --check the file's own check is told.
+    let other = grid(&["--from", &out, "--check", "500", "--seed", "9", "--json"]).report();
+    assert_ne!(other.0["check"], again.0["check"]);
+    assert_eq!(
+        grid(&["--from", &out, "--json"]).report().0["check"],
+        file["check"]
+    );
+}
+
+#[test]
+fn the_fewest_and_equal_gains() {
+    let (folder, space) = space();
+    let count = |arguments: &[&str]| -> u64 {
+        let outcome = grid(&[&[space.as_str(), "--json", "--check", "300"], arguments].concat());
+        let report = outcome.report();
+        assert_eq!(report.0["holds"], true);
+        report.0["members"].as_u64().unwrap()
+    };
+    let out = folder.name("grid.json");
+    let (rays, fewest) = (count(&[]), count(&["--fewest", "--out", &out]));
+    assert!(4 * fewest < rays, "{fewest} {rays}");
+    assert!(rays < count(&["--equal-gains"]));
+    assert!(rays < count(&["--deterioration", "0.05"]));
+    let file = read(&out);
+    assert_eq!(file["settings"]["layout"], "fewest");
+    assert_eq!(file["members"][0]["row"], Value::Null);
+    assert_eq!(file["matrix"].as_array().unwrap().len() as u64, fewest);
+    let again = grid(&["--from", &out, "--picture", &folder.name("grid.svg")]);
+    assert!(
+        again.stdout.contains("the fewest within 10.00 %"),
+        "{}",
+        again.stdout
+    );
+    is_svg(&std::fs::read_to_string(folder.path("grid.svg")).unwrap());
+}
+
+// The same bytes at one thread and at three; either spelling of a deterioration.
+#[test]
+fn the_same_bytes_at_any_number_of_threads() {
+    let (folder, space) = space();
+    let [one, three] = ["one.json", "three.json"].map(|name| folder.name(name));
+    let check = ["--check", "200", "--seed", "4"];
+    grid(
+        &[
+            &[
+                &space,
+                "--deterioration",
+                "15 %",
+                "--threads",
+                "1",
+                "--out",
+                &one,
+            ],
+            &check[..],
+        ]
+        .concat(),
+    );
+    grid(
+        &[
+            &[
+                &space,
+                "--deterioration",
+                "0.15",
+                "--threads",
+                "3",
+                "--out",
+                &three,
+            ],
+            &check[..],
+        ]
+        .concat(),
+    );
+    assert!(
+        std::fs::read(one).unwrap() == std::fs::read(three).unwrap(),
+        "other bytes"
+    );
+}
+
+// A member that covers nothing but itself: the check says so, and so does the exit code.
+#[test]
+fn a_grid_that_does_not_hold() {
+    let (folder, space) = space();
+    let out = folder.name("grid.json");
+    grid(&[&space, "--fewest", "--deterioration", "20%", "--out", &out]);
+    let mut file = read(&out);
+    assert_eq!(file["check"], Value::Null);
+    file["members"].as_array_mut().unwrap().truncate(1);
+    file["matrix"] = Value::Null;
+    std::fs::write(&out, file.to_string()).unwrap();
+    let checked = run(&["grid", "--from", &out, "--check", "200"]);
+    assert_eq!(checked.code, Some(4), "{checked:?}");
+    assert!(
+        checked
+            .stdout
+            .contains("are farther than 20.00 % from every member")
+    );
+}
+
+// ---------------------------------------------------------------- stopped and gone on with
+
+/// Runs and, once its part file has this many lines, ends it by force; what the file then holds.
+fn killed(arguments: &[&str], part: &std::path::Path, lines: usize) -> Vec<u8> {
+    let mut child = onecycle()
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begin = Instant::now();
+    loop {
+        let bytes = std::fs::read(part).unwrap_or_default();
+        let ended = child.try_wait().unwrap();
+        assert!(ended.is_none(), "it was done before it was stopped");
+        if bytes.iter().filter(|&&byte| byte == b'\n').count() >= lines {
+            break;
+        }
+        assert!(
+            begin.elapsed() < Duration::from_secs(60),
+            "no {lines} lines"
+        );
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    std::fs::read(part).unwrap()
+}
+
+// Ended by force among the rows and in the check, and then with the part file cut anywhere: the
+// file comes out the same to the last bit, and the part file goes.
+#[test]
+fn an_interrupted_run_is_gone_on_with() {
+    let (folder, space) = space();
+    let [whole, out] = ["whole.json", "grid.json"].map(|name| folder.name(name));
+    let to = |out| {
+        [
+            "grid",
+            &space,
+            "--deterioration",
+            "7%",
+            "--check",
+            "2000",
+            "--out",
+            out,
+        ]
+    };
+    run(&to(&whole));
+    let expected = std::fs::read(&whole).unwrap();
+    let part = folder.path("grid.json.part");
+    let resumes = |left: &[u8]| {
+        std::fs::write(&part, left).unwrap();
+        assert!(!folder.path("grid.json").exists());
+        let resumed = run(&to(&out));
+        assert_eq!(resumed.code, Some(0), "{resumed:?}");
+        assert!(std::fs::read(&out).unwrap() == expected, "other bytes");
+        assert!(!part.exists());
+        std::fs::remove_file(&out).unwrap();
+        resumed.stderr
+    };
+    // Settings, angles, and a row or two.
+    let said = resumes(&killed(&to(&out), &part, 3));
+    assert!(said.starts_with("onecycle: going on after "), "{said}");
+    assert!(
+        said.contains(" rows of ") && said.lines().count() == 1,
+        "{said}"
+    );
+
+    let members = read(&whole)["members"].as_array().unwrap().clone();
+    let rows = members.last().unwrap()["row"].as_u64().unwrap() as usize + 1;
+    let left = killed(&to(&out), &part, 2 + rows + members.len());
+    let ends: Vec<usize> = (0..left.len())
+        .filter(|&k| left[k] == b'\n')
+        .map(|k| k + 1)
+        .collect();
+    for (length, words) in [
+        (
+            left.len(),
+            format!("the costs of {} members", members.len()),
+        ),
+        (
+            left.len() - 1,
+            format!("the costs of {} members", members.len() - 1),
+        ),
+        (ends[2 + rows + 4] + 9, "the costs of 5 members".to_owned()),
+        (ends[1 + rows], format!("{rows} of {rows} rows")),
+        (ends[3] + 30, format!("2 of {rows} rows")),
+    ] {
+        let said = resumes(&left[..length]);
+        assert!(said.contains(&words), "{words}: {said}");
+    }
+    // Cut in the angles of the rows, in the settings, and down to nothing.
+    for length in [ends[0] + 9, 17, 0] {
+        assert_eq!(resumes(&left[..length]), "");
+    }
+}
+
+#[test]
+fn a_part_of_something_else() {
+    let (folder, space) = space();
+    let out = folder.name("grid.json");
+    let part = folder.path("grid.json.part");
+    let make = |more: &[&str]| run(&[&["grid", &space, "--out", &out], more].concat());
+    let quick = ["--deterioration", "30%"];
+    // Of other settings: kept, unless told otherwise.
+    let left = killed(
+        &["grid", &space, "--out", &out, "--deterioration", "4%"],
+        &part,
+        3,
+    );
+    let refused = make(&quick);
+    refused.refused(
+        UNREADABLE,
+        &[
+            "grid.json.part",
+            "other settings (deterioration 4 %)",
+            "--restart",
+        ],
+    );
+    assert_eq!(std::fs::read(&part).unwrap(), left);
+    // Damaged within, or in another order: refused as well.
+    let text = String::from_utf8(left).unwrap();
+    let lines: Vec<&str> = text.lines().collect();
+    let four = ["--deterioration", "4%"];
+    for (damaged, words) in [
+        (
+            [lines[0], "{\"thetas_rad\":[1.0,", lines[2], ""].join("\n"),
+            "line 2 is damaged",
+        ),
+        (
+            [lines[0], lines[2], lines[1], ""].join("\n"),
+            "line 2 is not what comes next",
+        ),
+        (
+            [lines[0], lines[1], "{\"costs\":[0.0]}", ""].join("\n"),
+            "line 3 is not what comes next",
+        ),
+    ] {
+        std::fs::write(&part, damaged).unwrap();
+        make(&four).refused(UNREADABLE, &["grid.json.part", words, "--restart"]);
+    }
+    let restarted = make(&["--deterioration", "30%", "--restart"]);
+    assert_eq!((restarted.code, restarted.stderr.as_str()), (Some(0), ""));
+    assert!(!part.exists());
+}
+
+// ---------------------------------------------------------------- refusals
+
+#[test]
+fn bad_arguments() {
+    for (arguments, words) in [
+        (&["--deterioration", "0"][..], "0.1 % and 100 %"),
+        (&["--deterioration", "0.05%"], "0.1 % and 100 %"),
+        (&["--deterioration", "101%"], "0.1 % and 100 %"),
+        (&["--deterioration", "-5%"], "0.1 % and 100 %"),
+        (&["--deterioration", "nan"], "percentage"),
+        (&["--deterioration", "ten"], "percentage"),
+        (&["--check", "0"], "1..=10000000"),
+        (&["--check", "-1"], "-1"),
+        (&["--threads", "0"], "1..=1024"),
+        (&["--seed", "1"], "required arguments"),
+        (&["--matrix"], "required arguments"),
+        (&["--restart"], "required arguments"),
+        (&["--from", "g.json", "space.toml"], "cannot be used with"),
+        (
+            &["--from", "g.json", "--out", "h.json"],
+            "cannot be used with",
+        ),
+        (&["--from", "g.json", "--fewest"], "cannot be used with"),
+        (
+            &["--from", "g.json", "--deterioration", "5%"],
+            "cannot be used with",
+        ),
+    ] {
+        run(&[&["grid"], arguments].concat()).misused(&[]);
+        let outcome = run(&[&["grid"], arguments].concat());
+        assert!(
+            outcome.stderr.contains(words),
+            "{words}: {}",
+            outcome.stderr
+        );
+    }
+}
+
+#[test]
+fn bad_files() {
+    let (folder, space) = space();
+    let out = folder.name("grid.json");
+    let missing = folder.name("nosuch.json");
+    run(&["grid", "--from", &missing]).refused(UNREADABLE, &["nosuch.json", "No such file"]);
+    run(&["grid", &missing]).refused(UNREADABLE, &["nosuch.json", "No such file"]);
+    run(&["grid", "--from", &space]).refused(UNREADABLE, &["space.toml", "not a grid"]);
+    grid(&[&space, "--deterioration", "50%", "--out", &out]);
+    let text = std::fs::read_to_string(&out).unwrap();
+    for (damaged, words) in [
+        (text[..text.len() / 2].to_owned(), "not a grid"),
+        (text.replace("grid/1", "grid/9"), "make the grid again"),
+        (
+            text.replacen("\"kp\":0", "\"kp\":1", 1),
+            "member 0: kp is 1",
+        ),
+        (text.replace("0.5,1.0", "0.9,1.0"), "is outside the space"),
+    ] {
+        assert_ne!(damaged, text, "{words}");
+        let path = folder.write("damaged.json", damaged.as_bytes());
+        run(&["grid", "--from", &path]).refused(UNREADABLE, &["damaged.json", words]);
+    }
+    // Outputs that cannot be written, before and after the work.
+    let nowhere = folder.name("nosuch/grid.json");
+    run(&["grid", &space, "--out", &nowhere]).refused(NOT_WRITTEN, &["cannot write", "nosuch"]);
+    let nowhere = folder.name("nosuch/grid.svg");
+    run(&["grid", "--from", &out, "--picture", &nowhere]).refused(NOT_WRITTEN, &["grid.svg"]);
+    // A space that is none.
+    let backwards = SPACE.replace("[0.03, 0.1]", "[0.1, 0.03]");
+    let path = folder.write("backwards.toml", backwards.as_bytes());
+    run(&["grid", &path]).refused(UNREADABLE, &["t_prop_s", "the lower time first"]);
+}
