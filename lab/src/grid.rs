@@ -189,7 +189,7 @@ impl Grid {
         let members = match settings.layout {
             Layout::Fewest => fewest::members(settings, pieces)?,
             Layout::Rays => {
-                let thetas_rad = rows(settings)?;
+                let thetas_rad = rows(settings, pieces)?;
                 let rows = pieces.map(thetas_rad.len(), |k| row(settings, thetas_rad[k]));
                 let rows: Vec<Vec<Ray>> = rows.into_iter().collect::<Result<_, _>>()?;
                 return Self::of_rays(settings, &rows, pieces);

@@ -175,8 +175,19 @@ impl Search<'_> {
     /// `F` of the [module](self).
     fn imbalance(&self, period_s: f64) -> Option<f64> {
         let waveform = self.waveform(period_s)?;
-        let constant = |high| Window::of(&waveform, high).constant(self.b(high));
-        Some(constant(true) - constant(false))
+        let high = Window::of(&waveform, true);
+        let constant = high.constant(self.b(true));
+        let opposite = if self.is_symmetric() {
+            // The low half is the high one upside down about the mean.
+            -constant - (high.course[0].y + high.end.y)
+        } else {
+            Window::of(&waveform, false).constant(self.b(false))
+        };
+        Some(constant - opposite)
+    }
+
+    fn is_symmetric(&self) -> bool {
+        self.bias == 0.0 && self.beta[0] == self.beta[1]
     }
 
     fn b(&self, high: bool) -> f64 {

@@ -621,7 +621,7 @@ fn every_member_is_computed_afresh() {
 fn pieces_make_the_grid() {
     let grid = small();
     let settings = &grid.settings;
-    let rays: Vec<_> = rows(settings)
+    let rays: Vec<_> = rows(settings, &InTurn)
         .unwrap()
         .iter()
         .map(|&theta| row(settings, theta).unwrap())

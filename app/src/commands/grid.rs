@@ -145,7 +145,7 @@ fn lay(settings: &Settings, part: Option<&mut Part>, workers: &Workers) -> Resul
     let thetas_rad = match part.thetas_rad() {
         Some(thetas_rad) => thetas_rad.to_vec(),
         None => {
-            let thetas_rad = grid::rows(settings).map_err(Failure::usage)?;
+            let thetas_rad = grid::rows(settings, workers).map_err(Failure::usage)?;
             part.keep_thetas(thetas_rad.clone())?;
             thetas_rad
         }

@@ -15,7 +15,7 @@
 //! takes fewer: 182 against 280 for the paper's space at 10 %.
 
 use super::chain::{Line, beyond, cover};
-use super::{Member, Place, Settings};
+use super::{Member, Pieces, Place, Settings};
 use crate::candidate::{Candidate, CandidateError};
 use crate::roots::root;
 use crate::space::Range;
@@ -29,9 +29,9 @@ const PLACES_PER_ROW: usize = 9;
 ///
 /// # Errors
 /// See [`CandidateError`].
-pub fn rows(settings: &Settings) -> Result<Vec<f64>, CandidateError> {
+pub fn rows(settings: &Settings, pieces: &impl Pieces) -> Result<Vec<f64>, CandidateError> {
     cover(
-        &Rows(settings),
+        &Rows { settings, pieces },
         settings.space.theta_range_rad(),
         settings.deterioration,
     )
@@ -173,39 +173,45 @@ impl Line for Row<'_> {
 }
 
 /// The space as a line of `theta`; what stands at one is its row.
-struct Rows<'a>(&'a Settings);
+struct Rows<'a, P> {
+    settings: &'a Settings,
+    pieces: &'a P,
+}
 
-impl Rows<'_> {
+impl<P> Rows<'_, P> {
     fn row(&self, theta_rad: f64) -> Row<'_> {
         Row {
-            settings: self.0,
+            settings: self.settings,
             theta_rad,
         }
     }
 }
 
-impl Line for Rows<'_> {
+impl<P: Pieces> Line for Rows<'_, P> {
     type Place = Vec<(f64, Candidate)>;
 
     fn place(&self, theta_rad: f64) -> Result<Self::Place, CandidateError> {
-        let Some((low, high)) = self.0.space.phi_range_rad(theta_rad) else {
+        let Some((low, high)) = self.settings.space.phi_range_rad(theta_rad) else {
             return Ok(Vec::new());
         };
         let row = self.row(theta_rad);
         let count = if high > low { PLACES_PER_ROW } else { 1 };
-        (0..count)
-            .map(|k| {
-                let phi_rad = high - (high - low) * k as f64 / (PLACES_PER_ROW - 1) as f64;
-                Ok((phi_rad, row.place(phi_rad)?))
-            })
-            .collect()
+        let places = self.pieces.map(count, |k| {
+            let phi_rad = high - (high - low) * k as f64 / (PLACES_PER_ROW - 1) as f64;
+            Ok((phi_rad, row.place(phi_rad)?))
+        });
+        places.into_iter().collect()
     }
 
     fn distance(&self, from: &Self::Place, theta_rad: f64) -> Result<f64, CandidateError> {
         let row = self.row(theta_rad);
+        let distances = self.pieces.map(from.len(), |k| {
+            let (phi_rad, candidate) = &from[k];
+            row.distance(candidate, *phi_rad)
+        });
         let mut sum = 0.0;
-        for (phi_rad, candidate) in from {
-            sum += row.distance(candidate, *phi_rad)?.powi(2);
+        for distance in distances {
+            sum += distance?.powi(2);
         }
         Ok((sum / from.len().max(1) as f64).sqrt())
     }

@@ -147,23 +147,23 @@ impl Waveform {
     /// Where the rate changes sign within a piece: at most twice, for its derivative does once.
     fn turns(&self, piece: &Piece) -> impl Iterator<Item = f64> {
         let rate = |t: f64| self.rate(piece, t);
-        let acceleration = |t: f64| {
-            let fade = (-self.prop * t).exp();
-            piece.input + (piece.start.f - piece.input) * fade - self.body * rate(t)
-        };
-        let length_s = piece.length_s;
-        let bend_s = if acceleration(0.0) * acceleration(length_s) < 0.0 {
-            root(acceleration, 0.0, length_s, BEND_TOLERANCE * length_s)
+        let end_s = piece.length_s;
+        let turn = |from_s: f64, to_s: f64| Some(root(rate, from_s, to_s, TURN_TOLERANCE * end_s));
+        let changes = |a: f64, b: f64| a * b < 0.0;
+        let ends = [rate(0.0), rate(end_s)];
+        let turns = if changes(ends[0], ends[1]) {
+            [turn(0.0, end_s), None]
         } else {
-            length_s
+            let acceleration = |t: f64| {
+                let fade = (-self.prop * t).exp();
+                piece.input + (piece.start.f - piece.input) * fade - self.body * rate(t)
+            };
+            let bend_s = changes(acceleration(0.0), acceleration(end_s))
+                .then(|| root(acceleration, 0.0, end_s, BEND_TOLERANCE * end_s))
+                .filter(|&bend_s| changes(ends[0], rate(bend_s)));
+            bend_s.map_or([None; 2], |bend_s| [turn(0.0, bend_s), turn(bend_s, end_s)])
         };
-        let turn = move |from_s: f64, to_s: f64| {
-            (from_s < to_s && rate(from_s) * rate(to_s) < 0.0)
-                .then(|| root(rate, from_s, to_s, TURN_TOLERANCE * length_s))
-        };
-        [turn(0.0, bend_s), turn(bend_s, length_s)]
-            .into_iter()
-            .flatten()
+        turns.into_iter().flatten()
     }
 
     /// Rate after `t` of a piece.
