@@ -48,6 +48,7 @@ pub mod space;
 mod step_metrics;
 pub mod step_response;
 pub mod surface;
+pub mod train;
 
 pub use candidate::{Candidate, CandidateError, Gains};
 pub use cost::ise;

@@ -1,0 +1,151 @@
+//! Batch normalisation: every column of a batch to mean zero and variance one, then scaled.
+//!
+//! ```text
+//! x^ = (x - mean) / sqrt(var + eps),   y = weight x^ + bias
+//!
+//! learning:   mean, var  of the batch, var = sum (x - mean)^2 / m
+//!             running := 0.9 running + 0.1 batch, its variance times m / (m - 1)
+//! evaluating: mean, var  the running ones
+//!
+//! dL/dx = weight / sqrt(var + eps) (dy - mean(dy) - x^ mean(dy x^))
+//! ```
+//!
+//! Reference: S. Ioffe, C. Szegedy, "Batch normalization: accelerating deep network training by
+//! reducing internal covariate shift", ICML (2015). The two variances, `eps` and the share of the
+//! batch are the conventions of PyTorch's `BatchNorm1d`.
+
+use super::TrainError;
+use super::layer::Memory;
+use super::matrix::Matrix;
+
+/// Added to the variance: PyTorch's.
+const EPSILON: f64 = 1e-5;
+
+/// Share of a batch in the running statistics: PyTorch's.
+const MOMENTUM: f64 = 0.1;
+
+/// Four rows of as many numbers as there are columns to normalise.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct BatchNorm {
+    pub(super) weight: Matrix,
+    pub(super) bias: Matrix,
+    pub(super) running_mean: Matrix,
+    pub(super) running_var: Matrix,
+}
+
+impl BatchNorm {
+    /// Scales by one, shifts by nothing; running statistics of a standard normal variable.
+    pub(super) fn new(columns: usize) -> Self {
+        let mut ones = Matrix::zeros(1, columns);
+        ones.values_mut().fill(1.0);
+        let zeros = Matrix::zeros(1, columns);
+        Self {
+            weight: ones.clone(),
+            bias: zeros.clone(),
+            running_mean: zeros,
+            running_var: ones,
+        }
+    }
+
+    /// `(scale, shift)` of every column: what evaluating comes to.
+    pub(super) fn scale_and_shift(&self) -> impl Iterator<Item = (f64, f64)> {
+        let [weight, bias, mean, var] = [
+            &self.weight,
+            &self.bias,
+            &self.running_mean,
+            &self.running_var,
+        ]
+        .map(Matrix::values);
+        (0..weight.len()).map(move |j| {
+            let scale = f64::from(weight[j]) / (f64::from(var[j]) + EPSILON).sqrt();
+            (scale, f64::from(bias[j]) - scale * f64::from(mean[j]))
+        })
+    }
+
+    pub(super) fn evaluate(&self, values: &mut Matrix) {
+        let columns: Vec<_> = self.scale_and_shift().collect();
+        for i in 0..values.rows() {
+            for (value, (scale, shift)) in values.row_mut(i).iter_mut().zip(&columns) {
+                *value = (scale * f64::from(*value) + shift) as f32;
+            }
+        }
+    }
+
+    /// Remembers `x^` and `1 / sqrt(var + eps)`.
+    pub(super) fn learn(
+        &mut self,
+        input: &Matrix,
+        output: &mut Matrix,
+        memory: &mut Memory,
+    ) -> Result<(), TrainError> {
+        if input.rows() < 2 {
+            return Err(TrainError::OneSample);
+        }
+        let samples = input.rows() as f64;
+        let mut mean = input.column_sums();
+        mean.iter_mut().for_each(|mean| *mean /= samples);
+        let mut var = vec![0.0; mean.len()];
+        for row in input.iter_rows() {
+            for ((var, mean), x) in var.iter_mut().zip(&mean).zip(row) {
+                *var += (f64::from(*x) - mean).powi(2);
+            }
+        }
+        var.iter_mut().for_each(|var| *var /= samples);
+        let unbiased = samples / (samples - 1.0);
+        blend(self.running_mean.values_mut(), &mean, 1.0);
+        blend(self.running_var.values_mut(), &var, unbiased);
+
+        memory.row.clear();
+        (memory.row).extend(var.iter().map(|var| (var + EPSILON).sqrt().recip()));
+        memory.matrix.reshape(input.rows(), input.columns());
+        output.reshape(input.rows(), input.columns());
+        let (weight, bias) = (self.weight.values(), self.bias.values());
+        for i in 0..input.rows() {
+            let normal = memory.matrix.row_mut(i);
+            for (j, x) in input.row(i).iter().enumerate() {
+                normal[j] = ((f64::from(*x) - mean[j]) * memory.row[j]) as f32;
+            }
+            for (j, y) in output.row_mut(i).iter_mut().enumerate() {
+                *y = weight[j] * normal[j] + bias[j];
+            }
+        }
+        Ok(())
+    }
+
+    /// The gradient of the outputs becomes that of the inputs; those of weight and bias go to
+    /// `into`.
+    pub(super) fn backward(&self, memory: &Memory, gradient: &mut Matrix, into: &mut [Matrix]) {
+        let sums = gradient.column_sums();
+        let mut products = vec![0.0; sums.len()];
+        for (dy, normal) in gradient.iter_rows().zip(memory.matrix.iter_rows()) {
+            for ((product, dy), normal) in products.iter_mut().zip(dy).zip(normal) {
+                *product += f64::from(*dy) * f64::from(*normal);
+            }
+        }
+        for (into, from) in into.iter_mut().zip([&products, &sums]) {
+            for (to, from) in into.values_mut().iter_mut().zip(from) {
+                *to = *from as f32;
+            }
+        }
+        let samples = gradient.rows() as f64;
+        let columns: Vec<[f64; 3]> = (self.weight.values().iter().enumerate())
+            .map(|(j, weight)| {
+                let scale = f64::from(*weight) * memory.row[j];
+                [scale, sums[j] / samples, products[j] / samples]
+            })
+            .collect();
+        for i in 0..gradient.rows() {
+            let dx = gradient.row_mut(i).iter_mut();
+            for ((dx, normal), [scale, mean, slope]) in dx.zip(memory.matrix.row(i)).zip(&columns) {
+                *dx = (scale * (f64::from(*dx) - mean - slope * f64::from(*normal))) as f32;
+            }
+        }
+    }
+}
+
+/// Running statistics after one more batch, whose own are `times` the given ones.
+fn blend(running: &mut [f32], batch: &[f64], times: f64) {
+    for (running, batch) in running.iter_mut().zip(batch) {
+        *running = ((1.0 - MOMENTUM) * f64::from(*running) + MOMENTUM * times * batch) as f32;
+    }
+}

@@ -1,0 +1,146 @@
+//! A network's outputs as a density: a Gaussian of any dimension, or a mixture of several.
+//!
+//! ```text
+//! outputs of a Gaussian of dimension D:
+//!     mu_1 .. mu_D,  l_1 .. l_D,  L_21, L_31, L_32, L_41, ..       D + D + D (D - 1) / 2 numbers
+//! precision = L L^T,   L_ii = exp(l_i),   w = L^T (y - mu)
+//!
+//! -ln N(y) = D/2 ln(2 pi) - sum_i l_i + w^T w / 2
+//! d/dmu = -L w,   d/dl_i = w_i (y - mu)_i L_ii - 1,   d/dL_ij = w_j (y - mu)_i
+//!
+//! outputs of a mixture of M: M logits a, then M Gaussians;  pi = softmax(a)
+//! -ln p(y) = -ln sum_m pi_m N_m(y),   r_m = pi_m N_m(y) / p(y)
+//! d/da_m = pi_m - r_m,   of the Gaussian m: r_m times its own
+//! ```
+//!
+//! The factor of the precision, not of the covariance, because then nothing is divided by.
+//! References: C. M. Bishop, "Mixture density networks", Aston University NCRG/94/004 (1994);
+//! P. M. Williams, "Using neural networks to model conditional multivariate densities", Neural
+//! Computation 8 (1996), for the factor.
+
+use std::f64::consts::TAU;
+
+use super::softmax::normalise;
+
+/// A Gaussian that a network put out: of dimension `D` its mean, the logarithms of the diagonal of
+/// `L`, then what is below it, row by row.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gaussian {
+    /// Mean, `D` numbers.
+    pub mean: Vec<f64>,
+    /// `L` with `precision = L L^T`: lower triangular, row by row, `D x D` numbers.
+    pub factor: Vec<f64>,
+}
+
+impl Gaussian {
+    /// How many outputs describe one of this dimension.
+    #[must_use]
+    pub fn outputs(dimension: usize) -> usize {
+        2 * dimension + dimension * dimension.saturating_sub(1) / 2
+    }
+
+    /// From the outputs; `None` where they are not as many as this dimension takes.
+    #[must_use]
+    pub fn from_outputs(dimension: usize, outputs: &[f32]) -> Option<Self> {
+        (outputs.len() == Self::outputs(dimension)).then(|| Self {
+            mean: outputs[..dimension]
+                .iter()
+                .copied()
+                .map(f64::from)
+                .collect(),
+            factor: (0..dimension * dimension)
+                .map(|ij| factor(dimension, outputs, ij / dimension, ij % dimension))
+                .collect(),
+        })
+    }
+
+    /// `-ln N(y)`; `y` has as many numbers as the mean.
+    #[must_use]
+    pub fn negative_log_likelihood(&self, y: &[f64]) -> f64 {
+        let dimension = self.mean.len();
+        let mut sum = 0.5 * dimension as f64 * TAU.ln();
+        for j in 0..dimension {
+            let w: f64 = (j..dimension)
+                .map(|i| self.factor[i * dimension + j] * (y[i] - self.mean[i]))
+                .sum();
+            sum += 0.5 * w * w - self.factor[j * dimension + j].ln();
+        }
+        sum
+    }
+}
+
+/// Element `(i, j)` of the factor.
+fn factor(dimension: usize, outputs: &[f32], i: usize, j: usize) -> f64 {
+    match i.cmp(&j) {
+        std::cmp::Ordering::Less => 0.0,
+        std::cmp::Ordering::Equal => f64::from(outputs[dimension + i]).exp(),
+        std::cmp::Ordering::Greater => f64::from(outputs[below(dimension, i, j)]),
+    }
+}
+
+/// Where `L_ij` below the diagonal stands among the outputs.
+fn below(dimension: usize, i: usize, j: usize) -> usize {
+    2 * dimension + i * (i - 1) / 2 + j
+}
+
+/// `-ln N(y)` and its derivatives with respect to the outputs.
+pub(super) fn gaussian(outputs: &[f32], y: &[f32], gradient: &mut [f64]) -> f64 {
+    let dimension = y.len();
+    let off = |i: usize| f64::from(y[i]) - f64::from(outputs[i]);
+    gradient[..dimension].fill(0.0);
+    let mut loss = 0.5 * dimension as f64 * TAU.ln();
+    for j in 0..dimension {
+        let diagonal = factor(dimension, outputs, j, j);
+        let w = (j + 1..dimension).fold(diagonal * off(j), |w, i| {
+            w + factor(dimension, outputs, i, j) * off(i)
+        });
+        loss += 0.5 * w * w - f64::from(outputs[dimension + j]);
+        gradient[j] -= diagonal * w;
+        gradient[dimension + j] = w * off(j) * diagonal - 1.0;
+        for i in j + 1..dimension {
+            gradient[i] -= factor(dimension, outputs, i, j) * w;
+            gradient[below(dimension, i, j)] = w * off(i);
+        }
+    }
+    loss
+}
+
+/// Rows of a mixture at work, as long as it has components.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Mixture {
+    /// Logits, then `pi`.
+    shares: Vec<f64>,
+    /// `ln pi_m N_m`, then `r`.
+    parts: Vec<f64>,
+}
+
+impl Mixture {
+    /// `-ln p(y)` and its derivatives with respect to the outputs.
+    pub(super) fn evaluate(
+        &mut self,
+        components: usize,
+        outputs: &[f32],
+        y: &[f32],
+        gradient: &mut [f64],
+    ) -> f64 {
+        let size = Gaussian::outputs(y.len()).max(1);
+        let (logits, blocks) = outputs.split_at(components);
+        let (of_logits, of_blocks) = gradient.split_at_mut(components);
+        self.shares.clear();
+        self.shares.extend(logits.iter().copied().map(f64::from));
+        let log_sum = normalise(&mut self.shares);
+        self.parts.clear();
+        for ((logit, block), gradient) in (logits.iter())
+            .zip(blocks.chunks_exact(size))
+            .zip(of_blocks.chunks_exact_mut(size))
+        {
+            (self.parts).push(f64::from(*logit) - log_sum - gaussian(block, y, gradient));
+        }
+        let loss = -normalise(&mut self.parts);
+        for (m, gradient) in of_blocks.chunks_exact_mut(size).enumerate() {
+            of_logits[m] = self.shares[m] - self.parts[m];
+            (gradient.iter_mut()).for_each(|slope| *slope *= self.parts[m]);
+        }
+        loss
+    }
+}

@@ -1,0 +1,275 @@
+//! Layers: what they are called, what they hold, their forward and backward pass.
+//!
+//! | layer       | output                                             | tensors                |
+//! |-------------|----------------------------------------------------|------------------------|
+//! | dense       | `x weight^T + bias`                                | `out x in`, `out`      |
+//! | ReLU        | `max(x, 0)`, derivative zero at zero               |                        |
+//! | tanh        | `tanh x`                                           |                        |
+//! | batch norm  | see its own file                                   | four of `out`          |
+//! | dropout     | learning: zero with `p`, else `x / (1 - p)`        |                        |
+//! |             | evaluating: `x`                                    |                        |
+//!
+//! References: K. He, X. Zhang, S. Ren, J. Sun, "Delving deep into rectifiers: surpassing
+//! human-level performance on ImageNet classification", ICCV (2015), for the initial weights;
+//! N. Srivastava et al., "Dropout: a simple way to prevent neural networks from overfitting",
+//! J. Machine Learning Research 15 (2014).
+
+use rand::{Rng, RngExt};
+use rand_distr::{Distribution, StandardNormal};
+
+use super::batch_norm::BatchNorm;
+use super::matrix::{Matrix, Workers};
+use super::{Purpose, TrainError, expect_size, stream};
+
+/// A layer, as a user names it.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Layer {
+    /// Every output a weighted sum of every input, and a bias.
+    Dense {
+        /// Number of outputs.
+        outputs: usize,
+    },
+    /// Cuts off what is negative.
+    Relu,
+    /// Hyperbolic tangent.
+    Tanh,
+    /// Brings every column to mean zero and variance one, then scales and shifts it.
+    BatchNorm,
+    /// Leaves out random numbers while learning.
+    Dropout {
+        /// How likely a number is left out, 0 to 0.99.
+        probability: f64,
+    },
+}
+
+/// A layer with its numbers.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Stage {
+    Dense { weight: Matrix, bias: Matrix },
+    Relu,
+    Tanh,
+    BatchNorm(BatchNorm),
+    Dropout { probability: f64 },
+}
+
+/// What a layer keeps of a forward pass for the backward one.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    /// `x^` of batch normalisation, factors of dropout.
+    pub(super) matrix: Matrix,
+    /// `1 / sqrt(var + eps)` of batch normalisation.
+    pub(super) row: Vec<f64>,
+}
+
+/// A layer's own part of a forward pass.
+pub(super) struct Passed<'a> {
+    pub(super) input: &'a Matrix,
+    pub(super) output: &'a Matrix,
+    pub(super) memory: &'a Memory,
+}
+
+/// Which random numbers are left out: the same of the same seed, step and layer.
+#[derive(Clone, Copy)]
+pub(super) struct Draw {
+    pub(super) seed: u64,
+    pub(super) number: u64,
+}
+
+impl Stage {
+    /// A layer of so many inputs, its weights and biases zero.
+    pub(super) fn zeros(layer: Layer, inputs: usize) -> Self {
+        match layer {
+            Layer::Dense { outputs } => Self::Dense {
+                weight: Matrix::zeros(outputs, inputs),
+                bias: Matrix::zeros(1, outputs),
+            },
+            Layer::Relu => Self::Relu,
+            Layer::Tanh => Self::Tanh,
+            Layer::BatchNorm => Self::BatchNorm(BatchNorm::new(inputs)),
+            Layer::Dropout { probability } => Self::Dropout { probability },
+        }
+    }
+
+    /// Draws the weights of a dense layer: normal with variance `2 / inputs` (He et al.).
+    pub(super) fn draw(&mut self, rng: &mut impl Rng) {
+        if let Self::Dense { weight, .. } = self {
+            let sigma = (2.0 / weight.columns() as f64).sqrt();
+            for value in weight.values_mut() {
+                let normal: f64 = StandardNormal.sample(rng);
+                *value = (sigma * normal) as f32;
+            }
+        }
+    }
+
+    pub(super) fn layer(&self) -> Layer {
+        match self {
+            Self::Dense { weight, .. } => Layer::Dense {
+                outputs: weight.rows(),
+            },
+            Self::Relu => Layer::Relu,
+            Self::Tanh => Layer::Tanh,
+            Self::BatchNorm(_) => Layer::BatchNorm,
+            Self::Dropout { probability } => Layer::Dropout {
+                probability: *probability,
+            },
+        }
+    }
+
+    /// What is learnt, under PyTorch's names.
+    pub(super) fn parameters(&self) -> Vec<(&'static str, &Matrix)> {
+        match self {
+            Self::Dense { weight, bias } => vec![("weight", weight), ("bias", bias)],
+            Self::BatchNorm(norm) => vec![("weight", &norm.weight), ("bias", &norm.bias)],
+            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
+        }
+    }
+
+    /// As [`Self::parameters`], to change.
+    pub(super) fn parameters_mut(&mut self) -> Vec<&mut Matrix> {
+        match self {
+            Self::Dense { weight, bias } => vec![weight, bias],
+            Self::BatchNorm(norm) => vec![&mut norm.weight, &mut norm.bias],
+            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
+        }
+    }
+
+    /// What is kept besides: running statistics.
+    pub(super) fn buffers(&self) -> Vec<(&'static str, &Matrix)> {
+        match self {
+            Self::BatchNorm(norm) => vec![
+                ("running_mean", &norm.running_mean),
+                ("running_var", &norm.running_var),
+            ],
+            _ => Vec::new(),
+        }
+    }
+
+    /// As [`Self::buffers`], to change.
+    pub(super) fn buffers_mut(&mut self) -> Vec<&mut Matrix> {
+        match self {
+            Self::BatchNorm(norm) => vec![&mut norm.running_mean, &mut norm.running_var],
+            _ => Vec::new(),
+        }
+    }
+
+    /// The outputs of a network that has learnt.
+    pub(super) fn evaluate(
+        &self,
+        mut values: Matrix,
+        workers: &dyn Workers,
+    ) -> Result<Matrix, TrainError> {
+        match self {
+            Self::Dense { weight, bias } => return dense(weight, bias, &values, workers),
+            Self::Relu => in_place(&mut values, relu),
+            Self::Tanh => in_place(&mut values, f32::tanh),
+            Self::BatchNorm(norm) => norm.evaluate(&mut values),
+            Self::Dropout { .. } => {}
+        }
+        Ok(values)
+    }
+
+    /// The outputs of a network that learns, and what the backward pass needs of them.
+    pub(super) fn learn(
+        &mut self,
+        input: &Matrix,
+        (output, memory): (&mut Matrix, &mut Memory),
+        draw: Draw,
+        workers: &dyn Workers,
+    ) -> Result<(), TrainError> {
+        match self {
+            Self::Dense { weight, bias } => *output = dense(weight, bias, input, workers)?,
+            Self::Relu => apply(input, output, relu),
+            Self::Tanh => apply(input, output, f32::tanh),
+            Self::BatchNorm(norm) => norm.learn(input, output, memory)?,
+            Self::Dropout { probability } => {
+                let mut rng = stream(draw.seed, Purpose::Dropout, draw.number);
+                let kept = (1.0 - *probability).recip() as f32;
+                memory.matrix.reshape(input.rows(), input.columns());
+                for factor in memory.matrix.values_mut() {
+                    let is_dropped = rng.random::<f64>() < *probability;
+                    *factor = if is_dropped { 0.0 } else { kept };
+                }
+                output.copy_from(input);
+                multiply(output, &memory.matrix);
+            }
+        }
+        Ok(())
+    }
+
+    /// From the gradient of the outputs that of the parameters, into `into`, and of the inputs,
+    /// which nobody asks of the `first` layer. Expects the gradient in the shape of the outputs.
+    pub(super) fn backward(
+        &self,
+        passed: &Passed<'_>,
+        mut gradient: Matrix,
+        into: &mut [Matrix],
+        first: bool,
+        workers: &dyn Workers,
+    ) -> Matrix {
+        match self {
+            Self::Dense { weight, .. } => {
+                if let [of_weight, of_bias] = into {
+                    gradient.transposed_times_into(passed.input, workers, of_weight);
+                    let sums = gradient.column_sums();
+                    for (to, sum) in of_bias.values_mut().iter_mut().zip(sums) {
+                        *to = sum as f32;
+                    }
+                }
+                if !first {
+                    gradient = gradient.times(weight, workers).unwrap_or_default();
+                }
+            }
+            Self::Relu => by_output(&mut gradient, passed, |y| if y > 0.0 { 1.0 } else { 0.0 }),
+            Self::Tanh => by_output(&mut gradient, passed, |y| 1.0 - y * y),
+            Self::BatchNorm(norm) => norm.backward(passed.memory, &mut gradient, into),
+            Self::Dropout { .. } => multiply(&mut gradient, &passed.memory.matrix),
+        }
+        gradient
+    }
+}
+
+pub(super) fn dense(
+    weight: &Matrix,
+    bias: &Matrix,
+    input: &Matrix,
+    workers: &dyn Workers,
+) -> Result<Matrix, TrainError> {
+    expect_size("the number of inputs", weight.columns(), input.columns())?;
+    let mut output = input.times_transposed(weight, workers).unwrap_or_default();
+    for i in 0..output.rows() {
+        for (value, bias) in output.row_mut(i).iter_mut().zip(bias.values()) {
+            *value += bias;
+        }
+    }
+    Ok(output)
+}
+
+fn relu(x: f32) -> f32 {
+    // Not `max`, which would make a zero of what is no number.
+    if x < 0.0 { 0.0 } else { x }
+}
+
+fn in_place(values: &mut Matrix, function: impl Fn(f32) -> f32) {
+    for value in values.values_mut() {
+        *value = function(*value);
+    }
+}
+
+fn apply(input: &Matrix, output: &mut Matrix, function: impl Fn(f32) -> f32) {
+    output.copy_from(input);
+    in_place(output, function);
+}
+
+fn multiply(values: &mut Matrix, factors: &Matrix) {
+    for (value, factor) in values.values_mut().iter_mut().zip(factors.values()) {
+        *value *= factor;
+    }
+}
+
+/// Multiplies by the derivative, which is known from the output.
+fn by_output(gradient: &mut Matrix, passed: &Passed<'_>, derivative: impl Fn(f32) -> f32) {
+    for (value, y) in (gradient.values_mut().iter_mut()).zip(passed.output.values()) {
+        *value *= derivative(*y);
+    }
+}

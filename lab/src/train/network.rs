@@ -1,0 +1,411 @@
+//! A network: layers one after another.
+//!
+//! Learning goes forward and backward through a [`Tape`], which keeps what each layer put out;
+//! evaluating keeps nothing. [`Network::folded`] multiplies batch normalisation into the dense
+//! layers next to it: of `y = W x + b` and `z = scale y + shift`
+//!
+//! ```text
+//! after a dense layer      W := diag(scale) W,   b := scale b + shift
+//! before a dense layer     b := b + W shift,     W := W diag(scale)
+//! ```
+//!
+//! Weights go in and out as [`TensorFile`]s, under the names PyTorch gives them in a
+//! `Sequential`: `0.weight` of shape `[out, in]`, `0.bias`, `1.running_mean`, and so on. Its
+//! `num_batches_tracked`, which nothing here reads, may be there or not.
+
+use rand::Rng;
+
+use super::layer::{Draw, Layer, Memory, Passed, Stage};
+use super::matrix::{Matrix, Workers};
+use super::tensor_file::{Tensor, TensorFile, TensorFileError};
+use super::{TrainError, expect_size};
+use crate::space::FieldError;
+
+/// Most weights of a network, 4 GB: beyond, a size is a mistake.
+const MOST_WEIGHTS: usize = 1 << 30;
+
+/// Most of what dropout may leave out; beyond, hardly a number is left.
+const MOST_DROPPED: f64 = 0.99;
+
+/// Layers one after another. See the [module](super).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Network {
+    inputs: usize,
+    stages: Vec<Stage>,
+}
+
+/// What a forward pass leaves for the backward one. One tape serves all steps.
+#[derive(Clone, Debug, Default)]
+pub struct Tape {
+    /// The inputs, then what each layer put out.
+    values: Vec<Matrix>,
+    memories: Vec<Memory>,
+    /// Of every parameter, in their order.
+    gradients: Vec<Matrix>,
+}
+
+impl Tape {
+    /// The network's outputs, `batch x out`.
+    #[must_use]
+    pub fn outputs(&self) -> Option<&Matrix> {
+        self.values.last()
+    }
+
+    /// Gradients of the parameters, in the order of [`Network::parameters`].
+    #[must_use]
+    pub fn gradients(&self) -> &[Matrix] {
+        &self.gradients
+    }
+}
+
+/// What dropout leaves out: the same in the same step of the same seed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dropped {
+    /// Seed of the training.
+    pub seed: u64,
+    /// Number of the step.
+    pub step: u64,
+}
+
+impl Network {
+    /// A network of so many inputs, its weights drawn (He et al.: normal, variance `2 / inputs`),
+    /// its biases zero.
+    ///
+    /// # Errors
+    /// Names the first size or probability that is out of its range.
+    pub fn new(inputs: usize, layers: &[Layer], rng: &mut impl Rng) -> Result<Self, TrainError> {
+        let mut network = Self::zeros(inputs, layers)?;
+        for stage in &mut network.stages {
+            stage.draw(rng);
+        }
+        Ok(network)
+    }
+
+    /// As [`Self::new`], all weights zero, to be filled from a file.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn zeros(inputs: usize, layers: &[Layer]) -> Result<Self, TrainError> {
+        count_weights(inputs, layers)?;
+        let mut width = inputs;
+        let stages = (layers.iter())
+            .map(|&layer| {
+                let stage = Stage::zeros(layer, width);
+                width = width_after(layer, width);
+                stage
+            })
+            .collect();
+        Ok(Self { inputs, stages })
+    }
+
+    /// Number of inputs.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// Number of outputs.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        (self.stages.iter()).fold(self.inputs, |width, stage| {
+            width_after(stage.layer(), width)
+        })
+    }
+
+    /// Its layers.
+    #[must_use]
+    pub fn layers(&self) -> Vec<Layer> {
+        self.stages.iter().map(Stage::layer).collect()
+    }
+
+    /// How many numbers are learnt.
+    #[must_use]
+    pub fn weights(&self) -> usize {
+        self.parameters().map(|matrix| matrix.values().len()).sum()
+    }
+
+    /// What is learnt: of every layer in turn its weight, `out x in` or a row, and its bias, a row.
+    pub fn parameters(&self) -> impl Iterator<Item = &Matrix> {
+        (self.stages.iter())
+            .flat_map(Stage::parameters)
+            .map(|(_, matrix)| matrix)
+    }
+
+    /// As [`Self::parameters`], to change.
+    pub(super) fn parameters_mut(&mut self) -> impl Iterator<Item = &mut Matrix> {
+        self.stages.iter_mut().flat_map(Stage::parameters_mut)
+    }
+
+    /// The outputs, `batch x out`, of inputs `batch x in`: no dropout, running statistics.
+    ///
+    /// # Errors
+    /// Where the inputs are not as many as the network's.
+    pub fn evaluate(&self, inputs: &Matrix, workers: &dyn Workers) -> Result<Matrix, TrainError> {
+        expect_size("the number of inputs", self.inputs, inputs.columns())?;
+        let mut values = None;
+        for stage in &self.stages {
+            values = Some(match (values, stage) {
+                (None, Stage::Dense { weight, bias }) => {
+                    super::layer::dense(weight, bias, inputs, workers)?
+                }
+                (None, _) => stage.evaluate(inputs.clone(), workers)?,
+                (Some(values), _) => stage.evaluate(values, workers)?,
+            });
+        }
+        Ok(values.unwrap_or_else(|| inputs.clone()))
+    }
+
+    /// The forward pass of a step: dropout, the statistics of the batch, and a share of them into
+    /// the running ones. The outputs, `batch x out`, are the tape's.
+    ///
+    /// # Errors
+    /// Where the inputs are not as many as the network's, or one sample is to be normalised.
+    pub fn forward(
+        &mut self,
+        tape: &mut Tape,
+        inputs: &Matrix,
+        dropped: Dropped,
+        workers: &dyn Workers,
+    ) -> Result<(), TrainError> {
+        expect_size("the number of inputs", self.inputs, inputs.columns())?;
+        let layers = self.stages.len();
+        tape.values.resize_with(layers + 1, Matrix::default);
+        tape.memories.resize_with(layers, Memory::default);
+        tape.values[0].copy_from(inputs);
+        for (i, stage) in self.stages.iter_mut().enumerate() {
+            let (before, after) = tape.values.split_at_mut(i + 1);
+            let draw = Draw {
+                seed: dropped.seed,
+                number: (dropped.step.wrapping_mul(layers as u64)).wrapping_add(i as u64),
+            };
+            let out = (&mut after[0], &mut tape.memories[i]);
+            stage.learn(&before[i], out, draw, workers)?;
+        }
+        Ok(())
+    }
+
+    /// The backward pass after [`Self::forward`]: from the gradient with respect to the outputs,
+    /// `batch x out`, to [`Tape::gradients`].
+    ///
+    /// # Errors
+    /// Where the gradient has not the shape of the tape's outputs.
+    pub fn backward(
+        &self,
+        tape: &mut Tape,
+        gradient: &Matrix,
+        workers: &dyn Workers,
+    ) -> Result<(), TrainError> {
+        expect_size(
+            "the layers on the tape",
+            self.stages.len(),
+            tape.memories.len(),
+        )?;
+        let Some(outputs) = tape.outputs() else {
+            return Err(TrainError::NoSample("go back from"));
+        };
+        expect_size("the rows of the gradient", outputs.rows(), gradient.rows())?;
+        let (expected, found) = (outputs.columns(), gradient.columns());
+        expect_size("the columns of the gradient", expected, found)?;
+        let parameters = self.parameters().count();
+        tape.gradients.resize_with(parameters, Matrix::default);
+        for (gradient, parameter) in tape.gradients.iter_mut().zip(self.parameters()) {
+            gradient.reshape(parameter.rows(), parameter.columns());
+        }
+        let mut rest = &mut tape.gradients[..];
+        let mut gradient = gradient.clone();
+        for (i, stage) in self.stages.iter().enumerate().rev() {
+            let (earlier, own) = rest.split_at_mut(rest.len() - stage.parameters().len());
+            rest = earlier;
+            let passed = Passed {
+                input: &tape.values[i],
+                output: &tape.values[i + 1],
+                memory: &tape.memories[i],
+            };
+            gradient = stage.backward(&passed, gradient, own, i == 0, workers);
+        }
+        Ok(())
+    }
+
+    /// The same function for evaluating, without dropout, and without batch normalisation wherever
+    /// a dense layer stands before or after it.
+    #[must_use]
+    pub fn folded(&self) -> Self {
+        let mut stages: Vec<Stage> = Vec::new();
+        // The batch normalisation that stands before the layer to come.
+        let mut waiting: Option<Stage> = None;
+        let kept = (self.stages.iter()).filter(|stage| !matches!(stage, Stage::Dropout { .. }));
+        for stage in kept.cloned() {
+            match (stage, waiting.take()) {
+                (Stage::Dense { weight, bias }, Some(Stage::BatchNorm(norm))) => {
+                    let columns: Vec<_> = norm.scale_and_shift().collect();
+                    stages.push(folded_before(weight, bias, &columns));
+                }
+                (Stage::BatchNorm(norm), held) => {
+                    stages.extend(held);
+                    if let Some(Stage::Dense { weight, bias }) = stages.last_mut() {
+                        for (i, (scale, shift)) in norm.scale_and_shift().enumerate() {
+                            for value in weight.row_mut(i) {
+                                *value = (scale * f64::from(*value)) as f32;
+                            }
+                            let bias = &mut bias.values_mut()[i];
+                            *bias = (scale * f64::from(*bias) + shift) as f32;
+                        }
+                    } else {
+                        waiting = Some(Stage::BatchNorm(norm));
+                    }
+                }
+                (stage, held) => {
+                    stages.extend(held);
+                    stages.push(stage);
+                }
+            }
+        }
+        stages.extend(waiting);
+        Self {
+            inputs: self.inputs,
+            stages,
+        }
+    }
+
+    /// Every tensor, parameters and running statistics, as PyTorch names and shapes it.
+    #[must_use]
+    pub fn tensors(&self) -> Vec<Tensor> {
+        let mut tensors = Vec::new();
+        for (i, stage) in self.stages.iter().enumerate() {
+            for (name, matrix) in stage.parameters().into_iter().chain(stage.buffers()) {
+                tensors.push(Tensor {
+                    name: format!("{i}.{name}"),
+                    shape: shape(stage, name, matrix),
+                    values: matrix.values().to_vec(),
+                });
+            }
+        }
+        tensors
+    }
+
+    /// Takes every tensor from a file, each under its name after `prefix`, and leaves the rest
+    /// there.
+    ///
+    /// # Errors
+    /// Names the first tensor that is missing, of another shape, or holds what no network can; the
+    /// network is then as it was.
+    pub fn take(&mut self, file: &mut TensorFile, prefix: &str) -> Result<(), TensorFileError> {
+        let mut taken = self.clone();
+        for (i, stage) in taken.stages.iter_mut().enumerate() {
+            let named = stage.parameters().into_iter().chain(stage.buffers());
+            let values = named
+                .map(|(name, matrix)| {
+                    let tensor = file.take(&format!("{prefix}{i}.{name}"))?;
+                    tensor.expect_shape(&shape(stage, name, matrix))?;
+                    tensor.expect_values(name == "running_var")?;
+                    Ok(tensor.values)
+                })
+                .collect::<Result<Vec<_>, TensorFileError>>()?;
+            let parameters = stage.parameters().len();
+            let mut values = values.into_iter();
+            for (matrix, values) in
+                (stage.parameters_mut().into_iter()).zip(values.by_ref().take(parameters))
+            {
+                matrix.values_mut().copy_from_slice(&values);
+            }
+            for (matrix, values) in stage.buffers_mut().into_iter().zip(values) {
+                matrix.values_mut().copy_from_slice(&values);
+            }
+        }
+        *self = taken;
+        Ok(())
+    }
+
+    /// Takes every tensor from the bytes of a safetensors file that holds nothing else.
+    ///
+    /// # Errors
+    /// As [`Self::take`]; also names a tensor that is not the network's.
+    pub fn load(&mut self, bytes: &[u8]) -> Result<(), TensorFileError> {
+        let mut file = TensorFile::from_bytes(bytes)?;
+        let mut loaded = self.clone();
+        loaded.take(&mut file, "")?;
+        file.expect_nothing_left()?;
+        *self = loaded;
+        Ok(())
+    }
+
+    /// The bytes of a safetensors file with every tensor.
+    #[must_use]
+    pub fn save(&self) -> Vec<u8> {
+        TensorFile {
+            tensors: self.tensors(),
+            ..TensorFile::default()
+        }
+        .to_bytes()
+    }
+}
+
+/// The shape that PyTorch gives a tensor: vectors but for the weights of a dense layer.
+fn shape(stage: &Stage, name: &str, matrix: &Matrix) -> Vec<usize> {
+    match stage {
+        Stage::Dense { .. } if name == "weight" => vec![matrix.rows(), matrix.columns()],
+        _ => vec![matrix.columns()],
+    }
+}
+
+fn width_after(layer: Layer, width: usize) -> usize {
+    match layer {
+        Layer::Dense { outputs } => outputs,
+        _ => width,
+    }
+}
+
+/// How many numbers such a network would hold, running statistics included; names the first size or
+/// probability that is out of its range.
+pub(super) fn count_weights(inputs: usize, layers: &[Layer]) -> Result<usize, FieldError> {
+    let size = |field, value: usize| FieldError {
+        field,
+        range: "1 or more, with less than 2^30 weights in all",
+        value: value as f64,
+    };
+    if inputs == 0 {
+        return Err(size("inputs", inputs));
+    }
+    let mut width = inputs;
+    let mut weights = 0_usize;
+    for &layer in layers {
+        match layer {
+            Layer::Dense { outputs } => {
+                let more = width.saturating_add(1).saturating_mul(outputs);
+                weights = weights.saturating_add(more);
+                if outputs == 0 || weights > MOST_WEIGHTS {
+                    return Err(size("outputs", outputs));
+                }
+            }
+            Layer::BatchNorm => {
+                weights = weights.saturating_add(width.saturating_mul(4));
+                if weights > MOST_WEIGHTS {
+                    return Err(size("inputs", width));
+                }
+            }
+            Layer::Dropout { probability } if !(0.0..=MOST_DROPPED).contains(&probability) => {
+                return Err(FieldError {
+                    field: "probability",
+                    range: "0 to 0.99",
+                    value: probability,
+                });
+            }
+            _ => {}
+        }
+        width = width_after(layer, width);
+    }
+    Ok(weights)
+}
+
+/// A dense layer of what a batch normalisation puts out.
+fn folded_before(mut weight: Matrix, mut bias: Matrix, columns: &[(f64, f64)]) -> Stage {
+    for (i, bias) in bias.values_mut().iter_mut().enumerate() {
+        let mut sum = f64::from(*bias);
+        for (value, (scale, shift)) in weight.row_mut(i).iter_mut().zip(columns) {
+            sum += f64::from(*value) * shift;
+            *value = (scale * f64::from(*value)) as f32;
+        }
+        *bias = sum as f32;
+    }
+    Stage::Dense { weight, bias }
+}
