@@ -33,6 +33,7 @@ pub mod campaign;
 pub mod candidate;
 pub mod certificate;
 pub mod cost;
+pub mod dataset;
 pub mod deterioration;
 pub mod grid;
 pub mod identify;

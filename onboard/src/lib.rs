@@ -8,10 +8,12 @@ pub mod control;
 pub mod cycle;
 mod distortion;
 mod least_squares;
+pub mod network;
 pub mod process;
 pub mod refine;
 pub mod relay;
 mod response;
+pub mod signature;
 pub mod transition;
 pub mod window;
 
