@@ -16,7 +16,8 @@ Exit codes:
   0  done (identify: a process was identified)
   2  bad arguments
   3  the input file cannot be read; the message says where and what to do
-  4  the recording tells no process; the verdict says why and what to do
+  4  the answer is no: the recording tells no process (the verdict says why and what to do), a space
+     is not certified, a grid leaves holes
   5  the output cannot be written";
 
 /// From one cycle of a relay test to the process and its optimal controller.
