@@ -3,6 +3,8 @@
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use indicatif::{ProgressBar, ProgressStyle};
+
 use crate::failure::Failure;
 
 /// Prints `text` to the standard output.
@@ -19,6 +21,15 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
 /// Prints a line to the error output; where that is closed there is no one left to tell.
 pub(crate) fn complain(line: &str) {
     let _ = writeln!(io::stderr().lock(), "{line}");
+}
+
+/// A bar on the error output, for so many pieces of work; nothing where that is no terminal.
+pub(crate) fn progress_bar(pieces: u64) -> ProgressBar {
+    let bar = ProgressBar::new(pieces);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}") {
+        bar.set_style(style);
+    }
+    bar
 }
 
 /// Writes a file through a temporary one beside it: whole, or not at all.

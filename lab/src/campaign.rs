@@ -5,7 +5,7 @@
 
 use std::f64::consts::TAU;
 
-use onecycle_onboard::cycle::{CycleDetector, SteadyRun};
+use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
 use onecycle_onboard::process::{Process, ProcessError};
 use onecycle_onboard::relay::{Relay, RelayError, RelaySettings};
 use onecycle_plant::{Experiment, Trace};
@@ -14,7 +14,7 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::identify::{Identification, MOST_CYCLES, Options, Signals, identify};
 use crate::optimum::pd_at_phase_margin;
-use crate::space::{FieldError, Space};
+use crate::space::{FieldError, Space, first_out_of_range};
 use crate::{Deterioration, deterioration};
 
 /// A campaign as a file describes it.
@@ -111,7 +111,7 @@ impl Campaign {
     /// # Errors
     /// Names the first field that is out of its range.
     pub fn validate(&self) -> Result<(), FieldError> {
-        for (field, range, value, is_right) in [
+        first_out_of_range([
             (
                 "cases",
                 "1 to 10,000,000",
@@ -148,16 +148,7 @@ impl Campaign {
                 self.cycles as f64,
                 (1..=MOST_CYCLES).contains(&self.cycles),
             ),
-        ] {
-            if !is_right {
-                return Err(FieldError {
-                    field,
-                    range,
-                    value,
-                });
-            }
-        }
-        Ok(())
+        ])
     }
 
     /// Case number `n`.
@@ -233,6 +224,25 @@ impl Campaign {
     }
 }
 
+/// A jump of the input between the trim's small moves and the relay's own of two.
+const JUMP: f64 = 0.5;
+
+/// The cycles of a relay of amplitude one, of its output as measured or as it was.
+pub(crate) fn cycles<'a>(
+    trace: &'a Trace,
+    output: &'a [f64],
+) -> impl Iterator<Item = Cycle> + use<'a> {
+    let mut detector = CycleDetector::new();
+    let mut is_high = false;
+    (1..trace.len()).filter_map(move |index| {
+        let jump = trace.input[index] - trace.input[index - 1];
+        if jump.abs() > JUMP {
+            is_high = jump > 0.0;
+        }
+        detector.push(trace.time_s[index], is_high, output[index])
+    })
+}
+
 /// What became of the relay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelayOutcome {
@@ -259,20 +269,9 @@ const DEAD_PERIODS: f64 = 8.0;
 /// A [`CaseError`] for parameters outside their range.
 pub fn relay_outcome(campaign: &Campaign, case: &Case) -> Result<RelayOutcome, CaseError> {
     let (trace, relay) = campaign.run(case, RELAY_PERIODS)?;
-    let mut detector = CycleDetector::new();
     let mut run = SteadyRun::default();
-    let (mut cycles, mut steady_at, mut last_end_s) = (0, None, 0.0);
-    let mut high = false;
-    for index in 1..trace.len() {
-        let jump = trace.input[index] - trace.input[index - 1];
-        // Between the trim's small moves and the relay's own jump of two.
-        if jump.abs() > 0.5 {
-            high = jump > 0.0;
-        }
-        let Some(cycle) = detector.push(trace.time_s[index], high, trace.true_output[index]) else {
-            continue;
-        };
-        cycles += 1;
+    let (mut steady_at, mut last_end_s) = (None, 0.0);
+    for (cycles, cycle) in (1..).zip(cycles(&trace, &trace.true_output)) {
         run.push(&cycle);
         last_end_s = cycle.start_s + cycle.period_s;
         if run.is_steady() {

@@ -14,7 +14,7 @@
 //! integrators. The fourth gives the gain: the amplitude of a sampled, smoothed relay is not that of
 //! the continuous one, and a gain taken from that costs several per cent.
 
-use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
+use onecycle_onboard::cycle::{Cycle, SteadyRun};
 use onecycle_onboard::signature::Signature;
 use onecycle_onboard::window::Window;
 use onecycle_onboard::{Process, ProcessError, Relay, RelayError, RelaySettings};
@@ -22,8 +22,9 @@ use onecycle_plant::{Experiment, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::campaign::cycles;
 use crate::limit_cycle::symmetric;
-use crate::space::{FieldError, Range, Space};
+use crate::space::{FieldError, Range, Space, first_out_of_range};
 
 /// How examples are made.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -105,7 +106,7 @@ impl Recipe {
     pub fn validate(&self) -> Result<(), FieldError> {
         self.space.validate()?;
         let (least, most) = self.samples_per_period;
-        for (field, range, value, is_right) in [
+        first_out_of_range([
             (
                 "bias",
                 "0 to 0.9",
@@ -124,16 +125,7 @@ impl Recipe {
                 least,
                 (40.0..=1e6).contains(&least) && (least..=1e6).contains(&most),
             ),
-        ] {
-            if !is_right {
-                return Err(FieldError {
-                    field,
-                    range,
-                    value,
-                });
-            }
-        }
-        Ok(())
+        ])
     }
 
     /// Example number `n`; `None` where the relay does not make the process oscillate, or not
@@ -176,23 +168,12 @@ impl Recipe {
     }
 }
 
-/// A jump of the input between the trim's small moves and the relay's own of two.
-const JUMP: f64 = 0.5;
-
 fn last_steady_cycle(trace: &Trace) -> Option<Cycle> {
-    let mut detector = CycleDetector::new();
     let mut run = SteadyRun::default();
-    let (mut is_high, mut last) = (false, None);
-    for index in 1..trace.len() {
-        let jump = trace.input[index] - trace.input[index - 1];
-        if jump.abs() > JUMP {
-            is_high = jump > 0.0;
-        }
-        let found = detector.push(trace.time_s[index], is_high, trace.output[index]);
-        if let Some(cycle) = found {
-            run.push(&cycle);
-            last = run.is_steady().then_some(cycle);
-        }
+    let mut last = None;
+    for cycle in cycles(trace, &trace.output) {
+        run.push(&cycle);
+        last = run.is_steady().then_some(cycle);
     }
     last
 }

@@ -118,8 +118,9 @@ pub fn trimmed_spectral_radius(process: &Process, beta: f64, trim_gain: f64) -> 
         bias: 0.0,
     };
     let waveform = search.waveform(cycle.period_s())?;
-    (process.tau_s() < cycle.high_s)
-        .then(|| search.orbit(&waveform).trimmed_spectral_radius(trim_gain))
+    let [high, low] = [true, false].map(|high| Window::of(&waveform, high));
+    let orbit = search.orbit(&waveform, [&high, &low]);
+    (process.tau_s() < cycle.high_s).then(|| orbit.trimmed_spectral_radius(trim_gain))
 }
 
 /// All limit cycles with two switches a period under a constant `bias` between -1 and 1, the
@@ -211,16 +212,16 @@ impl Search<'_> {
             low_s: period_s - waveform.high_s,
             amplitude: 0.5 * gain * (low.extreme.y - high.extreme.y),
             centre: gain * (0.5 * (low.extreme.y + high.extreme.y) + constant),
-            spectral_radius: self.orbit(&waveform).spectral_radius(),
+            spectral_radius: self.orbit(&waveform, [&high, &low]).spectral_radius(),
         })
     }
 
-    fn orbit<'a>(&self, waveform: &'a Waveform) -> Orbit<'a> {
+    fn orbit<'a>(&self, waveform: &'a Waveform, windows: [&Window; 2]) -> Orbit<'a> {
         Orbit {
             waveform,
             tau_s: self.process.tau_s(),
             b: [true, false].map(|high| self.b(high)),
-            extremes_s: [true, false].map(|high| Window::of(waveform, high).extreme.time_s),
+            extremes_s: windows.map(|window| window.extreme.time_s),
         }
     }
 }

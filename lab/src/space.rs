@@ -67,6 +67,22 @@ pub struct FieldError {
     pub value: f64,
 }
 
+/// The first of these checks that fails: a field, what it may be, what it is, whether that is right.
+pub(crate) fn first_out_of_range(
+    checks: impl IntoIterator<Item = (&'static str, &'static str, f64, bool)>,
+) -> Result<(), FieldError> {
+    for (field, range, value, is_right) in checks {
+        if !is_right {
+            return Err(FieldError {
+                field,
+                range,
+                value,
+            });
+        }
+    }
+    Ok(())
+}
+
 /// Shortest and longest time of a process (s): from electronics to the climate, and far enough
 /// from the limits of `f64` for any power that a formula takes.
 const TIMES_S: Range = (1e-9, 1e9);
@@ -113,21 +129,20 @@ impl Space {
                 });
             }
         }
-        if !(1.0..=80.0).contains(&self.phase_margin_deg) {
-            return Err(FieldError {
-                field: "phase_margin_deg",
-                range: "1 to 80",
-                value: self.phase_margin_deg,
-            });
-        }
-        if !(-0.95..=0.95).contains(&self.beta) {
-            return Err(FieldError {
-                field: "beta",
-                range: "-0.95 to 0.95",
-                value: self.beta,
-            });
-        }
-        Ok(())
+        first_out_of_range([
+            (
+                "phase_margin_deg",
+                "1 to 80",
+                self.phase_margin_deg,
+                (1.0..=80.0).contains(&self.phase_margin_deg),
+            ),
+            (
+                "beta",
+                "-0.95 to 0.95",
+                self.beta,
+                (-0.95..=0.95).contains(&self.beta),
+            ),
+        ])
     }
 
     /// Least phase margin of a controller (rad).

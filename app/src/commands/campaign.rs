@@ -3,7 +3,6 @@
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use indicatif::{ProgressBar, ProgressStyle};
 use onecycle_lab::Deterioration;
 use onecycle_lab::campaign::{
     Campaign, CaseError, IdentificationOutcome, Measure, RelayOutcome, identification_outcome,
@@ -12,7 +11,7 @@ use onecycle_lab::campaign::{
 use rayon::prelude::*;
 
 use crate::failure::{Failure, exit};
-use crate::output::print;
+use crate::output::{print, progress_bar};
 use crate::{args, settings};
 
 pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
@@ -36,10 +35,7 @@ fn all<T: Send>(
     campaign: &Campaign,
     outcome: impl Fn(&Campaign, &onecycle_lab::campaign::Case) -> Result<T, CaseError> + Sync,
 ) -> Result<Vec<T>, Failure> {
-    let bar = ProgressBar::new(campaign.cases);
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}") {
-        bar.set_style(style);
-    }
+    let bar = progress_bar(campaign.cases);
     let done = AtomicU64::new(0);
     let outcomes = (0..campaign.cases)
         .into_par_iter()

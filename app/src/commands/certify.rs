@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use onecycle_lab::campaign::{Campaign, Measure, relay_outcome};
 use onecycle_lab::certificate::{Certificate, LeastStable, Summary};
 use onecycle_lab::{Direction, Space};
@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::args::Certify;
 use crate::failure::{Failure, exit};
-use crate::output::print;
+use crate::output::{print, progress_bar};
 use crate::pictures::certify::draw;
 use crate::report::certificate;
 use crate::settings;
@@ -75,10 +75,7 @@ fn certify(arguments: &Certify, space: Space) -> Result<Certified, Failure> {
     let side = arguments.shapes as usize;
     let shapes = space.shapes(side, side);
     let biases = arguments.biases();
-    let bar = ProgressBar::new(((biases.len() + 1) * shapes.len()) as u64);
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}") {
-        bar.set_style(style);
-    }
+    let bar = progress_bar(((biases.len() + 1) * shapes.len()) as u64);
     let least_stable = space
         .least_stable(FINER * side, FINER * side)
         .ok_or_else(|| Failure::usage("the space has no process"))?;

@@ -172,7 +172,7 @@ impl MemberRecord {
         let candidate = settings
             .candidate(self.times_s())
             .map_err(|error: CandidateError| error.to_string())?;
-        let fresh = Self::of(&Member {
+        let member = Member {
             candidate,
             direction: Direction {
                 theta_rad: self.theta_rad,
@@ -180,7 +180,8 @@ impl MemberRecord {
             },
             radius_s: self.r_s,
             place: self.place(),
-        });
+        };
+        let fresh = Self::of(&member);
         for (name, found, expected) in [
             ("k_over_t_body", self.k_over_t_body, fresh.k_over_t_body),
             ("kp", self.kp, fresh.kp),
@@ -199,15 +200,7 @@ impl MemberRecord {
                 ));
             }
         }
-        Ok(Member {
-            candidate,
-            direction: Direction {
-                theta_rad: self.theta_rad,
-                phi_rad: self.phi_rad,
-            },
-            radius_s: self.r_s,
-            place: self.place(),
-        })
+        Ok(member)
     }
 
     /// What is wrong with it that takes no computing.

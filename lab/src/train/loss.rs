@@ -28,7 +28,7 @@ use super::density::{Gaussian, Mixture, gaussian};
 use super::matrix::Matrix;
 use super::softmax::{Logits, Shares, Softmax};
 use super::{TrainError, expect_size};
-use crate::space::FieldError;
+use crate::space::{FieldError, first_out_of_range};
 
 /// What is to become small, of outputs `a`, the true class `T` and costs `J_iT` up to a cap.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -98,8 +98,14 @@ impl Loss {
     /// # Errors
     /// Names the first field that is out of its range.
     pub fn validate(&self) -> Result<(), FieldError> {
-        let positive = |field, value: f64| (field, "positive and finite", value, value > 0.0);
-        let share = |field, value: f64| (field, "zero or positive, finite", value, value >= 0.0);
+        let positive = |field, value: f64| {
+            let is_right = value.is_finite() && value > 0.0;
+            (field, "positive and finite", value, is_right)
+        };
+        let share = |field, value: f64| {
+            let is_right = value.is_finite() && value >= 0.0;
+            (field, "zero or positive, finite", value, is_right)
+        };
         let number = |field, value: usize| {
             let is_right = (1..=MOST_DIMENSIONS).contains(&value);
             (field, "1 to 1000", value as f64, is_right)
@@ -130,16 +136,7 @@ impl Loss {
                 number("components", components),
             ],
         };
-        for (field, range, value, is_right) in checks {
-            if !(is_right && value.is_finite()) {
-                return Err(FieldError {
-                    field,
-                    range,
-                    value,
-                });
-            }
-        }
-        Ok(())
+        first_out_of_range(checks)
     }
 
     /// How many outputs it takes; `None` where any number does, one a class.

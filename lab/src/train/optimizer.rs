@@ -17,7 +17,7 @@ use super::TrainError;
 use super::expect_size;
 use super::matrix::{Matrix, Workers};
 use super::network::{Network, Tape};
-use crate::space::FieldError;
+use crate::space::{FieldError, first_out_of_range};
 
 /// How a gradient becomes a step.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -79,16 +79,7 @@ impl Method {
                 vec![fraction("b1", b1), fraction("b2", b2), decay(d)]
             }
         };
-        for (field, range, value, is_right) in checks {
-            if !is_right {
-                return Err(FieldError {
-                    field,
-                    range,
-                    value,
-                });
-            }
-        }
-        Ok(())
+        first_out_of_range(checks)
     }
 }
 

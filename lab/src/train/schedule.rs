@@ -11,7 +11,7 @@
 
 use std::f64::consts::PI;
 
-use crate::space::FieldError;
+use crate::space::{FieldError, first_out_of_range};
 
 /// Learning rates over the epochs.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -66,7 +66,10 @@ impl Schedule {
     /// # Errors
     /// Names the first field that is out of its range.
     pub fn validate(&self) -> Result<(), FieldError> {
-        let positive = |field, value: f64| (field, "positive and finite", value, value > 0.0);
+        let positive = |field, value: f64| {
+            let is_right = value.is_finite() && value > 0.0;
+            (field, "positive and finite", value, is_right)
+        };
         let part = |field, value: f64| (field, "0 to 1", value, (0.0..=1.0).contains(&value));
         let mut checks = vec![
             positive("rate", self.rate),
@@ -74,7 +77,7 @@ impl Schedule {
                 "warm_up",
                 "zero or positive, finite",
                 self.warm_up,
-                self.warm_up >= 0.0,
+                self.warm_up.is_finite() && self.warm_up >= 0.0,
             ),
         ];
         match self.shape {
@@ -86,16 +89,7 @@ impl Schedule {
                 checks.extend([positive("epochs", epochs), part("least", least)]);
             }
         }
-        for (field, range, value, is_right) in checks {
-            if !(is_right && value.is_finite()) {
-                return Err(FieldError {
-                    field,
-                    range,
-                    value,
-                });
-            }
-        }
-        Ok(())
+        first_out_of_range(checks)
     }
 
     /// The rate after so many epochs, whole and parts.

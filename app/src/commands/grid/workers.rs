@@ -1,11 +1,12 @@
 //! Threads that work on pieces, and a bar that shows how far they are.
 
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use onecycle_lab::grid::Pieces;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::failure::Failure;
+use crate::output::progress_bar;
 
 pub(super) struct Workers {
     pool: ThreadPool,
@@ -20,10 +21,7 @@ impl Workers {
             .num_threads(threads.unwrap_or(0) as usize)
             .build()
             .map_err(|error| Failure::usage(format!("cannot start the threads: {error}")))?;
-        let bar = ProgressBar::new(0);
-        if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}") {
-            bar.set_style(style);
-        }
+        let bar = progress_bar(0);
         Ok(Self { pool, bar })
     }
 
