@@ -1,7 +1,9 @@
-//! One cost, one set of margins, one optimum, one step response.
+//! One cost, one set of margins, one optimum, searched and from a table, one step response.
 
 use divan::{Bencher, black_box};
+use onecycle_lab::lead_table::{POINTS, build};
 use onecycle_lab::{ise, margins, pd, pd_at_phase_margin, step_response};
+use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::{Pd, Process};
 
 /// The paper's hover process and, with its floor inactive, a process that is mostly dead time.
@@ -48,6 +50,24 @@ fn optimum_at_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
 fn optimum_above_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
     let process = process(times);
     bencher.bench(|| pd(black_box(&process), PHASE_MARGIN_RAD));
+}
+
+/// From a table, as on board.
+#[divan::bench(args = [HOVER, DELAYED])]
+fn tabled_at_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
+    let numbers = build(PHASE_MARGIN_RAD, POINTS).expect("20 deg is a margin");
+    let table = LeadTable::from_floats(&numbers).expect("what is built is a table");
+    let process = process(times);
+    bencher.bench(|| table.pd_at_phase_margin(black_box(&process)));
+}
+
+/// From a table, as on board.
+#[divan::bench(args = [HOVER, DELAYED])]
+fn tabled_above_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
+    let numbers = build(PHASE_MARGIN_RAD, POINTS).expect("20 deg is a margin");
+    let table = LeadTable::from_floats(&numbers).expect("what is built is a table");
+    let process = process(times);
+    bencher.bench(|| table.pd(black_box(&process)));
 }
 
 #[divan::bench(args = [HOVER, DELAYED])]

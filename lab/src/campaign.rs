@@ -39,6 +39,9 @@ pub struct Campaign {
     pub offset: f64,
     /// Whether the relay follows the bias.
     pub trim: bool,
+    /// Asymmetry that the trim leaves, see [`RelaySettings::asymmetry`].
+    #[serde(default)]
+    pub asymmetry: f32,
     /// Cycles to fit.
     #[serde(default = "one")]
     pub cycles: usize,
@@ -211,6 +214,7 @@ impl Campaign {
         } else {
             0.0
         };
+        settings.asymmetry = self.asymmetry;
         let mut relay = Relay::new(settings)?;
         let duration_s = PREROLL_S + periods * case.period_s;
         let mut experiment = Experiment::new(case.process, SAMPLE_S, duration_s);

@@ -92,9 +92,9 @@ const PREROLL_SAMPLES: f64 = 100.0;
 /// Periods of an experiment. Of the paper's multirotors 0.4 % are not steady by then.
 const PERIODS: f64 = 14.0;
 
-/// Bins of a cycle's window, two of which it keeps for itself: each at least twice as narrow as a part
+/// Bins of a cycle's window, five of which it keeps for itself: each at least twice as narrow as a part
 /// of the signature.
-const BINS: usize = 258;
+const BINS: usize = 261;
 /// Edges of a cycle, and as many again that were taken back.
 const EDGES: usize = 16;
 

@@ -37,6 +37,7 @@ pub mod dataset;
 pub mod deterioration;
 pub mod grid;
 pub mod identify;
+pub mod lead_table;
 pub mod limit_cycle;
 pub mod margins;
 mod open_loop;

@@ -18,6 +18,7 @@ fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
         sigma_uniform: false,
         offset: 0.0,
         trim,
+        asymmetry: 0.0,
         cycles: 2,
         beta: -0.73,
     }

@@ -7,6 +7,7 @@
 pub mod control;
 pub mod cycle;
 mod distortion;
+pub mod gains;
 mod least_squares;
 pub mod network;
 pub mod process;

@@ -15,6 +15,8 @@
 //! Two things are known beforehand and stand as rows of the equations. The acceleration at the
 //! beginning of the past cannot exceed what the relay can produce: without that, one that has died
 //! away before the window begins would be undetermined. And the even part of the force is small.
+//! Where the family of the process is known, so is how likely its shapes are (`prior.rs`): three rows
+//! more, and the estimate is the most probable process instead of that of least squares.
 //!
 //! The three unknowns are the sum of the two poles (its logarithm), their product over the square
 //! of the sum, and the delay: regular where the lags are equal (1/4) and where damping vanishes
@@ -22,6 +24,7 @@
 
 mod descent;
 mod fundamental;
+mod prior;
 mod uncertainty;
 
 use core::f64::consts::TAU;
@@ -30,16 +33,19 @@ use libm::{exp, log, sqrt};
 
 use self::descent::NormalEquations;
 use self::fundamental::Fundamental;
+pub use self::prior::ShapePrior;
 use self::uncertainty::{Tangent, coordinate_map};
 use crate::distortion;
 use crate::least_squares::{Columns, Triangle, back_substitute, dot};
 use crate::process::Process;
 use crate::response::{Drive, Grid, Response};
 use crate::transition::State;
-use crate::window::Window;
+use crate::window::{KNOWN_ROWS, Window};
 
 /// Unknowns of the search: `ln(pole sum * period)`, pole ratio, `tau / period`.
-type Shape = [f64; 3];
+pub type Shape = [f64; SHAPE];
+/// Number of unknowns of the search.
+const SHAPE: usize = 3;
 
 /// The domain, in periods: lags from 1/1000 of a period to one, delays to half a period. Wider
 /// than any relay oscillation of this process: its actuator and delay are at most its half period.
@@ -48,13 +54,13 @@ const HIGHEST: Shape = [6.9, 0.25, 0.5];
 
 /// Number of linear unknowns: y0, v0, w0, the distortion, the bias times the gain, the gain.
 const LINEAR: usize = 6;
-/// Rows for what is known beforehand: of the acceleration and of the distortion.
-const KNOWN: usize = 2;
+/// Rows for what is known beforehand: of the acceleration, of the distortion, of the shape.
+const KNOWN: usize = KNOWN_ROWS;
 /// Standard deviation of the distortion known beforehand, as a part of the force: that of a thrust
 /// quadratic in the rotor's speed under a relay of a twelfth of hover is 0.02.
 const DISTORTION: f64 = 0.02;
 /// All unknowns.
-const ALL: usize = LINEAR + 3;
+const ALL: usize = LINEAR + SHAPE;
 
 /// Index of each coordinate in [`Refined::covariance`].
 pub mod coordinate {
@@ -135,7 +141,30 @@ pub fn refine<const BINS: usize, const EDGES: usize>(
     window: &Window<BINS, EDGES>,
     period_s: f64,
 ) -> Result<Refined, RefineError> {
-    Estimator::new(window, period_s)?.run()
+    refine_with(window, period_s, &Beforehand::default())
+}
+
+/// What is known before the fit.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Beforehand<'a> {
+    /// Shapes to start from, beside those that the oscillation itself suggests.
+    pub starts: &'a [Shape],
+    /// How likely shapes are.
+    pub prior: Option<ShapePrior>,
+}
+
+/// As [`refine`], with what is known beforehand.
+///
+/// # Errors
+/// As [`refine`].
+pub fn refine_with<const BINS: usize, const EDGES: usize>(
+    window: &Window<BINS, EDGES>,
+    period_s: f64,
+    beforehand: &Beforehand<'_>,
+) -> Result<Refined, RefineError> {
+    let mut estimator = Estimator::new(window, period_s)?;
+    estimator.prior = beforehand.prior;
+    estimator.run(beforehand.starts)
 }
 
 /// What the best linear fit at a given process leaves of each bin (output unit): measured less
@@ -178,6 +207,9 @@ struct Estimator<'a, const BINS: usize, const EDGES: usize> {
     acceleration_row: f64,
     /// Standard deviation of a sample over that of the distortion known beforehand.
     distortion_row: f64,
+    /// Standard deviation of a sample (output unit), and what is known of the shape.
+    sigma: f64,
+    prior: Option<ShapePrior>,
     fundamental: Fundamental,
 }
 
@@ -217,6 +249,8 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
             used: 0,
             acceleration_row: 0.0,
             distortion_row: 0.0,
+            sigma: 0.0,
+            prior: None,
             fundamental: Fundamental::of(window, period_s),
         };
         let half_bin_s = 0.5 * (bin_s - window.sample_s());
@@ -235,23 +269,28 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
             return Err(RefineError::TooFewBins(estimator.used));
         }
         // A perfect recording leaves rounding of about a millionth.
-        let sigma = window.noise_sigma().max(1e-6 * estimator.fundamental.rms);
+        estimator.sigma = window.noise_sigma().max(1e-6 * estimator.fundamental.rms);
         if estimator.fundamental.acceleration > 0.0 {
-            estimator.acceleration_row = sigma / estimator.fundamental.acceleration;
+            estimator.acceleration_row = estimator.sigma / estimator.fundamental.acceleration;
         }
-        estimator.distortion_row = sigma / DISTORTION;
+        estimator.distortion_row = estimator.sigma / DISTORTION;
         Ok(estimator)
     }
 
-    fn run(&self) -> Result<Refined, RefineError> {
-        let mut starts = self.fundamental.starts().map(|start| {
+    fn run(&self, given: &[Shape]) -> Result<Refined, RefineError> {
+        let suggested = self.fundamental.starts();
+        let mut starts = [([0.0; SHAPE], f64::INFINITY); SEARCHED];
+        for start in given.iter().chain(&suggested) {
+            let start = clamp(start);
             let cost = self.fit(&start).map_or(f64::INFINITY, |fit| fit.cost);
-            (start, cost)
-        });
-        starts.sort_unstable_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some(place) = starts.iter().position(|&(_, other)| cost < other) {
+                starts[place..].rotate_right(1);
+                starts[place] = (start, cost);
+            }
+        }
         let mut steps = 0;
         let mut best: Option<(Shape, LinearFit<BINS>)> = None;
-        for (start, _) in starts.iter().take(SEARCHED) {
+        for (start, _) in starts.iter().filter(|(_, cost)| cost.is_finite()) {
             if let Some((shape, fit)) = self.search(*start, &mut steps)
                 && best.as_ref().is_none_or(|(_, least)| fit.cost < least.cost)
             {
@@ -323,6 +362,12 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
                 residual[k] = bin.output_sum / self.weight[k];
             }
         }
+        if let Some(prior) = &self.prior {
+            let rows = &mut residual[self.rows - SHAPE..self.rows];
+            for (row, deviation) in rows.iter_mut().zip(prior.deviations(shape)) {
+                *row = -self.sigma * deviation;
+            }
+        }
         let parts = basis.project_out(&mut residual[..self.rows]);
         let cost = dot(&residual[..self.rows], &residual[..self.rows]);
         let coefficients = back_substitute(&triangle, &parts);
@@ -356,6 +401,9 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
             for (value, here) in column.iter_mut().zip(&here) {
                 *value = (*value - here) / step;
             }
+        }
+        if let Some(prior) = &self.prior {
+            prior.add_to(&mut jacobian, self.rows - SHAPE, self.sigma);
         }
         Some(jacobian)
     }

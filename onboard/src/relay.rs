@@ -323,7 +323,7 @@ impl Relay {
         self.set_smoothing(dt_s);
     }
 
-    /// Moves the trim a share of the way to the mean of the output over the cycle that ended.
+    /// Moves the trim a share of the way to where the cycle that ended would have had its asymmetry.
     fn begin_cycle(&mut self) {
         let h = self.settings.amplitude;
         let Excursion {
@@ -333,7 +333,8 @@ impl Relay {
             ..
         } = self.excursion;
         if self.switches >= TRIM_FROM_SWITCH && cycle_s > 0.0 {
-            let moved = trim + self.settings.trim_gain * h * cycle_high_less_low_s / cycle_s;
+            let excess = cycle_high_less_low_s / cycle_s - self.settings.asymmetry;
+            let moved = trim + self.settings.trim_gain * h * excess;
             let limit = RelaySettings::TRIM_LIMIT * h;
             self.excursion.trim = moved.clamp(-limit, limit);
             if self.settings.trim_gain > 0.0 {

@@ -31,10 +31,13 @@ pub enum WindowError {
     TooManyEdges(usize),
 }
 
+/// Rows of its equations that the estimator keeps for what is known beforehand.
+pub(crate) const KNOWN_ROWS: usize = 5;
+
 /// Most instants in a bin; samples beyond what the bins then hold are ignored.
 pub(crate) const MOST_PER_BIN: u32 = 1 << 20;
 
-/// Up to `BINS - 2` bins and `EDGES` edges; `BINS` of at least 4.
+/// Up to `BINS - 5` bins and `EDGES` edges; `BINS` of at least 7.
 #[derive(Clone, Debug)]
 pub struct Window<const BINS: usize, const EDGES: usize> {
     sample_s: f64,
@@ -52,8 +55,8 @@ pub struct Window<const BINS: usize, const EDGES: usize> {
 }
 
 impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
-    /// Bins to fill: the estimator keeps two rows for what is known beforehand.
-    const ROOM: usize = BINS - 2;
+    /// Bins to fill.
+    const ROOM: usize = BINS - KNOWN_ROWS;
 
     /// An empty window of samples every `sample_s`, the first at `start_s`.
     #[must_use]
@@ -247,8 +250,8 @@ mod tests {
         fn check<const BINS: usize>(samples: usize) {
             let window = squares::<BINS>(samples);
             let per_bin = window.per_bin() as usize;
-            // The least power of two that leaves two bins free.
-            let needed = samples.div_ceil(BINS - 2).next_power_of_two();
+            // The least power of two that leaves the rows kept free.
+            let needed = samples.div_ceil(BINS - KNOWN_ROWS).next_power_of_two();
             assert_eq!(per_bin, needed);
             assert_eq!(window.bins().len(), samples.div_ceil(per_bin));
             for (index, bin) in window.bins().iter().enumerate() {
@@ -262,9 +265,9 @@ mod tests {
             }
         }
         for samples in [1, 7, 8, 9, 100, 127, 128, 129, 1000] {
-            check::<9>(samples);
-            check::<10>(samples);
-            check::<4>(samples);
+            check::<12>(samples);
+            check::<13>(samples);
+            check::<7>(samples);
         }
     }
 
@@ -272,17 +275,17 @@ mod tests {
     #[test]
     fn groups_are_their_samples() {
         let samples = 256;
-        let mut grouped = Window::<20, 4>::of_groups(2.0, 1.0 / 1024.0, 4);
+        let mut grouped = Window::<23, 4>::of_groups(2.0, 1.0 / 1024.0, 4);
         for first in (0..samples).step_by(4) {
             let mean = (first..first + 4).map(|k| (k * k) as f64).sum::<f64>() / 4.0;
             grouped.push_output(2.0 + first as f64 / 1024.0, mean);
         }
-        let single = squares::<20>(samples);
+        let single = squares::<23>(samples);
         assert_eq!(grouped.per_bin(), 16);
         assert_eq!(grouped.per_bin(), single.per_bin());
         assert_eq!(grouped.bins().len(), single.bins().len());
         for (grouped_bin, bin) in grouped.bins().iter().zip(single.bins()) {
-            let output_sum = |window: &Window<20, 4>, bin: &Bin| {
+            let output_sum = |window: &Window<23, 4>, bin: &Bin| {
                 bin.output_sum + f64::from(bin.count) * window.first_output()
             };
             assert_eq!(grouped_bin.count, bin.count);
@@ -293,7 +296,7 @@ mod tests {
 
     #[test]
     fn a_gap_leaves_its_bins_empty() {
-        let mut window = Window::<17, 4>::new(0.0, 1.0);
+        let mut window = Window::<20, 4>::new(0.0, 1.0);
         for k in (0..10).chain(40..60) {
             window.push_output(f64::from(k), 1.0);
         }
@@ -305,7 +308,7 @@ mod tests {
 
     #[test]
     fn outputs_before_the_start_are_ignored() {
-        let mut window = Window::<16, 4>::new(10.0, 0.1);
+        let mut window = Window::<19, 4>::new(10.0, 0.1);
         window.push_output(9.9, 7.0);
         assert!(window.bins().is_empty());
         window.push_output(10.0, 8.0);
@@ -314,7 +317,7 @@ mod tests {
 
     #[test]
     fn only_changes_of_the_input_take_room() {
-        let mut window = Window::<16, 3>::new(0.0, 0.1);
+        let mut window = Window::<19, 3>::new(0.0, 0.1);
         for (time_s, input) in [(0.0, 1.0), (0.1, 1.0), (0.2, -1.0), (0.3, -1.0), (0.4, 1.0)] {
             assert_eq!(window.push_input(time_s, input), Ok(()));
         }
@@ -343,7 +346,7 @@ mod tests {
     fn white_noise_is_measured() {
         let expected = libm::sqrt(1.0 / 3.0);
         for group in [1, 5] {
-            let mut window = Window::<64, 4>::of_groups(0.0, 1e-3, group);
+            let mut window = Window::<67, 4>::of_groups(0.0, 1e-3, group);
             let mut state = 1;
             for k in 0..100_000_u32 {
                 let mean = (0..group).map(|_| uniform(&mut state)).sum::<f64>() / f64::from(group);
@@ -361,7 +364,7 @@ mod tests {
     // sqrt(20) and a root mean square of 1/sqrt(2): 6.13e-7 A.
     #[test]
     fn a_smooth_oscillation_has_next_to_no_noise() {
-        let mut window = Window::<64, 4>::new(0.0, 1e-3);
+        let mut window = Window::<67, 4>::new(0.0, 1e-3);
         for k in 0..4000 {
             let angle = core::f64::consts::TAU * f64::from(k) / 400.0;
             window.push_output(f64::from(k) * 1e-3, libm::sin(angle));
@@ -376,7 +379,7 @@ mod tests {
     // 1e15 instants in 15 bins would take 2^46 a bin, more than the count can hold.
     #[test]
     fn a_time_far_ahead_is_survived() {
-        let mut window = Window::<16, 4>::new(0.0, 1e-3);
+        let mut window = Window::<19, 4>::new(0.0, 1e-3);
         window.push_output(0.0, 1.0);
         window.push_output(1e12, 1.0);
         assert!(window.per_bin() > 0);
@@ -385,7 +388,7 @@ mod tests {
     // A smooth oscillation with every tenth sample missing has no noise.
     #[test]
     fn lost_samples_are_no_noise() {
-        let mut window = Window::<64, 4>::new(0.0, 1e-3);
+        let mut window = Window::<67, 4>::new(0.0, 1e-3);
         for k in (0..4000).filter(|k| k % 10 != 0) {
             let angle = core::f64::consts::TAU * f64::from(k) / 400.0;
             window.push_output(f64::from(k) * 1e-3, libm::sin(angle));

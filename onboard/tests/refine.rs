@@ -6,7 +6,9 @@
 mod common;
 
 use common::{FitWindow, Simulation, every, last_cycles, run};
-use onecycle_onboard::refine::{DomainEdge, RefineError, Refined, refine};
+use onecycle_onboard::refine::{
+    Beforehand, DomainEdge, RefineError, Refined, Shape, ShapePrior, refine, refine_with,
+};
 use onecycle_onboard::{Process, Relay, RelaySettings};
 
 fn relay() -> Relay {
@@ -234,6 +236,44 @@ fn a_short_window_says_how_short() {
         refine(&window, 0.02),
         Err(RefineError::TooFewBins(_))
     ));
+}
+
+// Noise-free, the data settle a shape to a millionth against a prior of a standard deviation of one; against
+// one of 1e-12 about another shape they have no say, and the covariance says so too.
+#[test]
+fn a_prior_counts_for_what_it_is_worth() {
+    let process = new(0.05, 1.0, 0.03);
+    let sample_s = scale_s(&process) / 400.0;
+    let run = run(&process, &mut relay(), 0.0, every(sample_s, 16 * 400));
+    let (window, period_s) = last_cycles(&run, sample_s, 1, |_| true);
+    let (sum_per_s, ratio) = process.pole_sum();
+    let off: Shape = [
+        (sum_per_s * period_s).ln() + 0.1,
+        ratio + 0.02,
+        process.tau_s() / period_s + 0.01,
+    ];
+    let with = |size: f64| {
+        let root =
+            core::array::from_fn(|i| core::array::from_fn(|j| if i == j { size } else { 0.0 }));
+        let beforehand = Beforehand {
+            starts: &[off],
+            prior: ShapePrior::new(off, &root),
+        };
+        refine_with(&window, period_s, &beforehand).unwrap()
+    };
+    assert_recovered(&with(1.0), &process, 0.0, 1e-6);
+    let held = with(1e-12);
+    let (found_sum, found_ratio) = held.process.pole_sum();
+    let found = [
+        (found_sum * period_s).ln(),
+        found_ratio,
+        held.process.tau_s() / period_s,
+    ];
+    for (found, off) in found.iter().zip(off) {
+        assert!((found - off).abs() < 1e-6, "{found} {off}");
+    }
+    let sigma = held.covariance.unwrap()[1][1].sqrt();
+    assert!(sigma < 1e-6, "{sigma}");
 }
 
 /// Two periods of a wave of one second, high for a third, through the process in open loop: it need not

@@ -6,7 +6,7 @@
 mod common;
 
 use common::{every, run};
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_onboard::{Process, Relay, RelayError, RelaySettings};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
@@ -29,6 +29,36 @@ fn trim_converges_to_minus_the_bias() {
             relay.trim()
         );
     }
+}
+
+// With an asymmetry of 0.2 the output is high for 0.6 of a cycle whatever the bias, to the half sample in
+// a half cycle that the duty can resolve; the trim leaves a fifth of the relay's amplitude of the bias.
+#[test]
+fn the_trim_leaves_the_asymmetry_asked_for() {
+    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
+    for bias in [-0.5, 0.0, 0.3] {
+        let settings = RelaySettings {
+            trim_gain: RelaySettings::TRIM_GAIN,
+            asymmetry: 0.2,
+            ..RelaySettings::new(1.0, RelaySettings::DISTINGUISHING_BETA)
+        };
+        let mut relay = Relay::new(settings).unwrap();
+        let run = run(&process, &mut relay, bias, every(1e-3, 20_000));
+        let middle = f64::from(relay.trim());
+        assert!((middle + bias + 0.2).abs() < 0.01, "{bias}: {middle}");
+        let rises: Vec<usize> = (1..run.input.len())
+            .filter(|&k| run.input[k] > run.input[k - 1] + 1.0)
+            .collect();
+        let cycles = &run.input[rises[rises.len() - 6]..rises[rises.len() - 1]];
+        let high = cycles.iter().filter(|&&input| input > middle).count();
+        let duty = high as f64 / cycles.len() as f64;
+        assert!((duty - 0.6).abs() < 0.005, "{bias}: {duty}");
+    }
+    let settings = RelaySettings {
+        asymmetry: 1.0,
+        ..RelaySettings::new(1.0, 0.0)
+    };
+    assert_eq!(Relay::new(settings).err(), Some(RelayError::Asymmetry(1.0)));
 }
 
 // Without a trim the duty carries the bias: mean(u) = h (2 duty - 1) = -bias over whole cycles.

@@ -92,7 +92,7 @@ fn cycles_and_window(bencher: Bencher) {
         .counter(ItemsCount::new(trace.len()))
         .bench_local(|| {
             let mut detector = CycleDetector::new();
-            let mut window = Window::<257, 64>::new(0.0, SAMPLE_S);
+            let mut window = Window::<260, 64>::new(0.0, SAMPLE_S);
             let mut cycles = 0;
             for row in 0..trace.len() {
                 let (time_s, output) = (trace.time_s[row], trace.output[row]);

@@ -11,7 +11,7 @@ use onecycle_plant::{Experiment, Sensor, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-type FitWindow = Window<257, 64>;
+type FitWindow = Window<260, 64>;
 
 fn noisy_relay(process: &Process, sigma: f64, bias: f64, rng: &mut Pcg64) -> (Trace, f64) {
     let (omega, amplitude) = process.describing_function_oscillation(1.0, -0.73).unwrap();

@@ -162,6 +162,7 @@ fn settles(space: &Space, certificate: &Certificate, trim: bool) -> Result<bool,
         sigma_uniform: false,
         offset: 0.0,
         trim,
+        asymmetry: 0.0,
         cycles: 1,
         beta: space.beta,
     };

@@ -11,8 +11,8 @@ use super::{FitPoint, Signals, Verdict};
 
 /// Bins and edges of the window: with eight cycles, some 30 to 60 bins a cycle.
 pub(super) type FitWindow = Window<BINS, EDGES>;
-/// Rows of the window: 512 bins, and two that the estimator keeps for itself.
-const BINS: usize = 514;
+/// Rows of the window: 512 bins, and five that the estimator keeps for itself.
+const BINS: usize = 517;
 /// Edges of the input in the window; a relay makes two a cycle and a trim none of its own.
 const EDGES: usize = 128;
 

@@ -24,6 +24,9 @@ pub struct RelaySettings {
     pub ramp_switches: u16,
     /// Share of the measured bias that the trim takes up each cycle; 0 switches it off.
     pub trim_gain: f32,
+    /// What the trim leaves: part of a cycle that the output is high, less that it is low. Zero makes
+    /// the oscillation symmetric; some asymmetry tells more of the process.
+    pub asymmetry: f32,
 }
 
 impl RelaySettings {
@@ -44,6 +47,9 @@ impl RelaySettings {
         }
         if !(self.beta > -1.0 && self.beta < 1.0) {
             return Err(RelayError::Beta(self.beta));
+        }
+        if !(self.asymmetry > -1.0 && self.asymmetry < 1.0) {
+            return Err(RelayError::Asymmetry(self.asymmetry));
         }
         for (name, value) in [
             ("the pre-roll", self.preroll_s),
@@ -72,6 +78,7 @@ impl RelaySettings {
             plain_switches: 3,
             ramp_switches: 4,
             trim_gain: 0.0,
+            asymmetry: 0.0,
         }
     }
 
@@ -93,6 +100,8 @@ pub enum RelayError {
     Amplitude(f32),
     /// `beta` is not between -1 and 1.
     Beta(f32),
+    /// The asymmetry is not between -1 and 1.
+    Asymmetry(f32),
     /// A time, a fraction or the noise is negative or not finite: its name and value.
     Setting(&'static str, f32),
 }
@@ -102,6 +111,9 @@ impl fmt::Display for RelayError {
         match self {
             Self::Amplitude(v) => write!(f, "the relay amplitude must be positive, but is {v}"),
             Self::Beta(v) => write!(f, "beta must lie between -1 and 1, but is {v}"),
+            Self::Asymmetry(v) => {
+                write!(f, "the asymmetry must lie between -1 and 1, but is {v}")
+            }
             Self::Setting(name, v) => write!(f, "{name} must be zero or positive, but is {v}"),
         }
     }

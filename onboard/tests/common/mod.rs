@@ -8,7 +8,7 @@ use onecycle_onboard::transition::State;
 use onecycle_onboard::window::Window;
 use onecycle_onboard::{Process, Relay, Transition};
 
-pub type FitWindow = Window<257, 64>;
+pub type FitWindow = Window<260, 64>;
 
 /// Input from the sample on, and output at it.
 #[derive(Clone, Debug, Default)]
