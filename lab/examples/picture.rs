@@ -125,7 +125,7 @@ fn draw_step(area: &Area<'_>, found: &Identification) -> Result<(), Box<dyn std:
     let Ok(identified) = &found.outcome else {
         return Ok(());
     };
-    let response = step_response(&identified.refined.process, identified.optimum.pd)?;
+    let response = step_response(&identified.refined.process, identified.controller.pd)?;
     let mut chart = ChartBuilder::on(area)
         .caption(
             "The step its optimal controller will give",
@@ -155,7 +155,7 @@ fn draw_step(area: &Area<'_>, found: &Identification) -> Result<(), Box<dyn std:
         FITTED.stroke_width(2),
     ))?;
     let process = &identified.refined.process;
-    let pd = identified.optimum.pd;
+    let pd = identified.controller.pd;
     for (row, text) in [
         format!(
             "T_prop {:.1} ms, tau {:.1} ms",

@@ -13,7 +13,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::identify::{Identification, MOST_CYCLES, Options, Signals, identify};
-use crate::optimum::pd_at_phase_margin;
+use crate::optimum::pd;
 use crate::space::{FieldError, Space, first_out_of_range};
 use crate::{Deterioration, deterioration};
 
@@ -314,7 +314,7 @@ const IDENTIFICATION_PERIODS: f64 = 30.0;
 
 /// Runs the relay of a case and identifies the process from its recording.
 ///
-/// The controllers compared have exactly the paper's 20 degrees of phase margin, as its do.
+/// The controllers compared are those of the paper's 20 degrees of phase margin.
 ///
 /// # Errors
 /// A [`CaseError`] for parameters outside their range.
@@ -343,9 +343,8 @@ pub fn identification_outcome(
     let truth = ordered.with_gain_scaled(jerk_gain * ordered.t_prop_s())?;
     let margin = options.phase_margin_rad;
     let deterioration = found.outcome.as_ref().ok().and_then(|identified| {
-        let made = pd_at_phase_margin(&identified.refined.process, margin).ok()?;
-        let best = pd_at_phase_margin(&truth, margin).ok()?;
-        Some(deterioration(made.pd, &truth, &best))
+        let best = pd(&truth, margin).ok()?;
+        Some(deterioration(identified.controller.pd, &truth, &best))
     });
     Ok(IdentificationOutcome {
         found,

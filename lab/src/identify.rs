@@ -3,6 +3,7 @@
 //!
 //! Every way of not knowing is a [`Verdict`] with a sentence of advice, never a number.
 
+mod decision;
 mod oscillation;
 mod posterior;
 mod relay_input;
@@ -12,6 +13,7 @@ mod verdict;
 
 use onecycle_onboard::refine::{RefineError, Refined, refine};
 
+use self::decision::Decision;
 use self::oscillation::{FitWindow, Oscillation};
 pub use self::posterior::{Interval, Posterior, ProcessEstimate};
 use self::relay_input::{InputKind, RelayInput};
@@ -105,8 +107,12 @@ pub struct Identified {
     pub refined: Refined,
     /// Parameters with their intervals.
     pub process: ProcessEstimate,
-    /// Controller of least squared error with the phase margin asked for, and its margins.
-    pub optimum: Optimum,
+    /// Probability that gain, lags and delay are all within their intervals at once; `None` where
+    /// there are no intervals.
+    pub joint_probability: Option<f64>,
+    /// Controller of least expected cost at the phase margin asked for; cost and margins are those
+    /// on the process found.
+    pub controller: Optimum,
     /// Its phase margin (rad) with the interval that the process's intervals leave it.
     pub phase_margin_rad: Interval,
     /// Predicted response to a unit step of the reference; `None` where it is too slow to simulate.
@@ -267,7 +273,9 @@ fn design(
     let optimum = pd(&refined.process, options.phase_margin_rad)
         .map_err(|error| Verdict::NoController(error.to_string()))?;
     let posterior = Posterior::new(refined, window.sample_s());
-    let phase_margin_rad = posterior.phase_margin_rad(optimum.pd);
+    let controller = Decision::new(&posterior.processes(), options.phase_margin_rad)
+        .controller(&refined.process, optimum);
+    let phase_margin_rad = posterior.phase_margin_rad(controller.pd);
     if phase_margin_rad.low.is_none_or(|low| low <= 0.0) {
         return Err(if refined.response_error > 0.0 {
             Verdict::NotThisProcess { misfit }
@@ -275,12 +283,14 @@ fn design(
             Verdict::TooUncertain
         });
     }
+    let process = posterior.process();
     Ok(Identified {
         refined: *refined,
-        process: posterior.process(),
+        joint_probability: posterior.joint_probability(&process),
+        process,
         phase_margin_rad,
-        optimum,
-        step: step_response(&refined.process, optimum.pd)
+        controller,
+        step: step_response(&refined.process, controller.pd)
             .ok()
             .map(|step| step.metrics),
         misfit,

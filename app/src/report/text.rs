@@ -52,7 +52,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             describe_process(&mut text, identified, &units);
             describe_controller(
                 &mut text,
-                &identified.optimum,
+                &identified.controller,
                 Some(&identified.phase_margin_rad),
             );
             describe_step(&mut text, identified.step.as_ref());

@@ -155,14 +155,19 @@ impl Posterior {
             cholesky(&covariance)
         });
         let mut rng = Pcg64Mcg::seed_from_u64(SEED);
-        let mut draw = |root: &[[f64; 5]; 5]| {
+        // In pairs on either side of the centre: so few as a handful have their mean there.
+        let mut pair = |root: &[[f64; 5]; 5]| {
             let normal: [f64; 5] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
-            let at = std::array::from_fn(|i| {
-                centre[i] + (0..=i).map(|j| root[i][j] * normal[j]).sum::<f64>()
-            });
-            Parameters::of(&at, sign)
+            [1.0, -1.0].map(|side| {
+                let at = std::array::from_fn(|i| {
+                    centre[i] + side * (0..=i).map(|j| root[i][j] * normal[j]).sum::<f64>()
+                });
+                Parameters::of(&at, sign)
+            })
         };
-        let draws = root.map_or(vec![], |root| (0..DRAWS).map(|_| draw(&root)).collect());
+        let draws = root.map_or(vec![], |root| {
+            (0..DRAWS / 2).flat_map(|_| pair(&root)).collect()
+        });
         Self {
             best: Parameters::of(&centre, sign),
             draws,
@@ -184,6 +189,27 @@ impl Posterior {
             tau_s: interval(|p| p.tau_s),
             input_bias: interval(|p| p.input_bias),
         }
+    }
+
+    /// Draws of the process.
+    #[must_use]
+    pub fn processes(&self) -> Vec<Process> {
+        self.draws.iter().filter_map(Parameters::process).collect()
+    }
+
+    /// Probability that gain, lags and delay are all within their intervals at once; `None` where the
+    /// estimator gives no covariance.
+    #[must_use]
+    pub fn joint_probability(&self, within: &ProcessEstimate) -> Option<f64> {
+        let inside = |draw: &&Parameters| {
+            within.k.holds(draw.k)
+                && within.k_over_t_body.holds(draw.k_over_t_body)
+                && within.t_prop_s.holds(draw.t_prop_s)
+                && within.t_body_s.holds(draw.t_body_s)
+                && within.tau_s.holds(draw.tau_s)
+        };
+        let count = self.draws.iter().filter(inside).count();
+        (!self.draws.is_empty()).then(|| count as f64 / self.draws.len() as f64)
     }
 
     /// Phase margin (rad) that a controller leaves on the process, with its 90 % interval.
