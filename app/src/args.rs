@@ -1,5 +1,7 @@
 //! Arguments, typed and documented; `--help` is generated from here.
 
+mod pack;
+
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -11,13 +13,17 @@ use onecycle_onboard::{Process, ProcessError};
 
 use crate::failure::Failure;
 
+pub(crate) use self::pack::{
+    ExportPack, ImportPack, Pack, PackAction, PackSource, ShowPack, VerifyPack,
+};
+
 const EXIT_CODES: &str = "\
 Exit codes:
   0  done (identify: a process was identified)
   2  bad arguments
   3  the input file cannot be read; the message says where and what to do
   4  the answer is no: the recording tells no process (the verdict says why and what to do), a space
-     is not certified, a grid leaves holes
+     is not certified, a grid leaves holes, a pack does not give the outputs it must
   5  the output cannot be written";
 
 /// From one cycle of a relay test to the process and its optimal controller.
@@ -37,6 +43,7 @@ pub(crate) enum Command {
     Phase(Phase),
     Certify(Certify),
     Grid(Grid),
+    Pack(Pack),
 }
 
 /// Identify the process behind a recorded relay test, and design its controller.

@@ -4,5 +4,6 @@ pub(crate) mod certificate;
 pub(crate) mod grid;
 pub(crate) mod json;
 pub(crate) mod number;
+pub(crate) mod pack;
 pub(crate) mod phase;
 pub(crate) mod text;

@@ -7,9 +7,11 @@
 pub mod control;
 pub mod cycle;
 mod distortion;
+pub mod floats;
 pub mod gains;
 mod least_squares;
 pub mod network;
+pub mod pack;
 pub mod process;
 pub mod refine;
 pub mod relay;

@@ -1,157 +1,291 @@
-//! Dense layers of a small network, their sizes in their types, their weights borrowed.
+//! Dense layers of a small network, their weights borrowed as the bytes that they are.
 //!
 //! ```text
-//! y_o = b_o + sum_i w_oi x_i              Dense
-//! y_o = b_o + s_o sum_i q_oi x_i          QuantisedDense: q a whole number, -127..127
+//! y_o = f(b_o + sum_i w_oi x_i)              f32 weights
+//! y_o = f(b_o + s_o sum_i q_oi x_i)          bytes: q a whole number, -127..127
+//!
+//! f: nothing, max(x, 0), tanh x
 //! ```
 //!
 //! Weights lie as PyTorch and the trainer keep them, a row for each output, and stay where they are:
-//! in flash as a `static`. One byte a weight instead of four, with a scale for each row, needs no
-//! calibration, as the inputs stay f32 (R. Krishnamoorthi, "Quantizing deep convolutional networks
-//! for efficient inference", arXiv 1806.08342, section 3: symmetric, per channel).
+//! in flash or in a file, at any address. One byte a weight instead of four, with a scale for each
+//! row, needs no calibration, as the inputs stay f32 (R. Krishnamoorthi, "Quantizing deep
+//! convolutional networks for efficient inference", arXiv 1806.08342, section 3: symmetric, per
+//! channel).
 //!
 //! ```
-//! use onecycle_onboard::network::{Dense, relu};
+//! use onecycle_onboard::floats::Floats;
+//! use onecycle_onboard::network::{Activation, Dense, Weights};
 //!
-//! let hidden = Dense { weights: &[[1.0, 2.0], [3.0, -4.0], [0.5, 0.5]], biases: &[0.0, 1.0, 0.0] };
-//! let last = Dense { weights: &[[1.0, 1.0, 2.0]], biases: &[-1.0] };
-//! // Hidden: 3, 3 - 4 + 1 = 0, 1. Out: 3 + 0 + 2 - 1.
-//! assert_eq!(last.forward(&relu(hidden.forward(&[1.0, 1.0]))), [4.0]);
+//! // 0.5 (1 * 2 + 4 * 3) + 1 = 8 and 2 (-1 * 2 + 0 * 3) + 1 = -3, of which nothing is left.
+//! let [half, one, two] = [0.5_f32, 1.0, 2.0].map(f32::to_le_bytes);
+//! let (scales, biases) = ([half, two].concat(), [one, one].concat());
+//! let weights = Weights::Bytes {
+//!     rows: &[1, 4, 0xff, 0],
+//!     scales: Floats::new(&scales).ok_or("scales")?,
+//! };
+//! let biases = Floats::new(&biases).ok_or("biases")?;
+//! let layer = Dense::new(2, weights, biases, Activation::Relu).ok_or("sizes")?;
+//! let mut outputs = [0.0; 2];
+//! layer.forward(&[2.0, 3.0], &mut outputs);
+//! assert_eq!(outputs, [8.0, 0.0]);
+//! # Ok::<(), &str>(())
 //! ```
+
+use crate::floats::Floats;
 
 /// Sums that go on side by side in a row: a chain of additions would wait for each one's latency
 /// (3 to 4 cycles on a Cortex-M7 or a desktop core), and four of f32 fill a 128-bit register.
 const LANES: usize = 4;
 
+/// Weights of a layer, row by row, a row for each output.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weights<'a> {
+    /// `w`.
+    Floats(Floats<'a>),
+    /// `w = s q`.
+    Bytes {
+        /// `q`: two's complement, a byte each.
+        rows: &'a [u8],
+        /// `s`: what a one of the row stands for, its largest weight over 127.
+        scales: Floats<'a>,
+    },
+}
+
+/// What becomes of the sums.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activation {
+    /// Nothing: they are the outputs.
+    None,
+    /// `max(x, 0)`; what is no number stays so.
+    Relu,
+    /// The hyperbolic tangent.
+    Tanh,
+}
+
 /// A dense layer. See the [module](self).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Dense<'a, const IN: usize, const OUT: usize> {
-    /// `w`: a row for each output.
-    pub weights: &'a [[f32; IN]; OUT],
-    /// `b`.
-    pub biases: &'a [f32; OUT],
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Dense<'a> {
+    inputs: usize,
+    weights: Weights<'a>,
+    biases: Floats<'a>,
+    activation: Activation,
 }
 
-impl<const IN: usize, const OUT: usize> Dense<'_, IN, OUT> {
-    /// The outputs, before any activation.
+impl<'a> Dense<'a> {
+    /// A layer of so many inputs, and as many outputs as biases; `None` where there are no inputs or
+    /// not as many weights and scales as that makes.
     #[must_use]
-    pub fn forward(&self, inputs: &[f32; IN]) -> [f32; OUT] {
-        let mut outputs = *self.biases;
-        for (output, row) in outputs.iter_mut().zip(self.weights) {
-            *output += dot(row, inputs);
+    pub fn new(
+        inputs: usize,
+        weights: Weights<'a>,
+        biases: Floats<'a>,
+        activation: Activation,
+    ) -> Option<Self> {
+        let outputs = biases.len();
+        let (count, scales) = match weights {
+            Weights::Floats(floats) => (floats.len(), outputs),
+            Weights::Bytes { rows, scales } => (rows.len(), scales.len()),
+        };
+        let fits = inputs > 0 && inputs.checked_mul(outputs) == Some(count) && scales == outputs;
+        fits.then_some(Self {
+            inputs,
+            weights,
+            biases,
+            activation,
+        })
+    }
+
+    /// Number of inputs.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// Number of outputs.
+    #[must_use]
+    pub fn outputs(&self) -> usize {
+        self.biases.len()
+    }
+
+    /// Its weights.
+    #[must_use]
+    pub fn weights(&self) -> Weights<'a> {
+        self.weights
+    }
+
+    /// `b`.
+    #[must_use]
+    pub fn biases(&self) -> Floats<'a> {
+        self.biases
+    }
+
+    /// What becomes of the sums.
+    #[must_use]
+    pub fn activation(&self) -> Activation {
+        self.activation
+    }
+
+    /// The outputs of as many inputs as the layer has. Inputs that are missing count as zeros;
+    /// inputs and outputs beyond the layer's are left alone.
+    pub fn forward(&self, inputs: &[f32], outputs: &mut [f32]) {
+        let sums = outputs.iter_mut().zip(self.biases.iter());
+        match self.weights {
+            Weights::Floats(weights) => {
+                let rows = weights.chunks().chunks_exact(self.inputs);
+                for ((sum, bias), row) in sums.zip(rows) {
+                    *sum = bias + dot(row, inputs, f32::from_le_bytes);
+                }
+            }
+            Weights::Bytes { rows, scales } => {
+                let rows = rows.as_chunks::<1>().0.chunks_exact(self.inputs);
+                for (((sum, bias), row), scale) in sums.zip(rows).zip(scales.iter()) {
+                    *sum = bias + scale * dot(row, inputs, |[byte]| f32::from(byte as i8));
+                }
+            }
         }
-        outputs
+        let outputs = outputs.iter_mut().take(self.outputs());
+        match self.activation {
+            Activation::None => {}
+            // Not `max`, which would make a zero of what is no number.
+            Activation::Relu => outputs.for_each(|x| *x = if *x < 0.0 { 0.0 } else { *x }),
+            Activation::Tanh => outputs.for_each(|x| *x = libm::tanhf(*x)),
+        }
     }
 }
 
-/// A dense layer whose weights are bytes. See the [module](self).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct QuantisedDense<'a, const IN: usize, const OUT: usize> {
-    /// `q`: a row for each output.
-    pub weights: &'a [[i8; IN]; OUT],
-    /// `s`: what a one of the row stands for, its largest weight over 127.
-    pub scales: &'a [f32; OUT],
-    /// `b`.
-    pub biases: &'a [f32; OUT],
-}
-
-impl<const IN: usize, const OUT: usize> QuantisedDense<'_, IN, OUT> {
-    /// The outputs, before any activation.
-    #[must_use]
-    pub fn forward(&self, inputs: &[f32; IN]) -> [f32; OUT] {
-        let mut outputs = *self.biases;
-        for ((output, row), scale) in outputs.iter_mut().zip(self.weights).zip(self.scales) {
-            *output += scale * dot(row, inputs);
-        }
-        outputs
-    }
-}
-
-fn dot<W: Copy + Into<f32>, const N: usize>(weights: &[W; N], inputs: &[f32; N]) -> f32 {
-    let (weights, last_weights) = weights.as_chunks::<LANES>();
-    let (inputs, last_inputs) = inputs.as_chunks::<LANES>();
+/// Sum of products as far as both go, the weights of `SIZE` bytes decoded by `weight`.
+fn dot<const SIZE: usize>(
+    weights: &[[u8; SIZE]],
+    inputs: &[f32],
+    weight: impl Fn([u8; SIZE]) -> f32,
+) -> f32 {
+    let both = weights.len().min(inputs.len());
+    let (weights, last_weights) = weights[..both].as_chunks::<LANES>();
+    let (inputs, last_inputs) = inputs[..both].as_chunks::<LANES>();
     let mut sums = [0.0; LANES];
     for (weights, inputs) in weights.iter().zip(inputs) {
         for lane in 0..LANES {
-            sums[lane] += weights[lane].into() * inputs[lane];
+            sums[lane] += weight(weights[lane]) * inputs[lane];
         }
     }
-    for ((sum, &weight), input) in sums.iter_mut().zip(last_weights).zip(last_inputs) {
-        *sum += weight.into() * input;
+    for ((sum, &bytes), input) in sums.iter_mut().zip(last_weights).zip(last_inputs) {
+        *sum += weight(bytes) * input;
     }
     let [a, b, c, d] = sums;
     (a + c) + (b + d)
 }
 
-/// `max(x, 0)` of every value; what is no number stays so.
-#[must_use]
-pub fn relu<const N: usize>(values: [f32; N]) -> [f32; N] {
-    values.map(|value| if value < 0.0 { 0.0 } else { value })
-}
-
-/// The hyperbolic tangent of every value.
-#[must_use]
-pub fn tanh<const N: usize>(values: [f32; N]) -> [f32; N] {
-    values.map(libm::tanhf)
-}
-
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
     use super::*;
 
+    fn le(values: &[f32]) -> Vec<u8> {
+        values
+            .iter()
+            .flat_map(|value| value.to_le_bytes())
+            .collect()
+    }
+
+    fn floats(bytes: &[u8]) -> Floats<'_> {
+        Floats::new(bytes).unwrap()
+    }
+
     // Row o is o + 1, o + 2, ...; inputs 1, 2, ... n: sum (o + i) i = o n (n + 1) / 2 +
-    // n (n + 1) (2 n + 1) / 6, and ten times o more. Whole numbers, so exact; n from none to past
-    // two full rounds of the lanes.
+    // n (n + 1) (2 n + 1) / 6, and ten times o more. Whole numbers, so exact; n up to past two full
+    // rounds of the lanes.
     #[test]
     fn sums_are_exact_at_every_length() {
-        fn check<const N: usize>() {
-            let weights: [[i8; N]; 3] =
-                core::array::from_fn(|o| core::array::from_fn(|i| (o + i + 1) as i8));
-            let inputs = core::array::from_fn(|i| (i + 1) as f32);
-            let biases = [0.0, 10.0, 20.0];
-            let n = N as f32;
+        for n in [1, 3, 4, 7, 8, 11] {
+            let rows: Vec<u8> = (0..3).flat_map(|o| (1..=n).map(move |i| o + i)).collect();
+            let values: Vec<f32> = rows.iter().map(|&w| f32::from(w)).collect();
+            let (values, scales) = (le(&values), le(&[1.0; 3]));
+            let biases = le(&[0.0, 10.0, 20.0]);
+            let inputs: Vec<f32> = (1..=n).map(f32::from).collect();
+            let count = f32::from(n);
             let expected = [0.0, 1.0, 2.0].map(|o| {
-                o * n * (n + 1.0) / 2.0 + n * (n + 1.0) * (2.0 * n + 1.0) / 6.0 + 10.0 * o
+                let squares = count * (count + 1.0) * (2.0 * count + 1.0) / 6.0;
+                o * count * (count + 1.0) / 2.0 + squares + 10.0 * o
             });
-            let dense = Dense {
-                weights: &weights.map(|row| row.map(f32::from)),
-                biases: &biases,
+            let bytes = Weights::Bytes {
+                rows: &rows,
+                scales: floats(&scales),
             };
-            assert_eq!(dense.forward(&inputs), expected);
-            let quantised = QuantisedDense {
-                weights: &weights,
-                scales: &[1.0; 3],
-                biases: &biases,
-            };
-            assert_eq!(quantised.forward(&inputs), expected);
+            for weights in [Weights::Floats(floats(&values)), bytes] {
+                let biases = floats(&biases);
+                let dense = Dense::new(usize::from(n), weights, biases, Activation::None).unwrap();
+                let mut outputs = [0.0, 0.0, 0.0, 7.0];
+                dense.forward(&inputs, &mut outputs);
+                assert_eq!(outputs[..3], expected);
+                assert_eq!(outputs[3], 7.0);
+            }
         }
-        check::<0>();
-        check::<1>();
-        check::<3>();
-        check::<4>();
-        check::<7>();
-        check::<8>();
-        check::<11>();
+    }
+
+    // Inputs 1, 2 and a third that is missing: 1 + 2 * 2 = 5, not 5 + 3 * x.
+    #[test]
+    fn missing_inputs_count_as_zeros() {
+        let (weights, biases) = (le(&[1.0, 2.0, 3.0]), le(&[0.0]));
+        let weights = Weights::Floats(floats(&weights));
+        let dense = Dense::new(3, weights, floats(&biases), Activation::None).unwrap();
+        let mut outputs = [0.0];
+        dense.forward(&[1.0, 2.0], &mut outputs);
+        assert_eq!(outputs, [5.0]);
     }
 
     // 0.25 (127 - 2 * 127) + 1 = -30.75 and 0.5 (-127 + 2 * 64) - 1 = -0.5.
     #[test]
     fn every_row_has_its_scale() {
-        let dense = QuantisedDense {
-            weights: &[[127, -127], [-127, 64]],
-            scales: &[0.25, 0.5],
-            biases: &[1.0, -1.0],
+        let (scales, biases) = (le(&[0.25, 0.5]), le(&[1.0, -1.0]));
+        let weights = Weights::Bytes {
+            rows: &[127, 0x81, 0x81, 64],
+            scales: floats(&scales),
         };
-        assert_eq!(dense.forward(&[1.0, 2.0]), [-30.75, -0.5]);
+        let dense = Dense::new(2, weights, floats(&biases), Activation::None).unwrap();
+        let mut outputs = [0.0; 2];
+        dense.forward(&[1.0, 2.0], &mut outputs);
+        assert_eq!(outputs, [-30.75, -0.5]);
     }
 
     // tanh(ln 2) = (2 - 1/2) / (2 + 1/2) = 0.6.
     #[test]
     fn activations_are_what_they_say() {
-        assert_eq!(relu([-1.5, -0.0, 0.0, 2.5]), [0.0, 0.0, 0.0, 2.5]);
-        assert!(relu([f32::NAN])[0].is_nan());
-        let [low, zero, high] = tanh([-core::f32::consts::LN_2, 0.0, 50.0]);
+        let run = |input: f32, activation| {
+            let (weights, biases) = (le(&[1.0]), le(&[0.0]));
+            let weights = Weights::Floats(floats(&weights));
+            let dense = Dense::new(1, weights, floats(&biases), activation).unwrap();
+            let mut outputs = [0.0];
+            dense.forward(&[input], &mut outputs);
+            outputs[0]
+        };
+        assert_eq!(run(-1.5, Activation::None), -1.5);
+        assert_eq!(run(-1.5, Activation::Relu), 0.0);
+        assert_eq!(run(2.5, Activation::Relu), 2.5);
+        assert!(run(f32::NAN, Activation::Relu).is_nan());
+        let low = run(-core::f32::consts::LN_2, Activation::Tanh);
         assert!((low + 0.6).abs() < 1e-7, "{low}");
-        assert_eq!((zero, high), (0.0, 1.0));
+        assert_eq!(run(0.0, Activation::Tanh), 0.0);
+        assert_eq!(run(50.0, Activation::Tanh), 1.0);
+    }
+
+    #[test]
+    fn sizes_that_do_not_fit_are_no_layer() {
+        let numbers = le(&[1.0; 6]);
+        let six = floats(&numbers);
+        let two = six.range(0, 2).unwrap();
+        let made = |inputs, weights, biases| {
+            Dense::new(inputs, weights, biases, Activation::None).map(|dense| dense.outputs())
+        };
+        assert_eq!(made(3, Weights::Floats(six), two), Some(2));
+        assert_eq!(made(2, Weights::Floats(six), two), None);
+        assert_eq!(made(0, Weights::Floats(Floats::default()), two), None);
+        assert_eq!(made(usize::MAX, Weights::Floats(six), two), None);
+        let rows = &[0; 6];
+        assert_eq!(made(3, Weights::Bytes { rows, scales: two }, two), Some(2));
+        assert_eq!(made(3, Weights::Bytes { rows, scales: six }, two), None);
     }
 }

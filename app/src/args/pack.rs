@@ -1,0 +1,126 @@
+//! Arguments of `onecycle pack`.
+
+use std::convert::Infallible;
+use std::fmt;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Subcommand};
+
+/// Show, check and exchange packs: files that hold all an identifier knows.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle pack show default\n",
+    "  onecycle pack verify my.pack\n",
+    "  onecycle pack export my.pack --onnx my.onnx\n",
+    "  onecycle pack import learnt.onnx --like default -o learnt.pack\n\n",
+    "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 4 a pack does not give the outputs it ",
+    "must, 5 output not written"
+))]
+pub(crate) struct Pack {
+    #[command(subcommand)]
+    pub(crate) action: PackAction,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum PackAction {
+    Show(ShowPack),
+    Verify(VerifyPack),
+    Export(ExportPack),
+    Import(ImportPack),
+}
+
+/// Where a pack is.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum PackSource {
+    /// In the program.
+    Embedded,
+    File(PathBuf),
+}
+
+impl FromStr for PackSource {
+    type Err = Infallible;
+
+    fn from_str(text: &str) -> Result<Self, Infallible> {
+        Ok(match text {
+            "default" => Self::Embedded,
+            path => Self::File(path.into()),
+        })
+    }
+}
+
+impl fmt::Display for PackSource {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Embedded => f.write_str("default"),
+            Self::File(path) => path.display().fmt(f),
+        }
+    }
+}
+
+/// Show what a pack holds, how many bytes each part takes, and its card.
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Examples:\n  onecycle pack show default\n  onecycle pack show my.pack --json\n"
+)]
+pub(crate) struct ShowPack {
+    /// The pack; default is the one built in
+    #[arg(value_name = "FILE|default")]
+    pub(crate) pack: PackSource,
+    /// Print it as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Check a pack: its length, its hash, every part of it, and the outputs it must give.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  onecycle pack verify my.pack\n")]
+pub(crate) struct VerifyPack {
+    /// The pack; default is the one built in
+    #[arg(value_name = "FILE|default")]
+    pub(crate) pack: PackSource,
+}
+
+/// Write the network of a pack, the normalisation of its inputs included, as ONNX.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle pack export default --onnx network.onnx\n",
+    "  onecycle pack export my.pack --onnx my.onnx --samples samples.safetensors\n",
+    "  python3 experiments/onnx_check.py my.onnx samples.safetensors\n"
+))]
+pub(crate) struct ExportPack {
+    /// The pack; default is the one built in
+    #[arg(value_name = "FILE|default")]
+    pub(crate) pack: PackSource,
+    /// The model to write
+    #[arg(long, value_name = "OUT.onnx")]
+    pub(crate) onnx: PathBuf,
+    /// Write random inputs and the outputs for them too, to check the model with
+    #[arg(long, value_name = "OUT.safetensors")]
+    pub(crate) samples: Option<PathBuf>,
+}
+
+/// Make a pack of a network that was learnt elsewhere; everything else is taken from another pack.
+///
+/// The network has 34 inputs and 14 outputs, as that of the other pack. An ONNX model brings its
+/// activations, and the normalisation of its inputs if it begins with one; a safetensors file has
+/// those of the other pack. Weights are kept in bytes where that pack keeps them so.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle pack import learnt.onnx --like default -o learnt.pack\n",
+    "  onecycle pack import learnt.safetensors --like my.pack -o learnt.pack\n"
+))]
+pub(crate) struct ImportPack {
+    /// The network: .onnx or .safetensors
+    #[arg(value_name = "MODEL")]
+    pub(crate) model: PathBuf,
+    /// The pack that gives everything but the network; default is the one built in
+    #[arg(long, value_name = "PACK|default")]
+    pub(crate) like: PackSource,
+    /// The pack to write
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+}

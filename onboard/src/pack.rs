@@ -1,0 +1,504 @@
+//! A pack: everything an identifier knows, in one file that is read where it lies.
+//!
+//! The file is checked once and borrowed from then on: nothing is copied, no heap is asked for, and
+//! bytes of any kind give a [`PackError`] at worst. All numbers are little endian, at any address.
+//!
+//! | offset | type              | meaning                                                              |
+//! |--------|-------------------|----------------------------------------------------------------------|
+//! | 0      | 8 bytes           | `4f 4e 45 43 59 43 1a 0a`, "ONECYC" and two that text would lose     |
+//! | 8      | u32               | version of the format, 1                                             |
+//! | 12     | u32               | length of the file (bytes)                                           |
+//! | 16     | u64               | FNV-1a of all bytes from 24 on                                       |
+//! | 24     |                   | the sections, one behind the other                                   |
+//!
+//! | section     | type              | meaning                                                         |
+//! |-------------|-------------------|-----------------------------------------------------------------|
+//! | network     | u32               | number of layers, 1 to 6; then of each layer:                   |
+//! |             | u16, u16          | inputs and outputs, 1 to 128                                    |
+//! |             | u8                | weights: 0 f32, 1 bytes                                         |
+//! |             | u8                | activation: 0 none, 1 relu, 2 tanh                              |
+//! |             | u16               | 0                                                               |
+//! |             | outputs f32       | biases                                                          |
+//! |             | outputs f32       | only with bytes: scale of each row                              |
+//! |             | inputs x outputs  | weights, a row for each output: f32, or two's complement bytes  |
+//! | inputs      | 34 f32, 34 f32    | offsets, then scales: the network sees `(x - offset) scale`     |
+//! | outputs     | 4 f32             | scales: values are the network's means over them                |
+//! |             | 4 f32             | temperatures: times the standard deviations                     |
+//! |             | 4 f32, 4 f32      | lowest and highest of the values                                |
+//! | domain      | 3 times 2 f32     | lowest and highest `ln(T/dt)`, duty and beta                    |
+//! |             | f32               | phase margin that the gains are for (rad)                       |
+//! | unknown     | f32               | score from which a cycle is unknown                             |
+//! |             | u32, that many f32| calibration of the score                                        |
+//! | lead table  | u32, u32          | points `n` along its first axis, `m` along its second           |
+//! |             | u32               | numbers `k` of each point                                       |
+//! |             | 4 f32             | where the points lie                                            |
+//! |             | n m k f32         | the numbers                                                     |
+//! | self-test   | u32, then of each:| how many cycles                                                 |
+//! |             | 34 f32, 14 f32    | a signature, and the outputs it must give                       |
+//! | card        | u32, that many    | JSON in UTF-8: recipe, seeds, scores, versions; ends the file   |
+//!
+//! A reader refuses a version it does not know; whatever changes in the tables above changes the
+//! version. The 14 outputs of a network are the means of the four values, the logarithms of the
+//! diagonal of the Cholesky factor of their precision, and what is below it, row by row.
+//!
+//! Reference: G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, "The FNV non-cryptographic hash
+//! algorithm", draft-eastlake-fnv. Each step is invertible, so no change of a single byte goes
+//! unseen; it is no protection against intent.
+
+mod cursor;
+mod error;
+
+use crate::floats::Floats;
+use crate::network::{Activation, Dense, Weights};
+use crate::signature::LENGTH;
+
+use self::cursor::Cursor;
+pub use self::error::{PackError, Section};
+
+/// What every pack begins with.
+pub const MAGIC: [u8; 8] = *b"ONECYC\x1a\n";
+/// Version of the format that this reader knows.
+pub const VERSION: u32 = 1;
+/// Bytes before the first section.
+pub const HEADER: usize = 24;
+
+/// Values that describe a process.
+pub const VALUES: usize = 4;
+/// Outputs of the network: means, and the Cholesky factor of the precision.
+pub const OUTPUTS: usize = 2 * VALUES + VALUES * (VALUES - 1) / 2;
+
+/// Numbers that say where the points of the lead table lie.
+pub const AXES: usize = 4;
+
+/// Most layers: twice what any identifier needed so far.
+pub const MOST_LAYERS: usize = 6;
+/// Widest layer: two rows of it are the scratch memory, 1 KiB of a board's stack.
+pub const WIDEST: usize = 128;
+
+/// Largest difference from the outputs of the self-test, relative where they are beyond one. The
+/// arithmetic is the same to the bit on every machine; sums in another order, as a later version
+/// may have them, are some 1e-6 off, and a wrong weight is off by a hundredth.
+pub const SELF_TEST_TOLERANCE: f32 = 1e-5;
+
+/// The pack that is built in; empty in a build without one.
+pub const DEFAULT: &[u8] = &[];
+
+/// An identifier. See the [module](self).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pack<'a> {
+    bytes: &'a [u8],
+    hash: u64,
+    layers: [Option<Dense<'a>>; MOST_LAYERS],
+    offsets: Floats<'a>,
+    scales: Floats<'a>,
+    output_scaling: OutputScaling,
+    domain: Domain,
+    unknown_threshold: f32,
+    calibration: Floats<'a>,
+    lead_table: LeadTableBytes<'a>,
+    self_tests: Floats<'a>,
+    card: &'a str,
+}
+
+/// From the network's outputs to values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutputScaling {
+    /// Values are the network's means over these.
+    pub scales: [f32; VALUES],
+    /// Times the standard deviations that the network claims.
+    pub temperatures: [f32; VALUES],
+    /// Lowest values that are believed.
+    pub lowest: [f32; VALUES],
+    /// Highest values that are believed.
+    pub highest: [f32; VALUES],
+}
+
+/// What the pack was made for: lowest and highest of each.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Domain {
+    /// `ln(T/dt)`, samples in a period.
+    pub ln_samples: [f32; 2],
+    /// Duty of a cycle.
+    pub duty: [f32; 2],
+    /// `beta` of the relay.
+    pub beta: [f32; 2],
+    /// Phase margin of the controllers in the lead table (rad).
+    pub phase_margin_rad: f32,
+}
+
+impl Domain {
+    /// Whether a signature and the relay behind it are what the pack was made for.
+    #[must_use]
+    pub fn holds(&self, signature: &[f32; LENGTH], beta: f32) -> bool {
+        let [.., duty, ln_samples] = *signature;
+        [
+            (self.ln_samples, ln_samples),
+            (self.duty, duty),
+            (self.beta, beta),
+        ]
+        .iter()
+        .all(|([lowest, highest], value)| (lowest..=highest).contains(&value))
+    }
+}
+
+/// The table of leads as it lies: what its numbers mean is for its reader to know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LeadTableBytes<'a> {
+    /// Points along the first axis.
+    pub n: usize,
+    /// Points along the second axis.
+    pub m: usize,
+    /// Numbers of each point.
+    pub fields: usize,
+    /// Four that say where the points lie.
+    pub axes: [f32; AXES],
+    /// `n m` times as many as there are fields.
+    pub values: Floats<'a>,
+    /// The axes, then the values: little-endian f32, one behind the other.
+    pub bytes: &'a [u8],
+}
+
+impl LeadTableBytes<'_> {
+    /// Number `index` of the values; `None` beyond the last.
+    #[must_use]
+    pub fn get(&self, index: usize) -> Option<f32> {
+        self.values.get(index)
+    }
+}
+
+/// Bytes of a pack by what they are for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Sizes {
+    /// Weights, biases and scales of the layers.
+    pub weights: usize,
+    /// The lead table, its axes included.
+    pub table: usize,
+    /// The card.
+    pub card: usize,
+    /// The file.
+    pub total: usize,
+}
+
+impl Pack<'static> {
+    /// The pack that is built in.
+    ///
+    /// # Errors
+    /// [`PackError::Empty`] in a build without one.
+    pub fn embedded() -> Result<Self, PackError> {
+        Self::read(DEFAULT)
+    }
+}
+
+impl<'a> Pack<'a> {
+    /// Checks the bytes of a pack and borrows them.
+    ///
+    /// # Errors
+    /// Names what is wrong with them, and where.
+    pub fn read(bytes: &'a [u8]) -> Result<Self, PackError> {
+        let (hash, body) = checked_body(bytes)?;
+        let mut cursor = Cursor::new(body);
+        let layers = network(&mut cursor)?;
+
+        cursor.enter(Section::Inputs);
+        let offsets = cursor.finite(LENGTH)?;
+        let scales = cursor.finite(LENGTH)?;
+
+        cursor.enter(Section::Outputs);
+        let output_scaling = OutputScaling {
+            scales: cursor.positive()?,
+            temperatures: cursor.positive()?,
+            lowest: cursor.array()?,
+            highest: cursor.array()?,
+        };
+        let (lowest, highest) = (output_scaling.lowest, output_scaling.highest);
+        cursor.ordered(lowest.into_iter().zip(highest))?;
+
+        cursor.enter(Section::Domain);
+        let domain = Domain {
+            ln_samples: cursor.array()?,
+            duty: cursor.array()?,
+            beta: cursor.array()?,
+            phase_margin_rad: cursor.array::<1>()?[0],
+        };
+        let limits = [domain.ln_samples, domain.duty, domain.beta];
+        cursor.ordered(limits.map(|[low, high]| (low, high)).into_iter())?;
+
+        cursor.enter(Section::Unknown);
+        let [unknown_threshold] = cursor.array()?;
+        let count = cursor.count()?;
+        let calibration = cursor.finite(count)?;
+
+        let lead_table = lead_table(&mut cursor)?;
+
+        cursor.enter(Section::SelfTest);
+        let count = cursor.count()?;
+        let each = LENGTH + OUTPUTS;
+        let self_tests = cursor.finite(count.checked_mul(each).ok_or(cursor.ends())?)?;
+
+        cursor.enter(Section::Card);
+        let length = cursor.count()?;
+        let card = core::str::from_utf8(cursor.bytes(length)?).map_err(|_| PackError::Card)?;
+        match cursor.left() {
+            0 => Ok(Self {
+                bytes,
+                hash,
+                layers,
+                offsets,
+                scales,
+                output_scaling,
+                domain,
+                unknown_threshold,
+                calibration,
+                lead_table,
+                self_tests,
+                card,
+            }),
+            left => Err(PackError::Left(left)),
+        }
+    }
+
+    /// The network's outputs for a signature: see the [module](self) for what they are.
+    #[must_use]
+    pub fn outputs(&self, signature: &[f32; LENGTH]) -> [f32; OUTPUTS] {
+        let mut scratch = [[0.0; WIDEST]; 2];
+        let [now, next] = &mut scratch;
+        let (mut now, mut next) = (now, next);
+        let normalised = (self.offsets.iter().zip(self.scales.iter())).zip(signature);
+        for (input, ((offset, scale), value)) in now.iter_mut().zip(normalised) {
+            *input = (value - offset) * scale;
+        }
+        for layer in self.layers() {
+            layer.forward(&now[..layer.inputs()], &mut next[..layer.outputs()]);
+            core::mem::swap(&mut now, &mut next);
+        }
+        core::array::from_fn(|i| now[i])
+    }
+
+    /// The largest difference from what the signatures of the pack must give, relative where that is
+    /// beyond one; `None` where the pack has none.
+    #[must_use]
+    pub fn self_test(&self) -> Option<f32> {
+        self.self_tests()
+            .flat_map(|(signature, expected)| {
+                let found = self.outputs(&signature);
+                (found.into_iter().zip(expected))
+                    .map(|(found, expected)| (found - expected).abs() / expected.abs().max(1.0))
+            })
+            // No number is the worst of all differences.
+            .reduce(|worst, next| if next <= worst { worst } else { next })
+    }
+
+    /// Signatures and the outputs they must give.
+    pub fn self_tests(&self) -> impl Iterator<Item = ([f32; LENGTH], [f32; OUTPUTS])> + use<'a> {
+        let (numbers, each) = (self.self_tests, LENGTH + OUTPUTS);
+        (0..numbers.len() / each).filter_map(move |i| {
+            let signature = numbers.range(i * each, LENGTH)?.first()?;
+            let outputs = numbers.range(i * each + LENGTH, OUTPUTS)?.first()?;
+            Some((signature, outputs))
+        })
+    }
+
+    /// The layers of the network, first to last.
+    pub fn layers(&self) -> impl Iterator<Item = &Dense<'a>> {
+        self.layers.iter().flatten()
+    }
+
+    /// What is subtracted from the values of a signature.
+    #[must_use]
+    pub fn input_offsets(&self) -> Floats<'a> {
+        self.offsets
+    }
+
+    /// What is then multiplied with.
+    #[must_use]
+    pub fn input_scales(&self) -> Floats<'a> {
+        self.scales
+    }
+
+    /// From the network's outputs to values.
+    #[must_use]
+    pub fn output_scaling(&self) -> &OutputScaling {
+        &self.output_scaling
+    }
+
+    /// What the pack was made for.
+    #[must_use]
+    pub fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    /// The score from which a cycle is unknown.
+    #[must_use]
+    pub fn unknown_threshold(&self) -> f32 {
+        self.unknown_threshold
+    }
+
+    /// Calibration of the score.
+    #[must_use]
+    pub fn calibration(&self) -> Floats<'a> {
+        self.calibration
+    }
+
+    /// The table of leads.
+    #[must_use]
+    pub fn lead_table(&self) -> LeadTableBytes<'a> {
+        self.lead_table
+    }
+
+    /// JSON: recipe, seeds, scores, versions.
+    #[must_use]
+    pub fn card(&self) -> &'a str {
+        self.card
+    }
+
+    /// FNV-1a of everything behind the header: what names a pack.
+    #[must_use]
+    pub fn content_hash(&self) -> u64 {
+        self.hash
+    }
+
+    /// Bytes by what they are for.
+    #[must_use]
+    pub fn sizes(&self) -> Sizes {
+        let weights = self.layers().map(|layer| {
+            let of_weights = match layer.weights() {
+                Weights::Floats(weights) => 4 * weights.len(),
+                Weights::Bytes { rows, scales } => rows.len() + 4 * scales.len(),
+            };
+            of_weights + 4 * layer.biases().len()
+        });
+        Sizes {
+            weights: weights.sum(),
+            table: self.lead_table.bytes.len(),
+            card: self.card.len(),
+            total: self.bytes.len(),
+        }
+    }
+}
+
+/// FNV-1a, 64 bits.
+#[must_use]
+pub fn content_hash(bytes: &[u8]) -> u64 {
+    // Offset basis and prime of the reference.
+    const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+    const PRIME: u64 = 0x0100_0000_01b3;
+    bytes.iter().fold(BASIS, |hash, &byte| {
+        (hash ^ u64::from(byte)).wrapping_mul(PRIME)
+    })
+}
+
+/// The hash of the sections, which is right, and their bytes.
+fn checked_body(bytes: &[u8]) -> Result<(u64, &[u8]), PackError> {
+    let found = bytes.len();
+    if found == 0 {
+        return Err(PackError::Empty);
+    }
+    let magic = &MAGIC[..found.min(MAGIC.len())];
+    if !bytes.starts_with(magic) {
+        return Err(PackError::NotAPack);
+    }
+    let truncated = |expected| PackError::Truncated { expected, found };
+    let (header, body) = bytes
+        .split_first_chunk::<HEADER>()
+        .ok_or(truncated(HEADER as u64))?;
+    let mut header = Cursor::new(header);
+    header.bytes(MAGIC.len())?;
+    match header.u32()? {
+        VERSION => {}
+        0 => return Err(PackError::NotAPack),
+        version => return Err(PackError::Newer(version)),
+    }
+    let expected = u64::from(header.u32()?);
+    match expected.cmp(&(found as u64)) {
+        core::cmp::Ordering::Greater => return Err(truncated(expected)),
+        core::cmp::Ordering::Less => return Err(PackError::Longer { expected, found }),
+        core::cmp::Ordering::Equal => {}
+    }
+    let expected = header.u64()?;
+    let hash = content_hash(body);
+    if hash != expected {
+        return Err(PackError::Damaged {
+            expected,
+            found: hash,
+        });
+    }
+    Ok((hash, body))
+}
+
+fn network<'a>(cursor: &mut Cursor<'a>) -> Result<[Option<Dense<'a>>; MOST_LAYERS], PackError> {
+    let mut layers = [None; MOST_LAYERS];
+    let count = cursor.count()?;
+    if !(1..=MOST_LAYERS).contains(&count) {
+        return Err(PackError::Layers(count));
+    }
+    let mut width = LENGTH;
+    for (index, place) in layers.iter_mut().take(count).enumerate() {
+        let layer = dense(cursor, index)?;
+        let found = layer.inputs();
+        if found != width {
+            return Err(PackError::Fit {
+                layer: index,
+                expected: width,
+                found,
+            });
+        }
+        width = layer.outputs();
+        *place = Some(layer);
+    }
+    if width != OUTPUTS {
+        return Err(PackError::Outputs(width));
+    }
+    Ok(layers)
+}
+
+fn dense<'a>(cursor: &mut Cursor<'a>, layer: usize) -> Result<Dense<'a>, PackError> {
+    let [inputs, outputs] = [cursor.u16()?, cursor.u16()?].map(usize::from);
+    if let Some(&width) = [inputs, outputs]
+        .iter()
+        .find(|width| !(1..=WIDEST).contains(width))
+    {
+        return Err(PackError::Width { layer, width });
+    }
+    let kinds = cursor.array_of_bytes::<4>()?;
+    let [kind, activation, 0, 0] = kinds else {
+        return Err(PackError::Kind { layer });
+    };
+    let activation = match activation {
+        0 => Activation::None,
+        1 => Activation::Relu,
+        2 => Activation::Tanh,
+        _ => return Err(PackError::Kind { layer }),
+    };
+    let biases = cursor.finite(outputs)?;
+    let weights = match kind {
+        0 => Weights::Floats(cursor.finite(inputs * outputs)?),
+        1 => Weights::Bytes {
+            scales: cursor.finite(outputs)?,
+            rows: cursor.bytes(inputs * outputs)?,
+        },
+        _ => return Err(PackError::Kind { layer }),
+    };
+    Dense::new(inputs, weights, biases, activation).ok_or(PackError::Kind { layer })
+}
+
+fn lead_table<'a>(cursor: &mut Cursor<'a>) -> Result<LeadTableBytes<'a>, PackError> {
+    cursor.enter(Section::LeadTable);
+    let [n, m, fields] = [cursor.count()?, cursor.count()?, cursor.count()?];
+    let points = n.checked_mul(m);
+    let values = points.and_then(|points| points.checked_mul(fields));
+    let count = values.and_then(|values| values.checked_add(AXES));
+    let bytes = cursor.peek();
+    let numbers = cursor.finite(count.ok_or(cursor.ends())?)?;
+    let (axes, values) = numbers
+        .first()
+        .zip(numbers.range(AXES, numbers.len() - AXES))
+        .ok_or(cursor.ends())?;
+    Ok(LeadTableBytes {
+        n,
+        m,
+        fields,
+        axes,
+        values,
+        bytes: &bytes[..size_of::<f32>() * numbers.len()],
+    })
+}
