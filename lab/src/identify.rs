@@ -273,8 +273,11 @@ fn design(
     let optimum = pd(&refined.process, options.phase_margin_rad)
         .map_err(|error| Verdict::NoController(error.to_string()))?;
     let posterior = Posterior::new(refined, window.sample_s());
-    let controller = Decision::new(&posterior.processes(), options.phase_margin_rad)
-        .controller(&refined.process, optimum);
+    let controller = Decision::new(
+        &posterior.processes(decision::DRAWS),
+        options.phase_margin_rad,
+    )
+    .controller(&refined.process, optimum);
     let phase_margin_rad = posterior.phase_margin_rad(controller.pd);
     if phase_margin_rad.low.is_none_or(|low| low <= 0.0) {
         return Err(if refined.response_error > 0.0 {

@@ -22,7 +22,7 @@ use crate::optimum::{Optimum, pd};
 
 /// Draws that the cost is averaged over and whose optima are tried: the mean of a distribution as
 /// wide as itself is then known to a tenth.
-const DRAWS: usize = 96;
+pub(super) const DRAWS: usize = 96;
 
 /// What the process may be, each with its optimum.
 pub(super) struct Decision {
@@ -30,11 +30,11 @@ pub(super) struct Decision {
 }
 
 impl Decision {
-    /// About what `processes` are, drawn from the posterior: the first of them.
+    /// About `processes`, drawn from the posterior: [`DRAWS`] are enough.
     pub(super) fn new(processes: &[Process], phase_margin_rad: f64) -> Self {
         let optimum = |process: &Process| Some((*process, pd(process, phase_margin_rad).ok()?));
         Self {
-            optima: processes.iter().take(DRAWS).filter_map(optimum).collect(),
+            optima: processes.iter().filter_map(optimum).collect(),
         }
     }
 

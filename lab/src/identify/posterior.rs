@@ -88,6 +88,8 @@ struct Parameters {
     t_body_s: f64,
     tau_s: f64,
     input_bias: f64,
+    /// Whether the coordinates were those of a process, not brought to the nearest one.
+    is_process: bool,
 }
 
 impl Parameters {
@@ -106,6 +108,7 @@ impl Parameters {
             t_body_s: 1.0 / slow_per_s,
             tau_s: at[coordinate::TAU_S].max(0.0),
             input_bias: at[coordinate::INPUT_BIAS],
+            is_process: (0.0..=0.25).contains(&ratio) && at[coordinate::TAU_S] >= 0.0,
         }
     }
 
@@ -191,10 +194,15 @@ impl Posterior {
         }
     }
 
-    /// Draws of the process.
-    #[must_use]
-    pub fn processes(&self) -> Vec<Process> {
-        self.draws.iter().filter_map(Parameters::process).collect()
+    /// The first draws that are processes, at most so many. Those beyond what a process can be have no
+    /// weight here, where the nearest one would have too much.
+    pub(super) fn processes(&self, most: usize) -> Vec<Process> {
+        self.draws
+            .iter()
+            .filter(|draw| draw.is_process)
+            .filter_map(Parameters::process)
+            .take(most)
+            .collect()
     }
 
     /// Probability that gain, lags and delay are all within their intervals at once; `None` where the
