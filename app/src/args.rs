@@ -1,5 +1,6 @@
 //! Arguments, typed and documented; `--help` is generated from here.
 
+mod dataset;
 mod pack;
 
 use std::path::PathBuf;
@@ -11,6 +12,7 @@ use onecycle_lab::identify::MOST_CYCLES;
 use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
 use onecycle_onboard::{Process, ProcessError};
 
+pub(crate) use self::dataset::Dataset;
 use crate::failure::Failure;
 
 pub(crate) use self::pack::{
@@ -44,6 +46,7 @@ pub(crate) enum Command {
     Certify(Certify),
     Grid(Grid),
     Pack(Pack),
+    Dataset(Dataset),
 }
 
 /// Identify the process behind a recorded relay test, and design its controller.

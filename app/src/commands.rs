@@ -2,9 +2,11 @@
 
 pub(crate) mod campaign;
 pub(crate) mod certify;
+pub(crate) mod dataset;
 pub(crate) mod grid;
 pub(crate) mod identify;
 pub(crate) mod pack;
 pub(crate) mod phase;
 pub(crate) mod simulate;
 pub(crate) mod tune;
+mod workers;

@@ -30,6 +30,7 @@ fn main() -> ExitCode {
         Command::Certify(certify) => commands::certify::run(certify),
         Command::Grid(grid) => commands::grid::run(grid),
         Command::Pack(pack) => commands::pack::run(pack),
+        Command::Dataset(dataset) => commands::dataset::run(dataset),
     };
     match result {
         Ok(code) => code,

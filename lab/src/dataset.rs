@@ -2,17 +2,34 @@
 //! of each, and what a network is to read off it.
 //!
 //! The experiment is that of the board: its relay with noise protection and trim, the exact process,
-//! noise and bias. Example `n` of a recipe is the same whatever else is made. What is learnt has no
+//! noise and bias. Example `n` of a [`Recipe`] is the same whatever else is made. What is learnt has no
 //! unit and no time scale (section III-C of the paper learns classes; Ayyad, Chehadeh, Awad, Zweiri
 //! 2020): with `T` the period, `a` the amplitude of the signature and `p1`, `p2` the poles,
 //!
 //! ```text
-//! values = ln((p1 + p2) T),   p1 p2 / (p1 + p2)^2,   tau / T,   ln(a / (K/T_body T^2))
+//! values = ln((p1 + p2) T),   p1 p2 / (p1 + p2)^2,   tau / T,   ln(a / (K p1 p2 T^3))
 //! ```
 //!
-//! The first three are the estimator's own coordinates, regular for equal lags and for double
-//! integrators. The fourth gives the gain: the amplitude of a sampled, smoothed relay is not that of
-//! the continuous one, and a gain taken from that costs several per cent.
+//! These are the estimator's own coordinates, regular for equal lags and for double integrators: none
+//! says which pole is the actuator's. The fourth gives the gain, `K p1 p2` being the jerk that a unit
+//! of input comes to: the amplitude of a sampled, smoothed relay is not that of the continuous one, and
+//! a gain taken from that costs several per cent.
+//!
+//! | question                                  | answer                                        |
+//! |-------------------------------------------|-----------------------------------------------|
+//! | which experiments?                        | [`Recipe`], of one [`Family`] or several      |
+//! | what is seen, and of what is it?          | [`Example`]                                   |
+//! | what does an error of the values cost?    | [`Example::cost_gradient`]                    |
+//! | how do many of them lie on a disk?        | [`shards`]: files that NumPy reads            |
+//! | how does a network learn from them?       | [`learning`]: rows of a [`Batch`]             |
+//!
+//! [`Batch`]: crate::train::Batch
+
+pub mod learning;
+mod npz;
+pub mod recipe;
+mod sensitivity;
+pub mod shards;
 
 use onecycle_onboard::cycle::{Cycle, SteadyRun};
 use onecycle_onboard::signature::Signature;
@@ -24,39 +41,8 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::campaign::cycles;
 use crate::limit_cycle::symmetric;
-use crate::space::{FieldError, Range, Space, first_out_of_range};
 
-/// How examples are made.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Recipe {
-    /// Where processes are drawn from, uniform, and the relay.
-    pub space: Space,
-    /// Seed of the first example; the others follow.
-    pub seed: u64,
-    /// Input bias, uniform between plus and minus this part of the relay's amplitude.
-    pub bias: f64,
-    /// Noise of a sample, uniform up to this part of the amplitude of the noise-free oscillation.
-    pub sigma: f64,
-    /// Samples in a period of the noise-free oscillation, uniform in logarithms.
-    pub samples_per_period: Range,
-    /// Whether the relay follows the bias.
-    pub trim: bool,
-}
-
-impl Default for Recipe {
-    /// The paper's multirotors at 1 kHz, whose periods are 89 to 2306 samples.
-    fn default() -> Self {
-        Self {
-            space: Space::MULTIROTOR,
-            seed: 1,
-            bias: 0.5,
-            sigma: 0.03,
-            samples_per_period: (89.0, 2306.0),
-            trim: true,
-        }
-    }
-}
+pub use recipe::{Draw, Family, Recipe, RecipeError};
 
 /// Number of values that describe a process.
 pub const VALUES: usize = 4;
@@ -68,8 +54,16 @@ pub struct Example {
     pub signature: Signature,
     /// Period of the cycle it was taken from (s).
     pub period_s: f64,
-    /// The process, its velocity gain one.
+    /// The process.
     pub process: Process,
+    /// Which family of the recipe it is from, counted from zero.
+    pub family: usize,
+    /// Input bias by the relay's amplitude.
+    pub bias: f64,
+    /// Noise by the amplitude of the noise-free oscillation.
+    pub sigma: f64,
+    /// Samples in a period of the noise-free oscillation.
+    pub samples_per_period: f64,
 }
 
 /// Why an example cannot be made; those of a valid recipe can.
@@ -77,7 +71,7 @@ pub struct Example {
 pub enum ExampleError {
     /// A field is out of its range.
     #[error("{0}")]
-    Field(#[from] FieldError),
+    Recipe(#[from] RecipeError),
     /// The times are no process.
     #[error("{0}")]
     Process(#[from] ProcessError),
@@ -89,7 +83,11 @@ pub enum ExampleError {
 /// Samples for which the relay first measures its noise: 0.1 s at the paper's 1 kHz.
 const PREROLL_SAMPLES: f64 = 100.0;
 
-/// Periods of an experiment. Of the paper's multirotors 0.4 % are not steady by then.
+/// And no longer than this part of a period: meanwhile a bias drives the process away, and one without
+/// damping so far that it is not back in time. A relay that measures so briefly is told the noise.
+const PREROLL_PERIODS: f64 = 0.1;
+
+/// Periods of an experiment. Of 45,300 of the paper's multirotors 3 are not steady by then.
 const PERIODS: f64 = 14.0;
 
 /// Bins of a cycle's window, five of which it keeps for itself: each at least twice as narrow as a part
@@ -99,35 +97,6 @@ const BINS: usize = 261;
 const EDGES: usize = 16;
 
 impl Recipe {
-    /// Checks every field.
-    ///
-    /// # Errors
-    /// Names the first field that is out of its range.
-    pub fn validate(&self) -> Result<(), FieldError> {
-        self.space.validate()?;
-        let (least, most) = self.samples_per_period;
-        first_out_of_range([
-            (
-                "bias",
-                "0 to 0.9",
-                self.bias,
-                (0.0..=0.9).contains(&self.bias),
-            ),
-            (
-                "sigma",
-                "0 to 1",
-                self.sigma,
-                (0.0..=1.0).contains(&self.sigma),
-            ),
-            (
-                "samples_per_period",
-                "two numbers from 40 to 1e6, the lower first",
-                least,
-                (40.0..=1e6).contains(&least) && (least..=1e6).contains(&most),
-            ),
-        ])
-    }
-
     /// Example number `n`; `None` where the relay does not make the process oscillate, or not
     /// steadily in time.
     ///
@@ -136,27 +105,30 @@ impl Recipe {
     pub fn example(&self, n: u64) -> Result<Option<Example>, ExampleError> {
         self.validate()?;
         let mut rng = Pcg64Mcg::seed_from_u64(self.seed.wrapping_add(n));
-        let [t_prop_s, t_body_s, tau_s] = self.space.random(&mut rng);
+        let number = self.family(&mut rng);
+        let family = self.families[number];
+        let process = family.process(&mut rng)?;
         let bias = self.bias * rng.random_range(-1.0..=1.0);
         let sigma = self.sigma * rng.random_range(0.0..=1.0);
-        let (least, most) = self.samples_per_period;
-        let samples = least * (most / least).powf(rng.random_range(0.0..=1.0));
+        let samples_per_period = family.samples(&mut rng);
 
-        let process = Process::new(1.0, t_prop_s, t_body_s, tau_s)?;
-        let Some(quiet) = symmetric(&process, self.space.beta) else {
+        let beta = family.space.beta;
+        let Some(quiet) = symmetric(&process, beta) else {
             return Ok(None);
         };
-        let sample_s = quiet.period_s() / samples;
-        let preroll_s = PREROLL_SAMPLES * sample_s;
-        let mut settings = RelaySettings::new(1.0, self.space.beta as f32);
+        let sample_s = quiet.period_s() / samples_per_period;
+        let preroll_s = (PREROLL_SAMPLES * sample_s).min(PREROLL_PERIODS * quiet.period_s());
+        let noise_sigma = sigma * quiet.amplitude;
+        let mut settings = RelaySettings::new(1.0, beta as f32);
         settings.preroll_s = preroll_s as f32;
+        settings.noise_sigma = noise_sigma as f32;
         if self.trim {
             settings.trim_gain = RelaySettings::TRIM_GAIN;
         }
         let duration_s = preroll_s + PERIODS * quiet.period_s();
         let mut experiment = Experiment::new(process, sample_s, duration_s);
         experiment.input_bias = bias;
-        experiment.sensor.noise_sigma = sigma * quiet.amplitude;
+        experiment.sensor.noise_sigma = noise_sigma;
         let trace = experiment.run(&mut Relay::new(settings)?, &mut rng);
         Ok(last_steady_cycle(&trace)
             .and_then(|cycle| signature(&trace, &cycle, sample_s))
@@ -164,6 +136,10 @@ impl Recipe {
                 signature,
                 period_s,
                 process,
+                family: number,
+                bias,
+                sigma,
+                samples_per_period,
             }))
     }
 }
@@ -189,23 +165,30 @@ fn signature(trace: &Trace, cycle: &Cycle, sample_s: f64) -> Option<(Signature, 
     Some((Signature::new(&window, cycle).ok()?, cycle.period_s))
 }
 
+/// `K p1 p2`: the third derivative of the output where the input is one and all else rests (output
+/// unit / (input unit s^3)).
+fn jerk_gain(process: &Process) -> f64 {
+    process.k_over_t_body() / process.t_prop_s()
+}
+
 impl Example {
     /// What a network is to put out, see the [module](self).
     #[must_use]
     pub fn values(&self) -> [f64; VALUES] {
         let period_s = self.period_s;
         let (pole_sum_per_s, pole_ratio) = self.process.pole_sum();
+        let moved = jerk_gain(&self.process).abs() * period_s.powi(3);
         [
             (pole_sum_per_s * period_s).ln(),
             pole_ratio,
             self.process.tau_s() / period_s,
-            (self.signature.amplitude / (self.process.k_over_t_body() * period_s * period_s)).ln(),
+            (self.signature.amplitude / moved).ln(),
         ]
     }
 }
 
 /// The process of these values, whatever put them out: a ratio of poles and a dead time beyond what
-/// they can be are the nearest that can.
+/// they can be are the nearest that can. Its faster pole is the actuator's.
 ///
 /// # Errors
 /// Where the period, the amplitude or a value is not finite.
@@ -215,11 +198,13 @@ pub fn process_of(
     period_s: f64,
 ) -> Result<Process, ProcessError> {
     let [ln_pole_sum, pole_ratio, delay, ln_amplitude] = values;
-    let gain = signature.amplitude / (ln_amplitude.exp() * period_s * period_s);
-    Process::from_pole_sum(
-        signature.sign * gain,
+    let gain = signature.amplitude / (ln_amplitude.exp() * period_s.powi(3));
+    // The gain goes with the actuator's lag, which is known only with the poles.
+    let shape = Process::from_pole_sum(
+        signature.sign,
         ln_pole_sum.exp() / period_s,
         pole_ratio.clamp(0.0, 0.25),
         delay.max(0.0) * period_s,
-    )
+    )?;
+    shape.with_gain_scaled(gain * shape.t_prop_s())
 }

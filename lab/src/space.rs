@@ -36,13 +36,13 @@ pub struct Space {
 }
 
 /// A third value is one too many, which a tuple would let pass.
-fn two_times<'de, D: serde::Deserializer<'de>>(file: D) -> Result<Range, D::Error> {
+pub(crate) fn two_times<'de, D: serde::Deserializer<'de>>(file: D) -> Result<Range, D::Error> {
     let values: Vec<f64> = serde::Deserialize::deserialize(file)?;
     match values[..] {
         [low, high] => Ok((low, high)),
         _ => Err(serde::de::Error::invalid_length(
             values.len(),
-            &"two times, the lowest and the highest",
+            &"two numbers, the lowest and the highest",
         )),
     }
 }

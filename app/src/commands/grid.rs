@@ -1,7 +1,6 @@
 //! `onecycle grid`: processes that stand for a space; made, written, checked, drawn.
 
 mod part;
-mod workers;
 
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
@@ -12,7 +11,7 @@ use onecycle_lab::Gains;
 use onecycle_lab::grid::{self, Check, Grid, GridFile, Layout, Settings, check};
 
 use self::part::Part;
-use self::workers::Workers;
+use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
 use crate::output::{complain, print, write_file};

@@ -105,6 +105,26 @@ pub(super) fn gaussian(outputs: &[f32], y: &[f32], gradient: &mut [f64]) -> f64 
     loss
 }
 
+/// `w (sqrt(1 + (e / c)^2) - 1)`, `e = g . (mu - y)`, of `(y, g)` and `(w, c)`; its derivatives with
+/// respect to the mean, `w e / c^2 / sqrt(1 + (e / c)^2) g`, are added.
+pub(super) fn cost_of_mean(
+    outputs: &[f32],
+    (y, slopes): (&[f32], &[f32]),
+    (weight, scale): (f64, f64),
+    gradient: &mut [f64],
+) -> f64 {
+    let errors = outputs.iter().zip(y);
+    let cost: f64 = (errors.zip(slopes))
+        .map(|((mean, y), slope)| (f64::from(*mean) - f64::from(*y)) * f64::from(*slope))
+        .sum();
+    let by_scale = cost / scale;
+    let length = 1.0_f64.hypot(by_scale);
+    for (to, slope) in gradient.iter_mut().zip(slopes) {
+        *to += weight * by_scale / (scale * length) * f64::from(*slope);
+    }
+    weight * (length - 1.0)
+}
+
 /// Rows of a mixture at work, as long as it has components.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Mixture {

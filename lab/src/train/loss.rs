@@ -12,6 +12,7 @@
 //! | cost-augmented       | `-ln p_T`, `p_i ~ exp(a_i + m J_iT)`                                  |
 //! | expected cost        | `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`             |
 //! | Gaussian             | `-ln N(y)` of the mean and the precision that the network puts out    |
+//! | cost-aware Gaussian  | `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)`                   |
 //! | mixture of Gaussians | `-ln sum_m pi_m N_m(y)`                                               |
 //!
 //! **The paper's loss has no optimum but a degenerate one.** `gamma_TT = 1` is the least of the
@@ -19,12 +20,19 @@
 //! `p_i / p_T` by `exp((gamma_iT - 1) s)`: the loss falls to zero and nothing is learnt. The shifted
 //! softmax cannot fall so, and is the same for outputs whose least is zero.
 //!
+//! The cost-aware Gaussian adds what the controller made for its mean `mu` costs: `g . (mu - y)` to first
+//! order, `g` the derivatives of the cost by the errors of `y`. Where that is beyond `c` it counts as it
+//! is, below as its square, which has a slope where the sign of the cost changes. A network that cannot
+//! have all values right has the costly combination of them right. The first order knows nothing of
+//! errors along which the cost has no slope, and likelihood alone keeps these small: of multirotors
+//! (see [`dataset`](crate::dataset)) `w = 1`, `c = 0.01` makes controllers cheaper, `w = 10` dearer.
+//!
 //! References: A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, IEEE Access 8 (2020), equations 15
 //! and 16; K. Gimpel, N. A. Smith, "Softmax-margin CRFs: training log-linear models with cost
 //! functions", NAACL (2010), for the cost-augmented one.
 
 use super::data::Batch;
-use super::density::{Gaussian, Mixture, gaussian};
+use super::density::{Gaussian, Mixture, cost_of_mean, gaussian};
 use super::matrix::Matrix;
 use super::softmax::{Logits, Shares, Softmax};
 use super::{TrainError, expect_size};
@@ -70,6 +78,16 @@ pub enum Loss {
     Gaussian {
         /// Length of `y`.
         dimension: usize,
+    },
+    /// `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)` of a [`Gaussian`] with mean `mu`. Reads
+    /// values: `y`, then `g`, what an error of each number of `y` costs.
+    CostAwareGaussian {
+        /// Length of `y`.
+        dimension: usize,
+        /// `w`, how much the cost counts beside the likelihood.
+        weight: f64,
+        /// `c`, the cost up to which its square counts, and from which it counts itself.
+        scale: f64,
     },
     /// `-ln sum_m pi_m N_m(y)`, `pi_m ~ exp(a_m)`: outputs are the `a`, then the [`Gaussian`]s.
     /// Reads values.
@@ -128,6 +146,15 @@ impl Loss {
                 share("entropy", entropy),
             ],
             Self::Gaussian { dimension } => vec![number("dimension", dimension)],
+            Self::CostAwareGaussian {
+                dimension,
+                weight,
+                scale,
+            } => vec![
+                number("dimension", dimension),
+                share("weight", weight),
+                positive("scale", scale),
+            ],
             Self::GaussianMixture {
                 dimension,
                 components,
@@ -143,7 +170,9 @@ impl Loss {
     #[must_use]
     pub fn outputs(&self) -> Option<usize> {
         match *self {
-            Self::Gaussian { dimension } => Some(Gaussian::outputs(dimension)),
+            Self::Gaussian { dimension } | Self::CostAwareGaussian { dimension, .. } => {
+                Some(Gaussian::outputs(dimension))
+            }
             Self::GaussianMixture {
                 dimension,
                 components,
@@ -219,6 +248,15 @@ impl Loss {
                 softmax.expected_cost(truth(), shares, capped(cap), gradient)
             }
             Self::Gaussian { .. } => gaussian(outputs, batch.values.row(i), gradient),
+            Self::CostAwareGaussian {
+                dimension,
+                weight,
+                scale,
+            } => {
+                let (y, slopes) = batch.values.row(i).split_at(dimension);
+                gaussian(outputs, y, gradient)
+                    + cost_of_mean(outputs, (y, slopes), (weight, scale), gradient)
+            }
             Self::GaussianMixture { components, .. } => {
                 mixture.evaluate(components, outputs, batch.values.row(i), gradient)
             }
@@ -235,9 +273,12 @@ impl Loss {
             expect_size("the number of outputs", expected, outputs.columns())?;
         }
         match *self {
-            Self::Gaussian { dimension } | Self::GaussianMixture { dimension, .. } => {
-                expect_size("the number of vectors", samples, batch.values.rows())?;
-                return expect_size("the length of a vector", dimension, batch.values.columns());
+            Self::Gaussian { dimension: length }
+            | Self::GaussianMixture {
+                dimension: length, ..
+            } => return expect_vectors(batch, length),
+            Self::CostAwareGaussian { dimension, .. } => {
+                return expect_vectors(batch, 2 * dimension);
             }
             Self::CrossEntropy => {}
             _ => {
@@ -253,4 +294,10 @@ impl Loss {
             Some(&class) => Err(TrainError::Class { class, classes }),
         }
     }
+}
+
+fn expect_vectors(batch: &Batch, length: usize) -> Result<(), TrainError> {
+    let samples = batch.inputs.rows();
+    expect_size("the number of vectors", samples, batch.values.rows())?;
+    expect_size("the length of a vector", length, batch.values.columns())
 }

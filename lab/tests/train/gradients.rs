@@ -198,6 +198,70 @@ fn losses_of_densities() {
     }
 }
 
+// The cost of the mean is beyond its scale for some samples and below it for others; where all slopes
+// are zero, or nothing is asked of them, what is left is the Gaussian.
+#[test]
+fn loss_of_a_density_that_knows_costs() {
+    let (_, mut batch) = classified();
+    let plain = batch.clone();
+    batch.values = random(5, 6, 15);
+    let outputs = random(5, 9, 14);
+    for (weight, scale) in [(1.0, 0.25), (3.0, 10.0), (0.5, 2.0)] {
+        let loss = Loss::CostAwareGaussian {
+            dimension: 3,
+            weight,
+            scale,
+        };
+        let error = worst_error_of_loss(loss, &outputs, &batch);
+        assert!(error < 1e-6, "{loss:?} {error}");
+    }
+
+    for (i, row) in plain.values.iter_rows().enumerate() {
+        batch.values.row_mut(i)[..3].copy_from_slice(row);
+        if i == 2 {
+            batch.values.row_mut(i)[3..].fill(0.0);
+        }
+    }
+    let of = |loss: Loss, batch: &Batch| {
+        let mut gradient = Matrix::default();
+        let value = loss.evaluate(&outputs, batch, &mut gradient).unwrap();
+        (value, gradient)
+    };
+    let aware = |weight| Loss::CostAwareGaussian {
+        dimension: 3,
+        weight,
+        scale: 0.5,
+    };
+    let gaussian = of(Loss::Gaussian { dimension: 3 }, &plain);
+    assert_eq!(of(aware(0.0), &batch), gaussian);
+    let (value, gradient) = of(aware(1.0), &batch);
+    assert!(value > gaussian.0);
+    assert_eq!(gradient.row(2), gaussian.1.row(2));
+    assert_ne!(gradient.row(1), gaussian.1.row(1));
+}
+
+// One number, mean 3 above y, slope 2, so a cost of 6; scale 8: 5/4 of length. The density is a standard
+// normal one. 4 (5/4 - 1) = 1 comes to its loss, and 4 * 6/64 / (5/4) * 2 = 0.6 to its slope of 3.
+#[test]
+fn cost_of_a_mean_by_hand() {
+    let batch = Batch {
+        inputs: Matrix::zeros(1, 1),
+        values: Matrix::from_rows(1, 2, vec![0.0, 2.0]).unwrap(),
+        ..Batch::default()
+    };
+    let outputs = Matrix::from_rows(1, 2, vec![3.0, 0.0]).unwrap();
+    let loss = Loss::CostAwareGaussian {
+        dimension: 1,
+        weight: 4.0,
+        scale: 8.0,
+    };
+    let mut gradient = Matrix::default();
+    let value = loss.evaluate(&outputs, &batch, &mut gradient).unwrap();
+    let normal = 0.5 * std::f64::consts::TAU.ln() + 4.5;
+    assert!((value - normal - 1.0).abs() < 1e-12);
+    assert!((gradient.row(0)[0] - 3.6).abs() < 1e-6);
+}
+
 // gamma_k (p_k - y_k), by hand: of outputs 0 and ln 2, T = 1, J_0 = 1, p_0 = 1/(1 + 2), and of
 // outputs ln 2 and 0, p_0 = 4/(4 + 1). J for gamma, as the paper has it, would be 0 for k = T.
 #[test]

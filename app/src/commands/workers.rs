@@ -8,14 +8,14 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use crate::failure::Failure;
 use crate::output::progress_bar;
 
-pub(super) struct Workers {
+pub(crate) struct Workers {
     pool: ThreadPool,
     bar: ProgressBar,
 }
 
 impl Workers {
     /// So many threads, or as many as there are cores.
-    pub(super) fn new(threads: Option<u64>) -> Result<Self, Failure> {
+    pub(crate) fn new(threads: Option<u64>) -> Result<Self, Failure> {
         // Zero is the builder's word for as many as there are cores.
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads.unwrap_or(0) as usize)
@@ -25,19 +25,19 @@ impl Workers {
         Ok(Self { pool, bar })
     }
 
-    pub(super) fn threads(&self) -> usize {
+    pub(crate) fn threads(&self) -> usize {
         self.pool.current_num_threads()
     }
 
     /// The bar is about so many pieces from now on, some of them done.
-    pub(super) fn expect(&self, count: usize, done: usize) {
+    pub(crate) fn expect(&self, count: usize, done: usize) {
         self.bar.reset();
         self.bar.set_length(count as u64);
         self.bar.set_position(done as u64);
     }
 
     /// Runs pieces that the bar expects; their results are in order.
-    pub(super) fn run<T: Send>(
+    pub(crate) fn run<T: Send>(
         &self,
         count: usize,
         piece: impl Fn(usize) -> T + Send + Sync,
@@ -51,7 +51,7 @@ impl Workers {
             .install(|| (0..count).into_par_iter().map(piece).collect())
     }
 
-    pub(super) fn finish(&self) {
+    pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
 }
@@ -60,5 +60,14 @@ impl Pieces for Workers {
     fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         self.expect(count, 0);
         self.run(count, piece)
+    }
+}
+
+/// The same threads for one of several lots of work, which the bar expects together.
+pub(crate) struct Lot<'a>(pub(crate) &'a Workers);
+
+impl Pieces for Lot<'_> {
+    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+        self.0.run(count, piece)
     }
 }

@@ -1,0 +1,89 @@
+//! `onecycle dataset`: experiments to learn from, made on all threads and kept file by file.
+
+mod folder;
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use onecycle_lab::dataset::Recipe;
+use onecycle_lab::dataset::shards::Manifest;
+
+use self::folder::Folder;
+use super::workers::{Lot, Workers};
+use crate::args;
+use crate::failure::{Failure, exit};
+use crate::output::{complain, print};
+use crate::{report, settings};
+
+/// What the command has done.
+pub(crate) struct Done {
+    pub(crate) manifest: Manifest,
+    /// Files that were there, whole.
+    pub(crate) kept: usize,
+    /// Experiments made, with and without an oscillation.
+    pub(crate) made: u64,
+    pub(crate) took: Duration,
+}
+
+pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
+    let recipe = recipe(arguments.recipe.as_deref())?;
+    let workers = Workers::new(arguments.threads)?;
+    let begin = Instant::now();
+    let mut folder = Folder::open(&arguments.into, recipe, arguments.examples)?;
+    let damaged = folder.drop_damaged();
+    if !damaged.is_empty() {
+        complain(&format!(
+            "onecycle: made again, for they are missing or damaged: {}",
+            damaged.join(", ")
+        ));
+    }
+    let missing = folder.missing();
+    let kept = folder.manifest().shards.len() - missing.len();
+    if kept > 0 && !missing.is_empty() {
+        complain(&format!(
+            "onecycle: going on after {kept} of {} files",
+            folder.manifest().shards.len()
+        ));
+    }
+    let made = make(&mut folder, &missing, &workers)?;
+    workers.finish();
+    let done = Done {
+        manifest: folder.into_manifest(),
+        kept,
+        made,
+        took: begin.elapsed(),
+    };
+    print(&if arguments.json {
+        report::dataset::json(&done)
+    } else {
+        report::dataset::text(&done, &arguments.into)
+    })?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
+    let Some(path) = path else {
+        return Ok(Recipe::default());
+    };
+    let recipe: Recipe = settings::read(path)?;
+    recipe.validate().map_err(|error| Failure::Settings {
+        path: path.to_owned(),
+        reason: error.to_string(),
+    })?;
+    Ok(recipe)
+}
+
+/// Makes the files that are missing; returns how many experiments that took.
+fn make(folder: &mut Folder, missing: &[usize], workers: &Workers) -> Result<u64, Failure> {
+    let examples = |shard: usize| folder.manifest().numbers(shard).count() as u64;
+    let made: u64 = missing.iter().map(|&shard| examples(shard)).sum();
+    let all = folder.manifest().examples;
+    workers.expect(all as usize, (all - made) as usize);
+    for &shard in missing {
+        let file = folder.manifest().make(shard, &Lot(workers));
+        let (bytes, entry) = file.map_err(Failure::usage)?;
+        folder.keep(shard, &bytes, entry)?;
+    }
+    Ok(made)
+}

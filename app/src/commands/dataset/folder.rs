@@ -1,0 +1,112 @@
+//! The folder of a dataset: its manifest, and the files that have been made.
+//!
+//! The manifest is written before the first file and after each: a file that it does not list has
+//! not been made, whatever lies there.
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use onecycle_lab::dataset::Recipe;
+use onecycle_lab::dataset::shards::{Entry, MANIFEST_NAME, Manifest, file_name};
+
+use crate::failure::Failure;
+use crate::output::write_file;
+
+pub(super) struct Folder {
+    path: PathBuf,
+    manifest: Manifest,
+}
+
+impl Folder {
+    /// Goes on with the folder of this recipe, or begins one.
+    pub(super) fn open(path: &Path, recipe: Recipe, examples: u64) -> Result<Self, Failure> {
+        let manifest_path = path.join(MANIFEST_NAME);
+        let manifest = match std::fs::read_to_string(&manifest_path) {
+            Ok(text) => Manifest::read(&text)
+                .and_then(|manifest| manifest.go_on(&recipe, examples))
+                .map_err(|error| refused(&manifest_path, error.to_string()))?,
+            // What is no folder cannot be made one, and says so.
+            Err(error)
+                if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) =>
+            {
+                begin(path)?;
+                Manifest::new(recipe, examples)
+            }
+            Err(error) => return Err(refused(&manifest_path, error.to_string())),
+        };
+        let path = path.to_owned();
+        let folder = Self { path, manifest };
+        folder.write_manifest()?;
+        Ok(folder)
+    }
+
+    pub(super) fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    pub(super) fn into_manifest(self) -> Manifest {
+        self.manifest
+    }
+
+    /// Strikes out of the manifest what is listed but not there as it was made; returns its names.
+    pub(super) fn drop_damaged(&mut self) -> Vec<String> {
+        let mut names = Vec::new();
+        for (shard, slot) in self.manifest.shards.iter_mut().enumerate() {
+            let name = file_name(shard);
+            let is_whole = |entry: &Entry| {
+                std::fs::read(self.path.join(&name)).is_ok_and(|bytes| entry.is_of(&bytes))
+            };
+            if slot.as_ref().is_some_and(|entry| !is_whole(entry)) {
+                *slot = None;
+                names.push(name);
+            }
+        }
+        names
+    }
+
+    /// The files to be made.
+    pub(super) fn missing(&self) -> Vec<usize> {
+        let shards = self.manifest.shards.iter().enumerate();
+        shards
+            .filter_map(|(shard, entry)| entry.is_none().then_some(shard))
+            .collect()
+    }
+
+    /// Writes a file, then that it has been made.
+    pub(super) fn keep(&mut self, shard: usize, bytes: &[u8], entry: Entry) -> Result<(), Failure> {
+        write_file(&self.path.join(file_name(shard)), |file| {
+            file.write_all(bytes)
+        })?;
+        self.manifest.shards[shard] = Some(entry);
+        self.write_manifest()
+    }
+
+    fn write_manifest(&self) -> Result<(), Failure> {
+        let text = self.manifest.text();
+        write_file(&self.path.join(MANIFEST_NAME), |file| {
+            file.write_all(text.as_bytes())
+        })
+    }
+}
+
+/// Makes the folder where there is none; refuses one with anything in it.
+fn begin(path: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(path).map_err(|error| Failure::output(path, error))?;
+    let mut entries = std::fs::read_dir(path).map_err(|error| Failure::output(path, error))?;
+    match entries.next() {
+        None => Ok(()),
+        Some(_) => Err(refused(
+            path,
+            format!(
+                "the folder is not empty and has no {MANIFEST_NAME}: name a new one for the dataset"
+            ),
+        )),
+    }
+}
+
+fn refused(path: &Path, reason: String) -> Failure {
+    Failure::Settings {
+        path: path.to_owned(),
+        reason,
+    }
+}
