@@ -12,6 +12,7 @@ use onecycle_plant::{Experiment, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::dataset::Recipe;
 use crate::identify::{Identification, MOST_CYCLES, Options, Signals, identify};
 use crate::optimum::pd;
 use crate::space::{FieldError, Space, first_out_of_range};
@@ -69,6 +70,9 @@ pub enum Measure {
     Relay,
     /// Errors, intervals and deterioration of the identified process.
     Identification,
+    /// What is made of processes out of the family: `cases` of each [kind](crate::outsiders::Kind), and
+    /// five times as many of the family. Noise is uniform from zero.
+    Unknown,
 }
 
 /// One experiment, before it is run.
@@ -152,6 +156,22 @@ impl Campaign {
                 (1..=MOST_CYCLES).contains(&self.cycles),
             ),
         ])
+    }
+
+    /// The recipe of the experiments on processes out of the family.
+    #[must_use]
+    pub fn recipe(&self) -> Recipe {
+        Recipe {
+            space: Space {
+                beta: self.beta,
+                ..Space::MULTIROTOR
+            },
+            seed: self.seed,
+            bias: self.bias,
+            sigma: self.sigma,
+            trim: self.trim,
+            ..Recipe::default()
+        }
     }
 
     /// Case number `n`.

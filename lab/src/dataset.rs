@@ -144,7 +144,7 @@ impl Recipe {
     }
 }
 
-fn last_steady_cycle(trace: &Trace) -> Option<Cycle> {
+pub(crate) fn last_steady_cycle(trace: &Trace) -> Option<Cycle> {
     let mut run = SteadyRun::default();
     let mut last = None;
     for cycle in cycles(trace, &trace.output) {
@@ -155,14 +155,20 @@ fn last_steady_cycle(trace: &Trace) -> Option<Cycle> {
 }
 
 fn signature(trace: &Trace, cycle: &Cycle, sample_s: f64) -> Option<(Signature, f64)> {
+    let window = window(trace, cycle, sample_s)?;
+    Some((Signature::new(&window, cycle).ok()?, cycle.period_s))
+}
+
+/// The samples of one cycle.
+pub(crate) fn window(trace: &Trace, cycle: &Cycle, sample_s: f64) -> Option<Window<BINS, EDGES>> {
     let first = (cycle.start_s / sample_s).round() as usize;
     let count = (cycle.period_s / sample_s).round() as usize;
     let last = (first + count).min(trace.len());
-    let mut window = Window::<BINS, EDGES>::new(*trace.time_s.get(first)?, sample_s);
+    let mut window = Window::new(*trace.time_s.get(first)?, sample_s);
     for index in first..last {
         window.push_output(trace.time_s[index], trace.output[index]);
     }
-    Some((Signature::new(&window, cycle).ok()?, cycle.period_s))
+    Some(window)
 }
 
 /// `K p1 p2`: the third derivative of the output where the input is one and all else rests (output

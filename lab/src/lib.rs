@@ -43,6 +43,7 @@ pub mod margins;
 pub mod onnx;
 mod open_loop;
 pub mod optimum;
+pub mod outsiders;
 pub mod pack;
 pub mod phase;
 mod propagation;

@@ -4,9 +4,12 @@
 //! simulator and the program run the very same code.
 #![no_std]
 
+pub mod classify;
+mod complex;
 pub mod control;
 pub mod cycle;
 mod distortion;
+mod fit_score;
 pub mod floats;
 pub mod gains;
 mod least_squares;

@@ -39,7 +39,7 @@ use crate::cycle::Cycle;
 use crate::window::{Bin, MOST_PER_BIN, Window};
 
 /// Parts of equal phase that the output is averaged over.
-const PARTS: usize = 32;
+pub(crate) const PARTS: usize = 32;
 
 /// Length of a signature: the shape, the duty and the samples in a period.
 pub const LENGTH: usize = PARTS + 2;

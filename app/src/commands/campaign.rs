@@ -1,5 +1,7 @@
 //! `onecycle campaign`: many random experiments, and a table of what became of them.
 
+mod unknown;
+
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -25,6 +27,7 @@ pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
         Measure::Identification => {
             identification_table(&campaign, &all(&campaign, identification_outcome)?)
         }
+        Measure::Unknown => unknown::table(&arguments.file, &campaign)?,
     };
     print(&table)?;
     Ok(ExitCode::from(exit::DONE))

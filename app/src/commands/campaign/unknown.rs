@@ -1,0 +1,114 @@
+//! What is made of processes out of the family: a row for each kind of them.
+
+use std::fmt::Write;
+use std::path::Path;
+
+use onecycle_lab::campaign::Campaign;
+use onecycle_lab::dataset::ExampleError;
+use onecycle_lab::outsiders::Kind;
+use onecycle_lab::outsiders::judge::{CYCLES, Judgement, Road, judge};
+use onecycle_onboard::classify::Verdict;
+use rayon::prelude::*;
+
+use crate::failure::Failure;
+use crate::output::progress_bar;
+use crate::settings;
+
+/// Cases of the family for one of each kind out of it: what is rare there counts most.
+const IN_FAMILY: u64 = 5;
+
+/// The cases' outcomes as a table. Without a network there is no score, and its columns are left out.
+pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure> {
+    let recipe = campaign.recipe();
+    recipe
+        .validate()
+        .map_err(|error| settings::out_of_range(file, error))?;
+    let road: Option<Road<'_>> = None;
+    let kinds = || std::iter::once(Kind::InFamily).chain(Kind::OUTSIDE);
+    let cases = |kind| match kind {
+        Kind::InFamily => IN_FAMILY * campaign.cases,
+        _ => campaign.cases,
+    };
+    let bar = progress_bar(kinds().map(cases).sum());
+    let mut rows = Vec::new();
+    for kind in kinds() {
+        let outcomes: Vec<Option<Judgement>> = (0..cases(kind))
+            .into_par_iter()
+            .map(|n| {
+                let outcome = judge(&recipe, kind, n, road.as_ref());
+                bar.inc(1);
+                outcome
+            })
+            .collect::<Result<_, ExampleError>>()
+            .map_err(Failure::usage)?;
+        rows.push((kind, outcomes.into_iter().flatten().collect::<Vec<_>>()));
+    }
+    bar.finish_and_clear();
+    Ok(text(campaign, &rows, road.is_some()))
+}
+
+fn text(campaign: &Campaign, rows: &[(Kind, Vec<Judgement>)], has_score: bool) -> String {
+    let mut text = format!(
+        "{} random processes with each defect, bias up to {} h, noise up to {} of the amplitude, trim {}\n\
+         refused, and accepted although the controller costs over 10 % more than promised, of {} \
+         cycles\n",
+        campaign.cases,
+        campaign.bias,
+        campaign.sigma,
+        if campaign.trim { "on" } else { "off" },
+        CYCLES.map(|cycles| cycles.to_string()).join(", "),
+    );
+    let of_score = if has_score {
+        "  harmful unknown  harmless unknown"
+    } else {
+        ""
+    };
+    let of_cycles: String = CYCLES
+        .map(|cycles| format!("  refused {cycles} harmful {cycles}"))
+        .concat();
+    // Writing to a string cannot fail.
+    let _ = writeln!(text, "{:<13} cases unsteady{of_score}{of_cycles}", "kind");
+    for (kind, outcomes) in rows {
+        let unsteady = outcomes.iter().filter(|outcome| !outcome.is_steady).count();
+        let _ = write!(
+            text,
+            "{:<13} {:5} {unsteady:8}",
+            kind.name(),
+            outcomes.len()
+        );
+        if has_score {
+            for harmful in [true, false] {
+                let [all, unknown] = by_score(outcomes, harmful);
+                let _ = write!(text, "  {all:8} {unknown:7}");
+            }
+        }
+        for k in 0..CYCLES.len() {
+            let [refused, harmful] = by_identification(outcomes, k);
+            let _ = write!(text, "  {refused:9} {harmful:9}");
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// Cases with a score that are harmful or not: all, and those called unknown.
+fn by_score(outcomes: &[Judgement], harmful: bool) -> [usize; 2] {
+    let scored = || {
+        (outcomes.iter())
+            .filter_map(|outcome| outcome.scored)
+            .filter(move |scored| scored.harm.is_harmful() == harmful)
+    };
+    let unknown = scored().filter(|scored| scored.verdict == Verdict::Unknown);
+    [scored().count(), unknown.count()]
+}
+
+/// Refused by the identification of so many cycles, and accepted but harmful.
+fn by_identification(outcomes: &[Judgement], k: usize) -> [usize; 2] {
+    let accepted = || {
+        outcomes
+            .iter()
+            .filter_map(move |outcome| outcome.identified[k])
+    };
+    let harmful = accepted().filter(|harm| harm.is_harmful());
+    [outcomes.len() - accepted().count(), harmful.count()]
+}

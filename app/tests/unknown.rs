@@ -1,0 +1,39 @@
+//! `campaign` on processes out of the family: a row for each kind, the same every time.
+
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use common::{Scratch, UNREADABLE, run};
+
+const CAMPAIGN: &str =
+    "measure = \"unknown\"\ncases = 1\nseed = 1\nbias = 0.5\nsigma = 0.01\ntrim = true\n";
+
+// One of each kind and five of the family, all steady, none refused and none harmful; two lines of
+// text, the head, and 14 rows. The clipped one is refused whatever the number of cycles.
+#[test]
+fn a_row_for_each_kind() {
+    let folder = Scratch::new();
+    let path = folder.write("unknown.toml", CAMPAIGN.as_bytes());
+    let table = run(&["campaign", &path]);
+    assert_eq!(table.code, Some(0), "{table:?}");
+    let lines: Vec<&str> = table.stdout.lines().collect();
+    assert_eq!(lines.len(), 17, "{}", table.stdout);
+    let row = |name: &str| -> Vec<usize> {
+        let line = lines.iter().find(|line| line.starts_with(name)).unwrap();
+        let words = line.split_whitespace().skip(1);
+        words.map(|word| word.parse().unwrap()).collect()
+    };
+    assert_eq!(row("in_family"), [5, 0, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(row("clipping"), [1, 0, 1, 0, 1, 0, 1, 0]);
+    assert_eq!(run(&["campaign", &path]).stdout, table.stdout);
+}
+
+#[test]
+fn impossible_experiments_are_refused() {
+    let folder = Scratch::new();
+    let text = CAMPAIGN.replace("bias = 0.5", "bias = 0.95");
+    let path = folder.write("unknown.toml", text.as_bytes());
+    run(&["campaign", &path]).refused(UNREADABLE, &["bias", "0 to 0.9"]);
+}

@@ -1,0 +1,508 @@
+//! From a network's outputs to the process and its doubt, and to "unknown".
+//!
+//! The outputs are a Gaussian over four values of the process (the mean, the logarithms of the
+//! diagonal of `L`, then what is below it row by row; `precision = L L^T`), each times its
+//! [`scale`](Calibration::scale):
+//!
+//! ```text
+//! ln((p1 + p2) T),   p1 p2 / (p1 + p2)^2,   tau / T,   ln(a / (K/(T_body T_prop) T^3))
+//! ```
+//!
+//! | symbol     | name        | meaning                                                     |
+//! |------------|-------------|-------------------------------------------------------------|
+//! | `T`        | `period_s`  | period of the cycle (s)                                     |
+//! | `a`        | `amplitude` | of the signature; the gain is that for a relay of amplitude one |
+//! | `p1`, `p2` |             | poles `1/T_prop`, `1/T_body` (1/s)                          |
+//!
+//! A network puts out some process whatever it is shown. Whether that process explains the cycle is
+//! asked of the cycle itself (`fit_score`): its harmonics against the process's response to the same
+//! wave, within the posterior and the noise. And a network that has not seen the like doubts: its
+//! posterior is wider than those of the family's cycles with as much noise and as many samples,
+//!
+//! ```text
+//! width = -mean l_i,   usual = w_0 + w_1 ln(sigma / (a sqrt(N)) + 1e-4) + w_2 ln N
+//! score = max((statistic + (max(width - usual, 0) / w_sigma)^2) / limit,   sigma / (a most_noise))
+//! ```
+//!
+//! Above one the cycle is none of this family's, or noisier than any that the network knows: an
+//! oscillation that friction holds down.
+
+use core::fmt;
+
+use libm::{exp, hypot, log, sqrt};
+
+use crate::fit_score::{Response, VALUES, harmonics};
+use crate::process::{Process, ProcessError};
+use crate::signature::{PARTS, Signature};
+
+/// Outputs of the network: a mean, a diagonal, what is below it.
+pub const OUTPUTS: usize = VALUES + VALUES + VALUES * (VALUES - 1) / 2;
+
+/// Candidates of a classification.
+pub const CANDIDATES: usize = 5;
+
+/// Nodes of the Gauss-Hermite rule of five points, in standard deviations, and their weights
+/// (Abramowitz and Stegun, table 25.10, times the square root of two, over that of pi).
+const NODES: [(f64, f64); CANDIDATES] = [
+    (0.0, 8.0 / 15.0),
+    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
+    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
+    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
+];
+
+/// What belongs to a network, and where its cycles of the family end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibration {
+    /// What the values were multiplied by to train the network.
+    pub scale: [f64; VALUES],
+    /// Standard deviation of a harmonic of the family's cycles without noise, over the amplitude.
+    pub floor: f64,
+    /// Jump between the end of a cycle and its start, over the amplitude: without noise.
+    pub jump: f64,
+    /// What noise adds to it, times the noise of a sample over the amplitude.
+    pub jump_of_noise: f64,
+    /// Width of the posterior of a cycle of the family: `w_0`, `w_1`, `w_2` of the [module](self).
+    pub width: [f64; 3],
+    /// Standard deviation of the width about that.
+    pub width_sigma: f64,
+    /// Largest sum that is of the family.
+    pub limit: f64,
+    /// Largest noise of a sample, over the amplitude, that the network knows.
+    pub most_noise: f64,
+}
+
+impl Calibration {
+    /// Of no network yet: no width is too wide and no noise too much, and any statistic is of the family that chi-squared
+    /// of 30 degrees of freedom exceeds in 2 % of cases.
+    ///
+    /// Jumps: 0.3 % of the amplitude with noise of 0.5 % and less, 0.5 % with 2..3 %, from what the
+    /// true processes leave of 600 cycles of multirotors; the floor is what they leave there without noise.
+    pub const UNTRAINED: Self = Self {
+        scale: [1.0, 8.0, 8.0, 1.0],
+        floor: 3e-4,
+        jump: 4e-3,
+        jump_of_noise: 0.13,
+        width: [0.0; 3],
+        width_sigma: f64::INFINITY,
+        limit: 47.96,
+        most_noise: f64::INFINITY,
+    };
+
+    /// The width of a posterior that these outputs tell.
+    #[must_use]
+    pub fn width_of(outputs: &[f32; OUTPUTS]) -> f64 {
+        let sum: f32 = outputs[VALUES..2 * VALUES].iter().sum();
+        -f64::from(sum) / VALUES as f64
+    }
+
+    /// What the usual width is a combination of: noise over amplitude, samples in a period.
+    #[must_use]
+    pub fn width_terms(noise: f64, samples: f64) -> [f64; 3] {
+        [1.0, log(noise / sqrt(samples) + QUIET), log(samples)]
+    }
+
+    /// How much wider than usual, in standard deviations.
+    fn excess(&self, outputs: &[f32; OUTPUTS], noise: f64, samples: f64) -> f64 {
+        let terms = Self::width_terms(noise, samples);
+        let usual: f64 = terms.iter().zip(self.width).map(|(term, w)| w * term).sum();
+        (Self::width_of(outputs) - usual).max(0.0) / self.width_sigma
+    }
+}
+
+/// Noise of a cycle's mean, over the amplitude, below which a network's own error is the larger.
+const QUIET: f64 = 1e-4;
+
+/// What a cycle is read as.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Classification {
+    /// The process's values and how well they are known.
+    pub posterior: Posterior,
+    /// Processes along the posterior's longest axis, most probable first.
+    pub candidates: [Candidate; CANDIDATES],
+    /// How badly the posterior's mean explains the cycle; one is the limit.
+    pub score: f64,
+    /// Whether the cycle is of the family.
+    pub verdict: Verdict,
+}
+
+/// Whether a cycle is of the family.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// It is: the processes explain it.
+    Known,
+    /// It is not, and no controller should be made from it.
+    Unknown,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Known => "the process explains the cycle",
+            Self::Unknown => "unknown: no process of this kind explains the cycle",
+        })
+    }
+}
+
+/// One process and the share of the posterior that it stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// The process, its gain for a relay of amplitude one.
+    pub process: Process,
+    /// Its share.
+    pub probability: f64,
+}
+
+/// A Gaussian over the values of the [module](self).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Posterior {
+    /// Its mean.
+    pub mean: [f64; VALUES],
+    /// A root of its covariance, `covariance = root root^T`: upper triangular.
+    pub root: [[f64; VALUES]; VALUES],
+}
+
+/// Why outputs are no classification.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ClassifyError {
+    /// An output that is not finite: which, and its value.
+    Output(usize, f32),
+    /// The noise is negative or no number.
+    Noise(f64),
+    /// The values are no process.
+    Process(ProcessError),
+}
+
+impl fmt::Display for ClassifyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Output(index, value) => write!(
+                f,
+                "output {index} of the network must be finite, but is {value}: check its inputs"
+            ),
+            Self::Noise(value) => write!(
+                f,
+                "the noise must be zero or positive and finite, but is {value}: take the window's"
+            ),
+            Self::Process(error) => write!(f, "the network's outputs are no process: {error}"),
+        }
+    }
+}
+
+impl core::error::Error for ClassifyError {}
+
+impl From<ProcessError> for ClassifyError {
+    fn from(error: ProcessError) -> Self {
+        Self::Process(error)
+    }
+}
+
+impl Posterior {
+    /// From the outputs of a network whose values were trained times `scale`.
+    #[must_use]
+    pub fn from_outputs(outputs: &[f32; OUTPUTS], scale: &[f64; VALUES]) -> Self {
+        let lower = |i: usize, j: usize| {
+            if i == j {
+                exp(f64::from(outputs[VALUES + i]))
+            } else {
+                f64::from(outputs[2 * VALUES + i * (i - 1) / 2 + j])
+            }
+        };
+        // Columns of the inverse of L are rows of the root: covariance = L^-T L^-1.
+        let mut root = [[0.0; VALUES]; VALUES];
+        for column in 0..VALUES {
+            for i in column..VALUES {
+                let unit = if i == column { 1.0 } else { 0.0 };
+                let known: f64 = (column..i).map(|k| lower(i, k) * root[column][k]).sum();
+                root[column][i] = (unit - known) / lower(i, i);
+            }
+        }
+        for (row, scale) in root.iter_mut().zip(scale) {
+            row.iter_mut().for_each(|value| *value /= scale);
+        }
+        Self {
+            mean: core::array::from_fn(|k| f64::from(outputs[k]) / scale[k]),
+            root,
+        }
+    }
+
+    /// Its longest axis, from the mean to one standard deviation, where each value counts in `scale`.
+    #[must_use]
+    pub fn longest_axis(&self, scale: &[f64; VALUES]) -> [f64; VALUES] {
+        let covariance: [[f64; VALUES]; VALUES] = core::array::from_fn(|i| {
+            core::array::from_fn(|j| {
+                let sum: f64 = (0..VALUES).map(|k| self.root[i][k] * self.root[j][k]).sum();
+                scale[i] * scale[j] * sum
+            })
+        });
+        let mut axis = [0.5; VALUES];
+        let mut length = 0.0;
+        for _ in 0..AXIS_STEPS {
+            let image: [f64; VALUES] =
+                core::array::from_fn(|i| (0..VALUES).map(|j| covariance[i][j] * axis[j]).sum());
+            length = sqrt(image.iter().map(|value| value * value).sum());
+            if length == 0.0 || !length.is_finite() {
+                return [0.0; VALUES];
+            }
+            axis = image.map(|value| value / length);
+        }
+        core::array::from_fn(|k| sqrt(length) * axis[k] / scale[k])
+    }
+}
+
+/// Steps of the power method: where the second axis is 0.9 of the longest, its part falls to 0.9^48 = 0.6 %.
+const AXIS_STEPS: usize = 24;
+
+/// Reads the process off a network's outputs for this cycle of `period_s`, and asks the cycle whether it
+/// is one. `noise_sigma` is the standard deviation of the noise on a sample (output unit), such as
+/// [`Window::noise_sigma`](crate::window::Window::noise_sigma).
+///
+/// # Errors
+/// Names the output, the noise or the parameter that is out of range.
+pub fn classify(
+    outputs: &[f32; OUTPUTS],
+    signature: &Signature,
+    period_s: f64,
+    noise_sigma: f64,
+    calibration: &Calibration,
+) -> Result<Classification, ClassifyError> {
+    if let Some(index) = outputs.iter().position(|output| !output.is_finite()) {
+        return Err(ClassifyError::Output(index, outputs[index]));
+    }
+    if !(noise_sigma.is_finite() && noise_sigma >= 0.0) {
+        return Err(ClassifyError::Noise(noise_sigma));
+    }
+    let posterior = Posterior::from_outputs(outputs, &calibration.scale);
+    let axis = posterior.longest_axis(&calibration.scale);
+    let at = |deviations: f64| -> [f64; VALUES] {
+        core::array::from_fn(|k| posterior.mean[k] + deviations * axis[k])
+    };
+    let mut candidates = [Candidate {
+        process: process_of(&posterior.mean, signature, period_s)?,
+        probability: NODES[0].1,
+    }; CANDIDATES];
+    for (candidate, (deviations, probability)) in candidates.iter_mut().zip(NODES).skip(1) {
+        *candidate = Candidate {
+            process: process_of(&at(deviations), signature, period_s)?,
+            probability,
+        };
+    }
+    let noise = noise_sigma / signature.amplitude;
+    let samples = exp(f64::from(signature.values[PARTS + 1]));
+    let excess = calibration.excess(outputs, noise, samples);
+    let statistic = statistic(&posterior, signature, noise, calibration);
+    let misfit = (statistic + excess * excess) / calibration.limit;
+    let score = misfit.max(noise / calibration.most_noise);
+    Ok(Classification {
+        posterior,
+        candidates,
+        score,
+        verdict: if score <= 1.0 {
+            Verdict::Known
+        } else {
+            Verdict::Unknown
+        },
+    })
+}
+
+/// The process of these values: a ratio of poles and a dead time beyond what they can be are the
+/// nearest that can.
+fn process_of(
+    values: &[f64; VALUES],
+    signature: &Signature,
+    period_s: f64,
+) -> Result<Process, ProcessError> {
+    let [ln_pole_sum, pole_ratio, delay, ln_amplitude] = *values;
+    let unit = Process::from_pole_sum(
+        signature.sign,
+        exp(ln_pole_sum) / period_s,
+        pole_ratio.clamp(0.0, 0.25),
+        delay.max(0.0) * period_s,
+    )?;
+    let jerk_gain = signature.amplitude / (exp(ln_amplitude) * period_s * period_s * period_s);
+    unit.with_gain_scaled(jerk_gain * unit.t_prop_s())
+}
+
+/// `noise`: of a sample, over the amplitude.
+fn statistic(
+    posterior: &Posterior,
+    signature: &Signature,
+    noise: f64,
+    calibration: &Calibration,
+) -> f64 {
+    let parts = core::array::from_fn(|part| f64::from(signature.values[part]));
+    let duty = f64::from(signature.values[PARTS]);
+    let samples = exp(f64::from(signature.values[PARTS + 1]));
+    let response = Response::new(&posterior.mean, duty, samples);
+    let jump = calibration.jump + calibration.jump_of_noise * noise;
+    // A harmonic has 1/32 of the variance of a part, half of it real, and a part is the mean of N/32
+    // samples.
+    let sigma = hypot(calibration.floor, noise * sqrt(0.5 / samples));
+    response.statistic(&harmonics(&parts), &posterior.root, jump, sigma)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::string::ToString;
+
+    use super::*;
+    use crate::signature::LENGTH;
+
+    const OUTPUT: [f32; OUTPUTS] = [
+        2.2, 0.9, 0.4, -5.8, 2.5, 3.0, 4.0, 3.5, 0.5, -1.0, 2.0, 0.25, 1.5, -3.0,
+    ];
+
+    fn signature() -> Signature {
+        let mut values = [0.0; LENGTH];
+        for (part, value) in values[..PARTS].iter_mut().enumerate() {
+            *value = libm::cosf(part as f32 / 5.0);
+        }
+        values[PARTS] = 0.5;
+        values[PARTS + 1] = 6.0;
+        Signature {
+            values,
+            amplitude: 0.01,
+            centre: 0.0,
+            sign: -1.0,
+        }
+    }
+
+    // root^T (S L L^T S) root = 1 with S the scale, to rounding.
+    #[test]
+    fn the_root_is_that_of_the_covariance() {
+        let scale = [1.0, 8.0, 8.0, 1.0];
+        let posterior = Posterior::from_outputs(&OUTPUT, &scale);
+        let below = [
+            [0.0; 4],
+            [0.5, 0.0, 0.0, 0.0],
+            [-1.0, 2.0, 0.0, 0.0],
+            [0.25, 1.5, -3.0, 0.0],
+        ];
+        let factor = |i: usize, j: usize| {
+            let diagonal = if i == j {
+                exp(f64::from(OUTPUT[4 + i]))
+            } else {
+                0.0
+            };
+            scale[i] * (diagonal + below[i][j])
+        };
+        for a in 0..VALUES {
+            for b in 0..VALUES {
+                // (L^T S root)_ab is a root of the unit matrix, and here that itself.
+                let product: f64 = (0..VALUES)
+                    .map(|i| factor(i, a) * posterior.root[i][b])
+                    .sum();
+                let unit = if a == b { 1.0 } else { 0.0 };
+                assert!((product - unit).abs() < 1e-13, "{a} {b} {product}");
+            }
+        }
+        let mean = posterior.mean.map(|value| value as f32);
+        assert_eq!(mean, [2.2, 0.1125, 0.05, -5.8]);
+    }
+
+    // Standard deviations 1/2, 1/4, 1/8, 1 without correlation: the last value's axis, of length one.
+    #[test]
+    fn the_longest_axis_of_a_diagonal() {
+        let l = |size: f32| libm::logf(size);
+        let mut outputs = [0.0; OUTPUTS];
+        outputs[4..8].copy_from_slice(&[l(2.0), l(4.0), l(8.0), l(1.0)]);
+        let posterior = Posterior::from_outputs(&outputs, &[1.0; VALUES]);
+        let axis = posterior.longest_axis(&[1.0; VALUES]);
+        for (axis, expected) in axis.iter().zip([0.0, 0.0, 0.0, 1.0]) {
+            assert!((axis - expected).abs() < 1e-7, "{axis:?}");
+        }
+    }
+
+    // The moments of the rule are those of a standard normal: 1, 0, 1, 0, 3.
+    #[test]
+    fn candidates_stand_for_the_posterior() {
+        for (power, moment) in [(0, 1.0), (1, 0.0), (2, 1.0), (3, 0.0), (4, 3.0)] {
+            let sum: f64 = NODES
+                .iter()
+                .map(|(node, weight)| weight * libm::pow(*node, f64::from(power)))
+                .sum();
+            assert!((sum - moment).abs() < 1e-14, "{power} {sum}");
+        }
+        let found = classify(&OUTPUT, &signature(), 0.4, 0.0, &Calibration::UNTRAINED).unwrap();
+        for pair in found.candidates.windows(2) {
+            assert!(pair[0].probability >= pair[1].probability);
+            assert_ne!(pair[0].process, pair[1].process);
+        }
+        // The gain has the sign of the signature.
+        assert!(found.candidates[0].process.k_over_t_body() < 0.0);
+    }
+
+    // A cosine is no response of this process: the score is that of any limit over it, and crosses one
+    // where the limit does.
+    #[test]
+    fn the_limit_is_a_score_of_one() {
+        let at = |limit| {
+            let calibration = Calibration {
+                limit,
+                ..Calibration::UNTRAINED
+            };
+            classify(&OUTPUT, &signature(), 0.4, 0.0, &calibration).unwrap()
+        };
+        let statistic = at(1.0).score;
+        assert!(statistic > 1000.0 && statistic.is_finite(), "{statistic}");
+        assert_eq!(at(1.0).verdict, Verdict::Unknown);
+        assert_eq!(at(0.999 * statistic).verdict, Verdict::Unknown);
+        assert_eq!(at(1.001 * statistic).verdict, Verdict::Known);
+    }
+
+    // Outputs whose diagonal is 3 on average are e^-3 wide; 0.3 wider than usual at 0.1 is three standard
+    // deviations, nine more in the sum.
+    #[test]
+    fn doubt_counts() {
+        assert_eq!(Calibration::width_of(&OUTPUT), -3.25);
+        let at = |usual: f64| {
+            let calibration = Calibration {
+                width: [usual, 0.0, 0.0],
+                width_sigma: 0.1,
+                limit: 1.0,
+                ..Calibration::UNTRAINED
+            };
+            classify(&OUTPUT, &signature(), 0.4, 0.0, &calibration)
+                .unwrap()
+                .score
+        };
+        assert!((at(-3.55) - at(-3.25) - 9.0).abs() < 1e-6);
+        assert_eq!(at(-3.25), at(0.0));
+    }
+
+    // Noise of a hundredth of the amplitude explains a cycle away, but not to a network that knows a
+    // 250th at most: 2.5.
+    #[test]
+    fn noise_beyond_what_is_known_counts() {
+        let calibration = Calibration {
+            limit: 1e9,
+            most_noise: 0.004,
+            ..Calibration::UNTRAINED
+        };
+        let noise_sigma = 0.01 * signature().amplitude;
+        let found = classify(&OUTPUT, &signature(), 0.4, noise_sigma, &calibration).unwrap();
+        assert!((found.score - 2.5).abs() < 1e-12, "{}", found.score);
+        assert_eq!(found.verdict, Verdict::Unknown);
+    }
+
+    #[test]
+    fn errors_name_the_offender() {
+        let of = |outputs: [f32; OUTPUTS], noise| {
+            classify(&outputs, &signature(), 0.4, noise, &Calibration::UNTRAINED).unwrap_err()
+        };
+        let mut broken = OUTPUT;
+        broken[9] = f32::INFINITY;
+        assert_eq!(of(broken, 0.0), ClassifyError::Output(9, f32::INFINITY));
+        assert!(
+            of(broken, 0.0)
+                .to_string()
+                .starts_with("output 9 of the network")
+        );
+        assert_eq!(of(OUTPUT, -1.0), ClassifyError::Noise(-1.0));
+        broken = OUTPUT;
+        broken[0] = 1e4;
+        assert!(matches!(of(broken, 0.0), ClassifyError::Process(_)));
+    }
+}
