@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use onecycle_lab::{FieldError, Space};
+use onecycle_lab::Space;
 use serde::de::DeserializeOwned;
 
 use crate::failure::Failure;
@@ -14,7 +14,7 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> {
 }
 
 /// The refusal of a file one of whose values is out of its range.
-pub(crate) fn out_of_range(path: &Path, error: FieldError) -> Failure {
+pub(crate) fn out_of_range(path: &Path, error: impl std::fmt::Display) -> Failure {
     failure(path, error.to_string())
 }
 

@@ -12,7 +12,7 @@ use onecycle_plant::{Experiment, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::dataset::Recipe;
+use crate::dataset::{Family, Recipe};
 use crate::identify::{Identification, MOST_CYCLES, Options, Signals, identify};
 use crate::optimum::pd;
 use crate::space::{FieldError, Space, first_out_of_range};
@@ -162,15 +162,17 @@ impl Campaign {
     #[must_use]
     pub fn recipe(&self) -> Recipe {
         Recipe {
-            space: Space {
-                beta: self.beta,
-                ..Space::MULTIROTOR
-            },
+            families: vec![Family {
+                space: Space {
+                    beta: self.beta,
+                    ..Space::MULTIROTOR
+                },
+                ..Family::default()
+            }],
             seed: self.seed,
             bias: self.bias,
             sigma: self.sigma,
             trim: self.trim,
-            ..Recipe::default()
         }
     }
 

@@ -347,13 +347,13 @@ const PERIODS: f64 = 26.0;
 pub fn case(recipe: &Recipe, kind: Kind, n: u64) -> Result<Option<Case>, ExampleError> {
     recipe.validate()?;
     let mut rng = Pcg64Mcg::seed_from_u64(recipe.seed.wrapping_add(n));
-    let [t_prop_s, t_body_s, tau_s] = recipe.space.random(&mut rng);
+    let family = recipe.families[recipe.family(&mut rng)];
+    let process = family.process(&mut rng)?;
     let bias = recipe.bias * rng.random_range(-1.0..=1.0);
     let sigma = recipe.sigma * rng.random_range(0.0..=1.0);
-    let (least, most) = recipe.samples_per_period;
-    let samples = least * (most / least).powf(rng.random_range(0.0..=1.0));
-    let process = Process::new(1.0, t_prop_s, t_body_s, tau_s)?;
-    let Some(quiet) = symmetric(&process, recipe.space.beta) else {
+    let samples = family.samples(&mut rng);
+    let beta = family.space.beta;
+    let Some(quiet) = symmetric(&process, beta) else {
         return Ok(None);
     };
     let mut scale = Scale {
@@ -361,8 +361,7 @@ pub fn case(recipe: &Recipe, kind: Kind, n: u64) -> Result<Option<Case>, Example
         amplitude: quiet.amplitude,
     };
     if kind == Kind::RateSensor {
-        let Some(omega) = process.frequency_at_phase(recipe.space.beta.asin() - PI - FRAC_PI_2)
-        else {
+        let Some(omega) = process.frequency_at_phase(beta.asin() - PI - FRAC_PI_2) else {
             return Ok(None);
         };
         scale = Scale {
@@ -379,7 +378,7 @@ pub fn case(recipe: &Recipe, kind: Kind, n: u64) -> Result<Option<Case>, Example
         sigma: sigma * scale.amplitude,
         sample_s: scale.period_s / samples,
         trim: recipe.trim,
-        beta: recipe.space.beta,
+        beta,
         rng,
     }))
 }

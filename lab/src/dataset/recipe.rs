@@ -104,7 +104,7 @@ impl Family {
     }
 
     /// A random process, its velocity gain one.
-    pub(super) fn process(&self, rng: &mut impl Rng) -> Result<Process, ProcessError> {
+    pub(crate) fn process(&self, rng: &mut impl Rng) -> Result<Process, ProcessError> {
         let [t_prop_s, t_body_s, tau_s] = match self.draw {
             Draw::Uniform => self.space.random(rng),
             Draw::Logarithmic => self.space.ranges_s().map(|range| between(range, rng)),
@@ -113,7 +113,7 @@ impl Family {
     }
 
     /// Samples in a period of a random experiment.
-    pub(super) fn samples(&self, rng: &mut impl Rng) -> f64 {
+    pub(crate) fn samples(&self, rng: &mut impl Rng) -> f64 {
         between(self.samples_per_period, rng)
     }
 }
@@ -208,7 +208,7 @@ impl Recipe {
     }
 
     /// The number of a random family, by their weights.
-    pub(super) fn family(&self, rng: &mut impl Rng) -> usize {
+    pub(crate) fn family(&self, rng: &mut impl Rng) -> usize {
         let total: f64 = self.families.iter().map(|family| family.weight).sum();
         let mut left = total * rng.random_range(0.0..1.0);
         let is_it = |family: &Family| {
