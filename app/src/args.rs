@@ -2,6 +2,7 @@
 
 mod dataset;
 mod pack;
+mod train;
 
 use std::path::PathBuf;
 use std::str::FromStr;
@@ -13,6 +14,7 @@ use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
 use onecycle_onboard::{Process, ProcessError};
 
 pub(crate) use self::dataset::Dataset;
+pub(crate) use self::train::Train;
 use crate::failure::Failure;
 
 pub(crate) use self::pack::{
@@ -45,6 +47,7 @@ pub(crate) enum Command {
     Phase(Phase),
     Certify(Certify),
     Grid(Grid),
+    Train(Train),
     Pack(Pack),
     Dataset(Dataset),
 }

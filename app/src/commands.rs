@@ -8,5 +8,6 @@ pub(crate) mod identify;
 pub(crate) mod pack;
 pub(crate) mod phase;
 pub(crate) mod simulate;
+pub(crate) mod train;
 pub(crate) mod tune;
 mod workers;

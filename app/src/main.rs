@@ -29,6 +29,7 @@ fn main() -> ExitCode {
         Command::Phase(phase) => commands::phase::run(phase),
         Command::Certify(certify) => commands::certify::run(certify),
         Command::Grid(grid) => commands::grid::run(grid),
+        Command::Train(train) => commands::train::run(train),
         Command::Pack(pack) => commands::pack::run(pack),
         Command::Dataset(dataset) => commands::dataset::run(dataset),
     };

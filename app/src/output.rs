@@ -60,3 +60,12 @@ fn set_usual_permissions(file: &std::fs::File) -> io::Result<()> {
 fn set_usual_permissions(_: &std::fs::File) -> io::Result<()> {
     Ok(())
 }
+
+/// The same with a message behind it.
+pub(crate) fn progress_bar_with_message(pieces: u64) -> ProgressBar {
+    let bar = ProgressBar::new(pieces);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}  {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}

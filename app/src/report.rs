@@ -3,6 +3,7 @@
 pub(crate) mod certificate;
 pub(crate) mod dataset;
 pub(crate) mod grid;
+pub(crate) mod identifier;
 pub(crate) mod json;
 pub(crate) mod number;
 pub(crate) mod pack;

@@ -8,7 +8,9 @@ mod common;
 use onecycle_lab::onnx::{self, Normalisation};
 use onecycle_lab::pack::{LeadTableContents, PackContents, PackedWeights, Precision, layers};
 use onecycle_lab::train::{Layer, Matrix, Network, OneThread, TensorFile};
-use onecycle_onboard::pack::{DEFAULT, Domain, HEADER, OUTPUTS, OutputScaling, Pack, content_hash};
+use onecycle_onboard::pack::{
+    DEFAULT, Domain, HEADER, OUTPUTS, OutputScaling, Pack, Prior, content_hash,
+};
 use onecycle_onboard::signature::LENGTH;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -46,6 +48,7 @@ fn contents(precision: Precision) -> PackContents {
             phase_margin_rad: std::f32::consts::PI / 9.0,
         },
         unknown_threshold: 3.25,
+        prior: Prior::default(),
         calibration: vec![0.5, 0.25],
         lead_table: LeadTableContents {
             n: 2,

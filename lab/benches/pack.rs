@@ -3,7 +3,7 @@
 use divan::{Bencher, black_box};
 use onecycle_lab::pack::{LeadTableContents, PackContents, Precision, layers};
 use onecycle_lab::train::{Layer, Network};
-use onecycle_onboard::pack::{Domain, OUTPUTS, OutputScaling, Pack, VALUES};
+use onecycle_onboard::pack::{Domain, OUTPUTS, OutputScaling, Pack, Prior, VALUES};
 use onecycle_onboard::signature::LENGTH;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -44,6 +44,7 @@ fn bytes(precision: Precision) -> Vec<u8> {
             phase_margin_rad: 0.35,
         },
         unknown_threshold: 1.0,
+        prior: Prior::default(),
         calibration: Vec::new(),
         lead_table: LeadTableContents {
             n: 32,

@@ -36,6 +36,7 @@ pub mod cost;
 pub mod dataset;
 pub mod deterioration;
 pub mod grid;
+pub mod identifier;
 pub mod identify;
 pub mod lead_table;
 pub mod limit_cycle;

@@ -15,7 +15,7 @@ mod tensors;
 use onecycle_onboard::floats::Floats;
 use onecycle_onboard::network::Activation;
 use onecycle_onboard::pack::{
-    AXES, Domain, HEADER, MAGIC, OutputScaling, Pack, PackError, VERSION, content_hash,
+    AXES, Domain, HEADER, MAGIC, OutputScaling, Pack, PackError, Prior, VERSION, content_hash,
 };
 use onecycle_onboard::signature::LENGTH;
 
@@ -41,6 +41,8 @@ pub struct PackContents {
     pub unknown_threshold: f32,
     /// Calibration of the score.
     pub calibration: Vec<f32>,
+    /// How the shapes of the family are distributed.
+    pub prior: Prior,
     /// Table of leads.
     pub lead_table: LeadTableContents,
     /// Signatures of the self-test.
@@ -147,6 +149,7 @@ impl PackContents {
             domain: *pack.domain(),
             unknown_threshold: pack.unknown_threshold(),
             calibration: pack.calibration().iter().collect(),
+            prior: *pack.prior(),
             lead_table: LeadTableContents {
                 n: table.n,
                 m: table.m,
@@ -205,6 +208,8 @@ impl PackContents {
         body.floats(&[domain.phase_margin_rad, self.unknown_threshold]);
         body.count(self.calibration.len());
         body.floats(&self.calibration);
+        body.floats(&self.prior.mean);
+        body.floats(self.prior.root.as_flattened());
         body.count(self.lead_table.n);
         body.count(self.lead_table.m);
         body.count(self.lead_table.fields);

@@ -167,7 +167,10 @@ fn a_case_is_always_the_same() {
     for kind in Kind::OUTSIDE {
         let made = case(&recipe, kind, 7).unwrap().unwrap();
         assert_eq!(case(&recipe, kind, 7).unwrap().unwrap(), made);
-        let later = Recipe { seed: 8, ..recipe };
+        let later = Recipe {
+            seed: 8,
+            ..recipe.clone()
+        };
         assert_eq!(case(&later, kind, 0).unwrap().unwrap(), made);
         let plain = case(&recipe, Kind::InFamily, 7).unwrap().unwrap();
         assert_eq!(made.process, plain.process);
@@ -377,7 +380,11 @@ fn a_small_network_knows_what_it_does_not_know() {
         seed: 1_000_000,
         ..Recipe::default()
     };
-    let calibration = calibrate(&recipe, 0..250, &outputs, SCALE, 0.02).unwrap();
+    let start = Calibration {
+        scale: SCALE,
+        ..Calibration::UNTRAINED
+    };
+    let calibration = calibrate(&recipe, 0..250, &outputs, &start, 0.02).unwrap();
     let road = Road {
         network: &outputs,
         calibration,

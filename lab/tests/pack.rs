@@ -9,7 +9,7 @@ use onecycle_lab::pack::{
 };
 use onecycle_lab::train::{Layer, Matrix, Network, OneThread, Tensor, TensorFile};
 use onecycle_onboard::network::Activation;
-use onecycle_onboard::pack::{Domain, OUTPUTS, OutputScaling, Pack, PackError};
+use onecycle_onboard::pack::{Domain, OUTPUTS, OutputScaling, Pack, PackError, Prior};
 use onecycle_onboard::signature::LENGTH;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -58,6 +58,7 @@ fn contents(network: &Network, precision: Precision) -> PackContents {
             phase_margin_rad: 0.35,
         },
         unknown_threshold: 3.0,
+        prior: Prior::default(),
         calibration: vec![0.1, 0.2, 0.3],
         lead_table: LeadTableContents {
             n: 2,

@@ -27,11 +27,16 @@
 //! Above one the cycle is none of this family's, or noisier than any that the network knows: an
 //! oscillation that friction holds down.
 
+mod calibration;
+
 use core::fmt;
 
-use libm::{exp, hypot, log, sqrt};
+use libm::{exp, hypot, sqrt};
+
+pub use self::calibration::Calibration;
 
 use crate::fit_score::{Response, VALUES, harmonics};
+use crate::pack::Pack;
 use crate::process::{Process, ProcessError};
 use crate::signature::{PARTS, Signature};
 
@@ -50,68 +55,6 @@ const NODES: [(f64, f64); CANDIDATES] = [
     (2.856_970_013_872_806, 0.011_257_411_327_720_69),
     (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
 ];
-
-/// What belongs to a network, and where its cycles of the family end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Calibration {
-    /// What the values were multiplied by to train the network.
-    pub scale: [f64; VALUES],
-    /// Standard deviation of a harmonic of the family's cycles without noise, over the amplitude.
-    pub floor: f64,
-    /// Jump between the end of a cycle and its start, over the amplitude: without noise.
-    pub jump: f64,
-    /// What noise adds to it, times the noise of a sample over the amplitude.
-    pub jump_of_noise: f64,
-    /// Width of the posterior of a cycle of the family: `w_0`, `w_1`, `w_2` of the [module](self).
-    pub width: [f64; 3],
-    /// Standard deviation of the width about that.
-    pub width_sigma: f64,
-    /// Largest sum that is of the family.
-    pub limit: f64,
-    /// Largest noise of a sample, over the amplitude, that the network knows.
-    pub most_noise: f64,
-}
-
-impl Calibration {
-    /// Of no network yet: no width is too wide and no noise too much, and any statistic is of the family that chi-squared
-    /// of 30 degrees of freedom exceeds in 2 % of cases.
-    ///
-    /// Jumps: 0.3 % of the amplitude with noise of 0.5 % and less, 0.5 % with 2..3 %, from what the
-    /// true processes leave of 600 cycles of multirotors; the floor is what they leave there without noise.
-    pub const UNTRAINED: Self = Self {
-        scale: [1.0, 8.0, 8.0, 1.0],
-        floor: 3e-4,
-        jump: 4e-3,
-        jump_of_noise: 0.13,
-        width: [0.0; 3],
-        width_sigma: f64::INFINITY,
-        limit: 47.96,
-        most_noise: f64::INFINITY,
-    };
-
-    /// The width of a posterior that these outputs tell.
-    #[must_use]
-    pub fn width_of(outputs: &[f32; OUTPUTS]) -> f64 {
-        let sum: f32 = outputs[VALUES..2 * VALUES].iter().sum();
-        -f64::from(sum) / VALUES as f64
-    }
-
-    /// What the usual width is a combination of: noise over amplitude, samples in a period.
-    #[must_use]
-    pub fn width_terms(noise: f64, samples: f64) -> [f64; 3] {
-        [1.0, log(noise / sqrt(samples) + QUIET), log(samples)]
-    }
-
-    /// How much wider than usual, in standard deviations.
-    fn excess(&self, outputs: &[f32; OUTPUTS], noise: f64, samples: f64) -> f64 {
-        let terms = Self::width_terms(noise, samples);
-        let usual: f64 = terms.iter().zip(self.width).map(|(term, w)| w * term).sum();
-        (Self::width_of(outputs) - usual).max(0.0) / self.width_sigma
-    }
-}
-
-/// Noise of a cycle's mean, over the amplitude, below which a network's own error is the larger.
-const QUIET: f64 = 1e-4;
 
 /// What a cycle is read as.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -171,6 +114,8 @@ pub enum ClassifyError {
     Noise(f64),
     /// The values are no process.
     Process(ProcessError),
+    /// The pack has another calibration than this score's.
+    Pack,
 }
 
 impl fmt::Display for ClassifyError {
@@ -185,6 +130,7 @@ impl fmt::Display for ClassifyError {
                 "the noise must be zero or positive and finite, but is {value}: take the window's"
             ),
             Self::Process(error) => write!(f, "the network's outputs are no process: {error}"),
+            Self::Pack => write!(f, "the pack has no calibration of the score: train it anew"),
         }
     }
 }
@@ -272,7 +218,14 @@ pub fn classify(
     if !(noise_sigma.is_finite() && noise_sigma >= 0.0) {
         return Err(ClassifyError::Noise(noise_sigma));
     }
-    let posterior = Posterior::from_outputs(outputs, &calibration.scale);
+    let mut posterior = Posterior::from_outputs(outputs, &calibration.scale);
+    for (row, temperature) in posterior.root.iter_mut().zip(calibration.temperature) {
+        row.iter_mut().for_each(|value| *value *= temperature);
+    }
+    let [lowest, highest] = &calibration.range;
+    for (k, mean) in posterior.mean.iter_mut().enumerate() {
+        *mean = mean.max(lowest[k]).min(highest[k]);
+    }
     let axis = posterior.longest_axis(&calibration.scale);
     let at = |deviations: f64| -> [f64; VALUES] {
         core::array::from_fn(|k| posterior.mean[k] + deviations * axis[k])
@@ -303,6 +256,21 @@ pub fn classify(
             Verdict::Unknown
         },
     })
+}
+
+/// [`classify`] with a pack's network and calibration.
+///
+/// # Errors
+/// As [`classify`], and where the pack has no calibration.
+pub fn classify_by(
+    pack: &Pack<'_>,
+    signature: &Signature,
+    period_s: f64,
+    noise_sigma: f64,
+) -> Result<Classification, ClassifyError> {
+    let calibration = Calibration::of_pack(pack).ok_or(ClassifyError::Pack)?;
+    let outputs = pack.outputs(&signature.values);
+    classify(&outputs, signature, period_s, noise_sigma, &calibration)
 }
 
 /// The process of these values: a ratio of poles and a dead time beyond what they can be are the

@@ -29,6 +29,8 @@
 //! |             | f32               | phase margin that the gains are for (rad)                       |
 //! | unknown     | f32               | score from which a cycle is unknown                             |
 //! |             | u32, that many f32| calibration of the score                                        |
+//! | prior       | 3 f32             | mean of the first three values over the family                  |
+//! |             | 3 times 3 f32     | root of their covariance, lower triangular, row by row          |
 //! | lead table  | u32, u32          | points `n` along its first axis, `m` along its second           |
 //! |             | u32               | numbers `k` of each point                                       |
 //! |             | 4 f32             | where the points lie                                            |
@@ -95,6 +97,7 @@ pub struct Pack<'a> {
     domain: Domain,
     unknown_threshold: f32,
     calibration: Floats<'a>,
+    prior: Prior,
     lead_table: LeadTableBytes<'a>,
     self_tests: Floats<'a>,
     card: &'a str,
@@ -111,6 +114,15 @@ pub struct OutputScaling {
     pub lowest: [f32; VALUES],
     /// Highest values that are believed.
     pub highest: [f32; VALUES],
+}
+
+/// How the shapes of the family are distributed: a Gaussian over the first three values.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Prior {
+    /// Its mean.
+    pub mean: [f32; 3],
+    /// The lower triangular root of its covariance.
+    pub root: [[f32; 3]; 3],
 }
 
 /// What the pack was made for: lowest and highest of each.
@@ -167,7 +179,7 @@ impl LeadTableBytes<'_> {
 }
 
 /// Bytes of a pack by what they are for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sizes {
     /// Weights, biases and scales of the layers.
     pub weights: usize,
@@ -228,6 +240,12 @@ impl<'a> Pack<'a> {
         let count = cursor.count()?;
         let calibration = cursor.finite(count)?;
 
+        cursor.enter(Section::Prior);
+        let prior = Prior {
+            mean: cursor.array()?,
+            root: [cursor.array()?, cursor.array()?, cursor.array()?],
+        };
+
         let lead_table = lead_table(&mut cursor)?;
 
         cursor.enter(Section::SelfTest);
@@ -249,6 +267,7 @@ impl<'a> Pack<'a> {
                 domain,
                 unknown_threshold,
                 calibration,
+                prior,
                 lead_table,
                 self_tests,
                 card,
@@ -337,6 +356,12 @@ impl<'a> Pack<'a> {
     #[must_use]
     pub fn calibration(&self) -> Floats<'a> {
         self.calibration
+    }
+
+    /// How the shapes of the family are distributed.
+    #[must_use]
+    pub fn prior(&self) -> &Prior {
+        &self.prior
     }
 
     /// The table of leads.

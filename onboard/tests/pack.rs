@@ -17,7 +17,8 @@ const INPUTS: usize = SECOND_LAYER + 8 + 4 * OUTPUTS + 4 * OUTPUTS * 2;
 const OUTPUT_SCALING: usize = INPUTS + 4 * 2 * LENGTH;
 const DOMAIN: usize = OUTPUT_SCALING + 4 * 16;
 const UNKNOWN: usize = DOMAIN + 4 * 7;
-const LEAD_TABLE: usize = UNKNOWN + 4 + 4 + 4 * 2;
+const PRIOR: usize = UNKNOWN + 4 + 4 + 4 * 2;
+const LEAD_TABLE: usize = PRIOR + 4 * 12;
 const SELF_TEST: usize = LEAD_TABLE + 12 + 4 * 4 + 4 * 6;
 const CARD: usize = SELF_TEST + 4 + 4 * (LENGTH + OUTPUTS);
 const TOTAL: usize = CARD + 4 + 4;
@@ -50,6 +51,8 @@ fn body() -> Vec<u8> {
     body.extend(le([4.5]));
     body.extend(2_u32.to_le_bytes());
     body.extend(le([0.125, 7.0]));
+    body.extend(le([2.0, 0.125, 0.0625]));
+    body.extend(le([0.5, 0.0, 0.0, 0.25, 0.125, 0.0, -0.25, 0.0, 0.0625]));
     body.extend([1_u32, 2, 3].map(u32::to_le_bytes).concat());
     body.extend(le([-1.0, 1.0, 0.0, 2.0]));
     body.extend(le([10.0, 11.0, 12.0, 20.0, 21.0, 22.0]));
@@ -120,6 +123,8 @@ fn everything_comes_back() {
     assert_eq!(domain.phase_margin_rad, 0.375);
     assert_eq!(pack.unknown_threshold(), 4.5);
     assert_eq!(pack.calibration().first(), Some([0.125, 7.0]));
+    assert_eq!(pack.prior().mean, [2.0, 0.125, 0.0625]);
+    assert_eq!(pack.prior().root[1], [0.25, 0.125, 0.0]);
     let table = pack.lead_table();
     assert_eq!((table.n, table.m, table.fields), (1, 2, 3));
     assert_eq!(table.axes, [-1.0, 1.0, 0.0, 2.0]);

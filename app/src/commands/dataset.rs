@@ -1,6 +1,6 @@
 //! `onecycle dataset`: experiments to learn from, made on all threads and kept file by file.
 
-mod folder;
+pub(super) mod folder;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -8,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use onecycle_lab::dataset::Recipe;
 use onecycle_lab::dataset::shards::Manifest;
+use onecycle_lab::identifier;
 
 use self::folder::Folder;
 use super::workers::{Lot, Workers};
@@ -30,23 +31,7 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     let recipe = recipe(arguments.recipe.as_deref())?;
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
-    let mut folder = Folder::open(&arguments.into, recipe, arguments.examples)?;
-    let damaged = folder.drop_damaged();
-    if !damaged.is_empty() {
-        complain(&format!(
-            "onecycle: made again, for they are missing or damaged: {}",
-            damaged.join(", ")
-        ));
-    }
-    let missing = folder.missing();
-    let kept = folder.manifest().shards.len() - missing.len();
-    if kept > 0 && !missing.is_empty() {
-        complain(&format!(
-            "onecycle: going on after {kept} of {} files",
-            folder.manifest().shards.len()
-        ));
-    }
-    let made = make(&mut folder, &missing, &workers)?;
+    let (folder, kept, made) = filled(&arguments.into, recipe, arguments.examples, &workers)?;
     workers.finish();
     let done = Done {
         manifest: folder.into_manifest(),
@@ -62,11 +47,45 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
+/// The folder of so many experiments of a recipe, all of them made; how many files were there, and how
+/// many experiments were missing.
+pub(super) fn filled(
+    path: &Path,
+    recipe: Recipe,
+    examples: u64,
+    workers: &Workers,
+) -> Result<(Folder, usize, u64), Failure> {
+    let mut folder = Folder::open(path, recipe, examples)?;
+    let damaged = folder.drop_damaged();
+    if !damaged.is_empty() {
+        complain(&format!(
+            "onecycle: made again, for they are missing or damaged: {}",
+            damaged.join(", ")
+        ));
+    }
+    let missing = folder.missing();
+    let kept = folder.manifest().shards.len() - missing.len();
+    if kept > 0 && !missing.is_empty() {
+        complain(&format!(
+            "onecycle: going on after {kept} of {} files",
+            folder.manifest().shards.len()
+        ));
+    }
+    let made = make(&mut folder, &missing, workers)?;
+    Ok((folder, kept, made))
+}
+
 fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
     let Some(path) = path else {
         return Ok(Recipe::default());
     };
-    let recipe: Recipe = settings::read(path)?;
+    // That of an identifier has the recipe of its experiments in a table.
+    let table: toml::Table = settings::read(path)?;
+    let recipe = if table.contains_key("experiments") {
+        settings::read::<identifier::Recipe>(path)?.experiments
+    } else {
+        settings::read::<Recipe>(path)?
+    };
     recipe.validate().map_err(|error| Failure::Settings {
         path: path.to_owned(),
         reason: error.to_string(),

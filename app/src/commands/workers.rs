@@ -2,6 +2,7 @@
 
 use indicatif::ProgressBar;
 use onecycle_lab::grid::Pieces;
+use onecycle_lab::train;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -69,5 +70,16 @@ pub(crate) struct Lot<'a>(pub(crate) &'a Workers);
 impl Pieces for Lot<'_> {
     fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
         self.0.run(count, piece)
+    }
+}
+
+impl train::Workers for Workers {
+    fn count(&self) -> usize {
+        self.threads()
+    }
+
+    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
+        self.pool
+            .install(|| (0..parts).into_par_iter().for_each(part));
     }
 }

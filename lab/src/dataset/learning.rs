@@ -16,7 +16,7 @@ use crate::train::{Batch, Matrix};
 pub const SCALE: [f64; VALUES] = [1.0, 8.0, 8.0, 1.0];
 
 /// Middle and half extent of the logarithm of the samples in a period: 40 to 2500 are 3.7 to 7.8.
-const LN_SAMPLES: (f32, f32) = (6.0, 2.0);
+pub(crate) const LN_SAMPLES: (f32, f32) = (6.0, 2.0);
 
 /// What a network sees of a signature.
 #[must_use]

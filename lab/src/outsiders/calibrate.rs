@@ -16,8 +16,8 @@ use crate::dataset::{ExampleError, Recipe};
 /// hundred samples.
 const NOISE_ROOM: f64 = 1.1;
 
-/// The calibration of a network whose values were trained times `scale`, from the cycles of these
-/// numbers of a recipe, so that `unknown` of them (0 to 1) are called unknown.
+/// The calibration of a network from the cycles of these numbers of a recipe, so that `unknown` of them
+/// (0 to 1) are called unknown; scale and temperatures are those of `start`.
 ///
 /// # Errors
 /// See [`ExampleError`].
@@ -25,7 +25,7 @@ pub fn calibrate(
     recipe: &Recipe,
     numbers: Range<u64>,
     network: Classifier<'_>,
-    scale: [f64; 4],
+    start: &Calibration,
     unknown: f64,
 ) -> Result<Calibration, ExampleError> {
     let mut seen = Vec::new();
@@ -36,10 +36,9 @@ pub fn calibrate(
         }
     }
     let mut calibration = Calibration {
-        scale,
         // So that the scores below are the sums.
         limit: 1.0,
-        ..Calibration::UNTRAINED
+        ..*start
     };
     let widths: Vec<([f64; 3], f64)> = seen
         .iter()

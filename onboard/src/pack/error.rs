@@ -17,6 +17,8 @@ pub enum Section {
     Domain,
     /// Threshold and calibration of the unknown.
     Unknown,
+    /// How the shapes of the family are distributed.
+    Prior,
     /// Table of leads.
     LeadTable,
     /// Signatures with their outputs.
@@ -33,6 +35,7 @@ impl fmt::Display for Section {
             Self::Outputs => "outputs",
             Self::Domain => "domain",
             Self::Unknown => "unknown",
+            Self::Prior => "prior",
             Self::LeadTable => "lead table",
             Self::SelfTest => "self-test",
             Self::Card => "card",

@@ -7,19 +7,19 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use onecycle_lab::dataset::Recipe;
-use onecycle_lab::dataset::shards::{Entry, MANIFEST_NAME, Manifest, file_name};
+use onecycle_lab::dataset::shards::{Entry, MANIFEST_NAME, Manifest, Record, file_name};
 
 use crate::failure::Failure;
 use crate::output::write_file;
 
-pub(super) struct Folder {
+pub(crate) struct Folder {
     path: PathBuf,
     manifest: Manifest,
 }
 
 impl Folder {
     /// Goes on with the folder of this recipe, or begins one.
-    pub(super) fn open(path: &Path, recipe: Recipe, examples: u64) -> Result<Self, Failure> {
+    pub(crate) fn open(path: &Path, recipe: Recipe, examples: u64) -> Result<Self, Failure> {
         let manifest_path = path.join(MANIFEST_NAME);
         let manifest = match std::fs::read_to_string(&manifest_path) {
             Ok(text) => Manifest::read(&text)
@@ -40,16 +40,16 @@ impl Folder {
         Ok(folder)
     }
 
-    pub(super) fn manifest(&self) -> &Manifest {
+    pub(crate) fn manifest(&self) -> &Manifest {
         &self.manifest
     }
 
-    pub(super) fn into_manifest(self) -> Manifest {
+    pub(crate) fn into_manifest(self) -> Manifest {
         self.manifest
     }
 
     /// Strikes out of the manifest what is listed but not there as it was made; returns its names.
-    pub(super) fn drop_damaged(&mut self) -> Vec<String> {
+    pub(crate) fn drop_damaged(&mut self) -> Vec<String> {
         let mut names = Vec::new();
         for (shard, slot) in self.manifest.shards.iter_mut().enumerate() {
             let name = file_name(shard);
@@ -65,7 +65,7 @@ impl Folder {
     }
 
     /// The files to be made.
-    pub(super) fn missing(&self) -> Vec<usize> {
+    pub(crate) fn missing(&self) -> Vec<usize> {
         let shards = self.manifest.shards.iter().enumerate();
         shards
             .filter_map(|(shard, entry)| entry.is_none().then_some(shard))
@@ -73,12 +73,34 @@ impl Folder {
     }
 
     /// Writes a file, then that it has been made.
-    pub(super) fn keep(&mut self, shard: usize, bytes: &[u8], entry: Entry) -> Result<(), Failure> {
+    pub(crate) fn keep(&mut self, shard: usize, bytes: &[u8], entry: Entry) -> Result<(), Failure> {
         write_file(&self.path.join(file_name(shard)), |file| {
             file.write_all(bytes)
         })?;
         self.manifest.shards[shard] = Some(entry);
         self.write_manifest()
+    }
+
+    /// The experiments of all files, in order.
+    pub(crate) fn records(&self) -> Result<Vec<Record>, Failure> {
+        let mut records = Vec::with_capacity(self.manifest.rows());
+        for shard in 0..self.manifest.shards.len() {
+            let path = self.path.join(file_name(shard));
+            let bytes = std::fs::read(&path).map_err(|error| refused(&path, error.to_string()))?;
+            let read = self.manifest.records(shard, &bytes);
+            records.extend(read.map_err(|error| refused(&path, error.to_string()))?);
+        }
+        Ok(records)
+    }
+
+    /// Removes the files and the folder, where there is nothing else in it.
+    pub(crate) fn remove(self) -> Result<(), Failure> {
+        let names = (0..self.manifest.shards.len()).map(file_name);
+        for name in names.chain([MANIFEST_NAME.to_owned()]) {
+            let path = self.path.join(name);
+            std::fs::remove_file(&path).map_err(|error| Failure::output(&path, error))?;
+        }
+        std::fs::remove_dir(&self.path).map_err(|error| Failure::output(&self.path, error))
     }
 
     fn write_manifest(&self) -> Result<(), Failure> {
