@@ -13,7 +13,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::dataset::{Family, Recipe};
-use crate::identify::{Identification, MOST_CYCLES, Options, Signals, identify};
+use crate::identify::{Identification, MOST_CYCLES, Method, Options, Signals, identify};
 use crate::optimum::pd;
 use crate::space::{FieldError, Space, first_out_of_range};
 use crate::{Deterioration, deterioration};
@@ -46,6 +46,9 @@ pub struct Campaign {
     /// Cycles to fit.
     #[serde(default = "one")]
     pub cycles: usize,
+    /// How processes are found.
+    #[serde(default)]
+    pub method: Method,
     /// Parameter of the relay.
     #[serde(default = "distinguishing_beta")]
     pub beta: f64,
@@ -355,6 +358,7 @@ pub fn identification_outcome(
     };
     let options = Options {
         cycles: campaign.cycles,
+        method: campaign.method,
         ..Options::default()
     };
     let found = identify(&signals, &options);

@@ -6,16 +6,19 @@
 mod decision;
 mod oscillation;
 mod posterior;
+mod reading;
 mod relay_input;
 mod remark;
 mod saturation;
 mod verdict;
 
-use onecycle_onboard::refine::{RefineError, Refined, refine};
+use onecycle_onboard::pack::Pack;
+use onecycle_onboard::refine::{Beforehand, RefineError, Refined, refine_with};
 
 use self::decision::Decision;
 use self::oscillation::{FitWindow, Oscillation};
 pub use self::posterior::{Interval, Posterior, ProcessEstimate};
+pub use self::reading::Reading;
 use self::relay_input::{InputKind, RelayInput};
 pub use self::remark::Remark;
 pub use self::verdict::Verdict;
@@ -47,6 +50,22 @@ pub struct Options {
     pub cycles: usize,
     /// Least phase margin of the controller (rad).
     pub phase_margin_rad: f64,
+    /// How the process is found.
+    pub method: Method,
+}
+
+/// How the process is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// By the pack's network alone, from the last cycle.
+    Classify,
+    /// By least squares, with no pack.
+    Refine,
+    /// The most probable process: least squares from where the pack's network points to, with what the
+    /// pack knows of its family.
+    #[default]
+    Map,
 }
 
 /// Most cycles that the window holds.
@@ -58,6 +77,7 @@ impl Default for Options {
         Self {
             cycles: 8,
             phase_margin_rad: 20_f64.to_radians(),
+            method: Method::default(),
         }
     }
 }
@@ -128,17 +148,31 @@ pub struct Identified {
 pub struct Identification {
     /// The oscillation, where there is one.
     pub oscillation: Option<OscillationFound>,
+    /// What the pack reads off its last cycle; `None` without a pack or where it has no answer.
+    pub reading: Option<Reading>,
     /// The process, or why there is none.
     pub outcome: Result<Identified, Verdict>,
     /// What a user should know beside the numbers.
     pub remarks: Vec<Remark>,
 }
 
-/// Identifies the process behind a recorded relay test.
+/// Identifies the process behind a recorded relay test, with the pack that is built in.
 #[must_use]
 pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
+    identify_by(signals, options, Pack::embedded().ok().as_ref())
+}
+
+/// The same with a pack of one's own, or none.
+#[must_use]
+pub fn identify_by(
+    signals: &Signals<'_>,
+    options: &Options,
+    pack: Option<&Pack<'_>>,
+) -> Identification {
+    let pack = pack.filter(|_| options.method != Method::Refine);
     let mut found = Identification {
         oscillation: None,
+        reading: None,
         outcome: Err(Verdict::NoFit),
         remarks: vec![],
     };
@@ -146,7 +180,17 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
         let most = options.cycles.clamp(1, MOST_CYCLES);
         let mut refusal = None;
         for oscillation in oscillation::candidates(signals, &relay, most)? {
-            let (described, outcome) = attempt(signals, &relay, &oscillation, options);
+            let window = oscillation.window(signals, &relay);
+            let described = describe(signals, &oscillation, &relay, &window);
+            let reading =
+                pack.and_then(|pack| Reading::of(signals, &relay, &oscillation, &window, pack));
+            let saw = Seen {
+                signals,
+                oscillation: &oscillation,
+                window: &window,
+                reading: reading.as_ref(),
+            };
+            let outcome = attempt(&saw, pack, options);
             // A stretch that fits where a longer one did not is believed when it is a good one.
             let outcome = outcome.and_then(|identified| match &refusal {
                 Some(_) if identified.refined.response_error > MOST_ERROR_OF_SECOND_CHOICE => {
@@ -159,6 +203,7 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
             match outcome {
                 Ok(identified) => {
                     found.oscillation = Some(described);
+                    found.reading = reading;
                     if let Some(Verdict::NotThisProcess { misfit }) = refusal {
                         found.remarks.push(Remark::Disturbed(misfit));
                     }
@@ -166,6 +211,7 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
                 }
                 Err(verdict) => {
                     found.oscillation.get_or_insert(described);
+                    found.reading = found.reading.or(reading);
                     refusal.get_or_insert(verdict);
                 }
             }
@@ -181,26 +227,44 @@ pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
 /// stretch between two a good one, a resonance is in every stretch.
 const MOST_ERROR_OF_SECOND_CHOICE: f64 = 0.05;
 
-/// Fits and judges one stretch of the recording.
+/// One stretch of the recording.
+struct Seen<'a> {
+    signals: &'a Signals<'a>,
+    oscillation: &'a Oscillation,
+    window: &'a FitWindow,
+    reading: Option<&'a Reading>,
+}
+
+/// Fits and judges a stretch.
 fn attempt(
-    signals: &Signals<'_>,
-    relay: &RelayInput,
-    oscillation: &Oscillation,
+    seen: &Seen<'_>,
+    pack: Option<&Pack<'_>>,
     options: &Options,
-) -> (OscillationFound, Result<Identified, Verdict>) {
-    let window = oscillation.window(signals, relay);
-    let described = describe(signals, oscillation, relay, &window);
-    let output = &signals.output[oscillation.points(signals)];
-    let outcome = match saturation::flat_part(output, oscillation.cycles.len()) {
-        Some(part) => Err(Verdict::Saturated { part }),
-        None => refine(&window, oscillation.period_s)
-            .map_err(|error| match error {
-                RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
-                RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
-            })
-            .and_then(|refined| design(&refined, &window, oscillation.period_s, options)),
+) -> Result<Identified, Verdict> {
+    let (oscillation, window) = (seen.oscillation, seen.window);
+    let output = &seen.signals.output[oscillation.points(seen.signals)];
+    if let Some(part) = saturation::flat_part(output, oscillation.cycles.len()) {
+        return Err(Verdict::Saturated { part });
+    }
+    let known = seen.reading.filter(|reading| reading.is_known());
+    let refined = if options.method == Method::Classify {
+        let reading = known.ok_or(Verdict::Unknown {
+            score: seen.reading.map(|reading| reading.classification.score),
+        })?;
+        reading.as_fit(window).map_err(|_| Verdict::NoFit)?
+    } else {
+        let period_s = oscillation.period_s;
+        let starts = known.map_or(vec![], |reading| reading.starts(period_s));
+        let beforehand = Beforehand {
+            starts: &starts,
+            prior: pack.filter(|_| known.is_some()).and_then(reading::prior),
+        };
+        refine_with(window, period_s, &beforehand).map_err(|error| match error {
+            RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
+            RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
+        })?
     };
-    (described, outcome)
+    design(&refined, window, oscillation.period_s, options)
 }
 
 /// Sizes of signals whose squares and their sums are far from the limits of f64.
@@ -273,11 +337,14 @@ fn design(
     let optimum = pd(&refined.process, options.phase_margin_rad)
         .map_err(|error| Verdict::NoController(error.to_string()))?;
     let posterior = Posterior::new(refined, window.sample_s());
-    let controller = Decision::new(
-        &posterior.processes(decision::DRAWS),
-        options.phase_margin_rad,
-    )
-    .controller(&refined.process, optimum);
+    // An error of the model widens the intervals, but is no distribution to choose a controller from.
+    let draws = if refined.response_error > 0.0 {
+        vec![]
+    } else {
+        posterior.processes(decision::DRAWS)
+    };
+    let controller =
+        Decision::new(&draws, options.phase_margin_rad).controller(&refined.process, optimum);
     let phase_margin_rad = posterior.phase_margin_rad(controller.pd);
     if phase_margin_rad.low.is_none_or(|low| low <= 0.0) {
         return Err(if refined.response_error > 0.0 {

@@ -7,6 +7,7 @@ use onecycle_lab::Deterioration;
 use onecycle_lab::campaign::{
     Campaign, IdentificationOutcome, Measure, identification_outcome, relay_outcome,
 };
+use onecycle_lab::identify::Method;
 
 fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
     Campaign {
@@ -19,6 +20,7 @@ fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
         offset: 0.0,
         trim,
         asymmetry: 0.0,
+        method: Method::default(),
         cycles: 2,
         beta: -0.73,
     }

@@ -254,6 +254,10 @@ fn perfect_example() -> Example {
         signature: Signature::new(&window, &cycle).unwrap(),
         period_s,
         process,
+        family: 0,
+        bias: 0.0,
+        sigma: 0.0,
+        samples_per_period: samples as f64,
     }
 }
 

@@ -81,8 +81,8 @@ pub enum Verdict {
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Known => "the process explains the cycle",
-            Self::Unknown => "unknown: no process of this kind explains the cycle",
+            Self::Known => "known: a process of this kind explains it",
+            Self::Unknown => "unknown: no process of this kind explains it",
         })
     }
 }

@@ -82,8 +82,8 @@ pub const WIDEST: usize = 128;
 /// may have them, are some 1e-6 off, and a wrong weight is off by a hundredth.
 pub const SELF_TEST_TOLERANCE: f32 = 1e-5;
 
-/// The pack that is built in; empty in a build without one.
-pub const DEFAULT: &[u8] = &[];
+/// The pack that is built in.
+pub const DEFAULT: &[u8] = include_bytes!("../packs/default.pack");
 
 /// An identifier. See the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]

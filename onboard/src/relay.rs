@@ -125,6 +125,8 @@ pub struct Relay {
     /// Share of `beta` used while the output is high, and while it is low: halved where the signal
     /// turned back, whole again when the trim moves.
     lead: [f32; 2],
+    /// What the trim aims for: the asymmetry, to the side that the first cycle leaned to.
+    aim: Option<f32>,
     /// Whether the process was at rest within the noise when the relay began.
     from_rest: bool,
 }
@@ -164,6 +166,7 @@ impl Relay {
             switches: 0,
             undone: 0,
             lead: [1.0; 2],
+            aim: None,
             from_rest: false,
         })
     }
@@ -333,8 +336,10 @@ impl Relay {
             ..
         } = self.excursion;
         if self.switches >= TRIM_FROM_SWITCH && cycle_s > 0.0 {
-            let excess = cycle_high_less_low_s / cycle_s - self.settings.asymmetry;
-            let moved = trim + self.settings.trim_gain * h * excess;
+            let excess = cycle_high_less_low_s / cycle_s;
+            let asymmetry = self.settings.asymmetry;
+            let aim = *self.aim.get_or_insert(asymmetry.copysign(excess));
+            let moved = trim + self.settings.trim_gain * h * (excess - aim);
             let limit = RelaySettings::TRIM_LIMIT * h;
             self.excursion.trim = moved.clamp(-limit, limit);
             if self.settings.trim_gain > 0.0 {

@@ -31,12 +31,13 @@ fn trim_converges_to_minus_the_bias() {
     }
 }
 
-// With an asymmetry of 0.2 the output is high for 0.6 of a cycle whatever the bias, to the half sample in
-// a half cycle that the duty can resolve; the trim leaves a fifth of the relay's amplitude of the bias.
+// With an asymmetry of 0.2 the output is high for 0.6 of a cycle, or for 0.4 where the bias is positive, to
+// the half sample in a half cycle that the duty can resolve; the trim leaves a fifth of the relay's amplitude
+// of the bias.
 #[test]
 fn the_trim_leaves_the_asymmetry_asked_for() {
     let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
-    for bias in [-0.5, 0.0, 0.3] {
+    for bias in [-0.5_f64, -0.3, 0.3, 0.5] {
         let settings = RelaySettings {
             trim_gain: RelaySettings::TRIM_GAIN,
             asymmetry: 0.2,
@@ -45,14 +46,20 @@ fn the_trim_leaves_the_asymmetry_asked_for() {
         let mut relay = Relay::new(settings).unwrap();
         let run = run(&process, &mut relay, bias, every(1e-3, 20_000));
         let middle = f64::from(relay.trim());
-        assert!((middle + bias + 0.2).abs() < 0.01, "{bias}: {middle}");
+        assert!(
+            (middle + bias - 0.2_f64.copysign(bias)).abs() < 0.01,
+            "{bias}: {middle}"
+        );
         let rises: Vec<usize> = (1..run.input.len())
             .filter(|&k| run.input[k] > run.input[k - 1] + 1.0)
             .collect();
         let cycles = &run.input[rises[rises.len() - 6]..rises[rises.len() - 1]];
         let high = cycles.iter().filter(|&&input| input > middle).count();
         let duty = high as f64 / cycles.len() as f64;
-        assert!((duty - 0.6).abs() < 0.005, "{bias}: {duty}");
+        assert!(
+            (duty - 0.5 + 0.1_f64.copysign(bias)).abs() < 0.005,
+            "{bias}: {duty}"
+        );
     }
     let settings = RelaySettings {
         asymmetry: 1.0,

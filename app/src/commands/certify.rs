@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use indicatif::ProgressBar;
 use onecycle_lab::campaign::{Campaign, Measure, relay_outcome};
 use onecycle_lab::certificate::{Certificate, LeastStable, Summary};
+use onecycle_lab::identify::Method;
 use onecycle_lab::{Direction, Space};
 use onecycle_onboard::Process;
 use rayon::prelude::*;
@@ -163,6 +164,7 @@ fn settles(space: &Space, certificate: &Certificate, trim: bool) -> Result<bool,
         offset: 0.0,
         trim,
         asymmetry: 0.0,
+        method: Method::default(),
         cycles: 1,
         beta: space.beta,
     };

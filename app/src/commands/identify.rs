@@ -3,10 +3,11 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle_lab::identify::{Options, Signals, identify};
+use onecycle_lab::identify::{self, Options, Signals, identify_by};
 use onecycle_link::{ColumnRef, CsvOptions, Recording};
 
-use crate::args::Identify;
+use super::pack;
+use crate::args::{Identify, Method};
 use crate::failure::{Failure, exit};
 use crate::output::print;
 use crate::report::{json, text};
@@ -25,8 +26,15 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let options = Options {
         cycles: arguments.cycles as usize,
         phase_margin_rad: arguments.phase_margin,
+        method: match arguments.method {
+            Method::Classify => identify::Method::Classify,
+            Method::Refine => identify::Method::Refine,
+            Method::Map => identify::Method::Map,
+        },
     };
-    let found = identify(&signals, &options);
+    let bytes = pack::bytes(&arguments.pack)?;
+    let pack = pack::read(&arguments.pack, &bytes)?;
+    let found = identify_by(&signals, &options, Some(&pack));
     let name = arguments.file.display().to_string();
     print(&if arguments.json {
         json::identification(&name, &recording, &found)

@@ -242,14 +242,14 @@ fn unreadable(path: &Path, reason: String) -> Failure {
     }
 }
 
-fn bytes(source: &PackSource) -> Result<Cow<'static, [u8]>, Failure> {
+pub(super) fn bytes(source: &PackSource) -> Result<Cow<'static, [u8]>, Failure> {
     match source {
         PackSource::Embedded => Ok(Cow::Borrowed(DEFAULT)),
         PackSource::File(path) => read_at_most(path, MOST_OF_A_PACK).map(Cow::Owned),
     }
 }
 
-fn read<'a>(source: &PackSource, bytes: &'a [u8]) -> Result<Pack<'a>, Failure> {
+pub(super) fn read<'a>(source: &PackSource, bytes: &'a [u8]) -> Result<Pack<'a>, Failure> {
     Pack::read(bytes).map_err(|error| unreadable(&path(source), error.to_string()))
 }
 

@@ -17,7 +17,9 @@ struct IdentifyReport<'a> {
     columns: Columns<'a>,
     verdict: Verdict,
     oscillation: Option<Oscillation>,
+    last_cycle: Option<LastCycle>,
     process: Option<ProcessReport>,
+    joint_probability: Option<f64>,
     fit: Option<Fit>,
     controller: Option<Controller>,
     margins: Option<MarginsReport>,
@@ -34,6 +36,12 @@ struct TuneReport {
     ise: f64,
     margins: MarginsReport,
     step: Option<Step>,
+}
+
+#[derive(Serialize)]
+struct LastCycle {
+    is_known: bool,
+    score: f64,
 }
 
 #[derive(Serialize)]
@@ -159,7 +167,12 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             noise_sigma: o.noise_sigma,
             sample_s: o.sample_s,
         }),
+        last_cycle: found.reading.map(|reading| LastCycle {
+            is_known: reading.is_known(),
+            score: reading.classification.score,
+        }),
         process: identified.map(|i| process(&i.process)),
+        joint_probability: identified.and_then(|i| i.joint_probability),
         fit: identified.map(fit),
         controller: identified.map(|i| controller(i.controller.pd)),
         margins: identified.map(|i| margins(&i.controller.margins, Some(&i.phase_margin_rad))),

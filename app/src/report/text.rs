@@ -46,6 +46,14 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     }
     if let Some(oscillation) = &found.oscillation {
         describe_oscillation(&mut text, oscillation, &units);
+        if let Some(reading) = &found.reading {
+            let _ = writeln!(
+                text,
+                "  last cycle  {} (score {})",
+                reading.classification.verdict,
+                significant(reading.classification.score)
+            );
+        }
     }
     match &found.outcome {
         Ok(identified) => {

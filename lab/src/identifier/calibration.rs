@@ -115,10 +115,9 @@ impl Calibrated {
 }
 
 /// The lowest and the highest of each number.
-fn extremes<T: PartialOrd + Copy, const N: usize>(rows: impl Iterator<Item = [T; N]>) -> [[T; N]; 2]
-where
-    T: From<f32>,
-{
+fn extremes<T: PartialOrd + Copy + From<f32>, const N: usize>(
+    rows: impl Iterator<Item = [T; N]>,
+) -> [[T; N]; 2] {
     let mut extremes = [[T::from(f32::INFINITY); N], [T::from(f32::NEG_INFINITY); N]];
     for row in rows {
         for (k, value) in row.into_iter().enumerate() {

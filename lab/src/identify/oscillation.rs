@@ -12,7 +12,7 @@ use super::{FitPoint, Signals, Verdict};
 /// Bins and edges of the window: with eight cycles, some 30 to 60 bins a cycle.
 pub(super) type FitWindow = Window<BINS, EDGES>;
 /// Rows of the window: 512 bins, and five that the estimator keeps for itself.
-const BINS: usize = 517;
+pub(super) const BINS: usize = 517;
 /// Edges of the input in the window; a relay makes two a cycle and a trim none of its own.
 const EDGES: usize = 128;
 
@@ -154,6 +154,11 @@ impl Oscillation {
             steady,
             period_s,
         }
+    }
+
+    /// Its last cycle alone.
+    pub(super) fn last(&self) -> Self {
+        Self::of(&self.cycles[self.cycles.len() - 1..], self.steady)
     }
 
     /// The points of the recording from the first cycle's beginning to the last one's end.

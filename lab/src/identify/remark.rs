@@ -14,6 +14,8 @@ pub enum Remark {
         /// Cycles used.
         used: usize,
     },
+    /// The pack's family does not explain the last cycle: its score.
+    Unknown(f64),
     /// The gain is negative.
     NegativeGain,
     /// No upper bound for `T_body` and `K`; the lower one of `T_body` (s).
@@ -54,6 +56,11 @@ impl Remark {
                 "More cycles leave {:.1} % of the oscillation unexplained, as gusts or a moving bias \
                  would: only the cycles named above were fitted.",
                 100.0 * part
+            ),
+            Self::Unknown(score) => format!(
+                "The last cycle alone is unlike those of the family that the pack knows (score \
+                 {score:.1}, the limit is 1): another beta of the relay, a resonance, friction, a wrong \
+                 sensor, a disturbance. The fit stands without the pack; trust it less."
             ),
             Self::FewCycles { used } => {
                 format!("Only {used} steady cycles could be used; more narrow the intervals.")
@@ -124,6 +131,11 @@ pub(super) fn remarks(found: &Identification, options: &Options) -> Vec<Remark> 
     let mut remarks = Vec::new();
     if let Some(oscillation) = &found.oscillation {
         of_oscillation(oscillation, options, &mut remarks);
+        if let (Some(reading), Ok(_)) = (&found.reading, &found.outcome)
+            && !reading.is_known()
+        {
+            remarks.push(Remark::Unknown(reading.classification.score));
+        }
         if let Ok(identified) = &found.outcome {
             of_process(identified, oscillation, &mut remarks);
             of_controller(identified, options, &mut remarks);

@@ -43,6 +43,11 @@ pub enum Verdict {
         /// What it leaves, over the oscillation (root mean squares).
         misfit: f64,
     },
+    /// No process of the pack's family explains the last cycle.
+    Unknown {
+        /// Its score, one being the limit; `None` where the pack has no answer at all.
+        score: Option<f64>,
+    },
     /// The intervals hold processes on which the controller would be unstable.
     TooUncertain,
     /// The best fit lies on a limit of the domain.
@@ -64,6 +69,7 @@ impl Verdict {
             Self::NotSteady { .. } => "not_steady",
             Self::Saturated { .. } => "saturated",
             Self::NotThisProcess { .. } | Self::NoFit => "not_this_process",
+            Self::Unknown { .. } => "unknown",
             Self::TooUncertain => "too_uncertain",
             Self::EdgeOfDomain(_) => "edge_of_domain",
             Self::NoController(_) => "no_controller",
@@ -105,6 +111,10 @@ impl Verdict {
             Self::NotThisProcess { .. } => {
                 "Look for a resonance, friction, wind or another loop at work: the process is not \
                  an integrator with two lags and a delay."
+            }
+            Self::Unknown { .. } => {
+                "Leave out --method classify, take a pack of this family with --pack, or look for a \
+                 resonance, friction or a wrong sensor."
             }
             Self::TooUncertain => {
                 "Use more cycles or a larger relay amplitude: too little is known for a controller \
@@ -173,6 +183,14 @@ impl fmt::Display for Verdict {
                  unexplained, far above the noise",
                 100.0 * misfit
             ),
+            Self::Unknown { score: Some(score) } => write!(
+                f,
+                "unknown: no process of the pack's family explains the last cycle (score {score:.1}, \
+                 the limit is 1)"
+            ),
+            Self::Unknown { score: None } => {
+                write!(f, "unknown: there is no pack that reads the last cycle")
+            }
             Self::TooUncertain => write!(
                 f,
                 "too uncertain: the intervals hold processes on which the controller is unstable"

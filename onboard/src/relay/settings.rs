@@ -24,8 +24,8 @@ pub struct RelaySettings {
     pub ramp_switches: u16,
     /// Share of the measured bias that the trim takes up each cycle; 0 switches it off.
     pub trim_gain: f32,
-    /// What the trim leaves: part of a cycle that the output is high, less that it is low. Zero makes
-    /// the oscillation symmetric; some asymmetry tells more of the process.
+    /// What the trim leaves between the parts of a cycle that the output is high and low, to whichever
+    /// side the bias is. Zero makes the oscillation symmetric; some asymmetry tells more of the process.
     pub asymmetry: f32,
 }
 
@@ -35,6 +35,10 @@ impl RelaySettings {
 
     /// Share of the bias that a trim takes up each cycle: near all of it, short of overshooting.
     pub const TRIM_GAIN: f32 = 0.8;
+
+    /// An asymmetry that tells twice as much of a process as none and is well short of the 0.3 at which
+    /// the least stable ones lose their limit cycle (`docs/decisions/0011-asymmetry.md`).
+    pub const ASYMMETRY: f32 = 0.2;
 
     /// The trim stays within this part of the relay's amplitude: at the whole of it no switching could
     /// hold the process.
@@ -48,7 +52,7 @@ impl RelaySettings {
         if !(self.beta > -1.0 && self.beta < 1.0) {
             return Err(RelayError::Beta(self.beta));
         }
-        if !(self.asymmetry > -1.0 && self.asymmetry < 1.0) {
+        if !(0.0..1.0).contains(&self.asymmetry) {
             return Err(RelayError::Asymmetry(self.asymmetry));
         }
         for (name, value) in [
@@ -100,7 +104,7 @@ pub enum RelayError {
     Amplitude(f32),
     /// `beta` is not between -1 and 1.
     Beta(f32),
-    /// The asymmetry is not between -1 and 1.
+    /// The asymmetry is not between 0 and 1.
     Asymmetry(f32),
     /// A time, a fraction or the noise is negative or not finite: its name and value.
     Setting(&'static str, f32),
@@ -112,7 +116,7 @@ impl fmt::Display for RelayError {
             Self::Amplitude(v) => write!(f, "the relay amplitude must be positive, but is {v}"),
             Self::Beta(v) => write!(f, "beta must lie between -1 and 1, but is {v}"),
             Self::Asymmetry(v) => {
-                write!(f, "the asymmetry must lie between -1 and 1, but is {v}")
+                write!(f, "the asymmetry must lie between 0 and 1, but is {v}")
             }
             Self::Setting(name, v) => write!(f, "{name} must be zero or positive, but is {v}"),
         }
