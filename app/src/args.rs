@@ -10,6 +10,7 @@ use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
 use onecycle_lab::campaign::MOST_CASES;
+use onecycle_lab::identify::MOST_CYCLES;
 use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
 use onecycle_onboard::{Process, ProcessError};
 
@@ -242,6 +243,18 @@ pub(crate) struct Campaign {
     /// Run this many cases instead of the file's number, up to ten million
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_CASES))]
     pub(crate) cases: Option<u64>,
+    /// Fit this many cycles instead of the file's number
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
+    pub(crate) cycles: Option<u64>,
+    /// Find processes in this way instead of the file's
+    #[arg(long, value_enum)]
+    pub(crate) method: Option<Method>,
+    /// Noise of exactly this part of the amplitude instead of the file's
+    #[arg(long, value_name = "PART")]
+    pub(crate) sigma: Option<f64>,
+    /// Scale all times by this factor, those of the sampling too
+    #[arg(long, value_name = "FACTOR")]
+    pub(crate) time_scale: Option<f64>,
 }
 
 /// Find the distinguishing phase of a space of processes: that of the relay whose tuning rule costs

@@ -7,6 +7,7 @@ use std::f64::consts::TAU;
 
 use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
 use onecycle_onboard::process::{Process, ProcessError};
+use onecycle_onboard::refine::{Refined, coordinate};
 use onecycle_onboard::relay::{Relay, RelayError, RelaySettings};
 use onecycle_plant::{Experiment, Trace};
 use rand::{RngExt, SeedableRng};
@@ -46,6 +47,9 @@ pub struct Campaign {
     /// Cycles to fit.
     #[serde(default = "one")]
     pub cycles: usize,
+    /// Times of all processes and of the sample period, over those of the paper's.
+    #[serde(default = "unscaled")]
+    pub time_scale: f64,
     /// How processes are found.
     #[serde(default)]
     pub method: Method,
@@ -56,6 +60,10 @@ pub struct Campaign {
 
 /// Most cases of a campaign: a day's work.
 pub const MOST_CASES: u64 = 10_000_000;
+
+fn unscaled() -> f64 {
+    1.0
+}
 
 fn one() -> usize {
     1
@@ -94,11 +102,11 @@ pub struct Case {
     seed: u64,
 }
 
-/// Sample period of all experiments (s): the paper's.
+/// Sample period of unscaled experiments (s): the paper's.
 const SAMPLE_S: f64 = 1e-3;
 /// Periods after which a perfect oscillation has settled, with a few to spare.
 const SETTLING_PERIODS: f64 = 15.0;
-/// The relay measures its noise for this long (s).
+/// The relay of an unscaled experiment measures its noise for this long (s).
 const PREROLL_S: f64 = 0.1;
 
 /// Why a case cannot be run; none of the domain's cases ever fails so.
@@ -147,6 +155,12 @@ impl Campaign {
                 (-1e6..=1e6).contains(&self.offset),
             ),
             (
+                "time_scale",
+                "1e-3 to 1e6",
+                self.time_scale,
+                (1e-3..=1e6).contains(&self.time_scale),
+            ),
+            (
                 "beta",
                 "-0.95 to 0.95",
                 self.beta,
@@ -186,7 +200,8 @@ impl Campaign {
     pub fn case(&self, n: u64) -> Result<Case, CaseError> {
         let seed = self.seed + n;
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        let [t_prop_s, t_body_s, tau_s] = Space::MULTIROTOR.random(&mut rng);
+        let times_s = Space::MULTIROTOR.random(&mut rng);
+        let [t_prop_s, t_body_s, tau_s] = times_s.map(|time_s| time_s * self.time_scale);
         let bias = rng.random_range(-1.0..1.0) * self.bias;
         let part = if self.sigma_uniform {
             rng.random_range(0.0..1.0)
@@ -220,10 +235,14 @@ impl Campaign {
         Ok(case)
     }
 
+    fn sample_s(&self) -> f64 {
+        SAMPLE_S * self.time_scale
+    }
+
     /// Half the peak-to-peak output over the last two periods of a perfect experiment.
     fn noise_free_amplitude(&self, case: &Case) -> Result<f64, CaseError> {
         let (trace, _) = self.run(case, SETTLING_PERIODS)?;
-        Ok(trace.amplitude_of_last((2.0 * case.period_s / SAMPLE_S) as usize))
+        Ok(trace.amplitude_of_last((2.0 * case.period_s / self.sample_s()) as usize))
     }
 
     /// The relay experiment of a case over so many periods of the describing function, and the
@@ -233,7 +252,8 @@ impl Campaign {
     /// A [`CaseError`] for settings outside their range.
     pub fn run(&self, case: &Case, periods: f64) -> Result<(Trace, Relay), CaseError> {
         let mut settings = RelaySettings::new(1.0, self.beta as f32);
-        settings.preroll_s = PREROLL_S as f32;
+        let preroll_s = PREROLL_S * self.time_scale;
+        settings.preroll_s = preroll_s as f32;
         settings.trim_gain = if self.trim {
             RelaySettings::TRIM_GAIN
         } else {
@@ -241,8 +261,8 @@ impl Campaign {
         };
         settings.asymmetry = self.asymmetry;
         let mut relay = Relay::new(settings)?;
-        let duration_s = PREROLL_S + periods * case.period_s;
-        let mut experiment = Experiment::new(case.process, SAMPLE_S, duration_s);
+        let duration_s = preroll_s + periods * case.period_s;
+        let mut experiment = Experiment::new(case.process, self.sample_s(), duration_s);
         experiment.input_bias = case.bias;
         experiment.sensor.noise_sigma = case.sigma;
         experiment.initial_output = self.offset * case.amplitude;
@@ -332,6 +352,33 @@ pub struct IdentificationOutcome {
     pub bias: f64,
     /// Cost of the identified process's controller on the true one.
     pub deterioration: Option<Deterioration>,
+    /// Errors of the coordinates of a fit but for the bias, over what the estimator says of them: the
+    /// Cramer-Rao bound of the window, narrowed by what was known beforehand. `None` where it found
+    /// an error of the model or was not asked.
+    pub errors: Option<[f64; SHAPE_AND_GAIN]>,
+}
+
+/// Coordinates of a fit but for the bias.
+pub const SHAPE_AND_GAIN: usize = 4;
+
+/// Errors of a fit over its standard deviations.
+fn errors(refined: &Refined, truth: &Process) -> Option<[f64; SHAPE_AND_GAIN]> {
+    let covariance = refined
+        .covariance
+        .filter(|_| refined.response_error == 0.0)?;
+    let coordinates = |process: &Process| {
+        let (pole_sum_per_s, ratio) = process.pole_sum();
+        let mut at = [0.0; SHAPE_AND_GAIN];
+        at[coordinate::LN_POLE_SUM] = pole_sum_per_s.ln();
+        at[coordinate::POLE_RATIO] = ratio;
+        at[coordinate::TAU_S] = process.tau_s();
+        at[coordinate::LN_JERK_GAIN] = (process.k_over_t_body() / process.t_prop_s()).abs().ln();
+        at
+    };
+    let (found, truth) = (coordinates(&refined.process), coordinates(truth));
+    Some(std::array::from_fn(|k| {
+        (found[k] - truth[k]) / covariance[k][k].sqrt()
+    }))
 }
 
 /// Periods for an identification: the transient and the cycles to fit.
@@ -353,7 +400,7 @@ pub fn identification_outcome(
         input: &trace.input,
         output: &trace.output,
         samples_per_point: 1,
-        sample_period_s: SAMPLE_S,
+        sample_period_s: campaign.sample_s(),
         breaks: &[],
     };
     let options = Options {
@@ -372,7 +419,10 @@ pub fn identification_outcome(
         let best = pd(&truth, margin).ok()?;
         Some(deterioration(identified.controller.pd, &truth, &best))
     });
+    let errors =
+        (found.outcome.as_ref().ok()).and_then(|identified| errors(&identified.refined, &truth));
     Ok(IdentificationOutcome {
+        errors,
         found,
         truth,
         bias: case.bias,

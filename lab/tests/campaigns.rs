@@ -21,6 +21,7 @@ fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
         trim,
         asymmetry: 0.0,
         method: Method::default(),
+        time_scale: 1.0,
         cycles: 2,
         beta: -0.73,
     }

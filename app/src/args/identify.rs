@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use onecycle_lab::identify::MOST_CYCLES;
+use onecycle_lab::identify::{self, MOST_CYCLES};
 use onecycle_link::TimeUnit;
 
 use super::{PackSource, phase_margin, sample_rate, time_unit};
@@ -66,4 +66,14 @@ pub(crate) enum Method {
     Classify,
     Refine,
     Map,
+}
+
+impl From<Method> for identify::Method {
+    fn from(method: Method) -> Self {
+        match method {
+            Method::Classify => Self::Classify,
+            Method::Refine => Self::Refine,
+            Method::Map => Self::Map,
+        }
+    }
 }

@@ -7,9 +7,10 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use onecycle_lab::Deterioration;
 use onecycle_lab::campaign::{
-    Campaign, CaseError, IdentificationOutcome, Measure, RelayOutcome, identification_outcome,
-    relay_outcome,
+    Campaign, CaseError, IdentificationOutcome, Measure, RelayOutcome, SHAPE_AND_GAIN,
+    identification_outcome, relay_outcome,
 };
+use onecycle_onboard::refine::coordinate;
 use rayon::prelude::*;
 
 use crate::failure::{Failure, exit};
@@ -19,6 +20,14 @@ use crate::{args, settings};
 pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
     let mut campaign: Campaign = settings::read(&arguments.file)?;
     campaign.cases = arguments.cases.unwrap_or(campaign.cases);
+    campaign.cycles = arguments
+        .cycles
+        .map_or(campaign.cycles, |cycles| cycles as usize);
+    campaign.time_scale = arguments.time_scale.unwrap_or(campaign.time_scale);
+    campaign.method = arguments.method.map_or(campaign.method, Into::into);
+    if let Some(sigma) = arguments.sigma {
+        (campaign.sigma, campaign.sigma_uniform) = (sigma, false);
+    }
     campaign
         .validate()
         .map_err(|error| settings::out_of_range(&arguments.file, error))?;
@@ -130,6 +139,7 @@ fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome])
         0 => "-".to_owned(),
         count => format!("{:.3}", cost.iter().sum::<f64>() / count as f64),
     };
+    let bound = error_over_bound(outcomes);
     let held = coverage(outcomes).map(|count| 100.0 * count as f64 / identified.max(1) as f64);
     let [k, k_over_t_body, t_prop, t_body, tau, bias] = held;
     format!(
@@ -139,7 +149,8 @@ fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome])
          deterioration |J| (%)   mean {mean}, median {}, 95 % {}, 99 % {}, worst {}\n\
          least phase margin      {} deg\n\
          90 % intervals hold (%) K {k:.1}, K/T_body {k_over_t_body:.1}, T_prop {t_prop:.1}, \
-         T_body {t_body:.1}, tau {tau:.1}, bias {bias:.1}\n",
+         T_body {t_body:.1}, tau {tau:.1}, bias {bias:.1}\n\
+         error / Cramer-Rao      {bound}\n",
         outcomes.len(),
         campaign.bias,
         if campaign.sigma_uniform { "up to " } else { "" },
@@ -151,6 +162,27 @@ fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome])
         quantile(&mut cost, 0.99, 2),
         quantile(&mut cost, 1.0, 2),
         quantile(&mut margins_deg, 0.0, 1),
+    )
+}
+
+/// Root mean squares of the errors over their standard deviations, five of which count at most: a wild
+/// one is the cost's to show.
+fn error_over_bound(outcomes: &[IdentificationOutcome]) -> String {
+    let errors: Vec<_> = outcomes
+        .iter()
+        .filter_map(|outcome| outcome.errors)
+        .collect();
+    let rms = |k: usize| {
+        let square = |errors: &[f64; SHAPE_AND_GAIN]| errors[k].powi(2).min(25.0);
+        (errors.iter().map(square).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+    };
+    format!(
+        "pole sum {:.2}, pole ratio {:.2}, tau {:.2}, gain {:.2} (of {} cases)",
+        rms(coordinate::LN_POLE_SUM),
+        rms(coordinate::POLE_RATIO),
+        rms(coordinate::TAU_S),
+        rms(coordinate::LN_JERK_GAIN),
+        errors.len()
     )
 }
 

@@ -165,6 +165,7 @@ fn settles(space: &Space, certificate: &Certificate, trim: bool) -> Result<bool,
         trim,
         asymmetry: 0.0,
         method: Method::default(),
+        time_scale: 1.0,
         cycles: 1,
         beta: space.beta,
     };

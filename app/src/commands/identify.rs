@@ -3,11 +3,11 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle_lab::identify::{self, Options, Signals, identify_by};
+use onecycle_lab::identify::{Options, Signals, identify_by};
 use onecycle_link::{ColumnRef, CsvOptions, Recording};
 
 use super::pack;
-use crate::args::{Identify, Method};
+use crate::args::Identify;
 use crate::failure::{Failure, exit};
 use crate::output::print;
 use crate::report::{json, text};
@@ -26,11 +26,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let options = Options {
         cycles: arguments.cycles as usize,
         phase_margin_rad: arguments.phase_margin,
-        method: match arguments.method {
-            Method::Classify => identify::Method::Classify,
-            Method::Refine => identify::Method::Refine,
-            Method::Map => identify::Method::Map,
-        },
+        method: arguments.method.into(),
     };
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::read(&arguments.pack, &bytes)?;

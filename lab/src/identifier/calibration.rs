@@ -11,8 +11,8 @@ use crate::dataset::shards::Record;
 use crate::outsiders::calibrate::calibrate;
 use crate::pack::{LeadTableContents, PackContents};
 
-/// Part of the family's own cycles that are called unknown, at most 2 % being allowed.
-pub const MOST_UNKNOWN: f64 = 0.015;
+/// Part of the family's own cycles that are called unknown; 2 % are the most that is allowed.
+pub const MOST_UNKNOWN: f64 = 0.01;
 
 /// Experiments that the limit of the score is taken from: 1.5 % of them are known to 0.3 %.
 const LIMIT_EXPERIMENTS: u64 = 2000;

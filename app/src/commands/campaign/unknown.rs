@@ -7,7 +7,9 @@ use onecycle_lab::campaign::Campaign;
 use onecycle_lab::dataset::ExampleError;
 use onecycle_lab::outsiders::Kind;
 use onecycle_lab::outsiders::judge::{CYCLES, Judgement, Road, judge};
-use onecycle_onboard::classify::Verdict;
+use onecycle_onboard::classify::{Calibration, Verdict};
+use onecycle_onboard::pack::Pack;
+use onecycle_onboard::signature::Signature;
 use rayon::prelude::*;
 
 use crate::failure::Failure;
@@ -23,7 +25,12 @@ pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure>
     recipe
         .validate()
         .map_err(|error| settings::out_of_range(file, error))?;
-    let road: Option<Road<'_>> = None;
+    let pack = Pack::embedded().map_err(Failure::usage)?;
+    let network = |signature: &Signature| pack.outputs(&signature.values);
+    let road = Calibration::of_pack(&pack).map(|calibration| Road {
+        network: &network,
+        calibration,
+    });
     let kinds = || std::iter::once(Kind::InFamily).chain(Kind::OUTSIDE);
     let cases = |kind| match kind {
         Kind::InFamily => IN_FAMILY * campaign.cases,
