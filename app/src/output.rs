@@ -32,6 +32,15 @@ pub(crate) fn progress_bar(pieces: u64) -> ProgressBar {
     bar
 }
 
+/// The same with a message behind it.
+pub(crate) fn progress_bar_with_message(pieces: u64) -> ProgressBar {
+    let bar = ProgressBar::new(pieces);
+    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}  {msg}") {
+        bar.set_style(style);
+    }
+    bar
+}
+
 /// Writes a file through a temporary one beside it: whole, or not at all.
 pub(crate) fn write_file(
     path: &Path,
@@ -59,13 +68,4 @@ fn set_usual_permissions(file: &std::fs::File) -> io::Result<()> {
 #[cfg(not(unix))]
 fn set_usual_permissions(_: &std::fs::File) -> io::Result<()> {
     Ok(())
-}
-
-/// The same with a message behind it.
-pub(crate) fn progress_bar_with_message(pieces: u64) -> ProgressBar {
-    let bar = ProgressBar::new(pieces);
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}  {msg}") {
-        bar.set_style(style);
-    }
-    bar
 }

@@ -32,6 +32,7 @@
 pub mod campaign;
 pub mod candidate;
 pub mod certificate;
+pub mod classifier;
 pub mod cost;
 pub mod dataset;
 pub mod deterioration;

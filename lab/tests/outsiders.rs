@@ -197,7 +197,7 @@ fn harm_is_a_promise_broken() {
     let kept = of(&plain, 1.0).0;
     assert!((kept - 1.0).abs() < 0.015, "{kept}");
     assert!(!of(&plain, 1.0).is_harmful());
-    assert!(of(&plain, 0.5).is_harmful());
+    assert!(of(&plain, 0.5).is_harmful(), "{:?}", of(&plain, 0.5));
     assert_eq!(of(&plain, 0.33).0, f64::INFINITY);
     let foreign = case(&Recipe::default(), Kind::OtherCycle, 3)
         .unwrap()

@@ -1,5 +1,6 @@
 //! `onecycle train`: networks from nothing, as a recipe says.
 
+pub(crate) mod classifier;
 pub(crate) mod identifier;
 mod part;
 
@@ -21,6 +22,8 @@ struct Head {
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Network {
+    /// The paper's classifier.
+    Classifier,
     /// The shipped identifier, or one of a user's own.
     Density,
 }
@@ -28,6 +31,7 @@ enum Network {
 pub(crate) fn run(arguments: &args::Train) -> Result<ExitCode, Failure> {
     let head: Head = settings::read(&arguments.recipe)?;
     match head.network {
+        Network::Classifier => classifier::run(arguments, &settings::read(&arguments.recipe)?),
         Network::Density => identifier::run(arguments, &settings::read(&arguments.recipe)?),
     }
 }
