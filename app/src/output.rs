@@ -44,7 +44,7 @@ pub(crate) fn progress_bar_with_message(pieces: u64) -> ProgressBar {
 /// Writes a file through a temporary one beside it: whole, or not at all.
 pub(crate) fn write_file(
     path: &Path,
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+    write: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
 ) -> Result<(), Failure> {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),

@@ -194,6 +194,57 @@ fn stopped(arguments: &[&str], folder: &Path) {
     child.wait().unwrap();
 }
 
+// ---------------------------------------------------------------- Parquet
+
+// Of two files 4200 rows or a few less: the table of the records of the one, then of the other.
+#[cfg(feature = "parquet")]
+#[test]
+fn one_parquet_file_of_all() {
+    use onecycle_lab::dataset::parquet::Writer;
+    use onecycle_lab::dataset::shards::{Manifest, file_name};
+
+    let (folder, recipe) = recipe();
+    let (into, table) = (folder.name("into"), folder.name("all.parquet"));
+    let arguments = [&recipe, "-n", TWO_FILES, "--into", &into, "--parquet"];
+    dataset(&[&arguments[..], &[&table]].concat());
+    let found = std::fs::read(&table).unwrap();
+
+    let files = bytes_in(&folder.path("into"));
+    assert_eq!(files.len(), 3);
+    let manifest = std::str::from_utf8(&files["manifest.json"]).unwrap();
+    let manifest = Manifest::read(manifest).unwrap();
+    let mut expected = Vec::new();
+    let mut writer = Writer::new(&mut expected).unwrap();
+    for shard in 0..2 {
+        let records = manifest.records(shard, &files[&file_name(shard)]);
+        writer.add(&records.unwrap()).unwrap();
+    }
+    writer.finish().unwrap();
+    // Not assert_eq: megabytes say nothing.
+    assert!(found == expected, "other bytes");
+    // Of what has been made already as well, and what cannot be written is said.
+    std::fs::remove_file(&table).unwrap();
+    dataset(&[&arguments[..], &[&table]].concat());
+    assert!(std::fs::read(&table).unwrap() == expected, "other bytes");
+    let nowhere = folder.name("nowhere/all.parquet");
+    let outcome = run(&[&["dataset"], &arguments[..], &[&nowhere]].concat());
+    outcome.refused(NOT_WRITTEN, &["nowhere/all.parquet"]);
+}
+
+// Without the feature the option says how to have it, before anything is made.
+#[cfg(not(feature = "parquet"))]
+#[test]
+fn no_parquet_without_its_feature() {
+    let folder = Scratch::new();
+    let (into, table) = (folder.name("into"), folder.name("all.parquet"));
+    let outcome = run(&["dataset", "-n", "2", "--into", &into, "--parquet", &table]);
+    outcome.misused(&[
+        "cannot write Parquet",
+        "cargo build --release --features parquet",
+    ]);
+    assert_eq!(folder.files(), Vec::<String>::new());
+}
+
 // ---------------------------------------------------------------- refusals
 
 #[test]

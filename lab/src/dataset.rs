@@ -21,12 +21,15 @@
 //! | what is seen, and of what is it?          | [`Example`]                                   |
 //! | what does an error of the values cost?    | [`Example::cost_gradient`]                    |
 //! | how do many of them lie on a disk?        | [`shards`]: files that NumPy reads            |
+//! | and in one table, for other programs?     | `parquet`, with the feature of that name      |
 //! | how does a network learn from them?       | [`learning`]: rows of a [`Batch`]             |
 //!
 //! [`Batch`]: crate::train::Batch
 
 pub mod learning;
 mod npz;
+#[cfg(feature = "parquet")]
+pub mod parquet;
 pub mod recipe;
 mod sensitivity;
 pub mod shards;

@@ -182,3 +182,76 @@ fn a_dataset_grows() {
     let refused = stranger.go_on(&recipe(), 10_000).unwrap_err();
     assert!(refused.to_string().contains("made by onecycle 999"));
 }
+
+// Three lots of 3, 0 and the other rows; 2 whole numbers, 34 inputs, 3 times 4 and 6 single ones make 54
+// columns. Read by the crate that wrote them, not by the code under test: every number to the last bit.
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet_has_the_records() {
+    use onecycle_lab::dataset::parquet::Writer;
+    use parquet::file::reader::{FileReader, SerializedFileReader};
+    use parquet::record::Field;
+
+    let (manifest, bytes) = made(8);
+    let mut records = manifest.records(0, &bytes).unwrap();
+    // One that would come back negative, were its column one of signed numbers.
+    records[4].number = u64::MAX;
+    let path = concat!(env!("CARGO_TARGET_TMPDIR"), "/records.parquet");
+    let mut writer = Writer::new(std::fs::File::create(path).unwrap()).unwrap();
+    for lot in [&records[..3], &[], &records[3..]] {
+        writer.add(lot).unwrap();
+    }
+    writer.finish().unwrap();
+
+    let reader = SerializedFileReader::new(std::fs::File::open(path).unwrap()).unwrap();
+    let groups = reader.metadata().row_groups().iter();
+    let rows: Vec<i64> = groups.map(|group| group.num_rows()).collect();
+    assert_eq!(rows, [3, 0, records.len() as i64 - 3]);
+    let mut read = 0;
+    for (row, record) in reader.get_row_iter(None).unwrap().zip(&records) {
+        let row: Vec<(String, Field)> = row.unwrap().into_columns();
+        assert_eq!(row.len(), 54);
+        assert_eq!(row, parquet_row(record));
+        read += 1;
+    }
+    assert_eq!(read, records.len());
+    std::fs::remove_file(path).unwrap();
+}
+
+/// The columns of a record, in order.
+#[cfg(feature = "parquet")]
+fn parquet_row(record: &Record) -> Vec<(String, parquet::record::Field)> {
+    use parquet::record::Field;
+    let whole = |name: &str, x: u64| vec![(name.to_owned(), Field::ULong(x))];
+    let real = |name: &str, x: f64| vec![(name.to_owned(), Field::Double(x))];
+    let four = |name: &str, x: [f64; 4]| {
+        let columns = x.into_iter().enumerate();
+        let named = columns.map(|(k, x)| (format!("{name}_{k}"), Field::Double(x)));
+        named.collect::<Vec<_>>()
+    };
+    let (example, process) = (&record.example, &record.example.process);
+    let signature = &example.signature;
+    let inputs = (signature.values.iter().enumerate())
+        .map(|(k, &x)| (format!("inputs_{k:02}"), Field::Float(x)));
+    let process = [
+        process.k().unwrap(),
+        process.t_prop_s(),
+        process.t_body_s().unwrap(),
+        process.tau_s(),
+    ];
+    [
+        whole("number", record.number),
+        whole("family", example.family as u64),
+        inputs.collect(),
+        four("values", record.values),
+        four("gradient", record.gradient),
+        real("period_s", example.period_s),
+        real("amplitude", signature.sign * signature.amplitude),
+        real("centre", signature.centre),
+        four("process", process),
+        real("bias", example.bias),
+        real("sigma", example.sigma),
+        real("samples_per_period", example.samples_per_period),
+    ]
+    .concat()
+}

@@ -33,6 +33,9 @@ pub(crate) struct Dataset {
     /// Folder to write to: a new one, or one of the same recipe
     #[arg(long, value_name = "DIR")]
     pub(crate) into: PathBuf,
+    /// Write all examples to this one Parquet file as well [needs a build with --features parquet]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) parquet: Option<PathBuf>,
     /// Threads to work with [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]

@@ -28,11 +28,20 @@ pub(crate) struct Done {
 }
 
 pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
+    if arguments.parquet.is_some() && !cfg!(feature = "parquet") {
+        return Err(Failure::usage(
+            "this build cannot write Parquet: make one with cargo build --release --features parquet",
+        ));
+    }
     let recipe = recipe(arguments.recipe.as_deref())?;
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
     let (folder, kept, made) = filled(&arguments.into, recipe, arguments.examples, &workers)?;
     workers.finish();
+    #[cfg(feature = "parquet")]
+    if let Some(path) = &arguments.parquet {
+        folder.write_parquet(path)?;
+    }
     let done = Done {
         manifest: folder.into_manifest(),
         kept,

@@ -44,7 +44,7 @@ pub const EXAMPLES_PER_SHARD: u64 = 4096;
 /// Most examples of a dataset: 3 GB or so.
 pub const MOST_EXAMPLES: u64 = 10_000_000;
 
-const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));
+pub(super) const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));
 
 /// One example as a file has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -308,7 +308,7 @@ impl Recipe {
 }
 
 /// The columns of these records; of none, what columns there are.
-fn columns(records: &[Record]) -> Vec<Column> {
+pub(super) fn columns(records: &[Record]) -> Vec<Column> {
     let whole = |name, of: fn(&Record) -> u64| Column {
         name,
         width: None,

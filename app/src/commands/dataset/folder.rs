@@ -85,12 +85,16 @@ impl Folder {
     pub(crate) fn records(&self) -> Result<Vec<Record>, Failure> {
         let mut records = Vec::with_capacity(self.manifest.rows());
         for shard in 0..self.manifest.shards.len() {
-            let path = self.path.join(file_name(shard));
-            let bytes = std::fs::read(&path).map_err(|error| refused(&path, error.to_string()))?;
-            let read = self.manifest.records(shard, &bytes);
-            records.extend(read.map_err(|error| refused(&path, error.to_string()))?);
+            records.extend(self.records_of(shard)?);
         }
         Ok(records)
+    }
+
+    fn records_of(&self, shard: usize) -> Result<Vec<Record>, Failure> {
+        let path = self.path.join(file_name(shard));
+        let bytes = std::fs::read(&path).map_err(|error| refused(&path, error.to_string()))?;
+        let read = self.manifest.records(shard, &bytes);
+        read.map_err(|error| refused(&path, error.to_string()))
     }
 
     /// Removes the files and the folder, where there is nothing else in it.
@@ -101,6 +105,20 @@ impl Folder {
             std::fs::remove_file(&path).map_err(|error| Failure::output(&path, error))?;
         }
         std::fs::remove_dir(&self.path).map_err(|error| Failure::output(&self.path, error))
+    }
+
+    /// Writes the experiments of all files to one Parquet file, a file at a time.
+    #[cfg(feature = "parquet")]
+    pub(super) fn write_parquet(&self, to: &Path) -> Result<(), Failure> {
+        use onecycle_lab::dataset::parquet::Writer;
+        write_file(to, |file| {
+            let mut writer = Writer::new(file)?;
+            for shard in 0..self.manifest.shards.len() {
+                let records = self.records_of(shard);
+                writer.add(&records.map_err(std::io::Error::other)?)?;
+            }
+            writer.finish()
+        })
     }
 
     fn write_manifest(&self) -> Result<(), Failure> {
