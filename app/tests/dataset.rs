@@ -61,7 +61,7 @@ fn from_recipe_to_files() {
     assert_eq!(made.stderr, "");
     made.without_nan();
     for words in [
-        "Family 1   weight 1: T_prop 0.015 .. 0.3 s",
+        "Family 1   weight 2: T_prop 0.015 .. 0.3 s",
         "Family 2   weight 1: T_prop 0.005 .. 0.12 s, T_body 20 .. 2000 s",
         "of 30 experiments",
         "Made now   30 experiments in ",

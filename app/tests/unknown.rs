@@ -1,7 +1,7 @@
 //! `campaign` on processes out of the family: a row for each kind, the same every time.
 
 // Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod common;
 
@@ -10,8 +10,8 @@ use common::{Scratch, UNREADABLE, run};
 const CAMPAIGN: &str =
     "measure = \"unknown\"\ncases = 1\nseed = 1\nbias = 0.5\nsigma = 0.01\ntrim = true\n";
 
-// One of each kind and five of the family, all steady, none refused and none harmful; two lines of
-// text, the head, and 14 rows. The clipped one is refused whatever the number of cycles.
+// One of each kind and five of the family, all steady, known, none refused and none harmful; two lines of
+// text, the head, and 14 rows. The clipped one is unknown, and refused whatever the number of cycles.
 #[test]
 fn a_row_for_each_kind() {
     let folder = Scratch::new();
@@ -25,8 +25,14 @@ fn a_row_for_each_kind() {
         let words = line.split_whitespace().skip(1);
         words.map(|word| word.parse().unwrap()).collect()
     };
-    assert_eq!(row("in_family"), [5, 0, 0, 0, 0, 0, 0, 0]);
-    assert_eq!(row("clipping"), [1, 0, 1, 0, 1, 0, 1, 0]);
+    assert_eq!(row("in_family"), [5, 0, 0, 0, 5, 0, 0, 0, 0, 0, 0, 0]);
+    let clipping = row("clipping");
+    assert_eq!(clipping[..2], [1, 0]);
+    let [harmful, unknown, harmless, also_unknown] = clipping[2..6] else {
+        panic!("{clipping:?}");
+    };
+    assert_eq!((harmful + harmless, unknown + also_unknown), (1, 1));
+    assert_eq!(clipping[6..], [1, 0, 1, 0, 1, 0]);
     assert_eq!(run(&["campaign", &path]).stdout, table.stdout);
 }
 
