@@ -179,6 +179,14 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
     row("T_body", &process.t_body_s, "s");
     row("tau", &process.tau_s, "s");
     row("input bias", &process.input_bias, &units.input);
+    if let Some(probability) = identified.joint_probability {
+        let _ = writeln!(
+            text,
+            "  {:<24}gain, lags and delay all within at once: {:.0} %",
+            "",
+            100.0 * probability
+        );
+    }
 }
 
 fn describe_controller(text: &mut String, optimum: &Optimum, phase_margin_rad: Option<&Interval>) {
