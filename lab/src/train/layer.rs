@@ -18,6 +18,7 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::batch_norm::BatchNorm;
+use super::few_rows;
 use super::matrix::{Matrix, Workers};
 use super::{Purpose, TrainError, expect_size, stream};
 
@@ -160,7 +161,9 @@ impl Stage {
         workers: &dyn Workers,
     ) -> Result<Matrix, TrainError> {
         match self {
-            Self::Dense { weight, bias } => return dense(weight, bias, &values, workers),
+            Self::Dense { weight, bias } => {
+                return dense_evaluated(weight, bias, &values, workers);
+            }
             Self::Relu => in_place(&mut values, relu),
             Self::Tanh => in_place(&mut values, f32::tanh),
             Self::BatchNorm(norm) => norm.evaluate(&mut values),
@@ -229,14 +232,39 @@ impl Stage {
     }
 }
 
-pub(super) fn dense(
+/// As [`dense`], and in the time that reading the weights takes where the inputs are a few rows.
+pub(super) fn dense_evaluated(
     weight: &Matrix,
     bias: &Matrix,
     input: &Matrix,
     workers: &dyn Workers,
 ) -> Result<Matrix, TrainError> {
+    if input.rows() > few_rows::FEW {
+        return dense(weight, bias, input, workers);
+    }
+    let product = few_rows::times_transposed(input, weight, workers);
+    with_bias(product, weight, bias, input)
+}
+
+fn dense(
+    weight: &Matrix,
+    bias: &Matrix,
+    input: &Matrix,
+    workers: &dyn Workers,
+) -> Result<Matrix, TrainError> {
+    let product = input.times_transposed(weight, workers);
+    with_bias(product, weight, bias, input)
+}
+
+/// The product of inputs and weights, where their shapes fit, and the bias.
+fn with_bias(
+    product: Option<Matrix>,
+    weight: &Matrix,
+    bias: &Matrix,
+    input: &Matrix,
+) -> Result<Matrix, TrainError> {
     expect_size("the number of inputs", weight.columns(), input.columns())?;
-    let mut output = input.times_transposed(weight, workers).unwrap_or_default();
+    let mut output = product.unwrap_or_default();
     for i in 0..output.rows() {
         for (value, bias) in output.row_mut(i).iter_mut().zip(bias.values()) {
             *value += bias;

@@ -2,7 +2,7 @@
 //!
 //! A row is a sample; a product of `batch x in` by the transpose of `out x in` weights is
 //! `batch x out`. Products have the same bits on any number of threads: every element is one chain
-//! of fused multiply-adds in the order of its terms.
+//! of fused multiply-adds in the order of its terms; `few_rows` has another order, as fixed.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -41,7 +41,7 @@ impl Workers for OneThread {
 
 /// Multiply-adds below which a product is not divided: some 0.1 ms on one thread, ten times what
 /// handing over a part costs.
-const LEAST_DIVIDED: usize = 1 << 22;
+pub(super) const LEAST_DIVIDED: usize = 1 << 22;
 
 /// Parts are multiples of this many rows or columns, so that none but the last has a ragged edge:
 /// two vectors of 16, and four tiles of eight rows.
@@ -174,7 +174,7 @@ impl Matrix {
         .then(|| result.transposed())
     }
 
-    fn transposed(&self) -> Self {
+    pub(super) fn transposed(&self) -> Self {
         let mut result = Self::zeros(self.columns, self.rows);
         if self.rows > 0 && self.columns > 0 {
             // By bands of rows, so that what is written to stays in the cache.
