@@ -133,7 +133,8 @@ fn help_lists_commands_and_exit_codes() {
     };
     let all = help(&["--help"]).stdout;
     for command in [
-        "identify", "simulate", "tune", "campaign", "phase", "grid", "certify",
+        "identify", "simulate", "tune", "campaign", "phase", "grid", "certify", "dataset", "train",
+        "pack",
     ] {
         assert!(all.contains(command), "{command}: {all}");
         let own = help(&[command, "--help"]).stdout;

@@ -1,80 +1,59 @@
-//! Outputs of a pack of an identifier's size, and reading it.
+//! What a board does with one cycle, by the pack that is built in: outputs of the network, the whole
+//! classification, gains from the table; and reading the pack.
 
 use divan::{Bencher, black_box};
-use onecycle_lab::pack::{LeadTableContents, PackContents, Precision, layers};
-use onecycle_lab::train::{Layer, Network};
-use onecycle_onboard::pack::{Domain, OUTPUTS, OutputScaling, Pack, Prior, VALUES};
-use onecycle_onboard::signature::LENGTH;
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
-
-/// Width of the two hidden layers.
-const HIDDEN: usize = 48;
+use onecycle_onboard::classify::classify_by;
+use onecycle_onboard::gains::LeadTable;
+use onecycle_onboard::pack::{DEFAULT, Pack};
+use onecycle_onboard::signature::Signature;
 
 fn main() {
     divan::main();
 }
 
-/// 34-48-48-14 with a table of 2 x 32 x 32 numbers.
-fn bytes(precision: Precision) -> Vec<u8> {
-    let dense = |outputs| Layer::Dense { outputs };
-    let kinds = [
-        dense(HIDDEN),
-        Layer::Tanh,
-        dense(HIDDEN),
-        Layer::Tanh,
-        dense(OUTPUTS),
-    ];
-    let network = Network::new(LENGTH, &kinds, &mut Pcg64Mcg::seed_from_u64(1));
-    let network = network.expect("the sizes are those of a network");
-    let contents = PackContents {
-        layers: layers(&network, precision).expect("the layers are dense"),
-        input_offsets: [0.0; LENGTH],
-        input_scales: [1.0; LENGTH],
-        output_scaling: OutputScaling {
-            scales: [1.0; VALUES],
-            temperatures: [1.0; VALUES],
-            lowest: [-9.0; VALUES],
-            highest: [9.0; VALUES],
-        },
-        domain: Domain {
-            ln_samples: [3.0, 8.0],
-            duty: [0.1, 0.9],
-            beta: [-0.73; 2],
-            phase_margin_rad: 0.35,
-        },
-        unknown_threshold: 1.0,
-        prior: Prior::default(),
-        calibration: Vec::new(),
-        lead_table: LeadTableContents {
-            n: 32,
-            m: 32,
-            fields: 2,
-            axes: [0.0, 1.0, 0.0, 1.0],
-            values: vec![0.5; 2 * 32 * 32],
-        },
-        self_tests: vec![[0.5; LENGTH]; 4],
-        card: serde_json::json!({}),
-    };
-    contents
-        .to_bytes()
-        .expect("the contents are those of a pack")
+fn pack() -> Pack<'static> {
+    Pack::embedded().expect("a pack is built in")
 }
 
-fn signature() -> [f32; LENGTH] {
-    std::array::from_fn(|i| (i as f32 / 5.0).sin())
+/// A cycle that the pack tests itself with, its period 1 s.
+fn signature() -> Signature {
+    let (values, _) = pack()
+        .self_tests()
+        .next()
+        .expect("the pack tests itself with a cycle");
+    Signature {
+        values,
+        amplitude: 1.0,
+        centre: 0.0,
+        sign: 1.0,
+    }
 }
 
-#[divan::bench(args = [Precision::Bytes, Precision::Floats])]
-fn outputs(bencher: Bencher, precision: Precision) {
-    let bytes = bytes(precision);
-    let pack = Pack::read(&bytes).expect("the pack is whole");
-    let signature = signature();
-    bencher.bench_local(|| pack.outputs(black_box(&signature)));
+/// Noise of a sample, over the amplitude.
+const NOISE: f64 = 0.01;
+
+#[divan::bench]
+fn outputs(bencher: Bencher) {
+    let (pack, signature) = (pack(), signature());
+    bencher.bench_local(|| pack.outputs(black_box(&signature.values)));
+}
+
+#[divan::bench]
+fn classify(bencher: Bencher) {
+    let (pack, signature) = (pack(), signature());
+    bencher.bench_local(|| classify_by(&pack, black_box(&signature), 1.0, NOISE));
+}
+
+#[divan::bench]
+fn gains(bencher: Bencher) {
+    let pack = pack();
+    let found = classify_by(&pack, &signature(), 1.0, NOISE).expect("the cycle is one");
+    let process = found.candidates[0].process;
+    let table = LeadTable::from_bytes(pack.lead_table().bytes).expect("the table is whole");
+    bencher.bench_local(|| table.pd(black_box(&process)));
 }
 
 #[divan::bench]
 fn read(bencher: Bencher) {
-    let bytes = bytes(Precision::Bytes);
-    bencher.bench_local(|| Pack::read(black_box(&bytes)).map(|pack| pack.content_hash()));
+    bencher.bench_local(|| Pack::read(black_box(DEFAULT)).map(|pack| pack.content_hash()));
 }

@@ -105,13 +105,13 @@ fn cycles_and_window(bencher: Bencher) {
 }
 
 #[divan::bench(args = [1, 2, 4])]
-fn refine_257_bins(bencher: Bencher, cycles: usize) {
-    let (window, period_s) = last_cycles::<257>(&experiment(), cycles);
+fn refine_255_bins(bencher: Bencher, cycles: usize) {
+    let (window, period_s) = last_cycles::<260>(&experiment(), cycles);
     bencher.bench_local(|| refine(black_box(&window), period_s));
 }
 
 #[divan::bench(args = [1, 2, 4])]
-fn refine_129_bins(bencher: Bencher, cycles: usize) {
-    let (window, period_s) = last_cycles::<129>(&experiment(), cycles);
+fn refine_127_bins(bencher: Bencher, cycles: usize) {
+    let (window, period_s) = last_cycles::<132>(&experiment(), cycles);
     bencher.bench_local(|| refine(black_box(&window), period_s));
 }
