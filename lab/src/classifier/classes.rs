@@ -62,7 +62,7 @@ pub struct Class {
     pub period_s: f64,
 }
 
-/// All classes. See the [module](self).
+/// All classes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Classes {
     classes: Vec<Class>,
@@ -134,7 +134,7 @@ impl Truth {
         deterioration(controller, &self.process, &self.best)
     }
 
-    /// What is minimised, infinite where unstable. See the [module](self).
+    /// What is minimised, infinite where unstable.
     #[must_use]
     pub fn cost(&self, controller: Pd) -> f64 {
         let Some(cost) = ise(&self.process, controller) else {

@@ -46,7 +46,7 @@ pub struct Response {
     pub phase_rad: f64,
 }
 
-/// What a cycle says of the gain. See the [module](self).
+/// What a cycle says of the gain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonics {
     /// At the frequency of the cycle.

@@ -11,7 +11,7 @@ use super::examples::Examples;
 use crate::deterioration::Deterioration;
 use crate::train::{Batch, Dataset, Matrix, Network, Workers};
 
-/// How a class is picked. See the [module](self).
+/// How a class is picked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Rule {
