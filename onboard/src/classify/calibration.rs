@@ -24,7 +24,7 @@ pub struct Calibration {
     pub jump: f64,
     /// What noise adds to it, times the noise of a sample over the amplitude.
     pub jump_of_noise: f64,
-    /// Width of the posterior of a cycle of the family: `w_0`, `w_1`, `w_2` of the [module](self).
+    /// Width of the posterior of a cycle of the family: `w_0`, `w_1`, `w_2`.
     pub width: [f64; 3],
     /// Standard deviation of the width about that.
     pub width_sigma: f64,

@@ -31,7 +31,7 @@ pub(super) const STENCIL: usize = 4;
 /// Largest number of points along an axis; the error of a table is rounding long before.
 const MAX_POINTS: usize = 1000;
 
-/// Where the nodes of a table lie. See the [module](self) for its coordinates.
+/// Where the nodes of a table lie.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nodes {
     /// Phase margin that the table is made for (rad), between 0 and `pi/2`.

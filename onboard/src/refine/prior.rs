@@ -8,7 +8,7 @@
 use super::{SHAPE, Shape};
 use crate::least_squares::Columns;
 
-/// A Gaussian over [`Shape`]. See the [module](self).
+/// A Gaussian over [`Shape`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapePrior {
     mean: Shape,
