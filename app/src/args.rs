@@ -163,6 +163,11 @@ pub(crate) struct Simulate {
     /// Let the relay keep its centre instead of following the input bias
     #[arg(long)]
     pub(crate) no_trim: bool,
+    /// Part of a cycle by which the trim leaves the output high longer than low, or low longer than
+    /// high (0 to 0.5); 0.2 tells about twice as much of the process as none
+    #[arg(long, value_name = "PART", default_value_t = 0.0, conflicts_with = "no_trim",
+          allow_negative_numbers = true, value_parser = asymmetry)]
+    pub(crate) asymmetry: f64,
     /// Plain relay: no smoothing of the error and no dwell
     #[arg(long)]
     pub(crate) bare: bool,
@@ -450,6 +455,14 @@ fn deterioration(text: &str) -> Result<f64, String> {
         Ok(deterioration)
     } else {
         Err("a deterioration lies between 0.1 % and 100 %, such as 10% or 0.1".to_owned())
+    }
+}
+
+/// An asymmetry of the relay.
+fn asymmetry(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(part) if (0.0..=0.5).contains(&part) => Ok(part),
+        _ => Err("an asymmetry lies between 0 and 0.5".to_owned()),
     }
 }
 

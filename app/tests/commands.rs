@@ -30,6 +30,38 @@ fn a_round_trip_without_noise() {
     assert!((report.number("/oscillation/sample_s") - 1e-3).abs() < 1e-12);
 }
 
+// With an asymmetry of 0.2 and a positive bias the relay is high for 0.4 of a cycle, and what made the recording
+// comes back from it: a cycle that the pack knows, of which the controller is certain. Five 90 % intervals hold
+// all at once with less than 0.9 and, even if nothing bound them together, with 0.9^5 = 0.59.
+#[test]
+fn an_asymmetric_test_is_identified() {
+    let arguments = ["--noise", "1%", "--bias", "30%", "--asymmetry", "0.2"];
+    let report = identify(simulate(&HOVER, &arguments), &[]).identified();
+    report
+        .near("k_over_t_body", HOVER_K_OVER_T_BODY, 0.01)
+        .near("t_prop_s", HOVER_T_PROP_S, 0.05)
+        .near("tau_s", HOVER_TAU_S, 0.05)
+        .near("input_bias", 0.3, 0.02);
+    assert!((report.number("/oscillation/duty") - 0.4).abs() < 0.02);
+    assert!(report.number("/last_cycle/score") < 1.0);
+    assert!((0.55..0.9).contains(&report.number("/joint_probability")));
+}
+
+// By the network alone and by least squares alone the same process comes out, as far as each can tell.
+#[test]
+fn every_method_finds_the_process() {
+    for (method, tolerance) in [("classify", 0.2), ("refine", 0.05), ("map", 0.05)] {
+        let recording = simulate(&HOVER, &["--noise", "1%", "--bias", "30%"]);
+        let report = identify(recording, &["--method", method]).identified();
+        report
+            .near("k_over_t_body", HOVER_K_OVER_T_BODY, tolerance)
+            .near("t_prop_s", HOVER_T_PROP_S, tolerance)
+            .near("tau_s", HOVER_TAU_S, tolerance);
+        let reads = report.0["last_cycle"].is_object();
+        assert_eq!(reads, method != "refine", "{}", report.0["last_cycle"]);
+    }
+}
+
 #[test]
 fn a_round_trip_with_noise() {
     let arguments = ["--noise", "1%", "--bias", "-20%", "--seed", "11"];

@@ -148,15 +148,15 @@ impl Recipe {
     /// # Errors
     /// Names the first field that is out of its range.
     pub fn validate(&self) -> Result<(), IdentifierError> {
-        let widths = self.hidden.iter().all(|width| (1..=128).contains(width));
+        let wrong = self.hidden.iter().find(|&width| !(1..=128).contains(width));
         let positive = |value: f64| value.is_finite() && value > 0.0;
         let some = |field, value: u64| (field, "1 or more", value as f64, value > 0);
         first_out_of_range([
             (
                 "hidden",
                 "1 to 5 widths of 1 to 128",
-                self.hidden.len() as f64,
-                widths && (1..=5).contains(&self.hidden.len()),
+                *wrong.unwrap_or(&self.hidden.len()) as f64,
+                wrong.is_none() && (1..=5).contains(&self.hidden.len()),
             ),
             some("learning", self.learning),
             some("choosing", self.choosing),

@@ -93,6 +93,7 @@ fn relay(arguments: &Simulate, noise_sigma: f64) -> Result<Relay, Failure> {
     let settings = RelaySettings {
         preroll_s: arguments.preroll as f32,
         noise_sigma: noise_sigma as f32,
+        asymmetry: arguments.asymmetry as f32,
         trim_gain: if arguments.no_trim {
             0.0
         } else {
