@@ -372,7 +372,7 @@ fn errors(refined: &Refined, truth: &Process) -> Option<[f64; SHAPE_AND_GAIN]> {
         at[coordinate::LN_POLE_SUM] = pole_sum_per_s.ln();
         at[coordinate::POLE_RATIO] = ratio;
         at[coordinate::TAU_S] = process.tau_s();
-        at[coordinate::LN_JERK_GAIN] = (process.k_over_t_body() / process.t_prop_s()).abs().ln();
+        at[coordinate::LN_JERK_GAIN] = process.jerk_gain().abs().ln();
         at
     };
     let (found, truth) = (coordinates(&refined.process), coordinates(truth));
@@ -411,9 +411,8 @@ pub fn identification_outcome(
     let found = identify(&signals, &options);
     // The same process with its lags in order.
     let (sum, ratio) = case.process.pole_sum();
-    let jerk_gain = case.process.k_over_t_body() / case.process.t_prop_s();
     let ordered = Process::from_pole_sum(1.0, sum, ratio, case.process.tau_s())?;
-    let truth = ordered.with_gain_scaled(jerk_gain * ordered.t_prop_s())?;
+    let truth = ordered.with_gain_scaled(case.process.jerk_gain() * ordered.t_prop_s())?;
     let margin = options.phase_margin_rad;
     let deterioration = found.outcome.as_ref().ok().and_then(|identified| {
         let best = pd(&truth, margin).ok()?;

@@ -47,8 +47,7 @@ use crate::limit_cycle::symmetric;
 
 pub use recipe::{Draw, Family, Recipe, RecipeError};
 
-/// Number of values that describe a process.
-pub const VALUES: usize = 4;
+pub use onecycle_onboard::pack::VALUES;
 
 /// One experiment: what is seen, and what it is of.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +83,7 @@ pub enum ExampleError {
 }
 
 /// Samples for which the relay first measures its noise: 0.1 s at the paper's 1 kHz.
-const PREROLL_SAMPLES: f64 = 100.0;
+pub(crate) const PREROLL_SAMPLES: f64 = 100.0;
 
 /// And no longer than this part of a period: meanwhile a bias drives the process away, and one without
 /// damping so far that it is not back in time. A relay that measures so briefly is told the noise.
@@ -174,19 +173,13 @@ pub(crate) fn window(trace: &Trace, cycle: &Cycle, sample_s: f64) -> Option<Wind
     Some(window)
 }
 
-/// `K p1 p2`: the third derivative of the output where the input is one and all else rests (output
-/// unit / (input unit s^3)).
-fn jerk_gain(process: &Process) -> f64 {
-    process.k_over_t_body() / process.t_prop_s()
-}
-
 impl Example {
     /// What a network is to put out, see the [module](self).
     #[must_use]
     pub fn values(&self) -> [f64; VALUES] {
         let period_s = self.period_s;
         let (pole_sum_per_s, pole_ratio) = self.process.pole_sum();
-        let moved = jerk_gain(&self.process).abs() * period_s.powi(3);
+        let moved = self.process.jerk_gain().abs() * period_s.powi(3);
         [
             (pole_sum_per_s * period_s).ln(),
             pole_ratio,

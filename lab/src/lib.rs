@@ -32,6 +32,7 @@
 pub mod campaign;
 pub mod candidate;
 pub mod certificate;
+mod cholesky;
 pub mod classifier;
 pub mod cost;
 pub mod dataset;

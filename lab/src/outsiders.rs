@@ -38,7 +38,7 @@ use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use self::plant::{Plant, Scale};
-use crate::dataset::{ExampleError, Recipe};
+use crate::dataset::{ExampleError, PREROLL_SAMPLES, Recipe};
 use crate::limit_cycle::symmetric;
 
 /// What is wrong with a process, see the [module](self).
@@ -333,9 +333,6 @@ pub struct Case {
     beta: f64,
     rng: Pcg64Mcg,
 }
-
-/// Samples for which the relay first measures its noise: 0.1 s at the paper's 1 kHz.
-const PREROLL_SAMPLES: f64 = 100.0;
 
 /// Periods of an experiment: until it is steady, and the eight cycles that an identification takes.
 const PERIODS: f64 = 26.0;

@@ -35,13 +35,11 @@ use libm::{exp, hypot, sqrt};
 
 pub use self::calibration::Calibration;
 
-use crate::fit_score::{Response, VALUES, harmonics};
-use crate::pack::Pack;
+use crate::fit_score::{Response, harmonics};
+pub use crate::pack::OUTPUTS;
+use crate::pack::{Pack, VALUES};
 use crate::process::{Process, ProcessError};
 use crate::signature::{PARTS, Signature};
-
-/// Outputs of the network: a mean, a diagonal, what is below it.
-pub const OUTPUTS: usize = VALUES + VALUES + VALUES * (VALUES - 1) / 2;
 
 /// Candidates of a classification.
 pub const CANDIDATES: usize = 5;

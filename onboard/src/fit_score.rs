@@ -32,6 +32,7 @@ use core::f64::consts::{PI, TAU};
 use libm::{exp, sin, sqrt};
 
 use crate::complex::Complex;
+use crate::pack::VALUES;
 use crate::signature::PARTS;
 
 /// Harmonics of the parts: those below the one that alternates.
@@ -39,9 +40,6 @@ pub(crate) const HARMONICS: usize = PARTS / 2 - 1;
 
 /// Real parts of the harmonics, then imaginary parts.
 pub(crate) const ROWS: usize = 2 * HARMONICS;
-
-/// Values of a process.
-pub(crate) const VALUES: usize = 4;
 
 /// Jumps between a cycle's end and its start.
 pub(crate) const JUMPS: usize = 3;

@@ -109,6 +109,13 @@ impl Process {
         self.k_over_t_body
     }
 
+    /// `K/(T_body T_prop)`: the third derivative of the output where the input is one and all else rests
+    /// (output unit / (input unit s^3)); unlike `K/T_body`, the same whichever lag comes first.
+    #[must_use]
+    pub fn jerk_gain(&self) -> f64 {
+        self.k_over_t_body / self.t_prop_s
+    }
+
     /// Velocity gain `K`: output unit / (input unit s); `None` without damping.
     #[must_use]
     pub fn k(&self) -> Option<f64> {

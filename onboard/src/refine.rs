@@ -23,6 +23,7 @@
 //! (0), so the double integrator is an ordinary point of the domain's boundary.
 
 mod descent;
+mod domain;
 mod fundamental;
 mod prior;
 mod uncertainty;
@@ -32,6 +33,8 @@ use core::f64::consts::TAU;
 use libm::{exp, log, sqrt};
 
 use self::descent::NormalEquations;
+pub use self::domain::{DomainEdge, Shape};
+use self::domain::{HIGHEST, SHAPE, clamp, domain_edge};
 use self::fundamental::Fundamental;
 pub use self::prior::ShapePrior;
 use self::uncertainty::{Tangent, coordinate_map};
@@ -41,16 +44,6 @@ use crate::process::Process;
 use crate::response::{Drive, Grid, Response};
 use crate::transition::State;
 use crate::window::{KNOWN_ROWS, Window};
-
-/// Unknowns of the search: `ln(pole sum * period)`, pole ratio, `tau / period`.
-pub type Shape = [f64; SHAPE];
-/// Number of unknowns of the search.
-const SHAPE: usize = 3;
-
-/// The domain, in periods: lags from 1/1000 of a period to one, delays to half a period. Wider
-/// than any relay oscillation of this process: its actuator and delay are at most its half period.
-const LOWEST: Shape = [0.0, 0.0, 0.0];
-const HIGHEST: Shape = [6.9, 0.25, 0.5];
 
 /// Number of linear unknowns: y0, v0, w0, the distortion, the bias times the gain, the gain.
 const LINEAR: usize = 6;
@@ -75,17 +68,6 @@ pub mod coordinate {
     pub const LN_JERK_GAIN: usize = 3;
     /// Input bias (input unit).
     pub const INPUT_BIAS: usize = 4;
-}
-
-/// A limit of the domain that the best fit lies on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DomainEdge {
-    /// Both lags as slow as the oscillation allows.
-    SlowLags,
-    /// The actuator's lag too fast to be seen.
-    FastLag,
-    /// The delay as long as the oscillation allows.
-    LongDelay,
 }
 
 /// The best process and how well it is known.
@@ -513,29 +495,5 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let noise_sigma = self.window.noise_sigma();
         self.tangent(shape, fit)?
             .covariance(&fit.residual, &output, noise_sigma, &map)
-    }
-}
-
-fn clamp(shape: &Shape) -> Shape {
-    let mut inside = *shape;
-    for (value, (low, high)) in inside.iter_mut().zip(LOWEST.iter().zip(&HIGHEST)) {
-        *value = value.clamp(*low, *high);
-    }
-    inside
-}
-
-fn domain_edge(shape: &Shape) -> Option<DomainEdge> {
-    // The search stops short of a limit that it creeps up to.
-    let near = |index: usize, limit: f64| {
-        (shape[index] - limit).abs() < 1e-2 * (HIGHEST[index] - LOWEST[index])
-    };
-    if near(2, HIGHEST[2]) {
-        Some(DomainEdge::LongDelay)
-    } else if near(0, LOWEST[0]) {
-        Some(DomainEdge::SlowLags)
-    } else if near(0, HIGHEST[0]) {
-        Some(DomainEdge::FastLag)
-    } else {
-        None
     }
 }

@@ -95,10 +95,9 @@ fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
     } else {
         settings::read::<Recipe>(path)?
     };
-    recipe.validate().map_err(|error| Failure::Settings {
-        path: path.to_owned(),
-        reason: error.to_string(),
-    })?;
+    recipe
+        .validate()
+        .map_err(|error| settings::out_of_range(path, error))?;
     Ok(recipe)
 }
 

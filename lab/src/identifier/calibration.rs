@@ -5,6 +5,7 @@ use onecycle_onboard::pack::{Domain, OutputScaling, Pack, Prior};
 use onecycle_onboard::signature::LENGTH;
 
 use super::{IdentifierError, Recipe, output_scales};
+use crate::cholesky::cholesky;
 use crate::dataset::VALUES;
 use crate::dataset::learning::LN_SAMPLES;
 use crate::dataset::shards::Record;
@@ -14,7 +15,7 @@ use crate::pack::{LeadTableContents, PackContents};
 /// Part of the family's own cycles that are called unknown; 2 % are the most that is allowed.
 pub const MOST_UNKNOWN: f64 = 0.01;
 
-/// Experiments that the limit of the score is taken from: 1.5 % of them are known to 0.3 %.
+/// Experiments that the limit of the score is taken from: 1 % of them are known to 0.2 %.
 const LIMIT_EXPERIMENTS: u64 = 2000;
 
 /// What belongs to a network.
@@ -151,18 +152,7 @@ fn prior(records: &[Record]) -> Option<Prior> {
             }
         }
     }
-    let mut root = [[0.0; SHAPE]; SHAPE];
-    for i in 0..SHAPE {
-        for j in 0..=i {
-            let known: f64 = (0..j).map(|k| root[i][k] * root[j][k]).sum();
-            let rest = covariance[i][j] - known;
-            root[i][j] = if i == j {
-                rest.sqrt()
-            } else {
-                rest / root[j][j]
-            };
-        }
-    }
+    let root = cholesky(&covariance)?;
     let is_right = (0..SHAPE).all(|i| root[i][i] > 0.0 && root[i][i].is_finite());
     is_right.then(|| Prior {
         mean: mean.map(|value| value as f32),

@@ -11,6 +11,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
+use crate::cholesky::cholesky;
 use crate::margins::margins;
 
 /// Draws: the 5 % quantile of so many is known to 0.35 of a per cent point.
@@ -147,7 +148,7 @@ impl Posterior {
         centre[coordinate::LN_POLE_SUM] = pole_sum.ln();
         centre[coordinate::POLE_RATIO] = pole_ratio;
         centre[coordinate::TAU_S] = process.tau_s();
-        let jerk_gain = process.k_over_t_body() / process.t_prop_s();
+        let jerk_gain = process.jerk_gain();
         centre[coordinate::LN_JERK_GAIN] = jerk_gain.abs().ln();
         centre[coordinate::INPUT_BIAS] = refined.input_bias;
         let root = refined.covariance.and_then(|mut covariance| {
@@ -242,29 +243,4 @@ fn quantiles(mut values: Vec<f64>) -> Option<(f64, f64)> {
     values.sort_unstable_by(f64::total_cmp);
     let at = |q: f64| values[((values.len() - 1) as f64 * q).round() as usize];
     Some((at(QUANTILES.0), at(QUANTILES.1)))
-}
-
-/// Lower triangular root of `covariance`; `None` where rounding has made it indefinite.
-fn cholesky(covariance: &[[f64; 5]; 5]) -> Option<[[f64; 5]; 5]> {
-    let mut root = [[0.0; 5]; 5];
-    for i in 0..5 {
-        for j in 0..=i {
-            let known: f64 = (0..j).map(|k| root[i][k] * root[j][k]).sum();
-            let rest = covariance[i][j] - known;
-            if i == j {
-                // A variance of zero (a perfect recording) is no error.
-                if rest < -1e-9 * covariance[i][i] || !rest.is_finite() {
-                    return None;
-                }
-                root[i][i] = rest.max(0.0).sqrt();
-            } else {
-                root[i][j] = if root[j][j] > 0.0 {
-                    rest / root[j][j]
-                } else {
-                    0.0
-                };
-            }
-        }
-    }
-    Some(root)
 }

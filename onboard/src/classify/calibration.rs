@@ -3,8 +3,7 @@
 use libm::{log, sqrt};
 
 use super::OUTPUTS;
-use crate::fit_score::VALUES;
-use crate::pack::Pack;
+use crate::pack::{Pack, VALUES};
 
 /// Numbers that a pack keeps.
 const NUMBERS: usize = 8;

@@ -1,6 +1,6 @@
 //! One step of the search: Levenberg-Marquardt in a box, with Marquardt's scaling.
 
-use super::{HIGHEST, LOWEST, Shape};
+use super::domain::{HIGHEST, LOWEST, Shape};
 use crate::least_squares::{Columns, dot, solve_symmetric};
 
 /// Gradient and curvature of the sum of squares in the free coordinates.

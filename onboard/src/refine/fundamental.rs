@@ -4,7 +4,7 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use libm::{atan, atan2, cos, floor, hypot, log, sin, sqrt, tan};
 
-use super::{Shape, clamp};
+use super::domain::{Shape, clamp};
 use crate::window::Window;
 
 /// Number of starts.

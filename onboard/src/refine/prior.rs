@@ -5,7 +5,7 @@
 //! rows = sigma W (shape - mean),   W^T W = covariance^-1
 //! ```
 
-use super::{SHAPE, Shape};
+use super::domain::{SHAPE, Shape};
 use crate::least_squares::Columns;
 
 /// A Gaussian over [`Shape`].

@@ -1,6 +1,5 @@
 //! The paper's classifier with every loss of its recipe, each scored on the same experiments.
 
-use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -10,7 +9,7 @@ use onecycle_lab::classifier::{
     Classes, ClassifierError, Examples, Gain, Protocol, Recipe, Rule, Score, Standard,
     Standardised, picks,
 };
-use onecycle_lab::train::{Dataset, Epoch, Loss, Network, Outcome, TensorFile, Trainer};
+use onecycle_lab::train::{Dataset, Epoch, Loss, Network, TensorFile, Trainer};
 use serde::Serialize;
 
 use super::part::Part;
@@ -19,6 +18,7 @@ use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
 use crate::output::{print, progress_bar_with_message, write_file};
 use crate::report::classifier as report;
+use crate::settings;
 
 /// Key of what is said beside the weights; changes with every change that a reader could notice.
 const FORMAT: &str = "onecycle.classifier/1";
@@ -95,10 +95,7 @@ struct Lesson<'a> {
 
 pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
     let begin = Instant::now();
-    let failed = |error: ClassifierError| Failure::Settings {
-        path: arguments.recipe.clone(),
-        reason: error.to_string(),
-    };
+    let failed = |error: ClassifierError| settings::out_of_range(&arguments.recipe, error);
     recipe.validate().map_err(failed)?;
     let lesson = Lesson::prepare(recipe, Workers::new(arguments.threads)?).map_err(failed)?;
     let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
@@ -197,21 +194,10 @@ impl<'a> Lesson<'a> {
         bar: &ProgressBar,
     ) -> Result<(Trained, Network), Failure> {
         let begin = Instant::now();
-        let left = match part {
-            Some(part) if resume => part.read()?,
-            _ => None,
-        };
-        let mut trainer = match left {
-            Some(trainer) => trainer,
-            None => {
-                let network = self.recipe.network(self.classes.len());
-                Trainer::new(
-                    self.recipe.settings(number),
-                    network.map_err(Failure::usage)?,
-                )
-                .map_err(Failure::usage)?
-            }
-        };
+        let mut trainer = super::begun(part, resume, || {
+            let network = self.recipe.network(self.classes.len())?;
+            Ok::<_, ClassifierError>(Trainer::new(self.recipe.settings(number), network)?)
+        })?;
         let loss = trainer.settings().loss;
         let [training, verification] =
             [&self.training, &self.sets[0]].map(|examples| Standardised {
@@ -219,29 +205,19 @@ impl<'a> Lesson<'a> {
                 standard: &self.standard,
             });
         let name = report::name(&loss);
-        let outcome = loop {
-            // An epoch at a time: a part is kept after each.
-            let mut last = None;
-            let outcome = trainer
-                .run(&training, &verification, &self.workers, &mut |epoch| {
-                    last = Some(*epoch);
-                    ControlFlow::Break(())
-                })
-                .map_err(Failure::usage)?;
-            if let Some(epoch) = last {
+        let outcome = super::train(
+            &mut trainer,
+            [&training, &verification],
+            &self.workers,
+            part,
+            |epoch| {
                 bar.set_position(number as u64 * self.recipe.epochs + epoch.number);
                 bar.set_message(format!(
                     "{name}, epoch {}: loss {:.4}, verification {:.4}",
                     epoch.number, epoch.training_loss, epoch.validation_loss
                 ));
-                if let Some(part) = part {
-                    part.write(&trainer)?;
-                }
-            }
-            if outcome != Outcome::Paused {
-                break outcome;
-            }
-        };
+            },
+        )?;
         let network = (self.standard.before(trainer.best())).map_err(Failure::usage)?;
         let trained = Trained {
             loss,

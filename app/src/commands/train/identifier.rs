@@ -1,6 +1,5 @@
 //! An identifier from nothing: experiments, training, calibration, scores, a pack.
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -116,37 +115,26 @@ fn learn(
     arguments: &args::Train,
     workers: &Workers,
 ) -> Result<(Trainer, Outcome), Failure> {
-    let left = if arguments.resume { part.read()? } else { None };
-    let mut trainer = match left {
-        Some(trainer) => trainer,
-        None => {
-            let network = recipe.network().map_err(Failure::usage)?;
-            Trainer::new(recipe.settings(), network).map_err(Failure::usage)?
-        }
-    };
+    let mut trainer = super::begun(Some(part), arguments.resume, || {
+        recipe
+            .network()
+            .and_then(|network| Trainer::new(recipe.settings(), network))
+    })?;
     let bar = progress_bar_with_message(recipe.epochs);
     let (training, validation) = (rows(learning), rows(choosing));
-    let outcome = loop {
-        // An epoch at a time: a part is kept after each.
-        let mut last = None;
-        let outcome = trainer
-            .run(&training, &validation, workers, &mut |epoch| {
-                last = Some(*epoch);
-                ControlFlow::Break(())
-            })
-            .map_err(Failure::usage)?;
-        if let Some(epoch) = last {
+    let outcome = super::train(
+        &mut trainer,
+        [&training, &validation],
+        workers,
+        Some(part),
+        |epoch| {
             bar.set_position(epoch.number);
             bar.set_message(format!(
                 "loss {:.4}, of unseen cycles {:.4}",
                 epoch.training_loss, epoch.validation_loss
             ));
-            part.write(&trainer)?;
-        }
-        if outcome != Outcome::Paused {
-            break outcome;
-        }
-    };
+        },
+    )?;
     bar.finish_and_clear();
     Ok((trainer, outcome))
 }
