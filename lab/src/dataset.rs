@@ -188,25 +188,3 @@ impl Example {
         ]
     }
 }
-
-/// The process of these values, whatever put them out: a ratio of poles and a dead time beyond what
-/// they can be are the nearest that can. Its faster pole is the actuator's.
-///
-/// # Errors
-/// Where the period, the amplitude or a value is not finite.
-pub fn process_of(
-    values: [f64; VALUES],
-    signature: &Signature,
-    period_s: f64,
-) -> Result<Process, ProcessError> {
-    let [ln_pole_sum, pole_ratio, delay, ln_amplitude] = values;
-    let gain = signature.amplitude / (ln_amplitude.exp() * period_s.powi(3));
-    // The gain goes with the actuator's lag, which is known only with the poles.
-    let shape = Process::from_pole_sum(
-        signature.sign,
-        ln_pole_sum.exp() / period_s,
-        pole_ratio.clamp(0.0, 0.25),
-        delay.max(0.0) * period_s,
-    )?;
-    shape.with_gain_scaled(gain * shape.t_prop_s())
-}

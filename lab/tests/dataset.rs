@@ -7,11 +7,12 @@ use std::ops::{ControlFlow, Range};
 
 use onecycle_lab::dataset::learning::{self, Wanted};
 use onecycle_lab::dataset::shards::Record;
-use onecycle_lab::dataset::{Draw, Example, Family, Recipe, RecipeError, VALUES, process_of};
+use onecycle_lab::dataset::{Draw, Example, Family, Recipe, RecipeError, VALUES};
 use onecycle_lab::train::{
     Gaussian, Layer, Loss, Method, Network, OneThread, Schedule, Settings, Shape, Trainer,
 };
 use onecycle_lab::{deterioration, ise, pd_at_phase_margin};
+use onecycle_onboard::classify::process_of;
 use onecycle_onboard::signature::LENGTH;
 use onecycle_onboard::{Pd, Process};
 use rand::{RngExt, SeedableRng};
@@ -87,7 +88,7 @@ fn values_are_the_process() {
     alike.space.t_body_s = (0.2, 0.3);
     recipe.families.push(alike);
     for example in examples(&recipe, 0..100) {
-        let back = process_of(example.values(), &example.signature, example.period_s).unwrap();
+        let back = process_of(&example.values(), &example.signature, example.period_s).unwrap();
         same(&back, &example.process);
         let is_slow = example.process.t_body_s() < Some(example.process.t_prop_s());
         slow_actuators += usize::from(is_slow);
@@ -120,7 +121,7 @@ fn values_are_regular_where_the_lags_meet() {
         same(&one, &other);
     }
     same(
-        &process_of(at, &template.signature, template.period_s).unwrap(),
+        &process_of(&at, &template.signature, template.period_s).unwrap(),
         &equal,
     );
 }
@@ -176,7 +177,7 @@ fn cost_at(example: &Example, d: [f64; VALUES]) -> f64 {
     let margin = 20_f64.to_radians();
     let values = example.values();
     let moved = std::array::from_fn(|k| values[k] + d[k]);
-    let found = process_of(moved, &example.signature, example.period_s).unwrap();
+    let found = process_of(&moved, &example.signature, example.period_s).unwrap();
     let made = pd_at_phase_margin(&found, margin).unwrap();
     let best = pd_at_phase_margin(&example.process, margin).unwrap();
     deterioration(made.pd, &example.process, &best)
@@ -374,7 +375,7 @@ fn a_small_network_learns_controllers() {
             let example = &record.example;
             let density = Gaussian::from_outputs(VALUES, outputs.row(row)).unwrap();
             let values = learning::values(std::array::from_fn(|k| density.mean[k]));
-            let found = process_of(values, &example.signature, example.period_s).unwrap();
+            let found = process_of(&values, &example.signature, example.period_s).unwrap();
             let made = pd_at_phase_margin(&found, margin).unwrap();
             let best = pd_at_phase_margin(&example.process, margin).unwrap();
             deterioration(made.pd, &example.process, &best)

@@ -6,7 +6,7 @@
 
 use std::ops::ControlFlow;
 
-use onecycle_lab::dataset::{Example, Recipe, VALUES, process_of};
+use onecycle_lab::dataset::{Example, Recipe, VALUES};
 use onecycle_lab::outsiders::calibrate::calibrate;
 use onecycle_lab::outsiders::harm::Harm;
 use onecycle_lab::outsiders::judge::{Road, judge, scored};
@@ -281,12 +281,7 @@ fn a_perfect_cycle_scores_nothing() {
     let score = |values| {
         let outputs = sure(values);
         let (signature, period_s) = (&example.signature, example.period_s);
-        let found = classify(&outputs, signature, period_s, 0.0, &Calibration::UNTRAINED).unwrap();
-        let process = found.candidates[0].process;
-        let by_dataset = process_of(found.posterior.mean, signature, period_s).unwrap();
-        assert!((process.tau_s() / by_dataset.tau_s() - 1.0).abs() < 1e-14);
-        assert!((process.k_over_t_body() / by_dataset.k_over_t_body() - 1.0).abs() < 1e-14);
-        found
+        classify(&outputs, signature, period_s, 0.0, &Calibration::UNTRAINED).unwrap()
     };
     let values = example.values();
     let found = score(values);

@@ -21,7 +21,7 @@
 //!
 //! ```text
 //! width = -mean l_i,   usual = w_0 + w_1 ln(sigma / (a sqrt(N)) + 1e-4) + w_2 ln N
-//! score = max((statistic + (max(width - usual, 0) / w_sigma)^2) / limit,   sigma / (a most_noise))
+//! score = max((statistic + 2 (max(width - usual, 0) / w_sigma)^2) / limit,   sigma / (a most_noise))
 //! ```
 //!
 //! Above one the cycle is none of this family's, or noisier than any that the network knows: an
@@ -35,7 +35,7 @@ use libm::{exp, hypot, sqrt};
 
 pub use self::calibration::Calibration;
 
-use crate::fit_score::{Response, harmonics};
+use crate::fit_score::{self, Doubt, MOST_POLE_RATIO, harmonics};
 pub use crate::pack::OUTPUTS;
 use crate::pack::{Pack, VALUES};
 use crate::process::{Process, ProcessError};
@@ -194,6 +194,10 @@ impl Posterior {
     }
 }
 
+/// Weight of a doubt that is wider than usual. Of the harmful cycles out of the family 94, 96, 96 and 97 % are
+/// unknown with weights of 0, 1, 2 and 4, of the paper's multirotors 0.8, 1.1, 1.3 and 2.1 %.
+const DOUBT: f64 = 2.0;
+
 /// Steps of the power method: where the second axis is 0.9 of the longest, its part falls to 0.9^48 = 0.6 %.
 const AXIS_STEPS: usize = 24;
 
@@ -242,7 +246,7 @@ pub fn classify(
     let samples = exp(f64::from(signature.values[PARTS + 1]));
     let excess = calibration.excess(outputs, noise, samples);
     let statistic = statistic(&posterior, signature, noise, calibration);
-    let misfit = (statistic + excess * excess) / calibration.limit;
+    let misfit = (statistic + DOUBT * excess * excess) / calibration.limit;
     let score = misfit.max(noise / calibration.most_noise);
     Ok(Classification {
         posterior,
@@ -271,9 +275,12 @@ pub fn classify_by(
     classify(&outputs, signature, period_s, noise_sigma, &calibration)
 }
 
-/// The process of these values: a ratio of poles and a dead time beyond what they can be are the
-/// nearest that can.
-fn process_of(
+/// The process of these values, whatever put them out: a ratio of poles and a dead time beyond what
+/// they can be are the nearest that can. Its faster pole is the actuator's.
+///
+/// # Errors
+/// Where the period, the amplitude or a value is not finite.
+pub fn process_of(
     values: &[f64; VALUES],
     signature: &Signature,
     period_s: f64,
@@ -282,9 +289,10 @@ fn process_of(
     let unit = Process::from_pole_sum(
         signature.sign,
         exp(ln_pole_sum) / period_s,
-        pole_ratio.clamp(0.0, 0.25),
+        pole_ratio.clamp(0.0, MOST_POLE_RATIO),
         delay.max(0.0) * period_s,
     )?;
+    // The gain goes with the actuator's lag, which is known only with the poles.
     let jerk_gain = signature.amplitude / (exp(ln_amplitude) * period_s * period_s * period_s);
     unit.with_gain_scaled(jerk_gain * unit.t_prop_s())
 }
@@ -299,12 +307,14 @@ fn statistic(
     let parts = core::array::from_fn(|part| f64::from(signature.values[part]));
     let duty = f64::from(signature.values[PARTS]);
     let samples = exp(f64::from(signature.values[PARTS + 1]));
-    let response = Response::new(&posterior.mean, duty, samples);
-    let jump = calibration.jump + calibration.jump_of_noise * noise;
-    // A harmonic has 1/32 of the variance of a part, half of it real, and a part is the mean of N/32
-    // samples.
-    let sigma = hypot(calibration.floor, noise * sqrt(0.5 / samples));
-    response.statistic(&harmonics(&parts), &posterior.root, jump, sigma)
+    let doubt = Doubt {
+        root: &posterior.root,
+        jump: calibration.jump + calibration.jump_of_noise * noise,
+        // A harmonic has 1/32 of the variance of a part, half of it real, and a part is the mean of N/32
+        // samples.
+        sigma: hypot(calibration.floor, noise * sqrt(0.5 / samples)),
+    };
+    fit_score::statistic(&harmonics(&parts), &posterior.mean, &doubt, duty, samples)
 }
 
 #[cfg(test)]
@@ -412,14 +422,14 @@ mod tests {
             classify(&OUTPUT, &signature(), 0.4, 0.0, &calibration).unwrap()
         };
         let statistic = at(1.0).score;
-        assert!(statistic > 1000.0 && statistic.is_finite(), "{statistic}");
+        assert!(statistic > 100.0 && statistic.is_finite(), "{statistic}");
         assert_eq!(at(1.0).verdict, Verdict::Unknown);
         assert_eq!(at(0.999 * statistic).verdict, Verdict::Unknown);
         assert_eq!(at(1.001 * statistic).verdict, Verdict::Known);
     }
 
     // Outputs whose diagonal is 3 on average are e^-3 wide; 0.3 wider than usual at 0.1 is three standard
-    // deviations, nine more in the sum.
+    // deviations, twice nine more in the sum.
     #[test]
     fn doubt_counts() {
         assert_eq!(Calibration::width_of(&OUTPUT), -3.25);
@@ -434,7 +444,7 @@ mod tests {
                 .unwrap()
                 .score
         };
-        assert!((at(-3.55) - at(-3.25) - 9.0).abs() < 1e-6);
+        assert!((at(-3.55) - at(-3.25) - 18.0).abs() < 1e-6);
         assert_eq!(at(-3.25), at(0.0));
     }
 

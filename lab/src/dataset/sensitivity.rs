@@ -11,7 +11,9 @@
 //! linear near zero, and `|g . d|` is what an estimate that is off by `d` costs, to first order: within
 //! 5 % of costs up to 1 %. Of far errors it says too much, above all of a ratio of poles off by 0.05.
 
-use super::{Example, VALUES, process_of};
+use onecycle_onboard::classify::process_of;
+
+use super::{Example, VALUES};
 use crate::cost::ise;
 use crate::optimum::pd_at_phase_margin;
 
@@ -41,7 +43,7 @@ impl Example {
         let cost = |k: usize, value: f64| {
             let mut values = truth;
             values[k] = value;
-            let found = process_of(values, &self.signature, self.period_s).ok()?;
+            let found = process_of(&values, &self.signature, self.period_s).ok()?;
             let made = pd_at_phase_margin(&found, phase_margin_rad).ok()?;
             Some(ise(&self.process, made.pd)? / best.ise)
         };

@@ -37,15 +37,16 @@ impl Calibration {
     /// Of no network yet: no width is too wide and no noise too much, and any statistic is of the family that chi-squared
     /// of 30 degrees of freedom exceeds in 2 % of cases.
     ///
-    /// Jumps: 0.3 % of the amplitude with noise of 0.5 % and less, 0.5 % with 2..3 %, from what the
-    /// true processes leave of 600 cycles of multirotors; the floor is what they leave there without noise.
+    /// Jumps: twice the 0.3 % of the amplitude with noise of 0.5 % and less, 0.5 % with 2..3 %, that the true
+    /// processes leave of 600 trimmed cycles of multirotors, for those of untrimmed relays leave more; the
+    /// floor is what the trimmed ones leave without noise.
     pub const UNTRAINED: Self = Self {
         scale: [1.0, 8.0, 8.0, 1.0],
         temperature: [1.0; VALUES],
         range: [[f64::NEG_INFINITY; VALUES], [f64::INFINITY; VALUES]],
         floor: 3e-4,
-        jump: 4e-3,
-        jump_of_noise: 0.13,
+        jump: 8e-3,
+        jump_of_noise: 0.26,
         width: [0.0; 3],
         width_sigma: f64::INFINITY,
         limit: 47.96,

@@ -7,7 +7,7 @@ use onecycle_lab::campaign::Campaign;
 use onecycle_lab::dataset::ExampleError;
 use onecycle_lab::outsiders::Kind;
 use onecycle_lab::outsiders::judge::{CYCLES, Judgement, Road, judge};
-use onecycle_onboard::classify::{Calibration, Verdict};
+use onecycle_onboard::classify::{Calibration, ClassifyError, Verdict};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::Signature;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ use crate::settings;
 /// Cases of the family for one of each kind out of it: what is rare there counts most.
 const IN_FAMILY: u64 = 5;
 
-/// The cases' outcomes as a table. Without a network there is no score, and its columns are left out.
+/// The cases' outcomes as a table.
 pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure> {
     let recipe = campaign.recipe();
     recipe
@@ -27,10 +27,11 @@ pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure>
         .map_err(|error| settings::out_of_range(file, error))?;
     let pack = Pack::embedded().map_err(Failure::usage)?;
     let network = |signature: &Signature| pack.outputs(&signature.values);
-    let road = Calibration::of_pack(&pack).map(|calibration| Road {
+    let road = Road {
         network: &network,
-        calibration,
-    });
+        calibration: Calibration::of_pack(&pack)
+            .ok_or_else(|| Failure::usage(ClassifyError::Pack))?,
+    };
     let kinds = || std::iter::once(Kind::InFamily).chain(Kind::OUTSIDE);
     let cases = |kind| match kind {
         Kind::InFamily => IN_FAMILY * campaign.cases,
@@ -42,7 +43,7 @@ pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure>
         let outcomes: Vec<Option<Judgement>> = (0..cases(kind))
             .into_par_iter()
             .map(|n| {
-                let outcome = judge(&recipe, kind, n, road.as_ref());
+                let outcome = judge(&recipe, kind, n, Some(&road));
                 bar.inc(1);
                 outcome
             })
@@ -51,30 +52,29 @@ pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure>
         rows.push((kind, outcomes.into_iter().flatten().collect::<Vec<_>>()));
     }
     bar.finish_and_clear();
-    Ok(text(campaign, &rows, road.is_some()))
+    Ok(text(campaign, &rows))
 }
 
-fn text(campaign: &Campaign, rows: &[(Kind, Vec<Judgement>)], has_score: bool) -> String {
+fn text(campaign: &Campaign, rows: &[(Kind, Vec<Judgement>)]) -> String {
     let mut text = format!(
         "{} random processes with each defect, bias up to {} h, noise up to {} of the amplitude, trim {}\n\
          refused, and accepted although the controller costs over 10 % more than promised, of {} \
-         cycles\n",
+         cycles; silent: of these last, those whose last cycle is not called unknown either\n",
         campaign.cases,
         campaign.bias,
         campaign.sigma,
         if campaign.trim { "on" } else { "off" },
         CYCLES.map(|cycles| cycles.to_string()).join(", "),
     );
-    let of_score = if has_score {
-        "  harmful unknown  harmless unknown"
-    } else {
-        ""
-    };
     let of_cycles: String = CYCLES
         .map(|cycles| format!("  refused {cycles} harmful {cycles}"))
         .concat();
     // Writing to a string cannot fail.
-    let _ = writeln!(text, "{:<13} cases unsteady{of_score}{of_cycles}", "kind");
+    let _ = writeln!(
+        text,
+        "{:<13} cases unsteady  harmful unknown  harmless unknown{of_cycles} silent",
+        "kind"
+    );
     for (kind, outcomes) in rows {
         let unsteady = outcomes.iter().filter(|outcome| !outcome.is_steady).count();
         let _ = write!(
@@ -83,17 +83,15 @@ fn text(campaign: &Campaign, rows: &[(Kind, Vec<Judgement>)], has_score: bool) -
             kind.name(),
             outcomes.len()
         );
-        if has_score {
-            for harmful in [true, false] {
-                let [all, unknown] = by_score(outcomes, harmful);
-                let _ = write!(text, "  {all:8} {unknown:7}");
-            }
+        for harmful in [true, false] {
+            let [all, unknown] = by_score(outcomes, harmful);
+            let _ = write!(text, "  {all:8} {unknown:7}");
         }
         for k in 0..CYCLES.len() {
             let [refused, harmful] = by_identification(outcomes, k);
             let _ = write!(text, "  {refused:9} {harmful:9}");
         }
-        text.push('\n');
+        let _ = writeln!(text, " {:6}", silent(outcomes));
     }
     text
 }
@@ -118,4 +116,16 @@ fn by_identification(outcomes: &[Judgement], k: usize) -> [usize; 2] {
     };
     let harmful = accepted().filter(|harm| harm.is_harmful());
     [outcomes.len() - accepted().count(), harmful.count()]
+}
+
+/// Harmful, accepted from the most cycles, and without a word on the last of them.
+fn silent(outcomes: &[Judgement]) -> usize {
+    (outcomes.iter())
+        .filter(|outcome| {
+            let is_accepted = (outcome.identified.last().copied().flatten())
+                .is_some_and(|harm| harm.is_harmful());
+            let is_known = (outcome.scored).is_none_or(|scored| scored.verdict == Verdict::Known);
+            is_accepted && is_known
+        })
+        .count()
 }
