@@ -258,7 +258,9 @@ fn a_hole_in_the_middle() {
 fn holes_in_every_cycle() {
     let mut table = Table::clean();
     table.0.retain(|sample| sample.time_s % 0.4 > 0.03);
-    identify(table.csv(), &[]).no_process("too_short");
+    let report = identify(table.csv(), &[]).no_process("too_short");
+    let message = report.0["verdict"]["message"].as_str().unwrap();
+    assert!(message.contains("gaps"), "{message}");
 }
 
 #[test]

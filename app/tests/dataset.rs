@@ -7,10 +7,8 @@ mod common;
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Stdio;
-use std::time::{Duration, Instant};
 
-use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, names_in, onecycle, run};
+use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, killed_when, names_in, run};
 use serde_json::Value;
 
 /// The file of this repository.
@@ -171,27 +169,11 @@ fn the_same_bytes_however_they_come_about() {
 
 /// Runs and ends it by force once the manifest lists a file.
 fn stopped(arguments: &[&str], folder: &Path) {
-    let mut child = onecycle()
-        .args(arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let begin = Instant::now();
     let lists_a_file = || {
         let text = std::fs::read_to_string(folder.join("manifest.json")).unwrap_or_default();
         text.contains("sha256")
     };
-    while !lists_a_file() {
-        assert!(
-            child.try_wait().unwrap().is_none(),
-            "done before it was stopped"
-        );
-        assert!(begin.elapsed() < Duration::from_secs(60), "no file");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
+    killed_when(arguments, lists_a_file);
 }
 
 // ---------------------------------------------------------------- Parquet

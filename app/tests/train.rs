@@ -5,10 +5,7 @@
 
 mod common;
 
-use std::process::Stdio;
-use std::time::{Duration, Instant};
-
-use common::{NOT_WRITTEN, Scratch, UNREADABLE, onecycle, run};
+use common::{NOT_WRITTEN, Scratch, UNREADABLE, killed_when, run};
 use serde_json::Value;
 
 /// Seconds of work: 2 losses, 6 epochs each.
@@ -16,25 +13,6 @@ const RECIPE: &str = include_str!("../../experiments/paper_network_small.toml");
 
 fn recipe(folder: &Scratch) -> String {
     folder.write("recipe.toml", RECIPE.as_bytes())
-}
-
-/// Ends a run by force as soon as this file is there.
-fn killed_after(arguments: &[&str], part: &std::path::Path) {
-    let mut child = onecycle()
-        .args(arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let begin = Instant::now();
-    while !part.exists() {
-        let ended = child.try_wait().unwrap();
-        assert!(ended.is_none(), "it was done before it was stopped");
-        assert!(begin.elapsed() < Duration::from_secs(60), "no {part:?}");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
 }
 
 /// A report without the times that it took.
@@ -103,7 +81,7 @@ fn from_recipe_to_table_and_network_through_interruptions() {
         "3",
     ];
     for part in ["out.safetensors.1.part", "out.safetensors.2.part"] {
-        killed_after(&resumed, &folder.path(part));
+        killed_when(&resumed, || folder.path(part).exists());
         assert!(!folder.path("out.safetensors").exists());
     }
     let resumed = run(&resumed);
@@ -179,7 +157,9 @@ fn a_part_of_something_else() {
     let recipe = recipe(&folder);
     let out = folder.name("out.safetensors");
     let part = folder.path("out.safetensors.1.part");
-    killed_after(&["train", "--recipe", &recipe, "-o", &out], &part);
+    killed_when(&["train", "--recipe", &recipe, "-o", &out], || {
+        part.exists()
+    });
     let left = std::fs::read(&part).unwrap();
     let other = folder.write(
         "other.toml",

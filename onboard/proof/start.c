@@ -48,6 +48,14 @@ int memcmp(const void *left, const void *right, size_t count)
 /* Null, or a sentence for what went wrong: see src/lib.rs. */
 const char *onecycle_proof(void);
 
+struct size {
+    const char *name;
+    size_t bytes;
+};
+
+/* Something that takes room; no name behind the last. */
+struct size onecycle_proof_size(size_t index);
+
 /* The kernel enters with the stack aligned to 16; a C function expects a call to have moved it. */
 __asm__(".globl _start\n"
         "_start:\n"
@@ -65,13 +73,31 @@ static long system_call(long number, long first, const void *second, long third)
     return result;
 }
 
-static void write_line(const char *line)
+static void write_text(const char *text)
 {
     long length = 0;
-    while (line[length] != 0)
+    while (text[length] != 0)
         length++;
-    system_call(1, 1, line, length);
-    system_call(1, 1, "\n", 1);
+    system_call(1, 1, text, length);
+}
+
+static void write_line(const char *line)
+{
+    write_text(line);
+    write_text("\n");
+}
+
+static void write_size(const char *name, size_t bytes)
+{
+    char digits[24];
+    char *first = digits + sizeof digits - 1;
+    *first = 0;
+    do
+        *--first = (char)('0' + bytes % 10);
+    while ((bytes /= 10) > 0);
+    write_text(name);
+    write_text(" ");
+    write_line(first);
 }
 
 __attribute__((noreturn)) static void leave(long status)
@@ -86,9 +112,24 @@ __attribute__((noreturn)) void onecycle_proof_panicked(void)
     leave(101);
 }
 
+/* The stack below the caller is painted, and after the run its lowest byte that has changed is the
+   high-water mark: 8 bytes more or less where the last value there happens to be paint. */
+enum { PAINT = 0xa5, PAINTED = 1 << 20, MARGIN = 64 };
+
 __attribute__((noreturn, used)) void onecycle_proof_main(void)
 {
+    volatile unsigned char *top;
+    __asm__ volatile("mov %%rsp, %0" : "=r"(top));
+    volatile unsigned char *bottom = top - PAINTED;
+    for (volatile unsigned char *at = top - MARGIN; at != bottom;)
+        *--at = PAINT;
     const char *wrong = onecycle_proof();
+    while (bottom != top && *bottom == PAINT)
+        bottom++;
     write_line(wrong ? wrong : "ok");
+    write_size("stack", (size_t)(top - bottom));
+    struct size size;
+    for (size_t index = 0; (size = onecycle_proof_size(index)).name; index++)
+        write_size(size.name, size.bytes);
     leave(wrong ? 1 : 0);
 }

@@ -39,6 +39,7 @@ use crate::fit_score::{self, Doubt, MOST_POLE_RATIO, harmonics};
 pub use crate::pack::OUTPUTS;
 use crate::pack::{Pack, VALUES};
 use crate::process::{Process, ProcessError};
+use crate::refine::{Shape, shape_of};
 use crate::signature::{PARTS, Signature};
 
 /// Candidates of a classification.
@@ -65,6 +66,15 @@ pub struct Classification {
     pub score: f64,
     /// Whether the cycle is of the family.
     pub verdict: Verdict,
+}
+
+impl Classification {
+    /// The candidates as shapes of an oscillation of this period (s), for a refinement to start from.
+    #[must_use]
+    pub fn starts(&self, period_s: f64) -> [Shape; CANDIDATES] {
+        self.candidates
+            .map(|candidate| shape_of(&candidate.process, period_s))
+    }
 }
 
 /// Whether a cycle is of the family.

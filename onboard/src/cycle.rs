@@ -71,6 +71,14 @@ impl CycleDetector {
         self.turn(began_s, high)
     }
 
+    /// No more samples: a level that has begun counts, although it has not lasted yet. Returns the cycle
+    /// that this completes.
+    #[must_use]
+    pub fn finish(mut self) -> Option<Cycle> {
+        let (high, began_s) = self.candidate?;
+        self.turn(began_s, high)
+    }
+
     fn turn(&mut self, time_s: f64, high: bool) -> Option<Cycle> {
         if !high {
             self.fall_s = time_s;
@@ -199,6 +207,29 @@ mod tests {
                 (high != (glitch(k) && !edge), output)
             }));
             assert_eq!(found, clean, "glitch at {at}");
+        }
+    }
+
+    // Rises at samples 64 and 128: the second counts six samples later (a quarter of the last half period that
+    // is over, 24), at sample 134. Ended before, the cycle is the same; without sample 128 there is none.
+    #[test]
+    fn the_last_edge_ends_a_cycle_that_samples_no_longer_confirm() {
+        let complete = cycles((0..135).map(square));
+        assert_eq!(complete.len(), 1);
+        for count in 127..=135 {
+            let mut detector = CycleDetector::new();
+            let found: Vec<Cycle> = (0..count)
+                .filter_map(|k| {
+                    let (high, output) = square(k);
+                    detector.push(k as f64 / 64.0, high, output)
+                })
+                .collect();
+            assert_eq!(found.len(), usize::from(count == 135), "{count}");
+            let last = detector.finish();
+            assert_eq!(last.is_some(), (129..135).contains(&count), "{count}");
+            if let Some(last) = last {
+                assert_eq!(last, complete[0]);
+            }
         }
     }
 

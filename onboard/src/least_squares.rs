@@ -29,7 +29,13 @@ impl<const M: usize, const N: usize> Columns<M, N> {
     /// those before it becomes zero, with a zero on the diagonal.
     pub(crate) fn orthonormalise(&mut self) -> Triangle<M> {
         let mut r = [[0.0; M]; M];
-        for j in 0..M {
+        self.orthonormalise_from(0, &mut r);
+        r
+    }
+
+    /// The same where the columns before `first` are orthonormal already; `r` holds what they were.
+    pub(crate) fn orthonormalise_from(&mut self, first: usize, r: &mut Triangle<M>) {
+        for j in first..M {
             let before = norm(&self.column[j][..self.rows]);
             let (basis, rest) = self.column.split_at_mut(j);
             for (i, q) in basis.iter().enumerate() {
@@ -45,7 +51,6 @@ impl<const M: usize, const N: usize> Columns<M, N> {
                 rest[0][..self.rows].fill(0.0);
             }
         }
-        r
     }
 
     /// Takes the parts along the basis out of `vector` and returns them.

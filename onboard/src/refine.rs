@@ -30,9 +30,10 @@ mod uncertainty;
 
 use core::f64::consts::TAU;
 
-use libm::{exp, log, sqrt};
+use libm::{exp, sqrt};
 
 use self::descent::NormalEquations;
+pub(crate) use self::domain::shape_of;
 pub use self::domain::{DomainEdge, Shape};
 use self::domain::{HIGHEST, SHAPE, clamp, domain_edge};
 use self::fundamental::Fundamental;
@@ -161,9 +162,10 @@ pub fn residuals<const BINS: usize, const EDGES: usize>(
     residuals: &mut [f64; BINS],
 ) -> Result<usize, RefineError> {
     let estimator = Estimator::new(window, period_s)?;
-    let (sum_per_s, ratio) = process.pole_sum();
-    let shape = [log(sum_per_s * period_s), ratio, process.tau_s() / period_s];
-    let fit = estimator.fit(&shape).ok_or(RefineError::NoFit)?;
+    let mut fit = LinearFit::room();
+    estimator
+        .fit(&shape_of(process, period_s), &mut fit)
+        .ok_or(RefineError::NoFit)?;
     *residuals = fit.residual;
     for (residual, weight) in residuals.iter_mut().zip(&estimator.weight) {
         *residual = if *weight > 0.0 {
@@ -202,6 +204,19 @@ struct LinearFit<const BINS: usize> {
     coefficients: [f64; LINEAR],
     residual: [f64; BINS],
     cost: f64,
+}
+
+impl<const BINS: usize> LinearFit<BINS> {
+    /// Room for one: a fit is most of the memory that the estimator takes, so it is made where it stays.
+    fn room() -> Self {
+        Self {
+            basis: Columns::zero(0),
+            triangle: [[0.0; LINEAR]; LINEAR],
+            coefficients: [0.0; LINEAR],
+            residual: [0.0; BINS],
+            cost: f64::INFINITY,
+        }
+    }
 }
 
 impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
@@ -261,30 +276,33 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
 
     fn run(&self, given: &[Shape]) -> Result<Refined, RefineError> {
         let suggested = self.fundamental.starts();
+        let mut fits = [LinearFit::room(), LinearFit::room()];
         let mut starts = [([0.0; SHAPE], f64::INFINITY); SEARCHED];
         for start in given.iter().chain(&suggested) {
             let start = clamp(start);
-            let cost = self.fit(&start).map_or(f64::INFINITY, |fit| fit.cost);
+            let cost = self.fit(&start, &mut fits[0]).unwrap_or(f64::INFINITY);
             if let Some(place) = starts.iter().position(|&(_, other)| cost < other) {
                 starts[place..].rotate_right(1);
                 starts[place] = (start, cost);
             }
         }
         let mut steps = 0;
-        let mut best: Option<(Shape, LinearFit<BINS>)> = None;
+        let mut best: Option<(Shape, f64)> = None;
         for (start, _) in starts.iter().filter(|(_, cost)| cost.is_finite()) {
-            if let Some((shape, fit)) = self.search(*start, &mut steps)
-                && best.as_ref().is_none_or(|(_, least)| fit.cost < least.cost)
+            if let Some((shape, cost)) = self.search(*start, &mut fits, &mut steps)
+                && best.is_none_or(|(_, least)| cost < least)
             {
-                let is_noise = fit.cost <= self.cost_of_noise();
-                best = Some((shape, fit));
-                if is_noise {
+                best = Some((shape, cost));
+                if cost <= self.cost_of_noise() {
                     break;
                 }
             }
         }
-        let (shape, fit) = best.ok_or(RefineError::NoFit)?;
-        self.result(&shape, &fit, steps)
+        let (shape, _) = best.ok_or(RefineError::NoFit)?;
+        // Made again rather than kept, for want of room.
+        let [fit, _] = &mut fits;
+        self.fit(&shape, fit).ok_or(RefineError::NoFit)?;
+        self.result(&shape, fit, steps)
     }
 
     /// Sum of squares that white noise as seen in the samples would leave, and a quarter more.
@@ -329,16 +347,28 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         rows[bins + 1] = self.distortion_row * distortion;
     }
 
-    fn fit(&self, shape: &Shape) -> Option<LinearFit<BINS>> {
+    /// The model at a shape, whose process there may not be.
+    #[inline(never)]
+    fn model_at(&self, shape: &Shape, of: &[f64; LINEAR], rows: &mut [f64; BINS]) -> Option<()> {
         let response = Response::new(&self.process(shape)?, self.grid, self.window.edges());
-        let mut basis = Columns::zero(self.rows);
-        for (index, column) in basis.column.iter_mut().enumerate() {
+        self.model(&response, of, rows);
+        Some(())
+    }
+
+    /// The linear fit at a shape, into `fit`; `None` where there is no such process or no finite fit.
+    #[inline(never)]
+    fn fit(&self, shape: &Shape, fit: &mut LinearFit<BINS>) -> Option<f64> {
+        let response = Response::new(&self.process(shape)?, self.grid, self.window.edges());
+        fit.basis.rows = self.rows;
+        for (index, column) in fit.basis.column.iter_mut().enumerate() {
             let mut unit = [0.0; LINEAR];
             unit[index] = 1.0;
+            column.fill(0.0);
             self.model(&response, &unit, column);
         }
-        let triangle = basis.orthonormalise();
-        let mut residual = [0.0; BINS];
+        fit.triangle = fit.basis.orthonormalise();
+        let residual = &mut fit.residual;
+        residual.fill(0.0);
         for (k, bin) in self.window.bins().iter().enumerate() {
             if self.weight[k] > 0.0 {
                 residual[k] = bin.output_sum / self.weight[k];
@@ -350,27 +380,25 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
                 *row = -self.sigma * deviation;
             }
         }
-        let parts = basis.project_out(&mut residual[..self.rows]);
-        let cost = dot(&residual[..self.rows], &residual[..self.rows]);
-        let coefficients = back_substitute(&triangle, &parts);
-        cost.is_finite().then_some(LinearFit {
-            basis,
-            triangle,
-            coefficients,
-            residual,
-            cost,
-        })
+        let parts = fit.basis.project_out(&mut residual[..self.rows]);
+        fit.cost = dot(&residual[..self.rows], &residual[..self.rows]);
+        fit.coefficients = back_substitute(&fit.triangle, &parts);
+        fit.cost.is_finite().then_some(fit.cost)
     }
 
-    /// Derivatives of the fitted model by the shape, the coefficients held.
-    fn jacobian(&self, shape: &Shape, fit: &LinearFit<BINS>) -> Option<Columns<3, BINS>> {
+    /// Derivatives of the fitted model by the shape, the coefficients held, into `jacobian`.
+    #[inline(never)]
+    fn jacobian(
+        &self,
+        shape: &Shape,
+        coefficients: &[f64; LINEAR],
+        jacobian: &mut [[f64; BINS]],
+    ) -> Option<()> {
         // Small enough for a truncation error of 1e-6, large enough for rounding of 1e-9.
         const STEP: f64 = 1e-6;
         let mut here = [0.0; BINS];
-        let response = Response::new(&self.process(shape)?, self.grid, self.window.edges());
-        self.model(&response, &fit.coefficients, &mut here);
-        let mut jacobian = Columns::zero(self.rows);
-        for (index, column) in jacobian.column.iter_mut().enumerate() {
+        self.model_at(shape, coefficients, &mut here)?;
+        for (index, column) in jacobian.iter_mut().enumerate() {
             let mut moved = *shape;
             let step = if shape[index] + STEP > HIGHEST[index] {
                 -STEP
@@ -378,37 +406,45 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
                 STEP
             };
             moved[index] += step;
-            let response = Response::new(&self.process(&moved)?, self.grid, self.window.edges());
-            self.model(&response, &fit.coefficients, column);
+            column.fill(0.0);
+            self.model_at(&moved, coefficients, column)?;
             for (value, here) in column.iter_mut().zip(&here) {
                 *value = (*value - here) / step;
             }
         }
         if let Some(prior) = &self.prior {
-            prior.add_to(&mut jacobian, self.rows - SHAPE, self.sigma);
+            prior.add_to(jacobian, self.rows - SHAPE, self.sigma);
         }
-        Some(jacobian)
+        Some(())
     }
 
     /// Levenberg-Marquardt inside the domain; a coordinate at its limit stays there while the
     /// descent points outwards.
-    fn search(&self, start: Shape, steps: &mut u32) -> Option<(Shape, LinearFit<BINS>)> {
+    #[inline(never)]
+    fn search(
+        &self,
+        start: Shape,
+        [fit, candidate]: &mut [LinearFit<BINS>; 2],
+        steps: &mut u32,
+    ) -> Option<(Shape, f64)> {
         let mut shape = start;
-        let mut fit = self.fit(&shape)?;
+        self.fit(&shape, fit)?;
         let mut damping = 1e-2;
+        let mut jacobian = Columns::zero(self.rows);
         for _ in 0..MOST_STEPS {
             *steps += 1;
-            let mut jacobian = self.jacobian(&shape, &fit)?;
+            self.jacobian(&shape, &fit.coefficients, &mut jacobian.column)?;
             for column in &mut jacobian.column {
                 fit.basis.project_out(&mut column[..self.rows]);
             }
             let normal = NormalEquations::new(&jacobian, &fit.residual, &shape);
             let before = fit.cost;
             while damping < 1e12 {
-                let candidate = clamp(&normal.step(&shape, damping));
-                match self.fit(&candidate) {
-                    Some(better) if better.cost < fit.cost => {
-                        (shape, fit) = (candidate, better);
+                let tried = clamp(&normal.step(&shape, damping));
+                match self.fit(&tried, candidate) {
+                    Some(cost) if cost < fit.cost => {
+                        shape = tried;
+                        core::mem::swap(fit, candidate);
                         damping *= 0.1;
                         break;
                     }
@@ -422,7 +458,7 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
                 break;
             }
         }
-        Some((shape, fit))
+        Some((shape, fit.cost))
     }
 
     fn result(
@@ -453,36 +489,27 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         })
     }
 
-    /// The derivatives of the fitted model by all unknowns, orthonormalised.
-    fn tangent(&self, shape: &Shape, fit: &LinearFit<BINS>) -> Option<Tangent<BINS>> {
-        let mut jacobian = self.jacobian(shape, fit)?;
-        let mut triangle = [[0.0; ALL]; ALL];
-        for (i, row) in fit.triangle.iter().enumerate() {
-            triangle[i][..LINEAR].copy_from_slice(row);
+    /// The derivatives of the fitted model by all unknowns, orthonormalised, into `tangent`.
+    fn tangent(
+        &self,
+        shape: &Shape,
+        fit: &LinearFit<BINS>,
+        tangent: &mut Tangent<'_, BINS>,
+    ) -> Option<()> {
+        for (row, known) in tangent.triangle.iter_mut().zip(&fit.triangle) {
+            row[..LINEAR].copy_from_slice(known);
         }
-        for (j, column) in jacobian.column.iter_mut().enumerate() {
-            let along = fit.basis.project_out(&mut column[..self.rows]);
-            for (i, part) in along.into_iter().enumerate() {
-                triangle[i][LINEAR + j] = part;
-            }
-        }
-        let inner = jacobian.orthonormalise();
-        for (i, row) in inner.iter().enumerate() {
-            triangle[LINEAR + i][LINEAR..].copy_from_slice(row);
-        }
-        let mut basis = Columns::zero(self.rows);
-        basis.column[..LINEAR].copy_from_slice(&fit.basis.column);
-        basis.column[LINEAR..].copy_from_slice(&jacobian.column);
-        let bin_rad = TAU * self.window.bin_s() / self.period_s;
-        Some(Tangent {
-            basis,
-            triangle,
-            weight: self.weight,
-            bin_rad,
-        })
+        let (linear, by_shape) = tangent.basis.column.split_at_mut(LINEAR);
+        linear.copy_from_slice(&fit.basis.column);
+        self.jacobian(shape, &fit.coefficients, by_shape)?;
+        tangent
+            .basis
+            .orthonormalise_from(LINEAR, &mut tangent.triangle);
+        Some(())
     }
 
     /// Covariance of the coordinates, and relative error of the response.
+    #[inline(never)]
     fn covariance(&self, shape: &Shape, fit: &LinearFit<BINS>) -> Option<([[f64; 5]; 5], f64)> {
         let mut output = [0.0; BINS];
         for (k, bin) in self.window.bins().iter().enumerate() {
@@ -493,7 +520,13 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
         let [.., bias_gain, gain] = fit.coefficients;
         let map = coordinate_map(bias_gain, gain, self.period_s);
         let noise_sigma = self.window.noise_sigma();
-        self.tangent(shape, fit)?
-            .covariance(&fit.residual, &output, noise_sigma, &map)
+        let mut tangent = Tangent {
+            basis: Columns::zero(self.rows),
+            triangle: [[0.0; ALL]; ALL],
+            weight: &self.weight,
+            bin_rad: TAU * self.window.bin_s() / self.period_s,
+        };
+        self.tangent(shape, fit, &mut tangent)?;
+        tangent.covariance(&fit.residual, &output, noise_sigma, &map)
     }
 }

@@ -9,6 +9,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -77,6 +78,25 @@ pub(crate) fn run_with_input(arguments: &[&str], bytes: &[u8]) -> Outcome {
     // Only a program that has refused already stops reading; its sentence is then what counts.
     let _ = child.stdin.take().expect("stdin is piped").write_all(bytes);
     Outcome::of(&child.wait_with_output().expect("the program ends"))
+}
+
+/// Ends a run by force as soon as `is_time`.
+pub(crate) fn killed_when(arguments: &[&str], is_time: impl Fn() -> bool) {
+    let mut child = onecycle()
+        .args(arguments)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program starts");
+    let begin = Instant::now();
+    while !is_time() {
+        let ended = child.try_wait().expect("its status is known");
+        assert!(ended.is_none(), "it was done before it was stopped");
+        assert!(begin.elapsed() < Duration::from_secs(60), "it never came");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    child.kill().expect("it can be stopped");
+    child.wait().expect("it ends");
 }
 
 /// `identify FILE --json ARGUMENTS`, the file holding `bytes`.

@@ -22,9 +22,29 @@ const LEAST_SHARE: f64 = 0.25;
 /// Periods of input before the window that tell its state at the beginning.
 const PAST_PERIODS: f64 = 1.5;
 
+/// The switch that a cycle begins and ends with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Beginning {
+    /// From low to high.
+    Rise,
+    /// From high to low.
+    Fall,
+}
+
+/// The input before the window, where the recording does not reach back far enough.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Past {
+    /// The first that is recorded, for ever.
+    Held,
+    /// The same as over the window: of an oscillation that is known to be steady.
+    Repeated,
+}
+
 /// The steady oscillation of a recording.
 #[derive(Clone, Debug)]
 pub(super) struct Oscillation {
+    /// What its cycles begin with.
+    pub(super) beginning: Beginning,
     /// The cycles to fit, in order.
     pub(super) cycles: Vec<Cycle>,
     /// Cycles of the whole steady run.
@@ -34,16 +54,21 @@ pub(super) struct Oscillation {
 }
 
 /// The oscillations to try, `most` cycles at most: the end of the longest steady run, then that of
-/// the last one; of each, half as many cycles and half again, as far as two.
+/// the last one; of each, half as many cycles and half again, as far as two. Where the recording has one
+/// complete cycle and no more, this one.
 pub(super) fn candidates(
     signals: &Signals<'_>,
     relay: &RelayInput,
     most: usize,
 ) -> Result<Vec<Oscillation>, Verdict> {
-    let cycles = all_cycles(signals, relay);
+    let (beginning, cycles) = all_cycles(signals, relay);
     let count = cycles.len();
-    if count < 2 {
+    // Among gaps a single cycle only happens to have none: nobody knows what the others are like.
+    if count == 0 || count == 1 && has_gap(signals, relay) {
         return Err(Verdict::TooShort { cycles: count });
+    }
+    if count == 1 {
+        return Ok(vec![Oscillation::of(beginning, &cycles, 1)]);
     }
     let runs = steady_runs(&cycles);
     let alike = runs.iter().map(Range::len).max().unwrap_or(0);
@@ -75,7 +100,8 @@ pub(super) fn candidates(
     for run in std::iter::once(longest).chain(last) {
         let mut size = run.len().min(most);
         loop {
-            candidates.push(Oscillation::of(&cycles[run.end - size..run.end], run.len()));
+            let end = &cycles[run.end - size..run.end];
+            candidates.push(Oscillation::of(beginning, end, run.len()));
             if size <= 2 {
                 break;
             }
@@ -85,8 +111,39 @@ pub(super) fn candidates(
     Ok(candidates)
 }
 
-/// Complete cycles of the relay, none across a break of the recording.
-fn all_cycles(signals: &Signals<'_>, relay: &RelayInput) -> Vec<Cycle> {
+fn has_gap(signals: &Signals<'_>, relay: &RelayInput) -> bool {
+    let inside = relay.span.start + 1..relay.span.end;
+    signals.breaks.iter().any(|at| inside.contains(at))
+}
+
+/// The recording's cycles from rise to rise. Where these are fewer than two, the last one may end where the
+/// recording does, and if there are more from fall to fall, or as many and later, those.
+fn all_cycles(signals: &Signals<'_>, relay: &RelayInput) -> (Beginning, Vec<Cycle>) {
+    let (mut rises, last) = cycles_from(Beginning::Rise, signals, relay);
+    if rises.len() >= 2 {
+        return (Beginning::Rise, rises);
+    }
+    rises.extend(last);
+    let (mut falls, last) = cycles_from(Beginning::Fall, signals, relay);
+    falls.extend(last);
+    for cycle in &mut falls {
+        cycle.duty = 1.0 - cycle.duty;
+    }
+    let worth = |cycles: &[Cycle]| (cycles.len(), cycles.last().map(|cycle| cycle.start_s));
+    if worth(&falls) > worth(&rises) {
+        (Beginning::Fall, falls)
+    } else {
+        (Beginning::Rise, rises)
+    }
+}
+
+/// Complete cycles of the relay, none across a break of the recording, and one more that the recording's
+/// end leaves without the samples that would confirm its own.
+fn cycles_from(
+    beginning: Beginning,
+    signals: &Signals<'_>,
+    relay: &RelayInput,
+) -> (Vec<Cycle>, Option<Cycle>) {
     let mut cycles = Vec::new();
     let mut detector = CycleDetector::new();
     let mut breaks = signals.breaks.iter().peekable();
@@ -96,9 +153,10 @@ fn all_cycles(signals: &Signals<'_>, relay: &RelayInput) -> Vec<Cycle> {
             detector = CycleDetector::new();
         }
         let (time_s, output) = (signals.time_s[index], signals.output[index]);
-        cycles.extend(detector.push(time_s, high, output));
+        let is_first_half = high == (beginning == Beginning::Rise);
+        cycles.extend(detector.push(time_s, is_first_half, output));
     }
-    cycles
+    (cycles, detector.finish())
 }
 
 /// All runs of consecutive cycles that are alike.
@@ -147,9 +205,10 @@ pub(super) fn fit_points(window: &FitWindow, period_s: f64, refined: &Refined) -
 }
 
 impl Oscillation {
-    fn of(cycles: &[Cycle], steady: usize) -> Self {
+    fn of(beginning: Beginning, cycles: &[Cycle], steady: usize) -> Self {
         let period_s = cycles.iter().map(|cycle| cycle.period_s).sum::<f64>() / cycles.len() as f64;
         Self {
+            beginning,
             cycles: cycles.to_vec(),
             steady,
             period_s,
@@ -158,7 +217,8 @@ impl Oscillation {
 
     /// Its last cycle alone.
     pub(super) fn last(&self) -> Self {
-        Self::of(&self.cycles[self.cycles.len() - 1..], self.steady)
+        let last = &self.cycles[self.cycles.len() - 1..];
+        Self::of(self.beginning, last, self.steady)
     }
 
     /// The points of the recording from the first cycle's beginning to the last one's end.
@@ -168,11 +228,23 @@ impl Oscillation {
         index(first.start_s)..index(last.start_s + last.period_s)
     }
 
+    /// Whether it is the only complete cycle of its recording.
+    pub(super) fn is_alone(&self) -> bool {
+        self.steady == 1
+    }
+
     /// The cycles and the input before them in a window for the estimator.
-    pub(super) fn window(&self, signals: &Signals<'_>, relay: &RelayInput) -> FitWindow {
+    pub(super) fn window(
+        &self,
+        signals: &Signals<'_>,
+        relay: &RelayInput,
+        past: Past,
+    ) -> FitWindow {
         let points = self.points(signals);
-        self.exact_window(signals, &points)
-            .unwrap_or_else(|| self.two_level_window(signals, &points, relay))
+        let inputs = self.inputs(signals, &points, past);
+        let outputs = self.output_window(signals, &points);
+        exact_window(outputs.clone(), &inputs)
+            .unwrap_or_else(|| two_level_window(outputs, &inputs, relay))
     }
 
     /// The outputs of the cycles, without any input yet.
@@ -199,36 +271,47 @@ impl Oscillation {
         index.max(behind.copied().unwrap_or(0))
     }
 
-    /// The window with every change of the input; `None` where it changes too often.
-    fn exact_window(&self, signals: &Signals<'_>, points: &Range<usize>) -> Option<FitWindow> {
-        let mut window = self.output_window(signals, points);
-        for index in self.past(signals, points)..points.end {
-            window
-                .push_input(signals.time_s[index], signals.input[index])
-                .ok()?;
+    /// Times and values of the input, from the past to the end of the window.
+    fn inputs(&self, signals: &Signals<'_>, points: &Range<usize>, past: Past) -> Vec<(f64, f64)> {
+        let begin = self.past(signals, points);
+        let at = |index: usize| (signals.time_s[index], signals.input[index]);
+        let recorded = (begin..points.end).map(at);
+        if past == Past::Held {
+            return recorded.collect();
         }
-        Some(window)
+        let cycles = self.cycles.len() as f64;
+        let missing_s =
+            signals.time_s[points.start] - PAST_PERIODS * self.period_s..signals.time_s[begin];
+        let copies = 1..=(PAST_PERIODS / cycles).ceil() as u32;
+        let repeated = copies.rev().flat_map(|copy| {
+            let before_s = f64::from(copy) * cycles * self.period_s;
+            let earlier = move |(time_s, input)| (time_s - before_s, input);
+            points.clone().map(at).map(earlier)
+        });
+        let unrecorded = repeated.filter(|(time_s, _)| missing_s.contains(time_s));
+        unrecorded.chain(recorded).collect()
     }
+}
 
-    /// The window with the input's mean between the switches of the relay.
-    fn two_level_window(
-        &self,
-        signals: &Signals<'_>,
-        points: &Range<usize>,
-        relay: &RelayInput,
-    ) -> FitWindow {
-        let mut window = self.output_window(signals, points);
-        let past = self.past(signals, points);
-        let input = &signals.input[past..points.end];
-        let levels: Vec<bool> = relay.levels(input).collect();
-        let mut begin = 0;
-        for stretch in levels.chunk_by(|a, b| a == b) {
-            let values = &input[begin..begin + stretch.len()];
-            let mean = values.iter().sum::<f64>() / values.len() as f64;
-            // Two switches a cycle and at most eight cycles: there is room.
-            let _ = window.push_input(signals.time_s[past + begin], mean);
-            begin += stretch.len();
-        }
-        window
+/// The window with every change of the input; `None` where it changes too often.
+fn exact_window(mut window: FitWindow, inputs: &[(f64, f64)]) -> Option<FitWindow> {
+    for &(time_s, input) in inputs {
+        window.push_input(time_s, input).ok()?;
     }
+    Some(window)
+}
+
+/// The window with the input's mean between the switches of the relay.
+fn two_level_window(mut window: FitWindow, inputs: &[(f64, f64)], relay: &RelayInput) -> FitWindow {
+    let values: Vec<f64> = inputs.iter().map(|&(_, input)| input).collect();
+    let levels: Vec<bool> = relay.levels(&values).collect();
+    let mut begin = 0;
+    for stretch in levels.chunk_by(|a, b| a == b) {
+        let stretch = begin..begin + stretch.len();
+        let mean = values[stretch.clone()].iter().sum::<f64>() / stretch.len() as f64;
+        // Two switches a cycle and at most eight cycles: there is room.
+        let _ = window.push_input(inputs[begin].0, mean);
+        begin = stretch.end;
+    }
+    window
 }

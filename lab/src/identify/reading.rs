@@ -1,14 +1,15 @@
 //! What a pack reads off the last cycle alone: where to start, what is likely, whether it is known.
 
+use onecycle_onboard::ProcessError;
 use onecycle_onboard::classify::{Classification, Verdict, classify_by};
+use onecycle_onboard::cycle::Cycle;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::refine::{Refined, Shape, ShapePrior, coordinate, residuals};
+use onecycle_onboard::refine::{Refined, coordinate, residuals};
 use onecycle_onboard::signature::Signature;
 use onecycle_onboard::window::Window;
-use onecycle_onboard::{Process, ProcessError};
 
 use super::Signals;
-use super::oscillation::{FitWindow, Oscillation};
+use super::oscillation::{Beginning, FitWindow, Oscillation};
 use super::relay_input::RelayInput;
 
 /// Bins of a cycle's window, five of which it keeps for itself: each at least twice as narrow as a part
@@ -44,12 +45,17 @@ impl Reading {
         let points = last.points(signals);
         let sample_s = window.sample_s();
         let start_s = *signals.time_s.get(points.start)?;
+        // A signature begins with a rise. A process answers the mirrored input with the mirrored output.
+        let (sign, duty) = match oscillation.beginning {
+            Beginning::Rise => (1.0, cycle.duty),
+            Beginning::Fall => (-1.0, 1.0 - cycle.duty),
+        };
         let mut of_cycle =
             Window::<BINS, EDGES>::of_groups(start_s, sample_s, signals.samples_per_point);
         for index in points.clone() {
-            of_cycle.push_output(signals.time_s[index], signals.output[index]);
+            of_cycle.push_output(signals.time_s[index], sign * signals.output[index]);
         }
-        let signature = Signature::new(&of_cycle, &cycle).ok()?;
+        let signature = Signature::new(&of_cycle, &Cycle { duty, ..cycle }).ok()?;
         let period_s = cycle.period_s;
         let noise_sigma = window.noise_sigma();
         let classification = classify_by(pack, &signature, period_s, noise_sigma).ok()?;
@@ -67,23 +73,6 @@ impl Reading {
     #[must_use]
     pub fn is_known(&self) -> bool {
         self.classification.verdict == Verdict::Known
-    }
-
-    /// The candidates as shapes of an oscillation of this period.
-    pub(super) fn starts(&self, period_s: f64) -> Vec<Shape> {
-        let shape = |process: &Process| {
-            let (pole_sum_per_s, ratio) = process.pole_sum();
-            [
-                (pole_sum_per_s * period_s).ln(),
-                ratio,
-                process.tau_s() / period_s,
-            ]
-        };
-        self.classification
-            .candidates
-            .iter()
-            .map(|candidate| shape(&candidate.process))
-            .collect()
     }
 
     /// The posterior's mean as a fit of the window would be.
@@ -129,10 +118,3 @@ impl Reading {
 /// Standard deviation of a cycle's mean input about minus the bias, over the relay's amplitude: of the
 /// paper's multirotors with 2 to 3 % noise at 250 to 700 samples a period.
 const BIAS: f64 = 0.004;
-
-/// How likely the shapes of the pack's family are.
-pub(super) fn prior(pack: &Pack<'_>) -> Option<ShapePrior> {
-    let prior = pack.prior();
-    let root = prior.root.map(|row| row.map(f64::from));
-    ShapePrior::new(prior.mean.map(f64::from), &root)
-}

@@ -9,6 +9,11 @@ use super::{Identification, Identified, Options, OscillationFound};
 pub enum Remark {
     /// More cycles could not be fitted: what they leave unexplained, as a part of the oscillation.
     Disturbed(f64),
+    /// The recording holds one complete cycle and no more.
+    OneCycle {
+        /// Whether the pack knows it as one of a steady oscillation.
+        is_known: bool,
+    },
     /// Fewer cycles than asked for, or than steadiness takes.
     FewCycles {
         /// Cycles used.
@@ -62,6 +67,18 @@ impl Remark {
                  {score:.1}, the limit is 1): another beta of the relay, a resonance, friction, a wrong \
                  sensor, a disturbance. The fit stands without the pack; trust it less."
             ),
+            Self::OneCycle { is_known } => {
+                let rest = if is_known {
+                    "The pack knows it as one of a steady oscillation, so the input is taken to have \
+                     been the same a period earlier."
+                } else {
+                    "Record two that are alike."
+                };
+                format!(
+                    "The recording holds one complete cycle: nothing in it confirms that the \
+                     oscillation is steady. {rest}"
+                )
+            }
             Self::FewCycles { used } => {
                 format!("Only {used} steady cycles could be used; more narrow the intervals.")
             }
@@ -130,7 +147,8 @@ impl Remark {
 pub(super) fn remarks(found: &Identification, options: &Options) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if let Some(oscillation) = &found.oscillation {
-        of_oscillation(oscillation, options, &mut remarks);
+        let is_known = found.reading.is_some_and(|reading| reading.is_known());
+        of_oscillation(oscillation, is_known, options, &mut remarks);
         if let (Some(reading), Ok(_)) = (&found.reading, &found.outcome)
             && !reading.is_known()
         {
@@ -144,9 +162,16 @@ pub(super) fn remarks(found: &Identification, options: &Options) -> Vec<Remark> 
     remarks
 }
 
-fn of_oscillation(oscillation: &OscillationFound, options: &Options, remarks: &mut Vec<Remark>) {
+fn of_oscillation(
+    oscillation: &OscillationFound,
+    is_known: bool,
+    options: &Options,
+    remarks: &mut Vec<Remark>,
+) {
     let used = oscillation.cycles_used;
-    if oscillation.cycles_steady < 3 || (used < options.cycles && used < 4) {
+    if oscillation.cycles_steady == 1 {
+        remarks.push(Remark::OneCycle { is_known });
+    } else if oscillation.cycles_steady < 3 || (used < options.cycles && used < 4) {
         remarks.push(Remark::FewCycles { used });
     }
     let noise = oscillation.noise_sigma / oscillation.amplitude;

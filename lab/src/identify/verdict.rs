@@ -16,7 +16,7 @@ pub enum Verdict {
         /// Whether the output does: the columns are swapped.
         output_is_relay: bool,
     },
-    /// Not enough complete cycles.
+    /// No complete cycle, one among gaps, or two or three that are not all alike.
     TooShort {
         /// Complete cycles that there are.
         cycles: usize,
@@ -154,14 +154,18 @@ impl fmt::Display for Verdict {
                     Ok(())
                 }
             }
-            Self::TooShort { cycles } => {
-                let plural = if *cycles == 1 { "" } else { "s" };
-                write!(
-                    f,
-                    "too short: {cycles} complete cycle{plural} of the relay, at least 2 that are \
-                     alike are needed"
-                )
-            }
+            Self::TooShort { cycles: 0 } => write!(
+                f,
+                "too short: no complete cycle of the relay, from one switch to the next but one"
+            ),
+            Self::TooShort { cycles: 1 } => write!(
+                f,
+                "too short: a single complete cycle of the relay, the others have gaps"
+            ),
+            Self::TooShort { cycles } => write!(
+                f,
+                "too short: {cycles} complete cycles of the relay that are not alike"
+            ),
             Self::NotSteady { cycles, alike } => write!(
                 f,
                 "no steady oscillation: of {cycles} cycles at most {alike} in a row are alike"

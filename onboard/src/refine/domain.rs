@@ -1,5 +1,9 @@
 //! Where the estimator searches: shapes in periods of the oscillation, and their limits.
 
+use libm::log;
+
+use crate::process::Process;
+
 /// Unknowns of the search: `ln(pole sum * period)`, pole ratio, `tau / period`.
 pub type Shape = [f64; SHAPE];
 /// Number of unknowns of the search.
@@ -19,6 +23,12 @@ pub enum DomainEdge {
     FastLag,
     /// The delay as long as the oscillation allows.
     LongDelay,
+}
+
+/// The shape of a process under an oscillation of this period (s).
+pub(crate) fn shape_of(process: &Process, period_s: f64) -> Shape {
+    let (sum_per_s, ratio) = process.pole_sum();
+    [log(sum_per_s * period_s), ratio, process.tau_s() / period_s]
 }
 
 /// The shape nearest to this one that is in the domain.

@@ -6,7 +6,7 @@
 //! ```
 
 use super::domain::{SHAPE, Shape};
-use crate::least_squares::Columns;
+use crate::pack::Pack;
 
 /// A Gaussian over [`Shape`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,6 +40,14 @@ impl ShapePrior {
         is_right.then_some(Self { mean, whitening })
     }
 
+    /// What a pack knows of its family; `None` where that is no Gaussian.
+    #[must_use]
+    pub fn of_pack(pack: &Pack<'_>) -> Option<Self> {
+        let prior = pack.prior();
+        let root = prior.root.map(|row| row.map(f64::from));
+        Self::new(prior.mean.map(f64::from), &root)
+    }
+
     /// The prior's rows at a shape, in standard deviations.
     #[must_use]
     pub fn deviations(&self, shape: &Shape) -> Shape {
@@ -50,11 +58,11 @@ impl ShapePrior {
     /// Writes the derivatives of the rows, times `sigma`, from row `first` on.
     pub(super) fn add_to<const BINS: usize>(
         &self,
-        jacobian: &mut Columns<SHAPE, BINS>,
+        jacobian: &mut [[f64; BINS]],
         first: usize,
         sigma: f64,
     ) {
-        for (index, column) in jacobian.column.iter_mut().enumerate() {
+        for (index, column) in jacobian.iter_mut().enumerate() {
             for (row, whitening) in column[first..].iter_mut().zip(&self.whitening) {
                 *row = sigma * whitening[index];
             }

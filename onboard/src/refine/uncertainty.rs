@@ -28,12 +28,12 @@ const SIGNIFICANT: f64 = 2.7;
 const TRIED: usize = 61;
 
 /// The fit's surroundings to first order.
-pub(super) struct Tangent<const BINS: usize> {
+pub(super) struct Tangent<'a, const BINS: usize> {
     /// Orthonormal basis of the model's derivatives: initial state, bias, gain, shape.
     pub(super) basis: Columns<ALL, BINS>,
     pub(super) triangle: Triangle<ALL>,
     /// Square roots of the numbers of samples of the bins.
-    pub(super) weight: [f64; BINS],
+    pub(super) weight: &'a [f64; BINS],
     /// Phase of the fundamental from one bin to the next (rad).
     pub(super) bin_rad: f64,
 }
@@ -51,7 +51,7 @@ struct Wave {
     scale: f64,
 }
 
-impl<const BINS: usize> Tangent<BINS> {
+impl<const BINS: usize> Tangent<'_, BINS> {
     /// Covariance over the coordinates of [`coordinate`] and relative error of the response:
     /// `residual` and `output` are the weighted rows of the fit, `noise_sigma` the white noise of a
     /// sample; `None` where an unknown has no influence.
