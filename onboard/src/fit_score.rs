@@ -237,12 +237,11 @@ pub(crate) fn statistic(
     let first = Response::new(mean, duty, samples).fit(observed, &here, doubt);
     let (there, values) = nearest(mean, &first.values, doubt.root);
     let second = Response::new(&there, duty, samples).fit(observed, &values, doubt);
-    let statistic = second.statistic;
-    if statistic.is_nan() {
-        f64::INFINITY
-    } else {
-        statistic.max(0.0)
-    }
+    // Great doubt leads to where a response overflows.
+    let found = [second.statistic, first.statistic]
+        .into_iter()
+        .find(|one| one.is_finite());
+    found.map_or(f64::INFINITY, |statistic| statistic.max(0.0))
 }
 
 /// The process these deviations off the mean, or the nearest that there is, and its own deviations.

@@ -103,17 +103,19 @@ impl Calibrated {
                 beta: [space.beta as f32; 2],
                 phase_margin_rad: space.phase_margin_rad() as f32,
             },
-            unknown_threshold: calibration.limit as f32,
-            // What is infinite before calibration has no place in a file.
-            calibration: (calibration.numbers())
-                .map(|value| value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32)
-                .to_vec(),
+            unknown_threshold: finite(calibration.limit),
+            calibration: calibration.numbers().map(finite).to_vec(),
             prior: prior(learnt).ok_or(IdentifierError::OneShape)?,
             lead_table: LeadTableContents::default(),
             self_tests: vec![],
             card: serde_json::Value::Null,
         })
     }
+}
+
+/// What is infinite before calibration, or of a network that has hardly learnt, has no place in a file.
+fn finite(value: f64) -> f32 {
+    value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32
 }
 
 /// The lowest and the highest of each number.
