@@ -395,14 +395,7 @@ pub fn identification_outcome(
     case: &Case,
 ) -> Result<IdentificationOutcome, CaseError> {
     let (trace, _) = campaign.run(case, IDENTIFICATION_PERIODS)?;
-    let signals = Signals {
-        time_s: &trace.time_s,
-        input: &trace.input,
-        output: &trace.output,
-        samples_per_point: 1,
-        sample_period_s: campaign.sample_s(),
-        breaks: &[],
-    };
+    let signals = Signals::of_trace(&trace, campaign.sample_s());
     let options = Options {
         cycles: campaign.cycles,
         method: campaign.method,

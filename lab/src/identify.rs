@@ -14,6 +14,7 @@ mod verdict;
 
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{Beforehand, RefineError, Refined, ShapePrior, refine_with};
+use onecycle_plant::Trace;
 
 use self::decision::Decision;
 use self::oscillation::{FitWindow, Oscillation, Past};
@@ -41,6 +42,21 @@ pub struct Signals<'a> {
     pub sample_period_s: f64,
     /// Index of the first point behind each gap, in order.
     pub breaks: &'a [usize],
+}
+
+impl<'a> Signals<'a> {
+    /// A simulated experiment at an even sample period (s), as measured.
+    #[must_use]
+    pub fn of_trace(trace: &'a Trace, sample_period_s: f64) -> Self {
+        Self {
+            time_s: &trace.time_s,
+            input: &trace.input,
+            output: &trace.output,
+            samples_per_point: 1,
+            sample_period_s,
+            breaks: &[],
+        }
+    }
 }
 
 /// What is asked for.
@@ -238,6 +254,18 @@ fn look(
     } else {
         (window, reading)
     }
+}
+
+/// The steady oscillation that [`identify`] looks at first, its last `cycles` at most.
+///
+/// # Errors
+/// The verdict that [`identify`] would give: no relay, too short, not steady.
+pub fn find_oscillation(signals: &Signals<'_>, cycles: usize) -> Result<OscillationFound, Verdict> {
+    let relay = find_relay(signals)?;
+    let stretches = oscillation::candidates(signals, &relay, cycles.clamp(1, MOST_CYCLES))?;
+    let first = stretches.first().ok_or(Verdict::TooShort { cycles: 0 })?;
+    let window = first.window(signals, &relay, Past::Held);
+    Ok(describe(signals, first, &relay, &window))
 }
 
 /// Relative error of the response above which a stretch is no second choice: a gust leaves the short

@@ -11,6 +11,7 @@
 //! | which relay and tuning rule give that PD?        | [`TuningRule`]                       |
 //! | what does one process's PD cost on another?      | [`deterioration()`]                  |
 //! | what will the step look like?                    | [`step_response()`]                  |
+//! | what would other methods make of the experiment? | [`baselines`]                        |
 //!
 //! The method is that of A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, "Real-time system
 //! identification using deep learning for linear processes with application to unmanned aerial
@@ -29,6 +30,7 @@
 //! # }
 //! ```
 
+pub mod baselines;
 pub mod campaign;
 pub mod candidate;
 pub mod certificate;

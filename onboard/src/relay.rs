@@ -384,6 +384,21 @@ impl Relay {
         self.smoothed_sigma = self.noise_sigma / sqrtf(n);
     }
 
+    /// Changes the phase of the oscillation, `asin(beta)`, from the next tick on; the running excursion
+    /// and all that was learned go on.
+    ///
+    /// # Errors
+    /// [`RelayError::Beta`] unless `beta` is between -1 and 1; the relay stays as it was.
+    pub fn set_beta(&mut self, beta: f32) -> Result<(), RelayError> {
+        let settings = RelaySettings {
+            beta,
+            ..self.settings
+        };
+        settings.validate()?;
+        self.settings = settings;
+        Ok(())
+    }
+
     /// What the relay is doing.
     #[must_use]
     pub fn phase(&self) -> RelayPhase {

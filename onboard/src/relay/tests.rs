@@ -166,6 +166,25 @@ fn beta_sets_the_phase_of_the_switches() {
     }
 }
 
+// Two periods at beta = -0.73, then -0.3: the switches up to sample 2000 are due where -0.73 has them,
+// those behind it where -0.3 has them. A beta out of range is refused and changes nothing.
+#[test]
+fn a_changed_beta_moves_the_next_switches() {
+    let mut relay = relay(RelaySettings::bare(1.0, -0.73));
+    let mut levels_seen = levels(&mut relay, sine(2, 2.5, 0.0));
+    relay.set_beta(-0.3).unwrap();
+    assert_eq!(relay.set_beta(-1.0), Err(RelayError::Beta(-1.0)));
+    levels_seen.extend(levels(&mut relay, sine(2, 2.5, 0.0)));
+    let switches = switches(&levels_seen);
+    assert_eq!(switches.len(), 8);
+    for (index, &at) in switches.iter().enumerate() {
+        let beta: f32 = if at < 2000 { -0.73 } else { -0.3 };
+        let due = 500.0 + 1000.0 * asinf(beta) / TAU + 500.0 * index as f32;
+        let late = at as f32 - due;
+        assert!((-0.01..1.01).contains(&late), "{at} for {due}");
+    }
+}
+
 // A fixed hysteresis b = beta A is the same relay under a steady oscillation.
 #[test]
 fn positive_beta_is_the_classical_hysteresis() {
