@@ -1,5 +1,6 @@
 //! Arguments, typed and documented; `--help` is generated from here.
 
+mod bench;
 mod dataset;
 mod identify;
 mod pack;
@@ -14,6 +15,7 @@ use onecycle_lab::identify::MOST_CYCLES;
 use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
 use onecycle_onboard::{Process, ProcessError};
 
+pub(crate) use self::bench::{Answers, Bench, BenchAction, Format, MakeBench, RunBench};
 pub(crate) use self::dataset::Dataset;
 pub(crate) use self::identify::{Identify, Method};
 pub(crate) use self::train::Train;
@@ -52,6 +54,7 @@ pub(crate) enum Command {
     Train(Train),
     Pack(Pack),
     Dataset(Dataset),
+    Bench(Bench),
 }
 
 /// Parameters of a process `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`.

@@ -1,5 +1,6 @@
 //! One file a command: arguments in, report out.
 
+pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certify;
 pub(crate) mod dataset;
@@ -7,6 +8,7 @@ pub(crate) mod grid;
 pub(crate) mod identify;
 pub(crate) mod pack;
 pub(crate) mod phase;
+mod signals;
 pub(crate) mod simulate;
 pub(crate) mod train;
 pub(crate) mod tune;

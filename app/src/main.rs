@@ -32,6 +32,7 @@ fn main() -> ExitCode {
         Command::Train(train) => commands::train::run(train),
         Command::Pack(pack) => commands::pack::run(pack),
         Command::Dataset(dataset) => commands::dataset::run(dataset),
+        Command::Bench(bench) => commands::bench::run(bench),
     };
     match result {
         Ok(code) => code,

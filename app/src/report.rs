@@ -1,5 +1,6 @@
 //! Results as text for people and as JSON for programs.
 
+pub(crate) mod bench;
 pub(crate) mod certificate;
 pub(crate) mod classifier;
 pub(crate) mod dataset;

@@ -13,11 +13,11 @@ use onecycle_plant::{Experiment, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
+use crate::Deterioration;
 use crate::dataset::{Family, Recipe};
+use crate::evaluate::{Judge, PHASE_MARGIN_DEG, in_order};
 use crate::identify::{Identification, MOST_CYCLES, Method, Options, Signals, identify};
-use crate::optimum::pd;
 use crate::space::{FieldError, Space, first_out_of_range};
-use crate::{Deterioration, deterioration};
 
 /// A campaign as a file describes it.
 #[derive(Clone, Debug, PartialEq, serde::Deserialize)]
@@ -245,23 +245,28 @@ impl Campaign {
         Ok(trace.amplitude_of_last((2.0 * case.period_s / self.sample_s()) as usize))
     }
 
-    /// The relay experiment of a case over so many periods of the describing function, and the
-    /// relay after it.
-    ///
-    /// # Errors
-    /// A [`CaseError`] for settings outside their range.
-    pub fn run(&self, case: &Case, periods: f64) -> Result<(Trace, Relay), CaseError> {
+    /// The relay of its experiments.
+    #[must_use]
+    pub fn relay_settings(&self) -> RelaySettings {
         let mut settings = RelaySettings::new(1.0, self.beta as f32);
-        let preroll_s = PREROLL_S * self.time_scale;
-        settings.preroll_s = preroll_s as f32;
+        settings.preroll_s = (PREROLL_S * self.time_scale) as f32;
         settings.trim_gain = if self.trim {
             RelaySettings::TRIM_GAIN
         } else {
             0.0
         };
         settings.asymmetry = self.asymmetry;
-        let mut relay = Relay::new(settings)?;
-        let duration_s = preroll_s + periods * case.period_s;
+        settings
+    }
+
+    /// The relay experiment of a case over so many periods of the describing function, and the
+    /// relay after it.
+    ///
+    /// # Errors
+    /// A [`CaseError`] for settings outside their range.
+    pub fn run(&self, case: &Case, periods: f64) -> Result<(Trace, Relay), CaseError> {
+        let mut relay = Relay::new(self.relay_settings())?;
+        let duration_s = PREROLL_S * self.time_scale + periods * case.period_s;
         let mut experiment = Experiment::new(case.process, self.sample_s(), duration_s);
         experiment.input_bias = case.bias;
         experiment.sensor.noise_sigma = case.sigma;
@@ -382,11 +387,11 @@ fn errors(refined: &Refined, truth: &Process) -> Option<[f64; SHAPE_AND_GAIN]> {
 }
 
 /// Periods for an identification: the transient and the cycles to fit.
-const IDENTIFICATION_PERIODS: f64 = 30.0;
+pub(crate) const IDENTIFICATION_PERIODS: f64 = 30.0;
 
 /// Runs the relay of a case and identifies the process from its recording.
 ///
-/// The controllers compared are those of the paper's 20 degrees of phase margin.
+/// The controllers compared are those of the paper's phase margin, [`PHASE_MARGIN_DEG`].
 ///
 /// # Errors
 /// A [`CaseError`] for parameters outside their range.
@@ -398,19 +403,14 @@ pub fn identification_outcome(
     let signals = Signals::of_trace(&trace, campaign.sample_s());
     let options = Options {
         cycles: campaign.cycles,
+        phase_margin_rad: PHASE_MARGIN_DEG.to_radians(),
         method: campaign.method,
-        ..Options::default()
     };
     let found = identify(&signals, &options);
-    // The same process with its lags in order.
-    let (sum, ratio) = case.process.pole_sum();
-    let ordered = Process::from_pole_sum(1.0, sum, ratio, case.process.tau_s())?;
-    let truth = ordered.with_gain_scaled(case.process.jerk_gain() * ordered.t_prop_s())?;
-    let margin = options.phase_margin_rad;
-    let deterioration = found.outcome.as_ref().ok().and_then(|identified| {
-        let best = pd(&truth, margin).ok()?;
-        Some(deterioration(identified.controller.pd, &truth, &best))
-    });
+    let truth = in_order(&case.process)?;
+    let judge = Judge::new(&truth).ok();
+    let deterioration = (found.outcome.as_ref().ok().zip(judge))
+        .map(|(identified, judge)| judge.deterioration(identified.controller.pd));
     let errors =
         (found.outcome.as_ref().ok()).and_then(|identified| errors(&identified.refined, &truth));
     Ok(IdentificationOutcome {

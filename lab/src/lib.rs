@@ -39,6 +39,7 @@ pub mod classifier;
 pub mod cost;
 pub mod dataset;
 pub mod deterioration;
+pub mod evaluate;
 pub mod grid;
 pub mod identifier;
 pub mod identify;

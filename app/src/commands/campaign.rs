@@ -5,11 +5,11 @@ mod unknown;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use onecycle_lab::Deterioration;
 use onecycle_lab::campaign::{
     Campaign, CaseError, IdentificationOutcome, Measure, RelayOutcome, SHAPE_AND_GAIN,
     identification_outcome, relay_outcome,
 };
+use onecycle_lab::evaluate::Costs;
 use onecycle_onboard::refine::coordinate;
 use rayon::prelude::*;
 
@@ -64,11 +64,12 @@ fn all<T: Send>(
 
 /// A quantile as text, `-` where there are no values.
 fn quantile(values: &mut [f64], q: f64, decimals: usize) -> String {
-    values.sort_unstable_by(f64::total_cmp);
-    let index = ((values.len().max(1) - 1) as f64 * q).round() as usize;
-    values
-        .get(index)
-        .map_or("-".to_owned(), |value| format!("{value:.decimals$}"))
+    or_dash(onecycle_lab::evaluate::quantile(values, q), decimals)
+}
+
+/// A value as text, `-` where there is none.
+fn or_dash(value: Option<f64>, decimals: usize) -> String {
+    value.map_or("-".to_owned(), |value| format!("{value:.decimals$}"))
 }
 
 fn relay_table(campaign: &Campaign, outcomes: &[RelayOutcome]) -> String {
@@ -119,34 +120,16 @@ fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome])
         .filter(|outcome| outcome.found.outcome.is_err())
         .count();
     let identified = outcomes.len() - refused;
-    let mut cost = Vec::new();
-    let mut margins_deg = Vec::new();
-    let mut unstable = 0;
-    for outcome in outcomes {
-        match outcome.deterioration {
-            Some(Deterioration::Stable {
-                relative,
-                phase_margin_rad,
-            }) => {
-                cost.push(100.0 * relative.abs());
-                margins_deg.push(phase_margin_rad.to_degrees());
-            }
-            Some(Deterioration::Unstable) => unstable += 1,
-            None => {}
-        }
-    }
-    let mean = match cost.len() {
-        0 => "-".to_owned(),
-        count => format!("{:.3}", cost.iter().sum::<f64>() / count as f64),
-    };
+    let costs = Costs::of(outcomes.iter().map(|outcome| outcome.deterioration));
+    let percent = |cost: Option<f64>, decimals| or_dash(cost.map(|cost| 100.0 * cost), decimals);
     let bound = error_over_bound(outcomes);
     let held = coverage(outcomes).map(|count| 100.0 * count as f64 / identified.max(1) as f64);
     let [k, k_over_t_body, t_prop, t_body, tau, bias] = held;
     format!(
         "{} random processes, bias up to {} h, noise {}{} of the amplitude, trim {}, {} cycle(s)\n\
          refused                 {refused}\n\
-         unstable                {unstable}\n\
-         deterioration |J| (%)   mean {mean}, median {}, 95 % {}, 99 % {}, worst {}\n\
+         unstable                {}\n\
+         deterioration |J| (%)   mean {}, median {}, 95 % {}, 99 % {}, worst {}\n\
          least phase margin      {} deg\n\
          90 % intervals hold (%) K {k:.1}, K/T_body {k_over_t_body:.1}, T_prop {t_prop:.1}, \
          T_body {t_body:.1}, tau {tau:.1}, bias {bias:.1}\n\
@@ -157,11 +140,13 @@ fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome])
         campaign.sigma,
         if campaign.trim { "on" } else { "off" },
         campaign.cycles,
-        quantile(&mut cost, 0.5, 3),
-        quantile(&mut cost, 0.95, 2),
-        quantile(&mut cost, 0.99, 2),
-        quantile(&mut cost, 1.0, 2),
-        quantile(&mut margins_deg, 0.0, 1),
+        costs.unstable,
+        percent(costs.mean, 3),
+        percent(costs.median, 3),
+        percent(costs.percentile_95, 2),
+        percent(costs.percentile_99, 2),
+        percent(costs.worst, 2),
+        or_dash(costs.least_phase_margin_deg, 1),
     )
 }
 

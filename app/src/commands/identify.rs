@@ -3,10 +3,11 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle_lab::identify::{Options, Signals, identify_by};
+use onecycle_lab::identify::{Options, identify_by};
 use onecycle_link::{ColumnRef, CsvOptions, Recording};
 
 use super::pack;
+use super::signals::{breaks, signals};
 use crate::args::Identify;
 use crate::failure::{Failure, exit};
 use crate::output::print;
@@ -14,15 +15,8 @@ use crate::report::{json, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let recording = read(arguments)?;
-    let breaks: Vec<usize> = recording.gaps().iter().map(|gap| gap.index).collect();
-    let signals = Signals {
-        time_s: recording.time_s(),
-        input: recording.input(),
-        output: recording.output(),
-        samples_per_point: recording.samples_per_point() as u32,
-        sample_period_s: recording.sample_period_s(),
-        breaks: &breaks,
-    };
+    let breaks = breaks(&recording);
+    let signals = signals(&recording, &breaks);
     let options = Options {
         cycles: arguments.cycles as usize,
         phase_margin_rad: arguments.phase_margin,

@@ -44,7 +44,7 @@ pub const EXAMPLES_PER_SHARD: u64 = 4096;
 /// Most examples of a dataset: 3 GB or so.
 pub const MOST_EXAMPLES: u64 = 10_000_000;
 
-pub(super) const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));
+pub(crate) const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));
 
 /// One example as a file has it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,18 @@
+//! `onecycle bench`: the public benchmark, made and run.
+
+pub(crate) mod folder;
+mod make;
+mod part;
+mod run;
+
+use std::process::ExitCode;
+
+use crate::args::{Bench, BenchAction};
+use crate::failure::Failure;
+
+pub(crate) fn run(arguments: &Bench) -> Result<ExitCode, Failure> {
+    match &arguments.action {
+        BenchAction::Make(make) => make::run(make),
+        BenchAction::Run(run) => run::run(run),
+    }
+}
