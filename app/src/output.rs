@@ -1,5 +1,6 @@
 //! The only place that writes: the terminal, and files whole or not at all.
 
+use std::fs::File;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -41,6 +42,19 @@ pub(crate) fn progress_bar_with_message(pieces: u64) -> ProgressBar {
     bar
 }
 
+/// Appends a value as a line of JSON to a file of this path. A whole line at a time reaches the system, so
+/// that an end by force cuts the last at most.
+pub(crate) fn append_line(
+    file: &mut File,
+    path: &Path,
+    line: &impl serde::Serialize,
+) -> Result<(), Failure> {
+    let mut text = serde_json::to_vec(line).map_err(Failure::usage)?;
+    text.push(b'\n');
+    file.write_all(&text)
+        .map_err(|error| Failure::output(path, error))
+}
+
 /// Writes a file through a temporary one beside it: whole, or not at all.
 pub(crate) fn write_file(
     path: &Path,
@@ -60,7 +74,7 @@ pub(crate) fn write_file(
 
 /// Temporary files are private; what a user asked for is readable like any other file.
 #[cfg(unix)]
-fn set_usual_permissions(file: &std::fs::File) -> io::Result<()> {
+fn set_usual_permissions(file: &File) -> io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
     file.set_permissions(std::fs::Permissions::from_mode(0o644))
 }

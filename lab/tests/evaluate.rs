@@ -3,6 +3,8 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
+mod common;
+
 use std::collections::BTreeSet;
 
 use onecycle_lab::baselines::rules;
@@ -15,6 +17,8 @@ use onecycle_lab::grid::{InTurn, Pieces};
 use onecycle_lab::identify::find_oscillation;
 use onecycle_lab::{Deterioration, Space};
 use onecycle_onboard::{Pd, Process};
+
+use common::Two;
 
 fn stable(relative: f64, margin_deg: f64) -> Option<Deterioration> {
     Some(Deterioration::Stable {
@@ -194,21 +198,6 @@ fn other_relay_tests_are_of_the_same_process() {
         assert_eq!(levels, expected);
         let found = find_oscillation(&asymmetric.seen().signals, 4).unwrap();
         assert!(found.cycles_steady >= 10, "{truth:?}: {found:?}");
-    }
-}
-
-/// Pieces on two threads.
-struct Two;
-
-impl Pieces for Two {
-    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        let half = count / 2;
-        std::thread::scope(|scope| {
-            let upper = scope.spawn(|| (half..count).map(&piece).collect::<Vec<T>>());
-            let mut all: Vec<T> = (0..half).map(&piece).collect();
-            all.extend(upper.join().unwrap());
-            all
-        })
     }
 }
 

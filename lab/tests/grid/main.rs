@@ -3,6 +3,8 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../common/mod.rs"]
+mod common;
 mod files;
 
 use std::sync::OnceLock;
@@ -14,20 +16,7 @@ use onecycle_lab::{Candidate, Direction, Gains, Space};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
-/// Pieces on two threads.
-struct Two;
-
-impl Pieces for Two {
-    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        let half = count / 2;
-        std::thread::scope(|scope| {
-            let upper = scope.spawn(|| (half..count).map(&piece).collect::<Vec<T>>());
-            let mut all: Vec<T> = (0..half).map(&piece).collect();
-            all.extend(upper.join().unwrap());
-            all
-        })
-    }
-}
+use common::Two;
 
 fn config() -> Config {
     Config {

@@ -4,7 +4,6 @@
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
-use std::io::Write;
 use std::path::PathBuf;
 
 use onecycle_lab::evaluate::Record;
@@ -12,6 +11,7 @@ use serde::{Deserialize, Serialize};
 
 use super::folder::{Manifest, read_text, unreadable};
 use crate::failure::Failure;
+use crate::output::append_line;
 
 /// Whose results they are.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -53,22 +53,14 @@ impl Part {
         file.set_len(whole.len() as u64).map_err(failed)?;
         let mut part = Self { path, file };
         if whole.is_empty() {
-            part.add(head)?;
+            append_line(&mut part.file, &part.path, head)?;
         }
         Ok((part, done))
     }
 
     /// The records of an experiment; a whole line reaches the system at a time.
     pub(super) fn keep(&mut self, records: &Vec<Record>) -> Result<(), Failure> {
-        self.add(records)
-    }
-
-    fn add(&mut self, line: &impl Serialize) -> Result<(), Failure> {
-        let mut text = serde_json::to_vec(line).map_err(Failure::usage)?;
-        text.push(b'\n');
-        self.file
-            .write_all(&text)
-            .map_err(|error| Failure::output(&self.path, error))
+        append_line(&mut self.file, &self.path, records)
     }
 
     /// Removes the file: all is written.

@@ -10,13 +10,14 @@
 //! Lines are only ever added. The last one may have been cut short; it is dropped.
 
 use std::fs::{File, OpenOptions};
-use std::io::{self, BufRead, BufReader, Write};
+use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
 use onecycle_lab::grid::{Ray, Settings};
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
+use crate::output::append_line;
 
 /// Changes with the file, so that what another program left is not gone on with.
 const FORMAT: &str = "onecycle.grid.part/1";
@@ -212,13 +213,8 @@ impl Part {
         }))
     }
 
-    /// A whole line at a time reaches the system, so that an end by force cuts the last at most.
     fn add(&mut self, line: &Line) -> Result<(), Failure> {
-        let mut text = serde_json::to_vec(line).map_err(Failure::usage)?;
-        text.push(b'\n');
-        self.file
-            .write_all(&text)
-            .map_err(|error| Failure::output(&self.path, error))
+        append_line(&mut self.file, &self.path, line)
     }
 
     /// Removes the file: all is written.
