@@ -13,7 +13,7 @@ use crate::outsiders::calibrate::calibrate;
 use crate::pack::{LeadTableContents, PackContents};
 
 /// Part of the family's own cycles that are called unknown: 2 % are the most that is allowed, less twice
-/// what [`LIMIT_EXPERIMENTS`] err by.
+/// what so many experiments as the limit is taken from err by.
 pub const MOST_UNKNOWN: f64 = 0.017;
 
 /// Experiments that the limit of the score is taken from: 2 % of them are known to 0.16 %.

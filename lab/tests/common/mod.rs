@@ -3,7 +3,7 @@
 use onecycle_lab::grid::Pieces;
 
 /// Pieces on two threads.
-pub struct Two;
+pub(crate) struct Two;
 
 impl Pieces for Two {
     fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {

@@ -9,9 +9,7 @@ mod files;
 
 use std::sync::OnceLock;
 
-use onecycle_lab::grid::{
-    Grid, GridFile, InTurn, Index, Layout, Pieces, Settings, check, step, write,
-};
+use onecycle_lab::grid::{Grid, GridFile, InTurn, Index, Layout, Settings, check, step, write};
 use onecycle_lab::{Candidate, Direction, Gains, Space};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
