@@ -4,6 +4,7 @@ mod bench;
 mod dataset;
 mod identify;
 mod pack;
+mod reproduce;
 mod train;
 
 use std::path::PathBuf;
@@ -18,6 +19,7 @@ use onecycle_onboard::{Process, ProcessError};
 pub(crate) use self::bench::{Answers, Bench, BenchAction, Format, MakeBench, RunBench};
 pub(crate) use self::dataset::Dataset;
 pub(crate) use self::identify::{Identify, Method};
+pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::train::Train;
 use crate::failure::Failure;
 
@@ -55,6 +57,7 @@ pub(crate) enum Command {
     Pack(Pack),
     Dataset(Dataset),
     Bench(Bench),
+    Reproduce(Reproduce),
 }
 
 /// Parameters of a process `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`.

@@ -8,6 +8,7 @@ pub(crate) mod grid;
 pub(crate) mod identify;
 pub(crate) mod pack;
 pub(crate) mod phase;
+pub(crate) mod reproduce;
 mod signals;
 pub(crate) mod simulate;
 pub(crate) mod train;

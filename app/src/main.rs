@@ -7,6 +7,7 @@ mod args;
 mod commands;
 mod failure;
 mod output;
+mod pages;
 mod pictures;
 mod report;
 mod settings;
@@ -33,6 +34,7 @@ fn main() -> ExitCode {
         Command::Pack(pack) => commands::pack::run(pack),
         Command::Dataset(dataset) => commands::dataset::run(dataset),
         Command::Bench(bench) => commands::bench::run(bench),
+        Command::Reproduce(reproduce) => commands::reproduce::run(reproduce),
     };
     match result {
         Ok(code) => code,

@@ -10,4 +10,5 @@ pub(crate) mod json;
 pub(crate) mod number;
 pub(crate) mod pack;
 pub(crate) mod phase;
+pub(crate) mod reproduction;
 pub(crate) mod text;

@@ -21,6 +21,26 @@ pub(crate) fn bounded(value: Option<f64>) -> String {
     value.map_or("unbounded".to_owned(), significant)
 }
 
+/// A part as a percentage with two decimals, without the sign of a zero.
+pub(crate) fn percent(part: f64) -> String {
+    let rounded = (1e4 * part).round() / 100.0;
+    format!("{:.2} %", rounded + 0.0)
+}
+
+/// An angle (rad) in degrees with two decimals.
+pub(crate) fn degrees(angle_rad: f64) -> String {
+    format!("{:.2} deg", angle_rad.to_degrees())
+}
+
+/// A time (s) with a unit that suits it.
+pub(crate) fn seconds(time_s: f64) -> String {
+    match time_s {
+        0.1.. => format!("{time_s:.2} s"),
+        1e-3..0.1 => format!("{:.1} ms", 1e3 * time_s),
+        _ => format!("{:.0} us", 1e6 * time_s),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -42,5 +62,17 @@ mod tests {
             assert_eq!(significant(value), text);
         }
         assert_eq!(bounded(None), "unbounded");
+    }
+
+    // Nothing that rounds to zero is below it.
+    #[test]
+    fn with_units() {
+        assert_eq!(percent(0.12346), "12.35 %");
+        assert_eq!(percent(-0.00001), "0.00 %");
+        assert_eq!(percent(-0.0123), "-1.23 %");
+        assert_eq!(degrees(-0.818_355), "-46.89 deg");
+        assert_eq!(seconds(1.8936), "1.89 s");
+        assert_eq!(seconds(0.005), "5.0 ms");
+        assert_eq!(seconds(3.2e-5), "32 us");
     }
 }

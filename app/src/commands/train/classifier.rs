@@ -90,26 +90,64 @@ struct Lesson<'a> {
     standard: Standard,
     /// The first one is to verify with.
     sets: Vec<Examples>,
-    workers: Workers,
+    workers: &'a Workers,
+}
+
+/// What a recipe has led to.
+pub(crate) struct Learnt<'a> {
+    pub(crate) done: Done<'a>,
+    /// The best network.
+    network: Network,
+    card: Card<'a>,
+}
+
+/// Where a run keeps its networks while they learn.
+#[derive(Clone, Copy)]
+pub(crate) struct Keep<'a> {
+    /// The file that they stand beside; nothing is kept without.
+    pub(crate) beside: Option<&'a Path>,
+    /// Go on with those that are there.
+    pub(crate) resume: bool,
 }
 
 pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
-    let begin = Instant::now();
-    let failed = |error: ClassifierError| settings::out_of_range(&arguments.recipe, error);
-    recipe.validate().map_err(failed)?;
-    let lesson = Lesson::prepare(recipe, Workers::new(arguments.threads)?).map_err(failed)?;
-    let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
-    let part = |number: usize| {
-        let out = arguments.out.as_deref()?;
-        Some(Part::of(out, number + 1, kept.clone()))
+    let keep = Keep {
+        beside: arguments.out.as_deref(),
+        resume: arguments.resume,
     };
+    let workers = Workers::new(arguments.threads)?;
+    let learnt = learn(recipe, keep, &workers, |error| {
+        settings::out_of_range(&arguments.recipe, error)
+    })?;
+    if let Some(out) = &arguments.out {
+        write(out, &learnt.network, &learnt.card)?;
+    }
+    if let Some(path) = &arguments.json {
+        let text = report::json(&learnt.done);
+        write_file(path, |file| file.write_all(text.as_bytes()))?;
+    }
+    print(&report::text(&learnt.done))?;
+    keep.remove(recipe)?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+/// Trains a network with every loss of a recipe and scores them; `failed` says whose recipe it is.
+pub(crate) fn learn<'a>(
+    recipe: &'a Recipe,
+    keep: Keep<'_>,
+    workers: &'a Workers,
+    failed: impl Fn(ClassifierError) -> Failure,
+) -> Result<Learnt<'a>, Failure> {
+    let begin = Instant::now();
+    recipe.validate().map_err(&failed)?;
+    let lesson = Lesson::prepare(recipe, workers).map_err(failed)?;
     let bar = progress_bar_with_message(recipe.losses.len() as u64 * recipe.epochs);
     let mut networks = Vec::new();
     let mut best: Option<((usize, f64), usize, Network)> = None;
     for number in 0..recipe.losses.len() {
-        let part = part(number);
+        let part = keep.part(recipe, number)?;
         bar.set_position(number as u64 * recipe.epochs);
-        let (trained, network) = lesson.learn(number, part.as_ref(), arguments.resume, &bar)?;
+        let (trained, network) = lesson.learn(number, part.as_ref(), keep.resume, &bar)?;
         let key = standing(&trained.scores[0]);
         if best.as_ref().is_none_or(|(least, ..)| key < *least) {
             best = Some((key, number, network));
@@ -117,27 +155,35 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
         networks.push(trained);
     }
     bar.finish_and_clear();
-    let Some((_, best, network)) = best else {
-        return Ok(ExitCode::from(exit::DONE));
-    };
-    if let Some(out) = &arguments.out {
-        let rule = better_rule(&networks[best].scores[0]);
-        write(out, &network, &lesson.card(best, rule))?;
+    let (_, best, network) = best.ok_or_else(|| Failure::usage("the recipe names no loss"))?;
+    let card = lesson.card(best, better_rule(&networks[best].scores[0]));
+    let weights = network.folded().weights();
+    Ok(Learnt {
+        done: lesson.done(networks, (best, weights), begin.elapsed()),
+        network,
+        card,
+    })
+}
+
+impl Keep<'_> {
+    /// The file of the network of loss `number`, from zero.
+    fn part(&self, recipe: &Recipe, number: usize) -> Result<Option<Part>, Failure> {
+        let Some(out) = self.beside else {
+            return Ok(None);
+        };
+        let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
+        Ok(Some(Part::of(out, number + 1, kept)))
     }
-    let done = lesson.done(
-        networks,
-        (best, network.folded().weights()),
-        begin.elapsed(),
-    );
-    if let Some(path) = &arguments.json {
-        let text = report::json(&done);
-        write_file(path, |file| file.write_all(text.as_bytes()))?;
+
+    /// Removes what was kept: all is written.
+    pub(crate) fn remove(&self, recipe: &Recipe) -> Result<(), Failure> {
+        for number in 0..recipe.losses.len() {
+            if let Some(part) = self.part(recipe, number)? {
+                part.remove()?;
+            }
+        }
+        Ok(())
     }
-    print(&report::text(&done))?;
-    for part in (0..recipe.losses.len()).filter_map(part) {
-        part.remove()?;
-    }
-    Ok(ExitCode::from(exit::DONE))
 }
 
 /// The less the better: unstable picks, then the mean cost, by the better rule.
@@ -167,12 +213,12 @@ fn write(path: &Path, network: &Network, card: &Card<'_>) -> Result<(), Failure>
 }
 
 impl<'a> Lesson<'a> {
-    fn prepare(recipe: &'a Recipe, workers: Workers) -> Result<Self, ClassifierError> {
-        let classes = recipe.classes(&workers)?;
-        let training = recipe.training(&classes, &workers)?;
-        let mut sets = vec![recipe.verification(&classes, &workers)?];
+    fn prepare(recipe: &'a Recipe, workers: &'a Workers) -> Result<Self, ClassifierError> {
+        let classes = recipe.classes(workers)?;
+        let training = recipe.training(&classes, workers)?;
+        let mut sets = vec![recipe.verification(&classes, workers)?];
         for test in &recipe.tests {
-            sets.push(recipe.test(test, &classes, &workers)?);
+            sets.push(recipe.test(test, &classes, workers)?);
         }
         workers.finish();
         Ok(Self {
@@ -208,7 +254,7 @@ impl<'a> Lesson<'a> {
         let outcome = super::train(
             &mut trainer,
             [&training, &verification],
-            &self.workers,
+            self.workers,
             part,
             |epoch| {
                 bar.set_position(number as u64 * self.recipe.epochs + epoch.number);
@@ -232,7 +278,7 @@ impl<'a> Lesson<'a> {
     fn scores(&self, network: &Network) -> Result<Vec<[Score; 2]>, ClassifierError> {
         let network = network.folded();
         let scores = self.sets.iter().map(|examples| {
-            let picks = picks(&network, examples, &self.classes, &self.workers)?;
+            let picks = picks(&network, examples, &self.classes, self.workers)?;
             Ok(picks.map(|picks| Score::of_picks(&picks, examples, &self.classes)))
         });
         scores.collect()

@@ -1,0 +1,97 @@
+//! Arguments of `onecycle reproduce`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+
+use super::MOST_THREADS;
+
+/// Reproduce the paper's simulated results: its tables and figures, each number beside the paper's.
+///
+/// Writes DIR/reproduction.html, one page that needs no network, and DIR/reproduction.md.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle reproduce\n",
+    "  onecycle reproduce --quick\n",
+    "  onecycle reproduce table_4 table_5 -o out --resume\n\n",
+    "Parts: phase, grid, figures, table_2_and_3, table_4, tuning_rules, table_5, table_6, table_7.\n",
+    "What is done is kept in DIR/parts: with --resume, parts whose settings are the same are read from ",
+    "there, and a training goes on after its last epoch.\n\n",
+    "Exit codes: 0 done, 2 bad arguments, 3 unreadable part, 5 output not written"
+))]
+pub(crate) struct Reproduce {
+    /// Parts to reproduce [default: all]
+    #[arg(value_name = "NAME")]
+    pub(crate) names: Vec<Name>,
+    /// Small sizes, to see that everything runs: at most two minutes
+    #[arg(long)]
+    pub(crate) quick: bool,
+    /// Folder to write
+    #[arg(long, short, value_name = "DIR", default_value = "reproduction")]
+    pub(crate) out: PathBuf,
+    /// Keep what an earlier run has done with the same settings
+    #[arg(long)]
+    pub(crate) resume: bool,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
+    pub(crate) threads: Option<u64>,
+}
+
+/// A part of the reproduction.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Name {
+    Phase,
+    Grid,
+    Figures,
+    Table2And3,
+    Table4,
+    TuningRules,
+    Table5,
+    Table6,
+    Table7,
+}
+
+impl Name {
+    /// All of them, in the paper's order.
+    pub(crate) const ALL: [Self; 9] = [
+        Self::Phase,
+        Self::Grid,
+        Self::Figures,
+        Self::Table2And3,
+        Self::Table4,
+        Self::TuningRules,
+        Self::Table5,
+        Self::Table6,
+        Self::Table7,
+    ];
+
+    /// As arguments and files have it.
+    pub(crate) fn as_str(self) -> &'static str {
+        match self {
+            Self::Phase => "phase",
+            Self::Grid => "grid",
+            Self::Figures => "figures",
+            Self::Table2And3 => "table_2_and_3",
+            Self::Table4 => "table_4",
+            Self::TuningRules => "tuning_rules",
+            Self::Table5 => "table_5",
+            Self::Table6 => "table_6",
+            Self::Table7 => "table_7",
+        }
+    }
+}
+
+impl FromStr for Name {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|name| name.as_str() == text);
+        found.ok_or_else(|| {
+            let names = Self::ALL.map(Self::as_str).join(", ");
+            format!("there is no part '{text}': name some of {names}")
+        })
+    }
+}

@@ -1,0 +1,255 @@
+//! What a part of the reproduction is made of: what was found, which is kept, and the sheet that says what
+//! it is and what the paper has.
+//!
+//! ```text
+//! Sheet (TOML in the program)  settings -> Found (JSON in a file)
+//!       titles, captions, the paper's numbers, remarks  +  Found  ->  Part, which is rendered
+//! ```
+//!
+//! A sheet holds none of our numbers, and what is found none of the paper's.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
+
+use crate::args::Name;
+use crate::failure::Failure;
+use crate::output::write_file;
+use crate::pages::plot::{Figure, Series};
+
+/// What the work of a part yields.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Found {
+    /// Rows of each table.
+    pub(crate) tables: Vec<Vec<Row>>,
+    /// Series of each figure.
+    pub(crate) figures: Vec<Vec<Series>>,
+}
+
+/// A row of our numbers.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Row {
+    /// What it is of; the paper's row has the same name.
+    pub(crate) name: String,
+    /// A cell a column.
+    pub(crate) cells: Vec<String>,
+}
+
+impl Row {
+    pub(super) fn new(name: impl Into<String>, cells: impl IntoIterator<Item = String>) -> Self {
+        Self {
+            name: name.into(),
+            cells: cells.into_iter().collect(),
+        }
+    }
+}
+
+/// A file of `experiments/reproduction`.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Sheet {
+    title: String,
+    source: String,
+    /// What both sizes have in common.
+    #[serde(default)]
+    settings: toml::Table,
+    /// What only the full run has.
+    full: toml::Table,
+    /// What only the quick one has.
+    quick: toml::Table,
+    #[serde(default)]
+    tables: Vec<TableSheet>,
+    #[serde(default)]
+    figures: Vec<Figure>,
+    remarks: Vec<String>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TableSheet {
+    caption: String,
+    /// The first one is of the names of the rows.
+    columns: Vec<String>,
+    /// The paper's cells by the name of the row.
+    #[serde(default)]
+    paper: BTreeMap<String, Vec<String>>,
+}
+
+impl Sheet {
+    /// The one of this name; those in the program are all well formed.
+    pub(super) fn of(name: Name) -> Result<Self, Failure> {
+        let text = match name {
+            Name::Phase => include_str!("../../../../experiments/reproduction/phase.toml"),
+            Name::Grid => include_str!("../../../../experiments/reproduction/grid.toml"),
+            Name::Figures => include_str!("../../../../experiments/reproduction/figures.toml"),
+            Name::Table2And3 => {
+                include_str!("../../../../experiments/reproduction/table_2_and_3.toml")
+            }
+            Name::Table4 => include_str!("../../../../experiments/reproduction/table_4.toml"),
+            Name::TuningRules => {
+                include_str!("../../../../experiments/reproduction/tuning_rules.toml")
+            }
+            Name::Table5 => include_str!("../../../../experiments/reproduction/table_5.toml"),
+            Name::Table6 => include_str!("../../../../experiments/reproduction/table_6.toml"),
+            Name::Table7 => include_str!("../../../../experiments/reproduction/table_7.toml"),
+        };
+        toml::from_str(text).map_err(Failure::usage)
+    }
+
+    /// The settings of a run.
+    pub(super) fn settings(&self, quick: bool) -> toml::Table {
+        let mut settings = self.settings.clone();
+        settings.extend(if quick { &self.quick } else { &self.full }.clone());
+        settings
+    }
+
+    /// The part, once its numbers are found.
+    pub(super) fn part(self, name: Name, found: Found) -> Part {
+        let tables = self.tables.into_iter().zip(found.tables);
+        let figures = self.figures.into_iter().zip(found.figures);
+        Part {
+            name: name.as_str(),
+            title: self.title,
+            source: self.source,
+            tables: tables.map(|(sheet, rows)| Table::of(sheet, rows)).collect(),
+            figures: figures
+                .map(|(figure, series)| Figure { series, ..figure })
+                .collect(),
+            remarks: self.remarks,
+        }
+    }
+}
+
+/// A part, ready to be shown.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Part {
+    pub(crate) name: &'static str,
+    pub(crate) title: String,
+    /// Where the paper has it.
+    pub(crate) source: String,
+    pub(crate) tables: Vec<Table>,
+    pub(crate) figures: Vec<Figure>,
+    pub(crate) remarks: Vec<String>,
+}
+
+/// A table with the paper's numbers beside ours.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Table {
+    pub(crate) caption: String,
+    pub(crate) columns: Vec<String>,
+    /// Name of the row and its cells.
+    pub(crate) rows: Vec<(String, Vec<Cell>)>,
+}
+
+/// One value, ours and the paper's where it has one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct Cell {
+    pub(crate) ours: String,
+    pub(crate) paper: Option<String>,
+}
+
+impl Table {
+    fn of(sheet: TableSheet, rows: Vec<Row>) -> Self {
+        let row = |row: Row| {
+            let paper = sheet.paper.get(&row.name);
+            let cells = row.cells.into_iter().enumerate();
+            let cells = cells.map(|(column, ours)| Cell {
+                ours,
+                paper: paper
+                    .and_then(|cells| cells.get(column))
+                    .filter(|text| !text.is_empty())
+                    .cloned(),
+            });
+            (row.name, cells.collect())
+        };
+        Self {
+            rows: rows.into_iter().map(row).collect(),
+            caption: sheet.caption,
+            columns: sheet.columns,
+        }
+    }
+}
+
+/// Settings as a type; a sheet in the program has them all.
+pub(super) fn typed<T: DeserializeOwned>(settings: &toml::Table) -> Result<T, Failure> {
+    settings.clone().try_into().map_err(Failure::usage)
+}
+
+/// A part's file: what was found, and by which program with which settings.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    program: String,
+    settings: toml::Table,
+    found: Found,
+}
+
+/// File of a part.
+pub(super) fn path(folder: &Path, name: Name) -> PathBuf {
+    folder.join(format!("{}.json", name.as_str()))
+}
+
+/// What an earlier run of this program has found with the same settings.
+pub(super) fn kept(path: &Path, settings: &toml::Table) -> Result<Option<Found>, Failure> {
+    let unreadable = |reason: String| Failure::Settings {
+        path: path.to_owned(),
+        reason: format!("{reason}: leave out --resume to begin anew"),
+    };
+    let text = match fs::read_to_string(path) {
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        read => read.map_err(|error| unreadable(error.to_string()))?,
+    };
+    let kept: Kept = serde_json::from_str(&text).map_err(|error| unreadable(error.to_string()))?;
+    let is_same = kept.program == env!("CARGO_PKG_VERSION") && kept.settings == *settings;
+    Ok(is_same.then_some(kept.found))
+}
+
+/// Keeps what was found.
+pub(super) fn keep(path: &Path, settings: &toml::Table, found: &Found) -> Result<(), Failure> {
+    let kept = Kept {
+        program: env!("CARGO_PKG_VERSION").to_owned(),
+        settings: settings.clone(),
+        found: found.clone(),
+    };
+    let text = crate::report::json::to_text(&kept);
+    write_file(path, |file| file.write_all(text.as_bytes()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Every sheet reads; none has more of the paper's cells in a row than columns to put them in; each has
+    // something to show, and a remark that says why ours differ.
+    #[test]
+    fn sheets_are_well_formed() {
+        for name in Name::ALL {
+            let sheet = Sheet::of(name).unwrap();
+            assert!(!sheet.remarks.is_empty(), "{name:?}");
+            assert!(sheet.tables.len() + sheet.figures.len() > 0, "{name:?}");
+            for table in &sheet.tables {
+                for (row, cells) in &table.paper {
+                    assert!(cells.len() < table.columns.len(), "{name:?}, {row}");
+                }
+            }
+        }
+    }
+
+    // What is kept is read back to the same bits with the same settings, and with no others.
+    #[test]
+    fn only_the_same_settings_are_read_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = path(folder.path(), Name::Phase);
+        let sheet = Sheet::of(Name::Phase).unwrap();
+        let found = Found {
+            tables: vec![vec![Row::new("one", ["1 %".to_owned()])]],
+            figures: vec![],
+        };
+        assert_eq!(kept(&path, &sheet.settings(true)).unwrap(), None);
+        keep(&path, &sheet.settings(true), &found).unwrap();
+        assert_eq!(kept(&path, &sheet.settings(true)).unwrap(), Some(found));
+        assert_eq!(kept(&path, &sheet.settings(false)).unwrap(), None);
+    }
+}

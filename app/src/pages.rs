@@ -1,0 +1,4 @@
+//! Pages for a browser: one file each, which needs no network.
+
+pub(crate) mod page;
+pub(crate) mod plot;

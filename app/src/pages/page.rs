@@ -1,0 +1,180 @@
+//! A page in one file: style, script and plots inside, light and dark, for screens and paper.
+//!
+//! All text goes through [`escaped`]; bodies are made of the components here.
+
+use std::fmt::Write;
+
+use plotly::Plot;
+
+use super::plot::Figure;
+
+/// A heading and what stands below it.
+pub(crate) struct Section {
+    /// Its address on the page.
+    pub(crate) id: String,
+    pub(crate) title: String,
+    /// Components.
+    pub(crate) body: String,
+}
+
+/// Text as HTML has it.
+pub(crate) fn escaped(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\'' => out.push_str("&#39;"),
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+/// A paragraph of a class.
+pub(crate) fn paragraph(class: &str, text: &str) -> String {
+    format!("<p class=\"{}\">{}</p>\n", escaped(class), escaped(text))
+}
+
+/// A list.
+pub(crate) fn list(items: &[String]) -> String {
+    let items = items
+        .iter()
+        .map(|item| format!("<li>{}</li>", escaped(item)));
+    format!("<ul>{}</ul>\n", items.collect::<String>())
+}
+
+/// A value, and a smaller one below it.
+pub(crate) struct Cell<'a> {
+    pub(crate) value: &'a str,
+    pub(crate) below: Option<String>,
+}
+
+/// A table; the first of the columns is of the names of the rows.
+pub(crate) fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'_>>)]) -> String {
+    let mut html = format!(
+        "<div class=\"table\"><table><caption>{}</caption><thead><tr>",
+        escaped(caption)
+    );
+    for column in columns {
+        let _ = write!(html, "<th scope=\"col\">{}</th>", escaped(column));
+    }
+    html.push_str("</tr></thead><tbody>\n");
+    for (name, cells) in rows {
+        let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escaped(name));
+        for cell in cells {
+            let _ = write!(html, "<td>{}", escaped(cell.value));
+            if let Some(below) = &cell.below {
+                let _ = write!(html, "<small>{}</small>", escaped(below));
+            }
+            html.push_str("</td>");
+        }
+        html.push_str("</tr>\n");
+    }
+    html.push_str("</tbody></table></div>\n");
+    html
+}
+
+/// A plot with its caption.
+pub(crate) fn figure(figure: &Figure) -> String {
+    // Within a script nothing but its end is read: no `<`, no end.
+    let json = figure.to_json().replace('<', "\\u003c");
+    format!(
+        "<figure><div class=\"plot\"><script type=\"application/json\">{json}</script></div>\
+         <figcaption>{}</figcaption></figure>\n",
+        escaped(&figure.caption)
+    )
+}
+
+/// The whole page.
+pub(crate) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
+    let title = escaped(title);
+    let mut links = String::new();
+    let mut body = String::new();
+    for section in sections {
+        let (id, name) = (escaped(&section.id), escaped(&section.title));
+        let _ = write!(links, "<a href=\"#{id}\">{name}</a>");
+        let _ = write!(
+            body,
+            "<section id=\"{id}\"><h2>{name}</h2>\n{}</section>\n",
+            section.body
+        );
+    }
+    format!(
+        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+         <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n{}\n</head>\n<body>\n\
+         <header><h1>{title}</h1><button id=\"theme\" type=\"button\">light / dark</button></header>\n\
+         {lead}<nav>{links}</nav>\n\
+         <noscript><p class=\"note\">Plots need JavaScript; the tables do not.</p></noscript>\n\
+         <main>\n{body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n",
+        plotly_script()
+    )
+}
+
+/// The element that holds plotly.js; what the crate adds for formulas is left out.
+fn plotly_script() -> String {
+    const END: &str = "</script>";
+    let mut sources = Plot::offline_js_sources();
+    let end = sources.find(END).map_or(sources.len(), |at| at + END.len());
+    sources.truncate(end);
+    sources
+}
+
+const STYLE: &str = include_str!("page.css");
+const SCRIPT: &str = include_str!("page.js");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Whatever stands in a text, it is text: no tag of it reaches the page, and it can leave no
+    // attribute and no script.
+    #[test]
+    fn text_stays_text() {
+        let hostile = "</script><b x='\"'>&";
+        let safe = "&lt;/script&gt;&lt;b x=&#39;&quot;&#39;&gt;&amp;";
+        assert_eq!(escaped(hostile), safe);
+        let cell = Cell {
+            value: hostile,
+            below: Some(hostile.to_owned()),
+        };
+        let html = table(hostile, &[hostile.to_owned()], &[(hostile, vec![cell])]);
+        assert_eq!(html.matches(safe).count(), 5);
+        assert!(!html.contains("<b") && !html.contains("</script"));
+        let axis = super::super::plot::Axis {
+            title: hostile.to_owned(),
+            is_logarithmic: false,
+        };
+        let html = figure(&Figure {
+            caption: hostile.to_owned(),
+            x: axis.clone(),
+            y: axis,
+            series: vec![],
+        });
+        assert_eq!(html.matches("</script").count(), 1, "{html}");
+    }
+
+    // One file below 6 MB that fetches nothing: plotly.js is in it, MathJax (2 MB more) is not, and
+    // two scripts end: that of plotly.js and that of the page.
+    #[test]
+    fn the_page_is_whole() {
+        let section = Section {
+            id: "one".to_owned(),
+            title: "One".to_owned(),
+            body: paragraph("note", "text"),
+        };
+        let html = page("A & B", "", &[section]);
+        assert!(html.contains("<title>A &amp; B</title>"));
+        assert!(html.contains("<a href=\"#one\">One</a>"));
+        assert_eq!(html.matches("</script>").count(), 2);
+        assert!(!html.contains("<script src") && !html.contains("<link"));
+        assert!(
+            (4_000_000..6_000_000).contains(&html.len()),
+            "{}",
+            html.len()
+        );
+    }
+}

@@ -1,0 +1,163 @@
+//! The reproduction of the paper's results, as Markdown and as a page.
+
+use std::fmt::Write;
+
+use crate::commands::reproduce::part::{Cell, Part};
+use crate::pages::page::{self, Section, page};
+
+const TITLE: &str = "The paper's simulated results, reproduced";
+const LEAD: &str = "A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, \"Real-time system identification using deep \
+    learning for linear processes with application to unmanned aerial vehicles\", IEEE Access 8 (2020). \
+    J is what a controller costs (integral of the squared error) above the true process's own optimum, as \
+    a part of it. The paper's numbers stand with ours; every number of ours was found by the command.";
+const QUICK: &str = "A quick run: small sizes, to see that everything runs. Its numbers are not those to \
+    compare with the paper's; leave out --quick for them.";
+
+/// The command that makes it.
+fn command(is_quick: bool) -> &'static str {
+    if is_quick {
+        "onecycle reproduce --quick"
+    } else {
+        "onecycle reproduce"
+    }
+}
+
+/// Tables and remarks.
+pub(crate) fn markdown(parts: &[Part], is_quick: bool) -> String {
+    let mut text = format!(
+        "# {TITLE}\n\n{LEAD}\n\nMade by `{}`, onecycle {}: not to be edited. The plots are on the page that \
+         it writes beside this file.\n",
+        command(is_quick),
+        env!("CARGO_PKG_VERSION")
+    );
+    if is_quick {
+        let _ = writeln!(text, "\n**{QUICK}**");
+    }
+    for part in parts {
+        let _ = writeln!(
+            text,
+            "\n## {}\n\n{}. `{} {}`",
+            part.title,
+            part.source,
+            command(is_quick),
+            part.name
+        );
+        for table in &part.tables {
+            let cells: Vec<String> = table.columns.iter().map(|cell| in_cell(cell)).collect();
+            let _ = writeln!(
+                text,
+                "\n{}\n\n| {} |\n|---|{}",
+                table.caption,
+                cells.join(" | "),
+                "--:|".repeat(cells.len().saturating_sub(1))
+            );
+            for (name, cells) in &table.rows {
+                let cells: Vec<String> = cells.iter().map(cell).collect();
+                let _ = writeln!(text, "| {} | {} |", in_cell(name), cells.join(" | "));
+            }
+        }
+        text.push('\n');
+        for remark in &part.remarks {
+            let _ = writeln!(text, "- {remark}");
+        }
+    }
+    text
+}
+
+fn cell(cell: &Cell) -> String {
+    match &cell.paper {
+        Some(paper) => in_cell(&format!("**{}** (paper: {paper})", cell.ours)),
+        None => in_cell(&cell.ours),
+    }
+}
+
+/// A cell of Markdown ends at a bar.
+fn in_cell(text: &str) -> String {
+    text.replace('|', "\\|")
+}
+
+/// Tables, plots and remarks on one page.
+pub(crate) fn html(parts: &[Part], is_quick: bool) -> String {
+    let mut lead = page::paragraph("lead", LEAD);
+    if is_quick {
+        lead += &page::paragraph("note", QUICK);
+    }
+    let version = env!("CARGO_PKG_VERSION");
+    let made = format!("Made by {}, onecycle {version}.", command(is_quick));
+    lead += &page::paragraph("source", &made);
+    let sections: Vec<Section> = parts.iter().map(section).collect();
+    page(TITLE, &lead, &sections)
+}
+
+fn section(part: &Part) -> Section {
+    let mut body = page::paragraph("source", &part.source);
+    for table in &part.tables {
+        let rows: Vec<_> = (table.rows.iter())
+            .map(|(name, cells)| (name.as_str(), cells.iter().map(beside).collect()))
+            .collect();
+        body += &page::table(&table.caption, &table.columns, &rows);
+    }
+    body.extend(part.figures.iter().map(page::figure));
+    body += &page::list(&part.remarks);
+    Section {
+        id: part.name.to_owned(),
+        title: part.title.clone(),
+        body,
+    }
+}
+
+/// Ours, the paper's below it.
+fn beside(cell: &Cell) -> page::Cell<'_> {
+    page::Cell {
+        value: &cell.ours,
+        below: cell.paper.as_ref().map(|paper| format!("paper: {paper}")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::commands::reproduce::part::Table;
+
+    fn part() -> Part {
+        let cell = |ours: &str, paper: Option<&str>| Cell {
+            ours: ours.to_owned(),
+            paper: paper.map(str::to_owned),
+        };
+        Part {
+            name: "table_9",
+            title: "Nine".to_owned(),
+            source: "Table IX".to_owned(),
+            tables: vec![Table {
+                caption: "of nothing".to_owned(),
+                columns: vec![String::new(), "mean |J|".to_owned(), "n".to_owned()],
+                rows: vec![(
+                    "one".to_owned(),
+                    vec![cell("0.31 %", Some("0.52 %")), cell("3", None)],
+                )],
+            }],
+            figures: vec![],
+            remarks: vec!["Because.".to_owned()],
+        }
+    }
+
+    // The paper's number stands beside ours where it has one, bars of a name do not end its cell, and a
+    // quick run says that it is one.
+    #[test]
+    fn both_numbers_in_a_row() {
+        let text = markdown(&[part()], false);
+        assert!(
+            text.contains("|  | mean \\|J\\| | n |\n|---|--:|--:|\n"),
+            "{text}"
+        );
+        assert!(
+            text.contains("| one | **0.31 %** (paper: 0.52 %) | 3 |\n"),
+            "{text}"
+        );
+        assert!(text.contains("- Because.\n") && !text.contains(QUICK));
+        assert!(markdown(&[part()], true).contains(QUICK));
+        let html = html(&[part()], false);
+        assert!(html.contains("<td>0.31 %<small>paper: 0.52 %</small></td><td>3</td>"));
+        assert!(html.contains("<li>Because.</li>"));
+    }
+}

@@ -1,0 +1,113 @@
+//! `reproduce`: the quick run of the parts that take seconds, gone on with, and what it refuses.
+
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+
+use common::{Scratch, UNREADABLE, run};
+
+/// Parts that take seconds, and their sheets.
+const PARTS: [(&str, &str); 3] = [
+    (
+        "phase",
+        include_str!("../../experiments/reproduction/phase.toml"),
+    ),
+    (
+        "figures",
+        include_str!("../../experiments/reproduction/figures.toml"),
+    ),
+    (
+        "table_7",
+        include_str!("../../experiments/reproduction/table_7.toml"),
+    ),
+];
+
+/// The paper's cells of a sheet.
+fn papers(sheet: &str) -> usize {
+    let sheet: toml::Table = sheet.parse().unwrap();
+    let tables = sheet.get("tables").and_then(|tables| tables.as_array());
+    let papers = tables
+        .into_iter()
+        .flatten()
+        .filter_map(|table| table.get("paper")?.as_table());
+    papers
+        .flat_map(|paper| paper.values())
+        .filter_map(|cells| cells.as_array())
+        .flatten()
+        .filter(|cell| cell.as_str() != Some(""))
+        .count()
+}
+
+// Every number of the paper stands beside one that was found, so every row is there: 2 of the phase, 20 and
+// 1 of Table VII. Both files are there and nothing is left beside them but the parts. Gone on with, nothing
+// is worked out again and all is the same to the byte; a part made with other settings is made anew.
+#[test]
+fn quick_run_of_the_fast_parts() {
+    let folder = Scratch::new();
+    let out = folder.name("out");
+    let mut arguments = vec!["reproduce", "--quick", "-o", &out];
+    arguments.extend(PARTS.iter().map(|(name, _)| *name));
+    let made = run(&arguments);
+    assert_eq!(made.code, Some(0), "{made:?}");
+    let read = |name: &str| fs::read_to_string(format!("{out}/{name}")).unwrap();
+    let text = read("reproduction.md");
+    let expected: usize = PARTS.iter().map(|(_, sheet)| papers(sheet)).sum();
+    assert_eq!(expected, 23);
+    assert_eq!(text.matches("(paper: ").count(), expected, "{text}");
+    assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
+    let page = read("reproduction.html");
+    assert_eq!(page.matches("<figure>").count(), 5);
+    assert_eq!(page.matches("<small>paper: ").count(), expected);
+
+    let part = read("parts/phase.json");
+    arguments.push("--resume");
+    let again = run(&arguments);
+    assert_eq!(again.code, Some(0), "{again:?}");
+    assert_eq!(
+        again
+            .stderr
+            .matches("as an earlier run has found it")
+            .count(),
+        PARTS.len(),
+        "{again:?}"
+    );
+    assert_eq!(read("reproduction.md"), text);
+    assert_eq!(read("reproduction.html"), page);
+
+    let other = part.replacen('8', "9", 1);
+    fs::write(format!("{out}/parts/phase.json"), other).unwrap();
+    let anew = run(&arguments);
+    assert_eq!(
+        anew.stderr
+            .matches("as an earlier run has found it")
+            .count(),
+        PARTS.len() - 1,
+        "{anew:?}"
+    );
+    assert_eq!(read("parts/phase.json"), part);
+}
+
+// One sentence names the parts; a part that is no JSON is named with what to do.
+#[test]
+fn what_it_refuses() {
+    let refused = run(&["reproduce", "table_8"]);
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    let words = "there is no part 'table_8': name some of phase, grid, figures, table_2_and_3, table_4, \
+                 tuning_rules, table_5, table_6, table_7";
+    assert!(refused.stderr.contains(words), "{refused:?}");
+
+    let folder = Scratch::new();
+    let out = folder.name("out");
+    fs::create_dir_all(format!("{out}/parts")).unwrap();
+    fs::write(format!("{out}/parts/phase.json"), "{").unwrap();
+    let refused = run(&["reproduce", "phase", "--quick", "--resume", "-o", &out]);
+    assert_eq!(refused.code, Some(UNREADABLE), "{refused:?}");
+    assert!(
+        refused.stderr.contains("phase.json")
+            && refused.stderr.contains("leave out --resume to begin anew"),
+        "{refused:?}"
+    );
+}
