@@ -124,6 +124,23 @@ pub enum CaseError {
 }
 
 impl Campaign {
+    /// One experiment on the paper's relay, without trim, bias and noise: what a campaign is changed from.
+    pub const QUIET: Self = Self {
+        measure: Measure::Identification,
+        cases: 1,
+        seed: 1,
+        bias: 0.0,
+        sigma: 0.0,
+        sigma_uniform: false,
+        offset: 0.0,
+        trim: false,
+        asymmetry: 0.0,
+        cycles: 1,
+        time_scale: 1.0,
+        method: Method::Map,
+        beta: Space::MULTIROTOR.beta,
+    };
+
     /// Checks every field.
     ///
     /// # Errors

@@ -3,7 +3,7 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use onecycle_lab::campaign::{Campaign, Case, Measure};
+use onecycle_lab::campaign::{Campaign, Case};
 use onecycle_lab::identify::{
     Identification, Identified, Method, Options, Remark, Signals, Verdict, identify,
 };
@@ -15,19 +15,11 @@ use onecycle_plant::Trace;
 
 /// The paper's multirotors with 1 % noise, the bias left in.
 const CAMPAIGN: Campaign = Campaign {
-    measure: Measure::Identification,
     cases: 200,
-    seed: 1,
     bias: 0.5,
     sigma: 0.01,
-    sigma_uniform: false,
-    offset: 0.0,
-    trim: false,
-    asymmetry: 0.0,
-    method: Method::Map,
-    time_scale: 1.0,
     cycles: 8,
-    beta: -0.73,
+    ..Campaign::QUIET
 };
 /// Periods that every relay has settled in.
 const PERIODS: f64 = 25.0;

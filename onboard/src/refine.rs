@@ -28,8 +28,6 @@ mod fundamental;
 mod prior;
 mod uncertainty;
 
-use core::f64::consts::TAU;
-
 use libm::{exp, sqrt};
 
 use self::descent::NormalEquations;
@@ -38,7 +36,6 @@ pub use self::domain::{DomainEdge, Shape};
 use self::domain::{HIGHEST, SHAPE, clamp, domain_edge};
 use self::fundamental::Fundamental;
 pub use self::prior::ShapePrior;
-use self::uncertainty::{Tangent, coordinate_map};
 use crate::distortion;
 use crate::least_squares::{Columns, Triangle, back_substitute, dot};
 use crate::process::Process;
@@ -487,46 +484,5 @@ impl<'a, const BINS: usize, const EDGES: usize> Estimator<'a, BINS, EDGES> {
             edge: domain_edge(shape),
             steps,
         })
-    }
-
-    /// The derivatives of the fitted model by all unknowns, orthonormalised, into `tangent`.
-    fn tangent(
-        &self,
-        shape: &Shape,
-        fit: &LinearFit<BINS>,
-        tangent: &mut Tangent<'_, BINS>,
-    ) -> Option<()> {
-        for (row, known) in tangent.triangle.iter_mut().zip(&fit.triangle) {
-            row[..LINEAR].copy_from_slice(known);
-        }
-        let (linear, by_shape) = tangent.basis.column.split_at_mut(LINEAR);
-        linear.copy_from_slice(&fit.basis.column);
-        self.jacobian(shape, &fit.coefficients, by_shape)?;
-        tangent
-            .basis
-            .orthonormalise_from(LINEAR, &mut tangent.triangle);
-        Some(())
-    }
-
-    /// Covariance of the coordinates, and relative error of the response.
-    #[inline(never)]
-    fn covariance(&self, shape: &Shape, fit: &LinearFit<BINS>) -> Option<([[f64; 5]; 5], f64)> {
-        let mut output = [0.0; BINS];
-        for (k, bin) in self.window.bins().iter().enumerate() {
-            if self.weight[k] > 0.0 {
-                output[k] = bin.output_sum / self.weight[k] - fit.residual[k];
-            }
-        }
-        let [.., bias_gain, gain] = fit.coefficients;
-        let map = coordinate_map(bias_gain, gain, self.period_s);
-        let noise_sigma = self.window.noise_sigma();
-        let mut tangent = Tangent {
-            basis: Columns::zero(self.rows),
-            triangle: [[0.0; ALL]; ALL],
-            weight: &self.weight,
-            bin_rad: TAU * self.window.bin_s() / self.period_s,
-        };
-        self.tangent(shape, fit, &mut tangent)?;
-        tangent.covariance(&fit.residual, &output, noise_sigma, &map)
     }
 }

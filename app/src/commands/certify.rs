@@ -5,7 +5,6 @@ use std::process::ExitCode;
 use indicatif::ProgressBar;
 use onecycle_lab::campaign::{Campaign, Measure, relay_outcome};
 use onecycle_lab::certificate::{Certificate, LeastStable, Summary};
-use onecycle_lab::identify::Method;
 use onecycle_lab::{Direction, Space};
 use onecycle_onboard::Process;
 use rayon::prelude::*;
@@ -156,18 +155,9 @@ fn settles(space: &Space, certificate: &Certificate, trim: bool) -> Result<bool,
     };
     let campaign = Campaign {
         measure: Measure::Relay,
-        cases: 1,
-        seed: 1,
-        bias: 0.0,
-        sigma: 0.0,
-        sigma_uniform: false,
-        offset: 0.0,
         trim,
-        asymmetry: 0.0,
-        method: Method::default(),
-        time_scale: 1.0,
-        cycles: 1,
         beta: space.beta,
+        ..Campaign::QUIET
     };
     let [t_prop_s, t_body_s, tau_s] = certificate
         .times_s

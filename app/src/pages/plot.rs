@@ -1,9 +1,9 @@
 //! Plots of a page: series of points as plotly.js draws them (plotly.rs, MIT licence).
 
-use plotly::Plot;
-use plotly::common::{Mode, Orientation};
-use plotly::layout::{Axis as PlotAxis, AxisType, Layout, Legend, Margin};
 use serde::{Deserialize, Serialize};
+use serde_json::json;
+
+use super::page::escaped;
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,49 +74,43 @@ pub(crate) struct Figure {
 }
 
 impl Figure {
-    /// Data and layout as JSON. Colours are the page's, which change with its theme.
+    /// Data and layout as JSON. Colours are the page's, which change with its theme; plotly.js reads a few
+    /// tags in names and titles, and there are none in ours.
     pub(crate) fn to_json(&self) -> String {
-        let mut plot = Plot::new();
-        for series in &self.series {
+        let trace = |series: &Series| {
             let mode = match series.marks {
-                Marks::Line => Mode::Lines,
-                Marks::Points => Mode::Markers,
-                Marks::LineAndPoints => Mode::LinesMarkers,
+                Marks::Line => "lines",
+                Marks::Points => "markers",
+                Marks::LineAndPoints => "lines+markers",
             };
-            let trace = plotly::Scatter::new(series.x.clone(), series.y.clone());
-            plot.add_trace(trace.name(escaped(&series.name)).mode(mode));
-        }
-        let axis = |axis: &Axis| {
-            let kind = if axis.is_logarithmic {
-                AxisType::Log
-            } else {
-                AxisType::Linear
-            };
-            PlotAxis::new()
-                .title(escaped(&axis.title))
-                .type_(kind)
-                .auto_margin(true)
-                .zero_line(false)
+            json!({
+                "type": "scatter",
+                "name": escaped(&series.name),
+                "mode": mode,
+                "x": series.x,
+                "y": series.y,
+            })
         };
-        let legend = Legend::new()
-            .orientation(Orientation::Horizontal)
-            .y(1.02)
-            .y_anchor(plotly::common::Anchor::Bottom);
-        plot.set_layout(
-            Layout::new()
-                .x_axis(axis(&self.x))
-                .y_axis(axis(&self.y))
-                .legend(legend)
-                .show_legend(self.series.len() > 1)
-                .margin(Margin::new().left(56).right(16).top(24).bottom(48)),
-        );
-        plot.to_json()
+        let axis = |axis: &Axis| {
+            json!({
+                "title": { "text": escaped(&axis.title) },
+                "type": if axis.is_logarithmic { "log" } else { "linear" },
+                "automargin": true,
+                "zeroline": false,
+            })
+        };
+        let figure = json!({
+            "data": self.series.iter().map(trace).collect::<Vec<_>>(),
+            "layout": {
+                "xaxis": axis(&self.x),
+                "yaxis": axis(&self.y),
+                "legend": { "orientation": "h", "y": 1.02, "yanchor": "bottom" },
+                "showlegend": self.series.len() > 1,
+                "margin": { "l": 56, "r": 16, "t": 24, "b": 48 },
+            },
+        });
+        figure.to_string()
     }
-}
-
-/// Plotly reads a few tags in names and titles: there are none in ours.
-fn escaped(text: &str) -> String {
-    super::page::escaped(text)
 }
 
 #[cfg(test)]

@@ -3,14 +3,14 @@
 //!
 //! Trial `n` of a seed is the same whatever else is run.
 
-use onecycle_onboard::cycle::{Cycle, SteadyRun};
+use onecycle_onboard::cycle::Cycle;
 use onecycle_onboard::{Process, Relay, RelaySettings};
 use onecycle_plant::{Experiment, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::ClassifierError;
-use crate::campaign::cycles;
+use crate::dataset::last_steady_cycle;
 use crate::limit_cycle::symmetric;
 use crate::space::{FieldError, Space, first_out_of_range};
 
@@ -151,16 +151,6 @@ impl Trials {
         }
         Ok(None)
     }
-}
-
-fn last_steady_cycle(trace: &Trace) -> Option<Cycle> {
-    let mut run = SteadyRun::default();
-    let mut last = None;
-    for cycle in cycles(trace, &trace.output) {
-        run.push(&cycle);
-        last = run.is_steady().then_some(cycle);
-    }
-    last
 }
 
 fn sampled(trace: &Trace, cycle: &Cycle) -> Option<SampledCycle> {

@@ -24,8 +24,8 @@ use super::{RelayTest, Seen};
 use crate::baselines::RivalError;
 use crate::baselines::asymmetric::AsymmetricRelay;
 use crate::baselines::pem::SweptRelay;
-use crate::campaign::{Campaign, CaseError, IDENTIFICATION_PERIODS, Measure, cycles};
-use crate::identify::{Method, Signals};
+use crate::campaign::{Campaign, CaseError, IDENTIFICATION_PERIODS, cycles};
+use crate::identify::Signals;
 use crate::optimum::OptimumError;
 use crate::space::Space;
 
@@ -154,19 +154,14 @@ impl Benchmark {
     /// The campaign that its experiments of a protocol are cases of.
     fn campaign(&self, is_trimmed: bool) -> Campaign {
         Campaign {
-            measure: Measure::Identification,
             cases: self.experiments,
             seed: self.seed,
             bias: 0.5,
             sigma: 0.03,
             sigma_uniform: true,
-            offset: 0.0,
             trim: is_trimmed,
-            asymmetry: 0.0,
             cycles: CYCLES_KEPT,
-            time_scale: 1.0,
-            method: Method::default(),
-            beta: Space::MULTIROTOR.beta,
+            ..Campaign::QUIET
         }
     }
 

@@ -8,6 +8,7 @@ use onecycle_onboard::pack::Pack;
 use crate::dataset::VALUES;
 use crate::dataset::shards::Record;
 use crate::deterioration::{Deterioration, deterioration};
+use crate::evaluate::Costs;
 use crate::optimum::pd_at_phase_margin;
 
 /// Of one cycle each, those called unknown left out.
@@ -73,29 +74,16 @@ pub fn scores(pack: &Pack<'_>, records: &[&Record]) -> Scores {
         .filter_map(|record| outcome(pack, record))
         .collect();
     scores.unknown = records.len() - outcomes.len();
-    let mut costs = Vec::new();
-    let mut least_margin_rad = f64::INFINITY;
-    for outcome in &outcomes {
-        match outcome.deterioration {
-            Deterioration::Stable {
-                relative,
-                phase_margin_rad,
-            } => {
-                costs.push(relative.abs());
-                least_margin_rad = least_margin_rad.min(phase_margin_rad);
-            }
-            Deterioration::Unstable => scores.unstable += 1,
-        }
-    }
-    costs.sort_unstable_by(f64::total_cmp);
-    let at = |q: f64| {
-        let index = (costs.len().saturating_sub(1) as f64 * q).round() as usize;
-        costs.get(index).copied().unwrap_or_default()
-    };
+    let costs = Costs::of(outcomes.iter().map(|outcome| Some(outcome.deterioration)));
+    scores.unstable = costs.unstable;
+    [
+        scores.mean,
+        scores.median,
+        scores.percentile_99,
+        scores.worst,
+    ] = [costs.mean, costs.median, costs.percentile_99, costs.worst].map(Option::unwrap_or_default);
+    scores.least_margin_deg = costs.least_phase_margin_deg.unwrap_or(f64::INFINITY);
     let count = outcomes.len().max(1) as f64;
-    scores.mean = costs.iter().sum::<f64>() / costs.len().max(1) as f64;
-    (scores.median, scores.percentile_99, scores.worst) = (at(0.5), at(0.99), at(1.0));
-    scores.least_margin_deg = least_margin_rad.to_degrees();
     let squares = || outcomes.iter().map(|outcome| outcome.mahalanobis);
     scores.mahalanobis = squares().sum::<f64>() / (count * VALUES as f64);
     scores.reliability = LEVELS.map(|(stated, quantile)| Reliability {

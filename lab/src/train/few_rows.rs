@@ -182,34 +182,12 @@ fn in_halves(mut chains: [f32; CHAINS]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use rand::{RngExt, SeedableRng};
+    use rand::SeedableRng;
     use rand_pcg::Pcg64Mcg;
 
     use super::*;
+    use crate::train::matrix::tests::{Threads, random};
     use crate::train::{Layer, Network, OneThread};
-
-    fn random(rows: usize, columns: usize, seed: u64) -> Matrix {
-        let mut rng = Pcg64Mcg::seed_from_u64(seed);
-        let values = (0..rows * columns).map(|_| rng.random_range(-1.0..1.0));
-        Matrix::from_rows(rows, columns, values.collect()).unwrap()
-    }
-
-    /// As many threads as it says.
-    struct Threads(usize);
-
-    impl Workers for Threads {
-        fn count(&self) -> usize {
-            self.0
-        }
-
-        fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
-            std::thread::scope(|scope| {
-                for i in 0..parts {
-                    scope.spawn(move || part(i));
-                }
-            });
-        }
-    }
 
     // 1/2 (1 + 2 + .. + 70) = 1242.5: halves of whole numbers, exact in any order.
     #[test]

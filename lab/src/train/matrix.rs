@@ -251,14 +251,14 @@ fn product(
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_pcg::Pcg64Mcg;
 
     use super::*;
 
     /// As many threads as it says.
-    struct Threads(usize);
+    pub(crate) struct Threads(pub(crate) usize);
 
     impl Workers for Threads {
         fn count(&self) -> usize {
@@ -274,8 +274,8 @@ mod tests {
         }
     }
 
-    fn random(rows: usize, columns: usize) -> Matrix {
-        let mut rng = Pcg64Mcg::seed_from_u64((rows * 10_000 + columns) as u64);
+    pub(crate) fn random(rows: usize, columns: usize, seed: u64) -> Matrix {
+        let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let values = (0..rows * columns).map(|_| rng.random_range(-1.0..1.0));
         Matrix::from_rows(rows, columns, values.collect()).unwrap()
     }
@@ -293,7 +293,7 @@ mod tests {
             (193, 513, 65),
             (128, 66, 9),
         ] {
-            let (a, b) = (random(rows, terms), random(terms, columns));
+            let (a, b) = (random(rows, terms, 1), random(terms, columns, 2));
             let mut expected = Matrix::zeros(rows, columns);
             for i in 0..rows {
                 for j in 0..columns {
@@ -316,7 +316,7 @@ mod tests {
     #[test]
     fn threads_do_not_change_a_bit() {
         for (rows, columns) in [(300, 128), (128, 300)] {
-            let (a, b) = (random(rows, 130), random(130, columns));
+            let (a, b) = (random(rows, 130, 3), random(130, columns, 4));
             assert!(rows * columns * 130 > LEAST_DIVIDED);
             let alone = a.times(&b, &OneThread);
             assert!(alone.is_some());

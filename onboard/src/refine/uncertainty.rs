@@ -14,7 +14,7 @@ use core::f64::consts::TAU;
 
 use libm::{cos, log, sin};
 
-use super::{ALL, KNOWN, LINEAR, coordinate};
+use super::{ALL, Estimator, KNOWN, LINEAR, LinearFit, Shape, coordinate};
 use crate::least_squares::{Columns, Triangle, back_substitute, dot};
 
 /// Harmonics that are looked at; beyond them a relay oscillation has less than 1/1000 of its
@@ -26,6 +26,53 @@ const LEAST_LEFT: f64 = 1e-4;
 const SIGNIFICANT: f64 = 2.7;
 /// Relative errors of the response that are tried: from 1e-5 to 1, twelve a decade.
 const TRIED: usize = 61;
+
+impl<const BINS: usize, const EDGES: usize> Estimator<'_, BINS, EDGES> {
+    /// The derivatives of the fitted model by all unknowns, orthonormalised, into `tangent`.
+    fn tangent(
+        &self,
+        shape: &Shape,
+        fit: &LinearFit<BINS>,
+        tangent: &mut Tangent<'_, BINS>,
+    ) -> Option<()> {
+        for (row, known) in tangent.triangle.iter_mut().zip(&fit.triangle) {
+            row[..LINEAR].copy_from_slice(known);
+        }
+        let (linear, by_shape) = tangent.basis.column.split_at_mut(LINEAR);
+        linear.copy_from_slice(&fit.basis.column);
+        self.jacobian(shape, &fit.coefficients, by_shape)?;
+        tangent
+            .basis
+            .orthonormalise_from(LINEAR, &mut tangent.triangle);
+        Some(())
+    }
+
+    /// Covariance of the coordinates, and relative error of the response.
+    #[inline(never)]
+    pub(super) fn covariance(
+        &self,
+        shape: &Shape,
+        fit: &LinearFit<BINS>,
+    ) -> Option<([[f64; 5]; 5], f64)> {
+        let mut output = [0.0; BINS];
+        for (k, bin) in self.window.bins().iter().enumerate() {
+            if self.weight[k] > 0.0 {
+                output[k] = bin.output_sum / self.weight[k] - fit.residual[k];
+            }
+        }
+        let [.., bias_gain, gain] = fit.coefficients;
+        let map = coordinate_map(bias_gain, gain, self.period_s);
+        let noise_sigma = self.window.noise_sigma();
+        let mut tangent = Tangent {
+            basis: Columns::zero(self.rows),
+            triangle: [[0.0; ALL]; ALL],
+            weight: &self.weight,
+            bin_rad: TAU * self.window.bin_s() / self.period_s,
+        };
+        self.tangent(shape, fit, &mut tangent)?;
+        tangent.covariance(&fit.residual, &output, noise_sigma, &map)
+    }
+}
 
 /// The fit's surroundings to first order.
 pub(super) struct Tangent<'a, const BINS: usize> {

@@ -1,13 +1,13 @@
 //! Tables V and VI: one process, with other starts of the fit and with other input biases.
 
+use onecycle_lab::Deterioration;
 use onecycle_lab::baselines::pem::{self, Data};
-use onecycle_lab::campaign::{Campaign, Measure};
+use onecycle_lab::campaign::Campaign;
 use onecycle_lab::evaluate::{
     Contender, Judge, PHASE_MARGIN_DEG, Recorded, RelayTest, Seen, Truth,
 };
 use onecycle_lab::grid::Pieces;
-use onecycle_lab::identify::{Method, Signals};
-use onecycle_lab::{Deterioration, Space};
+use onecycle_lab::identify::Signals;
 use onecycle_onboard::Process;
 use onecycle_plant::Trace;
 use serde::Deserialize;
@@ -43,19 +43,11 @@ impl Setup {
         let [t_prop_s, t_body_s, tau_s] = self.times_s;
         let process = Process::new(1.0, t_prop_s, t_body_s, tau_s).map_err(Failure::usage)?;
         let campaign = Campaign {
-            measure: Measure::Identification,
-            cases: 1,
             seed: self.seed,
             bias: input_bias.abs(),
             sigma: self.sigma,
-            sigma_uniform: false,
-            offset: 0.0,
             trim: self.is_trimmed,
-            asymmetry: 0.0,
-            cycles: 1,
-            time_scale: 1.0,
-            method: Method::default(),
-            beta: Space::MULTIROTOR.beta,
+            ..Campaign::QUIET
         };
         let case = campaign.quiet_case(process, self.seed);
         let mut case = case.map_err(Failure::usage)?;
