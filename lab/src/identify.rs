@@ -12,6 +12,7 @@ mod remark;
 mod saturation;
 mod verdict;
 
+use onecycle_onboard::judgement::{MOST_MISFIT, MOST_RESPONSE_ERROR, misfit};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{Beforehand, RefineError, Refined, ShapePrior, refine_with};
 use onecycle_plant::Trace;
@@ -362,12 +363,6 @@ fn describe(
     }
 }
 
-/// Part of the oscillation that a process of this kind never leaves unexplained.
-const MOST_MISFIT: f64 = 0.05;
-/// Relative error of the response that turns it by the paper's phase margin of 20 degrees: a model
-/// so wrong promises nothing.
-const MOST_RESPONSE_ERROR: f64 = 0.34;
-
 fn design(
     refined: &Refined,
     window: &FitWindow,
@@ -413,24 +408,4 @@ fn design(
         misfit,
         fit: oscillation::fit_points(window, period_s, refined),
     })
-}
-
-/// Residual beyond the noise, over the oscillation: root mean squares of the bins.
-fn misfit(refined: &Refined, window: &FitWindow) -> f64 {
-    let means: Vec<f64> = window
-        .bins()
-        .iter()
-        .filter(|bin| bin.count > 0)
-        .map(|bin| bin.output_sum / f64::from(bin.count))
-        .collect();
-    let count = means.len() as f64;
-    let mean = means.iter().sum::<f64>() / count;
-    let variance = means
-        .iter()
-        .map(|value| (value - mean) * (value - mean))
-        .sum::<f64>()
-        / count;
-    let noise = refined.noise_sigma * refined.noise_sigma / f64::from(window.per_bin());
-    let excess = (refined.residual_rms * refined.residual_rms - noise).max(0.0);
-    (excess / variance).sqrt()
 }

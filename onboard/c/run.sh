@@ -1,0 +1,56 @@
+#!/usr/bin/env bash
+# The tuner for firmware in C: builds the static library, checks that onecycle.h is what its source says,
+# compiles the example with gcc, tunes its simulated axis, and compares every output with the tuner in
+# Rust, bit by bit. Prints what a tuner takes; one sentence and status 1 when any of it fails.
+# `run.sh header` writes onecycle.h anew (with the cbindgen of the version below).
+set -euo pipefail
+
+CBINDGEN_VERSION=0.29.2
+
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/c
+library=$target/release/libonecycle.a
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+cd "$here"
+
+fail() {
+    echo "the C interface failed: $1" >&2
+    if [[ -s ${2:-} ]]; then
+        tail -n 20 "$2" >&2
+    fi
+    exit 1
+}
+
+header() { # FILE
+    [[ $(cbindgen --version 2>/dev/null) == "cbindgen $CBINDGEN_VERSION" ]] ||
+        fail "it needs cbindgen: cargo install --locked --debug cbindgen --version $CBINDGEN_VERSION"
+    cbindgen --quiet --config cbindgen.toml --crate onecycle-c --output "$1" . 2>"$scratch/log" ||
+        fail "cbindgen does not read the source." "$scratch/log"
+}
+
+if [[ ${1:-} == header ]]; then
+    header onecycle.h
+    exit
+fi
+
+header "$scratch/onecycle.h"
+cmp -s onecycle.h "$scratch/onecycle.h" ||
+    fail "onecycle.h is not what src/ says: run onboard/c/run.sh header."
+
+cargo build --release --locked --target-dir "$target" >"$scratch/log" 2>&1 ||
+    fail "it does not build." "$scratch/log"
+gcc -std=c99 -O2 -Wall -Wextra -Werror -pedantic -ffp-contract=off examples/axis.c "$library" -lm \
+    -o "$scratch/axis" >"$scratch/log" 2>&1 || fail "the example does not compile." "$scratch/log"
+"$scratch/axis" trace >"$scratch/trace" 2>"$scratch/said" ||
+    fail "the example finds no controller." "$scratch/said"
+bits=$(cargo run --quiet --release --locked --manifest-path ../Cargo.toml --example replay \
+    <"$scratch/trace") || fail "C and Rust differ: $bits"
+
+# A tuner's memory is the one number that a caller's build must have room for.
+words=$(awk '$2 == "ONECYCLE_TUNER_WORDS" { print $3 }' onecycle.h)
+cat <<END
+C interface: ok; a simulated axis tuned from C, $bits
+$(cat "$scratch/said")
+  memory of a tuner   $((8 * words)) bytes
+END

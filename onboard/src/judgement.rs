@@ -1,0 +1,257 @@
+//! Whether a fit is to be believed, and how sure the controller's margin is.
+//!
+//! To first order the parameters and the phase margin `m` of a fixed controller move with the
+//! coordinates `x` of the fit (`refine::coordinate`), whose covariance is `C`:
+//!
+//! ```text
+//! sigma^2 = (dm/dx)^T C (dm/dx)
+//! ```
+//!
+//! The derivatives are differences between the process found and five beside it, so that the work comes
+//! in equal slices.
+
+use core::f64::consts::PI;
+
+use libm::{atan2, exp, hypot, log, sqrt};
+
+use crate::control::Pd;
+use crate::process::Process;
+use crate::refine::{Refined, coordinate};
+use crate::window::Window;
+
+/// Part of the oscillation that a process of this kind never leaves unexplained.
+pub const MOST_MISFIT: f64 = 0.05;
+
+/// Relative error of the response that turns it by the paper's phase margin of 20 degrees: a model
+/// so wrong promises nothing.
+pub const MOST_RESPONSE_ERROR: f64 = 0.34;
+
+/// Residual beyond the noise, over the oscillation: root mean squares of the bins.
+#[must_use]
+pub fn misfit<const BINS: usize, const EDGES: usize>(
+    refined: &Refined,
+    window: &Window<BINS, EDGES>,
+) -> f64 {
+    let means = || {
+        let bins = window.bins().iter().filter(|bin| bin.count > 0);
+        bins.map(|bin| bin.output_sum / f64::from(bin.count))
+    };
+    let count = means().count() as f64;
+    let mean = means().sum::<f64>() / count;
+    let variance = means()
+        .map(|value| (value - mean) * (value - mean))
+        .sum::<f64>()
+        / count;
+    let noise = refined.noise_sigma * refined.noise_sigma / f64::from(window.per_bin());
+    let excess = (refined.residual_rms * refined.residual_rms - noise).max(0.0);
+    sqrt(excess / variance)
+}
+
+/// Standard deviations, to first order.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviations {
+    /// Of `ln K/T_body`: relative.
+    pub ln_k_over_t_body: f64,
+    /// Of `T_prop` (s).
+    pub t_prop_s: f64,
+    /// Of `1/T_body` (1/s).
+    pub inv_t_body_per_s: f64,
+    /// Of `tau` (s).
+    pub tau_s: f64,
+    /// Of the phase margin that the controller has (rad).
+    pub phase_margin_rad: f64,
+}
+
+/// What is followed from one coordinate to the next: the fields of [`Deviations`].
+const FOLLOWED: usize = 5;
+/// Coordinates of the process: all but the input's bias.
+pub(crate) const COORDINATES: usize = 4;
+
+/// The derivatives, one coordinate at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Spread {
+    here: [f64; FOLLOWED],
+    slopes: [[f64; FOLLOWED]; COORDINATES],
+    crossover_rad_per_s: f64,
+}
+
+impl Spread {
+    /// About a process and its controller; `None` where their loop has no gain crossover.
+    pub(crate) fn new(process: &Process, pd: &Pd) -> Option<Self> {
+        let start = pd.kd * process.k_over_t_body();
+        let crossover_rad_per_s = gain_crossover(process, pd, start)?;
+        Some(Self {
+            here: followed(process, pd, crossover_rad_per_s),
+            slopes: [[0.0; FOLLOWED]; COORDINATES],
+            crossover_rad_per_s,
+        })
+    }
+
+    /// The phase margin at the process itself (rad).
+    pub(crate) fn phase_margin_rad(&self) -> f64 {
+        self.here[FOLLOWED - 1]
+    }
+
+    /// The slopes along one coordinate; `None` where there is no process beside this one.
+    pub(crate) fn follow(&mut self, index: usize, process: &Process, pd: &Pd) -> Option<()> {
+        // A thousandth: the square of it, the error, is far below any deviation that matters.
+        const STEP: f64 = 1e-3;
+        let (sum, ratio) = process.pole_sum();
+        let mut moved = [log(sum), ratio, process.tau_s(), 0.0];
+        let step = match index {
+            coordinate::POLE_RATIO if ratio > 0.125 => -STEP,
+            coordinate::TAU_S => STEP / self.crossover_rad_per_s,
+            _ => STEP,
+        };
+        moved[index] += step;
+        let [ln_sum, ratio, tau_s, ln_gain] = moved;
+        let unit = Process::from_pole_sum(1.0, exp(ln_sum), ratio, tau_s).ok()?;
+        let gain = process.jerk_gain() * exp(ln_gain) * unit.t_prop_s();
+        let beside = unit.with_gain_scaled(gain).ok()?;
+        let crossover = gain_crossover(&beside, pd, self.crossover_rad_per_s)?;
+        let there = followed(&beside, pd, crossover);
+        for (slope, (there, here)) in self.slopes[index]
+            .iter_mut()
+            .zip(there.iter().zip(&self.here))
+        {
+            *slope = (there - here) / step;
+        }
+        Some(())
+    }
+
+    /// The deviations, once every coordinate has been followed.
+    pub(crate) fn deviations(&self, covariance: &[[f64; 5]; 5]) -> Deviations {
+        let of = |field: usize| {
+            let mut variance = 0.0;
+            for (i, row) in self.slopes.iter().enumerate() {
+                for (j, column) in self.slopes.iter().enumerate() {
+                    variance += row[field] * covariance[i][j] * column[field];
+                }
+            }
+            sqrt(variance.max(0.0))
+        };
+        Deviations {
+            ln_k_over_t_body: of(0),
+            t_prop_s: of(1),
+            inv_t_body_per_s: of(2),
+            tau_s: of(3),
+            phase_margin_rad: of(4),
+        }
+    }
+}
+
+fn followed(process: &Process, pd: &Pd, crossover_rad_per_s: f64) -> [f64; FOLLOWED] {
+    let lead_rad = atan2(pd.kd.abs() * crossover_rad_per_s, pd.kp.abs());
+    [
+        log(process.k_over_t_body().abs()),
+        process.t_prop_s(),
+        process.inv_t_body_per_s(),
+        process.tau_s(),
+        PI + process.phase_rad(crossover_rad_per_s) + lead_rad,
+    ]
+}
+
+/// Frequency (rad/s) where `|(kp + j kd w) G(jw)|`, which falls, is one. Newton's method on
+/// logarithms, halving the bracket where it leaves it.
+fn gain_crossover(process: &Process, pd: &Pd, start_rad_per_s: f64) -> Option<f64> {
+    const MOST_STEPS: u32 = 40;
+    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
+    let mut x = log(start_rad_per_s.abs());
+    if !x.is_finite() {
+        return None;
+    }
+    for _ in 0..MOST_STEPS {
+        let omega = exp(x);
+        let value = log(hypot(pd.kp, pd.kd * omega) * process.magnitude(omega));
+        if value > 0.0 {
+            low = x;
+        } else {
+            high = x;
+        }
+        let part = |of: f64, rest: f64| of * of / (of * of + rest * rest);
+        let slope = part(pd.kd * omega, pd.kp)
+            - part(omega * process.t_prop_s(), 1.0)
+            - 1.0
+            - part(omega, process.inv_t_body_per_s());
+        let newton = x - (value / slope).clamp(-2.0, 2.0);
+        if (newton - x).abs() < 1e-10 {
+            return Some(exp(newton));
+        }
+        let is_inside = newton > low && newton < high;
+        let next = if is_inside {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
+        if !next.is_finite() {
+            return None;
+        }
+        x = next;
+    }
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // A/s^2 (T s + 1) with kp = 0: |kd A / w / sqrt(1 + w^2 T^2)| = 1. With kd A = sqrt(2)/T that is at
+    // w = 1/T; the phase there is -180 - 45 degrees, the lead 90: a margin of 45 degrees. With a dead
+    // time of pi/8 T, 22.5 degrees less.
+    #[test]
+    fn a_margin_by_hand() {
+        let lag_s = 0.2;
+        let pd = Pd {
+            kp: 0.0,
+            kd: sqrt(2.0) / lag_s / 3.0,
+        };
+        for (tau_s, expected) in [(0.0, 45.0_f64), (PI / 8.0 * lag_s, 22.5)] {
+            let process = Process::from_acceleration_gain(3.0, lag_s, 0.0, tau_s).unwrap();
+            let margin = Spread::new(&process, &pd).unwrap().phase_margin_rad();
+            assert!((margin.to_degrees() - expected).abs() < 1e-6, "{margin}");
+        }
+    }
+
+    // A dead time known to a millisecond moves the margin by the crossover times that, a gain by its
+    // slope: with the double integrator above, d margin / d ln A = -(90/2 deg part) derived as follows:
+    // ln|L| has the slope -1 - 1/2 in ln w at w = 1/T, so d ln w / d ln A = 2/3, and the phase falls by
+    // d atan(w T) / d ln w = 1/2: -1/3 rad.
+    #[test]
+    fn deviations_by_hand() {
+        let lag_s = 0.2;
+        let pd = Pd {
+            kp: 0.0,
+            kd: sqrt(2.0) / lag_s / 3.0,
+        };
+        let process = Process::from_acceleration_gain(3.0, lag_s, 0.0, 0.01).unwrap();
+        let mut spread = Spread::new(&process, &pd).unwrap();
+        for index in 0..COORDINATES {
+            spread.follow(index, &process, &pd).unwrap();
+        }
+        let mut covariance = [[0.0; 5]; 5];
+        covariance[coordinate::TAU_S][coordinate::TAU_S] = 1e-6;
+        let found = spread.deviations(&covariance);
+        assert!((found.tau_s - 1e-3).abs() < 1e-12, "{found:?}");
+        assert!(
+            (found.phase_margin_rad - 1e-3 / lag_s).abs() < 1e-8,
+            "{found:?}"
+        );
+        assert_eq!(found.t_prop_s, 0.0);
+
+        let mut covariance = [[0.0; 5]; 5];
+        covariance[coordinate::LN_JERK_GAIN][coordinate::LN_JERK_GAIN] = 1e-4;
+        let found = spread.deviations(&covariance);
+        assert!((found.ln_k_over_t_body - 0.01).abs() < 1e-12);
+        let expected = 0.01 * (1.0 / 3.0 + 2.0 / 3.0 * 0.01 / lag_s);
+        assert!(
+            (found.phase_margin_rad - expected).abs() < 1e-5,
+            "{found:?} {expected}"
+        );
+
+        // T_prop = 1/sum here, so d T_prop = -T_prop d ln sum.
+        let mut covariance = [[0.0; 5]; 5];
+        covariance[coordinate::LN_POLE_SUM][coordinate::LN_POLE_SUM] = 1e-4;
+        let found = spread.deviations(&covariance);
+        assert!((found.t_prop_s - 0.01 * lag_s).abs() < 2e-6, "{found:?}");
+    }
+}

@@ -1,0 +1,150 @@
+//! What the new controller must do if the process is the one identified: the closed loop, ahead of it.
+//!
+//! From the switch on the model runs beside the vehicle, with the same law, reference and limits:
+//!
+//! ```text
+//! y' = v,   v' = A f - v/T_body,   T_prop f' = u(t - tau) + u0 - f,   u = law(r, y, v)
+//! ```
+//!
+//! It begins at the measured output and rate; its force is what the relay's last switches, through the
+//! actuator's lag, have made of it. The loop is stable, so what is wrong with the beginning dies away, and
+//! what the vehicle then does otherwise it does because it is another process.
+//!
+//! Inputs of before the switch are known as edges, those of the model as a line of delay, in which one
+//! place holds as many ticks as the dead time needs.
+
+use libm::{ceil, exp};
+
+use crate::control::PdLaw;
+use crate::process::Process;
+use crate::transition::{State, Transition};
+use crate::window::Edge;
+
+/// Places in the line of delay: a place is at most a hundredth of the dead time, or a tick.
+const PLACES: usize = 104;
+const MOST_PLACES: f64 = 100.0;
+
+/// Where and when the model begins.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Beginning<'a> {
+    /// The relay's last switches.
+    pub(crate) edges: &'a [Edge],
+    pub(crate) time_s: f64,
+    pub(crate) value: f32,
+    pub(crate) rate: f32,
+    /// Reference, the same until the response has been checked (output unit).
+    pub(crate) reference: f32,
+    /// Constant input that is not recorded (input unit).
+    pub(crate) input_bias: f64,
+}
+
+/// The model of the loop.
+#[derive(Clone, Debug)]
+pub(crate) struct Prediction {
+    law: PdLaw,
+    lowest: f32,
+    highest: f32,
+    reference: f32,
+    gain: f64,
+    input_bias: f64,
+    transition: Transition,
+    state: State,
+    /// Inputs of the last places, the latest at `next - 1`.
+    line: [f32; PLACES],
+    next: usize,
+    /// Dead time: whole places and the part of one.
+    places: usize,
+    part: f32,
+    /// Ticks in a place, and those since the last.
+    every: u32,
+    ticks: u32,
+}
+
+impl Prediction {
+    /// Of a process under a law whose output stays between two limits, called every `sample_s`.
+    pub(crate) fn new(
+        process: &Process,
+        law: PdLaw,
+        [lowest, highest]: [f32; 2],
+        sample_s: f64,
+        beginning: &Beginning<'_>,
+    ) -> Self {
+        let every = ceil(process.tau_s() / (MOST_PLACES * sample_s)).max(1.0);
+        let place_s = every * sample_s;
+        let delay = process.tau_s() / place_s;
+        let mut prediction = Self {
+            law,
+            lowest,
+            highest,
+            reference: beginning.reference,
+            gain: process.k_over_t_body(),
+            input_bias: beginning.input_bias,
+            transition: Transition::over(process, place_s),
+            state: State {
+                y: f64::from(beginning.value) / process.k_over_t_body(),
+                v: f64::from(beginning.rate) / process.k_over_t_body(),
+                f: force(beginning, process),
+            },
+            line: [0.0; PLACES],
+            next: 0,
+            places: delay as usize,
+            part: (delay - libm::floor(delay)) as f32,
+            every: every as u32,
+            ticks: 0,
+        };
+        // The line as it would be had the model run all along: oldest first.
+        for place in (1..=PLACES).rev() {
+            let middle_s = beginning.time_s - (place as f64 - 0.5) * place_s;
+            prediction.push(input_at(beginning.edges, middle_s) as f32);
+        }
+        prediction
+    }
+
+    fn push(&mut self, input: f32) {
+        self.line[self.next] = input;
+        self.next = (self.next + 1) % PLACES;
+    }
+
+    /// The input so many places ago, zero being the latest.
+    fn ago(&self, places: usize) -> f32 {
+        self.line[(self.next + 2 * PLACES - 1 - places) % PLACES]
+    }
+
+    /// The output (output unit) at the next tick.
+    #[inline]
+    pub(crate) fn step(&mut self) -> f32 {
+        if self.ticks == 0 {
+            let (value, rate) = (self.gain * self.state.y, self.gain * self.state.v);
+            let input = self.law.output(self.reference, value as f32, rate as f32);
+            self.push(input.max(self.lowest).min(self.highest));
+            let late = self.ago(self.places)
+                + self.part * (self.ago(self.places + 1) - self.ago(self.places));
+            let input = f64::from(late) + self.input_bias;
+            self.state = self.transition.apply(&self.state, input);
+        }
+        self.ticks = (self.ticks + 1) % self.every;
+        // Between the places, where the last one leads to.
+        (self.gain * self.state.y) as f32
+    }
+}
+
+/// The recorded input at a time: the first edge's before all of them.
+fn input_at(edges: &[Edge], time_s: f64) -> f64 {
+    let held = edges.iter().rev().find(|edge| edge.time_s <= time_s);
+    held.or(edges.first()).map_or(0.0, |edge| edge.input)
+}
+
+/// The actuator's force at the beginning: the edges that have arrived, through its lag.
+fn force(beginning: &Beginning<'_>, process: &Process) -> f64 {
+    let now_s = beginning.time_s - process.tau_s();
+    let edges = beginning.edges;
+    let mut force = edges.first().map_or(0.0, |edge| edge.input);
+    for (index, edge) in edges.iter().enumerate() {
+        let until_s = edges.get(index + 1).map_or(now_s, |next| next.time_s);
+        let held_s = until_s.min(now_s) - edge.time_s;
+        if held_s > 0.0 {
+            force = edge.input + (force - edge.input) * exp(-held_s / process.t_prop_s());
+        }
+    }
+    force + beginning.input_bias
+}
