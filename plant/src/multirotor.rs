@@ -1,0 +1,52 @@
+//! A multirotor in six degrees of freedom: what the paper's section IV-D flies.
+//!
+//! A [`Vehicle`] is what does not change: airframe, rotors, battery, legs, sensors. A [`Flight`] is a
+//! vehicle somewhere, in a wind, under a held [`Command`]; it is integrated in steps of at most 1 ms
+//! and read through sensors that are late and noisy. [`Vehicle::linearised`] is the exact
+//! [`Process`](onecycle_onboard::Process) of an axis at hover, the truth an identification is held
+//! against.
+//!
+//! ```
+//! use onecycle_plant::multirotor::{Axis, Command, Flight, Vehicle};
+//! use rand_pcg::Pcg64;
+//!
+//! let vehicle = Vehicle::quadrotor();
+//! let (mut flight, mut rng) = (Flight::standing(vehicle), Pcg64::new(1, 1));
+//! for _ in 0..500 {
+//!     flight.step(Command { thrust: 0.6, ..Command::default() }, 2e-3, &mut rng);
+//! }
+//! // Up and away after a second at more than the thrust of hover.
+//! assert!(flight.sense(&mut rng).position_m.z > 0.5);
+//! // The paper's T_body of altitude, 1.6886 s.
+//! let altitude = vehicle.linearised(Axis::Altitude)?;
+//! assert!((1.0 / altitude.inv_t_body_per_s() - 1.6886).abs() < 0.005);
+//! # Ok::<(), onecycle_plant::multirotor::VehicleError>(())
+//! ```
+
+pub mod battery;
+pub mod body;
+pub mod dynamics;
+pub mod error;
+pub mod flight;
+pub mod frames;
+pub mod ground;
+pub mod hover;
+pub mod mixer;
+pub mod rotor;
+pub mod sensors;
+pub mod vehicle;
+pub mod wind;
+
+pub use battery::Battery;
+pub use body::{Body, GRAVITY_M_PER_S2};
+pub use dynamics::State;
+pub use error::VehicleError;
+pub use flight::Flight;
+pub use frames::{Attitude, Vec3};
+pub use ground::Legs;
+pub use hover::{Axis, Hover};
+pub use mixer::Command;
+pub use rotor::Rotors;
+pub use sensors::{Channel, Reading, Sensors};
+pub use vehicle::{Parts, Vehicle};
+pub use wind::{Nudge, Wind};

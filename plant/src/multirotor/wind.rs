@@ -1,0 +1,155 @@
+//! Wind: a steady part and gusts; and nudges.
+//!
+//! Each component of the gusts is a first-order Gauss-Markov process, the spectrum that the Dryden
+//! model (MIL-F-8785C) gives the component along the flight, here for all three. Its exact
+//! discrete form over a step `h`, with `rho = exp(-h / T)`:
+//!
+//! ```text
+//! g <- rho g + sigma sqrt(1 - rho^2) n,   n normal
+//! ```
+//!
+//! so variance `sigma^2` and autocorrelation `exp(-t / T)` do not depend on the step.
+
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+use super::error::{VehicleError, at_least_zero, finite, positive};
+use super::frames::Vec3;
+
+/// The wind, the same everywhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wind {
+    /// Steady part (m/s, world): where the air goes.
+    pub steady_m_per_s: Vec3,
+    /// Standard deviation of the gusts (m/s, world).
+    pub gust_sigma_m_per_s: Vec3,
+    /// Correlation time of the gusts (s): their length scale over the airspeed.
+    pub gust_correlation_s: f64,
+}
+
+impl Wind {
+    /// No wind.
+    pub const CALM: Self = Self::steady(Vec3::ZERO);
+
+    /// A steady wind (m/s, world) without gusts.
+    #[must_use]
+    pub const fn steady(steady_m_per_s: Vec3) -> Self {
+        Self {
+            steady_m_per_s,
+            gust_sigma_m_per_s: Vec3::ZERO,
+            gust_correlation_s: 1.0,
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), VehicleError> {
+        finite("steady wind", self.steady_m_per_s)?;
+        for sigma in [
+            self.gust_sigma_m_per_s.x,
+            self.gust_sigma_m_per_s.y,
+            self.gust_sigma_m_per_s.z,
+        ] {
+            at_least_zero("sigma of the gusts", sigma)?;
+        }
+        positive("correlation time of the gusts", self.gust_correlation_s)
+    }
+}
+
+/// What the gusts are now.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Gusts {
+    velocity_m_per_s: Vec3,
+}
+
+impl Gusts {
+    /// The gust now (m/s, world).
+    #[must_use]
+    #[inline]
+    pub fn velocity_m_per_s(&self) -> Vec3 {
+        self.velocity_m_per_s
+    }
+
+    /// Moves on by `dt_s`; draws nothing where the wind has no gusts.
+    pub fn step<R: Rng + ?Sized>(&mut self, wind: &Wind, dt_s: f64, rng: &mut R) {
+        if wind.gust_sigma_m_per_s == Vec3::ZERO {
+            self.velocity_m_per_s = Vec3::ZERO;
+            return;
+        }
+        let kept = (-dt_s / wind.gust_correlation_s).exp();
+        let fresh = (1.0 - kept * kept).sqrt();
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        let drawn = Vec3::new(normal(), normal(), normal());
+        self.velocity_m_per_s =
+            self.velocity_m_per_s * kept + wind.gust_sigma_m_per_s.scaled_by(drawn) * fresh;
+    }
+}
+
+/// A force and a torque for a while.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Nudge {
+    /// Force at the centre of mass (N, world).
+    pub force_n: Vec3,
+    /// Torque (N m, body).
+    pub torque_nm: Vec3,
+    /// How long (s).
+    pub duration_s: f64,
+}
+
+impl Nudge {
+    pub(super) fn check(&self) -> Result<(), VehicleError> {
+        finite("force of the nudge", self.force_n)?;
+        finite("torque of the nudge", self.torque_nm)?;
+        at_least_zero("duration of the nudge", self.duration_s)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_pcg::Pcg64;
+
+    use super::*;
+
+    // sigma = 1.5 m/s, T = 0.2 s, N = 400,000 steps of 10 ms, rho = exp(-1/20). Variance: relative
+    // standard error sqrt(2/N (1 + rho^2)/(1 - rho^2)) = sqrt(2/N * 20.02) = 1.0 %. Autocorrelation at
+    // one correlation time: exp(-1) = 0.368, standard error below sqrt(2 T / (N h)) = 1.0 %. The mean has
+    // sigma sqrt(2 T / (N h)) = 0.015 m/s. Three of each.
+    #[test]
+    fn gusts_have_their_variance_and_correlation() {
+        const STEPS: usize = 400_000;
+        const LAG: usize = 20;
+        let wind = Wind {
+            gust_sigma_m_per_s: Vec3::new(1.5, 0.0, 3.0),
+            gust_correlation_s: 0.2,
+            ..Wind::CALM
+        };
+        let (mut gusts, mut rng) = (Gusts::default(), Pcg64::new(11, 5));
+        let series: Vec<Vec3> = (0..STEPS)
+            .map(|_| {
+                gusts.step(&wind, 0.01, &mut rng);
+                gusts.velocity_m_per_s()
+            })
+            .collect();
+        let mean = series.iter().map(|g| g.x).sum::<f64>() / STEPS as f64;
+        let power = |part: fn(&Vec3) -> f64| {
+            series.iter().map(|g| part(g) * part(g)).sum::<f64>() / STEPS as f64
+        };
+        let lagged = series.windows(LAG + 1).map(|w| w[0].x * w[LAG].x);
+        let correlation = lagged.sum::<f64>() / (STEPS - LAG) as f64 / power(|g| g.x);
+        assert!(mean.abs() < 0.045, "{mean}");
+        assert!((power(|g| g.x) / 2.25 - 1.0).abs() < 0.03);
+        assert!((power(|g| g.z) / 9.0 - 1.0).abs() < 0.03);
+        assert_eq!(power(|g| g.y), 0.0);
+        assert!(
+            (correlation - (-1.0_f64).exp()).abs() < 0.03,
+            "{correlation}"
+        );
+    }
+
+    // Without sigma the gusts are zero and the generator stays as it was.
+    #[test]
+    fn no_gusts_draw_nothing() {
+        let (mut gusts, mut rng) = (Gusts::default(), Pcg64::new(1, 1));
+        gusts.step(&Wind::steady(Vec3::new(5.0, 0.0, 0.0)), 0.01, &mut rng);
+        assert_eq!(gusts, Gusts::default());
+        assert_eq!(rng, Pcg64::new(1, 1));
+    }
+}
