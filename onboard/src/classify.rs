@@ -26,34 +26,41 @@
 //!
 //! Above one the cycle is none of this family's, or noisier than any that the network knows: an
 //! oscillation that friction holds down.
+//!
+//! # In slices
+//!
+//! A [`Classifier`] does all of it a slice at a time, of which none takes longer than a controller's tick
+//! has to spare; [`classify`] and [`classify_by`] are the loop over them.
+//! Operations of the longest slices, on numbers of eight bytes unless it says four:
+//!
+//! | slice                                        | operations | slices |
+//! |----------------------------------------------|------------|--------|
+//! | a layer of the network, of `n` by `m` (four) | `3 n m`    | layers |
+//! | the posterior                                | 400        | 1      |
+//! | its longest axis and the candidates          | 2,700      | 1      |
+//! | eight harmonics of the cycle                 | 1,500      | 2      |
+//! | three harmonics of a process                 | 1,800      | 2 x 5  |
+//! | the equations                                | 1,900      | 2      |
+//! | two to five rows of their least squares      | 1,300      | 2 x 2  |
 
 mod calibration;
+mod classifier;
 
 use core::fmt;
 
-use libm::{exp, hypot, sqrt};
+use libm::{exp, sqrt};
 
 pub use self::calibration::Calibration;
-
-use crate::fit_score::{self, Doubt, MOST_POLE_RATIO, harmonics};
+pub use self::classifier::Classifier;
+use crate::fit_score::MOST_POLE_RATIO;
 pub use crate::pack::OUTPUTS;
 use crate::pack::{Pack, VALUES};
 use crate::process::{Process, ProcessError};
 use crate::refine::{Shape, shape_of};
-use crate::signature::{PARTS, Signature};
+use crate::signature::Signature;
 
 /// Candidates of a classification.
 pub const CANDIDATES: usize = 5;
-
-/// Nodes of the Gauss-Hermite rule of five points, in standard deviations, and their weights
-/// (Abramowitz and Stegun, table 25.10, times the square root of two, over that of pi).
-const NODES: [(f64, f64); CANDIDATES] = [
-    (0.0, 8.0 / 15.0),
-    (1.355_626_179_974_266, 0.222_075_922_005_612_6),
-    (-1.355_626_179_974_266, 0.222_075_922_005_612_6),
-    (2.856_970_013_872_806, 0.011_257_411_327_720_69),
-    (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
-];
 
 /// What a cycle is read as.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,10 +211,6 @@ impl Posterior {
     }
 }
 
-/// Weight of a doubt that is wider than usual. Of the harmful cycles out of the family 94, 96, 96 and 97 % are
-/// unknown with weights of 0, 1, 2 and 4, of the paper's multirotors 0.8, 1.1, 1.3 and 2.1 %.
-const DOUBT: f64 = 2.0;
-
 /// Steps of the power method: where the second axis is 0.9 of the longest, its part falls to 0.9^48 = 0.6 %.
 const AXIS_STEPS: usize = 24;
 
@@ -224,50 +227,13 @@ pub fn classify(
     noise_sigma: f64,
     calibration: &Calibration,
 ) -> Result<Classification, ClassifyError> {
-    if let Some(index) = outputs.iter().position(|output| !output.is_finite()) {
-        return Err(ClassifyError::Output(index, outputs[index]));
+    let mut classifier = Classifier::new();
+    classifier.begin_at(outputs, signature, period_s, noise_sigma, calibration)?;
+    loop {
+        if let Some(outcome) = classifier.read() {
+            return outcome;
+        }
     }
-    if !(noise_sigma.is_finite() && noise_sigma >= 0.0) {
-        return Err(ClassifyError::Noise(noise_sigma));
-    }
-    let mut posterior = Posterior::from_outputs(outputs, &calibration.scale);
-    for (row, temperature) in posterior.root.iter_mut().zip(calibration.temperature) {
-        row.iter_mut().for_each(|value| *value *= temperature);
-    }
-    let [lowest, highest] = &calibration.range;
-    for (k, mean) in posterior.mean.iter_mut().enumerate() {
-        *mean = mean.max(lowest[k]).min(highest[k]);
-    }
-    let axis = posterior.longest_axis(&calibration.scale);
-    let at = |deviations: f64| -> [f64; VALUES] {
-        core::array::from_fn(|k| posterior.mean[k] + deviations * axis[k])
-    };
-    let mut candidates = [Candidate {
-        process: process_of(&posterior.mean, signature, period_s)?,
-        probability: NODES[0].1,
-    }; CANDIDATES];
-    for (candidate, (deviations, probability)) in candidates.iter_mut().zip(NODES).skip(1) {
-        *candidate = Candidate {
-            process: process_of(&at(deviations), signature, period_s)?,
-            probability,
-        };
-    }
-    let noise = noise_sigma / signature.amplitude;
-    let samples = exp(f64::from(signature.values[PARTS + 1]));
-    let excess = calibration.excess(outputs, noise, samples);
-    let statistic = statistic(&posterior, signature, noise, calibration);
-    let misfit = (statistic + DOUBT * excess * excess) / calibration.limit;
-    let score = misfit.max(noise / calibration.most_noise);
-    Ok(Classification {
-        posterior,
-        candidates,
-        score,
-        verdict: if score <= 1.0 {
-            Verdict::Known
-        } else {
-            Verdict::Unknown
-        },
-    })
 }
 
 /// [`classify`] with a pack's network and calibration.
@@ -280,9 +246,13 @@ pub fn classify_by(
     period_s: f64,
     noise_sigma: f64,
 ) -> Result<Classification, ClassifyError> {
-    let calibration = Calibration::of_pack(pack).ok_or(ClassifyError::Pack)?;
-    let outputs = pack.outputs(&signature.values);
-    classify(&outputs, signature, period_s, noise_sigma, &calibration)
+    let mut classifier = Classifier::new();
+    classifier.begin(pack, signature, period_s, noise_sigma)?;
+    loop {
+        if let Some(outcome) = classifier.advance(pack) {
+            return outcome;
+        }
+    }
 }
 
 /// The process of these values, whatever put them out: a ratio of poles and a dead time beyond what
@@ -307,34 +277,15 @@ pub fn process_of(
     unit.with_gain_scaled(jerk_gain * unit.t_prop_s())
 }
 
-/// `noise`: of a sample, over the amplitude.
-fn statistic(
-    posterior: &Posterior,
-    signature: &Signature,
-    noise: f64,
-    calibration: &Calibration,
-) -> f64 {
-    let parts = core::array::from_fn(|part| f64::from(signature.values[part]));
-    let duty = f64::from(signature.values[PARTS]);
-    let samples = exp(f64::from(signature.values[PARTS + 1]));
-    let doubt = Doubt {
-        root: &posterior.root,
-        jump: calibration.jump + calibration.jump_of_noise * noise,
-        // A harmonic has 1/32 of the variance of a part, half of it real, and a part is the mean of N/32
-        // samples.
-        sigma: hypot(calibration.floor, noise * sqrt(0.5 / samples)),
-    };
-    fit_score::statistic(&harmonics(&parts), &posterior.mean, &doubt, duty, samples)
-}
-
 #[cfg(test)]
 mod tests {
     extern crate std;
 
     use std::string::ToString;
 
+    use super::classifier::NODES;
     use super::*;
-    use crate::signature::LENGTH;
+    use crate::signature::{LENGTH, PARTS};
 
     const OUTPUT: [f32; OUTPUTS] = [
         2.2, 0.9, 0.4, -5.8, 2.5, 3.0, 4.0, 3.5, 0.5, -1.0, 2.0, 0.25, 1.5, -3.0,

@@ -12,6 +12,7 @@ pub(crate) struct Complex {
 }
 
 impl Complex {
+    pub(crate) const ZERO: Self = Self { re: 0.0, im: 0.0 };
     pub(crate) const ONE: Self = Self { re: 1.0, im: 0.0 };
 
     /// `e^(j angle)`.

@@ -27,8 +27,10 @@ fn smooth_poles(process: &Process) -> (f64, f64) {
 }
 
 /// The mean square of the lagged input, bin by bin, from the beginning of the past on.
-struct Squares<'a> {
-    later: &'a [Edge],
+#[derive(Clone, Copy, Debug)]
+struct Squares {
+    /// The next edge.
+    edge: usize,
     /// Middle and half range of the input's levels.
     middle: f64,
     half: f64,
@@ -41,10 +43,10 @@ struct Squares<'a> {
     lagged: f64,
 }
 
-impl<'a> Squares<'a> {
+impl Squares {
     /// `None` for an input of a single level.
-    fn new(process: &Process, grid: &Grid, edges: &'a [Edge]) -> Option<Self> {
-        let (first, later) = edges.split_first()?;
+    fn new(process: &Process, grid: &Grid, edges: &[Edge]) -> Option<Self> {
+        let first = edges.first()?;
         let (low, high) = edges
             .iter()
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| {
@@ -59,7 +61,7 @@ impl<'a> Squares<'a> {
         let (rate_per_s, _) = smooth_poles(process);
         let level = (first.input - middle) / half;
         Some(Self {
-            later,
+            edge: 1,
             middle,
             half,
             rate_per_s,
@@ -83,16 +85,16 @@ impl<'a> Squares<'a> {
     }
 
     /// Mean of `x^2` over the next bin.
-    fn next_mean(&mut self) -> f64 {
+    fn next_mean(&mut self, edges: &[Edge]) -> f64 {
         let (mut from_s, mut sum) = (0.0, 0.0);
-        while let Some((edge, later)) = self.later.split_first() {
+        while let Some(edge) = edges.get(self.edge) {
             let at_s = (edge.time_s + self.tau_s - self.begin_s).max(0.0);
             if at_s >= self.bin_s {
                 break;
             }
             sum += self.stretch(at_s - from_s, exp(-self.rate_per_s * (at_s - from_s)));
             (self.level, from_s) = ((edge.input - self.middle) / self.half, at_s);
-            self.later = later;
+            self.edge += 1;
         }
         let rest_s = self.bin_s - from_s;
         let decay = if from_s > 0.0 {
@@ -106,42 +108,119 @@ impl<'a> Squares<'a> {
     }
 }
 
-/// Mean outputs over the bins of the window when the force is `x^2` less its mean there; zero for an
-/// input of a single level.
-pub(crate) fn means(process: &Process, grid: &Grid, edges: &[Edge], means: &mut [f64]) {
-    means.fill(0.0);
-    let Some(mut squares) = Squares::new(process, grid, edges) else {
-        return;
-    };
-    // Without decay of the force a bin's transition is that under a constant force.
-    let (_, damping_per_s) = smooth_poles(process);
-    let body = Transition::of_poles(damping_per_s, 0.0, squares.bin_s);
-    // The samples of a bin begin with it: their mean time lies before its middle.
-    let instants = f64::from(grid.per_bin);
-    let centre = 0.5 * (instants - 1.0) / instants;
-    let mut respond = |force: &mut dyn FnMut(bool) -> f64, sign: f64| {
-        let (mut y, mut v) = (0.0, 0.0);
-        for index in 0..grid.past_bins + means.len() {
-            let in_window = index >= grid.past_bins;
-            let force = force(in_window);
-            let next_y = y + body.y_v * v + body.y_f * force;
-            if in_window {
-                means[index - grid.past_bins] += sign * (y + centre * (next_y - y));
-            }
-            (y, v) = (next_y, body.v_v * v + body.v_f * force);
-        }
-    };
-    let (mut total, mut bins) = (0.0, 0.0);
-    let mut square = |in_window: bool| {
-        let mean = squares.next_mean();
-        if in_window {
-            (total, bins) = (total + mean, bins + 1.0);
-        }
+/// Bins that are followed in one call: each takes 45 operations. See the table in `refine`.
+pub(crate) const SLICE_BINS: usize = 32;
+/// What an edge costs, in bins: two exponentials.
+const EDGE_BINS: usize = 3;
+
+/// Mean outputs over the bins of the window when the force is `x^2` less its mean there, some bins at a
+/// time: the response to `x^2`, then that to its mean taken out.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Course {
+    /// `None` for an input of a single level.
+    squares: Option<Squares>,
+    body: Body,
+    past_bins: usize,
+    /// The next bin, from the beginning of the past.
+    index: usize,
+    /// Sum of `x^2` over the bins of the window.
+    total: f64,
+    /// Its mean, once known.
+    mean: Option<f64>,
+}
+
+/// The body under a force that is constant over each bin.
+#[derive(Clone, Copy, Debug)]
+struct Body {
+    step: Transition,
+    /// Where in its bin the mean time of the samples lies: they begin with it, so before its middle.
+    centre: f64,
+    y: f64,
+    v: f64,
+}
+
+impl Body {
+    /// Mean output over the next bin.
+    #[inline]
+    fn next_mean(&mut self, force: f64) -> f64 {
+        let next_y = self.y + self.step.y_v * self.v + self.step.y_f * force;
+        let mean = self.y + self.centre * (next_y - self.y);
+        self.v = self.step.v_v * self.v + self.step.v_f * force;
+        self.y = next_y;
         mean
-    };
-    respond(&mut square, 1.0);
-    let mean_square = total / f64::max(bins, 1.0);
-    respond(&mut |_| mean_square, -1.0);
+    }
+}
+
+impl Course {
+    /// At the beginning of the past.
+    pub(crate) fn new(process: &Process, grid: &Grid, edges: &[Edge]) -> Self {
+        let (_, damping_per_s) = smooth_poles(process);
+        let instants = f64::from(grid.per_bin);
+        Self {
+            squares: Squares::new(process, grid, edges),
+            body: Body {
+                // Without decay of the force a bin's transition is that under a constant force.
+                step: Transition::of_poles(damping_per_s, 0.0, instants * grid.sample_s),
+                centre: 0.5 * (instants - 1.0) / instants,
+                y: 0.0,
+                v: 0.0,
+            },
+            past_bins: grid.past_bins,
+            index: 0,
+            total: 0.0,
+            mean: None,
+        }
+    }
+
+    /// Follows it by [`SLICE_BINS`]. True where the means are complete: zeros for an input of a single
+    /// level.
+    pub(crate) fn follow(&mut self, edges: &[Edge], means: &mut [f64]) -> bool {
+        let bins = self.past_bins + means.len();
+        match (self.squares, self.mean) {
+            (None, _) => {
+                means.fill(0.0);
+                true
+            }
+            (Some(squares), None) => {
+                self.follow_squares(squares, edges, means);
+                if self.index == bins {
+                    self.mean = Some(self.total / f64::max(means.len() as f64, 1.0));
+                    (self.index, self.body.y, self.body.v) = (0, 0.0, 0.0);
+                }
+                false
+            }
+            (_, Some(mean)) => {
+                let mut body = self.body;
+                let end = bins.min(self.index + SLICE_BINS);
+                for index in self.index..end {
+                    let even = body.next_mean(mean);
+                    if let Some(k) = index.checked_sub(self.past_bins) {
+                        means[k] -= even;
+                    }
+                }
+                (self.body, self.index) = (body, end);
+                end == bins
+            }
+        }
+    }
+
+    fn follow_squares(&mut self, mut squares: Squares, edges: &[Edge], means: &mut [f64]) {
+        let (mut body, mut index, mut total) = (self.body, self.index, self.total);
+        let (past_bins, mut left) = (self.past_bins, SLICE_BINS);
+        while index < past_bins + means.len() && left > 0 {
+            let edge = squares.edge;
+            let square = squares.next_mean(edges);
+            left = left.saturating_sub(1 + EDGE_BINS * (squares.edge - edge));
+            let even = body.next_mean(square);
+            if let Some(k) = index.checked_sub(past_bins) {
+                means[k] = even;
+                total += square;
+            }
+            index += 1;
+        }
+        (self.body, self.index, self.total) = (body, index, total);
+        self.squares = Some(squares);
+    }
 }
 
 #[cfg(test)]
@@ -149,6 +228,20 @@ mod tests {
     use super::*;
 
     const STEP_S: f64 = 1e-5;
+
+    fn follow(process: &Process, edges: &[Edge], means: &mut [f64]) {
+        let mut course = Course::new(process, &grid(), edges);
+        let (mut calls, mut before) = (1, 0);
+        while !course.follow(edges, means) {
+            let bins = course.index.saturating_sub(before);
+            assert!(bins <= SLICE_BINS, "{bins}");
+            (calls, before) = (calls + 1, course.index);
+        }
+        // Twice the bins, and three more for each edge the first time.
+        let bins = grid().past_bins + means.len();
+        let most = 2 * bins.div_ceil(SLICE_BINS) + EDGE_BINS * edges.len() / SLICE_BINS + 1;
+        assert!(calls <= most, "{calls} of {most}");
+    }
 
     fn grid() -> Grid {
         Grid {
@@ -172,9 +265,9 @@ mod tests {
     #[test]
     fn agrees_with_small_steps() {
         let process = Process::from_acceleration_gain(1.0, 0.05, 0.5, 0.02).unwrap();
-        let (grid, edges) = (grid(), edges());
+        let edges = edges();
         let mut found = [0.0; 100];
-        means(&process, &grid, &edges, &mut found);
+        follow(&process, &edges, &mut found);
 
         let level = |time_s: f64| {
             let past = edges.iter().rfind(|edge| edge.time_s + 0.02 <= time_s);
@@ -211,7 +304,7 @@ mod tests {
     fn a_single_level_has_none() {
         let process = Process::from_acceleration_gain(1.0, 0.05, 0.5, 0.02).unwrap();
         let mut found = [1.0; 10];
-        means(&process, &grid(), &edges()[..1], &mut found);
+        follow(&process, &edges()[..1], &mut found);
         assert_eq!(found, [0.0; 10]);
     }
 

@@ -29,10 +29,13 @@
 //! all were Gaussian and linear and the floor zero, it would be chi-squared with 30 degrees of freedom,
 //! for each of these only adds to the covariance.
 
-use core::f64::consts::{PI, TAU};
+mod fit;
+mod response;
 
-use libm::{exp, sin, sqrt};
+use core::f64::consts::PI;
 
+use self::fit::Explained;
+use self::response::Response;
 use crate::complex::Complex;
 use crate::pack::VALUES;
 use crate::signature::PARTS;
@@ -49,199 +52,166 @@ pub(crate) const JUMPS: usize = 3;
 /// What may be left is a combination of so many.
 const COLUMNS: usize = VALUES + JUMPS;
 
-/// Harmonics fall as `n^-4`, where the actuator is fast after a plateau of up to seven times, and their means by
-/// another fifth: those beyond 32 + 15 add less than 7 * 49^-4 / 5 = 3e-7 of the fundamental to any.
-const ALIASES: [i32; 3] = [-1, 0, 1];
-
 pub(crate) type Rows = [f64; ROWS];
 
-/// The harmonics of the means over equal parts.
-pub(crate) fn harmonics(parts: &[f64; PARTS]) -> Rows {
-    // Turns by half a part.
-    let mut turns = [Complex::ONE; 2 * PARTS];
-    let step = Complex::turn(-PI / PARTS as f64);
-    for index in 1..turns.len() {
-        turns[index] = turns[index - 1] * step;
-    }
-    let mut rows = [0.0; ROWS];
-    for harmonic in 1..=HARMONICS {
-        let sum = (parts.iter().enumerate()).fold(Complex::default(), |sum, (part, mean)| {
-            sum + turns[harmonic * (2 * part + 1) % turns.len()].scaled(*mean)
-        });
-        put(&mut rows, harmonic, sum.scaled(1.0 / PARTS as f64));
-    }
-    rows
-}
-
-fn put(rows: &mut Rows, harmonic: usize, value: Complex) {
-    rows[harmonic - 1] = value.re;
-    rows[HARMONICS + harmonic - 1] = value.im;
-}
-
-/// What a process makes of a rectangular wave, and how that moves with its values.
-#[derive(Clone, Debug)]
-pub(crate) struct Response {
-    /// Harmonics of the parts.
-    pub(crate) mean: Rows,
-    /// Derivatives with respect to the values.
-    slopes: [Rows; VALUES],
-    /// Of jumps of force, rate and output, each of size one at the fundamental.
-    jumps: [Rows; JUMPS],
-}
-
-impl Response {
-    /// Of the process of these values `ln S, r, tau/T, ln A` to a wave of this duty, sampled so many
-    /// times in a period and each sample held around its time.
-    pub(crate) fn new(values: &[f64; VALUES], duty: f64, samples: f64) -> Self {
-        let [ln_pole_sum, pole_ratio, delay, ln_amplitude] = *values;
-        let pole_sum = exp(ln_pole_sum);
-        let gain = exp(-ln_amplitude);
-        let product = pole_ratio * pole_sum * pole_sum;
-        let (mut late, mut fall) = (Complex::ONE, Complex::ONE);
-        let [late_by_one, fall_by_one] = [delay, duty].map(|part| Complex::turn(-TAU * part));
-        let far = |part: f64| Complex::turn(-TAU * PARTS as f64 * part);
-        let [late_by_all, fall_by_all] = [far(delay), far(duty)];
-
-        let mut response = Self {
-            mean: [0.0; ROWS],
-            slopes: [[0.0; ROWS]; VALUES],
-            jumps: [[0.0; ROWS]; JUMPS],
-        };
-        for harmonic in 1..=HARMONICS {
-            late = late * late_by_one;
-            fall = fall * fall_by_one;
-            let of_part = sin(PI * harmonic as f64 / PARTS as f64) * PARTS as f64;
-            let mut sums = [Complex::default(); 1 + COLUMNS];
-            for alias in ALIASES {
-                let turned = |turn: Complex, all: Complex| match alias {
-                    0 => turn,
-                    1 => turn * all,
-                    _ => turn * all.conjugate(),
-                };
-                let number = harmonic as f64 + f64::from(alias) * PARTS as f64;
-                let omega = TAU * number;
-                // Means over parts, of samples held around their times.
-                let held = PI * number / samples;
-                let mean = of_part / (PI * number) * sin(held) / held;
-                let quadratic = Complex {
-                    re: product - omega * omega,
-                    im: omega * pole_sum,
-                };
-                let inverse = quadratic.inverse();
-                let integral = Complex {
-                    re: 0.0,
-                    im: -1.0 / omega,
-                };
-                let wave = (Complex::ONE + -turned(fall, fall_by_all)) * integral;
-                let response = turned(late, late_by_all) * integral * inverse * wave;
-                let response = response.scaled(2.0 * gain * mean);
-                let of_pole_sum = Complex {
-                    re: 2.0 * product,
-                    im: omega * pole_sum,
-                };
-                let terms = [
-                    response,
-                    -(response * inverse * of_pole_sum),
-                    -(response * inverse).scaled(pole_sum * pole_sum),
-                    response
-                        * Complex {
-                            re: 0.0,
-                            im: -omega,
-                        },
-                    -response,
-                    (integral * inverse).scaled(mean),
-                    inverse.scaled(mean),
-                    (inverse * Complex { re: 0.0, im: omega }).scaled(mean),
-                ];
-                for (sum, term) in sums.iter_mut().zip(terms) {
-                    *sum = *sum + term;
-                }
-            }
-            response.put(harmonic, &sums);
-        }
-        response.normalise();
-        response
-    }
-
-    fn put(&mut self, harmonic: usize, sums: &[Complex; 1 + COLUMNS]) {
-        put(&mut self.mean, harmonic, sums[0]);
-        for (rows, sum) in self
-            .slopes
-            .iter_mut()
-            .chain(&mut self.jumps)
-            .zip(&sums[1..])
-        {
-            put(rows, harmonic, *sum);
-        }
-    }
-
-    fn normalise(&mut self) {
-        for jump in &mut self.jumps {
-            let size = libm::hypot(jump[0], jump[HARMONICS]);
-            jump.iter_mut().for_each(|value| *value /= size);
-        }
-    }
-
-    /// How `observed` harmonics are explained within this doubt, with the slopes of this response,
-    /// whose process is `values` (counted like the [`Fit`]'s) off the mean.
-    fn fit(&self, observed: &Rows, values: &[f64; VALUES], doubt: &Doubt<'_>) -> Fit {
-        let mut left = [0.0; ROWS];
-        let mut columns = [[0.0; ROWS]; COLUMNS];
-        for row in 0..ROWS {
-            left[row] = (observed[row] - self.mean[row]) / doubt.sigma;
-            for k in 0..VALUES {
-                let slope: f64 = (0..VALUES)
-                    .map(|v| self.slopes[v][row] * doubt.root[v][k])
-                    .sum();
-                columns[k][row] = slope / doubt.sigma;
-                left[row] += columns[k][row] * values[k];
-            }
-            for k in 0..JUMPS {
-                columns[VALUES + k][row] = doubt.jump * self.jumps[k][row] / doubt.sigma;
-            }
-        }
-        explained(&columns, &left)
-    }
-}
+/// Harmonics of the measured parts that are summed in one slice.
+const SUMMED: usize = 8;
 
 /// How far off a process that was read may be, and a cycle from that of any process.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Doubt<'a> {
+pub(crate) struct Doubt {
     /// Upper triangular root of the values' covariance.
-    pub(crate) root: &'a [[f64; VALUES]; VALUES],
+    pub(crate) root: [[f64; VALUES]; VALUES],
     /// Standard deviation of the jumps.
     pub(crate) jump: f64,
     /// Standard deviation of noise and floor together on a row.
     pub(crate) sigma: f64,
 }
 
-/// The least sum of squares.
+/// A cycle, and the process read off it.
 #[derive(Clone, Copy, Debug)]
-struct Fit {
-    /// It.
-    statistic: f64,
-    /// Where: deviations of the values from their mean, in columns of the root.
-    values: [f64; VALUES],
+pub(crate) struct Cycle {
+    /// Mean outputs over the parts, over the amplitude.
+    pub(crate) parts: [f64; PARTS],
+    /// Values of the process: `ln S, r, tau/T, ln A`.
+    pub(crate) mean: [f64; VALUES],
+    pub(crate) doubt: Doubt,
+    pub(crate) duty: f64,
+    /// Samples in the period.
+    pub(crate) samples: f64,
 }
 
-/// The statistic of the [module](self) of a cycle of this duty and so many samples, the process of these
-/// values read off it.
-pub(crate) fn statistic(
-    observed: &Rows,
-    mean: &[f64; VALUES],
-    doubt: &Doubt<'_>,
-    duty: f64,
-    samples: f64,
-) -> f64 {
-    let here = [0.0; VALUES];
-    let first = Response::new(mean, duty, samples).fit(observed, &here, doubt);
-    let (there, values) = nearest(mean, &first.values, doubt.root);
-    let second = Response::new(&there, duty, samples).fit(observed, &values, doubt);
-    // Great doubt leads to where a response overflows.
-    let found = [second.statistic, first.statistic]
-        .into_iter()
-        .find(|one| one.is_finite());
-    found.map_or(f64::INFINITY, |statistic| statistic.max(0.0))
+/// The statistic of the [module](self), in slices.
+#[derive(Clone, Debug)]
+pub(crate) struct Statistic {
+    cycle: Cycle,
+    observed: Rows,
+    response: Response,
+    /// Where the response is taken: deviations of the values from their mean, in columns of the root.
+    deviations: [f64; VALUES],
+    explained: Explained,
+    /// What the slopes at the process read leave, and whether these are those where they lead.
+    first: f64,
+    is_second: bool,
+    stage: Stage,
+}
+
+/// What is next.
+#[derive(Clone, Copy, Debug)]
+enum Stage {
+    /// Harmonics of the measured parts: those that are summed.
+    Observed(usize),
+    /// Of the process.
+    Response,
+    /// The equations.
+    Equations,
+    /// Their least squares.
+    Explained,
+}
+
+impl Statistic {
+    /// Of no cycle yet.
+    pub(crate) const NONE: Self = Self {
+        cycle: Cycle {
+            parts: [0.0; PARTS],
+            mean: [0.0; VALUES],
+            doubt: Doubt {
+                root: [[0.0; VALUES]; VALUES],
+                jump: 0.0,
+                sigma: 0.0,
+            },
+            duty: 0.0,
+            samples: 0.0,
+        },
+        observed: [0.0; ROWS],
+        response: Response::NONE,
+        deviations: [0.0; VALUES],
+        explained: Explained::NONE,
+        first: 0.0,
+        is_second: false,
+        stage: Stage::Observed(0),
+    };
+
+    /// Begins that of a cycle.
+    pub(crate) fn begin(&mut self, cycle: Cycle) {
+        self.cycle = cycle;
+        self.deviations = [0.0; VALUES];
+        self.is_second = false;
+        self.stage = Stage::Observed(0);
+    }
+
+    /// One slice; the statistic after the last.
+    pub(crate) fn advance(&mut self) -> Option<f64> {
+        let cycle = &self.cycle;
+        match self.stage {
+            Stage::Observed(done) => {
+                let end = HARMONICS.min(done + SUMMED);
+                add_harmonics(&cycle.parts, done + 1..=end, &mut self.observed);
+                self.stage = Stage::Observed(end);
+                if end == HARMONICS {
+                    self.response.begin(&cycle.mean, cycle.duty);
+                    self.stage = Stage::Response;
+                }
+            }
+            Stage::Response => {
+                if self.response.advance(cycle.samples) {
+                    self.stage = Stage::Equations;
+                }
+            }
+            Stage::Equations => {
+                let left =
+                    (self.response).equations(&self.observed, &self.deviations, &cycle.doubt);
+                self.explained.begin(left);
+                self.stage = Stage::Explained;
+            }
+            Stage::Explained => {
+                let left = self.explained.advance(&self.response.columns)?;
+                return self.judge(left);
+            }
+        }
+        None
+    }
+
+    /// After the slopes at the process read, those where they lead; after these, the statistic.
+    fn judge(&mut self, left: f64) -> Option<f64> {
+        if !self.is_second {
+            (self.first, self.is_second) = (left, true);
+            let (mean, root) = (&self.cycle.mean, &self.cycle.doubt.root);
+            let (there, deviations) = nearest(mean, &self.explained.values(), root);
+            self.deviations = deviations;
+            self.response.begin(&there, self.cycle.duty);
+            self.stage = Stage::Response;
+            return None;
+        }
+        // Great doubt leads to where a response overflows.
+        let found = [left, self.first].into_iter().find(|one| one.is_finite());
+        Some(found.map_or(f64::INFINITY, |statistic| statistic.max(0.0)))
+    }
+}
+
+/// These harmonics of the means over equal parts.
+fn add_harmonics(
+    parts: &[f64; PARTS],
+    harmonics: core::ops::RangeInclusive<usize>,
+    rows: &mut Rows,
+) {
+    // Turns by half a part.
+    let mut turns = [Complex::ONE; 2 * PARTS];
+    let step = Complex::turn(-PI / PARTS as f64);
+    for index in 1..turns.len() {
+        turns[index] = turns[index - 1] * step;
+    }
+    for harmonic in harmonics {
+        let sum = (parts.iter().enumerate()).fold(Complex::default(), |sum, (part, mean)| {
+            sum + turns[harmonic * (2 * part + 1) % turns.len()].scaled(*mean)
+        });
+        put(rows, harmonic, sum.scaled(1.0 / PARTS as f64));
+    }
+}
+
+fn put(rows: &mut Rows, harmonic: usize, value: Complex) {
+    rows[harmonic - 1] = value.re;
+    rows[HARMONICS + harmonic - 1] = value.im;
 }
 
 /// The process these deviations off the mean, or the nearest that there is, and its own deviations.
@@ -266,40 +236,6 @@ fn nearest(
 
 /// Of equal lags.
 pub(crate) const MOST_POLE_RATIO: f64 = 0.25;
-
-fn dot(a: &Rows, b: &Rows) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
-/// The least `|y - A x|^2 + |x|^2`, which is `|y|^2 - b^T (A^T A + 1)^-1 b` with `b = A^T y`, by Cholesky's
-/// factor; and the first of `x`.
-fn explained(columns: &[Rows; COLUMNS], y: &Rows) -> Fit {
-    let mut factor = [[0.0; COLUMNS]; COLUMNS];
-    let mut forward = [0.0; COLUMNS];
-    for i in 0..COLUMNS {
-        for j in 0..=i {
-            let known: f64 = (0..j).map(|k| factor[i][k] * factor[j][k]).sum();
-            let rest = dot(&columns[i], &columns[j]) - known;
-            factor[i][j] = if i == j {
-                sqrt(rest + 1.0)
-            } else {
-                rest / factor[j][j]
-            };
-        }
-        let known: f64 = (0..i).map(|k| factor[i][k] * forward[k]).sum();
-        forward[i] = (dot(&columns[i], y) - known) / factor[i][i];
-    }
-    let explained: f64 = forward.iter().map(|value| value * value).sum();
-    let mut x = forward;
-    for i in (0..COLUMNS).rev() {
-        let known: f64 = (i + 1..COLUMNS).map(|k| factor[k][i] * x[k]).sum();
-        x[i] = (forward[i] - known) / factor[i][i];
-    }
-    Fit {
-        statistic: dot(y, y) - explained,
-        values: core::array::from_fn(|k| x[k]),
-    }
-}
 
 #[cfg(test)]
 mod tests;

@@ -18,48 +18,39 @@ pub(crate) type Triangle<const M: usize> = [[f64; M]; M];
 const DEPENDENT: f64 = 1e-13;
 
 impl<const M: usize, const N: usize> Columns<M, N> {
-    pub(crate) fn zero(rows: usize) -> Self {
-        Self {
-            column: [[0.0; N]; M],
-            rows,
-        }
+    pub(crate) const NONE: Self = Self {
+        column: [[0.0; N]; M],
+        rows: 0,
+    };
+
+    /// Length of column `j`.
+    pub(crate) fn length(&self, j: usize) -> f64 {
+        norm(&self.column[j][..self.rows])
     }
 
-    /// Replaces the columns by an orthonormal basis of what they span; a column that depends on
-    /// those before it becomes zero, with a zero on the diagonal.
-    pub(crate) fn orthonormalise(&mut self) -> Triangle<M> {
-        let mut r = [[0.0; M]; M];
-        self.orthonormalise_from(0, &mut r);
-        r
+    /// Takes the part along the unit vector in column `i` out of column `j` behind it and returns it.
+    pub(crate) fn remove(&mut self, i: usize, j: usize) -> f64 {
+        let (basis, rest) = self.column.split_at_mut(j);
+        remove(&basis[i][..self.rows], &mut rest[0][..self.rows])
     }
 
-    /// The same where the columns before `first` are orthonormal already; `r` holds what they were.
-    pub(crate) fn orthonormalise_from(&mut self, first: usize, r: &mut Triangle<M>) {
-        for j in first..M {
-            let before = norm(&self.column[j][..self.rows]);
-            let (basis, rest) = self.column.split_at_mut(j);
-            for (i, q) in basis.iter().enumerate() {
-                r[i][j] = remove(&q[..self.rows], &mut rest[0][..self.rows]);
-            }
-            let length = norm(&rest[0][..self.rows]);
-            if length > DEPENDENT * before {
-                r[j][j] = length;
-                rest[0][..self.rows]
-                    .iter_mut()
-                    .for_each(|value| *value /= length);
-            } else {
-                rest[0][..self.rows].fill(0.0);
-            }
-        }
+    /// The same of a vector that is no column.
+    pub(crate) fn remove_from(&self, i: usize, vector: &mut [f64]) -> f64 {
+        remove(&self.column[i][..self.rows], vector)
     }
 
-    /// Takes the parts along the basis out of `vector` and returns them.
-    pub(crate) fn project_out(&self, vector: &mut [f64]) -> [f64; M] {
-        let mut parts = [0.0; M];
-        for (part, q) in parts.iter_mut().zip(&self.column) {
-            *part = remove(&q[..self.rows], vector);
+    /// Makes column `j` a unit vector and returns its length; one that is next to nothing of what it was
+    /// `before` depends on those before it, becomes zero and has no length.
+    pub(crate) fn normalise(&mut self, j: usize, before: f64) -> f64 {
+        let length = self.length(j);
+        let column = &mut self.column[j][..self.rows];
+        if length > DEPENDENT * before {
+            column.iter_mut().for_each(|value| *value /= length);
+            length
+        } else {
+            column.fill(0.0);
+            0.0
         }
-        parts
     }
 }
 
@@ -94,11 +85,15 @@ pub(crate) fn norm(vector: &[f64]) -> f64 {
     libm::sqrt(dot(vector, vector))
 }
 
-/// Solves `r x = right` for upper triangular `r`; a zero on the diagonal gives a zero.
-pub(crate) fn back_substitute<const M: usize>(r: &Triangle<M>, right: &[f64; M]) -> [f64; M] {
-    let mut x = [0.0; M];
-    for i in (0..M).rev() {
-        let known: f64 = (i + 1..M).map(|j| r[i][j] * x[j]).sum();
+/// Solves `r x = right` for the first `N` rows and columns of upper triangular `r`; a zero on the diagonal
+/// gives a zero.
+pub(crate) fn back_substitute<const M: usize, const N: usize>(
+    r: &Triangle<M>,
+    right: &[f64; N],
+) -> [f64; N] {
+    let mut x = [0.0; N];
+    for i in (0..N).rev() {
+        let known: f64 = (i + 1..N).map(|j| r[i][j] * x[j]).sum();
         x[i] = if r[i][i] == 0.0 {
             0.0
         } else {
@@ -142,15 +137,30 @@ pub(crate) fn solve_symmetric(a: &[[f64; 3]; 3], right: &[f64; 3]) -> Option<[f6
 mod tests {
     use super::*;
 
+    fn orthonormalise<const M: usize, const N: usize>(columns: &mut Columns<M, N>) -> Triangle<M> {
+        let mut r = [[0.0; M]; M];
+        for j in 0..M {
+            let before = columns.length(j);
+            for i in 0..j {
+                r[i][j] = columns.remove(i, j);
+            }
+            r[j][j] = columns.normalise(j, before);
+        }
+        r
+    }
+
     // Fit of a + b t to 1, 3, 2, 5 at t = 0..3 by hand: b = 5.5/5 = 1.1, a = 2.75 - 1.65 = 1.1.
     #[test]
     fn straight_line_by_hand() {
-        let mut columns = Columns::<2, 8>::zero(4);
+        let mut columns = Columns::<2, 8> {
+            rows: 4,
+            ..Columns::NONE
+        };
         columns.column[0][..4].fill(1.0);
         columns.column[1][..4].copy_from_slice(&[0.0, 1.0, 2.0, 3.0]);
-        let r = columns.orthonormalise();
+        let r = orthonormalise(&mut columns);
         let mut y = [1.0, 3.0, 2.0, 5.0];
-        let parts = columns.project_out(&mut y);
+        let parts = [0, 1].map(|i| columns.remove_from(i, &mut y));
         let [a, b] = back_substitute(&r, &parts);
         assert!((a - 1.1).abs() < 1e-14 && (b - 1.1).abs() < 1e-14);
         // Residual 0.8 - ... by hand: -0.1, 0.8, -1.3, 0.6: sum of squares 2.70.
@@ -159,10 +169,13 @@ mod tests {
 
     #[test]
     fn dependent_column_is_dropped() {
-        let mut columns = Columns::<2, 4>::zero(3);
+        let mut columns = Columns::<2, 4> {
+            rows: 3,
+            ..Columns::NONE
+        };
         columns.column[0][..3].copy_from_slice(&[1.0, 2.0, 3.0]);
         columns.column[1][..3].copy_from_slice(&[2.0, 4.0, 6.0]);
-        let r = columns.orthonormalise();
+        let r = orthonormalise(&mut columns);
         assert_eq!(r[1][1], 0.0);
         assert_eq!(back_substitute(&r, &[1.0, 1.0])[1], 0.0);
     }

@@ -49,6 +49,7 @@
 
 mod cursor;
 mod error;
+mod forward;
 mod sections;
 
 use crate::floats::Floats;
@@ -57,6 +58,7 @@ use crate::signature::LENGTH;
 
 use self::cursor::Cursor;
 pub use self::error::{PackError, Section};
+pub(crate) use self::forward::Forward;
 pub use self::sections::{Domain, LeadTableBytes, OutputScaling, Prior, Sizes};
 
 /// What every pack begins with.
@@ -193,18 +195,13 @@ impl<'a> Pack<'a> {
     /// The network's outputs for a signature: see the [module](self) for what they are.
     #[must_use]
     pub fn outputs(&self, signature: &[f32; LENGTH]) -> [f32; OUTPUTS] {
-        let mut scratch = [[0.0; WIDEST]; 2];
-        let [now, next] = &mut scratch;
-        let (mut now, mut next) = (now, next);
-        let normalised = (self.offsets.iter().zip(self.scales.iter())).zip(signature);
-        for (input, ((offset, scale), value)) in now.iter_mut().zip(normalised) {
-            *input = (value - offset) * scale;
+        let mut forward = Forward::NONE;
+        forward.begin(self, signature);
+        loop {
+            if let Some(outputs) = forward.advance(self) {
+                return outputs;
+            }
         }
-        for layer in self.layers() {
-            layer.forward(&now[..layer.inputs()], &mut next[..layer.outputs()]);
-            core::mem::swap(&mut now, &mut next);
-        }
-        core::array::from_fn(|i| now[i])
     }
 
     /// The largest difference from what the signatures of the pack must give, relative where that is

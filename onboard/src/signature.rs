@@ -107,6 +107,14 @@ impl fmt::Display for SignatureError {
 impl core::error::Error for SignatureError {}
 
 impl Signature {
+    /// Of no cycle.
+    pub(crate) const NONE: Self = Self {
+        values: [0.0; LENGTH],
+        amplitude: 0.0,
+        centre: 0.0,
+        sign: 0.0,
+    };
+
     /// Of a cycle that lies in the window, which may hold more. The cycle's start, period and duty
     /// are used; its amplitude and centre, those of single samples, are not.
     ///

@@ -62,6 +62,18 @@ impl Transition {
         f_u: 0.0,
     };
 
+    /// Nothing is left of any state.
+    pub(crate) const ZERO: Self = Self {
+        y_v: 0.0,
+        y_f: 0.0,
+        y_u: 0.0,
+        v_v: 0.0,
+        v_f: 0.0,
+        v_u: 0.0,
+        f_f: 0.0,
+        f_u: 0.0,
+    };
+
     /// Over `duration_s >= 0` of the process (its gain and delay play no part).
     #[must_use]
     pub fn over(process: &Process, duration_s: f64) -> Self {

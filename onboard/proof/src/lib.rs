@@ -36,11 +36,11 @@ use core::ffi::{CStr, c_char};
 use core::ops::RangeInclusive;
 use core::ptr;
 
-use onecycle_onboard::classify::{Classification, Verdict, classify_by};
+use onecycle_onboard::classify::{Classification, Classifier, Verdict};
 use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
 use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::refine::{Beforehand, Refined, ShapePrior, refine_with};
+use onecycle_onboard::refine::{Beforehand, Refined, Refiner, ShapePrior};
 use onecycle_onboard::signature::Signature;
 use onecycle_onboard::transition::State;
 use onecycle_onboard::window::{Edge, Window};
@@ -60,10 +60,13 @@ const AMPLITUDE: f64 = 0.1;
 /// Ten seconds, more than twenty periods: whoever has no window by then never will.
 const MOST_SAMPLES: u32 = 10_000;
 /// Rows of the window that is refined, and of the one that the pack reads: 55 bins and 110 of the cycle. A
-/// signature needs the finer ones, and a refinement takes 200 bytes for each of its own.
+/// signature needs the finer ones, and a refinement takes 144 bytes for each of its own.
 const BINS: usize = 69;
 const FINE_BINS: usize = 133;
 const EDGES: usize = 16;
+
+/// The layers of a pack and all else: see `Classifier`.
+const MOST_SLICES_TO_READ: u32 = 30;
 
 /// Two half periods, each between 218.08 and 221.55 ms.
 const PERIOD_S: RangeInclusive<f64> = 0.4361..=0.4432;
@@ -115,7 +118,12 @@ pub extern "C" fn onecycle_proof_size(index: usize) -> Size {
             size_of::<CycleDetector>() + size_of::<SteadyRun>(),
         ),
         (c"past", size_of::<Past>()),
-        (c"windows", size_of::<Windows>()),
+        (
+            c"windows",
+            size_of::<Window<BINS, EDGES>>() + size_of::<Window<FINE_BINS, 0>>(),
+        ),
+        (c"classifier", size_of::<Classifier>()),
+        (c"refiner", size_of::<Refiner<BINS>>()),
         (c"pack_reader", size_of::<Pack<'_>>()),
         (c"classification", size_of::<Classification>()),
     ];
@@ -131,12 +139,6 @@ pub extern "C" fn onecycle_proof_size(index: usize) -> Size {
     )
 }
 
-/// The last cycle of a relay test, in a window to refine and in one to read.
-struct Windows {
-    coarse: Window<BINS, EDGES>,
-    fine: Window<FINE_BINS, 0>,
-}
-
 /// All that the board finds out.
 struct Found {
     run: SteadyRun,
@@ -145,50 +147,94 @@ struct Found {
     gains: Pd,
 }
 
-/// From the relay test to the gains, as on board.
+/// From the relay test to the gains, as on board: what is large is there only as long as it is needed.
 fn identify() -> Result<Found, &'static CStr> {
-    let mut windows = Windows {
-        coarse: Window::new(0.0, SAMPLE_S),
-        fine: Window::new(0.0, SAMPLE_S),
-    };
-    let (run, last) = oscillate(&mut windows)?;
+    let mut coarse = Window::new(0.0, SAMPLE_S);
     let pack = Pack::embedded().map_err(|_| c"there is no pack")?;
-    let read = read(&windows.fine, &last, &pack)?;
-    let period_s = last.period_s;
+    let test = measure(&mut coarse)?;
+    let read = read(&test, &pack)?;
     let beforehand = Beforehand {
-        starts: &read.starts(period_s),
+        starts: &read.starts(test.period_s),
         prior: ShapePrior::of_pack(&pack),
     };
-    let refined = refine_with(&windows.coarse, period_s, &beforehand)
-        .map_err(|_| c"the window holds no process")?;
+    let refined = refine(&coarse, test.period_s, &beforehand)?;
     let table = LeadTable::from_bytes(pack.lead_table().bytes)
         .map_err(|_| c"there is no table of leads")?;
     let gains = table
         .pd_at_phase_margin(&refined.process)
         .map_err(|_| c"the table has no gains")?;
     Ok(Found {
-        run,
+        run: test.run,
         read,
         refined,
         gains,
     })
 }
 
-/// What the pack reads off the last cycle.
+/// What is kept of a relay test beside the window to refine.
+struct Test {
+    run: SteadyRun,
+    /// Period of the last cycle (s).
+    period_s: f64,
+    signature: Signature,
+    /// White noise on a sample (output unit).
+    noise_sigma: f64,
+}
+
+/// The relay test, and the signature of its last cycle, which the finer window is for.
 #[inline(never)]
-fn read(
-    window: &Window<FINE_BINS, 0>,
-    last: &Cycle,
-    pack: &Pack<'_>,
-) -> Result<Classification, &'static CStr> {
-    let signature = Signature::new(window, last).map_err(|_| c"the cycle has no signature")?;
-    classify_by(pack, &signature, last.period_s, window.noise_sigma())
-        .map_err(|_| c"the pack reads nothing")
+fn measure(coarse: &mut Window<BINS, EDGES>) -> Result<Test, &'static CStr> {
+    let mut fine = Window::new(0.0, SAMPLE_S);
+    let (run, last) = oscillate(coarse, &mut fine)?;
+    let signature = Signature::new(&fine, &last).map_err(|_| c"the cycle has no signature")?;
+    Ok(Test {
+        run,
+        period_s: last.period_s,
+        signature,
+        noise_sigma: fine.noise_sigma(),
+    })
+}
+
+/// What the pack reads off the cycle, a slice at a time.
+#[inline(never)]
+fn read(test: &Test, pack: &Pack<'_>) -> Result<Classification, &'static CStr> {
+    let mut classifier = Classifier::new();
+    classifier
+        .begin(pack, &test.signature, test.period_s, test.noise_sigma)
+        .map_err(|_| c"the pack has no calibration")?;
+    for _ in 0..MOST_SLICES_TO_READ {
+        if let Some(read) = classifier.advance(pack) {
+            return read.map_err(|_| c"the pack reads nothing");
+        }
+    }
+    Err(c"the classification takes more slices than it may")
+}
+
+/// The process of the window, a slice at a time.
+#[inline(never)]
+fn refine(
+    window: &Window<BINS, EDGES>,
+    period_s: f64,
+    beforehand: &Beforehand<'_>,
+) -> Result<Refined, &'static CStr> {
+    let mut refiner = Refiner::new();
+    refiner
+        .begin(window, period_s, beforehand)
+        .map_err(|_| c"the window is not to be fitted")?;
+    for _ in 0..refiner.most_slices(window) {
+        if let Some(refined) = refiner.advance(window) {
+            return refined.map_err(|_| c"the window holds no process");
+        }
+    }
+    Err(c"the refinement takes more slices than it may")
 }
 
 /// One step at a time, as on board: the process, the relay, the cycles, the window.
 #[inline(never)]
-fn oscillate(windows: &mut Windows) -> Result<(SteadyRun, Cycle), &'static CStr> {
+fn oscillate(
+    coarse: &mut Window<BINS, EDGES>,
+    fine: &mut Window<FINE_BINS, 0>,
+) -> Result<(SteadyRun, Cycle), &'static CStr> {
     let process = Process::from_acceleration_gain(K_OVER_T_BODY, T_PROP_S, 1.0 / T_BODY_S, TAU_S)
         .map_err(|_| c"the parameters are not a process")?;
     let settings = RelaySettings::bare(AMPLITUDE as f32, RelaySettings::DISTINGUISHING_BETA);
@@ -206,7 +252,7 @@ fn oscillate(windows: &mut Windows) -> Result<(SteadyRun, Cycle), &'static CStr>
         let input = f64::from(relay.step(-output as f32, SAMPLE_S as f32));
         if let Some(cycle) = detector.push(time_s, relay.is_high(), output) {
             run.push(&cycle);
-            if is_open && cycle.start_s >= windows.fine.start_s() {
+            if is_open && cycle.start_s >= fine.start_s() {
                 return Ok((run, cycle));
             }
         }
@@ -214,13 +260,12 @@ fn oscillate(windows: &mut Windows) -> Result<(SteadyRun, Cycle), &'static CStr>
         let rises = relay.is_high() && !was_high;
         was_high = relay.is_high();
         if run.is_steady() && rises && !is_open {
-            windows.coarse = past.window(time_s)?;
-            windows.fine = Window::new(time_s, SAMPLE_S);
+            past.open(coarse, time_s)?;
+            *fine = Window::new(time_s, SAMPLE_S);
             is_open = true;
         }
         past.push(time_s, input);
         if is_open {
-            let Windows { coarse, fine } = windows;
             coarse
                 .push_input(time_s, input)
                 .map_err(|_| c"more switches than the window holds")?;
@@ -295,14 +340,14 @@ impl Past {
         }
     }
 
-    fn window(&self, start_s: f64) -> Result<Window<BINS, EDGES>, &'static CStr> {
-        let mut window = Window::new(start_s, SAMPLE_S);
+    fn open(&self, window: &mut Window<BINS, EDGES>, start_s: f64) -> Result<(), &'static CStr> {
+        *window = Window::new(start_s, SAMPLE_S);
         for edge in &self.edges {
             window
                 .push_input(edge.time_s, edge.input)
                 .map_err(|_| c"more switches than the window holds")?;
         }
-        Ok(window)
+        Ok(())
     }
 }
 

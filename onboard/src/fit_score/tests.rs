@@ -1,5 +1,8 @@
 //! The score's response against the time domain, and its statistic against what it should be.
 
+use libm::sqrt;
+
+use super::fit::dot;
 use super::*;
 use crate::transition::{State, Transition};
 
@@ -102,8 +105,67 @@ fn left(
     jump: f64,
     sigma: f64,
 ) -> f64 {
-    let doubt = Doubt { root, jump, sigma };
-    response.fit(observed, &[0.0; VALUES], &doubt).statistic
+    let doubt = Doubt {
+        root: *root,
+        jump,
+        sigma,
+    };
+    let mut response = response.clone();
+    let mut explained = Explained::NONE;
+    explained.begin(response.equations(observed, &[0.0; VALUES], &doubt));
+    loop {
+        if let Some(statistic) = explained.advance(&response.columns) {
+            return statistic;
+        }
+    }
+}
+
+fn harmonics(parts: &[f64; PARTS]) -> Rows {
+    let mut rows = [0.0; ROWS];
+    add_harmonics(parts, 1..=HARMONICS, &mut rows);
+    rows
+}
+
+fn respond(values: &[f64; VALUES], duty: f64, samples: f64) -> Response {
+    let mut response = Response::NONE;
+    response.begin(values, duty);
+    while !response.advance(samples) {}
+    response
+}
+
+/// The parts of a cycle of these harmonics.
+fn parts(harmonics: &Rows) -> [f64; PARTS] {
+    core::array::from_fn(|part| {
+        (1..=HARMONICS)
+            .map(|n| {
+                let turn = Complex::turn(PI * (n * (2 * part + 1)) as f64 / PARTS as f64);
+                let (re, im) = (harmonics[n - 1], harmonics[HARMONICS + n - 1]);
+                2.0 * (re * turn.re - im * turn.im)
+            })
+            .sum()
+    })
+}
+
+fn statistic(
+    parts: [f64; PARTS],
+    mean: &[f64; VALUES],
+    doubt: &Doubt,
+    duty: f64,
+    samples: f64,
+) -> f64 {
+    let mut statistic = Statistic::NONE;
+    statistic.begin(Cycle {
+        parts,
+        mean: *mean,
+        doubt: *doubt,
+        duty,
+        samples,
+    });
+    loop {
+        if let Some(found) = statistic.advance() {
+            return found;
+        }
+    }
 }
 
 // Against the time domain: what the aliases beyond 47 add is below 3e-7 of the fundamental, and a
@@ -114,7 +176,7 @@ fn a_perfect_cycle_leaves_nothing() {
         let [body, prop, delay, duty] = shape;
         let observed = harmonics(&Wave::new(body, prop, delay, duty).parts());
         // Held for no time.
-        let response = Response::new(&values(shape), duty, 1e9);
+        let response = respond(&values(shape), duty, 1e9);
         let fundamental = libm::hypot(observed[0], observed[HARMONICS]);
         for (row, (a, b)) in observed.iter().zip(response.mean).enumerate() {
             assert!(
@@ -132,7 +194,7 @@ fn a_perfect_cycle_leaves_nothing() {
 #[test]
 fn jumps_are_free_motions() {
     let [body, prop, delay, duty] = SHAPES[1];
-    let response = Response::new(&values(SHAPES[1]), duty, 1e9);
+    let response = respond(&values(SHAPES[1]), duty, 1e9);
     let amplitude = size(&response.mean);
     let mut wave = Wave::new(body, prop, delay, duty);
     wave.start.v += 0.05 * wave.start.v;
@@ -157,19 +219,19 @@ fn jumps_are_free_motions() {
 #[test]
 fn slopes_are_derivatives() {
     for shape in SHAPES {
-        let response = Response::new(&values(shape), shape[3], 200.0);
+        let response = respond(&values(shape), shape[3], 200.0);
         for k in 0..VALUES {
             let at = |step: f64| {
                 let mut moved = values(shape);
                 moved[k] += step;
-                Response::new(&moved, shape[3], 200.0).mean
+                respond(&moved, shape[3], 200.0).mean
             };
             let [above, below] = [at(1e-5), at(-1e-5)];
             for row in 0..ROWS {
                 let difference = (above[row] - below[row]) / 2e-5;
-                let slope = response.slopes[k][row];
+                let slope = response.columns[k][row];
                 assert!(
-                    (difference - slope).abs() < 1e-7 * size(&response.slopes[k]),
+                    (difference - slope).abs() < 1e-7 * size(&response.columns[k]),
                     "value {k} row {row}: {difference} {slope}"
                 );
             }
@@ -197,7 +259,7 @@ impl Normal {
 // sqrt(60/4000) = 0.12, the variance to 60 sqrt(2.4/4000) = 1.5.
 #[test]
 fn noise_is_chi_squared() {
-    let response = Response::new(&values(SHAPES[0]), 0.5, 200.0);
+    let response = respond(&values(SHAPES[0]), 0.5, 200.0);
     let scale = size(&response.mean);
     let (jumps, sigma) = (0.01 * scale, 0.003 * scale);
     let mut root = NO_DOUBT;
@@ -215,10 +277,10 @@ fn noise_is_chi_squared() {
         for row in 0..ROWS {
             for v in 0..VALUES {
                 let off: f64 = (0..VALUES).map(|k| root[v][k] * doubts[k]).sum();
-                observed[row] += response.slopes[v][row] * off;
+                observed[row] += response.columns[v][row] * off;
             }
             for k in 0..JUMPS {
-                observed[row] += jumps * response.jumps[k][row] * jump[k];
+                observed[row] += jumps * response.columns[VALUES + k][row] * jump[k];
             }
             observed[row] += sigma * normal.next();
         }
@@ -235,7 +297,7 @@ fn noise_is_chi_squared() {
 // Of what is left the statistic is a quadratic form: a defect twice as large counts four times.
 #[test]
 fn grows_with_the_square_of_a_defect() {
-    let response = Response::new(&values(SHAPES[0]), 0.5, 200.0);
+    let response = respond(&values(SHAPES[0]), 0.5, 200.0);
     let scale = size(&response.mean);
     let at = |size: f64| {
         let mut observed = response.mean;
@@ -265,20 +327,20 @@ fn slopes_are_taken_where_they_lead() {
     for (found, expected) in deviations.iter().zip(off) {
         assert!((found - expected).abs() < 1e-12, "{deviations:?}");
     }
-    let observed = Response::new(&moved, 0.5, 200.0).mean;
+    let observed = respond(&moved, 0.5, 200.0).mean;
     let sigma = 1e-4 * size(&observed);
     let doubt = Doubt {
-        root: &root,
+        root,
         jump: 0.0,
         sigma,
     };
-    let at_mean = Response::new(&mean, 0.5, 200.0);
+    let at_mean = respond(&mean, 0.5, 200.0);
     let first = left(&at_mean, &observed, &root, 0.0, sigma);
-    let second = statistic(&observed, &mean, &doubt, 0.5, 200.0);
+    let second = statistic(parts(&observed), &mean, &doubt, 0.5, 200.0);
     assert!(first > 24.0 && second < 12.6, "{first} {second}");
 
-    let nothing = [f64::NAN; ROWS];
-    let of_nothing = statistic(&nothing, &mean, &doubt, 0.5, 200.0);
+    let nothing = [f64::NAN; PARTS];
+    let of_nothing = statistic(nothing, &mean, &doubt, 0.5, 200.0);
     assert_eq!(of_nothing, f64::INFINITY);
 }
 

@@ -1,9 +1,10 @@
 //! One step of the search: Levenberg-Marquardt in a box, with Marquardt's scaling.
 
 use super::domain::{HIGHEST, LOWEST, Shape};
-use crate::least_squares::{Columns, dot, solve_symmetric};
+use crate::least_squares::{dot, solve_symmetric};
 
 /// Gradient and curvature of the sum of squares in the free coordinates.
+#[derive(Clone, Copy)]
 pub(super) struct NormalEquations {
     curvature: [[f64; 3]; 3],
     gradient: [f64; 3],
@@ -11,20 +12,23 @@ pub(super) struct NormalEquations {
 }
 
 impl NormalEquations {
+    /// Flat.
+    pub(super) const NONE: Self = Self {
+        curvature: [[0.0; 3]; 3],
+        gradient: [0.0; 3],
+        free: [true; 3],
+    };
+
+    /// From the derivatives' columns and the residual, as many rows of them as that has.
     pub(super) fn new<const BINS: usize>(
-        jacobian: &Columns<3, BINS>,
-        residual: &[f64; BINS],
+        jacobian: &[[f64; BINS]],
+        residual: &[f64],
         shape: &Shape,
     ) -> Self {
-        let rows = jacobian.rows;
-        let column = |i: usize| &jacobian.column[i][..rows];
-        let mut this = Self {
-            curvature: [[0.0; 3]; 3],
-            gradient: [0.0; 3],
-            free: [true; 3],
-        };
+        let column = |i: usize| &jacobian[i][..residual.len()];
+        let mut this = Self::NONE;
         for i in 0..3 {
-            this.gradient[i] = dot(column(i), &residual[..rows]);
+            this.gradient[i] = dot(column(i), residual);
             let outwards = (shape[i] <= LOWEST[i] && this.gradient[i] < 0.0)
                 || (shape[i] >= HIGHEST[i] && this.gradient[i] > 0.0);
             this.free[i] = !outwards;

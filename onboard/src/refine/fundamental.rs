@@ -5,7 +5,7 @@ use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use libm::{atan, atan2, cos, floor, hypot, log, sin, sqrt, tan};
 
 use super::domain::{Shape, clamp};
-use crate::window::Window;
+use crate::window::{Bin, Edge, Window};
 
 /// Number of starts.
 pub(super) const STARTS: usize = 12;
@@ -31,32 +31,86 @@ pub(super) struct Fundamental {
     pub(super) rms: f64,
 }
 
-impl Fundamental {
-    pub(super) fn of<const BINS: usize, const EDGES: usize>(
+/// Bins and edges that are summed in one slice: two sines each of the former, four of the latter.
+pub(super) const SLICE: usize = 16;
+const EDGE: usize = 2;
+
+/// Sums over the window under way.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    bins: usize,
+    edges: usize,
+    y_cos: f64,
+    y_sin: f64,
+    y_square: f64,
+    samples: f64,
+    u_cos: f64,
+    u_sin: f64,
+}
+
+impl Sums {
+    /// One slice; the fundamental where that was the last.
+    #[inline(never)]
+    pub(super) fn advance<const BINS: usize, const EDGES: usize>(
+        &mut self,
         window: &Window<BINS, EDGES>,
         period_s: f64,
-    ) -> Self {
+    ) -> Option<Fundamental> {
         let omega = TAU / period_s;
-        let (mut y_cos, mut y_sin, mut y_square, mut samples) = (0.0, 0.0, 0.0, 0.0);
-        for bin in window.bins().iter().filter(|bin| bin.count > 0) {
-            let count = f64::from(bin.count);
-            let mean = bin.output_sum / count;
-            let angle = omega * bin.time_sum_s / count;
-            y_cos += mean * cos(angle) * window.bin_s();
-            y_sin += mean * sin(angle) * window.bin_s();
-            y_square += bin.output_sum * mean;
-            samples += count;
+        let mut left = SLICE;
+        for bin in window.bins().iter().skip(self.bins).take(left) {
+            (self.bins, left) = (self.bins + 1, left - 1);
+            if bin.count > 0 {
+                self.add_bin(bin, omega, window.bin_s());
+            }
         }
-        let (u_cos, u_sin) = input_fundamental(window, omega);
-        let inputs = window.edges().iter().map(|edge| edge.input);
+        while self.edges < window.edges().len() && left >= EDGE {
+            self.add_edge(window, omega);
+            (self.edges, left) = (self.edges + 1, left - EDGE);
+        }
+        let is_complete =
+            self.bins == window.bins().len() && self.edges == window.edges().len() && left > 0;
+        is_complete.then(|| self.fundamental(window.edges(), period_s))
+    }
+
+    fn add_bin(&mut self, bin: &Bin, omega: f64, bin_s: f64) {
+        let count = f64::from(bin.count);
+        let mean = bin.output_sum / count;
+        let angle = omega * bin.time_sum_s / count;
+        self.y_cos += mean * cos(angle) * bin_s;
+        self.y_sin += mean * sin(angle) * bin_s;
+        self.y_square += bin.output_sum * mean;
+        self.samples += count;
+    }
+
+    /// Integrals of `u cos` and `u sin` over what the window has of the piece behind the next edge.
+    fn add_edge<const BINS: usize, const EDGES: usize>(
+        &mut self,
+        window: &Window<BINS, EDGES>,
+        omega: f64,
+    ) {
+        let end_s = window.bins().len() as f64 * window.bin_s();
+        let inside = |time_s: f64| (time_s - window.start_s()).clamp(0.0, end_s);
+        let edges = window.edges();
+        let edge = &edges[self.edges];
+        let from = inside(edge.time_s);
+        let to = (edges.get(self.edges + 1)).map_or(end_s, |next| inside(next.time_s));
+        self.u_cos += edge.input * (sin(omega * to) - sin(omega * from)) / omega;
+        self.u_sin += edge.input * (cos(omega * from) - cos(omega * to)) / omega;
+    }
+
+    fn fundamental(&self, edges: &[Edge], period_s: f64) -> Fundamental {
+        let omega = TAU / period_s;
+        let inputs = edges.iter().map(|edge| edge.input);
         let (low, high) = inputs.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), input| {
             (low.min(input), high.max(input))
         });
-        let lag = atan2(y_sin, y_cos) - atan2(u_sin, u_cos);
+        let lag = atan2(self.y_sin, self.y_cos) - atan2(self.u_sin, self.u_cos);
         let lag = lag - TAU * floor(lag / TAU);
         // |G| is less than b / w^2, by less than two; the largest input takes b to the bound.
-        let magnitude = hypot(y_cos, y_sin) / hypot(u_cos, u_sin).max(f64::MIN_POSITIVE);
-        Self {
+        let magnitude =
+            hypot(self.y_cos, self.y_sin) / hypot(self.u_cos, self.u_sin).max(f64::MIN_POSITIVE);
+        Fundamental {
             period_s,
             // Under a relay a process lags by one to three quarters of a turn: `pi - asin(beta)`.
             // Anything else is the lag of one whose gain is negative.
@@ -69,45 +123,37 @@ impl Fundamental {
             },
             acceleration: 2.0 * magnitude * omega * omega * high.abs().max(low.abs()),
             relay_acceleration: magnitude * omega * omega * 0.5 * (high - low),
-            rms: sqrt(y_square / f64::max(samples, 1.0)),
+            rms: sqrt(self.y_square / f64::max(self.samples, 1.0)),
         }
-    }
-
-    /// Starts on the surface of processes that have the lag seen at the fundamental.
-    pub(super) fn starts(&self) -> [Shape; STARTS] {
-        let omega = TAU / self.period_s;
-        core::array::from_fn(|n| {
-            let body_per_s = DAMPINGS[n / SHARES.len()] / self.period_s;
-            let share = SHARES[n % SHARES.len()];
-            // What is left for actuator and delay once the body has taken its part; the actuator
-            // alone lags by less than a quarter turn.
-            let rest = (self.lag_rad - FRAC_PI_2 - atan(omega / body_per_s)).clamp(0.1, FRAC_PI_2);
-            let actuator = (share * rest).min(MOST_ACTUATOR_RAD);
-            let prop_per_s = omega / tan(actuator);
-            let sum_per_s = prop_per_s + body_per_s;
-            clamp(&[
-                log(sum_per_s * self.period_s),
-                prop_per_s * body_per_s / (sum_per_s * sum_per_s),
-                (rest - actuator) / TAU,
-            ])
-        })
     }
 }
 
-/// Integrals of `u cos` and `u sin` over the window, piece by piece.
-fn input_fundamental<const BINS: usize, const EDGES: usize>(
-    window: &Window<BINS, EDGES>,
-    omega: f64,
-) -> (f64, f64) {
-    let end_s = window.bins().len() as f64 * window.bin_s();
-    let inside = |time_s: f64| (time_s - window.start_s()).clamp(0.0, end_s);
-    let edges = window.edges();
-    let (mut u_cos, mut u_sin) = (0.0, 0.0);
-    for (k, edge) in edges.iter().enumerate() {
-        let from = inside(edge.time_s);
-        let to = edges.get(k + 1).map_or(end_s, |next| inside(next.time_s));
-        u_cos += edge.input * (sin(omega * to) - sin(omega * from)) / omega;
-        u_sin += edge.input * (cos(omega * from) - cos(omega * to)) / omega;
+impl Fundamental {
+    /// Of no oscillation yet.
+    pub(super) const NONE: Self = Self {
+        period_s: 0.0,
+        lag_rad: 0.0,
+        acceleration: 0.0,
+        relay_acceleration: 0.0,
+        rms: 0.0,
+    };
+
+    /// A start, the first [`STARTS`] of them different, on the surface of processes that have the lag seen
+    /// at the fundamental.
+    pub(super) fn start(&self, n: usize) -> Shape {
+        let omega = TAU / self.period_s;
+        let body_per_s = DAMPINGS[n / SHARES.len() % DAMPINGS.len()] / self.period_s;
+        let share = SHARES[n % SHARES.len()];
+        // What is left for actuator and delay once the body has taken its part; the actuator
+        // alone lags by less than a quarter turn.
+        let rest = (self.lag_rad - FRAC_PI_2 - atan(omega / body_per_s)).clamp(0.1, FRAC_PI_2);
+        let actuator = (share * rest).min(MOST_ACTUATOR_RAD);
+        let prop_per_s = omega / tan(actuator);
+        let sum_per_s = prop_per_s + body_per_s;
+        clamp(&[
+            log(sum_per_s * self.period_s),
+            prop_per_s * body_per_s / (sum_per_s * sum_per_s),
+            (rest - actuator) / TAU,
+        ])
     }
-    (u_cos, u_sin)
 }

@@ -6,259 +6,348 @@
 //! White noise gives the usual covariance. A process that is not quite of this kind errs by some
 //! part `e` of its response at each harmonic of the oscillation. The unknowns take up nearly all of
 //! that at the large low harmonics, so the residual shows next to nothing of it: `e` is found from
-//! the little that is left at each harmonic, by maximum likelihood, and its full effect on the
-//! unknowns added. An even harmonic that a symmetric relay does not excite is measured against its
-//! neighbours: what is found there is distortion. What else is in the residual and is not white counts by its degrees of freedom.
+//! the little that is left at each harmonic, by maximum likelihood (`model_error.rs`), and its full effect
+//! on the unknowns added. What else is in the residual and is not white counts by its degrees of freedom.
 
 use core::f64::consts::TAU;
+use core::task::Poll;
 
-use libm::{cos, log, sin};
+use libm::{cos, sin, sqrt};
 
-use super::{ALL, Estimator, KNOWN, LINEAR, LinearFit, Shape, coordinate};
-use crate::least_squares::{Columns, Triangle, back_substitute, dot};
+use super::linear_fit::{Bench, Jacobian, LinearFit, Orthonormalisation, PARTS};
+use super::model_error::{HARMONICS, ModelError, Wave};
+use super::problem::Problem;
+use super::tried::TRIED;
+use super::{ALL, KNOWN, LINEAR, coordinate};
+use crate::least_squares::{back_substitute, dot};
+use crate::window::Window;
 
-/// Harmonics that are looked at; beyond them a relay oscillation has less than 1/1000 of its
-/// amplitude.
-const HARMONICS: usize = 9;
-/// Part of a harmonic that must be left in the residual for it to tell anything.
-const LEAST_LEFT: f64 = 1e-4;
-/// Gain in log likelihood that makes an error of the model more than chance (1 % of white noises).
-const SIGNIFICANT: f64 = 2.7;
-/// Relative errors of the response that are tried: from 1e-5 to 1, twelve a decade.
-const TRIED: usize = 61;
+/// Bins of a wave that are made in one slice: a sine each.
+const WAVE_BINS: usize = 32;
+/// Lags of the residual's autocorrelation in one slice.
+const LAGS: usize = 8;
+/// Squares that are added to the covariance in one slice.
+const SQUARES: usize = 5;
 
-impl<const BINS: usize, const EDGES: usize> Estimator<'_, BINS, EDGES> {
-    /// The derivatives of the fitted model by all unknowns, orthonormalised, into `tangent`.
-    fn tangent(
-        &self,
-        shape: &Shape,
-        fit: &LinearFit<BINS>,
-        tangent: &mut Tangent<'_, BINS>,
-    ) -> Option<()> {
-        for (row, known) in tangent.triangle.iter_mut().zip(&fit.triangle) {
-            row[..LINEAR].copy_from_slice(known);
-        }
-        let (linear, by_shape) = tangent.basis.column.split_at_mut(LINEAR);
-        linear.copy_from_slice(&fit.basis.column);
-        self.jacobian(shape, &fit.coefficients, by_shape)?;
-        tangent
-            .basis
-            .orthonormalise_from(LINEAR, &mut tangent.triangle);
-        Some(())
-    }
-
-    /// Covariance of the coordinates, and relative error of the response.
-    #[inline(never)]
-    pub(super) fn covariance(
-        &self,
-        shape: &Shape,
-        fit: &LinearFit<BINS>,
-    ) -> Option<([[f64; 5]; 5], f64)> {
-        let mut output = [0.0; BINS];
-        for (k, bin) in self.window.bins().iter().enumerate() {
-            if self.weight[k] > 0.0 {
-                output[k] = bin.output_sum / self.weight[k] - fit.residual[k];
-            }
-        }
-        let [.., bias_gain, gain] = fit.coefficients;
-        let map = coordinate_map(bias_gain, gain, self.period_s);
-        let noise_sigma = self.window.noise_sigma();
-        let mut tangent = Tangent {
-            basis: Columns::zero(self.rows),
-            triangle: [[0.0; ALL]; ALL],
-            weight: &self.weight,
-            bin_rad: TAU * self.window.bin_s() / self.period_s,
-        };
-        self.tangent(shape, fit, &mut tangent)?;
-        tangent.covariance(&fit.residual, &output, noise_sigma, &map)
-    }
+/// What is found out of it so far.
+pub(super) struct Uncertainty {
+    error: ModelError,
+    /// Covariance of all unknowns.
+    all: [[f64; ALL]; ALL],
+    stage: Stage,
 }
 
-/// The fit's surroundings to first order.
-pub(super) struct Tangent<'a, const BINS: usize> {
-    /// Orthonormal basis of the model's derivatives: initial state, bias, gain, shape.
-    pub(super) basis: Columns<ALL, BINS>,
-    pub(super) triangle: Triangle<ALL>,
-    /// Square roots of the numbers of samples of the bins.
-    pub(super) weight: &'a [f64; BINS],
-    /// Phase of the fundamental from one bin to the next (rad).
-    pub(super) bin_rad: f64,
+/// What is next.
+enum Stage {
+    /// The derivatives by the shape.
+    Derivatives(Jacobian),
+    /// Their part of the basis.
+    Basis(Orthonormalisation),
+    /// A wave: bins that are made.
+    Wave(usize, usize),
+    /// The wave without what the unknowns take up of it.
+    Part(usize, Projection),
+    /// The error of the model.
+    Error,
+    /// The residual's redundancy.
+    Redundancy(Redundancy),
+    /// The covariance: squares that are in it, standard deviation of a row.
+    Squares(usize, f64),
 }
 
-/// A cosine or sine over the bins, as far as the fit is concerned.
-struct Wave {
-    /// Change of the unknowns per unit of the wave.
-    shift: [f64; ALL],
-    /// Part of its energy that the residual keeps.
-    left: f64,
-    /// Its amplitude in the output and in the residual (output unit).
+/// Parts of a wave that are out of it, and what it was.
+#[derive(Clone, Copy)]
+struct Projection {
+    parts: [f64; ALL],
+    done: usize,
+    energy: f64,
     output: f64,
-    residual: f64,
-    /// Root mean square of the amplitudes that an error of one would give it (output unit).
-    scale: f64,
 }
 
-impl<const BINS: usize> Tangent<'_, BINS> {
-    /// Covariance over the coordinates of [`coordinate`] and relative error of the response:
-    /// `residual` and `output` are the weighted rows of the fit, `noise_sigma` the white noise of a
-    /// sample; `None` where an unknown has no influence.
-    pub(super) fn covariance(
-        &self,
-        residual: &[f64; BINS],
-        output: &[f64; BINS],
-        noise_sigma: f64,
-        map: &[[f64; 5]; 5],
-    ) -> Option<([[f64; 5]; 5], f64)> {
-        if (0..ALL).any(|i| self.triangle[i][i] == 0.0) {
-            return None;
-        }
-        let rows = self.basis.rows - KNOWN;
-        let noise = noise_sigma * noise_sigma;
-        let mut rest = *residual;
-        let mut shifts = [[0.0; ALL]; 2 * HARMONICS];
-        let mut waves: [Option<Wave>; 2 * HARMONICS] = [const { None }; 2 * HARMONICS];
-        for (n, slot) in waves.iter_mut().enumerate() {
-            *slot = self.wave(n, residual, output, &mut rest);
-        }
-        set_scales(&mut waves);
-        let error = self.response_error(&waves, noise);
-        for (shift, wave) in shifts.iter_mut().zip(waves.iter().flatten()) {
-            *shift = wave.shift.map(|value| value * error * wave.scale);
-        }
-        // Harmonics that are explained as error of the model are no noise any more.
-        let rest = if error > 0.0 { &rest } else { residual };
-        let variance = dot(&rest[..rows], &rest[..rows]) / (rows - ALL) as f64;
-        let variance = variance * redundancy(&rest[..rows], noise / variance);
-        let mut all = [[0.0; ALL]; ALL];
-        for row in 0..ALL {
-            let mut unit = [0.0; ALL];
-            unit[row] = libm::sqrt(variance);
-            add_square(&mut all, &back_substitute(&self.triangle, &unit));
-        }
-        for shift in &shifts {
-            add_square(&mut all, shift);
-        }
-        Some((mapped(&all, map), error))
+impl Uncertainty {
+    /// Nothing yet.
+    pub(super) const NONE: Self = Self {
+        error: ModelError::NONE,
+        all: [[0.0; ALL]; ALL],
+        stage: Stage::Derivatives(Jacobian::BEGIN),
+    };
+
+    pub(super) fn begin(&mut self) {
+        self.error.begin();
+        self.all = [[0.0; ALL]; ALL];
+        self.stage = Stage::Derivatives(Jacobian::BEGIN);
     }
 
-    /// Wave `n` (cosine and sine of each harmonic in turn); `None` beyond half the bins' rate. Takes
-    /// what the residual keeps of it out of `rest`.
-    fn wave(
-        &self,
-        n: usize,
-        residual: &[f64; BINS],
-        output: &[f64; BINS],
-        rest: &mut [f64; BINS],
-    ) -> Option<Wave> {
-        let rows = self.basis.rows - KNOWN;
-        let step_rad = (n / 2 + 1) as f64 * self.bin_rad;
-        if step_rad > 0.25 * TAU {
-            return None;
-        }
-        let mut wave = [0.0; BINS];
-        for (k, value) in wave[..rows].iter_mut().enumerate() {
-            let angle = step_rad * k as f64;
-            *value = self.weight[k]
-                * if n.is_multiple_of(2) {
-                    cos(angle)
-                } else {
-                    sin(angle)
-                };
-        }
-        let energy = dot(&wave[..rows], &wave[..rows]);
-        let in_output = dot(&wave[..rows], &output[..rows]) / energy;
-        let parts = self.basis.project_out(&mut wave[..rows + KNOWN]);
-        let kept = dot(&wave[..rows], &wave[..rows]);
-        let in_residual = dot(&wave[..rows], &residual[..rows]);
-        let again = dot(&wave[..rows], &rest[..rows]) / kept.max(f64::MIN_POSITIVE);
-        for (value, wave) in rest[..rows].iter_mut().zip(&wave) {
-            *value -= again * wave;
-        }
-        Some(Wave {
-            shift: back_substitute(&self.triangle, &parts),
-            left: kept / energy,
-            output: in_output,
-            residual: in_residual / energy,
-            scale: 0.0,
-        })
+    /// Most slices for so many bins.
+    pub(super) fn most_slices(bins: usize) -> usize {
+        let of_wave = bins / WAVE_BINS + 1 + ALL / PARTS + 1;
+        let squares = (ALL + 2 * HARMONICS) / SQUARES + 2;
+        2 * (ALL - LINEAR)
+            + 2 * HARMONICS * of_wave
+            + 3
+            + TRIED.len()
+            + bins / (2 * LAGS)
+            + 1
+            + squares
     }
 
-    /// Relative error of the response that the harmonics left in the residual speak for; zero where
-    /// noise explains them.
-    fn response_error(&self, waves: &[Option<Wave>; 2 * HARMONICS], noise: f64) -> f64 {
-        let rows = self.basis.rows - KNOWN;
-        let samples = dot(&self.weight[..rows], &self.weight[..rows]);
-        // Rounding of the fit itself, for recordings without any noise.
-        let floor = 1e-12;
-        let log_likelihood = |error: f64| {
-            let mut sum = 0.0;
-            for pair in waves.chunks_exact(2) {
-                let [Some(cosine), Some(sine)] = pair else {
-                    continue;
-                };
-                for wave in [cosine, sine] {
-                    if wave.left > LEAST_LEFT {
-                        let size = wave.scale * wave.scale;
-                        let error_variance = wave.left * error * error * size;
-                        let variance =
-                            wave.left * (error_variance + 2.0 * noise / samples + floor * size);
-                        sum -= 0.5 * (log(variance) + wave.residual * wave.residual / variance);
-                    }
+    /// One slice, of the fit at the best shape: covariance over the coordinates of
+    /// [`coordinate`] and relative error of the response; `None` where an unknown has no influence.
+    #[inline(never)]
+    pub(super) fn advance<const BINS: usize, const EDGES: usize>(
+        &mut self,
+        problem: &Problem<BINS>,
+        window: &Window<BINS, EDGES>,
+        fit: &mut LinearFit<BINS>,
+        bench: &mut Bench<BINS>,
+    ) -> Poll<Option<([[f64; 5]; 5], f64)>> {
+        match &mut self.stage {
+            Stage::Derivatives(jacobian) => match jacobian.advance(problem, window, fit, bench) {
+                Poll::Pending => {}
+                Poll::Ready(None) => return Poll::Ready(None),
+                Poll::Ready(Some(())) => {
+                    self.stage = Stage::Basis(Orthonormalisation::of(LINEAR));
+                }
+            },
+            Stage::Basis(under_way) => {
+                if under_way.advance(&mut fit.basis, &mut fit.triangle) {
+                    let next = under_way.column + 1;
+                    self.stage = if next < ALL {
+                        Stage::Basis(Orthonormalisation::of(next))
+                    } else if (0..ALL).any(|i| fit.triangle[i][i] == 0.0) {
+                        return Poll::Ready(None);
+                    } else {
+                        set_output(problem, window, fit, bench);
+                        Stage::Wave(0, 0)
+                    };
                 }
             }
-            sum
-        };
-        let without = log_likelihood(0.0);
-        let mut best = (without + SIGNIFICANT, 0.0);
-        for n in 0..TRIED {
-            let error = libm::exp10(n as f64 / 12.0 - 5.0);
-            let likelihood = log_likelihood(error);
-            if likelihood > best.0 {
-                best = (likelihood, error);
+            Stage::Wave(n, made) => {
+                let step_rad = (*n / 2 + 1) as f64 * (TAU * window.bin_s() / problem.period_s);
+                if *n == 2 * HARMONICS || step_rad > 0.25 * TAU {
+                    self.error.set_scales();
+                    self.stage = Stage::Error;
+                } else if make_wave(*n, step_rad, made, problem, &mut bench.rows[0]) {
+                    self.stage = Stage::Part(*n, Projection::NONE);
+                }
+            }
+            Stage::Part(n, under_way) => {
+                let next = *n + 1;
+                let [wave, output, rest] = &mut bench.rows;
+                if under_way.advance(problem, fit, wave, output) {
+                    self.error.push(under_way.wave(problem, fit, wave, rest));
+                    self.stage = Stage::Wave(next, 0);
+                }
+            }
+            Stage::Error => {
+                if self.error.advance(problem) {
+                    let residual = self.residual(problem, fit, bench);
+                    self.stage = Stage::Redundancy(Redundancy::of(problem, residual));
+                }
+            }
+            Stage::Redundancy(redundancy) => {
+                let mut found = *redundancy;
+                let variance = found.advance(self.residual(problem, fit, bench));
+                self.stage = match variance {
+                    None => Stage::Redundancy(found),
+                    Some(variance) => Stage::Squares(0, sqrt(variance)),
+                };
+            }
+            Stage::Squares(done, sigma) => {
+                let (from, sigma) = (*done, *sigma);
+                *done = from + SQUARES;
+                if !self.add_squares(from, sigma, fit) {
+                    let [.., bias_gain, gain] = fit.coefficients;
+                    let map = coordinate_map(bias_gain, gain, problem.period_s);
+                    return Poll::Ready(Some((mapped(&self.all, &map), self.error.found())));
+                }
             }
         }
-        best.1
+        Poll::Pending
+    }
+
+    /// The residual, but for harmonics that are explained as error of the model: no noise any more.
+    fn residual<'a, const BINS: usize>(
+        &self,
+        problem: &Problem<BINS>,
+        fit: &'a LinearFit<BINS>,
+        bench: &'a Bench<BINS>,
+    ) -> &'a [f64] {
+        let [_, _, rest] = &bench.rows;
+        let rows = if self.error.found() > 0.0 {
+            rest
+        } else {
+            &fit.residual
+        };
+        &rows[..problem.bins()]
+    }
+
+    /// Adds squares of the unknowns' shifts from number `from` on: by noise of `sigma` along each vector of
+    /// the basis, then by the error of each wave. False where there are none left.
+    fn add_squares<const BINS: usize>(
+        &mut self,
+        from: usize,
+        sigma: f64,
+        fit: &LinearFit<BINS>,
+    ) -> bool {
+        for n in from..from + SQUARES {
+            let shift = match n.checked_sub(ALL) {
+                None => {
+                    let mut unit = [0.0; ALL];
+                    unit[n] = sigma;
+                    Some(back_substitute(&fit.triangle, &unit))
+                }
+                Some(wave) => self.error.shift(wave),
+            };
+            match shift {
+                Some(shift) => add_square(&mut self.all, &shift),
+                None => return n > from,
+            }
+        }
+        true
     }
 }
 
-/// The scale of a harmonic is its size in the output, or the geometric mean of its neighbours'
-/// sizes where that is larger; half of the energy for the cosine and half for the sine.
-fn set_scales(waves: &mut [Option<Wave>; 2 * HARMONICS]) {
-    let mut size = [0.0; HARMONICS];
-    for (size, pair) in size.iter_mut().zip(waves.chunks_exact(2)) {
-        if let [Some(cosine), Some(sine)] = pair {
-            *size = libm::hypot(cosine.output, sine.output);
+impl Projection {
+    const NONE: Self = Self {
+        parts: [0.0; ALL],
+        done: 0,
+        energy: 0.0,
+        output: 0.0,
+    };
+
+    /// Takes the next parts out of a wave; true where all are.
+    fn advance<const BINS: usize>(
+        &mut self,
+        problem: &Problem<BINS>,
+        fit: &LinearFit<BINS>,
+        wave: &mut [f64; BINS],
+        output: &[f64; BINS],
+    ) -> bool {
+        let bins = problem.bins();
+        if self.done == 0 {
+            self.energy = dot(&wave[..bins], &wave[..bins]);
+            self.output = dot(&wave[..bins], &output[..bins]) / self.energy;
+            wave[bins..].fill(0.0);
+        }
+        let from = self.done;
+        self.done = ALL.min(from + PARTS);
+        for i in from..self.done {
+            self.parts[i] = fit.basis.remove_from(i, &mut wave[..bins + KNOWN]);
+        }
+        self.done == ALL
+    }
+
+    /// What the fit has to do with a wave that all parts are out of; what the residual keeps of it is taken
+    /// out of `rest`.
+    fn wave<const BINS: usize>(
+        &self,
+        problem: &Problem<BINS>,
+        fit: &LinearFit<BINS>,
+        wave: &[f64; BINS],
+        rest: &mut [f64; BINS],
+    ) -> Wave {
+        let bins = problem.bins();
+        let kept = dot(&wave[..bins], &wave[..bins]);
+        let residual = dot(&wave[..bins], &fit.residual[..bins]);
+        let again = dot(&wave[..bins], &rest[..bins]) / kept.max(f64::MIN_POSITIVE);
+        for (value, wave) in rest[..bins].iter_mut().zip(wave) {
+            *value -= again * wave;
+        }
+        Wave {
+            shift: back_substitute(&fit.triangle, &self.parts),
+            left: kept / self.energy,
+            output: self.output,
+            residual: residual / self.energy,
+            scale: 0.0,
         }
     }
-    for (k, pair) in waves.chunks_exact_mut(2).enumerate() {
-        let neighbours = match (k.checked_sub(1).map(|j| size[j]), size.get(k + 1)) {
-            (Some(before), Some(behind)) => libm::sqrt(before * behind),
-            _ => 0.0,
-        };
-        for wave in pair.iter_mut().flatten() {
-            wave.scale = size[k].max(neighbours) * core::f64::consts::FRAC_1_SQRT_2;
+}
+
+/// Makes the next bins of wave `n`, cosine or sine, whose phase goes on by `step_rad` a bin; true where all
+/// are `made`.
+fn make_wave<const BINS: usize>(
+    n: usize,
+    step_rad: f64,
+    made: &mut usize,
+    problem: &Problem<BINS>,
+    wave: &mut [f64; BINS],
+) -> bool {
+    let bins = problem.bins();
+    let end = bins.min(*made + WAVE_BINS);
+    for k in *made..end {
+        let angle = step_rad * k as f64;
+        wave[k] = problem.weight[k]
+            * if n.is_multiple_of(2) {
+                cos(angle)
+            } else {
+                sin(angle)
+            };
+    }
+    *made = end;
+    end == bins
+}
+
+/// The fitted output, and the residual to take the waves out of.
+fn set_output<const BINS: usize, const EDGES: usize>(
+    problem: &Problem<BINS>,
+    window: &Window<BINS, EDGES>,
+    fit: &LinearFit<BINS>,
+    bench: &mut Bench<BINS>,
+) {
+    let [_, output, rest] = &mut bench.rows;
+    output.fill(0.0);
+    for (k, bin) in window.bins().iter().enumerate() {
+        if problem.weight[k] > 0.0 {
+            output[k] = bin.output_sum / problem.weight[k] - fit.residual[k];
         }
     }
+    *rest = fit.residual;
 }
 
 /// How much less a residual tells than white noise of its size: the bins over its degrees of
 /// freedom, which are the bins over the sum of the squared autocorrelations (a pure harmonic has
-/// two). Only for the part that white noise, `noise_part` of it, does not explain.
-fn redundancy(residual: &[f64], noise_part: f64) -> f64 {
-    let unexplained = (1.0 - noise_part).max(0.0);
-    let mut sum = 1.0;
-    for lag in 1..residual.len() / 2 {
-        let pairs = (residual.len() - lag) as f64;
-        let correlation = autocorrelation(residual, lag);
-        // White noise alone has a mean square of one over the number of pairs.
-        sum += 2.0 * (correlation * correlation - 1.0 / pairs) * pairs / residual.len() as f64;
+/// two). Only for the part that white noise does not explain.
+#[derive(Clone, Copy)]
+struct Redundancy {
+    variance: f64,
+    /// Part of it that white noise does not explain.
+    unexplained: f64,
+    sum: f64,
+    lag: usize,
+}
+
+impl Redundancy {
+    fn of<const BINS: usize>(problem: &Problem<BINS>, residual: &[f64]) -> Self {
+        let noise = problem.noise_sigma * problem.noise_sigma;
+        let variance = dot(residual, residual) / (residual.len() - ALL) as f64;
+        Self {
+            variance,
+            unexplained: (1.0 - noise / variance).max(0.0),
+            sum: 1.0,
+            lag: 1,
+        }
     }
-    1.0 + unexplained * (sum.max(1.0) - 1.0)
+
+    /// The next lags; after the last the variance times the redundancy.
+    fn advance(&mut self, residual: &[f64]) -> Option<f64> {
+        let bins = residual.len();
+        let mean_square = dot(residual, residual) / bins as f64;
+        let end = (bins / 2).min(self.lag + LAGS);
+        while self.lag < end {
+            let pairs = (bins - self.lag) as f64;
+            let correlation = autocorrelation(residual, self.lag, mean_square);
+            // White noise alone has a mean square of one over the number of pairs.
+            self.sum += 2.0 * (correlation * correlation - 1.0 / pairs) * pairs / bins as f64;
+            self.lag += 1;
+        }
+        let redundancy = 1.0 + self.unexplained * (self.sum.max(1.0) - 1.0);
+        (end == bins / 2).then_some(self.variance * redundancy)
+    }
 }
 
 /// Mean product of values `lag` apart over the mean square.
-fn autocorrelation(values: &[f64], lag: usize) -> f64 {
-    let mean_square = dot(values, values) / values.len() as f64;
+fn autocorrelation(values: &[f64], lag: usize, mean_square: f64) -> f64 {
     let product = dot(&values[..values.len() - lag], &values[lag..]) / (values.len() - lag) as f64;
     if mean_square > 0.0 {
         product / mean_square
@@ -292,7 +381,7 @@ fn mapped(all: &[[f64; ALL]; ALL], map: &[[f64; 5]; 5]) -> [[f64; 5]; 5] {
 }
 
 /// Derivatives of the coordinates of [`coordinate`] by (bias times gain, gain, shape).
-pub(super) fn coordinate_map(bias_gain: f64, gain: f64, period_s: f64) -> [[f64; 5]; 5] {
+fn coordinate_map(bias_gain: f64, gain: f64, period_s: f64) -> [[f64; 5]; 5] {
     let mut map = [[0.0; 5]; 5];
     map[coordinate::LN_POLE_SUM][2] = 1.0;
     map[coordinate::POLE_RATIO][3] = 1.0;

@@ -1,0 +1,130 @@
+//! The model over the rows, for one combination of the linear unknowns, some bins at a time.
+
+use super::LINEAR;
+use super::domain::Shape;
+use super::problem::Problem;
+use crate::distortion;
+use crate::process::Process;
+use crate::response::{self, Drive, Response};
+use crate::transition::State;
+use crate::window::Edge;
+
+pub(super) struct Model {
+    process: Option<Process>,
+    response: Response,
+    /// The linear unknowns: y0, v0, w0, the distortion, the bias times the gain, the gain.
+    of: [f64; LINEAR],
+    drive: Drive,
+    part: Part,
+}
+
+/// What of it is under way.
+// With a tag of its own, zero for the first, so that an idle model is all zeros: no image in flash.
+#[repr(u8)]
+enum Part {
+    Response(response::Course),
+    /// The distortion, not begun.
+    Distorted,
+    Distortion(distortion::Course),
+}
+
+impl Model {
+    /// Of no process yet.
+    pub(super) const NONE: Self = Self {
+        process: None,
+        response: Response::NONE,
+        of: [0.0; LINEAR],
+        drive: Drive::NONE,
+        part: Part::Response(response::Course::NONE),
+    };
+
+    /// Becomes that at a shape; `None` where there is no such process.
+    #[inline(never)]
+    pub(super) fn set<const BINS: usize>(
+        &mut self,
+        problem: &Problem<BINS>,
+        shape: &Shape,
+    ) -> Option<()> {
+        let process = problem.process(shape)?;
+        self.response.set(&process, &problem.grid);
+        self.process = Some(process);
+        Some(())
+    }
+
+    /// Begins the rows of these linear unknowns.
+    pub(super) fn begin<const BINS: usize>(
+        &mut self,
+        edges: &[Edge],
+        of: &[f64; LINEAR],
+        rows: &mut [f64; BINS],
+    ) {
+        rows.fill(0.0);
+        let Some(process) = &self.process else {
+            return;
+        };
+        let [y, v, w, _, constant, recorded] = *of;
+        // The acceleration, unlike the force, is a state whichever of the lags comes first, as
+        // K/(T_body T_prop), unlike K/T_body, is a gain.
+        let f = w + process.inv_t_body_per_s() * v;
+        let unit = process.t_prop_s();
+        self.of = *of;
+        self.drive = Drive {
+            initial: State { y, v, f },
+            constant: unit * constant,
+            recorded: unit * recorded,
+        };
+        self.part = if self.drive == Drive::NONE {
+            Part::Distorted
+        } else {
+            Part::Response(response::Course::new(edges, &self.drive))
+        };
+    }
+
+    /// Follows it over some bins: weighted means, and what is known beforehand in the rows behind them.
+    /// True where the rows are complete; `even` is to work in.
+    #[inline(never)]
+    pub(super) fn follow<const BINS: usize>(
+        &mut self,
+        problem: &Problem<BINS>,
+        edges: &[Edge],
+        rows: &mut [f64; BINS],
+        even: &mut [f64; BINS],
+    ) -> bool {
+        let bins = problem.bins();
+        let [_, _, w, distortion, ..] = self.of;
+        match (&mut self.part, &self.process) {
+            (Part::Response(course), Some(_)) => {
+                let offset_s = &problem.offset_s[..bins];
+                let driven = (edges, &self.drive);
+                if !(self.response).follow(driven, offset_s, &mut rows[..bins], course) {
+                    return false;
+                }
+                if distortion != 0.0 {
+                    self.part = Part::Distorted;
+                    return false;
+                }
+            }
+            (Part::Distorted, Some(process)) => {
+                let course = distortion::Course::new(process, &problem.grid, edges);
+                self.part = Part::Distortion(course);
+                return false;
+            }
+            (Part::Distortion(course), _) => {
+                if !course.follow(edges, &mut even[..bins]) {
+                    return false;
+                }
+                let scale = distortion * problem.fundamental.relay_acceleration;
+                for (row, even) in rows[..bins].iter_mut().zip(&*even) {
+                    *row += scale * even;
+                }
+            }
+            (_, None) => {}
+        }
+        for (mean, weight) in rows.iter_mut().zip(&problem.weight) {
+            *mean *= weight;
+        }
+        rows[bins] = problem.acceleration_row * w;
+        rows[bins + 1] = problem.distortion_row * distortion;
+        true
+    }
+}
