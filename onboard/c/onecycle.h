@@ -11,7 +11,7 @@
 #include <stdint.h>
 
 // Memory of a tuner, in words of eight bytes: what it takes on 64-bit machines, the largest.
-#define ONECYCLE_TUNER_WORDS 1900
+#define ONECYCLE_TUNER_WORDS 2560
 
 // Whether there is a tuner, or what is wrong with its settings.
 typedef enum onecycle_status {
@@ -31,8 +31,8 @@ typedef enum onecycle_status {
   ONECYCLE_STATUS_SETTING,
   // The cycles are not 1 to 4.
   ONECYCLE_STATUS_CYCLES,
-  // There are no attempts.
-  ONECYCLE_STATUS_ATTEMPTS,
+  // There are no attempts, or no slices.
+  ONECYCLE_STATUS_NO_WORK,
   // The least output is not below the largest.
   ONECYCLE_STATUS_OUTPUT_LIMITS,
   // The safe controller has a number that is not finite.
@@ -103,6 +103,9 @@ typedef struct onecycle_settings {
   uint8_t cycles;
   // Looks at cycles that may be refused before the test ends.
   uint8_t attempts;
+  // Slices of the identification in a tick, each of up to 2,700 operations in double precision; 1 where
+  // those are emulated.
+  uint16_t slices;
   // Whether the test begins with a take-off from the ground.
   bool take_off;
   // Gain of the take-off's integrator (input unit / (output unit s)).
@@ -129,7 +132,8 @@ typedef struct onecycle_settings {
   float safe_kd;
   // Output of the safe controller at rest (input unit).
   float safe_offset;
-  // Time constant of the mean of the safe controller's output that the relay is offset by (s); 0 for none.
+  // Time constant of the means under the safe controller, of its output, which the relay is offset by, and
+  // of the process's, which it oscillates about (s); 0 for none.
   float bias_filter_s;
   // Lag of a rate that is found from differences (s).
   float rate_lag_s;

@@ -11,8 +11,8 @@ use crate::identification::Refusal;
 /// What must never happen. Every limit is positive; `f32::INFINITY` switches one off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Largest distance of the output from the reference (output unit). Before the process has first
-    /// come that near, as at a take-off, only a distance beyond where it began counts.
+    /// Largest distance of the output from the reference (output unit). Until the process has first come
+    /// within half of it, as at a take-off, it counts from where the process began.
     pub excursion: f32,
     /// Largest rate of the output (output unit / s).
     pub rate: f32,
@@ -47,6 +47,9 @@ impl Limits {
         .find(|&(_, value)| value.is_nan() || value <= 0.0)
     }
 }
+
+/// The process has come near when it is within this part of the excursion allowed.
+const NEAR: f32 = 0.5;
 
 /// Why a test ended in the safe controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -141,7 +144,7 @@ impl Guard {
     /// Whether the test may go on.
     pub(crate) fn check_motion(&mut self, seen: &Seen<'_>) -> Result<(), Abort> {
         let distance = (seen.measurement.value - seen.reference).abs();
-        if distance <= self.limits.excursion {
+        if distance <= NEAR * self.limits.excursion {
             self.approach = None;
         }
         let allowed = self.approach.unwrap_or(0.0) + self.limits.excursion;

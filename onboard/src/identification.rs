@@ -1,31 +1,32 @@
 //! From the samples of a running relay test to a process and its controller, a slice at a time.
 //!
 //! ```text
-//! wait -> collect -> sign -> classify -> refine -> design -> identified
-//!   ^         |         |        |          |         |
-//!   +---------+---------+--------+----------+---------+  another cycle
+//! wait -> collect -> sign -> classify -> refine -> judge -> design -> identified
+//!   ^         |         |        |          |        |         |
+//!   +---------+---------+--------+----------+--------+---------+  another cycle
 //! ```
 //!
 //! - **wait** for three cycles alike and for the next rise of the relay;
 //! - **collect** the last cycles into two windows: a coarse one of all of them to refine, a fine one of the
 //!   last to read. A switch that the relay takes back spoils them;
 //! - **sign**, **classify**: the pack reads the last cycle, or does not know it;
-//! - **refine**: the most probable process from there;
+//! - **refine**: the most probable process from there; **judge**: is it one to be believed?
 //! - **design**: gains from the pack's table, how far the margin may be off.
 //!
-//! [`Identification::observe`] takes a sample, [`Identification::advance`] does one slice of the work: no
-//! call of either does more than the row of the table in `onboard/proof` says.
+//! [`Identification::observe`] takes a sample, [`Identification::advance`] does one slice of the work, of a
+//! few thousand operations at most (the table is in [`refine`](crate::refine)): a board without double
+//! precision does one at each tick, others more.
 
 use core::fmt;
 
-use crate::classify::{Classification, Verdict, classify_by};
+use crate::classify::{Classification, Classifier, Verdict};
 use crate::control::Pd;
 use crate::cycle::{Cycle, CycleDetector, SteadyRun};
 use crate::gains::LeadTable;
 use crate::judgement::{COORDINATES, Deviations, MOST_MISFIT, MOST_RESPONSE_ERROR, Spread, misfit};
 use crate::pack::Pack;
 use crate::process::Process;
-use crate::refine::{Beforehand, DomainEdge, Refined, ShapePrior, refine_with};
+use crate::refine::{Beforehand, DomainEdge, Refined, Refiner, ShapePrior};
 use crate::signature::Signature;
 use crate::window::{Edge, Window};
 
@@ -143,7 +144,19 @@ enum Stage {
     Sign,
     Classify,
     Refine,
+    Judge,
     Design,
+}
+
+/// What is large: each is needed only before the next.
+#[allow(clippy::large_enum_variant)] // The largest is what there must be room for.
+enum Bench {
+    /// Samples of the last cycle.
+    Reading(Window<FINE_BINS, 0>),
+    /// The pack's answer in the making.
+    Classifying(Classifier),
+    /// The process in the making.
+    Refining(Refiner<BINS>),
 }
 
 /// A controller in the making: how many of the coordinates have been followed.
@@ -156,7 +169,6 @@ struct Design {
 }
 
 /// The identification of one axis. See the [module](self).
-#[derive(Clone, Debug)]
 pub struct Identification<'a> {
     pack: Pack<'a>,
     sample_s: f64,
@@ -166,11 +178,11 @@ pub struct Identification<'a> {
     past: Past,
     was_high: bool,
     coarse: Window<BINS, EDGES>,
-    fine: Window<FINE_BINS, 0>,
+    bench: Bench,
     /// The last cycle, and what has been made of it so far.
     last: Option<Cycle>,
-    signature: Option<Signature>,
-    classification: Option<Classification>,
+    score: f64,
+    refined: Option<Refined>,
     design: Option<Design>,
     stage: Stage,
 }
@@ -188,10 +200,10 @@ impl<'a> Identification<'a> {
             past: Past::default(),
             was_high: true,
             coarse: Window::new(0.0, sample_s),
-            fine: Window::new(0.0, sample_s),
+            bench: Bench::Reading(Window::new(0.0, sample_s)),
             last: None,
-            signature: None,
-            classification: None,
+            score: f64::INFINITY,
+            refined: None,
             design: None,
             stage: Stage::Wait,
         }
@@ -246,7 +258,7 @@ impl<'a> Identification<'a> {
             // There are fewer than the window holds.
             let _ = self.coarse.push_input(edge.time_s, edge.input);
         }
-        self.fine = Window::new(sample.time_s, self.sample_s);
+        self.bench = Bench::Reading(Window::new(sample.time_s, self.sample_s));
         self.stage = Stage::Collect {
             rises: 0,
             complete: 0,
@@ -270,7 +282,7 @@ impl<'a> Identification<'a> {
         }
         rises += u8::from(rises_now);
         if rises_now && rises < self.cycles {
-            self.fine = Window::new(sample.time_s, self.sample_s);
+            self.bench = Bench::Reading(Window::new(sample.time_s, self.sample_s));
         }
         if let Some(cycle) = cycle
             && cycle.start_s >= self.coarse.start_s()
@@ -298,7 +310,9 @@ impl<'a> Identification<'a> {
             self.stage = Stage::Wait;
         }
         self.coarse.push_output(sample.time_s, sample.output);
-        self.fine.push_output(sample.time_s, sample.output);
+        if let Bench::Reading(fine) = &mut self.bench {
+            fine.push_output(sample.time_s, sample.output);
+        }
     }
 
     /// One slice of the work; `None` where there is none or more to come. After a refusal another cycle is
@@ -307,7 +321,8 @@ impl<'a> Identification<'a> {
         let outcome = match (self.stage, self.last) {
             (Stage::Sign, Some(cycle)) => self.sign(&cycle).map(|()| None),
             (Stage::Classify, Some(cycle)) => self.classify(&cycle).map(|()| None),
-            (Stage::Refine, Some(cycle)) => self.refine(&cycle).map(|()| None),
+            (Stage::Refine, Some(_)) => self.refine().map(|()| None),
+            (Stage::Judge, Some(_)) => self.judge().map(|()| None),
             (Stage::Design, Some(cycle)) => self.design(&cycle),
             _ => return None,
         };
@@ -317,37 +332,64 @@ impl<'a> Identification<'a> {
     }
 
     fn sign(&mut self, cycle: &Cycle) -> Result<(), Refusal> {
-        let signature = Signature::new(&self.fine, cycle).map_err(|_| Refusal::NoSignature)?;
-        self.signature = Some(signature);
+        let Bench::Reading(fine) = &self.bench else {
+            return Err(Refusal::NoSignature);
+        };
+        let signature = Signature::new(fine, cycle).map_err(|_| Refusal::NoSignature)?;
+        let noise_sigma = fine.noise_sigma();
+        self.bench = Bench::Classifying(Classifier::new());
+        if let Bench::Classifying(classifier) = &mut self.bench {
+            classifier
+                .begin(&self.pack, &signature, cycle.period_s, noise_sigma)
+                .map_err(|_| Refusal::Unknown(f64::INFINITY))?;
+        }
         self.stage = Stage::Classify;
         Ok(())
     }
 
     fn classify(&mut self, cycle: &Cycle) -> Result<(), Refusal> {
-        let signature = self.signature.as_ref().ok_or(Refusal::NoSignature)?;
-        let read = classify_by(
-            &self.pack,
-            signature,
-            cycle.period_s,
-            self.fine.noise_sigma(),
-        )
-        .map_err(|_| Refusal::Unknown(f64::INFINITY))?;
+        let Bench::Classifying(classifier) = &mut self.bench else {
+            return Err(Refusal::NoSignature);
+        };
+        let Some(read) = classifier.advance(&self.pack) else {
+            return Ok(());
+        };
+        let read = read.map_err(|_| Refusal::Unknown(f64::INFINITY))?;
         if read.verdict == Verdict::Unknown {
             return Err(Refusal::Unknown(read.score));
         }
-        self.classification = Some(read);
+        self.score = read.score;
+        self.begin_refinement(cycle, &read)
+    }
+
+    fn begin_refinement(&mut self, cycle: &Cycle, read: &Classification) -> Result<(), Refusal> {
+        self.bench = Bench::Refining(Refiner::new());
+        if let Bench::Refining(refiner) = &mut self.bench {
+            let beforehand = Beforehand {
+                starts: &read.starts(cycle.period_s),
+                prior: ShapePrior::of_pack(&self.pack),
+            };
+            refiner
+                .begin(&self.coarse, cycle.period_s, &beforehand)
+                .map_err(|_| Refusal::NoFit)?;
+        }
         self.stage = Stage::Refine;
         Ok(())
     }
 
-    fn refine(&mut self, cycle: &Cycle) -> Result<(), Refusal> {
-        let read = self.classification.as_ref().ok_or(Refusal::NoFit)?;
-        let beforehand = Beforehand {
-            starts: &read.starts(cycle.period_s),
-            prior: ShapePrior::of_pack(&self.pack),
+    fn refine(&mut self) -> Result<(), Refusal> {
+        let Bench::Refining(refiner) = &mut self.bench else {
+            return Err(Refusal::NoFit);
         };
-        let refined =
-            refine_with(&self.coarse, cycle.period_s, &beforehand).map_err(|_| Refusal::NoFit)?;
+        if let Some(refined) = refiner.advance(&self.coarse) {
+            self.refined = Some(refined.map_err(|_| Refusal::NoFit)?);
+            self.stage = Stage::Judge;
+        }
+        Ok(())
+    }
+
+    fn judge(&mut self) -> Result<(), Refusal> {
+        let refined = self.refined.ok_or(Refusal::NoFit)?;
         let misfit = misfit(&refined, &self.coarse);
         if misfit > MOST_MISFIT || refined.response_error > MOST_RESPONSE_ERROR {
             return Err(Refusal::Misfit(misfit.max(refined.response_error)));
@@ -399,7 +441,7 @@ impl<'a> Identification<'a> {
             pd: *pd,
             phase_margin_rad,
             input_bias: refined.input_bias,
-            score: (self.classification.as_ref()).map_or(f64::INFINITY, |read| read.score),
+            score: self.score,
             period_s: cycle.period_s,
             amplitude: cycle.amplitude,
             noise_sigma: refined.noise_sigma,

@@ -5,14 +5,15 @@
 //! | Idle     | safe controller                   | [`Tuner::start`]                                  | TakeOff, or Relay without one |
 //! | TakeOff  | integrator and relay (eq. 17)     | the relay has switched twice about the reference  | Relay    |
 //! | Relay    | offset and relay                  | the cycles asked for are complete and steady      | Identify |
-//! | Identify | offset and relay, a slice a tick  | a controller has been found                       | Control  |
+//! | Identify | offset and relay, slices each tick | a controller has been found                       | Control  |
 //! |          |                                   | the cycles were refused and attempts are left     | Relay    |
 //! | Control  | the controller that was found     | (stays; proven when the response was as predicted)|          |
 //! | Aborted  | safe controller                   | [`Tuner::reset`]                                  | Idle     |
 //!
 //! Every phase of a test goes to Aborted in the tick in which the guard says so ([`Abort`] has the
-//! reasons), and that tick's output is the safe controller's. The reference is that of the start until
-//! the new controller has proven itself: predicted, then checked.
+//! reasons), and that tick's output is the safe controller's. Until the new controller has proven itself
+//! (predicted, then checked) the reference is that of the start; with a bias filter it is where the safe
+//! controller held the process, so that the relay begins at rest however far off that was.
 //!
 //! One tick is bounded work without a heap; samples that are no numbers are never passed on.
 
@@ -55,7 +56,6 @@ pub enum Phase {
 }
 
 /// The tuner of one axis. See the [module](self).
-#[derive(Clone, Debug)]
 pub struct Tuner<'a> {
     settings: TunerSettings,
     phase: Phase,
@@ -67,8 +67,9 @@ pub struct Tuner<'a> {
     rate: RateEstimate,
     /// The reference in force; that of the start during a test.
     reference: f32,
-    /// Mean of the safe controller's output (input unit).
+    /// Means under the safe controller: of its output (input unit), of the process's (output unit).
     usual: f32,
+    usual_value: f32,
     test_s: f32,
     /// What the relay is offset by, then the new controller (input unit).
     offset: f32,
@@ -109,6 +110,7 @@ impl<'a> Tuner<'a> {
             rate: RateEstimate::default(),
             reference: 0.0,
             usual: settings.safe.offset,
+            usual_value: 0.0,
             test_s: 0.0,
             offset: 0.0,
             relay: Relay::new(settings.relay)?,
@@ -132,15 +134,16 @@ impl<'a> Tuner<'a> {
         if self.phase != Phase::Idle {
             return;
         }
-        self.guard.begin((self.value - self.reference).abs());
         if self.settings.take_off.is_some() {
             self.phase = Phase::TakeOff;
         } else {
             self.phase = Phase::Relay;
             if self.settings.bias_filter_s > 0.0 {
                 self.offset = self.usual;
+                self.reference = self.usual_value;
             }
         }
+        self.guard.begin((self.value - self.reference).abs());
     }
 
     /// The operator ends the test, or the controller that came of it; the next tick's output is safe.
@@ -156,11 +159,11 @@ impl<'a> Tuner<'a> {
         if matches!(self.phase, Phase::Aborted | Phase::Control)
             && let Ok(fresh) = Self::with_pack(&self.settings, *self.identification.pack())
         {
-            let (value, reference, usual) = (self.value, self.reference, self.usual);
             *self = Self {
-                value,
-                reference,
-                usual,
+                value: self.value,
+                reference: self.reference,
+                usual: self.usual,
+                usual_value: self.usual_value,
                 ..fresh
             };
         }
@@ -251,7 +254,9 @@ impl<'a> Tuner<'a> {
         let output = self.within_limits(self.safe());
         let filter_s = self.settings.bias_filter_s;
         if dt_s > 0.0 && filter_s > 0.0 {
-            self.usual += dt_s / (dt_s + filter_s) * (output - self.usual);
+            let share = dt_s / (dt_s + filter_s);
+            self.usual += share * (output - self.usual);
+            self.usual_value += share * (self.value - self.usual_value);
         }
         output
     }
@@ -292,7 +297,8 @@ impl<'a> Tuner<'a> {
         if self.phase == Phase::TakeOff {
             return;
         }
-        match self.identification.advance() {
+        let outcome = (0..self.settings.slices).find_map(|_| self.identification.advance());
+        match outcome {
             Some(Ok(identified)) => self.enter_control(time_s, &identified),
             Some(Err(refusal)) => {
                 self.attempts_left -= 1;

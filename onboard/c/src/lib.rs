@@ -15,7 +15,7 @@ use onecycle_onboard::tuner::{Phase, Tuner};
 pub use self::settings::{OnecycleSettings, OnecycleStatus};
 
 /// Memory of a tuner, in words of eight bytes: what it takes on 64-bit machines, the largest.
-pub const ONECYCLE_TUNER_WORDS: usize = 1900;
+pub const ONECYCLE_TUNER_WORDS: usize = 2560;
 
 /// Marks memory that holds a tuner: "ONECYCLE".
 const ALIVE: u64 = u64::from_le_bytes(*b"ONECYCLE");

@@ -27,6 +27,9 @@ pub struct OnecycleSettings {
     pub cycles: u8,
     /// Looks at cycles that may be refused before the test ends.
     pub attempts: u8,
+    /// Slices of the identification in a tick, each of up to 2,700 operations in double precision; 1 where
+    /// those are emulated.
+    pub slices: u16,
     /// Whether the test begins with a take-off from the ground.
     pub take_off: bool,
     /// Gain of the take-off's integrator (input unit / (output unit s)).
@@ -53,7 +56,8 @@ pub struct OnecycleSettings {
     pub safe_kd: f32,
     /// Output of the safe controller at rest (input unit).
     pub safe_offset: f32,
-    /// Time constant of the mean of the safe controller's output that the relay is offset by (s); 0 for none.
+    /// Time constant of the means under the safe controller, of its output, which the relay is offset by, and
+    /// of the process's, which it oscillates about (s); 0 for none.
     pub bias_filter_s: f32,
     /// Lag of a rate that is found from differences (s).
     pub rate_lag_s: f32,
@@ -79,8 +83,8 @@ pub enum OnecycleStatus {
     Setting,
     /// The cycles are not 1 to 4.
     Cycles,
-    /// There are no attempts.
-    Attempts,
+    /// There are no attempts, or no slices.
+    NoWork,
     /// The least output is not below the largest.
     OutputLimits,
     /// The safe controller has a number that is not finite.
@@ -98,7 +102,7 @@ impl From<TunerError> for OnecycleStatus {
             TunerError::Relay(RelayError::Setting(..)) => Self::RelaySetting,
             TunerError::Setting(..) => Self::Setting,
             TunerError::Cycles(_) => Self::Cycles,
-            TunerError::Attempts => Self::Attempts,
+            TunerError::NoWork => Self::NoWork,
             TunerError::OutputLimits(..) => Self::OutputLimits,
             TunerError::Safe => Self::Safe,
             TunerError::Pack => Self::Pack,
@@ -119,6 +123,7 @@ impl OnecycleSettings {
             sample_s,
             cycles: new.cycles,
             attempts: new.attempts,
+            slices: new.slices,
             take_off: false,
             take_off_gain: 0.0,
             take_off_climb: 0.0,
@@ -150,6 +155,7 @@ impl OnecycleSettings {
             },
             cycles: self.cycles,
             attempts: self.attempts,
+            slices: self.slices,
             take_off: self.take_off.then_some(TakeOffSettings {
                 gain: self.take_off_gain,
                 climb: self.take_off_climb,

@@ -186,6 +186,7 @@ impl Run {
             output_highest: (1.5 * h) as f32,
             safe,
             cycles: 1 + (seed % 2) as u8,
+            slices: 1 + (seed % 50) as u16,
             ..new
         };
         Self {

@@ -1,0 +1,150 @@
+"""One axis of one vehicle, from a poor controller to a tuned one, and the step that must follow.
+
+A vehicle is any object with `hold(axis)`, `step(axis, input)` and `read(axis)`: see f450.py.
+"""
+
+import collections
+import dataclasses
+import math
+import random
+
+from tuner import Tuner
+
+TICK_S = 0.001
+# The predicted and the flown response may differ by this part, overshoots also by a hundredth of the step.
+TOLERANCE, LEAST = 0.2, 0.01
+# The response has settled when it stays within this part of the step.
+BAND = 0.05
+
+
+@dataclasses.dataclass
+class Axis:
+    """What is tuned and how. Units: of the input, of the output, seconds."""
+
+    name: str
+    amplitude: float
+    delay_ticks: int
+    safe_kp: float
+    safe_kd: float
+    excursion: float
+    rate: float
+
+
+@dataclasses.dataclass
+class Disturbance:
+    """Noise as a part of the oscillation's amplitude, a constant input as a part of the relay's."""
+
+    noise: float = 0.0
+    bias: float = 0.0
+
+
+def metrics(values, step):
+    """Overshoot (part of the step) and settling time (s) of a response to a step at its beginning, from
+    zero; the noise-free output, a tick apart."""
+    overshoot = max(values) / step - 1.0
+    outside = [index for index, value in enumerate(values) if abs(value - step) > BAND * abs(step)]
+    return overshoot, TICK_S * (outside[-1] + 1 if outside else 0)
+
+
+def predicted(found, step, seconds):
+    """The response of the process identified under the controller made for it: the trapezoidal rule in
+    tenths of a tick, the dead time as a line of ticks."""
+    parts = 10
+    h = TICK_S / parts
+    line = collections.deque([0.0] * (1 + round(found.tau_s / h)))
+    y = v = f = 0.0
+    values = []
+    for _ in range(round(seconds / TICK_S)):
+        values.append(y)
+        command = found.kp * (step - y) - found.kd * v
+        for _ in range(parts):
+            line.append(command)
+            u = line.popleft()
+            f_next = f + h * (u - f) / found.t_prop_s / (1 + 0.5 * h / found.t_prop_s)
+            d = found.inv_t_body_per_s
+            force = found.k_over_t_body * 0.5 * (f + f_next)
+            v_next = (v * (1 - 0.5 * h * d) + h * force) / (1 + 0.5 * h * d)
+            y, v, f = y + 0.5 * h * (v + v_next), v_next, f_next
+    return values
+
+
+def fly(interface, vehicle, axis, disturbance):
+    """Returns what was found, and the metrics of the predicted and of the flown step."""
+    noise = random.Random(1)
+    size = vehicle.oscillation[axis.name]
+    sigma = disturbance.noise * size
+    tuner = Tuner(
+        interface,
+        axis.amplitude,
+        TICK_S,
+        # A sensor without noise still has a resolution.
+        noise_sigma=max(sigma, 1e-3 * size),
+        limit_excursion=axis.excursion,
+        limit_rate=axis.rate,
+        limit_duration_s=30.0,
+        limit_no_switch_s=5.0,
+        limit_stale_s=0.01,
+        output_lowest=-8.0 * axis.amplitude,
+        output_highest=8.0 * axis.amplitude,
+        safe_kp=axis.safe_kp,
+        safe_kd=axis.safe_kd,
+        bias_filter_s=0.5,
+    )
+    late = collections.deque([0.0] * axis.delay_ticks)
+    bias = disturbance.bias * axis.amplitude
+    tick, true_values = 0, []
+
+    def run(seconds, reference, until=lambda: False):
+        nonlocal tick
+        for _ in range(round(seconds / TICK_S)):
+            value, rate = vehicle.read(axis.name)
+            true_values.append(value)
+            measured = value + noise.gauss(0.0, sigma)
+            late.append(tuner.step(tick * TICK_S, measured, rate, reference))
+            vehicle.step(axis.name, late.popleft() + bias)
+            tick += 1
+            if until():
+                return
+
+    run(5.0, 0.0)
+    tuner.start()
+    run(30.0, 0.0, lambda: tuner.phase == "phase_aborted" or (tuner.result and tuner.result.is_proven))
+    if not (tuner.result and tuner.result.is_proven):
+        raise RuntimeError(f"{axis.name}: {tuner.phase}, {tuner.reason}")
+    found, tuned_s = tuner.result, tick * TICK_S - 5.0
+    rest_s = 12.0 * found.kd / found.kp
+    run(2.0 * rest_s, 0.0)
+    # So small that nothing saturates: the command jumps by three times the relay's.
+    step = 3.0 * axis.amplitude / found.kp
+    at_rest = sum(true_values[-500:]) / 500
+    flown_from = len(true_values)
+    run(rest_s, step)
+    flown = [value - at_rest for value in true_values[flown_from:]]
+    return found, tuned_s, metrics(predicted(found, step, rest_s), step), metrics(flown, step)
+
+
+def report(title, vehicle_of, axes, interface):
+    """All axes clean and with noise and bias; prints a line each. Returns whether all is as predicted."""
+    is_right = True
+    for axis in axes:
+        for label, disturbance in [
+            ("clean", Disturbance()),
+            ("1 % noise, bias 0.3 h", Disturbance(noise=0.01, bias=0.3)),
+        ]:
+            found, tuned_s, (overshoot, settling), (flown_overshoot, flown_settling) = fly(
+                interface, vehicle_of(), axis, disturbance
+            )
+            right = math.isclose(
+                flown_overshoot, overshoot, rel_tol=TOLERANCE, abs_tol=LEAST
+            ) and math.isclose(flown_settling, settling, rel_tol=TOLERANCE)
+            is_right = is_right and right
+            print(
+                f"{title:22} {axis.name:8} {label:22} tuned in {tuned_s:4.1f} s  "
+                f"K/T_body {found.k_over_t_body:8.3f}  T_prop {1e3 * found.t_prop_s:5.1f} ms  "
+                f"tau {1e3 * found.tau_s:5.1f} ms  Kp {found.kp:7.3f}  Kd {found.kd:7.4f}  "
+                f"overshoot {100 * overshoot:5.1f} % -> {100 * flown_overshoot:5.1f} %  "
+                f"settling {settling:5.3f} s -> {flown_settling:5.3f} s"
+                f"{'' if right else '   NOT AS PREDICTED'}",
+                flush=True,
+            )
+    return is_right

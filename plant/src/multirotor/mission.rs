@@ -1,0 +1,271 @@
+//! The paper's flights (section IV-D), each a script that reads as it is flown.
+
+use onecycle_onboard::RelaySettings;
+use onecycle_onboard::tuner::TunerSettings;
+use rand::Rng;
+
+use super::flight::Flight;
+use super::frames::Vec3;
+use super::hover::Axis;
+use super::pilot::{MissionError, Pilot, Record, Tuned, hovering};
+use super::vehicle::{Parts, Vehicle};
+use super::wind::{Nudge, Wind};
+
+/// The payload of the paper (kg): 30 % of the vehicle.
+pub const PAYLOAD_KG: f64 = 0.4;
+/// Where the altitude is to be (m).
+const ALTITUDE_M: f64 = 1.0;
+/// A step that shows the new controller (m, rad).
+const STEP_M: f64 = 0.1;
+/// How far to the left the centre of mass lies where the roll has a bias (m): a third of the relay's torque.
+const OFF_CENTRE_M: f64 = 3e-4;
+
+/// What is flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mission {
+    /// From the ground without a controller of the altitude, to a step of it.
+    Altitude,
+    /// The same with the paper's payload.
+    Payload,
+    /// Altitude held by the relay for long enough to look at five cycles one by one.
+    Cycles,
+    /// Roll, its centre of mass off the middle, with the relay about what held it before.
+    Roll,
+    /// The same with the relay about zero.
+    RollUncompensated,
+    /// Weight, blows and wind on the tuned vehicle.
+    Disturbed,
+    /// The same on the one that was not tuned.
+    DisturbedUntuned,
+    /// From the ground to all four axes tuned.
+    Vehicle,
+}
+
+impl Mission {
+    /// All of them.
+    pub const ALL: [Self; 8] = [
+        Self::Altitude,
+        Self::Payload,
+        Self::Cycles,
+        Self::Roll,
+        Self::RollUncompensated,
+        Self::Disturbed,
+        Self::DisturbedUntuned,
+        Self::Vehicle,
+    ];
+
+    /// Its name in arguments and files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Altitude => "altitude",
+            Self::Payload => "payload",
+            Self::Cycles => "cycles",
+            Self::Roll => "roll",
+            Self::RollUncompensated => "roll-uncompensated",
+            Self::Disturbed => "disturbed",
+            Self::DisturbedUntuned => "disturbed-untuned",
+            Self::Vehicle => "vehicle",
+        }
+    }
+}
+
+/// A mission as it was flown.
+#[derive(Clone, Debug)]
+pub struct Flown {
+    /// Every tick.
+    pub records: Vec<Record>,
+    /// What was tuned, in order.
+    pub tuned: Vec<Tuned>,
+    /// What happened when (s).
+    pub events: Vec<(f64, &'static str)>,
+    /// Why it ended early, if it did.
+    pub failure: Option<MissionError>,
+}
+
+/// Flies a mission; the generator makes noise and gusts.
+///
+/// # Errors
+/// Where the vehicle or its settings cannot be; a test that ends early is no error but a
+/// [`failure`](Flown::failure).
+pub fn fly<R: Rng>(mission: Mission, rng: R) -> Result<Flown, MissionError> {
+    match mission {
+        Mission::Altitude => from_the_ground(Vehicle::quadrotor(), rng, &[]),
+        Mission::Payload => {
+            let vehicle = Vehicle::quadrotor().with_payload(PAYLOAD_KG, 0.0)?;
+            from_the_ground(vehicle, rng, &[])
+        }
+        Mission::Vehicle => from_the_ground(
+            Vehicle::quadrotor(),
+            rng,
+            &[&[Axis::Roll, Axis::Pitch, Axis::Yaw]],
+        ),
+        Mission::Cycles => cycles(rng),
+        Mission::Roll => roll(rng, true),
+        Mission::RollUncompensated => roll(rng, false),
+        Mission::Disturbed => disturbed(rng, true),
+        Mission::DisturbedUntuned => disturbed(rng, false),
+    }
+}
+
+/// A script in the making.
+struct Script<R> {
+    pilot: Pilot<R>,
+    tuned: Vec<Tuned>,
+    events: Vec<(f64, &'static str)>,
+}
+
+impl<R: Rng> Script<R> {
+    fn new(
+        flight: Flight,
+        settings: &[TunerSettings; 4],
+        references: [f64; 4],
+        rng: R,
+    ) -> Result<Self, MissionError> {
+        let mut pilot = Pilot::new(flight, settings, rng)?;
+        pilot.references = references;
+        pilot.holds_position = true;
+        Ok(Self {
+            pilot,
+            tuned: vec![],
+            events: vec![],
+        })
+    }
+
+    fn event(&mut self, name: &'static str) {
+        self.events.push((self.pilot.time_s(), name));
+    }
+
+    fn tune(&mut self, axes: &[Axis]) -> Result<(), MissionError> {
+        self.event("test begins");
+        let tuned = self.pilot.tune(axes)?;
+        self.tuned.extend(tuned);
+        self.event("tuned");
+        Ok(())
+    }
+
+    /// The flight as it was, whether or not all went well.
+    fn end(self, outcome: Result<(), MissionError>) -> Flown {
+        Flown {
+            records: self.pilot.into_records(),
+            tuned: self.tuned,
+            events: self.events,
+            failure: outcome.err(),
+        }
+    }
+}
+
+fn in_the_air() -> [TunerSettings; 4] {
+    Axis::ALL.map(Axis::settings)
+}
+
+fn from_the_ground<R: Rng>(
+    vehicle: Vehicle,
+    rng: R,
+    then: &[&[Axis]],
+) -> Result<Flown, MissionError> {
+    let [_, roll, pitch, yaw] = in_the_air();
+    let altitude = Axis::Altitude.settings_for_take_off();
+    let settings = [altitude, roll, pitch, yaw];
+    let flight = Flight::standing(vehicle);
+    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
+    let outcome = (|| {
+        // A moment to see where it stands.
+        script.pilot.run(0.1);
+        script.tune(&[Axis::Altitude])?;
+        for axes in then {
+            script.tune(axes)?;
+        }
+        script.pilot.run(2.0);
+        script.event("step");
+        script.pilot.references[Axis::Altitude.index()] += STEP_M;
+        script.pilot.run(4.0);
+        Ok(())
+    })();
+    Ok(script.end(outcome))
+}
+
+/// A poor controller of the altitude that knows what holds the vehicle.
+fn hovering_settings(vehicle: &Vehicle) -> Result<[TunerSettings; 4], MissionError> {
+    let mut settings = in_the_air();
+    let hover = vehicle.hover(1.0, Vec3::ZERO)?;
+    settings[Axis::Altitude.index()].safe.offset = hover.thrust_command() as f32;
+    Ok(settings)
+}
+
+fn cycles<R: Rng>(rng: R) -> Result<Flown, MissionError> {
+    let vehicle = Vehicle::quadrotor();
+    let mut settings = hovering_settings(&vehicle)?;
+    // All that the tuner takes at once: with the three that it waits for there are seven.
+    settings[Axis::Altitude.index()].cycles = onecycle_onboard::identification::MOST_CYCLES;
+    let flight = hovering(vehicle, ALTITUDE_M)?;
+    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
+    let outcome = (|| {
+        script.pilot.run(3.0);
+        script.tune(&[Axis::Altitude])
+    })();
+    Ok(script.end(outcome))
+}
+
+fn roll<R: Rng>(rng: R, is_compensated: bool) -> Result<Flown, MissionError> {
+    let mut parts = Parts::quadrotor();
+    parts.body.centre_of_mass_m = Vec3::new(0.0, OFF_CENTRE_M, 0.0);
+    let vehicle = Vehicle::new(parts)?;
+    let mut settings = hovering_settings(&vehicle)?;
+    let roll = &mut settings[Axis::Roll.index()];
+    // The paper's relay has no trim; its offset is all that is against the bias.
+    roll.relay = RelaySettings {
+        trim_gain: 0.0,
+        ..roll.relay
+    };
+    if !is_compensated {
+        roll.bias_filter_s = 0.0;
+    }
+    let flight = hovering(vehicle, ALTITUDE_M)?;
+    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
+    let outcome = (|| {
+        script.pilot.run(4.0);
+        script.tune(&[Axis::Roll])?;
+        script.pilot.run(3.0);
+        Ok(())
+    })();
+    Ok(script.end(outcome))
+}
+
+fn disturbed<R: Rng>(rng: R, is_tuned: bool) -> Result<Flown, MissionError> {
+    let vehicle = Vehicle::quadrotor();
+    let settings = hovering_settings(&vehicle)?;
+    let flight = hovering(vehicle, ALTITUDE_M)?;
+    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
+    let outcome = (|| {
+        script.pilot.run(3.0);
+        if is_tuned {
+            script.tune(&[Axis::Altitude])?;
+            script.tune(&[Axis::Roll, Axis::Pitch])?;
+        }
+        script.pilot.run(2.0);
+        script.event("+200 g");
+        let loaded = vehicle.with_payload(0.5 * PAYLOAD_KG, 0.0)?;
+        script.pilot.flight.set_vehicle(loaded);
+        script.pilot.run(3.0);
+        script.event("-200 g");
+        script.pilot.flight.set_vehicle(vehicle);
+        script.pilot.run(3.0);
+        script.event("nudge");
+        script.pilot.flight.nudge(Nudge {
+            force_n: Vec3::new(0.0, 2.0, 2.0),
+            torque_nm: Vec3::new(0.1, 0.1, 0.0),
+            duration_s: 0.1,
+        })?;
+        script.pilot.run(3.0);
+        script.event("wind of 5 m/s");
+        script.pilot.flight.set_wind(Wind {
+            steady_m_per_s: Vec3::new(0.0, 5.0, 0.0),
+            gust_sigma_m_per_s: Vec3::new(0.5, 0.5, 0.25),
+            gust_correlation_s: 1.0,
+        })?;
+        script.pilot.run(5.0);
+        Ok(())
+    })();
+    Ok(script.end(outcome))
+}

@@ -1,0 +1,373 @@
+//! A vehicle with a tuner on each axis: what flies a mission.
+//!
+//! Each axis is held by its own [`Tuner`] from the first tick on: by the poor controller that a builder
+//! would begin with, by the relay while it is tuned, by what came of it afterwards.
+
+use std::fmt;
+
+use onecycle_onboard::control::{Measurement, PdLaw};
+use onecycle_onboard::guard::{Abort, Limits};
+use onecycle_onboard::identification::Identified;
+use onecycle_onboard::tuner::{Phase, TakeOffSettings, Tuner, TunerError, TunerSettings};
+use onecycle_onboard::{Process, RelaySettings};
+use rand::Rng;
+
+use super::body::GRAVITY_M_PER_S2;
+use super::error::VehicleError;
+use super::flight::Flight;
+use super::hover::Axis;
+use super::mixer::Command;
+use super::sensors::Reading;
+use super::vehicle::Vehicle;
+
+/// Time between ticks (s): the paper's 1 kHz.
+pub const TICK_S: f64 = 0.001;
+
+impl Axis {
+    /// All of them, in the order in which a vehicle is tuned.
+    pub const ALL: [Self; 4] = [Self::Altitude, Self::Roll, Self::Pitch, Self::Yaw];
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Altitude => "altitude",
+            Self::Roll => "roll",
+            Self::Pitch => "pitch",
+            Self::Yaw => "yaw",
+        }
+    }
+
+    /// Its place in [`Axis::ALL`].
+    #[must_use]
+    pub fn index(self) -> usize {
+        self as usize
+    }
+
+    /// Its output in a reading (m or rad), and the rate of that.
+    #[must_use]
+    pub fn of(self, reading: &Reading) -> (f64, f64) {
+        let Reading {
+            position_m,
+            velocity_m_per_s,
+            angles_rad,
+            rates_rad_per_s,
+        } = reading;
+        match self {
+            Self::Altitude => (position_m.z, velocity_m_per_s.z),
+            Self::Roll => (angles_rad.x, rates_rad_per_s.x),
+            Self::Pitch => (angles_rad.y, rates_rad_per_s.y),
+            Self::Yaw => (angles_rad.z, rates_rad_per_s.z),
+        }
+    }
+
+    /// What a builder sets for a quadrotor of a kilogram or two before anything is known of it. Commands
+    /// are parts of a motor's full static thrust, of which some 20 m/s^2, 300 and 25 rad/s^2 can be expected.
+    #[must_use]
+    pub fn settings(self) -> TunerSettings {
+        // The relay: a quarter of a g, ten rad/s^2 of roll and pitch, nine of yaw. The noise of a camera's
+        // half millimetre and of angles known to three hundredths of a degree.
+        let (amplitude, noise_sigma) = match self {
+            Self::Altitude => (0.12, 5e-4),
+            Self::Roll | Self::Pitch => (0.03, 5e-4),
+            Self::Yaw => (0.35, 5e-4),
+        };
+        // The poor controller: damped, with poles of 1.5 to 4.5 1/s, a quarter of what comes of the tuning.
+        let (kp, kd) = match self {
+            Self::Altitude => (0.11, 0.14),
+            Self::Roll | Self::Pitch => (0.06, 0.02),
+            Self::Yaw => (0.2, 0.12),
+        };
+        let (excursion, rate) = match self {
+            Self::Altitude => (1.0, 3.0),
+            Self::Roll | Self::Pitch | Self::Yaw => (0.7, 8.0),
+        };
+        let new = TunerSettings::new(amplitude, TICK_S as f32);
+        let (output_lowest, output_highest) = match self {
+            Self::Altitude => (0.0, 1.0),
+            Self::Roll | Self::Pitch | Self::Yaw => (-0.45, 0.45),
+        };
+        TunerSettings {
+            relay: RelaySettings {
+                noise_sigma,
+                ..new.relay
+            },
+            limits: Limits {
+                excursion,
+                rate,
+                duration_s: 40.0,
+                no_switch_s: 5.0,
+                stale_s: 0.01,
+            },
+            output_lowest,
+            output_highest,
+            safe: PdLaw {
+                kp,
+                kd,
+                offset: 0.0,
+            },
+            bias_filter_s: 0.5,
+            ..new
+        }
+    }
+
+    /// As [`Axis::settings`] for a vehicle on the ground that nothing lifts yet.
+    #[must_use]
+    pub fn settings_for_take_off(self) -> TunerSettings {
+        let settings = self.settings();
+        TunerSettings {
+            take_off: Some(TakeOffSettings {
+                gain: 0.3,
+                climb: 0.2,
+            }),
+            relay: RelaySettings {
+                plain_switches: 1,
+                ramp_switches: 2,
+                ..settings.relay
+            },
+            safe: PdLaw::ZERO,
+            bias_filter_s: 0.0,
+            ..settings
+        }
+    }
+}
+
+/// What was found for an axis, and what is true of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tuned {
+    /// The axis.
+    pub axis: Axis,
+    /// When its test began and when its controller was proven (s).
+    pub from_s: f64,
+    /// When its controller was proven (s).
+    pub until_s: f64,
+    /// What was found.
+    pub identified: Identified,
+    /// The process of the vehicle as it was then.
+    pub truth: Process,
+}
+
+/// A tick of a flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Record {
+    /// Its time (s).
+    pub time_s: f64,
+    /// What was true.
+    pub reading: Reading,
+    /// What the tuners were told, in the order of [`Axis::ALL`] (m or rad).
+    pub measured: [f64; 4],
+    /// The commands held from then on.
+    pub commands: [f64; 4],
+    /// What the tuners were doing.
+    pub phases: [Phase; 4],
+}
+
+/// Why a mission ended early.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MissionError {
+    /// The vehicle has a parameter out of range or cannot hover.
+    Vehicle(VehicleError),
+    /// A tuner has a setting out of range.
+    Settings(TunerError),
+    /// An axis was not tuned: why, `None` where it took too long.
+    NotTuned(Axis, Option<Abort>),
+}
+
+impl fmt::Display for MissionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Vehicle(error) => error.fmt(f),
+            Self::Settings(error) => error.fmt(f),
+            Self::NotTuned(axis, Some(reason)) => write!(f, "{}: {reason}", axis.name()),
+            Self::NotTuned(axis, None) => write!(f, "{}: it takes too long", axis.name()),
+        }
+    }
+}
+
+impl std::error::Error for MissionError {}
+
+impl From<VehicleError> for MissionError {
+    fn from(error: VehicleError) -> Self {
+        Self::Vehicle(error)
+    }
+}
+
+impl From<TunerError> for MissionError {
+    fn from(error: TunerError) -> Self {
+        Self::Settings(error)
+    }
+}
+
+/// Four tuners on a vehicle in flight.
+pub struct Pilot<R> {
+    /// The vehicle.
+    pub flight: Flight,
+    /// Where each axis should be (m or rad).
+    pub references: [f64; 4],
+    /// Whether roll and pitch are steered so that the vehicle stays above where it began. While they are
+    /// tuned they are not: a tuner keeps the reference of its start.
+    pub holds_position: bool,
+    rng: R,
+    tuners: [Tuner<'static>; 4],
+    ticks: u64,
+    records: Vec<Record>,
+}
+
+impl<R: Rng> Pilot<R> {
+    /// With the settings of each axis, in the order of [`Axis::ALL`].
+    ///
+    /// # Errors
+    /// [`MissionError::Settings`] names the setting that is out of range.
+    pub fn new(
+        flight: Flight,
+        settings: &[TunerSettings; 4],
+        rng: R,
+    ) -> Result<Self, MissionError> {
+        let [altitude, roll, pitch, yaw] = settings.each_ref().map(Tuner::new);
+        Ok(Self {
+            flight,
+            references: [0.0; 4],
+            holds_position: false,
+            rng,
+            tuners: [altitude?, roll?, pitch?, yaw?],
+            ticks: 0,
+            records: Vec::new(),
+        })
+    }
+
+    /// The tuner of an axis.
+    #[must_use]
+    pub fn tuner(&self, axis: Axis) -> &Tuner<'static> {
+        &self.tuners[axis.index()]
+    }
+
+    /// Time of the next tick (s).
+    #[must_use]
+    pub fn time_s(&self) -> f64 {
+        self.ticks as f64 * TICK_S
+    }
+
+    /// One tick of sensors, tuners and vehicle.
+    pub fn tick(&mut self) {
+        let (time_s, sensed) = (self.time_s(), self.flight.sense(&mut self.rng));
+        if self.holds_position {
+            let [roll_rad, pitch_rad] = tilt(&sensed);
+            self.references[Axis::Roll.index()] = roll_rad;
+            self.references[Axis::Pitch.index()] = pitch_rad;
+        }
+        let mut record = Record {
+            time_s,
+            reading: self.flight.reading(),
+            measured: [0.0; 4],
+            commands: [0.0; 4],
+            phases: [Phase::Idle; 4],
+        };
+        for axis in Axis::ALL {
+            let (index, (value, rate)) = (axis.index(), axis.of(&sensed));
+            let measurement = Measurement::of(value as f32).with_rate(rate as f32);
+            let reference = self.references[index] as f32;
+            let tuner = &mut self.tuners[index];
+            record.measured[index] = value;
+            record.commands[index] = f64::from(tuner.step(time_s, &measurement, reference));
+            record.phases[index] = tuner.phase();
+        }
+        let [thrust, roll, pitch, yaw] = record.commands;
+        let command = Command {
+            thrust,
+            roll,
+            pitch,
+            yaw,
+        };
+        self.flight.step(command, TICK_S, &mut self.rng);
+        self.records.push(record);
+        self.ticks += 1;
+    }
+
+    /// Ticks for so long (s).
+    pub fn run(&mut self, seconds: f64) {
+        for _ in 0..(seconds / TICK_S).round() as u64 {
+            self.tick();
+        }
+    }
+
+    /// Tunes axes at the same time, until each has proven itself.
+    ///
+    /// # Errors
+    /// [`MissionError::NotTuned`] names the axis that was not, and why.
+    pub fn tune(&mut self, axes: &[Axis]) -> Result<Vec<Tuned>, MissionError> {
+        // Twice as long as the guards let a test take.
+        const MOST_S: f64 = 80.0;
+        let from_s = self.time_s();
+        for axis in axes {
+            self.tuners[axis.index()].start();
+        }
+        let mut tuned: Vec<Tuned> = Vec::new();
+        while tuned.len() < axes.len() {
+            self.tick();
+            for &axis in axes {
+                let tuner = self.tuner(axis);
+                if tuner.phase() == Phase::Aborted || self.time_s() - from_s > MOST_S {
+                    return Err(MissionError::NotTuned(axis, tuner.reason()));
+                }
+                if tuner.is_proven()
+                    && let Some(&identified) = tuner.identified()
+                    && tuned.iter().all(|other| other.axis != axis)
+                {
+                    tuned.push(Tuned {
+                        axis,
+                        from_s,
+                        until_s: self.time_s(),
+                        identified,
+                        truth: self.truth(axis)?,
+                    });
+                }
+            }
+        }
+        Ok(tuned)
+    }
+
+    /// The process of an axis of the vehicle as it is now, in calm air.
+    ///
+    /// # Errors
+    /// Where the vehicle cannot hover.
+    pub fn truth(&self, axis: Axis) -> Result<Process, VehicleError> {
+        let charge = self.flight.state().charge;
+        let hover = self
+            .flight
+            .vehicle()
+            .hover(charge, super::frames::Vec3::ZERO)?;
+        hover.linearised(axis)
+    }
+
+    /// All ticks so far.
+    #[must_use]
+    pub fn records(&self) -> &[Record] {
+        &self.records
+    }
+
+    /// All ticks so far.
+    #[must_use]
+    pub fn into_records(self) -> Vec<Record> {
+        self.records
+    }
+}
+
+/// Roll and pitch (rad) that bring the vehicle back above where it began, with a double pole at 0.8 1/s: a
+/// tilt of `a` accelerates by `g a`, to the right or forward.
+fn tilt(sensed: &Reading) -> [f64; 2] {
+    const POLE_PER_S: f64 = 0.8;
+    const MOST_RAD: f64 = 0.25;
+    let (at, speed) = (sensed.position_m, sensed.velocity_m_per_s);
+    let wanted = |at: f64, speed: f64| -POLE_PER_S * (POLE_PER_S * at + 2.0 * speed);
+    let tilt = |acceleration: f64| (acceleration / GRAVITY_M_PER_S2).clamp(-MOST_RAD, MOST_RAD);
+    [-tilt(wanted(at.y, speed.y)), tilt(wanted(at.x, speed.x))]
+}
+
+/// A vehicle that hovers at this altitude (m), full of charge.
+pub(super) fn hovering(vehicle: Vehicle, altitude_m: f64) -> Result<Flight, VehicleError> {
+    let hover = vehicle.hover(1.0, super::frames::Vec3::ZERO)?;
+    Flight::new(
+        vehicle,
+        hover.state(super::frames::Vec3::new(0.0, 0.0, altitude_m)),
+    )
+}
