@@ -35,6 +35,7 @@
 //! ```
 
 pub mod contender;
+pub mod cycles;
 pub mod experiment;
 pub mod files;
 #[cfg(feature = "parquet")]
@@ -44,6 +45,7 @@ pub mod summary;
 use onecycle_onboard::{Pd, Process, ProcessError};
 
 pub use self::contender::{Contender, RelayTest, Seen};
+pub use self::cycles::{Cycles, CyclesError};
 pub use self::experiment::{Benchmark, ExperimentError, Recorded, Truth};
 pub use self::summary::{Costs, Summary, quantile};
 use crate::optimum::{Optimum, OptimumError, pd};

@@ -40,6 +40,7 @@ pub mod cost;
 pub mod dataset;
 pub mod deterioration;
 pub mod evaluate;
+pub mod flights;
 pub mod grid;
 pub mod identifier;
 pub mod identify;

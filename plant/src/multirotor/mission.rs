@@ -200,10 +200,8 @@ fn cycles<R: Rng>(rng: R) -> Result<Flown, MissionError> {
     settings[Axis::Altitude.index()].cycles = onecycle_onboard::identification::MOST_CYCLES;
     let flight = hovering(vehicle, ALTITUDE_M)?;
     let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
-    let outcome = (|| {
-        script.pilot.run(3.0);
-        script.tune(&[Axis::Altitude])
-    })();
+    script.pilot.run(3.0);
+    let outcome = script.tune(&[Axis::Altitude]);
     Ok(script.end(outcome))
 }
 

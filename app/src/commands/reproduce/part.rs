@@ -39,7 +39,7 @@ pub(crate) struct Row {
 }
 
 impl Row {
-    pub(super) fn new(name: impl Into<String>, cells: impl IntoIterator<Item = String>) -> Self {
+    pub(crate) fn new(name: impl Into<String>, cells: impl IntoIterator<Item = String>) -> Self {
         Self {
             name: name.into(),
             cells: cells.into_iter().collect(),
