@@ -3,6 +3,7 @@
 pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certify;
+mod clock;
 pub(crate) mod dataset;
 pub(crate) mod grid;
 pub(crate) mod identify;

@@ -8,7 +8,7 @@ mod common;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, names_in, run};
+use common::{NOT_IDENTIFIED, NOT_WRITTEN, Outcome, Scratch, UNREADABLE, names_in, run};
 use serde_json::Value;
 
 /// A folder of four experiments.
@@ -243,6 +243,99 @@ fn results_are_the_same_bits_after_an_interruption() {
     bench_run(&path, &resumed).refused(UNREADABLE, &["line 2 is damaged"]);
 }
 
+// A folder a method that makes an experiment of its own, a file an experiment, twice the same bytes, and
+// `identify` reads each, whether or not it finds a process there. A method that reads the recordings of all
+// writes none.
+#[test]
+fn traces_are_recordings() {
+    let folder = Scratch::new();
+    let path = made(&folder, "bench");
+    let written = |name: &str| {
+        let traces = folder.name(name);
+        let methods = [
+            "--methods",
+            "rules,pem-sweep,asymmetric",
+            "--traces",
+            &traces,
+        ];
+        let outcome = bench_run(&path, &methods);
+        assert_eq!(outcome.code, Some(0), "{outcome:?}");
+        bytes_below(&folder.path(name))
+    };
+    let files = written("traces");
+    let names: Vec<&str> = files.keys().map(String::as_str).collect();
+    let expected = ["asymmetric", "pem-sweep"]
+        .map(|method| [1, 2, 3, 4].map(|number| format!("{method}/000{number}.csv")));
+    assert_eq!(names, expected.concat());
+    assert!(files == written("again"), "other bytes");
+    for name in names {
+        let outcome = run(&["identify", &folder.name(&format!("traces/{name}"))]);
+        assert!(
+            matches!(outcome.code, Some(0 | NOT_IDENTIFIED)),
+            "{outcome:?}"
+        );
+    }
+    // 20 s of sweep at 1 kHz behind the tenth of a second in which the relay measures its noise.
+    let swept = String::from_utf8_lossy(&files["pem-sweep/0001.csv"]).into_owned();
+    let rows = swept.lines().filter(|line| !line.starts_with('#')).count() - 1;
+    assert!((20_050..=20_500).contains(&rows), "{rows}");
+    let traces = folder.name("traces");
+    let again = ["--methods", "pem-sweep", "--traces", &traces];
+    bench_run(&path, &again).refused(2, &["is not empty"]);
+    let none = ["--methods", "rules", "--traces", &traces];
+    bench_run(&path, &none).refused(2, &["no method makes an experiment of its own"]);
+}
+
+// The same experiments in one Parquet file: the methods read the same numbers, so that results are the same
+// bits but for the time. A file that is none, or lacks an experiment, is refused.
+#[cfg(feature = "parquet")]
+#[test]
+fn a_parquet_folder_gives_the_same_results() {
+    let folder = Scratch::new();
+    let csv = made(&folder, "csv");
+    let table = folder.name("parquet");
+    let make = [
+        "bench", "make", "-o", &table, "--format", "parquet", "--seed", "5",
+    ];
+    let four = run(&[&make[..], &["--cases", "4"]].concat());
+    assert_eq!(four.code, Some(0), "{four:?}");
+    let mut names = names_in(&folder.path("parquet"));
+    names.sort_unstable();
+    assert_eq!(
+        names,
+        [
+            "README.md",
+            "benchmark.json",
+            "recordings.parquet",
+            "truth.csv"
+        ]
+    );
+    let results = [csv.as_str(), &table].map(|path| {
+        let out = folder.name("results");
+        let methods = ["--methods", "onecycle-1,arx-gmvc,pem-sweep", "-o", &out];
+        let outcome = bench_run(path, &methods);
+        assert_eq!(outcome.code, Some(0), "{outcome:?}");
+        without_time(&folder.path("results.csv"))
+    });
+    assert_eq!(results[0], results[1]);
+    assert_eq!(results[0].lines().count(), 1 + 3 * 4);
+    let refused = |words: &[&str]| {
+        bench_run(&table, &["--methods", "rules"]).refused(UNREADABLE, words);
+    };
+    let other = folder.name("other");
+    let make = [
+        "bench", "make", "-o", &other, "--format", "parquet", "--cases", "3",
+    ];
+    assert_eq!(run(&make).code, Some(0));
+    let recordings = folder.path("parquet/recordings.parquet");
+    std::fs::copy(folder.path("other/recordings.parquet"), &recordings).unwrap();
+    refused(&["recordings.parquet", "no experiment 4"]);
+    std::fs::write(&recordings, "time_s,output,input\n").unwrap();
+    refused(&["recordings.parquet"]);
+    std::fs::remove_file(&recordings).unwrap();
+    refused(&["recordings.parquet"]);
+}
+
 // ---------------------------------------------------------------- refusals
 
 #[test]
@@ -278,7 +371,11 @@ fn wrong_folders_are_refused() {
         (
             "benchmark.json",
             manifest.replace("\"csv\"", "\"parquet\""),
-            vec!["--format csv"],
+            vec![if cfg!(feature = "parquet") {
+                "recordings.parquet"
+            } else {
+                "--format csv"
+            }],
         ),
         (
             "benchmark.json",

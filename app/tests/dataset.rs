@@ -340,7 +340,8 @@ fn folders_of_something_else() {
 fn folders_that_cannot_be() {
     let (folder, recipe) = recipe();
     let file = folder.write("file", b"");
-    for into in [file.clone(), format!("{file}/below")] {
+    let nowhere = folder.name("nosuch/into");
+    for into in [file.clone(), format!("{file}/below"), nowhere] {
         let outcome = run(&["dataset", &recipe, "--examples", "4", "--into", &into]);
         outcome.refused(NOT_WRITTEN, &[&into]);
     }

@@ -150,4 +150,9 @@ fn wrong_recipes_are_refused_in_one_sentence() {
     let nowhere = folder.name("bad.toml/out.pack");
     let refused = run(&["train", "--recipe", &recipe, "-o", &nowhere]);
     refused.refused(NOT_WRITTEN, &["bad.toml/out.pack"]);
+    // No folder is made for it either.
+    let nowhere = folder.name("nosuch/out.pack");
+    let refused = run(&["train", "--recipe", &recipe, "-o", &nowhere]);
+    refused.refused(NOT_WRITTEN, &["nosuch/out.pack"]);
+    assert_eq!(folder.files(), ["bad.toml"]);
 }

@@ -5,12 +5,13 @@
 //! | [`pem`]        | prediction error, output error by SQP         | any recording from rest or steady |
 //! | [`rules`]      | homogeneous tuning rules                      | a cycle at the rule's `beta`     |
 //! | [`arx`]        | recursive least squares on ARX(2,2), as PX4's | any lively recording             |
+//! | [`gmvc`]       | PX4's gains for that model                    | the same                         |
 //! | [`asymmetric`] | asymmetric relay, integrator with dead time   | that relay's recording           |
 //!
 //! All read a recording as [`Signals`], one sample a point and at an even period, and return a
 //! [`Rival`]: the controller they lead to and the process behind it, or the reason why there is none.
 //! Where there is a process the controller is its PD of least exact ISE at the phase margin asked for,
-//! so that identifiers are compared and nothing else.
+//! so that identifiers are compared and nothing else. Only [`gmvc`] makes the controller that flies.
 //!
 //! ```
 //! use onecycle_lab::baselines::{pem, rules};
@@ -36,6 +37,7 @@
 
 pub mod arx;
 pub mod asymmetric;
+pub mod gmvc;
 pub mod pem;
 pub mod rules;
 

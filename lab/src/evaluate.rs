@@ -3,14 +3,16 @@
 //! ```text
 //! J      = (ISE of the controller on the true process - J*) / J*           exact, see deterioration
 //! J*     = least ISE of the true process at a phase margin of 20 degrees at least
-//! score  = mean over ALL experiments of min(|J|, 1), an unstable loop and a missing answer being 1
+//! score  = mean over ALL experiments of min(|J|, 1), an unstable loop and a missing answer being 1,
+//!          a J below zero at a margin of 20 degrees or more being 0
 //! ```
 //!
-//! An answer is a process, which gets its PD of least ISE at the same margin, or gains. Unstable loops
+//! An answer is a process, which gets its PD of least ISE at the same margin, or gains: of a PD, or of a
+//! cascade with a PID of the rate ([`Cascade`]), which may cost less than the best PD. Unstable loops
 //! and missing answers have no `J`: they are counted apart, and mean, median, percentiles, worst and the
 //! least phase margin are over the stable loops. Alone these could be bettered by refusing the hard
 //! experiments; the score cannot: a refusal costs as much as anything can. `|J|`, for less margin than
-//! asked for may buy a cost below `J*`, which is no merit.
+//! asked for may buy a cost below `J*`, which is no merit. No PD has one at the full margin; a cascade may.
 //!
 //! | module         | what it holds                                                            |
 //! |----------------|--------------------------------------------------------------------------|
@@ -19,7 +21,8 @@
 //! | [`summary`]    | many verdicts in a row of numbers                                        |
 //! | [`files`]      | truth, answers and results as CSV                                        |
 //!
-//! Times are taken from a clock that the caller hands in; nothing else depends on it.
+//! Times are taken from a clock that the caller hands in, the program's is the processor time of the thread;
+//! nothing else depends on it.
 //!
 //! ```
 //! use onecycle_lab::evaluate::{Answer, Judge};
@@ -29,7 +32,7 @@
 //! let truth = Process::new(1.0, 0.05, 0.8, 0.02)?;
 //! let judge = Judge::new(&truth)?;
 //! let perfect = Answer::of_process(truth)?;
-//! assert!(judge.deterioration(perfect.pd).relative().is_some_and(|j| j.abs() < 1e-12));
+//! assert!(judge.deterioration(perfect.feedback).relative().is_some_and(|j| j.abs() < 1e-12));
 //! # Ok(())
 //! # }
 //! ```
@@ -49,7 +52,7 @@ pub use self::cycles::{Cycles, CyclesError};
 pub use self::experiment::{Benchmark, ExperimentError, Recorded, Truth};
 pub use self::summary::{Costs, Summary, quantile};
 use crate::optimum::{Optimum, OptimumError, pd};
-use crate::{Deterioration, deterioration};
+use crate::{Cascade, Deterioration, deterioration};
 
 /// Least phase margin of all controllers (degrees): the paper's.
 pub const PHASE_MARGIN_DEG: f64 = 20.0;
@@ -60,7 +63,28 @@ pub struct Answer {
     /// The process it identifies; `None` where it goes straight to gains.
     pub process: Option<Process>,
     /// The controller it leads to.
-    pub pd: Pd,
+    pub feedback: Feedback,
+}
+
+/// A controller as the method would fly it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Feedback {
+    /// A PD.
+    Pd(Pd),
+    /// A cascade with a PID of the rate.
+    Cascade(Cascade),
+}
+
+impl From<Pd> for Feedback {
+    fn from(pd: Pd) -> Self {
+        Self::Pd(pd)
+    }
+}
+
+impl From<Cascade> for Feedback {
+    fn from(cascade: Cascade) -> Self {
+        Self::Cascade(cascade)
+    }
 }
 
 impl Answer {
@@ -72,14 +96,17 @@ impl Answer {
         let optimum = pd(&process, PHASE_MARGIN_DEG.to_radians())?;
         Ok(Self {
             process: Some(process),
-            pd: optimum.pd,
+            feedback: optimum.pd.into(),
         })
     }
 
     /// Gains and nothing else.
     #[must_use]
-    pub fn of_gains(pd: Pd) -> Self {
-        Self { process: None, pd }
+    pub fn of_gains(gains: impl Into<Feedback>) -> Self {
+        Self {
+            process: None,
+            feedback: gains.into(),
+        }
     }
 }
 
@@ -115,8 +142,15 @@ impl Judge {
 
     /// What a controller costs on the true process.
     #[must_use]
-    pub fn deterioration(&self, controller: Pd) -> Deterioration {
-        deterioration(controller, &self.truth, &self.best)
+    pub fn deterioration(&self, controller: impl Into<Feedback>) -> Deterioration {
+        let cascade = match controller.into() {
+            Feedback::Pd(pd) => return deterioration(pd, &self.truth, &self.best),
+            Feedback::Cascade(cascade) => cascade,
+        };
+        (cascade.cost(&self.truth)).map_or(Deterioration::Unstable, |cost| Deterioration::Stable {
+            relative: (cost.ise - self.best.ise) / self.best.ise,
+            phase_margin_rad: cost.phase_margin_rad,
+        })
     }
 
     /// The verdict on an answer to an experiment, or on why there is none.
@@ -141,7 +175,7 @@ impl Judge {
                 return record;
             }
         };
-        record.outcome = match self.deterioration(answer.pd) {
+        record.outcome = match self.deterioration(answer.feedback) {
             Deterioration::Stable {
                 relative,
                 phase_margin_rad,
@@ -206,7 +240,7 @@ pub struct Record {
     pub tau_error_s: Option<f64>,
     /// Why there is no answer.
     pub reason: Option<String>,
-    /// Time that the method took (s), where it was taken; the one number that no seed fixes.
+    /// Time of the clock that the method took (s), where it was taken; the one number that no seed fixes.
     pub seconds: Option<f64>,
 }
 

@@ -10,6 +10,7 @@
 //! | what is the best PD, at or above a phase margin? | [`pd_at_phase_margin`], [`pd`]       |
 //! | which relay and tuning rule give that PD?        | [`TuningRule`]                       |
 //! | what does one process's PD cost on another?      | [`deterioration()`]                  |
+//! | and a cascade with a PID of the rate?            | [`Cascade`]                          |
 //! | what will the step look like?                    | [`step_response()`]                  |
 //! | what would other methods make of the experiment? | [`baselines`]                        |
 //!
@@ -33,6 +34,7 @@
 pub mod baselines;
 pub mod campaign;
 pub mod candidate;
+pub mod cascade;
 pub mod certificate;
 mod cholesky;
 pub mod classifier;
@@ -63,6 +65,7 @@ pub mod surface;
 pub mod train;
 
 pub use candidate::{Candidate, CandidateError, Gains};
+pub use cascade::{Cascade, CascadeCost};
 pub use cost::ise;
 pub use deterioration::{Deterioration, deterioration};
 pub use limit_cycle::LimitCycle;

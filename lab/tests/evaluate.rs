@@ -10,12 +10,12 @@ use std::collections::BTreeSet;
 use onecycle_lab::baselines::rules;
 use onecycle_lab::evaluate::files::{read_answers, read_truth, results_csv, truth_csv};
 use onecycle_lab::evaluate::{
-    Answer, Benchmark, Contender, Costs, Judge, Record, RelayTest, Summary, Truth, Verdict,
-    quantile, records,
+    Answer, Benchmark, Contender, Costs, Judge, PHASE_MARGIN_DEG, Record, RelayTest, Summary,
+    Truth, Verdict, quantile, records,
 };
 use onecycle_lab::grid::{InTurn, Pieces};
 use onecycle_lab::identify::find_oscillation;
-use onecycle_lab::{Deterioration, Space};
+use onecycle_lab::{Cascade, Deterioration, Space, pd};
 use onecycle_onboard::{Pd, Process};
 
 use common::Two;
@@ -28,6 +28,40 @@ fn stable(relative: f64, margin_deg: f64) -> Option<Deterioration> {
 }
 
 // ---------------------------------------------------------------- the scoring rule
+
+// A J of -0.3 bought with margin counts 0.3; at the full margin it is won and counts nothing, and so do 20
+// degrees but for rounding. A cost above the optimum counts whatever the margin.
+#[test]
+fn what_is_won_at_the_full_margin_counts_nothing() {
+    for (relative, margin_deg, score) in [
+        (-0.3, 19.9, 0.3),
+        (-0.3, 20.0 - 1e-9, 0.0),
+        (-0.3, 45.0, 0.0),
+        (0.3, 45.0, 0.3),
+    ] {
+        let costs = Costs::of([stable(relative, margin_deg)]);
+        assert_eq!((costs.score, costs.worst), (score, Some(score)));
+    }
+}
+
+// The best PD as a cascade is judged as the PD is: J 0 and 20 degrees, but for what a walk through
+// frequencies errs by. Four times the gain is unstable, for the gain margin is 2.26.
+#[test]
+fn a_cascade_is_judged_as_a_pd_is() {
+    let truth = Process::new(1.0, 0.3, 2.0, 0.1).unwrap();
+    let judge = Judge::new(&truth).unwrap();
+    let best = pd(&truth, PHASE_MARGIN_DEG.to_radians()).unwrap().pd;
+    let cascade = |factor: f64| Cascade {
+        angle_p: best.angle_p(),
+        rate_p: factor * best.rate_p(),
+        rate_i: 0.0,
+        rate_d: 0.0,
+    };
+    let record = judge.record(1, "cascade", Ok(Answer::of_gains(cascade(1.0))));
+    assert!(record.deterioration.is_some_and(|j| j.abs() < 1e-6));
+    assert!((record.phase_margin_deg.unwrap() - 20.0).abs() < 1e-3);
+    assert_eq!(judge.deterioration(cascade(4.0)), Deterioration::Unstable);
+}
 
 // Three stable loops of J 0.1, -0.3 and 2, one unstable, one missing: the score is
 // (0.1 + 0.3 + 1 + 1 + 1)/5 = 0.68; over the stable ones the mean is 2.4/3 = 0.8, the median 0.3, the
@@ -115,7 +149,7 @@ fn a_perfect_answer_scores_zero() {
 fn unstable_and_missing_answers_count_one() {
     let truth = Process::new(1.0, 0.3, 2.0, 0.1).unwrap();
     let judge = Judge::new(&truth).unwrap();
-    let best = Answer::of_process(truth).unwrap().pd;
+    let best = pd(&truth, PHASE_MARGIN_DEG.to_radians()).unwrap().pd;
     for factor in [5.0, -1.0] {
         let pd = Pd {
             kp: factor * best.kp,

@@ -72,9 +72,9 @@ pub(crate) struct MakeBench {
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Methods that read the recordings: onecycle-1, onecycle-2, onecycle-4 (cycles), network, pem, \n",
-    "pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled: all by default. Two read a relay \n",
-    "test of their own, which is simulated on the true process with the same bias, noise and seed: \n",
-    "pem-sweep, asymmetric. With 'none' only --answers are scored.\n\n",
+    "pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc: all by default. Two read \n",
+    "a relay test of their own, which is simulated on the true process with the same bias, noise and seed: \n",
+    "pem-sweep, asymmetric. With 'none' only --answers are scored. Times are those of the processor.\n\n",
     "With --out, what is done is kept in OUT.part: with --resume the same command goes on from there."
 ))]
 pub(crate) struct RunBench {
@@ -91,6 +91,10 @@ pub(crate) struct RunBench {
     /// Write OUT.csv (a row a method and experiment), OUT.json (the same and the leaderboard) and OUT.md
     #[arg(long, short, value_name = "OUT")]
     pub(crate) out: Option<PathBuf>,
+    /// Write the recordings that methods make for themselves to a folder, new or empty: a folder a method, a CSV
+    /// an experiment, as `identify` reads them
+    #[arg(long, value_name = "DIR")]
+    pub(crate) traces: Option<PathBuf>,
     /// Go on from where an interrupted run of the same methods was
     #[arg(long, requires = "out")]
     pub(crate) resume: bool,

@@ -3,7 +3,9 @@
 pub(crate) mod folder;
 mod make;
 mod part;
+mod recordings;
 mod run;
+mod traces;
 
 use std::process::ExitCode;
 

@@ -43,11 +43,19 @@ impl Workers {
         count: usize,
         piece: impl Fn(usize) -> T + Send + Sync,
     ) -> Vec<T> {
-        let piece = |k| {
+        self.quietly(count, |k| {
             let result = piece(k);
             self.bar.inc(1);
             result
-        };
+        })
+    }
+
+    /// Runs pieces that the bar does not count; their results are in order.
+    pub(crate) fn quietly<T: Send>(
+        &self,
+        count: usize,
+        piece: impl Fn(usize) -> T + Send + Sync,
+    ) -> Vec<T> {
         self.pool
             .install(|| (0..count).into_par_iter().map(piece).collect())
     }

@@ -35,8 +35,8 @@ impl<'a> Results<'a> {
 pub(crate) fn leaderboard(results: &Results<'_>) -> String {
     let of = &results.benchmark.benchmark;
     let mut text = format!(
-        "{} experiments, seed {}: costs and errors in %, times in ms; a score of 100 % is no answer at \
-         all\n\n\
+        "{} experiments, seed {}: costs and errors in %, processor times in ms; a score of 100 % is \
+         no answer at all\n\n\
          | method | score | mean abs J | median | 95 % | 99 % | worst | unstable | no answer \
          | least margin (deg) | K/T_body | T_prop | tau (ms) | time (ms) |\n\
          |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
@@ -119,7 +119,8 @@ pub(crate) fn rules(manifest: &Manifest) -> String {
          `J` is the integral of the squared error of your controller on the true process, above that of \
          the true process's own best at that margin, as a fraction of it: exact, without a simulation. \
          The score is the mean over all experiments of `min(|J|, 1)`; an unstable loop and a missing \
-         answer count 1, so that nothing is won by refusing. Mean, median, percentiles and worst in the \
+         answer count 1, so that nothing is won by refusing, and a `J` below zero that leaves the full \
+         margin counts nothing: no PD has one, richer controllers may. Mean, median, percentiles and worst in the \
          leaderboard are over the stable loops; unstable loops and missing answers stand beside them.\n\n\
          ## Licence\n\n\
          MIT or Apache-2.0, as the program that made it.\n",

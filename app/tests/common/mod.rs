@@ -14,8 +14,9 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Exit codes: an input that cannot be read, an output that cannot be written.
+/// Exit codes: an input that cannot be read or tells no process, an output that cannot be written.
 pub(crate) const UNREADABLE: i32 = 3;
+pub(crate) const NOT_IDENTIFIED: i32 = 4;
 pub(crate) const NOT_WRITTEN: i32 = 5;
 
 /// A multirotor's attitude: oscillates with a period of 0.44 s and an amplitude of 3.3e-3.

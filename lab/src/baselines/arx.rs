@@ -22,9 +22,7 @@
 //! the last for the hold of the input and the difference of the output, half a sample each. From there
 //! on it gets the same controller as everybody.
 //!
-//! PX4 itself goes on by a generalised minimum variance law (Yamamoto, Fujii, Kaneda 1998) with a rise
-//! time of 0.14 s and a detuning of 0.7 in units of its normalised torque. That law depends on the unit of
-//! the input and follows no margin, so its gains compare with nothing here and it is left out.
+//! PX4 itself goes on by a law of its own: [`gmvc`](super::gmvc).
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 
@@ -201,14 +199,8 @@ pub fn identify(
     settings: &Settings,
     phase_margin_rad: f64,
 ) -> Result<Rival, RivalError> {
-    let sample_s = signals.sample_period_s;
-    let differences = signals
-        .output
-        .windows(2)
-        .map(|pair| (pair[1] - pair[0]) / sample_s);
-    let rate: Vec<f64> = std::iter::once(0.0).chain(differences).collect();
-    let model = Model::of(signals, &rate, settings)?;
-    Rival::of_process(model.process(sample_s)?, phase_margin_rad)
+    let model = Model::of_differences(signals, settings)?;
+    Rival::of_process(model.process(signals.sample_period_s)?, phase_margin_rad)
 }
 
 /// The same with the rate (output unit / s) of a sensor of its own, a value a sample.
@@ -238,6 +230,20 @@ pub struct Model {
 }
 
 impl Model {
+    /// Of input and output, the rate by differences.
+    ///
+    /// # Errors
+    /// Those of [`Model::of`].
+    pub fn of_differences(signals: &Signals<'_>, settings: &Settings) -> Result<Self, RivalError> {
+        let sample_s = signals.sample_period_s;
+        let differences = signals
+            .output
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) / sample_s);
+        let rate: Vec<f64> = std::iter::once(0.0).chain(differences).collect();
+        Self::of(signals, &rate, settings)
+    }
+
     /// Filters the signals and runs the estimator over them.
     ///
     /// # Errors

@@ -6,7 +6,7 @@ use super::{Answer, PHASE_MARGIN_DEG};
 use crate::Space;
 use crate::TuningRule;
 use crate::baselines::rules::Rule;
-use crate::baselines::{Rival, RivalError, arx, asymmetric, pem, rules};
+use crate::baselines::{Rival, RivalError, arx, asymmetric, gmvc, pem, rules};
 use crate::identify::{Method, Options, Signals, identify};
 
 /// A method as it enters.
@@ -32,6 +32,9 @@ pub enum Contender {
     Arx,
     /// The same with filters in proportion to the oscillation.
     ArxScaled,
+    /// The same with the gains that PX4 makes of it, in proportion to the oscillation: a PID of the rate
+    /// in a cascade.
+    ArxGmvc,
     /// The asymmetric relay with the model of an integrator with dead time.
     Asymmetric,
 }
@@ -81,7 +84,7 @@ static EXACT_RULE: LazyLock<Result<TuningRule, RivalError>> =
 
 impl Contender {
     /// All of them.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::OneCycle(1),
         Self::OneCycle(2),
         Self::OneCycle(4),
@@ -93,6 +96,7 @@ impl Contender {
         Self::RulesHarmonic,
         Self::Arx,
         Self::ArxScaled,
+        Self::ArxGmvc,
         Self::PemSweep,
         Self::Asymmetric,
     ];
@@ -111,6 +115,7 @@ impl Contender {
             Self::RulesHarmonic => "rules-harmonic",
             Self::Arx => "arx",
             Self::ArxScaled => "arx-scaled",
+            Self::ArxGmvc => "arx-gmvc",
             Self::Asymmetric => "asymmetric",
         };
         name.to_owned()
@@ -156,6 +161,7 @@ impl Contender {
             Self::Arx => arx::identify(signals, &arx::Settings::PX4, margin_rad),
             Self::ArxScaled => arx::Settings::scaled_to_oscillation(signals)
                 .and_then(|settings| arx::identify(signals, &settings, margin_rad)),
+            Self::ArxGmvc => return by_gmvc(signals).map_err(|error| error.to_string()),
             Self::Asymmetric => {
                 asymmetric::identify(signals, seen.hysteresis, ASYMMETRIC_CYCLES, margin_rad)
             }
@@ -175,8 +181,16 @@ fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, 
     let identified = identified.map_err(|verdict| verdict.to_string())?;
     Ok(Answer {
         process: Some(identified.refined.process),
-        pd: identified.controller.pd,
+        feedback: identified.controller.pd.into(),
     })
+}
+
+/// PX4's whole road from a recording to gains.
+fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, RivalError> {
+    let settings = arx::Settings::scaled_to_oscillation(signals)?;
+    let model = arx::Model::of_differences(signals, &settings)?;
+    let design = gmvc::Design::scaled_to_oscillation(signals)?;
+    Ok(Answer::of_gains(design.cascade(&model)?))
 }
 
 /// A process gets the same controller whoever found it.

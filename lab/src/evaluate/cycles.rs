@@ -70,7 +70,7 @@ impl Cycles {
     #[must_use]
     pub fn cross(&self) -> Vec<Vec<Deterioration>> {
         let row = |(answer, _): &(Answer, Judge)| {
-            let cost = |(_, judge): &(Answer, Judge)| judge.deterioration(answer.pd);
+            let cost = |(_, judge): &(Answer, Judge)| judge.deterioration(answer.feedback);
             self.answers.iter().map(cost).collect()
         };
         self.answers.iter().map(row).collect()

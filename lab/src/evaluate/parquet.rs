@@ -7,13 +7,16 @@
 //!
 //! Reference: Apache Parquet, "parquet-format", version 2.
 
+use std::fs::File;
 use std::io::{self, Write};
 use std::sync::Arc;
 
 use parquet::basic::{Repetition, Type};
-use parquet::data_type::{DoubleType, Int64Type};
+use parquet::column::reader::get_typed_column_reader;
+use parquet::data_type::{DataType, DoubleType, Int64Type};
 use parquet::errors::ParquetError;
 use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type as Schema;
 
@@ -88,4 +91,65 @@ impl<W: Write + Send> Writer<W> {
         self.0.close()?;
         Ok(())
     }
+}
+
+/// Reads recordings, one at a time and by one thread, for the position in the file is one.
+pub struct Reader(SerializedFileReader<File>);
+
+impl Reader {
+    /// Of a file that a [`Writer`] has written.
+    ///
+    /// # Errors
+    /// Those of the file; where it is no Parquet, or its columns are others.
+    pub fn new(file: File) -> io::Result<Self> {
+        let reader = SerializedFileReader::new(file)?;
+        let schema = reader.metadata().file_metadata().schema_descr();
+        let found = schema.columns().iter();
+        let is_right = found
+            .map(|column| (column.name(), column.physical_type()))
+            .eq(COLUMNS);
+        if !is_right {
+            return Err(malformed("its columns are no recordings".to_owned()));
+        }
+        Ok(Self(reader))
+    }
+
+    /// The recording of an experiment; they are numbered from one.
+    ///
+    /// # Errors
+    /// Those of the file; where it lacks the experiment or holds another in its place.
+    pub fn recording(&self, experiment: u64) -> io::Result<Recorded> {
+        let missing = || malformed(format!("it has no experiment {experiment}"));
+        let index = usize::try_from(experiment).unwrap_or(0);
+        if !(1..=self.0.num_row_groups()).contains(&index) {
+            return Err(missing());
+        }
+        let group = self.0.get_row_group(index - 1)?;
+        let numbers = column::<Int64Type>(&*group, 0)?;
+        if numbers
+            .iter()
+            .any(|number| number.cast_unsigned() != experiment)
+        {
+            return Err(missing());
+        }
+        Ok(Recorded {
+            time_s: column::<DoubleType>(&*group, 1)?,
+            output: column::<DoubleType>(&*group, 2)?,
+            input: column::<DoubleType>(&*group, 3)?,
+            hysteresis: 0.0,
+        })
+    }
+}
+
+/// All values of a column of a row group.
+fn column<T: DataType>(group: &dyn RowGroupReader, number: usize) -> io::Result<Vec<T::T>> {
+    let mut reader = get_typed_column_reader::<T>(group.get_column_reader(number)?);
+    let rows = usize::try_from(group.metadata().num_rows()).unwrap_or(0);
+    let mut values = Vec::new();
+    reader.read_records(rows, None, None, &mut values)?;
+    Ok(values)
+}
+
+fn malformed(reason: String) -> io::Error {
+    io::Error::new(io::ErrorKind::InvalidData, reason)
 }

@@ -2,18 +2,18 @@
 
 use serde::Serialize;
 
-use super::Record;
+use super::{PHASE_MARGIN_DEG, Record};
 use crate::Deterioration;
 
-/// What controllers cost, over many experiments. See the [module](super) for how unstable loops and
-/// missing answers enter.
+/// What controllers cost, over many experiments. See the [module](super) for how unstable loops, missing
+/// answers and `J` below zero enter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Costs {
     /// Experiments, answered or not.
     pub experiments: usize,
     /// Mean over all of them of `min(|J|, 1)`, unstable and missing being 1; zero of none.
     pub score: f64,
-    /// Mean of `|J|` over the stable loops.
+    /// Mean of `|J|` over the stable loops, zero for what is won at the full margin.
     pub mean: Option<f64>,
     /// Its median.
     pub median: Option<f64>,
@@ -43,7 +43,7 @@ impl Costs {
                     relative,
                     phase_margin_rad,
                 }) => {
-                    costs.push(relative.abs());
+                    costs.push(priced(relative, phase_margin_rad));
                     least_rad = Some(
                         least_rad
                             .map_or(phase_margin_rad, |least: f64| least.min(phase_margin_rad)),
@@ -70,6 +70,19 @@ impl Costs {
             no_answer,
             least_phase_margin_deg: least_rad.map(f64::to_degrees),
         }
+    }
+}
+
+/// A margin that is short of the full one by this much is rounded (degrees).
+const MARGIN_ROUNDING_DEG: f64 = 1e-6;
+
+/// `|J|`, but zero for a `J` below zero with the full margin: that is bought with nothing.
+fn priced(relative: f64, phase_margin_rad: f64) -> f64 {
+    let is_full = phase_margin_rad.to_degrees() >= PHASE_MARGIN_DEG - MARGIN_ROUNDING_DEG;
+    if is_full {
+        relative.max(0.0)
+    } else {
+        relative.abs()
     }
 }
 

@@ -5,6 +5,7 @@
 
 mod arx;
 mod asymmetric;
+mod gmvc;
 mod pem;
 mod rules;
 

@@ -37,7 +37,27 @@ pub(crate) struct Manifest {
 
 /// The recording of an experiment, in the folder.
 pub(super) fn recording(folder: &Path, number: u64) -> PathBuf {
-    folder.join(RECORDINGS).join(format!("{number:04}.csv"))
+    folder.join(RECORDINGS).join(numbered(number))
+}
+
+/// The name of an experiment's file.
+pub(super) fn numbered(number: u64) -> String {
+    format!("{number:04}.csv")
+}
+
+/// A folder with anything in it is not written to.
+pub(super) fn refuse_filled(out: &Path) -> Result<(), Failure> {
+    if !out.exists() {
+        return Ok(());
+    }
+    let mut entries = std::fs::read_dir(out).map_err(|error| Failure::output(out, error))?;
+    match entries.next() {
+        None => Ok(()),
+        Some(_) => Err(Failure::usage(format!(
+            "{} is not empty: name a new folder",
+            out.display()
+        ))),
+    }
 }
 
 /// Reads what a folder holds besides the recordings.

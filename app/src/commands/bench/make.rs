@@ -21,7 +21,7 @@ pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
         ));
     }
     let out = &arguments.out;
-    refuse_filled(out)?;
+    folder::refuse_filled(out)?;
     let workers = Workers::new(arguments.threads)?;
     let manifest = Manifest {
         format: FORMAT.to_owned(),
@@ -69,21 +69,6 @@ pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
         out.display()
     ))?;
     Ok(ExitCode::from(exit::DONE))
-}
-
-/// A folder with anything in it is not written to.
-fn refuse_filled(out: &Path) -> Result<(), Failure> {
-    if !out.exists() {
-        return Ok(());
-    }
-    let mut entries = std::fs::read_dir(out).map_err(|error| Failure::output(out, error))?;
-    match entries.next() {
-        None => Ok(()),
-        Some(_) => Err(Failure::usage(format!(
-            "{} is not empty: name a new folder for the benchmark",
-            out.display()
-        ))),
-    }
 }
 
 fn experiment(benchmark: &Benchmark, number: u64) -> Result<(Truth, Recorded), Failure> {

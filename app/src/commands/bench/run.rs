@@ -3,15 +3,16 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
-use std::time::Instant;
 
 use onecycle_lab::evaluate::files::{read_answers, results_csv};
 use onecycle_lab::evaluate::{Contender, Judge, Record, Truth, records};
-use onecycle_link::CsvOptions;
 
-use super::folder::{self, MANIFEST, read_text, recording, refused, unreadable};
+use super::folder::{self, TRUTH, read_text, refused, unreadable};
 use super::part::{Head, Part};
-use crate::args::{self, Format, RunBench};
+use super::recordings::Recordings;
+use super::traces;
+use crate::args::{self, RunBench};
+use crate::commands::clock::thread_seconds;
 use crate::commands::signals::{breaks, signals};
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
@@ -22,15 +23,15 @@ use crate::report::bench::Results;
 pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
     let (manifest, truths) = folder::read(&arguments.folder)?;
     let methods = arguments.methods.clone().unwrap_or_default().0;
-    if manifest.recordings == Format::Parquet && !methods.is_empty() {
-        return Err(unreadable(
-            &arguments.folder.join(MANIFEST),
-            "the methods read recordings as CSV: make the folder with --format csv, the same seed \
-             gives the same experiments, or score answers alone with --methods none"
-                .to_owned(),
-        ));
-    }
     let foreign = foreign(&arguments.answers, &truths)?;
+    let workers = Workers::new(arguments.threads)?;
+    let recordings = match methods[..] {
+        [] => None,
+        _ => Some(Recordings::open(&arguments.folder, &manifest)?),
+    };
+    if let Some(folder) = &arguments.traces {
+        traces::write(folder, &methods, &truths, &workers)?;
+    }
     let head = Head {
         program: env!("CARGO_PKG_VERSION").to_owned(),
         benchmark: manifest,
@@ -44,8 +45,18 @@ pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
         }
         None => (None, BTreeMap::new()),
     };
-    let mut records = answered(arguments, &methods, &truths, (part.as_mut(), done))?;
-    records.extend(foreign);
+    let mut records = foreign;
+    if let Some(recordings) = &recordings {
+        let ours = answered(
+            recordings,
+            &methods,
+            &truths,
+            (part.as_mut(), done),
+            &workers,
+            &arguments.folder.join(TRUTH),
+        )?;
+        records.splice(0..0, ours);
+    }
     let results = Results::of(&head.benchmark, &records);
     let text = report::bench::leaderboard(&results);
     let json = report::json::to_text(&results);
@@ -77,16 +88,19 @@ fn beside(out: &Path, ending: &str) -> PathBuf {
 /// Experiments between two lines of the part, for each thread: few, for an end by force loses them.
 const LOT: usize = 4;
 
-/// The records of all methods, by experiment, those that are done and those that are made now.
+/// The records of all methods, by experiment, those that are done and those that are made now; `truth` is
+/// the file that the truths are from.
 fn answered(
-    arguments: &RunBench,
+    recordings: &Recordings,
     methods: &[Contender],
     truths: &[Truth],
     (mut part, mut done): (Option<&mut Part>, BTreeMap<u64, Vec<Record>>),
+    workers: &Workers,
+    truth: &Path,
 ) -> Result<Vec<Record>, Failure> {
     let open: Vec<&Truth> = truths
         .iter()
-        .filter(|truth| !methods.is_empty() && !done.contains_key(&truth.number))
+        .filter(|truth| !done.contains_key(&truth.number))
         .collect();
     if !done.is_empty() {
         let (kept, all) = (done.len(), truths.len());
@@ -94,22 +108,16 @@ fn answered(
             "onecycle: going on after {kept} of {all} experiments"
         ));
     }
-    let workers = Workers::new(arguments.threads)?;
     workers.expect(truths.len(), truths.len() - open.len());
-    let begin = Instant::now();
-    let clock = || begin.elapsed().as_secs_f64();
     for lot in open.chunks(LOT * workers.threads()) {
+        let numbers: Vec<u64> = lot.iter().map(|truth| truth.number).collect();
+        let read = recordings.read(&numbers, workers)?;
         let made = workers.run(lot.len(), |index| {
-            let truth = lot[index];
-            let path = recording(&arguments.folder, truth.number);
-            let read = onecycle_link::read(&path, &CsvOptions::default());
-            let read = read.map_err(|reason| Failure::Recording {
-                path: path.clone(),
-                reason: Box::new(reason),
-            })?;
-            let breaks = breaks(&read);
-            records(truth, &signals(&read, &breaks), methods, &clock)
-                .map_err(|error| unreadable(&path, error.to_string()))
+            let breaks = breaks(&read[index]);
+            let seen = signals(&read[index], &breaks);
+            records(lot[index], &seen, methods, &thread_seconds).map_err(|error| {
+                unreadable(truth, format!("experiment {}: {error}", numbers[index]))
+            })
         });
         for (truth, made) in lot.iter().zip(made) {
             let made = made?;

@@ -129,9 +129,11 @@ impl Folder {
     }
 }
 
-/// Makes the folder where there is none; refuses one with anything in it.
+/// Makes the folder where there is none, in one that there is; refuses one with anything in it.
 fn begin(path: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(path).map_err(|error| Failure::output(path, error))?;
+    if !path.exists() {
+        std::fs::create_dir(path).map_err(|error| Failure::output(path, error))?;
+    }
     let mut entries = std::fs::read_dir(path).map_err(|error| Failure::output(path, error))?;
     match entries.next() {
         None => Ok(()),

@@ -1,12 +1,11 @@
 //! Table IV and the tuning rules: several methods on the same random processes, under both protocols.
 
-use std::time::Instant;
-
 use onecycle_lab::evaluate::{Benchmark, Contender, Record, Summary, records};
 use onecycle_lab::grid::Pieces;
 use serde::Deserialize;
 
 use super::part::{Found, Row};
+use crate::commands::clock::thread_seconds;
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
@@ -35,14 +34,12 @@ pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Fail
         experiments: 2 * settings.systems,
         seed: settings.seed,
     };
-    let begin = Instant::now();
-    let clock = || begin.elapsed().as_secs_f64();
     let judged = workers.map(benchmark.experiments as usize, |index| {
         let (truth, recorded) = benchmark.experiment(index as u64 + 1)?;
         let signals = recorded.seen().signals;
         Ok((
             truth.is_trimmed,
-            records(&truth, &signals, &contenders, &clock)?,
+            records(&truth, &signals, &contenders, &thread_seconds)?,
         ))
     });
     let judged: Result<Vec<(bool, Vec<Record>)>, onecycle_lab::evaluate::ExperimentError> =

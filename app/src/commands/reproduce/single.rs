@@ -122,7 +122,7 @@ impl Bench {
 
     fn by(&self, contender: Contender) -> Option<Deterioration> {
         let answer = contender.answer(&Seen::of(self.one())).ok()?;
-        Some(self.judge.deterioration(answer.pd))
+        Some(self.judge.deterioration(answer.feedback))
     }
 }
 
