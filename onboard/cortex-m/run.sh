@@ -1,0 +1,182 @@
+#!/usr/bin/env bash
+# Flies a simulated axis through the whole tuner on an emulated Cortex-M4F, compares every output and every
+# number found with the host's, bit by bit, and prints what the tuner takes there: bytes, and instructions a
+# tick. Instructions, not cycles: the emulator knows none, and a load or a division takes more than one.
+# One sentence and status 1 when anything differs or takes more than it may; "skipped: ..." and status 0 where
+# the machine does not offer what this needs: qemu-system-arm, and Debian's packages of a Rust compiler and of
+# its library's source, which are downloaded for this run and installed nowhere.
+set -euo pipefail
+
+# What the tuner takes now, and a little: so that it does not grow. Beside it what is wanted: 96 kB of code and
+# tables, 24 kB of memory; in a tick what leaves a tenth of a 1 kHz loop at 168 MHz to the rest of the board.
+most_flash=116000 wanted_flash=96000
+most_memory=72500 wanted_memory=24000
+most_relay_tick=33000 wanted_relay_tick=150000
+most_control_tick=2800 wanted_control_tick=150000
+most_identify_tick=190000000 wanted_identify_tick=150000
+
+# The oldest compiler that builds this.
+oldest=1.95
+# An instruction takes 2^7 ns of the emulated time: src/bin/board.rs counts with a timer of 25 MHz.
+shift=7
+
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/cortex-m
+triple=thumbv7em-none-eabihf
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+cd "$here"
+
+skip() {
+    echo "the tuner on an emulated Cortex-M4F: skipped: $1"
+    exit 0
+}
+
+fail() {
+    echo "the tuner on an emulated Cortex-M4F failed: $1" >&2
+    if [[ -s ${2:-} ]]; then
+        tail -n 20 "$2" >&2
+    fi
+    exit 1
+}
+
+# The compiler and what it is made of: unpacked into $scratch/usr.
+compiler() {
+    local version release llvm package
+    version=$(apt-cache madison rustc-web | awk '{ print $3 }' | sort --version-sort | tail -n 1)
+    dpkg --compare-versions "${version:-0}" ge "$oldest" ||
+        skip "there is no package rustc-web of $oldest or later."
+    release=$(cut -d . -f 1,2 <<<"$version")
+    llvm=$(apt-cache show "libstd-rust-web-$release=$version" |
+        awk 'match($0, /libllvm[0-9]+/) { name = substr($0, RSTART, RLENGTH) } END { print name }')
+    (cd "$scratch" && apt-get -qq download "rustc-web=$version" "rust-web-src=$version" \
+        "libstd-rust-web-$release=$version" "libstd-rust-web-dev=$version" "$llvm") \
+        >"$scratch/log" 2>&1 ||
+        skip "the packages of rustc-web $version cannot be downloaded."
+    for package in "$scratch"/*.deb; do
+        # Of the sources, which are ten times the rest, the library alone.
+        dpkg-deb --fsys-tarfile "$package" | tar -x -C "$scratch" --wildcards \
+            './usr/bin/*' './usr/lib/*' './usr/src/*/library/*' 2>/dev/null || true
+        rm "$package"
+    done
+    [[ $(with_compiler "$scratch/usr/bin/rustc" --version) == "rustc $release"* ]] ||
+        fail "the compiler that was downloaded does not run."
+}
+
+with_compiler() { # COMMAND...
+    LD_LIBRARY_PATH=$(echo "$scratch"/usr/lib/*-linux-gnu) "$@"
+}
+
+# The library of this target is built with the program, for which a compiler must be told that it may.
+build() {
+    local upper
+    upper=$(tr 'a-z-' 'A-Z_' <<<"$triple")
+    with_compiler env --unset RUSTFLAGS RUSTC="$scratch/usr/bin/rustc" RUSTC_BOOTSTRAP=1 \
+        "CARGO_TARGET_${upper}_LINKER=$linker" \
+        "CARGO_TARGET_${upper}_RUSTFLAGS=-C link-arg=-Tmps2-an386.ld" \
+        cargo build --release --locked --target-dir "$target" -Zbuild-std=core --target "$triple" \
+        --bin board --features board >"$scratch/log" 2>&1
+}
+
+emulate() { # PROGRAM LINES
+    timeout 300 qemu-system-arm -M mps2-an386 -nographic -monitor none -serial none \
+        -icount "shift=$shift,sleep=off,align=off" -chardev "file,id=said,path=$2" \
+        -semihosting-config enable=on,target=native,chardev=said -kernel "$1" >"$scratch/log" 2>&1
+}
+
+# Without what differs by nature: instructions, bytes, the last word.
+comparable() { # LINES
+    awk '$1 == "tick" { print $1, $2, $3, $4, $5 } $1 == "found"' "$1"
+}
+
+within() { # WHAT NUMBER MOST
+    [[ $2 -gt 0 && $2 -le $3 ]] || fail "$1: $2, more than the $3 that it may be."
+}
+
+libm() { # LOCK FILE: version and checksum
+    grep -A 3 '^name = "libm"' "$1"
+}
+
+for tool in apt-get apt-cache dpkg dpkg-deb; do
+    command -v "$tool" >/dev/null || skip "the machine has no Debian packages ($tool)."
+done
+command -v qemu-system-arm >/dev/null || skip "qemu-system-arm is not installed."
+linker=$(find "$(rustc --print sysroot)" -type f -name rust-lld -print -quit)
+[[ -n $linker ]] || skip "the Rust toolchain comes without rust-lld."
+[[ $(libm Cargo.lock) == "$(libm ../../Cargo.lock)" ]] ||
+    fail "its Cargo.lock names another libm than the workspace's: run 'cargo update -p libm' in both."
+
+cargo test --quiet --release --locked --lib --target-dir "$target" >"$scratch/log" 2>&1 ||
+    fail "its own tests fail." "$scratch/log"
+cargo build --quiet --release --locked --bin host --target-dir "$target" >"$scratch/log" 2>&1 ||
+    fail "it does not build for the host." "$scratch/log"
+"$target/release/host" >"$scratch/host" 2>"$scratch/words" || fail "the host finds no controller."
+compiler
+build || fail "it does not build for $triple." "$scratch/log"
+status=0
+emulate "$target/$triple/release/board" "$scratch/board" || status=$?
+[[ $status -eq 0 && $(tail -n 1 "$scratch/board") == ok ]] ||
+    fail "the board says '$(tail -n 1 "$scratch/board")' (status $status)." "$scratch/log"
+
+comparable "$scratch/host" >"$scratch/there"
+comparable "$scratch/board" >"$scratch/here"
+cmp -s "$scratch/there" "$scratch/here" || {
+    diff "$scratch/there" "$scratch/here" | head -n 6 >"$scratch/log" || true
+    fail "the board's bits are not the host's:" "$scratch/log"
+}
+ticks=$(grep -c '^tick' "$scratch/here")
+found=$(grep -c '^found' "$scratch/here")
+
+number() { # NAME: found, in figures
+    awk -v name="$1" -v factor="${2:-1}" '$1 == name { printf "%.4g", factor * $2 }' "$scratch/words"
+}
+bytes() { # NAME
+    awk -v name="$1" '$1 == "bytes" && $2 == name { print $3 }' "$scratch/board"
+}
+# Instructions of the ticks that began and ended in these phases, sorted.
+instructions() { # BEFORE AFTER
+    awk -v before="$1" -v after="$2" '$1 == "tick" && $3 == before && $4 == after { print $6 }' \
+        "$scratch/board" | sort -n
+}
+median() { awk '{ all[NR] = $1 } END { print all[int((NR + 1) / 2)] }'; }
+
+# The tick that completes the cycles does the first slice already.
+awk '$1 == "tick" && ($3 == "Identify" || $4 == "Identify") { print ++slice, $6 }' \
+    "$scratch/board" >"$scratch/slices"
+read -r worst identify < <(sort -n -k 2 "$scratch/slices" | tail -n 1)
+slices=$(wc -l <"$scratch/slices")
+# What the slices are, in the order of onecycle_onboard::identification, while there are no more than these.
+stages=(sign classify refine design design design design design)
+of_stage() { # SLICE
+    [[ $slices -ne ${#stages[@]} ]] || printf ' (%s)' "${stages[$(($1 - 1))]}"
+}
+each=""
+[[ $slices -gt 16 ]] || while read -r slice count; do
+    each+="${each:+, }$count$(of_stage "$slice")"
+done <"$scratch/slices"
+
+flash=$(bytes flash) memory=$(($(bytes static) + $(bytes stack)))
+relay=$(instructions Relay Relay | tail -n 1) control=$(instructions Control Control | tail -n 1)
+within "bytes of flash" "$flash" "$most_flash"
+within "bytes of memory" "$memory" "$most_memory"
+within "instructions of the worst tick of the relay" "$relay" "$most_relay_tick"
+within "instructions of the worst tick in control" "$control" "$most_control_tick"
+within "instructions of the worst tick of identification" "$identify" "$most_identify_tick"
+
+cat <<END
+the tuner on an emulated Cortex-M4F: ok; $ticks outputs and $found numbers found, the host's bits \
+(checksum $(cksum "$scratch/here" | cut -d ' ' -f 1))
+  found         K/T_body $(number k_over_t_body), T_prop $(number t_prop_s 1000) ms, tau $(number tau_s 1000) ms; \
+Kp $(number kp), Kd $(number kd)
+  flash         $flash bytes of $most_flash (wanted: $wanted_flash): code, tables, pack, the axis
+  memory        $memory bytes of $most_memory (wanted: $wanted_memory): static $(bytes static), \
+a tuner $(bytes tuner) of it; stack $(bytes stack), to make the tuner $(bytes beginning)
+  instructions  of a tick: median, worst
+    safe        $(instructions Idle Idle | median), $(instructions Idle Idle | tail -n 1)
+    relay       $(instructions Relay Relay | median), $relay of $most_relay_tick (wanted: $wanted_relay_tick)
+    control     $(instructions Control Control | median), $control of $most_control_tick \
+(wanted: $wanted_control_tick)
+    identify    $(cut -d ' ' -f 2 "$scratch/slices" | sort -n | median), $identify of $most_identify_tick \
+(wanted: $wanted_identify_tick): tick $worst of $slices$(of_stage "$worst")
+END
+[[ -z $each ]] || echo "      in order  $each"

@@ -1,0 +1,215 @@
+//! The flight on a Cortex-M4F without an operating system: the machine `mps2-an386` as qemu emulates it.
+//!
+//! Lines go out by semihosting, and so does the exit status. Behind those of the flight come
+//!
+//! ```text
+//! bytes <flash | tuner | static | stack | beginning> <number>
+//! ```
+//!
+//! *flash* is all of the image: code, tables, pack, axis; *static* is all static memory, the tuner's with it.
+//! *stack* is its high-water mark, and *beginning* that before the first tick: it is painted at the reset, and
+//! the lowest word that has changed is looked for.
+#![no_std]
+#![no_main]
+
+use core::arch::{asm, global_asm};
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+use core::ptr;
+
+use onecycle_flight::{Line, fly, settings};
+use onecycle_onboard::tuner::Tuner;
+
+/// Operations of semihosting, and what a program that ends as it should says (Arm, "Semihosting for AArch32
+/// and AArch64", 2.0).
+const WRITE0: u32 = 0x04;
+const EXIT_EXTENDED: u32 = 0x20;
+const APPLICATION_EXIT: u32 = 0x2_0026;
+
+/// Timer 0 of the machine, a CMSDK APB timer: control, value, reload. It counts down at 25 MHz.
+const TIMER_CONTROL: *mut u32 = 0x4000_0000 as *mut u32;
+const TIMER_VALUE: *const u32 = 0x4000_0004 as *const u32;
+const TIMER_RELOAD: *mut u32 = 0x4000_0008 as *mut u32;
+/// run.sh lets an instruction take 2^7 ns of the emulated time, which are 3.2 counts of 40 ns: more than one,
+/// so that none is lost. The counter goes round in 1.3 thousand million instructions.
+const COUNTS_OF_TEN_INSTRUCTIONS: u64 = 32;
+
+/// A loop of two instructions, so often: what the counter is checked with, and what it may be off, for the few
+/// instructions around the loop.
+const CHECKED_ROUNDS: u32 = 10_000;
+const MOST_OFF: u64 = 10;
+
+const PAINT: u32 = 0xa5a5_a5a5;
+
+// What runs before Rust may: the floating-point unit on, data in place, the stack painted.
+global_asm!(
+    ".pushsection .text.onecycle_reset",
+    ".global onecycle_reset",
+    ".thumb_func",
+    "onecycle_reset:",
+    "ldr r0, =0xe000ed88",
+    "ldr r1, [r0]",
+    "orr r1, r1, #0xf00000",
+    "str r1, [r0]",
+    "dsb",
+    "isb",
+    "ldr r0, =__data_start",
+    "ldr r1, =__data_end",
+    "ldr r2, =__data_load",
+    "0: cmp r0, r1",
+    "ittt lo",
+    "ldrlo r3, [r2], #4",
+    "strlo r3, [r0], #4",
+    "blo 0b",
+    "ldr r0, =__bss_start",
+    "ldr r1, =__bss_end",
+    "movs r3, #0",
+    "0: cmp r0, r1",
+    "itt lo",
+    "strlo r3, [r0], #4",
+    "blo 0b",
+    "ldr r0, =__stack_bottom",
+    "ldr r3, ={paint}",
+    "0: cmp r0, sp",
+    "itt lo",
+    "strlo r3, [r0], #4",
+    "blo 0b",
+    "bl {run}",
+    "udf #0",
+    ".popsection",
+    paint = const PAINT,
+    run = sym run,
+);
+
+unsafe extern "C" {
+    fn onecycle_reset() -> !;
+    static __stack_bottom: u32;
+    static __stack_top: u32;
+    static __data_start: u32;
+    static __bss_end: u32;
+    static __flash_end: u32;
+}
+
+/// Reset and the exceptions of the core; the linker's script puts the stack's top before them.
+#[unsafe(link_section = ".vectors")]
+#[used]
+static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
+    let mut vectors: [unsafe extern "C" fn() -> !; 15] = [fault; 15];
+    vectors[0] = onecycle_reset;
+    vectors
+};
+
+static mut TUNER: MaybeUninit<Tuner<'static>> = MaybeUninit::uninit();
+
+extern "C" fn run() -> ! {
+    start_timer();
+    if !counts_instructions() {
+        leave(
+            "the timer does not count instructions: is -icount as run.sh sets it?",
+            1,
+        )
+    }
+    let Ok(tuner) = Tuner::new(&settings()) else {
+        leave("the tuner's settings are wrong", 1)
+    };
+    // SAFETY: nothing else names it, and this function runs once.
+    let tuner = unsafe { (*(&raw mut TUNER)).write(tuner) };
+    let beginning = stack();
+    let is_tuned = fly(tuner, laps(), say);
+    for (name, bytes) in [
+        ("flash", (&raw const __flash_end).addr()),
+        ("tuner", size_of::<Tuner<'static>>()),
+        (
+            "static",
+            distance(&raw const __data_start, &raw const __bss_end),
+        ),
+        ("stack", stack()),
+        ("beginning", beginning),
+    ] {
+        say(Line::default()
+            .word("bytes")
+            .word(name)
+            .number(bytes as u64));
+    }
+    if is_tuned {
+        leave("ok", 0)
+    } else {
+        leave("there is no controller, or not the right one", 1)
+    }
+}
+
+/// Bytes of the stack at its deepest so far.
+fn stack() -> usize {
+    let (mut lowest, top) = (&raw const __stack_bottom, &raw const __stack_top);
+    // SAFETY: reads words between the stack's ends; the caller's own frame is none of the paint.
+    while lowest < top && unsafe { ptr::read_volatile(lowest) } == PAINT {
+        lowest = lowest.wrapping_add(1);
+    }
+    distance(lowest, top)
+}
+
+fn distance(from: *const u32, to: *const u32) -> usize {
+    to.addr() - from.addr()
+}
+
+fn start_timer() {
+    // SAFETY: registers of the timer, which nothing else uses.
+    unsafe {
+        ptr::write_volatile(TIMER_RELOAD, u32::MAX);
+        ptr::write_volatile(TIMER_CONTROL, 1);
+    }
+}
+
+/// Tells the instructions since it was last called, to the nearest.
+fn laps() -> impl FnMut() -> u64 {
+    let mut last = u32::MAX;
+    move || {
+        // SAFETY: a register of the timer.
+        let now = unsafe { ptr::read_volatile(TIMER_VALUE) };
+        let counts = u64::from(last.wrapping_sub(now));
+        last = now;
+        (10 * counts + COUNTS_OF_TEN_INSTRUCTIONS / 2) / COUNTS_OF_TEN_INSTRUCTIONS
+    }
+}
+
+/// Whether a loop of so many instructions is counted as such.
+fn counts_instructions() -> bool {
+    let mut lap = laps();
+    lap();
+    let idle = lap();
+    // SAFETY: counts a register of its own down to zero.
+    unsafe {
+        asm!("0: subs {0}, #1", "bne 0b", inout(reg) CHECKED_ROUNDS => _, options(nomem, nostack));
+    }
+    let counted = lap().saturating_sub(idle);
+    counted.abs_diff(2 * u64::from(CHECKED_ROUNDS)) <= MOST_OFF
+}
+
+fn say(line: &mut Line) {
+    let ended = line.ended();
+    semihost(WRITE0, ended.as_ptr());
+}
+
+fn leave(sentence: &str, status: u32) -> ! {
+    say(Line::default().word(sentence));
+    let block = [APPLICATION_EXIT, status];
+    loop {
+        semihost(EXIT_EXTENDED, block.as_ptr().cast());
+    }
+}
+
+fn semihost(operation: u32, argument: *const u8) {
+    // SAFETY: the emulator reads what the argument points to, which lives as long as the call.
+    unsafe {
+        asm!("bkpt 0xab", inout("r0") operation => _, in("r1") argument, options(nostack));
+    }
+}
+
+extern "C" fn fault() -> ! {
+    leave("a fault of the processor", 101)
+}
+
+#[panic_handler]
+fn panicked(_: &PanicInfo<'_>) -> ! {
+    leave("panicked", 101)
+}

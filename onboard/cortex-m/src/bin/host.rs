@@ -1,0 +1,33 @@
+//! The flight on the host: its lines to standard output, what was found in words to standard error.
+
+use std::io::Write;
+use std::process::ExitCode;
+
+use onecycle_flight::{fly, numbers, settings};
+use onecycle_onboard::tuner::Tuner;
+
+fn main() -> ExitCode {
+    let Ok(mut tuner) = Tuner::new(&settings()) else {
+        return ExitCode::FAILURE;
+    };
+    let mut lines = Vec::new();
+    // Nothing is counted here.
+    let is_tuned = fly(
+        &mut tuner,
+        || 0,
+        |line| {
+            let ended = line.ended();
+            lines.extend_from_slice(&ended[..ended.len() - 1]);
+        },
+    );
+    if let Some(found) = tuner.identified() {
+        for (name, value) in numbers(found) {
+            let _ = writeln!(std::io::stderr(), "{name} {value}");
+        }
+    }
+    if std::io::stdout().write_all(&lines).is_ok() && is_tuned {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}

@@ -1,0 +1,159 @@
+//! The whole tuner flying one simulated axis, the same on a microcontroller and on the host.
+//!
+//! Twenty seconds at 1 kHz: five under the safe controller, then relay, identification, the controller that
+//! was found; at 18 s the reference steps by 0.1 m. Every tick becomes a line of text, and so does every
+//! number that was found, floating-point numbers as their bits: two machines agree when their lines do.
+//!
+//! ```text
+//! tick <number> <phase before> <phase after> <bits of the output> <instructions>
+//! found <name> <bits>
+//! ```
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod axis;
+mod line;
+
+use core::hint::black_box;
+
+use onecycle_onboard::RelaySettings;
+use onecycle_onboard::control::{Measurement, PdLaw};
+use onecycle_onboard::guard::Limits;
+use onecycle_onboard::identification::Identified;
+use onecycle_onboard::tuner::{Phase, Tuner, TunerSettings};
+
+use crate::axis::{Axis, K_OVER_T_BODY, TICK_S};
+pub use crate::line::Line;
+
+/// Half the jump of the relay (part of hover).
+const AMPLITUDE: f32 = 0.05;
+/// Twenty seconds.
+const TICKS: u32 = 20_000;
+/// Five seconds: five time constants of the filter of the safe controller's output.
+const START_TICK: u32 = 5000;
+/// The reference's step: when (s), and by how much (m).
+const STEP_AT_S: f64 = 18.0;
+const STEP: f32 = 0.1;
+
+/// Largest relative error of `K/T_body`, near four of the standard deviations of 1.3 % that the tuner finds for
+/// it, and largest distance from the reference 2 s after its step (m): a tenth of the step, settled by then.
+const GAIN_TOLERANCE: f64 = 0.05;
+const STEP_TOLERANCE: f64 = 0.01;
+
+/// What the axis is tuned with: those of `c/examples/axis.c`.
+#[must_use]
+pub fn settings() -> TunerSettings {
+    let new = TunerSettings::new(AMPLITUDE, TICK_S as f32);
+    TunerSettings {
+        relay: RelaySettings {
+            noise_sigma: 0.0001,
+            ..new.relay
+        },
+        limits: Limits {
+            excursion: 0.5,
+            rate: 2.0,
+            duration_s: 20.0,
+            no_switch_s: 3.0,
+            stale_s: 0.01,
+        },
+        output_lowest: -0.5,
+        output_highest: 0.5,
+        safe: PdLaw {
+            kp: 0.3,
+            kd: 0.3,
+            offset: 0.0,
+        },
+        bias_filter_s: 1.0,
+        ..new
+    }
+}
+
+/// Flies the axis with a tuner of these [`settings`]. `lap` tells the instructions since it was last called;
+/// `say` is given every line. Whether the controller that was found has proven itself, is of the right process and follows
+/// the reference.
+pub fn fly(
+    tuner: &mut Tuner<'_>,
+    mut lap: impl FnMut() -> u64,
+    mut say: impl FnMut(&mut Line),
+) -> bool {
+    let mut axis = Axis::default();
+    // What counting itself takes, from the second call on.
+    lap();
+    let idle = lap();
+    for tick in 0..TICKS {
+        let time_s = f64::from(tick) * TICK_S;
+        let measurement = axis.measure();
+        let reference = if time_s < STEP_AT_S { 0.0 } else { STEP };
+        if tick == START_TICK {
+            tuner.start();
+        }
+        let before = tuner.phase();
+        lap();
+        let output = step(tuner, time_s, &measurement, reference);
+        let instructions = lap().saturating_sub(idle);
+        let mut line = Line::default();
+        line.word("tick")
+            .number(tick.into())
+            .word(name(before))
+            .word(name(tuner.phase()))
+            .number(output.to_bits().into())
+            .number(instructions);
+        say(&mut line);
+        axis.push(output.into());
+    }
+    let Some(identified) = tuner.identified() else {
+        return false;
+    };
+    for (name, value) in numbers(identified) {
+        say(Line::default()
+            .word("found")
+            .word(name)
+            .number(value.to_bits()));
+    }
+    let gain = identified.process.k_over_t_body() / K_OVER_T_BODY;
+    tuner.is_proven()
+        && (gain - 1.0).abs() < GAIN_TOLERANCE
+        && (axis.value() - f64::from(STEP)).abs() < STEP_TOLERANCE
+}
+
+/// A call of its own, so that nothing of a tick is moved out of what is counted.
+#[inline(never)]
+fn step(tuner: &mut Tuner<'_>, time_s: f64, measurement: &Measurement, reference: f32) -> f32 {
+    black_box(tuner.step(black_box(time_s), measurement, reference))
+}
+
+/// All that was found, by name.
+#[must_use]
+pub fn numbers(found: &Identified) -> [(&'static str, f64); 17] {
+    let (process, deviations) = (&found.process, &found.deviations);
+    [
+        ("k_over_t_body", process.k_over_t_body()),
+        ("t_prop_s", process.t_prop_s()),
+        ("inv_t_body_per_s", process.inv_t_body_per_s()),
+        ("tau_s", process.tau_s()),
+        ("kp", found.pd.kp),
+        ("kd", found.pd.kd),
+        ("phase_margin_rad", found.phase_margin_rad),
+        ("input_bias", found.input_bias),
+        ("score", found.score),
+        ("period_s", found.period_s),
+        ("amplitude", found.amplitude),
+        ("noise_sigma", found.noise_sigma),
+        ("ln_k_over_t_body_deviation", deviations.ln_k_over_t_body),
+        ("t_prop_deviation_s", deviations.t_prop_s),
+        ("inv_t_body_deviation_per_s", deviations.inv_t_body_per_s),
+        ("tau_deviation_s", deviations.tau_s),
+        ("phase_margin_deviation_rad", deviations.phase_margin_rad),
+    ]
+}
+
+fn name(phase: Phase) -> &'static str {
+    match phase {
+        Phase::Idle => "Idle",
+        Phase::TakeOff => "TakeOff",
+        Phase::Relay => "Relay",
+        Phase::Identify => "Identify",
+        Phase::Control => "Control",
+        Phase::Aborted => "Aborted",
+    }
+}
