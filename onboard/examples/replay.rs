@@ -34,6 +34,7 @@ fn settings() -> TunerSettings {
             kd: 0.3,
             offset: 0.0,
         },
+        slices: 1,
         bias_filter_s: 1.0,
         ..new
     }

@@ -19,7 +19,7 @@
 
 use core::fmt;
 
-use crate::classify::{Classification, Classifier, Verdict};
+use crate::classify::{Classifier, Verdict};
 use crate::control::Pd;
 use crate::cycle::{Cycle, CycleDetector, SteadyRun};
 use crate::gains::LeadTable;
@@ -131,32 +131,32 @@ pub struct Observed {
     pub undone: u32,
 }
 
-/// What is done next.
+/// What is done next: see the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stage {
+#[repr(u8)]
+pub enum Stage {
+    /// Waits for a steady oscillation and a rise.
     Wait,
-    /// Rises and complete cycles since the windows were opened, and switches taken back when they were.
-    Collect {
-        rises: u8,
-        complete: u8,
-        undone: u32,
-    },
+    /// Collects cycles.
+    Collect,
+    /// Takes the signature of the last.
     Sign,
+    /// The pack reads it.
     Classify,
+    /// The process is found.
     Refine,
+    /// Is it to be believed?
     Judge,
+    /// How far may its margin be off?
     Design,
 }
 
-/// What is large: each is needed only before the next.
-#[allow(clippy::large_enum_variant)] // The largest is what there must be room for.
-enum Bench {
-    /// Samples of the last cycle.
-    Reading(Window<FINE_BINS, 0>),
-    /// The pack's answer in the making.
-    Classifying(Classifier),
-    /// The process in the making.
-    Refining(Refiner<BINS>),
+/// Since the windows were opened: rises of the relay, complete cycles; and the switches taken back until then.
+#[derive(Clone, Copy, Debug, Default)]
+struct Collected {
+    rises: u8,
+    complete: u8,
+    undone: u32,
 }
 
 /// A controller in the making: how many of the coordinates have been followed.
@@ -168,17 +168,34 @@ struct Design {
     followed: usize,
 }
 
-/// The identification of one axis. See the [module](self).
+/// Room for the work of one axis: nearly all of its memory, and all zeros at first.
+pub struct Room {
+    coarse: Window<BINS, EDGES>,
+    fine: Window<FINE_BINS, 0>,
+    classifier: Classifier,
+    refiner: Refiner<BINS>,
+}
+
+impl Room {
+    /// For any axis.
+    pub const NEW: Self = Self {
+        coarse: Window::NONE,
+        fine: Window::NONE,
+        classifier: Classifier::new(),
+        refiner: Refiner::new(),
+    };
+}
+
+/// The identification of one axis, in a [`Room`] that is always the same. See the [module](self).
 pub struct Identification<'a> {
     pack: Pack<'a>,
-    sample_s: f64,
     cycles: u8,
     detector: CycleDetector,
     run: SteadyRun,
     past: Past,
     was_high: bool,
-    coarse: Window<BINS, EDGES>,
-    bench: Bench,
+    sample_s: f64,
+    collected: Collected,
     /// The last cycle, and what has been made of it so far.
     last: Option<Cycle>,
     score: f64,
@@ -193,14 +210,13 @@ impl<'a> Identification<'a> {
     pub fn new(pack: Pack<'a>, sample_s: f64, cycles: u8) -> Self {
         Self {
             pack,
-            sample_s,
             cycles: cycles.clamp(1, MOST_CYCLES),
             detector: CycleDetector::new(),
             run: SteadyRun::default(),
             past: Past::default(),
             was_high: true,
-            coarse: Window::new(0.0, sample_s),
-            bench: Bench::Reading(Window::new(0.0, sample_s)),
+            sample_s,
+            collected: Collected::default(),
             last: None,
             score: f64::INFINITY,
             refined: None,
@@ -209,16 +225,19 @@ impl<'a> Identification<'a> {
         }
     }
 
+    /// As new, where it lies.
+    pub fn restart(&mut self) {
+        self.detector = CycleDetector::new();
+        self.run = SteadyRun::default();
+        self.past = Past::default();
+        self.was_high = true;
+        self.stage = Stage::Wait;
+    }
+
     /// The steady oscillation so far.
     #[must_use]
     pub fn oscillation(&self) -> &SteadyRun {
         &self.run
-    }
-
-    /// The pack that it reads with.
-    #[must_use]
-    pub fn pack(&self) -> &Pack<'a> {
-        &self.pack
     }
 
     /// The latest changes of the input.
@@ -227,14 +246,20 @@ impl<'a> Identification<'a> {
         self.past.edges()
     }
 
+    /// What it does next.
+    #[must_use]
+    pub fn stage(&self) -> Stage {
+        self.stage
+    }
+
     /// Whether cycles are complete and wait for [`Identification::advance`].
     #[must_use]
     pub fn has_work(&self) -> bool {
-        !matches!(self.stage, Stage::Wait | Stage::Collect { .. })
+        !matches!(self.stage, Stage::Wait | Stage::Collect)
     }
 
     /// Takes a sample of the running test; those that come while there is work tell of the oscillation only.
-    pub fn observe(&mut self, sample: &Observed) {
+    pub fn observe(&mut self, room: &mut Room, sample: &Observed) {
         let cycle = self
             .detector
             .push(sample.time_s, sample.is_high, sample.output);
@@ -244,85 +269,78 @@ impl<'a> Identification<'a> {
         let rises = sample.is_high && !self.was_high;
         self.was_high = sample.is_high;
         match self.stage {
-            Stage::Wait if rises && self.run.is_steady() => self.open(sample),
-            Stage::Collect { .. } => self.collect(sample, rises, cycle),
+            Stage::Wait if rises && self.run.is_steady() => self.open(room, sample),
+            Stage::Collect => self.collect(room, sample, rises, cycle),
             _ => {}
         }
         self.past.push(sample.time_s, sample.input);
     }
 
     /// New windows from this rise on, the first that of the cycles' input.
-    fn open(&mut self, sample: &Observed) {
-        self.coarse = Window::new(sample.time_s, self.sample_s);
+    fn open(&mut self, room: &mut Room, sample: &Observed) {
+        room.coarse.begin(sample.time_s, self.sample_s);
         for edge in self.past.edges() {
             // There are fewer than the window holds.
-            let _ = self.coarse.push_input(edge.time_s, edge.input);
+            let _ = room.coarse.push_input(edge.time_s, edge.input);
         }
-        self.bench = Bench::Reading(Window::new(sample.time_s, self.sample_s));
-        self.stage = Stage::Collect {
-            rises: 0,
-            complete: 0,
+        room.fine.begin(sample.time_s, self.sample_s);
+        self.collected = Collected {
             undone: sample.undone,
+            ..Collected::default()
         };
-        self.take(sample);
+        self.stage = Stage::Collect;
+        self.take(room, sample);
     }
 
-    fn collect(&mut self, sample: &Observed, rises_now: bool, cycle: Option<Cycle>) {
-        let Stage::Collect {
-            mut rises,
-            mut complete,
-            undone,
-        } = self.stage
-        else {
-            return;
-        };
-        if sample.undone != undone || !self.run.is_steady() {
+    fn collect(
+        &mut self,
+        room: &mut Room,
+        sample: &Observed,
+        rises_now: bool,
+        cycle: Option<Cycle>,
+    ) {
+        let so_far = &mut self.collected;
+        if sample.undone != so_far.undone || !self.run.is_steady() {
             self.stage = Stage::Wait;
             return;
         }
-        rises += u8::from(rises_now);
-        if rises_now && rises < self.cycles {
-            self.bench = Bench::Reading(Window::new(sample.time_s, self.sample_s));
-        }
+        so_far.rises += u8::from(rises_now);
+        // What comes behind the last cycle is no part of it, though it is not yet sure to have ended.
+        let is_inside = so_far.rises < self.cycles;
         if let Some(cycle) = cycle
-            && cycle.start_s >= self.coarse.start_s()
+            && cycle.start_s >= room.coarse.start_s()
         {
-            complete += 1;
-            if complete == self.cycles {
+            so_far.complete += 1;
+            if so_far.complete == self.cycles {
                 self.last = Some(cycle);
                 self.stage = Stage::Sign;
                 return;
             }
         }
-        self.stage = Stage::Collect {
-            rises,
-            complete,
-            undone,
-        };
-        // What comes behind the last cycle is no part of it, though it is not yet sure to have ended.
-        if rises < self.cycles {
-            self.take(sample);
+        if rises_now && is_inside {
+            room.fine.begin(sample.time_s, self.sample_s);
+        }
+        if is_inside {
+            self.take(room, sample);
         }
     }
 
-    fn take(&mut self, sample: &Observed) {
-        if self.coarse.push_input(sample.time_s, sample.input).is_err() {
+    fn take(&mut self, room: &mut Room, sample: &Observed) {
+        if room.coarse.push_input(sample.time_s, sample.input).is_err() {
             self.stage = Stage::Wait;
         }
-        self.coarse.push_output(sample.time_s, sample.output);
-        if let Bench::Reading(fine) = &mut self.bench {
-            fine.push_output(sample.time_s, sample.output);
-        }
+        room.coarse.push_output(sample.time_s, sample.output);
+        room.fine.push_output(sample.time_s, sample.output);
     }
 
     /// One slice of the work; `None` where there is none or more to come. After a refusal another cycle is
     /// waited for.
-    pub fn advance(&mut self) -> Option<Result<Identified, Refusal>> {
+    pub fn advance(&mut self, room: &mut Room) -> Option<Result<Identified, Refusal>> {
         let outcome = match (self.stage, self.last) {
-            (Stage::Sign, Some(cycle)) => self.sign(&cycle).map(|()| None),
-            (Stage::Classify, Some(cycle)) => self.classify(&cycle).map(|()| None),
-            (Stage::Refine, Some(_)) => self.refine().map(|()| None),
-            (Stage::Judge, Some(_)) => self.judge().map(|()| None),
+            (Stage::Sign, Some(cycle)) => self.sign(room, &cycle).map(|()| None),
+            (Stage::Classify, Some(cycle)) => self.classify(room, &cycle).map(|()| None),
+            (Stage::Refine, Some(_)) => self.refine(room).map(|()| None),
+            (Stage::Judge, Some(_)) => self.judge(room).map(|()| None),
             (Stage::Design, Some(cycle)) => self.design(&cycle),
             _ => return None,
         };
@@ -331,27 +349,18 @@ impl<'a> Identification<'a> {
         Some(outcome)
     }
 
-    fn sign(&mut self, cycle: &Cycle) -> Result<(), Refusal> {
-        let Bench::Reading(fine) = &self.bench else {
-            return Err(Refusal::NoSignature);
-        };
-        let signature = Signature::new(fine, cycle).map_err(|_| Refusal::NoSignature)?;
-        let noise_sigma = fine.noise_sigma();
-        self.bench = Bench::Classifying(Classifier::new());
-        if let Bench::Classifying(classifier) = &mut self.bench {
-            classifier
-                .begin(&self.pack, &signature, cycle.period_s, noise_sigma)
-                .map_err(|_| Refusal::Unknown(f64::INFINITY))?;
-        }
+    fn sign(&mut self, room: &mut Room, cycle: &Cycle) -> Result<(), Refusal> {
+        let signature = Signature::new(&room.fine, cycle).map_err(|_| Refusal::NoSignature)?;
+        let noise_sigma = room.fine.noise_sigma();
+        room.classifier
+            .begin(&self.pack, &signature, cycle.period_s, noise_sigma)
+            .map_err(|_| Refusal::Unknown(f64::INFINITY))?;
         self.stage = Stage::Classify;
         Ok(())
     }
 
-    fn classify(&mut self, cycle: &Cycle) -> Result<(), Refusal> {
-        let Bench::Classifying(classifier) = &mut self.bench else {
-            return Err(Refusal::NoSignature);
-        };
-        let Some(read) = classifier.advance(&self.pack) else {
+    fn classify(&mut self, room: &mut Room, cycle: &Cycle) -> Result<(), Refusal> {
+        let Some(read) = room.classifier.advance(&self.pack) else {
             return Ok(());
         };
         let read = read.map_err(|_| Refusal::Unknown(f64::INFINITY))?;
@@ -359,38 +368,28 @@ impl<'a> Identification<'a> {
             return Err(Refusal::Unknown(read.score));
         }
         self.score = read.score;
-        self.begin_refinement(cycle, &read)
-    }
-
-    fn begin_refinement(&mut self, cycle: &Cycle, read: &Classification) -> Result<(), Refusal> {
-        self.bench = Bench::Refining(Refiner::new());
-        if let Bench::Refining(refiner) = &mut self.bench {
-            let beforehand = Beforehand {
-                starts: &read.starts(cycle.period_s),
-                prior: ShapePrior::of_pack(&self.pack),
-            };
-            refiner
-                .begin(&self.coarse, cycle.period_s, &beforehand)
-                .map_err(|_| Refusal::NoFit)?;
-        }
+        let beforehand = Beforehand {
+            starts: &read.starts(cycle.period_s),
+            prior: ShapePrior::of_pack(&self.pack),
+        };
+        room.refiner
+            .begin(&room.coarse, cycle.period_s, &beforehand)
+            .map_err(|_| Refusal::NoFit)?;
         self.stage = Stage::Refine;
         Ok(())
     }
 
-    fn refine(&mut self) -> Result<(), Refusal> {
-        let Bench::Refining(refiner) = &mut self.bench else {
-            return Err(Refusal::NoFit);
-        };
-        if let Some(refined) = refiner.advance(&self.coarse) {
+    fn refine(&mut self, room: &mut Room) -> Result<(), Refusal> {
+        if let Some(refined) = room.refiner.advance(&room.coarse) {
             self.refined = Some(refined.map_err(|_| Refusal::NoFit)?);
             self.stage = Stage::Judge;
         }
         Ok(())
     }
 
-    fn judge(&mut self) -> Result<(), Refusal> {
+    fn judge(&mut self, room: &mut Room) -> Result<(), Refusal> {
         let refined = self.refined.ok_or(Refusal::NoFit)?;
-        let misfit = misfit(&refined, &self.coarse);
+        let misfit = misfit(&refined, &room.coarse);
         if misfit > MOST_MISFIT || refined.response_error > MOST_RESPONSE_ERROR {
             return Err(Refusal::Misfit(misfit.max(refined.response_error)));
         }

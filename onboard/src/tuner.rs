@@ -19,15 +19,17 @@
 
 mod settings;
 
+use core::mem::MaybeUninit;
+
 use crate::control::{Measurement, PdLaw, RateEstimate};
 use crate::guard::{Abort, Guard, Seen};
-use crate::identification::{Identification, Identified, Observed};
+use crate::identification::{Identification, Identified, Observed, Room, Stage};
 use crate::pack::Pack;
 use crate::prediction::{Beginning, Prediction};
 use crate::relay::Relay;
 use crate::take_off;
 
-pub use self::settings::{TunerError, TunerSettings};
+pub use self::settings::{CheckedSettings, TunerError, TunerSettings};
 pub use crate::take_off::TakeOffSettings;
 
 /// Switches of the relay that end a take-off: the vehicle has been above the reference and come back.
@@ -76,6 +78,7 @@ pub struct Tuner<'a> {
     relay: Relay,
     since_switch_s: f32,
     identification: Identification<'a>,
+    room: Room,
     attempts_left: u8,
     identified: Option<Identified>,
     law: PdLaw,
@@ -100,8 +103,15 @@ impl<'a> Tuner<'a> {
     /// # Errors
     /// Names the setting that is out of range.
     pub fn with_pack(settings: &TunerSettings, pack: Pack<'a>) -> Result<Self, TunerError> {
-        settings.validate()?;
-        Ok(Self {
+        Ok(Self::of(&settings.checked()?, pack))
+    }
+
+    /// Of settings that were checked.
+    #[must_use]
+    #[inline]
+    pub fn of(checked: &CheckedSettings, pack: Pack<'a>) -> Self {
+        let CheckedSettings { settings, relay } = checked;
+        Self {
             phase: Phase::Idle,
             reason: None,
             guard: Guard::new(settings.limits),
@@ -113,20 +123,31 @@ impl<'a> Tuner<'a> {
             usual_value: 0.0,
             test_s: 0.0,
             offset: 0.0,
-            relay: Relay::new(settings.relay)?,
+            relay: relay.clone(),
             since_switch_s: 0.0,
             identification: Identification::new(
                 pack,
                 f64::from(settings.sample_s),
                 settings.cycles,
             ),
+            room: Room::NEW,
             attempts_left: settings.attempts,
             identified: None,
             law: settings.safe,
             prediction: None,
             unchecked_s: 0.0,
             settings: *settings,
-        })
+        }
+    }
+
+    /// As [`Tuner::of`], made where it is to stay: it is most of a board's memory.
+    #[inline(never)]
+    pub fn place<'p>(
+        place: &'p mut MaybeUninit<Self>,
+        checked: &CheckedSettings,
+        pack: Pack<'a>,
+    ) -> &'p mut Self {
+        place.write(Self::of(checked, pack))
     }
 
     /// Begins the test at the next tick; only from [`Phase::Idle`].
@@ -156,17 +177,25 @@ impl<'a> Tuner<'a> {
     /// Ready for another test, all that was learned forgotten; only from [`Phase::Aborted`] and
     /// [`Phase::Control`].
     pub fn reset(&mut self) {
-        if matches!(self.phase, Phase::Aborted | Phase::Control)
-            && let Ok(fresh) = Self::with_pack(&self.settings, *self.identification.pack())
-        {
-            *self = Self {
-                value: self.value,
-                reference: self.reference,
-                usual: self.usual,
-                usual_value: self.usual_value,
-                ..fresh
-            };
+        if !matches!(self.phase, Phase::Aborted | Phase::Control) {
+            return;
         }
+        let Ok(relay) = Relay::new(self.settings.relay) else {
+            return;
+        };
+        self.phase = Phase::Idle;
+        self.reason = None;
+        self.guard = Guard::new(self.settings.limits);
+        self.last_time_s = None;
+        self.test_s = 0.0;
+        self.offset = 0.0;
+        self.relay = relay;
+        self.since_switch_s = 0.0;
+        self.identification.restart();
+        self.attempts_left = self.settings.attempts;
+        self.identified = None;
+        self.law = self.settings.safe;
+        self.prediction = None;
     }
 
     /// One tick: time (s), what the sensor says, where the output should be (output unit). Returns the
@@ -287,17 +316,19 @@ impl<'a> Tuner<'a> {
 
     /// Shows the identification this tick, and lets it do a slice of its work.
     fn identify(&mut self, time_s: f64, output: f32) {
-        self.identification.observe(&Observed {
+        let observed = Observed {
             time_s,
             input: f64::from(output),
             output: f64::from(self.value),
             is_high: self.relay.is_high(),
             undone: self.relay.undone(),
-        });
+        };
+        self.identification.observe(&mut self.room, &observed);
         if self.phase == Phase::TakeOff {
             return;
         }
-        let outcome = (0..self.settings.slices).find_map(|_| self.identification.advance());
+        let outcome =
+            (0..self.settings.slices).find_map(|_| self.identification.advance(&mut self.room));
         match outcome {
             Some(Ok(identified)) => self.enter_control(time_s, &identified),
             Some(Err(refusal)) => {
@@ -393,6 +424,12 @@ impl<'a> Tuner<'a> {
     #[must_use]
     pub fn is_proven(&self) -> bool {
         self.phase == Phase::Control && self.prediction.is_none()
+    }
+
+    /// What the identification does next.
+    #[must_use]
+    pub fn stage(&self) -> Stage {
+        self.identification.stage()
     }
 
     /// The relay of the test.

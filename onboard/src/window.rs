@@ -13,6 +13,13 @@ pub struct Edge {
     pub input: f64,
 }
 
+impl Edge {
+    const NONE: Self = Self {
+        time_s: 0.0,
+        input: 0.0,
+    };
+}
+
 /// The samples at `per_bin` consecutive instants of the even grid, as far as they are there.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bin {
@@ -22,6 +29,14 @@ pub struct Bin {
     pub output_sum: f64,
     /// Sum of the samples' times since the window's start (s).
     pub time_sum_s: f64,
+}
+
+impl Bin {
+    const NONE: Self = Self {
+        count: 0,
+        output_sum: 0.0,
+        time_sum_s: 0.0,
+    };
 }
 
 /// Why a window could not be filled.
@@ -70,19 +85,38 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         Self {
             sample_s,
             start_s,
-            first_output: None,
             group,
             per_bin: group,
-            next_instant: 0,
-            used: 0,
-            bins: [Bin::default(); BINS],
-            edges: [Edge {
-                time_s: 0.0,
-                input: 0.0,
-            }; EDGES],
-            edge_count: 0,
-            noise: NoiseMeter::default(),
+            ..Self::NONE
         }
+    }
+
+    /// Room for a window, all zeros: it takes nothing until [`Window::begin`].
+    pub const NONE: Self = Self {
+        sample_s: 0.0,
+        start_s: 0.0,
+        first_output: None,
+        group: 0,
+        per_bin: 0,
+        next_instant: 0,
+        used: 0,
+        bins: [Bin::NONE; BINS],
+        edges: [Edge::NONE; EDGES],
+        edge_count: 0,
+        noise: NoiseMeter::NONE,
+    };
+
+    /// Empty, as [`Window::new`], but where it lies.
+    pub fn begin(&mut self, start_s: f64, sample_s: f64) {
+        self.start_s = start_s;
+        self.sample_s = sample_s;
+        self.first_output = None;
+        (self.group, self.per_bin) = (1, 1);
+        self.next_instant = 0;
+        self.used = 0;
+        self.bins.fill(Bin::default());
+        self.edge_count = 0;
+        self.noise = NoiseMeter::NONE;
     }
 
     /// The input from `time_s` on; times must not decrease. The first value is taken to have been
@@ -207,6 +241,13 @@ struct NoiseMeter {
 }
 
 impl NoiseMeter {
+    const NONE: Self = Self {
+        last: [0.0; 3],
+        seen: 0,
+        differences: 0,
+        sum_of_squares: 0.0,
+    };
+
     fn push(&mut self, output: f64) {
         let [a, b, c] = self.last;
         if self.seen == 3 {

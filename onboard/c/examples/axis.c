@@ -66,6 +66,7 @@ int main(int count, char **arguments)
     settings.output_highest = 0.5f;
     settings.safe_kp = 0.3f;
     settings.safe_kd = 0.3f;
+    settings.slices = 1;
     settings.bias_filter_s = 1.0f;
     onecycle_status status = onecycle_tuner_init(&tuner, &settings);
     if (status != ONECYCLE_STATUS_OK) {

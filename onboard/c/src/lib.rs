@@ -1,21 +1,22 @@
 //! The tuner for firmware in C. `onecycle.h` is generated from this file.
 //!
-//! The only crate of the project that has `unsafe`: at the border to C, pointers are what the caller says
-//! they are. Everything behind it is safe code; nothing here computes.
+//! `unsafe` stands here and where a program begins on a bare board, nowhere else: at the border to C,
+//! pointers are what the caller says they are. Everything behind it is safe code; nothing here computes.
 #![no_std]
 
 mod settings;
 
-use core::ptr;
+use core::mem::MaybeUninit;
 
 use onecycle_onboard::control::Measurement;
 use onecycle_onboard::guard::Abort;
-use onecycle_onboard::tuner::{Phase, Tuner};
+use onecycle_onboard::pack::Pack;
+use onecycle_onboard::tuner::{Phase, Tuner, TunerError};
 
 pub use self::settings::{OnecycleSettings, OnecycleStatus};
 
 /// Memory of a tuner, in words of eight bytes: what it takes on 64-bit machines, the largest.
-pub const ONECYCLE_TUNER_WORDS: usize = 2560;
+pub const ONECYCLE_TUNER_WORDS: usize = 3700;
 
 /// Marks memory that holds a tuner: "ONECYCLE".
 const ALIVE: u64 = u64::from_le_bytes(*b"ONECYCLE");
@@ -190,10 +191,13 @@ pub unsafe extern "C" fn onecycle_tuner_init(
         return OnecycleStatus::Null;
     };
     memory.memory[0] = 0;
-    match Tuner::new(&settings.to_settings()) {
-        Ok(fresh) => {
-            // SAFETY: the place is large enough and aligned, as is asserted above.
-            unsafe { ptr::write(memory.place(), fresh) };
+    let checked = settings.to_settings().checked();
+    let pack = Pack::embedded().map_err(|_| TunerError::Pack);
+    match checked.and_then(|checked| Ok((checked, pack?))) {
+        Ok((checked, pack)) => {
+            // SAFETY: the place is large enough and aligned, as is asserted above, and nobody else's.
+            let place = unsafe { &mut *memory.place().cast::<MaybeUninit<Tuner<'static>>>() };
+            Tuner::place(place, &checked, pack);
             memory.memory[0] = ALIVE;
             OnecycleStatus::Ok
         }

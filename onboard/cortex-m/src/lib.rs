@@ -5,7 +5,7 @@
 //! number that was found, floating-point numbers as their bits: two machines agree when their lines do.
 //!
 //! ```text
-//! tick <number> <phase before> <phase after> <bits of the output> <instructions>
+//! tick <number> <phase before> <phase after> <bits of the output> <instructions> <stage before>
 //! found <name> <bits>
 //! ```
 #![no_std]
@@ -19,7 +19,7 @@ use core::hint::black_box;
 use onecycle_onboard::RelaySettings;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::Limits;
-use onecycle_onboard::identification::Identified;
+use onecycle_onboard::identification::{Identified, Stage};
 use onecycle_onboard::tuner::{Phase, Tuner, TunerSettings};
 
 use crate::axis::{Axis, K_OVER_T_BODY, TICK_S};
@@ -63,6 +63,7 @@ pub fn settings() -> TunerSettings {
             kd: 0.3,
             offset: 0.0,
         },
+        slices: 1,
         bias_filter_s: 1.0,
         ..new
     }
@@ -87,7 +88,7 @@ pub fn fly(
         if tick == START_TICK {
             tuner.start();
         }
-        let before = tuner.phase();
+        let (before, stage) = (tuner.phase(), tuner.stage());
         lap();
         let output = step(tuner, time_s, &measurement, reference);
         let instructions = lap().saturating_sub(idle);
@@ -97,7 +98,8 @@ pub fn fly(
             .word(name(before))
             .word(name(tuner.phase()))
             .number(output.to_bits().into())
-            .number(instructions);
+            .number(instructions)
+            .word(of_work(stage));
         say(&mut line);
         axis.push(output.into());
     }
@@ -155,5 +157,17 @@ fn name(phase: Phase) -> &'static str {
         Phase::Identify => "Identify",
         Phase::Control => "Control",
         Phase::Aborted => "Aborted",
+    }
+}
+
+fn of_work(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Wait => "wait",
+        Stage::Collect => "collect",
+        Stage::Sign => "sign",
+        Stage::Classify => "classify",
+        Stage::Refine => "refine",
+        Stage::Judge => "judge",
+        Stage::Design => "design",
     }
 }

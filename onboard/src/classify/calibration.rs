@@ -34,6 +34,20 @@ pub struct Calibration {
 }
 
 impl Calibration {
+    /// Room for one, all zeros.
+    pub(super) const ROOM: Self = Self {
+        scale: [0.0; VALUES],
+        temperature: [0.0; VALUES],
+        range: [[0.0; VALUES]; 2],
+        floor: 0.0,
+        jump: 0.0,
+        jump_of_noise: 0.0,
+        width: [0.0; 3],
+        width_sigma: 0.0,
+        limit: 0.0,
+        most_noise: 0.0,
+    };
+
     /// Of no network yet: no width is too wide and no noise too much, and any statistic is of the family that chi-squared
     /// of 30 degrees of freedom exceeds in 2 % of cases.
     ///

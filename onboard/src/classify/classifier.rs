@@ -60,14 +60,14 @@ impl Default for Classifier {
 }
 
 impl Classifier {
-    /// Room for a classification.
+    /// Room for a classification, all zeros.
     #[must_use]
     pub const fn new() -> Self {
         Self {
             signature: Signature::NONE,
             period_s: 0.0,
             noise_sigma: 0.0,
-            calibration: Calibration::UNTRAINED,
+            calibration: Calibration::ROOM,
             network: Forward::NONE,
             outputs: [0.0; OUTPUTS],
             statistic: Statistic::NONE,

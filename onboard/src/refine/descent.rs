@@ -12,11 +12,11 @@ pub(super) struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// Flat.
+    /// Room for them, all zeros.
     pub(super) const NONE: Self = Self {
         curvature: [[0.0; 3]; 3],
         gradient: [0.0; 3],
-        free: [true; 3],
+        free: [false; 3],
     };
 
     /// From the derivatives' columns and the residual, as many rows of them as that has.

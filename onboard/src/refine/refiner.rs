@@ -86,7 +86,7 @@ impl<const BINS: usize> Default for Refiner<BINS> {
 }
 
 impl<const BINS: usize> Refiner<BINS> {
-    /// Room for a refinement.
+    /// Room for a refinement, all zeros.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -95,7 +95,7 @@ impl<const BINS: usize> Refiner<BINS> {
             given_count: 0,
             fit: LinearFit::NONE,
             bench: Bench::NONE,
-            search: Search::NONE,
+            search: Search::ROOM,
             uncertainty: Uncertainty::NONE,
             stage: Stage::Idle,
         }

@@ -53,6 +53,15 @@ pub(super) enum Next {
 }
 
 impl Search {
+    /// Room for one, all zeros.
+    pub(super) const ROOM: Self = Self {
+        starts: [([0.0; SHAPE], 0.0); SEARCHED],
+        cost: 0.0,
+        before: 0.0,
+        damping: 0.0,
+        ..Self::NONE
+    };
+
     /// Without starts.
     pub(super) const NONE: Self = Self {
         starts: [([0.0; SHAPE], f64::INFINITY); SEARCHED],

@@ -5,7 +5,7 @@ use core::fmt;
 use crate::control::PdLaw;
 use crate::guard::Limits;
 use crate::identification::MOST_CYCLES;
-use crate::relay::{RelayError, RelaySettings};
+use crate::relay::{Relay, RelayError, RelaySettings};
 use crate::take_off::TakeOffSettings;
 
 /// How an axis is tuned. Start from [`TunerSettings::new`].
@@ -66,7 +66,11 @@ impl TunerSettings {
         }
     }
 
-    pub(super) fn validate(&self) -> Result<(), TunerError> {
+    /// Checks every setting.
+    ///
+    /// # Errors
+    /// Names the first that is out of range.
+    pub fn checked(&self) -> Result<CheckedSettings, TunerError> {
         let positive = [("the sample period", self.sample_s)];
         let not_negative = [
             ("the bias filter's time constant", self.bias_filter_s),
@@ -96,8 +100,18 @@ impl TunerSettings {
         if !self.safe.is_finite() {
             return Err(TunerError::Safe);
         }
-        Ok(())
+        Ok(CheckedSettings {
+            settings: *self,
+            relay: Relay::new(self.relay)?,
+        })
     }
+}
+
+/// Settings that are in their ranges.
+#[derive(Clone, Debug)]
+pub struct CheckedSettings {
+    pub(super) settings: TunerSettings,
+    pub(super) relay: Relay,
 }
 
 /// A setting out of its range.

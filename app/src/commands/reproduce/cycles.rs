@@ -29,7 +29,8 @@ pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
     let judge = Judge::new(&truth.process).map_err(Failure::usage)?;
     let mut rows = table(&cycles);
     for (row, (answer, _)) in rows.iter_mut().zip(&cycles.answers) {
-        row.cells.push(shown(Some(judge.deterioration(answer.feedback))));
+        row.cells
+            .push(shown(Some(judge.deterioration(answer.feedback))));
     }
     let signal = |name, values| relative(name, &trace, values, cycles.range_s);
     Ok(Found {

@@ -18,6 +18,7 @@ use core::panic::PanicInfo;
 use core::ptr;
 
 use onecycle_flight::{Line, fly, settings};
+use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::Tuner;
 
 /// Operations of semihosting, and what a program that ends as it should says (Arm, "Semihosting for AArch32
@@ -109,11 +110,12 @@ extern "C" fn run() -> ! {
             1,
         )
     }
-    let Ok(tuner) = Tuner::new(&settings()) else {
+    let (Ok(checked), Ok(pack)) = (settings().checked(), Pack::embedded()) else {
         leave("the tuner's settings are wrong", 1)
     };
     // SAFETY: nothing else names it, and this function runs once.
-    let tuner = unsafe { (*(&raw mut TUNER)).write(tuner) };
+    let place = unsafe { &mut *(&raw mut TUNER) };
+    let tuner = Tuner::place(place, &checked, pack);
     let beginning = stack();
     let is_tuned = fly(tuner, laps(), say);
     for (name, bytes) in [
