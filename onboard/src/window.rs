@@ -82,13 +82,9 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
     /// An empty window for outputs that are means of `group` consecutive samples.
     #[must_use]
     pub fn of_groups(start_s: f64, sample_s: f64, group: u32) -> Self {
-        Self {
-            sample_s,
-            start_s,
-            group,
-            per_bin: group,
-            ..Self::NONE
-        }
+        let mut window = Self::NONE;
+        window.set(start_s, sample_s, group);
+        window
     }
 
     /// Room for a window, all zeros: it takes nothing until [`Window::begin`].
@@ -108,13 +104,18 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
 
     /// Empty, as [`Window::new`], but where it lies.
     pub fn begin(&mut self, start_s: f64, sample_s: f64) {
+        self.bins.fill(Bin::NONE);
+        self.set(start_s, sample_s, 1);
+    }
+
+    /// All but the bins, which are empty.
+    fn set(&mut self, start_s: f64, sample_s: f64, group: u32) {
         self.start_s = start_s;
         self.sample_s = sample_s;
         self.first_output = None;
-        (self.group, self.per_bin) = (1, 1);
+        (self.group, self.per_bin) = (group, group);
         self.next_instant = 0;
         self.used = 0;
-        self.bins.fill(Bin::default());
         self.edge_count = 0;
         self.noise = NoiseMeter::NONE;
     }

@@ -149,7 +149,7 @@ struct Found {
 
 /// From the relay test to the gains, as on board: what is large is there only as long as it is needed.
 fn identify() -> Result<Found, &'static CStr> {
-    let mut coarse = Window::new(0.0, SAMPLE_S);
+    let mut coarse = Window::NONE;
     let pack = Pack::embedded().map_err(|_| c"there is no pack")?;
     let test = measure(&mut coarse)?;
     let read = read(&test, &pack)?;
@@ -184,7 +184,7 @@ struct Test {
 /// The relay test, and the signature of its last cycle, which the finer window is for.
 #[inline(never)]
 fn measure(coarse: &mut Window<BINS, EDGES>) -> Result<Test, &'static CStr> {
-    let mut fine = Window::new(0.0, SAMPLE_S);
+    let mut fine = Window::NONE;
     let (run, last) = oscillate(coarse, &mut fine)?;
     let signature = Signature::new(&fine, &last).map_err(|_| c"the cycle has no signature")?;
     Ok(Test {
@@ -261,7 +261,7 @@ fn oscillate(
         was_high = relay.is_high();
         if run.is_steady() && rises && !is_open {
             past.open(coarse, time_s)?;
-            *fine = Window::new(time_s, SAMPLE_S);
+            fine.begin(time_s, SAMPLE_S);
             is_open = true;
         }
         past.push(time_s, input);
@@ -341,7 +341,7 @@ impl Past {
     }
 
     fn open(&self, window: &mut Window<BINS, EDGES>, start_s: f64) -> Result<(), &'static CStr> {
-        *window = Window::new(start_s, SAMPLE_S);
+        window.begin(start_s, SAMPLE_S);
         for edge in &self.edges {
             window
                 .push_input(edge.time_s, edge.input)
