@@ -2,6 +2,7 @@
 
 mod bench;
 mod dataset;
+mod fly;
 mod identify;
 mod pack;
 mod reproduce;
@@ -18,6 +19,7 @@ use onecycle_onboard::{Process, ProcessError};
 
 pub(crate) use self::bench::{Answers, Bench, BenchAction, Format, MakeBench, RunBench};
 pub(crate) use self::dataset::Dataset;
+pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Identify, Method};
 pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::train::Train;
@@ -58,6 +60,7 @@ pub(crate) enum Command {
     Dataset(Dataset),
     Bench(Bench),
     Reproduce(Reproduce),
+    Fly(Fly),
 }
 
 /// Parameters of a process `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`.

@@ -35,6 +35,7 @@ fn main() -> ExitCode {
         Command::Dataset(dataset) => commands::dataset::run(dataset),
         Command::Bench(bench) => commands::bench::run(bench),
         Command::Reproduce(reproduce) => commands::reproduce::run(reproduce),
+        Command::Fly(fly) => commands::fly::run(fly),
     };
     match result {
         Ok(code) => code,

@@ -4,6 +4,7 @@ pub(crate) mod bench;
 pub(crate) mod certificate;
 pub(crate) mod classifier;
 pub(crate) mod dataset;
+pub(crate) mod fly;
 pub(crate) mod grid;
 pub(crate) mod identifier;
 pub(crate) mod json;

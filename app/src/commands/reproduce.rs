@@ -1,7 +1,7 @@
 //! `onecycle reproduce`: the paper's simulated results, each part worked out, kept and rendered.
 
 mod comparison;
-mod cycles;
+pub(crate) mod cycles;
 mod figures;
 mod grid;
 mod network;

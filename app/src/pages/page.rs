@@ -46,6 +46,17 @@ pub(crate) fn list(items: &[String]) -> String {
     format!("<ul>{}</ul>\n", items.collect::<String>())
 }
 
+/// Names and what is to be said of each.
+pub(crate) fn facts(facts: &[(String, String)]) -> String {
+    let fact = |(name, value): &(String, String)| {
+        format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(value))
+    };
+    format!(
+        "<dl>\n{}</dl>\n",
+        facts.iter().map(fact).collect::<String>()
+    )
+}
+
 /// A value, and a smaller one below it.
 pub(crate) struct Cell<'a> {
     pub(crate) value: &'a str,
@@ -143,6 +154,8 @@ mod tests {
         };
         let html = table(hostile, &[hostile.to_owned()], &[(hostile, vec![cell])]);
         assert_eq!(html.matches(safe).count(), 5);
+        let html = facts(&[(hostile.to_owned(), hostile.to_owned())]);
+        assert_eq!(html.matches(safe).count(), 2);
         assert!(!html.contains("<b") && !html.contains("</script"));
         let axis = super::super::plot::Axis {
             title: hostile.to_owned(),
