@@ -1,6 +1,7 @@
 """One axis of one vehicle, from a poor controller to a tuned one, and the step that must follow.
 
-A vehicle is any object with `hold(axis)`, `step(axis, input)` and `read(axis)`: see f450.py.
+A vehicle is any object with `step(axis, input)` for a tick, `read(axis)` for value and rate, and the sizes of
+its oscillations in `oscillation`: see f450.py.
 """
 
 import collections
