@@ -39,7 +39,13 @@ fn a_mission_with_its_page_and_its_ticks() {
     }
     assert!(!csv.contains("NaN") && !csv.contains("inf"));
     assert_eq!(page.matches("<figure>").count(), 3);
-    let main = page.split("<main>").nth(1).unwrap().split("</main>").next().unwrap();
+    let main = page
+        .split("<main>")
+        .nth(1)
+        .unwrap()
+        .split("</main>")
+        .next()
+        .unwrap();
     assert!(!main.contains("NaN") && !main.contains("null") && !main.contains("http"));
     assert_eq!(fly("again", "7").1, csv);
     assert_ne!(fly("other", "8").1, csv);
@@ -72,7 +78,9 @@ fn a_flight_is_a_recording() {
     ]);
     assert_eq!(found.code, Some(0), "{found:?}");
     let json: serde_json::Value = serde_json::from_str(&found.stdout).unwrap();
-    let gain = json["process"]["k_over_t_body"]["estimate"].as_f64().unwrap();
+    let gain = json["process"]["k_over_t_body"]["estimate"]
+        .as_f64()
+        .unwrap();
     // 20.7 m/s^2 for the whole thrust; what one test of four cycles leaves is some 2 %.
     assert!((gain / 20.7 - 1.0).abs() < 0.08, "{gain}");
 }

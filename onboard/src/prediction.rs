@@ -148,3 +148,81 @@ fn force(beginning: &Beginning<'_>, process: &Process) -> f64 {
     }
     force + beginning.input_bias
 }
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec;
+
+    use super::*;
+    use crate::control::Pd;
+
+    const SAMPLE_S: f64 = 0.001;
+
+    /// The largest distance between prediction and process over two seconds behind a switch, over the amplitude
+    /// before it; the dead time is `ticks` long, the relay switches every 0.2 s under a bias of 0.02.
+    fn largest(ticks: usize, pd: Pd) -> f64 {
+        let tau_s = ticks as f64 * SAMPLE_S;
+        let process = Process::from_acceleration_gain(4.0, 0.05, 0.5, tau_s).unwrap();
+        let transition = Transition::over(&process, SAMPLE_S);
+        let (mut state, mut line) = (State::default(), vec![0.0; ticks]);
+        let mut edges = vec![];
+        let mut tick = 0;
+        let mut push = |input: f64| {
+            let late = core::mem::replace(&mut line[tick % ticks], input);
+            state = transition.apply(&state, late + 0.02);
+            tick += 1;
+            (4.0 * state.y, 4.0 * state.v)
+        };
+        let (mut value, mut rate, mut amplitude) = (0.0, 0.0, 0.0_f64);
+        for tick in 0..1700 {
+            let input = if tick / 200 % 2 == 0 { 0.1 } else { -0.1 };
+            if tick % 200 == 0 {
+                edges.push(Edge {
+                    time_s: f64::from(tick) * SAMPLE_S,
+                    input,
+                });
+            }
+            (value, rate) = push(input);
+            amplitude = amplitude.max(f64::abs(value));
+        }
+        let law = PdLaw::new(pd, -0.02);
+        let beginning = Beginning {
+            edges: &edges,
+            time_s: 1.7,
+            value: value as f32,
+            rate: rate as f32,
+            reference: 0.0,
+            input_bias: 0.02,
+        };
+        let mut model = Prediction::new(&process, law, [-10.0, 10.0], SAMPLE_S, &beginning);
+        let mut largest = 0.0_f64;
+        for _ in 0..2000 {
+            let predicted = model.step();
+            let input = law.output(0.0, value as f32, rate as f32);
+            (value, rate) = push(f64::from(input));
+            largest = largest.max((f64::from(predicted) - value).abs());
+        }
+        largest / amplitude
+    }
+
+    // The model is the process: what is left is single precision in the law.
+    #[test]
+    fn it_is_the_process() {
+        for ticks in [1, 7, 100] {
+            let off = largest(ticks, Pd { kp: 4.0, kd: 2.0 });
+            assert!(off < 1e-5, "{ticks}: {off}");
+        }
+    }
+
+    // Places of two and of four ticks: the edges before the switch and the law fall on them, up to four ticks
+    // late, which at a tenth of a rad a tick is worth a percent.
+    #[test]
+    fn long_dead_times_share_places() {
+        for ticks in [150, 380] {
+            let off = largest(ticks, Pd { kp: 0.2, kd: 0.3 });
+            assert!(off < 0.05, "{ticks}: {off}");
+        }
+    }
+}

@@ -7,7 +7,8 @@ mod axis;
 mod faults;
 
 use onecycle_onboard::control::PdLaw;
-use onecycle_onboard::tuner::{TakeOffSettings, Tuner, TunerSettings};
+use onecycle_onboard::guard::Abort;
+use onecycle_onboard::tuner::{Phase, TakeOffSettings, Tuner, TunerSettings};
 use onecycle_onboard::{Process, RelaySettings};
 
 use self::axis::Axis;
@@ -102,5 +103,150 @@ fn from_the_ground_without_a_controller() {
             "{seed}: at {} m",
             axis.value()
         );
+    }
+}
+
+// Without a limit of any kind: a gain that has grown sixfold by the time of the switch makes the new loop
+// unstable (its gain margin is about 2), which the prediction tells and ends in the safe controller.
+#[test]
+fn a_response_that_is_not_the_predicted_one_falls_back() {
+    let settings = TunerSettings {
+        output_lowest: -1.0,
+        output_highest: 1.0,
+        ..TunerSettings::new(0.1, SAMPLE_S as f32)
+    };
+    let mut tuner = tuner(&settings);
+    let mut axis = Axis::new(height(), SAMPLE_S, 1);
+    tuner.start();
+    axis.fly(&mut tuner, 0.0, 20.0, |tuner, _| {
+        tuner.phase() == Phase::Control
+    });
+    assert!(tuner.phase() == Phase::Control && !tuner.is_proven());
+    let amplitude = tuner.identified().unwrap().amplitude as f32;
+    axis.becomes(height().with_gain_scaled(6.0).unwrap());
+    axis.fly(&mut tuner, 0.0, 4.0, |tuner, _| {
+        tuner.phase() == Phase::Aborted
+    });
+    let Some(Abort::Mismatch(off)) = tuner.reason() else {
+        panic!("{:?} {:?}", tuner.phase(), tuner.reason());
+    };
+    // Found in the tick in which it passed 1.5 amplitudes.
+    assert!((1.5..1.7).contains(&(off / amplitude)), "{off} {amplitude}");
+    assert_eq!(*tuner.law(), PdLaw::ZERO);
+}
+
+// A bias of 0.03 under Kp = 0.5 holds the process 0.06 off, with an output of -0.03: there the relay begins, half
+// its jump to either side, and nothing drifts.
+#[test]
+fn the_relay_begins_where_the_safe_controller_held_the_process() {
+    let settings = TunerSettings {
+        safe: PdLaw {
+            kp: 0.5,
+            kd: 0.4,
+            offset: 0.0,
+        },
+        bias_filter_s: 0.5,
+        output_lowest: -1.0,
+        output_highest: 1.0,
+        ..TunerSettings::new(0.1, SAMPLE_S as f32)
+    };
+    let mut tuner = tuner(&settings);
+    let mut axis = Axis::new(height(), SAMPLE_S, 1);
+    axis.bias = 0.03;
+    axis.fly(&mut tuner, 0.0, 20.0, |_, _| false);
+    assert!((axis.value() - 0.06).abs() < 1e-4, "{}", axis.value());
+    tuner.start();
+    assert!((tuner.offset() + 0.03).abs() < 1e-4, "{}", tuner.offset());
+    axis.fly(&mut tuner, 0.0, 20.0, |tuner, axis| {
+        assert!((axis.value() - 0.06).abs() < 0.03, "{}", axis.value());
+        tuner.phase() == Phase::Control
+    });
+    let found = tuner.identified().unwrap();
+    assert!((found.input_bias - 0.03).abs() < 1e-3, "{found:?}");
+}
+
+// What ended one test does not keep the next from succeeding, with what the next vehicle is.
+#[test]
+fn after_a_reset_all_begins_anew() {
+    let settings = TunerSettings {
+        output_lowest: -1.0,
+        output_highest: 1.0,
+        ..TunerSettings::new(0.1, SAMPLE_S as f32)
+    };
+    let mut tuner = tuner(&settings);
+    let mut axis = Axis::new(height(), SAMPLE_S, 1);
+    tuner.start();
+    axis.fly(&mut tuner, 0.0, 1.5, |_, _| false);
+    tuner.abort();
+    assert_eq!(
+        (tuner.phase(), tuner.reason()),
+        (Phase::Aborted, Some(Abort::Operator))
+    );
+    tuner.start();
+    assert_eq!(tuner.phase(), Phase::Aborted);
+    tuner.reset();
+    assert_eq!((tuner.phase(), tuner.reason()), (Phase::Idle, None));
+    let other = height().with_gain_scaled(2.0).unwrap();
+    let mut axis = Axis::new(other, SAMPLE_S, 2);
+    tuner.start();
+    axis.fly(&mut tuner, 0.0, 20.0, |tuner, _| tuner.is_proven());
+    let found = tuner.identified().unwrap();
+    assert!(
+        (found.process.k_over_t_body() / 8.0 - 1.0).abs() < 1e-5,
+        "{found:?}"
+    );
+}
+
+type Change = fn(&mut TunerSettings);
+
+const OUT_OF_RANGE: [(Change, &str); 12] = [
+    (|s| s.sample_s = 0.0, "the sample period must be positive"),
+    (
+        |s| s.bias_filter_s = -1.0,
+        "the bias filter's time constant",
+    ),
+    (
+        |s| s.rate_lag_s = f32::NAN,
+        "the rate's lag must be positive",
+    ),
+    (|s| s.limits.rate = 0.0, "the limit of the rate must be"),
+    (
+        |s| s.limits.stale_s = f32::NAN,
+        "the limit of a sample's age",
+    ),
+    (
+        |s| s.take_off = take_off(0.0, 1.0),
+        "the integrator's gain must",
+    ),
+    (
+        |s| s.take_off = take_off(1.0, -1.0),
+        "the climb allowed must be",
+    ),
+    (|s| s.cycles = 5, "the cycles must be 1 to 4, but are 5"),
+    (|s| s.slices = 0, "at least one attempt and one slice"),
+    (|s| s.output_lowest = 1.0, "the least output must be below"),
+    (|s| s.safe.kp = f32::NAN, "must be finite"),
+    (|s| s.relay.amplitude = -1.0, "amplitude must be positive"),
+];
+
+fn take_off(gain: f32, climb: f32) -> Option<TakeOffSettings> {
+    Some(TakeOffSettings { gain, climb })
+}
+
+// Each setting out of range is named, and none makes a tuner.
+#[test]
+fn settings_out_of_range_are_named() {
+    let good = TunerSettings {
+        output_lowest: -1.0,
+        output_highest: 1.0,
+        ..TunerSettings::new(0.1, SAMPLE_S as f32)
+    };
+    assert_eq!(Tuner::new(&good).err(), None);
+    for (change, words) in OUT_OF_RANGE {
+        let mut settings = good;
+        change(&mut settings);
+        let error = Tuner::new(&settings).err();
+        let said = error.map(|error| error.to_string()).unwrap_or_default();
+        assert!(said.contains(words), "{said}");
     }
 }
