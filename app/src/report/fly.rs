@@ -175,7 +175,7 @@ fn on_the_vehicle(tuned: &[&(Tuned, Deterioration)]) -> String {
     let mean = costs.iter().map(|(cost, _)| cost.abs()).sum::<f64>() / costs.len() as f64;
     let worst = costs
         .iter()
-        .fold(0.0_f64, |most, (cost, _)| most.max(*cost));
+        .fold(0.0_f64, |most, (cost, _)| most.max(cost.abs()));
     let least = costs
         .iter()
         .fold(f64::INFINITY, |least, (_, margin)| least.min(*margin));

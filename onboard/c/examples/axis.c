@@ -3,12 +3,12 @@
  *
  *     cc -std=c99 -O2 -ffp-contract=off axis.c libonecycle.a -o axis && ./axis
  *
- * With an argument it also writes every tick to standard output, in hexadecimal so that no bit is lost:
- * time, measured value, measured rate, reference, output.
+ * With an argument it also writes the bits of every tick's output to standard output, a line each.
  */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
+#include <string.h>
 
 #include "../onecycle.h"
 
@@ -83,9 +83,11 @@ int main(int count, char **arguments)
         if (tick == 5000)
             onecycle_tuner_start(&tuner);
         float output = onecycle_tuner_step(&tuner, time_s, &measurement, reference);
-        if (count > 1)
-            printf("%a %a %a %a %a\n", time_s, (double)measurement.value, (double)measurement.rate,
-                   (double)reference, (double)output);
+        if (count > 1) {
+            uint32_t bits;
+            memcpy(&bits, &output, sizeof bits);
+            printf("%lu\n", (unsigned long)bits);
+        }
         push(&axis, output);
     }
 

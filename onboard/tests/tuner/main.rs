@@ -20,6 +20,15 @@ fn height() -> Process {
     Process::from_acceleration_gain(4.0, 0.0321, 1.0 / 1.6886, 0.024).unwrap()
 }
 
+/// Outputs of one at most, ten times the relay's.
+fn settings() -> TunerSettings {
+    TunerSettings {
+        output_lowest: -1.0,
+        output_highest: 1.0,
+        ..TunerSettings::new(0.1, SAMPLE_S as f32)
+    }
+}
+
 fn tuner(settings: &TunerSettings) -> Tuner<'static> {
     Tuner::new(settings).unwrap()
 }
@@ -27,7 +36,7 @@ fn tuner(settings: &TunerSettings) -> Tuner<'static> {
 // Without noise the model is exact: the process comes back, and the margin is the pack's 20 degrees.
 #[test]
 fn a_test_from_rest_ends_in_the_controller_of_the_process() {
-    let mut tuner = tuner(&TunerSettings::new(0.1, SAMPLE_S as f32));
+    let mut tuner = tuner(&settings());
     let mut axis = Axis::new(height(), SAMPLE_S, 1);
     axis.bias = 0.02;
     tuner.start();
@@ -110,12 +119,7 @@ fn from_the_ground_without_a_controller() {
 // unstable (its gain margin is about 2), which the prediction tells and ends in the safe controller.
 #[test]
 fn a_response_that_is_not_the_predicted_one_falls_back() {
-    let settings = TunerSettings {
-        output_lowest: -1.0,
-        output_highest: 1.0,
-        ..TunerSettings::new(0.1, SAMPLE_S as f32)
-    };
-    let mut tuner = tuner(&settings);
+    let mut tuner = tuner(&settings());
     let mut axis = Axis::new(height(), SAMPLE_S, 1);
     tuner.start();
     axis.fly(&mut tuner, 0.0, 20.0, |tuner, _| {
@@ -146,9 +150,7 @@ fn the_relay_begins_where_the_safe_controller_held_the_process() {
             offset: 0.0,
         },
         bias_filter_s: 0.5,
-        output_lowest: -1.0,
-        output_highest: 1.0,
-        ..TunerSettings::new(0.1, SAMPLE_S as f32)
+        ..settings()
     };
     let mut tuner = tuner(&settings);
     let mut axis = Axis::new(height(), SAMPLE_S, 1);
@@ -168,12 +170,7 @@ fn the_relay_begins_where_the_safe_controller_held_the_process() {
 // What ended one test does not keep the next from succeeding, with what the next vehicle is.
 #[test]
 fn after_a_reset_all_begins_anew() {
-    let settings = TunerSettings {
-        output_lowest: -1.0,
-        output_highest: 1.0,
-        ..TunerSettings::new(0.1, SAMPLE_S as f32)
-    };
-    let mut tuner = tuner(&settings);
+    let mut tuner = tuner(&settings());
     let mut axis = Axis::new(height(), SAMPLE_S, 1);
     tuner.start();
     axis.fly(&mut tuner, 0.0, 1.5, |_, _| false);
@@ -236,14 +233,9 @@ fn take_off(gain: f32, climb: f32) -> Option<TakeOffSettings> {
 // Each setting out of range is named, and none makes a tuner.
 #[test]
 fn settings_out_of_range_are_named() {
-    let good = TunerSettings {
-        output_lowest: -1.0,
-        output_highest: 1.0,
-        ..TunerSettings::new(0.1, SAMPLE_S as f32)
-    };
-    assert_eq!(Tuner::new(&good).err(), None);
+    assert_eq!(Tuner::new(&settings()).err(), None);
     for (change, words) in OUT_OF_RANGE {
-        let mut settings = good;
+        let mut settings = settings();
         change(&mut settings);
         let error = Tuner::new(&settings).err();
         let said = error.map(|error| error.to_string()).unwrap_or_default();
