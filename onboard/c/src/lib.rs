@@ -10,8 +10,9 @@ use core::mem::MaybeUninit;
 
 use onecycle_onboard::control::Measurement;
 use onecycle_onboard::guard::Abort;
+use onecycle_onboard::identification::Room;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::{Phase, Tuner, TunerError};
+use onecycle_onboard::tuner::{Core, Phase, TunerError};
 
 pub use self::settings::{OnecycleSettings, OnecycleStatus};
 
@@ -21,12 +22,17 @@ pub const ONECYCLE_TUNER_WORDS: usize = 3700;
 /// Marks memory that holds a tuner: "ONECYCLE".
 const ALIVE: u64 = u64::from_le_bytes(*b"ONECYCLE");
 
-/// Words in front of the tuner itself.
-const HEADER_WORDS: usize = 1;
+/// What the memory holds once it is a tuner's.
+#[repr(C)]
+struct Placed {
+    alive: u64,
+    core: MaybeUninit<Core<'static>>,
+    room: MaybeUninit<Room>,
+}
 
 const _: () = assert!(
-    size_of::<Tuner<'static>>() <= 8 * (ONECYCLE_TUNER_WORDS - HEADER_WORDS)
-        && align_of::<Tuner<'static>>() <= 8
+    size_of::<Placed>() <= size_of::<OnecycleTuner>()
+        && align_of::<Placed>() <= align_of::<OnecycleTuner>()
 );
 
 /// Memory for one tuner: static, or wherever the caller has room. Its contents are no business of the
@@ -140,32 +146,38 @@ pub struct OnecycleResult {
 }
 
 impl OnecycleTuner {
-    fn place(&mut self) -> *mut Tuner<'static> {
-        // The words are eight bytes each and aligned so, as the tuner may be at most.
-        (&raw mut self.memory[HEADER_WORDS]).cast()
+    fn placed(&self) -> &Placed {
+        // SAFETY: large enough and aligned, as is asserted above, and any bits are a `Placed`.
+        unsafe { &*(&raw const *self).cast() }
     }
 
-    fn tuner(&self) -> Option<&Tuner<'static>> {
+    fn placed_mut(&mut self) -> &mut Placed {
+        // SAFETY: as in `placed`.
+        unsafe { &mut *(&raw mut *self).cast() }
+    }
+
+    fn core(&self) -> Option<&Core<'static>> {
+        let placed = self.placed();
         // SAFETY: the first word says that `onecycle_tuner_init` has written a tuner behind it, and
         // nothing else has been here since: that is what the caller of every function promises.
-        (self.memory[0] == ALIVE)
-            .then(|| unsafe { &*(&raw const self.memory[HEADER_WORDS]).cast::<Tuner<'static>>() })
+        (placed.alive == ALIVE).then(|| unsafe { placed.core.assume_init_ref() })
     }
 
-    fn tuner_mut(&mut self) -> Option<&mut Tuner<'static>> {
-        let place = self.place();
-        // SAFETY: as in `tuner`.
-        (self.memory[0] == ALIVE).then(|| unsafe { &mut *place })
+    fn parts(&mut self) -> Option<(&mut Core<'static>, &mut Room)> {
+        let placed = self.placed_mut();
+        // SAFETY: as in `core`.
+        (placed.alive == ALIVE)
+            .then(|| unsafe { (placed.core.assume_init_mut(), placed.room.assume_init_mut()) })
     }
 }
 
-/// A pointer from C as a reference, where it is one.
+/// A pointer from C as the parts of a tuner, where there is one.
 ///
 /// # Safety
 /// Null, or what it points to is valid, aligned and nobody else's meanwhile.
-unsafe fn tuner_at<'a>(tuner: *mut OnecycleTuner) -> Option<&'a mut Tuner<'static>> {
+unsafe fn parts_at<'a>(tuner: *mut OnecycleTuner) -> Option<(&'a mut Core<'static>, &'a mut Room)> {
     // SAFETY: the caller's promise.
-    unsafe { tuner.as_mut() }.and_then(OnecycleTuner::tuner_mut)
+    unsafe { tuner.as_mut() }.and_then(OnecycleTuner::parts)
 }
 
 /// Settings to start from: a noise-protected relay of this amplitude (input unit) at the distinguishing
@@ -190,15 +202,15 @@ pub unsafe extern "C" fn onecycle_tuner_init(
     else {
         return OnecycleStatus::Null;
     };
-    memory.memory[0] = 0;
+    let placed = memory.placed_mut();
+    placed.alive = 0;
     let checked = settings.to_settings().checked();
     let pack = Pack::embedded().map_err(|_| TunerError::Pack);
     match checked.and_then(|checked| Ok((checked, pack?))) {
         Ok((checked, pack)) => {
-            // SAFETY: the place is large enough and aligned, as is asserted above, and nobody else's.
-            let place = unsafe { &mut *memory.place().cast::<MaybeUninit<Tuner<'static>>>() };
-            Tuner::place(place, &checked, pack);
-            memory.memory[0] = ALIVE;
+            placed.core.write(Core::of(&checked, pack));
+            placed.room.write(Room::NEW);
+            placed.alive = ALIVE;
             OnecycleStatus::Ok
         }
         Err(error) => OnecycleStatus::from(error),
@@ -218,7 +230,7 @@ pub unsafe extern "C" fn onecycle_tuner_step(
     reference: f32,
 ) -> f32 {
     // SAFETY: the caller's promise.
-    let Some(tuner) = (unsafe { tuner_at(tuner) }) else {
+    let Some((core, room)) = (unsafe { parts_at(tuner) }) else {
         return 0.0;
     };
     // SAFETY: the caller's promise. No measurement is as good as one that is no number.
@@ -230,7 +242,7 @@ pub unsafe extern "C" fn onecycle_tuner_step(
                 age_s: measurement.age_s,
             }
         });
-    tuner.step(time_s, &measurement, reference)
+    core.step(room, time_s, &measurement, reference)
 }
 
 /// Begins the test at the next tick; only when idle.
@@ -240,8 +252,8 @@ pub unsafe extern "C" fn onecycle_tuner_step(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_start(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
-    if let Some(tuner) = unsafe { tuner_at(tuner) } {
-        tuner.start();
+    if let Some((core, _)) = unsafe { parts_at(tuner) } {
+        core.start();
     }
 }
 
@@ -252,8 +264,8 @@ pub unsafe extern "C" fn onecycle_tuner_start(tuner: *mut OnecycleTuner) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_abort(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
-    if let Some(tuner) = unsafe { tuner_at(tuner) } {
-        tuner.abort();
+    if let Some((core, _)) = unsafe { parts_at(tuner) } {
+        core.abort();
     }
 }
 
@@ -264,8 +276,8 @@ pub unsafe extern "C" fn onecycle_tuner_abort(tuner: *mut OnecycleTuner) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_reset(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
-    if let Some(tuner) = unsafe { tuner_at(tuner) } {
-        tuner.reset();
+    if let Some((core, _)) = unsafe { parts_at(tuner) } {
+        core.reset();
     }
 }
 
@@ -276,7 +288,7 @@ pub unsafe extern "C" fn onecycle_tuner_reset(tuner: *mut OnecycleTuner) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_phase(tuner: *const OnecycleTuner) -> OnecyclePhase {
     // SAFETY: the caller's promise.
-    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::tuner);
+    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
     tuner.map_or(OnecyclePhase::None, |tuner| match tuner.phase() {
         Phase::Idle => OnecyclePhase::Idle,
         Phase::TakeOff => OnecyclePhase::TakeOff,
@@ -294,8 +306,8 @@ pub unsafe extern "C" fn onecycle_tuner_phase(tuner: *const OnecycleTuner) -> On
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_reason(tuner: *const OnecycleTuner) -> OnecycleReason {
     // SAFETY: the caller's promise.
-    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::tuner);
-    match tuner.and_then(Tuner::reason) {
+    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
+    match tuner.and_then(Core::reason) {
         None => OnecycleReason::None,
         Some(Abort::Operator) => OnecycleReason::Operator,
         Some(Abort::NotFinite) => OnecycleReason::NotFinite,
@@ -319,7 +331,7 @@ pub unsafe extern "C" fn onecycle_tuner_result(
     result: *mut OnecycleResult,
 ) -> bool {
     // SAFETY: the caller's promise.
-    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::tuner);
+    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
     // SAFETY: the caller's promise.
     let (Some(tuner), Some(result)) = (tuner, unsafe { result.as_mut() }) else {
         return false;

@@ -18,8 +18,9 @@ use core::panic::PanicInfo;
 use core::ptr;
 
 use onecycle_flight::{Line, fly, settings};
+use onecycle_onboard::identification::Room;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::Tuner;
+use onecycle_onboard::tuner::Core;
 
 /// Operations of semihosting, and what a program that ends as it should says (Arm, "Semihosting for AArch32
 /// and AArch64", 2.0).
@@ -100,7 +101,8 @@ static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
     vectors
 };
 
-static mut TUNER: MaybeUninit<Tuner<'static>> = MaybeUninit::uninit();
+static mut CORE: MaybeUninit<Core<'static>> = MaybeUninit::uninit();
+static mut ROOM: Room = Room::NEW;
 
 extern "C" fn run() -> ! {
     start_timer();
@@ -113,14 +115,14 @@ extern "C" fn run() -> ! {
     let (Ok(checked), Ok(pack)) = (settings().checked(), Pack::embedded()) else {
         leave("the tuner's settings are wrong", 1)
     };
-    // SAFETY: nothing else names it, and this function runs once.
-    let place = unsafe { &mut *(&raw mut TUNER) };
-    let tuner = Tuner::place(place, &checked, pack);
+    // SAFETY: nothing else names them, and this function runs once.
+    let (core, room) = unsafe { (&mut *(&raw mut CORE), &mut *(&raw mut ROOM)) };
+    let core = core.write(Core::of(&checked, pack));
     let beginning = stack();
-    let is_tuned = fly(tuner, laps(), say);
+    let is_tuned = fly(core, room, laps(), say);
     for (name, bytes) in [
         ("flash", (&raw const __flash_end).addr()),
-        ("tuner", size_of::<Tuner<'static>>()),
+        ("tuner", size_of::<Core<'static>>() + size_of::<Room>()),
         (
             "static",
             distance(&raw const __data_start, &raw const __bss_end),

@@ -4,16 +4,20 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use onecycle_flight::{fly, numbers, settings};
-use onecycle_onboard::tuner::Tuner;
+use onecycle_onboard::identification::Room;
+use onecycle_onboard::pack::Pack;
+use onecycle_onboard::tuner::Core;
 
 fn main() -> ExitCode {
-    let Ok(mut tuner) = Tuner::new(&settings()) else {
+    let (Ok(checked), Ok(pack)) = (settings().checked(), Pack::embedded()) else {
         return ExitCode::FAILURE;
     };
+    let (mut tuner, mut room) = (Core::of(&checked, pack), Room::NEW);
     let mut lines = Vec::new();
     // Nothing is counted here.
     let is_tuned = fly(
         &mut tuner,
+        &mut room,
         || 0,
         |line| {
             let ended = line.ended();

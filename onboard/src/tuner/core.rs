@@ -1,0 +1,382 @@
+//! All of a tuner but the room of its work: its phases, its guard, its laws.
+
+use super::Phase;
+use super::settings::{CheckedSettings, TunerSettings};
+use crate::control::{Measurement, PdLaw, RateEstimate};
+use crate::guard::{Abort, Guard, Seen};
+use crate::identification::{Identification, Identified, Observed, Room, Stage};
+use crate::pack::Pack;
+use crate::prediction::{Beginning, Prediction};
+use crate::relay::Relay;
+use crate::take_off;
+
+/// Switches of the relay that end a take-off: the vehicle has been above the reference and come back.
+const AIRBORNE_SWITCHES: u32 = 2;
+/// Periods of the oscillation in which the response must be the predicted one.
+const CHECKED_PERIODS: f64 = 4.0;
+/// What the response may be off the predicted one, in amplitudes of the oscillation: it begins on the
+/// oscillation with a force that is known roughly, and noise and gusts go on.
+const MOST_MISMATCH: f32 = 1.5;
+
+/// The tuner of one axis but for the [`Room`] of its work, which it must always be given the same: so that firmware can
+/// make each where it is to stay. See [`tuner`](super).
+pub struct Core<'a> {
+    settings: TunerSettings,
+    phase: Phase,
+    reason: Option<Abort>,
+    guard: Guard,
+    last_time_s: Option<f64>,
+    /// The last sample that could be used.
+    value: f32,
+    rate: RateEstimate,
+    /// The reference in force; that of the start during a test.
+    reference: f32,
+    /// Means under the safe controller: of its output (input unit), of the process's (output unit).
+    usual: f32,
+    usual_value: f32,
+    test_s: f32,
+    /// What the relay is offset by, then the new controller (input unit).
+    offset: f32,
+    relay: Relay,
+    since_switch_s: f32,
+    identification: Identification<'a>,
+    attempts_left: u8,
+    identified: Option<Identified>,
+    law: PdLaw,
+    prediction: Option<Prediction>,
+    unchecked_s: f32,
+}
+
+impl<'a> Core<'a> {
+    /// Of settings that were checked.
+    #[must_use]
+    #[inline]
+    pub fn of(checked: &CheckedSettings, pack: Pack<'a>) -> Self {
+        let CheckedSettings { settings, relay } = checked;
+        Self {
+            phase: Phase::Idle,
+            reason: None,
+            guard: Guard::new(settings.limits),
+            last_time_s: None,
+            value: 0.0,
+            rate: RateEstimate::default(),
+            reference: 0.0,
+            usual: settings.safe.offset,
+            usual_value: 0.0,
+            test_s: 0.0,
+            offset: 0.0,
+            relay: relay.clone(),
+            since_switch_s: 0.0,
+            identification: Identification::new(
+                pack,
+                f64::from(settings.sample_s),
+                settings.cycles,
+            ),
+            attempts_left: settings.attempts,
+            identified: None,
+            law: settings.safe,
+            prediction: None,
+            unchecked_s: 0.0,
+            settings: *settings,
+        }
+    }
+
+    /// Begins the test at the next tick; only from [`Phase::Idle`].
+    pub fn start(&mut self) {
+        if self.phase != Phase::Idle {
+            return;
+        }
+        if self.settings.take_off.is_some() {
+            self.phase = Phase::TakeOff;
+        } else {
+            self.phase = Phase::Relay;
+            if self.settings.bias_filter_s > 0.0 {
+                self.offset = self.usual;
+                self.reference = self.usual_value;
+            }
+        }
+        self.guard.begin((self.value - self.reference).abs());
+    }
+
+    /// The operator ends the test, or the controller that came of it; the next tick's output is safe.
+    pub fn abort(&mut self) {
+        if self.phase != Phase::Idle {
+            self.end(Abort::Operator);
+        }
+    }
+
+    /// Ready for another test, all that was learned forgotten; only from [`Phase::Aborted`] and
+    /// [`Phase::Control`].
+    pub fn reset(&mut self) {
+        if !matches!(self.phase, Phase::Aborted | Phase::Control) {
+            return;
+        }
+        let Ok(relay) = Relay::new(self.settings.relay) else {
+            return;
+        };
+        self.phase = Phase::Idle;
+        self.reason = None;
+        self.guard = Guard::new(self.settings.limits);
+        self.last_time_s = None;
+        self.test_s = 0.0;
+        self.offset = 0.0;
+        self.relay = relay;
+        self.since_switch_s = 0.0;
+        self.identification.restart();
+        self.attempts_left = self.settings.attempts;
+        self.identified = None;
+        self.law = self.settings.safe;
+        self.prediction = None;
+    }
+
+    /// One tick: time (s), what the sensor says, where the output should be (output unit). Returns the
+    /// input to hold until the next tick (input unit), always finite and within the limits.
+    #[inline]
+    pub fn step(
+        &mut self,
+        room: &mut Room,
+        time_s: f64,
+        measurement: &Measurement,
+        reference: f32,
+    ) -> f32 {
+        let dt_s = self.tick_s(time_s);
+        if let Err(reason) = self.watch(dt_s, measurement, reference) {
+            self.end(reason);
+        }
+        let output = match self.phase {
+            Phase::Idle => self.idle(dt_s),
+            Phase::TakeOff => self.take_off(dt_s),
+            Phase::Relay | Phase::Identify => self.offset + self.excite(dt_s),
+            Phase::Control => self.control(),
+            Phase::Aborted => self.safe(),
+        };
+        let output = self.within_limits(output);
+        if matches!(self.phase, Phase::TakeOff | Phase::Relay | Phase::Identify) {
+            self.identify(room, time_s, output);
+            if self.phase == Phase::Aborted {
+                return self.within_limits(self.safe());
+            }
+        }
+        output
+    }
+
+    fn tick_s(&mut self, time_s: f64) -> f32 {
+        match self.last_time_s {
+            None if time_s.is_finite() => {
+                self.last_time_s = Some(time_s);
+                self.settings.sample_s
+            }
+            None => f32::NAN,
+            Some(last_s) => {
+                if time_s.is_finite() && time_s > last_s {
+                    self.last_time_s = Some(time_s);
+                }
+                (time_s - last_s) as f32
+            }
+        }
+    }
+
+    /// Takes the sample in, unless it must not be used.
+    fn watch(&mut self, dt_s: f32, measurement: &Measurement, reference: f32) -> Result<(), Abort> {
+        let is_test = !matches!(self.phase, Phase::Idle | Phase::Aborted) && !self.is_proven();
+        let seen = |rate, reference, test_s, since_switch_s| Seen {
+            measurement,
+            reference,
+            rate,
+            dt_s,
+            test_s,
+            since_switch_s,
+        };
+        self.guard.check_data(&seen(0.0, reference, None, None))?;
+        self.value = measurement.value;
+        let rate = self.rate.step(measurement, dt_s, self.settings.rate_lag_s);
+        if !is_test {
+            self.reference = reference;
+            return Ok(());
+        }
+        self.test_s += dt_s;
+        let switch_s = matches!(self.phase, Phase::Relay | Phase::Identify);
+        let since_s = switch_s.then_some(self.since_switch_s + dt_s);
+        let test_s = (self.phase != Phase::Control).then_some(self.test_s);
+        self.guard
+            .check_motion(&seen(rate, self.reference, test_s, since_s))
+    }
+
+    fn end(&mut self, reason: Abort) {
+        if !matches!(self.phase, Phase::Idle | Phase::Aborted) {
+            self.phase = Phase::Aborted;
+            self.reason = Some(reason);
+            self.law = self.settings.safe;
+            self.prediction = None;
+        }
+    }
+
+    fn safe(&self) -> f32 {
+        let safe = &self.settings.safe;
+        safe.output(self.reference, self.value, self.rate.rate())
+    }
+
+    fn idle(&mut self, dt_s: f32) -> f32 {
+        let output = self.within_limits(self.safe());
+        let filter_s = self.settings.bias_filter_s;
+        if dt_s > 0.0 && filter_s > 0.0 {
+            let share = dt_s / (dt_s + filter_s);
+            self.usual += share * (output - self.usual);
+            self.usual_value += share * (self.value - self.usual_value);
+        }
+        output
+    }
+
+    fn take_off(&mut self, dt_s: f32) -> f32 {
+        if let Some(settings) = &self.settings.take_off {
+            let error = self.reference - self.value;
+            self.offset = take_off::lift(settings, self.offset, error, self.rate.rate(), dt_s);
+        }
+        let output = self.offset + self.excite(dt_s);
+        if self.relay.switches() >= AIRBORNE_SWITCHES {
+            self.phase = Phase::Relay;
+        }
+        output
+    }
+
+    /// The relay's output at this tick.
+    fn excite(&mut self, dt_s: f32) -> f32 {
+        let was_high = self.relay.is_high();
+        let output = self.relay.step(self.reference - self.value, dt_s);
+        if self.relay.is_high() == was_high {
+            self.since_switch_s += dt_s;
+        } else {
+            self.since_switch_s = 0.0;
+        }
+        output
+    }
+
+    /// Shows the identification this tick, and lets it do a slice of its work.
+    fn identify(&mut self, room: &mut Room, time_s: f64, output: f32) {
+        let observed = Observed {
+            time_s,
+            input: f64::from(output),
+            output: f64::from(self.value),
+            is_high: self.relay.is_high(),
+            undone: self.relay.undone(),
+        };
+        self.identification.observe(room, &observed);
+        if self.phase == Phase::TakeOff {
+            return;
+        }
+        let outcome = (0..self.settings.slices).find_map(|_| self.identification.advance(room));
+        match outcome {
+            Some(Ok(identified)) => self.enter_control(time_s, &identified),
+            Some(Err(refusal)) => {
+                self.attempts_left -= 1;
+                self.phase = Phase::Relay;
+                if self.attempts_left == 0 {
+                    self.end(Abort::Refused(refusal));
+                }
+            }
+            None if self.identification.has_work() => self.phase = Phase::Identify,
+            None => {}
+        }
+    }
+
+    /// The new controller from the next tick on, about the input that holds the process at rest: the relay
+    /// could hold no bias beyond its own amplitude.
+    fn enter_control(&mut self, time_s: f64, identified: &Identified) {
+        let centre = self.offset + self.relay.trim();
+        let h = self.settings.relay.amplitude;
+        let at_rest = -identified.input_bias as f32;
+        self.offset = at_rest.max(centre - h).min(centre + h);
+        self.law = PdLaw::new(identified.pd, self.offset);
+        if !self.law.is_finite() {
+            self.end(Abort::NotFinite);
+            return;
+        }
+        self.identified = Some(*identified);
+        self.prediction = Some(Prediction::new(
+            &identified.process,
+            self.law,
+            [self.settings.output_lowest, self.settings.output_highest],
+            f64::from(self.settings.sample_s),
+            &Beginning {
+                edges: self.identification.past_edges(),
+                time_s: time_s + f64::from(self.settings.sample_s),
+                value: self.value,
+                rate: self.rate.rate(),
+                reference: self.reference,
+                input_bias: identified.input_bias,
+            },
+        ));
+        self.unchecked_s = (CHECKED_PERIODS * identified.period_s) as f32;
+        self.phase = Phase::Control;
+    }
+
+    fn control(&mut self) -> f32 {
+        if let (Some(prediction), Some(identified)) = (&mut self.prediction, &self.identified) {
+            let off = (prediction.step() - self.value).abs();
+            if off > MOST_MISMATCH * identified.amplitude as f32 {
+                self.end(Abort::Mismatch(off));
+                return self.safe();
+            }
+            self.unchecked_s -= self.settings.sample_s;
+            if self.unchecked_s <= 0.0 {
+                self.prediction = None;
+            }
+        }
+        self.law
+            .output(self.reference, self.value, self.rate.rate())
+    }
+
+    fn within_limits(&self, output: f32) -> f32 {
+        output
+            .max(self.settings.output_lowest)
+            .min(self.settings.output_highest)
+    }
+
+    /// What it is doing.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Why the test was aborted.
+    #[must_use]
+    pub fn reason(&self) -> Option<Abort> {
+        self.reason
+    }
+
+    /// What the test has told: process, deviations, gains.
+    #[must_use]
+    pub fn identified(&self) -> Option<&Identified> {
+        self.identified.as_ref()
+    }
+
+    /// The law in force in [`Phase::Control`]; the safe one in any other phase.
+    #[must_use]
+    pub fn law(&self) -> &PdLaw {
+        &self.law
+    }
+
+    /// Whether the new controller is in force and its response was as predicted.
+    #[must_use]
+    pub fn is_proven(&self) -> bool {
+        self.phase == Phase::Control && self.prediction.is_none()
+    }
+
+    /// What the identification does next.
+    #[must_use]
+    pub fn stage(&self) -> Stage {
+        self.identification.stage()
+    }
+
+    /// The relay of the test.
+    #[must_use]
+    pub fn relay(&self) -> &Relay {
+        &self.relay
+    }
+
+    /// Centre of the output while the relay runs, without its trim (input unit).
+    #[must_use]
+    pub fn offset(&self) -> f32 {
+        self.offset
+    }
+}
