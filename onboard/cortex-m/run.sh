@@ -13,7 +13,7 @@ most_flash=112000 wanted_flash=96000
 most_memory=38500 wanted_memory=24000
 most_relay_tick=33000 wanted_relay_tick=150000
 most_control_tick=2800 wanted_control_tick=150000
-most_identify_tick=235000 wanted_identify_tick=150000
+most_identify_tick=215000 wanted_identify_tick=150000
 
 # The oldest compiler that builds this.
 oldest=1.95
@@ -146,7 +146,7 @@ read -r identify worst < <(tail -n 1 "$scratch/slices")
 slices=$(wc -l <"$scratch/slices")
 stages() {
     local stage
-    for stage in classify refine judge design; do
+    for stage in classify refine judge gains design; do
         awk -v stage="$stage" '$2 == stage { all[++n] = $1 }
             END { printf "      %-9s %d ticks, %d, %d\n", stage, n, all[int((n + 1) / 2)], all[n] }' "$scratch/slices"
     done

@@ -1,9 +1,9 @@
 //! From the samples of a running relay test to a process and its controller, a slice at a time.
 //!
 //! ```text
-//! wait -> collect -> sign -> classify -> refine -> judge -> design -> identified
-//!   ^         |         |        |          |        |         |
-//!   +---------+---------+--------+----------+--------+---------+  another cycle
+//! wait -> collect -> sign -> classify -> refine -> judge -> gains -> design -> identified
+//!   ^         |         |        |          |        |        |         |
+//!   +---------+---------+--------+----------+--------+--------+---------+  another cycle
 //! ```
 //!
 //! - **wait** for three cycles alike and for the next rise of the relay;
@@ -11,7 +11,7 @@
 //!   last to read. A switch that the relay takes back spoils them;
 //! - **sign**, **classify**: the pack reads the last cycle, or does not know it;
 //! - **refine**: the most probable process from there; **judge**: is it one to be believed?
-//! - **design**: gains from the pack's table, how far the margin may be off.
+//! - **gains** from the pack's table; **design**: how far may their margin be off?
 //!
 //! [`Identification::observe`] takes a sample, [`Identification::advance`] does one slice of the work, of a
 //! few thousand operations at most (the table is in [`refine`](crate::refine)): a board without double
@@ -147,6 +147,8 @@ pub enum Stage {
     Refine,
     /// Is it to be believed?
     Judge,
+    /// The pack's controller for it.
+    Gains,
     /// How far may its margin be off?
     Design,
 }
@@ -341,6 +343,7 @@ impl<'a> Identification<'a> {
             (Stage::Classify, Some(cycle)) => self.classify(room, &cycle).map(|()| None),
             (Stage::Refine, Some(_)) => self.refine(room).map(|()| None),
             (Stage::Judge, Some(_)) => self.judge(room).map(|()| None),
+            (Stage::Gains, Some(_)) => self.gains().map(|()| None),
             (Stage::Design, Some(cycle)) => self.design(&cycle),
             _ => return None,
         };
@@ -396,6 +399,12 @@ impl<'a> Identification<'a> {
         if let Some(edge) = refined.edge {
             return Err(Refusal::Edge(edge));
         }
+        self.stage = Stage::Gains;
+        Ok(())
+    }
+
+    fn gains(&mut self) -> Result<(), Refusal> {
+        let refined = self.refined.ok_or(Refusal::NoFit)?;
         let table =
             LeadTable::from_bytes(self.pack.lead_table().bytes).map_err(|_| Refusal::NoGains)?;
         let pd = table.pd(&refined.process).map_err(|_| Refusal::NoGains)?;

@@ -175,6 +175,7 @@ fn of_work(stage: Stage) -> &'static str {
         Stage::Classify => "classify",
         Stage::Refine => "refine",
         Stage::Judge => "judge",
+        Stage::Gains => "gains",
         Stage::Design => "design",
     }
 }
