@@ -13,14 +13,8 @@ library=$target/release/libonecycle.a
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$here"
-
-fail() {
-    echo "the C interface failed: $1" >&2
-    if [[ -s ${2:-} ]]; then
-        tail -n 20 "$2" >&2
-    fi
-    exit 1
-}
+what="the C interface"
+source ../common.sh
 
 header() { # FILE
     [[ $(cbindgen --version 2>/dev/null) == "cbindgen $CBINDGEN_VERSION" ]] ||
@@ -35,6 +29,7 @@ if [[ ${1:-} == header ]]; then
 fi
 
 header "$scratch/onecycle.h"
+same_libm
 cmp -s onecycle.h "$scratch/onecycle.h" ||
     fail "onecycle.h is not what src/ says: run onboard/c/run.sh header."
 

@@ -26,18 +26,12 @@ triple=thumbv7em-none-eabihf
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$here"
+what="the tuner on an emulated Cortex-M4F"
+source ../common.sh
 
 skip() {
-    echo "the tuner on an emulated Cortex-M4F: skipped: $1"
+    echo "$what: skipped: $1"
     exit 0
-}
-
-fail() {
-    echo "the tuner on an emulated Cortex-M4F failed: $1" >&2
-    if [[ -s ${2:-} ]]; then
-        tail -n 20 "$2" >&2
-    fi
-    exit 1
 }
 
 # The compiler and what it is made of: unpacked into $scratch/usr.
@@ -93,18 +87,13 @@ within() { # WHAT NUMBER MOST
     [[ $2 -gt 0 && $2 -le $3 ]] || fail "$1: $2, more than the $3 that it may be."
 }
 
-libm() { # LOCK FILE: version and checksum
-    grep -A 3 '^name = "libm"' "$1"
-}
-
 for tool in apt-get apt-cache dpkg dpkg-deb; do
     command -v "$tool" >/dev/null || skip "the machine has no Debian packages ($tool)."
 done
 command -v qemu-system-arm >/dev/null || skip "qemu-system-arm is not installed."
 linker=$(find "$(rustc --print sysroot)" -type f -name rust-lld -print -quit)
 [[ -n $linker ]] || skip "the Rust toolchain comes without rust-lld."
-[[ $(libm Cargo.lock) == "$(libm ../../Cargo.lock)" ]] ||
-    fail "its Cargo.lock names another libm than the workspace's: run 'cargo update -p libm' in both."
+same_libm
 
 cargo test --quiet --release --locked --lib --target-dir "$target" >"$scratch/log" 2>&1 ||
     fail "its own tests fail." "$scratch/log"
@@ -141,7 +130,7 @@ instructions() { # BEFORE AFTER
 median() { awk '{ all[NR] = $1 } END { print all[int((NR + 1) / 2)] }'; }
 
 # Of the ticks of identification: those that began in a stage of it, with the stage's name.
-awk '$1 == "tick" && $3 == "Identify" { print $6, $7 }' "$scratch/board" | sort -n >"$scratch/slices"
+awk '$1 == "tick" && $3 == "identify" { print $6, $7 }' "$scratch/board" | sort -n >"$scratch/slices"
 read -r identify worst < <(tail -n 1 "$scratch/slices")
 slices=$(wc -l <"$scratch/slices")
 stages() {
@@ -153,7 +142,7 @@ stages() {
 }
 
 flash=$(bytes flash) memory=$(($(bytes static) + $(bytes stack)))
-relay=$(instructions Relay Relay | tail -n 1) control=$(instructions Control Control | tail -n 1)
+relay=$(instructions relay relay | tail -n 1) control=$(instructions control control | tail -n 1)
 within "bytes of flash" "$flash" "$most_flash"
 within "bytes of memory" "$memory" "$most_memory"
 within "instructions of the worst tick of the relay" "$relay" "$most_relay_tick"
@@ -169,9 +158,9 @@ Kp $(number kp), Kd $(number kd)
   memory        $memory bytes of $most_memory (wanted: $wanted_memory): static $(bytes static), \
 a tuner $(bytes tuner) of it; stack $(bytes stack), to make the tuner $(bytes beginning)
   instructions  of a tick: median, worst
-    safe        $(instructions Idle Idle | median), $(instructions Idle Idle | tail -n 1)
-    relay       $(instructions Relay Relay | median), $relay of $most_relay_tick (wanted: $wanted_relay_tick)
-    control     $(instructions Control Control | median), $control of $most_control_tick \
+    safe        $(instructions idle idle | median), $(instructions idle idle | tail -n 1)
+    relay       $(instructions relay relay | median), $relay of $most_relay_tick (wanted: $wanted_relay_tick)
+    control     $(instructions control control | median), $control of $most_control_tick \
 (wanted: $wanted_control_tick)
     identify    $(median <"$scratch/slices"), $identify of $most_identify_tick \
 (wanted: $wanted_identify_tick) in $worst; $slices ticks

@@ -16,14 +16,8 @@ library=$target/release/libonecycle_onboard_proof.a
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$here"
-
-fail() {
-    echo "onboard proof failed: $1" >&2
-    if [[ -s ${2:-} ]]; then
-        tail -n 20 "$2" >&2
-    fi
-    exit 1
-}
+what="onboard proof"
+source ../common.sh
 
 build() { # FEATURES LOG
     rm -f "$library"
@@ -35,16 +29,11 @@ link() { # PROGRAM LOG
         -fno-stack-protector -mno-red-zone -Wl,--gc-sections start.c "$library" -o "$1" >"$2" 2>&1
 }
 
-libm() { # LOCK FILE: version and checksum
-    grep -A 3 '^name = "libm"' "$1"
-}
-
 [[ $(uname -sm) == "Linux x86_64" ]] || fail "it runs on x86-64 Linux only, not on $(uname -sm)."
 for tool in cargo gcc nm size; do
     command -v "$tool" >/dev/null || fail "the command $tool is missing."
 done
-[[ $(libm Cargo.lock) == "$(libm ../../Cargo.lock)" ]] ||
-    fail "its Cargo.lock names another libm than the workspace's: run 'cargo update -p libm' in both."
+same_libm
 
 build "" "$scratch/log" || fail "it does not build without std." "$scratch/log"
 link "$scratch/proof" "$scratch/log" || fail "it does not link without libc." "$scratch/log"

@@ -91,15 +91,14 @@ impl fmt::Display for Abort {
     }
 }
 
-/// What the guard looks at.
+/// How the process moves in a test.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Seen<'a> {
-    pub(crate) measurement: &'a Measurement,
-    pub(crate) reference: f32,
+pub(crate) struct Motion {
+    /// From the reference (output unit).
+    pub(crate) distance: f32,
+    /// Of the output (output unit / s).
     pub(crate) rate: f32,
-    /// Since the tick before (s).
-    pub(crate) dt_s: f32,
-    /// Since the test's start (s); `None` outside one.
+    /// Since the test's start (s); `None` once it has led to a controller.
     pub(crate) test_s: Option<f32>,
     /// Since the relay's last switch (s); `None` where there is no relay.
     pub(crate) since_switch_s: Option<f32>,
@@ -126,15 +125,20 @@ impl Guard {
         self.approach = Some(distance);
     }
 
-    /// Whether the numbers are such that anything can be computed from them.
-    pub(crate) fn check_data(&self, seen: &Seen<'_>) -> Result<(), Abort> {
-        if !(seen.measurement.is_finite() && seen.reference.is_finite() && seen.dt_s.is_finite()) {
+    /// Whether the numbers are such that anything can be computed from them; `dt_s` after the tick before.
+    pub(crate) fn check_data(
+        &self,
+        measurement: &Measurement,
+        reference: f32,
+        dt_s: f32,
+    ) -> Result<(), Abort> {
+        if !(measurement.is_finite() && reference.is_finite() && dt_s.is_finite()) {
             return Err(Abort::NotFinite);
         }
-        if seen.dt_s <= 0.0 {
-            return Err(Abort::Stale(seen.dt_s));
+        if dt_s <= 0.0 {
+            return Err(Abort::Stale(dt_s));
         }
-        let age_s = seen.measurement.age_s.max(seen.dt_s);
+        let age_s = measurement.age_s.max(dt_s);
         if age_s > self.limits.stale_s {
             return Err(Abort::Stale(age_s));
         }
@@ -142,8 +146,8 @@ impl Guard {
     }
 
     /// Whether the test may go on.
-    pub(crate) fn check_motion(&mut self, seen: &Seen<'_>) -> Result<(), Abort> {
-        let distance = (seen.measurement.value - seen.reference).abs();
+    pub(crate) fn check_motion(&mut self, motion: &Motion) -> Result<(), Abort> {
+        let distance = motion.distance.abs();
         if distance <= NEAR * self.limits.excursion {
             self.approach = None;
         }
@@ -151,15 +155,15 @@ impl Guard {
         if distance > allowed {
             return Err(Abort::Excursion(distance));
         }
-        if seen.rate.abs() > self.limits.rate {
-            return Err(Abort::Rate(seen.rate.abs()));
+        if motion.rate.abs() > self.limits.rate {
+            return Err(Abort::Rate(motion.rate.abs()));
         }
-        if let Some(test_s) = seen.test_s
+        if let Some(test_s) = motion.test_s
             && test_s > self.limits.duration_s
         {
             return Err(Abort::Duration(test_s));
         }
-        if let Some(since_s) = seen.since_switch_s
+        if let Some(since_s) = motion.since_switch_s
             && since_s > self.limits.no_switch_s
         {
             return Err(Abort::NoOscillation(since_s));

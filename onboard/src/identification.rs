@@ -23,7 +23,9 @@ use crate::classify::{Classifier, Verdict};
 use crate::control::Pd;
 use crate::cycle::{Cycle, CycleDetector, SteadyRun};
 use crate::gains::LeadTable;
-use crate::judgement::{COORDINATES, Deviations, MOST_MISFIT, MOST_RESPONSE_ERROR, Spread, misfit};
+use crate::judgement::{
+    COORDINATES, Deviations, HALF_90_PERCENT, MOST_MISFIT, MOST_RESPONSE_ERROR, Spread, misfit,
+};
 use crate::pack::Pack;
 use crate::process::Process;
 use crate::refine::{Beforehand, DomainEdge, Refined, Refiner, ShapePrior};
@@ -43,9 +45,6 @@ pub const EDGES: usize = 20;
 pub const PAST_EDGES: usize = 8;
 /// Most cycles that are refined together: as many as the edges leave room for.
 pub const MOST_CYCLES: u8 = 4;
-
-/// Standard deviations by which the phase margin must be positive: 95 % of a Gaussian lie above.
-const SURE: f64 = 1.645;
 
 /// Why a cycle has led to no controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -153,6 +152,23 @@ pub enum Stage {
     Design,
 }
 
+impl Stage {
+    /// Its name, for logs.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Wait => "wait",
+            Self::Collect => "collect",
+            Self::Sign => "sign",
+            Self::Classify => "classify",
+            Self::Refine => "refine",
+            Self::Judge => "judge",
+            Self::Gains => "gains",
+            Self::Design => "design",
+        }
+    }
+}
+
 /// Since the windows were opened: rises of the relay, complete cycles; and the switches taken back until then.
 #[derive(Clone, Copy, Debug, Default)]
 struct Collected {
@@ -164,7 +180,6 @@ struct Collected {
 /// A controller in the making: how many of the coordinates have been followed.
 #[derive(Clone, Copy, Debug)]
 struct Design {
-    refined: Refined,
     pd: Pd,
     spread: Spread,
     followed: usize,
@@ -234,12 +249,6 @@ impl<'a> Identification<'a> {
         self.past = Past::default();
         self.was_high = true;
         self.stage = Stage::Wait;
-    }
-
-    /// The steady oscillation so far.
-    #[must_use]
-    pub fn oscillation(&self) -> &SteadyRun {
-        &self.run
     }
 
     /// The latest changes of the input.
@@ -409,7 +418,6 @@ impl<'a> Identification<'a> {
             LeadTable::from_bytes(self.pack.lead_table().bytes).map_err(|_| Refusal::NoGains)?;
         let pd = table.pd(&refined.process).map_err(|_| Refusal::NoGains)?;
         self.design = Some(Design {
-            refined,
             pd,
             spread: Spread::new(&refined.process, &pd).ok_or(Refusal::NoGains)?,
             followed: 0,
@@ -419,11 +427,10 @@ impl<'a> Identification<'a> {
     }
 
     fn design(&mut self, cycle: &Cycle) -> Result<Option<Identified>, Refusal> {
-        let Some(design) = &mut self.design else {
+        let (Some(refined), Some(design)) = (&self.refined, &mut self.design) else {
             return Ok(None);
         };
         let Design {
-            refined,
             pd,
             spread,
             followed,
@@ -439,7 +446,7 @@ impl<'a> Identification<'a> {
         let uncertain = |sigma| Refusal::TooUncertain(phase_margin_rad, sigma);
         let covariance = refined.covariance.ok_or(uncertain(f64::INFINITY))?;
         let deviations = spread.deviations(&covariance);
-        let is_sure = phase_margin_rad > SURE * deviations.phase_margin_rad;
+        let is_sure = phase_margin_rad > HALF_90_PERCENT * deviations.phase_margin_rad;
         if !is_sure {
             return Err(uncertain(deviations.phase_margin_rad));
         }

@@ -26,6 +26,9 @@ pub const MOST_MISFIT: f64 = 0.05;
 /// so wrong promises nothing.
 pub const MOST_RESPONSE_ERROR: f64 = 0.34;
 
+/// Standard deviations to either side that hold 90 % of a Gaussian; 95 % of it lie above the lower end.
+pub const HALF_90_PERCENT: f64 = 1.645;
+
 /// Residual beyond the noise, over the oscillation: root mean squares of the bins.
 #[must_use]
 pub fn misfit<const BINS: usize, const EDGES: usize>(

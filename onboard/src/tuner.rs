@@ -47,6 +47,21 @@ pub enum Phase {
     Aborted,
 }
 
+impl Phase {
+    /// Its name, for logs.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Idle => "idle",
+            Self::TakeOff => "takeoff",
+            Self::Relay => "relay",
+            Self::Identify => "identify",
+            Self::Control => "control",
+            Self::Aborted => "aborted",
+        }
+    }
+}
+
 /// The tuner of one axis. See the [module](self).
 pub struct Tuner<'a> {
     core: Core<'a>,

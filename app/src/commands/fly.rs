@@ -8,6 +8,8 @@ use onecycle_lab::Deterioration;
 use onecycle_lab::evaluate::{Cycles, CyclesError};
 use onecycle_lab::flights::{judged, trace};
 use onecycle_lab::grid::Pieces;
+use onecycle_onboard::tuner::Phase;
+use onecycle_plant::multirotor::pilot::TICK_S;
 use onecycle_plant::multirotor::{Axis, Flown, Mission, Record, Tuned, fly};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -109,13 +111,11 @@ fn one(mission: Mission, seed: u64, is_kept: bool) -> Result<Flight, Failure> {
 
 /// The last cycles of the relay, one by one.
 fn cycles(flown: &Flown) -> Result<Cycles, CyclesError> {
-    use onecycle_onboard::tuner::Phase;
     let index = Axis::Altitude.index();
     let oscillates =
         |record: &&Record| matches!(record.phases[index], Phase::Relay | Phase::Identify);
     let records: Vec<Record> = flown.records.iter().filter(oscillates).copied().collect();
-    let sample_s = onecycle_plant::multirotor::pilot::TICK_S;
-    Cycles::of(&trace(&records, Axis::Altitude), sample_s, CYCLES)
+    Cycles::of(&trace(&records, Axis::Altitude), TICK_S, CYCLES)
 }
 
 /// Every tick: what was true, what was measured and commanded, what each tuner was doing.
@@ -140,7 +140,7 @@ fn csv(out: &mut dyn Write, records: &[Record]) -> io::Result<()> {
         write!(out, ",{},{},{}", angles.x, angles.y, angles.z)?;
         for axis in Axis::ALL {
             let k = axis.index();
-            let phase = format!("{:?}", record.phases[k]).to_lowercase();
+            let phase = record.phases[k].name();
             write!(
                 out,
                 ",{},{},{phase}",

@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use onecycle_lab::Deterioration;
 use onecycle_lab::evaluate::{Cycles, PHASE_MARGIN_DEG};
+use onecycle_onboard::judgement::HALF_90_PERCENT;
 use onecycle_plant::multirotor::{Axis, Flown, Mission, Record, Tuned};
 
 use super::number::percent;
@@ -11,9 +12,6 @@ use crate::commands::fly::{Campaign, Flight};
 use crate::commands::reproduce::cycles;
 use crate::pages::page::{self, Cell, Section, page};
 use crate::pages::plot::{self, Figure, Marks, Series};
-
-/// Half of a 90 % interval, in standard deviations.
-const HALF_WIDTH: f64 = 1.645;
 
 /// Points of a series: as many as a wide screen has.
 const POINTS: usize = 2000;
@@ -180,7 +178,7 @@ fn on_the_vehicle(tuned: &[&(Tuned, Deterioration)]) -> String {
         .iter()
         .fold(f64::INFINITY, |least, (_, margin)| least.min(*margin));
     let width =
-        |tuned: &Tuned| HALF_WIDTH * tuned.identified.deviations.phase_margin_rad.to_degrees();
+        |tuned: &Tuned| HALF_90_PERCENT * tuned.identified.deviations.phase_margin_rad.to_degrees();
     let kept = (tuned.iter().zip(&costs))
         .filter(|((tuned, _), (_, margin))| *margin >= PHASE_MARGIN_DEG - width(tuned))
         .count();

@@ -5,7 +5,7 @@ use onecycle_lab::baselines::pem::{
     Data, InitialState, InputBias, Settings, SweptRelay, fit, identify,
 };
 use onecycle_lab::campaign::{Campaign, Measure};
-use onecycle_lab::identify::{Method, Signals, find_oscillation};
+use onecycle_lab::identify::{Signals, find_oscillation};
 use onecycle_onboard::{RelayError, RelaySettings};
 
 use super::{SAMPLE_S, cost, margin, process, relay_test, run};
@@ -168,14 +168,7 @@ fn the_sweep_survives_noise_and_bias() {
         seed: 7,
         bias: 0.5,
         sigma: 0.03,
-        sigma_uniform: false,
-        offset: 0.0,
-        trim: false,
-        asymmetry: 0.0,
-        cycles: 1,
-        time_scale: 1.0,
-        method: Method::default(),
-        beta: -0.73,
+        ..Campaign::QUIET
     };
     for n in 0..campaign.cases {
         let case = campaign.case(n).unwrap();

@@ -19,8 +19,8 @@ use core::hint::black_box;
 use onecycle_onboard::RelaySettings;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::Limits;
-use onecycle_onboard::identification::{Identified, Room, Stage};
-use onecycle_onboard::tuner::{Core, Phase, TunerSettings};
+use onecycle_onboard::identification::{Identified, Room};
+use onecycle_onboard::tuner::{Core, TunerSettings};
 
 use crate::axis::{Axis, K_OVER_T_BODY, TICK_S};
 pub use crate::line::Line;
@@ -96,11 +96,11 @@ pub fn fly(
         let mut line = Line::default();
         line.word("tick")
             .number(tick.into())
-            .word(name(before))
-            .word(name(tuner.phase()))
+            .word(before.name())
+            .word(tuner.phase().name())
             .number(output.to_bits().into())
             .number(instructions)
-            .word(of_work(stage));
+            .word(stage.name());
         say(&mut line);
         axis.push(output.into());
     }
@@ -154,28 +154,4 @@ pub fn numbers(found: &Identified) -> [(&'static str, f64); 17] {
         ("tau_deviation_s", deviations.tau_s),
         ("phase_margin_deviation_rad", deviations.phase_margin_rad),
     ]
-}
-
-fn name(phase: Phase) -> &'static str {
-    match phase {
-        Phase::Idle => "Idle",
-        Phase::TakeOff => "TakeOff",
-        Phase::Relay => "Relay",
-        Phase::Identify => "Identify",
-        Phase::Control => "Control",
-        Phase::Aborted => "Aborted",
-    }
-}
-
-fn of_work(stage: Stage) -> &'static str {
-    match stage {
-        Stage::Wait => "wait",
-        Stage::Collect => "collect",
-        Stage::Sign => "sign",
-        Stage::Classify => "classify",
-        Stage::Refine => "refine",
-        Stage::Judge => "judge",
-        Stage::Gains => "gains",
-        Stage::Design => "design",
-    }
 }

@@ -3,7 +3,7 @@
 use super::Phase;
 use super::settings::{CheckedSettings, TunerSettings};
 use crate::control::{Measurement, PdLaw, RateEstimate};
-use crate::guard::{Abort, Guard, Seen};
+use crate::guard::{Abort, Guard, Motion};
 use crate::identification::{Identification, Identified, Observed, Room, Stage};
 use crate::pack::Pack;
 use crate::prediction::{Beginning, Prediction};
@@ -179,15 +179,7 @@ impl<'a> Core<'a> {
     /// Takes the sample in, unless it must not be used.
     fn watch(&mut self, dt_s: f32, measurement: &Measurement, reference: f32) -> Result<(), Abort> {
         let is_test = !matches!(self.phase, Phase::Idle | Phase::Aborted) && !self.is_proven();
-        let seen = |rate, reference, test_s, since_switch_s| Seen {
-            measurement,
-            reference,
-            rate,
-            dt_s,
-            test_s,
-            since_switch_s,
-        };
-        self.guard.check_data(&seen(0.0, reference, None, None))?;
+        self.guard.check_data(measurement, reference, dt_s)?;
         self.value = measurement.value;
         let rate = self.rate.step(measurement, dt_s, self.settings.rate_lag_s);
         if !is_test {
@@ -195,11 +187,13 @@ impl<'a> Core<'a> {
             return Ok(());
         }
         self.test_s += dt_s;
-        let switch_s = matches!(self.phase, Phase::Relay | Phase::Identify);
-        let since_s = switch_s.then_some(self.since_switch_s + dt_s);
-        let test_s = (self.phase != Phase::Control).then_some(self.test_s);
-        self.guard
-            .check_motion(&seen(rate, self.reference, test_s, since_s))
+        let has_relay = matches!(self.phase, Phase::Relay | Phase::Identify);
+        self.guard.check_motion(&Motion {
+            distance: self.value - self.reference,
+            rate,
+            test_s: (self.phase != Phase::Control).then_some(self.test_s),
+            since_switch_s: has_relay.then_some(self.since_switch_s + dt_s),
+        })
     }
 
     fn end(&mut self, reason: Abort) {

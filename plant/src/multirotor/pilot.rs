@@ -15,6 +15,7 @@ use rand::Rng;
 use super::body::GRAVITY_M_PER_S2;
 use super::error::VehicleError;
 use super::flight::Flight;
+use super::frames::Vec3;
 use super::hover::Axis;
 use super::mixer::Command;
 use super::sensors::Reading;
@@ -137,7 +138,7 @@ impl Axis {
 pub struct Tuned {
     /// The axis.
     pub axis: Axis,
-    /// When its test began and when its controller was proven (s).
+    /// When its test began (s).
     pub from_s: f64,
     /// When its controller was proven (s).
     pub until_s: f64,
@@ -332,17 +333,8 @@ impl<R: Rng> Pilot<R> {
     /// Where the vehicle cannot hover.
     pub fn truth(&self, axis: Axis) -> Result<Process, VehicleError> {
         let charge = self.flight.state().charge;
-        let hover = self
-            .flight
-            .vehicle()
-            .hover(charge, super::frames::Vec3::ZERO)?;
+        let hover = self.flight.vehicle().hover(charge, Vec3::ZERO)?;
         hover.linearised(axis)
-    }
-
-    /// All ticks so far.
-    #[must_use]
-    pub fn records(&self) -> &[Record] {
-        &self.records
     }
 
     /// All ticks so far.
@@ -365,9 +357,6 @@ fn tilt(sensed: &Reading) -> [f64; 2] {
 
 /// A vehicle that hovers at this altitude (m), full of charge.
 pub(super) fn hovering(vehicle: Vehicle, altitude_m: f64) -> Result<Flight, VehicleError> {
-    let hover = vehicle.hover(1.0, super::frames::Vec3::ZERO)?;
-    Flight::new(
-        vehicle,
-        hover.state(super::frames::Vec3::new(0.0, 0.0, altitude_m)),
-    )
+    let hover = vehicle.hover(1.0, Vec3::ZERO)?;
+    Flight::new(vehicle, hover.state(Vec3::new(0.0, 0.0, altitude_m)))
 }

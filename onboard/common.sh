@@ -1,0 +1,15 @@
+# Sourced by the scripts in the folders beside it. `what` names what they are about.
+
+fail() { # SENTENCE [LOG]
+    echo "$what failed: $1" >&2
+    if [[ -s ${2:-} ]]; then
+        tail -n 20 "$2" >&2
+    fi
+    exit 1
+}
+
+# The lock file here and that of the workspace must name the same libm, by version and checksum.
+same_libm() {
+    [[ $(grep -A 3 '^name = "libm"' Cargo.lock) == "$(grep -A 3 '^name = "libm"' ../../Cargo.lock)" ]] ||
+        fail "its Cargo.lock names another libm than the workspace's: run 'cargo update -p libm' in both."
+}
