@@ -244,6 +244,9 @@ pub(crate) struct Tune {
     #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true,
           value_parser = phase_margin)]
     pub(crate) phase_margin: f64,
+    /// Write a page with pictures to this file, as HTML that needs no network
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) report: Option<PathBuf>,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
@@ -405,6 +408,9 @@ pub(crate) struct Grid {
     #[arg(long, value_name = "GRID.json",
           conflicts_with_all = ["space", "deterioration", "fewest", "equal_gains", "out"])]
     pub(crate) from: Option<PathBuf>,
+    /// Write a page with pictures to this file, as HTML that needs no network
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) report: Option<PathBuf>,
     /// Draw the grid in this file, as SVG
     #[arg(long, value_name = "FILE")]
     pub(crate) picture: Option<PathBuf>,

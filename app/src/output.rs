@@ -72,6 +72,11 @@ pub(crate) fn write_file(
     Ok(())
 }
 
+/// Writes a text to a file: whole, or not at all.
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+    write_file(path, |file| file.write_all(text.as_bytes()))
+}
+
 /// Temporary files are private; what a user asked for is readable like any other file.
 #[cfg(unix)]
 fn set_usual_permissions(file: &File) -> io::Result<()> {

@@ -10,7 +10,7 @@ use plotters::coord::Shift;
 use plotters::prelude::*;
 
 use crate::failure::Failure;
-use crate::output::write_file;
+use crate::output::write_text;
 
 /// What is drawn on.
 pub(crate) type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
@@ -45,7 +45,7 @@ pub(crate) fn write_svg(
             .and_then(|()| area.present().map_err(Into::into))
             .map_err(|error| Failure::output(path, std::io::Error::other(error.to_string())))?;
     }
-    write_file(path, |file| file.write_all(svg.as_bytes()))
+    write_text(path, &svg)
 }
 
 /// A number beside an axis, without the rounding of the steps that led to it.

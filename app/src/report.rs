@@ -10,6 +10,7 @@ pub(crate) mod identifier;
 pub(crate) mod json;
 pub(crate) mod number;
 pub(crate) mod pack;
+pub(crate) mod page;
 pub(crate) mod phase;
 pub(crate) mod reproduction;
 pub(crate) mod text;

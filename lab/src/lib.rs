@@ -11,6 +11,8 @@
 //! | which relay and tuning rule give that PD?        | [`TuningRule`]                       |
 //! | what does one process's PD cost on another?      | [`deterioration()`]                  |
 //! | and a cascade with a PID of the rate?            | [`Cascade`]                          |
+//! | what is the open loop at a frequency?            | [`loop_response()`]                  |
+//! | what does a recording say without a model?       | [`harmonics()`]                      |
 //! | what will the step look like?                    | [`step_response()`]                  |
 //! | what would other methods make of the experiment? | [`baselines`]                        |
 //!
@@ -31,6 +33,7 @@
 //! # }
 //! ```
 
+pub mod bands;
 pub mod baselines;
 pub mod campaign;
 pub mod candidate;
@@ -40,14 +43,17 @@ mod cholesky;
 pub mod classifier;
 pub mod cost;
 pub mod dataset;
+pub mod density;
 pub mod deterioration;
 pub mod evaluate;
 pub mod flights;
 pub mod grid;
+pub mod harmonics;
 pub mod identifier;
 pub mod identify;
 pub mod lead_table;
 pub mod limit_cycle;
+pub mod loop_response;
 pub mod margins;
 pub mod onnx;
 mod open_loop;
@@ -63,12 +69,16 @@ mod step_metrics;
 pub mod step_response;
 pub mod surface;
 pub mod train;
+pub mod whiteness;
 
 pub use candidate::{Candidate, CandidateError, Gains};
 pub use cascade::{Cascade, CascadeCost};
 pub use cost::ise;
+pub use density::{Density, density};
 pub use deterioration::{Deterioration, deterioration};
+pub use harmonics::{Harmonic, harmonics};
 pub use limit_cycle::LimitCycle;
+pub use loop_response::{LoopResponse, loop_response};
 pub use margins::{Margins, margins};
 pub use optimum::{Optimum, OptimumError, pd, pd_at_phase_margin};
 pub use phase::{DistinguishingPhase, LocalOptima, distinguishing_phase};
@@ -77,3 +87,4 @@ pub use space::{FieldError, Space};
 pub use step_metrics::StepMetrics;
 pub use step_response::{Sample, StepResponse, StepResponseError, step_response};
 pub use surface::Direction;
+pub use whiteness::{Whiteness, whiteness};

@@ -63,6 +63,32 @@ pub struct StepResponse {
     pub ise: f64,
 }
 
+impl StepResponse {
+    /// Output and controller's output at a time (s), on the straight line between samples: `(1/64)^2 / 8`, 3e-5 of
+    /// the step, beside the curve at most. Before the step of the reference it is that at its beginning, after the
+    /// last sample that one.
+    #[must_use]
+    pub fn at(&self, t_s: f64) -> (f64, f64) {
+        let next = self.samples.partition_point(|sample| sample.t_s <= t_s);
+        let (Some(before), Some(after)) = (
+            self.samples.get(next.saturating_sub(1)),
+            self.samples.get(next).or(self.samples.last()),
+        ) else {
+            return (0.0, 0.0);
+        };
+        let length_s = after.t_s - before.t_s;
+        let part = if length_s > 0.0 {
+            ((t_s - before.t_s) / length_s).clamp(0.0, 1.0)
+        } else {
+            0.0
+        };
+        (
+            before.y + part * (after.y - before.y),
+            before.u + part * (after.u - before.u),
+        )
+    }
+}
+
 /// Why there is no settled response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum StepResponseError {

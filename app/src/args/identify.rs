@@ -16,6 +16,7 @@ use super::{PackSource, phase_margin, sample_rate, time_unit};
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle identify examples/simulated_hover.csv\n",
+    "  onecycle identify examples/simulated_hover.csv --report report.html\n",
     "  onecycle identify log.csv --time t_ms --input 4 --output roll --cycles 4\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
     "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process (see the ",
@@ -27,6 +28,9 @@ pub(crate) struct Identify {
     /// Print the report as JSON (schema: docs/identify-json.md)
     #[arg(long)]
     pub(crate) json: bool,
+    /// Write a page with pictures to this file, as HTML that needs no network
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) report: Option<PathBuf>,
     /// Fit the last N steady cycles (1 to 50)
     #[arg(long, value_name = "N", default_value_t = 8,
           value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]

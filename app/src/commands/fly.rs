@@ -17,7 +17,7 @@ use rand_pcg::Pcg64Mcg;
 use super::workers::Workers;
 use crate::args::Fly;
 use crate::failure::{Failure, exit};
-use crate::output::{print, write_file};
+use crate::output::{print, write_file, write_text};
 use crate::report::fly as report;
 
 /// Cycles that are looked at one by one: those of the paper's Table VII.
@@ -77,7 +77,7 @@ pub(crate) fn run(arguments: &Fly) -> Result<ExitCode, Failure> {
         }
         let path = out.join("flights.html");
         let page = report::html(&campaigns);
-        write_file(&path, |file| file.write_all(page.as_bytes()))?;
+        write_text(&path, &page)?;
         print(&format!("{}\n", path.display()))?;
     }
     let all_flown = (campaigns.iter().flat_map(|campaign| &campaign.flights))

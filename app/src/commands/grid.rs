@@ -14,7 +14,7 @@ use self::part::Part;
 use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
-use crate::output::{complain, print, write_file};
+use crate::output::{complain, print, write_file, write_text};
 use crate::{pictures, report, settings};
 
 /// Most members whose costs are written unasked: four million numbers, 40 MB.
@@ -51,6 +51,10 @@ pub(crate) fn run(arguments: &args::Grid) -> Result<ExitCode, Failure> {
     workers.finish();
     if let Some(path) = &arguments.picture {
         pictures::grid::write(path, &done.grid)?;
+    }
+    if let Some(path) = &arguments.report {
+        let page = report::grid::html(&done).map_err(Failure::usage)?;
+        write_text(path, &page)?;
     }
     print(&if arguments.json {
         report::grid::json(&done)

@@ -10,8 +10,8 @@ use super::pack;
 use super::signals::{breaks, signals};
 use crate::args::Identify;
 use crate::failure::{Failure, exit};
-use crate::output::print;
-use crate::report::{json, text};
+use crate::output::{print, write_text};
+use crate::report::{json, page, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let recording = read(arguments)?;
@@ -26,6 +26,12 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let pack = pack::read(&arguments.pack, &bytes)?;
     let found = identify_by(&signals, &options, Some(&pack));
     let name = arguments.file.display().to_string();
+    if let Some(path) = &arguments.report {
+        write_text(
+            path,
+            &page::identification(&name, &recording, &signals, &found),
+        )?;
+    }
     print(&if arguments.json {
         json::identification(&name, &recording, &found)
     } else {

@@ -19,7 +19,7 @@ use super::train::classifier::Keep;
 use super::workers::Workers;
 use crate::args::{Name, Reproduce};
 use crate::failure::{Failure, exit};
-use crate::output::{complain, print, write_file};
+use crate::output::{complain, print, write_text};
 use crate::report::reproduction as report;
 
 pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
@@ -43,7 +43,7 @@ pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
     ];
     for (name, text) in pages {
         let path = out.join(name);
-        write_file(&path, |file| file.write_all(text.as_bytes()))?;
+        write_text(&path, &text)?;
         print(&format!("{}\n", path.display()))?;
     }
     Ok(ExitCode::from(exit::DONE))

@@ -6,8 +6,8 @@ use onecycle_lab::{pd, step_response};
 
 use crate::args::Tune;
 use crate::failure::{Failure, exit};
-use crate::output::print;
-use crate::report::{json, text};
+use crate::output::{print, write_text};
+use crate::report::{json, page, text};
 
 pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
     let process = arguments.process.process()?;
@@ -15,6 +15,9 @@ pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
     let step = step_response(&process, optimum.pd)
         .ok()
         .map(|response| response.metrics);
+    if let Some(path) = &arguments.report {
+        write_text(path, &page::design(&process, &optimum))?;
+    }
     print(&if arguments.json {
         json::design(&process, &optimum, step.as_ref())
     } else {

@@ -2,32 +2,84 @@
 (() => {
   const root = document.documentElement;
   const asks = matchMedia("(prefers-color-scheme: dark)");
-  const colours = ["#3d85e0", "#dd7426", "#22a37a", "#c25fa8", "#b8901a", "#4fa8c4"];
+  const palette = ["#3d85e0", "#dd7426", "#22a37a", "#c25fa8", "#b8901a", "#4fa8c4"];
   const plots = [...document.querySelectorAll(".plot")].map((place) => {
     const { data, layout } = JSON.parse(place.querySelector("script").textContent);
-    return { place, data, layout };
+    return { place, data, layout, width: 0 };
   });
 
-  const draw = () => {
+  // Colours of the theme, #rrggbb: of what a series shows, and of the page.
+  const colours = () => {
     const style = getComputedStyle(root);
-    const [text, line] = ["--text", "--line"].map((name) => style.getPropertyValue(name).trim());
-    for (const { place, data, layout } of plots) {
-      const axis = (one) => ({ ...one, gridcolor: line, linecolor: line, zerolinecolor: line });
-      Plotly.react(place, data, {
-        ...layout,
-        xaxis: axis(layout.xaxis),
-        yaxis: axis(layout.yaxis),
-        colorway: colours,
-        font: { color: text, family: "system-ui, sans-serif" },
-        paper_bgcolor: "rgba(0,0,0,0)",
-        plot_bgcolor: "rgba(0,0,0,0)",
-        modebar: { bgcolor: "rgba(0,0,0,0)", color: line, activecolor: text },
-      }, { displaylogo: false });
+    const of = (name) => style.getPropertyValue(`--${name}`).trim();
+    return Object.fromEntries(
+      ["text", "line", "card", "back", "measured", "model", "input", "reference"].map((name) => [name, of(name)]));
+  };
+  // Between two colours a part of the way.
+  const mixed = (from, to, part) => {
+    const channel = (colour, at) => parseInt(colour.slice(at, at + 2), 16);
+    const between = (at) => Math.round(channel(from, at) + part * (channel(to, at) - channel(from, at)));
+    return `rgb(${[1, 3, 5].map(between)})`;
+  };
+  const coloured = (trace, theme, next) => {
+    if (trace.kind === "regions") {
+      const colorscale = [0, 1 / 3, 2 / 3, 1].map((at) => [at, mixed(theme.model, theme.back, 0.25 + 0.75 * at)]);
+      return { ...trace, colorscale, line: { color: theme.model, width: 1 } };
+    }
+    if (trace.kind === "correlations") {
+      const strong = (colour) => mixed(theme.back, colour, 0.75);
+      const colorscale = [[0, strong(theme.input)], [0.5, theme.card], [1, strong(theme.model)]];
+      return { ...trace, colorscale, textfont: { color: theme.text } };
+    }
+    const colour = trace.hue === "next" ? next() : theme[trace.hue];
+    if (trace.fill) return { ...trace, fillcolor: `${colour}40` };
+    return { ...trace, line: { ...trace.line, color: colour }, marker: { ...trace.marker, color: colour } };
+  };
+
+  const draw = (plot, theme) => {
+    const { place, data, layout } = plot;
+    let used = 0;
+    const next = () => palette[used++ % palette.length];
+    const axes = Object.entries(layout).filter(([name]) => /^[xy]axis/.test(name));
+    const axis = (one) => ({ ...one, gridcolor: theme.line, linecolor: theme.line, zerolinecolor: theme.line });
+    plot.width = place.clientWidth;
+    Plotly.react(place, data.map((trace) => coloured(trace, theme, next)), {
+      ...layout,
+      ...Object.fromEntries(axes.map(([name, one]) => [name, axis(one)])),
+      annotations: layout.annotations.map((note) => ({
+        ...note, arrowcolor: theme.text, bgcolor: `${theme.back}cc`, font: { size: 12 },
+      })),
+      shapes: (layout.shapes ?? []).map((shape) => ({ ...shape, fillcolor: `${theme.model}1f` })),
+      font: { color: theme.text, family: "system-ui, sans-serif" },
+      paper_bgcolor: "rgba(0,0,0,0)",
+      plot_bgcolor: "rgba(0,0,0,0)",
+      hoverlabel: { bgcolor: theme.card, font: { color: theme.text } },
+      modebar: { bgcolor: "rgba(0,0,0,0)", color: theme.line, activecolor: theme.text },
+    }, { displaylogo: false, displayModeBar: place.closest(".small") ? false : "hover" });
+  };
+
+  // What is on the screen is drawn at once, the rest while there is nothing else to do.
+  let waiting = [];
+  const idle = window.requestIdleCallback ?? ((work) => setTimeout(work, 0));
+  const drawNext = () => {
+    const plot = waiting.shift();
+    if (plot) {
+      draw(plot, colours());
+      idle(drawNext);
+    } else {
+      root.dataset.drawn = root.dataset.theme;
     }
   };
-  const show = (theme) => {
+  const isSeen = ({ place }) => {
+    const { top, bottom } = place.getBoundingClientRect();
+    return bottom > 0 && top < innerHeight;
+  };
+  const show = (theme, isWhole) => {
     root.dataset.theme = theme;
-    draw();
+    const now = plots.filter((plot) => isWhole || isSeen(plot));
+    waiting = plots.filter((plot) => !now.includes(plot));
+    now.forEach((plot) => draw(plot, colours()));
+    idle(drawNext);
   };
 
   let chosen = null;
@@ -37,11 +89,17 @@
     show(theme());
   });
   asks.addEventListener("change", () => show(theme()));
-  addEventListener("beforeprint", () => show("light"));
+  addEventListener("beforeprint", () => show("light", true));
   addEventListener("afterprint", () => show(theme()));
   show(theme());
 
   // A window, a phone turned and a sheet of paper all change the width.
-  const follow = new ResizeObserver((changed) => changed.forEach(({ target }) => Plotly.Plots.resize(target)));
+  const follow = new ResizeObserver(() => {
+    const changed = plots.filter(({ place, width }) => width > 0 && width !== place.clientWidth);
+    changed.forEach((plot) => {
+      plot.width = plot.place.clientWidth;
+      Plotly.Plots.resize(plot.place);
+    });
+  });
   plots.forEach(({ place }) => follow.observe(place));
 })();

@@ -38,6 +38,12 @@ pub(crate) fn paragraph(class: &str, text: &str) -> String {
     format!("<p class=\"{}\">{}</p>\n", escaped(class), escaped(text))
 }
 
+/// What the whole page comes down to, good or bad.
+pub(crate) fn verdict(is_good: bool, text: &str) -> String {
+    let kind = if is_good { "good" } else { "bad" };
+    format!("<p class=\"verdict {kind}\">{}</p>\n", escaped(text))
+}
+
 /// A list.
 pub(crate) fn list(items: &[String]) -> String {
     let items = items
@@ -92,11 +98,18 @@ pub(crate) fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'
 pub(crate) fn figure(figure: &Figure) -> String {
     // Within a script nothing but its end is read: no `<`, no end.
     let json = figure.to_json().replace('<', "\\u003c");
+    let shape = figure.shape.name();
     format!(
-        "<figure><div class=\"plot\"><script type=\"application/json\">{json}</script></div>\
+        "<figure class=\"{shape}\"><div class=\"plot\"><script type=\"application/json\">{json}</script></div>\
          <figcaption>{}</figcaption></figure>\n",
         escaped(&figure.caption)
     )
+}
+
+/// Small plots beside each other, as many as there is room for.
+pub(crate) fn row(figures: &[Figure]) -> String {
+    let figures = figures.iter().map(figure).collect::<String>();
+    format!("<div class=\"row\">\n{figures}</div>\n")
 }
 
 /// The whole page.
@@ -139,6 +152,7 @@ const SCRIPT: &str = include_str!("page.js");
 
 #[cfg(test)]
 mod tests {
+    use super::super::plot::{Axis, Panel};
     use super::*;
 
     // Whatever stands in a text, it is text: no tag of it reaches the page, and it can leave no
@@ -157,16 +171,10 @@ mod tests {
         let html = facts(&[(hostile.to_owned(), hostile.to_owned())]);
         assert_eq!(html.matches(safe).count(), 2);
         assert!(!html.contains("<b") && !html.contains("</script"));
-        let axis = super::super::plot::Axis {
-            title: hostile.to_owned(),
-            is_logarithmic: false,
-        };
-        let html = figure(&Figure {
-            caption: hostile.to_owned(),
-            x: axis.clone(),
-            y: axis,
-            series: vec![],
-        });
+        assert!(!verdict(true, hostile).contains("<b"));
+        let axis = Axis::titled(hostile);
+        let panel = Panel::new(axis.clone(), vec![]);
+        let html = figure(&Figure::single(hostile, axis, panel));
         assert_eq!(html.matches("</script").count(), 1, "{html}");
     }
 

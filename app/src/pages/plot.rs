@@ -1,29 +1,53 @@
-//! Plots of a page: series of points as plotly.js draws them (plotly.rs, MIT licence).
+//! Plots of a page: panels of series as plotly.js draws them (plotly.rs, MIT licence).
+//!
+//! A series says what it is, not how it looks: colours are the page's, the same for the same thing in every figure,
+//! and they change with its theme.
+
+mod json;
 
 use serde::{Deserialize, Serialize};
-use serde_json::json;
-
-use super::page::escaped;
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Marks {
     Line,
+    Dashes,
+    /// Each value is held until the next.
+    Steps,
     Points,
     LineAndPoints,
+    /// A closed polygon, filled.
+    Area,
+    Bars,
 }
 
-/// Points under one name.
+/// What a series shows, which is what decides its colour.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Hue {
+    /// One of several of a kind: the next of the palette.
+    #[default]
+    Next,
+    Measured,
+    Model,
+    Input,
+    /// What others are held against.
+    Reference,
+}
+
+/// Points under one name; those of no name are not in the legend.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Series {
     pub(crate) name: String,
     pub(crate) marks: Marks,
+    #[serde(default)]
+    pub(crate) hue: Hue,
     pub(crate) x: Vec<f64>,
     pub(crate) y: Vec<f64>,
 }
 
-/// Digits of a coordinate that a screen can show.
+/// Digits that a screen can show of a coordinate, and of the width of all that there are.
 const DIGITS: usize = 5;
 
 impl Series {
@@ -33,26 +57,52 @@ impl Series {
         marks: Marks,
         points: impl IntoIterator<Item = (f64, f64)>,
     ) -> Self {
-        let (x, y) = points
-            .into_iter()
-            .map(|(x, y)| (short(x), short(y)))
-            .unzip();
+        let (x, y): (Vec<f64>, Vec<f64>) = points.into_iter().unzip();
         Self {
             name: name.to_owned(),
             marks,
-            x,
-            y,
+            hue: Hue::Next,
+            x: shortened(x),
+            y: shortened(y),
         }
+    }
+
+    /// What lies between two curves over the same abscissas.
+    pub(crate) fn between(name: &str, x: &[f64], low: &[f64], high: &[f64]) -> Self {
+        let there = x.iter().zip(low);
+        let back = x.iter().zip(high).rev();
+        Self::of_points(name, Marks::Area, there.chain(back).map(|(&x, &y)| (x, y)))
+    }
+
+    pub(crate) fn hue(self, hue: Hue) -> Self {
+        Self { hue, ..self }
     }
 }
 
-/// The number with no more digits than are shown.
-fn short(value: f64) -> f64 {
-    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
+/// The numbers with no more digits than are shown: of each, and of what lies between the least and the greatest.
+fn shortened(mut values: Vec<f64>) -> Vec<f64> {
+    let ends = values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (value.min(low), value.max(high))
+        });
+    let width = ends.1 - ends.0;
+    for value in &mut values {
+        let ahead = (value.abs() / width).log10();
+        let common = if ahead.is_finite() {
+            ahead.ceil().clamp(0.0, 10.0) as usize
+        } else {
+            0
+        };
+        *value = format!("{value:.*e}", DIGITS - 1 + common)
+            .parse()
+            .unwrap_or(*value);
+    }
+    values
 }
 
 /// An axis.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Axis {
     /// What it shows, and in which unit.
@@ -60,56 +110,165 @@ pub(crate) struct Axis {
     /// Whether it is logarithmic.
     #[serde(default)]
     pub(crate) is_logarithmic: bool,
+    /// What is shown of it [default: all that there is].
+    #[serde(default)]
+    pub(crate) range: Option<(f64, f64)>,
+    /// Whether it has neither numbers nor a grid.
+    #[serde(default)]
+    pub(crate) is_bare: bool,
 }
 
-/// A plot and what stands under it.
+impl Axis {
+    /// A linear axis.
+    pub(crate) fn titled(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            ..Self::default()
+        }
+    }
+
+    pub(crate) fn logarithmic(self) -> Self {
+        Self {
+            is_logarithmic: true,
+            ..self
+        }
+    }
+
+    pub(crate) fn from_to(self, low: f64, high: f64) -> Self {
+        Self {
+            range: Some((low, high)),
+            ..self
+        }
+    }
+}
+
+/// Words at a point of a panel, with an arrow to it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Note {
+    pub(crate) text: String,
+    pub(crate) x: f64,
+    pub(crate) y: f64,
+    /// Where the words stand from there: to the right and down (pixels).
+    pub(crate) away: (f64, f64),
+}
+
+/// Values over a plane, `z[row][column]` at `y[row]`, `x[column]`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Field {
+    pub(crate) kind: FieldKind,
+    pub(crate) x: Places,
+    pub(crate) y: Places,
+    pub(crate) z: Vec<Vec<f64>>,
+}
+
+/// Where the values of a field stand.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub(crate) enum Places {
+    Numbers(Vec<f64>),
+    Names(Vec<String>),
+}
+
+/// What the values of a field are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum FieldKind {
+    /// Contents of the smallest regions, 0 to 1: lines about those of 50, 90 and 99 %.
+    Regions,
+    /// Correlations, -1 to 1: coloured squares with their numbers.
+    Correlations,
+}
+
+/// One of the panels that stand above each other over the same abscissas.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Panel {
+    pub(crate) y: Axis,
+    #[serde(default)]
+    pub(crate) series: Vec<Series>,
+    #[serde(default)]
+    pub(crate) field: Option<Field>,
+    #[serde(default)]
+    pub(crate) notes: Vec<Note>,
+}
+
+impl Panel {
+    pub(crate) fn new(y: Axis, series: Vec<Series>) -> Self {
+        Self {
+            y,
+            series,
+            ..Self::default()
+        }
+    }
+}
+
+/// How much room a figure has.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Shape {
+    #[default]
+    Wide,
+    /// For two panels.
+    Tall,
+    /// Both axes have one scale.
+    ToScale,
+    Square,
+    /// One of several in a row.
+    Small,
+}
+
+impl Shape {
+    /// As the page's style has it.
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Wide => "wide",
+            Self::Tall => "tall",
+            Self::ToScale => "to-scale",
+            Self::Square => "square",
+            Self::Small => "small",
+        }
+    }
+}
+
+/// Panels above each other and what stands under them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Figure {
     pub(crate) caption: String,
     pub(crate) x: Axis,
-    pub(crate) y: Axis,
+    /// The uppermost first.
+    pub(crate) panels: Vec<Panel>,
     #[serde(default)]
-    pub(crate) series: Vec<Series>,
+    pub(crate) shape: Shape,
+    /// What is marked of the abscissas.
+    #[serde(default)]
+    pub(crate) span: Option<(f64, f64)>,
 }
 
 impl Figure {
-    /// Data and layout as JSON. Colours are the page's, which change with its theme; plotly.js reads a few
-    /// tags in names and titles, and there are none in ours.
-    pub(crate) fn to_json(&self) -> String {
-        let trace = |series: &Series| {
-            let mode = match series.marks {
-                Marks::Line => "lines",
-                Marks::Points => "markers",
-                Marks::LineAndPoints => "lines+markers",
-            };
-            json!({
-                "type": "scatter",
-                "name": escaped(&series.name),
-                "mode": mode,
-                "x": series.x,
-                "y": series.y,
-            })
+    /// Of one panel.
+    pub(crate) fn single(caption: &str, x: Axis, panel: Panel) -> Self {
+        Self::stacked(caption, x, vec![panel])
+    }
+
+    /// Of panels above each other.
+    pub(crate) fn stacked(caption: &str, x: Axis, panels: Vec<Panel>) -> Self {
+        let shape = if panels.len() > 1 {
+            Shape::Tall
+        } else {
+            Shape::Wide
         };
-        let axis = |axis: &Axis| {
-            json!({
-                "title": { "text": escaped(&axis.title) },
-                "type": if axis.is_logarithmic { "log" } else { "linear" },
-                "automargin": true,
-                "zeroline": false,
-            })
-        };
-        let figure = json!({
-            "data": self.series.iter().map(trace).collect::<Vec<_>>(),
-            "layout": {
-                "xaxis": axis(&self.x),
-                "yaxis": axis(&self.y),
-                "legend": { "orientation": "h", "y": 1.02, "yanchor": "bottom" },
-                "showlegend": self.series.len() > 1,
-                "margin": { "l": 56, "r": 16, "t": 24, "b": 48 },
-            },
-        });
-        figure.to_string()
+        Self {
+            caption: caption.to_owned(),
+            x,
+            panels,
+            shape,
+            span: None,
+        }
+    }
+
+    pub(crate) fn shaped(self, shape: Shape) -> Self {
+        Self { shape, ..self }
     }
 }
 
@@ -117,30 +276,14 @@ impl Figure {
 mod tests {
     use super::*;
 
-    // What plotly.js is given: a trace a series, types of the axes, five digits, and no tag of a name.
+    // Five digits of numbers over decades; of numbers that differ in the sixth the next five.
     #[test]
-    fn series_and_axes_reach_the_plot() {
-        let figure = Figure {
-            caption: String::new(),
-            x: Axis {
-                title: "time (s)".to_owned(),
-                is_logarithmic: false,
-            },
-            y: Axis {
-                title: "|J| (%)".to_owned(),
-                is_logarithmic: true,
-            },
-            series: vec![
-                Series::of_points("<b>one", Marks::Line, [(0.1, 1.234_567), (0.2, 2e-9)]),
-                Series::of_points("two", Marks::Points, [(1.0, 0.0)]),
-            ],
-        };
-        let json: serde_json::Value = serde_json::from_str(&figure.to_json()).unwrap();
-        assert_eq!(json["data"][0]["y"], serde_json::json!([1.2346, 2e-9]));
-        assert_eq!(json["data"][0]["name"], "&lt;b&gt;one");
-        assert_eq!(json["data"][1]["mode"], "markers");
-        assert_eq!(json["layout"]["yaxis"]["type"], "log");
-        assert_eq!(json["layout"]["xaxis"]["type"], "linear");
-        assert_eq!(json["layout"]["showlegend"], true);
+    fn digits_are_those_that_are_seen() {
+        assert_eq!(shortened(vec![1.234_567_8, 1234.567_8]), [1.2346, 1234.6]);
+        assert_eq!(
+            shortened(vec![0.300_001_234_567, 0.300_004]),
+            [0.300_001_234_6, 0.300_004]
+        );
+        assert_eq!(shortened(vec![0.123_456_78]), [0.123_46]);
     }
 }

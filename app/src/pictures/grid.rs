@@ -25,7 +25,7 @@ const NO_DELAY: f64 = 1e-5;
 /// What is shown of a ray: so many steps of the grid to either side.
 const STEPS_ALONG: f64 = 1.8;
 /// The deterioration axis, in that of the grid.
-const STEPS_UP: Range<f64> = -0.4..2.5;
+pub(crate) const STEPS_UP: Range<f64> = -0.4..2.5;
 
 /// Draws all and writes them.
 pub(crate) fn write(path: &Path, grid: &Grid) -> Result<(), Failure> {
@@ -35,16 +35,14 @@ pub(crate) fn write(path: &Path, grid: &Grid) -> Result<(), Failure> {
         draw_surface(&left, grid)?;
         draw_space(&right, grid)?;
         let (left, right) = lower.split_horizontally(HALF_WIDTH);
-        let [t_prop_s, t_body_s, tau_s] = grid.settings.space.ranges_s();
-        let lags = [t_prop_s.1, t_body_s.1, tau_s.0];
-        let delay = [t_prop_s.0, t_body_s.0, tau_s.1];
-        draw_ray(&left, &grid.settings, lags, "A ray of long lags")?;
-        draw_ray(&right, &grid.settings, delay, "A ray of long dead time")
+        let [lags, delay] = rays(&grid.settings.space);
+        draw_ray(&left, &grid.settings, lags)?;
+        draw_ray(&right, &grid.settings, delay)
     })
 }
 
 /// A shape as it is drawn: `tan theta` and `cos phi`, whose logarithms show every corner.
-fn place(shape: Direction) -> (f64, f64) {
+pub(crate) fn place(shape: Direction) -> (f64, f64) {
     let [t_prop, t_body, delay] = shape.at(1.0);
     (t_body / t_prop, delay.max(NO_DELAY))
 }
@@ -82,7 +80,7 @@ fn draw_surface(area: &Area<'_>, grid: &Grid) -> Drawn {
 }
 
 /// The border of the space's patch.
-fn outline(space: &Space) -> Vec<(f64, f64)> {
+pub(crate) fn outline(space: &Space) -> Vec<(f64, f64)> {
     let parts = || (0..=POINTS).map(|k| f64::from(k) / f64::from(POINTS));
     let sides: [Vec<(f64, f64)>; 4] = [
         parts().map(|part| (part, 0.0)).collect(),
@@ -163,17 +161,26 @@ fn two_digits(log10: &f64) -> String {
         .map_or(rounded, |value: f64| value.to_string())
 }
 
-/// A process of a ray beside the others of it.
-struct Along {
-    alpha: f64,
-    /// Its controller there, and theirs here.
-    there: f64,
-    here: f64,
+/// A process of a ray beside another one.
+pub(crate) struct Along {
+    /// Its radius over the other's.
+    pub(crate) alpha: f64,
+    /// What the other's controller costs on it, and its own on the other.
+    pub(crate) there: f64,
+    pub(crate) here: f64,
 }
 
-fn draw_ray(area: &Area<'_>, settings: &Settings, times_s: [f64; 3], caption: &str) -> Drawn {
-    let candidate = Candidate::new(&settings.space, settings.gains, times_s)?;
-    let alpha = step(&candidate, settings.deterioration);
+/// Two rays of a space, each with its name: `T_prop`, `T_body`, `tau` (s).
+pub(crate) fn rays(space: &Space) -> [(&'static str, [f64; 3]); 2] {
+    let [t_prop_s, t_body_s, tau_s] = space.ranges_s();
+    [
+        ("A ray of long lags", [t_prop_s.1, t_body_s.1, tau_s.0]),
+        ("A ray of long dead time", [t_prop_s.0, t_body_s.0, tau_s.1]),
+    ]
+}
+
+fn draw_ray(area: &Area<'_>, settings: &Settings, (caption, times_s): (&str, [f64; 3])) -> Drawn {
+    let (alpha, points) = along(settings, times_s)?;
     let percent = 100.0 * settings.deterioration;
     let x = alpha.powf(-STEPS_ALONG)..alpha.powf(STEPS_ALONG);
     let y = STEPS_UP.start * percent..STEPS_UP.end * percent;
@@ -192,7 +199,6 @@ fn draw_ray(area: &Area<'_>, settings: &Settings, times_s: [f64; 3], caption: &s
         .x_desc("alpha")
         .y_desc("deterioration (%)")
         .draw()?;
-    let points = along(&candidate, alpha)?;
     type Cost = fn(&Along) -> f64;
     let curves: [(&str, Cost, ShapeStyle); 3] = [
         (
@@ -230,16 +236,21 @@ fn draw_ray(area: &Area<'_>, settings: &Settings, times_s: [f64; 3], caption: &s
     Ok(())
 }
 
-fn along(candidate: &Candidate, step: f64) -> Result<Vec<Along>, CandidateError> {
-    (-POINTS..=POINTS)
-        .map(|k| {
-            let alpha = step.powf(STEPS_ALONG * f64::from(k) / f64::from(POINTS));
-            let other = candidate.scaled(alpha)?;
-            Ok(Along {
-                alpha,
-                there: candidate.cost_on(&other),
-                here: other.cost_on(candidate),
-            })
+/// The grid's step along the ray through a process, and processes to either side of it.
+pub(crate) fn along(
+    settings: &Settings,
+    times_s: [f64; 3],
+) -> Result<(f64, Vec<Along>), CandidateError> {
+    let candidate = Candidate::new(&settings.space, settings.gains, times_s)?;
+    let step = step(&candidate, settings.deterioration);
+    let points = (-POINTS..=POINTS).map(|k| {
+        let alpha = step.powf(STEPS_ALONG * f64::from(k) / f64::from(POINTS));
+        let other = candidate.scaled(alpha)?;
+        Ok(Along {
+            alpha,
+            there: candidate.cost_on(&other),
+            here: other.cost_on(&candidate),
         })
-        .collect()
+    });
+    Ok((step, points.collect::<Result<_, CandidateError>>()?))
 }

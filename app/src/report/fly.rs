@@ -2,16 +2,17 @@
 
 use std::fmt::Write;
 
-use onecycle_lab::Deterioration;
 use onecycle_lab::evaluate::{Cycles, PHASE_MARGIN_DEG};
+use onecycle_lab::{Deterioration, margins};
 use onecycle_onboard::judgement::HALF_90_PERCENT;
 use onecycle_plant::multirotor::{Axis, Flown, Mission, Record, Tuned};
 
 use super::number::percent;
+use super::page::stability::Loop;
 use crate::commands::fly::{Campaign, Flight};
 use crate::commands::reproduce::cycles;
 use crate::pages::page::{self, Cell, Section, page};
-use crate::pages::plot::{self, Figure, Marks, Series};
+use crate::pages::plot::{self, Figure, Marks, Panel, Series};
 
 /// Points of a series: as many as a wide screen has.
 const POINTS: usize = 2000;
@@ -310,12 +311,25 @@ fn section(campaign: &Campaign, campaigns: &[Campaign]) -> Section {
                 .iter()
                 .map(page::figure),
         );
+        let loops = first.flown.tuned.iter().filter_map(open_loop);
+        body += &page::row(&loops.collect::<Vec<_>>());
     }
     Section {
         id: campaign.mission.name().to_owned(),
         title: title(campaign.mission).to_owned(),
         body,
     }
+}
+
+/// The controller of an axis on the process found and on the true one.
+fn open_loop(tuned: &Tuned) -> Option<Figure> {
+    let (process, pd) = (&tuned.identified.process, tuned.identified.pd);
+    let margins = margins(process, pd)?;
+    let figure = Loop::new(process, pd, margins)
+        .beside(&tuned.truth)
+        .nyquist();
+    let caption = format!("{}: {}", tuned.axis.name(), figure.caption);
+    Some(Figure { caption, ..figure })
 }
 
 /// What the controller of each cycle costs on the process of every other.
@@ -344,18 +358,12 @@ fn pictures(mission: Mission, flown: &Flown) -> Vec<Figure> {
             points.map(|record| (record.time_s, value(record))),
         )
     };
-    let axis = |title: &str| plot::Axis {
-        title: title.to_owned(),
-        is_logarithmic: false,
-    };
     let events: Vec<String> = (flown.events.iter())
         .map(|(time_s, name)| format!("{name} at {time_s:.1} s"))
         .collect();
-    let figure = |title: &str, series: Vec<Series>| Figure {
-        caption: events.join(", "),
-        x: axis("time (s)"),
-        y: axis(title),
-        series,
+    let figure = |title: &str, series: Vec<Series>| {
+        let panel = Panel::new(plot::Axis::titled(title), series);
+        Figure::single(&events.join(", "), plot::Axis::titled("time (s)"), panel)
     };
     let degrees = |name: &str, axis: Axis| {
         series(name, &move |record| axis.of(&record.reading).0.to_degrees())

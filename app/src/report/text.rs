@@ -12,14 +12,18 @@ use super::number::{bounded, significant};
 /// Widest line of remarks, as terminals are.
 const WIDTH: usize = 96;
 
+/// What is identified.
+pub(super) const FORMULA: &str = "K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))";
+
 /// Units of the recording, for the parameters that are made of them.
-struct Units {
-    input: String,
-    output: String,
+#[derive(Default)]
+pub(super) struct Units {
+    pub(super) input: String,
+    pub(super) output: String,
 }
 
 impl Units {
-    fn of(recording: &Recording) -> Self {
+    pub(super) fn of(recording: &Recording) -> Self {
         let unit = |column: &onecycle_link::Column| column.unit.clone().unwrap_or_default();
         Self {
             input: unit(&recording.columns().input),
@@ -28,11 +32,28 @@ impl Units {
     }
 
     /// `output/(input per)`, nothing where the recording gives no units.
-    fn gain(&self, per: &str) -> String {
+    pub(super) fn gain(&self, per: &str) -> String {
         if self.input.is_empty() || self.output.is_empty() {
             return String::new();
         }
         format!("{}/({} {per})", self.output, self.input)
+    }
+
+    /// ` input/output` with what stands behind, nothing where the recording gives no units.
+    pub(super) fn controller(&self, behind: &str) -> String {
+        if self.input.is_empty() || self.output.is_empty() {
+            return String::new();
+        }
+        format!(" {}{behind}/{}", self.input, self.output)
+    }
+
+    /// What an axis is of, with its unit where there is one.
+    pub(super) fn titled(name: &str, unit: &str) -> String {
+        if unit.is_empty() {
+            name.to_owned()
+        } else {
+            format!("{name} ({unit})")
+        }
     }
 }
 
@@ -84,10 +105,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
 pub(crate) fn design(process: &Process, optimum: &Optimum, step: Option<&StepMetrics>) -> String {
     let mut text = String::new();
     let infinite = |value: Option<f64>| value.map_or("infinite".to_owned(), significant);
-    let _ = writeln!(
-        text,
-        "Process  K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))"
-    );
+    let _ = writeln!(text, "Process  {FORMULA}");
     for (name, value, unit) in [
         ("K", infinite(process.k()), ""),
         ("K/T_body", significant(process.k_over_t_body()), ""),
@@ -156,10 +174,7 @@ fn describe_oscillation(text: &mut String, found: &OscillationFound, units: &Uni
 
 fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
     let process = &identified.process;
-    let _ = writeln!(
-        text,
-        "\nProcess  K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))"
-    );
+    let _ = writeln!(text, "\nProcess  {FORMULA}");
     let _ = writeln!(text, "  {:<10}{:>12}   90 % interval", "", "estimate");
     let (velocity, acceleration) = (units.gain("s"), units.gain("s^2"));
     let mut row = |name: &str, interval: &Interval, unit: &str| {
@@ -246,7 +261,7 @@ fn describe_step(text: &mut String, step: Option<&StepMetrics>) {
 }
 
 /// The same with a capital letter and a full stop.
-fn sentence(text: &str) -> String {
+pub(super) fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     let first = letters.next().map(|letter| letter.to_ascii_uppercase());
     first

@@ -80,20 +80,26 @@ pub struct ProcessEstimate {
     pub input_bias: Interval,
 }
 
-/// One draw, or the best point, in physical parameters.
-#[derive(Clone, Copy, Debug)]
-struct Parameters {
-    k: f64,
-    k_over_t_body: f64,
-    t_prop_s: f64,
-    t_body_s: f64,
-    tau_s: f64,
-    input_bias: f64,
-    /// Whether the coordinates were those of a process, not brought to the nearest one.
-    is_process: bool,
+/// What the process may be: one draw from the posterior, in physical parameters.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Draw {
+    /// Velocity gain `K`: output unit / (input unit s), infinite without damping.
+    pub k: f64,
+    /// Acceleration gain `K/T_body`: output unit / (input unit s^2).
+    pub k_over_t_body: f64,
+    /// Lag of the actuator (s).
+    pub t_prop_s: f64,
+    /// Lag of the body (s), infinite without damping.
+    pub t_body_s: f64,
+    /// Dead time (s).
+    pub tau_s: f64,
+    /// Constant input that the recording does not show (input unit).
+    pub input_bias: f64,
+    /// Whether the Gaussian's coordinates were those of a process, not brought to the nearest one.
+    pub is_process: bool,
 }
 
-impl Parameters {
+impl Draw {
     /// From the estimator's coordinates; `sign` is the gain's.
     fn of(at: &[f64; 5], sign: f64) -> Self {
         let sum_per_s = at[coordinate::LN_POLE_SUM].exp();
@@ -113,7 +119,13 @@ impl Parameters {
         }
     }
 
-    fn process(&self) -> Option<Process> {
+    fn phase_margin_rad(&self, pd: Pd) -> Option<f64> {
+        margins(&self.process()?, pd).map(|margins| margins.phase_margin_rad)
+    }
+
+    /// The process; `None` where the parameters are those of none.
+    #[must_use]
+    pub fn process(&self) -> Option<Process> {
         let damping_per_s = 1.0 / self.t_body_s;
         let Self {
             k_over_t_body,
@@ -128,9 +140,9 @@ impl Parameters {
 /// The estimate and draws from its distribution.
 #[derive(Clone, Debug)]
 pub struct Posterior {
-    best: Parameters,
+    best: Draw,
     /// Empty where the estimator gives no covariance.
-    draws: Vec<Parameters>,
+    draws: Vec<Draw>,
 }
 
 impl Posterior {
@@ -166,14 +178,14 @@ impl Posterior {
                 let at = std::array::from_fn(|i| {
                     centre[i] + side * (0..=i).map(|j| root[i][j] * normal[j]).sum::<f64>()
                 });
-                Parameters::of(&at, sign)
+                Draw::of(&at, sign)
             })
         };
         let draws = root.map_or(vec![], |root| {
             (0..DRAWS / 2).flat_map(|_| pair(&root)).collect()
         });
         Self {
-            best: Parameters::of(&centre, sign),
+            best: Draw::of(&centre, sign),
             draws,
         }
     }
@@ -181,7 +193,7 @@ impl Posterior {
     /// The parameters with their 90 % intervals.
     #[must_use]
     pub fn process(&self) -> ProcessEstimate {
-        let interval = |parameter: fn(&Parameters) -> f64| {
+        let interval = |parameter: fn(&Draw) -> f64| {
             let values = self.draws.iter().map(parameter).collect();
             Interval::new(parameter(&self.best), quantiles(values))
         };
@@ -195,13 +207,20 @@ impl Posterior {
         }
     }
 
+    /// All draws, none where the estimator gives no covariance.
+    #[must_use]
+    pub fn draws(&self) -> &[Draw] {
+        &self.draws
+    }
+
     /// The first draws that are processes, at most so many. Those beyond what a process can be have no
     /// weight here, where the nearest one would have too much.
-    pub(super) fn processes(&self, most: usize) -> Vec<Process> {
+    #[must_use]
+    pub fn processes(&self, most: usize) -> Vec<Process> {
         self.draws
             .iter()
             .filter(|draw| draw.is_process)
-            .filter_map(Parameters::process)
+            .filter_map(Draw::process)
             .take(most)
             .collect()
     }
@@ -210,7 +229,7 @@ impl Posterior {
     /// estimator gives no covariance.
     #[must_use]
     pub fn joint_probability(&self, within: &ProcessEstimate) -> Option<f64> {
-        let inside = |draw: &&Parameters| {
+        let inside = |draw: &&Draw| {
             within.k.holds(draw.k)
                 && within.k_over_t_body.holds(draw.k_over_t_body)
                 && within.t_prop_s.holds(draw.t_prop_s)
@@ -221,18 +240,64 @@ impl Posterior {
         (!self.draws.is_empty()).then(|| count as f64 / self.draws.len() as f64)
     }
 
+    /// Correlations of `K/T_body`, `T_prop`, `1/T_body`, `tau` and the input bias, in this order; `None` where the
+    /// estimator gives no covariance.
+    #[must_use]
+    pub fn correlations(&self) -> Option<[[f64; 5]; 5]> {
+        let of = |draw: &Draw| {
+            let damping_per_s = 1.0 / draw.t_body_s;
+            [
+                draw.k_over_t_body,
+                draw.t_prop_s,
+                damping_per_s,
+                draw.tau_s,
+                draw.input_bias,
+            ]
+        };
+        let count = self.draws.len() as f64;
+        let mut mean = [0.0; 5];
+        for draw in &self.draws {
+            let values = of(draw);
+            (0..5).for_each(|i| mean[i] += values[i] / count);
+        }
+        let mut covariance = [[0.0; 5]; 5];
+        for draw in &self.draws {
+            let values = of(draw);
+            for i in 0..5 {
+                for j in 0..5 {
+                    covariance[i][j] += (values[i] - mean[i]) * (values[j] - mean[j]);
+                }
+            }
+        }
+        // What has no spread is correlated with itself alone.
+        let entry = |i: usize, j: usize| {
+            let size = (covariance[i][i] * covariance[j][j]).sqrt();
+            if i == j {
+                1.0
+            } else if size > 0.0 {
+                covariance[i][j] / size
+            } else {
+                0.0
+            }
+        };
+        let rows = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
+        (!self.draws.is_empty()).then_some(rows)
+    }
+
     /// Phase margin (rad) that a controller leaves on the process, with its 90 % interval.
     #[must_use]
     pub fn phase_margin_rad(&self, pd: Pd) -> Interval {
-        let margin = |parameters: &Parameters| {
-            let margins = margins(&parameters.process()?, pd)?;
-            Some(margins.phase_margin_rad)
-        };
-        let values = self.draws.iter().filter_map(margin).collect();
         Interval::new(
-            margin(&self.best).unwrap_or(f64::NEG_INFINITY),
-            quantiles(values),
+            self.best.phase_margin_rad(pd).unwrap_or(f64::NEG_INFINITY),
+            quantiles(self.phase_margins_rad(pd)),
         )
+    }
+
+    /// The phase margins (rad) that a controller leaves on the draws.
+    #[must_use]
+    pub fn phase_margins_rad(&self, pd: Pd) -> Vec<f64> {
+        let margin = |draw: &Draw| draw.phase_margin_rad(pd);
+        self.draws.iter().filter_map(margin).collect()
     }
 }
 

@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::args::Name;
 use crate::failure::Failure;
-use crate::output::write_file;
-use crate::pages::plot::{Figure, Series};
+use crate::output::write_text;
+use crate::pages::plot::{Axis, Figure, Panel, Series};
 
 /// What the work of a part yields.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -63,8 +63,16 @@ pub(super) struct Sheet {
     #[serde(default)]
     tables: Vec<TableSheet>,
     #[serde(default)]
-    figures: Vec<Figure>,
+    figures: Vec<FigureSheet>,
     remarks: Vec<String>,
+}
+
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FigureSheet {
+    caption: String,
+    x: Axis,
+    y: Axis,
 }
 
 #[derive(Clone, Debug, Deserialize)]
@@ -116,7 +124,9 @@ impl Sheet {
             source: self.source,
             tables: tables.map(|(sheet, rows)| Table::of(sheet, rows)).collect(),
             figures: figures
-                .map(|(figure, series)| Figure { series, ..figure })
+                .map(|(FigureSheet { caption, x, y }, series)| {
+                    Figure::single(&caption, x, Panel::new(y, series))
+                })
                 .collect(),
             remarks: self.remarks,
         }
@@ -214,7 +224,7 @@ pub(super) fn keep(path: &Path, settings: &toml::Table, found: &Found) -> Result
         found: found.clone(),
     };
     let text = crate::report::json::to_text(&kept);
-    write_file(path, |file| file.write_all(text.as_bytes()))
+    write_text(path, &text)
 }
 
 #[cfg(test)]

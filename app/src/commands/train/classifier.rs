@@ -16,7 +16,7 @@ use super::part::Part;
 use crate::args;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{print, progress_bar_with_message, write_file};
+use crate::output::{print, progress_bar_with_message, write_file, write_text};
 use crate::report::classifier as report;
 use crate::settings;
 
@@ -124,7 +124,7 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
     }
     if let Some(path) = &arguments.json {
         let text = report::json(&learnt.done);
-        write_file(path, |file| file.write_all(text.as_bytes()))?;
+        write_text(path, &text)?;
     }
     print(&report::text(&learnt.done))?;
     keep.remove(recipe)?;

@@ -18,7 +18,7 @@ use crate::args;
 use crate::commands::dataset::filled;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{print, progress_bar_with_message, write_file};
+use crate::output::{print, progress_bar_with_message, write_file, write_text};
 use crate::report::identifier as report;
 use crate::settings;
 
@@ -90,7 +90,7 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
     done.seconds[1] = begin.elapsed().as_secs_f64() - simulated_s;
     if let Some(path) = &arguments.json {
         let text = report::json(recipe, &done);
-        write_file(path, |file| file.write_all(text.as_bytes()))?;
+        write_text(path, &text)?;
     }
     print(&report::text(&done, out))?;
     part.remove()?;

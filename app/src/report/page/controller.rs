@@ -1,0 +1,56 @@
+//! The controller in the forms that it is entered in.
+
+use onecycle_lab::Optimum;
+
+use super::significant;
+use crate::pages::page::{self, Section};
+use crate::report::text::Units;
+
+pub(super) fn section(optimum: &Optimum, units: &Units) -> Section {
+    let pd = optimum.pd;
+    let (gain, rate) = (units.controller(""), units.controller(" s"));
+    let gains = format!(
+        "Kp {}{gain}, Kd {}{rate}",
+        significant(pd.kp),
+        significant(pd.kd)
+    );
+    let forms = [
+        ("PD", "u = Kp (r - y) - Kd dy/dt", gains.clone()),
+        (
+            "Cascade P/P",
+            "rate wanted w = P_angle (r - y), u = P_rate (w - dy/dt)",
+            format!(
+                "P_angle {} 1/s, P_rate {}{rate}",
+                significant(pd.angle_p()),
+                significant(pd.rate_p())
+            ),
+        ),
+        (
+            "Parallel PID",
+            "u = Kp e + Ki integral of e + Kd de/dt",
+            format!("{gains}, Ki 0"),
+        ),
+        (
+            "Ideal PID",
+            "u = Kp (e + 1/Ti integral of e + Td de/dt)",
+            format!(
+                "Kp {}{gain}, Td {} s, Ti infinite",
+                significant(pd.kp),
+                significant(pd.kd / pd.kp)
+            ),
+        ),
+    ];
+    let forms = forms.map(|(name, law, values)| (name.to_owned(), format!("{values}: {law}")));
+    let body = page::facts(&forms)
+        + &page::paragraph(
+            "source",
+            "Four forms of the same controller. The rate is that of the measurement: a step of the reference then gives \
+             no kick, and the predicted step holds. There is no integral action: a constant disturbance at the input \
+             leaves an offset of its size over Kp.",
+        );
+    Section {
+        id: "controller".to_owned(),
+        title: "Controller".to_owned(),
+        body,
+    }
+}

@@ -1,0 +1,214 @@
+"""What a reader of the pages would see, asked of a real browser.
+
+python3 pages.py PROGRAM EXAMPLES SCRATCH [--screenshots DIR]: makes the pages, opens each at two widths and in both
+themes, and prints a line for each. Ends with status 1 at the first thing that is not right.
+"""
+
+import argparse
+import json
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+
+from playwright.sync_api import sync_playwright
+
+SCREENS = {
+    "desk": {"viewport": {"width": 1280, "height": 900}},
+    "phone": {
+        "viewport": {"width": 390, "height": 844},
+        "device_scale_factor": 2,
+        "is_mobile": True,
+        "has_touch": True,
+    },
+}
+# The largest that a page may be.
+MOST_BYTES = 6_000_000
+
+
+class Wrong(Exception):
+    """A page that is not as it should be."""
+
+
+def expect(is_so, what):
+    if not is_so:
+        raise Wrong(what)
+
+
+def made(program, examples, scratch):
+    """Every page by its name, and the sections and the least number of plots that it must have."""
+    identified = {"recording", "fit", "process", "stability", "step", "controller"}
+    recording = lambda name: ["identify", str(examples / name)]
+    tune = ["tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1"]
+    pages = {
+        "hover": (recording("simulated_hover.csv"), identified, 12),
+        "roll": (recording("jsbsim_f450_roll_clean.csv"), identified | {"remarks"}, 12),
+        "bias": (recording("rotorpy_sih_alt_bias30.csv"), identified | {"remarks"}, 12),
+        "refused": (recording("unsteady_ardupilot_alt.csv"), {"recording"}, 1),
+        "tuned": (tune, {"stability", "step", "controller"}, 3),
+        "grid": (["grid"], {"shapes", "times", "rays"}, 5),
+    }
+    for name, (arguments, sections, plots) in pages.items():
+        path = scratch / f"{name}.html"
+        run(program, [*arguments, "--report", str(path)])
+        yield name, path, sections, plots
+    folder = scratch / "flights"
+    run(program, ["fly", "altitude", "vehicle", "-o", str(folder)])
+    yield "flights", folder / "flights.html", {"altitude", "vehicle"}, 6
+    folder = scratch / "reproduction"
+    run(program, ["reproduce", "phase", "--quick", "-o", str(folder)])
+    yield "reproduction", next(folder.glob("*.html")), {"phase"}, 1
+
+
+def run(program, arguments):
+    done = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
+    # 4: the answer is no, and there is a page of it too.
+    expect(done.returncode in (0, 4), f"{arguments[0]} ended with {done.returncode}: {done.stderr}")
+    return done.stdout
+
+
+def opened(browser, path, screen):
+    """The page in a window of its own, with all that went wrong and was fetched."""
+    window = browser.new_context(**SCREENS[screen], color_scheme="light")
+    page = window.new_page()
+    faults, fetched = [], []
+    page.on("console", lambda line: faults.append(line.text) if line.type in ("error", "warning") else None)
+    page.on("pageerror", lambda error: faults.append(str(error)))
+    page.on("request", lambda request: fetched.append(request.url))
+    page.goto(path.as_uri())
+    drawn(page)
+    return page, faults, fetched
+
+
+def drawn(page):
+    """Waits until all plots are, in the theme of the page."""
+    page.wait_for_function("(root => root.dataset.drawn === root.dataset.theme)(document.documentElement)")
+
+
+def look(page, path, sections, least_plots):
+    """Sections, plots and widths."""
+    ids = set(page.eval_on_selector_all("main section", "all => all.map((one) => one.id)"))
+    expect(sections <= ids, f"sections {sorted(sections - ids)} are missing")
+    plots = page.locator(".plot")
+    count = plots.count()
+    expect(count >= least_plots, f"{count} plots instead of {least_plots} or more")
+    drawn = page.locator(".plot .main-svg >> nth=0").count()
+    expect(drawn > 0, "nothing is drawn")
+    sizes = page.eval_on_selector_all(
+        ".plot",
+        """all => all.map((one) => {
+            const svg = one.querySelector(".main-svg")?.getBoundingClientRect();
+            const box = one.getBoundingClientRect();
+            return { drawn: svg?.width ?? 0, room: box.width, traces: one.querySelectorAll(".trace, .contourlayer, .heatmaplayer image").length };
+        })""",
+    )
+    for number, size in enumerate(sizes):
+        expect(size["traces"] > 0, f"plot {number} shows nothing")
+        expect(abs(size["drawn"] - size["room"]) < 2, f"plot {number} is {size['drawn']} wide, with room for {size['room']}")
+    width = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
+    expect(width[0] <= width[1], f"the page is {width[0]} wide in a window of {width[1]}")
+    expect(path.stat().st_size < MOST_BYTES, f"{path.stat().st_size} bytes")
+
+
+def colours(page):
+    """Of the page, and of the words of its first plot."""
+    return page.evaluate(
+        """() => [getComputedStyle(document.body).backgroundColor,
+                  getComputedStyle(document.querySelector(".plot .xtitle, .plot .xtick text")).fill]"""
+    )
+
+
+def turn(page):
+    """Light to dark, or back."""
+    page.click("#theme")
+    drawn(page)
+
+
+def switch(page):
+    """The button turns page and plots dark, and light again."""
+    light = colours(page)
+    turn(page)
+    dark = colours(page)
+    expect(dark[0] != light[0], f"the page stays {light[0]}")
+    expect(dark[1] != light[1], f"the words of the plots stay {light[1]}")
+    turn(page)
+    expect(colours(page) == light, "the page does not turn light again")
+
+
+def print_out(page):
+    """Dark pages are printed light."""
+    turn(page)
+    paper = page.pdf(format="A4")
+    expect(paper.startswith(b"%PDF") and len(paper) > 20_000, f"{len(paper)} bytes on paper")
+    turn(page)
+
+
+def annotations(page):
+    return page.eval_on_selector_all(".annotation-text", "all => all.map((one) => one.textContent)")
+
+
+def margins(page, report):
+    """The margins that the plots name are those of the report for programs."""
+    words = annotations(page)
+    phase = f"phase margin {report['margins']['phase_margin_deg']:.1f} deg"
+    gain = f"gain margin {report['margins']['gain_margin']:.2f}"
+    for wanted in (phase, gain):
+        found = [text for text in words if text.startswith(wanted)]
+        expect(len(found) == 2, f"'{wanted}' stands in {len(found)} plots, not in two: {words}")
+    overshoot = f"overshoot {100 * report['step']['overshoot']:.0f} %"
+    expect(overshoot in words, f"'{overshoot}' is not among {words}")
+    return phase
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("examples", type=pathlib.Path)
+    parser.add_argument("scratch", type=pathlib.Path)
+    parser.add_argument("--screenshots", type=pathlib.Path)
+    arguments = parser.parse_args()
+    chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
+    expect(chromium, "there is no chromium: install it, or name one in CHROMIUM")
+    if arguments.screenshots:
+        arguments.screenshots.mkdir(parents=True, exist_ok=True)
+    with sync_playwright() as driver:
+        browser = driver.chromium.launch(
+            executable_path=chromium,
+            args=["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"],
+        )
+        for name, path, sections, plots in made(arguments.program, arguments.examples, arguments.scratch):
+            for screen in SCREENS:
+                page, faults, fetched = opened(browser, path, screen)
+                look(page, path, sections, plots)
+                switch(page)
+                said = f"{len(annotations(page))} notes"
+                if name in ("hover", "roll", "bias"):
+                    recording = {"hover": "simulated_hover", "roll": "jsbsim_f450_roll_clean", "bias": "rotorpy_sih_alt_bias30"}[name]
+                    report = run(arguments.program, ["identify", str(arguments.examples / f"{recording}.csv"), "--json"])
+                    said = margins(page, json.loads(report))
+                if screen == "desk":
+                    print_out(page)
+                expect(not faults, f"the browser complains: {faults}")
+                others = [url for url in fetched if not re.match(r"file:|data:|blob:", url)]
+                expect(not others, f"the page fetches {others}")
+                took_ms = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
+                print(f"{name:<13} {screen:<6} {path.stat().st_size / 1e6:.1f} MB, open after {took_ms:.0f} ms, {said}")
+                if arguments.screenshots:
+                    save(page, arguments.screenshots / f"{name}-{screen}")
+                page.context.close()
+        browser.close()
+
+
+def save(page, path):
+    page.screenshot(path=f"{path}.png", full_page=True)
+    turn(page)
+    page.screenshot(path=f"{path}-dark.png", full_page=True)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except Wrong as wrong:
+        sys.exit(f"not right: {wrong}")
