@@ -11,7 +11,6 @@ pub(crate) mod identify;
 pub(crate) mod pack;
 pub(crate) mod phase;
 pub(crate) mod reproduce;
-mod signals;
 pub(crate) mod simulate;
 pub(crate) mod train;
 pub(crate) mod tune;

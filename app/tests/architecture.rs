@@ -37,11 +37,13 @@ struct Package {
     dependencies: Vec<Dependency>,
 }
 
-/// `kind` is `None` for a normal dependency, else `dev` or `build`.
+/// `kind` is `None` for a normal dependency, else `dev` or `build`; an optional one comes with a feature.
 #[derive(Deserialize)]
 struct Dependency {
     name: String,
     kind: Option<String>,
+    #[serde(default)]
+    optional: bool,
 }
 
 impl Metadata {
@@ -74,13 +76,17 @@ impl Metadata {
         offences
     }
 
-    /// Names of what a crate depends on, other than for its tests.
-    fn shipped_dependencies(&self, of: &str) -> Option<Vec<&str>> {
+    /// What a crate depends on, other than for its tests.
+    fn shipped_dependencies(&self, of: &str) -> Option<Vec<&Dependency>> {
+        let dependencies = self.package(of)?.dependencies.iter();
         let is_shipped = |dependency: &&Dependency| dependency.kind.as_deref() != Some("dev");
-        let dependencies = &self.package(of)?.dependencies;
-        let names = dependencies.iter().filter(is_shipped);
-        Some(names.map(|dependency| dependency.name.as_str()).collect())
+        Some(dependencies.filter(is_shipped).collect())
     }
+}
+
+fn names<'a>(dependencies: &[&'a Dependency]) -> Vec<&'a str> {
+    let name = |dependency: &&'a Dependency| dependency.name.as_str();
+    dependencies.iter().map(name).collect()
 }
 
 /// The workspace as cargo reads it; without its dependencies it needs neither lock nor network.
@@ -121,7 +127,24 @@ fn only_the_allowed_arrows() {
 fn onboard_ships_with_libm_alone() {
     let metadata = workspace();
     let shipped = metadata.shipped_dependencies("onecycle-onboard");
-    assert_eq!(shipped, Some(vec!["libm"]));
+    assert_eq!(names(&shipped.unwrap()), ["libm"]);
+}
+
+// Who takes the library without its features builds no program.
+#[test]
+fn the_library_ships_with_the_four_crates_alone() {
+    let metadata = workspace();
+    let mut shipped = metadata.shipped_dependencies("onecycle").unwrap();
+    assert!(shipped.iter().any(|dependency| dependency.optional));
+    shipped.retain(|dependency| !dependency.optional);
+    let mut expected = ALLOWED[..4]
+        .iter()
+        .map(|(name, _)| *name)
+        .collect::<Vec<_>>();
+    expected.sort_unstable();
+    let mut names = names(&shipped);
+    names.sort_unstable();
+    assert_eq!(names, expected);
 }
 
 #[test]
@@ -161,5 +184,5 @@ fn dependencies_for_tests_are_not_shipped() {
     ]);
     let metadata: Metadata = serde_json::from_value(metadata).expect("the graph is well formed");
     let shipped = metadata.shipped_dependencies("onecycle-onboard");
-    assert_eq!(shipped, Some(vec!["libm", "cc"]));
+    assert_eq!(names(&shipped.unwrap()), ["libm", "cc"]);
 }

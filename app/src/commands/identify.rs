@@ -3,11 +3,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle_lab::identify::{Options, identify_by};
-use onecycle_link::{ColumnRef, CsvOptions, Recording};
+use onecycle::{ColumnRef, CsvOptions, Options, Recording};
 
 use super::pack;
-use super::signals::{breaks, signals};
 use crate::args::Identify;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_text};
@@ -15,8 +13,6 @@ use crate::report::{json, page, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let recording = read(arguments)?;
-    let breaks = breaks(&recording);
-    let signals = signals(&recording, &breaks);
     let options = Options {
         cycles: arguments.cycles as usize,
         phase_margin_rad: arguments.phase_margin,
@@ -24,7 +20,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     };
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::read(&arguments.pack, &bytes)?;
-    let found = identify_by(&signals, &options, Some(&pack));
+    let found = onecycle::identify_by(&recording, &options, Some(&pack));
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
         write_text(
@@ -55,9 +51,9 @@ fn read(arguments: &Identify) -> Result<Recording, Failure> {
         ..CsvOptions::default()
     };
     let result = if arguments.file == Path::new("-") {
-        onecycle_link::read_from(std::io::stdin().lock(), &options)
+        onecycle::read_from(std::io::stdin().lock(), &options)
     } else {
-        onecycle_link::read(&arguments.file, &options)
+        onecycle::read(&arguments.file, &options)
     };
     result.map_err(|reason| Failure::Recording {
         path: arguments.file.clone(),

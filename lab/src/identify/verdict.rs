@@ -138,6 +138,8 @@ impl Verdict {
     }
 }
 
+impl std::error::Error for Verdict {}
+
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

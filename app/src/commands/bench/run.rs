@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use onecycle::with_signals;
 use onecycle_lab::evaluate::files::{read_answers, results_csv};
 use onecycle_lab::evaluate::{Contender, Judge, Record, Truth, records};
 
@@ -13,7 +14,6 @@ use super::recordings::Recordings;
 use super::traces;
 use crate::args::{self, RunBench};
 use crate::commands::clock::thread_seconds;
-use crate::commands::signals::{breaks, signals};
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
 use crate::output::{complain, print, write_file};
@@ -113,9 +113,10 @@ fn answered(
         let numbers: Vec<u64> = lot.iter().map(|truth| truth.number).collect();
         let read = recordings.read(&numbers, workers)?;
         let made = workers.run(lot.len(), |index| {
-            let breaks = breaks(&read[index]);
-            let seen = signals(&read[index], &breaks);
-            records(lot[index], &seen, methods, &thread_seconds).map_err(|error| {
+            let records = with_signals(&read[index], |signals| {
+                records(lot[index], signals, methods, &thread_seconds)
+            });
+            records.map_err(|error| {
                 unreadable(truth, format!("experiment {}: {error}", numbers[index]))
             })
         });
