@@ -23,10 +23,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let found = onecycle::identify_by(&recording, &options, Some(&pack));
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
-        write_text(
-            path,
-            &page::identification(&name, &recording, &signals, &found),
-        )?;
+        write_text(path, &page::identification(&name, &recording, &found))?;
     }
     print(&if arguments.json {
         json::identification(&name, &recording, &found)

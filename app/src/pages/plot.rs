@@ -134,7 +134,7 @@ impl Axis {
         }
     }
 
-    pub(crate) fn from_to(self, low: f64, high: f64) -> Self {
+    pub(crate) fn spanning(self, low: f64, high: f64) -> Self {
         Self {
             range: Some((low, high)),
             ..self
@@ -279,7 +279,7 @@ mod tests {
     // Five digits of numbers over decades; of numbers that differ in the sixth the next five.
     #[test]
     fn digits_are_those_that_are_seen() {
-        assert_eq!(shortened(vec![1.234_567_8, 1234.567_8]), [1.2346, 1234.6]);
+        assert_eq!(shortened(vec![1.234_567, 1234.567]), [1.2346, 1234.6]);
         assert_eq!(
             shortened(vec![0.300_001_234_567, 0.300_004]),
             [0.300_001_234_6, 0.300_004]

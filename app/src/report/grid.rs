@@ -244,7 +244,7 @@ fn ray(settings: &Settings, name: &str, times_s: [f64; 3]) -> Result<Figure, Can
     let limit = Series::of_points("J*", Marks::Dashes, ends.map(|at| (at.alpha, percent)));
     let up = picture::STEPS_UP;
     let panel = Panel::new(
-        Axis::titled("deterioration (%)").from_to(up.start * percent, up.end * percent),
+        Axis::titled("deterioration (%)").spanning(up.start * percent, up.end * percent),
         vec![
             curve("J_ij: the one's controller on the other", |at| at.there).hue(Hue::Model),
             curve("J_ji: the other's on the one", |at| at.here).hue(Hue::Input),

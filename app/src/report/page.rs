@@ -9,9 +9,9 @@ mod step;
 
 use std::fmt::Write;
 
-use onecycle_lab::harmonics::harmonics;
-use onecycle_lab::identify::{Identification, Identified, OscillationFound, Posterior, Signals};
-use onecycle_lab::{Optimum, StepResponse, step_response};
+use onecycle::with_signals;
+use onecycle_lab::identify::{Identification, Identified, Posterior};
+use onecycle_lab::{Harmonic, Optimum, StepResponse, harmonics, step_response};
 use onecycle_link::Recording;
 use onecycle_onboard::Process;
 
@@ -28,12 +28,7 @@ const HARMONICS: usize = 5;
 const STEP_POINTS: usize = 400;
 
 /// The page of an identification.
-pub(crate) fn identification(
-    file: &str,
-    recording: &Recording,
-    signals: &Signals<'_>,
-    found: &Identification,
-) -> String {
+pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
     let units = Units::of(recording);
     let mut sections = vec![recorded::section(recording, found.oscillation.as_ref())];
     let mut lead = made_by("identify");
@@ -43,11 +38,13 @@ pub(crate) fn identification(
             let posterior = Posterior::new(&identified.refined, oscillation.sample_s);
             let view = View {
                 units: &units,
-                oscillation,
                 identified,
                 posterior: &posterior,
             };
-            sections.extend(view.sections(signals));
+            let measured = with_signals(recording, |signals| {
+                harmonics(signals, oscillation, HARMONICS)
+            });
+            sections.extend(view.sections(&measured));
         }
         (Err(verdict), _) => {
             let words = format!("No process identified. {}", sentence(&verdict.to_string()));
@@ -78,13 +75,12 @@ pub(crate) fn design(process: &Process, optimum: &Optimum) -> String {
 /// An identified process and all that there is to show of it.
 struct View<'a> {
     units: &'a Units,
-    oscillation: &'a OscillationFound,
     identified: &'a Identified,
     posterior: &'a Posterior,
 }
 
 impl View<'_> {
-    fn sections(&self, signals: &Signals<'_>) -> Vec<Section> {
+    fn sections(&self, measured: &[Harmonic]) -> Vec<Section> {
         let Identified {
             refined,
             controller,
@@ -93,10 +89,9 @@ impl View<'_> {
         } = self.identified;
         let process = &refined.process;
         let draws = self.posterior.processes(DRAWS);
-        let measured = harmonics(signals, self.oscillation, HARMONICS);
         let own = Loop::new(process, controller.pd, controller.margins)
             .within(&draws, *phase_margin_rad)
-            .measured(&measured);
+            .measured(measured);
         let response = step_response(process, controller.pd).ok();
         let step = response.map(|response| {
             let times_s = times_s(&response);

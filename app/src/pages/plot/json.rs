@@ -247,8 +247,8 @@ mod tests {
             y: 100.0,
             away: (10.0, 0.0),
         });
-        let lower = Panel::new(Axis::titled("b").from_to(-1.0, 4.0), vec![]);
-        let x = Axis::titled("t").logarithmic().from_to(0.1, 1000.0);
+        let lower = Panel::new(Axis::titled("b").spanning(-1.0, 4.0), vec![]);
+        let x = Axis::titled("t").logarithmic().spanning(0.1, 1000.0);
         let figure = Figure::stacked("", x, vec![upper, lower]);
         assert_eq!(figure.shape, Shape::Tall);
         let json = parsed(&figure);

@@ -65,7 +65,7 @@ fn correlogram(white: &Whiteness) -> Figure {
          that the model misses something of the process.",
         Axis::titled("lag (points)"),
         Panel::new(
-            Axis::titled("autocorrelation").from_to(-1.0, 1.0),
+            Axis::titled("autocorrelation").spanning(-1.0, 1.0),
             vec![
                 Series::of_points("residuals", Marks::Bars, bars).hue(Hue::Model),
                 edge("95 % of white ones", white.band),

@@ -201,7 +201,7 @@ fn marginal(title: &str, mut values: Vec<f64>, interval: &Interval) -> Option<Fi
             .flatten()
             .map(|value| upright(Marks::Dashes, value)),
     );
-    let mut y = Axis::titled("").from_to(0.0, 1.08);
+    let mut y = Axis::titled("").spanning(0.0, 1.08);
     y.is_bare = true;
     let figure = Figure::single("", Axis::titled(title), Panel::new(y, series));
     Some(figure.shaped(Shape::Small))

@@ -12,7 +12,7 @@ const PHASES_DEG: (f64, f64) = (-360.0, 0.0);
 pub(super) fn figure(of: &Loop<'_>) -> Figure {
     let names = [OWN, TRUTH, MEASURED];
     let magnitude = Axis::titled("magnitude").logarithmic();
-    let phase = Axis::titled("phase (deg)").from_to(PHASES_DEG.0, PHASES_DEG.1);
+    let phase = Axis::titled("phase (deg)").spanning(PHASES_DEG.0, PHASES_DEG.1);
     let magnitudes = of.bands.as_ref().map(|bands| &bands.magnitude);
     let phases = of.bands.as_ref().map(|bands| in_degrees(&bands.phase_rad));
     let mut upper = Panel::new(

@@ -26,14 +26,14 @@ pub(super) fn figure(of: &Loop<'_>) -> Figure {
             above.max(1.2 * im),
         ]
     });
-    panel.y = panel.y.from_to(below, above);
+    panel.y = panel.y.spanning(below, above);
     let mut caption =
         "Nyquist's plot of the open loop: the farther from -1, the better.".to_owned();
     if !of.measured.is_empty() {
         caption += " The points under the relay are measured, output over input at the oscillation's harmonics, times \
                     the controller: no model is in them.";
     }
-    let x = Axis::titled("real part").from_to(left, right);
+    let x = Axis::titled("real part").spanning(left, right);
     Figure::single(&caption, x, panel).shaped(Shape::ToScale)
 }
 
