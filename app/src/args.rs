@@ -1,27 +1,35 @@
 //! Arguments, typed and documented; `--help` is generated from here.
 
 mod bench;
+mod campaign;
+mod certify;
+mod completions;
 mod dataset;
 mod fly;
 mod identify;
+mod man;
 mod pack;
 mod reproduce;
+mod simulate;
 mod train;
 
 use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
-use onecycle_lab::campaign::MOST_CASES;
-use onecycle_lab::identify::MOST_CYCLES;
 use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
 use onecycle_onboard::{Process, ProcessError};
 
 pub(crate) use self::bench::{Answers, Bench, BenchAction, Format, MakeBench, RunBench};
+pub(crate) use self::campaign::Campaign;
+pub(crate) use self::certify::Certify;
+pub(crate) use self::completions::Completions;
 pub(crate) use self::dataset::Dataset;
 pub(crate) use self::fly::Fly;
-pub(crate) use self::identify::{Identify, Method};
+pub(crate) use self::identify::{Identify, Method, When};
+pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
+pub(crate) use self::simulate::Simulate;
 pub(crate) use self::train::Train;
 use crate::failure::Failure;
 
@@ -29,7 +37,15 @@ pub(crate) use self::pack::{
     ExportPack, ImportPack, Pack, PackAction, PackSource, ShowPack, VerifyPack,
 };
 
-const EXIT_CODES: &str = "\
+const AFTER_HELP: &str = "\
+First steps:
+  onecycle simulate --k 1 --t-prop 0.03 --t-body 1.7 --tau 0.02 --noise 1% --bias 30% --out test.csv
+  onecycle identify test.csv
+  onecycle fly altitude
+  onecycle completions bash > ~/.local/share/bash-completion/completions/onecycle
+
+onecycle COMMAND --help explains each command and has examples.
+
 Exit codes:
   0  done (identify: a process was identified)
   2  bad arguments
@@ -40,27 +56,31 @@ Exit codes:
 
 /// From one cycle of a relay test to the process and its optimal controller.
 #[derive(Debug, Parser)]
-#[command(version, after_help = EXIT_CODES, max_term_width = 100)]
+#[command(version, after_help = AFTER_HELP, max_term_width = 100)]
 pub(crate) struct Arguments {
     #[command(subcommand)]
     pub(crate) command: Command,
 }
 
+/// In the order in which a newcomer needs them: a recording, a vehicle, a space of processes, how good it all is,
+/// an identifier of one's own.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Identify(Identify),
     Simulate(Simulate),
     Tune(Tune),
-    Campaign(Campaign),
-    Phase(Phase),
+    Fly(Fly),
     Certify(Certify),
+    Phase(Phase),
     Grid(Grid),
-    Train(Train),
-    Pack(Pack),
-    Dataset(Dataset),
+    Campaign(Campaign),
     Bench(Bench),
     Reproduce(Reproduce),
-    Fly(Fly),
+    Dataset(Dataset),
+    Train(Train),
+    Pack(Pack),
+    Completions(Completions),
+    Man(Man),
 }
 
 /// Parameters of a process `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`.
@@ -144,92 +164,6 @@ impl FromStr for Share {
     }
 }
 
-/// Simulate a relay test and write its recording.
-///
-/// The process is propagated exactly and the relay is the one of the on-board library. Comments at
-/// the head of the file tell the truth behind it.
-#[derive(Clone, Debug, Args)]
-#[command(after_help = concat!(
-    "Examples:\n",
-    "  onecycle simulate --k 1 --t-prop 0.0321 --t-body 1.6886 --tau 0.0237 --out hover.csv\n",
-    "  onecycle simulate --k-over-t-body 40 --t-prop 0.05 --t-body inf --tau 0.015 --noise 1% \\\n",
-    "      --bias 30% --seed 7 | onecycle identify -\n"
-))]
-pub(crate) struct Simulate {
-    #[command(flatten)]
-    pub(crate) process: ProcessArguments,
-    /// Amplitude h of the relay (input unit)
-    #[arg(
-        long,
-        value_name = "H",
-        default_value_t = 1.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) amplitude: f64,
-    /// Sine of the phase of the oscillation
-    #[arg(long, value_name = "BETA", default_value_t = -0.73, allow_negative_numbers = true)]
-    pub(crate) beta: f64,
-    /// Let the relay keep its centre instead of following the input bias
-    #[arg(long)]
-    pub(crate) no_trim: bool,
-    /// Part of a cycle by which the trim leaves the output high longer than low, or low longer than
-    /// high (0 to 0.5); 0.2 tells about twice as much of the process as none
-    #[arg(long, value_name = "PART", default_value_t = 0.0, conflicts_with = "no_trim",
-          allow_negative_numbers = true, value_parser = asymmetry)]
-    pub(crate) asymmetry: f64,
-    /// Plain relay: no smoothing of the error and no dwell
-    #[arg(long)]
-    pub(crate) bare: bool,
-    /// Time for which the relay first measures the noise, in seconds
-    #[arg(
-        long,
-        value_name = "S",
-        default_value_t = 0.1,
-        allow_negative_numbers = true
-    )]
-    pub(crate) preroll: f64,
-    /// Constant added to the input and not recorded (input unit, or % of the relay's amplitude)
-    #[arg(long, default_value = "0", allow_hyphen_values = true)]
-    pub(crate) bias: Share,
-    /// Standard deviation of the measurement noise (output unit, or % of the noise-free amplitude)
-    #[arg(long, default_value = "0", allow_hyphen_values = true)]
-    pub(crate) noise: Share,
-    /// Resolution of the sensor (output unit, or % of the noise-free amplitude)
-    #[arg(long, default_value = "0", allow_hyphen_values = true)]
-    pub(crate) quantum: Share,
-    /// Standard deviation of the sample period (s, or % of it)
-    #[arg(long, default_value = "0", allow_hyphen_values = true)]
-    pub(crate) jitter: Share,
-    /// Output at the start (output unit, or % of the noise-free amplitude)
-    #[arg(long, default_value = "0", allow_hyphen_values = true)]
-    pub(crate) offset: Share,
-    /// Reference of the output (output unit)
-    #[arg(
-        long,
-        value_name = "R",
-        default_value_t = 0.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) reference: f64,
-    /// Sample rate, in hertz
-    #[arg(
-        long,
-        value_name = "HZ",
-        default_value_t = 1000.0,
-        allow_negative_numbers = true
-    )]
-    pub(crate) sample_rate: f64,
-    /// Duration, in seconds [default: 20 periods]
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
-    pub(crate) duration: Option<f64>,
-    /// Seed of noise and jitter: the same seed gives the same bits
-    #[arg(long, default_value_t = 0)]
-    pub(crate) seed: u64,
-    /// File to write, whole or not at all [default: the standard output]
-    #[arg(long, short, value_name = "FILE")]
-    pub(crate) out: Option<PathBuf>,
-}
-
 /// Design the optimal controller of a process: gains, margins and the step to expect.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
@@ -250,28 +184,6 @@ pub(crate) struct Tune {
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
-}
-
-/// Run a campaign of random experiments that a TOML file describes (see experiments/).
-#[derive(Debug, Args)]
-pub(crate) struct Campaign {
-    /// The campaign
-    pub(crate) file: PathBuf,
-    /// Run this many cases instead of the file's number, up to ten million
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_CASES))]
-    pub(crate) cases: Option<u64>,
-    /// Fit this many cycles instead of the file's number
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
-    pub(crate) cycles: Option<u64>,
-    /// Find processes in this way instead of the file's
-    #[arg(long, value_enum)]
-    pub(crate) method: Option<Method>,
-    /// Noise of exactly this part of the amplitude instead of the file's
-    #[arg(long, value_name = "PART")]
-    pub(crate) sigma: Option<f64>,
-    /// Scale all times by this factor, those of the sampling too
-    #[arg(long, value_name = "FACTOR")]
-    pub(crate) time_scale: Option<f64>,
 }
 
 /// Find the distinguishing phase of a space of processes: that of the relay whose tuning rule costs
@@ -305,58 +217,6 @@ pub(crate) struct Phase {
     /// Draw the deterioration and the map of the shapes in this file, as SVG
     #[arg(long, value_name = "FILE")]
     pub(crate) picture: Option<PathBuf>,
-}
-
-/// Certify that the relay makes every process of a space oscillate, once and stably.
-///
-/// Limit cycles are exact, and so is the spectral radius of their Poincare map: what is left of a
-/// small deviation after a cycle. Time scales everything, so shapes of processes stand for all.
-#[derive(Debug, Args)]
-#[command(after_help = concat!(
-    "Examples:\n",
-    "  onecycle certify\n",
-    "  onecycle certify experiments/double_integrators.toml --bias 0,0.3,0.6 --picture out.svg\n",
-    "  onecycle certify --process 0.3,2,0.1 --bias 0,30% --sample-rate 1000\n\n",
-    "Exit codes: 0 certified, 2 bad arguments, 3 unreadable space, 4 not certified, 5 output not ",
-    "written"
-))]
-pub(crate) struct Certify {
-    /// The space, in TOML (see experiments/) [default: the paper's multirotors]
-    pub(crate) space: Option<PathBuf>,
-    /// One process instead of the space, may be repeated: T_prop,T_body,tau in seconds
-    #[arg(long, value_name = "T,T,T", conflicts_with_all = ["json", "picture", "shapes"])]
-    pub(crate) process: Vec<Times>,
-    /// Biases, in amplitudes of the relay or % of it [default: 0 to 0.9, of a process 0]
-    #[arg(long, value_name = "BIAS,...", value_delimiter = ',', allow_hyphen_values = true,
-          value_parser = bias)]
-    bias: Vec<f64>,
-    /// Of single processes: also of a relay sampled at this rate, in hertz
-    #[arg(long, value_name = "HZ", requires = "process", allow_negative_numbers = true,
-          value_parser = sample_rate)]
-    pub(crate) sample_rate: Option<f64>,
-    /// Shapes along either coordinate of their surface (2 to 100)
-    #[arg(long, value_name = "N", default_value_t = 16,
-          value_parser = clap::value_parser!(u64).range(2..=100))]
-    pub(crate) shapes: u64,
-    /// Print the result as JSON
-    #[arg(long)]
-    pub(crate) json: bool,
-    /// Draw loci and stability in this file, as SVG
-    #[arg(long, value_name = "FILE")]
-    pub(crate) picture: Option<PathBuf>,
-}
-
-impl Certify {
-    /// The biases asked for, or the usual ones.
-    pub(crate) fn biases(&self) -> Vec<f64> {
-        if !self.bias.is_empty() {
-            self.bias.clone()
-        } else if self.process.is_empty() {
-            (0..10).map(|tenth| f64::from(tenth) / 10.0).collect()
-        } else {
-            vec![0.0]
-        }
-    }
 }
 
 /// Choose processes that stand for a space, so that one of them is near every process of it.
@@ -428,41 +288,6 @@ const MOST_CHECKED: u64 = 10_000_000;
 /// More threads than any machine has cores.
 const MOST_THREADS: u64 = 1024;
 
-/// `T_prop`, `T_body`, `tau` (s), separated by commas.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Times(pub(crate) [f64; 3]);
-
-impl FromStr for Times {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let times: Vec<f64> = text
-            .split(',')
-            .map(|time| time.trim().parse().ok())
-            .collect::<Option<_>>()
-            .ok_or_else(|| format!("'{text}' is not three times such as 0.3,2,0.1"))?;
-        let times = <[f64; 3]>::try_from(times).map_err(|times| {
-            format!(
-                "a process has three times, but '{text}' has {}",
-                times.len()
-            )
-        })?;
-        Process::new(1.0, times[0], times[1], times[2])
-            .map(|_| Self(times))
-            .map_err(|error| error.to_string())
-    }
-}
-
-/// A bias as a part of the relay's amplitude, below it.
-fn bias(text: &str) -> Result<f64, String> {
-    let bias = text.trim().parse::<Share>()?.of(1.0);
-    if bias.abs() < 1.0 {
-        Ok(bias)
-    } else {
-        Err("a bias lies between -1 and 1 amplitudes of the relay".to_owned())
-    }
-}
-
 /// A deterioration as a fraction, within what a grid can be laid for.
 fn deterioration(text: &str) -> Result<f64, String> {
     let deterioration = text.trim().parse::<Share>()?.of(1.0);
@@ -470,14 +295,6 @@ fn deterioration(text: &str) -> Result<f64, String> {
         Ok(deterioration)
     } else {
         Err("a deterioration lies between 0.1 % and 100 %, such as 10% or 0.1".to_owned())
-    }
-}
-
-/// An asymmetry of the relay.
-fn asymmetry(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(part) if (0.0..=0.5).contains(&part) => Ok(part),
-        _ => Err("an asymmetry lies between 0 and 0.5".to_owned()),
     }
 }
 
@@ -500,3 +317,6 @@ fn sample_rate(text: &str) -> Result<f64, String> {
 fn time_unit(text: &str) -> Result<TimeUnit, String> {
     TimeUnit::from_name(text).ok_or_else(|| "a unit of time is h, min, s, ms, us or ns".to_owned())
 }
+
+#[cfg(test)]
+mod tests;

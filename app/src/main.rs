@@ -11,6 +11,7 @@ mod pages;
 mod pictures;
 mod report;
 mod settings;
+mod style;
 
 use std::process::ExitCode;
 
@@ -26,22 +27,24 @@ fn main() -> ExitCode {
         Command::Identify(identify) => commands::identify::run(identify),
         Command::Simulate(simulate) => commands::simulate::run(simulate),
         Command::Tune(tune) => commands::tune::run(tune),
-        Command::Campaign(campaign) => commands::campaign::run(campaign),
-        Command::Phase(phase) => commands::phase::run(phase),
+        Command::Fly(fly) => commands::fly::run(fly),
         Command::Certify(certify) => commands::certify::run(certify),
+        Command::Phase(phase) => commands::phase::run(phase),
         Command::Grid(grid) => commands::grid::run(grid),
-        Command::Train(train) => commands::train::run(train),
-        Command::Pack(pack) => commands::pack::run(pack),
-        Command::Dataset(dataset) => commands::dataset::run(dataset),
+        Command::Campaign(campaign) => commands::campaign::run(campaign),
         Command::Bench(bench) => commands::bench::run(bench),
         Command::Reproduce(reproduce) => commands::reproduce::run(reproduce),
-        Command::Fly(fly) => commands::fly::run(fly),
+        Command::Dataset(dataset) => commands::dataset::run(dataset),
+        Command::Train(train) => commands::train::run(train),
+        Command::Pack(pack) => commands::pack::run(pack),
+        Command::Completions(completions) => commands::completions::run(completions),
+        Command::Man(man) => commands::man::run(man),
     };
     match result {
         Ok(code) => code,
         Err(failure) if failure.is_closed_pipe() => ExitCode::from(exit::DONE),
         Err(failure) => {
-            complain(&format!("onecycle: {failure}"));
+            complain(&failure);
             ExitCode::from(failure.exit_code())
         }
     }

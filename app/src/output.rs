@@ -1,17 +1,34 @@
 //! The only place that writes: the terminal, and files whole or not at all.
 
+use std::borrow::Cow;
+use std::fmt::Display;
 use std::fs::File;
-use std::io::{self, Write};
+use std::io::{self, IsTerminal, Write};
 use std::path::{Path, PathBuf};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
 
-use indicatif::{ProgressBar, ProgressStyle};
+use anstream::AutoStream;
+use anstyle::Style;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use terminal_size::{Width, terminal_size_of};
 
 use crate::failure::Failure;
+use crate::style::{HEADING, REFUSAL};
 
-/// Prints `text` to the standard output.
+/// Prints a report to the standard output, its styles only where they are seen.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
-    let mut out = io::stdout().lock();
-    out.write_all(text.as_bytes())
+    written(AutoStream::auto(io::stdout().lock()), text.as_bytes())
+}
+
+/// Prints these very bytes to the standard output.
+pub(crate) fn print_data(bytes: &[u8]) -> Result<(), Failure> {
+    written(io::stdout().lock(), bytes)
+}
+
+fn written(mut out: impl Write, bytes: &[u8]) -> Result<(), Failure> {
+    out.write_all(bytes)
         .and_then(|()| out.flush())
         .map_err(|reason| Failure::Output {
             target: "to the standard output".to_owned(),
@@ -19,9 +36,32 @@ pub(crate) fn print(text: &str) -> Result<(), Failure> {
         })
 }
 
-/// Prints a line to the error output; where that is closed there is no one left to tell.
-pub(crate) fn complain(line: &str) {
-    let _ = writeln!(io::stderr().lock(), "{line}");
+/// Whether the standard output is a terminal.
+pub(crate) fn is_terminal() -> bool {
+    io::stdout().is_terminal()
+}
+
+/// Characters in a line of the standard output, where that is a terminal which tells it.
+pub(crate) fn columns() -> Option<usize> {
+    terminal_size_of(io::stdout()).map(|(Width(columns), _)| usize::from(columns))
+}
+
+/// Says on the error output why nothing came of it.
+pub(crate) fn complain(failure: &Failure) {
+    say(REFUSAL, failure);
+}
+
+/// Says on the error output how far it is.
+pub(crate) fn tell(news: &str) {
+    say(HEADING, news);
+}
+
+/// A line on the error output; where that is closed there is no one left to tell.
+fn say(style: Style, line: impl Display) {
+    let _ = writeln!(
+        AutoStream::auto(io::stderr().lock()),
+        "{style}onecycle:{style:#} {line}"
+    );
 }
 
 /// A bar on the error output, for so many pieces of work; nothing where that is no terminal.
@@ -40,6 +80,60 @@ pub(crate) fn progress_bar_with_message(pieces: u64) -> ProgressBar {
         bar.set_style(style);
     }
     bar
+}
+
+/// How long work goes on without a word about it.
+const QUICK: Duration = Duration::from_millis(500);
+/// Between two turns of what shows that work goes on.
+const TURN: Duration = Duration::from_millis(100);
+
+/// What is being done for an unknown time, shown on the error output if it takes longer than [`QUICK`] and that
+/// is a terminal; gone when it is dropped.
+pub(crate) struct Waiting {
+    bar: ProgressBar,
+    over: Option<Sender<()>>,
+    patience: Option<JoinHandle<()>>,
+}
+
+impl Waiting {
+    /// For work that this names, such as `reading log.csv`.
+    pub(crate) fn on(work: impl Into<Cow<'static, str>>) -> Self {
+        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+            bar.set_style(style);
+        }
+        bar.set_message(work);
+        let (over, is_over) = channel();
+        let shown = bar.clone();
+        let patience = std::thread::Builder::new().spawn(move || {
+            if is_over.recv_timeout(QUICK) == Err(RecvTimeoutError::Timeout) {
+                shown.set_draw_target(ProgressDrawTarget::stderr());
+                shown.enable_steady_tick(TURN);
+            }
+        });
+        Self {
+            bar,
+            over: Some(over),
+            // Without a thread the work goes on in silence.
+            patience: patience.ok(),
+        }
+    }
+
+    /// The same with other work from now on.
+    pub(crate) fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
+        self.bar.set_message(work);
+    }
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        drop(self.over.take());
+        if let Some(patience) = self.patience.take() {
+            // It cannot have panicked, and there would be nothing to do about it.
+            let _ = patience.join();
+        }
+        self.bar.finish_and_clear();
+    }
 }
 
 /// Appends a value as a line of JSON to a file of this path. A whole line at a time reaches the system, so

@@ -12,5 +12,6 @@ pub(crate) mod number;
 pub(crate) mod pack;
 pub(crate) mod page;
 pub(crate) mod phase;
+pub(crate) mod plot;
 pub(crate) mod reproduction;
 pub(crate) mod text;

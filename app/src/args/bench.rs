@@ -45,6 +45,11 @@ const MOST_EXPERIMENTS: u64 = 9999;
 ///
 /// A thousand experiments are some 200 MB, 60 MB when packed.
 #[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle bench make -o relay-benchmark\n",
+    "  onecycle bench make -o small-benchmark --cases 50 --seed 2\n"
+))]
 pub(crate) struct MakeBench {
     /// Folder to write, whole or not at all: a new or an empty one
     #[arg(long, short, value_name = "DIR")]
@@ -71,6 +76,10 @@ pub(crate) struct MakeBench {
 /// Answer the experiments by every method, score the answers, print the leaderboard.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle bench run relay-benchmark -o results\n",
+    "  onecycle bench run relay-benchmark --methods none --answers mine=answers.csv\n",
+    "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair -o results --resume\n\n",
     "Methods that read the recordings: onecycle-1, onecycle-2, onecycle-4 (cycles), network, pem, \n",
     "pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc: all by default. Two read \n",
     "a relay test of their own, which is simulated on the true process with the same bias, noise and seed: \n",

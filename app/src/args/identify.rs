@@ -18,6 +18,7 @@ use super::{PackSource, phase_margin, sample_rate, time_unit};
     "  onecycle identify examples/simulated_hover.csv\n",
     "  onecycle identify examples/simulated_hover.csv --report report.html\n",
     "  onecycle identify log.csv --time t_ms --input 4 --output roll --cycles 4\n",
+    "  onecycle identify log.csv --plot always > report.txt\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
     "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process (see the ",
     "verdict), 5 output not written"
@@ -31,6 +32,10 @@ pub(crate) struct Identify {
     /// Write a page with pictures to this file, as HTML that needs no network
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
+    /// Draw the last cycles and the fit: where the standard output is a terminal (auto), always or never
+    #[arg(long, value_name = "WHEN", value_enum, default_value_t = When::Auto, conflicts_with = "json",
+          hide_possible_values = true)]
+    pub(crate) plot: When,
     /// Fit the last N steady cycles (1 to 50)
     #[arg(long, value_name = "N", default_value_t = 8,
           value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
@@ -62,6 +67,14 @@ pub(crate) struct Identify {
     /// Unit of the time column, whatever its header says: h, min, s, ms, us or ns
     #[arg(long, value_name = "UNIT", value_parser = time_unit)]
     pub(crate) time_unit: Option<TimeUnit>,
+}
+
+/// When a plot is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum When {
+    Auto,
+    Always,
+    Never,
 }
 
 /// How a process is found.

@@ -75,7 +75,9 @@ pub(crate) struct ShowPack {
 
 /// Check a pack: its length, its hash, every part of it, and the outputs it must give.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  onecycle pack verify my.pack\n")]
+#[command(
+    after_help = "Examples:\n  onecycle pack verify default\n  onecycle pack verify my.pack\n"
+)]
 pub(crate) struct VerifyPack {
     /// The pack; default is the one built in
     #[arg(value_name = "FILE|default")]

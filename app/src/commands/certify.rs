@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use crate::args::Certify;
 use crate::failure::{Failure, exit};
-use crate::output::{print, progress_bar};
+use crate::output::{Waiting, print, progress_bar};
 use crate::pictures::certify::draw;
 use crate::report::certificate;
 use crate::settings;
@@ -49,7 +49,10 @@ impl Certified {
 pub(crate) fn run(arguments: &Certify) -> Result<ExitCode, Failure> {
     let space = settings::space(arguments.space.as_deref())?;
     if !arguments.process.is_empty() {
-        print(&certificate::processes(arguments, &space)?)?;
+        let waiting = Waiting::on("looking for limit cycles");
+        let report = certificate::processes(arguments, &space)?;
+        drop(waiting);
+        print(&report)?;
         return Ok(ExitCode::from(exit::DONE));
     }
     let certified = certify(arguments, space)?;
@@ -75,7 +78,8 @@ fn certify(arguments: &Certify, space: Space) -> Result<Certified, Failure> {
     let side = arguments.shapes as usize;
     let shapes = space.shapes(side, side);
     let biases = arguments.biases();
-    let bar = progress_bar(((biases.len() + 1) * shapes.len()) as u64);
+    // A certificate of each without bias; under each bias one, and two simulations.
+    let bar = progress_bar(((1 + 3 * biases.len()) * shapes.len()) as u64);
     let least_stable = space
         .least_stable(FINER * side, FINER * side)
         .ok_or_else(|| Failure::usage("the space has no process"))?;
@@ -116,7 +120,11 @@ fn row(space: &Space, shapes: &[Direction], bias: f64, bar: &ProgressBar) -> Res
     for (settled, trim) in settled.iter_mut().zip([false, true]) {
         *settled = certificates
             .par_iter()
-            .map(|certificate| settles(space, certificate, trim).map(usize::from))
+            .map(|certificate| {
+                let settles = settles(space, certificate, trim);
+                bar.inc(1);
+                settles.map(usize::from)
+            })
             .sum::<Result<usize, Failure>>()?;
     }
     Ok(Row {

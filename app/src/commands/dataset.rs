@@ -14,7 +14,7 @@ use self::folder::Folder;
 use super::workers::{Lot, Workers};
 use crate::args;
 use crate::failure::{Failure, exit};
-use crate::output::{complain, print};
+use crate::output::{Waiting, print, tell};
 use crate::{report, settings};
 
 /// What the command has done.
@@ -40,6 +40,7 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     workers.finish();
     #[cfg(feature = "parquet")]
     if let Some(path) = &arguments.parquet {
+        let _waiting = Waiting::on(format!("writing {}", path.display()));
         folder.write_parquet(path)?;
     }
     let done = Done {
@@ -64,19 +65,21 @@ pub(super) fn filled(
     examples: u64,
     workers: &Workers,
 ) -> Result<(Folder, usize, u64), Failure> {
+    let waiting = Waiting::on(format!("looking at {}", path.display()));
     let mut folder = Folder::open(path, recipe, examples)?;
     let damaged = folder.drop_damaged();
+    drop(waiting);
     if !damaged.is_empty() {
-        complain(&format!(
-            "onecycle: made again, for they are missing or damaged: {}",
+        tell(&format!(
+            "made again, for they are missing or damaged: {}",
             damaged.join(", ")
         ));
     }
     let missing = folder.missing();
     let kept = folder.manifest().shards.len() - missing.len();
     if kept > 0 && !missing.is_empty() {
-        complain(&format!(
-            "onecycle: going on after {kept} of {} files",
+        tell(&format!(
+            "going on after {kept} of {} files",
             folder.manifest().shards.len()
         ));
     }

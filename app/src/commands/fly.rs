@@ -119,7 +119,8 @@ fn cycles(flown: &Flown) -> Result<Cycles, CyclesError> {
 }
 
 /// Every tick: what was true, what was measured and commanded, what each tuner was doing.
-fn csv(out: &mut dyn Write, records: &[Record]) -> io::Result<()> {
+fn csv(file: &mut dyn Write, records: &[Record]) -> io::Result<()> {
+    let mut out = io::BufWriter::new(file);
     write!(
         out,
         "time_s,x_m,y_m,altitude_m,climb_m_per_s,roll_rad,pitch_rad,yaw_rad"
@@ -149,5 +150,5 @@ fn csv(out: &mut dyn Write, records: &[Record]) -> io::Result<()> {
         }
         writeln!(out)?;
     }
-    Ok(())
+    out.flush()
 }

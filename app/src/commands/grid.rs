@@ -14,7 +14,7 @@ use self::part::Part;
 use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
-use crate::output::{complain, print, write_file, write_text};
+use crate::output::{Waiting, print, tell, write_file, write_text};
 use crate::{pictures, report, settings};
 
 /// Most members whose costs are written unasked: four million numbers, 40 MB.
@@ -73,8 +73,10 @@ fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<Done, 
         path: path.to_owned(),
         reason,
     };
+    let waiting = Waiting::on(format!("reading {}", path.display()));
     let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
     let file = GridFile::read(&text).map_err(|error| failed(error.to_string()))?;
+    drop(waiting);
     let grid = file
         .grid(workers)
         .map_err(|error| failed(error.to_string()))?;
@@ -133,10 +135,7 @@ fn part_of(out: &Path, settings: &Settings, restart: bool) -> Result<Part, Failu
     path.push(".part");
     let part = Part::open(PathBuf::from(path), settings, restart)?;
     if let Some(what) = part.what_is_done() {
-        complain(&format!(
-            "onecycle: going on after {what} of {}",
-            part.name()
-        ));
+        tell(&format!("going on after {what} of {}", part.name()));
     }
     Ok(part)
 }

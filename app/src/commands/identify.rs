@@ -6,13 +6,15 @@ use std::process::ExitCode;
 use onecycle::{ColumnRef, CsvOptions, Options, Recording};
 
 use super::pack;
-use crate::args::Identify;
+use crate::args::{Identify, When};
 use crate::failure::{Failure, exit};
-use crate::output::{print, write_text};
-use crate::report::{json, page, text};
+use crate::output::{Waiting, columns, is_terminal, print, write_text};
+use crate::report::{json, page, plot, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
+    let waiting = Waiting::on(format!("reading {}", arguments.file.display()));
     let recording = read(arguments)?;
+    waiting.goes_on("identifying");
     let options = Options {
         cycles: arguments.cycles as usize,
         phase_margin_rad: arguments.phase_margin,
@@ -23,12 +25,20 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let found = onecycle::identify_by(&recording, &options, Some(&pack));
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
+        waiting.goes_on("drawing");
         write_text(path, &page::identification(&name, &recording, &found))?;
     }
+    drop(waiting);
+    let is_plotted = match arguments.plot {
+        When::Auto => is_terminal(),
+        When::Always => true,
+        When::Never => false,
+    };
     print(&if arguments.json {
         json::identification(&name, &recording, &found)
     } else {
-        text::identification(&name, &recording, &found)
+        let plotted = is_plotted.then(|| plot::cycles(&recording, &found, columns()));
+        text::identification(&name, &recording, &found) + &plotted.flatten().unwrap_or_default()
     })?;
     Ok(ExitCode::from(if found.outcome.is_ok() {
         exit::DONE

@@ -8,15 +8,18 @@ use onecycle_lab::phase::LocalRule;
 
 use crate::args::Phase;
 use crate::failure::{Failure, exit};
-use crate::output::{print, write_file};
+use crate::output::{Waiting, print, write_file};
 use crate::report::phase::{Found, json, text};
 use crate::{pictures, settings};
 
 pub(crate) fn run(arguments: &Phase) -> Result<ExitCode, Failure> {
     let space = settings::space(arguments.file.as_deref())?;
     let (rows, columns) = (arguments.rows as usize, arguments.columns as usize);
+    let waiting = Waiting::on("designing the optimal controllers");
     let optima = LocalOptima::of_shapes(&space, rows, columns).map_err(Failure::usage)?;
+    waiting.goes_on("applying every rule to every process");
     let phase = optima.distinguishing_phase().map_err(Failure::usage)?;
+    drop(waiting);
     if let Some(path) = &arguments.csv {
         write_file(path, |file| write_rules(file, &phase.rules))?;
     }

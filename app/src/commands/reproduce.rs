@@ -19,7 +19,7 @@ use super::train::classifier::Keep;
 use super::workers::Workers;
 use crate::args::{Name, Reproduce};
 use crate::failure::{Failure, exit};
-use crate::output::{complain, print, write_text};
+use crate::output::{Waiting, print, tell, write_text};
 use crate::report::reproduction as report;
 
 pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
@@ -30,8 +30,8 @@ pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
     let names: Vec<Name> = Name::ALL.into_iter().filter(wanted).collect();
     let mut parts = Vec::with_capacity(names.len());
     for (number, &name) in (1..).zip(&names) {
-        complain(&format!(
-            "onecycle: part {number} of {}, {}",
+        tell(&format!(
+            "part {number} of {}, {}",
             names.len(),
             name.as_str()
         ));
@@ -58,10 +58,13 @@ fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<Part, Failur
     if arguments.resume
         && let Some(found) = part::kept(&path, &settings)?
     {
-        complain("onecycle:   as an earlier run has found it");
+        tell("  as an earlier run has found it");
         return Ok(sheet.part(name, found));
     }
     let workers = Workers::new(arguments.threads)?;
+    // The others have a bar.
+    let waiting = matches!(name, Name::Phase | Name::Figures | Name::Table7)
+        .then(|| Waiting::on("working it out"));
     let found = match name {
         Name::Phase => phase::find(&part::typed(&settings)?)?,
         Name::Grid => grid::find(&part::typed(&settings)?, &workers)?,
@@ -78,11 +81,9 @@ fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<Part, Failur
         Name::Table6 => single::biases(&part::typed(&settings)?, &workers)?,
         Name::Table7 => cycles::find(&part::typed(&settings)?)?,
     };
+    drop(waiting);
     workers.finish();
     part::keep(&path, &settings, &found)?;
-    complain(&format!(
-        "onecycle:   {:.0} s",
-        begin.elapsed().as_secs_f64()
-    ));
+    tell(&format!("  {:.0} s", begin.elapsed().as_secs_f64()));
     Ok(sheet.part(name, found))
 }

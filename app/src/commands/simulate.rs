@@ -12,7 +12,7 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::args::Simulate;
 use crate::failure::{Failure, exit};
-use crate::output::{print, write_file};
+use crate::output::{Waiting, print_data, write_file};
 
 /// Periods of the oscillation in a recording: some to settle, eight and more to fit.
 const PERIODS: f64 = 20.0;
@@ -33,8 +33,10 @@ pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
     let amplitude = noise_free_amplitude(arguments, &process)?;
     let experiment = experiment(arguments, &process, amplitude)?;
     let noise = experiment.sensor.noise_sigma.max(experiment.sensor.quantum);
+    let waiting = Waiting::on("simulating");
     let trace = run_relay(&experiment, relay(arguments, noise)?, arguments.seed);
     let recording = recording(&trace)?;
+    waiting.goes_on("writing");
     let head = head(arguments, &experiment);
     let comments: Vec<&str> = head.lines().collect();
     match &arguments.out {
@@ -43,7 +45,8 @@ pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
             let mut table = Vec::new();
             // Writing to memory does not fail.
             let _ = write_csv(&mut table, &recording, &comments);
-            print(&String::from_utf8_lossy(&table))?;
+            drop(waiting);
+            print_data(&table)?;
         }
     }
     Ok(ExitCode::from(exit::DONE))

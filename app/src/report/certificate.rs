@@ -13,21 +13,21 @@ use super::number::significant;
 use crate::args::Certify;
 use crate::commands::certify::{Certified, Row};
 use crate::failure::Failure;
+use crate::style::{HEADING, REFUSAL, headed, painted, verdict};
 
 /// The report on a space for people.
 pub(crate) fn text(certified: &Certified) -> String {
     let mut text = String::new();
     let Certified { space, rows, .. } = certified;
     let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
-    let _ = writeln!(
-        text,
-        "Space   T_prop {}, T_body {}, tau {}\nRelay   beta {}, {:.2} deg\n",
+    text.push_str(&headed(&format!(
+        "Space   T_prop {}, T_body {}, tau {}\nRelay   beta {}, {:.2} deg\n\n",
         range(space.t_prop_s),
         range(space.t_body_s),
         range(space.tau_s),
         space.beta,
         space.beta.asin().to_degrees(),
-    );
+    )));
     without_bias(&mut text, certified);
     corners(&mut text, space, &certified.corners);
     under_bias(&mut text, rows);
@@ -35,9 +35,15 @@ pub(crate) fn text(certified: &Certified) -> String {
         text,
         "\n{}",
         if certified.holds() {
-            "Certified: stable without bias, and with the trim under every bias above."
+            verdict(
+                true,
+                "Certified: stable without bias, and with the trim under every bias above.",
+            )
         } else {
-            "Not certified: see the processes without a stable cycle above."
+            verdict(
+                false,
+                "Not certified: see the processes without a stable cycle above.",
+            )
         }
     );
     text
@@ -54,10 +60,11 @@ fn without_bias(text: &mut String, certified: &Certified) {
     let [t_prop, t_body, tau] = worst.times_s.map(significant);
     let _ = writeln!(
         text,
-        "Without bias, {shapes} shapes of processes (the time scale plays no part)\n  \
+        "{}, {shapes} shapes of processes (the time scale plays no part)\n  \
          exactly one stable limit cycle: {one} of {shapes}\n  \
          least stable: T_prop {t_prop} s, T_body {t_body} s, tau {tau} s\n    \
          where {} of a deviation is left after a cycle",
+        painted(HEADING, "Without bias"),
         percent(worst.spectral_radius),
     );
     let ratios = || {
@@ -98,10 +105,11 @@ fn percent(share: f64) -> String {
 fn corners(text: &mut String, space: &Space, corners: &[Certificate]) {
     let _ = writeln!(
         text,
-        "Corners of the space, and the describing function's error (velocity gain and relay \
+        "{}, and the describing function's error (velocity gain and relay \
          amplitude 1)\n  \
          T_prop   T_body   tau        period (s)     DF           amplitude     DF        left\n  \
-         (s)      (s)      (s)        exact          error        exact         error     a cycle"
+         (s)      (s)      (s)        exact          error        exact         error     a cycle",
+        painted(HEADING, "Corners of the space"),
     );
     for certificate in corners {
         let [t_prop, t_body, tau] = certificate.times_s;
@@ -137,10 +145,11 @@ fn under_bias(text: &mut String, rows: &[Row]) {
     let processes = rows.first().map_or(0, |row| row.summary.processes);
     let _ = writeln!(
         text,
-        "\nUnder a bias, in amplitudes of the relay; counts of {processes} processes, stable periods in \
+        "\n{}, in amplitudes of the relay; counts of {processes} processes, stable periods in \
          those\nwithout bias, and the largest part of a deviation that is left after a cycle\n        \
          bare relay                         turning back              with trim   simulated, settled\n  \
-         bias  stable unstable none periods       cycles periods            stable left   untrimmed trimmed"
+         bias  stable unstable none periods       cycles periods            stable left   untrimmed trimmed",
+        painted(HEADING, "Under a bias"),
     );
     for row in rows {
         let summary = &row.summary;
@@ -228,12 +237,11 @@ pub(crate) fn processes(arguments: &Certify, space: &Space) -> Result<String, Fa
     let mut text = String::new();
     for times in &arguments.process {
         let [t_prop, t_body, tau] = times.0;
-        let _ = writeln!(
-            text,
+        text.push_str(&headed(&format!(
             "Process   T_prop {t_prop} s, T_body {t_body} s, tau {tau} s, velocity gain 1; relay \
-             amplitude 1, beta {}",
+             amplitude 1, beta {}\n",
             space.beta
-        );
+        )));
         for bias in arguments.biases() {
             let certificate =
                 Certificate::new(times.0, space.beta, bias).map_err(Failure::usage)?;
@@ -292,7 +300,11 @@ fn described(cycle: &LimitCycle) -> String {
         significant(cycle.high_s),
         significant(cycle.amplitude),
         percent(cycle.spectral_radius),
-        if cycle.is_stable() { "" } else { ": unstable" },
+        if cycle.is_stable() {
+            String::new()
+        } else {
+            painted(REFUSAL, ": unstable")
+        },
     )
 }
 

@@ -13,9 +13,14 @@ use crate::commands::fly::{Campaign, Flight};
 use crate::commands::reproduce::cycles;
 use crate::pages::page::{self, Cell, Section, page};
 use crate::pages::plot::{self, Figure, Marks, Panel, Series};
+use crate::style::{HEADING, painted, verdict};
 
 /// Points of a series: as many as a wide screen has.
 const POINTS: usize = 2000;
+
+/// Names of the figures that say whether all went well.
+const FLOWN: &str = "flown";
+const ENDED_EARLY: &str = "ended early";
 
 fn title(mission: Mission) -> &'static str {
     match mission {
@@ -37,7 +42,7 @@ fn figures(campaign: &Campaign) -> Vec<(String, String)> {
         .iter()
         .filter(|flight| flight.flown.failure.is_none())
         .count();
-    let mut figures = vec![("flown".to_owned(), format!("{done} of {}", flights.len()))];
+    let mut figures = vec![(FLOWN.to_owned(), format!("{done} of {}", flights.len()))];
     for axis in Axis::ALL {
         let of_axis: Vec<&(Tuned, Deterioration)> = (flights.iter())
             .flat_map(|flight| &flight.judged)
@@ -52,7 +57,7 @@ fn figures(campaign: &Campaign) -> Vec<(String, String)> {
     figures.extend(
         failures
             .take(3)
-            .map(|failure| ("ended early".to_owned(), failure.to_string())),
+            .map(|failure| (ENDED_EARLY.to_owned(), failure.to_string())),
     );
     figures
 }
@@ -272,10 +277,15 @@ fn figures_of(campaign: &Campaign, campaigns: &[Campaign]) -> Vec<(String, Strin
 pub(crate) fn text(campaigns: &[Campaign]) -> String {
     let mut text = String::new();
     for campaign in campaigns {
-        let name = campaign.mission.name();
-        let _ = writeln!(text, "{name}: {}", title(campaign.mission));
+        let (name, title) = (campaign.mission.name(), title(campaign.mission));
+        let is_flown = (campaign.flights.iter()).all(|flight| flight.flown.failure.is_none());
+        let _ = writeln!(text, "{}: {title}", painted(HEADING, name));
         for (name, value) in figures_of(campaign, campaigns) {
-            let _ = writeln!(text, "  {name:<40} {value}");
+            let line = format!("  {name:<40} {value}\n");
+            text.push_str(&match name.as_str() {
+                FLOWN | ENDED_EARLY => verdict(is_flown, &line),
+                _ => line,
+            });
         }
     }
     text

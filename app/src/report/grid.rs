@@ -13,6 +13,7 @@ use crate::commands::grid::Done;
 use crate::pages::page::{self, Section, page};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series, Shape};
 use crate::pictures::grid as picture;
+use crate::style::{headed, verdict};
 
 /// Changes with every change that a reader of the summary could notice.
 const SCHEMA: &str = "onecycle.grid.summary/1";
@@ -110,6 +111,7 @@ pub(crate) fn text(done: &Done) -> String {
     );
     members(&mut text, &done.grid);
     let _ = writeln!(text, "Time     {} s", significant(done.took.as_secs_f64()));
+    text = headed(&text);
     if let Some(check) = &done.check {
         describe(&mut text, check, &limit);
     }
@@ -144,13 +146,12 @@ fn members(text: &mut String, grid: &Grid) {
 fn describe(text: &mut String, check: &Check, limit: &str) {
     let [t_prop, t_body, tau] = check.worst_at_s.map(significant);
     let cost = |cost: Option<f64>| cost.map_or("unstable".to_owned(), percent);
-    let _ = writeln!(
-        text,
+    text.push_str(&headed(&format!(
         "\nCheck    {} random processes, seed {}\n  \
          from the best member        worst {}, mean {}\n  \
          its controller on them      worst {}, mean {}\n  \
          least phase margin left     {}\n  \
-         farthest is                 T_prop {t_prop} s, T_body {t_body} s, tau {tau} s\n",
+         farthest is                 T_prop {t_prop} s, T_body {t_body} s, tau {tau} s\n\n",
         check.processes,
         check.seed,
         cost(check.worst),
@@ -163,14 +164,17 @@ fn describe(text: &mut String, check: &Check, limit: &str) {
                 "{:.1} deg",
                 margin.to_degrees()
             )),
-    );
-    let _ = match check.beyond {
-        0 => writeln!(text, "Every one of them is within {limit} of a member."),
-        beyond => writeln!(
-            text,
-            "{beyond} of them are farther than {limit} from every member."
+    )));
+    text.push_str(&match check.beyond {
+        0 => verdict(
+            true,
+            &format!("Every one of them is within {limit} of a member.\n"),
         ),
-    };
+        beyond => verdict(
+            false,
+            &format!("{beyond} of them are farther than {limit} from every member.\n"),
+        ),
+    });
 }
 
 /// The summary and its pictures on a page.

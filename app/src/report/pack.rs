@@ -11,6 +11,7 @@ use super::json::to_text;
 use super::number::significant;
 use crate::args::ImportPack;
 use crate::commands::pack::SAMPLES;
+use crate::style::{headed, verdict};
 
 /// Changes with every change that a reader of the report could notice.
 const SCHEMA: &str = "onecycle.pack/1";
@@ -114,8 +115,7 @@ pub(crate) fn text(name: &str, pack: &Pack<'_>) -> String {
         fields = table.fields,
         axes = row(&table.axes),
     );
-    let _ = write!(text, "Card\n{}", to_text(&card(pack)));
-    text
+    headed(&text) + &headed("Card\n") + &to_text(&card(pack))
 }
 
 /// Whether a pack is whole and gives the outputs it must.
@@ -128,15 +128,22 @@ pub(crate) fn verified(name: &str, pack: &Pack<'_>, worst: Option<f32>) -> Strin
     let tests = pack.self_tests().count();
     head + &match worst {
         None => "It holds no signature to test its outputs with.\n".to_owned(),
-        Some(worst) if worst <= SELF_TEST_TOLERANCE => format!(
-            "{tests} signatures give the outputs they must, the largest difference {}.\n",
-            significant(f64::from(worst))
+        Some(worst) if worst <= SELF_TEST_TOLERANCE => verdict(
+            true,
+            &format!(
+                "{tests} signatures give the outputs they must, the largest difference {}.\n",
+                significant(f64::from(worst))
+            ),
         ),
-        Some(worst) => format!(
-            "Its outputs are not those they must be: of {tests} signatures the largest difference \
-             is {}, where {} is allowed.\nDo not use it: make it again, or update onecycle.\n",
-            significant(f64::from(worst)),
-            significant(f64::from(SELF_TEST_TOLERANCE))
+        Some(worst) => verdict(
+            false,
+            &format!(
+                "Its outputs are not those they must be: of {tests} signatures the largest \
+                 difference is {}, where {} is allowed.\n\
+                 Do not use it: make it again, or update onecycle.\n",
+                significant(f64::from(worst)),
+                significant(f64::from(SELF_TEST_TOLERANCE))
+            ),
         ),
     }
 }

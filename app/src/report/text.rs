@@ -1,13 +1,15 @@
-//! The reports for people: plain text, aligned, at most 100 columns.
+//! The reports for people: text, aligned, at most 100 columns; headings and verdicts in their styles.
 
 use std::fmt::Write;
 
-use onecycle_lab::identify::{Identification, Identified, Interval, OscillationFound};
+use onecycle_lab::identify::{Identification, Identified, Interval, OscillationFound, Reading};
 use onecycle_lab::{Optimum, StepMetrics};
 use onecycle_link::Recording;
 use onecycle_onboard::Process;
+use onecycle_onboard::classify::Verdict;
 
 use super::number::{bounded, significant};
+use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
 
 /// Widest line of remarks, as terminals are.
 const WIDTH: usize = 96;
@@ -61,18 +63,23 @@ impl Units {
 pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
     let mut text = String::new();
     let units = Units::of(recording);
-    let _ = writeln!(text, "{file}");
+    let _ = writeln!(text, "{}", painted(HEADING, file));
     for note in recording.notes() {
-        wrapped(&mut text, "  note: ", &note.to_string());
+        remark(&mut text, "  note: ", &note.to_string());
     }
     if let Some(oscillation) = &found.oscillation {
         describe_oscillation(&mut text, oscillation, &units);
         if let Some(reading) = &found.reading {
+            let Reading { classification, .. } = reading;
+            let is_known = classification.verdict == Verdict::Known;
             let _ = writeln!(
                 text,
                 "  last cycle  {} (score {})",
-                reading.classification.verdict,
-                significant(reading.classification.score)
+                painted(
+                    if is_known { HOLDS } else { REMARK },
+                    &classification.verdict.to_string()
+                ),
+                significant(classification.score)
             );
         }
     }
@@ -87,15 +94,15 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             describe_step(&mut text, identified.step.as_ref());
         }
         Err(verdict) => {
-            let _ = writeln!(text, "\nNo process identified");
+            let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
             wrapped(&mut text, "  ", &sentence(&verdict.to_string()));
             wrapped(&mut text, "  ", verdict.advice());
         }
     }
     if !found.remarks.is_empty() {
-        let _ = writeln!(text, "\nRemarks");
-        for remark in &found.remarks {
-            wrapped(&mut text, "  - ", &remark.to_string());
+        text.push_str(&headed("\nRemarks\n"));
+        for one in &found.remarks {
+            remark(&mut text, "  - ", &one.to_string());
         }
     }
     text
@@ -105,7 +112,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
 pub(crate) fn design(process: &Process, optimum: &Optimum, step: Option<&StepMetrics>) -> String {
     let mut text = String::new();
     let infinite = |value: Option<f64>| value.map_or("infinite".to_owned(), significant);
-    let _ = writeln!(text, "Process  {FORMULA}");
+    let _ = writeln!(text, "{}", headed(&format!("Process  {FORMULA}")));
     for (name, value, unit) in [
         ("K", infinite(process.k()), ""),
         ("K/T_body", significant(process.k_over_t_body()), ""),
@@ -137,7 +144,7 @@ fn describe_oscillation(text: &mut String, found: &OscillationFound, units: &Uni
         end_s,
         ..
     } = *found;
-    let _ = writeln!(text, "\nOscillation");
+    text.push_str(&headed("\nOscillation\n"));
     let _ = writeln!(
         text,
         "  the last {cycles_used} of {cycles_steady} steady cycles, {start_s:.3} to {end_s:.3} s"
@@ -174,7 +181,7 @@ fn describe_oscillation(text: &mut String, found: &OscillationFound, units: &Uni
 
 fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
     let process = &identified.process;
-    let _ = writeln!(text, "\nProcess  {FORMULA}");
+    let _ = writeln!(text, "\n{}", headed(&format!("Process  {FORMULA}")));
     let _ = writeln!(text, "  {:<10}{:>12}   90 % interval", "", "estimate");
     let (velocity, acceleration) = (units.gain("s"), units.gain("s^2"));
     let mut row = |name: &str, interval: &Interval, unit: &str| {
@@ -206,7 +213,7 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
 
 fn describe_controller(text: &mut String, optimum: &Optimum, phase_margin_rad: Option<&Interval>) {
     let pd = optimum.pd;
-    let _ = writeln!(text, "\nController  u = Kp (r - y) - Kd dy/dt");
+    text.push_str(&headed("\nController  u = Kp (r - y) - Kd dy/dt\n"));
     let _ = writeln!(
         text,
         "  Kp {}   Kd {}   as cascade: angle P {} 1/s, rate P {}",
@@ -246,7 +253,11 @@ fn describe_controller(text: &mut String, optimum: &Optimum, phase_margin_rad: O
 }
 
 fn describe_step(text: &mut String, step: Option<&StepMetrics>) {
-    let _ = writeln!(text, "\nPredicted step of the reference");
+    let _ = writeln!(
+        text,
+        "\n{}",
+        painted(HEADING, "Predicted step of the reference")
+    );
     let _ = match step {
         Some(step) => writeln!(
             text,
@@ -258,6 +269,13 @@ fn describe_step(text: &mut String, step: Option<&StepMetrics>) {
         ),
         None => writeln!(text, "  too slow to simulate"),
     };
+}
+
+/// Writes what one should know besides, wrapped.
+fn remark(text: &mut String, lead: &str, words: &str) {
+    let mut lines = String::new();
+    wrapped(&mut lines, lead, words);
+    text.push_str(&painted(REMARK, &lines));
 }
 
 /// The same with a capital letter and a full stop.

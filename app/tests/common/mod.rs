@@ -53,8 +53,9 @@ pub(crate) struct Outcome {
 
 pub(crate) fn onecycle() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_onecycle"));
-    // A developer's backtraces must not hide behind the environment of the tests.
+    // A developer's backtraces and colours must not come in by the environment of the tests.
     command.env("RUST_BACKTRACE", "0");
+    command.env_remove("CLICOLOR_FORCE");
     command
 }
 

@@ -16,7 +16,7 @@ use crate::args::{self, RunBench};
 use crate::commands::clock::thread_seconds;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{complain, print, write_file};
+use crate::output::{print, tell, write_file};
 use crate::report;
 use crate::report::bench::Results;
 
@@ -104,9 +104,7 @@ fn answered(
         .collect();
     if !done.is_empty() {
         let (kept, all) = (done.len(), truths.len());
-        complain(&format!(
-            "onecycle: going on after {kept} of {all} experiments"
-        ));
+        tell(&format!("going on after {kept} of {all} experiments"));
     }
     workers.expect(truths.len(), truths.len() - open.len());
     for lot in open.chunks(LOT * workers.threads()) {

@@ -18,7 +18,7 @@ use crate::args;
 use crate::commands::dataset::filled;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{print, progress_bar_with_message, write_file, write_text};
+use crate::output::{Waiting, print, progress_bar_with_message, write_file, write_text};
 use crate::report::identifier as report;
 use crate::settings;
 
@@ -62,7 +62,9 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
     let experiments = recipe.experiments.clone();
     let (folder, ..) = filled(&path, experiments, recipe.experiments(), &workers)?;
     workers.finish();
+    let waiting = Waiting::on("reading the experiments");
     let records = folder.records()?;
+    drop(waiting);
     let simulated_s = begin.elapsed().as_secs_f64();
 
     let [learning, choosing, scoring] = recipe.numbers().map(|numbers| {
@@ -73,6 +75,7 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
     let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
     let part = Part::of(out, 1, kept);
     let (trainer, outcome) = learn(recipe, [learning, choosing], &part, arguments, &workers)?;
+    let waiting = Waiting::on("calibrating");
     let (pack, quantisation) = pack(recipe, trainer.best(), [learning, choosing])?;
     let mut done = Done {
         examples: records.len(),
@@ -85,7 +88,9 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
         sizes: Sizes::default(),
         seconds: [simulated_s, 0.0],
     };
+    waiting.goes_on("scoring");
     let bytes = finish(pack, recipe, scoring, &mut done).map_err(Failure::usage)?;
+    drop(waiting);
     write_file(out, |file| file.write_all(&bytes))?;
     done.seconds[1] = begin.elapsed().as_secs_f64() - simulated_s;
     if let Some(path) = &arguments.json {

@@ -1,0 +1,97 @@
+//! The help texts: every command has examples, they parse, and what they name is there.
+
+use std::path::Path;
+
+use clap::{Command, CommandFactory, Parser};
+
+use super::Arguments;
+
+/// Every command with the words that call it, the program itself first.
+fn commands() -> Vec<(String, Command)> {
+    fn of(words: &str, command: &Command, all: &mut Vec<(String, Command)>) {
+        all.push((words.to_owned(), command.clone()));
+        for inside in command.get_subcommands() {
+            of(&format!("{words} {}", inside.get_name()), inside, all);
+        }
+    }
+    let mut all = vec![];
+    of("onecycle", &Arguments::command(), &mut all);
+    all
+}
+
+/// What stands behind the options.
+fn after_help(command: &Command) -> String {
+    let text = command.get_after_help();
+    text.map(ToString::to_string).unwrap_or_default()
+}
+
+/// Calls of the program in a help text: lines that end in a backslash are joined, pipes are cut into what they
+/// connect, and redirections are cut off.
+fn calls(help: &str) -> Vec<Vec<String>> {
+    let joined = help.replace("\\\n", " ");
+    let pieces =
+        (joined.lines().filter(|line| line.starts_with(' '))).flat_map(|line| line.split('|'));
+    let words = pieces.map(|piece| {
+        let call = piece.split('>').next().unwrap_or_default();
+        call.split_whitespace()
+            .map(str::to_owned)
+            .collect::<Vec<_>>()
+    });
+    let is_call = |words: &Vec<String>| words.first().is_some_and(|word| word == "onecycle");
+    words.filter(is_call).collect()
+}
+
+// Two calls at least of each, by its own name.
+#[test]
+fn every_command_has_examples_of_itself() {
+    for (words, command) in &commands()[1..] {
+        let help = after_help(command);
+        assert!(help.contains("Examples:\n"), "{words}: {help}");
+        let is_own =
+            |call: &&Vec<String>| format!("{} ", call.join(" ")).starts_with(&format!("{words} "));
+        let own = calls(&help).iter().filter(is_own).count();
+        assert!(own >= 2, "{words}: {help}");
+    }
+}
+
+// As a shell would hand them over; none needs quotes, which this splitting does not know.
+#[test]
+fn every_example_parses() {
+    let mut count = 0;
+    for (words, command) in commands() {
+        for call in calls(&after_help(&command)) {
+            let quoted = call.iter().any(|word| word.contains(['\'', '"', '\\']));
+            assert!(!quoted, "{call:?} needs a shell");
+            let parsed = Arguments::try_parse_from(&call);
+            assert!(parsed.is_ok(), "{words}: {call:?}: {:?}", parsed.err());
+            count += 1;
+        }
+    }
+    // Two of each of the 19 commands that do something, and the first steps.
+    assert!(count >= 41, "{count}");
+}
+
+// What an example names of this repository is in it.
+#[test]
+fn files_of_examples_are_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let mut count = 0;
+    for (words, command) in commands() {
+        let help = after_help(&command);
+        let lines = help.lines().filter(|line| line.starts_with(' '));
+        let files = lines.flat_map(str::split_whitespace);
+        for file in
+            files.filter(|word| word.starts_with("examples/") || word.starts_with("experiments/"))
+        {
+            assert!(root.join(file).exists(), "{words}: {file}");
+            count += 1;
+        }
+    }
+    assert!(count > 5, "{count}");
+}
+
+// Every name, conflict and default that clap can only check when it runs.
+#[test]
+fn clap_finds_nothing_amiss() {
+    Arguments::command().debug_assert();
+}

@@ -1,0 +1,376 @@
+//! What a terminal shows: colours, the plot, completions and the manual.
+
+// Helpers of tests are tests too, which the lint does not see; a test that cannot run says so.
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use common::{Scratch, Table, names_in, onecycle, run};
+
+const ESCAPE: char = '\u{1b}';
+
+/// A recording that tells its process, and one whose output is clipped and tells none.
+fn recordings(folder: &Scratch) -> [String; 2] {
+    let clipped = Table::noisy().map(|_, sample| sample.output = sample.output.clamp(-2e-3, 2e-3));
+    [
+        folder.write("noisy.csv", Table::noisy().csv().as_bytes()),
+        folder.write("clipped.csv", clipped.csv().as_bytes()),
+    ]
+}
+
+/// Standard output and error output with colours as this variable has them, none of the others being set.
+fn coloured(arguments: &[&str], variable: Option<&str>) -> [String; 2] {
+    let mut command = onecycle();
+    for other in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
+        command.env_remove(other);
+    }
+    let output = command
+        .args(arguments)
+        .envs(variable.map(|variable| (variable, "1")))
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap())
+}
+
+/// The text without its codes for colours, which are the only ones there may be: an escape, a bracket, numbers
+/// and an m.
+fn stripped(text: &str) -> String {
+    let mut parts = text.split(ESCAPE);
+    let mut plain = parts.next().unwrap().to_owned();
+    for part in parts {
+        let (code, rest) = part.split_once('m').expect("a code of colours ends in m");
+        let numbers = code
+            .strip_prefix('[')
+            .expect("a code begins with a bracket");
+        assert!(
+            numbers.chars().all(|c| c.is_ascii_digit() || c == ';'),
+            "{code}"
+        );
+        plain.push_str(rest);
+    }
+    plain
+}
+
+/// Characters of braille that have a dot.
+fn is_braille(character: char) -> bool {
+    ('\u{2801}'..='\u{28ff}').contains(&character)
+}
+
+fn rows_of_braille(text: &str) -> usize {
+    text.lines()
+        .filter(|line| line.contains(is_braille))
+        .count()
+}
+
+/// Lines but the one that says how long it took.
+fn timeless(text: &str) -> Vec<&str> {
+    text.lines()
+        .filter(|line| !line.starts_with("Time"))
+        .collect()
+}
+
+/// A program of this name, where the machine has one.
+fn program(name: &str) -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    let found = std::env::split_paths(&path)
+        .map(|folder| folder.join(name))
+        .find(|file| file.is_file());
+    if found.is_none() {
+        eprintln!("skipped: there is no {name} here");
+    }
+    found
+}
+
+// ---------------------------------------------------------------- colours
+
+#[test]
+fn colours_change_nothing_but_the_colours() {
+    let folder = Scratch::new();
+    let [good, clipped] = recordings(&folder);
+    let commands: [&[&str]; 9] = [
+        &["identify", &good],
+        &["identify", &good, "--plot", "always"],
+        &["identify", &clipped],
+        &[
+            "tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
+        ],
+        &["certify", "--process", "0.3,2,0.1", "--bias", "0,90%"],
+        &["grid", "--deterioration", "50%", "--check", "20"],
+        &["pack", "verify", "default"],
+        &["pack", "show", "default"],
+        &["fly", "altitude"],
+    ];
+    for command in commands {
+        let [plain, _] = coloured(command, None);
+        let [forced, _] = coloured(command, Some("CLICOLOR_FORCE"));
+        assert!(!plain.contains(ESCAPE), "{plain}");
+        assert!(forced.contains(ESCAPE), "{forced}");
+        let forced = stripped(&forced);
+        assert_eq!(timeless(&forced), timeless(&plain), "{command:?}");
+    }
+}
+
+// Green is 32, yellow 33, bold red 1 and 31: what is known, the remark on the noise, and the refusal.
+#[test]
+fn verdicts_have_their_colours() {
+    let folder = Scratch::new();
+    let [good, clipped] = recordings(&folder);
+    let [text, _] = coloured(&["identify", &good], Some("CLICOLOR_FORCE"));
+    assert!(text.contains("\x1b[32mknown"), "{text}");
+    assert!(text.contains("\x1b[33m  note:"), "{text}");
+    assert!(text.contains("\x1b[1mController\x1b[0m"), "{text}");
+    let [text, _] = coloured(&["identify", &clipped], Some("CLICOLOR_FORCE"));
+    assert!(
+        text.contains("\x1b[1m\x1b[31mNo process identified\x1b[0m"),
+        "{text}"
+    );
+    let [text, _] = coloured(&["pack", "verify", "default"], Some("CLICOLOR_FORCE"));
+    assert!(text.contains("\x1b[32m"), "{text}");
+}
+
+#[test]
+fn only_the_word_before_a_complaint_is_coloured() {
+    let command = ["identify", "missing.csv"];
+    let [_, plain] = coloured(&command, None);
+    let [_, forced] = coloured(&command, Some("CLICOLOR_FORCE"));
+    assert!(
+        plain.starts_with("onecycle: cannot open missing.csv"),
+        "{plain}"
+    );
+    assert!(
+        forced.starts_with("\x1b[1m\x1b[31monecycle:\x1b[0m cannot open missing.csv"),
+        "{forced}"
+    );
+    assert_eq!(stripped(&forced), plain);
+}
+
+// Data are not reports: JSON and tables have no colours however they are asked for.
+#[test]
+fn data_have_no_colours() {
+    let folder = Scratch::new();
+    let [good, _] = recordings(&folder);
+    for command in [
+        &["identify", good.as_str(), "--json"][..],
+        &["completions", "zsh"],
+        &["man"],
+    ] {
+        let [text, _] = coloured(command, Some("CLICOLOR_FORCE"));
+        assert!(!text.contains(ESCAPE), "{command:?}");
+    }
+}
+
+// ---------------------------------------------------------------- the plot
+
+// Twelve rows, no line wider than the report's 96 characters, the axis from 2 periods of 0.44 s before the end.
+#[test]
+fn a_pipe_has_the_plot_when_it_is_asked_for() {
+    let folder = Scratch::new();
+    let [good, clipped] = recordings(&folder);
+    assert_eq!(rows_of_braille(&run(&["identify", &good]).stdout), 0);
+    assert_eq!(
+        rows_of_braille(&run(&["identify", &good, "--plot", "never"]).stdout),
+        0
+    );
+    let text = run(&["identify", &good, "--plot", "always"]).stdout;
+    assert!(!text.contains(ESCAPE), "{text}");
+    assert_eq!(rows_of_braille(&text), 12, "{text}");
+    assert!(
+        text.contains("Last two cycles  pv in dots, the fit as a line"),
+        "{text}"
+    );
+    assert!(
+        text.lines().all(|line| line.chars().count() <= 96),
+        "{text}"
+    );
+    let axis = text.lines().last().unwrap();
+    let times: Vec<f64> = axis
+        .split(" s")
+        .filter_map(|time| time.trim().parse().ok())
+        .collect();
+    assert!((times[1] - times[0] - 0.88).abs() < 0.05, "{axis}");
+    // The relay switches twice a cycle: four changes in two cycles, three if the window begins with one.
+    let relay = text.lines().find(|line| line.contains("relay │")).unwrap();
+    let strokes: Vec<char> = relay.chars().filter(|c| ['▔', '▁'].contains(c)).collect();
+    let switches = strokes.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    assert!((3..=4).contains(&switches), "{relay}");
+
+    // A refusal shows what was refused, without a fit.
+    let text = run(&["identify", &clipped, "--plot", "always"]).stdout;
+    assert!(text.contains("No process identified"), "{text}");
+    assert!(rows_of_braille(&text) >= 10, "{text}");
+    assert!(!text.contains("the fit"), "{text}");
+}
+
+// Without an oscillation there is nothing to draw; JSON has its own figures.
+#[test]
+fn there_is_no_plot_of_nothing() {
+    let folder = Scratch::new();
+    let still = Table::noisy().map(|_, sample| sample.output = 0.0);
+    let path = folder.write("still.csv", still.csv().as_bytes());
+    let outcome = run(&["identify", &path, "--plot", "always"]);
+    assert_eq!(outcome.code, Some(common::NOT_IDENTIFIED));
+    assert_eq!(rows_of_braille(&outcome.stdout), 0);
+    run(&["identify", &path, "--json", "--plot", "always"]).misused(&["--plot", "--json"]);
+}
+
+/// What a terminal of this width gets from `onecycle identify FILE`; `None` where there is no `script` to make
+/// one.
+fn on_a_terminal(file: &str, columns: usize, variable: Option<&str>) -> Option<String> {
+    let script = program("script")?;
+    // Progress stays out of the picture.
+    let program = env!("CARGO_BIN_EXE_onecycle");
+    let call = format!("stty rows 40 cols {columns}; '{program}' identify '{file}' 2>/dev/null");
+    let mut command = Command::new(script);
+    for other in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
+        command.env_remove(other);
+    }
+    let output = command
+        .args(["-qec", &call, "/dev/null"])
+        .env("TERM", "xterm-256color")
+        .envs(variable.map(|variable| (variable, "1")))
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    Some(String::from_utf8(output.stdout).unwrap())
+}
+
+// A plot is there unasked, as wide as the terminal: 70 characters, of which 13 stand before it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_terminal_has_plot_and_colours_where_script_makes_one() {
+    let folder = Scratch::new();
+    let [good, _] = recordings(&folder);
+    let Some(text) = on_a_terminal(&good, 70, None) else {
+        return;
+    };
+    assert!(text.contains("\x1b[36m"), "{text}");
+    assert!(text.contains("\x1b[1mController\x1b[0m"), "{text}");
+    assert_eq!(rows_of_braille(&text), 12, "{text}");
+    let axis = text.lines().find(|line| line.contains('└')).unwrap();
+    assert_eq!(axis.trim_end().chars().count(), 70, "{text}");
+
+    let text = on_a_terminal(&good, 200, Some("NO_COLOR")).unwrap();
+    assert!(!text.contains(ESCAPE), "{text}");
+    assert_eq!(rows_of_braille(&text), 12, "{text}");
+    let axis = text.lines().find(|line| line.contains('└')).unwrap();
+    assert_eq!(axis.trim_end().chars().count(), 96, "{text}");
+}
+
+// ---------------------------------------------------------------- completions and the manual
+
+#[test]
+fn every_shell_has_a_script() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let outcome = run(&["completions", shell]);
+        assert_eq!((outcome.code, outcome.stderr.as_str()), (Some(0), ""));
+        assert!(outcome.stdout.contains("identify"), "{shell}");
+    }
+    run(&["completions", "cmd"]).misused(&["cmd"]);
+}
+
+#[test]
+fn bash_completes_a_command_an_option_and_a_value() {
+    let Some(bash) = program("bash") else {
+        return;
+    };
+    let folder = Scratch::new();
+    let path = folder.write(
+        "onecycle.bash",
+        run(&["completions", "bash"]).stdout.as_bytes(),
+    );
+    let checked = Command::new(&bash).args(["-n", &path]).output().unwrap();
+    assert!(checked.status.success(), "{checked:?}");
+    // What bash does when Tab is pressed behind these words.
+    for (words, expected) in [
+        ("onecycle ide", "identify"),
+        ("onecycle identify --plo", "--plot"),
+        ("onecycle identify --plot al", "always"),
+        ("onecycle pack ver", "verify"),
+    ] {
+        let [.., before, current] = words.split(' ').collect::<Vec<_>>()[..] else {
+            unreachable!("there are two words");
+        };
+        let script = format!(
+            "source '{path}'; COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); \
+             _onecycle onecycle '{current}' '{before}'; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+        );
+        let output = Command::new(&bash).args(["-c", &script]).output().unwrap();
+        let completed = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(completed.trim_end(), expected, "{words}: {output:?}");
+    }
+}
+
+/// Commands that a help text lists.
+fn listed(help: &str) -> Vec<String> {
+    let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1);
+    let lines = lines.take_while(|line| !line.is_empty());
+    let names = lines.filter(|line| line.starts_with("  ") && !line.starts_with("   "));
+    let names = names.filter_map(|line| line.split_whitespace().next());
+    names
+        .filter(|name| *name != "help")
+        .map(str::to_owned)
+        .collect()
+}
+
+// A page for the program, one for each command that its help lists, and one for each of theirs.
+#[test]
+fn every_command_has_a_page() {
+    let folder = Scratch::new();
+    let out = folder.name("man1");
+    let outcome = run(&["man", "-o", &out]);
+    assert_eq!((outcome.code, outcome.stdout.as_str()), (Some(0), ""));
+    let mut expected = vec!["onecycle.1".to_owned()];
+    for command in listed(&run(&["--help"]).stdout) {
+        expected.push(format!("onecycle-{command}.1"));
+        let inside = listed(&run(&[&command, "--help"]).stdout);
+        expected.extend(
+            inside
+                .iter()
+                .map(|inside| format!("onecycle-{command}-{inside}.1")),
+        );
+    }
+    for known in [
+        "onecycle-identify.1",
+        "onecycle-pack-verify.1",
+        "onecycle-bench-run.1",
+    ] {
+        assert!(expected.iter().any(|name| name == known), "{expected:?}");
+    }
+    let mut pages = names_in(Path::new(&out));
+    pages.sort();
+    expected.sort();
+    assert_eq!(pages, expected);
+    for page in pages {
+        let text = std::fs::read_to_string(Path::new(&out).join(&page)).unwrap();
+        let name = page.trim_end_matches(".1").replace('-', "\\-");
+        assert!(
+            text.contains(&format!(".SH NAME\n{name} \\- ")),
+            "{page}: {text}"
+        );
+        let examples = if page == "onecycle.1" {
+            "\"FIRST STEPS\""
+        } else {
+            "EXAMPLES"
+        };
+        assert!(
+            text.contains(&format!(".SH {examples}\n.nf\nonecycle ")),
+            "{page}: {text}"
+        );
+        assert!(text.contains(".SH OPTIONS"), "{page}");
+    }
+    // The program's own page is the one that goes to the standard output.
+    let main = std::fs::read_to_string(Path::new(&out).join("onecycle.1")).unwrap();
+    assert_eq!(run(&["man"]).stdout, main);
+}
+
+// A file where the folder should be: a sentence and the code of outputs that cannot be written.
+#[test]
+fn pages_that_cannot_be_written_are_refused() {
+    let folder = Scratch::new();
+    let path = folder.write("file", b"");
+    run(&["man", "-o", &path]).refused(common::NOT_WRITTEN, &["file"]);
+}
