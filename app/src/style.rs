@@ -35,6 +35,11 @@ pub(crate) fn painted(style: Style, text: &str) -> String {
     all
 }
 
+/// The text without any style.
+pub(crate) fn bare(text: &str) -> String {
+    anstream::adapter::strip_str(text).to_string()
+}
+
 /// That of a verdict: what holds, or not.
 pub(crate) fn verdict(holds: bool, text: &str) -> String {
     painted(if holds { HOLDS } else { REFUSAL }, text)
@@ -64,6 +69,7 @@ mod tests {
             format!("{green}one\x1b[0m\n\n{green}two\x1b[0m")
         );
         assert_eq!(painted(PLAIN, "as it is\n"), "as it is\n");
+        assert_eq!(bare(&painted(HOLDS, "one\n\ntwo")), "one\n\ntwo");
     }
 
     #[test]

@@ -233,7 +233,7 @@ pub fn identify_by(
         }
         Err(refusal.unwrap_or(Verdict::NoFit))
     });
-    let remarks = remark::remarks(&found, options);
+    let remarks = remark::remarks(&found, options, pack.is_some());
     found.remarks.extend(remarks);
     found
 }

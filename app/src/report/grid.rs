@@ -13,7 +13,7 @@ use crate::commands::grid::Done;
 use crate::pages::page::{self, Section, page};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series, Shape};
 use crate::pictures::grid as picture;
-use crate::style::{headed, verdict};
+use crate::style::{bare, headed, verdict};
 
 /// Changes with every change that a reader of the summary could notice.
 const SCHEMA: &str = "onecycle.grid.summary/1";
@@ -184,7 +184,7 @@ pub(crate) fn html(done: &Done) -> Result<String, CandidateError> {
     let lead = page::paragraph(
         "lead",
         "Processes that stand for a space: every process of it has a member near, whose controller costs it little.",
-    ) + &format!("<pre>{}</pre>\n", page::escaped(&text(done)));
+    ) + &format!("<pre>{}</pre>\n", page::escaped(&bare(&text(done))));
     let mut shapes: Vec<_> = grid.members.iter().map(|member| member.direction).collect();
     shapes.dedup();
     let of = |name: &str, points: Vec<(f64, f64)>, hue| {

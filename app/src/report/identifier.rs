@@ -50,7 +50,7 @@ pub(crate) fn text(done: &Done, out: &Path) -> String {
         "Identifier  {}\n  \
          {} examples in {simulated_s:.0} s, {} epochs in {learnt_s:.0} s ({}), the best {}\n  \
          {} weights, {} bytes; table {} bytes, card {} bytes, all {} bytes\n  \
-         outputs {:.1e} off for weights in bytes, of {:.1} (root mean squares)\n\n\
+         weights in bytes would put outputs {:.1e} off, of {:.1} (root mean squares)\n\n\
          One cycle of unseen processes, as the board computes\n",
         out.display(),
         done.examples,

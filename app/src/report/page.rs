@@ -66,7 +66,7 @@ pub(crate) fn design(process: &Process, optimum: &Optimum) -> String {
     let sections = [
         Some(own.section()),
         response.map(|response| step::section(&response, None, &times_s(&response))),
-        Some(controller::section(optimum, &Units::default())),
+        Some(controller::section(optimum, &Units::default(), None)),
     ];
     let sections: Vec<Section> = sections.into_iter().flatten().collect();
     page("Optimal controller of a process", &lead, &sections)
@@ -107,7 +107,11 @@ impl View<'_> {
             )),
             Some(own.section()),
             step,
-            Some(controller::section(controller, self.units)),
+            Some(controller::section(
+                controller,
+                self.units,
+                Some(refined.input_bias),
+            )),
         ]
         .into_iter()
         .flatten()

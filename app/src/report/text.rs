@@ -8,7 +8,7 @@ use onecycle_link::Recording;
 use onecycle_onboard::Process;
 use onecycle_onboard::classify::Verdict;
 
-use super::number::{bounded, significant};
+use super::number::{bounded, seconds, significant};
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
 
 /// Widest line of remarks, as terminals are.
@@ -74,7 +74,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             let is_known = classification.verdict == Verdict::Known;
             let _ = writeln!(
                 text,
-                "  last cycle  {} (score {})",
+                "  last cycle  {} (score {}, known up to 1)",
                 painted(
                     if is_known { HOLDS } else { REMARK },
                     &classification.verdict.to_string()
@@ -86,11 +86,8 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     match &found.outcome {
         Ok(identified) => {
             describe_process(&mut text, identified, &units);
-            describe_controller(
-                &mut text,
-                &identified.controller,
-                Some(&identified.phase_margin_rad),
-            );
+            let margin = Some(&identified.phase_margin_rad);
+            describe_controller(&mut text, &identified.controller, margin, &units);
             describe_step(&mut text, identified.step.as_ref());
         }
         Err(verdict) => {
@@ -126,7 +123,7 @@ pub(crate) fn design(process: &Process, optimum: &Optimum, step: Option<&StepMet
             format!("  {name:<10}{value:>12} {unit}").trim_end()
         );
     }
-    describe_controller(&mut text, optimum, None);
+    describe_controller(&mut text, optimum, None, &Units::default());
     let _ = writeln!(
         text,
         "  squared error of a unit step {}",
@@ -211,12 +208,18 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
     }
 }
 
-fn describe_controller(text: &mut String, optimum: &Optimum, phase_margin_rad: Option<&Interval>) {
+fn describe_controller(
+    text: &mut String,
+    optimum: &Optimum,
+    phase_margin_rad: Option<&Interval>,
+    units: &Units,
+) {
     let pd = optimum.pd;
+    let (gain, rate) = (units.controller(""), units.controller(" s"));
     text.push_str(&headed("\nController  u = Kp (r - y) - Kd dy/dt\n"));
     let _ = writeln!(
         text,
-        "  Kp {}   Kd {}   as cascade: angle P {} 1/s, rate P {}",
+        "  Kp {}{gain}   Kd {}{rate}   as cascade: angle P {} 1/s, rate P {}",
         significant(pd.kp),
         significant(pd.kd),
         significant(pd.angle_p()),
@@ -245,11 +248,7 @@ fn describe_controller(text: &mut String, optimum: &Optimum, phase_margin_rad: O
         let decibels = 20.0 * gain_margin.log10();
         let _ = write!(text, "   gain margin {gain_margin:.2} ({decibels:.1} dB)");
     }
-    let _ = writeln!(
-        text,
-        "   delay margin {} ms",
-        significant(1e3 * margins.delay_margin_s)
-    );
+    let _ = writeln!(text, "   delay margin {}", seconds(margins.delay_margin_s));
 }
 
 fn describe_step(text: &mut String, step: Option<&StepMetrics>) {

@@ -21,6 +21,8 @@ pub enum Remark {
     },
     /// The pack's family does not explain the last cycle: its score.
     Unknown(f64),
+    /// The pack has no answer for the last cycle.
+    Unread,
     /// The gain is negative.
     NegativeGain,
     /// No upper bound for `T_body` and `K`; the lower one of `T_body` (s).
@@ -67,6 +69,10 @@ impl Remark {
                  {score:.1}, the limit is 1): another beta of the relay, a resonance, friction, a wrong \
                  sensor, a disturbance. The fit stands without the pack; trust it less."
             ),
+            Self::Unread => "The pack has no answer for the last cycle: it was made for another relay or for \
+                             processes of other shapes, or the cycle has too few samples. The fit stands \
+                             without it."
+                .to_owned(),
             Self::OneCycle { is_known } => {
                 let rest = if is_known {
                     "The pack knows it as one of a steady oscillation, so the input is taken to have \
@@ -144,15 +150,18 @@ impl Remark {
     }
 }
 
-pub(super) fn remarks(found: &Identification, options: &Options) -> Vec<Remark> {
+pub(super) fn remarks(found: &Identification, options: &Options, has_pack: bool) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if let Some(oscillation) = &found.oscillation {
         let is_known = found.reading.is_some_and(|reading| reading.is_known());
         of_oscillation(oscillation, is_known, options, &mut remarks);
-        if let (Some(reading), Ok(_)) = (&found.reading, &found.outcome)
-            && !reading.is_known()
-        {
-            remarks.push(Remark::Unknown(reading.classification.score));
+        if found.outcome.is_ok() {
+            match &found.reading {
+                Some(reading) if reading.is_known() => {}
+                Some(reading) => remarks.push(Remark::Unknown(reading.classification.score)),
+                None if has_pack => remarks.push(Remark::Unread),
+                None => {}
+            }
         }
         if let Ok(identified) = &found.outcome {
             of_process(identified, oscillation, &mut remarks);

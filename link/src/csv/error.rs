@@ -91,8 +91,9 @@ pub enum ReadError {
     },
     /// A cell that is not a number.
     #[error(
-        "line {line}, column {column}: \"{text}\" is not a number; correct it or leave it empty \
-         (thousands separators are not supported)"
+        "line {line}, column {}: \"{text}\" is not a number; correct it or leave it empty \
+         (thousands separators are not supported)",
+        without_word(.column)
     )]
     NotANumber {
         /// Where.
@@ -104,8 +105,9 @@ pub enum ReadError {
     },
     /// Both decimal points and decimal commas.
     #[error(
-        "line {line}, column {column}: \"{text}\" mixes decimal comma and decimal point with \
-         earlier cells; use one of them (thousands separators are not supported)"
+        "line {line}, column {}: \"{text}\" mixes decimal comma and decimal point with \
+         earlier cells; use one of them (thousands separators are not supported)",
+        without_word(.column)
     )]
     MixedDecimals {
         /// Where.
@@ -117,8 +119,9 @@ pub enum ReadError {
     },
     /// Time as a time of day or a date.
     #[error(
-        "line {line}, column {column}: \"{text}\" is a date or a time of day; \
-         export seconds from the start instead, or give the sample rate with --sample-rate"
+        "line {line}, column {}: \"{text}\" is a date or a time of day; \
+         export seconds from the start instead, or give the sample rate with --sample-rate",
+        without_word(.column)
     )]
     ClockTime {
         /// Where.
@@ -208,6 +211,11 @@ pub enum ReadError {
 
 /// Most columns that an error lists.
 const MOST_LISTED: usize = 12;
+
+/// A column's label behind the word `column`, which one without a name begins with.
+fn without_word(label: &str) -> &str {
+    label.strip_prefix("column ").unwrap_or(label)
+}
 
 fn listed(columns: &[String]) -> String {
     let mut list = columns[..columns.len().min(MOST_LISTED)].join(", ");

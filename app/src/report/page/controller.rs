@@ -6,7 +6,8 @@ use super::significant;
 use crate::pages::page::{self, Section};
 use crate::report::text::Units;
 
-pub(super) fn section(optimum: &Optimum, units: &Units) -> Section {
+/// `input_bias` is that of an identification, which a controller without an integral has to take away.
+pub(super) fn section(optimum: &Optimum, units: &Units, input_bias: Option<f64>) -> Section {
     let pd = optimum.pd;
     let (gain, rate) = (units.controller(""), units.controller(" s"));
     let gains = format!(
@@ -41,13 +42,32 @@ pub(super) fn section(optimum: &Optimum, units: &Units) -> Section {
         ),
     ];
     let forms = forms.map(|(name, law, values)| (name.to_owned(), format!("{values}: {law}")));
-    let body = page::facts(&forms)
+    let mut body = page::facts(&forms)
         + &page::paragraph(
             "source",
             "Four forms of the same controller. The rate is that of the measurement: a step of the reference then gives \
              no kick, and the predicted step holds. There is no integral action: a constant disturbance at the input \
              leaves an offset of its size over Kp.",
         );
+    if let Some(bias) = input_bias {
+        let (bias, offset) = (significant(bias), significant(bias / pd.kp));
+        let unit = |unit: &str| {
+            if unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {unit}")
+            }
+        };
+        body += &page::paragraph(
+            "note",
+            &format!(
+                "The process feels an input of {bias}{} besides the recorded one: subtract it from u, or the output \
+                 stands {offset}{} off.",
+                unit(&units.input),
+                unit(&units.output)
+            ),
+        );
+    }
     Section {
         id: "controller".to_owned(),
         title: "Controller".to_owned(),
