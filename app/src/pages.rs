@@ -1,4 +1,5 @@
 //! Pages for a browser: one file each, which needs no network.
 
+mod bundle;
 pub(crate) mod page;
 pub(crate) mod plot;

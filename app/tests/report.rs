@@ -67,7 +67,8 @@ fn an_identification_as_a_page() {
         );
     }
     let figures = figures(&page);
-    assert_eq!(figures.len(), 14);
+    // Recording, fit, correlogram, seven marginals, contours, correlations, Nyquist, Bode, step.
+    assert_eq!(figures.len(), 15);
     let notes = notes(&figures);
     let margins = &report["margins"];
     let phase = format!(
@@ -169,4 +170,8 @@ fn whole_or_not_at_all() {
     ran.refused(NOT_WRITTEN, &["cannot write", "out.html"]);
     assert_eq!(ran.stdout, "");
     assert!(folder.files().is_empty());
+    let copy = folder.write("log.csv", &fs::read(HOVER).unwrap());
+    let ran = run(&["identify", &copy, "--report", &copy]);
+    ran.misused(&["would overwrite the recording"]);
+    assert!(fs::read(&copy).unwrap() == fs::read(HOVER).unwrap());
 }

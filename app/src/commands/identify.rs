@@ -12,6 +12,12 @@ use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::report::{json, page, plot, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
+    if arguments.report.as_ref() == Some(&arguments.file) {
+        let file = arguments.file.display();
+        return Err(Failure::usage(format!(
+            "--report {file} would overwrite the recording: name another file for the page"
+        )));
+    }
     let waiting = Waiting::on(format!("reading {}", arguments.file.display()));
     let recording = read(arguments)?;
     waiting.goes_on("identifying");

@@ -4,8 +4,7 @@
 
 use std::fmt::Write;
 
-use plotly::Plot;
-
+use super::bundle;
 use super::plot::Figure;
 
 /// A heading and what stands below it.
@@ -134,17 +133,8 @@ pub(crate) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
          {lead}<nav>{links}</nav>\n\
          <noscript><p class=\"note\">Plots need JavaScript; the tables do not.</p></noscript>\n\
          <main>\n{body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n",
-        plotly_script()
+        bundle::script()
     )
-}
-
-/// The element that holds plotly.js; what the crate adds for formulas is left out.
-fn plotly_script() -> String {
-    const END: &str = "</script>";
-    let mut sources = Plot::offline_js_sources();
-    let end = sources.find(END).map_or(sources.len(), |at| at + END.len());
-    sources.truncate(end);
-    sources
 }
 
 const STYLE: &str = include_str!("page.css");

@@ -16,6 +16,8 @@ pub(crate) enum Marks {
     /// Each value is held until the next.
     Steps,
     Points,
+    /// Few points, which stand for themselves.
+    Rings,
     LineAndPoints,
     /// A closed polygon, filled.
     Area,
@@ -90,7 +92,7 @@ fn shortened(mut values: Vec<f64>) -> Vec<f64> {
     for value in &mut values {
         let ahead = (value.abs() / width).log10();
         let common = if ahead.is_finite() {
-            ahead.ceil().clamp(0.0, 10.0) as usize
+            ahead.floor().clamp(0.0, 10.0) as usize
         } else {
             0
         };

@@ -1,10 +1,11 @@
 """What a reader of the pages would see, asked of a real browser.
 
-python3 pages.py PROGRAM EXAMPLES SCRATCH [--screenshots DIR]: makes the pages, opens each at two widths and in both
-themes, and prints a line for each. Ends with status 1 at the first thing that is not right.
+python3 pages.py PROGRAM EXAMPLES SCRATCH [--screenshots DIR] [--picture FILE.png]: makes the pages, opens each at two
+widths and in both themes, and prints a line for each. Ends with status 1 at the first thing that is not right.
 """
 
 import argparse
+import base64
 import json
 import os
 import pathlib
@@ -162,12 +163,33 @@ def margins(page, report):
     return phase
 
 
+# Of the identification's page: the fit, the marginals with what is between them, Nyquist's plot, the step.
+PICTURED = ["#fit figure", "#process .row:has(.square)", "#stability figure", "#step figure"]
+
+
+def picture(browser, page, path):
+    """Four of a page's plots as one picture."""
+    shots = [page.locator(one).first.locator(".plot").all() for one in PICTURED]
+    images = "".join(
+        "<div>" + "".join(f'<img src="data:image/png;base64,{base64.b64encode(shot.screenshot()).decode()}">' for shot in row) + "</div>"
+        for row in shots
+    )
+    frame = browser.new_context(viewport={"width": 1280, "height": 800}, device_scale_factor=2).new_page()
+    frame.set_content(
+        f"""<style>body {{ margin: 0; padding: 12px; width: 1256px; display: grid; grid-template-columns: 1fr 1fr; gap: 12px; background: #fff }}
+        div {{ display: flex; gap: 8px; align-items: center }} img {{ min-width: 0; flex: 1; width: 0; }}</style>{images}"""
+    )
+    frame.screenshot(path=path, full_page=True)
+    frame.context.close()
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
     parser.add_argument("examples", type=pathlib.Path)
     parser.add_argument("scratch", type=pathlib.Path)
     parser.add_argument("--screenshots", type=pathlib.Path)
+    parser.add_argument("--picture", type=pathlib.Path)
     arguments = parser.parse_args()
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
     expect(chromium, "there is no chromium: install it, or name one in CHROMIUM")
@@ -195,6 +217,8 @@ def main():
                 expect(not others, f"the page fetches {others}")
                 took_ms = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
                 print(f"{name:<13} {screen:<6} {path.stat().st_size / 1e6:.1f} MB, open after {took_ms:.0f} ms, {said}")
+                if arguments.picture and (name, screen) == ("hover", "desk"):
+                    picture(browser, page, arguments.picture)
                 if arguments.screenshots:
                     save(page, arguments.screenshots / f"{name}-{screen}")
                 page.context.close()

@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Opens every page that onecycle writes in a real Chromium, as wide as a desk and as narrow as a phone, and looks at
 # what a reader would: plots, margins, the theme, paper. Status 1 when something is not right.
-#   --screenshots DIR   also saves what was seen
+#   --screenshots DIR     also saves what was seen
+#   --picture FILE.png    also makes the README's picture
 # PYTHON names an interpreter that has the packages of requirements.txt; without it they are installed into a
 # virtual environment that is removed again. CHROMIUM names the browser [default: chromium].
 set -euo pipefail

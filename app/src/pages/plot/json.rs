@@ -114,7 +114,7 @@ fn scaled(axis: &Axis, value: f64) -> f64 {
 
 fn trace(series: &Series, number: &str) -> Value {
     let mode = match series.marks {
-        Marks::Points => "markers",
+        Marks::Points | Marks::Rings => "markers",
         Marks::LineAndPoints => "lines+markers",
         _ => "lines",
     };
@@ -137,6 +137,10 @@ fn trace(series: &Series, number: &str) -> Value {
             trace["hoverinfo"] = json!("skip");
         }
         Marks::Points => trace["marker"] = json!({ "size": 4 }),
+        Marks::Rings => {
+            trace["marker"] =
+                json!({ "size": 10, "symbol": "circle-open", "line": { "width": 2.5 } });
+        }
         Marks::Line | Marks::LineAndPoints | Marks::Bars => {}
     }
     if series.name.is_empty() {

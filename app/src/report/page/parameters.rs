@@ -110,7 +110,7 @@ fn table(identified: &Identified, units: &Units) -> String {
 fn marginals(identified: &Identified, posterior: &Posterior, units: &Units) -> Vec<Figure> {
     let process = &identified.process;
     let values = |of: fn(&Draw) -> f64| posterior.draws().iter().map(of).collect();
-    let acceleration = units.gain("s^2");
+    let (velocity, acceleration) = (units.gain("s"), units.gain("s^2"));
     let (body, body_interval): (fn(&Draw) -> f64, Interval) = match process.t_body_s.high {
         Some(_) => (|draw| draw.t_body_s, process.t_body_s),
         None => (|draw| 1.0 / draw.t_body_s, inverse(&process.t_body_s)),
@@ -130,6 +130,11 @@ fn marginals(identified: &Identified, posterior: &Posterior, units: &Units) -> V
     let degrees = 1_f64.to_degrees();
     let margins = posterior.phase_margins_rad(identified.controller.pd);
     [
+        (
+            Units::titled("K", &velocity),
+            values(|draw| draw.k),
+            process.k,
+        ),
         (
             Units::titled("K/T_body", &acceleration),
             values(|draw| draw.k_over_t_body),
@@ -158,6 +163,8 @@ fn marginals(identified: &Identified, posterior: &Posterior, units: &Units) -> V
         ),
     ]
     .into_iter()
+    // Without damping the velocity gain is infinite.
+    .filter(|(_, _, interval)| interval.high.is_some())
     .filter_map(|(title, values, interval)| marginal(&title, values, &interval))
     .collect()
 }
@@ -222,7 +229,7 @@ fn surface(identified: &Identified, posterior: &Posterior) -> Option<Figure> {
     let estimate = shape(&identified.refined.process);
     let mut panel = Panel::new(
         Axis::titled("tau / T_prop"),
-        vec![Series::of_points("", Marks::Points, [estimate]).hue(Hue::Input)],
+        vec![Series::of_points("", Marks::Rings, [estimate]).hue(Hue::Input)],
     );
     panel.field = Some(Field {
         kind: FieldKind::Regions,

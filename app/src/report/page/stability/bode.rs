@@ -87,7 +87,7 @@ fn series(
     }
     if !of.measured.is_empty() {
         let points = of.measured.iter().map(|(omega, at)| (*omega, value(at)));
-        series.push(Series::of_points(measured, Marks::Points, points).hue(Hue::Measured));
+        series.push(Series::of_points(measured, Marks::Rings, points).hue(Hue::Input));
     }
     series
 }

@@ -68,7 +68,7 @@ fn series(of: &Loop<'_>) -> Vec<Series> {
     series.push(Series::of_points("", Marks::Points, [(-1.0, 0.0)]).hue(Hue::Input));
     if !of.measured.is_empty() {
         let points = of.measured.iter().map(|(_, at)| point(at));
-        series.push(Series::of_points(MEASURED, Marks::Points, points).hue(Hue::Measured));
+        series.push(Series::of_points(MEASURED, Marks::Rings, points).hue(Hue::Input));
     }
     series
 }
