@@ -59,7 +59,7 @@ fn quick_run_of_the_fast_parts() {
     assert_eq!(text.matches("(paper: ").count(), expected, "{text}");
     assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
     let page = read("reproduction.html");
-    assert_eq!(page.matches("<figure>").count(), 5);
+    assert_eq!(page.matches("<figure ").count(), 5);
     assert_eq!(page.matches("<small>paper: ").count(), expected);
 
     let part = read("parts/phase.json");

@@ -34,9 +34,9 @@ pub struct Density {
 }
 
 /// Part of the draws that may lie beyond either side of the grid, before it is widened.
-const CUT: f64 = 0.001;
+const CUT: f64 = 0.0025;
 /// Part of the grid's range that is added on either side.
-const MARGIN: f64 = 0.15;
+const MARGIN: f64 = 0.2;
 /// Kernels end at so many bandwidths, with a hundredth of their height.
 const KERNEL_END: f64 = 3.0;
 /// Deviation of `y` at a given `x`, in that of `y`, below which the draws lie on a line.

@@ -42,9 +42,12 @@
     const next = () => palette[used++ % palette.length];
     const axes = Object.entries(layout).filter(([name]) => /^[xy]axis/.test(name));
     const axis = (one) => ({ ...one, gridcolor: theme.line, linecolor: theme.line, zerolinecolor: theme.line });
-    plot.width = place.clientWidth;
+    const { clientWidth: width, clientHeight: height } = place;
+    plot.width = width;
     Plotly.react(place, data.map((trace) => coloured(trace, theme, next)), {
       ...layout,
+      width,
+      height,
       ...Object.fromEntries(axes.map(([name, one]) => [name, axis(one)])),
       annotations: layout.annotations.map((note) => ({
         ...note, arrowcolor: theme.text, bgcolor: `${theme.back}cc`, font: { size: 12 },
@@ -89,17 +92,21 @@
     show(theme());
   });
   asks.addEventListener("change", () => show(theme()));
-  addEventListener("beforeprint", () => show("light", true));
-  addEventListener("afterprint", () => show(theme()));
+  // As wide as paper is, before it is printed.
+  addEventListener("beforeprint", () => {
+    root.classList.add("paper");
+    show("light", true);
+  });
+  addEventListener("afterprint", () => {
+    root.classList.remove("paper");
+    show(theme());
+  });
   show(theme());
 
-  // A window, a phone turned and a sheet of paper all change the width.
+  // A window, and a phone that is turned, change the width.
   const follow = new ResizeObserver(() => {
     const changed = plots.filter(({ place, width }) => width > 0 && width !== place.clientWidth);
-    changed.forEach((plot) => {
-      plot.width = plot.place.clientWidth;
-      Plotly.Plots.resize(plot.place);
-    });
+    changed.forEach((plot) => draw(plot, colours()));
   });
   plots.forEach(({ place }) => follow.observe(place));
 })();

@@ -89,6 +89,9 @@ impl View<'_> {
         } = self.identified;
         let process = &refined.process;
         let draws = self.posterior.processes(DRAWS);
+        // Where it may be none there is nothing to take away.
+        let bias =
+            Some(refined.input_bias).filter(|_| !self.identified.process.input_bias.holds(0.0));
         let own = Loop::new(process, controller.pd, controller.margins)
             .within(&draws, *phase_margin_rad)
             .measured(measured);
@@ -107,11 +110,7 @@ impl View<'_> {
             )),
             Some(own.section()),
             step,
-            Some(controller::section(
-                controller,
-                self.units,
-                Some(refined.input_bias),
-            )),
+            Some(controller::section(controller, self.units, bias)),
         ]
         .into_iter()
         .flatten()

@@ -143,6 +143,14 @@ def print_out(page):
     turn(page)
     paper = page.pdf(format="A4")
     expect(paper.startswith(b"%PDF") and len(paper) > 20_000, f"{len(paper)} bytes on paper")
+    drawn(page)
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    on_paper = page.evaluate(
+        "[...document.querySelectorAll('.plot .main-svg')].map((one) => one.getBoundingClientRect().right)")
+    expect(max(on_paper) <= page.evaluate("document.body.getBoundingClientRect().right"), "plots leave the paper")
+    expect(page.evaluate("document.documentElement.dataset.theme") == "light", "dark pages are printed dark")
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    drawn(page)
     turn(page)
 
 
