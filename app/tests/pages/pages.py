@@ -147,11 +147,37 @@ def print_out(page):
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     on_paper = page.evaluate(
         "[...document.querySelectorAll('.plot .main-svg')].map((one) => one.getBoundingClientRect().right)")
-    expect(max(on_paper) <= page.evaluate("document.body.getBoundingClientRect().right"), "plots leave the paper")
+    edge = page.evaluate("document.body.getBoundingClientRect().right")
+    expect(max(on_paper) < edge + 1, f"a plot ends at {max(on_paper)}, the paper at {edge}")
     expect(page.evaluate("document.documentElement.dataset.theme") == "light", "dark pages are printed dark")
     page.evaluate("dispatchEvent(new Event('afterprint'))")
     drawn(page)
     turn(page)
+
+
+def handle(page):
+    """The first plot answers the mouse: a label under it, a closer look, all of it again, a file."""
+    plot = page.locator(".plot").first
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    across = lambda part: box["x"] + part * box["width"]
+    height = box["y"] + 0.3 * box["height"]
+    ticks = lambda: sorted(plot.locator(".xtick text").all_text_contents())
+    page.mouse.move(across(0.5), height)
+    expect(plot.locator(".hoverlayer .hovertext").first.text_content(timeout=5000), "no label under the mouse")
+    before = ticks()
+    page.mouse.move(across(0.4), height)
+    page.mouse.down()
+    page.mouse.move(across(0.6), height, steps=5)
+    page.mouse.up()
+    expect(ticks() != before, f"a closer look still shows {before}")
+    page.mouse.dblclick(across(0.5), height)
+    page.wait_for_timeout(500)
+    expect(ticks() == before, f"{ticks()} instead of {before} again")
+    page.mouse.move(across(0.5), height)
+    with page.expect_download() as download:
+        plot.locator(".modebar-btn").first.click()
+    expect(download.value.suggested_filename.endswith(".png"), "no picture to keep")
 
 
 def annotations(page):
@@ -220,6 +246,8 @@ def main():
                     said = margins(page, json.loads(report))
                 if screen == "desk":
                     print_out(page)
+                if screen == "desk" and "recording" in sections:
+                    handle(page)
                 expect(not faults, f"the browser complains: {faults}")
                 others = [url for url in fetched if not re.match(r"file:|data:|blob:", url)]
                 expect(not others, f"the page fetches {others}")

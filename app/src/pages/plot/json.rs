@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use super::{Axis, Field, FieldKind, Figure, Marks, Note, Panel, Places, Series};
+use super::{Axis, Field, FieldKind, Figure, Hue, Marks, Note, Panel, Places, Series, Shape};
 use crate::pages::page::escaped;
 
 /// Part of the height between two panels.
@@ -29,7 +29,7 @@ impl Figure {
             );
             let mut axis = axis(&panel.y, panel.field.as_ref().map(|field| &field.y));
             axis["domain"] = json!(domain(index, self.panels.len()));
-            if self.shape == super::Shape::ToScale {
+            if self.shape == Shape::ToScale {
                 axis["scaleanchor"] = json!("x");
             }
             layout.insert(format!("yaxis{number}"), axis);
@@ -48,6 +48,10 @@ impl Figure {
         }
         let named = data.iter().filter(|trace| trace["showlegend"] == true);
         layout.insert("showlegend".to_owned(), json!(named.count() > 1));
+        // Over time and frequency a label says what is above and below the mouse.
+        let is_of_abscissa = matches!(self.shape, Shape::Wide | Shape::Tall);
+        let hover = if is_of_abscissa { "x" } else { "closest" };
+        layout.insert("hovermode".to_owned(), json!(hover));
         layout.insert(
             "legend".to_owned(),
             json!({ "orientation": "h", "y": 1.02, "yanchor": "bottom" }),
@@ -134,7 +138,6 @@ fn trace(series: &Series, number: &str) -> Value {
         Marks::Area => {
             trace["fill"] = json!("toself");
             trace["line"] = json!({ "width": 0 });
-            trace["hoverinfo"] = json!("skip");
         }
         Marks::Points => trace["marker"] = json!({ "size": 4 }),
         Marks::Rings => {
@@ -143,8 +146,10 @@ fn trace(series: &Series, number: &str) -> Value {
         }
         Marks::Line | Marks::LineAndPoints | Marks::Bars => {}
     }
-    if series.name.is_empty() {
+    if series.hue == Hue::Reference || series.marks == Marks::Area {
         trace["hoverinfo"] = json!("skip");
+    } else if series.name.is_empty() {
+        trace["hoverinfo"] = json!("x+y");
     }
     trace
 }
@@ -209,7 +214,6 @@ fn annotation(note: &Note, panel: &Panel, figure: &Figure, number: &str) -> Valu
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Hue, Shape};
     use super::*;
 
     fn parsed(figure: &Figure) -> Value {
