@@ -149,20 +149,30 @@ pub(crate) fn append_line(
         .map_err(|error| Failure::output(path, error))
 }
 
-/// Writes a file through a temporary one beside it: whole, or not at all.
+/// Writes a file through a temporary one beside it: whole, or not at all. A link leads to what it names, and a pipe or a
+/// device is written into.
 pub(crate) fn write_file(
     path: &Path,
     write: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
 ) -> Result<(), Failure> {
-    let folder = match path.parent() {
+    let failed = |reason| Failure::output(path, reason);
+    let there = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    if there.exists() && !there.is_file() && !there.is_dir() {
+        let mut open = File::options().write(true).open(&there).map_err(failed)?;
+        return write(&mut open).map_err(failed);
+    }
+    let folder = match there.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
         _ => PathBuf::from("."),
     };
-    let failed = |reason| Failure::output(path, reason);
+    if !folder.is_dir() {
+        let missing = format!("there is no folder {}", folder.display());
+        return Err(failed(io::Error::new(io::ErrorKind::NotFound, missing)));
+    }
     let mut file = tempfile::NamedTempFile::new_in(folder).map_err(failed)?;
     write(file.as_file_mut()).map_err(failed)?;
     set_usual_permissions(file.as_file()).map_err(failed)?;
-    file.persist(path).map_err(|error| failed(error.error))?;
+    file.persist(&there).map_err(|error| failed(error.error))?;
     Ok(())
 }
 

@@ -24,6 +24,14 @@ fn a_constant_input() {
     assert!(report.advice().contains("--input"));
 }
 
+// A sensor that is not connected: no cycle is looked for, and nothing is divided by an amplitude of zero.
+#[test]
+fn a_constant_output() {
+    let table = Table::clean().map(|_, sample| sample.output = 0.0);
+    let report = identify(table.csv(), &[]).no_process("no_response");
+    assert!(report.advice().contains("--output"));
+}
+
 #[test]
 fn a_continuous_input() {
     let table = Table::clean().map(|_, sample| sample.input = (14.2 * sample.time_s).sin());

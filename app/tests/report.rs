@@ -167,11 +167,19 @@ fn whole_or_not_at_all() {
     let folder = Scratch::new();
     let nowhere = folder.name("no/such/folder/out.html");
     let ran = run(&["identify", HOVER, "--report", &nowhere]);
-    ran.refused(NOT_WRITTEN, &["cannot write", "out.html"]);
+    ran.refused(
+        NOT_WRITTEN,
+        &["cannot write", "out.html", "there is no folder"],
+    );
     assert_eq!(ran.stdout, "");
     assert!(folder.files().is_empty());
     let copy = folder.write("log.csv", &fs::read(HOVER).unwrap());
     let ran = run(&["identify", &copy, "--report", &copy]);
     ran.misused(&["would overwrite the recording"]);
+    let (folder_name, _) = copy.rsplit_once('/').unwrap();
+    let other_spelling = format!("{folder_name}/./log.csv");
+    let ran = run(&["identify", &copy, "--report", &other_spelling]);
+    ran.misused(&["would overwrite the recording"]);
+    run(&["identify", &copy, "--report", "-"]).misused(&["needs the name of a file"]);
     assert!(fs::read(&copy).unwrap() == fs::read(HOVER).unwrap());
 }

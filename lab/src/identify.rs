@@ -328,6 +328,9 @@ fn find_relay(signals: &Signals<'_>) -> Result<RelayInput, Verdict> {
         }
     }
     match relay_input::find(signals.input) {
+        InputKind::Relay(_) if signals.output.windows(2).all(|pair| pair[0] == pair[1]) => {
+            Err(Verdict::ConstantOutput)
+        }
         InputKind::Relay(relay) => Ok(relay),
         InputKind::Constant => Err(Verdict::ConstantInput),
         InputKind::NotTwoLevels => {

@@ -12,11 +12,8 @@ use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::report::{json, page, plot, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
-    if arguments.report.as_ref() == Some(&arguments.file) {
-        let file = arguments.file.display();
-        return Err(Failure::usage(format!(
-            "--report {file} would overwrite the recording: name another file for the page"
-        )));
+    if let Some(path) = &arguments.report {
+        check_page(path, &arguments.file)?;
     }
     let waiting = Waiting::on(format!("reading {}", arguments.file.display()));
     let recording = read(arguments)?;
@@ -51,6 +48,23 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     } else {
         exit::NO_PROCESS
     }))
+}
+
+/// Refuses what is no name for a page: the standard output, and the recording itself, however it is spelt.
+fn check_page(path: &Path, recording: &Path) -> Result<(), Failure> {
+    if path == Path::new("-") {
+        return Err(Failure::usage(
+            "--report needs the name of a file, and - is none",
+        ));
+    }
+    let there = |path: &Path| path.canonicalize().ok();
+    if there(path).is_some_and(|page| Some(page) == there(recording)) {
+        return Err(Failure::usage(format!(
+            "--report {} would overwrite the recording: name another file for the page",
+            path.display()
+        )));
+    }
+    Ok(())
 }
 
 fn read(arguments: &Identify) -> Result<Recording, Failure> {

@@ -39,7 +39,11 @@ pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
     waiting.goes_on("writing");
     let head = head(arguments, &experiment);
     let comments: Vec<&str> = head.lines().collect();
-    match &arguments.out {
+    match arguments
+        .out
+        .as_ref()
+        .filter(|path| path.as_os_str() != "-")
+    {
         Some(path) => write_file(path, |file| write_csv(file, &recording, &comments))?,
         None => {
             let mut table = Vec::new();

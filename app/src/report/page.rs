@@ -34,7 +34,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     let mut lead = made_by("identify");
     match (&found.outcome, &found.oscillation) {
         (Ok(identified), Some(oscillation)) => {
-            lead += &identified_lead(identified);
+            lead += &identified_lead(identified, found.remarks.len());
             let posterior = Posterior::new(&identified.refined, oscillation.sample_s);
             let view = View {
                 units: &units,
@@ -44,6 +44,12 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             let measured = with_signals(recording, |signals| {
                 harmonics(signals, oscillation, HARMONICS)
             });
+            // One cycle may be one of no steady oscillation, which has no harmonics.
+            let measured = if oscillation.cycles_used > 1 {
+                measured
+            } else {
+                vec![]
+            };
             sections.extend(view.sections(&measured));
         }
         (Err(verdict), _) => {
@@ -135,13 +141,13 @@ fn made_by(command: &str) -> String {
 }
 
 /// What the page comes down to.
-fn identified_lead(identified: &Identified) -> String {
-    let Optimum { pd, margins, .. } = identified.controller;
+fn identified_lead(identified: &Identified, remarks: usize) -> String {
+    let Optimum { pd, margins, .. } = &identified.controller;
+    let margin = stability::phase_margin(margins, Some(&identified.phase_margin_rad));
     let mut text = format!(
-        "Identified. Kp {}, Kd {}: phase margin {:.1} deg",
+        "Identified. Kp {}, Kd {}: phase margin {margin}",
         significant(pd.kp),
         significant(pd.kd),
-        margins.phase_margin_rad.to_degrees()
     );
     if let Some(step) = &identified.step {
         let (overshoot, settled) = (100.0 * step.overshoot, significant(step.settling_time_s));
@@ -150,7 +156,12 @@ fn identified_lead(identified: &Identified) -> String {
             ", a step overshoots by {overshoot:.0} % and settles in {settled} s"
         );
     }
-    page::verdict(true, &(text + "."))
+    text += match remarks {
+        0 => ".",
+        1 => ". There is a remark below.",
+        _ => ". There are remarks below.",
+    };
+    page::verdict(true, &text)
 }
 
 fn remarks(found: &Identification) -> Option<Section> {

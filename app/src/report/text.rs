@@ -88,7 +88,10 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             describe_process(&mut text, identified, &units);
             let margin = Some(&identified.phase_margin_rad);
             describe_controller(&mut text, &identified.controller, margin, &units);
-            describe_step(&mut text, identified.step.as_ref());
+            if !identified.process.input_bias.holds(0.0) {
+                text.push_str("  subtract the input bias from u: there is no integral action\n");
+            }
+            describe_step(&mut text, identified.step.as_ref(), &units);
         }
         Err(verdict) => {
             let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
@@ -129,7 +132,7 @@ pub(crate) fn design(process: &Process, optimum: &Optimum, step: Option<&StepMet
         "  squared error of a unit step {}",
         significant(optimum.ise)
     );
-    describe_step(&mut text, step);
+    describe_step(&mut text, step, &Units::default());
     text
 }
 
@@ -219,7 +222,7 @@ fn describe_controller(
     text.push_str(&headed("\nController  u = Kp (r - y) - Kd dy/dt\n"));
     let _ = writeln!(
         text,
-        "  Kp {}{gain}   Kd {}{rate}   as cascade: angle P {} 1/s, rate P {}",
+        "  Kp {}{gain}   Kd {}{rate}   as cascade: angle P {} 1/s, rate P {}{rate}",
         significant(pd.kp),
         significant(pd.kd),
         significant(pd.angle_p()),
@@ -251,7 +254,7 @@ fn describe_controller(
     let _ = writeln!(text, "   delay margin {}", seconds(margins.delay_margin_s));
 }
 
-fn describe_step(text: &mut String, step: Option<&StepMetrics>) {
+fn describe_step(text: &mut String, step: Option<&StepMetrics>, units: &Units) {
     let _ = writeln!(
         text,
         "\n{}",
@@ -260,11 +263,15 @@ fn describe_step(text: &mut String, step: Option<&StepMetrics>) {
     let _ = match step {
         Some(step) => writeln!(
             text,
-            "  overshoot {:.0} %   rise {} s   settling {} s   largest input {} per unit",
+            "  overshoot {:.0} %   rise {} s   settling {} s   largest input {}{}",
             100.0 * step.overshoot,
             significant(step.rise_time_s),
             significant(step.settling_time_s),
-            significant(step.peak_input)
+            significant(step.peak_input),
+            match units.controller("") {
+                none if none.is_empty() => " per unit".to_owned(),
+                unit => unit,
+            }
         ),
         None => writeln!(text, "  too slow to simulate"),
     };

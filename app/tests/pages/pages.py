@@ -238,6 +238,8 @@ def main():
             for screen in SCREENS:
                 page, faults, fetched = opened(browser, path, screen)
                 look(page, path, sections, plots)
+                if arguments.picture and (name, screen) == ("hover", "desk"):
+                    picture(browser, page, arguments.picture)
                 switch(page)
                 said = f"{len(annotations(page))} notes"
                 if name in ("hover", "roll", "bias"):
@@ -253,8 +255,6 @@ def main():
                 expect(not others, f"the page fetches {others}")
                 took_ms = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
                 print(f"{name:<13} {screen:<6} {path.stat().st_size / 1e6:.1f} MB, open after {took_ms:.0f} ms, {said}")
-                if arguments.picture and (name, screen) == ("hover", "desk"):
-                    picture(browser, page, arguments.picture)
                 if arguments.screenshots:
                     save(page, arguments.screenshots / f"{name}-{screen}")
                 page.context.close()

@@ -89,6 +89,7 @@ pub(super) fn candidates(
             _ => Verdict::NotSteady {
                 cycles: count,
                 alike,
+                needed: least,
             },
         });
     };

@@ -9,6 +9,8 @@ use onecycle_onboard::refine::DomainEdge;
 pub enum Verdict {
     /// The input is the same throughout.
     ConstantInput,
+    /// The output is the same throughout.
+    ConstantOutput,
     /// Values so large or small that their squares cannot be computed.
     Units,
     /// The input changes, but not between two levels.
@@ -27,6 +29,8 @@ pub enum Verdict {
         cycles: usize,
         /// Most consecutive ones that are alike.
         alike: usize,
+        /// So many that are alike it takes.
+        needed: usize,
     },
     /// Too few samples in the cycles.
     TooCoarse {
@@ -64,6 +68,7 @@ impl Verdict {
     pub fn kind(&self) -> &'static str {
         match self {
             Self::ConstantInput | Self::NoRelay { .. } => "no_relay",
+            Self::ConstantOutput => "no_response",
             Self::Units => "unusable_units",
             Self::TooShort { .. } | Self::TooCoarse { .. } => "too_short",
             Self::NotSteady { .. } => "not_steady",
@@ -83,6 +88,9 @@ impl Verdict {
             Self::ConstantInput => {
                 "Choose the column that holds the relay's output with --input, or record a relay \
                  test."
+            }
+            Self::ConstantOutput => {
+                "Choose the column that holds the measurement with --output, or check the sensor."
             }
             Self::Units => "Write the recording in other units.",
             Self::NoRelay {
@@ -138,12 +146,22 @@ impl Verdict {
     }
 }
 
+/// So few cycles in words.
+fn few(cycles: usize) -> String {
+    match cycles {
+        0 => "no complete cycle of the relay, from one switch to the next but one".to_owned(),
+        1 => "a single complete cycle of the relay, the others have gaps".to_owned(),
+        _ => format!("{cycles} complete cycles of the relay that are not alike"),
+    }
+}
+
 impl std::error::Error for Verdict {}
 
 impl fmt::Display for Verdict {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::ConstantInput => write!(f, "no relay in the input: it never changes"),
+            Self::ConstantOutput => write!(f, "no response: the output never changes"),
             Self::Units => write!(f, "the values are too large or too small to compute with"),
             Self::NoRelay { output_is_relay } => {
                 write!(
@@ -156,21 +174,15 @@ impl fmt::Display for Verdict {
                     Ok(())
                 }
             }
-            Self::TooShort { cycles: 0 } => write!(
+            Self::TooShort { cycles } => write!(f, "too short: {}", few(*cycles)),
+            Self::NotSteady {
+                cycles,
+                alike,
+                needed,
+            } => write!(
                 f,
-                "too short: no complete cycle of the relay, from one switch to the next but one"
-            ),
-            Self::TooShort { cycles: 1 } => write!(
-                f,
-                "too short: a single complete cycle of the relay, the others have gaps"
-            ),
-            Self::TooShort { cycles } => write!(
-                f,
-                "too short: {cycles} complete cycles of the relay that are not alike"
-            ),
-            Self::NotSteady { cycles, alike } => write!(
-                f,
-                "no steady oscillation: of {cycles} cycles at most {alike} in a row are alike"
+                "no steady oscillation: of {cycles} cycles at most {alike} in a row are alike, where {needed} are \
+                 needed"
             ),
             Self::TooCoarse { points } => {
                 write!(

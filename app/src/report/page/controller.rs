@@ -28,12 +28,12 @@ pub(super) fn section(optimum: &Optimum, units: &Units, input_bias: Option<f64>)
         ),
         (
             "Parallel PID",
-            "u = Kp e + Ki integral of e + Kd de/dt",
+            "u = Kp e + Ki integral of e - Kd dy/dt",
             format!("{gains}, Ki 0"),
         ),
         (
             "Ideal PID",
-            "u = Kp (e + 1/Ti integral of e + Td de/dt)",
+            "u = Kp (e + 1/Ti integral of e - Td dy/dt)",
             format!(
                 "Kp {}{gain}, Td {} s, Ti infinite",
                 significant(pd.kp),
@@ -45,7 +45,7 @@ pub(super) fn section(optimum: &Optimum, units: &Units, input_bias: Option<f64>)
     let mut body = page::facts(&forms)
         + &page::paragraph(
             "source",
-            "Four forms of the same controller. The rate is that of the measurement: a step of the reference then gives \
+            "Four forms of the same controller; e is r - y. The rate is that of the measurement: a step of the reference then gives \
              no kick, and the predicted step holds. There is no integral action: a constant disturbance at the input \
              leaves an offset of its size over Kp.",
         );

@@ -109,7 +109,7 @@ fn table(identified: &Identified, units: &Units) -> String {
 /// A marginal each: parameters that are finite, and the phase margin.
 fn marginals(identified: &Identified, posterior: &Posterior, units: &Units) -> Vec<Figure> {
     let process = &identified.process;
-    let values = |of: fn(&Draw) -> f64| posterior.draws().iter().map(of).collect();
+    let values = |of: fn(&Draw) -> f64| -> Vec<f64> { posterior.draws().iter().map(of).collect() };
     let (velocity, acceleration) = (units.gain("s"), units.gain("s^2"));
     let (body, body_interval): (fn(&Draw) -> f64, Interval) = match process.t_body_s.high {
         Some(_) => (|draw| draw.t_body_s, process.t_body_s),
@@ -118,14 +118,6 @@ fn marginals(identified: &Identified, posterior: &Posterior, units: &Units) -> V
     let body_title = match process.t_body_s.high {
         Some(_) => "T_body (s)",
         None => "damping 1/T_body (1/s)",
-    };
-    let scaled = |interval: &Interval, factor: f64| {
-        let by = |value: Option<f64>| value.map(|value| factor * value);
-        Interval {
-            estimate: by(interval.estimate),
-            low: by(interval.low),
-            high: by(interval.high),
-        }
     };
     let degrees = 1_f64.to_degrees();
     let margins = posterior.phase_margins_rad(identified.controller.pd);
@@ -140,17 +132,9 @@ fn marginals(identified: &Identified, posterior: &Posterior, units: &Units) -> V
             values(|draw| draw.k_over_t_body),
             process.k_over_t_body,
         ),
-        (
-            "T_prop (ms)".to_owned(),
-            values(|draw| 1e3 * draw.t_prop_s),
-            scaled(&process.t_prop_s, 1e3),
-        ),
+        time("T_prop", values(|draw| draw.t_prop_s), &process.t_prop_s),
         (body_title.to_owned(), values(body), body_interval),
-        (
-            "tau (ms)".to_owned(),
-            values(|draw| 1e3 * draw.tau_s),
-            scaled(&process.tau_s, 1e3),
-        ),
+        time("tau", values(|draw| draw.tau_s), &process.tau_s),
         (
             Units::titled("input bias", &units.input),
             values(|draw| draw.input_bias),
@@ -167,6 +151,29 @@ fn marginals(identified: &Identified, posterior: &Posterior, units: &Units) -> V
     .filter(|(_, _, interval)| interval.high.is_some())
     .filter_map(|(title, values, interval)| marginal(&title, values, &interval))
     .collect()
+}
+
+fn scaled(interval: &Interval, factor: f64) -> Interval {
+    let by = |value: Option<f64>| value.map(|value| factor * value);
+    Interval {
+        estimate: by(interval.estimate),
+        low: by(interval.low),
+        high: by(interval.high),
+    }
+}
+
+/// A time in the unit that suits it.
+fn time(name: &str, values_s: Vec<f64>, interval_s: &Interval) -> (String, Vec<f64>, Interval) {
+    let (unit, factor) = match interval_s.estimate {
+        Some(time_s) if time_s >= 1.0 => ("s", 1.0),
+        _ => ("ms", 1e3),
+    };
+    let values = values_s.into_iter().map(|time_s| factor * time_s).collect();
+    (
+        Units::titled(name, unit),
+        values,
+        scaled(interval_s, factor),
+    )
 }
 
 /// Of the inverse; what is unbounded above ends at zero.

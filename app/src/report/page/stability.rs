@@ -144,26 +144,30 @@ impl<'a> Loop<'a> {
         owned.collect()
     }
 
-    /// The phase margin with its interval.
     fn phase_margin(&self) -> String {
-        let margin = self.margins.phase_margin_rad.to_degrees();
-        match self.phase_margin_rad {
-            Some(Interval {
-                low: Some(low),
-                high: Some(high),
-                ..
-            }) => format!(
-                "{margin:.1} deg ({:.1} .. {:.1})",
-                low.to_degrees(),
-                high.to_degrees()
-            ),
-            _ => format!("{margin:.1} deg"),
-        }
+        phase_margin(&self.margins, self.phase_margin_rad.as_ref())
     }
 
     fn gain_margin(&self) -> Option<String> {
         let factor = self.margins.gain_margin?;
         Some(format!("{factor:.2} ({:.1} dB)", 20.0 * factor.log10()))
+    }
+}
+
+/// The phase margin with its interval.
+pub(super) fn phase_margin(margins: &Margins, within_rad: Option<&Interval>) -> String {
+    let margin = margins.phase_margin_rad.to_degrees();
+    match within_rad {
+        Some(Interval {
+            low: Some(low),
+            high: Some(high),
+            ..
+        }) => format!(
+            "{margin:.1} deg ({:.1} .. {:.1})",
+            low.to_degrees(),
+            high.to_degrees()
+        ),
+        _ => format!("{margin:.1} deg"),
     }
 }
 
@@ -175,4 +179,5 @@ fn curve(process: &Process, pd: Pd, omegas_rad_per_s: &[f64]) -> Vec<LoopRespons
 /// Names in the legends of both plots.
 const OWN: &str = "open loop";
 const TRUTH: &str = "on the true process";
+const BAND: &str = "90 % band";
 const MEASURED: &str = "measured under the relay";

@@ -3,14 +3,14 @@
 use onecycle_lab::bands::Band;
 use onecycle_lab::loop_response::LoopResponse;
 
-use super::{Loop, MEASURED, OWN, TRUTH};
+use super::{BAND, Loop, MEASURED, OWN, TRUTH};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Note, Panel, Series};
 
 /// Phases that are shown (degrees).
 const PHASES_DEG: (f64, f64) = (-360.0, 0.0);
 
 pub(super) fn figure(of: &Loop<'_>) -> Figure {
-    let names = [OWN, TRUTH, MEASURED];
+    let names = [OWN, TRUTH, MEASURED, BAND];
     let magnitude = Axis::titled("magnitude").logarithmic();
     let phase = Axis::titled("phase (deg)").spanning(PHASES_DEG.0, PHASES_DEG.1);
     let magnitudes = of.bands.as_ref().map(|bands| &bands.magnitude);
@@ -19,7 +19,7 @@ pub(super) fn figure(of: &Loop<'_>) -> Figure {
         magnitude,
         series(of, names, magnitudes, 1.0, |at| at.magnitude),
     );
-    let lower = series(of, [""; 3], phases.as_ref(), -180.0, |at| {
+    let lower = series(of, [""; 4], phases.as_ref(), -180.0, |at| {
         at.phase_rad.to_degrees()
     });
     let mut lower = Panel::new(phase, lower);
@@ -27,7 +27,7 @@ pub(super) fn figure(of: &Loop<'_>) -> Figure {
         text: format!("phase margin {}", of.phase_margin()),
         x: of.margins.gain_crossover_rad_per_s,
         y: -180.0 + of.margins.phase_margin_rad.to_degrees(),
-        away: (-60.0, -40.0),
+        away: (-10.0, -40.0),
     });
     let margins = &of.margins;
     if let (Some(factor), Some(omega), Some(text)) = (
@@ -39,7 +39,7 @@ pub(super) fn figure(of: &Loop<'_>) -> Figure {
             text: format!("gain margin {text}"),
             x: omega,
             y: 1.0 / factor,
-            away: (50.0, -40.0),
+            away: (10.0, -40.0),
         });
     }
     let caption = match of.bands {
@@ -63,7 +63,7 @@ fn in_degrees(band: &Band) -> Band {
 /// The curves of a panel; `level` is what margins count from.
 fn series(
     of: &Loop<'_>,
-    [own, truth, measured]: [&str; 3],
+    [own, truth, measured, band_name]: [&str; 4],
     band: Option<&Band>,
     level: f64,
     value: fn(&LoopResponse) -> f64,
@@ -76,7 +76,9 @@ fn series(
     let ends = omegas.first().into_iter().chain(omegas.last());
     let mut series = vec![];
     series.extend(
-        band.map(|Band { low, high }| Series::between("", omegas, low, high).hue(Hue::Model)),
+        band.map(|Band { low, high }| {
+            Series::between(band_name, omegas, low, high).hue(Hue::Model)
+        }),
     );
     series.push(
         Series::of_points("", Marks::Dashes, ends.map(|&omega| (omega, level))).hue(Hue::Reference),

@@ -5,11 +5,13 @@ use std::f64::consts::{PI, TAU};
 use onecycle_lab::bands::LoopBands;
 use onecycle_lab::loop_response::LoopResponse;
 
-use super::{Loop, MEASURED, OWN, TRUTH};
+use super::{BAND, Loop, MEASURED, OWN, TRUTH};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Note, Panel, Series, Shape};
 
 /// What is shown at least: left, right, below, above.
 const PLANE: [f64; 4] = [-2.4, 1.2, -1.9, 1.3];
+/// The farthest that is shown to the left and below, so that the circle stays to be seen.
+const FARTHEST: f64 = -4.0;
 /// Radius beyond which nothing is drawn.
 const FAR: f64 = 30.0;
 
@@ -20,10 +22,10 @@ pub(super) fn figure(of: &Loop<'_>) -> Figure {
         let (re, im) = point(at);
         let [left, right, below, above] = PLANE;
         [
-            left.min(1.2 * re),
-            right.max(1.2 * re),
-            below.min(1.2 * im),
-            above.max(1.2 * im),
+            left.min((1.2 * re).max(FARTHEST)),
+            right.max((1.2 * re).min(-FARTHEST)),
+            below.min((1.2 * im).max(FARTHEST)),
+            above.max((1.2 * im).min(-FARTHEST)),
         ]
     });
     panel.y = panel.y.spanning(below, above);
@@ -57,8 +59,7 @@ fn series(of: &Loop<'_>) -> Vec<Series> {
     }) = &of.bands
     {
         let edges = low.iter().chain(high.iter().rev()).map(|at| (at.re, at.im));
-        series
-            .push(Series::of_points("90 % band", Marks::Area, edges.filter(near)).hue(Hue::Model));
+        series.push(Series::of_points(BAND, Marks::Area, edges.filter(near)).hue(Hue::Model));
     }
     series.push(locus(OWN, Marks::Line, &of.own).hue(Hue::Model));
     if !of.truth.is_empty() {
@@ -79,14 +80,14 @@ fn notes(of: &Loop<'_>) -> Vec<Note> {
         text: format!("phase margin {}", of.phase_margin()),
         x: crossing.cos(),
         y: crossing.sin(),
-        away: (-70.0, 70.0),
+        away: (60.0, 55.0),
     }];
     if let (Some(factor), Some(text)) = (of.margins.gain_margin, of.gain_margin()) {
         notes.push(Note {
             text: format!("gain margin {text}"),
             x: -1.0 / factor,
             y: 0.0,
-            away: (-50.0, -70.0),
+            away: (10.0, -70.0),
         });
     }
     notes
