@@ -6,11 +6,9 @@
 use num_complex::Complex64;
 use onecycle_onboard::{Pd, Process};
 
+use crate::identify::quantiles;
 use crate::loop_response::loop_response;
 use crate::step_response::{StepResponse, step_response};
-
-/// Quantiles of a band: those of a 90 % interval.
-const QUANTILES: (f64, f64) = (0.05, 0.95);
 
 /// Ends of a band, a value for each abscissa that it was asked for.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,13 +23,9 @@ impl Band {
     /// About curves of equal length; `None` where there is none.
     fn of(curves: &[Vec<f64>]) -> Option<Self> {
         let count = curves.first()?.len();
-        let ends = (0..count).map(|at| {
-            let mut values: Vec<f64> = curves.iter().map(|curve| curve[at]).collect();
-            values.sort_unstable_by(f64::total_cmp);
-            let value = |q: f64| values[((values.len() - 1) as f64 * q).round() as usize];
-            (value(QUANTILES.0), value(QUANTILES.1))
-        });
-        let (low, high) = ends.unzip();
+        let ends = (0..count).map(|at| quantiles(curves.iter().map(|curve| curve[at]).collect()));
+        let ends: Option<Vec<(f64, f64)>> = ends.collect();
+        let (low, high) = ends?.into_iter().unzip();
         Some(Self { low, high })
     }
 }

@@ -19,6 +19,7 @@ use onecycle_plant::Trace;
 
 use self::decision::Decision;
 use self::oscillation::{FitWindow, Oscillation, Past};
+pub(crate) use self::posterior::quantiles;
 pub use self::posterior::{Draw, Interval, Posterior, ProcessEstimate};
 pub use self::reading::Reading;
 use self::relay_input::{InputKind, RelayInput};

@@ -12,16 +12,15 @@ use crate::report::{json, page, text};
 pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
     let process = arguments.process.process()?;
     let optimum = pd(&process, arguments.phase_margin).map_err(Failure::usage)?;
-    let step = step_response(&process, optimum.pd)
-        .ok()
-        .map(|response| response.metrics);
+    let response = step_response(&process, optimum.pd).ok();
+    let step = response.as_ref().map(|response| &response.metrics);
     if let Some(path) = &arguments.report {
-        write_text(path, &page::design(&process, &optimum))?;
+        write_text(path, &page::design(&process, &optimum, response.as_ref()))?;
     }
     print(&if arguments.json {
-        json::design(&process, &optimum, step.as_ref())
+        json::design(&process, &optimum, step)
     } else {
-        text::design(&process, &optimum, step.as_ref())
+        text::design(&process, &optimum, step)
     })?;
     Ok(ExitCode::from(exit::DONE))
 }

@@ -52,14 +52,13 @@ pub(crate) fn list(items: &[String]) -> String {
 }
 
 /// Names and what is to be said of each.
-pub(crate) fn facts(facts: &[(String, String)]) -> String {
-    let fact = |(name, value): &(String, String)| {
-        format!("<dt>{}</dt><dd>{}</dd>\n", escaped(name), escaped(value))
-    };
-    format!(
-        "<dl>\n{}</dl>\n",
-        facts.iter().map(fact).collect::<String>()
-    )
+pub(crate) fn facts(facts: &[(impl AsRef<str>, String)]) -> String {
+    let mut all = String::new();
+    for (name, value) in facts {
+        let (name, value) = (escaped(name.as_ref()), escaped(value));
+        let _ = writeln!(all, "<dt>{name}</dt><dd>{value}</dd>");
+    }
+    format!("<dl>\n{all}</dl>\n")
 }
 
 /// A value, and a smaller one below it.

@@ -104,7 +104,7 @@ fn shortened(mut values: Vec<f64>) -> Vec<f64> {
 }
 
 /// An axis.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Axis {
     /// What it shows, and in which unit.
@@ -145,7 +145,7 @@ impl Axis {
 }
 
 /// Words at a point of a panel, with an arrow to it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Note {
     pub(crate) text: String,
     pub(crate) x: f64,
@@ -155,7 +155,7 @@ pub(crate) struct Note {
 }
 
 /// Values over a plane, `z[row][column]` at `y[row]`, `x[column]`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Field {
     pub(crate) kind: FieldKind,
     pub(crate) x: Places,
@@ -164,7 +164,7 @@ pub(crate) struct Field {
 }
 
 /// Where the values of a field stand.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Places {
     Numbers(Vec<f64>),
@@ -172,7 +172,7 @@ pub(crate) enum Places {
 }
 
 /// What the values of a field are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum FieldKind {
     /// Contents of the smallest regions, 0 to 1: lines about those of 50, 90 and 99 %.
@@ -182,15 +182,11 @@ pub(crate) enum FieldKind {
 }
 
 /// One of the panels that stand above each other over the same abscissas.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Panel {
     pub(crate) y: Axis,
-    #[serde(default)]
     pub(crate) series: Vec<Series>,
-    #[serde(default)]
     pub(crate) field: Option<Field>,
-    #[serde(default)]
     pub(crate) notes: Vec<Note>,
 }
 
@@ -205,8 +201,7 @@ impl Panel {
 }
 
 /// How much room a figure has.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Shape {
     #[default]
     Wide,
@@ -233,17 +228,14 @@ impl Shape {
 }
 
 /// Panels above each other and what stands under them.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Figure {
     pub(crate) caption: String,
     pub(crate) x: Axis,
     /// The uppermost first.
     pub(crate) panels: Vec<Panel>,
-    #[serde(default)]
     pub(crate) shape: Shape,
     /// What is marked of the abscissas.
-    #[serde(default)]
     pub(crate) span: Option<(f64, f64)>,
 }
 

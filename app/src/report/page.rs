@@ -41,12 +41,11 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
                 identified,
                 posterior: &posterior,
             };
-            let measured = with_signals(recording, |signals| {
-                harmonics(signals, oscillation, HARMONICS)
-            });
             // One cycle may be one of no steady oscillation, which has no harmonics.
             let measured = if oscillation.cycles_used > 1 {
-                measured
+                with_signals(recording, |signals| {
+                    harmonics(signals, oscillation, HARMONICS)
+                })
             } else {
                 vec![]
             };
@@ -64,14 +63,17 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
 }
 
 /// The page of a design.
-pub(crate) fn design(process: &Process, optimum: &Optimum) -> String {
+pub(crate) fn design(
+    process: &Process,
+    optimum: &Optimum,
+    response: Option<&StepResponse>,
+) -> String {
     let mut lead = made_by("tune");
     lead += &page::facts(&parameters::of_process(process));
-    let response = step_response(process, optimum.pd).ok();
     let own = Loop::new(process, optimum.pd, optimum.margins);
     let sections = [
         Some(own.section()),
-        response.map(|response| step::section(&response, None, &times_s(&response))),
+        response.map(|response| step::section(response, None, &times_s(response))),
         Some(controller::section(optimum, &Units::default(), None)),
     ];
     let sections: Vec<Section> = sections.into_iter().flatten().collect();

@@ -39,7 +39,8 @@ def expect(is_so, what):
 
 
 def made(program, examples, scratch):
-    """Every page by its name, and the sections and the least number of plots that it must have."""
+    """Every page by its name, the sections and the least number of plots that it must have, and the call that also tells
+    its margins, where there are some."""
     identified = {"recording", "fit", "process", "stability", "step", "controller"}
     recording = lambda name: ["identify", str(examples / name)]
     tune = ["tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1"]
@@ -54,13 +55,13 @@ def made(program, examples, scratch):
     for name, (arguments, sections, plots) in pages.items():
         path = scratch / f"{name}.html"
         run(program, [*arguments, "--report", str(path)])
-        yield name, path, sections, plots
+        yield name, path, sections, plots, arguments if "controller" in sections else None
     folder = scratch / "flights"
     run(program, ["fly", "altitude", "vehicle", "-o", str(folder)])
-    yield "flights", folder / "flights.html", {"altitude", "vehicle"}, 6
+    yield "flights", folder / "flights.html", {"altitude", "vehicle"}, 6, None
     folder = scratch / "reproduction"
     run(program, ["reproduce", "phase", "--quick", "-o", str(folder)])
-    yield "reproduction", next(folder.glob("*.html")), {"phase"}, 1
+    yield "reproduction", next(folder.glob("*.html")), {"phase"}, 1, None
 
 
 def run(program, arguments):
@@ -234,7 +235,7 @@ def main():
             executable_path=chromium,
             args=["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"],
         )
-        for name, path, sections, plots in made(arguments.program, arguments.examples, arguments.scratch):
+        for name, path, sections, plots, tells in made(arguments.program, arguments.examples, arguments.scratch):
             for screen in SCREENS:
                 page, faults, fetched = opened(browser, path, screen)
                 look(page, path, sections, plots)
@@ -242,10 +243,8 @@ def main():
                     picture(browser, page, arguments.picture)
                 switch(page)
                 said = f"{len(annotations(page))} notes"
-                if name in ("hover", "roll", "bias"):
-                    recording = {"hover": "simulated_hover", "roll": "jsbsim_f450_roll_clean", "bias": "rotorpy_sih_alt_bias30"}[name]
-                    report = run(arguments.program, ["identify", str(arguments.examples / f"{recording}.csv"), "--json"])
-                    said = margins(page, json.loads(report))
+                if tells:
+                    said = margins(page, json.loads(run(arguments.program, [*tells, "--json"])))
                 if screen == "desk":
                     print_out(page)
                 if screen == "desk" and "recording" in sections:

@@ -301,7 +301,8 @@ impl Posterior {
     }
 }
 
-fn quantiles(mut values: Vec<f64>) -> Option<(f64, f64)> {
+/// The ends of the 90 % interval of draws; `None` where there are none.
+pub(crate) fn quantiles(mut values: Vec<f64>) -> Option<(f64, f64)> {
     if values.is_empty() {
         return None;
     }

@@ -134,7 +134,7 @@ impl Sheet {
 }
 
 /// A part, ready to be shown.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Part {
     pub(crate) name: &'static str,
     pub(crate) title: String,
@@ -146,7 +146,7 @@ pub(crate) struct Part {
 }
 
 /// A table with the paper's numbers beside ours.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Table {
     pub(crate) caption: String,
     pub(crate) columns: Vec<String>,
@@ -155,7 +155,7 @@ pub(crate) struct Table {
 }
 
 /// One value, ours and the paper's where it has one.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Cell {
     pub(crate) ours: String,
     pub(crate) paper: Option<String>,

@@ -41,7 +41,7 @@ pub(super) fn section(optimum: &Optimum, units: &Units, input_bias: Option<f64>)
             ),
         ),
     ];
-    let forms = forms.map(|(name, law, values)| (name.to_owned(), format!("{values}: {law}")));
+    let forms = forms.map(|(name, law, values)| (name, format!("{values}: {law}")));
     let mut body = page::facts(&forms)
         + &page::paragraph(
             "source",

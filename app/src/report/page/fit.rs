@@ -78,7 +78,7 @@ fn correlogram(white: &Whiteness) -> Figure {
 /// Probability below which residuals are called not white.
 const LEAST_PROBABILITY: f64 = 0.01;
 
-fn facts(identified: &Identified, white: &Whiteness) -> Vec<(String, String)> {
+fn facts(identified: &Identified, white: &Whiteness) -> Vec<(&'static str, String)> {
     let lags = white.autocorrelation.len();
     let is_white = white.probability >= LEAST_PROBABILITY;
     let judgement = if is_white {
@@ -110,6 +110,5 @@ fn facts(identified: &Identified, white: &Whiteness) -> Vec<(String, String)> {
             ),
         ),
     ]
-    .map(|(name, value)| (name.to_owned(), value))
     .into()
 }

@@ -20,7 +20,7 @@ const BARS: usize = 36;
 const TAIL: f64 = 0.005;
 
 /// Parameters of a process without intervals.
-pub(super) fn of_process(process: &Process) -> Vec<(String, String)> {
+pub(super) fn of_process(process: &Process) -> Vec<(&'static str, String)> {
     let infinite = |value: Option<f64>| value.map_or("infinite".to_owned(), significant);
     [
         ("process", FORMULA.to_owned()),
@@ -30,7 +30,6 @@ pub(super) fn of_process(process: &Process) -> Vec<(String, String)> {
         ("T_body", format!("{} s", infinite(process.t_body_s()))),
         ("tau", format!("{} s", significant(process.tau_s()))),
     ]
-    .map(|(name, value)| (name.to_owned(), value))
     .into()
 }
 

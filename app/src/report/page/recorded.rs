@@ -48,7 +48,7 @@ pub(super) fn section(recording: &Recording, found: Option<&OscillationFound>) -
     }
 }
 
-fn facts(found: &OscillationFound) -> Vec<(String, String)> {
+fn facts(found: &OscillationFound) -> Vec<(&'static str, String)> {
     let noise = 100.0 * found.noise_sigma / found.amplitude;
     [
         (
@@ -77,7 +77,6 @@ fn facts(found: &OscillationFound) -> Vec<(String, String)> {
             ),
         ),
     ]
-    .map(|(name, value)| (name.to_owned(), value))
     .into()
 }
 

@@ -103,7 +103,7 @@ impl<'a> Loop<'a> {
             id: "stability".to_owned(),
             title: "Stability".to_owned(),
             body: page::figure(&self.nyquist())
-                + &page::figure(&self.bode())
+                + &page::figure(&bode::figure(self))
                 + &page::facts(&self.facts()),
         }
     }
@@ -112,11 +112,7 @@ impl<'a> Loop<'a> {
         nyquist::figure(self)
     }
 
-    fn bode(&self) -> Figure {
-        bode::figure(self)
-    }
-
-    fn facts(&self) -> Vec<(String, String)> {
+    fn facts(&self) -> Vec<(&'static str, String)> {
         let Margins {
             delay_margin_s,
             gain_crossover_rad_per_s,
@@ -138,10 +134,7 @@ impl<'a> Loop<'a> {
         if let (Some(gain_margin), Some(omega)) = (self.gain_margin(), phase_crossover_rad_per_s) {
             facts.push(("gain margin", format!("{gain_margin} {}", at(omega))));
         }
-        let owned = facts
-            .into_iter()
-            .map(|(name, value)| (name.to_owned(), value));
-        owned.collect()
+        facts
     }
 
     fn phase_margin(&self) -> String {

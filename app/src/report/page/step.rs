@@ -76,7 +76,7 @@ fn notes(response: &StepResponse) -> Vec<Note> {
     peak.into_iter().chain([settled]).collect()
 }
 
-fn facts(response: &StepResponse, bands: Option<&StepBands>) -> Vec<(String, String)> {
+fn facts(response: &StepResponse, bands: Option<&StepBands>) -> Vec<(&'static str, String)> {
     let metrics = &response.metrics;
     let seconds = |time_s: f64| format!("{} s", significant(time_s));
     let largest = significant(metrics.peak_input);
@@ -91,8 +91,5 @@ fn facts(response: &StepResponse, bands: Option<&StepBands>) -> Vec<(String, Str
         let part = percent(bands.settling);
         facts.push(("stable", format!("on {part} of what the process may be")));
     }
-    let owned = facts
-        .into_iter()
-        .map(|(name, value)| (name.to_owned(), value));
-    owned.collect()
+    facts
 }
