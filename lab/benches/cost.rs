@@ -1,10 +1,13 @@
 //! One cost, one set of margins, one optimum, searched and from a table, one step response.
 
 use divan::{Bencher, black_box};
-use onecycle_lab::lead_table::{POINTS, build};
-use onecycle_lab::{ise, margins, pd, pd_at_phase_margin, step_response};
+use onecycle_design::soiptd_pd::cost::ise;
+use onecycle_design::soiptd_pd::margins::margins;
+use onecycle_design::soiptd_pd::optimum::{pd, pd_at_phase_margin};
+use onecycle_design::soiptd_pd::step_response::step_response;
+use onecycle_lab::learn::lead_table::{POINTS, build};
 use onecycle_onboard::gains::LeadTable;
-use onecycle_onboard::{Pd, Process};
+use onecycle_onboard::{Pd, Soiptd};
 
 /// The paper's hover process and, with its floor inactive, a process that is mostly dead time.
 const HOVER: (f64, f64, f64) = (0.0321, 1.6886, 0.0237);
@@ -16,11 +19,11 @@ fn main() {
     divan::main();
 }
 
-fn process((t_prop_s, t_body_s, tau_s): (f64, f64, f64)) -> Process {
-    Process::new(1.0, t_prop_s, t_body_s, tau_s).expect("the times are positive")
+fn process((t_prop_s, t_body_s, tau_s): (f64, f64, f64)) -> Soiptd {
+    Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).expect("the times are positive")
 }
 
-fn best(process: &Process) -> Pd {
+fn best(process: &Soiptd) -> Pd {
     pd_at_phase_margin(process, PHASE_MARGIN_RAD)
         .expect("20 deg is a margin")
         .pd

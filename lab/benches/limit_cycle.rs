@@ -1,10 +1,10 @@
 //! One limit cycle, one certificate, all sampled cycles of a process.
 
 use divan::{Bencher, black_box};
-use onecycle_lab::certificate::Certificate;
-use onecycle_lab::limit_cycle::sampled::symmetric_cycles;
-use onecycle_lab::limit_cycle::{limit_cycles, symmetric};
-use onecycle_onboard::Process;
+use onecycle_lab::space::certificate::Certificate;
+use onecycle_lab::space::limit_cycle::sampled::symmetric_cycles;
+use onecycle_lab::space::limit_cycle::{limit_cycles, symmetric};
+use onecycle_onboard::Soiptd;
 
 const BETA: f64 = -0.73;
 
@@ -15,9 +15,9 @@ fn main() {
     divan::main();
 }
 
-fn hover() -> Process {
+fn hover() -> Soiptd {
     let [t_prop_s, t_body_s, tau_s] = HOVER;
-    Process::new(1.0, t_prop_s, t_body_s, tau_s).expect("the times are positive")
+    Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).expect("the times are positive")
 }
 
 /// Exact, with the spectral radius of its Poincare map.

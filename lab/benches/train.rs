@@ -2,7 +2,7 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use onecycle_lab::train::{
+use onecycle_lab::learn::train::{
     Batch, Dropped, Layer, Loss, Matrix, Method, Network, OneThread, Optimizer, Tape, Workers,
 };
 use rand::{RngExt, SeedableRng};
@@ -100,7 +100,7 @@ fn steps(bencher: Bencher, (mut network, loss): (Network, Loss), method: Method,
         let value = loss.evaluate(outputs, &batch, &mut gradient)?;
         network.backward(&mut tape, &gradient, workers)?;
         optimizer.step(&mut network, &tape, 1e-4, workers)?;
-        Ok::<_, onecycle_lab::train::TrainError>(value)
+        Ok::<_, onecycle_lab::learn::train::TrainError>(value)
     });
 }
 

@@ -9,6 +9,13 @@
 //! beta = -0.73              # of the relay, -0.73 where it is left out
 //! ```
 
+pub mod candidate;
+pub mod certificate;
+pub mod limit_cycle;
+pub mod phase;
+pub mod rule;
+pub mod surface;
+
 use rand::{Rng, RngExt};
 
 /// Lowest and highest value.

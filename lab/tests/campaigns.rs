@@ -3,11 +3,11 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use onecycle_lab::Deterioration;
-use onecycle_lab::campaign::{
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_identify::Method;
+use onecycle_lab::judge::campaign::{
     Campaign, IdentificationOutcome, Measure, identification_outcome, relay_outcome,
 };
-use onecycle_lab::identify::Method;
 
 fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
     Campaign {

@@ -3,8 +3,8 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
-use onecycle_lab::Space;
-use onecycle_lab::certificate::{Certificate, Summary, Verdict};
+use onecycle_lab::space::Space;
+use onecycle_lab::space::certificate::{Certificate, Summary, Verdict};
 
 fn certificates(space: &Space, bias: f64) -> Vec<Certificate> {
     space

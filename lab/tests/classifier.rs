@@ -5,14 +5,16 @@
 
 use std::f64::consts::TAU;
 
-use onecycle_lab::classifier::{
+use onecycle_design::soiptd_pd::deterioration::deterioration;
+use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
+use onecycle_lab::learn::train::{Batch, Dataset, Matrix};
+use onecycle_lab::paper::classifier::{
     Classes, Examples, Fit, Gain, Harmonics, INPUTS, Measured, Prepared, Processes, Protocol,
     Response, SAMPLE_S, SAMPLES, SampledCycle, Score, Trials, label, least_expected_cost,
     most_likely,
 };
-use onecycle_lab::grid::{Grid, InTurn, Settings};
-use onecycle_lab::train::{Batch, Dataset, Matrix};
-use onecycle_lab::{Space, deterioration, pd_at_phase_margin};
+use onecycle_lab::paper::grid::{Grid, InTurn, Settings};
+use onecycle_lab::space::Space;
 
 const SPACE: Space = Space {
     t_prop_s: (0.03, 0.1),

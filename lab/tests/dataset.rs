@@ -5,16 +5,21 @@
 
 use std::ops::{ControlFlow, Range};
 
-use onecycle_lab::dataset::learning::{self, Wanted};
-use onecycle_lab::dataset::shards::Record;
-use onecycle_lab::dataset::{Draw, Example, Family, Recipe, RecipeError, VALUES};
-use onecycle_lab::train::{
+use onecycle_design::soiptd_pd::cost::ise;
+use onecycle_design::soiptd_pd::deterioration::deterioration;
+use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
+use onecycle_lab::experiments::recipe::Draw;
+use onecycle_lab::experiments::{Family, Recipe, RecipeError};
+use onecycle_lab::learn::dataset::learning;
+use onecycle_lab::learn::dataset::learning::Wanted;
+use onecycle_lab::learn::dataset::shards::Record;
+use onecycle_lab::learn::dataset::{Example, VALUES};
+use onecycle_lab::learn::train::{
     Gaussian, Layer, Loss, Method, Network, OneThread, Schedule, Settings, Shape, Trainer,
 };
-use onecycle_lab::{deterioration, ise, pd_at_phase_margin};
 use onecycle_onboard::classify::process_of;
 use onecycle_onboard::signature::LENGTH;
-use onecycle_onboard::{Pd, Process};
+use onecycle_onboard::{Pd, Soiptd};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -61,12 +66,12 @@ fn nearly_every_experiment_is_an_example() {
     assert_eq!(later.example(0), recipe.example(17));
 }
 
-fn jerk_gain(process: &Process) -> f64 {
+fn jerk_gain(process: &Soiptd) -> f64 {
     process.k_over_t_body() / process.t_prop_s()
 }
 
 /// Asserts that two processes are the same, whichever of their lags comes first.
-fn same(a: &Process, b: &Process) {
+fn same(a: &Soiptd, b: &Soiptd) {
     for (x, y) in [
         (a.tau_s(), b.tau_s()),
         (a.pole_sum().0, b.pole_sum().0),
@@ -102,7 +107,7 @@ fn values_are_the_process() {
 fn values_are_regular_where_the_lags_meet() {
     let template = examples(&Recipe::default(), 0..1)[0];
     let of = |t_prop_s: f64, t_body_s: f64| {
-        let process = Process::new(1.0, t_prop_s, t_body_s, 0.02).unwrap();
+        let process = Soiptd::new(1.0, t_prop_s, t_body_s, 0.02).unwrap();
         let example = Example {
             process,
             ..template

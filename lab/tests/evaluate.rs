@@ -7,16 +7,19 @@ mod common;
 
 use std::collections::BTreeSet;
 
-use onecycle_lab::baselines::rules;
-use onecycle_lab::evaluate::files::{read_answers, read_truth, results_csv, truth_csv};
-use onecycle_lab::evaluate::{
+use onecycle_design::cascade::Cascade;
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_design::soiptd_pd::optimum::pd;
+use onecycle_identify::find_oscillation;
+use onecycle_lab::judge::baselines::rules;
+use onecycle_lab::judge::evaluate::files::{read_answers, read_truth, results_csv, truth_csv};
+use onecycle_lab::judge::evaluate::{
     Answer, Benchmark, Contender, Costs, Judge, PHASE_MARGIN_DEG, Record, RelayTest, Summary,
     Truth, Verdict, quantile, records,
 };
-use onecycle_lab::grid::{InTurn, Pieces};
-use onecycle_lab::identify::find_oscillation;
-use onecycle_lab::{Cascade, Deterioration, Space, pd};
-use onecycle_onboard::{Pd, Process};
+use onecycle_lab::paper::grid::{InTurn, Pieces};
+use onecycle_lab::space::Space;
+use onecycle_onboard::{Pd, Soiptd};
 
 use common::Two;
 
@@ -48,7 +51,7 @@ fn what_is_won_at_the_full_margin_counts_nothing() {
 // frequencies errs by. Four times the gain is unstable, for the gain margin is 2.26.
 #[test]
 fn a_cascade_is_judged_as_a_pd_is() {
-    let truth = Process::new(1.0, 0.3, 2.0, 0.1).unwrap();
+    let truth = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
     let judge = Judge::new(&truth).unwrap();
     let best = pd(&truth, PHASE_MARGIN_DEG.to_radians()).unwrap().pd;
     let cascade = |factor: f64| Cascade {
@@ -120,8 +123,8 @@ fn quantiles_are_values_of_the_sample() {
 #[test]
 fn a_perfect_answer_scores_zero() {
     for [t_prop_s, t_body_s, tau_s] in [[0.02, 0.3, 0.001], [0.3, 0.2, 0.1], [0.1, 1.0, 0.03]] {
-        let truth = Process::new(3.0, t_prop_s, t_body_s, tau_s).unwrap();
-        let swapped = Process::new(3.0, t_body_s, t_prop_s, tau_s).unwrap();
+        let truth = Soiptd::new(3.0, t_prop_s, t_body_s, tau_s).unwrap();
+        let swapped = Soiptd::new(3.0, t_body_s, t_prop_s, tau_s).unwrap();
         let judge = Judge::new(&truth).unwrap();
         for answer in [truth, swapped] {
             let record = judge.record(7, "perfect", Ok(Answer::of_process(answer).unwrap()));
@@ -147,7 +150,7 @@ fn a_perfect_answer_scores_zero() {
 // is unstable too. Neither has a J, nor does a refusal, which has its reason.
 #[test]
 fn unstable_and_missing_answers_count_one() {
-    let truth = Process::new(1.0, 0.3, 2.0, 0.1).unwrap();
+    let truth = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
     let judge = Judge::new(&truth).unwrap();
     let best = pd(&truth, PHASE_MARGIN_DEG.to_radians()).unwrap().pd;
     for factor in [5.0, -1.0] {
@@ -360,7 +363,7 @@ fn answers_are_processes_or_gains() {
     let answers = read_answers(text, &experiments).unwrap();
     assert_eq!(answers.keys().collect::<Vec<_>>(), [&3]);
     let process = answers[&3].answer.as_ref().unwrap().process.unwrap();
-    assert_eq!(process, Process::new(2.0, 0.1, 1.0, 0.01).unwrap());
+    assert_eq!(process, Soiptd::new(2.0, 0.1, 1.0, 0.01).unwrap());
     assert_eq!(answers[&3].seconds, Some(0.5));
     let answers = read_answers("experiment,kp,kd,remark\n2,6,1.5,good\n", &experiments).unwrap();
     let pd = Pd { kp: 6.0, kd: 1.5 };
@@ -426,7 +429,7 @@ fn wrong_truths_name_their_line() {
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_has_the_recordings() {
-    use onecycle_lab::evaluate::parquet::Writer;
+    use onecycle_lab::judge::evaluate::parquet::Writer;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::Field;
 

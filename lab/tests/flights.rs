@@ -4,8 +4,8 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
-use onecycle_lab::Deterioration;
-use onecycle_lab::flights::judged;
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_lab::judge::flights::judged;
 use onecycle_plant::multirotor::{Axis, Mission, fly};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;

@@ -4,10 +4,11 @@
 #![allow(clippy::unwrap_used)]
 
 use num_complex::Complex64;
-use onecycle_lab::campaign::Campaign;
-use onecycle_lab::identify::{OscillationFound, Signals, find_oscillation};
-use onecycle_lab::{Harmonic, harmonics};
-use onecycle_onboard::Process;
+use onecycle_identify::{Harmonic, harmonics};
+use onecycle_identify::{OscillationFound, Signals, find_oscillation};
+use onecycle_lab::experiments::signals_of;
+use onecycle_lab::judge::campaign::Campaign;
+use onecycle_onboard::Soiptd;
 use onecycle_onboard::relay::Relay;
 use onecycle_plant::{Experiment, Sensor, Trace};
 use rand::SeedableRng;
@@ -26,12 +27,12 @@ const PROCESSES: [[f64; 3]; 5] = [
 /// after 296: 592 samples, a multiple of four.
 const EVEN: [f64; 3] = PROCESSES[2];
 
-fn process([t_prop, t_body, tau]: [f64; 3]) -> Process {
-    Process::new(1.0, t_prop, t_body, tau).unwrap()
+fn process([t_prop, t_body, tau]: [f64; 3]) -> Soiptd {
+    Soiptd::new(1.0, t_prop, t_body, tau).unwrap()
 }
 
 /// So long a test without noise that nothing is left of its beginning.
-fn settled(process: Process, bias: f64) -> Trace {
+fn settled(process: Soiptd, bias: f64) -> Trace {
     let mut case = Campaign::QUIET.quiet_case(process, 1).unwrap();
     case.bias = bias;
     Campaign::QUIET.run(&case, 80.0).unwrap().0
@@ -43,7 +44,7 @@ fn found_in(signals: &Signals<'_>, cycles: usize) -> OscillationFound {
     found
 }
 
-fn truth(process: &Process, omega: f64) -> Complex64 {
+fn truth(process: &Soiptd, omega: f64) -> Complex64 {
     let value = Complex64::from_polar(
         process.magnitude(omega.abs()),
         process.phase_rad(omega.abs()),
@@ -51,7 +52,7 @@ fn truth(process: &Process, omega: f64) -> Complex64 {
     if omega > 0.0 { value } else { value.conj() }
 }
 
-fn error(process: &Process, harmonic: &Harmonic) -> f64 {
+fn error(process: &Soiptd, harmonic: &Harmonic) -> f64 {
     let truth = truth(process, harmonic.omega_rad_per_s);
     (harmonic.response - truth).norm() / truth.norm()
 }
@@ -70,7 +71,7 @@ fn orders(harmonics: &[Harmonic]) -> Vec<usize> {
 fn a_settled_oscillation_has_the_response_of_the_process() {
     for times in PROCESSES {
         let (process, trace) = (process(times), settled(process(times), 0.0));
-        let signals = Signals::of_trace(&trace, SAMPLE_S);
+        let signals = signals_of(&trace, SAMPLE_S);
         let found = found_in(&signals, 8);
         let harmonics = harmonics(&signals, &found, 9);
         assert_eq!(orders(&harmonics), [1, 3, 5, 7, 9], "{times:?}");
@@ -102,7 +103,7 @@ fn a_bias_brings_even_orders_and_a_negative_gain_its_sign() {
     for (input, sign) in [(&trace.input, 1.0), (&mirrored_input, -1.0)] {
         let signals = Signals {
             input,
-            ..Signals::of_trace(&trace, SAMPLE_S)
+            ..signals_of(&trace, SAMPLE_S)
         };
         let found = found_in(&signals, 8);
         let harmonics = harmonics(&signals, &found, 9);
@@ -123,7 +124,7 @@ fn a_bias_brings_even_orders_and_a_negative_gain_its_sign() {
 fn points_of_several_samples_are_as_exact() {
     let process = process(EVEN);
     let trace = settled(process, 0.0);
-    let found = found_in(&Signals::of_trace(&trace, SAMPLE_S), 8);
+    let found = found_in(&signals_of(&trace, SAMPLE_S), 8);
     let offset = (found.start_s / SAMPLE_S).round() as usize % 4;
     let mean = |column: &[f64]| -> Vec<f64> {
         let groups = column[offset..].chunks_exact(4);
@@ -162,7 +163,7 @@ fn uneven_stamps_will_do() {
     let mut experiment = Experiment::new(process, SAMPLE_S, 15.0);
     experiment.jitter = 0.2;
     let trace = experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(1));
-    let signals = Signals::of_trace(&trace, SAMPLE_S);
+    let signals = signals_of(&trace, SAMPLE_S);
     let first = harmonics(&signals, &found_in(&signals, 8), 1)[0];
     assert!(error(&process, &first) < 1e-3, "{first:?}");
 }
@@ -187,7 +188,7 @@ fn the_scatter_under_noise_is_the_deviation() {
         quantum: 0.0,
     };
     for (cycles, most) in [(8, 3), (2, 1)] {
-        let clean = Signals::of_trace(&trace, SAMPLE_S);
+        let clean = signals_of(&trace, SAMPLE_S);
         let exact = harmonics(&clean, &found_in(&clean, cycles), most);
         let mut errors = vec![Vec::new(); exact.len()];
         for seed in 0..200 {
@@ -232,7 +233,7 @@ fn cycles_that_differ_are_worth_as_much() {
         .map(|number| {
             let case = campaign.case(number).unwrap();
             let trace = campaign.run(&case, 25.0).unwrap().0;
-            let signals = Signals::of_trace(&trace, SAMPLE_S);
+            let signals = signals_of(&trace, SAMPLE_S);
             let first = harmonics(&signals, &found_in(&signals, 8), 1)[0];
             (first, truth(&case.process, first.omega_rad_per_s))
         })
@@ -249,7 +250,7 @@ fn cycles_that_differ_are_worth_as_much() {
 fn a_recording_of_the_cycles_alone_will_do() {
     let process = process(EVEN);
     let trace = settled(process, 0.0);
-    let whole = Signals::of_trace(&trace, SAMPLE_S);
+    let whole = signals_of(&trace, SAMPLE_S);
     let found = found_in(&whole, 2);
     let index = |time_s: f64| (time_s / SAMPLE_S).round() as usize;
     let rows = index(found.start_s)..index(found.end_s) + 1;
@@ -266,7 +267,7 @@ fn a_recording_of_the_cycles_alone_will_do() {
 #[test]
 fn what_has_no_fundamental_has_no_harmonics() {
     let trace = settled(process(EVEN), 0.0);
-    let signals = Signals::of_trace(&trace, SAMPLE_S);
+    let signals = signals_of(&trace, SAMPLE_S);
     let found = found_in(&signals, 8);
     assert_eq!(harmonics(&signals, &found, 0), []);
     let level = vec![0.3; trace.len()];

@@ -2,12 +2,15 @@
 
 use std::f64::consts::PI;
 
-use onecycle_lab::lead_table::{
+use onecycle_design::soiptd_pd::cost::ise;
+use onecycle_design::soiptd_pd::margins::margins;
+use onecycle_design::soiptd_pd::optimum::{pd, pd_at_phase_margin};
+use onecycle_lab::learn::lead_table::{
     Constraint, CostExcess, POINTS, build, cost_excess, random_process, to_bytes,
 };
-use onecycle_lab::{Space, ise, margins, pd, pd_at_phase_margin};
+use onecycle_lab::space::Space;
 use onecycle_onboard::gains::{GainsError, LeadTable};
-use onecycle_onboard::{Pd, Process};
+use onecycle_onboard::{Pd, Soiptd};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -25,7 +28,7 @@ fn close(a: f64, b: f64, tolerance: f64) -> bool {
 }
 
 /// Processes of every shape that a table reaches.
-fn processes(seed: u64, count: usize) -> Vec<Process> {
+fn processes(seed: u64, count: usize) -> Vec<Soiptd> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     (0..count)
         .map(|_| random_process(&mut rng).expect("all in range"))
@@ -44,7 +47,7 @@ fn tabled_controllers_match_the_prototype() {
         ([0.015, 0.2, 0.0005], 774.29, 26.720),
         ([0.02, 1.6889, 0.0121], 587.007, 52.678),
     ] {
-        let process = Process::new(1.0, t_prop_s, t_body_s, tau_s).unwrap();
+        let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).unwrap();
         let pd = table.pd_at_phase_margin(&process).unwrap();
         assert!(close(pd.kp, kp, 0.01), "{} {kp}", pd.kp);
         assert!(close(pd.kd, kd, 0.01), "{} {kd}", pd.kd);
@@ -54,7 +57,7 @@ fn tabled_controllers_match_the_prototype() {
     }
 }
 
-fn excess_of(table: &LeadTable, constraint: Constraint, processes: &[Process]) -> CostExcess {
+fn excess_of(table: &LeadTable, constraint: Constraint, processes: &[Soiptd]) -> CostExcess {
     cost_excess(table, constraint, processes.iter().copied()).expect("no process is outside")
 }
 
@@ -90,14 +93,14 @@ fn multirotors_and_double_integrators_are_closer() {
     let mut processes = Vec::new();
     for _ in 0..1000 {
         let [t_prop_s, t_body_s, tau_s] = Space::MULTIROTOR.random(&mut rng);
-        processes.push(Process::new(1.0, t_prop_s, t_body_s, tau_s).unwrap());
-        processes.push(Process::from_acceleration_gain(1.0, t_prop_s, 0.0, tau_s).unwrap());
+        processes.push(Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).unwrap());
+        processes.push(Soiptd::from_acceleration_gain(1.0, t_prop_s, 0.0, tau_s).unwrap());
     }
     let [prop, body, delay] = Space::MULTIROTOR.ranges_s();
     for t_prop_s in [prop.0, prop.1] {
         for t_body_s in [body.0, body.1] {
             for tau_s in [delay.0, delay.1] {
-                processes.push(Process::new(1.0, t_prop_s, t_body_s, tau_s).unwrap());
+                processes.push(Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).unwrap());
             }
         }
     }
@@ -172,7 +175,7 @@ fn gains_scale_as_the_process_does() {
         let gain = process.k_over_t_body();
         let (lag_s, damping) = (process.t_prop_s(), process.inv_t_body_per_s());
         let alpha = 10_f64.powf(rng.random_range(-4.0..4.0));
-        let slower = Process::from_acceleration_gain(
+        let slower = Soiptd::from_acceleration_gain(
             gain,
             alpha * lag_s,
             damping / alpha,
@@ -192,7 +195,7 @@ fn gains_scale_as_the_process_does() {
         if damping > 0.0 {
             // K/T_body is K over the other lag now.
             let swapped_gain = gain / (damping * lag_s);
-            let swapped = Process::from_acceleration_gain(
+            let swapped = Soiptd::from_acceleration_gain(
                 swapped_gain,
                 1.0 / damping,
                 1.0 / lag_s,
@@ -225,7 +228,7 @@ fn a_file_is_the_table() {
 fn outside_the_table_is_an_error() {
     let numbers = numbers(PHASE_MARGIN_RAD);
     let table = LeadTable::from_floats(&numbers).unwrap();
-    let process = Process::new(1.0, 0.25, 2.0, 6.0).unwrap();
+    let process = Soiptd::new(1.0, 0.25, 2.0, 6.0).unwrap();
     assert_eq!(table.pd(&process), Err(GainsError::DeadTime(24.0)));
     let error = cost_excess(&table, Constraint::Exactly, [process]).unwrap_err();
     assert_eq!(

@@ -6,10 +6,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use onecycle_lab::LimitCycle;
-use onecycle_lab::limit_cycle::sampled::{Motion, motion, symmetric_cycles};
-use onecycle_lab::limit_cycle::{limit_cycles, symmetric, trimmed_spectral_radius};
-use onecycle_onboard::Process;
+use onecycle_lab::space::limit_cycle::LimitCycle;
+use onecycle_lab::space::limit_cycle::sampled::{Motion, motion, symmetric_cycles};
+use onecycle_lab::space::limit_cycle::{limit_cycles, symmetric, trimmed_spectral_radius};
+use onecycle_onboard::Soiptd;
 use onecycle_plant::VariableStepProcess;
 
 const BETA: f64 = -0.73;
@@ -24,13 +24,13 @@ const PROCESSES: [[f64; 3]; 5] = [
     [0.0321, 1.6886, 0.0237],
 ];
 
-fn process([t_prop, t_body, tau]: [f64; 3]) -> Process {
-    Process::new(1.0, t_prop, t_body, tau).unwrap()
+fn process([t_prop, t_body, tau]: [f64; 3]) -> Soiptd {
+    Soiptd::new(1.0, t_prop, t_body, tau).unwrap()
 }
 
 /// Output at a phase of the oscillation by the Fourier series of the square wave, high from phase 0
 /// to pi: terms fall as the fourth power, so that 4,000 leave 1e-12.
-fn fourier(process: &Process, omega: f64, phase: f64) -> f64 {
+fn fourier(process: &Soiptd, omega: f64, phase: f64) -> f64 {
     let term = |n: i32| {
         let n = f64::from(n);
         4.0 / (PI * n)
@@ -45,7 +45,7 @@ fn fourier(process: &Process, omega: f64, phase: f64) -> f64 {
 // lags equal, a plain relay and a lagging one.
 #[test]
 fn fourier_series_meets_the_switching_condition() {
-    let double = |t_prop, tau| Process::from_acceleration_gain(2.0, t_prop, 0.0, tau).unwrap();
+    let double = |t_prop, tau| Soiptd::from_acceleration_gain(2.0, t_prop, 0.0, tau).unwrap();
     let cases = PROCESSES
         .map(|times| (process(times), BETA))
         .into_iter()
@@ -102,7 +102,7 @@ struct Loop {
 
 impl Loop {
     /// Off rest, or the relay has nothing to switch on.
-    fn new(process: &Process, beta: [f64; 2], cycle: &LimitCycle) -> Self {
+    fn new(process: &Soiptd, beta: [f64; 2], cycle: &LimitCycle) -> Self {
         let mut plant = VariableStepProcess::new(process);
         plant.displace(-0.5 * cycle.amplitude, 0.0);
         Self {
@@ -117,7 +117,7 @@ impl Loop {
     }
 
     /// Settled without bias, then led to `bias` in small steps: from rest the bare relay may be lost.
-    fn under(process: &Process, beta: [f64; 2], bias: f64, cycle: &LimitCycle) -> Self {
+    fn under(process: &Soiptd, beta: [f64; 2], bias: f64, cycle: &LimitCycle) -> Self {
         let mut simulation = Self::new(process, beta, cycle);
         simulation.cycles(5);
         for step in 1..=40 {
@@ -335,7 +335,7 @@ fn time_scales_everything() {
     for bias in [0.0, 0.3] {
         for [t_prop, t_body, tau] in PROCESSES {
             let scaled = |alpha: f64| {
-                let process = Process::from_acceleration_gain(
+                let process = Soiptd::from_acceleration_gain(
                     1.0,
                     alpha * t_prop,
                     1.0 / (alpha * t_body),
@@ -429,7 +429,7 @@ fn biased_sampled_relay() {
 #[test]
 fn relays_without_oscillation() {
     // No lead, no damping: nothing turns a double integrator round.
-    let double = Process::from_acceleration_gain(1.0, 0.05, 0.0, 0.02).unwrap();
+    let double = Soiptd::from_acceleration_gain(1.0, 0.05, 0.0, 0.02).unwrap();
     assert_eq!(symmetric(&double, 0.2), None);
     assert_eq!(limit_cycles(&double, [0.2; 2], 0.0), []);
     assert_eq!(limit_cycles(&double, [BETA; 2], 1.0), []);

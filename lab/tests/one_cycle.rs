@@ -3,13 +3,13 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use onecycle_lab::campaign::{Campaign, Case};
-use onecycle_lab::identify::{
+use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
+use onecycle_design::soiptd_pd::optimum::pd;
+use onecycle_identify::{
     Identification, Identified, Method, Options, Remark, Signals, Verdict, identify,
 };
-use onecycle_lab::optimum::pd;
-use onecycle_lab::{Deterioration, deterioration};
-use onecycle_onboard::Process;
+use onecycle_lab::judge::campaign::{Campaign, Case};
+use onecycle_onboard::Soiptd;
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_plant::Trace;
 
@@ -94,7 +94,7 @@ impl Experiment {
         let (process, found) = (&self.case.process, &identified.process);
         // With the lags in order.
         let (sum_per_s, ratio) = process.pole_sum();
-        let truth = Process::from_pole_sum(1.0, sum_per_s, ratio, process.tau_s()).unwrap();
+        let truth = Soiptd::from_pole_sum(1.0, sum_per_s, ratio, process.tau_s()).unwrap();
         let truth = truth
             .with_gain_scaled(process.jerk_gain() * truth.t_prop_s())
             .unwrap();

@@ -3,8 +3,8 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
-use onecycle_lab::onnx::{Normalisation, OnnxError, export, import};
-use onecycle_lab::train::{Layer, Matrix, Network, OneThread, TensorFile};
+use onecycle_lab::learn::onnx::{Normalisation, OnnxError, export, import};
+use onecycle_lab::learn::train::{Layer, Matrix, Network, OneThread, TensorFile};
 use proptest::prelude::*;
 use prost::Message;
 use rand::{RngExt, SeedableRng};

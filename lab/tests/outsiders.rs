@@ -6,17 +6,18 @@
 
 use std::ops::ControlFlow;
 
-use onecycle_lab::dataset::{Example, Recipe, VALUES};
-use onecycle_lab::outsiders::calibrate::calibrate;
-use onecycle_lab::outsiders::harm::Harm;
-use onecycle_lab::outsiders::judge::{Road, judge, scored};
-use onecycle_lab::outsiders::plant::{Plant, Scale};
-use onecycle_lab::outsiders::{Case, Defect, Kind, case};
-use onecycle_lab::train::{
+use onecycle_lab::experiments::Recipe;
+use onecycle_lab::experiments::outsiders::plant::{Plant, Scale};
+use onecycle_lab::experiments::outsiders::{Case, Defect, Kind, case};
+use onecycle_lab::judge::calibrate::calibrate;
+use onecycle_lab::judge::harm::Harm;
+use onecycle_lab::judge::outsiders::{Road, judge, scored};
+use onecycle_lab::learn::dataset::{Example, VALUES};
+use onecycle_lab::learn::train::{
     Batch, Gaussian, Layer, Loss, Matrix, Method, Network, OneThread, Schedule, Settings, Shape,
     Trainer,
 };
-use onecycle_onboard::Process;
+use onecycle_onboard::Soiptd;
 use onecycle_onboard::classify::{Calibration, OUTPUTS, Posterior, Verdict, classify};
 use onecycle_onboard::cycle::Cycle;
 use onecycle_onboard::signature::{LENGTH, Signature};
@@ -28,8 +29,8 @@ use rand_pcg::Pcg64Mcg;
 const SCALE: [f64; VALUES] = [1.0, 8.0, 8.0, 1.0];
 
 /// The paper's hover process; period and amplitude of its oscillation.
-fn hover() -> (Process, Scale) {
-    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
+fn hover() -> (Soiptd, Scale) {
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
     let scale = Scale {
         period_s: 0.42,
         amplitude: 0.00297,
@@ -38,7 +39,7 @@ fn hover() -> (Process, Scale) {
 }
 
 /// Outputs and rates of ten periods under a square wave of 140 samples a period, over the amplitude.
-fn course(process: &Process, defect: &Defect, scale: Scale) -> Vec<[f64; 2]> {
+fn course(process: &Soiptd, defect: &Defect, scale: Scale) -> Vec<[f64; 2]> {
     let mut plant = Plant::new(process, defect, scale, 0.003);
     (0..1400)
         .map(|sample| {
@@ -61,7 +62,7 @@ fn apart(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
 }
 
 /// The exact simulation of a process, as [`course`] has it.
-fn exact(process: &Process) -> Vec<[f64; 2]> {
+fn exact(process: &Soiptd) -> Vec<[f64; 2]> {
     let mut exact = FixedStepProcess::new(process, 0.003);
     (0..1400)
         .map(|sample| {
@@ -84,7 +85,7 @@ fn without_a_defect_the_plant_is_exact() {
 #[test]
 fn a_second_way_is_a_delay() {
     let (process, scale) = hover();
-    let late = Process::new(1.0, 0.0321, 1.6886, 0.0237 + 0.037).unwrap();
+    let late = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237 + 0.037).unwrap();
     let way = |share| {
         let defect = Defect::SecondPath {
             share,

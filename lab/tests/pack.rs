@@ -3,11 +3,11 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
-use onecycle_lab::pack::{
+use onecycle_lab::learn::pack::{
     LeadTableContents, PackContents, PackContentsError, PackedWeights, Precision, layers,
     network_of_tensors, quantisation,
 };
-use onecycle_lab::train::{Layer, Matrix, Network, OneThread, Tensor, TensorFile};
+use onecycle_lab::learn::train::{Layer, Matrix, Network, OneThread, Tensor, TensorFile};
 use onecycle_onboard::network::Activation;
 use onecycle_onboard::pack::{Domain, OUTPUTS, OutputScaling, Pack, PackError, Prior};
 use onecycle_onboard::signature::LENGTH;

@@ -3,12 +3,15 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
-use onecycle_lab::phase::PhaseError;
-use onecycle_lab::{
-    Deterioration, DistinguishingPhase, LocalOptima, Space, TuningRule, deterioration,
-    distinguishing_phase, ise, margins, pd_at_phase_margin,
-};
-use onecycle_onboard::{Pd, Process};
+use onecycle_design::soiptd_pd::cost::ise;
+use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
+use onecycle_design::soiptd_pd::margins::margins;
+use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
+use onecycle_lab::space::Space;
+use onecycle_lab::space::phase::PhaseError;
+use onecycle_lab::space::phase::{DistinguishingPhase, LocalOptima, distinguishing_phase};
+use onecycle_lab::space::rule::TuningRule;
+use onecycle_onboard::{Pd, Soiptd};
 
 /// The paper's distinguishing phase (deg) and `beta`.
 const PAPER_DEG: f64 = -46.89;
@@ -21,8 +24,8 @@ fn processes(phase: &DistinguishingPhase) -> Vec<[f64; 3]> {
     phase.rules.iter().map(|local| local.times_s).collect()
 }
 
-fn process([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> Process {
-    Process::new(1.0, t_prop_s, t_body_s, tau_s).expect("times are positive")
+fn process([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> Soiptd {
+    Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).expect("times are positive")
 }
 
 /// Hardly damped at all, and a space whose margin puts its rules on either side of `beta = 0`.

@@ -4,11 +4,11 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
-use onecycle_lab::dataset::shards::{
+use onecycle_lab::experiments::{Family, Recipe};
+use onecycle_lab::learn::dataset::shards::{
     DatasetError, EXAMPLES_PER_SHARD, Entry, Manifest, Record, file_name,
 };
-use onecycle_lab::dataset::{Family, Recipe};
-use onecycle_lab::grid::{InTurn, Pieces};
+use onecycle_lab::paper::grid::{InTurn, Pieces};
 
 /// Few samples a period, for time's sake.
 fn recipe() -> Recipe {
@@ -188,7 +188,7 @@ fn a_dataset_grows() {
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_has_the_records() {
-    use onecycle_lab::dataset::parquet::Writer;
+    use onecycle_lab::learn::dataset::parquet::Writer;
     use parquet::file::reader::{FileReader, SerializedFileReader};
     use parquet::record::Field;
 

@@ -1,12 +1,14 @@
 //! Numbers printed in the paper and those of an independent prototype of its method.
 
-use onecycle_lab::{Optimum, TuningRule, ise, pd, pd_at_phase_margin};
-use onecycle_onboard::Process;
+use onecycle_design::soiptd_pd::cost::ise;
+use onecycle_design::soiptd_pd::optimum::{Optimum, pd, pd_at_phase_margin};
+use onecycle_lab::space::rule::TuningRule;
+use onecycle_onboard::Soiptd;
 
 const PHASE_MARGIN_RAD: f64 = std::f64::consts::PI / 9.0;
 
 fn optimum(t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Optimum {
-    let process = Process::new(1.0, t_prop_s, t_body_s, tau_s).expect("times are positive");
+    let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).expect("times are positive");
     pd_at_phase_margin(&process, PHASE_MARGIN_RAD).expect("20 deg is a margin")
 }
 
@@ -69,7 +71,7 @@ fn slowest_process_has_the_paper_s_phase() {
 // Elsewhere the floor is where the optimum lies.
 #[test]
 fn free_optimum_lies_above_the_floor_only_where_the_delay_dominates() {
-    let process = Process::new(1.0, 0.015, 0.2, 0.1).unwrap();
+    let process = Soiptd::new(1.0, 0.015, 0.2, 0.1).unwrap();
     let free = pd(&process, PHASE_MARGIN_RAD).unwrap();
     let margin_deg = free.margins.phase_margin_rad.to_degrees();
     assert!(prints_as(margin_deg, 21.2, 0.1), "{margin_deg}");
@@ -84,7 +86,7 @@ fn free_optimum_lies_above_the_floor_only_where_the_delay_dominates() {
         assert!(rise > 0.0 && rise < 1e-7, "{rise}");
     }
 
-    let process = Process::new(1.0, 0.3, 2.0, 0.1).unwrap();
+    let process = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
     let bound = pd(&process, PHASE_MARGIN_RAD).unwrap();
     assert_eq!(Ok(bound), pd_at_phase_margin(&process, PHASE_MARGIN_RAD));
 }

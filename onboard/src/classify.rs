@@ -55,7 +55,7 @@ pub use self::classifier::Classifier;
 use crate::fit_score::MOST_POLE_RATIO;
 pub use crate::pack::OUTPUTS;
 use crate::pack::{Pack, VALUES};
-use crate::process::{Process, ProcessError};
+use crate::process::{Soiptd, SoiptdError};
 use crate::refine::{Shape, shape_of};
 use crate::signature::Signature;
 
@@ -106,7 +106,7 @@ impl fmt::Display for Verdict {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     /// The process, its gain for a relay of amplitude one.
-    pub process: Process,
+    pub process: Soiptd,
     /// Its share.
     pub probability: f64,
 }
@@ -128,7 +128,7 @@ pub enum ClassifyError {
     /// The noise is negative or no number.
     Noise(f64),
     /// The values are no process.
-    Process(ProcessError),
+    Process(SoiptdError),
     /// The pack has another calibration than this score's.
     Pack,
 }
@@ -152,8 +152,8 @@ impl fmt::Display for ClassifyError {
 
 impl core::error::Error for ClassifyError {}
 
-impl From<ProcessError> for ClassifyError {
-    fn from(error: ProcessError) -> Self {
+impl From<SoiptdError> for ClassifyError {
+    fn from(error: SoiptdError) -> Self {
         Self::Process(error)
     }
 }
@@ -264,9 +264,9 @@ pub fn process_of(
     values: &[f64; VALUES],
     signature: &Signature,
     period_s: f64,
-) -> Result<Process, ProcessError> {
+) -> Result<Soiptd, SoiptdError> {
     let [ln_pole_sum, pole_ratio, delay, ln_amplitude] = *values;
-    let unit = Process::from_pole_sum(
+    let unit = Soiptd::from_pole_sum(
         signature.sign,
         exp(ln_pole_sum) / period_s,
         pole_ratio.clamp(0.0, MOST_POLE_RATIO),

@@ -14,13 +14,13 @@
 
 use libm::exp;
 
-use crate::process::Process;
+use crate::process::Soiptd;
 use crate::response::Grid;
 use crate::transition::Transition;
 use crate::window::Edge;
 
 /// Poles of actuator and body (1/s): of `sum (1 +- sqrt(1 - 4 ratio)) / 2`, the terms to the third.
-fn smooth_poles(process: &Process) -> (f64, f64) {
+fn smooth_poles(process: &Soiptd) -> (f64, f64) {
     let (sum, ratio) = process.pole_sum();
     let body = ratio + ratio * ratio + 2.0 * ratio * ratio * ratio;
     (sum * (1.0 - body), sum * body)
@@ -45,7 +45,7 @@ struct Squares {
 
 impl Squares {
     /// `None` for an input of a single level.
-    fn new(process: &Process, grid: &Grid, edges: &[Edge]) -> Option<Self> {
+    fn new(process: &Soiptd, grid: &Grid, edges: &[Edge]) -> Option<Self> {
         let first = edges.first()?;
         let (low, high) = edges
             .iter()
@@ -153,7 +153,7 @@ impl Body {
 
 impl Course {
     /// At the beginning of the past.
-    pub(crate) fn new(process: &Process, grid: &Grid, edges: &[Edge]) -> Self {
+    pub(crate) fn new(process: &Soiptd, grid: &Grid, edges: &[Edge]) -> Self {
         let (_, damping_per_s) = smooth_poles(process);
         let instants = f64::from(grid.per_bin);
         Self {
@@ -229,7 +229,7 @@ mod tests {
 
     const STEP_S: f64 = 1e-5;
 
-    fn follow(process: &Process, edges: &[Edge], means: &mut [f64]) {
+    fn follow(process: &Soiptd, edges: &[Edge], means: &mut [f64]) {
         let mut course = Course::new(process, &grid(), edges);
         let (mut calls, mut before) = (1, 0);
         while !course.follow(edges, means) {
@@ -264,7 +264,7 @@ mod tests {
     // window taken from the force by superposition. The bins' averages are off by a thousandth.
     #[test]
     fn agrees_with_small_steps() {
-        let process = Process::from_acceleration_gain(1.0, 0.05, 0.5, 0.02).unwrap();
+        let process = Soiptd::from_acceleration_gain(1.0, 0.05, 0.5, 0.02).unwrap();
         let edges = edges();
         let mut found = [0.0; 100];
         follow(&process, &edges, &mut found);
@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn a_single_level_has_none() {
-        let process = Process::from_acceleration_gain(1.0, 0.05, 0.5, 0.02).unwrap();
+        let process = Soiptd::from_acceleration_gain(1.0, 0.05, 0.5, 0.02).unwrap();
         let mut found = [1.0; 10];
         follow(&process, &edges()[..1], &mut found);
         assert_eq!(found, [0.0; 10]);
@@ -311,14 +311,14 @@ mod tests {
     // Equal lags: 1 - (1/4 + 1/16 + 1/32) of the sum; far apart: the lags' own poles.
     #[test]
     fn poles_are_those_of_the_lags_far_apart() {
-        let process = Process::from_acceleration_gain(1.0, 0.05, 0.5, 0.0).unwrap();
+        let process = Soiptd::from_acceleration_gain(1.0, 0.05, 0.5, 0.0).unwrap();
         let (fast, slow) = smooth_poles(&process);
         // The next term of the series is 5 ratio^4 = 1.6e-6 of the sum.
         assert!(
             (fast - 20.0).abs() < 4e-5 && (slow - 0.5).abs() < 4e-5,
             "{fast} {slow}"
         );
-        let equal = Process::from_acceleration_gain(1.0, 0.1, 10.0, 0.0).unwrap();
+        let equal = Soiptd::from_acceleration_gain(1.0, 0.1, 10.0, 0.0).unwrap();
         assert!((smooth_poles(&equal).0 - 20.0 * 0.65625).abs() < 1e-12);
     }
 }

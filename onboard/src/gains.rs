@@ -38,7 +38,7 @@ use libm::{atan, atan2, cos, sin};
 pub use self::nodes::{FIELDS, HEADER, LARGEST_DELAY_IN_LAGS, LeadTableError, Nodes};
 use self::nodes::{cubic, is_acute};
 use crate::control::Pd;
-use crate::process::Process;
+use crate::process::Soiptd;
 
 /// Newton's method takes two to eleven steps, five on average.
 const MAX_NEWTON_STEPS: usize = 30;
@@ -100,7 +100,7 @@ impl Numbers<'_> {
 ///
 /// ```
 /// use onecycle_onboard::gains::{GainsError, LeadTable, Nodes};
-/// use onecycle_onboard::Process;
+/// use onecycle_onboard::Soiptd;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// // A lead of 65 deg for every shape: what a single optimum says about all the others.
@@ -109,11 +109,11 @@ impl Numbers<'_> {
 /// numbers[..4].copy_from_slice(&nodes.header());
 /// let table = LeadTable::from_floats(&numbers)?;
 ///
-/// let process = Process::new(1.0, 0.3, 2.0, 0.1)?;
+/// let process = Soiptd::new(1.0, 0.3, 2.0, 0.1)?;
 /// let pd = table.pd_at_phase_margin(&process)?;
 /// assert!((pd.kp - 8.5).abs() < 0.5 && (pd.kd - 7.0).abs() < 0.5);
 ///
-/// let delayed = Process::new(1.0, 0.001, 2.0, 0.1)?;
+/// let delayed = Soiptd::new(1.0, 0.001, 2.0, 0.1)?;
 /// assert_eq!(table.pd_at_phase_margin(&delayed), Err(GainsError::DeadTime(100.0)));
 /// # Ok(())
 /// # }
@@ -175,7 +175,7 @@ impl<'a> LeadTable<'a> {
     /// # Errors
     /// [`GainsError::DeadTime`] outside the table; [`GainsError::Overflow`] for processes near the
     /// limits of `f64`.
-    pub fn pd(&self, process: &Process) -> Result<Pd, GainsError> {
+    pub fn pd(&self, process: &Soiptd) -> Result<Pd, GainsError> {
         let [lead_rad, free_margin_rad, free_lead_rad] = self.angles(process)?;
         let floor_rad = self.phase_margin_rad();
         if free_margin_rad > floor_rad {
@@ -189,7 +189,7 @@ impl<'a> LeadTable<'a> {
     ///
     /// # Errors
     /// Those of [`LeadTable::pd`].
-    pub fn pd_at_phase_margin(&self, process: &Process) -> Result<Pd, GainsError> {
+    pub fn pd_at_phase_margin(&self, process: &Soiptd) -> Result<Pd, GainsError> {
         let [lead_rad, ..] = self.angles(process)?;
         gains(process, self.phase_margin_rad(), lead_rad)
     }
@@ -199,7 +199,7 @@ impl<'a> LeadTable<'a> {
     }
 
     /// The angles at a process: a cubic through four nodes along either axis.
-    fn angles(&self, process: &Process) -> Result<[f64; FIELDS], GainsError> {
+    fn angles(&self, process: &Soiptd) -> Result<[f64; FIELDS], GainsError> {
         let [delay, lag] = self.nodes.position(process)?;
         if !(delay.is_finite() && lag.is_finite()) {
             return Err(GainsError::Overflow);
@@ -222,7 +222,7 @@ impl<'a> LeadTable<'a> {
 }
 
 /// The PD with this margin and this lead at its crossover.
-fn gains(process: &Process, phase_margin_rad: f64, lead_rad: f64) -> Result<Pd, GainsError> {
+fn gains(process: &Soiptd, phase_margin_rad: f64, lead_rad: f64) -> Result<Pd, GainsError> {
     let omega = crossover(process, lead_rad - phase_margin_rad).ok_or(GainsError::Overflow)?;
     let over_magnitude = 1.0 / process.magnitude(omega);
     let proportional = cos(lead_rad) * over_magnitude;
@@ -244,7 +244,7 @@ fn gains(process: &Process, phase_margin_rad: f64, lead_rad: f64) -> Result<Pd, 
 ///
 /// `f` rises and is concave, so Newton's method climbs to the root from any point below it. Any
 /// tangent of `f` gets there too early: that at zero does, and so does that without damping.
-fn crossover(process: &Process, lag_rad: f64) -> Option<f64> {
+fn crossover(process: &Soiptd, lag_rad: f64) -> Option<f64> {
     let (lag_s, tau_s) = (process.t_prop_s(), process.tau_s());
     let damping = process.inv_t_body_per_s();
     let reach_s = lag_s + tau_s;
@@ -298,22 +298,22 @@ mod tests {
     #[test]
     fn crossovers_by_hand() {
         for lag_rad in [0.01, 0.3, 1.0, 1.5] {
-            let process = Process::from_acceleration_gain(1.0, 0.2, 0.0, 0.0).unwrap();
+            let process = Soiptd::from_acceleration_gain(1.0, 0.2, 0.0, 0.0).unwrap();
             let omega = crossover(&process, lag_rad).unwrap();
             assert!(close(omega, tan(lag_rad) / 0.2, 1e-12), "{lag_rad} {omega}");
 
-            let process = Process::from_acceleration_gain(1.0, 0.2, 5.0, 0.0).unwrap();
+            let process = Soiptd::from_acceleration_gain(1.0, 0.2, 5.0, 0.0).unwrap();
             for lag_rad in [lag_rad, -lag_rad] {
                 let omega = crossover(&process, lag_rad).unwrap();
                 let expected = tan(0.5 * (lag_rad + FRAC_PI_2)) / 0.2;
                 assert!(close(omega, expected, 1e-12), "{lag_rad} {omega}");
             }
         }
-        let process = Process::from_acceleration_gain(1.0, 1e-15, 2.0, 0.5).unwrap();
+        let process = Soiptd::from_acceleration_gain(1.0, 1e-15, 2.0, 0.5).unwrap();
         let omega = crossover(&process, 1.0 - 0.25 * PI).unwrap();
         assert!(close(omega, 2.0, 1e-12), "{omega}");
         // A double integrator never lags by less than pi.
-        let process = Process::from_acceleration_gain(1.0, 0.2, 0.0, 0.1).unwrap();
+        let process = Soiptd::from_acceleration_gain(1.0, 0.2, 0.0, 0.1).unwrap();
         assert_eq!(crossover(&process, -0.1), None);
     }
 
@@ -324,7 +324,7 @@ mod tests {
         let lead_rad = 0.25 + 0.25 * PI;
         let numbers = table_of([lead_rad as f32, 0.125, 1.25]);
         let table = LeadTable::from_floats(&numbers).unwrap();
-        let process = Process::from_acceleration_gain(-3.0, 0.2, 0.0, 0.0).unwrap();
+        let process = Soiptd::from_acceleration_gain(-3.0, 0.2, 0.0, 0.0).unwrap();
         let pd = table.pd_at_phase_margin(&process).unwrap();
         let over_magnitude = -25.0 * sqrt(2.0) / 3.0;
         assert!(close(pd.kp, over_magnitude * cos(lead_rad), 1e-6));
@@ -350,7 +350,7 @@ mod tests {
             *bytes = number.to_le_bytes();
         }
         let bytes = bytes.as_flattened();
-        let process = Process::new(1.0, 0.3, 2.0, 0.1).unwrap();
+        let process = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
         let gains = |table: LeadTable| (table.pd(&process), table.pd_at_phase_margin(&process));
         assert_eq!(
             gains(LeadTable::from_bytes(bytes).unwrap()),
@@ -403,7 +403,7 @@ mod tests {
         let numbers = table_of([1.0, 0.5, 1.25]);
         let table = LeadTable::from_floats(&numbers).unwrap();
         let gains = |gain, t_prop_s, t_body_s, tau_s| {
-            table.pd(&Process::new(gain, t_prop_s, t_body_s, tau_s).unwrap())
+            table.pd(&Soiptd::new(gain, t_prop_s, t_body_s, tau_s).unwrap())
         };
         assert!(gains(1.0, 0.1, 1.0, 2.0).is_ok());
         assert!(gains(1.0, 1.0, 0.1, 2.0).is_ok());

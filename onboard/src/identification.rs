@@ -27,7 +27,7 @@ use crate::judgement::{
     COORDINATES, Deviations, HALF_90_PERCENT, MOST_MISFIT, MOST_RESPONSE_ERROR, Spread, misfit,
 };
 use crate::pack::Pack;
-use crate::process::Process;
+use crate::process::Soiptd;
 use crate::refine::{Beforehand, DomainEdge, Refined, Refiner, ShapePrior};
 use crate::signature::Signature;
 use crate::window::{Edge, Window};
@@ -96,7 +96,7 @@ impl fmt::Display for Refusal {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Identified {
     /// The most probable process.
-    pub process: Process,
+    pub process: Soiptd,
     /// How well it is known.
     pub deviations: Deviations,
     /// Its controller: the best with at least the margin of the pack.

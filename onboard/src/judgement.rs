@@ -15,7 +15,7 @@ use core::f64::consts::PI;
 use libm::{atan2, exp, hypot, log, sqrt};
 
 use crate::control::Pd;
-use crate::process::Process;
+use crate::process::Soiptd;
 use crate::refine::{Refined, coordinate};
 use crate::window::Window;
 
@@ -80,7 +80,7 @@ pub(crate) struct Spread {
 
 impl Spread {
     /// About a process and its controller; `None` where their loop has no gain crossover.
-    pub(crate) fn new(process: &Process, pd: &Pd) -> Option<Self> {
+    pub(crate) fn new(process: &Soiptd, pd: &Pd) -> Option<Self> {
         let start = pd.kd * process.k_over_t_body();
         let crossover_rad_per_s = gain_crossover(process, pd, start)?;
         Some(Self {
@@ -96,7 +96,7 @@ impl Spread {
     }
 
     /// The slopes along one coordinate; `None` where there is no process beside this one.
-    pub(crate) fn follow(&mut self, index: usize, process: &Process, pd: &Pd) -> Option<()> {
+    pub(crate) fn follow(&mut self, index: usize, process: &Soiptd, pd: &Pd) -> Option<()> {
         // A thousandth: the square of it, the error, is far below any deviation that matters.
         const STEP: f64 = 1e-3;
         let (sum, ratio) = process.pole_sum();
@@ -108,7 +108,7 @@ impl Spread {
         };
         moved[index] += step;
         let [ln_sum, ratio, tau_s, ln_gain] = moved;
-        let unit = Process::from_pole_sum(1.0, exp(ln_sum), ratio, tau_s).ok()?;
+        let unit = Soiptd::from_pole_sum(1.0, exp(ln_sum), ratio, tau_s).ok()?;
         let gain = process.jerk_gain() * exp(ln_gain) * unit.t_prop_s();
         let beside = unit.with_gain_scaled(gain).ok()?;
         let crossover = gain_crossover(&beside, pd, self.crossover_rad_per_s)?;
@@ -143,7 +143,7 @@ impl Spread {
     }
 }
 
-fn followed(process: &Process, pd: &Pd, crossover_rad_per_s: f64) -> [f64; FOLLOWED] {
+fn followed(process: &Soiptd, pd: &Pd, crossover_rad_per_s: f64) -> [f64; FOLLOWED] {
     let lead_rad = atan2(pd.kd.abs() * crossover_rad_per_s, pd.kp.abs());
     [
         log(process.k_over_t_body().abs()),
@@ -156,7 +156,7 @@ fn followed(process: &Process, pd: &Pd, crossover_rad_per_s: f64) -> [f64; FOLLO
 
 /// Frequency (rad/s) where `|(kp + j kd w) G(jw)|`, which falls, is one. Newton's method on
 /// logarithms, halving the bracket where it leaves it.
-fn gain_crossover(process: &Process, pd: &Pd, start_rad_per_s: f64) -> Option<f64> {
+fn gain_crossover(process: &Soiptd, pd: &Pd, start_rad_per_s: f64) -> Option<f64> {
     const MOST_STEPS: u32 = 40;
     let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
     let mut x = log(start_rad_per_s.abs());
@@ -209,7 +209,7 @@ mod tests {
             kd: sqrt(2.0) / lag_s / 3.0,
         };
         for (tau_s, expected) in [(0.0, 45.0_f64), (PI / 8.0 * lag_s, 22.5)] {
-            let process = Process::from_acceleration_gain(3.0, lag_s, 0.0, tau_s).unwrap();
+            let process = Soiptd::from_acceleration_gain(3.0, lag_s, 0.0, tau_s).unwrap();
             let margin = Spread::new(&process, &pd).unwrap().phase_margin_rad();
             assert!((margin.to_degrees() - expected).abs() < 1e-6, "{margin}");
         }
@@ -226,7 +226,7 @@ mod tests {
             kp: 0.0,
             kd: sqrt(2.0) / lag_s / 3.0,
         };
-        let process = Process::from_acceleration_gain(3.0, lag_s, 0.0, 0.01).unwrap();
+        let process = Soiptd::from_acceleration_gain(3.0, lag_s, 0.0, 0.01).unwrap();
         let mut spread = Spread::new(&process, &pd).unwrap();
         for index in 0..COORDINATES {
             spread.follow(index, &process, &pd).unwrap();

@@ -30,6 +30,6 @@ pub mod tuner;
 pub mod window;
 
 pub use control::Pd;
-pub use process::{Process, ProcessError};
+pub use process::{Soiptd, SoiptdError};
 pub use relay::{Relay, RelayError, RelayPhase, RelaySettings};
 pub use transition::Transition;

@@ -16,7 +16,7 @@
 use libm::{ceil, exp};
 
 use crate::control::PdLaw;
-use crate::process::Process;
+use crate::process::Soiptd;
 use crate::transition::{State, Transition};
 use crate::window::Edge;
 
@@ -63,7 +63,7 @@ pub(crate) struct Prediction {
 impl Prediction {
     /// Of a process under a law whose output stays between two limits, called every `sample_s`.
     pub(crate) fn new(
-        process: &Process,
+        process: &Soiptd,
         law: PdLaw,
         [lowest, highest]: [f32; 2],
         sample_s: f64,
@@ -135,7 +135,7 @@ fn input_at(edges: &[Edge], time_s: f64) -> f64 {
 }
 
 /// The actuator's force at the beginning: the edges that have arrived, through its lag.
-fn force(beginning: &Beginning<'_>, process: &Process) -> f64 {
+fn force(beginning: &Beginning<'_>, process: &Soiptd) -> f64 {
     let now_s = beginning.time_s - process.tau_s();
     let edges = beginning.edges;
     let mut force = edges.first().map_or(0.0, |edge| edge.input);
@@ -164,7 +164,7 @@ mod tests {
     /// before it; the dead time is `ticks` long, the relay switches every 0.2 s under a bias of 0.02.
     fn largest(ticks: usize, pd: Pd) -> f64 {
         let tau_s = ticks as f64 * SAMPLE_S;
-        let process = Process::from_acceleration_gain(4.0, 0.05, 0.5, tau_s).unwrap();
+        let process = Soiptd::from_acceleration_gain(4.0, 0.05, 0.5, tau_s).unwrap();
         let transition = Transition::over(&process, SAMPLE_S);
         let (mut state, mut line) = (State::default(), vec![0.0; ticks]);
         let mut edges = vec![];

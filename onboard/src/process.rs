@@ -24,7 +24,7 @@ use libm::{asin, atan, exp, hypot, log, sqrt};
 
 /// A process with valid parameters. See the [module](self) for the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Process {
+pub struct Soiptd {
     k_over_t_body: f64,
     t_prop_s: f64,
     inv_t_body_per_s: f64,
@@ -33,7 +33,7 @@ pub struct Process {
 
 /// Why a set of parameters is not a process: the offending parameter and its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum ProcessError {
+pub enum SoiptdError {
     /// The gain is zero or not finite.
     Gain(f64),
     /// `T_prop` is not a positive, finite time.
@@ -44,7 +44,7 @@ pub enum ProcessError {
     Tau(f64),
 }
 
-impl fmt::Display for ProcessError {
+impl fmt::Display for SoiptdError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Gain(v) => write!(f, "the gain must be finite and not zero, but is {v}"),
@@ -55,20 +55,20 @@ impl fmt::Display for ProcessError {
     }
 }
 
-impl core::error::Error for ProcessError {}
+impl core::error::Error for SoiptdError {}
 
-impl Process {
+impl Soiptd {
     /// From the paper's parameters: velocity gain `k`, times in seconds.
     ///
     /// # Errors
     /// Names the first parameter that is outside its physical range. For a process without
-    /// damping use [`Process::from_acceleration_gain`].
-    pub fn new(k: f64, t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Result<Self, ProcessError> {
+    /// damping use [`Soiptd::from_acceleration_gain`].
+    pub fn new(k: f64, t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Result<Self, SoiptdError> {
         if !(t_body_s.is_finite() && t_body_s > 0.0) {
-            return Err(ProcessError::TBody(t_body_s));
+            return Err(SoiptdError::TBody(t_body_s));
         }
         if !k.is_finite() {
-            return Err(ProcessError::Gain(k));
+            return Err(SoiptdError::Gain(k));
         }
         Self::from_acceleration_gain(k / t_body_s, t_prop_s, 1.0 / t_body_s, tau_s)
     }
@@ -82,18 +82,18 @@ impl Process {
         t_prop_s: f64,
         inv_t_body_per_s: f64,
         tau_s: f64,
-    ) -> Result<Self, ProcessError> {
+    ) -> Result<Self, SoiptdError> {
         if !(k_over_t_body.is_finite() && k_over_t_body != 0.0) {
-            return Err(ProcessError::Gain(k_over_t_body));
+            return Err(SoiptdError::Gain(k_over_t_body));
         }
         if !(t_prop_s.is_finite() && t_prop_s > 0.0) {
-            return Err(ProcessError::TProp(t_prop_s));
+            return Err(SoiptdError::TProp(t_prop_s));
         }
         if !(inv_t_body_per_s.is_finite() && inv_t_body_per_s >= 0.0) {
-            return Err(ProcessError::TBody(1.0 / inv_t_body_per_s));
+            return Err(SoiptdError::TBody(1.0 / inv_t_body_per_s));
         }
         if !(tau_s.is_finite() && tau_s >= 0.0) {
-            return Err(ProcessError::Tau(tau_s));
+            return Err(SoiptdError::Tau(tau_s));
         }
         Ok(Self {
             k_over_t_body,
@@ -151,8 +151,8 @@ impl Process {
     /// The same process with its acceleration gain multiplied by `factor`.
     ///
     /// # Errors
-    /// [`ProcessError::Gain`] when the product is zero or not finite.
-    pub fn with_gain_scaled(&self, factor: f64) -> Result<Self, ProcessError> {
+    /// [`SoiptdError::Gain`] when the product is zero or not finite.
+    pub fn with_gain_scaled(&self, factor: f64) -> Result<Self, SoiptdError> {
         Self::from_acceleration_gain(
             self.k_over_t_body * factor,
             self.t_prop_s,
@@ -224,7 +224,7 @@ impl Process {
     /// The two poles besides the integrator as `(sum, product / sum^2)`: (1/s, between 0 and 1/4).
     ///
     /// `G` depends on the two lags through these alone, so they stay regular where the lags are
-    /// equal (1/4) and where damping vanishes (0). See [`Process::from_pole_sum`].
+    /// equal (1/4) and where damping vanishes (0). See [`Soiptd::from_pole_sum`].
     #[must_use]
     pub fn pole_sum(&self) -> (f64, f64) {
         let prop = 1.0 / self.t_prop_s;
@@ -232,7 +232,7 @@ impl Process {
         (sum, prop * self.inv_t_body_per_s / (sum * sum))
     }
 
-    /// From the coordinates of [`Process::pole_sum`]; the faster pole becomes the actuator's lag.
+    /// From the coordinates of [`Soiptd::pole_sum`]; the faster pole becomes the actuator's lag.
     ///
     /// # Errors
     /// Names the parameter that is outside its physical range.
@@ -241,7 +241,7 @@ impl Process {
         pole_sum_per_s: f64,
         pole_ratio: f64,
         tau_s: f64,
-    ) -> Result<Self, ProcessError> {
+    ) -> Result<Self, SoiptdError> {
         let spread = sqrt((1.0 - 4.0 * pole_ratio).max(0.0));
         let fast = 0.5 * pole_sum_per_s * (1.0 + spread);
         // The slow pole by Vieta's product: the difference would cancel as it vanishes.
@@ -268,7 +268,7 @@ mod tests {
             (0.015, 0.2, 0.0005, 0.0833, 0.00074),
             (0.0321, 1.6886, 0.0237, 0.3919, 0.00261),
         ] {
-            let process = Process::new(1.0, t_prop, t_body, tau).unwrap();
+            let process = Soiptd::new(1.0, t_prop, t_body, tau).unwrap();
             let (omega, a0) = process.describing_function_oscillation(1.0, -0.73).unwrap();
             assert!(
                 (2.0 * PI / omega - period).abs() < 6e-5,
@@ -281,7 +281,7 @@ mod tests {
 
     #[test]
     fn double_integrator_has_no_oscillation_without_lead() {
-        let process = Process::from_acceleration_gain(1.0, 0.05, 0.0, 0.03).unwrap();
+        let process = Soiptd::from_acceleration_gain(1.0, 0.05, 0.0, 0.03).unwrap();
         assert!(process.describing_function_oscillation(1.0, 0.0).is_none());
         assert!(
             process
@@ -300,9 +300,9 @@ mod tests {
             (0.1, 10.0),
             (0.015, 0.5),
         ] {
-            let process = Process::from_acceleration_gain(3.0, t_prop, inv_t_body, 0.02).unwrap();
+            let process = Soiptd::from_acceleration_gain(3.0, t_prop, inv_t_body, 0.02).unwrap();
             let (sum, ratio) = process.pole_sum();
-            let back = Process::from_pole_sum(3.0, sum, ratio, 0.02).unwrap();
+            let back = Soiptd::from_pole_sum(3.0, sum, ratio, 0.02).unwrap();
             // At equal poles the root loses half the digits, and only there.
             assert!(close(back.t_prop_s(), t_prop, 1e-7));
             assert!((back.inv_t_body_per_s() - inv_t_body).abs() <= 1e-7 * inv_t_body);
@@ -311,25 +311,22 @@ mod tests {
 
     #[test]
     fn errors_name_the_parameter() {
+        assert_eq!(Soiptd::new(0.0, 0.1, 1.0, 0.0), Err(SoiptdError::Gain(0.0)));
         assert_eq!(
-            Process::new(0.0, 0.1, 1.0, 0.0),
-            Err(ProcessError::Gain(0.0))
+            Soiptd::new(1.0, -0.1, 1.0, 0.0),
+            Err(SoiptdError::TProp(-0.1))
         );
         assert_eq!(
-            Process::new(1.0, -0.1, 1.0, 0.0),
-            Err(ProcessError::TProp(-0.1))
+            Soiptd::new(1.0, 0.1, 0.0, 0.0),
+            Err(SoiptdError::TBody(0.0))
         );
         assert_eq!(
-            Process::new(1.0, 0.1, 0.0, 0.0),
-            Err(ProcessError::TBody(0.0))
-        );
-        assert_eq!(
-            Process::new(1.0, 0.1, 1.0, -1.0),
-            Err(ProcessError::Tau(-1.0))
+            Soiptd::new(1.0, 0.1, 1.0, -1.0),
+            Err(SoiptdError::Tau(-1.0))
         );
         assert!(matches!(
-            Process::new(f64::NAN, 0.1, 1.0, 0.0),
-            Err(ProcessError::Gain(_))
+            Soiptd::new(f64::NAN, 0.1, 1.0, 0.0),
+            Err(SoiptdError::Gain(_))
         ));
     }
 }

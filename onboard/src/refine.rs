@@ -71,7 +71,7 @@ pub use self::domain::{DomainEdge, Shape};
 pub use self::prior::ShapePrior;
 use self::problem::KNOWN;
 pub use self::refiner::Refiner;
-use crate::process::Process;
+use crate::process::Soiptd;
 use crate::window::Window;
 
 /// Number of linear unknowns: y0, v0, w0, the distortion, the bias times the gain, the gain.
@@ -98,7 +98,7 @@ pub mod coordinate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refined {
     /// The process of least squares.
-    pub process: Process,
+    pub process: Soiptd,
     /// Constant input that the recording does not show (input unit).
     pub input_bias: f64,
     /// Covariance over the coordinates of [`coordinate`], from the noise and from the error of the
@@ -179,7 +179,7 @@ pub fn refine_with<const BINS: usize, const EDGES: usize>(
 pub fn residuals<const BINS: usize, const EDGES: usize>(
     window: &Window<BINS, EDGES>,
     period_s: f64,
-    process: &Process,
+    process: &Soiptd,
     residuals: &mut [f64; BINS],
 ) -> Result<usize, RefineError> {
     let mut refiner = Refiner::new();

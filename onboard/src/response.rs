@@ -5,7 +5,7 @@
 //! input inside a bin adds the step response that starts there. A response is followed some bins at
 //! a time, so that none takes longer than a controller's tick has to spare.
 
-use crate::process::Process;
+use crate::process::Soiptd;
 use crate::transition::{State, Transition};
 use crate::window::{Edge, MOST_PER_BIN};
 
@@ -201,7 +201,7 @@ impl Response {
     };
 
     /// Becomes that of another process or grid: in place, for it is two kilobytes.
-    pub(crate) fn set(&mut self, process: &Process, grid: &Grid) {
+    pub(crate) fn set(&mut self, process: &Soiptd, grid: &Grid) {
         self.body_per_s = process.inv_t_body_per_s();
         self.prop_per_s = 1.0 / process.t_prop_s();
         self.tau_s = process.tau_s();

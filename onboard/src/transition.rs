@@ -13,7 +13,7 @@
 
 use libm::{exp, frexp, ldexp};
 
-use crate::process::Process;
+use crate::process::Soiptd;
 
 /// State of the process with unit acceleration gain, or its response to one of its inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,7 +76,7 @@ impl Transition {
 
     /// Over `duration_s >= 0` of the process (its gain and delay play no part).
     #[must_use]
-    pub fn over(process: &Process, duration_s: f64) -> Self {
+    pub fn over(process: &Soiptd, duration_s: f64) -> Self {
         Self::of_poles(
             process.inv_t_body_per_s(),
             1.0 / process.t_prop_s(),

@@ -9,7 +9,7 @@ use common::{FitWindow, Simulation, every, last_cycles, run};
 use onecycle_onboard::refine::{
     Beforehand, DomainEdge, RefineError, Refined, Shape, ShapePrior, refine, refine_with,
 };
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 
 fn relay() -> Relay {
     let beta = RelaySettings::DISTINGUISHING_BETA;
@@ -17,13 +17,13 @@ fn relay() -> Relay {
 }
 
 /// Period to expect (s), by the describing function.
-fn scale_s(process: &Process) -> f64 {
+fn scale_s(process: &Soiptd) -> f64 {
     let (omega, _) = process.describing_function_oscillation(1.0, -0.73).unwrap();
     std::f64::consts::TAU / omega
 }
 
 /// Sixteen periods of about 400 samples, of which the last `cycles` are fitted.
-fn refined(process: &Process, bias: f64, cycles: usize) -> Refined {
+fn refined(process: &Soiptd, bias: f64, cycles: usize) -> Refined {
     let sample_s = scale_s(process) / 400.0;
     let run = run(process, &mut relay(), bias, every(sample_s, 16 * 400));
     let (window, period_s) = last_cycles(&run, sample_s, cycles, |_| true);
@@ -32,7 +32,7 @@ fn refined(process: &Process, bias: f64, cycles: usize) -> Refined {
 
 /// Errors of what the response depends on, relative or in periods of the oscillation: gain over
 /// lag, sum of the poles, their ratio, delay.
-fn errors(found: &Process, process: &Process) -> [f64; 4] {
+fn errors(found: &Soiptd, process: &Soiptd) -> [f64; 4] {
     let relative = |a: f64, b: f64| (a / b - 1.0).abs();
     let ((sum, ratio), (found_sum, found_ratio)) = (process.pole_sum(), found.pole_sum());
     [
@@ -47,7 +47,7 @@ fn errors(found: &Process, process: &Process) -> [f64; 4] {
 }
 
 #[track_caller]
-fn assert_recovered(found: &Refined, process: &Process, bias: f64, tolerance: f64) {
+fn assert_recovered(found: &Refined, process: &Soiptd, bias: f64, tolerance: f64) {
     let errors = errors(&found.process, process);
     let bias_error = (found.input_bias - bias).abs();
     assert!(
@@ -58,16 +58,16 @@ fn assert_recovered(found: &Refined, process: &Process, bias: f64, tolerance: f6
     assert_eq!(found.edge, None);
 }
 
-fn new(t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Process {
-    Process::new(1.0, t_prop_s, t_body_s, tau_s).unwrap()
+fn new(t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Soiptd {
+    Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).unwrap()
 }
 
-fn undamped(t_prop_s: f64, tau_s: f64) -> Process {
-    Process::from_acceleration_gain(2.0, t_prop_s, 0.0, tau_s).unwrap()
+fn undamped(t_prop_s: f64, tau_s: f64) -> Soiptd {
+    Soiptd::from_acceleration_gain(2.0, t_prop_s, 0.0, tau_s).unwrap()
 }
 
 /// The corners of the multirotor domain, and beyond it.
-fn processes() -> [Process; 13] {
+fn processes() -> [Soiptd; 13] {
     [
         new(0.0321, 1.6886, 0.0237),
         new(0.3, 2.0, 0.1),
@@ -86,7 +86,7 @@ fn processes() -> [Process; 13] {
         new(0.3, 0.2, 0.05),
         // A lag of a 200th of the period.
         new(0.002, 1.0, 0.1),
-        Process::from_acceleration_gain(-7.0, 0.05, 1.0, 0.03).unwrap(),
+        Soiptd::from_acceleration_gain(-7.0, 0.05, 1.0, 0.03).unwrap(),
     ]
 }
 
@@ -279,7 +279,7 @@ fn a_prior_counts_for_what_it_is_worth() {
 /// Two periods of a wave of one second, high for a third, through the process in open loop: it need not
 /// be one that a relay would make oscillate at that period. (Of a wave high for a half, a delay by half a
 /// period would be a change of sign.)
-fn open_loop(process: &Process) -> Refined {
+fn open_loop(process: &Soiptd) -> Refined {
     let sample_s = 1.0 / 256.0;
     let mut simulation = Simulation::new(process);
     let mut window = FitWindow::new(4.0, sample_s);

@@ -6,7 +6,7 @@
 mod common;
 
 use common::{every, run};
-use onecycle_onboard::{Process, Relay, RelayError, RelaySettings};
+use onecycle_onboard::{Relay, RelayError, RelaySettings, Soiptd};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
@@ -15,7 +15,7 @@ use proptest::test_runner::{Config, RngSeed};
 // cycle either way, 2 h dt / period = 0.005 h.
 #[test]
 fn trim_converges_to_minus_the_bias() {
-    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
     for bias in [-0.5, -0.2, 0.0, 0.35, 0.5] {
         let settings = RelaySettings {
             trim_gain: RelaySettings::TRIM_GAIN,
@@ -36,7 +36,7 @@ fn trim_converges_to_minus_the_bias() {
 // of the bias.
 #[test]
 fn the_trim_leaves_the_asymmetry_asked_for() {
-    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
     for bias in [-0.5_f64, -0.3, 0.3, 0.5] {
         let settings = RelaySettings {
             trim_gain: RelaySettings::TRIM_GAIN,
@@ -71,7 +71,7 @@ fn the_trim_leaves_the_asymmetry_asked_for() {
 // Without a trim the duty carries the bias: mean(u) = h (2 duty - 1) = -bias over whole cycles.
 #[test]
 fn duty_carries_the_bias_without_a_trim() {
-    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
     let mut relay = Relay::new(RelaySettings::bare(1.0, -0.73)).unwrap();
     let bias = 0.2;
     let run = run(&process, &mut relay, bias, every(1e-3, 30_000));

@@ -14,20 +14,20 @@ use onecycle_onboard::refine::{
 };
 use onecycle_onboard::signature::Signature;
 use onecycle_onboard::window::Window;
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 
 /// As on a board.
 const BINS: usize = 69;
 type Coarse = Window<BINS, 16>;
 type Fine = Window<133, 0>;
 
-fn process() -> Process {
-    Process::from_acceleration_gain(4.0, 0.05, 2.0, 0.02).unwrap()
+fn process() -> Soiptd {
+    Soiptd::from_acceleration_gain(4.0, 0.05, 2.0, 0.02).unwrap()
 }
 
 /// The last cycle of a relay test at 1 kHz, two periods of input before it; `noise` on the outputs in parts
 /// of the largest, by a fixed pattern.
-fn last_cycle(process: &Process, noise: f64) -> (Coarse, Fine, Cycle) {
+fn last_cycle(process: &Soiptd, noise: f64) -> (Coarse, Fine, Cycle) {
     let settings = RelaySettings::new(1.0, RelaySettings::DISTINGUISHING_BETA);
     let run = run(
         process,
@@ -95,7 +95,7 @@ fn a_refinement_takes_no_more_slices_than_it_says() {
 fn a_refiner_can_be_begun_anew_at_any_time() {
     let pack = Pack::embedded().unwrap();
     let (window, _, cycle) = last_cycle(&process(), 0.01);
-    let other = Process::from_acceleration_gain(-1.0, 0.2, 0.5, 0.1).unwrap();
+    let other = Soiptd::from_acceleration_gain(-1.0, 0.2, 0.5, 0.1).unwrap();
     let (other_window, _, other_cycle) = last_cycle(&other, 0.05);
     let starts = [[2.5, 0.1, 0.05], [4.0, 0.01, 0.1]];
     let beforehand = Beforehand {

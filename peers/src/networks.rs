@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use onecycle_lab::onnx::{self, Normalisation};
-use onecycle_lab::pack::PackContents;
-use onecycle_lab::train::{Layer, Matrix, Network};
+use onecycle_lab::learn::onnx;
+use onecycle_lab::learn::onnx::Normalisation;
+use onecycle_lab::learn::pack::PackContents;
+use onecycle_lab::learn::train::{Layer, Matrix, Network};
 use onecycle_onboard::pack::Pack;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};

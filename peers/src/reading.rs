@@ -1,7 +1,7 @@
 //! What it takes merely to read the weights: their sum. No forward pass of one sample can be
 //! faster, as it reads each weight once too.
 
-use onecycle_lab::train::Network;
+use onecycle_lab::learn::train::Network;
 use pulp::{Arch, Simd, WithSimd};
 
 use crate::rounds::Contender;

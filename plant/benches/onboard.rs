@@ -5,7 +5,7 @@ use divan::{Bencher, black_box};
 use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::refine::refine;
 use onecycle_onboard::window::Window;
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, Sensor, Trace};
 use rand_pcg::Pcg64;
 
@@ -28,7 +28,7 @@ fn relay() -> Relay {
 
 /// Ten seconds of the paper's hover process under the relay.
 fn experiment() -> Trace {
-    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).expect("the times are positive");
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).expect("the times are positive");
     let experiment = Experiment {
         sensor: Sensor {
             noise_sigma: NOISE_SIGMA,

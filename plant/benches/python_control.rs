@@ -10,7 +10,7 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 
-use onecycle_onboard::{Pd, Process, Relay, RelaySettings};
+use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, SampledPd};
 use rand_pcg::Pcg64;
 
@@ -106,7 +106,7 @@ fn number(line: &str, key: &str) -> Result<f64, Box<dyn Error>> {
 
 /// The hover process and the loops of the script.
 fn onecycle() -> Result<Measured, Box<dyn Error>> {
-    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237)?;
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?;
     let experiment = Experiment::new(process, SAMPLE_S, STEPS as f64 * SAMPLE_S);
     let mut relay = Relay::new(RelaySettings::bare(1.0, RelaySettings::DISTINGUISHING_BETA))?;
     let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);

@@ -2,7 +2,7 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, FixedStepProcess, Sensor, VariableStepProcess};
 use rand_pcg::Pcg64;
 
@@ -16,8 +16,8 @@ fn main() {
 }
 
 /// The paper's hover process.
-fn hover() -> Process {
-    Process::new(1.0, 0.0321, 1.6886, 0.0237).expect("the times are positive")
+fn hover() -> Soiptd {
+    Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).expect("the times are positive")
 }
 
 fn relay() -> Relay {

@@ -11,7 +11,7 @@ use std::time::Instant;
 
 use onecycle_onboard::control::Measurement;
 use onecycle_onboard::tuner::{Phase, Tuner, TunerSettings};
-use onecycle_onboard::{Process, RelaySettings};
+use onecycle_onboard::{RelaySettings, Soiptd};
 use onecycle_plant::FixedStepProcess;
 
 const SAMPLE_S: f64 = 1e-3;
@@ -33,7 +33,7 @@ fn flight(slices: u16) -> Vec<Tick> {
         slices,
         ..new
     };
-    let process = Process::from_acceleration_gain(4.0, 0.0321, 1.0 / 1.6886, 0.024)
+    let process = Soiptd::from_acceleration_gain(4.0, 0.0321, 1.0 / 1.6886, 0.024)
         .expect("the times are positive");
     let mut axis = FixedStepProcess::new(&process, SAMPLE_S);
     let mut tuner = Tuner::new(&settings).expect("the settings are in range");

@@ -1,7 +1,7 @@
 //! Any controller around any process: one experiment, sample by sample.
 
 use onecycle_onboard::relay::Relay;
-use onecycle_onboard::{Pd, Process};
+use onecycle_onboard::{Pd, Soiptd};
 use rand::{Rng, RngExt};
 
 use crate::{FixedStepProcess, Sensor, Trace, VariableStepProcess};
@@ -51,7 +51,7 @@ impl Controller for SampledPd {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Experiment {
     /// The process.
-    pub process: Process,
+    pub process: Soiptd,
     /// Sample period (s).
     pub sample_s: f64,
     /// Duration (s).
@@ -72,7 +72,7 @@ pub struct Experiment {
 impl Experiment {
     /// A perfect sensor, no bias, no jitter, from rest at the reference zero.
     #[must_use]
-    pub fn new(process: Process, sample_s: f64, duration_s: f64) -> Self {
+    pub fn new(process: Soiptd, sample_s: f64, duration_s: f64) -> Self {
         Self {
             process,
             sample_s,

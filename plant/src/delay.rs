@@ -5,13 +5,13 @@
 
 use std::collections::VecDeque;
 
-use onecycle_onboard::Process;
+use onecycle_onboard::Soiptd;
 use onecycle_onboard::transition::{State, Transition};
 
 /// A process at rest, advanced with a held input by any duration.
 #[derive(Clone, Debug)]
 pub struct VariableStepProcess {
-    process: Process,
+    process: Soiptd,
     time_s: f64,
     state: State,
     arrived: f64,
@@ -22,7 +22,7 @@ pub struct VariableStepProcess {
 impl VariableStepProcess {
     /// The process at rest at time zero.
     #[must_use]
-    pub fn new(process: &Process) -> Self {
+    pub fn new(process: &Soiptd) -> Self {
         Self {
             process: *process,
             time_s: 0.0,

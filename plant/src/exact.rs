@@ -4,7 +4,7 @@
 //! ago for `fraction * step` and the one from `n` steps ago for the rest: one transition and two
 //! input columns, computed once.
 
-use onecycle_onboard::Process;
+use onecycle_onboard::Soiptd;
 use onecycle_onboard::transition::{State, Transition};
 
 /// A process at rest, stepped with a held input. See the [module](self).
@@ -25,7 +25,7 @@ pub struct FixedStepProcess {
 impl FixedStepProcess {
     /// The process at rest, to be stepped by `step_s > 0`.
     #[must_use]
-    pub fn new(process: &Process, step_s: f64) -> Self {
+    pub fn new(process: &Soiptd, step_s: f64) -> Self {
         let steps = process.tau_s() / step_s;
         let whole = steps.floor();
         let early = Transition::over(process, (steps - whole) * step_s);

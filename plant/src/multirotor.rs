@@ -3,7 +3,7 @@
 //! A [`Vehicle`] is what does not change: airframe, rotors, battery, legs, sensors. A [`Flight`] is a
 //! vehicle somewhere, in a wind, under a held [`Command`]; it is integrated in steps of at most 1 ms
 //! and read through sensors that are late and noisy. [`Vehicle::linearised`] is the exact
-//! [`Process`](onecycle_onboard::Process) of an axis at hover, the truth an identification is held
+//! [`Soiptd`](onecycle_onboard::Process) of an axis at hover, the truth an identification is held
 //! against.
 //!
 //! ```

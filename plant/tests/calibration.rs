@@ -6,14 +6,14 @@
 use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::refine::{Refined, coordinate, refine};
 use onecycle_onboard::window::Window;
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, Sensor, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 type FitWindow = Window<260, 64>;
 
-fn noisy_relay(process: &Process, sigma: f64, bias: f64, rng: &mut Pcg64) -> (Trace, f64) {
+fn noisy_relay(process: &Soiptd, sigma: f64, bias: f64, rng: &mut Pcg64) -> (Trace, f64) {
     let (omega, amplitude) = process.describing_function_oscillation(1.0, -0.73).unwrap();
     let period_s = std::f64::consts::TAU / omega;
     let noise_sigma = sigma * amplitude;
@@ -79,10 +79,10 @@ fn window(trace: &Trace, cycles: usize) -> (FitWindow, f64) {
 }
 
 /// Errors in the coordinates of the covariance, and that covariance.
-fn errors(found: &Refined, process: &Process, bias: f64) -> ([f64; 5], [[f64; 5]; 5]) {
+fn errors(found: &Refined, process: &Soiptd, bias: f64) -> ([f64; 5], [[f64; 5]; 5]) {
     use coordinate::{INPUT_BIAS, LN_JERK_GAIN, LN_POLE_SUM, POLE_RATIO, TAU_S};
     let ((sum, ratio), (found_sum, found_ratio)) = (process.pole_sum(), found.process.pole_sum());
-    let gain = |process: &Process| process.k_over_t_body() / process.t_prop_s();
+    let gain = |process: &Soiptd| process.k_over_t_body() / process.t_prop_s();
     let mut errors = [0.0; 5];
     errors[LN_POLE_SUM] = (found_sum / sum).ln();
     errors[POLE_RATIO] = found_ratio - ratio;
@@ -134,7 +134,7 @@ fn calibration(sigma: f64, cycles: usize, cases: usize) -> Calibration {
     for _ in 0..cases {
         let t_prop_s: f64 = rng.random_range(0.015..0.3);
         let t_body_s = rng.random_range((1.5 * t_prop_s).max(0.2)..2.0);
-        let process = Process::new(1.0, t_prop_s, t_body_s, rng.random_range(0.0005..0.1)).unwrap();
+        let process = Soiptd::new(1.0, t_prop_s, t_body_s, rng.random_range(0.0005..0.1)).unwrap();
         let bias = rng.random_range(-0.5..0.5);
         let (trace, noise_sigma) = noisy_relay(&process, sigma, bias, &mut rng);
         let (window, period_s) = window(&trace, cycles);

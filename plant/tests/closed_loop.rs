@@ -3,7 +3,7 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
-use onecycle_onboard::{Pd, Process, Relay, RelaySettings};
+use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, SampledPd, Sensor, Trace};
 use rand_pcg::Pcg64;
 
@@ -15,7 +15,7 @@ fn rng(seed: u128) -> Pcg64 {
 // loop's slowest pole is near 2.4/s: after 20 s e^-48, nothing but rounding is left.
 #[test]
 fn a_bias_leaves_the_predicted_error() {
-    let process = Process::new(1.5, 0.03, 1.2, 0.02).unwrap();
+    let process = Soiptd::new(1.5, 0.03, 1.2, 0.02).unwrap();
     let experiment = Experiment {
         reference: 0.7,
         input_bias: -0.25,
@@ -38,7 +38,7 @@ const POLE: f64 = 10.0;
 /// No damping, b = 1, lag T: `s^2 (T s + 1) + kd s + kp = T (s + p)^3` for `T = 1/(3 p)`,
 /// `kd = 3 p^2 T = p`, `kp = p^3 T = p^2 / 3`.
 fn sampled_at_400_ms(sample_s: f64) -> f64 {
-    let process = Process::from_acceleration_gain(1.0, 1.0 / (3.0 * POLE), 0.0, 0.0).unwrap();
+    let process = Soiptd::from_acceleration_gain(1.0, 1.0 / (3.0 * POLE), 0.0, 0.0).unwrap();
     let pd = Pd {
         kp: POLE * POLE / 3.0,
         kd: POLE,
@@ -76,7 +76,7 @@ fn sampled_pd_converges_to_the_continuous_loop() {
 }
 
 fn noisy_relay(seed: u128, jitter: f64) -> Trace {
-    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
     let settings = RelaySettings {
         noise_sigma: 3e-5,
         ..RelaySettings::new(1.0, -0.73)
@@ -141,7 +141,7 @@ fn time_always_advances() {
 // the same trajectory up to times and switches a part in 1e12 off.
 #[test]
 fn both_propagations_run_the_same_loop() {
-    let process = Process::new(1.5, 0.03, 1.2, 0.0213).unwrap();
+    let process = Soiptd::new(1.5, 0.03, 1.2, 0.0213).unwrap();
     let run = |jitter| {
         let experiment = Experiment {
             reference: 1.0,

@@ -4,12 +4,12 @@
 #![allow(clippy::unwrap_used)]
 
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::Experiment;
 use rand_pcg::Pcg64;
 
 /// The last cycles of a run of the bare relay at 1 ms.
-fn steady_cycles(process: &Process, amplitude: f32, periods_s: f64) -> Vec<Cycle> {
+fn steady_cycles(process: &Soiptd, amplitude: f32, periods_s: f64) -> Vec<Cycle> {
     let settings = RelaySettings::bare(amplitude, RelaySettings::DISTINGUISHING_BETA);
     let mut relay = Relay::new(settings).unwrap();
     let mut detector = CycleDetector::new();
@@ -46,7 +46,7 @@ const TABLE: [Row; 5] = [
 #[test]
 fn limit_cycles_match_the_prototype() {
     for ((t_prop, t_body, tau), period, (amplitude, digit)) in TABLE {
-        let process = Process::new(1.0, t_prop, t_body, tau).unwrap();
+        let process = Soiptd::new(1.0, t_prop, t_body, tau).unwrap();
         let cycles = steady_cycles(&process, 1.0, period);
         let mean_period = mean(cycles.iter().map(|cycle| cycle.period_s));
         let mean_amplitude = mean(cycles.iter().map(|cycle| cycle.amplitude));
@@ -68,7 +68,7 @@ fn limit_cycles_match_the_prototype() {
 // same oscillation of the same output, to the bit, as all factors are powers of two.
 #[test]
 fn amplitude_and_gain_trade_exactly() {
-    let process = Process::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
     let half = process.with_gain_scaled(0.5).unwrap();
     assert_eq!(
         steady_cycles(&process, 1.0, 0.42),
@@ -83,7 +83,7 @@ fn amplitude_and_gain_trade_exactly() {
 fn describing_function_is_a_scale() {
     let excess = [0.046, 0.060, -0.003, 0.104, 0.072];
     for (((t_prop, t_body, tau), ..), excess) in TABLE.into_iter().zip(excess) {
-        let process = Process::new(1.0, t_prop, t_body, tau).unwrap();
+        let process = Soiptd::new(1.0, t_prop, t_body, tau).unwrap();
         let (omega, _) = process.describing_function_oscillation(1.0, -0.73).unwrap();
         let predicted_s = std::f64::consts::TAU / omega;
         let cycles = steady_cycles(&process, 1.0, predicted_s);

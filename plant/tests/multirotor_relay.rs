@@ -3,7 +3,7 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
-use onecycle_onboard::{Pd, Process, Relay, RelaySettings};
+use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
 use onecycle_plant::multirotor::{Axis, Command, Flight, Hover, Parts, Vec3, Vehicle};
 use onecycle_plant::{Controller, Experiment, SampledPd, Sensed, Trace};
 use rand_pcg::Pcg64;
@@ -62,7 +62,7 @@ fn flown(vehicle: Vehicle, hover: &Hover, axis: Axis, amplitude: f64) -> Trace {
     trace
 }
 
-fn simulated(process: Process, amplitude: f64) -> Trace {
+fn simulated(process: Soiptd, amplitude: f64) -> Trace {
     let experiment = Experiment::new(process, TICK_S, SAMPLES as f64 * TICK_S);
     experiment.run(&mut relay(amplitude), &mut Pcg64::new(1, 1))
 }

@@ -14,7 +14,7 @@
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
 
-use onecycle_onboard::Process;
+use onecycle_onboard::Soiptd;
 use onecycle_plant::{FixedStepProcess, VariableStepProcess};
 
 /// Of the largest output: a thousand roundings of a run of a few hundred steps.
@@ -72,14 +72,14 @@ fn superposed(steps: &[(f64, f64)], tau_s: f64, by_hand: &ByHand, t: f64) -> (f6
 const DELAYS: [f64; 6] = [0.0, 0.4, 1.0, 3.0, 3.7, 57.3];
 
 /// Processes without their delay, and their step responses.
-fn processes(tau_s: f64) -> [(Process, ByHand); 4] {
-    let new = |k, lag, body| Process::new(k, lag, body, tau_s).unwrap();
+fn processes(tau_s: f64) -> [(Soiptd, ByHand); 4] {
+    let new = |k, lag, body| Soiptd::new(k, lag, body, tau_s).unwrap();
     [
         (new(2.0, 0.0321, 1.6886), distinct_lags(2.0, 0.0321, 1.6886)),
         (new(-0.7, 0.3, 0.2), distinct_lags(-0.7, 0.3, 0.2)),
         (new(1.3, 0.15, 0.15), equal_lags(1.3, 0.15)),
         (
-            Process::from_acceleration_gain(3.0, 0.05, 0.0, tau_s).unwrap(),
+            Soiptd::from_acceleration_gain(3.0, 0.05, 0.0, tau_s).unwrap(),
             no_damping(3.0, 0.05),
         ),
     ]
@@ -163,7 +163,7 @@ fn variable_steps_match_the_method_of_steps() {
     }
 }
 
-fn after_200_steps(process: &Process) -> f64 {
+fn after_200_steps(process: &Soiptd) -> f64 {
     let mut simulated = FixedStepProcess::new(process, 0.01);
     for sample in 0..200 {
         simulated.step(if sample < 70 { 1.0 } else { -0.5 });
@@ -178,7 +178,7 @@ fn nothing_happens_where_the_lags_meet() {
     let tau_s = 0.0137;
     let at = |e: f64| {
         let (lag, body) = (0.2 * (1.0 - 0.5 * e), 0.2 * (1.0 + 0.5 * e));
-        after_200_steps(&Process::new(1.0, lag, body, tau_s).unwrap())
+        after_200_steps(&Soiptd::new(1.0, lag, body, tau_s).unwrap())
     };
     let steps = [(0.0, 1.0), (0.7, -0.5)];
     let (equal, _) = superposed(&steps, tau_s, &equal_lags(1.0, 0.2), 2.0);
@@ -198,8 +198,7 @@ fn nothing_happens_where_the_lags_meet() {
 #[test]
 fn damping_fades_away_without_a_jump() {
     let (lag, tau_s) = (0.05, 0.0137);
-    let at =
-        |a: f64| after_200_steps(&Process::from_acceleration_gain(1.0, lag, a, tau_s).unwrap());
+    let at = |a: f64| after_200_steps(&Soiptd::from_acceleration_gain(1.0, lag, a, tau_s).unwrap());
     let series = move |a: f64| -> ByHand {
         Box::new(move |t: f64| {
             let g = 1.0 - (-t / lag).exp();
@@ -230,7 +229,7 @@ fn damping_fades_away_without_a_jump() {
 // A displacement of the output stays (integrator); a rate v0 adds v0 B (1 - e^(-t/B)).
 #[test]
 fn a_displacement_follows_the_free_response() {
-    let process = Process::new(2.0, 0.03, 0.8, 0.02).unwrap();
+    let process = Soiptd::new(2.0, 0.03, 0.8, 0.02).unwrap();
     let mut fixed = FixedStepProcess::new(&process, 0.01);
     let mut variable = VariableStepProcess::new(&process);
     fixed.displace(0.3, -1.5);
@@ -246,7 +245,7 @@ fn a_displacement_follows_the_free_response() {
 }
 
 mod random {
-    use super::{FixedStepProcess, Process, VariableStepProcess, assert_matches};
+    use super::{FixedStepProcess, Soiptd, VariableStepProcess, assert_matches};
     use proptest::prelude::*;
     use proptest::test_runner::{Config, RngSeed};
 
@@ -276,7 +275,7 @@ mod random {
         ) {
             let tau_s = delay * sample_s;
             let process =
-                Process::from_acceleration_gain(gain, t_prop_s, damping, tau_s).unwrap();
+                Soiptd::from_acceleration_gain(gain, t_prop_s, damping, tau_s).unwrap();
             let mut fixed = FixedStepProcess::new(&process, sample_s);
             let mut variable = VariableStepProcess::new(&process);
             let (mut actual, mut expected) = (Vec::new(), Vec::new());

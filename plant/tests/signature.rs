@@ -6,7 +6,7 @@
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::signature::{LENGTH, Signature};
 use onecycle_onboard::window::Window;
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Controller, Experiment, Sensed, Trace};
 use rand_pcg::Pcg64;
 
@@ -15,9 +15,9 @@ const HOVER_S: [f64; 3] = [0.0321, 1.6886, 0.0237];
 const PERIOD_S: f64 = 0.42;
 const SAMPLE_S: f64 = 1e-3;
 
-fn process(k: f64, scale: f64) -> Process {
+fn process(k: f64, scale: f64) -> Soiptd {
     let [t_prop_s, t_body_s, tau_s] = HOVER_S.map(|time_s| scale * time_s);
-    Process::new(k, t_prop_s, t_body_s, tau_s).unwrap()
+    Soiptd::new(k, t_prop_s, t_body_s, tau_s).unwrap()
 }
 
 /// Thirty periods with a bias of the input, so that the halves of a cycle differ.

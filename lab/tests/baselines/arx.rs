@@ -1,8 +1,11 @@
 //! PX4's ARX(2,2).
 
-use onecycle_lab::baselines::RivalError;
-use onecycle_lab::baselines::arx::{Estimator, Model, Settings, identify, identify_with_rate};
-use onecycle_lab::identify::Signals;
+use onecycle_identify::Signals;
+use onecycle_lab::experiments::signals_of;
+use onecycle_lab::judge::baselines::RivalError;
+use onecycle_lab::judge::baselines::arx::{
+    Estimator, Model, Settings, identify, identify_with_rate,
+};
 use onecycle_plant::FixedStepProcess;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -106,7 +109,7 @@ fn what_is_no_lag_becomes_the_nearest() {
 fn the_filters_decide() {
     for truth in processes() {
         let trace = relay_test(truth, 0.0, 30.0);
-        let signals = Signals::of_trace(&trace, SAMPLE_S);
+        let signals = signals_of(&trace, SAMPLE_S);
         let scaled = Settings::scaled_to_oscillation(&signals).unwrap();
         let by_differences = cost(identify(&signals, &scaled, margin()), &truth);
         let mut simulated = FixedStepProcess::new(&truth, SAMPLE_S);
@@ -132,7 +135,7 @@ fn the_filters_decide() {
     }
     let slow = processes()[0];
     let trace = relay_test(slow, 0.0, 30.0);
-    let signals = Signals::of_trace(&trace, SAMPLE_S);
+    let signals = signals_of(&trace, SAMPLE_S);
     assert_eq!(
         cost(identify(&signals, &Settings::PX4, margin()), &slow),
         None
@@ -142,7 +145,7 @@ fn the_filters_decide() {
 #[test]
 fn errors_say_what_is_wrong() {
     let trace = relay_test(process(1.0, 0.02, 0.3, 0.01), 0.0, 10.0);
-    let signals = Signals::of_trace(&trace, SAMPLE_S);
+    let signals = signals_of(&trace, SAMPLE_S);
     let settings = Settings {
         low_pass_hz: 500.0,
         ..Settings::PX4

@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-use onecycle_lab::baselines::RivalError;
-use onecycle_lab::baselines::asymmetric::{AsymmetricRelay, HalfPeriods, identify};
-use onecycle_lab::identify::Signals;
-use onecycle_lab::pd_at_phase_margin;
+use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
+use onecycle_lab::experiments::signals_of;
+use onecycle_lab::judge::baselines::RivalError;
+use onecycle_lab::judge::baselines::asymmetric::{AsymmetricRelay, HalfPeriods, identify};
 use onecycle_plant::{Controller, Sensed, Trace};
 
 use super::{SAMPLE_S, cost, margin, process, processes, run};
@@ -73,7 +73,7 @@ fn simulated_first_order(relay: &mut AsymmetricRelay) -> Trace {
 fn a_recording_is_measured_right() {
     let mut relay = AsymmetricRelay::new(LEVELS.0, LEVELS.1, 0.01).unwrap();
     let trace = simulated_first_order(&mut relay);
-    let signals = Signals::of_trace(&trace, 1e-3);
+    let signals = signals_of(&trace, 1e-3);
     let measured = HalfPeriods::measure(&signals, 0.01, 4).unwrap();
     let exact = first_order(1.0, 0.01);
     assert!((measured.above - LEVELS.0).abs() < 1e-12 && (measured.below + LEVELS.1).abs() < 1e-12);
@@ -122,7 +122,7 @@ fn an_integrator_from_a_recording_whatever_the_bias() {
     for bias in [0.0, 0.3, -0.4] {
         let mut relay = AsymmetricRelay::new(LEVELS.0, LEVELS.1, 0.03).unwrap();
         let trace = run(truth, bias, 20.0, &mut relay);
-        let signals = Signals::of_trace(&trace, SAMPLE_S);
+        let signals = signals_of(&trace, SAMPLE_S);
         let found = identify(&signals, 0.03, 4, margin())
             .unwrap()
             .process
@@ -154,7 +154,7 @@ fn lags_taken_for_a_dead_time_cost() {
     for process in processes() {
         let mut relay = AsymmetricRelay::new(LEVELS.0, LEVELS.1, 0.0).unwrap();
         let trace = run(process, 0.0, 120.0, &mut relay);
-        let found = identify(&Signals::of_trace(&trace, SAMPLE_S), 0.0, 8, margin());
+        let found = identify(&signals_of(&trace, SAMPLE_S), 0.0, 8, margin());
         let cost = cost(found, &process);
         assert!(
             cost.is_some_and(|cost| (0.1..2.0).contains(&cost)),

@@ -1,11 +1,13 @@
 //! PX4's gains.
 
-use onecycle_lab::baselines::RivalError;
-use onecycle_lab::baselines::arx::{Model, Settings};
-use onecycle_lab::baselines::gmvc::Design;
-use onecycle_lab::identify::Signals;
-use onecycle_lab::{Cascade, pd};
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_design::cascade::Cascade;
+use onecycle_design::soiptd_pd::optimum::pd;
+use onecycle_identify::Signals;
+use onecycle_lab::experiments::signals_of;
+use onecycle_lab::judge::baselines::RivalError;
+use onecycle_lab::judge::baselines::arx::{Model, Settings};
+use onecycle_lab::judge::baselines::gmvc::Design;
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 
 use super::{SAMPLE_S, margin, process, processes, relay_test, run};
 
@@ -90,7 +92,7 @@ fn scaled(signals: &Signals<'_>) -> Cascade {
 #[test]
 fn units_do_not_matter() {
     let trace = relay_test(process(1.0, 0.15, 1.0, 0.05), 0.1, 20.0);
-    let signals = Signals::of_trace(&trace, SAMPLE_S);
+    let signals = signals_of(&trace, SAMPLE_S);
     let found = scaled(&signals);
     let times = |values: &[f64], factor: f64| values.iter().map(|v| v * factor).collect::<Vec<_>>();
     let (output, input) = (times(&trace.output, 10.0), times(&trace.input, 0.25));
@@ -113,7 +115,7 @@ fn units_do_not_matter() {
 // best PD, at 21 degrees and more.
 #[test]
 fn it_flies_its_own_vehicle_and_others() {
-    let below = |cascade: Cascade, truth: &Process, margin_deg: f64| {
+    let below = |cascade: Cascade, truth: &Soiptd, margin_deg: f64| {
         let cost = cascade.cost(truth).unwrap();
         assert!(
             cost.phase_margin_rad.to_degrees() > margin_deg,
@@ -121,10 +123,10 @@ fn it_flies_its_own_vehicle_and_others() {
         );
         1.0 - cost.ise / pd(truth, margin()).unwrap().ise
     };
-    let vehicle = Process::from_acceleration_gain(500.0, 0.052, 0.2, 0.012).unwrap();
+    let vehicle = Soiptd::from_acceleration_gain(500.0, 0.052, 0.2, 0.012).unwrap();
     let mut relay = Relay::new(RelaySettings::bare(0.05, -0.73)).unwrap();
     let trace = run(vehicle, 0.0, 12.0, &mut relay);
-    let signals = Signals::of_trace(&trace, SAMPLE_S);
+    let signals = signals_of(&trace, SAMPLE_S);
     let model = Model::of_differences(&signals, &Settings::PX4).unwrap();
     let saved = below(Design::PX4.cascade(&model).unwrap(), &vehicle, 48.5);
     assert!((saved - 0.189).abs() < 0.005, "{saved}");
@@ -139,7 +141,7 @@ fn it_flies_its_own_vehicle_and_others() {
     }
     for truth in processes() {
         let trace = relay_test(truth, 0.0, 20.0);
-        let found = scaled(&Signals::of_trace(&trace, SAMPLE_S));
+        let found = scaled(&signals_of(&trace, SAMPLE_S));
         let saved = below(found, &truth, 21.0);
         assert!((0.09..0.15).contains(&saved), "{truth:?} {saved}");
     }

@@ -9,9 +9,10 @@ mod gmvc;
 mod pem;
 mod rules;
 
-use onecycle_lab::baselines::{Rival, RivalError};
-use onecycle_lab::{deterioration, pd_at_phase_margin};
-use onecycle_onboard::{Process, Relay, RelaySettings};
+use onecycle_design::soiptd_pd::deterioration::deterioration;
+use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
+use onecycle_lab::judge::baselines::{Rival, RivalError};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Controller, Experiment, Trace};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -23,12 +24,12 @@ fn margin() -> f64 {
     20_f64.to_radians()
 }
 
-fn process(k: f64, t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Process {
-    Process::new(k, t_prop_s, t_body_s, tau_s).unwrap()
+fn process(k: f64, t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Soiptd {
+    Soiptd::new(k, t_prop_s, t_body_s, tau_s).unwrap()
 }
 
 /// Processes in the corners and the middle of the paper's domain.
-fn processes() -> [Process; 4] {
+fn processes() -> [Soiptd; 4] {
     [
         process(1.0, 0.3, 2.0, 0.1),
         process(1.0, 0.15, 1.0, 0.05),
@@ -38,14 +39,14 @@ fn processes() -> [Process; 4] {
 }
 
 /// An experiment at 1 kHz from rest, without noise.
-fn run(process: Process, bias: f64, duration_s: f64, controller: &mut impl Controller) -> Trace {
+fn run(process: Soiptd, bias: f64, duration_s: f64, controller: &mut impl Controller) -> Trace {
     let mut experiment = Experiment::new(process, SAMPLE_S, duration_s);
     experiment.input_bias = bias;
     experiment.run(controller, &mut Pcg64Mcg::seed_from_u64(1))
 }
 
 /// The paper's relay, without protection, on a process without noise, for so many of its periods.
-fn relay_test(process: Process, bias: f64, periods: f64) -> Trace {
+fn relay_test(process: Soiptd, bias: f64, periods: f64) -> Trace {
     let (omega, _) = process.describing_function_oscillation(1.0, -0.73).unwrap();
     let mut relay = Relay::new(RelaySettings::bare(1.0, -0.73)).unwrap();
     run(
@@ -57,14 +58,14 @@ fn relay_test(process: Process, bias: f64, periods: f64) -> Trace {
 }
 
 /// Cost of what a rival found above the optimum; `None` where unstable.
-fn cost(found: Result<Rival, RivalError>, truth: &Process) -> Option<f64> {
+fn cost(found: Result<Rival, RivalError>, truth: &Soiptd) -> Option<f64> {
     let best = pd_at_phase_margin(truth, margin()).unwrap();
     deterioration(found.unwrap().pd, truth, &best).relative()
 }
 
 /// The experiment of a campaign's case under another controller.
 fn run_noisy(
-    case: &onecycle_lab::campaign::Case,
+    case: &onecycle_lab::judge::campaign::Case,
     duration_s: f64,
     controller: &mut impl Controller,
 ) -> Trace {

@@ -1,11 +1,12 @@
 //! The prediction error method.
 
-use onecycle_lab::baselines::RivalError;
-use onecycle_lab::baselines::pem::{
+use onecycle_identify::{Signals, find_oscillation};
+use onecycle_lab::experiments::signals_of;
+use onecycle_lab::judge::baselines::RivalError;
+use onecycle_lab::judge::baselines::pem::{
     Data, InitialState, InputBias, Settings, SweptRelay, fit, identify,
 };
-use onecycle_lab::campaign::{Campaign, Measure};
-use onecycle_lab::identify::{Signals, find_oscillation};
+use onecycle_lab::judge::campaign::{Campaign, Measure};
 use onecycle_onboard::{RelayError, RelaySettings};
 
 use super::{SAMPLE_S, cost, margin, process, relay_test, run};
@@ -39,7 +40,7 @@ fn the_truth_is_found_without_noise() {
         (InitialState::Estimated, InputBias::Estimated, 0.3),
     ] {
         let trace = relay_test(truth, bias, 30.0);
-        let signals = Signals::of_trace(&trace, SAMPLE_S);
+        let signals = signals_of(&trace, SAMPLE_S);
         let window = match initial_state {
             InitialState::Rest => 0..trace.len(),
             InitialState::Estimated => {
@@ -79,7 +80,7 @@ fn the_truth_is_found_without_noise() {
 fn the_guess_decides() {
     let truth = process(1.0, 0.02, 0.3, 0.001);
     let trace = relay_test(truth, 0.0, 30.0);
-    let signals = Signals::of_trace(&trace, SAMPLE_S);
+    let signals = signals_of(&trace, SAMPLE_S);
     let costs = GUESSES_S.map(|guess_s| {
         let settings = Settings {
             input_bias: InputBias::Ignored,
@@ -111,7 +112,7 @@ fn a_bias_spoils_it_unless_it_is_estimated() {
                 input_bias,
                 ..from(GUESSES_S[0], data)
             };
-            let signals = Signals::of_trace(trace, SAMPLE_S);
+            let signals = signals_of(trace, SAMPLE_S);
             cost(identify(&signals, &settings, margin()), &truth)
         })
     };
@@ -191,7 +192,7 @@ fn the_sweep_survives_noise_and_bias() {
 #[test]
 fn errors_say_what_is_wrong() {
     let trace = relay_test(process(1.0, 0.02, 0.3, 0.01), 0.0, 10.0);
-    let signals = Signals::of_trace(&trace, SAMPLE_S);
+    let signals = signals_of(&trace, SAMPLE_S);
     let settings = Settings::paper(Data::Whole);
     let short = fit(&signals, 0..7, &settings);
     assert_eq!(short, Err(RivalError::TooShort { samples: 7 }));

@@ -1,9 +1,11 @@
 //! The tuning rules.
 
-use onecycle_lab::baselines::RivalError;
-use onecycle_lab::baselines::rules::{Rule, calibrated, identify};
-use onecycle_lab::identify::Signals;
-use onecycle_lab::{Space, pd_at_phase_margin};
+use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
+use onecycle_identify::Signals;
+use onecycle_lab::experiments::signals_of;
+use onecycle_lab::judge::baselines::RivalError;
+use onecycle_lab::judge::baselines::rules::{Rule, calibrated, identify};
+use onecycle_lab::space::Space;
 use onecycle_plant::{Controller, Experiment, Sensed};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -48,7 +50,7 @@ fn the_rule_is_the_optimum_at_the_optimum_s_crossover() {
         let rule = Rule::FirstHarmonic {
             phase_margin_rad: margin(),
         };
-        let found = identify(&Signals::of_trace(&trace, sample_s), &rule, 1).unwrap();
+        let found = identify(&signals_of(&trace, sample_s), &rule, 1).unwrap();
         assert!(
             (found.pd.kp / best.pd.kp - 1.0).abs() < 1e-7,
             "{found:?} {best:?}"
@@ -74,7 +76,7 @@ fn a_rule_for_one_process_gives_back_its_optimum() {
         };
         let rule = Rule::Amplitude(calibrated(&space, 1, 1).unwrap());
         let trace = relay_test(process, 0.0, 30.0);
-        let found = identify(&Signals::of_trace(&trace, SAMPLE_S), &rule, 1).unwrap();
+        let found = identify(&signals_of(&trace, SAMPLE_S), &rule, 1).unwrap();
         let best = pd_at_phase_margin(&process, margin()).unwrap().pd;
         assert!(
             (found.pd.kp / best.kp - 1.0).abs() < 0.02,
@@ -98,7 +100,7 @@ fn the_paper_s_rule_costs_a_few_per_cent() {
     };
     for process in processes() {
         let trace = relay_test(process, 0.0, 30.0);
-        let signals = Signals::of_trace(&trace, SAMPLE_S);
+        let signals = signals_of(&trace, SAMPLE_S);
         for (rule, most) in [
             (Rule::of_relay(-0.73, margin()), 0.14),
             (Rule::Amplitude(exact), 0.09),
@@ -119,7 +121,7 @@ fn no_oscillation_no_rule() {
     let still = vec![0.5; trace.len()];
     let signals = Signals {
         input: &still,
-        ..Signals::of_trace(&trace, SAMPLE_S)
+        ..signals_of(&trace, SAMPLE_S)
     };
     let found = identify(&signals, &Rule::of_relay(-0.73, margin()), 1);
     assert!(
@@ -130,13 +132,13 @@ fn no_oscillation_no_rule() {
     let rule = Rule::FirstHarmonic {
         phase_margin_rad: 1.2,
     };
-    let found = identify(&Signals::of_trace(&trace, SAMPLE_S), &rule, 1);
+    let found = identify(&signals_of(&trace, SAMPLE_S), &rule, 1);
     assert!(
         matches!(found, Err(RivalError::NotThisProcess(_))),
         "{found:?}"
     );
     // A relay at -80 deg asks for a lead of 100 deg, whose cosine is negative.
     let rule = Rule::of_relay(f64::sin(-80_f64.to_radians()), margin());
-    let found = identify(&Signals::of_trace(&trace, SAMPLE_S), &rule, 1);
+    let found = identify(&signals_of(&trace, SAMPLE_S), &rule, 1);
     assert!(matches!(found, Err(RivalError::Setting(..))), "{found:?}");
 }

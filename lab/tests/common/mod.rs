@@ -1,6 +1,6 @@
 //! What several tests need.
 
-use onecycle_lab::grid::Pieces;
+use onecycle_lab::paper::grid::Pieces;
 
 /// Pieces on two threads.
 pub(crate) struct Two;

@@ -3,8 +3,10 @@
 use std::io;
 use std::sync::OnceLock;
 
-use onecycle_lab::Space;
-use onecycle_lab::grid::{Grid, GridFile, InTurn, Settings, check, rounded, row, rows, write};
+use onecycle_lab::paper::grid::{
+    Grid, GridFile, InTurn, Settings, check, rounded, row, rows, write,
+};
+use onecycle_lab::space::Space;
 
 use super::{Two, same, ten_percent};
 

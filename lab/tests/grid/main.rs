@@ -9,8 +9,12 @@ mod files;
 
 use std::sync::OnceLock;
 
-use onecycle_lab::grid::{Grid, GridFile, InTurn, Index, Layout, Settings, check, step, write};
-use onecycle_lab::{Candidate, Direction, Gains, Space};
+use onecycle_lab::paper::grid::{
+    Grid, GridFile, InTurn, Index, Layout, Settings, check, step, write,
+};
+use onecycle_lab::space::Space;
+use onecycle_lab::space::candidate::{Candidate, Gains};
+use onecycle_lab::space::surface::Direction;
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use onecycle_lab::train::{
+use onecycle_lab::learn::train::{
     Batch, Dropped, Layer, Loss, Method, Network, OneThread, Schedule, Settings, Tape, TensorFile,
     Trainer,
 };

@@ -1,6 +1,6 @@
 //! Every layer and every loss by central differences.
 
-use onecycle_lab::train::{
+use onecycle_lab::learn::train::{
     Batch, Dropped, Gaussian, Layer, Loss, Matrix, Network, OneThread, Tape, TensorFile, TrainError,
 };
 
@@ -347,7 +347,7 @@ fn weights_count_samples() {
     let (outputs, batch) = classified();
     let pick = |rows: &[usize], weights: &[f32]| {
         let mut picked = Batch::default();
-        onecycle_lab::train::Dataset::fill(&batch, rows, &mut picked);
+        onecycle_lab::learn::train::Dataset::fill(&batch, rows, &mut picked);
         picked.weights = weights.to_vec();
         let mut values = Vec::new();
         rows.iter().for_each(|&i| values.extend(outputs.row(i)));

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use onecycle_lab::train::{
+use onecycle_lab::learn::train::{
     Batch, Epoch, Layer, Loss, Matrix, Method, Network, OneThread, Outcome, Schedule, Settings,
     Shape, Trainer, Workers,
 };

@@ -7,7 +7,7 @@ mod gradients;
 mod learning;
 mod torch;
 
-use onecycle_lab::train::{Layer, Matrix, Network};
+use onecycle_lab::learn::train::{Layer, Matrix, Network};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 

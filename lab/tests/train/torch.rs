@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use onecycle_lab::train::{
+use onecycle_lab::learn::train::{
     Batch, Dropped, Layer, Loss, Matrix, Method, Network, OneThread, Optimizer, Tape,
 };
 use serde::Deserialize;

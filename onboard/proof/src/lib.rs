@@ -44,7 +44,7 @@ use onecycle_onboard::refine::{Beforehand, Refined, Refiner, ShapePrior};
 use onecycle_onboard::signature::Signature;
 use onecycle_onboard::transition::State;
 use onecycle_onboard::window::{Edge, Window};
-use onecycle_onboard::{Pd, Process, Relay, RelaySettings, Transition};
+use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd, Transition};
 
 /// The simulated process. `K/T_body` (1/s^2), `T_prop`, `T_body` and `tau` (s).
 const K_OVER_T_BODY: f64 = 4.0;
@@ -235,7 +235,7 @@ fn oscillate(
     coarse: &mut Window<BINS, EDGES>,
     fine: &mut Window<FINE_BINS, 0>,
 ) -> Result<(SteadyRun, Cycle), &'static CStr> {
-    let process = Process::from_acceleration_gain(K_OVER_T_BODY, T_PROP_S, 1.0 / T_BODY_S, TAU_S)
+    let process = Soiptd::from_acceleration_gain(K_OVER_T_BODY, T_PROP_S, 1.0 / T_BODY_S, TAU_S)
         .map_err(|_| c"the parameters are not a process")?;
     let settings = RelaySettings::bare(AMPLITUDE as f32, RelaySettings::DISTINGUISHING_BETA);
     let mut relay = Relay::new(settings).map_err(|_| c"the settings are not a relay")?;

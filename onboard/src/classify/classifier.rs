@@ -8,7 +8,7 @@ use super::{
 };
 use crate::fit_score::{Cycle, Doubt, Statistic};
 use crate::pack::{Forward, Pack, VALUES};
-use crate::process::ProcessError;
+use crate::process::SoiptdError;
 use crate::signature::{PARTS, Signature};
 
 /// Nodes of the Gauss-Hermite rule of five points, in standard deviations, and their weights
@@ -196,7 +196,7 @@ impl Classifier {
         posterior
     }
 
-    fn candidates(&self, posterior: &Posterior) -> Result<[Candidate; CANDIDATES], ProcessError> {
+    fn candidates(&self, posterior: &Posterior) -> Result<[Candidate; CANDIDATES], SoiptdError> {
         let axis = posterior.longest_axis(&self.calibration.scale);
         let at = |deviations: f64| -> [f64; VALUES] {
             core::array::from_fn(|k| posterior.mean[k] + deviations * axis[k])

@@ -7,7 +7,7 @@ use core::f64::consts::FRAC_PI_2;
 use core::fmt;
 
 use super::GainsError;
-use crate::process::Process;
+use crate::process::Soiptd;
 
 /// Largest dead time of a table, in shorter lags. Beyond it, as both lags vanish, the lead changes
 /// faster than a small table follows.
@@ -141,7 +141,7 @@ impl Nodes {
     /// The process at a node, of unit acceleration gain, dead time and shorter lag together one
     /// second; `None` outside the table.
     #[must_use]
-    pub fn process(&self, delay_index: usize, lag_index: usize) -> Option<Process> {
+    pub fn process(&self, delay_index: usize, lag_index: usize) -> Option<Soiptd> {
         let coordinate = |index: usize, stretch: f32| {
             let position = index as f64 / (self.points - 1) as f64;
             let stretched = f64::from(stretch) * position;
@@ -154,11 +154,11 @@ impl Nodes {
         let lag_share = coordinate(lag_index, self.lag_stretch);
         let short_s = 1.0 - tau_s;
         let inv_long_per_s = lag_share / (1.0 + short_s - lag_share);
-        Process::from_acceleration_gain(1.0, short_s, inv_long_per_s, tau_s).ok()
+        Soiptd::from_acceleration_gain(1.0, short_s, inv_long_per_s, tau_s).ok()
     }
 
     /// Where a process lies, in cells from the first node.
-    pub(super) fn position(&self, process: &Process) -> Result<[f64; 2], GainsError> {
+    pub(super) fn position(&self, process: &Soiptd) -> Result<[f64; 2], GainsError> {
         let (prop_s, body_s) = (process.t_prop_s(), 1.0 / process.inv_t_body_per_s());
         let (short_s, long_s) = (prop_s.min(body_s), prop_s.max(body_s));
         let tau_s = process.tau_s();
@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(NODES.process(0, 5), None);
         // x = 5/7 = 3/4 of 20/21: tau = 5, T_1 = 2. y = (4 + 5) / (2 + 5 + T_2) = 3/4: T_2 = 5.
         for (t_prop_s, t_body_s) in [(2.0, 5.0), (5.0, 2.0)] {
-            let process = Process::new(1.0, t_prop_s, t_body_s, 5.0).unwrap();
+            let process = Soiptd::new(1.0, t_prop_s, t_body_s, 5.0).unwrap();
             let [delay, lag] = NODES.position(&process).unwrap();
             assert!(fabs(delay - 24.0 / 7.0) < 1e-14, "{delay}");
             assert!(fabs(lag - 12.0 / 5.0) < 1e-14, "{lag}");

@@ -2,7 +2,7 @@
 
 use libm::log;
 
-use crate::process::Process;
+use crate::process::Soiptd;
 
 /// Unknowns of the search: `ln(pole sum * period)`, pole ratio, `tau / period`.
 pub type Shape = [f64; SHAPE];
@@ -26,7 +26,7 @@ pub enum DomainEdge {
 }
 
 /// The shape of a process under an oscillation of this period (s).
-pub(crate) fn shape_of(process: &Process, period_s: f64) -> Shape {
+pub(crate) fn shape_of(process: &Soiptd, period_s: f64) -> Shape {
     let (sum_per_s, ratio) = process.pole_sum();
     [log(sum_per_s * period_s), ratio, process.tau_s() / period_s]
 }

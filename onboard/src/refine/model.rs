@@ -4,13 +4,13 @@ use super::LINEAR;
 use super::domain::Shape;
 use super::problem::Problem;
 use crate::distortion;
-use crate::process::Process;
+use crate::process::Soiptd;
 use crate::response::{self, Drive, Response};
 use crate::transition::State;
 use crate::window::Edge;
 
 pub(super) struct Model {
-    process: Option<Process>,
+    process: Option<Soiptd>,
     response: Response,
     /// The linear unknowns: y0, v0, w0, the distortion, the bias times the gain, the gain.
     of: [f64; LINEAR],

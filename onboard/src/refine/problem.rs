@@ -5,7 +5,7 @@ use libm::{exp, sqrt};
 use super::domain::{HIGHEST, SHAPE, Shape};
 use super::fundamental::Fundamental;
 use super::{RefineError, ShapePrior};
-use crate::process::Process;
+use crate::process::Soiptd;
 use crate::response::Grid;
 use crate::window::{KNOWN_ROWS, Window};
 
@@ -122,10 +122,10 @@ impl<const BINS: usize> Problem<BINS> {
     }
 
     /// The process of a shape and of unit acceleration gain, which there may not be.
-    pub(super) fn process(&self, shape: &Shape) -> Option<Process> {
+    pub(super) fn process(&self, shape: &Shape) -> Option<Soiptd> {
         let [ln_sum, ratio, delay] = *shape;
         let sum_per_s = exp(ln_sum) / self.period_s;
-        Process::from_pole_sum(1.0, sum_per_s, ratio, delay * self.period_s).ok()
+        Soiptd::from_pole_sum(1.0, sum_per_s, ratio, delay * self.period_s).ok()
     }
 
     /// The weighted outputs, and the prior's rows at a shape.

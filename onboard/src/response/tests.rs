@@ -12,7 +12,7 @@ const SAMPLE_S: f64 = 0.01;
 /// Outputs at the samples one by one: every stretch between an instant and an arriving edge has a
 /// transition of its own.
 fn outputs(
-    process: &Process,
+    process: &Soiptd,
     drive: &Drive,
     edges: &[Edge],
     begin_s: f64,
@@ -40,8 +40,8 @@ fn outputs(
     outputs
 }
 
-fn processes(tau_s: f64) -> [Process; 4] {
-    let new = |prop, damping| Process::from_acceleration_gain(1.0, prop, damping, tau_s).unwrap();
+fn processes(tau_s: f64) -> [Soiptd; 4] {
+    let new = |prop, damping| Soiptd::from_acceleration_gain(1.0, prop, damping, tau_s).unwrap();
     [
         new(0.032, 0.6),
         new(0.2, 5.0),
@@ -96,7 +96,7 @@ fn edges() -> Vec<Edge> {
 
 /// All means, and how many calls they took.
 fn means(
-    process: &Process,
+    process: &Soiptd,
     grid: &Grid,
     edges: &[Edge],
     drive: &Drive,

@@ -6,7 +6,7 @@
 use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::transition::State;
 use onecycle_onboard::window::Window;
-use onecycle_onboard::{Process, Relay, Transition};
+use onecycle_onboard::{Relay, Soiptd, Transition};
 
 pub type FitWindow = Window<260, 64>;
 
@@ -20,7 +20,7 @@ pub struct Run {
 
 /// The delayed process under held inputs; the recorded input arrives `tau` late.
 pub struct Simulation {
-    process: Process,
+    process: Soiptd,
     state: State,
     now_s: f64,
     arrived: f64,
@@ -28,7 +28,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    pub fn new(process: &Process) -> Self {
+    pub fn new(process: &Soiptd) -> Self {
         let under_way = std::collections::VecDeque::new();
         Self {
             process: *process,
@@ -67,7 +67,7 @@ impl Simulation {
 
 /// Runs the relay at these instants, under a constant input bias.
 pub fn run(
-    process: &Process,
+    process: &Soiptd,
     relay: &mut Relay,
     bias: f64,
     times_s: impl IntoIterator<Item = f64>,

@@ -1,6 +1,6 @@
 //! One axis for a tuner to tune: a process on the grid of its ticks, with a bias, noise and a ground.
 
-use onecycle_onboard::Process;
+use onecycle_onboard::Soiptd;
 use onecycle_onboard::control::Measurement;
 use onecycle_onboard::transition::{State, Transition};
 use onecycle_onboard::tuner::Tuner;
@@ -30,7 +30,7 @@ impl Noise {
 
 /// The axis.
 pub(crate) struct Axis {
-    pub(crate) process: Process,
+    pub(crate) process: Soiptd,
     pub(crate) sample_s: f64,
     pub(crate) bias: f64,
     pub(crate) noise_sigma: f64,
@@ -45,7 +45,7 @@ pub(crate) struct Axis {
 
 impl Axis {
     /// At rest at zero; the dead time is rounded to ticks.
-    pub(crate) fn new(process: Process, sample_s: f64, seed: u64) -> Self {
+    pub(crate) fn new(process: Soiptd, sample_s: f64, seed: u64) -> Self {
         let ticks = (process.tau_s() / sample_s).round() as usize;
         Self {
             process,
@@ -62,7 +62,7 @@ impl Axis {
     }
 
     /// Another process from now on, from the state that there is.
-    pub(crate) fn becomes(&mut self, process: Process) {
+    pub(crate) fn becomes(&mut self, process: Soiptd) {
         let ratio = self.process.k_over_t_body() / process.k_over_t_body();
         self.state.y *= ratio;
         self.state.v *= ratio;

@@ -10,7 +10,7 @@ use std::ops::Range;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::{Abort, Limits};
 use onecycle_onboard::tuner::{Phase, Tuner, TunerSettings};
-use onecycle_onboard::{Process, RelaySettings};
+use onecycle_onboard::{RelaySettings, Soiptd};
 
 use crate::axis::{Axis, Noise};
 
@@ -146,7 +146,7 @@ impl Run {
     fn new(seed: u64) -> Self {
         let mut noise = Noise(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
         let h = noise.between(0.05, 0.5);
-        let process = Process::from_acceleration_gain(
+        let process = Soiptd::from_acceleration_gain(
             noise.between(2.0, 30.0),
             noise.between(0.01, 0.05),
             noise.between(0.0, 2.0),

@@ -9,15 +9,15 @@ mod faults;
 use onecycle_onboard::control::PdLaw;
 use onecycle_onboard::guard::Abort;
 use onecycle_onboard::tuner::{Phase, TakeOffSettings, Tuner, TunerSettings};
-use onecycle_onboard::{Process, RelaySettings};
+use onecycle_onboard::{RelaySettings, Soiptd};
 
 use self::axis::Axis;
 
 const SAMPLE_S: f64 = 0.001;
 
 /// The paper's altitude: T_prop 32.1 ms, T_body 1.6886 s, dead time 24 ms, at 4 1/s^2 a unit.
-fn height() -> Process {
-    Process::from_acceleration_gain(4.0, 0.0321, 1.0 / 1.6886, 0.024).unwrap()
+fn height() -> Soiptd {
+    Soiptd::from_acceleration_gain(4.0, 0.0321, 1.0 / 1.6886, 0.024).unwrap()
 }
 
 /// Outputs of one at most, ten times the relay's.
@@ -82,7 +82,7 @@ fn from_the_ground_without_a_controller() {
     for seed in 0..20 {
         let mut tuner = tuner(&settings);
         let mut axis = Axis::new(
-            Process::from_acceleration_gain(20.0, 0.0321, 1.0 / 1.6886, 0.024).unwrap(),
+            Soiptd::from_acceleration_gain(20.0, 0.0321, 1.0 / 1.6886, 0.024).unwrap(),
             SAMPLE_S,
             seed,
         );

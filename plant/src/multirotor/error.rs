@@ -1,6 +1,6 @@
 //! What is no vehicle, no wind, no flight: errors that name the parameter.
 
-use onecycle_onboard::process::ProcessError;
+use onecycle_onboard::process::SoiptdError;
 
 use super::frames::Vec3;
 
@@ -58,7 +58,7 @@ pub enum VehicleError {
     },
     /// Its response at hover is no process.
     #[error("the response at hover is no process: {0}")]
-    NoProcess(#[from] ProcessError),
+    NoProcess(#[from] SoiptdError),
 }
 
 pub(super) fn positive(name: &'static str, value: f64) -> Result<(), VehicleError> {

@@ -23,7 +23,7 @@
 //! the rotors' drag rights it); with one off to the side, or in a horizontal wind, the coupling
 //! of the axes.
 
-use onecycle_onboard::Process;
+use onecycle_onboard::Soiptd;
 
 use super::dynamics::State;
 use super::error::{VehicleError, charged, finite};
@@ -95,7 +95,7 @@ impl Vehicle {
     ///
     /// # Errors
     /// As [`Vehicle::hover`] and [`Hover::linearised`].
-    pub fn linearised(&self, axis: Axis) -> Result<Process, VehicleError> {
+    pub fn linearised(&self, axis: Axis) -> Result<Soiptd, VehicleError> {
         self.hover(1.0, Vec3::ZERO)?.linearised(axis)
     }
 }
@@ -137,7 +137,7 @@ impl Hover {
     ///
     /// # Errors
     /// [`VehicleError::NoProcess`] where nothing is steered, as when an updraft carries the vehicle.
-    pub fn linearised(&self, axis: Axis) -> Result<Process, VehicleError> {
+    pub fn linearised(&self, axis: Axis) -> Result<Soiptd, VehicleError> {
         let parts = self.vehicle.parts();
         let (rotors, body, sensors) = (&parts.rotors, &parts.body, &parts.sensors);
         let omega = self.rotor_rad_per_s;
@@ -186,7 +186,7 @@ impl Hover {
                 &sensors.angles,
             ),
         };
-        Ok(Process::from_acceleration_gain(
+        Ok(Soiptd::from_acceleration_gain(
             4.0 * force * speed_per_command / inertia,
             t_prop_s,
             4.0 * damping / inertia,

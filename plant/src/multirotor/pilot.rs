@@ -9,7 +9,7 @@ use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::{Abort, Limits};
 use onecycle_onboard::identification::Identified;
 use onecycle_onboard::tuner::{Phase, TakeOffSettings, Tuner, TunerError, TunerSettings};
-use onecycle_onboard::{Process, RelaySettings};
+use onecycle_onboard::{RelaySettings, Soiptd};
 use rand::Rng;
 
 use super::body::GRAVITY_M_PER_S2;
@@ -145,7 +145,7 @@ pub struct Tuned {
     /// What was found.
     pub identified: Identified,
     /// The process of the vehicle as it was then.
-    pub truth: Process,
+    pub truth: Soiptd,
 }
 
 /// A tick of a flight.
@@ -331,7 +331,7 @@ impl<R: Rng> Pilot<R> {
     ///
     /// # Errors
     /// Where the vehicle cannot hover.
-    pub fn truth(&self, axis: Axis) -> Result<Process, VehicleError> {
+    pub fn truth(&self, axis: Axis) -> Result<Soiptd, VehicleError> {
         let charge = self.flight.state().charge;
         let hover = self.flight.vehicle().hover(charge, Vec3::ZERO)?;
         hover.linearised(axis)

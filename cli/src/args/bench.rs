@@ -1,0 +1,178 @@
+//! Arguments of `onecycle bench`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::{Args, Subcommand, ValueEnum};
+use onecycle_lab::judge::evaluate::{Benchmark, Contender, RelayTest};
+
+use super::MOST_THREADS;
+
+/// A benchmark for identifiers: relay experiments with their truth, and the score of any answers.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle bench make -o relay-benchmark\n",
+    "  onecycle bench run relay-benchmark -o results\n",
+    "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair --answers mine=answers.csv\n\n",
+    "Exit codes: 0 done, 2 bad arguments, 3 unreadable folder or answers, 5 output not written"
+))]
+pub(crate) struct Bench {
+    #[command(subcommand)]
+    pub(crate) action: BenchAction,
+}
+
+#[derive(Debug, Subcommand)]
+pub(crate) enum BenchAction {
+    Make(MakeBench),
+    Run(RunBench),
+}
+
+/// How recordings are kept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Format {
+    /// A file an experiment
+    Csv,
+    /// One file [needs a build with --features parquet]
+    Parquet,
+}
+
+/// Most experiments of a benchmark: what four digits number.
+const MOST_EXPERIMENTS: u64 = 9999;
+
+/// Make the experiments: recordings, the truth behind them and the rules, in a new folder.
+///
+/// A thousand experiments are some 200 MB, 60 MB when packed.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle bench make -o relay-benchmark\n",
+    "  onecycle bench make -o small-benchmark --cases 50 --seed 2\n"
+))]
+pub(crate) struct MakeBench {
+    /// Folder to write, whole or not at all: a new or an empty one
+    #[arg(long, short, value_name = "DIR")]
+    pub(crate) out: PathBuf,
+    /// How many experiments (1 to 9999)
+    #[arg(long, value_name = "N", default_value_t = Benchmark::default().experiments,
+          allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_EXPERIMENTS))]
+    pub(crate) cases: u64,
+    /// Seed of the experiments (up to 2^32 - 1): the same seed gives the same bytes
+    #[arg(long, value_name = "SEED", default_value_t = Benchmark::default().seed,
+          allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(0..=u64::from(u32::MAX)))]
+    pub(crate) seed: u64,
+    /// How recordings are kept
+    #[arg(long, value_enum, default_value = "csv")]
+    pub(crate) format: Format,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
+    pub(crate) threads: Option<u64>,
+}
+
+/// Answer the experiments by every method, score the answers, print the leaderboard.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle bench run relay-benchmark -o results\n",
+    "  onecycle bench run relay-benchmark --methods none --answers mine=answers.csv\n",
+    "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair -o results --resume\n\n",
+    "Methods that read the recordings: onecycle-1, onecycle-2, onecycle-4 (cycles), network, pem, \n",
+    "pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc: all by default. Two read \n",
+    "a relay test of their own, which is simulated on the true process with the same bias, noise and seed: \n",
+    "pem-sweep, asymmetric. With 'none' only --answers are scored. Times are those of the processor.\n\n",
+    "With --out, what is done is kept in OUT.part: with --resume the same command goes on from there."
+))]
+pub(crate) struct RunBench {
+    /// The folder that `bench make` has written
+    #[arg(value_name = "DIR")]
+    pub(crate) folder: PathBuf,
+    /// Methods to run
+    #[arg(long, value_name = "NAME,...")]
+    pub(crate) methods: Option<Methods>,
+    /// Answers made elsewhere, may be repeated: a CSV with experiment,K,T_prop_s,T_body_s,tau_s or
+    /// experiment,kp,kd, and seconds if you like
+    #[arg(long, value_name = "NAME=FILE")]
+    pub(crate) answers: Vec<Answers>,
+    /// Write OUT.csv (a row a method and experiment), OUT.json (the same and the leaderboard) and OUT.md
+    #[arg(long, short, value_name = "OUT")]
+    pub(crate) out: Option<PathBuf>,
+    /// Write the recordings that methods make for themselves to a folder, new or empty: a folder a method, a CSV
+    /// an experiment, as `identify` reads them
+    #[arg(long, value_name = "DIR")]
+    pub(crate) traces: Option<PathBuf>,
+    /// Go on from where an interrupted run of the same methods was
+    #[arg(long, requires = "out")]
+    pub(crate) resume: bool,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
+    pub(crate) threads: Option<u64>,
+    /// Print the leaderboard and all results as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// A list of methods, each once.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Methods(pub(crate) Vec<Contender>);
+
+impl Default for Methods {
+    /// Those that read the recordings.
+    fn default() -> Self {
+        let reads = |one: &Contender| one.relay_test() == RelayTest::Recorded;
+        Self(Contender::ALL.into_iter().filter(reads).collect())
+    }
+}
+
+impl FromStr for Methods {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let mut methods = Vec::new();
+        for name in text.split(',').map(str::trim) {
+            let Some(method) = Contender::from_name(name) else {
+                if text.trim() == "none" {
+                    break;
+                }
+                let names = Contender::ALL.map(Contender::name).join(", ");
+                return Err(format!("there is no method '{name}': name some of {names}"));
+            };
+            if methods.contains(&method) {
+                return Err(format!("'{name}' is named twice"));
+            }
+            methods.push(method);
+        }
+        Ok(Self(methods))
+    }
+}
+
+/// A file of answers and what to call them.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Answers {
+    pub(crate) name: String,
+    pub(crate) file: PathBuf,
+}
+
+impl FromStr for Answers {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, file) = text.split_once('=').unwrap_or_default();
+        let (name, file) = (name.trim().to_owned(), PathBuf::from(file));
+        if name.is_empty() || file.as_os_str().is_empty() {
+            return Err(format!(
+                "'{text}' is not a name and a file such as mine=answers.csv"
+            ));
+        }
+        if name.contains(['|', '\n', '\r']) || Contender::from_name(&name).is_some() {
+            return Err(format!(
+                "answers cannot be named '{name}': choose another name"
+            ));
+        }
+        Ok(Self { name, file })
+    }
+}

@@ -1,0 +1,96 @@
+//! Arguments of `certify`.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use clap::Args;
+use onecycle_onboard::Soiptd;
+
+use super::{Share, sample_rate};
+
+/// Certify that the relay makes every process of a space oscillate, once and stably.
+///
+/// Limit cycles are exact, and so is the spectral radius of their Poincare map: what is left of a
+/// small deviation after a cycle. Time scales everything, so shapes of processes stand for all.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle certify\n",
+    "  onecycle certify experiments/double_integrators.toml --bias 0,0.3,0.6 --picture out.svg\n",
+    "  onecycle certify --process 0.3,2,0.1 --bias 0,30% --sample-rate 1000\n\n",
+    "Exit codes: 0 certified, 2 bad arguments, 3 unreadable space, 4 not certified, 5 output not ",
+    "written"
+))]
+pub(crate) struct Certify {
+    /// The space, in TOML (see experiments/) [default: the paper's multirotors]
+    pub(crate) space: Option<PathBuf>,
+    /// One process instead of the space, may be repeated: T_prop,T_body,tau in seconds
+    #[arg(long, value_name = "T,T,T", conflicts_with_all = ["json", "picture", "shapes"])]
+    pub(crate) process: Vec<Times>,
+    /// Biases, in amplitudes of the relay or % of it [default: 0 to 0.9, of a process 0]
+    #[arg(long, value_name = "BIAS,...", value_delimiter = ',', allow_hyphen_values = true,
+          value_parser = bias)]
+    bias: Vec<f64>,
+    /// Of single processes: also of a relay sampled at this rate, in hertz
+    #[arg(long, value_name = "HZ", requires = "process", allow_negative_numbers = true,
+          value_parser = sample_rate)]
+    pub(crate) sample_rate: Option<f64>,
+    /// Shapes along either coordinate of their surface (2 to 100)
+    #[arg(long, value_name = "N", default_value_t = 16,
+          value_parser = clap::value_parser!(u64).range(2..=100))]
+    pub(crate) shapes: u64,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Draw loci and stability in this file, as SVG
+    #[arg(long, value_name = "FILE")]
+    pub(crate) picture: Option<PathBuf>,
+}
+
+impl Certify {
+    /// The biases asked for, or the usual ones.
+    pub(crate) fn biases(&self) -> Vec<f64> {
+        if !self.bias.is_empty() {
+            self.bias.clone()
+        } else if self.process.is_empty() {
+            (0..10).map(|tenth| f64::from(tenth) / 10.0).collect()
+        } else {
+            vec![0.0]
+        }
+    }
+}
+
+/// `T_prop`, `T_body`, `tau` (s), separated by commas.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Times(pub(crate) [f64; 3]);
+
+impl FromStr for Times {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let times: Vec<f64> = text
+            .split(',')
+            .map(|time| time.trim().parse().ok())
+            .collect::<Option<_>>()
+            .ok_or_else(|| format!("'{text}' is not three times such as 0.3,2,0.1"))?;
+        let times = <[f64; 3]>::try_from(times).map_err(|times| {
+            format!(
+                "a process has three times, but '{text}' has {}",
+                times.len()
+            )
+        })?;
+        Soiptd::new(1.0, times[0], times[1], times[2])
+            .map(|_| Self(times))
+            .map_err(|error| error.to_string())
+    }
+}
+
+/// A bias as a part of the relay's amplitude, below it.
+fn bias(text: &str) -> Result<f64, String> {
+    let bias = text.trim().parse::<Share>()?.of(1.0);
+    if bias.abs() < 1.0 {
+        Ok(bias)
+    } else {
+        Err("a bias lies between -1 and 1 amplitudes of the relay".to_owned())
+    }
+}

@@ -1,0 +1,46 @@
+//! Arguments of `dataset`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use onecycle_lab::learn::dataset::shards::MOST_EXAMPLES;
+
+use super::MOST_THREADS;
+
+/// Make relay experiments to learn from, as files that NumPy, PyTorch and JAX read.
+///
+/// Each example is one steady cycle of a random process of the recipe as a signature of 34 numbers, the
+/// process as the four values that a network is to put out, and what an error of these costs.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle dataset --examples 40000 --into multirotors\n",
+    "  onecycle dataset experiments/identifier.toml --examples 1000000 --into examples_to_learn\n",
+    "  python examples/train_pytorch.py multirotors network.safetensors\n\n",
+    "What is done is kept: the same command goes on where it was stopped, with a larger --examples\n",
+    "it makes what is missing, and files that are damaged are made again.\n\n",
+    "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or a folder of something else, ",
+    "5 output not written"
+))]
+pub(crate) struct Dataset {
+    /// The recipe, in TOML (see experiments/identifier.toml) [default: the paper's multirotors]
+    #[arg(value_name = "RECIPE")]
+    pub(crate) recipe: Option<PathBuf>,
+    /// How many experiments (1 to 10,000,000)
+    #[arg(long, short = 'n', value_name = "N", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_EXAMPLES))]
+    pub(crate) examples: u64,
+    /// Folder to write to: a new one, or one of the same recipe
+    #[arg(long, value_name = "DIR")]
+    pub(crate) into: PathBuf,
+    /// Write all examples to this one Parquet file as well [needs a build with --features parquet]
+    #[arg(long, value_name = "FILE")]
+    pub(crate) parquet: Option<PathBuf>,
+    /// Threads to work with [default: one a core]
+    #[arg(long, value_name = "N", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
+    pub(crate) threads: Option<u64>,
+    /// Print the summary as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}

@@ -1,0 +1,118 @@
+//! The folder of a benchmark: what lies where in it, and reading it back.
+//!
+//! ```text
+//! benchmark.json             format, number of experiments, seed, how recordings are kept
+//! recordings/0001.csv ..     or recordings.parquet
+//! truth.csv                  what is behind each: for the score alone
+//! README.md                  the rules
+//! ```
+
+use std::path::{Path, PathBuf};
+
+use onecycle_lab::judge::evaluate::files::{TableError, read_truth};
+use onecycle_lab::judge::evaluate::{Benchmark, Truth};
+use serde::{Deserialize, Serialize};
+
+use crate::args::Format;
+use crate::failure::Failure;
+
+/// Changes with the folder, so that results are never compared across versions.
+pub(crate) const FORMAT: &str = "onecycle.benchmark/1";
+
+pub(super) const MANIFEST: &str = "benchmark.json";
+pub(super) const TRUTH: &str = "truth.csv";
+pub(super) const RULES: &str = "README.md";
+pub(super) const RECORDINGS: &str = "recordings";
+#[cfg(feature = "parquet")]
+pub(super) const PARQUET: &str = "recordings.parquet";
+
+/// What a folder says of itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Manifest {
+    pub(crate) format: String,
+    #[serde(flatten)]
+    pub(crate) benchmark: Benchmark,
+    pub(crate) recordings: Format,
+}
+
+/// The recording of an experiment, in the folder.
+pub(super) fn recording(folder: &Path, number: u64) -> PathBuf {
+    folder.join(RECORDINGS).join(numbered(number))
+}
+
+/// The name of an experiment's file.
+pub(super) fn numbered(number: u64) -> String {
+    format!("{number:04}.csv")
+}
+
+/// A folder with anything in it is not written to.
+pub(super) fn refuse_filled(out: &Path) -> Result<(), Failure> {
+    if !out.exists() {
+        return Ok(());
+    }
+    let mut entries = std::fs::read_dir(out).map_err(|error| Failure::output(out, error))?;
+    match entries.next() {
+        None => Ok(()),
+        Some(_) => Err(Failure::usage(format!(
+            "{} is not empty: name a new folder",
+            out.display()
+        ))),
+    }
+}
+
+/// Reads what a folder holds besides the recordings.
+pub(super) fn read(folder: &Path) -> Result<(Manifest, Vec<Truth>), Failure> {
+    let path = folder.join(MANIFEST);
+    let text = std::fs::read_to_string(&path).map_err(|error| {
+        unreadable(
+            &path,
+            format!("{error}: name a folder that onecycle bench make has written"),
+        )
+    })?;
+    #[derive(Deserialize)]
+    struct Version {
+        format: String,
+    }
+    let malformed = |error: serde_json::Error| unreadable(&path, error.to_string());
+    let found: Version = serde_json::from_str(&text).map_err(malformed)?;
+    if found.format != FORMAT {
+        return Err(unreadable(
+            &path,
+            format!(
+                "the folder is of version '{}', but this program scores '{FORMAT}': make it anew",
+                found.format
+            ),
+        ));
+    }
+    let manifest: Manifest = serde_json::from_str(&text).map_err(malformed)?;
+    let path = folder.join(TRUTH);
+    let truths = read_truth(&read_text(&path)?).map_err(|error| refused(&path, &error))?;
+    if truths.len() as u64 != manifest.benchmark.experiments {
+        return Err(unreadable(
+            &path,
+            format!(
+                "it has {} experiments, but {MANIFEST} says {}",
+                truths.len(),
+                manifest.benchmark.experiments
+            ),
+        ));
+    }
+    Ok((manifest, truths))
+}
+
+/// The text of a file.
+pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
+    std::fs::read_to_string(path).map_err(|error| unreadable(path, error.to_string()))
+}
+
+/// A table that cannot be read: its file, its line and why.
+pub(super) fn refused(path: &Path, error: &TableError) -> Failure {
+    unreadable(path, error.to_string())
+}
+
+pub(super) fn unreadable(path: &Path, reason: String) -> Failure {
+    Failure::Settings {
+        path: path.to_owned(),
+        reason,
+    }
+}

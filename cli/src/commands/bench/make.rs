@@ -1,0 +1,143 @@
+//! `onecycle bench make`: the folder, whole or not at all.
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use onecycle_lab::judge::evaluate::files::truth_csv;
+use onecycle_lab::judge::evaluate::{Benchmark, Recorded, Truth};
+use onecycle_link::{Recording, write_csv};
+
+use super::folder::{self, FORMAT, MANIFEST, Manifest, RULES, TRUTH, recording};
+use crate::args::{Format, MakeBench};
+use crate::commands::workers::Workers;
+use crate::failure::{Failure, exit};
+use crate::output::{print, write_file};
+use crate::report;
+
+pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
+    if arguments.format == Format::Parquet && !cfg!(feature = "parquet") {
+        return Err(Failure::usage(
+            "this build cannot write Parquet: make one with cargo build --release --features parquet",
+        ));
+    }
+    let out = &arguments.out;
+    folder::refuse_filled(out)?;
+    let workers = Workers::new(arguments.threads)?;
+    let manifest = Manifest {
+        format: FORMAT.to_owned(),
+        benchmark: Benchmark {
+            experiments: arguments.cases,
+            seed: arguments.seed,
+        },
+        recordings: arguments.format,
+    };
+    // Beside the folder, so that it can be moved there.
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let failed = |error| Failure::output(out, error);
+    let staged = tempfile::Builder::new()
+        .prefix(".onecycle-bench-")
+        .tempdir_in(parent.unwrap_or(Path::new(".")))
+        .map_err(failed)?;
+    let truths = match arguments.format {
+        Format::Csv => write_recordings(staged.path(), &manifest.benchmark, &workers)?,
+        #[cfg(feature = "parquet")]
+        Format::Parquet => write_table(staged.path(), &manifest.benchmark, &workers)?,
+        #[cfg(not(feature = "parquet"))]
+        Format::Parquet => Vec::new(),
+    };
+    workers.finish();
+    let files = [
+        (MANIFEST, report::json::to_text(&manifest)),
+        (TRUTH, truth_csv(&truths)),
+        (RULES, report::bench::rules(&manifest)),
+    ];
+    for (name, text) in files {
+        write_file(&staged.path().join(name), |file| {
+            file.write_all(text.as_bytes())
+        })?;
+    }
+    set_usual_permissions(staged.path()).map_err(failed)?;
+    if out.exists() {
+        std::fs::remove_dir(out).map_err(failed)?;
+    }
+    std::fs::rename(staged.path(), out).map_err(failed)?;
+    // It is no longer there to be removed.
+    let _ = staged.keep();
+    print(&format!(
+        "{} experiments in {}\n",
+        arguments.cases,
+        out.display()
+    ))?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+fn experiment(benchmark: &Benchmark, number: u64) -> Result<(Truth, Recorded), Failure> {
+    benchmark.experiment(number).map_err(Failure::usage)
+}
+
+/// A file an experiment.
+fn write_recordings(
+    folder: &Path,
+    benchmark: &Benchmark,
+    workers: &Workers,
+) -> Result<Vec<Truth>, Failure> {
+    let inside = folder.join(folder::RECORDINGS);
+    std::fs::create_dir(&inside).map_err(|error| Failure::output(&inside, error))?;
+    let count = benchmark.experiments as usize;
+    workers.expect(count, 0);
+    let written = workers.run(count, |index| {
+        let number = index as u64 + 1;
+        let (truth, recorded) = experiment(benchmark, number)?;
+        let table = Recording::from_samples(&recorded.time_s, &recorded.input, &recorded.output)
+            .map_err(Failure::usage)?;
+        write_file(&recording(folder, number), |file| {
+            write_csv(file, &table, &[])
+        })?;
+        Ok(truth)
+    });
+    written.into_iter().collect()
+}
+
+/// Experiments in memory at a time.
+#[cfg(feature = "parquet")]
+const LOT: usize = 64;
+
+/// One file, a row group an experiment.
+#[cfg(feature = "parquet")]
+fn write_table(
+    folder: &Path,
+    benchmark: &Benchmark,
+    workers: &Workers,
+) -> Result<Vec<Truth>, Failure> {
+    use onecycle_lab::judge::evaluate::parquet::Writer;
+    let count = benchmark.experiments as usize;
+    workers.expect(count, 0);
+    let mut truths = Vec::with_capacity(count);
+    write_file(&folder.join(folder::PARQUET), |file| {
+        let mut writer = Writer::new(file)?;
+        for begin in (0..count).step_by(LOT) {
+            let lot = workers.run(LOT.min(count - begin), |index| {
+                experiment(benchmark, (begin + index) as u64 + 1)
+            });
+            for made in lot {
+                let (truth, recorded) = made.map_err(std::io::Error::other)?;
+                writer.add(truth.number, &recorded)?;
+                truths.push(truth);
+            }
+        }
+        writer.finish()
+    })?;
+    Ok(truths)
+}
+
+/// Temporary folders are private; what a user asked for is readable like any other.
+#[cfg(unix)]
+fn set_usual_permissions(folder: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o755))
+}
+
+#[cfg(not(unix))]
+fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
+    Ok(())
+}

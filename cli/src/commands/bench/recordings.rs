@@ -1,0 +1,100 @@
+//! The recordings of a benchmark, however its folder keeps them.
+
+use std::path::{Path, PathBuf};
+
+use onecycle_link::{CsvOptions, Recording};
+
+use super::folder::{Manifest, recording};
+use crate::args::Format;
+use crate::commands::workers::Workers;
+use crate::failure::Failure;
+
+/// Where recordings are read from.
+pub(super) enum Recordings {
+    /// A file an experiment, in this folder.
+    Csv(PathBuf),
+    /// One file.
+    #[cfg(feature = "parquet")]
+    Parquet(table::Table),
+}
+
+impl Recordings {
+    /// Of a folder with this manifest.
+    pub(super) fn open(folder: &Path, manifest: &Manifest) -> Result<Self, Failure> {
+        match manifest.recordings {
+            Format::Csv => Ok(Self::Csv(folder.to_owned())),
+            #[cfg(feature = "parquet")]
+            Format::Parquet => table::Table::open(folder).map(Self::Parquet),
+            #[cfg(not(feature = "parquet"))]
+            Format::Parquet => Err(super::folder::unreadable(
+                &folder.join(super::folder::MANIFEST),
+                "this build cannot read Parquet: make one with cargo build --release --features \
+                 parquet, make the folder with --format csv, for the same seed gives the same \
+                 experiments, or score answers alone with --methods none"
+                    .to_owned(),
+            )),
+        }
+    }
+
+    /// Those of these experiments, in their order.
+    pub(super) fn read(
+        &self,
+        numbers: &[u64],
+        workers: &Workers,
+    ) -> Result<Vec<Recording>, Failure> {
+        match self {
+            Self::Csv(folder) => {
+                let read = |index: usize| {
+                    let path = recording(folder, numbers[index]);
+                    onecycle_link::read(&path, &CsvOptions::default()).map_err(|reason| {
+                        Failure::Recording {
+                            path,
+                            reason: Box::new(reason),
+                        }
+                    })
+                };
+                workers.quietly(numbers.len(), read).into_iter().collect()
+            }
+            // One after the other: threads would share the position in the file.
+            #[cfg(feature = "parquet")]
+            Self::Parquet(table) => numbers.iter().map(|&number| table.read(number)).collect(),
+        }
+    }
+}
+
+#[cfg(feature = "parquet")]
+mod table {
+    use std::fs::File;
+    use std::path::{Path, PathBuf};
+
+    use onecycle_lab::judge::evaluate::parquet::Reader;
+    use onecycle_link::Recording;
+
+    use crate::commands::bench::folder::{PARQUET, unreadable};
+    use crate::failure::Failure;
+
+    /// The file that holds all recordings.
+    pub(in crate::commands::bench) struct Table {
+        path: PathBuf,
+        reader: Reader,
+    }
+
+    impl Table {
+        pub(super) fn open(folder: &Path) -> Result<Self, Failure> {
+            let path = folder.join(PARQUET);
+            let reader = File::open(&path).and_then(Reader::new);
+            match reader {
+                Ok(reader) => Ok(Self { path, reader }),
+                Err(error) => Err(unreadable(&path, error.to_string())),
+            }
+        }
+
+        pub(super) fn read(&self, number: u64) -> Result<Recording, Failure> {
+            let wrong = |reason| unreadable(&self.path, reason);
+            let recorded = self.reader.recording(number);
+            let recorded = recorded.map_err(|error| wrong(error.to_string()))?;
+            Recording::from_samples(&recorded.time_s, &recorded.input, &recorded.output)
+                .map_err(|error| wrong(format!("experiment {number}: {error}")))
+        }
+    }
+}

@@ -1,0 +1,163 @@
+//! `onecycle bench run`: every method on every recording, scored.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use onecycle::with_signals;
+use onecycle_lab::judge::evaluate::files::{read_answers, results_csv};
+use onecycle_lab::judge::evaluate::{Contender, Judge, Record, Truth, records};
+
+use super::folder::{self, TRUTH, read_text, refused, unreadable};
+use super::part::{Head, Part};
+use super::recordings::Recordings;
+use super::traces;
+use crate::args::{self, RunBench};
+use crate::commands::clock::thread_seconds;
+use crate::commands::workers::Workers;
+use crate::failure::{Failure, exit};
+use crate::output::{print, tell, write_file};
+use crate::report;
+use crate::report::bench::Results;
+
+pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
+    let (manifest, truths) = folder::read(&arguments.folder)?;
+    let methods = arguments.methods.clone().unwrap_or_default().0;
+    let foreign = foreign(&arguments.answers, &truths)?;
+    let workers = Workers::new(arguments.threads)?;
+    let recordings = match methods[..] {
+        [] => None,
+        _ => Some(Recordings::open(&arguments.folder, &manifest)?),
+    };
+    if let Some(folder) = &arguments.traces {
+        traces::write(folder, &methods, &truths, &workers)?;
+    }
+    let head = Head {
+        program: env!("CARGO_PKG_VERSION").to_owned(),
+        benchmark: manifest,
+        methods: methods.iter().map(|method| method.name()).collect(),
+    };
+    let out = arguments.out.as_deref();
+    let (mut part, done) = match out.filter(|_| !methods.is_empty()) {
+        Some(out) => {
+            let (part, done) = Part::open(beside(out, "part"), &head, arguments.resume)?;
+            (Some(part), done)
+        }
+        None => (None, BTreeMap::new()),
+    };
+    let mut records = foreign;
+    if let Some(recordings) = &recordings {
+        let ours = answered(
+            recordings,
+            &methods,
+            &truths,
+            (part.as_mut(), done),
+            &workers,
+            &arguments.folder.join(TRUTH),
+        )?;
+        records.splice(0..0, ours);
+    }
+    let results = Results::of(&head.benchmark, &records);
+    let text = report::bench::leaderboard(&results);
+    let json = report::json::to_text(&results);
+    if let Some(out) = out {
+        let csv = results_csv(&records).map_err(Failure::usage)?;
+        for (ending, bytes) in [
+            ("csv", csv.as_slice()),
+            ("json", json.as_bytes()),
+            ("md", text.as_bytes()),
+        ] {
+            write_file(&beside(out, ending), |file| file.write_all(bytes))?;
+        }
+    }
+    if let Some(part) = part {
+        part.remove()?;
+    }
+    print(if arguments.json { &json } else { &text })?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+/// A name with an ending added.
+fn beside(out: &Path, ending: &str) -> PathBuf {
+    let mut path = out.as_os_str().to_owned();
+    path.push(".");
+    path.push(ending);
+    path.into()
+}
+
+/// Experiments between two lines of the part, for each thread: few, for an end by force loses them.
+const LOT: usize = 4;
+
+/// The records of all methods, by experiment, those that are done and those that are made now; `truth` is
+/// the file that the truths are from.
+fn answered(
+    recordings: &Recordings,
+    methods: &[Contender],
+    truths: &[Truth],
+    (mut part, mut done): (Option<&mut Part>, BTreeMap<u64, Vec<Record>>),
+    workers: &Workers,
+    truth: &Path,
+) -> Result<Vec<Record>, Failure> {
+    let open: Vec<&Truth> = truths
+        .iter()
+        .filter(|truth| !done.contains_key(&truth.number))
+        .collect();
+    if !done.is_empty() {
+        let (kept, all) = (done.len(), truths.len());
+        tell(&format!("going on after {kept} of {all} experiments"));
+    }
+    workers.expect(truths.len(), truths.len() - open.len());
+    for lot in open.chunks(LOT * workers.threads()) {
+        let numbers: Vec<u64> = lot.iter().map(|truth| truth.number).collect();
+        let read = recordings.read(&numbers, workers)?;
+        let made = workers.run(lot.len(), |index| {
+            let records = with_signals(&read[index], |signals| {
+                records(lot[index], signals, methods, &thread_seconds)
+            });
+            records.map_err(|error| {
+                unreadable(truth, format!("experiment {}: {error}", numbers[index]))
+            })
+        });
+        for (truth, made) in lot.iter().zip(made) {
+            let made = made?;
+            if let Some(part) = part.as_deref_mut() {
+                part.keep(&made)?;
+            }
+            done.insert(truth.number, made);
+        }
+    }
+    workers.finish();
+    Ok(done.into_values().flatten().collect())
+}
+
+/// The records of answers made elsewhere.
+fn foreign(all: &[args::Answers], truths: &[Truth]) -> Result<Vec<Record>, Failure> {
+    let experiments: BTreeSet<u64> = truths.iter().map(|truth| truth.number).collect();
+    let mut records = Vec::new();
+    for (index, answers) in all.iter().enumerate() {
+        if all[..index]
+            .iter()
+            .any(|before| before.name == answers.name)
+        {
+            return Err(Failure::usage(format!(
+                "two files of answers are named '{}'",
+                answers.name
+            )));
+        }
+        let text = read_text(&answers.file)?;
+        let mut found =
+            read_answers(&text, &experiments).map_err(|error| refused(&answers.file, &error))?;
+        for truth in truths {
+            let judge = Judge::new(&truth.process).map_err(Failure::usage)?;
+            let (answer, seconds) = match found.remove(&truth.number) {
+                Some(foreign) => (foreign.answer, foreign.seconds),
+                None => (Err("there is no row for it".to_owned()), None),
+            };
+            records.push(Record {
+                seconds,
+                ..judge.record(truth.number, &answers.name, answer)
+            });
+        }
+    }
+    Ok(records)
+}

@@ -1,0 +1,119 @@
+//! `onecycle dataset`: experiments to learn from, made on all threads and kept file by file.
+
+pub(super) mod folder;
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use onecycle_lab::experiments::Recipe;
+use onecycle_lab::learn::dataset::shards::Manifest;
+use onecycle_lab::learn::identifier;
+
+use self::folder::Folder;
+use super::workers::{Lot, Workers};
+use crate::args;
+use crate::failure::{Failure, exit};
+use crate::output::{Waiting, print, tell};
+use crate::{report, settings};
+
+/// What the command has done.
+pub(crate) struct Done {
+    pub(crate) manifest: Manifest,
+    /// Files that were there, whole.
+    pub(crate) kept: usize,
+    /// Experiments made, with and without an oscillation.
+    pub(crate) made: u64,
+    pub(crate) took: Duration,
+}
+
+pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
+    if arguments.parquet.is_some() && !cfg!(feature = "parquet") {
+        return Err(Failure::usage(
+            "this build cannot write Parquet: make one with cargo build --release --features parquet",
+        ));
+    }
+    let recipe = recipe(arguments.recipe.as_deref())?;
+    let workers = Workers::new(arguments.threads)?;
+    let begin = Instant::now();
+    let (folder, kept, made) = filled(&arguments.into, recipe, arguments.examples, &workers)?;
+    workers.finish();
+    #[cfg(feature = "parquet")]
+    if let Some(path) = &arguments.parquet {
+        let _waiting = Waiting::on(format!("writing {}", path.display()));
+        folder.write_parquet(path)?;
+    }
+    let done = Done {
+        manifest: folder.into_manifest(),
+        kept,
+        made,
+        took: begin.elapsed(),
+    };
+    print(&if arguments.json {
+        report::dataset::json(&done)
+    } else {
+        report::dataset::text(&done, &arguments.into)
+    })?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+/// The folder of so many experiments of a recipe, all of them made; how many files were there, and how
+/// many experiments were missing.
+pub(super) fn filled(
+    path: &Path,
+    recipe: Recipe,
+    examples: u64,
+    workers: &Workers,
+) -> Result<(Folder, usize, u64), Failure> {
+    let waiting = Waiting::on(format!("looking at {}", path.display()));
+    let mut folder = Folder::open(path, recipe, examples)?;
+    let damaged = folder.drop_damaged();
+    drop(waiting);
+    if !damaged.is_empty() {
+        tell(&format!(
+            "made again, for they are missing or damaged: {}",
+            damaged.join(", ")
+        ));
+    }
+    let missing = folder.missing();
+    let kept = folder.manifest().shards.len() - missing.len();
+    if kept > 0 && !missing.is_empty() {
+        tell(&format!(
+            "going on after {kept} of {} files",
+            folder.manifest().shards.len()
+        ));
+    }
+    let made = make(&mut folder, &missing, workers)?;
+    Ok((folder, kept, made))
+}
+
+fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
+    let Some(path) = path else {
+        return Ok(Recipe::default());
+    };
+    // That of an identifier has the recipe of its experiments in a table.
+    let table: toml::Table = settings::read(path)?;
+    let recipe = if table.contains_key("experiments") {
+        settings::read::<identifier::Recipe>(path)?.experiments
+    } else {
+        settings::read::<Recipe>(path)?
+    };
+    recipe
+        .validate()
+        .map_err(|error| settings::out_of_range(path, error))?;
+    Ok(recipe)
+}
+
+/// Makes the files that are missing; returns how many experiments that took.
+fn make(folder: &mut Folder, missing: &[usize], workers: &Workers) -> Result<u64, Failure> {
+    let examples = |shard: usize| folder.manifest().numbers(shard).count() as u64;
+    let made: u64 = missing.iter().map(|&shard| examples(shard)).sum();
+    let all = folder.manifest().examples;
+    workers.expect(all as usize, (all - made) as usize);
+    for &shard in missing {
+        let file = folder.manifest().make(shard, &Lot(workers));
+        let (bytes, entry) = file.map_err(Failure::usage)?;
+        folder.keep(shard, &bytes, entry)?;
+    }
+    Ok(made)
+}

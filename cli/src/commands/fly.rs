@@ -1,0 +1,154 @@
+//! `onecycle fly`: missions flown, judged, and written down.
+
+use std::fs;
+use std::io::{self, Write};
+use std::process::ExitCode;
+
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_lab::judge::evaluate::{Cycles, CyclesError};
+use onecycle_lab::judge::flights::{judged, trace};
+use onecycle_lab::paper::grid::Pieces;
+use onecycle_onboard::tuner::Phase;
+use onecycle_plant::multirotor::pilot::TICK_S;
+use onecycle_plant::multirotor::{Axis, Flown, Mission, Record, Tuned, fly};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+use super::workers::Workers;
+use crate::args::Fly;
+use crate::failure::{Failure, exit};
+use crate::output::{print, write_file, write_text};
+use crate::report::fly as report;
+
+/// Cycles that are looked at one by one: those of the paper's Table VII.
+const CYCLES: usize = 5;
+
+/// One flight and what it was worth.
+pub(crate) struct Flight {
+    pub(crate) flown: Flown,
+    /// Of each axis that was tuned.
+    pub(crate) judged: Vec<(Tuned, Deterioration)>,
+    /// Of [`Mission::Cycles`], where each of them tells a process.
+    pub(crate) cycles: Option<Cycles>,
+}
+
+/// A mission and its flights; ticks are kept of the first alone.
+pub(crate) struct Campaign {
+    pub(crate) mission: Mission,
+    pub(crate) flights: Vec<Flight>,
+}
+
+pub(crate) fn run(arguments: &Fly) -> Result<ExitCode, Failure> {
+    let is_wanted = |mission: &Mission| {
+        let mut names = arguments.missions.iter();
+        arguments.missions.is_empty() || names.any(|named| named.0 == *mission)
+    };
+    let missions: Vec<Mission> = Mission::ALL.into_iter().filter(is_wanted).collect();
+    if let Some(out) = &arguments.out {
+        fs::create_dir_all(out).map_err(|error| Failure::output(out, error))?;
+    }
+    let workers = Workers::new(arguments.threads)?;
+    let seeds = arguments.seeds as usize;
+    let flights = workers.map(missions.len() * seeds, |piece| {
+        let (mission, number) = (missions[piece / seeds], piece % seeds);
+        one(
+            mission,
+            arguments.seed.wrapping_add(number as u64),
+            number == 0,
+        )
+    });
+    workers.finish();
+    let mut flights = flights.into_iter();
+    let mut campaigns = Vec::with_capacity(missions.len());
+    for mission in missions {
+        let flights: Result<Vec<Flight>, Failure> = flights.by_ref().take(seeds).collect();
+        campaigns.push(Campaign {
+            mission,
+            flights: flights?,
+        });
+    }
+    print(&report::text(&campaigns))?;
+    if let Some(out) = &arguments.out {
+        for campaign in &campaigns {
+            let path = out.join(format!("{}.csv", campaign.mission.name()));
+            if let Some(first) = campaign.flights.first() {
+                write_file(&path, |file| csv(file, &first.flown.records))?;
+            }
+        }
+        let path = out.join("flights.html");
+        let page = report::html(&campaigns);
+        write_text(&path, &page)?;
+        print(&format!("{}\n", path.display()))?;
+    }
+    let all_flown = (campaigns.iter().flat_map(|campaign| &campaign.flights))
+        .all(|flight| flight.flown.failure.is_none());
+    Ok(ExitCode::from(if all_flown {
+        exit::DONE
+    } else {
+        exit::NO_PROCESS
+    }))
+}
+
+fn one(mission: Mission, seed: u64, is_kept: bool) -> Result<Flight, Failure> {
+    let mut flown = fly(mission, Pcg64Mcg::seed_from_u64(seed)).map_err(Failure::usage)?;
+    let judged = (flown.tuned.iter())
+        .map(|tuned| judged(tuned).map(|cost| (*tuned, cost)))
+        .collect::<Result<_, _>>()
+        .map_err(Failure::usage)?;
+    let cycles = match mission {
+        Mission::Cycles if flown.failure.is_none() => cycles(&flown).ok(),
+        _ => None,
+    };
+    if !is_kept {
+        flown.records = vec![];
+    }
+    Ok(Flight {
+        flown,
+        judged,
+        cycles,
+    })
+}
+
+/// The last cycles of the relay, one by one.
+fn cycles(flown: &Flown) -> Result<Cycles, CyclesError> {
+    let index = Axis::Altitude.index();
+    let oscillates =
+        |record: &&Record| matches!(record.phases[index], Phase::Relay | Phase::Identify);
+    let records: Vec<Record> = flown.records.iter().filter(oscillates).copied().collect();
+    Cycles::of(&trace(&records, Axis::Altitude), TICK_S, CYCLES)
+}
+
+/// Every tick: what was true, what was measured and commanded, what each tuner was doing.
+fn csv(file: &mut dyn Write, records: &[Record]) -> io::Result<()> {
+    let mut out = io::BufWriter::new(file);
+    write!(
+        out,
+        "time_s,x_m,y_m,altitude_m,climb_m_per_s,roll_rad,pitch_rad,yaw_rad"
+    )?;
+    for axis in Axis::ALL {
+        let name = axis.name();
+        write!(out, ",{name}_measured,{name}_command,{name}_phase")?;
+    }
+    writeln!(out)?;
+    for record in records {
+        let (at, angles) = (record.reading.position_m, record.reading.angles_rad);
+        let climb = record.reading.velocity_m_per_s.z;
+        write!(
+            out,
+            "{:.3},{},{},{},{climb}",
+            record.time_s, at.x, at.y, at.z
+        )?;
+        write!(out, ",{},{},{}", angles.x, angles.y, angles.z)?;
+        for axis in Axis::ALL {
+            let k = axis.index();
+            let phase = record.phases[k].name();
+            write!(
+                out,
+                ",{},{},{phase}",
+                record.measured[k], record.commands[k]
+            )?;
+        }
+        writeln!(out)?;
+    }
+    out.flush()
+}

@@ -1,0 +1,220 @@
+//! `onecycle grid`: processes that stand for a space; made, written, checked, drawn.
+
+mod part;
+
+use std::io::{self, BufWriter};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use onecycle_lab::paper::grid;
+use onecycle_lab::paper::grid::{Check, Grid, GridFile, Layout, Settings, check};
+use onecycle_lab::space::candidate::Gains;
+
+use self::part::Part;
+use super::workers::Workers;
+use crate::args;
+use crate::failure::{Failure, exit};
+use crate::output::{Waiting, print, tell, write_file, write_text};
+use crate::{pictures, report, settings};
+
+/// Most members whose costs are written unasked: four million numbers, 40 MB.
+const MOST_IN_MATRIX: usize = 2000;
+
+/// Rows of members, and of the matrix, that each thread works on before all are kept in the part
+/// file: a second's work or so.
+const ROWS_PER_THREAD: usize = 2;
+const COSTS_PER_THREAD: usize = 64;
+
+/// What the command has done.
+pub(crate) struct Done {
+    pub(crate) grid: Grid,
+    pub(crate) check: Option<Check>,
+    pub(crate) has_matrix: bool,
+    pub(crate) took: Duration,
+}
+
+impl Done {
+    /// Whether no process was found without a member near; of no check, nothing was.
+    pub(crate) fn holds(&self) -> bool {
+        self.check.is_none_or(|check| check.beyond == 0)
+    }
+}
+
+pub(crate) fn run(arguments: &args::Grid) -> Result<ExitCode, Failure> {
+    let begin = Instant::now();
+    let workers = Workers::new(arguments.threads)?;
+    let mut done = match &arguments.from {
+        Some(path) => read(arguments, path, &workers)?,
+        None => make(arguments, &workers)?,
+    };
+    done.took = begin.elapsed();
+    workers.finish();
+    if let Some(path) = &arguments.picture {
+        pictures::grid::write(path, &done.grid)?;
+    }
+    if let Some(path) = &arguments.report {
+        let page = report::grid::html(&done).map_err(Failure::usage)?;
+        write_text(path, &page)?;
+    }
+    print(&if arguments.json {
+        report::grid::json(&done)
+    } else {
+        report::grid::text(&done)
+    })?;
+    Ok(ExitCode::from(if done.holds() {
+        exit::DONE
+    } else {
+        exit::NO_PROCESS
+    }))
+}
+
+fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<Done, Failure> {
+    let failed = |reason: String| Failure::Settings {
+        path: path.to_owned(),
+        reason,
+    };
+    let waiting = Waiting::on(format!("reading {}", path.display()));
+    let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
+    let file = GridFile::read(&text).map_err(|error| failed(error.to_string()))?;
+    drop(waiting);
+    let grid = file
+        .grid(workers)
+        .map_err(|error| failed(error.to_string()))?;
+    let check = match arguments.check {
+        Some(_) => checked(arguments, &grid, workers)?,
+        None => file.check,
+    };
+    Ok(Done {
+        grid,
+        check,
+        has_matrix: file.matrix.is_some(),
+        took: Duration::ZERO,
+    })
+}
+
+fn make(arguments: &args::Grid, workers: &Workers) -> Result<Done, Failure> {
+    let settings = Settings {
+        space: settings::space(arguments.space.as_deref())?,
+        deterioration: arguments.deterioration,
+        layout: if arguments.fewest {
+            Layout::Fewest
+        } else {
+            Layout::Rays
+        },
+        gains: if arguments.equal_gains {
+            Gains::Equal
+        } else {
+            Gains::SameAmplitude
+        },
+    };
+    // A few members are made again sooner than they are read.
+    let mut part = match (&arguments.out, settings.layout) {
+        (Some(out), Layout::Rays) => Some(part_of(out, &settings, arguments.restart)?),
+        _ => None,
+    };
+    let grid = lay(&settings, part.as_mut(), workers)?;
+    let has_matrix =
+        arguments.out.is_some() && (arguments.matrix || grid.members.len() <= MOST_IN_MATRIX);
+    if let (true, Some(part)) = (has_matrix, &mut part) {
+        keep_costs(&grid, part, workers)?;
+    }
+    let check = checked(arguments, &grid, workers)?;
+    if let Some(out) = &arguments.out {
+        write(out, &grid, check.as_ref(), has_matrix, part)?;
+    }
+    Ok(Done {
+        grid,
+        check,
+        has_matrix,
+        took: Duration::ZERO,
+    })
+}
+
+fn part_of(out: &Path, settings: &Settings, restart: bool) -> Result<Part, Failure> {
+    let mut path = out.as_os_str().to_owned();
+    path.push(".part");
+    let part = Part::open(PathBuf::from(path), settings, restart)?;
+    if let Some(what) = part.what_is_done() {
+        tell(&format!("going on after {what} of {}", part.name()));
+    }
+    Ok(part)
+}
+
+fn lay(settings: &Settings, part: Option<&mut Part>, workers: &Workers) -> Result<Grid, Failure> {
+    let Some(part) = part else {
+        return Grid::build(settings, workers).map_err(Failure::usage);
+    };
+    let thetas_rad = match part.thetas_rad() {
+        Some(thetas_rad) => thetas_rad.to_vec(),
+        None => {
+            let thetas_rad = grid::rows(settings, workers).map_err(Failure::usage)?;
+            part.keep_thetas(thetas_rad.clone())?;
+            thetas_rad
+        }
+    };
+    workers.expect(thetas_rad.len(), part.rows().len());
+    let at_once = ROWS_PER_THREAD * workers.threads();
+    for some in thetas_rad[part.rows().len()..].to_vec().chunks(at_once) {
+        for row in workers.run(some.len(), |k| grid::row(settings, some[k])) {
+            part.keep_row(row.map_err(Failure::usage)?)?;
+        }
+    }
+    Grid::of_rays(settings, part.rows(), workers).map_err(Failure::usage)
+}
+
+fn keep_costs(grid: &Grid, part: &mut Part, workers: &Workers) -> Result<(), Failure> {
+    let count = grid.members.len();
+    let at_once = COSTS_PER_THREAD * workers.threads();
+    workers.expect(count, part.costs());
+    while part.costs() < count {
+        let first = part.costs();
+        let some = at_once.min(count - first);
+        for costs in workers.run(some, |k| costs(grid, first + k)) {
+            part.keep_costs(&costs)?;
+        }
+    }
+    Ok(())
+}
+
+/// A row of the matrix, as files have it.
+fn costs(grid: &Grid, of: usize) -> Vec<Option<f64>> {
+    let costs = grid.costs(of).into_iter();
+    costs.map(|cost| cost.map(grid::rounded)).collect()
+}
+
+fn checked(
+    arguments: &args::Grid,
+    grid: &Grid,
+    workers: &Workers,
+) -> Result<Option<Check>, Failure> {
+    let processes = arguments.check;
+    processes
+        .map(|processes| check(grid, processes, arguments.seed, workers))
+        .transpose()
+        .map_err(Failure::usage)
+}
+
+fn write(
+    path: &Path,
+    grid: &Grid,
+    check: Option<&Check>,
+    has_matrix: bool,
+    part: Option<Part>,
+) -> Result<(), Failure> {
+    write_file(path, |file| {
+        let mut file = BufWriter::new(file);
+        match (&part, has_matrix) {
+            (_, false) => grid::write(&mut file, grid, check, None),
+            (Some(part), true) => {
+                grid::write(&mut file, grid, check, Some(&mut part.read_costs()?))
+            }
+            (None, true) => {
+                let mut rows = (0..grid.members.len()).map(|i| Ok(costs(grid, i)));
+                grid::write(&mut file, grid, check, Some(&mut rows))
+            }
+        }?;
+        io::Write::flush(&mut file)
+    })?;
+    part.map_or(Ok(()), Part::remove)
+}

@@ -1,0 +1,271 @@
+//! `onecycle pack`: the files that identifiers are; shown, checked, exchanged.
+
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+use onecycle_lab::learn::onnx;
+use onecycle_lab::learn::onnx::Normalisation;
+use onecycle_lab::learn::pack::{
+    PackContents, PackedWeights, Precision, Quantisation, layers, network_of_tensors, quantisation,
+};
+use onecycle_lab::learn::train::{Network, Tensor, TensorFile};
+use onecycle_onboard::network::Activation;
+use onecycle_onboard::pack::{DEFAULT, OUTPUTS, Pack, SELF_TEST_TOLERANCE};
+use onecycle_onboard::signature::LENGTH;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+use serde_json::{Value, json};
+
+use crate::args::{self, PackAction, PackSource};
+use crate::failure::{Failure, exit};
+use crate::output::{print, write_file};
+use crate::report;
+
+/// Most bytes of a pack: a thousand times what one takes. What is larger is something else.
+const MOST_OF_A_PACK: u64 = 1 << 24;
+/// Most bytes of a model: what its format can have.
+const MOST_OF_A_MODEL: u64 = 1 << 31;
+
+/// Random signatures that networks are compared on, of seed 1.
+pub(crate) const SAMPLES: usize = 1000;
+/// How far what the network sees of them lies from zero: two standard deviations of its inputs.
+const SPREAD: f32 = 2.0;
+
+pub(crate) fn run(arguments: &args::Pack) -> Result<ExitCode, Failure> {
+    match &arguments.action {
+        PackAction::Show(arguments) => show(arguments),
+        PackAction::Verify(arguments) => verify(arguments),
+        PackAction::Export(arguments) => export(arguments),
+        PackAction::Import(arguments) => import(arguments),
+    }
+}
+
+fn show(arguments: &args::ShowPack) -> Result<ExitCode, Failure> {
+    let bytes = bytes(&arguments.pack)?;
+    let pack = read(&arguments.pack, &bytes)?;
+    print(&if arguments.json {
+        report::pack::json(&pack)
+    } else {
+        report::pack::text(&arguments.pack.to_string(), &pack)
+    })?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+fn verify(arguments: &args::VerifyPack) -> Result<ExitCode, Failure> {
+    let bytes = bytes(&arguments.pack)?;
+    let pack = read(&arguments.pack, &bytes)?;
+    let worst = pack.self_test();
+    print(&report::pack::verified(
+        &arguments.pack.to_string(),
+        &pack,
+        worst,
+    ))?;
+    // A difference that is no number is not below the tolerance.
+    let passes = worst.is_none_or(|worst| worst <= SELF_TEST_TOLERANCE);
+    Ok(ExitCode::from(if passes {
+        exit::DONE
+    } else {
+        exit::NO_PROCESS
+    }))
+}
+
+fn export(arguments: &args::ExportPack) -> Result<ExitCode, Failure> {
+    let bytes = bytes(&arguments.pack)?;
+    let pack = read(&arguments.pack, &bytes)?;
+    let failed = |reason: String| unreadable(&path(&arguments.pack), reason);
+    let contents = PackContents::read(&pack).map_err(|error| failed(error.to_string()))?;
+    let network = contents
+        .network()
+        .map_err(|error| failed(error.to_string()))?;
+    let normalisation = Normalisation {
+        offsets: contents.input_offsets.to_vec(),
+        scales: contents.input_scales.to_vec(),
+    };
+    let model =
+        onnx::export(&network, Some(&normalisation)).map_err(|error| failed(error.to_string()))?;
+    write_file(&arguments.onnx, |file| file.write_all(&model))?;
+    if let Some(path) = &arguments.samples {
+        let samples = samples_file(&pack);
+        write_file(path, |file| file.write_all(&samples))?;
+    }
+    Ok(ExitCode::from(exit::DONE))
+}
+
+/// Random signatures and what the pack makes of them, as safetensors.
+fn samples_file(pack: &Pack<'_>) -> Vec<u8> {
+    let signatures = signatures(pack);
+    let outputs = signatures
+        .iter()
+        .flat_map(|signature| pack.outputs(signature));
+    let tensor = |name: &str, columns, values| Tensor {
+        name: name.to_owned(),
+        shape: vec![SAMPLES, columns],
+        values,
+    };
+    let outputs = tensor("outputs", OUTPUTS, outputs.collect());
+    let inputs = tensor("inputs", LENGTH, signatures.into_flattened());
+    TensorFile {
+        tensors: vec![inputs, outputs],
+        ..TensorFile::default()
+    }
+    .to_bytes()
+}
+
+/// Random ones, within [`SPREAD`] once they are normalised.
+fn signatures(pack: &Pack<'_>) -> Vec<[f32; LENGTH]> {
+    let mut rng = Pcg64Mcg::seed_from_u64(1);
+    let scaling: Vec<_> = (pack.input_offsets().iter())
+        .zip(pack.input_scales().iter())
+        .collect();
+    let signature = |_| {
+        std::array::from_fn(|i| {
+            let (offset, scale) = scaling[i];
+            let normalised: f32 = rng.random_range(-SPREAD..=SPREAD);
+            // An input that the network does not see may be anything.
+            if scale == 0.0 {
+                offset
+            } else {
+                offset + normalised / scale
+            }
+        })
+    };
+    (0..SAMPLES).map(signature).collect()
+}
+
+fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
+    let like_bytes = bytes(&arguments.like)?;
+    let like = read(&arguments.like, &like_bytes)?;
+    let mut contents = PackContents::read(&like)
+        .map_err(|error| unreadable(&path(&arguments.like), error.to_string()))?;
+    let activations: Vec<_> = contents
+        .layers
+        .iter()
+        .map(|layer| layer.activation)
+        .collect();
+    let (normalisation, network) = learnt(&arguments.model, &activations)?;
+    let failed = |reason: String| unreadable(&arguments.model, reason);
+
+    let brings_normalisation = normalisation.is_some();
+    if let Some(Normalisation { offsets, scales }) = normalisation {
+        let row = |values: Vec<f32>| {
+            <[f32; LENGTH]>::try_from(values).map_err(|values| {
+                failed(format!("it takes {} numbers, not {LENGTH}", values.len()))
+            })
+        };
+        contents.input_offsets = row(offsets)?;
+        contents.input_scales = row(scales)?;
+    }
+    contents.layers =
+        layers(&network, precision(&contents)).map_err(|error| failed(error.to_string()))?;
+    contents.card = card(contents.card, arguments, like.content_hash());
+    let made = contents
+        .to_bytes()
+        .map_err(|error| failed(error.to_string()))?;
+    let pack = Pack::read(&made).map_err(|error| failed(error.to_string()))?;
+    let changed: Quantisation = quantisation(&pack, &network, &signatures(&pack))
+        .map_err(|error| failed(error.to_string()))?;
+    write_file(&arguments.out, |file| file.write_all(&made))?;
+    print(&report::pack::imported(
+        arguments,
+        &pack,
+        brings_normalisation,
+        &changed,
+    ))?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+/// The network of a file, and the normalisation that it brings.
+fn learnt(
+    path: &Path,
+    activations: &[Activation],
+) -> Result<(Option<Normalisation>, Network), Failure> {
+    let failed = |reason: String| unreadable(path, reason);
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    match extension.to_str() {
+        Some("onnx") => {
+            let imported = onnx::import(&read_at_most(path, MOST_OF_A_MODEL)?)
+                .map_err(|error| failed(error.to_string()))?;
+            Ok((imported.normalisation, imported.network))
+        }
+        Some("safetensors") => {
+            let bytes = read_at_most(path, MOST_OF_A_MODEL)?;
+            let network = network_of_tensors(&bytes, activations)
+                .map_err(|error| failed(error.to_string()))?;
+            Ok((None, network))
+        }
+        _ => Err(failed(
+            "its name does not say what it is: a network ends in .onnx or .safetensors".to_owned(),
+        )),
+    }
+}
+
+/// How the pack keeps its weights.
+fn precision(contents: &PackContents) -> Precision {
+    let is_bytes = |weights: &PackedWeights| matches!(weights, PackedWeights::Bytes { .. });
+    if contents.layers.iter().any(|layer| is_bytes(&layer.weights)) {
+        Precision::Bytes
+    } else {
+        Precision::Floats
+    }
+}
+
+/// A card that says where the network and everything else come from. What was measured with the
+/// other network is not said of this one.
+fn card(mut other: Value, arguments: &args::ImportPack, hash: u64) -> Value {
+    if let Some(card) = other.as_object_mut() {
+        card.remove("scores");
+    }
+    let model = arguments.model.file_name().unwrap_or_default();
+    json!({
+        "scores": null,
+        "imported": {
+            "network": model.to_string_lossy(),
+            "onecycle": env!("CARGO_PKG_VERSION"),
+            "all_else_from": { "hash": format!("{hash:016x}"), "card": other },
+        },
+    })
+}
+
+fn path(source: &PackSource) -> PathBuf {
+    match source {
+        PackSource::Embedded => PathBuf::from("default"),
+        PackSource::File(path) => path.clone(),
+    }
+}
+
+fn unreadable(path: &Path, reason: String) -> Failure {
+    Failure::Settings {
+        path: path.to_owned(),
+        reason,
+    }
+}
+
+pub(super) fn bytes(source: &PackSource) -> Result<Cow<'static, [u8]>, Failure> {
+    match source {
+        PackSource::Embedded => Ok(Cow::Borrowed(DEFAULT)),
+        PackSource::File(path) => read_at_most(path, MOST_OF_A_PACK).map(Cow::Owned),
+    }
+}
+
+pub(super) fn read<'a>(source: &PackSource, bytes: &'a [u8]) -> Result<Pack<'a>, Failure> {
+    Pack::read(bytes).map_err(|error| unreadable(&path(source), error.to_string()))
+}
+
+/// The bytes of a file, of which there may be so many.
+fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
+    let failed = |error: io::Error| unreadable(path, error.to_string());
+    let mut bytes = Vec::new();
+    let file = File::open(path).map_err(failed)?;
+    let read = file
+        .take(most + 1)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
+    if read as u64 > most {
+        let reason = format!("it has more than {most} bytes, too many to be what is asked for");
+        return Err(unreadable(path, reason));
+    }
+    Ok(bytes)
+}

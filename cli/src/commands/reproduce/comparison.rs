@@ -1,0 +1,107 @@
+//! Table IV and the tuning rules: several methods on the same random processes, under both protocols.
+
+use onecycle_lab::judge::evaluate::{Benchmark, Contender, Record, Summary, records};
+use onecycle_lab::paper::grid::Pieces;
+use serde::Deserialize;
+
+use super::part::{Found, Row};
+use crate::commands::clock::thread_seconds;
+use crate::commands::workers::Workers;
+use crate::failure::Failure;
+use crate::pages::plot::{Marks, Series};
+use crate::report::number::{percent, seconds};
+
+/// The experiments and the methods.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Settings {
+    /// Processes under either protocol.
+    systems: u64,
+    seed: u64,
+    /// Names of methods, and what the rows call them.
+    methods: Vec<(String, String)>,
+}
+
+/// A method of this name.
+fn contender(name: &str) -> Result<Contender, Failure> {
+    Contender::from_name(name).ok_or_else(|| Failure::usage(format!("there is no method '{name}'")))
+}
+
+pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Failure> {
+    let contenders = settings.methods.iter().map(|(name, _)| contender(name));
+    let contenders: Vec<Contender> = contenders.collect::<Result<_, _>>()?;
+    let benchmark = Benchmark {
+        experiments: 2 * settings.systems,
+        seed: settings.seed,
+    };
+    let judged = workers.map(benchmark.experiments as usize, |index| {
+        let (truth, recorded) = benchmark.experiment(index as u64 + 1)?;
+        let signals = recorded.seen().signals;
+        Ok((
+            truth.is_trimmed,
+            records(&truth, &signals, &contenders, &thread_seconds)?,
+        ))
+    });
+    let judged: Result<Vec<(bool, Vec<Record>)>, onecycle_lab::judge::evaluate::ExperimentError> =
+        judged.into_iter().collect();
+    let judged = judged.map_err(Failure::usage)?;
+    let mut found = Found::default();
+    for is_trimmed in [false, true] {
+        let of_protocol = judged.iter().filter(|(trimmed, _)| *trimmed == is_trimmed);
+        let records: Vec<&Vec<Record>> = of_protocol.map(|(_, records)| records).collect();
+        let of_method = |number: usize| -> Vec<&Record> {
+            records.iter().map(|records| &records[number]).collect()
+        };
+        let labels = settings.methods.iter().map(|(_, label)| label).enumerate();
+        found.tables.push(
+            labels
+                .clone()
+                .map(|(number, label)| row(label, &Summary::of(label, &of_method(number))))
+                .collect(),
+        );
+        found.figures.push(
+            labels
+                .map(|(number, label)| sorted(label, &of_method(number)))
+                .collect(),
+        );
+    }
+    Ok(found)
+}
+
+fn row(label: &str, summary: &Summary) -> Row {
+    let costs = &summary.costs;
+    let cost = |cost: Option<f64>| cost.map_or("-".to_owned(), percent);
+    let worst = if costs.unstable > 0 {
+        format!("unstable ({})", cost(costs.worst))
+    } else {
+        cost(costs.worst)
+    };
+    Row::new(
+        label,
+        [
+            cost(costs.mean),
+            worst,
+            costs.unstable.to_string(),
+            costs.no_answer.to_string(),
+            summary.median_seconds.map_or("-".to_owned(), seconds),
+        ],
+    )
+}
+
+/// Least `|J|` that a logarithmic axis shows (%).
+const LEAST_SHOWN: f64 = 1e-3;
+
+/// `|J|` (%) of the stable loops in rising order, over the part of the systems that are no worse (%).
+fn sorted(label: &str, records: &[&Record]) -> Series {
+    let costs = records.iter().filter_map(|record| record.deterioration);
+    let mut costs: Vec<f64> = costs.map(f64::abs).collect();
+    costs.sort_unstable_by(f64::total_cmp);
+    let whole = records.len().max(1) as f64;
+    let points = costs.iter().enumerate().map(|(rank, cost)| {
+        (
+            100.0 * (rank + 1) as f64 / whole,
+            (100.0 * cost).max(LEAST_SHOWN),
+        )
+    });
+    Series::of_points(label, Marks::Line, points)
+}

@@ -1,0 +1,85 @@
+//! Table VII: cycles of one run, each identified by itself, and what the controller of each costs on the
+//! process of every other.
+
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_lab::judge::evaluate::{Cycles, Judge};
+use onecycle_plant::Trace;
+use serde::Deserialize;
+
+use super::part::{Found, Row};
+use super::single::{SAMPLE_S, Setup, shown};
+use crate::failure::Failure;
+use crate::pages::plot::{Marks, Series};
+use crate::report::number::percent;
+
+/// The run.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Settings {
+    setup: Setup,
+    /// Input bias, in parts of the relay's amplitude.
+    input_bias: f64,
+    /// Cycles at its end.
+    cycles: usize,
+}
+
+pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
+    let (truth, trace) = settings.setup.run(settings.input_bias)?;
+    let cycles = Cycles::of(&trace, SAMPLE_S, settings.cycles).map_err(Failure::usage)?;
+    let judge = Judge::new(&truth.process).map_err(Failure::usage)?;
+    let mut rows = table(&cycles);
+    for (row, (answer, _)) in rows.iter_mut().zip(&cycles.answers) {
+        row.cells
+            .push(shown(Some(judge.deterioration(answer.feedback))));
+    }
+    let signal = |name, values| relative(name, &trace, values, cycles.range_s);
+    Ok(Found {
+        tables: vec![
+            rows,
+            vec![Row::new(
+                "largest J_ij of two cycles",
+                [percent(cycles.largest())],
+            )],
+        ],
+        figures: vec![vec![
+            signal("output", &trace.output),
+            signal("input", &trace.input),
+        ]],
+    })
+}
+
+/// A row for the controller of each cycle, a cell for each process.
+pub(crate) fn table(cycles: &Cycles) -> Vec<Row> {
+    let cells = |i: usize, row: &[Deterioration]| -> Vec<String> {
+        (row.iter().enumerate())
+            .map(|(j, cost)| {
+                if i == j {
+                    "-".to_owned()
+                } else {
+                    shown(Some(*cost))
+                }
+            })
+            .collect()
+    };
+    (cycles.cross().iter().enumerate())
+        .map(|(i, row)| Row::new((i + 1).to_string(), cells(i, row)))
+        .collect()
+}
+
+/// A signal over its largest size, from one time to another (s).
+pub(super) fn relative(
+    name: &str,
+    trace: &Trace,
+    signal: &[f64],
+    (from_s, to_s): (f64, f64),
+) -> Series {
+    let points = trace.time_s.iter().copied().zip(signal.iter().copied());
+    let inside = points.filter(|(time_s, _)| (from_s..=to_s).contains(time_s));
+    let inside: Vec<(f64, f64)> = inside.collect();
+    let size = inside
+        .iter()
+        .fold(0.0_f64, |most, (_, y)| most.max(y.abs()));
+    let scale = if size > 0.0 { 1.0 / size } else { 1.0 };
+    let marks = Marks::Line;
+    Series::of_points(name, marks, inside.iter().map(|&(t, y)| (t, scale * y)))
+}

@@ -1,0 +1,81 @@
+//! The paper's figures of signals: a cycle as its network sees it, and what PEM is given.
+
+use onecycle_identify::find_oscillation;
+use onecycle_lab::judge::evaluate::RelayTest;
+use onecycle_lab::paper::classifier::{Fit, INPUTS, Prepared, Protocol, SAMPLES, Trials};
+use onecycle_lab::space::Space;
+use onecycle_plant::Trace;
+use serde::Deserialize;
+
+use super::cycles::relative;
+use super::part::Found;
+use super::single::{SAMPLE_S, Setup};
+use crate::failure::Failure;
+use crate::pages::plot::{Marks, Series};
+
+/// The processes and their experiments.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Settings {
+    /// Of the network's cycle: `T_prop`, `T_body`, `tau` (s); largest bias and noise, and their seed.
+    times_s: [f64; 3],
+    bias: f64,
+    sigma: f64,
+    seed: u64,
+    /// Of PEM's data.
+    setup: Setup,
+    input_bias: f64,
+}
+
+pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
+    let (truth, trace) = settings.setup.run(settings.input_bias)?;
+    let found = find_oscillation(&onecycle_lab::experiments::signals_of(&trace, SAMPLE_S), 1);
+    let cycle = found.map_err(Failure::usage)?;
+    let swept = truth
+        .recorded_by(RelayTest::Swept)
+        .map_err(Failure::usage)?
+        .ok_or_else(|| Failure::usage("there is no swept recording"))?;
+    let mut sweep = Trace::with_capacity(swept.time_s.len());
+    for (index, &time_s) in swept.time_s.iter().enumerate() {
+        let output = swept.output[index];
+        sweep.push(time_s, swept.input[index], output, output);
+    }
+    let both = |trace: &Trace, range_s| {
+        vec![
+            relative("output", trace, &trace.output, range_s),
+            relative("input", trace, &trace.input, range_s),
+        ]
+    };
+    Ok(Found {
+        tables: vec![],
+        figures: vec![
+            prepared(settings)?,
+            both(&trace, (cycle.start_s, cycle.end_s)),
+            both(&sweep, (0.0, f64::INFINITY)),
+        ],
+    })
+}
+
+/// Both halves of the network's inputs, over their numbers.
+fn prepared(settings: &Settings) -> Result<Vec<Series>, Failure> {
+    let trials = Trials {
+        space: Space::MULTIROTOR,
+        seed: settings.seed,
+        bias: settings.bias,
+        sigma: settings.sigma,
+        protocol: Protocol::Untrimmed,
+    };
+    let trial = trials.trial(0, Some(settings.times_s));
+    let trial = trial
+        .map_err(Failure::usage)?
+        .ok_or_else(|| Failure::usage("the oscillation does not become steady"))?;
+    let mut inputs = [0.0; INPUTS];
+    Prepared::of(&trial.cycle, Fit::Padded).fill(&mut inputs);
+    let (output, input) = inputs.split_at(SAMPLES);
+    let series = |name, values: &[f32]| {
+        let points = values.iter().enumerate();
+        let points = points.map(|(number, &value)| (number as f64, f64::from(value)));
+        Series::of_points(name, Marks::Line, points)
+    };
+    Ok(vec![series("output", output), series("input", input)])
+}

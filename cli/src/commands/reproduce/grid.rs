@@ -1,0 +1,78 @@
+//! The grid of the paper's space.
+
+use onecycle_lab::paper::grid;
+use onecycle_lab::paper::grid::{Check, Grid, check};
+use onecycle_lab::space::candidate::Gains;
+use serde::Deserialize;
+
+use super::part::{Found, Row};
+use crate::commands::workers::Workers;
+use crate::failure::Failure;
+use crate::pages::plot::{Marks, Series};
+use crate::report::number::{degrees, percent};
+
+/// What is laid and how it is checked.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Settings {
+    deterioration: f64,
+    /// Grids, a column each: the gains at which processes are compared.
+    gains: Vec<Gains>,
+    /// Random processes of the check, and their seed.
+    processes: u64,
+    seed: u64,
+}
+
+pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Failure> {
+    let grids = settings.gains.iter().map(|&gains| {
+        let wanted = grid::Settings {
+            deterioration: settings.deterioration,
+            gains,
+            ..grid::Settings::default()
+        };
+        let grid = Grid::build(&wanted, workers).map_err(Failure::usage)?;
+        let check =
+            check(&grid, settings.processes, settings.seed, workers).map_err(Failure::usage)?;
+        Ok((grid, check))
+    });
+    let grids: Vec<(Grid, Check)> = grids.collect::<Result<_, Failure>>()?;
+    let row = |name: &str, cell: &dyn Fn(&(Grid, Check)) -> String| {
+        Row::new(name, grids.iter().map(cell))
+    };
+    let or_unstable = |cost: Option<f64>| cost.map_or("unstable".to_owned(), percent);
+    Ok(Found {
+        tables: vec![vec![
+            row("members", &|(grid, _)| grid.members.len().to_string()),
+            row("random processes", &|(_, check)| {
+                check.processes.to_string()
+            }),
+            row("beyond J* of their best member", &|(_, check)| {
+                check.beyond.to_string()
+            }),
+            row("farthest from it", &|(_, check)| or_unstable(check.worst)),
+            row("mean distance from it", &|(_, check)| {
+                or_unstable(check.mean)
+            }),
+            row("least phase margin under it", &|(_, check)| {
+                check.least_margin_rad.map_or("-".to_owned(), degrees)
+            }),
+        ]],
+        figures: vec![
+            grids
+                .first()
+                .map(|(grid, _)| members(grid))
+                .into_iter()
+                .collect(),
+        ],
+    })
+}
+
+/// Members by their body's lag and their dead time (s).
+fn members(grid: &Grid) -> Series {
+    let times_s = grid.members.iter().map(|member| member.candidate.times_s());
+    Series::of_points(
+        "members",
+        Marks::Points,
+        times_s.map(|[_, t_body_s, tau_s]| (t_body_s, tau_s)),
+    )
+}

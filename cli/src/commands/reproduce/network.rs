@@ -1,0 +1,87 @@
+//! Tables II and III: the paper's network with either softmax.
+
+use onecycle_lab::paper::classifier::{Choice, Recipe, Rule, Score, Test};
+use serde::Deserialize;
+
+use super::part::{Found, Row};
+use crate::commands::train::classifier::{Keep, Kind, Trained, learn};
+use crate::commands::workers::Workers;
+use crate::failure::Failure;
+use crate::report::number::{degrees, percent};
+
+/// The recipe, and what of it is another here.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Settings {
+    /// A file of `experiments`.
+    recipe: RecipeName,
+    /// Losses, a column each.
+    losses: Vec<Choice>,
+    /// The systems of Table III.
+    test: Test,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "snake_case")]
+enum RecipeName {
+    PaperNetwork,
+    PaperNetworkSmall,
+}
+
+impl Settings {
+    fn recipe(&self) -> Result<Recipe, Failure> {
+        let text = match self.recipe {
+            RecipeName::PaperNetwork => include_str!("../../../../experiments/paper_network.toml"),
+            RecipeName::PaperNetworkSmall => {
+                include_str!("../../../../experiments/paper_network_small.toml")
+            }
+        };
+        let recipe: Recipe = toml::from_str(text).map_err(Failure::usage)?;
+        Ok(Recipe {
+            losses: self.losses.clone(),
+            tests: vec![self.test],
+            ..recipe
+        })
+    }
+}
+
+pub(super) fn find(
+    settings: &Settings,
+    keep: Keep<'_>,
+    workers: &Workers,
+) -> Result<Found, Failure> {
+    let recipe = settings.recipe()?;
+    let learnt = learn(&recipe, keep, workers, Failure::usage)?;
+    let sets = learnt.done.sets.iter().enumerate();
+    let tables = sets.map(|(number, set)| {
+        let of = |trained: &Trained| trained.scores[number][Rule::MostLikely as usize];
+        let scores = learnt.done.networks.iter().map(of);
+        let [best, _] = set.best;
+        table(&scores.chain([best]).collect::<Vec<_>>(), set.kind)
+    });
+    let found = Found {
+        tables: tables.collect(),
+        figures: vec![],
+    };
+    keep.remove(&recipe)?;
+    Ok(found)
+}
+
+fn table(scores: &[Score], kind: Kind) -> Vec<Row> {
+    let row = |name: &str, cell: fn(&Score) -> String| Row::new(name, scores.iter().map(cell));
+    let cost = |cost: Option<f64>| cost.map_or("-".to_owned(), percent);
+    let accuracy = row("accuracy", |score| percent(score.accuracy));
+    let costs = [
+        row("mean |J|", |score| {
+            score.mean.map_or("-".to_owned(), percent)
+        }),
+        Row::new("largest |J|", scores.iter().map(|score| cost(score.worst))),
+        row("least phase margin", |score| {
+            score.least_margin_rad.map_or("-".to_owned(), degrees)
+        }),
+        row("unstable", |score| score.unstable.to_string()),
+        row("experiments", |score| score.examples.to_string()),
+    ];
+    let accuracy = (kind == Kind::Verification).then_some(accuracy);
+    accuracy.into_iter().chain(costs).collect()
+}

@@ -1,0 +1,203 @@
+//! Tables V and VI: one process, with other starts of the fit and with other input biases.
+
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_identify::Signals;
+use onecycle_lab::judge::baselines::pem;
+use onecycle_lab::judge::baselines::pem::Data;
+use onecycle_lab::judge::campaign::Campaign;
+use onecycle_lab::judge::evaluate::{
+    Contender, Judge, PHASE_MARGIN_DEG, Recorded, RelayTest, Seen, Truth,
+};
+use onecycle_lab::paper::grid::Pieces;
+use onecycle_onboard::Soiptd;
+use onecycle_plant::Trace;
+use serde::Deserialize;
+
+use super::part::{Found, Row};
+use crate::commands::workers::Workers;
+use crate::failure::Failure;
+use crate::pages::plot::{Marks, Series};
+use crate::report::number::percent;
+
+/// Sample period (s): the paper's.
+pub(super) const SAMPLE_S: f64 = 1e-3;
+
+/// A process and the experiment on it.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Setup {
+    /// `T_prop`, `T_body`, `tau` (s).
+    times_s: [f64; 3],
+    /// Standard deviation of the noise, as a part of the amplitude of the noise-free oscillation.
+    sigma: f64,
+    /// Seed of the noise.
+    seed: u64,
+    /// Whether the relay follows the bias.
+    is_trimmed: bool,
+    /// Duration, in periods of the oscillation.
+    periods: f64,
+}
+
+impl Setup {
+    /// The experiment under a bias (parts of the relay's amplitude), and the truth behind it.
+    pub(super) fn run(&self, input_bias: f64) -> Result<(Truth, Trace), Failure> {
+        let [t_prop_s, t_body_s, tau_s] = self.times_s;
+        let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).map_err(Failure::usage)?;
+        let campaign = Campaign {
+            seed: self.seed,
+            bias: input_bias.abs(),
+            sigma: self.sigma,
+            trim: self.is_trimmed,
+            ..Campaign::QUIET
+        };
+        let case = campaign.quiet_case(process, self.seed);
+        let mut case = case.map_err(Failure::usage)?;
+        case.bias = input_bias;
+        case.sigma = self.sigma * case.amplitude;
+        let (trace, _) = campaign.run(&case, self.periods).map_err(Failure::usage)?;
+        let truth = Truth {
+            number: 1,
+            process,
+            input_bias,
+            noise_sigma: case.sigma,
+            seed: self.seed,
+            is_trimmed: self.is_trimmed,
+        };
+        Ok((truth, trace))
+    }
+}
+
+/// What Table V starts from.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Starts {
+    setup: Setup,
+    /// Input bias, in parts of the relay's amplitude.
+    input_bias: f64,
+    /// `T_prop`, `T_body`, `tau` (s) of each.
+    starts_s: Vec<[f64; 3]>,
+}
+
+/// One process under both relay tests, and the judge of what is made of them.
+struct Bench {
+    judge: Judge,
+    /// Set I is its last cycle.
+    trace: Trace,
+    /// Set II.
+    swept: Recorded,
+}
+
+impl Bench {
+    fn new(setup: &Setup, input_bias: f64) -> Result<Self, Failure> {
+        let (truth, trace) = setup.run(input_bias)?;
+        let swept = truth.recorded_by(RelayTest::Swept);
+        Ok(Self {
+            judge: Judge::new(&truth.process).map_err(Failure::usage)?,
+            trace,
+            swept: swept
+                .map_err(Failure::usage)?
+                .ok_or_else(|| Failure::usage("there is no swept recording"))?,
+        })
+    }
+
+    fn one(&self) -> Signals<'_> {
+        onecycle_lab::experiments::signals_of(&self.trace, SAMPLE_S)
+    }
+
+    /// What PEM from a start comes to: on set I, on set II, and on set I with the bias in its model.
+    fn by_pem(&self, start_s: [f64; 3]) -> [Option<Deterioration>; 3] {
+        let cases = [
+            (self.one(), pem::Settings::paper(Data::LastCycle)),
+            (self.swept.seen().signals, pem::Settings::paper(Data::Whole)),
+            (self.one(), pem::Settings::fair()),
+        ];
+        cases.map(|(signals, settings)| {
+            let settings = pem::Settings {
+                starts_s: vec![start_s],
+                ..settings
+            };
+            let rival = pem::identify(&signals, &settings, PHASE_MARGIN_DEG.to_radians());
+            Some(self.judge.deterioration(rival.ok()?.pd))
+        })
+    }
+
+    fn by(&self, contender: Contender) -> Option<Deterioration> {
+        let answer = contender.answer(&Seen::of(self.one())).ok()?;
+        Some(self.judge.deterioration(answer.feedback))
+    }
+}
+
+/// Table V: a row a start; set I, set II, set I with the bias in the model, and ours, which needs none.
+pub(super) fn starts(settings: &Starts, workers: &Workers) -> Result<Found, Failure> {
+    let bench = Bench::new(&settings.setup, settings.input_bias)?;
+    let ours = bench.by(Contender::OneCycle(1));
+    let rows = workers.map(settings.starts_s.len(), |index| {
+        let start_s = settings.starts_s[index];
+        let cells = bench.by_pem(start_s).into_iter().chain([ours]);
+        Row::new(name(start_s), cells.map(shown))
+    });
+    Ok(Found {
+        tables: vec![rows],
+        figures: vec![],
+    })
+}
+
+/// A start as the paper's sheet has it.
+fn name([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> String {
+    format!("{t_prop_s}, {t_body_s}, {tau_s}")
+}
+
+/// What Table VI varies.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct Biases {
+    setup: Setup,
+    /// Input biases, in parts of the relay's amplitude.
+    input_biases: Vec<f64>,
+    /// Where PEM starts: `T_prop`, `T_body`, `tau` (s).
+    start_s: [f64; 3],
+}
+
+/// Names of Table VI's columns in its figure.
+const METHODS: [&str; 5] = [
+    "PEM, set I",
+    "PEM, set II",
+    "onecycle, one cycle",
+    "PEM, set I, bias in the model",
+    "PEM, set I, done with care",
+];
+
+/// Table VI: a row a bias, a column a method.
+pub(super) fn biases(settings: &Biases, workers: &Workers) -> Result<Found, Failure> {
+    let judged = workers.map(settings.input_biases.len(), |index| {
+        let bench = Bench::new(&settings.setup, settings.input_biases[index])?;
+        let [one, two, with_bias] = bench.by_pem(settings.start_s);
+        let ours = bench.by(Contender::OneCycle(1));
+        let careful = bench.by(Contender::PemFair);
+        Ok([one, two, ours, with_bias, careful])
+    });
+    let judged: Vec<[Option<Deterioration>; 5]> =
+        judged.into_iter().collect::<Result<_, Failure>>()?;
+    let both = || settings.input_biases.iter().zip(&judged);
+    let rows = both().map(|(bias, judged)| Row::new(format!("{bias:.1} h"), judged.map(shown)));
+    let series = METHODS.iter().enumerate().map(|(number, label)| {
+        let points = both().filter_map(|(bias, judged)| {
+            let relative = judged[number]?.relative()?;
+            Some((*bias, 100.0 * relative))
+        });
+        Series::of_points(label, Marks::LineAndPoints, points)
+    });
+    Ok(Found {
+        tables: vec![rows.collect()],
+        figures: vec![series.collect()],
+    })
+}
+
+/// `J` as a cell.
+pub(super) fn shown(judged: Option<Deterioration>) -> String {
+    match judged {
+        Some(Deterioration::Stable { relative, .. }) => percent(relative),
+        Some(Deterioration::Unstable) => "unstable".to_owned(),
+        None => "no answer".to_owned(),
+    }
+}

@@ -1,0 +1,331 @@
+//! The paper's classifier with every loss of its recipe, each scored on the same experiments.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::{Duration, Instant};
+
+use indicatif::ProgressBar;
+use onecycle_lab::learn::train::{Dataset, Epoch, Loss, Network, TensorFile, Trainer};
+use onecycle_lab::paper::classifier::{
+    Classes, ClassifierError, Examples, Gain, Protocol, Recipe, Rule, Score, Standard,
+    Standardised, picks,
+};
+use serde::Serialize;
+
+use super::part::Part;
+use crate::args;
+use crate::commands::workers::Workers;
+use crate::failure::{Failure, exit};
+use crate::output::{print, progress_bar_with_message, write_file, write_text};
+use crate::report::classifier as report;
+use crate::settings;
+
+/// Key of what is said beside the weights; changes with every change that a reader could notice.
+const FORMAT: &str = "onecycle.classifier/1";
+
+/// What the command has done.
+#[derive(Serialize)]
+pub(crate) struct Done<'a> {
+    pub(crate) recipe: &'a Recipe,
+    pub(crate) classes: usize,
+    pub(crate) weights: usize,
+    pub(crate) examples: usize,
+    pub(crate) unsteady: u64,
+    pub(crate) sets: Vec<Set>,
+    pub(crate) networks: Vec<Trained>,
+    /// Number of the network that was chosen, from zero.
+    pub(crate) best: usize,
+    pub(crate) seconds: f64,
+}
+
+/// Experiments that networks are scored on, and how the best picks there are would fare.
+#[derive(Serialize)]
+pub(crate) struct Set {
+    pub(crate) kind: Kind,
+    pub(crate) protocol: Protocol,
+    pub(crate) examples: usize,
+    pub(crate) unsteady: u64,
+    /// Gains from harmonics, gains from amplitudes.
+    pub(crate) best: [Score; 2],
+}
+
+/// What a set is of.
+#[derive(Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Kind {
+    /// The classes, which the best epoch is chosen by.
+    Verification,
+    /// Random processes.
+    Test,
+}
+
+/// What came of a loss.
+#[derive(Serialize)]
+pub(crate) struct Trained {
+    pub(crate) loss: Loss,
+    /// Why it ended.
+    pub(crate) outcome: &'static str,
+    pub(crate) history: Vec<Epoch>,
+    /// Seconds of training in this run.
+    pub(crate) seconds: f64,
+    /// Of every set the scores by [`Rule::ALL`].
+    pub(crate) scores: Vec<[Score; 2]>,
+}
+
+/// What is beside the weights of the best network.
+#[derive(Serialize)]
+struct Card<'a> {
+    recipe: &'a Recipe,
+    loss: Loss,
+    rule: Rule,
+    /// `T_prop`, `T_body`, `tau` of every class (s).
+    classes_s: Vec<[f64; 3]>,
+}
+
+/// What all losses have in common.
+struct Lesson<'a> {
+    recipe: &'a Recipe,
+    classes: Classes,
+    training: Examples,
+    standard: Standard,
+    /// The first one is to verify with.
+    sets: Vec<Examples>,
+    workers: &'a Workers,
+}
+
+/// What a recipe has led to.
+pub(crate) struct Learnt<'a> {
+    pub(crate) done: Done<'a>,
+    /// The best network.
+    network: Network,
+    card: Card<'a>,
+}
+
+/// Where a run keeps its networks while they learn.
+#[derive(Clone, Copy)]
+pub(crate) struct Keep<'a> {
+    /// The file that they stand beside; nothing is kept without.
+    pub(crate) beside: Option<&'a Path>,
+    /// Go on with those that are there.
+    pub(crate) resume: bool,
+}
+
+pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
+    let keep = Keep {
+        beside: arguments.out.as_deref(),
+        resume: arguments.resume,
+    };
+    let workers = Workers::new(arguments.threads)?;
+    let learnt = learn(recipe, keep, &workers, |error| {
+        settings::out_of_range(&arguments.recipe, error)
+    })?;
+    if let Some(out) = &arguments.out {
+        write(out, &learnt.network, &learnt.card)?;
+    }
+    if let Some(path) = &arguments.json {
+        let text = report::json(&learnt.done);
+        write_text(path, &text)?;
+    }
+    print(&report::text(&learnt.done))?;
+    keep.remove(recipe)?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+/// Trains a network with every loss of a recipe and scores them; `failed` says whose recipe it is.
+pub(crate) fn learn<'a>(
+    recipe: &'a Recipe,
+    keep: Keep<'_>,
+    workers: &'a Workers,
+    failed: impl Fn(ClassifierError) -> Failure,
+) -> Result<Learnt<'a>, Failure> {
+    let begin = Instant::now();
+    recipe.validate().map_err(&failed)?;
+    let lesson = Lesson::prepare(recipe, workers).map_err(failed)?;
+    let bar = progress_bar_with_message(recipe.losses.len() as u64 * recipe.epochs);
+    let mut networks = Vec::new();
+    let mut best: Option<((usize, f64), usize, Network)> = None;
+    for number in 0..recipe.losses.len() {
+        let part = keep.part(recipe, number)?;
+        bar.set_position(number as u64 * recipe.epochs);
+        let (trained, network) = lesson.learn(number, part.as_ref(), keep.resume, &bar)?;
+        let key = standing(&trained.scores[0]);
+        if best.as_ref().is_none_or(|(least, ..)| key < *least) {
+            best = Some((key, number, network));
+        }
+        networks.push(trained);
+    }
+    bar.finish_and_clear();
+    let (_, best, network) = best.ok_or_else(|| Failure::usage("the recipe names no loss"))?;
+    let card = lesson.card(best, better_rule(&networks[best].scores[0]));
+    let weights = network.folded().weights();
+    Ok(Learnt {
+        done: lesson.done(networks, (best, weights), begin.elapsed()),
+        network,
+        card,
+    })
+}
+
+impl Keep<'_> {
+    /// The file of the network of loss `number`, from zero.
+    fn part(&self, recipe: &Recipe, number: usize) -> Result<Option<Part>, Failure> {
+        let Some(out) = self.beside else {
+            return Ok(None);
+        };
+        let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
+        Ok(Some(Part::of(out, number + 1, kept)))
+    }
+
+    /// Removes what was kept: all is written.
+    pub(crate) fn remove(&self, recipe: &Recipe) -> Result<(), Failure> {
+        for number in 0..recipe.losses.len() {
+            if let Some(part) = self.part(recipe, number)? {
+                part.remove()?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The less the better: unstable picks, then the mean cost, by the better rule.
+fn standing(scores: &[Score; 2]) -> (usize, f64) {
+    let score = &scores[better_rule(scores) as usize];
+    (score.unstable, score.mean.unwrap_or(f64::INFINITY))
+}
+
+fn better_rule(scores: &[Score; 2]) -> Rule {
+    let key = |score: &Score| (score.unstable, score.mean.unwrap_or(f64::INFINITY));
+    let [most_likely, least_expected] = Rule::ALL;
+    if key(&scores[1]) < key(&scores[0]) {
+        least_expected
+    } else {
+        most_likely
+    }
+}
+
+fn write(path: &Path, network: &Network, card: &Card<'_>) -> Result<(), Failure> {
+    let card = serde_json::to_string(card).map_err(Failure::usage)?;
+    let bytes = TensorFile {
+        tensors: network.tensors(),
+        metadata: [(FORMAT.to_owned(), card)].into(),
+    }
+    .to_bytes();
+    write_file(path, |file| file.write_all(&bytes))
+}
+
+impl<'a> Lesson<'a> {
+    fn prepare(recipe: &'a Recipe, workers: &'a Workers) -> Result<Self, ClassifierError> {
+        let classes = recipe.classes(workers)?;
+        let training = recipe.training(&classes, workers)?;
+        let mut sets = vec![recipe.verification(&classes, workers)?];
+        for test in &recipe.tests {
+            sets.push(recipe.test(test, &classes, workers)?);
+        }
+        workers.finish();
+        Ok(Self {
+            recipe,
+            classes,
+            standard: Standard::of(&training),
+            training,
+            sets,
+            workers,
+        })
+    }
+
+    /// Trains with one loss; the scores of its best network, and that.
+    fn learn(
+        &self,
+        number: usize,
+        part: Option<&Part>,
+        resume: bool,
+        bar: &ProgressBar,
+    ) -> Result<(Trained, Network), Failure> {
+        let begin = Instant::now();
+        let mut trainer = super::begun(part, resume, || {
+            let network = self.recipe.network(self.classes.len())?;
+            Ok::<_, ClassifierError>(Trainer::new(self.recipe.settings(number), network)?)
+        })?;
+        let loss = trainer.settings().loss;
+        let [training, verification] =
+            [&self.training, &self.sets[0]].map(|examples| Standardised {
+                examples,
+                standard: &self.standard,
+            });
+        let name = report::name(&loss);
+        let outcome = super::train(
+            &mut trainer,
+            [&training, &verification],
+            self.workers,
+            part,
+            |epoch| {
+                bar.set_position(number as u64 * self.recipe.epochs + epoch.number);
+                bar.set_message(format!(
+                    "{name}, epoch {}: loss {:.4}, verification {:.4}",
+                    epoch.number, epoch.training_loss, epoch.validation_loss
+                ));
+            },
+        )?;
+        let network = (self.standard.before(trainer.best())).map_err(Failure::usage)?;
+        let trained = Trained {
+            loss,
+            outcome: super::described(outcome),
+            history: trainer.history().to_vec(),
+            seconds: begin.elapsed().as_secs_f64(),
+            scores: self.scores(&network).map_err(Failure::usage)?,
+        };
+        Ok((trained, network))
+    }
+
+    fn scores(&self, network: &Network) -> Result<Vec<[Score; 2]>, ClassifierError> {
+        let network = network.folded();
+        let scores = self.sets.iter().map(|examples| {
+            let picks = picks(&network, examples, &self.classes, self.workers)?;
+            Ok(picks.map(|picks| Score::of_picks(&picks, examples, &self.classes)))
+        });
+        scores.collect()
+    }
+
+    fn card(&self, best: usize, rule: Rule) -> Card<'a> {
+        let classes = 0..self.classes.len();
+        Card {
+            recipe: self.recipe,
+            loss: self.recipe.losses[best].loss,
+            rule,
+            classes_s: classes.map(|class| self.classes.times_s(class)).collect(),
+        }
+    }
+
+    fn done(
+        &self,
+        networks: Vec<Trained>,
+        (best, weights): (usize, usize),
+        took: Duration,
+    ) -> Done<'a> {
+        let verification = (Kind::Verification, self.recipe.protocol);
+        let tests = self
+            .recipe
+            .tests
+            .iter()
+            .map(|test| (Kind::Test, test.protocol));
+        let sets = [verification].into_iter().chain(tests).zip(&self.sets);
+        let gains = [Gain::Harmonics, Gain::Amplitude];
+        Done {
+            recipe: self.recipe,
+            classes: self.classes.len(),
+            weights,
+            examples: self.training.len(),
+            unsteady: self.training.unsteady(),
+            sets: sets
+                .map(|((kind, protocol), examples)| Set {
+                    kind,
+                    protocol,
+                    examples: examples.len(),
+                    unsteady: examples.unsteady(),
+                    best: gains.map(|gain| Score::of_best(examples, &self.classes, gain)),
+                })
+                .collect(),
+            networks,
+            best,
+            seconds: took.as_secs_f64(),
+        }
+    }
+}

@@ -1,0 +1,205 @@
+//! An identifier from nothing: experiments, training, calibration, scores, a pack.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use onecycle_lab::learn::dataset::shards::Record;
+use onecycle_lab::learn::identifier::{
+    Calibrated, IdentifierError, Recipe, Scores, calibrated, rows, scores,
+};
+use onecycle_lab::learn::pack::{PackContents, Quantisation, quantisation};
+use onecycle_lab::learn::train::{Epoch, Network, Outcome, Trainer};
+use onecycle_onboard::pack::{Pack, Sizes};
+use serde::Serialize;
+
+use super::part::Part;
+use crate::args;
+use crate::commands::dataset::filled;
+use crate::commands::workers::Workers;
+use crate::failure::{Failure, exit};
+use crate::output::{Waiting, print, progress_bar_with_message, write_file, write_text};
+use crate::report::identifier as report;
+use crate::settings;
+
+/// What the command has done.
+#[derive(Serialize)]
+pub(crate) struct Done {
+    pub(crate) examples: usize,
+    pub(crate) weights: usize,
+    pub(crate) outcome: &'static str,
+    pub(crate) epochs: u64,
+    pub(crate) best_epoch: u64,
+    pub(crate) scores: Vec<Scored>,
+    #[serde(skip)]
+    pub(crate) quantisation: Quantisation,
+    #[serde(skip)]
+    pub(crate) sizes: Sizes,
+    #[serde(skip)]
+    pub(crate) seconds: [f64; 2],
+}
+
+/// Scores of all cycles, or of one family's.
+#[derive(Serialize)]
+pub(crate) struct Scored {
+    /// Number of the family, from one; `None` of all.
+    pub(crate) family: Option<usize>,
+    #[serde(flatten)]
+    pub(crate) scores: Scores,
+}
+
+pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
+    recipe
+        .validate()
+        .map_err(|error| settings::out_of_range(&arguments.recipe, error))?;
+    let out = arguments.out.as_deref().ok_or_else(|| {
+        Failure::usage("an identifier is written to a pack: name the file with --out")
+    })?;
+    let workers = Workers::new(arguments.threads)?;
+    let begin = Instant::now();
+    let dataset = arguments.dataset.clone();
+    let path = dataset.unwrap_or_else(|| beside(out, "dataset"));
+    let experiments = recipe.experiments.clone();
+    let (folder, ..) = filled(&path, experiments, recipe.experiments(), &workers)?;
+    workers.finish();
+    let waiting = Waiting::on("reading the experiments");
+    let records = folder.records()?;
+    drop(waiting);
+    let simulated_s = begin.elapsed().as_secs_f64();
+
+    let [learning, choosing, scoring] = recipe.numbers().map(|numbers| {
+        let from = records.partition_point(|record| record.number < numbers.start);
+        let to = records.partition_point(|record| record.number < numbers.end);
+        &records[from..to]
+    });
+    let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
+    let part = Part::of(out, 1, kept);
+    let (trainer, outcome) = learn(recipe, [learning, choosing], &part, arguments, &workers)?;
+    let waiting = Waiting::on("calibrating");
+    let (pack, quantisation) = pack(recipe, trainer.best(), [learning, choosing])?;
+    let mut done = Done {
+        examples: records.len(),
+        weights: trainer.best().weights(),
+        outcome: super::described(outcome),
+        epochs: trainer.history().len() as u64,
+        best_epoch: best_epoch(trainer.history()),
+        scores: vec![],
+        quantisation,
+        sizes: Sizes::default(),
+        seconds: [simulated_s, 0.0],
+    };
+    waiting.goes_on("scoring");
+    let bytes = finish(pack, recipe, scoring, &mut done).map_err(Failure::usage)?;
+    drop(waiting);
+    write_file(out, |file| file.write_all(&bytes))?;
+    done.seconds[1] = begin.elapsed().as_secs_f64() - simulated_s;
+    if let Some(path) = &arguments.json {
+        let text = report::json(recipe, &done);
+        write_text(path, &text)?;
+    }
+    print(&report::text(&done, out))?;
+    part.remove()?;
+    if arguments.dataset.is_none() {
+        folder.remove()?;
+    }
+    Ok(ExitCode::from(exit::DONE))
+}
+
+/// The path with another ending behind it.
+fn beside(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(ending);
+    PathBuf::from(name)
+}
+
+fn learn(
+    recipe: &Recipe,
+    [learning, choosing]: [&[Record]; 2],
+    part: &Part,
+    arguments: &args::Train,
+    workers: &Workers,
+) -> Result<(Trainer, Outcome), Failure> {
+    let mut trainer = super::begun(Some(part), arguments.resume, || {
+        recipe
+            .network()
+            .and_then(|network| Trainer::new(recipe.settings(), network))
+    })?;
+    let bar = progress_bar_with_message(recipe.epochs);
+    let (training, validation) = (rows(learning), rows(choosing));
+    let outcome = super::train(
+        &mut trainer,
+        [&training, &validation],
+        workers,
+        Some(part),
+        |epoch| {
+            bar.set_position(epoch.number);
+            bar.set_message(format!(
+                "loss {:.4}, of unseen cycles {:.4}",
+                epoch.training_loss, epoch.validation_loss
+            ));
+        },
+    )?;
+    bar.finish_and_clear();
+    Ok((trainer, outcome))
+}
+
+fn best_epoch(history: &[Epoch]) -> u64 {
+    history
+        .iter()
+        .rfind(|epoch| epoch.is_best)
+        .map_or(0, |epoch| epoch.number)
+}
+
+/// The calibrated pack, its card still empty, and what weights in bytes change.
+fn pack(
+    recipe: &Recipe,
+    network: &Network,
+    [learning, choosing]: [&[Record]; 2],
+) -> Result<(PackContents, Quantisation), Failure> {
+    let made = || -> Result<_, IdentifierError> {
+        let first = recipe.pack(network, learning, &Calibrated::not_yet())?;
+        let bytes = first.to_bytes()?;
+        let pack =
+            Pack::read(&bytes).map_err(onecycle_lab::learn::pack::PackContentsError::from)?;
+        let calibrated = calibrated(recipe, &pack, choosing)?;
+        let signatures: Vec<_> = choosing
+            .iter()
+            .map(|record| record.example.signature.values)
+            .collect();
+        let quantisation = quantisation(&pack, network, &signatures)?;
+        Ok((recipe.pack(network, learning, &calibrated)?, quantisation))
+    };
+    made().map_err(Failure::usage)
+}
+
+/// Scores the pack, writes them on its card, and returns its bytes.
+fn finish(
+    mut pack: PackContents,
+    recipe: &Recipe,
+    scoring: &[Record],
+    done: &mut Done,
+) -> Result<Vec<u8>, IdentifierError> {
+    let bytes = pack.to_bytes()?;
+    let read = Pack::read(&bytes).map_err(onecycle_lab::learn::pack::PackContentsError::from)?;
+    let families = recipe.experiments.families.len();
+    let of = |family: Option<usize>| {
+        let cycles: Vec<&Record> = scoring
+            .iter()
+            .filter(|record| family.is_none_or(|family| record.example.family + 1 == family))
+            .collect();
+        Scored {
+            family,
+            scores: scores(&read, &cycles),
+        }
+    };
+    done.scores = std::iter::once(None)
+        .chain((1..=families).map(Some).filter(|_| families > 1))
+        .map(of)
+        .collect();
+    pack.card = report::card(recipe, done);
+    let bytes = pack.to_bytes()?;
+    let read = Pack::read(&bytes).map_err(onecycle_lab::learn::pack::PackContentsError::from)?;
+    done.sizes = read.sizes();
+    Ok(bytes)
+}

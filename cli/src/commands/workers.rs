@@ -1,0 +1,93 @@
+//! Threads that work on pieces, and a bar that shows how far they are.
+
+use indicatif::ProgressBar;
+use onecycle_lab::learn::train;
+use onecycle_lab::paper::grid::Pieces;
+use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+
+use crate::failure::Failure;
+use crate::output::progress_bar;
+
+pub(crate) struct Workers {
+    pool: ThreadPool,
+    bar: ProgressBar,
+}
+
+impl Workers {
+    /// So many threads, or as many as there are cores.
+    pub(crate) fn new(threads: Option<u64>) -> Result<Self, Failure> {
+        // Zero is the builder's word for as many as there are cores.
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads.unwrap_or(0) as usize)
+            .build()
+            .map_err(|error| Failure::usage(format!("cannot start the threads: {error}")))?;
+        let bar = progress_bar(0);
+        Ok(Self { pool, bar })
+    }
+
+    pub(crate) fn threads(&self) -> usize {
+        self.pool.current_num_threads()
+    }
+
+    /// The bar is about so many pieces from now on, some of them done.
+    pub(crate) fn expect(&self, count: usize, done: usize) {
+        self.bar.reset();
+        self.bar.set_length(count as u64);
+        self.bar.set_position(done as u64);
+    }
+
+    /// Runs pieces that the bar expects; their results are in order.
+    pub(crate) fn run<T: Send>(
+        &self,
+        count: usize,
+        piece: impl Fn(usize) -> T + Send + Sync,
+    ) -> Vec<T> {
+        self.quietly(count, |k| {
+            let result = piece(k);
+            self.bar.inc(1);
+            result
+        })
+    }
+
+    /// Runs pieces that the bar does not count; their results are in order.
+    pub(crate) fn quietly<T: Send>(
+        &self,
+        count: usize,
+        piece: impl Fn(usize) -> T + Send + Sync,
+    ) -> Vec<T> {
+        self.pool
+            .install(|| (0..count).into_par_iter().map(piece).collect())
+    }
+
+    pub(crate) fn finish(&self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+impl Pieces for Workers {
+    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+        self.expect(count, 0);
+        self.run(count, piece)
+    }
+}
+
+/// The same threads for one of several lots of work, which the bar expects together.
+pub(crate) struct Lot<'a>(pub(crate) &'a Workers);
+
+impl Pieces for Lot<'_> {
+    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
+        self.0.run(count, piece)
+    }
+}
+
+impl train::Workers for Workers {
+    fn count(&self) -> usize {
+        self.threads()
+    }
+
+    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
+        self.pool
+            .install(|| (0..parts).into_par_iter().for_each(part));
+    }
+}

@@ -1,0 +1,53 @@
+//! `onecycle`: from one cycle of a relay test to the process and its optimal controller.
+//!
+//! In stages: arguments are parsed and typed (`args`), a command runs (`commands`), its result is
+//! printed (`report`), and what went wrong becomes one sentence and an exit code (`failure`).
+
+mod args;
+mod commands;
+mod failure;
+mod output;
+mod pages;
+mod pictures;
+mod report;
+mod settings;
+mod style;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use crate::args::{Arguments, Command};
+use crate::failure::exit;
+use crate::output::complain;
+
+/// Parses the arguments of the process, runs the command and returns its exit code.
+#[must_use]
+pub fn run() -> ExitCode {
+    let arguments = Arguments::parse();
+    let result = match &arguments.command {
+        Command::Identify(identify) => commands::identify::run(identify),
+        Command::Simulate(simulate) => commands::simulate::run(simulate),
+        Command::Tune(tune) => commands::tune::run(tune),
+        Command::Fly(fly) => commands::fly::run(fly),
+        Command::Certify(certify) => commands::certify::run(certify),
+        Command::Phase(phase) => commands::phase::run(phase),
+        Command::Grid(grid) => commands::grid::run(grid),
+        Command::Campaign(campaign) => commands::campaign::run(campaign),
+        Command::Bench(bench) => commands::bench::run(bench),
+        Command::Reproduce(reproduce) => commands::reproduce::run(reproduce),
+        Command::Dataset(dataset) => commands::dataset::run(dataset),
+        Command::Train(train) => commands::train::run(train),
+        Command::Pack(pack) => commands::pack::run(pack),
+        Command::Completions(completions) => commands::completions::run(completions),
+        Command::Man(man) => commands::man::run(man),
+    };
+    match result {
+        Ok(code) => code,
+        Err(failure) if failure.is_closed_pipe() => ExitCode::from(exit::DONE),
+        Err(failure) => {
+            complain(&failure);
+            ExitCode::from(failure.exit_code())
+        }
+    }
+}

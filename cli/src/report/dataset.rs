@@ -1,0 +1,90 @@
+//! What a dataset holds, and how long it took.
+
+use std::path::Path;
+
+use onecycle_lab::experiments::{Family, Recipe};
+use serde::Serialize;
+
+use super::json::to_text;
+use super::number::significant;
+use crate::commands::dataset::Done;
+
+/// Changes with every change that a reader of the summary could notice.
+const SCHEMA: &str = "onecycle.dataset.summary/1";
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    schema: &'static str,
+    recipe: &'a Recipe,
+    /// Experiments of the dataset.
+    experiments: u64,
+    /// Those that became examples.
+    examples: usize,
+    without_oscillation: u64,
+    files: usize,
+    files_kept: usize,
+    /// Experiments of this run.
+    experiments_made: u64,
+    seconds: f64,
+    experiments_per_s: Option<f64>,
+}
+
+impl<'a> Summary<'a> {
+    fn of(done: &'a Done) -> Self {
+        let (experiments, examples) = (done.manifest.examples, done.manifest.rows());
+        let seconds = done.took.as_secs_f64();
+        Self {
+            schema: SCHEMA,
+            recipe: &done.manifest.recipe,
+            experiments,
+            examples,
+            without_oscillation: experiments.saturating_sub(examples as u64),
+            files: done.manifest.shards.len(),
+            files_kept: done.kept,
+            experiments_made: done.made,
+            seconds,
+            experiments_per_s: (done.made > 0).then(|| done.made as f64 / seconds),
+        }
+    }
+}
+
+pub(crate) fn json(done: &Done) -> String {
+    to_text(&Summary::of(done))
+}
+
+pub(crate) fn text(done: &Done, folder: &Path) -> String {
+    let summary = Summary::of(done);
+    let mut text = String::new();
+    for (index, family) in summary.recipe.families.iter().enumerate() {
+        text += &format!("Family {}   {}\n", index + 1, of_family(family));
+    }
+    let (experiments, examples) = (summary.experiments, summary.examples);
+    let speed = match summary.experiments_per_s {
+        Some(speed) => format!(
+            "{} experiments in {} s, {} a second",
+            summary.experiments_made,
+            significant(summary.seconds),
+            significant(speed)
+        ),
+        None => "nothing: all was there".to_owned(),
+    };
+    text + &format!(
+        "Examples   {examples} of {experiments} experiments, {} without a steady oscillation\n\
+         Files      {} in {}, {} of them kept\n\
+         Made now   {speed}\n",
+        summary.without_oscillation,
+        summary.files,
+        folder.display(),
+        summary.files_kept,
+    )
+}
+
+fn of_family(family: &Family) -> String {
+    let [prop, body, tau] = family.space.ranges_s();
+    let (least, most) = family.samples_per_period;
+    format!(
+        "weight {}: T_prop {} .. {} s, T_body {} .. {} s, tau {} .. {} s,\n           \
+         {least} .. {most} samples a period",
+        family.weight, prop.0, prop.1, body.0, body.1, tau.0, tau.1
+    )
+}

@@ -1,0 +1,265 @@
+//! What a grid is made of, and how near its members are to random processes: as text, and as a page with pictures.
+
+use std::fmt::Write;
+
+use onecycle_lab::paper::grid::{Check, Grid, Layout, Settings};
+use onecycle_lab::space::candidate::{CandidateError, Gains};
+use serde::Serialize;
+
+use super::json::to_text;
+use super::number::significant;
+use super::text::wrapped;
+use crate::commands::grid::Done;
+use crate::pages::page::{self, Section, page};
+use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series, Shape};
+use crate::pictures::grid as picture;
+use crate::style::{bare, headed, verdict};
+
+/// Changes with every change that a reader of the summary could notice.
+const SCHEMA: &str = "onecycle.grid.summary/1";
+
+#[derive(Serialize)]
+struct Summary<'a> {
+    schema: &'static str,
+    settings: &'a Settings,
+    members: usize,
+    members_per_row: Vec<usize>,
+    alpha: Option<Alpha>,
+    has_matrix: bool,
+    check: Option<&'a Check>,
+    holds: Option<bool>,
+    seconds: f64,
+}
+
+/// Ratio of neighbouring radii.
+#[derive(Serialize)]
+struct Alpha {
+    least: f64,
+    most: f64,
+}
+
+impl Alpha {
+    fn of(grid: &Grid) -> Option<Self> {
+        let alphas = || {
+            let places = grid.members.iter().filter_map(|member| member.place);
+            places.map(|place| place.alpha)
+        };
+        Some(Self {
+            least: alphas().reduce(f64::min)?,
+            most: alphas().reduce(f64::max)?,
+        })
+    }
+}
+
+fn members_per_row(grid: &Grid) -> Vec<usize> {
+    let mut counts = Vec::new();
+    for place in grid.members.iter().filter_map(|member| member.place) {
+        if counts.len() <= place.row {
+            counts.resize(place.row + 1, 0);
+        }
+        counts[place.row] += 1;
+    }
+    counts
+}
+
+/// The summary for programs.
+pub(crate) fn json(done: &Done) -> String {
+    to_text(&Summary {
+        schema: SCHEMA,
+        settings: &done.grid.settings,
+        members: done.grid.members.len(),
+        members_per_row: members_per_row(&done.grid),
+        alpha: Alpha::of(&done.grid),
+        has_matrix: done.has_matrix,
+        check: done.check.as_ref(),
+        holds: done.check.map(|_| done.holds()),
+        seconds: done.took.as_secs_f64(),
+    })
+}
+
+/// The summary for people.
+pub(crate) fn text(done: &Done) -> String {
+    let mut text = String::new();
+    let Settings {
+        space,
+        deterioration,
+        layout,
+        gains,
+    } = &done.grid.settings;
+    let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
+    let _ = writeln!(
+        text,
+        "Space    T_prop {}, T_body {}, tau {}\n         phase margin at least {} deg, relay beta {}",
+        range(space.t_prop_s),
+        range(space.t_body_s),
+        range(space.tau_s),
+        space.phase_margin_deg,
+        space.beta,
+    );
+    let limit = percent(*deterioration);
+    let _ = writeln!(
+        text,
+        "Grid     {}, {}",
+        match layout {
+            Layout::Rays => format!("neighbours {limit} apart"),
+            Layout::Fewest => format!("the fewest within {limit} of every process"),
+        },
+        match gains {
+            Gains::SameAmplitude => "gains by the amplitude",
+            Gains::Equal => "equal velocity gains",
+        }
+    );
+    members(&mut text, &done.grid);
+    let _ = writeln!(text, "Time     {} s", significant(done.took.as_secs_f64()));
+    text = headed(&text);
+    if let Some(check) = &done.check {
+        describe(&mut text, check, &limit);
+    }
+    text
+}
+
+fn members(text: &mut String, grid: &Grid) {
+    let counts = members_per_row(grid);
+    let count = grid.members.len();
+    if counts.is_empty() {
+        let _ = writeln!(text, "Members  {count}");
+        return;
+    }
+    let rows: Vec<String> = counts.iter().map(ToString::to_string).collect();
+    let rows = format!("{count} in {} rows: {}", rows.len(), rows.join(" "));
+    wrapped(text, "Members  ", &rows);
+    let alone = grid.members.iter().filter(|member| member.place.is_none());
+    match alone.count() {
+        0 => {}
+        alone => {
+            let _ = writeln!(text, "         and {alone} where the rows left holes");
+        }
+    }
+    if let Some(Alpha { least, most }) = Alpha::of(grid) {
+        let _ = writeln!(
+            text,
+            "         radii of a ray at ratios of {least:.3} to {most:.3}"
+        );
+    }
+}
+
+fn describe(text: &mut String, check: &Check, limit: &str) {
+    let [t_prop, t_body, tau] = check.worst_at_s.map(significant);
+    let cost = |cost: Option<f64>| cost.map_or("unstable".to_owned(), percent);
+    text.push_str(&headed(&format!(
+        "\nCheck    {} random processes, seed {}\n  \
+         from the best member        worst {}, mean {}\n  \
+         its controller on them      worst {}, mean {}\n  \
+         least phase margin left     {}\n  \
+         farthest is                 T_prop {t_prop} s, T_body {t_body} s, tau {tau} s\n\n",
+        check.processes,
+        check.seed,
+        cost(check.worst),
+        cost(check.mean),
+        cost(check.worst_cost),
+        cost(check.mean_cost),
+        check
+            .least_margin_rad
+            .map_or("unstable".to_owned(), |margin| format!(
+                "{:.1} deg",
+                margin.to_degrees()
+            )),
+    )));
+    text.push_str(&match check.beyond {
+        0 => verdict(
+            true,
+            &format!("Every one of them is within {limit} of a member.\n"),
+        ),
+        beyond => verdict(
+            false,
+            &format!("{beyond} of them are farther than {limit} from every member.\n"),
+        ),
+    });
+}
+
+/// The summary and its pictures on a page.
+pub(crate) fn html(done: &Done) -> Result<String, CandidateError> {
+    let grid = &done.grid;
+    let space = &grid.settings.space;
+    let lead = page::paragraph(
+        "lead",
+        "Processes that stand for a space: every process of it has a member near, whose controller costs it little.",
+    ) + &format!("<pre>{}</pre>\n", page::escaped(&bare(&text(done))));
+    let mut shapes: Vec<_> = grid.members.iter().map(|member| member.direction).collect();
+    shapes.dedup();
+    let of = |name: &str, points: Vec<(f64, f64)>, hue| {
+        Series::of_points(name, Marks::Points, points).hue(hue)
+    };
+    let outline = Series::of_points("border of the space", Marks::Line, picture::outline(space));
+    let surface = Figure::single(
+        "Rays of members on the surface of shapes.",
+        Axis::titled("T_body / T_prop").logarithmic(),
+        Panel::new(
+            Axis::titled("tau / r").logarithmic(),
+            vec![
+                outline.hue(Hue::Reference),
+                of(
+                    "rays",
+                    shapes.into_iter().map(picture::place).collect(),
+                    Hue::Model,
+                ),
+            ],
+        ),
+    );
+    let times = |x: usize, y: usize| {
+        let axis = |k: usize| Axis::titled(format!("{} (s)", ["T_prop", "T_body", "tau"][k]));
+        let members = grid.members.iter().map(|member| member.candidate.times_s());
+        let points = members.map(|times_s| (times_s[x], times_s[y]));
+        let panel = Panel::new(
+            axis(y).logarithmic(),
+            vec![of("", points.collect(), Hue::Model)],
+        );
+        Figure::single(
+            "Members in the space of times.",
+            axis(x).logarithmic(),
+            panel,
+        )
+        .shaped(Shape::Square)
+    };
+    let rays = picture::rays(space).map(|(name, times_s)| ray(&grid.settings, name, times_s));
+    let rays: Vec<Figure> = rays.into_iter().collect::<Result<_, _>>()?;
+    let section = |id: &str, title: &str, body: String| Section {
+        id: id.to_owned(),
+        title: title.to_owned(),
+        body,
+    };
+    let sections = [
+        section("shapes", "Shapes", page::figure(&surface)),
+        section("times", "Times", page::row(&[times(0, 1), times(0, 2)])),
+        section("rays", "Along a ray", page::row(&rays)),
+    ];
+    Ok(page("A grid of processes", &lead, &sections))
+}
+
+/// What neighbours on a ray cost each other.
+fn ray(settings: &Settings, name: &str, times_s: [f64; 3]) -> Result<Figure, CandidateError> {
+    let (step, along) = picture::along(settings, times_s)?;
+    let percent = 100.0 * settings.deterioration;
+    let curve = |name, cost: fn(&picture::Along) -> f64| {
+        let points = along.iter().map(|at| (at.alpha, 100.0 * cost(at)));
+        Series::of_points(name, Marks::Line, points)
+    };
+    let ends = [along.first(), along.last()].into_iter().flatten();
+    let limit = Series::of_points("J*", Marks::Dashes, ends.map(|at| (at.alpha, percent)));
+    let up = picture::STEPS_UP;
+    let panel = Panel::new(
+        Axis::titled("deterioration (%)").spanning(up.start * percent, up.end * percent),
+        vec![
+            curve("J_ij: the one's controller on the other", |at| at.there).hue(Hue::Model),
+            curve("J_ji: the other's on the one", |at| at.here).hue(Hue::Input),
+            limit.hue(Hue::Reference),
+        ],
+    );
+    let caption = format!("{name}: members at ratios of {step:.3}.");
+    let figure = Figure::single(&caption, Axis::titled("ratio of the radii"), panel);
+    Ok(figure.shaped(Shape::Square))
+}
+
+fn percent(fraction: f64) -> String {
+    format!("{} %", significant(100.0 * fraction))
+}

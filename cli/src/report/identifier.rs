@@ -1,0 +1,102 @@
+//! What came of training an identifier.
+
+use std::path::Path;
+
+use onecycle_lab::learn::identifier::Recipe;
+use serde_json::{Value, json};
+
+use super::json::to_text;
+use crate::commands::train::identifier::{Done, Scored};
+
+/// Changes with every change that a reader could notice.
+const SCHEMA: &str = "onecycle.identifier/1";
+
+/// What a pack says of itself.
+pub(crate) fn card(recipe: &Recipe, done: &Done) -> Value {
+    json!({
+        "program": concat!("onecycle ", env!("CARGO_PKG_VERSION")),
+        "recipe": recipe,
+        "training": {
+            "examples": done.examples,
+            "outcome": done.outcome,
+            "epochs": done.epochs,
+            "best_epoch": done.best_epoch,
+        },
+        "scores": done.scores,
+    })
+}
+
+pub(crate) fn json(recipe: &Recipe, done: &Done) -> String {
+    let [simulated_s, learnt_s] = done.seconds;
+    to_text(&json!({
+        "schema": SCHEMA,
+        "card": card(recipe, done),
+        "weights": done.weights,
+        "bytes": {
+            "weights": done.sizes.weights,
+            "table": done.sizes.table,
+            "card": done.sizes.card,
+            "total": done.sizes.total,
+        },
+        "quantisation_rms": done.quantisation.rms,
+        "seconds": { "experiments": simulated_s, "training": learnt_s },
+    }))
+}
+
+pub(crate) fn text(done: &Done, out: &Path) -> String {
+    let [simulated_s, learnt_s] = done.seconds;
+    let sizes = &done.sizes;
+    let mut text = format!(
+        "Identifier  {}\n  \
+         {} examples in {simulated_s:.0} s, {} epochs in {learnt_s:.0} s ({}), the best {}\n  \
+         {} weights, {} bytes; table {} bytes, card {} bytes, all {} bytes\n  \
+         weights in bytes would put outputs {:.1e} off, of {:.1} (root mean squares)\n\n\
+         One cycle of unseen processes, as the board computes\n",
+        out.display(),
+        done.examples,
+        done.epochs,
+        done.outcome.replace('_', " "),
+        done.best_epoch,
+        done.weights,
+        sizes.weights,
+        sizes.table,
+        sizes.card,
+        sizes.total,
+        done.quantisation.rms,
+        done.quantisation.size,
+    );
+    for scored in &done.scores {
+        text += &row(scored);
+    }
+    text
+}
+
+fn row(scored: &Scored) -> String {
+    let scores = &scored.scores;
+    let name = scored.family.map_or("all families".to_owned(), |family| {
+        format!("family {family}")
+    });
+    let percent = |value: f64| format!("{:.2}", 100.0 * value);
+    let reliability: Vec<String> = scores
+        .reliability
+        .iter()
+        .map(|level| format!("{:.0}: {:.1}", 100.0 * level.stated, 100.0 * level.held))
+        .collect();
+    format!(
+        "{name}\n  \
+         {} cycles, {} unknown ({:.1} %), {} unstable\n  \
+         |J| (%)  mean {}, median {}, 99 % {}, worst {}; least phase margin {:.1} deg\n  \
+         posterior holds the truth (stated %: held)  {}; squared distance {:.2}\n",
+        scores.cycles,
+        scores.unknown,
+        100.0 * scores.unknown as f64 / scores.cycles.max(1) as f64,
+        scores.unstable,
+        percent(scores.mean),
+        percent(scores.median),
+        percent(scores.percentile_99),
+        percent(scores.worst),
+        scores.least_margin_deg,
+        reliability.join(", "),
+        scores.mahalanobis,
+    )
+}

@@ -1,0 +1,114 @@
+//! The model over the data, and what it leaves.
+
+use onecycle_identify::{FitPoint, Identified};
+use onecycle_identify::{Whiteness, whiteness};
+
+use super::significant;
+use crate::pages::page::{self, Section};
+use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series};
+use crate::report::number::percent;
+use crate::report::text::Units;
+
+/// Lags that residuals are compared at, and the least number of residuals for each.
+const LAGS: usize = 25;
+const RESIDUALS_PER_LAG: usize = 4;
+
+pub(super) fn section(identified: &Identified, units: &Units) -> Section {
+    let mut body = page::figure(&over_data(&identified.fit, units));
+    let residuals: Vec<f64> = (identified.fit.iter())
+        .map(|point| point.measured - point.fitted)
+        .collect();
+    let lags = LAGS.min(residuals.len() / RESIDUALS_PER_LAG);
+    // No parameters are those of the residuals themselves.
+    if let Some(white) = whiteness(&residuals, lags, 0) {
+        body += &page::figure(&correlogram(&white));
+        body += &page::facts(&facts(identified, &white));
+    }
+    Section {
+        id: "fit".to_owned(),
+        title: "Fit".to_owned(),
+        body,
+    }
+}
+
+fn over_data(fit: &[FitPoint], units: &Units) -> Figure {
+    let series = |name, marks, value: fn(&FitPoint) -> f64| {
+        let points = fit.iter().map(|point| (point.time_s, value(point)));
+        Series::of_points(name, marks, points)
+    };
+    let upper = vec![
+        series("fitted", Marks::Line, |point| point.fitted).hue(Hue::Model),
+        series("measured", Marks::Points, |point| point.measured).hue(Hue::Measured),
+    ];
+    let residual = series("", Marks::Points, |point| point.measured - point.fitted);
+    Figure::stacked(
+        "The process found, driven by the recorded input, over the measured output; below, what it leaves. A point \
+         is the mean of the samples of a short interval, as they are fitted.",
+        Axis::titled("time (s)"),
+        vec![
+            Panel::new(Axis::titled(Units::titled("output", &units.output)), upper),
+            Panel::new(Axis::titled("residual"), vec![residual.hue(Hue::Measured)]),
+        ],
+    )
+}
+
+fn correlogram(white: &Whiteness) -> Figure {
+    let lags = || (1..=white.autocorrelation.len()).map(|lag| lag as f64);
+    let bars = lags().zip(white.autocorrelation.iter().copied());
+    let ends = [0.0, white.autocorrelation.len() as f64 + 1.0];
+    let edge = |name, value: f64| {
+        let points = ends.map(|lag| (lag, value));
+        Series::of_points(name, Marks::Dashes, points).hue(Hue::Reference)
+    };
+    Figure::single(
+        "Correlation of the residuals with themselves. Of white ones 19 in 20 are within the dashes; a slow wave says \
+         that the model misses something of the process.",
+        Axis::titled("lag (points)"),
+        Panel::new(
+            Axis::titled("autocorrelation").spanning(-1.0, 1.0),
+            vec![
+                Series::of_points("residuals", Marks::Bars, bars).hue(Hue::Model),
+                edge("95 % of white ones", white.band),
+                edge("", -white.band),
+            ],
+        ),
+    )
+}
+
+/// Probability below which residuals are called not white.
+const LEAST_PROBABILITY: f64 = 0.01;
+
+fn facts(identified: &Identified, white: &Whiteness) -> Vec<(&'static str, String)> {
+    let lags = white.autocorrelation.len();
+    let is_white = white.probability >= LEAST_PROBABILITY;
+    let judgement = if is_white {
+        "white: nothing is left to be explained"
+    } else {
+        "not white: the model leaves something, or the recording has so little noise that anything shows"
+    };
+    let refined = &identified.refined;
+    [
+        (
+            "unexplained",
+            format!("{} of the oscillation, beyond the noise", percent(identified.misfit)),
+        ),
+        (
+            "residual, noise",
+            format!(
+                "{}, {} (standard deviations of a sample)",
+                significant(refined.residual_sigma),
+                significant(refined.noise_sigma)
+            ),
+        ),
+        (
+            "whiteness",
+            format!(
+                "{} of {lags} lags outside; Ljung-Box {:.1}, which white residuals exceed in {} of cases: {judgement}",
+                white.outside,
+                white.portmanteau,
+                percent(white.probability),
+            ),
+        ),
+    ]
+    .into()
+}

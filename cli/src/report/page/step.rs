@@ -1,0 +1,95 @@
+//! The step that will come.
+
+use onecycle_design::bands::StepBands;
+use onecycle_design::soiptd_pd::step_response::StepResponse;
+
+use super::significant;
+use crate::pages::page::{self, Section};
+use crate::pages::plot::{Axis, Figure, Hue, Marks, Note, Panel, Series};
+use crate::report::number::percent;
+
+pub(super) fn section(
+    response: &StepResponse,
+    bands: Option<&StepBands>,
+    times_s: &[f64],
+) -> Section {
+    let mut upper = Panel::new(Axis::titled("output"), output(response, bands, times_s));
+    upper.notes = notes(response);
+    let lower = Panel::new(
+        Axis::titled("controller's output"),
+        input(response, bands, times_s),
+    );
+    let figure = Figure::stacked(
+        "Response to a unit step of the reference, and what the controller puts out for it. Nothing saturates here: \
+         scale the step to what the actuator can do.",
+        Axis::titled("time (s)"),
+        vec![upper, lower],
+    );
+    Section {
+        id: "step".to_owned(),
+        title: "Predicted step".to_owned(),
+        body: page::figure(&figure) + &page::facts(&facts(response, bands)),
+    }
+}
+
+fn output(response: &StepResponse, bands: Option<&StepBands>, times_s: &[f64]) -> Vec<Series> {
+    let end_s = times_s.last().copied().unwrap_or(1.0);
+    let reference = Series::of_points("reference", Marks::Dashes, [(0.0, 1.0), (end_s, 1.0)]);
+    let band = bands.map(|StepBands { output, .. }| {
+        Series::between("90 % band", times_s, &output.low, &output.high).hue(Hue::Model)
+    });
+    let points = times_s
+        .iter()
+        .map(|&time_s| (time_s, response.at(time_s).0));
+    let curve = Series::of_points("output", Marks::Line, points).hue(Hue::Model);
+    [Some(reference.hue(Hue::Reference)), band, Some(curve)]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+fn input(response: &StepResponse, bands: Option<&StepBands>, times_s: &[f64]) -> Vec<Series> {
+    let band = bands.map(|StepBands { input, .. }| {
+        Series::between("", times_s, &input.low, &input.high).hue(Hue::Input)
+    });
+    let points = times_s
+        .iter()
+        .map(|&time_s| (time_s, response.at(time_s).1));
+    let curve = Series::of_points("", Marks::Line, points).hue(Hue::Input);
+    band.into_iter().chain([curve]).collect()
+}
+
+fn notes(response: &StepResponse) -> Vec<Note> {
+    let metrics = &response.metrics;
+    let peak = metrics.peak_time_s.map(|peak_s| Note {
+        text: format!("overshoot {:.0} %", 100.0 * metrics.overshoot),
+        x: peak_s,
+        y: 1.0 + metrics.overshoot,
+        away: (60.0, -20.0),
+    });
+    let settled = Note {
+        text: format!("settled after {} s", significant(metrics.settling_time_s)),
+        x: metrics.settling_time_s,
+        y: response.at(metrics.settling_time_s).0,
+        away: (0.0, 60.0),
+    };
+    peak.into_iter().chain([settled]).collect()
+}
+
+fn facts(response: &StepResponse, bands: Option<&StepBands>) -> Vec<(&'static str, String)> {
+    let metrics = &response.metrics;
+    let seconds = |time_s: f64| format!("{} s", significant(time_s));
+    let largest = significant(metrics.peak_input);
+    let mut facts = vec![
+        ("overshoot", percent(metrics.overshoot)),
+        ("rise, 10 to 90 %", seconds(metrics.rise_time_s)),
+        ("settling, within 2 %", seconds(metrics.settling_time_s)),
+        ("largest input", format!("{largest} per unit of the step")),
+        ("squared error", seconds(response.ise)),
+    ];
+    if let Some(bands) = bands.filter(|bands| bands.settling < 1.0) {
+        let part = percent(bands.settling);
+        facts.push(("stable", format!("on {part} of what the process may be")));
+    }
+    facts
+}

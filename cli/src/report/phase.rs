@@ -1,0 +1,202 @@
+//! The report of a distinguishing phase, for people and as JSON.
+
+use std::fmt::Write;
+
+use onecycle_lab::space::Space;
+use onecycle_lab::space::phase::{AppliedRule, LocalRule};
+use onecycle_lab::space::phase::{DistinguishingPhase, LocalOptima};
+use serde::Serialize;
+
+use super::json::to_text;
+use super::number::significant;
+
+const SCHEMA: &str = "onecycle.phase/1";
+
+/// Most lines of the table for people.
+const MOST_LINES: f64 = 16.0;
+
+/// What the command found, and in what.
+pub(crate) struct Found<'a> {
+    pub(crate) space: &'a Space,
+    pub(crate) optima: &'a LocalOptima,
+    pub(crate) phase: &'a DistinguishingPhase,
+}
+
+/// Plain text, at most 100 columns.
+pub(crate) fn text(found: &Found<'_>) -> String {
+    let Found { space, phase, .. } = found;
+    let mut text = String::new();
+    let shapes = match phase.rules.len() {
+        1 => "one shape".to_owned(),
+        count => format!("{count} shapes"),
+    };
+    let _ = writeln!(
+        text,
+        "Distinguishing phase of {shapes} of processes at a phase margin of {} deg",
+        space.phase_margin_deg
+    );
+    let ranges = space.ranges_s().map(|(low, high)| {
+        let (low, high) = (significant(low), significant(high));
+        format!("{low} .. {high} s")
+    });
+    let _ = writeln!(
+        text,
+        "  T_prop {}   T_body {}   tau {}",
+        ranges[0], ranges[1], ranges[2]
+    );
+    let _ = writeln!(
+        text,
+        "\n{:<20}{:>9}{:>10}{:>9}{:>9}     deterioration (%)\n\
+         {:<20}{:>9}{:>10}{:>9}{:>9}{:>10}{:>9}",
+        "", "phase", "beta", "c1", "c3", "", "(deg)", "", "", "", "worst", "mean"
+    );
+    rule_line(&mut text, "Best local rule", &phase.best.applied);
+    rule_line(&mut text, "Best rule of all", &phase.minimax);
+    let _ = writeln!(
+        text,
+        "\nThe best local rule is that of {},\nand costs most on {}.",
+        times(phase.best.times_s),
+        times(phase.best.applied.worst_on_s)
+    );
+    table(&mut text, found);
+    text
+}
+
+fn rule_line(text: &mut String, name: &str, applied: &AppliedRule) {
+    let rule = applied.rule;
+    let _ = writeln!(
+        text,
+        "{name:<20}{:>9.2}{:>10.4}{:>9.4}{:>9.4}{:>10.2}{:>9.2}",
+        applied.phase_rad.to_degrees(),
+        rule.beta,
+        rule.c1,
+        rule.c3,
+        100.0 * applied.worst,
+        100.0 * applied.mean
+    );
+}
+
+fn times([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> String {
+    format!(
+        "T_prop {} s, T_body {} s, tau {} s",
+        significant(t_prop_s),
+        significant(t_body_s),
+        significant(tau_s)
+    )
+}
+
+/// What every phase costs, over whole degrees that hold all local rules.
+fn table(text: &mut String, found: &Found<'_>) {
+    let margin_deg = found.space.phase_margin_deg;
+    let (low, high) = found.optima.lead_range_rad();
+    let range_deg = (high - low).to_degrees();
+    let step_deg = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|step| range_deg < MOST_LINES * step)
+        .unwrap_or(10.0);
+    let first = ((margin_deg - high.to_degrees()) / step_deg).round() as i32;
+    let last = ((margin_deg - low.to_degrees()) / step_deg).round() as i32;
+    let _ = writeln!(
+        text,
+        "\nPhase of the rule   local rules   deterioration (%)   costs most on (ms)\n\
+         {:<20}{:>11}{:>12}{:>9}   {:>8}{:>9}{:>9}",
+        "(deg)", "near it", "worst", "mean", "T_prop", "T_body", "tau"
+    );
+    for multiple in (first..=last).rev() {
+        let phase_deg = f64::from(multiple) * step_deg;
+        let Ok(applied) = found.optima.apply((margin_deg - phase_deg).to_radians()) else {
+            continue;
+        };
+        let is_near = |local: &&LocalRule| {
+            (local.applied.phase_rad.to_degrees() / step_deg).round() as i32 == multiple
+        };
+        let [t_prop, t_body, tau] = applied.worst_on_s.map(|time_s| significant(1e3 * time_s));
+        let _ = writeln!(
+            text,
+            "{phase_deg:<20}{:>11}{:>12.2}{:>9.2}   {t_prop:>8}{t_body:>9}{tau:>9}",
+            found.phase.rules.iter().filter(is_near).count(),
+            100.0 * applied.worst,
+            100.0 * applied.mean,
+        );
+    }
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    schema: &'static str,
+    space: &'a Space,
+    distinguishing: Local,
+    minimax: Rule,
+    rules: Vec<Local>,
+}
+
+#[derive(Serialize)]
+struct Local {
+    process: Times,
+    #[serde(flatten)]
+    rule: Rule,
+}
+
+#[derive(Serialize)]
+struct Rule {
+    phase_deg: f64,
+    lead_deg: f64,
+    beta: f64,
+    c1: f64,
+    c3: f64,
+    worst: f64,
+    mean: f64,
+    worst_on: Times,
+}
+
+#[derive(Serialize)]
+struct Times {
+    t_prop_s: f64,
+    t_body_s: f64,
+    tau_s: f64,
+}
+
+/// Deteriorations are fractions, and null where they are infinite.
+pub(crate) fn json(found: &Found<'_>) -> String {
+    to_text(&Report {
+        schema: SCHEMA,
+        space: found.space,
+        distinguishing: Local::of(&found.phase.best),
+        minimax: Rule::of(&found.phase.minimax),
+        rules: found.phase.rules.iter().map(Local::of).collect(),
+    })
+}
+
+impl Local {
+    fn of(local: &LocalRule) -> Self {
+        Self {
+            process: Times::of(local.times_s),
+            rule: Rule::of(&local.applied),
+        }
+    }
+}
+
+impl Rule {
+    fn of(applied: &AppliedRule) -> Self {
+        Self {
+            phase_deg: applied.phase_rad.to_degrees(),
+            lead_deg: applied.lead_rad.to_degrees(),
+            beta: applied.rule.beta,
+            c1: applied.rule.c1,
+            c3: applied.rule.c3,
+            worst: applied.worst,
+            mean: applied.mean,
+            worst_on: Times::of(applied.worst_on_s),
+        }
+    }
+}
+
+impl Times {
+    fn of([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> Self {
+        Self {
+            t_prop_s,
+            t_body_s,
+            tau_s,
+        }
+    }
+}

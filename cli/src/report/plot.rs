@@ -1,0 +1,325 @@
+//! The last cycles in the terminal: what was measured as dots, the fit as a line, the relay underneath.
+//!
+//! A character of braille has two columns of four dots, so a plot of 80 by 12 characters has 160 by 48 dots.
+
+use std::fmt::Write;
+
+use onecycle_identify::{Identification, OscillationFound};
+use onecycle_link::Recording;
+
+use super::number::significant;
+use crate::style::{FIT, HEADING, PLAIN, painted};
+
+/// Widest plot, as wide as the rest of the report.
+const WIDTH: usize = 96;
+/// Narrowest, whatever the terminal: narrower shows nothing.
+const LEAST_WIDTH: usize = 40;
+/// Characters from the top of the plot to its bottom.
+const ROWS: usize = 12;
+/// Characters to the left of the plot: a number, a blank and the frame.
+const MARGIN: usize = 13;
+/// Most cycles that are drawn: with more of them dots would hide the line.
+const MOST_CYCLES: usize = 2;
+
+/// Dots of a character across and down.
+const ACROSS: usize = 2;
+const DOWN: usize = 4;
+/// The bit of each dot, by row and column, in the order of Unicode's block of braille.
+const BITS: [[u8; ACROSS]; DOWN] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
+/// The character without a dot.
+const BRAILLE: u32 = 0x2800;
+
+/// A plot as wide as a terminal of so many characters; of none, as wide as the report may be. The fit is there
+/// where a process was identified. `None` without an oscillation.
+pub(crate) fn cycles(
+    recording: &Recording,
+    found: &Identification,
+    columns: Option<usize>,
+) -> Option<String> {
+    let oscillation = found.oscillation.as_ref()?;
+    let cycles = oscillation.cycles_used.clamp(1, MOST_CYCLES);
+    let from_s = oscillation.end_s - cycles as f64 * oscillation.period_s;
+    let shown = |time_s: f64| (from_s..=oscillation.end_s).contains(&time_s);
+    let (measured, fitted): (Vec<Point>, Vec<Point>) = match &found.outcome {
+        Ok(identified) => (identified.fit.iter())
+            .filter(|point| shown(point.time_s))
+            .map(|point| {
+                let of = |value| (point.time_s, value);
+                (of(point.measured), of(point.fitted))
+            })
+            .unzip(),
+        Err(_) => {
+            let points = recording.time_s().iter().zip(recording.output());
+            let points = points.map(|(time_s, output)| (*time_s, *output));
+            (points.filter(|point| shown(point.0)).collect(), vec![])
+        }
+    };
+    let width = columns.unwrap_or(WIDTH).clamp(LEAST_WIDTH, WIDTH) - MARGIN;
+    let frame = Frame::around(&measured, &fitted, width)?;
+    let mut text = title(recording, cycles, !fitted.is_empty());
+    frame.write(&mut text, &measured, &fitted);
+    text += &frame.relay(recording, oscillation);
+    text += &frame.times();
+    Some(text)
+}
+
+/// What is drawn, and in which unit.
+fn title(recording: &Recording, cycles: usize, has_fit: bool) -> String {
+    let column = &recording.columns().output;
+    let unit = (column.unit.as_ref()).map_or(String::new(), |unit| format!(" ({unit})"));
+    let heading = match cycles {
+        1 => "Last cycle",
+        _ => "Last two cycles",
+    };
+    let what = if has_fit {
+        format!(
+            "{}{unit} in dots, the {} as a line",
+            column.name,
+            painted(FIT, "fit")
+        )
+    } else {
+        format!("{}{unit}", column.name)
+    };
+    format!("\n{}  {what}\n", painted(HEADING, heading))
+}
+
+/// Time (s) and value.
+type Point = (f64, f64);
+
+/// What the plot reaches over, and its characters across.
+struct Frame {
+    times_s: [f64; 2],
+    values: [f64; 2],
+    width: usize,
+}
+
+impl Frame {
+    /// Around all points; `None` where they have no extent.
+    fn around(measured: &[Point], fitted: &[Point], width: usize) -> Option<Self> {
+        let all = || measured.iter().chain(fitted);
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            let [low, high] = values
+                .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+                    [low.min(value), high.max(value)]
+                });
+            (low < high && (high - low).is_finite()).then_some([low, high])
+        };
+        Some(Self {
+            times_s: range(&mut all().map(|point| point.0))?,
+            values: range(&mut all().map(|point| point.1))?,
+            width,
+        })
+    }
+
+    /// Column of dots of a time.
+    fn across(&self, time_s: f64) -> usize {
+        place(time_s, self.times_s, self.width * ACROSS)
+    }
+
+    /// Row of dots of a value, from the top.
+    fn down(&self, value: f64) -> usize {
+        ROWS * DOWN - 1 - place(value, self.values, ROWS * DOWN)
+    }
+
+    /// Time in the middle of a column, of so many.
+    fn time_s(&self, column: usize, columns: usize) -> f64 {
+        let [from, to] = self.times_s;
+        from + (to - from) * (column as f64 + 0.5) / columns as f64
+    }
+
+    /// The rows of the plot.
+    fn write(&self, text: &mut String, measured: &[Point], fitted: &[Point]) {
+        let mut dots = Canvas::new(self.width);
+        for &(time_s, value) in measured {
+            dots.set(self.across(time_s), self.down(value));
+        }
+        let mut line = Canvas::new(self.width);
+        let mut last = None;
+        for column in 0..self.width * ACROSS {
+            let Some(value) = interpolated(fitted, self.time_s(column, self.width * ACROSS)) else {
+                continue;
+            };
+            let row = self.down(value);
+            // Down or up to where the column before ended, so that a steep line has no gaps.
+            let begin = match last {
+                Some(last) if last < row => last + 1,
+                Some(last) if last > row => last - 1,
+                _ => row,
+            };
+            for row in begin.min(row)..=begin.max(row) {
+                line.set(column, row);
+            }
+            last = Some(row);
+        }
+        for row in 0..ROWS {
+            let label = match row {
+                0 => significant(self.values[1]),
+                _ if row == ROWS - 1 => significant(self.values[0]),
+                _ => String::new(),
+            };
+            let edge = if label.is_empty() { '│' } else { '┤' };
+            let row = merged(&dots.rows[row], &line.rows[row]);
+            // Writing to a string cannot fail.
+            let _ = writeln!(text, "{label:>margin$} {edge}{row}", margin = MARGIN - 2);
+        }
+    }
+
+    /// The relay: high where a stroke is above, low where it is below.
+    fn relay(&self, recording: &Recording, found: &OscillationFound) -> String {
+        let stroke = |column| {
+            let time_s = self.time_s(column, self.width);
+            let next = recording.time_s().partition_point(|&at_s| at_s <= time_s);
+            let is_high = recording.input()[next.saturating_sub(1)] > found.relay_centre;
+            if is_high { '▔' } else { '▁' }
+        };
+        let strokes: String = (0..self.width).map(stroke).collect();
+        format!("{:>margin$} │{strokes}\n", "relay", margin = MARGIN - 2)
+    }
+
+    /// The axis of time, with where it begins and ends.
+    fn times(&self) -> String {
+        let [from, to] = self.times_s;
+        // Three digits of what the axis reaches over, whatever it begins at; casts saturate.
+        let decimals = (2.0 - (to - from).log10().floor()).clamp(0.0, 9.0) as usize;
+        let [from, to] = self.times_s.map(|time_s| format!("{time_s:.decimals$} s"));
+        format!(
+            "{:MARGIN$}{}\n{:MARGIN$}{from}{to:>rest$}\n",
+            format!("{:>margin$}", '└', margin = MARGIN),
+            "─".repeat(self.width),
+            "",
+            rest = self.width.saturating_sub(from.len()),
+        )
+    }
+}
+
+/// Which of `count` equal parts of a range a value lies in.
+fn place(value: f64, [low, high]: [f64; 2], count: usize) -> usize {
+    let part = (value - low) / (high - low) * count as f64;
+    // Casts saturate.
+    (part as usize).min(count - 1)
+}
+
+/// The value at a time between points; `None` before and behind them.
+fn interpolated(points: &[Point], time_s: f64) -> Option<f64> {
+    let next = points.partition_point(|point| point.0 < time_s);
+    let (before, after) = (points.get(next.checked_sub(1)?)?, points.get(next)?);
+    let part = (time_s - before.0) / (after.0 - before.0);
+    Some(before.1 + part * (after.1 - before.1))
+}
+
+/// Dots in characters.
+struct Canvas {
+    rows: Vec<Vec<u8>>,
+}
+
+impl Canvas {
+    fn new(width: usize) -> Self {
+        Self {
+            rows: vec![vec![0; width]; ROWS],
+        }
+    }
+
+    fn set(&mut self, across: usize, down: usize) {
+        self.rows[down / DOWN][across / ACROSS] |= BITS[down % DOWN][across % ACROSS];
+    }
+}
+
+/// A row of dots and of the line, one over the other: in the line's colour where it runs.
+fn merged(dots: &[u8], line: &[u8]) -> String {
+    let character = |bits: u8| match bits {
+        0 => ' ',
+        bits => char::from_u32(BRAILLE + u32::from(bits)).unwrap_or(' '),
+    };
+    let cells: Vec<(bool, char)> = (dots.iter().zip(line))
+        .map(|(dots, line)| (*line != 0, character(dots | line)))
+        .collect();
+    let runs = cells.chunk_by(|one, next| one.0 == next.0);
+    let painted = runs.map(|run| {
+        let characters: String = run.iter().map(|cell| cell.1).collect();
+        painted(if run[0].0 { FIT } else { PLAIN }, &characters)
+    });
+    painted.collect::<String>().trim_end().to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two seconds and a value from -1 to 1, on sixteen characters.
+    const FRAME: Frame = Frame {
+        times_s: [3.0, 5.0],
+        values: [-1.0, 1.0],
+        width: 16,
+    };
+
+    fn rows(measured: &[Point], fitted: &[Point]) -> Vec<String> {
+        let mut text = String::new();
+        FRAME.write(&mut text, measured, fitted);
+        text.lines().map(str::to_owned).collect()
+    }
+
+    // The lowest dot at the beginning is the lower left one of the lower left character, and the highest at the
+    // end the upper right one of the upper right character, fifteen blanks behind the frame.
+    #[test]
+    fn dots_lie_at_the_corners() {
+        let rows = rows(&[(3.0, -1.0), (5.0, 1.0)], &[]);
+        assert_eq!(rows.len(), ROWS);
+        assert_eq!(rows[ROWS - 1], "     -1.000 ┤⡀");
+        assert_eq!(rows[0], format!("      1.000 ┤{}⠈", " ".repeat(15)));
+        assert!(
+            rows[1..ROWS - 1]
+                .iter()
+                .all(|row| row.trim_end() == "            │")
+        );
+    }
+
+    // From corner to corner 32 columns of dots rise by 48 rows: more rows than columns, so that every one of
+    // the 12 rows of characters has some of the line, in its colour, and none is missing between two.
+    #[test]
+    fn a_steep_line_has_no_gaps() {
+        let points = [(3.0, -1.0), (5.0, 1.0)];
+        let mut dots = 0;
+        for row in rows(&[], &points) {
+            let bits = row
+                .chars()
+                .filter(|c| ('\u{2801}'..='\u{28ff}').contains(c));
+            let in_row: u32 = bits.map(|c| (c as u32 - BRAILLE).count_ones()).sum();
+            assert!(in_row >= 4, "{row}");
+            assert!(row.contains("\x1b[36m"), "{row}");
+            dots += in_row;
+        }
+        // The middles of the first and the last column are half a column from the corners: a row less at each.
+        assert!((46..=48).contains(&dots), "{dots}");
+    }
+
+    // Halfway between two points is the mean of their values; outside there is nothing to draw.
+    #[test]
+    fn only_between_points() {
+        let points = [(0.0, 1.0), (2.0, 5.0)];
+        assert_eq!(interpolated(&points, 1.0), Some(3.0));
+        assert_eq!(interpolated(&points, 2.5), None);
+        assert_eq!(interpolated(&points, -0.5), None);
+    }
+
+    // What has no extent has no frame, and numbers that are none do not make one.
+    #[test]
+    fn nothing_is_drawn_of_nothing() {
+        for points in [
+            &[][..],
+            &[(1.0, 2.0)],
+            &[(1.0, 2.0), (2.0, 2.0)],
+            &[(1.0, f64::NAN), (2.0, f64::NAN)],
+        ] {
+            assert!(Frame::around(points, &[], 10).is_none(), "{points:?}");
+        }
+    }
+
+    // The axis reaches over 2 s, so a hundredth is its third digit; it is as wide as the plot.
+    #[test]
+    fn the_axis_names_its_ends() {
+        let times = FRAME.times();
+        let lines: Vec<&str> = times.lines().collect();
+        assert_eq!(lines[0], format!("            └{}", "─".repeat(16)));
+        assert_eq!(lines[1], "             3.00 s    5.00 s");
+    }
+}

@@ -1,0 +1,52 @@
+//! Settings files: TOML, checked field by field.
+
+use std::path::Path;
+
+use onecycle_lab::space::Space;
+use serde::de::DeserializeOwned;
+
+use crate::failure::Failure;
+
+/// What a file holds, as far as its types go; its values are for the caller to check.
+pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> {
+    let text = std::fs::read_to_string(path).map_err(|error| failure(path, error.to_string()))?;
+    toml::from_str(&text).map_err(|error| failure(path, located(&text, &error)))
+}
+
+/// The refusal of a file one of whose values is out of its range.
+pub(crate) fn out_of_range(path: &Path, error: impl std::fmt::Display) -> Failure {
+    failure(path, error.to_string())
+}
+
+/// The space that a file describes, the paper's multirotors without one.
+pub(crate) fn space(path: Option<&Path>) -> Result<Space, Failure> {
+    let Some(path) = path else {
+        return Ok(Space::MULTIROTOR);
+    };
+    let space: Space = read(path)?;
+    space
+        .validate()
+        .map_err(|error| out_of_range(path, error))?;
+    Ok(space)
+}
+
+fn failure(path: &Path, reason: String) -> Failure {
+    Failure::Settings {
+        path: path.to_owned(),
+        reason,
+    }
+}
+
+/// The parser's complaint with line and key; its own report is a picture of several lines.
+fn located(text: &str, error: &toml::de::Error) -> String {
+    let begin = error.span().map_or(0, |span| span.start).min(text.len());
+    let before = &text[..begin];
+    let number = before.matches('\n').count() + 1;
+    let line = before.rsplit('\n').next().unwrap_or_default();
+    let complaint = error.message().replace('\n', ", ");
+    // Where a value is wrong, its key stands before it.
+    match line.split_once('=') {
+        Some((key, _)) => format!("line {number}, {}: {complaint}", key.trim()),
+        None => format!("line {number}: {complaint}"),
+    }
+}

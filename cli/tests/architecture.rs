@@ -1,0 +1,211 @@
+//! The dependencies between the crates, as ARCHITECTURE.md draws them.
+//!
+//! Read from `cargo metadata`, dependencies for tests and builds included. What flies depends on
+//! nothing that does not fly, and what reads files knows nothing of how the identifier was made.
+
+use std::process::Command;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+/// Each crate with the crates of this workspace that it may depend on, tests included.
+const ALLOWED: [(&str, &[&str]); 8] = [
+    ("onecycle-onboard", &[]),
+    ("onecycle-plant", &["onecycle-onboard"]),
+    ("onecycle-link", &[]),
+    ("onecycle-design", &["onecycle-onboard"]),
+    // `plant` for its tests alone.
+    (
+        "onecycle-identify",
+        &["onecycle-design", "onecycle-onboard", "onecycle-plant"],
+    ),
+    ("onecycle", &PARTS),
+    (
+        "onecycle-lab",
+        &[
+            "onecycle-design",
+            "onecycle-identify",
+            "onecycle-onboard",
+            "onecycle-plant",
+        ],
+    ),
+    (
+        "onecycle-cli",
+        &[
+            "onecycle",
+            "onecycle-lab",
+            "onecycle-design",
+            "onecycle-identify",
+            "onecycle-link",
+            "onecycle-onboard",
+            "onecycle-plant",
+        ],
+    ),
+];
+
+/// What the library ships.
+const PARTS: [&str; 5] = [
+    "onecycle-design",
+    "onecycle-identify",
+    "onecycle-link",
+    "onecycle-onboard",
+    "onecycle-plant",
+];
+
+/// The part of `cargo metadata` that matters here.
+#[derive(Deserialize)]
+struct Metadata {
+    packages: Vec<Package>,
+}
+
+#[derive(Deserialize)]
+struct Package {
+    name: String,
+    dependencies: Vec<Dependency>,
+}
+
+/// `kind` is `None` for a normal dependency, else `dev` or `build`.
+#[derive(Deserialize)]
+struct Dependency {
+    name: String,
+    kind: Option<String>,
+}
+
+impl Metadata {
+    fn package(&self, name: &str) -> Option<&Package> {
+        self.packages.iter().find(|package| package.name == name)
+    }
+
+    /// A sentence for every arrow that is not allowed and every crate that has no row, or no crate.
+    fn offences(&self) -> Vec<String> {
+        let mut offences = Vec::new();
+        for (name, _) in ALLOWED {
+            if self.package(name).is_none() {
+                offences.push(format!("{name} is not in the workspace"));
+            }
+        }
+        for package in &self.packages {
+            let row = ALLOWED.iter().find(|(name, _)| *name == package.name);
+            let Some((_, allowed)) = row else {
+                offences.push(format!("{} has no row in ALLOWED", package.name));
+                continue;
+            };
+            for dependency in &package.dependencies {
+                let on = dependency.name.as_str();
+                if self.package(on).is_some() && !allowed.contains(&on) {
+                    let kind = dependency.kind.as_deref().unwrap_or("normal");
+                    offences.push(format!("{on} <- {} ({kind})", package.name));
+                }
+            }
+        }
+        offences
+    }
+
+    /// What a crate depends on, other than for its tests.
+    fn shipped_dependencies(&self, of: &str) -> Option<Vec<&Dependency>> {
+        let dependencies = self.package(of)?.dependencies.iter();
+        let is_shipped = |dependency: &&Dependency| dependency.kind.as_deref() != Some("dev");
+        Some(dependencies.filter(is_shipped).collect())
+    }
+}
+
+fn names<'a>(dependencies: &[&'a Dependency]) -> Vec<&'a str> {
+    let name = |dependency: &&'a Dependency| dependency.name.as_str();
+    dependencies.iter().map(name).collect()
+}
+
+/// The workspace as cargo reads it; without its dependencies it needs neither lock nor network.
+fn workspace() -> Metadata {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml");
+    let output = Command::new(cargo)
+        .args(["metadata", "--no-deps", "--format-version", "1"])
+        .args(["--locked", "--offline", "--manifest-path", manifest])
+        .output()
+        .expect("cargo runs");
+    let complaint = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "cargo metadata: {complaint}");
+    serde_json::from_slice(&output.stdout).expect("cargo metadata is JSON")
+}
+
+/// The allowed graph in full, as cargo would describe it.
+fn made_up() -> Value {
+    let packages = ALLOWED.map(|(name, allowed)| {
+        let dependencies = allowed.iter().map(|on| json!({"name": on, "kind": null}));
+        json!({"name": name, "dependencies": dependencies.collect::<Vec<_>>()})
+    });
+    json!({ "packages": packages })
+}
+
+fn offences_of(metadata: Value) -> Vec<String> {
+    let metadata: Metadata = serde_json::from_value(metadata).expect("the graph is well formed");
+    metadata.offences()
+}
+
+#[test]
+fn only_the_allowed_arrows() {
+    assert_eq!(workspace().offences(), Vec::<String>::new());
+}
+
+// Firmware pays for every crate that comes along.
+#[test]
+fn onboard_ships_with_libm_alone() {
+    let metadata = workspace();
+    let shipped = metadata.shipped_dependencies("onecycle-onboard");
+    assert_eq!(names(&shipped.unwrap()), ["libm"]);
+}
+
+// Nothing that ships depends on the research: neither the library nor its parts know `lab`.
+#[test]
+fn the_library_ships_with_its_parts_alone() {
+    let metadata = workspace();
+    let shipped = metadata.shipped_dependencies("onecycle").unwrap();
+    assert_eq!(names(&shipped), PARTS);
+    for part in PARTS {
+        let shipped = metadata.shipped_dependencies(part).unwrap();
+        let names = names(&shipped);
+        assert!(!names.contains(&"onecycle-lab"), "{part} {names:?}");
+    }
+    let identify = metadata.shipped_dependencies("onecycle-identify").unwrap();
+    assert!(!names(&identify).contains(&"onecycle-plant"));
+}
+
+#[test]
+fn the_allowed_graph_passes() {
+    assert_eq!(offences_of(made_up()), Vec::<String>::new());
+}
+
+#[test]
+fn a_forbidden_arrow_is_named() {
+    let mut metadata = made_up();
+    metadata["packages"][0]["dependencies"] = json!([
+        {"name": "libm", "kind": null},
+        {"name": "onecycle-plant", "kind": "dev"},
+    ]);
+    let expected = "onecycle-plant <- onecycle-onboard (dev)";
+    assert_eq!(offences_of(metadata), [expected]);
+}
+
+#[test]
+fn a_crate_without_a_row_is_named() {
+    let mut metadata = made_up();
+    metadata["packages"][2] = json!({"name": "onecycle-radio", "dependencies": []});
+    let expected = [
+        "onecycle-link is not in the workspace",
+        "onecycle-radio has no row in ALLOWED",
+    ];
+    assert_eq!(offences_of(metadata), expected);
+}
+
+#[test]
+fn dependencies_for_tests_are_not_shipped() {
+    let mut metadata = made_up();
+    metadata["packages"][0]["dependencies"] = json!([
+        {"name": "libm", "kind": null},
+        {"name": "cc", "kind": "build"},
+        {"name": "proptest", "kind": "dev"},
+    ]);
+    let metadata: Metadata = serde_json::from_value(metadata).expect("the graph is well formed");
+    let shipped = metadata.shipped_dependencies("onecycle-onboard");
+    assert_eq!(names(&shipped.unwrap()), ["libm", "cc"]);
+}

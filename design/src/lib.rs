@@ -1,0 +1,9 @@
+//! From a process model to its controller.
+
+pub mod bands;
+pub mod cascade;
+pub mod decision;
+pub mod roots;
+pub mod soiptd_pd;
+
+pub use soiptd_pd::*;

@@ -1,0 +1,102 @@
+//! What a controller costs on a process, relative to that process's own optimum (the `J_ij` of the
+//! paper's equation 8; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//!
+//! ```text
+//! deterioration = (J(process, controller) - J*) / J*,    J* = J(process, its optimum)
+//! ```
+//!
+//! `J*` is the least cost *at a phase margin*, so the figure can be negative: a controller that
+//! leaves less margin may follow a step faster. It means something only beside the margin.
+
+use onecycle_onboard::{Pd, Soiptd};
+
+use crate::soiptd_pd::cost::ise;
+use crate::soiptd_pd::margins::margins;
+use crate::soiptd_pd::optimum::Optimum;
+
+/// How a controller made for one process fares on another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Deterioration {
+    /// The loop is stable.
+    Stable {
+        /// Cost above the optimum, as a fraction of it.
+        relative: f64,
+        /// Phase margin that is left (rad).
+        phase_margin_rad: f64,
+    },
+    /// The loop is unstable: its cost does not exist.
+    Unstable,
+}
+
+impl Deterioration {
+    /// Cost above the optimum, as a fraction of it; `None` where unstable.
+    #[must_use]
+    pub fn relative(&self) -> Option<f64> {
+        match *self {
+            Self::Stable { relative, .. } => Some(relative),
+            Self::Unstable => None,
+        }
+    }
+}
+
+/// Deterioration of `process` under `controller`; `optimum` is that of the same process, at the
+/// margin or floor that the comparison is about.
+#[must_use]
+pub fn deterioration(controller: Pd, process: &Soiptd, optimum: &Optimum) -> Deterioration {
+    match (ise(process, controller), margins(process, controller)) {
+        (Some(cost), Some(margins)) => Deterioration::Stable {
+            relative: (cost - optimum.ise) / optimum.ise,
+            phase_margin_rad: margins.phase_margin_rad,
+        },
+        _ => Deterioration::Unstable,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::soiptd_pd::optimum::pd_at_phase_margin;
+
+    // Its own optimum deteriorates nothing; five times its gain passes the gain margin of 2.26.
+    #[test]
+    fn own_optimum_and_unstable_gain() {
+        let process = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
+        let margin = 20_f64.to_radians();
+        let best = pd_at_phase_margin(&process, margin).unwrap();
+        match deterioration(best.pd, &process, &best) {
+            Deterioration::Stable {
+                relative,
+                phase_margin_rad,
+            } => {
+                assert!(relative.abs() < 1e-14, "{relative}");
+                assert!((phase_margin_rad - margin).abs() < 1e-14);
+            }
+            Deterioration::Unstable => panic!("the optimum is stable"),
+        }
+        let hot = Pd {
+            kp: 5.0 * best.pd.kp,
+            kd: 5.0 * best.pd.kd,
+        };
+        assert_eq!(deterioration(hot, &process, &best), Deterioration::Unstable);
+        assert_eq!(Deterioration::Unstable.relative(), None);
+    }
+
+    // The margin is bought with cost: the best PD at 15 deg is cheaper than the best at 20 deg, by
+    // 6.02 % on (0.3, 2, 0.1), and the margin beside the figure says why.
+    #[test]
+    fn less_margin_may_cost_less() {
+        let process = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
+        let [at_15, at_20] = [15_f64, 20.0]
+            .map(|margin_deg| pd_at_phase_margin(&process, margin_deg.to_radians()).unwrap());
+        match deterioration(at_15.pd, &process, &at_20) {
+            Deterioration::Stable {
+                relative,
+                phase_margin_rad,
+            } => {
+                assert!((relative + 0.0602).abs() < 5e-5, "{relative}");
+                assert!((phase_margin_rad.to_degrees() - 15.0).abs() < 1e-12);
+            }
+            Deterioration::Unstable => panic!("15 deg is stable"),
+        }
+    }
+}

@@ -1,0 +1,221 @@
+//! Recipes: which processes, how often each kind, under which disturbances.
+//!
+//! ```toml
+//! seed = 1        # of the first example, 1 where it is left out
+//! bias = 0.5      # up to this part of the relay's amplitude
+//! sigma = 0.03    # noise, up to this part of the amplitude of the oscillation
+//! trim = true     # whether the relay follows the bias
+//!
+//! [[families]]
+//! samples_per_period = [89, 2306]
+//! space = { t_prop_s = [0.015, 0.3], t_body_s = [0.2, 2.0], tau_s = [0.0005, 0.1] }
+//!
+//! [[families]]    # as many as there are kinds of processes
+//! weight = 0.5    # half as often as one of weight 1
+//! draw = "logarithmic"
+//! samples_per_period = [40, 2500]
+//! space = { t_prop_s = [0.005, 0.12], t_body_s = [20, 2000], tau_s = [0.008, 0.05] }
+//! ```
+//!
+//! What is left out is the paper's; an empty file is a recipe.
+
+use onecycle_onboard::{Soiptd, SoiptdError};
+use rand::{Rng, RngExt};
+
+use crate::space::{FieldError, Range, Space, first_out_of_range, two_times};
+
+/// How the times of a process are drawn from the box of its space.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Draw {
+    /// Uniform.
+    #[default]
+    Uniform,
+    /// Uniform in their logarithms: for times of several powers of ten.
+    Logarithmic,
+}
+
+/// One kind of processes.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Family {
+    /// Where they are drawn from, the relay, and the margin of their controllers.
+    pub space: Space,
+    /// How they are drawn.
+    pub draw: Draw,
+    /// How often, beside the other families.
+    pub weight: f64,
+    /// Samples in a period of the noise-free oscillation, uniform in logarithms.
+    #[serde(deserialize_with = "two_times")]
+    pub samples_per_period: Range,
+}
+
+impl Default for Family {
+    /// The paper's multirotors at 1 kHz, whose periods are 89 to 2306 samples.
+    fn default() -> Self {
+        Self {
+            space: Space::MULTIROTOR,
+            draw: Draw::Uniform,
+            weight: 1.0,
+            samples_per_period: (89.0, 2306.0),
+        }
+    }
+}
+
+impl Family {
+    /// Multirotors of other people's simulators: nearly double integrators behind a fast motor, down to
+    /// 40 samples a period. A body that takes 2000 s is as good as one without damping.
+    pub const NEAR_DOUBLE_INTEGRATORS: Self = Self {
+        space: Space {
+            t_prop_s: (0.005, 0.12),
+            t_body_s: (20.0, 2000.0),
+            tau_s: (0.008, 0.05),
+            ..Space::MULTIROTOR
+        },
+        draw: Draw::Logarithmic,
+        weight: 1.0,
+        samples_per_period: (40.0, 2500.0),
+    };
+
+    fn validate(&self) -> Result<(), FieldError> {
+        self.space.validate()?;
+        let (least, most) = self.samples_per_period;
+        let least_tau_s = self.space.tau_s.0;
+        first_out_of_range([
+            (
+                "weight",
+                "positive and at most 1e6",
+                self.weight,
+                self.weight > 0.0 && self.weight <= 1e6,
+            ),
+            (
+                "samples_per_period",
+                "two numbers from 40 to 1e6, the lower first",
+                least,
+                (40.0..=1e6).contains(&least) && (least..=1e6).contains(&most),
+            ),
+            (
+                "tau_s",
+                "positive, for there is no logarithm of zero",
+                least_tau_s,
+                self.draw == Draw::Uniform || least_tau_s > 0.0,
+            ),
+        ])
+    }
+
+    /// A random process, its velocity gain one.
+    pub(crate) fn process(&self, rng: &mut impl Rng) -> Result<Soiptd, SoiptdError> {
+        let [t_prop_s, t_body_s, tau_s] = match self.draw {
+            Draw::Uniform => self.space.random(rng),
+            Draw::Logarithmic => self.space.ranges_s().map(|range| between(range, rng)),
+        };
+        Soiptd::new(1.0, t_prop_s, t_body_s, tau_s)
+    }
+
+    /// Samples in a period of a random experiment.
+    pub(crate) fn samples(&self, rng: &mut impl Rng) -> f64 {
+        between(self.samples_per_period, rng)
+    }
+}
+
+/// Uniform in logarithms.
+fn between((low, high): Range, rng: &mut impl Rng) -> f64 {
+    low * (high / low).powf(rng.random_range(0.0..=1.0))
+}
+
+/// How examples are made. See the [module](self).
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Recipe {
+    /// Seed of the first example; the others follow.
+    pub seed: u64,
+    /// Input bias, uniform between plus and minus this part of the relay's amplitude.
+    pub bias: f64,
+    /// Noise of a sample, uniform up to this part of the amplitude of the noise-free oscillation.
+    pub sigma: f64,
+    /// Whether the relay follows the bias.
+    pub trim: bool,
+    /// Kinds of processes; one is usual. Last, for a file has its tables at its end.
+    pub families: Vec<Family>,
+}
+
+impl Default for Recipe {
+    /// The paper's multirotors alone.
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            bias: 0.5,
+            sigma: 0.03,
+            trim: true,
+            families: vec![Family::default()],
+        }
+    }
+}
+
+/// What is wrong with a recipe.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum RecipeError {
+    /// A field of all experiments.
+    #[error("{0}")]
+    Field(#[from] FieldError),
+    /// A field of a family.
+    #[error("family {number}: {reason}")]
+    Family {
+        /// Its number, from one.
+        number: usize,
+        /// The field.
+        reason: FieldError,
+    },
+}
+
+impl RecipeError {
+    /// The field that is out of its range.
+    #[must_use]
+    pub fn field(&self) -> FieldError {
+        match *self {
+            Self::Field(reason) | Self::Family { reason, .. } => reason,
+        }
+    }
+}
+
+impl Recipe {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field that is out of its range, and its family.
+    pub fn validate(&self) -> Result<(), RecipeError> {
+        let families = self.families.len();
+        first_out_of_range([
+            (
+                "bias",
+                "0 to 0.9",
+                self.bias,
+                (0.0..=0.9).contains(&self.bias),
+            ),
+            (
+                "sigma",
+                "0 to 1",
+                self.sigma,
+                (0.0..=1.0).contains(&self.sigma),
+            ),
+            ("families", "one or more", families as f64, families > 0),
+        ])?;
+        for (index, family) in self.families.iter().enumerate() {
+            let number = index + 1;
+            (family.validate()).map_err(|reason| RecipeError::Family { number, reason })?;
+        }
+        Ok(())
+    }
+
+    /// The number of a random family, by their weights.
+    pub(crate) fn family(&self, rng: &mut impl Rng) -> usize {
+        let total: f64 = self.families.iter().map(|family| family.weight).sum();
+        let mut left = total * rng.random_range(0.0..1.0);
+        let is_it = |family: &Family| {
+            left -= family.weight;
+            left < 0.0
+        };
+        // Rounding may leave nothing for the last one.
+        (self.families.iter().position(is_it)).unwrap_or(self.families.len().saturating_sub(1))
+    }
+}

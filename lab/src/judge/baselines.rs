@@ -1,0 +1,131 @@
+//! The rivals: what others would do with the same experiment, each as good as it can be made.
+//!
+//! | module         | method                                        | what it needs                    |
+//! |----------------|-----------------------------------------------|----------------------------------|
+//! | [`pem`]        | prediction error, output error by SQP         | any recording from rest or steady |
+//! | [`rules`]      | homogeneous tuning rules                      | a cycle at the rule's `beta`     |
+//! | [`arx`]        | recursive least squares on ARX(2,2), as PX4's | any lively recording             |
+//! | [`gmvc`]       | PX4's gains for that model                    | the same                         |
+//! | [`asymmetric`] | asymmetric relay, integrator with dead time   | that relay's recording           |
+//!
+//! All read a recording as [`Signals`], one sample a point and at an even period, and return a
+//! [`Rival`]: the controller they lead to and the process behind it, or the reason why there is none.
+//! Where there is a process the controller is its PD of least exact ISE at the phase margin asked for,
+//! so that identifiers are compared and nothing else. Only [`gmvc`] makes the controller that flies.
+//!
+//! ```
+//! use crate::judge::baselines::{pem, rules};
+//! use onecycle_identify::Signals;
+//! use onecycle_onboard::{Soiptd, Relay, RelaySettings};
+//! use onecycle_plant::Experiment;
+//! use rand::SeedableRng;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let process = Soiptd::new(1.0, 0.02, 0.3, 0.01)?;
+//! let mut relay = Relay::new(RelaySettings::bare(1.0, -0.73))?;
+//! let mut noise = rand_pcg::Pcg64Mcg::seed_from_u64(1);
+//! let trace = Experiment::new(process, 1e-3, 6.0).run(&mut relay, &mut noise);
+//! let signals = signals_of(&trace, 1e-3);
+//!
+//! let margin = 20_f64.to_radians();
+//! let by_pem = pem::identify(&signals, &pem::Settings::fair(), margin)?;
+//! let by_rule = rules::identify(&signals, &rules::Rule::of_relay(-0.73, margin), 1)?;
+//! assert!((by_pem.pd.kp / by_rule.pd.kp - 1.0).abs() < 0.2);
+//! # Ok(())
+//! # }
+//! ```
+
+pub mod arx;
+pub mod asymmetric;
+pub mod gmvc;
+pub mod pem;
+pub mod rules;
+
+use onecycle_onboard::{Pd, Soiptd, SoiptdError};
+
+use onecycle_design::soiptd_pd::optimum::{OptimumError, pd_at_phase_margin};
+use onecycle_identify::{OscillationFound, Signals, Verdict, find_oscillation};
+
+/// What a rival makes of a recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rival {
+    /// The process it identifies; `None` for a rule that goes straight to the controller.
+    pub process: Option<Soiptd>,
+    /// The controller it leads to.
+    pub pd: Pd,
+}
+
+/// Why a rival has no answer.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RivalError {
+    /// There is no steady oscillation where one is needed.
+    #[error("{0}")]
+    NoOscillation(Verdict),
+    /// The columns differ in length, points are averages, or they do not lie at an even period.
+    #[error("the recording must hold single samples at an even period, without gaps")]
+    Uneven,
+    /// There are too few samples for the method.
+    #[error("{samples} samples are too few for this method")]
+    TooShort {
+        /// Samples that there are.
+        samples: usize,
+    },
+    /// A setting is out of its range: its name and value.
+    #[error("{0} is out of range: {1}")]
+    Setting(&'static str, f64),
+    /// What was found is no process of this kind: why.
+    #[error("the model found is no integrating process with lags: {0}")]
+    NotThisProcess(&'static str),
+    /// The parameters found are out of their physical range.
+    #[error("{0}")]
+    Process(#[from] SoiptdError),
+    /// The process found has no optimal controller.
+    #[error("{0}")]
+    Optimum(#[from] OptimumError),
+}
+
+impl Rival {
+    /// The process with its PD of least ISE at a phase margin (rad).
+    fn of_process(process: Soiptd, phase_margin_rad: f64) -> Result<Self, RivalError> {
+        Ok(Self {
+            process: Some(process),
+            pd: pd_at_phase_margin(&process, phase_margin_rad)?.pd,
+        })
+    }
+}
+
+/// Stamps may stray from the even grid by this part of the sample period: what rounding in a file
+/// leaves, far below what moves a fit.
+const EVEN: f64 = 0.01;
+
+/// Checks that the recording is what every rival reads.
+fn check_even(signals: &Signals<'_>) -> Result<(), RivalError> {
+    let samples = signals.time_s.len();
+    let is_single = signals.samples_per_point == 1 && signals.breaks.is_empty();
+    if !is_single || signals.input.len() != samples || signals.output.len() != samples {
+        return Err(RivalError::Uneven);
+    }
+    let sample_s = signals.sample_period_s;
+    let strays = |(index, &time_s): (usize, &f64)| {
+        let on_grid_s = signals.time_s[0] + index as f64 * sample_s;
+        let stray_s = (time_s - on_grid_s).abs();
+        stray_s.is_nan() || stray_s > EVEN * sample_s
+    };
+    if signals.time_s.iter().enumerate().any(strays) {
+        return Err(RivalError::Uneven);
+    }
+    Ok(())
+}
+
+/// The last steady cycles, `most` at most, and their samples.
+fn steady_cycles(
+    signals: &Signals<'_>,
+    most: usize,
+) -> Result<(OscillationFound, std::ops::Range<usize>), RivalError> {
+    check_even(signals)?;
+    let found = find_oscillation(signals, most).map_err(RivalError::NoOscillation)?;
+    let half_s = 0.5 * signals.sample_period_s;
+    let index = |time_s: f64| signals.time_s.partition_point(|&t| t < time_s - half_s);
+    let window = index(found.start_s)..index(found.end_s);
+    Ok((found, window))
+}

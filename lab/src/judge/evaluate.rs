@@ -1,0 +1,289 @@
+//! The judge: every method on the same experiments, scored by what its controller costs.
+//!
+//! ```text
+//! J      = (ISE of the controller on the true process - J*) / J*           exact, see deterioration
+//! J*     = least ISE of the true process at a phase margin of 20 degrees at least
+//! score  = mean over ALL experiments of min(|J|, 1), an unstable loop and a missing answer being 1,
+//!          a J below zero at a margin of 20 degrees or more being 0
+//! ```
+//!
+//! An answer is a process, which gets its PD of least ISE at the same margin, or gains: of a PD, or of a
+//! cascade with a PID of the rate ([`Cascade`]), which may cost less than the best PD. Unstable loops
+//! and missing answers have no `J`: they are counted apart, and mean, median, percentiles, worst and the
+//! least phase margin are over the stable loops. Alone these could be bettered by refusing the hard
+//! experiments; the score cannot: a refusal costs as much as anything can. `|J|`, for less margin than
+//! asked for may buy a cost below `J*`, which is no merit. No PD has one at the full margin; a cascade may.
+//!
+//! | module         | what it holds                                                            |
+//! |----------------|--------------------------------------------------------------------------|
+//! | [`experiment`] | the experiments: random processes of the paper's domain, two protocols   |
+//! | [`contender`]  | the methods, ours and the rivals                                         |
+//! | [`summary`]    | many verdicts in a row of numbers                                        |
+//! | [`files`]      | truth, answers and results as CSV                                        |
+//!
+//! Times are taken from a clock that the caller hands in, the program's is the processor time of the thread;
+//! nothing else depends on it.
+//!
+//! ```
+//! use crate::judge::evaluate::{Answer, Judge};
+//! use onecycle_onboard::Soiptd;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let truth = Soiptd::new(1.0, 0.05, 0.8, 0.02)?;
+//! let judge = Judge::new(&truth)?;
+//! let perfect = Answer::of_process(truth)?;
+//! assert!(judge.deterioration(perfect.feedback).relative().is_some_and(|j| j.abs() < 1e-12));
+//! # Ok(())
+//! # }
+//! ```
+
+pub mod contender;
+pub mod cycles;
+pub mod experiment;
+pub mod files;
+#[cfg(feature = "parquet")]
+pub mod parquet;
+pub mod summary;
+
+use onecycle_onboard::{Pd, Soiptd, SoiptdError};
+
+pub use self::contender::{Contender, RelayTest, Seen};
+pub use self::cycles::{Cycles, CyclesError};
+pub use self::experiment::{Benchmark, ExperimentError, Recorded, Truth};
+pub use self::summary::{Costs, Summary, quantile};
+use onecycle_design::cascade::Cascade;
+use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
+use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd};
+
+/// Least phase margin of all controllers (degrees): the paper's.
+pub const PHASE_MARGIN_DEG: f64 = 20.0;
+
+/// What a method makes of an experiment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Answer {
+    /// The process it identifies; `None` where it goes straight to gains.
+    pub process: Option<Soiptd>,
+    /// The controller it leads to.
+    pub feedback: Feedback,
+}
+
+/// A controller as the method would fly it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Feedback {
+    /// A PD.
+    Pd(Pd),
+    /// A cascade with a PID of the rate.
+    Cascade(Cascade),
+}
+
+impl From<Pd> for Feedback {
+    fn from(pd: Pd) -> Self {
+        Self::Pd(pd)
+    }
+}
+
+impl From<Cascade> for Feedback {
+    fn from(cascade: Cascade) -> Self {
+        Self::Cascade(cascade)
+    }
+}
+
+impl Answer {
+    /// A process, with its PD of least ISE at [`PHASE_MARGIN_DEG`].
+    ///
+    /// # Errors
+    /// Those of [`pd`]: the process is too extreme.
+    pub fn of_process(process: Soiptd) -> Result<Self, OptimumError> {
+        let optimum = pd(&process, PHASE_MARGIN_DEG.to_radians())?;
+        Ok(Self {
+            process: Some(process),
+            feedback: optimum.pd.into(),
+        })
+    }
+
+    /// Gains and nothing else.
+    #[must_use]
+    pub fn of_gains(gains: impl Into<Feedback>) -> Self {
+        Self {
+            process: None,
+            feedback: gains.into(),
+        }
+    }
+}
+
+/// The process with its lags in order, the shorter one first: they may be swapped without any change
+/// of the response.
+///
+/// # Errors
+/// [`SoiptdError`] where rounding makes it none: not for a process within reach of a relay.
+pub fn in_order(process: &Soiptd) -> Result<Soiptd, SoiptdError> {
+    let (sum, ratio) = process.pole_sum();
+    let unit = Soiptd::from_pole_sum(1.0, sum, ratio, process.tau_s())?;
+    unit.with_gain_scaled(process.jerk_gain() * unit.t_prop_s())
+}
+
+/// What answers are held against: a true process and its optimum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Judge {
+    truth: Soiptd,
+    best: Optimum,
+}
+
+impl Judge {
+    /// The judge of answers to this process.
+    ///
+    /// # Errors
+    /// [`OptimumError`] for a process too extreme to have an optimum.
+    pub fn new(truth: &Soiptd) -> Result<Self, OptimumError> {
+        Ok(Self {
+            truth: *truth,
+            best: pd(truth, PHASE_MARGIN_DEG.to_radians())?,
+        })
+    }
+
+    /// What a controller costs on the true process.
+    #[must_use]
+    pub fn deterioration(&self, controller: impl Into<Feedback>) -> Deterioration {
+        let cascade = match controller.into() {
+            Feedback::Pd(pd) => return deterioration(pd, &self.truth, &self.best),
+            Feedback::Cascade(cascade) => cascade,
+        };
+        (cascade.cost(&self.truth)).map_or(Deterioration::Unstable, |cost| Deterioration::Stable {
+            relative: (cost.ise - self.best.ise) / self.best.ise,
+            phase_margin_rad: cost.phase_margin_rad,
+        })
+    }
+
+    /// The verdict on an answer to an experiment, or on why there is none.
+    #[must_use]
+    pub fn record(&self, experiment: u64, method: &str, answer: Result<Answer, String>) -> Record {
+        let mut record = Record {
+            experiment,
+            method: method.to_owned(),
+            outcome: Verdict::NoAnswer,
+            deterioration: None,
+            phase_margin_deg: None,
+            k_over_t_body_error: None,
+            t_prop_error: None,
+            tau_error_s: None,
+            reason: None,
+            seconds: None,
+        };
+        let answer = match answer {
+            Ok(answer) => answer,
+            Err(reason) => {
+                record.reason = Some(reason);
+                return record;
+            }
+        };
+        record.outcome = match self.deterioration(answer.feedback) {
+            Deterioration::Stable {
+                relative,
+                phase_margin_rad,
+            } => {
+                record.deterioration = Some(relative);
+                record.phase_margin_deg = Some(phase_margin_rad.to_degrees());
+                Verdict::Stable
+            }
+            Deterioration::Unstable => Verdict::Unstable,
+        };
+        if let Some(errors) = answer.process.and_then(|found| errors(&found, &self.truth)) {
+            [
+                record.k_over_t_body_error,
+                record.t_prop_error,
+                record.tau_error_s,
+            ] = errors.map(Some);
+        }
+        record
+    }
+}
+
+/// Errors of `K/T_body` and `T_prop` over their true values, and of `tau` (s), lags in order.
+fn errors(found: &Soiptd, truth: &Soiptd) -> Option<[f64; 3]> {
+    let (found, truth) = (in_order(found).ok()?, in_order(truth).ok()?);
+    Some([
+        found.k_over_t_body() / truth.k_over_t_body() - 1.0,
+        found.t_prop_s() / truth.t_prop_s() - 1.0,
+        found.tau_s() - truth.tau_s(),
+    ])
+}
+
+/// How an answer fares.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Its loop is stable.
+    Stable,
+    /// Its loop is unstable.
+    Unstable,
+    /// There is none.
+    NoAnswer,
+}
+
+/// The verdict on a method in an experiment: a row of the results.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Record {
+    /// Number of the experiment.
+    pub experiment: u64,
+    /// Name of the method.
+    pub method: String,
+    /// How its answer fares.
+    pub outcome: Verdict,
+    /// `J`, where the loop is stable.
+    pub deterioration: Option<f64>,
+    /// Phase margin on the true process (degrees), where the loop is stable.
+    pub phase_margin_deg: Option<f64>,
+    /// Error of `K/T_body` over its true value, where there is a process.
+    pub k_over_t_body_error: Option<f64>,
+    /// Error of `T_prop` over its true value.
+    pub t_prop_error: Option<f64>,
+    /// Error of `tau` (s).
+    pub tau_error_s: Option<f64>,
+    /// Why there is no answer.
+    pub reason: Option<String>,
+    /// Time of the clock that the method took (s), where it was taken; the one number that no seed fixes.
+    pub seconds: Option<f64>,
+}
+
+impl Record {
+    /// What the controller costs; `None` without an answer.
+    #[must_use]
+    pub fn judged(&self) -> Option<Deterioration> {
+        match (self.outcome, self.deterioration, self.phase_margin_deg) {
+            (Verdict::Stable, Some(relative), Some(margin_deg)) => Some(Deterioration::Stable {
+                relative,
+                phase_margin_rad: margin_deg.to_radians(),
+            }),
+            (Verdict::NoAnswer, ..) => None,
+            _ => Some(Deterioration::Unstable),
+        }
+    }
+}
+
+/// Every contender's record of an experiment. `recorded` is its recording; those whose relay test is
+/// another one get theirs, on the same process with the same bias, noise and seed. The clock tells
+/// seconds.
+///
+/// # Errors
+/// [`ExperimentError`] where the true process has no optimum or cannot be run.
+pub fn records(
+    truth: &Truth,
+    recorded: &onecycle_identify::Signals<'_>,
+    contenders: &[Contender],
+    clock: &dyn Fn() -> f64,
+) -> Result<Vec<Record>, ExperimentError> {
+    let judge = Judge::new(&truth.process)?;
+    let mut records = Vec::with_capacity(contenders.len());
+    for contender in contenders {
+        let own = truth.recorded_by(contender.relay_test())?;
+        let seen = own.as_ref().map_or(Seen::of(*recorded), Recorded::seen);
+        let begin_s = clock();
+        let answer = contender.answer(&seen);
+        let seconds = clock() - begin_s;
+        records.push(Record {
+            seconds: Some(seconds),
+            ..judge.record(truth.number, &contender.name(), answer)
+        });
+    }
+    Ok(records)
+}

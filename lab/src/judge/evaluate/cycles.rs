@@ -1,0 +1,90 @@
+//! Cycles of one run, each identified by itself, and what the controller of each costs on the process of
+//! every other: the paper's Table VII.
+
+use onecycle_plant::Trace;
+
+use super::{Answer, Contender, Judge, Seen};
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_design::soiptd_pd::optimum::OptimumError;
+use onecycle_identify::{Signals, Verdict, find_oscillation};
+
+/// Why cycles cannot be looked at one by one.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum CyclesError {
+    /// There are not so many of them.
+    #[error("{0}")]
+    Oscillation(Verdict),
+    /// One of them tells no process.
+    #[error("a cycle tells no process: {0}")]
+    Cycle(String),
+    /// A process has no controller.
+    #[error(transparent)]
+    Optimum(#[from] OptimumError),
+}
+
+/// The last cycles of a recording, each identified by itself.
+#[derive(Clone, Debug)]
+pub struct Cycles {
+    /// Beginning of the first and end of the last (s).
+    pub range_s: (f64, f64),
+    /// Of each the answer, and the judge of others on its process.
+    pub answers: Vec<(Answer, Judge)>,
+}
+
+/// Where a recording is cut, in periods behind the end of a cycle: far from that end and from the next.
+const BEHIND: f64 = 0.25;
+
+impl Cycles {
+    /// Looks at the last `count` cycles of a recording one by one, each as though the recording ended there.
+    ///
+    /// # Errors
+    /// Where they are not steady or one of them tells no process.
+    pub fn of(trace: &Trace, sample_s: f64, count: usize) -> Result<Self, CyclesError> {
+        let signals = crate::experiments::signals_of(trace, sample_s);
+        let found = find_oscillation(&signals, count).map_err(CyclesError::Oscillation)?;
+        let mut answers = Vec::with_capacity(count);
+        for later in (0..count).rev() {
+            let cut_s = found.end_s - (later as f64 - BEHIND) * found.period_s;
+            let points = trace.time_s.partition_point(|&time_s| time_s < cut_s);
+            let before = Signals {
+                time_s: &trace.time_s[..points],
+                input: &trace.input[..points],
+                output: &trace.output[..points],
+                ..signals
+            };
+            let answer = Contender::OneCycle(1).answer(&Seen::of(before));
+            let answer = answer.map_err(|error| CyclesError::Cycle(error.to_string()))?;
+            let process = answer
+                .process
+                .ok_or_else(|| CyclesError::Cycle("no fit".to_owned()))?;
+            answers.push((Answer::of_process(process)?, Judge::new(&process)?));
+        }
+        let from_s = found.end_s - count as f64 * found.period_s;
+        Ok(Self {
+            range_s: (from_s, found.end_s),
+            answers,
+        })
+    }
+
+    /// `J_ij`: what the controller of cycle `i` costs on the process of cycle `j`.
+    #[must_use]
+    pub fn cross(&self) -> Vec<Vec<Deterioration>> {
+        let row = |(answer, _): &(Answer, Judge)| {
+            let cost = |(_, judge): &(Answer, Judge)| judge.deterioration(answer.feedback);
+            self.answers.iter().map(cost).collect()
+        };
+        self.answers.iter().map(row).collect()
+    }
+
+    /// The largest of them off the diagonal, a fraction; infinite where one is unstable.
+    #[must_use]
+    pub fn largest(&self) -> f64 {
+        let mut largest = 0.0_f64;
+        for (i, row) in self.cross().iter().enumerate() {
+            for (_, cost) in row.iter().enumerate().filter(|(j, _)| *j != i) {
+                largest = largest.max(cost.relative().unwrap_or(f64::INFINITY));
+            }
+        }
+        largest
+    }
+}

@@ -1,0 +1,8 @@
+//! Training: examples, networks, packs.
+
+pub mod dataset;
+pub mod identifier;
+pub mod lead_table;
+pub mod onnx;
+pub mod pack;
+pub mod train;

@@ -1,0 +1,414 @@
+//! Many examples on a disk: a manifest, and files of up to 4096 of them that NumPy reads.
+//!
+//! ```text
+//! manifest.json       format, program, recipe, number of examples, rows and hash of every file
+//! shard-00000.npz     examples 0 .. 4095, less those without a steady oscillation
+//! shard-00001.npz     examples 4096 .. 8191, ..
+//! ```
+//!
+//! | column               | numbers          | meaning                                            |
+//! |----------------------|------------------|----------------------------------------------------|
+//! | `number`             | u64              | of the example in its recipe                       |
+//! | `family`             | u64              | of the recipe, counted from zero                   |
+//! | `inputs`             | f32, 34 a row    | [`Signature::values`]                              |
+//! | `values`             | f64, 4 a row     | [`Example::values`]                                |
+//! | `gradient`           | f64, 4 a row     | [`Example::cost_gradient`], at the family's margin |
+//! | `period_s`           | f64              | of the cycle (s)                                   |
+//! | `amplitude`          | f64              | of the signature, times the sign it found the gain to have |
+//! | `centre`             | f64              | of the signature                                   |
+//! | `process`            | f64, 4 a row     | `K`, `T_prop`, `T_body`, `tau` (s)                 |
+//! | `bias`               | f64              | by the relay's amplitude                           |
+//! | `sigma`              | f64              | noise by the amplitude without noise               |
+//! | `samples_per_period` | f64              | of the oscillation without noise                   |
+//!
+//! A recipe and a number give the same bytes on any number of threads, so a file that is missing or
+//! damaged is made again rather than refused; what belongs to another recipe or program is refused.
+
+use std::ops::Range;
+
+use onecycle_onboard::Soiptd;
+use onecycle_onboard::signature::{LENGTH, Signature};
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::npz::{self, Column, Numbers};
+use super::{Example, ExampleError, VALUES};
+use crate::experiments::{Recipe, RecipeError};
+use crate::paper::grid::Pieces;
+
+/// Changes with every change that a reader could notice.
+pub const FORMAT: &str = "onecycle.dataset/1";
+
+/// Numbers of examples in a file: 1.2 MB, and some seconds of work, which is what an interruption loses.
+pub const EXAMPLES_PER_SHARD: u64 = 4096;
+
+/// Most examples of a dataset: 3 GB or so.
+pub const MOST_EXAMPLES: u64 = 10_000_000;
+
+pub(crate) const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));
+
+/// One example as a file has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Record {
+    /// Of the example in its recipe.
+    pub number: u64,
+    /// The example.
+    pub example: Example,
+    /// [`Example::values`].
+    pub values: [f64; VALUES],
+    /// [`Example::cost_gradient`] at the margin of its family.
+    pub gradient: [f64; VALUES],
+}
+
+/// What is wrong with a dataset.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum DatasetError {
+    /// The manifest is no JSON, or its fields are others.
+    #[error("the manifest is not one of a dataset: {0}")]
+    Json(String),
+    /// A manifest of another program, or a later one.
+    #[error("the format of the manifest must be \"{FORMAT}\", but is {0}")]
+    Format(String),
+    /// Its recipe.
+    #[error("the recipe of the manifest is out of range: {0}")]
+    Recipe(#[from] RecipeError),
+    /// Its lists do not fit each other.
+    #[error(
+        "the manifest must list {expected} files for its {examples} examples, but lists {found}"
+    )]
+    List {
+        /// How many examples it has.
+        examples: u64,
+        /// How many files these take.
+        expected: usize,
+        /// How many it lists.
+        found: usize,
+    },
+    /// Examples of another recipe.
+    #[error(
+        "the folder holds a dataset of another recipe: name another folder, or remove this one"
+    )]
+    OtherRecipe,
+    /// Examples of another version, whose last bits may differ.
+    #[error(
+        "the folder holds a dataset made by {0}, this is {PROGRAM}: name another folder, or remove this one"
+    )]
+    OtherProgram(String),
+    /// More examples than are asked for.
+    #[error(
+        "the folder already holds {found} examples of this recipe, more than {asked}: name another folder"
+    )]
+    Fewer {
+        /// How many it holds.
+        found: u64,
+        /// How many are asked for.
+        asked: u64,
+    },
+    /// A file that is not there yet.
+    #[error(
+        "{0} has not been made: the command that makes the dataset goes on where it was stopped"
+    )]
+    Unfinished(String),
+    /// A file whose bytes have changed.
+    #[error("{0} is not the file that the manifest speaks of: make the dataset again")]
+    Damaged(String),
+}
+
+/// A file of the dataset, once it has been made.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Entry {
+    /// How many examples it holds.
+    pub rows: usize,
+    /// SHA-256 of its bytes, in hexadecimal.
+    pub sha256: String,
+}
+
+impl Entry {
+    /// Whether these are its bytes.
+    #[must_use]
+    pub fn is_of(&self, bytes: &[u8]) -> bool {
+        self.sha256 == sha256(bytes)
+    }
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    let digest = Sha256::digest(bytes);
+    digest.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// What a dataset is of, and what of it has been made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    format: String,
+    program: String,
+    /// How its examples are made.
+    pub recipe: Recipe,
+    /// Numbers of examples, with and without an oscillation.
+    pub examples: u64,
+    /// Its files in order; `None` of those still to be made.
+    pub shards: Vec<Option<Entry>>,
+}
+
+impl Manifest {
+    /// Of a dataset of which nothing has been made.
+    #[must_use]
+    pub fn new(recipe: Recipe, examples: u64) -> Self {
+        Self {
+            format: FORMAT.to_owned(),
+            program: PROGRAM.to_owned(),
+            recipe,
+            examples,
+            shards: vec![None; count(examples)],
+        }
+    }
+
+    /// From the text of its file.
+    ///
+    /// # Errors
+    /// Says what is wrong with it.
+    pub fn read(text: &str) -> Result<Self, DatasetError> {
+        #[derive(Deserialize)]
+        struct Head {
+            format: serde_json::Value,
+        }
+        let json = |error: serde_json::Error| DatasetError::Json(error.to_string());
+        let head: Head = serde_json::from_str(text).map_err(json)?;
+        if head.format != FORMAT {
+            return Err(DatasetError::Format(head.format.to_string()));
+        }
+        let manifest: Self = serde_json::from_str(text).map_err(json)?;
+        manifest.recipe.validate()?;
+        let (expected, found) = (count(manifest.examples), manifest.shards.len());
+        if expected != found {
+            let examples = manifest.examples;
+            return Err(DatasetError::List {
+                examples,
+                expected,
+                found,
+            });
+        }
+        Ok(manifest)
+    }
+
+    /// The text of its file.
+    #[must_use]
+    pub fn text(&self) -> String {
+        // Strings for keys and no number that is none: there is a text.
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+
+    /// Makes room for as many examples as are asked for; what has been made stays.
+    ///
+    /// # Errors
+    /// Where the recipe or the program is another, or fewer are asked for.
+    pub fn go_on(mut self, recipe: &Recipe, examples: u64) -> Result<Self, DatasetError> {
+        if self.recipe != *recipe {
+            return Err(DatasetError::OtherRecipe);
+        }
+        if self.program != PROGRAM {
+            return Err(DatasetError::OtherProgram(self.program));
+        }
+        if self.examples > examples {
+            let (found, asked) = (self.examples, examples);
+            return Err(DatasetError::Fewer { found, asked });
+        }
+        // The last file is longer now.
+        let full = (self.examples / EXAMPLES_PER_SHARD) as usize;
+        if self.examples < examples {
+            self.shards.truncate(full);
+        }
+        self.shards.resize(count(examples), None);
+        self.examples = examples;
+        Ok(self)
+    }
+
+    /// Numbers of the examples of a file.
+    #[must_use]
+    pub fn numbers(&self, shard: usize) -> Range<u64> {
+        let first = shard as u64 * EXAMPLES_PER_SHARD;
+        first..(first + EXAMPLES_PER_SHARD).min(self.examples)
+    }
+
+    /// How many examples there are with an oscillation.
+    #[must_use]
+    pub fn rows(&self) -> usize {
+        self.shards.iter().flatten().map(|entry| entry.rows).sum()
+    }
+
+    /// Makes a file: its bytes, and what the manifest will say of it.
+    ///
+    /// # Errors
+    /// See [`ExampleError`]; none of a valid recipe.
+    pub fn make(
+        &self,
+        shard: usize,
+        pieces: &impl Pieces,
+    ) -> Result<(Vec<u8>, Entry), ExampleError> {
+        let numbers = self.numbers(shard);
+        let count = (numbers.end - numbers.start) as usize;
+        let made = pieces.map(count, |k| self.recipe.record(numbers.start + k as u64));
+        let made: Vec<Option<Record>> = made.into_iter().collect::<Result<_, _>>()?;
+        let records: Vec<Record> = made.into_iter().flatten().collect();
+        let bytes = npz::write(&columns(&records));
+        let entry = Entry {
+            rows: records.len(),
+            sha256: sha256(&bytes),
+        };
+        Ok((bytes, entry))
+    }
+
+    /// The examples of a file with these bytes.
+    ///
+    /// # Errors
+    /// [`DatasetError::Unfinished`] or [`DatasetError::Damaged`].
+    pub fn records(&self, shard: usize, bytes: &[u8]) -> Result<Vec<Record>, DatasetError> {
+        let entry = self.shards.get(shard).and_then(Option::as_ref);
+        let entry = entry.ok_or_else(|| DatasetError::Unfinished(file_name(shard)))?;
+        let damaged = || DatasetError::Damaged(file_name(shard));
+        if !entry.is_of(bytes) {
+            return Err(damaged());
+        }
+        let columns = npz::read(bytes, &columns(&[]), entry.rows).ok_or_else(damaged)?;
+        records(&columns, entry.rows).ok_or_else(damaged)
+    }
+}
+
+/// How many files so many examples take.
+fn count(examples: u64) -> usize {
+    examples.div_ceil(EXAMPLES_PER_SHARD) as usize
+}
+
+/// Name of the manifest in the folder of a dataset.
+pub const MANIFEST_NAME: &str = "manifest.json";
+
+/// Name of a file in the folder of a dataset.
+#[must_use]
+pub fn file_name(shard: usize) -> String {
+    format!("shard-{shard:05}.npz")
+}
+
+impl Recipe {
+    /// Example number `n` with what an error costs; `None` as of [`Self::example`].
+    ///
+    /// # Errors
+    /// See [`ExampleError`].
+    pub fn record(&self, n: u64) -> Result<Option<Record>, ExampleError> {
+        let made = self.example(n)?;
+        Ok(made.and_then(|example| {
+            let margin_rad = self.families[example.family].space.phase_margin_rad();
+            Some(Record {
+                number: n,
+                example,
+                values: example.values(),
+                gradient: example.cost_gradient(margin_rad)?,
+            })
+        }))
+    }
+}
+
+/// The columns of these records; of none, what columns there are.
+pub(super) fn columns(records: &[Record]) -> Vec<Column> {
+    let whole = |name, of: fn(&Record) -> u64| Column {
+        name,
+        width: None,
+        numbers: Numbers::U64(records.iter().map(of).collect()),
+    };
+    let real = |name, of: fn(&Record) -> f64| Column {
+        name,
+        width: None,
+        numbers: Numbers::F64(records.iter().map(of).collect()),
+    };
+    let four = |name, of: fn(&Record) -> [f64; 4]| Column {
+        name,
+        width: Some(4),
+        numbers: Numbers::F64(records.iter().flat_map(of).collect()),
+    };
+    let inputs = records
+        .iter()
+        .flat_map(|record| record.example.signature.values);
+    vec![
+        whole("number", |record| record.number),
+        whole("family", |record| record.example.family as u64),
+        Column {
+            name: "inputs",
+            width: Some(LENGTH),
+            numbers: Numbers::F32(inputs.collect()),
+        },
+        four("values", |record| record.values),
+        four("gradient", |record| record.gradient),
+        real("period_s", |record| record.example.period_s),
+        real("amplitude", |record| {
+            record.example.signature.sign * record.example.signature.amplitude
+        }),
+        real("centre", |record| record.example.signature.centre),
+        four("process", |record| parameters(&record.example.process)),
+        real("bias", |record| record.example.bias),
+        real("sigma", |record| record.example.sigma),
+        real("samples_per_period", |record| {
+            record.example.samples_per_period
+        }),
+    ]
+}
+
+fn parameters(process: &Soiptd) -> [f64; 4] {
+    let unbounded = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
+    [
+        unbounded(process.k()),
+        process.t_prop_s(),
+        unbounded(process.t_body_s()),
+        process.tau_s(),
+    ]
+}
+
+/// The records of these columns; `None` where a process is none.
+fn records(columns: &[Column], rows: usize) -> Option<Vec<Record>> {
+    let wholes = |name: &str| match &named(columns, name)?.numbers {
+        Numbers::U64(numbers) => Some(numbers),
+        _ => None,
+    };
+    let reals = |name: &str| match &named(columns, name)?.numbers {
+        Numbers::F64(numbers) => Some(numbers),
+        _ => None,
+    };
+    let four = |name: &str, row: usize| reals(name)?.get(4 * row..4 * row + 4)?.try_into().ok();
+    let real = |name: &str, row: usize| reals(name)?.get(row).copied();
+    let Numbers::F32(inputs) = &named(columns, "inputs")?.numbers else {
+        return None;
+    };
+    (0..rows)
+        .map(|row| {
+            let [k, t_prop_s, t_body_s, tau_s] = four("process", row)?;
+            let amplitude = real("amplitude", row)?;
+            let signature = Signature {
+                values: inputs
+                    .get(LENGTH * row..LENGTH * (row + 1))?
+                    .try_into()
+                    .ok()?,
+                amplitude: amplitude.abs(),
+                centre: real("centre", row)?,
+                sign: amplitude.signum(),
+            };
+            let example = Example {
+                signature,
+                period_s: real("period_s", row)?,
+                process: Soiptd::new(k, t_prop_s, t_body_s, tau_s).ok()?,
+                family: *wholes("family")?.get(row)? as usize,
+                bias: real("bias", row)?,
+                sigma: real("sigma", row)?,
+                samples_per_period: real("samples_per_period", row)?,
+            };
+            Some(Record {
+                number: *wholes("number")?.get(row)?,
+                example,
+                values: four("values", row)?,
+                gradient: four("gradient", row)?,
+            })
+        })
+        .collect()
+}
+
+fn named<'a>(columns: &'a [Column], name: &str) -> Option<&'a Column> {
+    columns.iter().find(|column| column.name == name)
+}

@@ -1,0 +1,308 @@
+//! The shipped identifier: from a recipe to a pack, and what it is worth on cycles it has not seen.
+//!
+//! ```text
+//! Recipe -> Manifest -> records -> Trainer -> calibrate -> PackContents -> bytes
+//!                                                              |
+//!                                                  Scores  <---+   as the board computes
+//! ```
+//!
+//! The network puts out a Gaussian over the four values of `dataset`: the estimator's own coordinates,
+//! in which the posterior of a cycle is nearly Gaussian. Experiments are numbered from zero: first
+//! those to learn from, then those that choose the best epoch and calibrate, then those that are
+//! only scored.
+//!
+//! ```toml
+//! network = "density"
+//! hidden = [64, 64]      # widths of the hidden layers, tanh behind each
+//! learning = 220000      # experiments to learn from
+//! choosing = 8000        # that choose the epoch and calibrate
+//! scoring = 8000         # that are scored
+//! # and what is left out of it: Recipe::default()
+//!
+//! [experiments]          # a recipe of `dataset`
+//! ```
+
+mod calibration;
+mod score;
+
+use std::ops::Range;
+
+use onecycle_onboard::signature::LENGTH;
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+pub use self::calibration::{Calibrated, MOST_UNKNOWN, calibrated};
+pub use self::score::{Reliability, Scores, scores};
+use crate::experiments;
+use crate::experiments::RecipeError;
+use crate::learn::dataset;
+use crate::learn::dataset::VALUES;
+use crate::learn::dataset::learning::{SCALE, Wanted, batch};
+use crate::learn::dataset::shards::Record;
+use crate::learn::lead_table;
+use crate::learn::pack::{LeadTableContents, PackContents, PackContentsError, Precision, layers};
+use crate::learn::train::{
+    Batch, Gaussian, Layer, Loss, Method, Network, Schedule, Settings, Shape, TrainError,
+};
+use crate::space::{FieldError, first_out_of_range};
+
+/// How an identifier is made.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Recipe {
+    /// What of; always `density` here.
+    pub network: Kind,
+    /// Widths of the hidden layers.
+    pub hidden: Vec<usize>,
+    /// Experiments to learn from.
+    pub learning: u64,
+    /// Experiments that choose the best epoch and calibrate.
+    pub choosing: u64,
+    /// Experiments that are scored.
+    pub scoring: u64,
+    /// Epochs at most.
+    pub epochs: u64,
+    /// Epochs without a better one after which it is enough.
+    pub patience: u64,
+    /// Examples a step.
+    pub batch: usize,
+    /// Learning rate at its highest.
+    pub rate: f64,
+    /// How much the cost counts beside the likelihood, see [`Loss::CostAwareGaussian`].
+    pub cost_weight: f64,
+    /// Cost from which it no longer counts by its square.
+    pub cost_scale: f64,
+    /// Whether a weight is a byte on board, or four.
+    pub bytes: bool,
+    /// Seed of the first weights and of the order of the examples.
+    pub seed: u64,
+    /// Where the experiments come from.
+    pub experiments: experiments::Recipe,
+}
+
+/// The kind of network, which tells recipes apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// A density over the values of a process.
+    Density,
+}
+
+impl Default for Recipe {
+    fn default() -> Self {
+        Self {
+            network: Kind::Density,
+            hidden: vec![64, 64],
+            learning: 220_000,
+            choosing: 8_000,
+            scoring: 8_000,
+            epochs: 100,
+            patience: 30,
+            batch: 128,
+            rate: 4e-3,
+            // Of weights from 0 to 30 and scales from 0.002 to 0.05 these gave the least mean cost, a
+            // tenth less than the likelihood alone.
+            cost_weight: 1.0,
+            cost_scale: 0.01,
+            bytes: true,
+            seed: 1,
+            experiments: experiments::Recipe::default(),
+        }
+    }
+}
+
+/// Epochs over which the learning rate rises to its highest.
+const WARM_UP_EPOCHS: f64 = 0.5;
+/// Learning rate of the last epoch over the highest.
+const LEAST_RATE: f64 = 0.003;
+
+/// Why there is no identifier.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum IdentifierError {
+    /// A field of the recipe.
+    #[error("{0}")]
+    Field(#[from] FieldError),
+    /// A field of its experiments.
+    #[error("experiments: {0}")]
+    Experiments(#[from] RecipeError),
+    /// The families do not agree in what one pack can have.
+    #[error("all families of one identifier must have the same {0}")]
+    Families(&'static str),
+    /// Nothing can be learnt.
+    #[error("{0}")]
+    Train(#[from] TrainError),
+    /// The network is too large for a pack, or the like.
+    #[error("{0}")]
+    Pack(#[from] PackContentsError),
+    /// There is no table for the phase margin.
+    #[error("{0}")]
+    Table(#[from] lead_table::LeadTableError),
+    /// An experiment cannot be made.
+    #[error("{0}")]
+    Example(#[from] dataset::ExampleError),
+    /// The shapes of the family have no spread.
+    #[error("the processes of the family are all alike: widen its space")]
+    OneShape,
+}
+
+impl Recipe {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field that is out of its range.
+    pub fn validate(&self) -> Result<(), IdentifierError> {
+        let wrong = self.hidden.iter().find(|&width| !(1..=128).contains(width));
+        let positive = |value: f64| value.is_finite() && value > 0.0;
+        let some = |field, value: u64| (field, "1 or more", value as f64, value > 0);
+        first_out_of_range([
+            (
+                "hidden",
+                "1 to 5 widths of 1 to 128",
+                *wrong.unwrap_or(&self.hidden.len()) as f64,
+                wrong.is_none() && (1..=5).contains(&self.hidden.len()),
+            ),
+            some("learning", self.learning),
+            some("choosing", self.choosing),
+            some("scoring", self.scoring),
+            some("epochs", self.epochs),
+            some("patience", self.patience),
+            some("batch", self.batch as u64),
+            ("rate", "positive", self.rate, positive(self.rate)),
+            (
+                "cost_weight",
+                "zero or positive",
+                self.cost_weight,
+                self.cost_weight.is_finite() && self.cost_weight >= 0.0,
+            ),
+            (
+                "cost_scale",
+                "positive",
+                self.cost_scale,
+                positive(self.cost_scale),
+            ),
+        ])?;
+        self.experiments.validate()?;
+        let [first, others @ ..] = self.experiments.families.as_slice() else {
+            return Ok(());
+        };
+        for other in others {
+            if other.space.beta != first.space.beta {
+                return Err(IdentifierError::Families("beta"));
+            }
+            if other.space.phase_margin_deg != first.space.phase_margin_deg {
+                return Err(IdentifierError::Families("phase_margin_deg"));
+            }
+        }
+        Ok(())
+    }
+
+    /// Experiments of all kinds.
+    #[must_use]
+    pub fn experiments(&self) -> u64 {
+        self.learning + self.choosing + self.scoring
+    }
+
+    /// Numbers of the experiments to learn from, to choose by, to score.
+    #[must_use]
+    pub fn numbers(&self) -> [Range<u64>; 3] {
+        let chosen = self.learning + self.choosing;
+        [
+            0..self.learning,
+            self.learning..chosen,
+            chosen..self.experiments(),
+        ]
+    }
+
+    /// The network before it has learnt anything.
+    ///
+    /// # Errors
+    /// Where the widths are none of a network.
+    pub fn network(&self) -> Result<Network, TrainError> {
+        let hidden = self.hidden.iter();
+        let mut layers: Vec<Layer> = hidden
+            .flat_map(|&outputs| [Layer::Dense { outputs }, Layer::Tanh])
+            .collect();
+        layers.push(Layer::Dense {
+            outputs: Gaussian::outputs(VALUES),
+        });
+        Network::new(LENGTH, &layers, &mut Pcg64Mcg::seed_from_u64(self.seed))
+    }
+
+    /// How it learns.
+    #[must_use]
+    pub fn settings(&self) -> Settings {
+        Settings {
+            loss: Loss::CostAwareGaussian {
+                dimension: VALUES,
+                weight: self.cost_weight,
+                scale: self.cost_scale,
+            },
+            method: Method::Adam {
+                b1: 0.9,
+                b2: 0.999,
+                decay: 0.0,
+            },
+            schedule: Schedule {
+                rate: self.rate,
+                warm_up: WARM_UP_EPOCHS,
+                shape: Shape::Cosine {
+                    epochs: self.epochs as f64,
+                    least: LEAST_RATE,
+                },
+            },
+            batch: self.batch,
+            epochs: self.epochs,
+            patience: Some(self.patience),
+            seed: self.seed,
+        }
+    }
+
+    /// The pack of a trained network, calibrated, without scores yet.
+    ///
+    /// # Errors
+    /// See [`IdentifierError`].
+    pub fn pack(
+        &self,
+        network: &Network,
+        learnt: &[Record],
+        calibrated: &Calibrated,
+    ) -> Result<PackContents, IdentifierError> {
+        let precision = if self.bytes {
+            Precision::Bytes
+        } else {
+            Precision::Floats
+        };
+        let margin_rad = self.experiments.families[0].space.phase_margin_rad();
+        let numbers = lead_table::build(margin_rad, lead_table::POINTS)?;
+        let points = [lead_table::POINTS; 2];
+        Ok(PackContents {
+            layers: layers(network, precision)?,
+            lead_table: LeadTableContents::of_numbers(
+                points,
+                onecycle_onboard::gains::FIELDS,
+                &numbers,
+            )
+            .unwrap_or_default(),
+            self_tests: learnt
+                .iter()
+                .take(SELF_TESTS)
+                .map(|record| record.example.signature.values)
+                .collect(),
+            ..calibrated.contents(self, learnt)?
+        })
+    }
+}
+
+/// Cycles that a pack carries to test itself with.
+const SELF_TESTS: usize = 2;
+
+/// Rows to learn from.
+#[must_use]
+pub fn rows(records: &[Record]) -> Batch {
+    batch(records, Wanted::ValuesAndSlopes)
+}
+
+/// Scales of the outputs, as a pack keeps them.
+fn output_scales() -> [f32; VALUES] {
+    SCALE.map(|scale| scale as f32)
+}

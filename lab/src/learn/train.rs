@@ -1,0 +1,132 @@
+//! Training of small networks: layers, losses that know what a mistake costs, optimisers.
+//!
+//! ```text
+//! Dataset -> Batch -> Network -> Loss -> backward -> Optimizer       steps of an epoch
+//!                        |                  |
+//!                        +- Trainer: shuffles, validates, keeps the best, stops, resumes
+//! ```
+//!
+//! | question                                          | answer                                 |
+//! |---------------------------------------------------|----------------------------------------|
+//! | which network?                                    | [`Network`], a row of [`Layer`]s       |
+//! | what does it learn: a class, a cost, a density?   | [`Loss`]                               |
+//! | how?                                              | [`Method`], [`Schedule`], [`Settings`] |
+//! | from what?                                        | [`Dataset`], which fills a [`Batch`]   |
+//! | how do weights come from PyTorch and go there?    | [`TensorFile`]: safetensors            |
+//! | on how many threads?                              | [`Workers`], the caller's              |
+//!
+//! Rows are samples throughout: inputs `batch x in`, weights of a dense layer `out x in`, outputs
+//! `batch x out`. Conventions and names are those of PyTorch, so that numbers can be compared.
+//! The same seed gives the same bits, on any number of threads and through any interruption.
+//!
+//! ```
+//! use crate::learn::train::{Layer, Matrix, Network, OneThread};
+//! use rand::SeedableRng;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let layers = [Layer::Dense { outputs: 8 }, Layer::Tanh, Layer::Dense { outputs: 2 }];
+//! let network = Network::new(3, &layers, &mut rand_pcg::Pcg64Mcg::seed_from_u64(1))?;
+//! let outputs = network.evaluate(&Matrix::zeros(5, 3), &OneThread)?;
+//! assert_eq!((outputs.rows(), outputs.columns()), (5, 2));
+//! assert_eq!(network.weights(), 8 * 3 + 8 + 2 * 8 + 2);
+//! # Ok(())
+//! # }
+//! ```
+
+mod batch_norm;
+mod checkpoint;
+mod data;
+mod density;
+mod few_rows;
+mod kernel;
+mod layer;
+mod loss;
+mod matrix;
+mod network;
+mod optimizer;
+mod schedule;
+mod softmax;
+mod tensor_file;
+mod trainer;
+
+use rand::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+pub use checkpoint::CheckpointError;
+pub use data::{Batch, Dataset};
+pub use density::Gaussian;
+pub use layer::Layer;
+pub use loss::Loss;
+pub use matrix::{Matrix, OneThread, Workers};
+pub use network::{Dropped, Network, Tape};
+pub use optimizer::{Method, Optimizer};
+pub use schedule::{Schedule, Shape};
+pub use tensor_file::{Tensor, TensorFile, TensorFileError};
+pub use trainer::{Epoch, Outcome, Settings, Trainer};
+
+use crate::space::FieldError;
+
+/// Why nothing can be learnt from this.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum TrainError {
+    /// A setting is out of its range.
+    #[error("{0}")]
+    Field(#[from] FieldError),
+    /// Two things that belong together have different sizes.
+    #[error("{what} must be {expected}, but is {found}")]
+    Size {
+        /// Of what.
+        what: &'static str,
+        /// What it must be.
+        expected: usize,
+        /// What it is.
+        found: usize,
+    },
+    /// A class beyond the network's outputs.
+    #[error("there is no class {class}: the network has {classes} outputs")]
+    Class {
+        /// The class.
+        class: usize,
+        /// Number of outputs.
+        classes: usize,
+    },
+    /// Weights of samples that have no mean.
+    #[error("the weights of samples must be finite and not negative, and their sum positive")]
+    SampleWeights,
+    /// The variance of one sample.
+    #[error("batch normalisation needs batches of at least two samples to learn from")]
+    OneSample,
+    /// No data.
+    #[error("there is no sample to {0}")]
+    NoSample(&'static str),
+}
+
+/// Refuses a size other than the expected one.
+fn expect_size(what: &'static str, expected: usize, found: usize) -> Result<(), TrainError> {
+    if expected == found {
+        return Ok(());
+    }
+    Err(TrainError::Size {
+        what,
+        expected,
+        found,
+    })
+}
+
+/// What a stream of random numbers is for; the streams of one seed do not depend on each other.
+#[derive(Clone, Copy)]
+enum Purpose {
+    Shuffling,
+    Dropout,
+}
+
+/// Stream `number` of a seed for a purpose.
+fn stream(seed: u64, purpose: Purpose, number: u64) -> Pcg64Mcg {
+    let mut keys = Pcg64Mcg::seed_from_u64(seed);
+    let [shuffling, dropout] = [keys.next_u64(), keys.next_u64()];
+    let key = match purpose {
+        Purpose::Shuffling => shuffling,
+        Purpose::Dropout => dropout,
+    };
+    Pcg64Mcg::seed_from_u64(key.wrapping_add(number))
+}

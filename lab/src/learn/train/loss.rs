@@ -1,0 +1,303 @@
+//! What a network is to make small: classes, costs of a mistake, densities.
+//!
+//! `J_iT` is what the controller of class `i` costs on the true process, as a fraction, `T` the
+//! true class. `gamma_iT = 1 + min(J_iT, cap)`: uncapped, the cost of an unstable pick would be
+//! infinite, and one class would be all that is learnt.
+//!
+//! | loss                 | formula                                                               |
+//! |----------------------|-----------------------------------------------------------------------|
+//! | cross-entropy        | `-ln p_T`, `p_i ~ exp(a_i)`                                           |
+//! | modified softmax     | `-ln p_T`, `p_i ~ exp(gamma_iT a_i)`: the paper's equation 15         |
+//! | shifted softmax      | `-ln p_T`, `p_i ~ exp(gamma_iT (a_i - min_j a_j))`                    |
+//! | cost-augmented       | `-ln p_T`, `p_i ~ exp(a_i + m J_iT)`                                  |
+//! | expected cost        | `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`             |
+//! | Gaussian             | `-ln N(y)` of the mean and the precision that the network puts out    |
+//! | cost-aware Gaussian  | `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)`                   |
+//! | mixture of Gaussians | `-ln sum_m pi_m N_m(y)`                                               |
+//!
+//! **The paper's loss has no optimum but a degenerate one.** `gamma_TT = 1` is the least of the
+//! gammas, so adding a constant `-s` to all outputs, whatever the inputs, divides every
+//! `p_i / p_T` by `exp((gamma_iT - 1) s)`: the loss falls to zero and nothing is learnt. The shifted
+//! softmax cannot fall so, and is the same for outputs whose least is zero.
+//!
+//! The cost-aware Gaussian adds what the controller made for its mean `mu` costs: `g . (mu - y)` to first
+//! order, `g` the derivatives of the cost by the errors of `y`. Where that is beyond `c` it counts as it
+//! is, below as its square, which has a slope where the sign of the cost changes. A network that cannot
+//! have all values right has the costly combination of them right. The first order knows nothing of
+//! errors along which the cost has no slope, and likelihood alone keeps these small: of multirotors
+//! (see [`dataset`](crate::learn::dataset)) `w = 1`, `c = 0.01` makes controllers cheaper, `w = 10` dearer.
+//!
+//! References: A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, IEEE Access 8 (2020), equations 15
+//! and 16; K. Gimpel, N. A. Smith, "Softmax-margin CRFs: training log-linear models with cost
+//! functions", NAACL (2010), for the cost-augmented one.
+
+use super::data::Batch;
+use super::density::{Gaussian, Mixture, cost_of_mean, gaussian};
+use super::matrix::Matrix;
+use super::softmax::{Logits, Shares, Softmax};
+use super::{TrainError, expect_size};
+use crate::space::{FieldError, first_out_of_range};
+
+/// What is to become small, of outputs `a`, the true class `T` and costs `J_iT` up to a cap.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Loss {
+    /// `-ln p_T`, `p_i ~ exp(a_i)`. Reads classes.
+    CrossEntropy,
+    /// `-ln p_T`, `p_i ~ exp((1 + J_iT) a_i)`: the paper's to the letter, whose optimum is to shift
+    /// all outputs to minus infinity. Reads classes and costs.
+    ModifiedSoftmax {
+        /// Highest cost that counts.
+        cap: f64,
+    },
+    /// `-ln p_T`, `p_i ~ exp((1 + J_iT) (a_i - min_j a_j))`. Reads classes and costs.
+    ShiftedSoftmax {
+        /// Highest cost that counts.
+        cap: f64,
+    },
+    /// `-ln p_T`, `p_i ~ exp(a_i + m J_iT)`: costly classes must be the further below the true one.
+    /// Reads classes and costs.
+    CostAugmented {
+        /// `m`, how far: a distance of outputs per unit of cost.
+        scale: f64,
+        /// Highest cost that counts.
+        cap: f64,
+    },
+    /// `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`: what a pick at random costs.
+    /// Reads classes and costs.
+    ExpectedCost {
+        /// Highest cost that counts.
+        cap: f64,
+        /// `c`, share of the plain cross-entropy.
+        cross_entropy: f64,
+        /// `h`, share of the entropy `H`, which keeps picks from being certain: alone with the cost
+        /// it makes `p_i ~ exp(-J_iT / h)` the optimum.
+        entropy: f64,
+    },
+    /// `-ln N(y)` of a [`Gaussian`]. Reads values.
+    Gaussian {
+        /// Length of `y`.
+        dimension: usize,
+    },
+    /// `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)` of a [`Gaussian`] with mean `mu`. Reads
+    /// values: `y`, then `g`, what an error of each number of `y` costs.
+    CostAwareGaussian {
+        /// Length of `y`.
+        dimension: usize,
+        /// `w`, how much the cost counts beside the likelihood.
+        weight: f64,
+        /// `c`, the cost up to which its square counts, and from which it counts itself.
+        scale: f64,
+    },
+    /// `-ln sum_m pi_m N_m(y)`, `pi_m ~ exp(a_m)`: outputs are the `a`, then the [`Gaussian`]s.
+    /// Reads values.
+    GaussianMixture {
+        /// Length of `y`.
+        dimension: usize,
+        /// Number of Gaussians.
+        components: usize,
+    },
+}
+
+/// Largest vector and most Gaussians: outputs grow with the square of the one, times the other.
+const MOST_DIMENSIONS: usize = 1000;
+
+/// What is used again from sample to sample.
+#[derive(Default)]
+struct Scratch {
+    softmax: Softmax,
+    mixture: Mixture,
+    gradient: Vec<f64>,
+}
+
+impl Loss {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field that is out of its range.
+    pub fn validate(&self) -> Result<(), FieldError> {
+        let positive = |field, value: f64| {
+            let is_right = value.is_finite() && value > 0.0;
+            (field, "positive and finite", value, is_right)
+        };
+        let share = |field, value: f64| {
+            let is_right = value.is_finite() && value >= 0.0;
+            (field, "zero or positive, finite", value, is_right)
+        };
+        let number = |field, value: usize| {
+            let is_right = (1..=MOST_DIMENSIONS).contains(&value);
+            (field, "1 to 1000", value as f64, is_right)
+        };
+        let checks = match *self {
+            Self::CrossEntropy => vec![],
+            Self::ModifiedSoftmax { cap } | Self::ShiftedSoftmax { cap } => {
+                vec![positive("cap", cap)]
+            }
+            Self::CostAugmented { scale, cap } => {
+                vec![share("scale", scale), positive("cap", cap)]
+            }
+            Self::ExpectedCost {
+                cap,
+                cross_entropy,
+                entropy,
+            } => vec![
+                positive("cap", cap),
+                share("cross_entropy", cross_entropy),
+                share("entropy", entropy),
+            ],
+            Self::Gaussian { dimension } => vec![number("dimension", dimension)],
+            Self::CostAwareGaussian {
+                dimension,
+                weight,
+                scale,
+            } => vec![
+                number("dimension", dimension),
+                share("weight", weight),
+                positive("scale", scale),
+            ],
+            Self::GaussianMixture {
+                dimension,
+                components,
+            } => vec![
+                number("dimension", dimension),
+                number("components", components),
+            ],
+        };
+        first_out_of_range(checks)
+    }
+
+    /// How many outputs it takes; `None` where any number does, one a class.
+    #[must_use]
+    pub fn outputs(&self) -> Option<usize> {
+        match *self {
+            Self::Gaussian { dimension } | Self::CostAwareGaussian { dimension, .. } => {
+                Some(Gaussian::outputs(dimension))
+            }
+            Self::GaussianMixture {
+                dimension,
+                components,
+            } => Some(components * (1 + Gaussian::outputs(dimension))),
+            _ => None,
+        }
+    }
+
+    /// The mean over a batch, by the weights of its samples, and in `gradient` its derivatives with
+    /// respect to the outputs, `batch x out`.
+    ///
+    /// # Errors
+    /// Where outputs and batch do not fit each other, or a field is out of its range.
+    pub fn evaluate(
+        &self,
+        outputs: &Matrix,
+        batch: &Batch,
+        gradient: &mut Matrix,
+    ) -> Result<f64, TrainError> {
+        self.validate()?;
+        self.expect_sizes(outputs, batch)?;
+        let total = batch.total_weight()?;
+        let mut scratch = Scratch {
+            gradient: vec![0.0; outputs.columns()],
+            ..Scratch::default()
+        };
+        gradient.reshape(outputs.rows(), outputs.columns());
+        let mut loss = 0.0;
+        for (i, outputs) in outputs.iter_rows().enumerate() {
+            let share = batch.weight(i) / total;
+            // No weight, no share, not even of what is infinite.
+            if share == 0.0 {
+                gradient.row_mut(i).fill(0.0);
+                continue;
+            }
+            loss += share * self.sample(outputs, batch, i, &mut scratch);
+            for (to, slope) in gradient.row_mut(i).iter_mut().zip(&scratch.gradient) {
+                *to = (share * slope) as f32;
+            }
+        }
+        Ok(loss)
+    }
+
+    /// The loss of sample `i`, its derivatives in the scratch.
+    fn sample(&self, outputs: &[f32], batch: &Batch, i: usize, scratch: &mut Scratch) -> f64 {
+        let Scratch {
+            softmax,
+            mixture,
+            gradient,
+        } = scratch;
+        let capped = |cap: f64| move |k: usize| f64::from(batch.costs.row(i)[k]).min(cap);
+        let truth = || (outputs, batch.classes[i]);
+        match *self {
+            Self::CrossEntropy => softmax.cross_entropy(truth(), Logits::Plain, |_| 0.0, gradient),
+            Self::ModifiedSoftmax { cap } => {
+                softmax.cross_entropy(truth(), Logits::Scaled, capped(cap), gradient)
+            }
+            Self::ShiftedSoftmax { cap } => {
+                softmax.cross_entropy(truth(), Logits::ScaledFromLeast, capped(cap), gradient)
+            }
+            Self::CostAugmented { scale, cap } => {
+                softmax.cross_entropy(truth(), Logits::Raised(scale), capped(cap), gradient)
+            }
+            Self::ExpectedCost {
+                cap,
+                cross_entropy,
+                entropy,
+            } => {
+                let shares = Shares {
+                    cross_entropy,
+                    entropy,
+                };
+                softmax.expected_cost(truth(), shares, capped(cap), gradient)
+            }
+            Self::Gaussian { .. } => gaussian(outputs, batch.values.row(i), gradient),
+            Self::CostAwareGaussian {
+                dimension,
+                weight,
+                scale,
+            } => {
+                let (y, slopes) = batch.values.row(i).split_at(dimension);
+                gaussian(outputs, y, gradient)
+                    + cost_of_mean(outputs, (y, slopes), (weight, scale), gradient)
+            }
+            Self::GaussianMixture { components, .. } => {
+                mixture.evaluate(components, outputs, batch.values.row(i), gradient)
+            }
+        }
+    }
+
+    fn expect_sizes(&self, outputs: &Matrix, batch: &Batch) -> Result<(), TrainError> {
+        let samples = batch.inputs.rows();
+        if samples == 0 {
+            return Err(TrainError::NoSample("learn from"));
+        }
+        expect_size("the number of samples", samples, outputs.rows())?;
+        if let Some(expected) = self.outputs() {
+            expect_size("the number of outputs", expected, outputs.columns())?;
+        }
+        match *self {
+            Self::Gaussian { dimension: length }
+            | Self::GaussianMixture {
+                dimension: length, ..
+            } => return expect_vectors(batch, length),
+            Self::CostAwareGaussian { dimension, .. } => {
+                return expect_vectors(batch, 2 * dimension);
+            }
+            Self::CrossEntropy => {}
+            _ => {
+                let classes = outputs.columns();
+                expect_size("the number of rows of costs", samples, batch.costs.rows())?;
+                expect_size("the number of costs a row", classes, batch.costs.columns())?;
+            }
+        }
+        expect_size("the number of classes", samples, batch.classes.len())?;
+        let classes = outputs.columns();
+        match batch.classes.iter().find(|&&class| class >= classes) {
+            None => Ok(()),
+            Some(&class) => Err(TrainError::Class { class, classes }),
+        }
+    }
+}
+
+fn expect_vectors(batch: &Batch, length: usize) -> Result<(), TrainError> {
+    let samples = batch.inputs.rows();
+    expect_size("the number of vectors", samples, batch.values.rows())?;
+    expect_size("the length of a vector", length, batch.values.columns())
+}

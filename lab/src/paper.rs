@@ -1,0 +1,4 @@
+//! What only reproduces the paper: its classifier and its grid.
+
+pub mod classifier;
+pub mod grid;

@@ -1,0 +1,376 @@
+//! The paper's classifier: one cycle of a relay test in, the member of a grid behind it out
+//! (section III-C; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//!
+//! ```text
+//! Recipe -> Classes, the members of a grid
+//!        -> Examples: Trials under the relay -> SampledCycle -> Prepared, the network's 4520 inputs
+//!                                                            -> Measured, what tells the gain
+//!        -> Network 4520-3000-1000-N, a Loss each -> picks by either Rule -> Score
+//! ```
+//!
+//! Where the paper leaves something open, or something else is better, this is what is done:
+//!
+//! | question              | the paper                          | here                               |
+//! |-----------------------|------------------------------------|------------------------------------|
+//! | learnt from           | 30 experiments of each class       | random processes, some of classes  |
+//! | the true class        | the simulated one                  | the one that costs least           |
+//! | cost of another one   | between classes                    | on the true process                |
+//! | gain of a class       | from the amplitude                 | from the harmonics                 |
+//! | the output, `pv`      | zero-padded                        | that, or stretched: [`Fit`]        |
+//! | inputs                | amplitude of one                   | that, learnt from in standard coordinates: [`Standard`] |
+//! | a hidden layer        | ReLU, batch normalisation, dropout | in this order                      |
+//! | rate, momentum, batch, epochs, part dropped, noise | not said | in the recipe                  |
+//!
+//! Controllers are two numbers and processes, but for their gain, three: many classes have nearly the same
+//! controller, so a wrong class is often as good as the right one, and accuracy says little.
+
+mod classes;
+mod examples;
+mod experiment;
+mod harmonic;
+mod input;
+mod scoring;
+mod standard;
+
+use onecycle_onboard::{RelayError, SoiptdError};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+pub use classes::{Class, Classes, Gain, Measured, Truth, label};
+pub use examples::{Examples, Processes};
+pub use experiment::{Protocol, SAMPLE_S, SampledCycle, Trial, Trials};
+pub use harmonic::{Harmonics, Response};
+pub use input::{Fit, INPUTS, Prepared, SAMPLES};
+pub use scoring::{Rule, Score, least_expected_cost, most_likely, picks};
+pub use standard::{Standard, Standardised};
+
+use crate::learn::train::{
+    Layer, Loss, Method, Network, Schedule, Settings, TensorFileError, TrainError,
+};
+use crate::paper::grid;
+use crate::paper::grid::{Grid, GridError, Pieces};
+use crate::space::{FieldError, Space, first_out_of_range};
+use onecycle_design::soiptd_pd::optimum::OptimumError;
+
+/// Why there is no classifier.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ClassifierError {
+    /// A field is out of its range.
+    #[error("{0}")]
+    Field(#[from] FieldError),
+    /// The grid of classes cannot be laid.
+    #[error("{0}")]
+    Grid(#[from] GridError),
+    /// The times are no process.
+    #[error("{0}")]
+    Process(#[from] SoiptdError),
+    /// A process has no controller.
+    #[error("{0}")]
+    Optimum(#[from] OptimumError),
+    /// The relay's settings are out of range.
+    #[error("{0}")]
+    Relay(#[from] RelayError),
+    /// The relay does not make a class oscillate.
+    #[error(
+        "T_prop, T_body, tau of {0:?} s do not oscillate under this relay: choose a smaller beta"
+    )]
+    NoOscillation([f64; 3]),
+    /// Network and examples do not fit each other.
+    #[error("{0}")]
+    Train(#[from] TrainError),
+    /// Weights of another network.
+    #[error("{0}")]
+    Weights(#[from] TensorFileError),
+    /// A loss that reads something else than classes and their costs.
+    #[error(
+        "losses: a classifier learns classes; take a loss that reads them, such as cross_entropy"
+    )]
+    Loss,
+}
+
+/// All that makes a classifier, its examples included.
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Recipe {
+    /// What it is a recipe of.
+    pub network: Kind,
+    /// Seed of experiments, first weights, shuffling and dropout; below 2^32.
+    pub seed: u64,
+    /// The processes; the paper's multirotors where it is left out.
+    #[serde(default = "multirotor")]
+    pub space: Space,
+    /// `J*` of the grid of classes.
+    pub deterioration: f64,
+    /// How a class comes to its gain.
+    #[serde(default)]
+    pub gain: Gain,
+    /// How the output comes to its 2260 numbers.
+    #[serde(default)]
+    pub fit: Fit,
+    /// Neurons of the hidden layers.
+    pub hidden: Vec<usize>,
+    /// Part that dropout leaves out.
+    pub dropout: f64,
+    /// Experiments to learn from.
+    pub examples: u64,
+    /// Every how many of them is of a class itself instead of a random process; 0 is none.
+    pub class_every: u64,
+    /// Experiments of every class to verify with, as the paper does.
+    pub verification: u64,
+    /// Input bias, uniform between plus and minus this part of the relay's amplitude.
+    pub bias: f64,
+    /// Noise, uniform up to this part of the amplitude.
+    pub sigma: f64,
+    /// Whether the relay follows the bias while it is learnt.
+    pub protocol: Protocol,
+    /// What the networks are tested on: random processes.
+    pub tests: Vec<Test>,
+    /// How a gradient becomes a step.
+    pub method: Method,
+    /// The learning rate.
+    pub schedule: Schedule,
+    /// Samples a step.
+    pub batch: usize,
+    /// Epochs at most.
+    pub epochs: u64,
+    /// Epochs without a lower loss on the verification set after which it is enough.
+    #[serde(default)]
+    pub patience: Option<u64>,
+    /// The losses to compare, one network each.
+    pub losses: Vec<Choice>,
+}
+
+/// The word by which a file says that it is of a classifier.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Kind {
+    /// `network = "classifier"`.
+    Classifier,
+}
+
+/// A loss to learn with.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Choice {
+    /// The loss.
+    pub loss: Loss,
+    /// Its own highest learning rate: some losses are steeper than others.
+    #[serde(default)]
+    pub rate: Option<f64>,
+}
+
+/// A set of random processes that no network has learnt from.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Test {
+    /// How many.
+    pub systems: u64,
+    /// Their seed; below 2^32.
+    pub seed: u64,
+    /// Whether the relay follows the bias.
+    pub protocol: Protocol,
+}
+
+fn multirotor() -> Space {
+    Space::MULTIROTOR
+}
+
+/// Seeds, and numbers of experiments, lie below this: what is learnt from, verified with and tested on
+/// draws from seeds that cannot meet.
+const SEEDS: u64 = 1 << 32;
+
+/// Most experiments in memory: some 10 GB.
+const MOST_EXAMPLES: u64 = 1_000_000;
+
+/// Most neurons of a layer, with which the first one weighs 2 GB.
+const MOST_NEURONS: u64 = 100_000;
+
+/// What experiments are for.
+#[derive(Clone, Copy)]
+enum Purpose {
+    Training,
+    Verification,
+    Test,
+}
+
+impl Recipe {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field that is out of its range.
+    pub fn validate(&self) -> Result<(), ClassifierError> {
+        let below = |field, value: u64, range, most: u64| {
+            (field, range, value as f64, (0..=most).contains(&value))
+        };
+        let few = |field, value: u64, range, most: u64| {
+            (field, range, value as f64, (1..=most).contains(&value))
+        };
+        first_out_of_range([
+            below("seed", self.seed, "0 to 4294967295", SEEDS - 1),
+            few("examples", self.examples, "1 to 1,000,000", MOST_EXAMPLES),
+            below(
+                "class_every",
+                self.class_every,
+                "0 to 1,000,000",
+                MOST_EXAMPLES,
+            ),
+            few("verification", self.verification, "1 to 1000", 1000),
+            few("losses", self.losses.len() as u64, "1 to 100 of them", 100),
+            (
+                "dropout",
+                "0 to 0.9",
+                self.dropout,
+                (0.0..=0.9).contains(&self.dropout),
+            ),
+        ])?;
+        for &neurons in &self.hidden {
+            first_out_of_range([few("hidden", neurons as u64, "1 to 100,000", MOST_NEURONS)])?;
+        }
+        for test in &self.tests {
+            first_out_of_range([
+                few(
+                    "tests.systems",
+                    test.systems,
+                    "1 to 1,000,000",
+                    MOST_EXAMPLES,
+                ),
+                below("tests.seed", test.seed, "0 to 4294967295", SEEDS - 1),
+            ])?;
+        }
+        self.grid().validate()?;
+        self.trials(Purpose::Training, 0, self.protocol)
+            .validate()?;
+        for (number, choice) in self.losses.iter().enumerate() {
+            if choice.loss.outputs().is_some() {
+                return Err(ClassifierError::Loss);
+            }
+            self.settings(number).validate()?;
+        }
+        Ok(())
+    }
+
+    fn grid(&self) -> grid::Settings {
+        grid::Settings {
+            space: self.space,
+            deterioration: self.deterioration,
+            ..grid::Settings::default()
+        }
+    }
+
+    fn trials(&self, purpose: Purpose, seed: u64, protocol: Protocol) -> Trials {
+        Trials {
+            space: self.space,
+            seed: (purpose as u64) * 2 * SEEDS + seed,
+            bias: self.bias,
+            sigma: self.sigma,
+            protocol,
+        }
+    }
+
+    /// The classes: a grid of the space.
+    ///
+    /// # Errors
+    /// Where the grid cannot be laid.
+    pub fn classes(&self, pieces: &impl Pieces) -> Result<Classes, ClassifierError> {
+        Classes::of(&Grid::build(&self.grid(), pieces)?)
+    }
+
+    /// What is learnt from.
+    ///
+    /// # Errors
+    /// Where a process has no controller.
+    pub fn training(
+        &self,
+        classes: &Classes,
+        pieces: &impl Pieces,
+    ) -> Result<Examples, ClassifierError> {
+        let trials = self.trials(Purpose::Training, self.seed, self.protocol);
+        let processes = match self.class_every {
+            0 => Processes::Random,
+            every => Processes::RandomAndClasses { every },
+        };
+        Examples::make(
+            (&trials, self.examples),
+            processes,
+            (classes, self.gain, self.fit),
+            pieces,
+        )
+    }
+
+    /// What the best epoch is chosen by: as many experiments of every class.
+    ///
+    /// # Errors
+    /// Where a process has no controller.
+    pub fn verification(
+        &self,
+        classes: &Classes,
+        pieces: &impl Pieces,
+    ) -> Result<Examples, ClassifierError> {
+        let trials = self.trials(Purpose::Verification, self.seed, self.protocol);
+        let count = self.verification * classes.len() as u64;
+        Examples::make(
+            (&trials, count),
+            Processes::Classes,
+            (classes, self.gain, self.fit),
+            pieces,
+        )
+    }
+
+    /// The random processes of a test.
+    ///
+    /// # Errors
+    /// Where a process has no controller.
+    pub fn test(
+        &self,
+        test: &Test,
+        classes: &Classes,
+        pieces: &impl Pieces,
+    ) -> Result<Examples, ClassifierError> {
+        let trials = self.trials(Purpose::Test, test.seed, test.protocol);
+        Examples::make(
+            (&trials, test.systems),
+            Processes::Random,
+            (classes, self.gain, self.fit),
+            pieces,
+        )
+    }
+
+    fn layers(&self, classes: usize) -> Vec<Layer> {
+        let hidden = (self.hidden.iter()).flat_map(|&outputs| {
+            let probability = self.dropout;
+            [
+                Layer::Dense { outputs },
+                Layer::Relu,
+                Layer::BatchNorm,
+                Layer::Dropout { probability },
+            ]
+        });
+        hidden.chain([Layer::Dense { outputs: classes }]).collect()
+    }
+
+    /// The network before it learns: the same for every loss.
+    ///
+    /// # Errors
+    /// Names the first size or probability that is out of its range.
+    pub fn network(&self, classes: usize) -> Result<Network, ClassifierError> {
+        let mut rng = Pcg64Mcg::seed_from_u64(self.seed);
+        Ok(Network::new(INPUTS, &self.layers(classes), &mut rng)?)
+    }
+
+    /// How the network of loss `number`, of those there are, is trained.
+    #[must_use]
+    pub fn settings(&self, number: usize) -> Settings {
+        let choice = &self.losses[number];
+        let mut schedule = self.schedule;
+        schedule.rate = choice.rate.unwrap_or(schedule.rate);
+        Settings {
+            loss: choice.loss,
+            method: self.method,
+            schedule,
+            batch: self.batch,
+            epochs: self.epochs,
+            patience: self.patience,
+            seed: self.seed,
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! Trials as examples: what the network sees, the class that fits best, what all others would cost.
+
+use onecycle_onboard::Pd;
+
+use super::ClassifierError;
+use super::classes::{Classes, Gain, Measured, Truth, label};
+use super::experiment::{SampledCycle, Trials};
+use super::harmonic::Harmonics;
+use super::input::{Fit, INPUTS, Prepared};
+use crate::learn::train::{Batch, Dataset, Matrix};
+use crate::paper::grid::Pieces;
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+
+/// Which processes examples are of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Processes {
+    /// Random ones of the space.
+    Random,
+    /// The same, but every so many a class, one after the other.
+    RandomAndClasses {
+        /// Every how many.
+        every: u64,
+    },
+    /// The classes themselves, one after the other.
+    Classes,
+}
+
+/// An example. See the [module](self).
+#[derive(Clone, Debug, PartialEq)]
+struct Example {
+    prepared: Prepared,
+    truth: Truth,
+    /// From the harmonics, and from the amplitude.
+    measured: [Measured; 2],
+    costs: Vec<f32>,
+}
+
+/// Examples in memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Examples {
+    examples: Vec<Example>,
+    labels: Vec<usize>,
+    gain: Gain,
+    unsteady: u64,
+}
+
+impl Processes {
+    fn class(self, n: u64, classes: usize) -> Option<usize> {
+        let turn = match self {
+            Self::Random => return None,
+            Self::RandomAndClasses { every } if n.is_multiple_of(every) => n / every,
+            Self::RandomAndClasses { .. } => return None,
+            Self::Classes => n,
+        };
+        Some((turn % classes as u64) as usize)
+    }
+}
+
+impl Examples {
+    /// Those of so many trials.
+    ///
+    /// # Errors
+    /// Where a process has no controller.
+    pub fn make(
+        (trials, count): (&Trials, u64),
+        processes: Processes,
+        (classes, gain, fit): (&Classes, Gain, Fit),
+        pieces: &impl Pieces,
+    ) -> Result<Self, ClassifierError> {
+        let made = pieces.map(count as usize, |n| {
+            let n = n as u64;
+            let class = processes.class(n, classes.len());
+            let trial = trials.trial(n, class.map(|class| classes.times_s(class)))?;
+            trial
+                .and_then(|trial| {
+                    let measured = measured(&trial.cycle, trials.space.beta)?;
+                    Some((trial, measured))
+                })
+                .map(|(trial, measured)| {
+                    let truth = classes.truth(trial.process)?;
+                    Ok(Example {
+                        prepared: Prepared::of(&trial.cycle, fit),
+                        costs: classes.costs(&truth, &measured[which(gain)]),
+                        truth,
+                        measured,
+                    })
+                })
+                .transpose()
+        });
+        let made: Vec<Option<Example>> =
+            made.into_iter().collect::<Result<_, ClassifierError>>()?;
+        let examples: Vec<Example> = made.into_iter().flatten().collect();
+        Ok(Self {
+            unsteady: count - examples.len() as u64,
+            labels: examples.iter().map(|one| label(&one.costs)).collect(),
+            examples,
+            gain,
+        })
+    }
+
+    /// The class of each example that costs least.
+    #[must_use]
+    pub fn labels(&self) -> &[usize] {
+        &self.labels
+    }
+
+    /// Trials whose oscillation did not become steady, of which there is no example.
+    #[must_use]
+    pub fn unsteady(&self) -> u64 {
+        self.unsteady
+    }
+
+    /// What every class would cost example `i` of those there are.
+    #[must_use]
+    pub fn costs(&self, i: usize) -> &[f32] {
+        &self.examples[i].costs
+    }
+
+    /// The inputs of example `i` of those there are.
+    pub(super) fn fill_inputs(&self, i: usize, row: &mut [f32]) {
+        self.examples[i].prepared.fill(row);
+    }
+
+    /// What the controller of a class costs example `i` of those there are.
+    #[must_use]
+    pub fn judge(&self, i: usize, classes: &Classes, class: usize) -> Deterioration {
+        let truth = &self.examples[i].truth;
+        truth.judge(self.controller(i, classes, class, self.gain))
+    }
+
+    /// The best class of each example, were its gain found in this way, and what it costs.
+    #[must_use]
+    pub fn best(&self, classes: &Classes, gain: Gain) -> Vec<(usize, Deterioration)> {
+        let best = |example: &Example| {
+            let measured = &example.measured[which(gain)];
+            let class = label(&classes.costs(&example.truth, measured));
+            let controller = classes.class(class).controller(measured);
+            (class, example.truth.judge(controller))
+        };
+        self.examples.iter().map(best).collect()
+    }
+
+    fn controller(&self, i: usize, classes: &Classes, class: usize, gain: Gain) -> Pd {
+        let measured = &self.examples[i].measured[which(gain)];
+        classes.class(class).controller(measured)
+    }
+}
+
+fn which(gain: Gain) -> usize {
+    match gain {
+        Gain::Harmonics => 0,
+        Gain::Amplitude => 1,
+    }
+}
+
+fn measured(cycle: &SampledCycle, beta: f64) -> Option<[Measured; 2]> {
+    let (low, high) = (cycle.output.iter())
+        .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &value| {
+            (low.min(value), high.max(value))
+        });
+    Some([
+        Measured::Harmonics(Harmonics::of(cycle, beta)?),
+        Measured::Amplitude(0.5 * f64::from(high - low)),
+    ])
+}
+
+impl Dataset for Examples {
+    fn len(&self) -> usize {
+        self.examples.len()
+    }
+
+    fn fill(&self, samples: &[usize], batch: &mut Batch) {
+        let classes = self.examples.first().map_or(0, |one| one.costs.len());
+        batch.inputs.reshape(samples.len(), INPUTS);
+        batch.costs.reshape(samples.len(), classes);
+        batch.classes.clear();
+        for (row, &sample) in samples.iter().enumerate() {
+            let example = &self.examples[sample];
+            example.prepared.fill(batch.inputs.row_mut(row));
+            batch.costs.row_mut(row).copy_from_slice(&example.costs);
+            batch.classes.push(self.labels[sample]);
+        }
+        batch.values = Matrix::default();
+        batch.weights.clear();
+    }
+}

@@ -1,0 +1,168 @@
+//! From the outputs of a network to a class, and what that class's controllers cost.
+//!
+//! | rule                | the class picked                                           |
+//! |---------------------|------------------------------------------------------------|
+//! | most likely         | the one with the largest output: the paper's               |
+//! | least expected cost | `min_i sum_k p_k min(J_ik, 1)`, `p` the softmax of the outputs |
+
+use super::ClassifierError;
+use super::classes::{Classes, Gain};
+use super::examples::Examples;
+use crate::learn::train::{Batch, Dataset, Matrix, Network, Workers};
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+
+/// How a class is picked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Rule {
+    /// The one with the largest output.
+    MostLikely,
+    /// The one that costs least on average.
+    LeastExpectedCost,
+}
+
+impl Rule {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::MostLikely, Self::LeastExpectedCost];
+}
+
+/// Cost of an unstable loop in an expectation: as if it were twice as bad as the optimum.
+const UNSTABLE: f64 = 1.0;
+
+/// Probabilities below this part of the highest do not count in an expectation.
+const UNLIKELY: f64 = 1e-6;
+
+/// Examples evaluated at a time: some tens of MB.
+const BATCH: usize = 512;
+
+/// How the picked classes fare; costs are fractions.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct Score {
+    /// Examples.
+    pub examples: usize,
+    /// Part of them whose pick is the best class.
+    pub accuracy: f64,
+    /// Mean of `|J|` where stable.
+    pub mean: Option<f64>,
+    /// 99 of 100 `|J|` are at most this; null where that one is unstable.
+    pub percentile_99: Option<f64>,
+    /// The largest `|J|` where stable.
+    pub worst: Option<f64>,
+    /// Mean of `J` with its sign where stable: below zero is bought with margin.
+    pub mean_signed: Option<f64>,
+    /// Unstable loops.
+    pub unstable: usize,
+    /// The least phase margin where stable (rad).
+    pub least_margin_rad: Option<f64>,
+}
+
+impl Score {
+    /// Of picks on examples.
+    #[must_use]
+    pub fn of_picks(picks: &[usize], examples: &Examples, classes: &Classes) -> Self {
+        let judged = (picks.iter().enumerate())
+            .map(|(i, &class)| (class, examples.judge(i, classes, class)))
+            .collect();
+        Self::of(judged, examples.labels())
+    }
+
+    /// Of the best picks there are, were gains found in this way.
+    #[must_use]
+    pub fn of_best(examples: &Examples, classes: &Classes, gain: Gain) -> Self {
+        Self::of(examples.best(classes, gain), examples.labels())
+    }
+
+    fn of(judged: Vec<(usize, Deterioration)>, labels: &[usize]) -> Self {
+        let examples = judged.len();
+        let right = (judged.iter().zip(labels)).filter(|((class, _), label)| class == *label);
+        let accuracy = right.count() as f64 / examples.max(1) as f64;
+        let (mut costs, mut margins_rad) = (Vec::new(), Vec::new());
+        for (_, outcome) in judged {
+            if let Deterioration::Stable {
+                relative,
+                phase_margin_rad,
+            } = outcome
+            {
+                costs.push(relative);
+                margins_rad.push(phase_margin_rad);
+            }
+        }
+        let mean = |values: &[f64]| {
+            let count = values.len() as f64;
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / count)
+        };
+        let mean_signed = mean(&costs);
+        for cost in &mut costs {
+            *cost = cost.abs();
+        }
+        costs.sort_unstable_by(f64::total_cmp);
+        // Unstable ones come last.
+        let rank = (0.99 * examples.saturating_sub(1) as f64).round() as usize;
+        Self {
+            examples,
+            accuracy,
+            mean: mean(&costs),
+            percentile_99: costs.get(rank).copied(),
+            worst: costs.last().copied(),
+            mean_signed,
+            unstable: examples - costs.len(),
+            least_margin_rad: margins_rad.into_iter().reduce(f64::min),
+        }
+    }
+}
+
+/// The classes that a network picks for every example, by each of [`Rule::ALL`].
+///
+/// # Errors
+/// Where the network has other inputs or outputs than the examples.
+pub fn picks(
+    network: &Network,
+    examples: &Examples,
+    classes: &Classes,
+    workers: &dyn Workers,
+) -> Result<[Vec<usize>; 2], ClassifierError> {
+    let mut batch = Batch::default();
+    let mut picks = [const { Vec::new() }; 2];
+    let order: Vec<usize> = (0..examples.len()).collect();
+    for some in order.chunks(BATCH) {
+        examples.fill(some, &mut batch);
+        let outputs = network.evaluate(&batch.inputs, workers)?;
+        for row in outputs.iter_rows() {
+            picks[0].push(most_likely(row));
+            picks[1].push(least_expected_cost(row, classes.matrix()));
+        }
+    }
+    Ok(picks)
+}
+
+/// The class with the largest output, the first of several.
+#[must_use]
+pub fn most_likely(outputs: &[f32]) -> usize {
+    let mut best = 0;
+    for (k, value) in outputs.iter().enumerate() {
+        if *value > outputs[best] {
+            best = k;
+        }
+    }
+    best
+}
+
+/// The class that costs least on average over the softmax of the outputs; row `i`, column `k` of
+/// `costs`: what class `i` costs on `k`.
+#[must_use]
+pub fn least_expected_cost(outputs: &[f32], costs: &Matrix) -> usize {
+    let highest = outputs.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let likely: Vec<(usize, f64)> = (outputs.iter().enumerate())
+        .map(|(k, value)| (k, f64::from(value - highest).exp()))
+        .filter(|&(_, weight)| weight >= UNLIKELY)
+        .collect();
+    let mut best = (0, f64::INFINITY);
+    for (i, row) in costs.iter_rows().enumerate() {
+        let cost = |&(k, weight): &(usize, f64)| weight * f64::from(row[k]).min(UNSTABLE);
+        let expected: f64 = likely.iter().map(cost).sum();
+        if expected < best.1 {
+            best = (i, expected);
+        }
+    }
+    best.0
+}

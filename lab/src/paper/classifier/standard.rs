@@ -1,0 +1,118 @@
+//! Inputs about their mean, over their deviation: the coordinates in which a network learns.
+//!
+//! Numbers of a cycle have large means and unlike variances, and what tells shapes apart is a per cent of
+//! them. Steps down a gradient hardly move along it, whatever the loss: with inputs as they are a network
+//! learns the period and no more. So the first layer learns from
+//!
+//! ```text
+//! x^ = (x - mean) / (deviation + 0.02)
+//! ```
+//!
+//! over what is learnt from. It is a batch normalisation whose statistics are known beforehand, and stands
+//! as one before the layers of the network that comes out; [`Network::folded`] multiplies it into the
+//! first of them.
+
+use super::ClassifierError;
+use super::examples::Examples;
+use super::input::INPUTS;
+use crate::learn::train::{Batch, Dataset, Layer, Network, TensorFile};
+
+/// Keeps numbers that are nearly always the same from counting more than others: a fiftieth of the
+/// amplitude, which is what noise moves them by.
+const LEAST_DEVIATION: f64 = 0.02;
+
+/// Added to the variance by batch normalisation, here to be taken off before.
+const EPSILON: f64 = 1e-5;
+
+/// Mean and deviation of every input.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standard {
+    mean: Vec<f64>,
+    deviation: Vec<f64>,
+}
+
+/// Examples in standard coordinates.
+#[derive(Clone, Copy, Debug)]
+pub struct Standardised<'a> {
+    /// The examples.
+    pub examples: &'a Examples,
+    /// The coordinates.
+    pub standard: &'a Standard,
+}
+
+impl Standard {
+    /// Of these examples.
+    #[must_use]
+    pub fn of(examples: &Examples) -> Self {
+        let mut row = vec![0.0_f32; INPUTS];
+        let (mut sums, mut squares) = (vec![0.0; INPUTS], vec![0.0; INPUTS]);
+        for i in 0..examples.len() {
+            examples.fill_inputs(i, &mut row);
+            for (k, value) in row.iter().enumerate() {
+                let value = f64::from(*value);
+                sums[k] += value;
+                squares[k] += value * value;
+            }
+        }
+        let count = examples.len().max(1) as f64;
+        let mean: Vec<f64> = sums.iter().map(|sum| sum / count).collect();
+        let deviation = (squares.iter().zip(&mean))
+            .map(|(square, mean)| (square / count - mean * mean).max(0.0).sqrt() + LEAST_DEVIATION)
+            .collect();
+        Self { mean, deviation }
+    }
+
+    /// The same network for inputs as they are: with a batch normalisation before its layers.
+    ///
+    /// # Errors
+    /// Where the network has another number of inputs.
+    pub fn before(&self, network: &Network) -> Result<Network, ClassifierError> {
+        let mut layers = vec![Layer::BatchNorm];
+        layers.extend(network.layers());
+        let mut whole = Network::zeros(INPUTS, &layers)?;
+        let mut file = TensorFile {
+            tensors: whole.tensors(),
+            ..TensorFile::default()
+        };
+        let single = |values: &[f64]| values.iter().map(|value| *value as f32).collect();
+        let variance: Vec<f64> = (self.deviation.iter())
+            .map(|deviation| deviation * deviation - EPSILON)
+            .collect();
+        for tensor in &mut file.tensors {
+            match tensor.name.as_str() {
+                "0.running_mean" => tensor.values = single(&self.mean),
+                "0.running_var" => tensor.values = single(&variance),
+                _ => {}
+            }
+        }
+        // The layers of the network come one later.
+        file.tensors.retain(|tensor| tensor.name.starts_with("0."));
+        for mut tensor in network.tensors() {
+            if let Some((number, name)) = tensor.name.split_once('.') {
+                let later = number.parse::<usize>().unwrap_or_default() + 1;
+                tensor.name = format!("{later}.{name}");
+            }
+            file.tensors.push(tensor);
+        }
+        whole.load(&file.to_bytes())?;
+        Ok(whole)
+    }
+}
+
+impl Dataset for Standardised<'_> {
+    fn len(&self) -> usize {
+        self.examples.len()
+    }
+
+    fn fill(&self, samples: &[usize], batch: &mut Batch) {
+        self.examples.fill(samples, batch);
+        for i in 0..samples.len() {
+            let row = batch.inputs.row_mut(i).iter_mut();
+            for ((value, mean), deviation) in
+                row.zip(&self.standard.mean).zip(&self.standard.deviation)
+            {
+                *value = ((f64::from(*value) - mean) / deviation) as f32;
+            }
+        }
+    }
+}

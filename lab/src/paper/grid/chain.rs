@@ -1,0 +1,132 @@
+//! Chains: as few places of a line as cover an interval, each a given deterioration from the next.
+
+use std::cell::Cell;
+
+use crate::space::Range;
+use crate::space::candidate::CandidateError;
+use onecycle_design::roots::root;
+
+/// A line of processes: one coordinate of a layout, the others held.
+pub(super) trait Line {
+    /// What stands at a coordinate.
+    type Place;
+
+    fn place(&self, at: f64) -> Result<Self::Place, CandidateError>;
+
+    /// `J_(ij)` between a place and what stands at another coordinate, growing with how far that
+    /// is; infinite where a controller is unstable.
+    fn distance(&self, from: &Self::Place, to: f64) -> Result<f64, CandidateError>;
+}
+
+/// How finely the slack is balanced between the ends of a chain, as a part of its first step:
+/// nothing that a neighbour's coverage would show.
+const BALANCE: f64 = 1e-3;
+
+/// A step is first looked for this far, as a part of what is left of the interval.
+const FIRST_LOOK: f64 = 1.0 / 32.0;
+
+/// Where a distance stands beside a step: from -1/2 through zero at a step up to 1/2, so that a
+/// search for the root can take infinite distances.
+pub(super) fn beyond(distance: f64, step: f64) -> f64 {
+    if distance.is_finite() {
+        distance / (distance + step) - 0.5
+    } else {
+        0.5
+    }
+}
+
+/// Coordinates from low to high whose neighbours are `step` apart, each of them owning the interval
+/// for half a step to either side: one where there is nothing to cover, and never two where one
+/// does. The first and the last are equally far from the ends.
+pub(super) fn cover<L: Line>(
+    line: &L,
+    (low, high): Range,
+    step: f64,
+) -> Result<Vec<f64>, CandidateError> {
+    if high <= low {
+        return Ok(vec![low]);
+    }
+    let walk = Walk { line, step, high };
+    let from_low = walk.from(low)?;
+    let count = from_low.len();
+    let latest = from_low.get(1).copied().unwrap_or(high);
+    let error = Cell::new(None);
+    let imbalance = |first: f64| {
+        walk.imbalance(low, first, count).unwrap_or_else(|reason| {
+            error.set(Some(reason));
+            // A root ends the search.
+            0.0
+        })
+    };
+    let first = root(imbalance, low, latest, BALANCE * (latest - low));
+    if let Some(reason) = error.get() {
+        return Err(reason);
+    }
+    let balanced = walk.from(first)?;
+    // Without any slack rounding may push the last one out.
+    Ok(if balanced.len() == count {
+        balanced
+    } else {
+        from_low
+    })
+}
+
+struct Walk<'a, L> {
+    line: &'a L,
+    step: f64,
+    high: f64,
+}
+
+impl<L: Line> Walk<'_, L> {
+    /// Coordinates from `first` on, a step apart.
+    fn from(&self, first: f64) -> Result<Vec<f64>, CandidateError> {
+        let mut places = vec![first];
+        let mut at = first;
+        while let Some(next) = self.next(at)? {
+            places.push(next);
+            at = next;
+        }
+        Ok(places)
+    }
+
+    /// The coordinate a step further; `None` beyond the end.
+    fn next(&self, at: f64) -> Result<Option<f64>, CandidateError> {
+        let from = self.line.place(at)?;
+        let error = Cell::new(None);
+        let beyond = |to: f64| match self.line.distance(&from, to) {
+            Ok(distance) => beyond(distance, self.step),
+            Err(reason) => {
+                error.set(Some(reason));
+                // A root ends the search.
+                0.0
+            }
+        };
+        let (mut near, mut look) = (at, FIRST_LOOK * (self.high - at));
+        let found = loop {
+            let far = (at + look).min(self.high);
+            if beyond(far) > 0.0 {
+                break Some(root(beyond, near, far, 0.0));
+            }
+            if far >= self.high || error.get().is_some() {
+                break None;
+            }
+            near = far;
+            look *= 2.0;
+        };
+        error.get().map_or(Ok(found), Err)
+    }
+
+    /// How much further the first of `count` places is from the low end than the last from the
+    /// high one.
+    fn imbalance(&self, low: f64, first: f64, count: usize) -> Result<f64, CandidateError> {
+        let before = self.line.distance(&self.line.place(low)?, first)?;
+        let places = self.from(first)?;
+        let after = match places.last() {
+            Some(&last) if places.len() >= count => {
+                self.line.distance(&self.line.place(last)?, self.high)?
+            }
+            _ => -self.step,
+        };
+        Ok((before - after).clamp(-self.step, self.step))
+    }
+}

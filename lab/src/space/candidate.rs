@@ -1,0 +1,222 @@
+//! A process as a candidate for another: what its controller would cost there (the `J_ij` of the
+//! paper's equation 8, gains matched; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//!
+//! In an identification the amplitude of the oscillation tells the gain: whatever the candidate,
+//! its gain is the one that makes its amplitude the measured one. So candidates are compared at
+//! gains that give them the same amplitude under the same relay, here one. [`Gains::Equal`]
+//! compares at equal velocity gains instead, to show the difference.
+//!
+//! Time scales everything: of a candidate whose times are `alpha` times as long, the amplitude is
+//! the same with `1/alpha^2` of the acceleration gain, `Kp` is the same, `Kd` and the cost are `alpha`
+//! times as large, and the margins do not change. Costs between two candidates stay what they are
+//! when both are scaled alike (the paper's property 1).
+
+use onecycle_onboard::{Pd, Soiptd, SoiptdError};
+
+use crate::space::Space;
+use crate::space::limit_cycle::symmetric;
+use onecycle_design::soiptd_pd::cost::ise;
+use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
+use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd};
+
+/// At which gains candidates are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Gains {
+    /// Those that give the same amplitude under the same relay.
+    #[default]
+    SameAmplitude,
+    /// Equal velocity gains.
+    Equal,
+}
+
+/// A process with its gain as [`Gains`] has it, and its optimal controller.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// The process.
+    pub process: Soiptd,
+    /// Its optimum at or above the margin of its space.
+    pub optimum: Optimum,
+    gains: Gains,
+}
+
+/// Why a process is no candidate.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum CandidateError {
+    /// The times are no process.
+    #[error("{0}")]
+    Process(#[from] SoiptdError),
+    /// It has no optimal controller.
+    #[error("{0}")]
+    Optimum(#[from] OptimumError),
+    /// The relay does not make it oscillate, so no amplitude tells its gain.
+    #[error(
+        "T_prop {t_prop_s} s, T_body {t_body_s} s, tau {tau_s} s does not oscillate under a relay \
+         with beta {beta}: choose a smaller beta"
+    )]
+    NoOscillation {
+        /// Lag of the actuator (s).
+        t_prop_s: f64,
+        /// Lag of the body (s).
+        t_body_s: f64,
+        /// Dead time (s).
+        tau_s: f64,
+        /// Parameter of the relay.
+        beta: f64,
+    },
+}
+
+impl Candidate {
+    /// The candidate with these times, `T_prop`, `T_body`, `tau` (s).
+    ///
+    /// # Errors
+    /// See [`CandidateError`].
+    pub fn new(
+        space: &Space,
+        gains: Gains,
+        [t_prop_s, t_body_s, tau_s]: [f64; 3],
+    ) -> Result<Self, CandidateError> {
+        let unit = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s)?;
+        let process = match gains {
+            Gains::Equal => unit,
+            Gains::SameAmplitude => {
+                let cycle = symmetric(&unit, space.beta).ok_or(CandidateError::NoOscillation {
+                    t_prop_s,
+                    t_body_s,
+                    tau_s,
+                    beta: space.beta,
+                })?;
+                unit.with_gain_scaled(1.0 / cycle.amplitude)?
+            }
+        };
+        Ok(Self {
+            process,
+            optimum: pd(&process, space.phase_margin_rad())?,
+            gains,
+        })
+    }
+
+    /// The candidate whose times are `alpha > 0` times as long, exactly.
+    ///
+    /// # Errors
+    /// [`CandidateError::Process`] where a time or the gain leaves the range of `f64`.
+    pub fn scaled(&self, alpha: f64) -> Result<Self, CandidateError> {
+        // Of the acceleration gain; what it changes beyond 1/alpha^2 divides the controller's.
+        let gain = match self.gains {
+            Gains::SameAmplitude => alpha.powi(-2),
+            Gains::Equal => alpha.recip(),
+        };
+        let controller = (alpha * alpha * gain).recip();
+        let process = Soiptd::from_acceleration_gain(
+            gain * self.process.k_over_t_body(),
+            alpha * self.process.t_prop_s(),
+            self.process.inv_t_body_per_s() / alpha,
+            alpha * self.process.tau_s(),
+        )?;
+        let mut optimum = self.optimum;
+        optimum.pd = Pd {
+            kp: controller * optimum.pd.kp,
+            kd: controller * alpha * optimum.pd.kd,
+        };
+        optimum.ise *= alpha;
+        let margins = &mut optimum.margins;
+        margins.gain_crossover_rad_per_s /= alpha;
+        margins.phase_crossover_rad_per_s = margins.phase_crossover_rad_per_s.map(|w| w / alpha);
+        margins.delay_margin_s *= alpha;
+        Ok(Self {
+            process,
+            optimum,
+            gains: self.gains,
+        })
+    }
+
+    /// `J_ij`: what the controller of this candidate costs on `other`, with the margin it leaves.
+    #[must_use]
+    pub fn on(&self, other: &Self) -> Deterioration {
+        deterioration(self.optimum.pd, &other.process, &other.optimum)
+    }
+
+    /// `J_(ij) = max(J_ij, J_ji)`: how far apart two candidates are; infinite where either
+    /// controller is unstable on the other process.
+    ///
+    /// At a margin `J_ij` alone can be negative, a faster step bought with margin, and then `J_ji`
+    /// is positive as a rule. Where both are negative (by some thousandths, seen between shapes
+    /// far apart) the candidates are as good as the same: zero.
+    #[must_use]
+    pub fn distance(&self, other: &Self) -> f64 {
+        self.cost_on(other).max(other.cost_on(self)).max(0.0)
+    }
+
+    /// The distance where it is below `bound`, at half the work where it is not.
+    #[must_use]
+    pub fn distance_below(&self, other: &Self, bound: f64) -> Option<f64> {
+        let there = self.cost_on(other);
+        if there >= bound {
+            return None;
+        }
+        let distance = there.max(other.cost_on(self)).max(0.0);
+        (distance < bound).then_some(distance)
+    }
+
+    /// `J_ij` alone, infinite where it is unstable.
+    #[must_use]
+    pub fn cost_on(&self, other: &Self) -> f64 {
+        ise(&other.process, self.optimum.pd).map_or(f64::INFINITY, |cost| {
+            (cost - other.optimum.ise) / other.optimum.ise
+        })
+    }
+
+    /// `T_prop`, `T_body`, `tau` (s).
+    #[must_use]
+    pub fn times_s(&self) -> [f64; 3] {
+        [
+            self.process.t_prop_s(),
+            self.process.inv_t_body_per_s().recip(),
+            self.process.tau_s(),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Twice the times: with the same amplitude a quarter of the acceleration gain and twice Kd;
+    // with equal gains half of it (K is the same) and half of Kp. Factors of two are exact.
+    #[test]
+    fn twice_as_slow() {
+        let times_s = [0.05, 1.0, 0.02];
+        for (gains, gain, kp) in [(Gains::SameAmplitude, 0.25, 1.0), (Gains::Equal, 0.5, 0.5)] {
+            let one = Candidate::new(&Space::MULTIROTOR, gains, times_s).unwrap();
+            let two = one.scaled(2.0).unwrap();
+            assert_eq!(two.times_s(), [0.1, 2.0, 0.04]);
+            assert_eq!(
+                two.process.k_over_t_body(),
+                gain * one.process.k_over_t_body()
+            );
+            let (a, b) = (&one.optimum, &two.optimum);
+            assert_eq!((b.pd.kp, b.pd.kd), (kp * a.pd.kp, 2.0 * kp * a.pd.kd));
+            assert_eq!(b.ise, 2.0 * a.ise);
+            assert_eq!(b.margins.phase_margin_rad, a.margins.phase_margin_rad);
+        }
+    }
+
+    // A distance is the larger of both costs, below any bound above it and below none under it. The
+    // controller made for a process ten times as slow has a Kd ten times as large: unstable.
+    #[test]
+    fn distances() {
+        let new =
+            |times_s| Candidate::new(&Space::MULTIROTOR, Gains::SameAmplitude, times_s).unwrap();
+        let (one, other) = (new([0.05, 1.0, 0.02]), new([0.06, 1.0, 0.03]));
+        let distance = one.distance(&other);
+        assert_eq!(distance, one.cost_on(&other).max(other.cost_on(&one)));
+        assert_eq!(distance, other.distance(&one));
+        assert_eq!(one.on(&other).relative(), Some(one.cost_on(&other)));
+        assert_eq!(one.distance_below(&other, 1.01 * distance), Some(distance));
+        assert_eq!(one.distance_below(&other, distance), None);
+        assert!(one.distance(&one) < 1e-13);
+        let fast = one.scaled(0.1).unwrap();
+        assert_eq!(one.cost_on(&fast), f64::INFINITY);
+        assert_eq!(fast.distance(&one), f64::INFINITY);
+    }
+}
