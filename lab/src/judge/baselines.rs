@@ -14,8 +14,8 @@
 //! so that identifiers are compared and nothing else. Only [`gmvc`] makes the controller that flies.
 //!
 //! ```
-//! use crate::judge::baselines::{pem, rules};
-//! use onecycle_identify::Signals;
+//! use onecycle_lab::judge::baselines::{pem, rules};
+//! use onecycle_lab::experiments::signals_of;
 //! use onecycle_onboard::{Soiptd, Relay, RelaySettings};
 //! use onecycle_plant::Experiment;
 //! use rand::SeedableRng;

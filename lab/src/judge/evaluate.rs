@@ -25,7 +25,7 @@
 //! nothing else depends on it.
 //!
 //! ```
-//! use crate::judge::evaluate::{Answer, Judge};
+//! use onecycle_lab::judge::evaluate::{Answer, Judge};
 //! use onecycle_onboard::Soiptd;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

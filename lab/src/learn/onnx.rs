@@ -20,8 +20,8 @@
 //! version 8, and its operators; the messages (field numbers) are those of `onnx.proto`.
 //!
 //! ```
-//! use crate::learn::onnx;
-//! use crate::learn::train::{Layer, Network};
+//! use onecycle_lab::learn::onnx;
+//! use onecycle_lab::learn::train::{Layer, Network};
 //! use rand::SeedableRng;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

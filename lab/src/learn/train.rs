@@ -20,7 +20,7 @@
 //! The same seed gives the same bits, on any number of threads and through any interruption.
 //!
 //! ```
-//! use crate::learn::train::{Layer, Matrix, Network, OneThread};
+//! use onecycle_lab::learn::train::{Layer, Matrix, Network, OneThread};
 //! use rand::SeedableRng;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {

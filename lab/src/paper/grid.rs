@@ -14,8 +14,8 @@
 //! Work is cut in independent pieces that a caller runs as it likes: [`Pieces`].
 //!
 //! ```
-//! use crate::space::Space;
-//! use crate::paper::grid::{Grid, InTurn, Layout, Settings, check};
+//! use onecycle_lab::space::Space;
+//! use onecycle_lab::paper::grid::{Grid, InTurn, Layout, Settings, check};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let space = Space { tau_s: (0.02, 0.02), ..Space::MULTIROTOR };
