@@ -15,3 +15,4 @@ pub(crate) mod phase;
 pub(crate) mod plot;
 pub(crate) mod reproduction;
 pub(crate) mod text;
+mod units;

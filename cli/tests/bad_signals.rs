@@ -48,6 +48,21 @@ fn one_switch() {
     assert!(report.advice().contains("four cycles"));
 }
 
+// A relay test that failed: the input moves from 1 to 2, then to 0, where it stays for 99.7 % of the recording.
+#[test]
+fn a_relay_that_gave_up() {
+    let table = Table::clean().map(|index, sample| {
+        sample.input = match index {
+            0..5 => 1.0,
+            5..20 => 2.0,
+            _ => 0.0,
+        };
+    });
+    let report = identify(table.csv(), &[]).no_process("no_relay");
+    let message = report.0["verdict"]["message"].as_str().unwrap();
+    assert!(message.contains("switches 2 times"), "{message}");
+}
+
 #[test]
 fn ten_samples() {
     let table = Table::clean();
@@ -160,7 +175,7 @@ fn one_cycle_only() {
         assert!(text.stdout.contains("holds one complete cycle"), "{text:?}");
         // Without a pack nothing is taken for granted.
         let report = identify(one.csv(), &["--method", "refine"]).identified();
-        report.remarked(&["one complete cycle", "Record two that are alike"]);
+        report.remarked(&["one complete cycle", "Record two cycles that are alike"]);
         is_hover(&report, 0.02);
     }
 }

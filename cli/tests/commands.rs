@@ -297,7 +297,7 @@ const PARTS: [(&str, &str); 9] = [
 #[test]
 fn the_json_report_has_every_key() {
     let report = identify(Table::noisy().csv(), &[]).identified().0;
-    assert_eq!(report["schema"], "onecycle.identify/1");
+    assert_eq!(report["schema"], "onecycle.identify/2");
     for (part, expected) in PARTS {
         let found = report.pointer(part).map(keys).unwrap_or_default();
         // Keys may be added; none may go.

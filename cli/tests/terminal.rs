@@ -120,7 +120,7 @@ fn verdicts_have_their_colours() {
     let folder = Scratch::new();
     let [good, clipped] = recordings(&folder);
     let [text, _] = coloured(&["identify", &good], Some("CLICOLOR_FORCE"));
-    assert!(text.contains("\x1b[32mknown"), "{text}");
+    assert!(text.contains("\x1b[32min the pack"), "{text}");
     assert!(text.contains("\x1b[33m  note:"), "{text}");
     assert!(text.contains("\x1b[1mController\x1b[0m"), "{text}");
     let [text, _] = coloured(&["identify", &clipped], Some("CLICOLOR_FORCE"));

@@ -22,7 +22,7 @@ fn tune_gives_the_published_gains() {
     assert!((kp - 8.5096).abs() < 1e-3, "{kp}");
     assert!((kd - 6.9966).abs() < 1e-3, "{kd}");
     assert!((angle_p - kp / kd).abs() < 1e-12);
-    assert_eq!(report.0["schema"], "onecycle.tune/1");
+    assert_eq!(report.0["schema"], "onecycle.tune/2");
     assert!((report.number("/margins/phase_margin_deg") - 20.0).abs() < 1e-6);
     // Twice the gain takes half the controller.
     let double = [

@@ -1,18 +1,18 @@
-//! What a controller will do over all that the process may be: bands about the step and the open loop.
+//! Bands of the step response and of the open loop over draws from the posterior.
 //!
-//! A band holds 90 % of the curves of the posterior's processes, point by point, as an interval holds 90 % of a
-//! number. No whole curve need lie within it.
+//! At each point a band holds 90 % of the curves of the draws. A single curve may leave it somewhere.
 
 use num_complex::Complex64;
-use onecycle_onboard::{Pd, Soiptd};
 
-use crate::soiptd_pd::loop_response::loop_response;
-use crate::soiptd_pd::step_response::{StepResponse, step_response};
+use crate::closed_loop::{loop_response, step_response};
+use crate::controller::Controller;
+use crate::model::Model;
+use crate::soiptd_pd::step_response::StepResponse;
 
 /// Quantiles of a 90 % interval.
 const QUANTILES: (f64, f64) = (0.05, 0.95);
 
-/// The ends of the 90 % interval of draws; `None` where there are none.
+/// Ends of the 90 % interval of draws; `None` without draws.
 #[must_use]
 pub fn quantiles(mut values: Vec<f64>) -> Option<(f64, f64)> {
     if values.is_empty() {
@@ -50,15 +50,15 @@ pub struct StepBands {
     pub output: Band,
     /// Of the controller's output (input unit).
     pub input: Band,
-    /// Part of the processes on which the loop settles: only those have a response.
+    /// Share of the models on which the loop settles; the others have no response.
     pub settling: f64,
 }
 
-/// Bands of the step responses of `processes` under `pd` at the times `times_s`; `None` where no loop settles.
+/// Bands of the step responses of `models` under `controller` at the times `times_s`; `None` where no loop settles.
 #[must_use]
-pub fn step_bands(processes: &[Soiptd], pd: Pd, times_s: &[f64]) -> Option<StepBands> {
-    let responses: Vec<StepResponse> = (processes.iter())
-        .filter_map(|process| step_response(process, pd).ok())
+pub fn step_bands(models: &[Model], controller: &Controller, times_s: &[f64]) -> Option<StepBands> {
+    let responses: Vec<StepResponse> = (models.iter())
+        .filter_map(|model| step_response(model, controller).ok())
         .collect();
     let curves = |value: fn((f64, f64)) -> f64| -> Vec<Vec<f64>> {
         let at = |response: &StepResponse| {
@@ -70,7 +70,7 @@ pub fn step_bands(processes: &[Soiptd], pd: Pd, times_s: &[f64]) -> Option<StepB
     Some(StepBands {
         output: Band::of(&curves(|(output, _)| output))?,
         input: Band::of(&curves(|(_, input)| input))?,
-        settling: responses.len() as f64 / processes.len() as f64,
+        settling: responses.len() as f64 / models.len() as f64,
     })
 }
 
@@ -85,24 +85,25 @@ pub struct LoopBands {
     pub locus: (Vec<Complex64>, Vec<Complex64>),
 }
 
-/// Bands of the open loops of `processes` with `pd` about that of `centre`, at rising frequencies (rad/s); `None`
-/// where there are no processes or fewer than two frequencies, or the loop of `centre` is unstable at every gain.
+/// Bands of the open loops of `models` under `controller` about that of `centre`, at rising frequencies (rad/s); `None`
+/// without models, with fewer than two frequencies, and where the loop of `centre` has no margins.
 #[must_use]
 pub fn loop_bands(
-    centre: &Soiptd,
-    processes: &[Soiptd],
-    pd: Pd,
+    centre: &Model,
+    models: &[Model],
+    controller: &Controller,
     omegas_rad_per_s: &[f64],
 ) -> Option<LoopBands> {
-    let responses = |process: &Soiptd| -> Option<Vec<(f64, f64)>> {
-        let one =
-            |&omega: &f64| loop_response(process, pd, omega).map(|at| (at.magnitude, at.phase_rad));
+    let responses = |model: &Model| -> Option<Vec<(f64, f64)>> {
+        let one = |&omega: &f64| {
+            loop_response(model, controller, omega).map(|at| (at.magnitude, at.phase_rad))
+        };
         omegas_rad_per_s.iter().map(one).collect()
     };
     let point = |(magnitude, phase_rad): (f64, f64)| Complex64::from_polar(magnitude, phase_rad);
     let locus: Vec<Complex64> = responses(centre)?.into_iter().map(point).collect();
     let across = normals(&locus)?;
-    let loops: Vec<Vec<(f64, f64)>> = processes.iter().filter_map(responses).collect();
+    let loops: Vec<Vec<(f64, f64)>> = models.iter().filter_map(responses).collect();
     let curves = |value: &dyn Fn(usize, (f64, f64)) -> f64| -> Vec<Vec<f64>> {
         let of = |curve: &Vec<(f64, f64)>| {
             let values = curve.iter().enumerate().map(|(k, &at)| value(k, at));
@@ -143,27 +144,31 @@ fn normals(curve: &[Complex64]) -> Option<Vec<Complex64>> {
 mod tests {
     use super::*;
 
+    use onecycle_onboard::{Pd, Soiptd};
+
     const OMEGAS: [f64; 5] = [5.0, 8.0, 12.0, 20.0, 35.0];
 
-    fn pd() -> (Soiptd, Pd) {
+    fn optimum() -> (Soiptd, Controller) {
         let process = Soiptd::new(1.0, 0.05, 1.0, 0.02).unwrap();
-        (
-            process,
-            crate::soiptd_pd::optimum::pd(&process, 0.35).unwrap().pd,
-        )
+        let pd: Pd = crate::soiptd_pd::pd(&process, 0.35).unwrap().pd;
+        (process, pd.into())
+    }
+
+    fn models(processes: &[Soiptd]) -> Vec<Model> {
+        processes.iter().map(|&process| process.into()).collect()
     }
 
     // Gains alone differ, 0.80 to 1.20 in 41 steps of 1 %: 5 % of 40 is the third of them, 0.82, and 95 % the one of
     // 1.18. The phase has no band, and the locus's edges are those loci, to the order of the curve's turning.
     #[test]
     fn a_band_of_gains_is_a_band_of_magnitudes() {
-        let (process, pd) = pd();
+        let (process, controller) = optimum();
         let processes: Vec<Soiptd> = (0..=40)
             .map(|k| process.with_gain_scaled(0.8 + 0.01 * f64::from(k)).unwrap())
             .collect();
-        let bands = loop_bands(&process, &processes, pd, &OMEGAS).unwrap();
+        let bands = loop_bands(&process.into(), &models(&processes), &controller, &OMEGAS).unwrap();
         for (k, &omega) in OMEGAS.iter().enumerate() {
-            let at = loop_response(&process, pd, omega).unwrap();
+            let at = loop_response(&process.into(), &controller, omega).unwrap();
             assert!((bands.magnitude.low[k] / at.magnitude - 0.82).abs() < 1e-12);
             assert!((bands.magnitude.high[k] / at.magnitude - 1.18).abs() < 1e-12);
             assert!((bands.phase_rad.low[k] - at.phase_rad).abs() < 1e-12);
@@ -171,7 +176,7 @@ mod tests {
         }
         let (low, high) = &bands.locus;
         let width = (high[2] - low[2]).norm();
-        let locus = loop_response(&process, pd, OMEGAS[2]).unwrap();
+        let locus = loop_response(&process.into(), &controller, OMEGAS[2]).unwrap();
         // The radius is not quite across the locus: its part across it is what is seen.
         assert!(width > 0.1 * 0.36 * locus.magnitude && width <= 0.36 * locus.magnitude);
     }
@@ -179,15 +184,20 @@ mod tests {
     // The step of each process alone is its own band, and the steps of all gains lie about it.
     #[test]
     fn steps_have_bands() {
-        let (process, pd) = pd();
+        let (process, controller) = optimum();
         let times_s = [0.0, 0.01, 0.05, 0.1, 0.4, 3.0];
-        let alone = step_bands(&[process], pd, &times_s).unwrap();
+        let alone = step_bands(&models(&[process]), &controller, &times_s).unwrap();
         assert_eq!(alone.output.low, alone.output.high);
         assert_eq!(alone.settling, 1.0);
         let unstable = process.with_gain_scaled(9.0).unwrap();
         let weak = process.with_gain_scaled(0.9).unwrap();
         let strong = process.with_gain_scaled(1.1).unwrap();
-        let both = step_bands(&[weak, strong, unstable, unstable], pd, &times_s).unwrap();
+        let both = step_bands(
+            &models(&[weak, strong, unstable, unstable]),
+            &controller,
+            &times_s,
+        )
+        .unwrap();
         assert_eq!(both.settling, 0.5);
         // Before the dead time of 20 ms is over nothing has moved; at the end all have settled.
         assert_eq!((both.output.low[1], both.output.high[1]), (0.0, 0.0));
@@ -196,6 +206,9 @@ mod tests {
             assert!(both.output.high[k] > alone.output.high[k]);
         }
         assert!((both.output.low[5] - 1.0).abs() < 1e-4);
-        assert_eq!(step_bands(&[unstable], pd, &times_s), None);
+        assert_eq!(
+            step_bands(&models(&[unstable]), &controller, &times_s),
+            None
+        );
     }
 }

@@ -1,4 +1,14 @@
-//! The exact road of one family: an integrator with two lags and a delay under a PD.
+//! Exact solutions for an integrator with two lags and a delay (SOIPTD) under a PD.
+//!
+//! | file | what it computes |
+//! |------|------------------|
+//! | `open_loop` | the loop cut open: gain and phase crossover |
+//! | `margins` | phase, gain and delay margin |
+//! | `cost` | squared error of a unit step, in closed form |
+//! | `optimum` | the PD of least cost at a phase margin |
+//! | `deterioration` | what a controller costs on another process than its own |
+//! | `loop_response` | the open loop at a frequency |
+//! | `step_response`, `step_metrics` | the closed loop's step and its figures |
 
 pub mod cost;
 pub mod deterioration;

@@ -6,14 +6,14 @@
 //! inverse may be zero is unbounded above.
 
 use onecycle_design::bands::quantiles;
+use onecycle_design::{Controller, Model, Parameter, Structure, margins};
+use onecycle_onboard::Soiptd;
 use onecycle_onboard::refine::{Refined, coordinate};
-use onecycle_onboard::{Pd, Soiptd};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 use crate::cholesky::cholesky;
-use onecycle_design::soiptd_pd::margins::margins;
 
 /// Draws: the 5 % quantile of so many is known to 0.35 of a per cent point.
 const DRAWS: usize = 4000;
@@ -62,40 +62,51 @@ impl Interval {
     }
 }
 
-/// The process with its intervals.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ProcessEstimate {
-    /// Velocity gain `K`: output unit / (input unit s).
-    pub k: Interval,
-    /// Acceleration gain `K/T_body`: output unit / (input unit s^2).
-    pub k_over_t_body: Interval,
-    /// Lag of the actuator, the shorter of the two (s).
-    pub t_prop_s: Interval,
-    /// Lag of the body, the longer of the two (s).
-    pub t_body_s: Interval,
-    /// Dead time (s).
-    pub tau_s: Interval,
-    /// Constant input that the recording does not show (input unit).
-    pub input_bias: Interval,
+/// Parameters of a model and the input bias, each with its interval.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    structure: Structure,
+    intervals: Vec<(Parameter, Interval)>,
 }
 
-/// What the process may be: one draw from the posterior, in physical parameters.
+impl Estimate {
+    /// Structure of the model.
+    #[must_use]
+    pub fn structure(&self) -> Structure {
+        self.structure
+    }
+
+    /// Interval of a parameter; `None` where it is not reported.
+    #[must_use]
+    pub fn get(&self, parameter: Parameter) -> Option<Interval> {
+        (self.intervals.iter())
+            .find(|(of, _)| *of == parameter)
+            .map(|(_, interval)| *interval)
+    }
+
+    /// All parameters with their intervals: those of the structure in its order, then the input bias.
+    pub fn iter(&self) -> impl Iterator<Item = (Parameter, Interval)> + '_ {
+        self.intervals.iter().copied()
+    }
+}
+
+/// One draw from the posterior, in physical parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw {
     /// Velocity gain `K`: output unit / (input unit s), infinite without damping.
-    pub k: f64,
+    k: f64,
     /// Acceleration gain `K/T_body`: output unit / (input unit s^2).
-    pub k_over_t_body: f64,
+    k_over_t_body: f64,
     /// Lag of the actuator (s).
-    pub t_prop_s: f64,
+    t_prop_s: f64,
     /// Lag of the body (s), infinite without damping.
-    pub t_body_s: f64,
+    t_body_s: f64,
     /// Dead time (s).
-    pub tau_s: f64,
-    /// Constant input that the recording does not show (input unit).
-    pub input_bias: f64,
-    /// Whether the Gaussian's coordinates were those of a process, not brought to the nearest one.
-    pub is_process: bool,
+    tau_s: f64,
+    /// Constant that the process adds to the recorded input (input unit).
+    input_bias: f64,
+    /// Whether the coordinates drawn were those of a process. Others are brought to the nearest one.
+    is_process: bool,
 }
 
 impl Draw {
@@ -118,26 +129,41 @@ impl Draw {
         }
     }
 
-    fn phase_margin_rad(&self, pd: Pd) -> Option<f64> {
-        margins(&self.process()?, pd).map(|margins| margins.phase_margin_rad)
+    fn phase_margin_rad(&self, controller: &Controller) -> Option<f64> {
+        margins(&self.model()?, controller).map(|margins| margins.phase_margin_rad)
     }
 
-    /// The process; `None` where the parameters are those of none.
+    /// Value of a parameter in its unit, which may be infinite; NaN where the model has no such parameter.
     #[must_use]
-    pub fn process(&self) -> Option<Soiptd> {
+    pub fn value(&self, parameter: Parameter) -> f64 {
+        match parameter {
+            Parameter::K => self.k,
+            Parameter::KOverTBody => self.k_over_t_body,
+            Parameter::TProp => self.t_prop_s,
+            Parameter::TBody => self.t_body_s,
+            Parameter::InverseTBody => 1.0 / self.t_body_s,
+            Parameter::Tau => self.tau_s,
+            Parameter::InputBias => self.input_bias,
+            _ => f64::NAN,
+        }
+    }
+
+    /// The model; `None` where the parameters are out of range.
+    #[must_use]
+    pub fn model(&self) -> Option<Model> {
         let damping_per_s = 1.0 / self.t_body_s;
-        let Self {
-            k_over_t_body,
-            t_prop_s,
-            tau_s,
-            ..
-        } = *self;
-        Soiptd::from_acceleration_gain(k_over_t_body, t_prop_s, damping_per_s, tau_s).ok()
+        let process = Soiptd::from_acceleration_gain(
+            self.k_over_t_body,
+            self.t_prop_s,
+            damping_per_s,
+            self.tau_s,
+        );
+        process.ok().map(Model::Soiptd)
     }
 }
 
-/// The estimate and draws from its distribution.
-#[derive(Clone, Debug)]
+/// The most probable model, and draws from the distribution about it.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     best: Draw,
     /// Empty where the estimator gives no covariance.
@@ -189,20 +215,21 @@ impl Posterior {
         }
     }
 
-    /// The parameters with their 90 % intervals.
+    /// The parameters of the model and the input bias, with their 90 % intervals.
     #[must_use]
-    pub fn process(&self) -> ProcessEstimate {
-        let interval = |parameter: fn(&Draw) -> f64| {
-            let values = self.draws.iter().map(parameter).collect();
-            Interval::new(parameter(&self.best), quantiles(values))
+    pub fn estimate(&self) -> Estimate {
+        let structure = Structure::Soiptd;
+        let interval = |parameter: Parameter| {
+            let values = self.draws.iter().map(|draw| draw.value(parameter));
+            let interval = Interval::new(self.best.value(parameter), quantiles(values.collect()));
+            (parameter, interval)
         };
-        ProcessEstimate {
-            k: interval(|p| p.k),
-            k_over_t_body: interval(|p| p.k_over_t_body),
-            t_prop_s: interval(|p| p.t_prop_s),
-            t_body_s: interval(|p| p.t_body_s),
-            tau_s: interval(|p| p.tau_s),
-            input_bias: interval(|p| p.input_bias),
+        let reported = structure.parameters().iter().copied();
+        Estimate {
+            structure,
+            intervals: (reported.chain([Parameter::InputBias]))
+                .map(interval)
+                .collect(),
         }
     }
 
@@ -212,47 +239,48 @@ impl Posterior {
         &self.draws
     }
 
-    /// The first draws that are processes, at most so many. Those beyond what a process can be have no
-    /// weight here, where the nearest one would have too much.
+    /// The models of the first `most` draws that are processes. A draw beyond what a process can be has no weight here:
+    /// the nearest process would get too much.
     #[must_use]
-    pub fn processes(&self, most: usize) -> Vec<Soiptd> {
+    pub fn models(&self, most: usize) -> Vec<Model> {
         self.draws
             .iter()
             .filter(|draw| draw.is_process)
-            .filter_map(Draw::process)
+            .filter_map(Draw::model)
             .take(most)
             .collect()
     }
 
-    /// Probability that gain, lags and delay are all within their intervals at once; `None` where the
-    /// estimator gives no covariance.
+    /// Probability that all parameters of the model are within their intervals at once; `None` where the estimator gives
+    /// no covariance.
     #[must_use]
-    pub fn joint_probability(&self, within: &ProcessEstimate) -> Option<f64> {
+    pub fn joint_probability(&self, within: &Estimate) -> Option<f64> {
+        let of_model: Vec<(Parameter, Interval)> = (within.iter())
+            .filter(|(parameter, _)| within.structure.parameters().contains(parameter))
+            .collect();
         let inside = |draw: &&Draw| {
-            within.k.holds(draw.k)
-                && within.k_over_t_body.holds(draw.k_over_t_body)
-                && within.t_prop_s.holds(draw.t_prop_s)
-                && within.t_body_s.holds(draw.t_body_s)
-                && within.tau_s.holds(draw.tau_s)
+            let holds = |(parameter, interval): &(Parameter, Interval)| {
+                interval.holds(draw.value(*parameter))
+            };
+            of_model.iter().all(holds)
         };
         let count = self.draws.iter().filter(inside).count();
         (!self.draws.is_empty()).then(|| count as f64 / self.draws.len() as f64)
     }
 
-    /// Correlations of `K/T_body`, `T_prop`, `1/T_body`, `tau` and the input bias, in this order; `None` where the
-    /// estimator gives no covariance.
+    /// Parameters of [`Posterior::correlations`], in its order.
+    pub const CORRELATED: [Parameter; 5] = [
+        Parameter::KOverTBody,
+        Parameter::TProp,
+        Parameter::InverseTBody,
+        Parameter::Tau,
+        Parameter::InputBias,
+    ];
+
+    /// Correlations of [`Posterior::CORRELATED`]; `None` where the estimator gives no covariance.
     #[must_use]
     pub fn correlations(&self) -> Option<[[f64; 5]; 5]> {
-        let of = |draw: &Draw| {
-            let damping_per_s = 1.0 / draw.t_body_s;
-            [
-                draw.k_over_t_body,
-                draw.t_prop_s,
-                damping_per_s,
-                draw.tau_s,
-                draw.input_bias,
-            ]
-        };
+        let of = |draw: &Draw| Self::CORRELATED.map(|parameter| draw.value(parameter));
         let count = self.draws.len() as f64;
         let mut mean = [0.0; 5];
         for draw in &self.draws {
@@ -268,7 +296,7 @@ impl Posterior {
                 }
             }
         }
-        // What has no spread is correlated with itself alone.
+        // A parameter without spread is correlated with itself alone.
         let entry = |i: usize, j: usize| {
             let size = (covariance[i][i] * covariance[j][j]).sqrt();
             if i == j {
@@ -283,19 +311,20 @@ impl Posterior {
         (!self.draws.is_empty()).then_some(rows)
     }
 
-    /// Phase margin (rad) that a controller leaves on the process, with its 90 % interval.
+    /// Phase margin (rad) that a controller leaves, with its 90 % interval.
     #[must_use]
-    pub fn phase_margin_rad(&self, pd: Pd) -> Interval {
+    pub fn phase_margin_rad(&self, controller: &Controller) -> Interval {
+        let best = self.best.phase_margin_rad(controller);
         Interval::new(
-            self.best.phase_margin_rad(pd).unwrap_or(f64::NEG_INFINITY),
-            quantiles(self.phase_margins_rad(pd)),
+            best.unwrap_or(f64::NEG_INFINITY),
+            quantiles(self.phase_margins_rad(controller)),
         )
     }
 
-    /// The phase margins (rad) that a controller leaves on the draws.
+    /// Phase margins (rad) that a controller leaves on the draws.
     #[must_use]
-    pub fn phase_margins_rad(&self, pd: Pd) -> Vec<f64> {
-        let margin = |draw: &Draw| draw.phase_margin_rad(pd);
+    pub fn phase_margins_rad(&self, controller: &Controller) -> Vec<f64> {
+        let margin = |draw: &Draw| draw.phase_margin_rad(controller);
         self.draws.iter().filter_map(margin).collect()
     }
 }

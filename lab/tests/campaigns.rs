@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_design::{Model, Parameter};
 use onecycle_identify::Method;
 use onecycle_lab::judge::campaign::{
     Campaign, IdentificationOutcome, Measure, identification_outcome, relay_outcome,
@@ -94,16 +95,17 @@ fn intervals_hold_the_truth_nine_times_in_ten() {
     let campaign = campaign(Measure::Identification, 200, 0.02, true);
     let mut held = [0; 5];
     for outcome in outcomes(&campaign) {
-        let process = outcome.found.outcome.unwrap().process;
-        let truth = outcome.truth;
-        for (count, inside) in held.iter_mut().zip([
-            process.k_over_t_body.holds(truth.k_over_t_body()),
-            process.t_prop_s.holds(truth.t_prop_s()),
-            process.t_body_s.holds(truth.t_body_s().unwrap()),
-            process.tau_s.holds(truth.tau_s()),
-            process.input_bias.holds(outcome.bias),
+        let estimate = outcome.found.outcome.unwrap().estimate;
+        let truth = Model::from(outcome.truth);
+        for (count, parameter) in held.iter_mut().zip([
+            Parameter::KOverTBody,
+            Parameter::TProp,
+            Parameter::TBody,
+            Parameter::Tau,
+            Parameter::InputBias,
         ]) {
-            *count += usize::from(inside);
+            let truth = truth.parameter(parameter).unwrap_or(outcome.bias);
+            *count += usize::from(estimate.get(parameter).unwrap().holds(truth));
         }
     }
     for count in held {

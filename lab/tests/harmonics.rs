@@ -5,7 +5,7 @@
 
 use num_complex::Complex64;
 use onecycle_identify::{Harmonic, harmonics};
-use onecycle_identify::{OscillationFound, Signals, find_oscillation};
+use onecycle_identify::{Oscillation, Signals, find_oscillation};
 use onecycle_lab::experiments::signals_of;
 use onecycle_lab::judge::campaign::Campaign;
 use onecycle_onboard::Soiptd;
@@ -38,7 +38,7 @@ fn settled(process: Soiptd, bias: f64) -> Trace {
     Campaign::QUIET.run(&case, 80.0).unwrap().0
 }
 
-fn found_in(signals: &Signals<'_>, cycles: usize) -> OscillationFound {
+fn found_in(signals: &Signals<'_>, cycles: usize) -> Oscillation {
     let found = find_oscillation(signals, cycles).unwrap();
     assert_eq!(found.cycles_used, cycles);
     found
@@ -294,7 +294,7 @@ fn what_has_no_fundamental_has_no_harmonics() {
         (found.start_s, found.end_s, 0),
         (found.start_s, found.end_s, 100_000),
     ] {
-        let wrong = OscillationFound {
+        let wrong = Oscillation {
             start_s,
             end_s,
             cycles_used,

@@ -5,6 +5,7 @@
 
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::pd;
+use onecycle_design::{Model, Parameter};
 use onecycle_identify::{
     Identification, Identified, Method, Options, Remark, Signals, Verdict, identify,
 };
@@ -72,18 +73,14 @@ impl Experiment {
             sample_period_s: SAMPLE_S,
             breaks: &[],
         };
-        let options = Options {
-            method,
-            ..Options::default()
-        };
-        identify(&signals, &options)
+        identify(&signals, &Options::default().method(method))
     }
 
     /// What the controller, which must be stable, costs above or below the optimum, as a fraction of it.
     fn deterioration(&self, identified: &Identified) -> f64 {
         let process = &self.case.process;
-        let best = pd(process, Options::default().phase_margin_rad).unwrap();
-        match deterioration(identified.controller.pd, process, &best) {
+        let best = pd(process, Options::default().specification.phase_margin_rad).unwrap();
+        match deterioration(identified.design.controller.pd().unwrap(), process, &best) {
             Deterioration::Stable { relative, .. } => relative.abs(),
             Deterioration::Unstable => panic!("unstable: {:?}", self.case),
         }
@@ -91,20 +88,28 @@ impl Experiment {
 
     /// Which of the intervals of gain, lags, delay and bias hold the truth.
     fn held(&self, identified: &Identified) -> [bool; 5] {
-        let (process, found) = (&self.case.process, &identified.process);
+        let process = &self.case.process;
         // With the lags in order.
         let (sum_per_s, ratio) = process.pole_sum();
         let truth = Soiptd::from_pole_sum(1.0, sum_per_s, ratio, process.tau_s()).unwrap();
         let truth = truth
             .with_gain_scaled(process.jerk_gain() * truth.t_prop_s())
             .unwrap();
+        let holds = |parameter| {
+            let truth = match parameter {
+                Parameter::InputBias => self.case.bias,
+                _ => Model::from(truth).parameter(parameter).unwrap(),
+            };
+            identified.estimate.get(parameter).unwrap().holds(truth)
+        };
         [
-            found.k_over_t_body.holds(truth.k_over_t_body()),
-            found.t_prop_s.holds(truth.t_prop_s()),
-            found.t_body_s.holds(truth.t_body_s().unwrap()),
-            found.tau_s.holds(truth.tau_s()),
-            found.input_bias.holds(self.case.bias),
+            Parameter::KOverTBody,
+            Parameter::TProp,
+            Parameter::TBody,
+            Parameter::Tau,
+            Parameter::InputBias,
         ]
+        .map(holds)
     }
 }
 
@@ -129,7 +134,7 @@ impl Tally {
         let to_s = cycle.start_s + cycle.period_s;
         let from_s = cycle.start_s - past * cycle.period_s;
         let found = experiment.identify(from_s, to_s, Method::Map);
-        let oscillation = found.oscillation.unwrap();
+        let oscillation = found.oscillation().unwrap();
         let duty = if from_rises {
             cycle.duty
         } else {
@@ -229,7 +234,7 @@ fn a_period_and_a_half_more_is_a_second_cycle() {
         let found = experiment.identify(from_s, cycle.start_s + cycle.period_s, Method::Map);
         match &found.outcome {
             Ok(identified) => {
-                assert_eq!(found.oscillation.unwrap().cycles_used, 2);
+                assert_eq!(found.oscillation().unwrap().cycles_used, 2);
                 costs.push(experiment.deterioration(identified));
             }
             Err(verdict) => assert_eq!(*verdict, Verdict::TooShort { cycles: 2 }),
@@ -256,6 +261,6 @@ fn half_a_cycle_is_none() {
             Err(Verdict::TooShort { cycles: 0 }),
             "{from}"
         );
-        assert_eq!((found.oscillation, found.remarks.len()), (None, 0));
+        assert_eq!((found.oscillation(), found.remarks.len()), (None, 0));
     }
 }

@@ -1,25 +1,26 @@
-//! From a process to its controllers: `cargo run -p onecycle --example design`.
+//! From a process model to its controllers: `cargo run -p onecycle --example design`.
 //!
-//! The paper's altitude at three phase margins: what more margin costs in squared error and speed, and what it buys in
-//! overshoot and in delay that the loop can bear.
+//! The altitude of the paper's hexacopter at three phase margins: a larger margin costs squared error and speed, and gives
+//! less overshoot and a larger delay margin.
 
 #![expect(clippy::print_stdout, reason = "an example reports")]
 
 use std::error::Error;
 
-use onecycle::{Soiptd, step_response, tune};
+use onecycle::{Model, Soiptd, Specification, design, step_response};
 
 fn main() -> Result<(), Box<dyn Error>> {
     // K, T_prop (s), T_body (s), delay (s).
-    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?;
+    let model = Model::from(Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?);
     println!("margin   Kp      Kd      ISE (s)  rise (s)  settling (s)  overshoot  delay margin");
     for phase_margin_deg in [20.0_f64, 45.0, 60.0] {
-        let best = tune(&process, phase_margin_deg.to_radians())?;
-        let step = step_response(&process, best.pd)?.metrics;
+        let asked = Specification::default().with_phase_margin_rad(phase_margin_deg.to_radians());
+        let best = design(&model, &asked)?;
+        let step = step_response(&model, &best.controller)?.metrics;
         println!(
             "{phase_margin_deg:>3.0} deg  {:<6.2}  {:<6.3}  {:<7.4}  {:<8.3}  {:<12.3}  {:>5.1} %    {:>5.1} ms",
-            best.pd.kp,
-            best.pd.kd,
+            best.controller.kp(),
+            best.controller.kd(),
             best.ise,
             step.rise_time_s,
             step.settling_time_s,

@@ -6,7 +6,7 @@
 
 use std::error::Error;
 
-use onecycle::{CsvOptions, Identified, Interval, Verdict};
+use onecycle::{CsvOptions, Identified, Identify, Interval};
 
 const HOVER: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -19,8 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     for note in recording.notes() {
         println!("the reader: {note}");
     }
-    let found = onecycle::identify(&recording);
-    if let Some(oscillation) = &found.oscillation {
+    let found = Identify::new().run(&recording);
+    if let Some(oscillation) = found.oscillation() {
         println!(
             "{} of {} steady cycles, period {:.4} s, amplitude {:.4e}, noise {:.1e}",
             oscillation.cycles_used,
@@ -30,39 +30,32 @@ fn main() -> Result<(), Box<dyn Error>> {
             oscillation.noise_sigma
         );
     }
-    // A verdict is a value; here, where there is nothing to do without a process, it is also the error.
-    let identified = found.outcome.inspect_err(advise)?;
+    // A verdict is a value, and an error where there is nothing to do without a process.
+    let identified = found.outcome?;
     report(&identified);
     for remark in &found.remarks {
-        println!("- {remark}");
+        println!("- {remark:?}");
     }
     Ok(())
 }
 
-fn advise(verdict: &Verdict) {
-    println!("{}", verdict.advice());
-}
-
 fn report(identified: &Identified) {
-    let process = &identified.process;
-    for (name, interval) in [
-        ("K", &process.k),
-        ("K/T_body", &process.k_over_t_body),
-        ("T_prop (s)", &process.t_prop_s),
-        ("T_body (s)", &process.t_body_s),
-        ("delay (s)", &process.tau_s),
-        ("input bias", &process.input_bias),
-    ] {
-        println!("{name:<11} {}", with_ends(interval));
+    println!("{}", identified.model.structure().transfer_function());
+    for (parameter, interval) in identified.estimate.iter() {
+        println!("{:<11} {}", parameter.symbol(), with_ends(&interval));
     }
-    let (pd, margins) = (identified.controller.pd, identified.controller.margins);
-    println!("u = {:.4} (r - y) - {:.4} dy/dt", pd.kp, pd.kd);
+    let (controller, margins) = (identified.design.controller, identified.design.margins);
+    println!(
+        "u = {:.4} (r - y) - {:.4} dy/dt",
+        controller.kp(),
+        controller.kd()
+    );
     println!(
         "phase margin {:.1} deg, delay margin {:.1} ms",
         margins.phase_margin_rad.to_degrees(),
         1e3 * margins.delay_margin_s
     );
-    // An undamped body without delay has no gain margin: no gain makes it unstable.
+    // Without delay and damping there is no gain margin: no gain makes the loop unstable.
     if let Some(gain_margin) = margins.gain_margin {
         println!("gain margin {gain_margin:.2}");
     }
@@ -76,7 +69,7 @@ fn report(identified: &Identified) {
     }
 }
 
-/// An end that is not there is unbounded: of a body whose damping was not seen.
+/// An absent end is unbounded: `T_body` and `K` where the damping is not visible.
 fn with_ends(interval: &Interval) -> String {
     let number =
         |value: Option<f64>| value.map_or("infinite".to_owned(), |value| format!("{value:.5}"));

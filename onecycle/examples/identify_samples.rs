@@ -1,13 +1,15 @@
 //! From samples in memory to the process: `cargo run -p onecycle --example identify_samples`.
 //!
-//! A multirotor's attitude under a relay, its sensor noisy, its thrust not quite balanced; then the same recording cut
-//! so short that it tells nothing, which is a value to handle like any other.
+//! The attitude of a multirotor under a relay, with sensor noise and an input bias. The first 0.3 s of the same recording
+//! are too short for an answer, and the refusal is a value to handle like any other.
 
 #![expect(clippy::print_stdout, reason = "an example reports")]
 
 use std::error::Error;
 
-use onecycle::{Experiment, Recording, Relay, RelaySettings, Sensor, Soiptd, Trace};
+use onecycle::{
+    Experiment, Identify, Parameter, Recording, Relay, RelaySettings, Sensor, Soiptd, Trace,
+};
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
@@ -15,7 +17,7 @@ use rand_pcg::Pcg64Mcg;
 const SAMPLE_S: f64 = 0.001;
 /// Half the jump of the relay (input unit).
 const AMPLITUDE: f32 = 0.5;
-/// Of a sample (output unit): 2 % of the oscillation's amplitude.
+/// Noise of one sample (output unit): 2 % of the amplitude of the oscillation.
 const NOISE_SIGMA: f64 = 3e-5;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -23,23 +25,24 @@ fn main() -> Result<(), Box<dyn Error>> {
     let trace = relay_test(&truth)?;
 
     let recording = Recording::from_samples(&trace.time_s, &trace.input, &trace.output)?;
-    let found = onecycle::identify(&recording);
+    let found = Identify::new().run(&recording);
     let identified = found.outcome?;
-    let process = &identified.process;
-    println!("                 truth      found   within its 90 %");
-    for (name, truth, interval) in [
-        ("K/T_body", truth.k_over_t_body(), &process.k_over_t_body),
-        ("T_prop (s)", truth.t_prop_s(), &process.t_prop_s),
-        ("delay (s)", truth.tau_s(), &process.tau_s),
+    println!("                  truth      found   within its 90 %");
+    for (parameter, truth) in [
+        (Parameter::KOverTBody, truth.k_over_t_body()),
+        (Parameter::TProp, truth.t_prop_s()),
+        (Parameter::Tau, truth.tau_s()),
     ] {
+        let name = parameter.key();
+        let interval = identified.estimate.get(parameter).ok_or("not reported")?;
         let estimate = interval.estimate.ok_or("an estimate is unbounded")?;
         let is_within = if interval.holds(truth) { "yes" } else { "no" };
-        println!("{name:<12} {truth:>9.5}  {estimate:>9.5}   {is_within}");
+        println!("{name:<13} {truth:>9.5}  {estimate:>9.5}   {is_within}");
     }
-    let pd = identified.controller.pd;
-    println!("Kp {:.3}, Kd {:.3}", pd.kp, pd.kd);
+    let controller = identified.design.controller;
+    println!("Kp {:.3}, Kd {:.3}", controller.kp(), controller.kd());
     for remark in &found.remarks {
-        println!("- {remark}");
+        println!("- {remark:?}");
     }
 
     // The first 0.3 s: less than a cycle.
@@ -49,10 +52,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         &trace.input[..begin],
         &trace.output[..begin],
     )?;
-    match onecycle::identify(&short).outcome {
+    match Identify::new().run(&short).outcome {
         Ok(_) => Err("0.3 s cannot tell the process".into()),
         Err(verdict) => {
-            println!("of 0.3 s: {verdict}. {}", verdict.advice());
+            println!("the first 0.3 s: {verdict}");
             Ok(())
         }
     }

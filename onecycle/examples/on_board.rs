@@ -8,11 +8,11 @@
 
 use std::error::Error;
 
-use onecycle::onboard::control::{Measurement, PdLaw};
-use onecycle::onboard::guard::Limits;
-use onecycle::onboard::tuner::{Phase, Tuner, TunerSettings};
-use onecycle::plant::FixedStepProcess;
 use onecycle::{Pd, RelaySettings, Sensor, Soiptd};
+use onecycle_onboard::control::{Measurement, PdLaw};
+use onecycle_onboard::guard::Limits;
+use onecycle_onboard::tuner::{Phase, Tuner, TunerSettings};
+use onecycle_plant::FixedStepProcess;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 

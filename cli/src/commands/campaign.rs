@@ -5,6 +5,7 @@ mod unknown;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use onecycle::Model;
 use onecycle_lab::judge::campaign::{
     Campaign, CaseError, IdentificationOutcome, Measure, RelayOutcome, SHAPE_AND_GAIN,
     identification_outcome, relay_outcome,
@@ -178,18 +179,11 @@ fn coverage(outcomes: &[IdentificationOutcome]) -> [usize; 6] {
         let Ok(identified) = &outcome.found.outcome else {
             continue;
         };
-        let (process, truth) = (&identified.process, &outcome.truth);
-        let unbounded = |value: Option<f64>| value.unwrap_or(f64::INFINITY);
-        let inside = [
-            process.k.holds(unbounded(truth.k())),
-            process.k_over_t_body.holds(truth.k_over_t_body()),
-            process.t_prop_s.holds(truth.t_prop_s()),
-            process.t_body_s.holds(unbounded(truth.t_body_s())),
-            process.tau_s.holds(truth.tau_s()),
-            process.input_bias.holds(outcome.bias),
-        ];
-        for (count, inside) in held.iter_mut().zip(inside) {
-            *count += usize::from(inside);
+        let truth = Model::from(outcome.truth);
+        // The five parameters of the model, then the input bias.
+        for (count, (parameter, interval)) in held.iter_mut().zip(identified.estimate.iter()) {
+            let truth = truth.parameter(parameter).unwrap_or(outcome.bias);
+            *count += usize::from(interval.holds(truth));
         }
     }
     held

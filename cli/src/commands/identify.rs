@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle::{ColumnRef, CsvOptions, Options, Recording};
+use onecycle::{ColumnRef, CsvOptions, Recording};
 
 use super::pack;
 use crate::args::{Identify, When};
@@ -18,14 +18,14 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let waiting = Waiting::on(format!("reading {}", arguments.file.display()));
     let recording = read(arguments)?;
     waiting.goes_on("identifying");
-    let options = Options {
-        cycles: arguments.cycles as usize,
-        phase_margin_rad: arguments.phase_margin,
-        method: arguments.method.into(),
-    };
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::read(&arguments.pack, &bytes)?;
-    let found = onecycle::identify_by(&recording, &options, Some(&pack));
+    let found = onecycle::Identify::new()
+        .cycles(arguments.cycles as usize)
+        .phase_margin_rad(arguments.phase_margin)
+        .method(arguments.method.into())
+        .pack(pack)
+        .run(&recording);
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
         waiting.goes_on("drawing");

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
+use onecycle::{Controller, Model, margins};
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
-use onecycle_design::soiptd_pd::margins::margins;
 use onecycle_lab::judge::evaluate::{Cycles, PHASE_MARGIN_DEG};
 use onecycle_onboard::judgement::HALF_90_PERCENT;
 use onecycle_plant::multirotor::{Axis, Flown, Mission, Record, Tuned};
@@ -334,10 +334,10 @@ fn section(campaign: &Campaign, campaigns: &[Campaign]) -> Section {
 
 /// The controller of an axis on the process found and on the true one.
 fn open_loop(tuned: &Tuned) -> Option<Figure> {
-    let (process, pd) = (&tuned.identified.process, tuned.identified.pd);
-    let margins = margins(process, pd)?;
-    let figure = Loop::new(process, pd, margins)
-        .beside(&tuned.truth)
+    let model = Model::from(tuned.identified.process);
+    let controller = Controller::from(tuned.identified.pd);
+    let figure = Loop::new(model, controller, margins(&model, &controller)?)
+        .beside(&tuned.truth.into())
         .nyquist();
     let caption = format!("{}: {}", tuned.axis.name(), figure.caption);
     Some(Figure { caption, ..figure })

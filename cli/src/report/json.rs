@@ -1,16 +1,19 @@
 //! The JSON reports; docs/identify-json.md is their description. Infinite values are null.
 
-use onecycle_design::soiptd_pd::margins::Margins;
-use onecycle_design::soiptd_pd::optimum::Optimum;
-use onecycle_design::soiptd_pd::step_metrics::StepMetrics;
-use onecycle_identify::{Identification, Identified, Interval, ProcessEstimate};
-use onecycle_link::{Column, Recording};
-use onecycle_onboard::{Pd, Soiptd};
+use std::collections::BTreeMap;
+
+use onecycle::{
+    Design, Identification, Identified, Interval, Margins, Model, Recording, StepMetrics,
+};
+use onecycle_link::Column;
 use serde::Serialize;
 
-/// Changes with every change that a reader of the report could notice.
-const IDENTIFY_SCHEMA: &str = "onecycle.identify/1";
-const TUNE_SCHEMA: &str = "onecycle.tune/1";
+use crate::words::remark::sentence;
+use crate::words::verdict::advice;
+
+/// Changes with every change that a reader of the report could notice, added keys excepted.
+const IDENTIFY_SCHEMA: &str = "onecycle.identify/2";
+const TUNE_SCHEMA: &str = "onecycle.tune/2";
 
 #[derive(Serialize)]
 struct IdentifyReport<'a> {
@@ -18,22 +21,26 @@ struct IdentifyReport<'a> {
     file: &'a str,
     columns: Columns<'a>,
     verdict: Verdict,
+    excitation: Option<&'static str>,
     oscillation: Option<Oscillation>,
     last_cycle: Option<LastCycle>,
-    process: Option<ProcessReport>,
+    structure: Option<&'static str>,
+    process: Option<BTreeMap<&'static str, Range>>,
     joint_probability: Option<f64>,
     fit: Option<Fit>,
     controller: Option<Controller>,
     margins: Option<MarginsReport>,
     step: Option<Step>,
     remarks: Vec<String>,
+    remark_kinds: Vec<&'static str>,
     notes: Vec<String>,
 }
 
 #[derive(Serialize)]
 struct TuneReport {
     schema: &'static str,
-    process: Parameters,
+    structure: &'static str,
+    process: BTreeMap<&'static str, Option<f64>>,
     controller: Controller,
     ise: f64,
     margins: MarginsReport,
@@ -89,25 +96,6 @@ struct Range {
 }
 
 #[derive(Serialize)]
-struct ProcessReport {
-    k: Range,
-    k_over_t_body: Range,
-    t_prop_s: Range,
-    t_body_s: Range,
-    tau_s: Range,
-    input_bias: Range,
-}
-
-#[derive(Serialize)]
-struct Parameters {
-    k: Option<f64>,
-    k_over_t_body: f64,
-    t_prop_s: f64,
-    t_body_s: Option<f64>,
-    tau_s: f64,
-}
-
-#[derive(Serialize)]
 struct Fit {
     misfit: f64,
     response_error: f64,
@@ -117,10 +105,13 @@ struct Fit {
 
 #[derive(Serialize)]
 struct Controller {
+    form: &'static str,
     kp: f64,
     kd: f64,
-    angle_p: f64,
-    rate_p: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    angle_p: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate_p: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -156,7 +147,8 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             output: column(&columns.output),
         },
         verdict: verdict(found),
-        oscillation: found.oscillation.map(|o| Oscillation {
+        excitation: found.excitation.as_ref().map(onecycle::Excitation::name),
+        oscillation: found.oscillation().map(|o| Oscillation {
             period_s: o.period_s,
             amplitude: o.amplitude,
             cycles_used: o.cycles_used,
@@ -169,35 +161,36 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             noise_sigma: o.noise_sigma,
             sample_s: o.sample_s,
         }),
-        last_cycle: found.reading.map(|reading| LastCycle {
+        last_cycle: found.last_cycle().map(|reading| LastCycle {
             is_known: reading.is_known(),
             score: reading.classification.score,
         }),
-        process: identified.map(|i| process(&i.process)),
+        structure: identified.map(|i| i.model.structure().name()),
+        process: identified.map(process),
         joint_probability: identified.and_then(|i| i.joint_probability),
         fit: identified.map(fit),
-        controller: identified.map(|i| controller(i.controller.pd)),
-        margins: identified.map(|i| margins(&i.controller.margins, Some(&i.phase_margin_rad))),
+        controller: identified.map(|i| controller(&i.design)),
+        margins: identified.map(|i| margins(&i.design.margins, Some(&i.phase_margin_rad))),
         step: identified.and_then(|i| i.step.as_ref()).map(step),
-        remarks: found.remarks.iter().map(ToString::to_string).collect(),
+        remarks: found.remarks.iter().map(sentence).collect(),
+        remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
         notes: recording.notes().iter().map(ToString::to_string).collect(),
     })
 }
 
 /// The report of a design.
-pub(crate) fn design(process: &Soiptd, optimum: &Optimum, metrics: Option<&StepMetrics>) -> String {
+pub(crate) fn design(model: &Model, design: &Design, metrics: Option<&StepMetrics>) -> String {
+    let structure = model.structure();
+    let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
     to_text(&TuneReport {
         schema: TUNE_SCHEMA,
-        process: Parameters {
-            k: process.k(),
-            k_over_t_body: process.k_over_t_body(),
-            t_prop_s: process.t_prop_s(),
-            t_body_s: process.t_body_s(),
-            tau_s: process.tau_s(),
-        },
-        controller: controller(optimum.pd),
-        ise: optimum.ise,
-        margins: margins(&optimum.margins, None),
+        structure: structure.name(),
+        process: (structure.parameters().iter())
+            .map(|&parameter| (parameter.key(), finite(model.parameter(parameter))))
+            .collect(),
+        controller: controller(design),
+        ise: design.ise,
+        margins: margins(&design.margins, None),
         step: metrics.map(step),
     })
 }
@@ -226,7 +219,7 @@ fn verdict(found: &Identification) -> Verdict {
         Err(verdict) => Verdict {
             kind: verdict.kind(),
             message: verdict.to_string(),
-            advice: Some(verdict.advice()),
+            advice: Some(advice(verdict)),
         },
     }
 }
@@ -239,32 +232,31 @@ fn range(interval: &Interval) -> Range {
     }
 }
 
-fn process(estimate: &ProcessEstimate) -> ProcessReport {
-    ProcessReport {
-        k: range(&estimate.k),
-        k_over_t_body: range(&estimate.k_over_t_body),
-        t_prop_s: range(&estimate.t_prop_s),
-        t_body_s: range(&estimate.t_body_s),
-        tau_s: range(&estimate.tau_s),
-        input_bias: range(&estimate.input_bias),
-    }
+/// The intervals by the keys of their parameters.
+fn process(identified: &Identified) -> BTreeMap<&'static str, Range> {
+    (identified.estimate.iter())
+        .map(|(parameter, interval)| (parameter.key(), range(&interval)))
+        .collect()
 }
 
 fn fit(identified: &Identified) -> Fit {
     Fit {
-        misfit: identified.misfit,
-        response_error: identified.refined.response_error,
-        residual_sigma: identified.refined.residual_sigma,
-        noise_sigma: identified.refined.noise_sigma,
+        misfit: identified.fit.misfit,
+        response_error: identified.fit.refined.response_error,
+        residual_sigma: identified.fit.refined.residual_sigma,
+        noise_sigma: identified.fit.refined.noise_sigma,
     }
 }
 
-fn controller(pd: Pd) -> Controller {
+fn controller(design: &Design) -> Controller {
+    let controller = &design.controller;
+    let pd = controller.pd();
     Controller {
-        kp: pd.kp,
-        kd: pd.kd,
-        angle_p: pd.angle_p(),
-        rate_p: pd.rate_p(),
+        form: controller.form().name(),
+        kp: controller.kp(),
+        kd: controller.kd(),
+        angle_p: pd.map(|pd| pd.angle_p()),
+        rate_p: pd.map(|pd| pd.rate_p()),
     }
 }
 

@@ -9,18 +9,18 @@ mod step;
 
 use std::fmt::Write;
 
-use onecycle::with_signals;
-use onecycle_design::soiptd_pd::optimum::Optimum;
-use onecycle_design::soiptd_pd::step_response::{StepResponse, step_response};
+use onecycle::{
+    Design, Identification, Identified, Model, Parameter, Recording, StepResponse, step_response,
+    with_signals,
+};
+use onecycle_design::bands::step_bands;
 use onecycle_identify::{Harmonic, harmonics};
-use onecycle_identify::{Identification, Identified, Posterior};
-use onecycle_link::Recording;
-use onecycle_onboard::Soiptd;
 
 use self::stability::Loop;
 use super::number::significant;
-use super::text::{Units, sentence};
+use super::units::Units;
 use crate::pages::page::{self, Section, page};
+use crate::words;
 
 /// Processes of the posterior that bands are drawn from: the ends of a 90 % band are then the tenth from either side.
 const DRAWS: usize = 200;
@@ -32,16 +32,14 @@ const STEP_POINTS: usize = 400;
 /// The page of an identification.
 pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
     let units = Units::of(recording);
-    let mut sections = vec![recorded::section(recording, found.oscillation.as_ref())];
+    let mut sections = vec![recorded::section(recording, found.oscillation())];
     let mut lead = made_by("identify");
-    match (&found.outcome, &found.oscillation) {
+    match (&found.outcome, found.oscillation()) {
         (Ok(identified), Some(oscillation)) => {
             lead += &identified_lead(identified, found.remarks.len());
-            let posterior = Posterior::new(&identified.refined, oscillation.sample_s);
             let view = View {
                 units: &units,
                 identified,
-                posterior: &posterior,
             };
             // One cycle may be one of no steady oscillation, which has no harmonics.
             let measured = if oscillation.cycles_used > 1 {
@@ -54,9 +52,12 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             sections.extend(view.sections(&measured));
         }
         (Err(verdict), _) => {
-            let words = format!("No process identified. {}", sentence(&verdict.to_string()));
+            let words = format!(
+                "No process identified. {}",
+                words::sentence(&verdict.to_string())
+            );
             lead += &page::verdict(false, &words);
-            lead += &page::paragraph("lead", verdict.advice());
+            lead += &page::paragraph("lead", words::verdict::advice(verdict));
         }
         (Ok(_), None) => {}
     }
@@ -65,62 +66,56 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
 }
 
 /// The page of a design.
-pub(crate) fn design(
-    process: &Soiptd,
-    optimum: &Optimum,
-    response: Option<&StepResponse>,
-) -> String {
+pub(crate) fn design(model: &Model, design: &Design, response: Option<&StepResponse>) -> String {
     let mut lead = made_by("tune");
-    lead += &page::facts(&parameters::of_process(process));
-    let own = Loop::new(process, optimum.pd, optimum.margins);
+    lead += &page::facts(&parameters::of_model(model));
+    let own = Loop::new(*model, design.controller, design.margins);
     let sections = [
         Some(own.section()),
         response.map(|response| step::section(response, None, &times_s(response))),
-        Some(controller::section(optimum, &Units::default(), None)),
+        Some(controller::section(design, &Units::default(), None)),
     ];
     let sections: Vec<Section> = sections.into_iter().flatten().collect();
     page("Optimal controller of a process", &lead, &sections)
 }
 
-/// An identified process and all that there is to show of it.
+/// An identified process and the units of its recording.
 struct View<'a> {
     units: &'a Units,
     identified: &'a Identified,
-    posterior: &'a Posterior,
 }
 
 impl View<'_> {
     fn sections(&self, measured: &[Harmonic]) -> Vec<Section> {
         let Identified {
-            refined,
-            controller,
+            model,
+            estimate,
+            posterior,
+            design,
             phase_margin_rad,
+            fit,
             ..
         } = self.identified;
-        let process = &refined.process;
-        let draws = self.posterior.processes(DRAWS);
-        // Where it may be none there is nothing to take away.
-        let bias =
-            Some(refined.input_bias).filter(|_| !self.identified.process.input_bias.holds(0.0));
-        let own = Loop::new(process, controller.pd, controller.margins)
+        let draws = posterior.models(DRAWS);
+        // Where the interval holds zero there is nothing to subtract.
+        let bias = (estimate.get(Parameter::InputBias))
+            .filter(|bias| !bias.holds(0.0))
+            .map(|_| fit.refined.input_bias);
+        let own = Loop::new(*model, design.controller, design.margins)
             .within(&draws, *phase_margin_rad)
             .measured(measured);
-        let response = step_response(process, controller.pd).ok();
+        let response = step_response(model, &design.controller).ok();
         let step = response.map(|response| {
             let times_s = times_s(&response);
-            let bands = onecycle_design::bands::step_bands(&draws, controller.pd, &times_s);
+            let bands = step_bands(&draws, &design.controller, &times_s);
             step::section(&response, bands.as_ref(), &times_s)
         });
         [
             Some(fit::section(self.identified, self.units)),
-            Some(parameters::section(
-                self.identified,
-                self.posterior,
-                self.units,
-            )),
+            Some(parameters::section(self.identified, self.units)),
             Some(own.section()),
             step,
-            Some(controller::section(controller, self.units, bias)),
+            Some(controller::section(design, self.units, bias)),
         ]
         .into_iter()
         .flatten()
@@ -146,12 +141,12 @@ fn made_by(command: &str) -> String {
 
 /// What the page comes down to.
 fn identified_lead(identified: &Identified, remarks: usize) -> String {
-    let Optimum { pd, margins, .. } = &identified.controller;
-    let margin = stability::phase_margin(margins, Some(&identified.phase_margin_rad));
+    let design = &identified.design;
+    let margin = stability::phase_margin(&design.margins, Some(&identified.phase_margin_rad));
     let mut text = format!(
         "Identified. Kp {}, Kd {}: phase margin {margin}",
-        significant(pd.kp),
-        significant(pd.kd),
+        significant(design.controller.kp()),
+        significant(design.controller.kd()),
     );
     if let Some(step) = &identified.step {
         let (overshoot, settled) = (100.0 * step.overshoot, significant(step.settling_time_s));
@@ -169,7 +164,7 @@ fn identified_lead(identified: &Identified, remarks: usize) -> String {
 }
 
 fn remarks(found: &Identification) -> Option<Section> {
-    let remarks: Vec<String> = found.remarks.iter().map(ToString::to_string).collect();
+    let remarks: Vec<String> = found.remarks.iter().map(words::remark::sentence).collect();
     (!remarks.is_empty()).then(|| Section {
         id: "remarks".to_owned(),
         title: "Remarks".to_owned(),

@@ -4,8 +4,7 @@
 
 use std::fmt::Write;
 
-use onecycle_identify::{Identification, OscillationFound};
-use onecycle_link::Recording;
+use onecycle::{Identification, Oscillation, Recording};
 
 use super::number::significant;
 use crate::style::{FIT, HEADING, PLAIN, painted};
@@ -36,12 +35,12 @@ pub(crate) fn cycles(
     found: &Identification,
     columns: Option<usize>,
 ) -> Option<String> {
-    let oscillation = found.oscillation.as_ref()?;
+    let oscillation = found.oscillation()?;
     let cycles = oscillation.cycles_used.clamp(1, MOST_CYCLES);
     let from_s = oscillation.end_s - cycles as f64 * oscillation.period_s;
     let shown = |time_s: f64| (from_s..=oscillation.end_s).contains(&time_s);
     let (measured, fitted): (Vec<Point>, Vec<Point>) = match &found.outcome {
-        Ok(identified) => (identified.fit.iter())
+        Ok(identified) => (identified.fit.points.iter())
             .filter(|point| shown(point.time_s))
             .map(|point| {
                 let of = |value| (point.time_s, value);
@@ -165,7 +164,7 @@ impl Frame {
     }
 
     /// The relay: high where a stroke is above, low where it is below.
-    fn relay(&self, recording: &Recording, found: &OscillationFound) -> String {
+    fn relay(&self, recording: &Recording, found: &Oscillation) -> String {
         let stroke = |column| {
             let time_s = self.time_s(column, self.width);
             let next = recording.time_s().partition_point(|&at_s| at_s <= time_s);

@@ -2,63 +2,21 @@
 
 use std::fmt::Write;
 
-use onecycle_design::soiptd_pd::optimum::Optimum;
-use onecycle_design::soiptd_pd::step_metrics::StepMetrics;
-use onecycle_identify::{Identification, Identified, Interval, OscillationFound, Reading};
-use onecycle_link::Recording;
-use onecycle_onboard::Soiptd;
-use onecycle_onboard::classify::Verdict;
+use onecycle::{
+    Controller, Design, Identification, Identified, Interval, Model, Oscillation, Parameter,
+    Recording, StepMetrics,
+};
+use onecycle_identify::Reading;
 
 use super::number::{bounded, seconds, significant};
+use super::units::Units;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
+use crate::words::remark::sentence as remark_sentence;
+use crate::words::sentence;
+use crate::words::verdict::advice;
 
 /// Widest line of remarks, as terminals are.
 const WIDTH: usize = 96;
-
-/// What is identified.
-pub(super) const FORMULA: &str = "K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))";
-
-/// Units of the recording, for the parameters that are made of them.
-#[derive(Default)]
-pub(super) struct Units {
-    pub(super) input: String,
-    pub(super) output: String,
-}
-
-impl Units {
-    pub(super) fn of(recording: &Recording) -> Self {
-        let unit = |column: &onecycle_link::Column| column.unit.clone().unwrap_or_default();
-        Self {
-            input: unit(&recording.columns().input),
-            output: unit(&recording.columns().output),
-        }
-    }
-
-    /// `output/(input per)`, nothing where the recording gives no units.
-    pub(super) fn gain(&self, per: &str) -> String {
-        if self.input.is_empty() || self.output.is_empty() {
-            return String::new();
-        }
-        format!("{}/({} {per})", self.output, self.input)
-    }
-
-    /// ` input/output` with what stands behind, nothing where the recording gives no units.
-    pub(super) fn controller(&self, behind: &str) -> String {
-        if self.input.is_empty() || self.output.is_empty() {
-            return String::new();
-        }
-        format!(" {}{behind}/{}", self.input, self.output)
-    }
-
-    /// What an axis is of, with its unit where there is one.
-    pub(super) fn titled(name: &str, unit: &str) -> String {
-        if unit.is_empty() {
-            name.to_owned()
-        } else {
-            format!("{name} ({unit})")
-        }
-    }
-}
 
 /// The report of an identification.
 pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
@@ -68,28 +26,19 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     for note in recording.notes() {
         remark(&mut text, "  note: ", &note.to_string());
     }
-    if let Some(oscillation) = &found.oscillation {
+    if let Some(oscillation) = found.oscillation() {
         describe_oscillation(&mut text, oscillation, &units);
-        if let Some(reading) = &found.reading {
-            let Reading { classification, .. } = reading;
-            let is_known = classification.verdict == Verdict::Known;
-            let _ = writeln!(
-                text,
-                "  last cycle  {} (score {}, known up to 1)",
-                painted(
-                    if is_known { HOLDS } else { REMARK },
-                    &classification.verdict.to_string()
-                ),
-                significant(classification.score)
-            );
+        if let Some(reading) = found.last_cycle() {
+            describe_last_cycle(&mut text, reading);
         }
     }
     match &found.outcome {
         Ok(identified) => {
             describe_process(&mut text, identified, &units);
             let margin = Some(&identified.phase_margin_rad);
-            describe_controller(&mut text, &identified.controller, margin, &units);
-            if !identified.process.input_bias.holds(0.0) {
+            describe_controller(&mut text, &identified.design, margin, &units);
+            let bias = identified.estimate.get(Parameter::InputBias);
+            if bias.is_some_and(|bias| !bias.holds(0.0)) {
                 text.push_str("  subtract the input bias from u: there is no integral action\n");
             }
             describe_step(&mut text, identified.step.as_ref(), &units);
@@ -97,48 +46,61 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         Err(verdict) => {
             let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
             wrapped(&mut text, "  ", &sentence(&verdict.to_string()));
-            wrapped(&mut text, "  ", verdict.advice());
+            wrapped(&mut text, "  ", advice(verdict));
         }
     }
     if !found.remarks.is_empty() {
         text.push_str(&headed("\nRemarks\n"));
         for one in &found.remarks {
-            remark(&mut text, "  - ", &one.to_string());
+            remark(&mut text, "  - ", &remark_sentence(one));
         }
     }
     text
 }
 
 /// The report of a design.
-pub(crate) fn design(process: &Soiptd, optimum: &Optimum, step: Option<&StepMetrics>) -> String {
+pub(crate) fn design(model: &Model, design: &Design, step: Option<&StepMetrics>) -> String {
     let mut text = String::new();
-    let infinite = |value: Option<f64>| value.map_or("infinite".to_owned(), significant);
-    let _ = writeln!(text, "{}", headed(&format!("Process  {FORMULA}")));
-    for (name, value, unit) in [
-        ("K", infinite(process.k()), ""),
-        ("K/T_body", significant(process.k_over_t_body()), ""),
-        ("T_prop", significant(process.t_prop_s()), "s"),
-        ("T_body", infinite(process.t_body_s()), "s"),
-        ("tau", significant(process.tau_s()), "s"),
-    ] {
+    let structure = model.structure();
+    let units = Units::default();
+    let heading = headed(&format!("Process  {}", structure.transfer_function()));
+    let _ = writeln!(text, "{heading}");
+    for &parameter in structure.parameters() {
+        let value = model.parameter(parameter).filter(|value| value.is_finite());
+        let value = value.map_or("infinite".to_owned(), significant);
+        let (name, unit) = (parameter.symbol(), units.parameter(parameter));
         let _ = writeln!(
             text,
             "{}",
             format!("  {name:<10}{value:>12} {unit}").trim_end()
         );
     }
-    describe_controller(&mut text, optimum, None, &Units::default());
+    describe_controller(&mut text, design, None, &units);
     let _ = writeln!(
         text,
         "  squared error of a unit step {}",
-        significant(optimum.ise)
+        significant(design.ise)
     );
-    describe_step(&mut text, step, &Units::default());
+    describe_step(&mut text, step, &units);
     text
 }
 
-fn describe_oscillation(text: &mut String, found: &OscillationFound, units: &Units) {
-    let OscillationFound {
+fn describe_last_cycle(text: &mut String, reading: &Reading) {
+    let (style, place) = if reading.is_known() {
+        (HOLDS, "in the pack's family")
+    } else {
+        (REMARK, "not in the pack's family")
+    };
+    let _ = writeln!(
+        text,
+        "  last cycle  {} (misfit score {}, limit 1)",
+        painted(style, place),
+        significant(reading.classification.score)
+    );
+}
+
+fn describe_oscillation(text: &mut String, found: &Oscillation, units: &Units) {
+    let Oscillation {
         cycles_used,
         cycles_steady,
         start_s,
@@ -148,7 +110,7 @@ fn describe_oscillation(text: &mut String, found: &OscillationFound, units: &Uni
     text.push_str(&headed("\nOscillation\n"));
     let _ = writeln!(
         text,
-        "  the last {cycles_used} of {cycles_steady} steady cycles, {start_s:.3} to {end_s:.3} s"
+        "  last {cycles_used} of {cycles_steady} steady cycles, {start_s:.3} to {end_s:.3} s"
     );
     let noise = 100.0 * found.noise_sigma / found.amplitude;
     for (name, value, unit, more) in [
@@ -181,31 +143,25 @@ fn describe_oscillation(text: &mut String, found: &OscillationFound, units: &Uni
 }
 
 fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
-    let process = &identified.process;
-    let _ = writeln!(text, "\n{}", headed(&format!("Process  {FORMULA}")));
+    let formula = identified.model.structure().transfer_function();
+    let _ = writeln!(text, "\n{}", headed(&format!("Process  {formula}")));
     let _ = writeln!(text, "  {:<10}{:>12}   90 % interval", "", "estimate");
-    let (velocity, acceleration) = (units.gain("s"), units.gain("s^2"));
-    let mut row = |name: &str, interval: &Interval, unit: &str| {
+    for (parameter, interval) in identified.estimate.iter() {
+        let (name, unit) = (parameter.symbol(), units.parameter(parameter));
         let Interval {
             estimate,
             low,
             high,
-        } = *interval;
+        } = interval;
         let estimate = estimate.map_or("infinite".to_owned(), significant);
         let range = format!("{} .. {}", bounded(low), bounded(high));
         let line = format!("  {name:<10}{estimate:>12}   {range:<26} {unit}");
         let _ = writeln!(text, "{}", line.trim_end());
-    };
-    row("K", &process.k, &velocity);
-    row("K/T_body", &process.k_over_t_body, &acceleration);
-    row("T_prop", &process.t_prop_s, "s");
-    row("T_body", &process.t_body_s, "s");
-    row("tau", &process.tau_s, "s");
-    row("input bias", &process.input_bias, &units.input);
+    }
     if let Some(probability) = identified.joint_probability {
         let _ = writeln!(
             text,
-            "  {:<24}gain, lags and delay all within at once: {:.0} %",
+            "  {:<24}all of the process within at once: {:.0} %",
             "",
             100.0 * probability
         );
@@ -214,22 +170,14 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
 
 fn describe_controller(
     text: &mut String,
-    optimum: &Optimum,
+    design: &Design,
     phase_margin_rad: Option<&Interval>,
     units: &Units,
 ) {
-    let pd = optimum.pd;
-    let (gain, rate) = (units.controller(""), units.controller(" s"));
-    text.push_str(&headed("\nController  u = Kp (r - y) - Kd dy/dt\n"));
-    let _ = writeln!(
-        text,
-        "  Kp {}{gain}   Kd {}{rate}   as cascade: angle P {} 1/s, rate P {}{rate}",
-        significant(pd.kp),
-        significant(pd.kd),
-        significant(pd.angle_p()),
-        significant(pd.rate_p())
-    );
-    let margins = &optimum.margins;
+    let law = design.controller.form().law();
+    text.push_str(&headed(&format!("\nController  {law}\n")));
+    describe_gains(text, &design.controller, units);
+    let margins = &design.margins;
     let _ = write!(
         text,
         "  phase margin {:.1} deg",
@@ -255,6 +203,25 @@ fn describe_controller(
     let _ = writeln!(text, "   delay margin {}", seconds(margins.delay_margin_s));
 }
 
+fn describe_gains(text: &mut String, controller: &Controller, units: &Units) {
+    let (gain, rate) = (units.controller(""), units.controller(" s"));
+    let _ = write!(
+        text,
+        "  Kp {}{gain}   Kd {}{rate}",
+        significant(controller.kp()),
+        significant(controller.kd())
+    );
+    if let Some(pd) = controller.pd() {
+        let _ = write!(
+            text,
+            "   as cascade: angle P {} 1/s, rate P {}{rate}",
+            significant(pd.angle_p()),
+            significant(pd.rate_p())
+        );
+    }
+    text.push('\n');
+}
+
 fn describe_step(text: &mut String, step: Option<&StepMetrics>, units: &Units) {
     let _ = writeln!(
         text,
@@ -278,22 +245,11 @@ fn describe_step(text: &mut String, step: Option<&StepMetrics>, units: &Units) {
     };
 }
 
-/// Writes what one should know besides, wrapped.
+/// Writes a remark in its colour, wrapped.
 fn remark(text: &mut String, lead: &str, words: &str) {
     let mut lines = String::new();
     wrapped(&mut lines, lead, words);
     text.push_str(&painted(REMARK, &lines));
-}
-
-/// The same with a capital letter and a full stop.
-pub(super) fn sentence(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
-    first
-        .into_iter()
-        .chain(letters)
-        .chain(std::iter::once('.'))
-        .collect()
 }
 
 /// Writes `words` behind `lead`, in lines as wide as a terminal, indented like the first.

@@ -36,7 +36,7 @@ use std::ops::Range;
 
 use num_complex::Complex64;
 
-use crate::outcome::OscillationFound;
+use crate::excitation::Oscillation;
 use crate::signals::Signals;
 
 /// The process at one frequency, as measured. See the [module](self).
@@ -78,7 +78,7 @@ const STAMP_TOLERANCE: f64 = 1e-3;
 /// than two points. Empty without a fundamental, or where the cycles do not begin and end at points of
 /// `signals`; every number is finite.
 #[must_use]
-pub fn harmonics(signals: &Signals<'_>, found: &OscillationFound, most: usize) -> Vec<Harmonic> {
+pub fn harmonics(signals: &Signals<'_>, found: &Oscillation, most: usize) -> Vec<Harmonic> {
     let Some(cycles) = Cycles::of(signals, found) else {
         return Vec::new();
     };
@@ -108,7 +108,7 @@ pub fn harmonics(signals: &Signals<'_>, found: &OscillationFound, most: usize) -
 /// The cycles of a recording, ready for a coefficient of any order.
 struct Cycles<'a> {
     signals: &'a Signals<'a>,
-    found: &'a OscillationFound,
+    found: &'a Oscillation,
     points: Range<usize>,
     /// Duration (s) and frequency (rad/s).
     length_s: f64,
@@ -130,7 +130,7 @@ struct Ends {
 
 impl<'a> Cycles<'a> {
     /// `None` where these are no cycles of at least three points.
-    fn of(signals: &'a Signals<'a>, found: &'a OscillationFound) -> Option<Self> {
+    fn of(signals: &'a Signals<'a>, found: &'a Oscillation) -> Option<Self> {
         let length_s = found.end_s - found.start_s;
         let tolerance_s =
             STAMP_TOLERANCE * signals.sample_period_s * f64::from(signals.samples_per_point);

@@ -19,6 +19,11 @@ const HYSTERESIS: f64 = 0.2;
 pub(super) enum InputKind {
     /// It never changes.
     Constant,
+    /// It changes its level a few times, then stays where it is.
+    FewSwitches {
+        /// Number of changes between levels that are held.
+        switches: usize,
+    },
     /// It changes, but not between two levels.
     NotTwoLevels,
     /// A relay.
@@ -73,7 +78,10 @@ pub(super) fn find(input: &[f64]) -> InputKind {
     };
     let range = most - least;
     if range <= 1e-12 * least.abs().max(most.abs()) {
-        return InputKind::Constant;
+        return match held_switches(input) {
+            0 => InputKind::Constant,
+            switches => InputKind::FewSwitches { switches },
+        };
     }
     let large = |pair: &[f64]| (pair[1] - pair[0]).abs() >= LARGE_JUMP * range;
     let mut jumps = input
@@ -98,6 +106,18 @@ pub(super) fn find(input: &[f64]) -> InputKind {
         Some((low, high)) => InputKind::Relay(RelayInput { span, low, high }),
         None => InputKind::NotTwoLevels,
     }
+}
+
+/// Points in a row at one value that make a level; fewer are a spike of the log.
+const HELD: usize = 3;
+
+/// Number of changes between values that are held.
+fn held_switches(input: &[f64]) -> usize {
+    let held = input
+        .chunk_by(|a, b| a == b)
+        .filter(|run| run.len() >= HELD);
+    let levels: Vec<f64> = held.map(|run| run[0]).collect();
+    levels.windows(2).filter(|pair| pair[0] != pair[1]).count()
 }
 
 /// All but the outermost per cent at either end, which may be spikes of the log.
@@ -159,6 +179,19 @@ mod tests {
         let switches = relay.levels(&input[relay.span.clone()]).collect::<Vec<_>>();
         // The rise out of the pause, and the nineteen edges inside the wave.
         assert_eq!(switches.windows(2).filter(|w| w[0] != w[1]).count(), 20);
+    }
+
+    // A relay that was switched on, reached its upper level and then stayed at zero: two changes in a hundredth of the
+    // recording. A spike of two samples is no change of level.
+    #[test]
+    fn a_test_that_failed_is_not_constant() {
+        let mut input = vec![0.0; 5000];
+        input[..5].fill(127.0);
+        input[5..36].fill(254.0);
+        assert_eq!(find(&input), InputKind::FewSwitches { switches: 2 });
+        let mut constant = vec![2.5; 5000];
+        constant[700..702].fill(30.0);
+        assert_eq!(find(&constant), InputKind::Constant);
     }
 
     #[test]

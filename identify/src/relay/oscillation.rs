@@ -44,7 +44,7 @@ pub(super) enum Past {
 
 /// The steady oscillation of a recording.
 #[derive(Clone, Debug)]
-pub(super) struct Oscillation {
+pub(super) struct Stretch {
     /// What its cycles begin with.
     pub(super) beginning: Beginning,
     /// The cycles to fit, in order.
@@ -62,7 +62,7 @@ pub(super) fn candidates(
     signals: &Signals<'_>,
     relay: &RelayInput,
     most: usize,
-) -> Result<Vec<Oscillation>, Verdict> {
+) -> Result<Vec<Stretch>, Verdict> {
     let (beginning, cycles) = all_cycles(signals, relay);
     let count = cycles.len();
     // Among gaps a single cycle only happens to have none: nobody knows what the others are like.
@@ -70,7 +70,7 @@ pub(super) fn candidates(
         return Err(Verdict::TooShort { cycles: count });
     }
     if count == 1 {
-        return Ok(vec![Oscillation::of(beginning, &cycles, 1)]);
+        return Ok(vec![Stretch::of(beginning, &cycles, 1)]);
     }
     let runs = steady_runs(&cycles);
     let alike = runs.iter().map(Range::len).max().unwrap_or(0);
@@ -104,7 +104,7 @@ pub(super) fn candidates(
         let mut size = run.len().min(most);
         loop {
             let end = &cycles[run.end - size..run.end];
-            candidates.push(Oscillation::of(beginning, end, run.len()));
+            candidates.push(Stretch::of(beginning, end, run.len()));
             if size <= 2 {
                 break;
             }
@@ -207,7 +207,7 @@ pub(super) fn fit_points(window: &FitWindow, period_s: f64, refined: &Refined) -
         .collect()
 }
 
-impl Oscillation {
+impl Stretch {
     fn of(beginning: Beginning, cycles: &[Cycle], steady: usize) -> Self {
         let period_s = cycles.iter().map(|cycle| cycle.period_s).sum::<f64>() / cycles.len() as f64;
         Self {

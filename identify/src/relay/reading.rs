@@ -9,7 +9,7 @@ use onecycle_onboard::signature::Signature;
 use onecycle_onboard::window::Window;
 
 use super::input::RelayInput;
-use super::oscillation::{Beginning, FitWindow, Oscillation};
+use super::oscillation::{Beginning, FitWindow, Stretch};
 use crate::signals::Signals;
 
 /// Bins of a cycle's window, five of which it keeps for itself: each at least twice as narrow as a part
@@ -36,17 +36,17 @@ impl Reading {
     pub(super) fn of(
         signals: &Signals<'_>,
         relay: &RelayInput,
-        oscillation: &Oscillation,
+        stretch: &Stretch,
         window: &FitWindow,
         pack: &Pack<'_>,
     ) -> Option<Self> {
-        let last = oscillation.last();
+        let last = stretch.last();
         let cycle = last.cycles[0];
         let points = last.points(signals);
         let sample_s = window.sample_s();
         let start_s = *signals.time_s.get(points.start)?;
         // A signature begins with a rise. A process answers the mirrored input with the mirrored output.
-        let (sign, duty) = match oscillation.beginning {
+        let (sign, duty) = match stretch.beginning {
             Beginning::Rise => (1.0, cycle.duty),
             Beginning::Fall => (-1.0, 1.0 - cycle.duty),
         };

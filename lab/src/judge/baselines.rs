@@ -44,7 +44,7 @@ pub mod rules;
 use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 
 use onecycle_design::soiptd_pd::optimum::{OptimumError, pd_at_phase_margin};
-use onecycle_identify::{OscillationFound, Signals, Verdict, find_oscillation};
+use onecycle_identify::{Oscillation, Signals, Verdict, find_oscillation};
 
 /// What a rival makes of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -121,7 +121,7 @@ fn check_even(signals: &Signals<'_>) -> Result<(), RivalError> {
 fn steady_cycles(
     signals: &Signals<'_>,
     most: usize,
-) -> Result<(OscillationFound, std::ops::Range<usize>), RivalError> {
+) -> Result<(Oscillation, std::ops::Range<usize>), RivalError> {
     check_even(signals)?;
     let found = find_oscillation(signals, most).map_err(RivalError::NoOscillation)?;
     let half_s = 0.5 * signals.sample_period_s;

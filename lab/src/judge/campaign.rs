@@ -418,18 +418,18 @@ pub fn identification_outcome(
 ) -> Result<IdentificationOutcome, CaseError> {
     let (trace, _) = campaign.run(case, IDENTIFICATION_PERIODS)?;
     let signals = crate::experiments::signals_of(&trace, campaign.sample_s());
-    let options = Options {
-        cycles: campaign.cycles,
-        phase_margin_rad: PHASE_MARGIN_DEG.to_radians(),
-        method: campaign.method,
-    };
+    let options = Options::default()
+        .cycles(campaign.cycles)
+        .phase_margin_rad(PHASE_MARGIN_DEG.to_radians())
+        .method(campaign.method);
     let found = identify(&signals, &options);
     let truth = in_order(&case.process)?;
     let judge = Judge::new(&truth).ok();
-    let deterioration = (found.outcome.as_ref().ok().zip(judge))
-        .map(|(identified, judge)| judge.deterioration(identified.controller.pd));
-    let errors =
-        (found.outcome.as_ref().ok()).and_then(|identified| errors(&identified.refined, &truth));
+    let deterioration = (found.outcome.as_ref().ok().zip(judge)).and_then(|(identified, judge)| {
+        Some(judge.deterioration(identified.design.controller.pd()?))
+    });
+    let errors = (found.outcome.as_ref().ok())
+        .and_then(|identified| errors(&identified.fit.refined, &truth));
     Ok(IdentificationOutcome {
         errors,
         found,

@@ -134,10 +134,7 @@ fn identified(case: &Case, trace: &Trace, cycles: usize) -> Option<Harm> {
         sample_period_s: case.sample_s,
         breaks: &[],
     };
-    let options = Options {
-        cycles,
-        ..Options::default()
-    };
+    let options = Options::default().cycles(cycles);
     let found = identify(&signals, &options).outcome.ok()?;
-    Some(Harm::of(case, &found.refined.process))
+    Some(Harm::of(case, &found.fit.refined.process))
 }

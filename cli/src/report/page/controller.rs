@@ -1,29 +1,25 @@
-//! The controller in the forms that it is entered in.
+//! The controller in the forms that autopilots and plant controllers ask for.
 
-use onecycle_design::soiptd_pd::optimum::Optimum;
+use onecycle::Design;
 
 use super::significant;
 use crate::pages::page::{self, Section};
-use crate::report::text::Units;
+use crate::report::units::Units;
 
-/// `input_bias` is that of an identification, which a controller without an integral has to take away.
-pub(super) fn section(optimum: &Optimum, units: &Units, input_bias: Option<f64>) -> Section {
-    let pd = optimum.pd;
+/// `input_bias`: constant to subtract from `u` (input unit), for the controller has no integral.
+pub(super) fn section(design: &Design, units: &Units, input_bias: Option<f64>) -> Section {
+    let (kp, kd) = (design.controller.kp(), design.controller.kd());
     let (gain, rate) = (units.controller(""), units.controller(" s"));
-    let gains = format!(
-        "Kp {}{gain}, Kd {}{rate}",
-        significant(pd.kp),
-        significant(pd.kd)
-    );
+    let gains = format!("Kp {}{gain}, Kd {}{rate}", significant(kp), significant(kd));
     let forms = [
-        ("PD", "u = Kp (r - y) - Kd dy/dt", gains.clone()),
+        ("PD", design.controller.form().law(), gains.clone()),
         (
             "Cascade P/P",
             "rate wanted w = P_angle (r - y), u = P_rate (w - dy/dt)",
             format!(
                 "P_angle {} 1/s, P_rate {}{rate}",
-                significant(pd.angle_p()),
-                significant(pd.rate_p())
+                significant(kp / kd),
+                significant(kd)
             ),
         ),
         (
@@ -36,8 +32,8 @@ pub(super) fn section(optimum: &Optimum, units: &Units, input_bias: Option<f64>)
             "u = Kp (e + 1/Ti integral of e - Td dy/dt)",
             format!(
                 "Kp {}{gain}, Td {} s, Ti infinite",
-                significant(pd.kp),
-                significant(pd.kd / pd.kp)
+                significant(kp),
+                significant(kd / kp)
             ),
         ),
     ];
@@ -45,12 +41,12 @@ pub(super) fn section(optimum: &Optimum, units: &Units, input_bias: Option<f64>)
     let mut body = page::facts(&forms)
         + &page::paragraph(
             "source",
-            "Four forms of the same controller; e is r - y. The rate is that of the measurement: a step of the reference then gives \
-             no kick, and the predicted step holds. There is no integral action: a constant disturbance at the input \
-             leaves an offset of its size over Kp.",
+            "Four forms of the same controller, with e = r - y. The derivative acts on the measurement: a step of the \
+             reference gives no kick. There is no integral action: a constant disturbance at the input leaves an \
+             offset of its size divided by Kp.",
         );
     if let Some(bias) = input_bias {
-        let (bias, offset) = (significant(bias), significant(bias / pd.kp));
+        let (bias, offset) = (significant(bias), significant(bias / kp));
         let unit = |unit: &str| {
             if unit.is_empty() {
                 String::new()
@@ -61,8 +57,7 @@ pub(super) fn section(optimum: &Optimum, units: &Units, input_bias: Option<f64>)
         body += &page::paragraph(
             "note",
             &format!(
-                "The process feels an input of {bias}{} besides the recorded one: subtract it from u, or the output \
-                 stands {offset}{} off.",
+                "The input bias is {bias}{}: subtract it from u, or the output stays {offset}{} off the reference.",
                 unit(&units.input),
                 unit(&units.output)
             ),

@@ -1,25 +1,25 @@
-//! The model over the data, and what it leaves.
+//! The model over the data, and the residuals.
 
-use onecycle_identify::{FitPoint, Identified};
-use onecycle_identify::{Whiteness, whiteness};
+use onecycle::Identified;
+use onecycle_identify::{FitPoint, Whiteness, whiteness};
 
 use super::significant;
 use crate::pages::page::{self, Section};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series};
 use crate::report::number::percent;
-use crate::report::text::Units;
+use crate::report::units::Units;
 
 /// Lags that residuals are compared at, and the least number of residuals for each.
 const LAGS: usize = 25;
 const RESIDUALS_PER_LAG: usize = 4;
 
 pub(super) fn section(identified: &Identified, units: &Units) -> Section {
-    let mut body = page::figure(&over_data(&identified.fit, units));
-    let residuals: Vec<f64> = (identified.fit.iter())
+    let mut body = page::figure(&over_data(&identified.fit.points, units));
+    let residuals: Vec<f64> = (identified.fit.points.iter())
         .map(|point| point.measured - point.fitted)
         .collect();
     let lags = LAGS.min(residuals.len() / RESIDUALS_PER_LAG);
-    // No parameters are those of the residuals themselves.
+    // No parameter was fitted to these bins alone: zero degrees of freedom are subtracted.
     if let Some(white) = whiteness(&residuals, lags, 0) {
         body += &page::figure(&correlogram(&white));
         body += &page::facts(&facts(identified, &white));
@@ -42,8 +42,8 @@ fn over_data(fit: &[FitPoint], units: &Units) -> Figure {
     ];
     let residual = series("", Marks::Points, |point| point.measured - point.fitted);
     Figure::stacked(
-        "The process found, driven by the recorded input, over the measured output; below, what it leaves. A point \
-         is the mean of the samples of a short interval, as they are fitted.",
+        "Measured output, and output of the identified model for the recorded input; below, the residuals. Each point is \
+         the mean of the samples in a short interval, as used in the fit.",
         Axis::titled("time (s)"),
         vec![
             Panel::new(Axis::titled(Units::titled("output", &units.output)), upper),
@@ -61,14 +61,14 @@ fn correlogram(white: &Whiteness) -> Figure {
         Series::of_points(name, Marks::Dashes, points).hue(Hue::Reference)
     };
     Figure::single(
-        "Correlation of the residuals with themselves. Of white ones 19 in 20 are within the dashes; a slow wave says \
-         that the model misses something of the process.",
+        "Autocorrelation of the residuals. Of white residuals 19 in 20 bars stay between the dashed lines; a slow wave \
+         means that the model misses a part of the process.",
         Axis::titled("lag (points)"),
         Panel::new(
             Axis::titled("autocorrelation").spanning(-1.0, 1.0),
             vec![
                 Series::of_points("residuals", Marks::Bars, bars).hue(Hue::Model),
-                edge("95 % of white ones", white.band),
+                edge("95 % of white residuals", white.band),
                 edge("", -white.band),
             ],
         ),
@@ -82,15 +82,15 @@ fn facts(identified: &Identified, white: &Whiteness) -> Vec<(&'static str, Strin
     let lags = white.autocorrelation.len();
     let is_white = white.probability >= LEAST_PROBABILITY;
     let judgement = if is_white {
-        "white: nothing is left to be explained"
+        "white: nothing is left to explain"
     } else {
-        "not white: the model leaves something, or the recording has so little noise that anything shows"
+        "not white: the model misses a part of the process, or the noise is so small that any error shows"
     };
-    let refined = &identified.refined;
+    let refined = &identified.fit.refined;
     [
         (
             "unexplained",
-            format!("{} of the oscillation, beyond the noise", percent(identified.misfit)),
+            format!("{} of the oscillation, beyond the noise", percent(identified.fit.misfit)),
         ),
         (
             "residual, noise",

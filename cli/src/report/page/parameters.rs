@@ -1,8 +1,7 @@
-//! What the process is, and how well that is known.
+//! The parameters of the process with their distributions.
 
+use onecycle::{Identified, Interval, Model, Parameter, Posterior};
 use onecycle_identify::density;
-use onecycle_identify::{Draw, Identified, Interval, Posterior};
-use onecycle_onboard::Soiptd;
 
 use super::significant;
 use crate::pages::page::{self, Cell, Section};
@@ -10,7 +9,7 @@ use crate::pages::plot::{
     Axis, Field, FieldKind, Figure, Hue, Marks, Panel, Places, Series, Shape,
 };
 use crate::report::number::bounded;
-use crate::report::text::{FORMULA, Units};
+use crate::report::units::Units;
 
 /// Cells along either side of the contours.
 const CELLS: usize = 64;
@@ -19,30 +18,37 @@ const BARS: usize = 36;
 /// What is cut off either end of a marginal.
 const TAIL: f64 = 0.005;
 
-/// Parameters of a process without intervals.
-pub(super) fn of_process(process: &Soiptd) -> Vec<(&'static str, String)> {
-    let infinite = |value: Option<f64>| value.map_or("infinite".to_owned(), significant);
-    [
-        ("process", FORMULA.to_owned()),
-        ("K", infinite(process.k())),
-        ("K/T_body", significant(process.k_over_t_body())),
-        ("T_prop", format!("{} s", significant(process.t_prop_s()))),
-        ("T_body", format!("{} s", infinite(process.t_body_s()))),
-        ("tau", format!("{} s", significant(process.tau_s()))),
-    ]
-    .into()
+/// Parameters of a model without intervals.
+pub(super) fn of_model(model: &Model) -> Vec<(&'static str, String)> {
+    let units = Units::default();
+    let structure = model.structure();
+    let shown = |&parameter: &Parameter| {
+        let value = model.parameter(parameter).filter(|value| value.is_finite());
+        let value = value.map_or("infinite".to_owned(), significant);
+        let unit = units.parameter(parameter);
+        (
+            parameter.symbol(),
+            format!("{value} {unit}").trim_end().to_owned(),
+        )
+    };
+    let formula = ("process", structure.transfer_function().to_owned());
+    std::iter::once(formula)
+        .chain(structure.parameters().iter().map(shown))
+        .collect()
 }
 
-pub(super) fn section(identified: &Identified, posterior: &Posterior, units: &Units) -> Section {
-    let mut body = page::paragraph("lead", FORMULA);
+pub(super) fn section(identified: &Identified, units: &Units) -> Section {
+    let posterior = &identified.posterior;
+    let formula = identified.model.structure().transfer_function();
+    let mut body = page::paragraph("lead", formula);
     body += &table(identified, units);
-    let marginals = marginals(identified, posterior, units);
+    let marginals = marginals(identified, units);
     if !marginals.is_empty() {
         body += &page::row(&marginals);
         body += &page::paragraph(
             "source",
-            "What each parameter may be, and the phase margin with it; the solid line is the estimate, the dashes are \
-             the ends of the 90 % interval.",
+            "Distribution of each parameter and of the phase margin. The solid line is the estimate, the dashed lines \
+             are the ends of the 90 % interval.",
         );
     }
     let planes: Vec<Figure> = [surface(identified, posterior), correlations(posterior)]
@@ -58,28 +64,14 @@ pub(super) fn section(identified: &Identified, posterior: &Posterior, units: &Un
 }
 
 fn table(identified: &Identified, units: &Units) -> String {
-    let process = &identified.process;
-    let (velocity, acceleration) = (units.gain("s"), units.gain("s^2"));
-    let parameters: [(&str, &Interval, &str); 6] = [
-        ("K", &process.k, &velocity),
-        ("K/T_body", &process.k_over_t_body, &acceleration),
-        ("T_prop", &process.t_prop_s, "s"),
-        ("T_body", &process.t_body_s, "s"),
-        ("tau", &process.tau_s, "s"),
-        ("input bias", &process.input_bias, &units.input),
-    ];
-    let cells = parameters.map(|(name, interval, unit)| {
-        let estimate = interval.estimate.map_or("infinite".to_owned(), significant);
-        (
-            name,
-            [
-                estimate,
-                bounded(interval.low),
-                bounded(interval.high),
-                unit.to_owned(),
-            ],
-        )
-    });
+    let cells: Vec<(&str, [String; 4])> = (identified.estimate.iter())
+        .map(|(parameter, interval)| {
+            let estimate = interval.estimate.map_or("infinite".to_owned(), significant);
+            let (low, high) = (bounded(interval.low), bounded(interval.high));
+            let unit = units.parameter(parameter);
+            (parameter.symbol(), [estimate, low, high, unit])
+        })
+        .collect();
     let cell = |value| Cell { value, below: None };
     let rows: Vec<_> = (cells.iter())
         .map(|(name, values)| {
@@ -94,7 +86,7 @@ fn table(identified: &Identified, units: &Units) -> String {
         .joint_probability
         .map_or(String::new(), |probability| {
             format!(
-                "; gain, lags and delay are all within at once with {:.0} %",
+                "; all parameters of the process are within at once with {:.0} %",
                 100.0 * probability
             )
         });
@@ -105,51 +97,51 @@ fn table(identified: &Identified, units: &Units) -> String {
     )
 }
 
-/// A marginal each: parameters that are finite, and the phase margin.
-fn marginals(identified: &Identified, posterior: &Posterior, units: &Units) -> Vec<Figure> {
-    let process = &identified.process;
-    let values = |of: fn(&Draw) -> f64| -> Vec<f64> { posterior.draws().iter().map(of).collect() };
-    let (velocity, acceleration) = (units.gain("s"), units.gain("s^2"));
-    let (body, body_interval): (fn(&Draw) -> f64, Interval) = match process.t_body_s.high {
-        Some(_) => (|draw| draw.t_body_s, process.t_body_s),
-        None => (|draw| 1.0 / draw.t_body_s, inverse(&process.t_body_s)),
-    };
-    let body_title = match process.t_body_s.high {
-        Some(_) => "T_body (s)",
-        None => "damping 1/T_body (1/s)",
-    };
+/// One marginal for each finite parameter, and one for the phase margin.
+fn marginals(identified: &Identified, units: &Units) -> Vec<Figure> {
     let degrees = 1_f64.to_degrees();
-    let margins = posterior.phase_margins_rad(identified.controller.pd);
-    [
-        (
-            Units::titled("K", &velocity),
-            values(|draw| draw.k),
-            process.k,
+    let margins = (identified.posterior).phase_margins_rad(&identified.design.controller);
+    let margin = (
+        "phase margin (deg)".to_owned(),
+        margins.iter().map(|margin| degrees * margin).collect(),
+        scaled(&identified.phase_margin_rad, degrees),
+    );
+    (identified.estimate.iter())
+        .map(|(parameter, interval)| distribution(parameter, &interval, identified, units))
+        .chain([margin])
+        // Without damping the velocity gain is infinite.
+        .filter(|(_, _, interval)| interval.high.is_some())
+        .filter_map(|(title, values, interval)| marginal(&title, values, &interval))
+        .collect()
+}
+
+/// Title of the axis, draws and interval of a parameter, in a unit that suits it.
+fn distribution(
+    parameter: Parameter,
+    interval: &Interval,
+    identified: &Identified,
+    units: &Units,
+) -> (String, Vec<f64>, Interval) {
+    let values = |parameter| -> Vec<f64> {
+        let draws = identified.posterior.draws().iter();
+        draws.map(|draw| draw.value(parameter)).collect()
+    };
+    let symbol = parameter.symbol();
+    match parameter {
+        // Unbounded above: its inverse, the damping, is bounded.
+        Parameter::TBody if interval.high.is_none() => (
+            "damping 1/T_body (1/s)".to_owned(),
+            values(Parameter::InverseTBody),
+            inverse(interval),
         ),
-        (
-            Units::titled("K/T_body", &acceleration),
-            values(|draw| draw.k_over_t_body),
-            process.k_over_t_body,
+        Parameter::TBody => (Units::titled(symbol, "s"), values(parameter), *interval),
+        Parameter::TProp | Parameter::Tau => time(symbol, values(parameter), interval),
+        _ => (
+            Units::titled(symbol, &units.parameter(parameter)),
+            values(parameter),
+            *interval,
         ),
-        time("T_prop", values(|draw| draw.t_prop_s), &process.t_prop_s),
-        (body_title.to_owned(), values(body), body_interval),
-        time("tau", values(|draw| draw.tau_s), &process.tau_s),
-        (
-            Units::titled("input bias", &units.input),
-            values(|draw| draw.input_bias),
-            process.input_bias,
-        ),
-        (
-            "phase margin (deg)".to_owned(),
-            margins.iter().map(|margin| degrees * margin).collect(),
-            scaled(&identified.phase_margin_rad, degrees),
-        ),
-    ]
-    .into_iter()
-    // Without damping the velocity gain is infinite.
-    .filter(|(_, _, interval)| interval.high.is_some())
-    .filter_map(|(title, values, interval)| marginal(&title, values, &interval))
-    .collect()
+    }
 }
 
 fn scaled(interval: &Interval, factor: f64) -> Interval {
@@ -220,19 +212,18 @@ fn marginal(title: &str, mut values: Vec<f64>, interval: &Interval) -> Option<Fi
     Some(figure.shaped(Shape::Small))
 }
 
-/// The posterior over the surface of shapes, which ratios of times say: time scales everything else.
+/// The posterior over the two ratios of times that make the shape of the process: a third time scales all of them.
 fn surface(identified: &Identified, posterior: &Posterior) -> Option<Figure> {
-    let shape = |process: &Soiptd| {
-        let t_prop_s = process.t_prop_s();
-        (
-            t_prop_s * process.inv_t_body_per_s(),
-            process.tau_s() / t_prop_s,
-        )
+    let shape = |model: &Model| {
+        let t_prop_s = model.parameter(Parameter::TProp)?;
+        let damping_per_s = model.parameter(Parameter::InverseTBody)?;
+        let tau_s = model.parameter(Parameter::Tau)?;
+        Some((t_prop_s * damping_per_s, tau_s / t_prop_s))
     };
-    let processes = posterior.processes(usize::MAX);
-    let points: Vec<(f64, f64)> = processes.iter().map(shape).collect();
+    let models = posterior.models(usize::MAX);
+    let points: Vec<(f64, f64)> = models.iter().filter_map(shape).collect();
     let density = density(&points, CELLS)?;
-    let estimate = shape(&identified.refined.process);
+    let estimate = shape(&identified.model)?;
     let mut panel = Panel::new(
         Axis::titled("tau / T_prop"),
         vec![Series::of_points("", Marks::Rings, [estimate]).hue(Hue::Input)],
@@ -244,8 +235,7 @@ fn surface(identified: &Identified, posterior: &Posterior) -> Option<Figure> {
         z: density.content,
     });
     let figure = Figure::single(
-        "Where the process lies on the surface of shapes: the regions that hold it with 50, 90 and 99 %, and the \
-         estimate.",
+        "Ratios of the times: the regions that hold the process with 50, 90 and 99 % probability, and the estimate.",
         Axis::titled("T_prop / T_body (0: no damping)"),
         panel,
     );
@@ -253,7 +243,7 @@ fn surface(identified: &Identified, posterior: &Posterior) -> Option<Figure> {
 }
 
 fn correlations(posterior: &Posterior) -> Option<Figure> {
-    let names = ["K/T_body", "T_prop", "1/T_body", "tau", "bias"].map(str::to_owned);
+    let names = Posterior::CORRELATED.map(|parameter| parameter.symbol().to_owned());
     let z = posterior.correlations()?.map(Vec::from).into();
     let mut panel = Panel::new(Axis::titled(""), vec![]);
     panel.field = Some(Field {

@@ -1,7 +1,7 @@
 //! The recording, with the cycles that were used.
 
-use onecycle_identify::OscillationFound;
-use onecycle_link::{Column, Recording};
+use onecycle::{Oscillation, Recording};
+use onecycle_link::Column;
 
 use super::significant;
 use crate::pages::page::{self, Section};
@@ -10,7 +10,7 @@ use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series};
 /// Pieces that a long recording is cut into, each drawn by its extremes: more than a screen is wide.
 const PIECES: usize = 1500;
 
-pub(super) fn section(recording: &Recording, found: Option<&OscillationFound>) -> Section {
+pub(super) fn section(recording: &Recording, found: Option<&Oscillation>) -> Section {
     let columns = recording.columns();
     let panel = |column: &Column, values: &[f64], marks, hue| {
         let points = thinned(recording.time_s(), values);
@@ -48,13 +48,13 @@ pub(super) fn section(recording: &Recording, found: Option<&OscillationFound>) -
     }
 }
 
-fn facts(found: &OscillationFound) -> Vec<(&'static str, String)> {
+fn facts(found: &Oscillation) -> Vec<(&'static str, String)> {
     let noise = 100.0 * found.noise_sigma / found.amplitude;
     [
         (
             "cycles",
             format!(
-                "the last {} of {} steady ones, {:.3} to {:.3} s",
+                "last {} of {} steady cycles, {:.3} to {:.3} s",
                 found.cycles_used, found.cycles_steady, found.start_s, found.end_s
             ),
         ),

@@ -5,12 +5,10 @@ mod nyquist;
 
 use std::f64::consts::TAU;
 
+use onecycle::{Controller, Interval, Margins, Model};
 use onecycle_design::bands::{LoopBands, loop_bands};
-use onecycle_design::soiptd_pd::loop_response::{LoopResponse, loop_response};
-use onecycle_design::soiptd_pd::margins::Margins;
+use onecycle_design::{LoopResponse, loop_response};
 use onecycle_identify::Harmonic;
-use onecycle_identify::Interval;
-use onecycle_onboard::{Pd, Soiptd};
 
 use crate::pages::page::{self, Section};
 use crate::pages::plot::Figure;
@@ -21,10 +19,10 @@ const POINTS: usize = 400;
 /// Frequencies are shown from the gain crossover over this to the crossover times this.
 const AROUND: f64 = 20.0;
 
-/// The open loop of a controller on a process, and on all that the process may be.
-pub(crate) struct Loop<'a> {
-    process: &'a Soiptd,
-    pd: Pd,
+/// The open loop of a controller on a model and on draws from the posterior.
+pub(crate) struct Loop {
+    model: Model,
+    controller: Controller,
     margins: Margins,
     phase_margin_rad: Option<Interval>,
     omegas_rad_per_s: Vec<f64>,
@@ -35,20 +33,20 @@ pub(crate) struct Loop<'a> {
     truth: Vec<LoopResponse>,
 }
 
-impl<'a> Loop<'a> {
-    /// Of a controller on a process, with its margins there.
-    pub(crate) fn new(process: &'a Soiptd, pd: Pd, margins: Margins) -> Self {
+impl Loop {
+    /// Of a controller on a model, with its margins there.
+    pub(crate) fn new(model: Model, controller: Controller, margins: Margins) -> Self {
         let crossover = margins.gain_crossover_rad_per_s;
         let exponent = |k: usize| 2.0 * k as f64 / POINTS as f64 - 1.0;
         let omegas_rad_per_s: Vec<f64> = (0..=POINTS)
             .map(|k| crossover * AROUND.powf(exponent(k)))
             .collect();
         Self {
-            process,
-            pd,
+            model,
+            controller,
             margins,
             phase_margin_rad: None,
-            own: curve(process, pd, &omegas_rad_per_s),
+            own: curve(&model, &controller, &omegas_rad_per_s),
             omegas_rad_per_s,
             bands: None,
             measured: vec![],
@@ -56,9 +54,9 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// With the interval of the phase margin, and a band about all that the process may be.
-    pub(super) fn within(self, draws: &[Soiptd], phase_margin_rad: Interval) -> Self {
-        let bands = loop_bands(self.process, draws, self.pd, &self.omegas_rad_per_s);
+    /// With the interval of the phase margin, and a band over draws from the posterior.
+    pub(super) fn within(self, draws: &[Model], phase_margin_rad: Interval) -> Self {
+        let bands = loop_bands(&self.model, draws, &self.controller, &self.omegas_rad_per_s);
         Self {
             bands,
             phase_margin_rad: Some(phase_margin_rad),
@@ -66,14 +64,14 @@ impl<'a> Loop<'a> {
         }
     }
 
-    /// With what a recording says of the process itself; phases are turned to the model's.
+    /// With the harmonics measured in the recording; whole turns bring their phases near the model's.
     pub(super) fn measured(self, harmonics: &[Harmonic]) -> Self {
         let point = |harmonic: &Harmonic| {
             let omega = harmonic.omega_rad_per_s;
-            let (kp, kd) = (self.pd.kp, self.pd.kd * omega);
-            let magnitude = harmonic.response.norm() * kp.hypot(kd);
-            let phase_rad = harmonic.response.arg() + kd.atan2(kp);
-            let expected_rad = loop_response(self.process, self.pd, omega)?.phase_rad;
+            let feedback = self.controller.frequency_response(omega);
+            let magnitude = harmonic.response.norm() * feedback.norm();
+            let phase_rad = harmonic.response.arg() + feedback.arg();
+            let expected_rad = loop_response(&self.model, &self.controller, omega)?.phase_rad;
             let turns = ((expected_rad - phase_rad) / TAU).round();
             let phase_rad = phase_rad + turns * TAU;
             Some((
@@ -91,9 +89,9 @@ impl<'a> Loop<'a> {
     }
 
     /// With the loop of the process that was simulated.
-    pub(crate) fn beside(self, truth: &Soiptd) -> Self {
+    pub(crate) fn beside(self, truth: &Model) -> Self {
         Self {
-            truth: curve(truth, self.pd, &self.omegas_rad_per_s),
+            truth: curve(truth, &self.controller, &self.omegas_rad_per_s),
             ..self
         }
     }
@@ -164,8 +162,8 @@ pub(super) fn phase_margin(margins: &Margins, within_rad: Option<&Interval>) -> 
     }
 }
 
-fn curve(process: &Soiptd, pd: Pd, omegas_rad_per_s: &[f64]) -> Vec<LoopResponse> {
-    let at = |&omega: &f64| loop_response(process, pd, omega);
+fn curve(model: &Model, controller: &Controller, omegas_rad_per_s: &[f64]) -> Vec<LoopResponse> {
+    let at = |&omega: &f64| loop_response(model, controller, omega);
     omegas_rad_per_s.iter().filter_map(at).collect()
 }
 

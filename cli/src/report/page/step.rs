@@ -1,7 +1,7 @@
-//! The step that will come.
+//! The predicted step response.
 
+use onecycle::StepResponse;
 use onecycle_design::bands::StepBands;
-use onecycle_design::soiptd_pd::step_response::StepResponse;
 
 use super::significant;
 use crate::pages::page::{self, Section};
@@ -20,8 +20,8 @@ pub(super) fn section(
         input(response, bands, times_s),
     );
     let figure = Figure::stacked(
-        "Response to a unit step of the reference, and what the controller puts out for it. Nothing saturates here: \
-         scale the step to what the actuator can do.",
+        "Response to a unit step of the reference, and the output of the controller. The prediction is linear, without \
+         saturation: scale the step to what the actuator can do.",
         Axis::titled("time (s)"),
         vec![upper, lower],
     );
@@ -89,7 +89,10 @@ fn facts(response: &StepResponse, bands: Option<&StepBands>) -> Vec<(&'static st
     ];
     if let Some(bands) = bands.filter(|bands| bands.settling < 1.0) {
         let part = percent(bands.settling);
-        facts.push(("stable", format!("on {part} of what the process may be")));
+        facts.push((
+            "stable",
+            format!("on {part} of the draws from the posterior"),
+        ));
     }
     facts
 }

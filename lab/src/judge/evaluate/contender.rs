@@ -172,16 +172,16 @@ impl Contender {
 
 /// Our road from a recording to a controller.
 fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, String> {
-    let options = Options {
-        cycles,
-        phase_margin_rad: PHASE_MARGIN_DEG.to_radians(),
-        method,
-    };
+    let options = Options::default()
+        .cycles(cycles)
+        .phase_margin_rad(PHASE_MARGIN_DEG.to_radians())
+        .method(method);
     let identified = identify(signals, &options).outcome;
     let identified = identified.map_err(|verdict| verdict.to_string())?;
+    let pd = identified.design.controller.pd();
     Ok(Answer {
-        process: Some(identified.refined.process),
-        feedback: identified.controller.pd.into(),
+        process: identified.model.soiptd(),
+        feedback: pd.ok_or("the controller is not a PD")?.into(),
     })
 }
 

@@ -9,7 +9,7 @@ use crate::pages::plot::{Axis, Figure, Hue, Marks, Note, Panel, Series};
 /// Phases that are shown (degrees).
 const PHASES_DEG: (f64, f64) = (-360.0, 0.0);
 
-pub(super) fn figure(of: &Loop<'_>) -> Figure {
+pub(super) fn figure(of: &Loop) -> Figure {
     let names = [OWN, TRUTH, MEASURED, BAND];
     let magnitude = Axis::titled("magnitude").logarithmic();
     let phase = Axis::titled("phase (deg)").spanning(PHASES_DEG.0, PHASES_DEG.1);
@@ -62,7 +62,7 @@ fn in_degrees(band: &Band) -> Band {
 
 /// The curves of a panel; `level` is what margins count from.
 fn series(
-    of: &Loop<'_>,
+    of: &Loop,
     [own, truth, measured, band_name]: [&str; 4],
     band: Option<&Band>,
     level: f64,

@@ -15,7 +15,7 @@ const FARTHEST: f64 = -4.0;
 /// Radius beyond which nothing is drawn.
 const FAR: f64 = 30.0;
 
-pub(super) fn figure(of: &Loop<'_>) -> Figure {
+pub(super) fn figure(of: &Loop) -> Figure {
     let mut panel = Panel::new(Axis::titled("imaginary part"), series(of));
     panel.notes = notes(of);
     let [left, right, below, above] = of.measured.first().map_or(PLANE, |(_, at)| {
@@ -44,7 +44,7 @@ fn point(at: &LoopResponse) -> (f64, f64) {
     (at.magnitude * cos, at.magnitude * sin)
 }
 
-fn series(of: &Loop<'_>) -> Vec<Series> {
+fn series(of: &Loop) -> Vec<Series> {
     let near = |&(re, im): &(f64, f64)| f64::hypot(re, im) < FAR;
     let locus = |name, marks, curve: &[LoopResponse]| {
         Series::of_points(name, marks, curve.iter().map(point).filter(near))
@@ -74,7 +74,7 @@ fn series(of: &Loop<'_>) -> Vec<Series> {
     series
 }
 
-fn notes(of: &Loop<'_>) -> Vec<Note> {
+fn notes(of: &Loop) -> Vec<Note> {
     let crossing = -PI + of.margins.phase_margin_rad;
     let mut notes = vec![Note {
         text: format!("phase margin {}", of.phase_margin()),
