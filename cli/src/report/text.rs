@@ -110,7 +110,7 @@ fn describe_oscillation(text: &mut String, found: &Oscillation, units: &Units) {
     text.push_str(&headed("\nOscillation\n"));
     let _ = writeln!(
         text,
-        "  last {cycles_used} of {cycles_steady} steady cycles, {start_s:.3} to {end_s:.3} s"
+        "  the last {cycles_used} of {cycles_steady} steady cycles, {start_s:.3} to {end_s:.3} s"
     );
     let noise = 100.0 * found.noise_sigma / found.amplitude;
     for (name, value, unit, more) in [
@@ -161,7 +161,7 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
     if let Some(probability) = identified.joint_probability {
         let _ = writeln!(
             text,
-            "  {:<24}all of the process within at once: {:.0} %",
+            "  {:<24}all intervals of the process hold at once: {:.0} %",
             "",
             100.0 * probability
         );

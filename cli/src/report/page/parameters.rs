@@ -86,7 +86,7 @@ fn table(identified: &Identified, units: &Units) -> String {
         .joint_probability
         .map_or(String::new(), |probability| {
             format!(
-                "; all parameters of the process are within at once with {:.0} %",
+                "; all intervals of the process hold at once with {:.0} %",
                 100.0 * probability
             )
         });

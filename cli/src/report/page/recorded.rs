@@ -54,7 +54,7 @@ fn facts(found: &Oscillation) -> Vec<(&'static str, String)> {
         (
             "cycles",
             format!(
-                "last {} of {} steady cycles, {:.3} to {:.3} s",
+                "the last {} of {} steady cycles, {:.3} to {:.3} s",
                 found.cycles_used, found.cycles_steady, found.start_s, found.end_s
             ),
         ),
