@@ -1,12 +1,10 @@
 //! The JSON reports; docs/identify-json.md is their description. Infinite values are null.
 
-use std::collections::BTreeMap;
-
 use onecycle::{
     Design, Identification, Identified, Interval, Margins, Model, Recording, StepMetrics,
 };
 use onecycle_link::Column;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use crate::words::remark::sentence;
 use crate::words::verdict::advice;
@@ -25,7 +23,7 @@ struct IdentifyReport<'a> {
     oscillation: Option<Oscillation>,
     last_cycle: Option<LastCycle>,
     structure: Option<&'static str>,
-    process: Option<BTreeMap<&'static str, Range>>,
+    process: Option<Parameters<Range>>,
     joint_probability: Option<f64>,
     fit: Option<Fit>,
     controller: Option<Controller>,
@@ -40,7 +38,7 @@ struct IdentifyReport<'a> {
 struct TuneReport {
     schema: &'static str,
     structure: &'static str,
-    process: BTreeMap<&'static str, Option<f64>>,
+    process: Parameters<Option<f64>>,
     controller: Controller,
     ise: f64,
     margins: MarginsReport,
@@ -93,6 +91,15 @@ struct Range {
     estimate: Option<f64>,
     low: Option<f64>,
     high: Option<f64>,
+}
+
+/// Values by the keys of their parameters, in the order of the structure.
+struct Parameters<T>(Vec<(&'static str, T)>);
+
+impl<T: Serialize> Serialize for Parameters<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
+    }
 }
 
 #[derive(Serialize)]
@@ -185,9 +192,11 @@ pub(crate) fn design(model: &Model, design: &Design, metrics: Option<&StepMetric
     to_text(&TuneReport {
         schema: TUNE_SCHEMA,
         structure: structure.name(),
-        process: (structure.parameters().iter())
-            .map(|&parameter| (parameter.key(), finite(model.parameter(parameter))))
-            .collect(),
+        process: Parameters(
+            (structure.parameters().iter())
+                .map(|&parameter| (parameter.key(), finite(model.parameter(parameter))))
+                .collect(),
+        ),
         controller: controller(design),
         ise: design.ise,
         margins: margins(&design.margins, None),
@@ -232,11 +241,13 @@ fn range(interval: &Interval) -> Range {
     }
 }
 
-/// The intervals by the keys of their parameters.
-fn process(identified: &Identified) -> BTreeMap<&'static str, Range> {
-    (identified.estimate.iter())
-        .map(|(parameter, interval)| (parameter.key(), range(&interval)))
-        .collect()
+fn process(identified: &Identified) -> Parameters<Range> {
+    let intervals = identified.estimate.iter();
+    Parameters(
+        intervals
+            .map(|(parameter, interval)| (parameter.key(), range(&interval)))
+            .collect(),
+    )
 }
 
 fn fit(identified: &Identified) -> Fit {
