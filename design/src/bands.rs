@@ -1,6 +1,7 @@
-//! Bands of the step response and of the open loop over draws from the posterior.
+//! 90 % bands of the step response and of the open loop over draws from a posterior.
 //!
-//! At each point a band holds 90 % of the curves of the draws. A single curve may leave it somewhere.
+//! The bands are pointwise: at each time or frequency the band holds 90 % of the curves. A single curve may leave the
+//! band at some points.
 
 use num_complex::Complex64;
 
@@ -9,10 +10,10 @@ use crate::controller::Controller;
 use crate::model::Model;
 use crate::soiptd_pd::step_response::StepResponse;
 
-/// Quantiles of a 90 % interval.
+/// Probabilities at the ends of a central 90 % interval.
 const QUANTILES: (f64, f64) = (0.05, 0.95);
 
-/// Ends of the 90 % interval of draws; `None` without draws.
+/// Ends (low, high) of the central 90 % interval of `values`. `None` if there are no values.
 #[must_use]
 pub fn quantiles(mut values: Vec<f64>) -> Option<(f64, f64)> {
     if values.is_empty() {
@@ -23,17 +24,17 @@ pub fn quantiles(mut values: Vec<f64>) -> Option<(f64, f64)> {
     Some((at(QUANTILES.0), at(QUANTILES.1)))
 }
 
-/// Ends of a band, a value for each abscissa that it was asked for.
+/// Band about a curve. Both vectors have one value for each requested time or frequency.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Band {
-    /// Lower end.
+    /// Lower ends.
     pub low: Vec<f64>,
-    /// Upper end.
+    /// Upper ends.
     pub high: Vec<f64>,
 }
 
 impl Band {
-    /// About curves of equal length; `None` where there is none.
+    /// Band of curves of equal length. `None` if there are no curves.
     fn of(curves: &[Vec<f64>]) -> Option<Self> {
         let count = curves.first()?.len();
         let ends = (0..count).map(|at| quantiles(curves.iter().map(|curve| curve[at]).collect()));
@@ -43,18 +44,20 @@ impl Band {
     }
 }
 
-/// Bands about the response to a unit step of the reference.
+/// Bands of the response to a unit step of the reference.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StepBands {
-    /// Of the output (output unit).
+    /// Band of the process output (output unit).
     pub output: Band,
-    /// Of the controller's output (input unit).
+    /// Band of the controller output (input unit).
     pub input: Band,
-    /// Share of the models on which the loop settles; the others have no response.
+    /// Share of the models on which the loop settles, 0 to 1. The bands leave out the other models.
     pub settling: f64,
 }
 
-/// Bands of the step responses of `models` under `controller` at the times `times_s`; `None` where no loop settles.
+/// Bands of the step responses of `models` under `controller` at the times `times_s` (s). `None` if the loop settles on
+/// none of the models.
 #[must_use]
 pub fn step_bands(models: &[Model], controller: &Controller, times_s: &[f64]) -> Option<StepBands> {
     let responses: Vec<StepResponse> = (models.iter())
@@ -74,19 +77,23 @@ pub fn step_bands(models: &[Model], controller: &Controller, times_s: &[f64]) ->
     })
 }
 
-/// Bands about the open loop.
+/// Bands of the open loop.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LoopBands {
-    /// Of the magnitude.
+    /// Band of the magnitude (1).
     pub magnitude: Band,
-    /// Of the phase, unwrapped (rad).
+    /// Band of the unwrapped phase (rad).
     pub phase_rad: Band,
-    /// The two edges of the band about the locus: what lies across it, at each frequency.
+    /// Two edges of the band about the Nyquist locus, one point a frequency, measured perpendicularly to the locus.
     pub locus: (Vec<Complex64>, Vec<Complex64>),
 }
 
-/// Bands of the open loops of `models` under `controller` about that of `centre`, at rising frequencies (rad/s); `None`
-/// without models, with fewer than two frequencies, and where the loop of `centre` has no margins.
+/// Bands of the open loops of `models` under `controller`, about the open loop of `centre`, at ascending frequencies
+/// (rad/s).
+///
+/// `None` if there are no models or fewer than two frequencies, or if the loop of `centre` has no
+/// [margins](crate::margins).
 #[must_use]
 pub fn loop_bands(
     centre: &Model,
@@ -127,7 +134,7 @@ pub fn loop_bands(
     })
 }
 
-/// Unit vectors across a curve at its points.
+/// Unit vectors perpendicular to a curve at its points. `None` if there are fewer than two points.
 fn normals(curve: &[Complex64]) -> Option<Vec<Complex64>> {
     if curve.len() < 2 {
         return None;
@@ -158,8 +165,9 @@ mod tests {
         processes.iter().map(|&process| process.into()).collect()
     }
 
-    // Gains alone differ, 0.80 to 1.20 in 41 steps of 1 %: 5 % of 40 is the third of them, 0.82, and 95 % the one of
-    // 1.18. The phase has no band, and the locus's edges are those loci, to the order of the curve's turning.
+    // 41 processes whose gains are 0.80 to 1.20 in steps of 0.01, equal otherwise. The 5 % quantile has the index
+    // 0.05 * 40 = 2, the gain 0.82; the 95 % quantile has the index 38, the gain 1.18. The phase does not depend on the
+    // gain, so its band has no width.
     #[test]
     fn a_band_of_gains_is_a_band_of_magnitudes() {
         let (process, controller) = optimum();
@@ -177,11 +185,13 @@ mod tests {
         let (low, high) = &bands.locus;
         let width = (high[2] - low[2]).norm();
         let locus = loop_response(&process.into(), &controller, OMEGAS[2]).unwrap();
-        // The radius is not quite across the locus: its part across it is what is seen.
+        // A gain moves the locus along its radius by 0.36 of the magnitude. The band is the part of this that is
+        // perpendicular to the locus.
         assert!(width > 0.1 * 0.36 * locus.magnitude && width <= 0.36 * locus.magnitude);
     }
 
-    // The step of each process alone is its own band, and the steps of all gains lie about it.
+    // The band of one process has no width. Gains of 0.9 and 1.1 lie on either side of it. The loop is unstable at nine
+    // times the gain, so half of the four models settle.
     #[test]
     fn steps_have_bands() {
         let (process, controller) = optimum();
@@ -199,7 +209,7 @@ mod tests {
         )
         .unwrap();
         assert_eq!(both.settling, 0.5);
-        // Before the dead time of 20 ms is over nothing has moved; at the end all have settled.
+        // Zero during the dead time of 20 ms; at 3 s all responses have settled at 1.
         assert_eq!((both.output.low[1], both.output.high[1]), (0.0, 0.0));
         for k in [2, 3] {
             assert!(both.output.low[k] < alone.output.low[k]);

@@ -1,60 +1,63 @@
-//! Any model under any controller: margins, cost, open loop, step response.
+//! Margins, cost, open loop and step response of a model under a controller.
 //!
-//! Each function chooses the method by structure and form. An integrator with two lags and a delay under a PD has exact
-//! solutions of its own, in [`soiptd_pd`].
+//! Each function chooses its method by the structure of the model and the form of the controller. The only pair today,
+//! an integrator with two lags and dead time under a PD, has exact solutions: [`soiptd_pd`].
 
 use onecycle_onboard::{Pd, Soiptd};
 
 use crate::controller::Controller;
 use crate::model::Model;
+use crate::soiptd_pd;
 use crate::soiptd_pd::loop_response::LoopResponse;
 use crate::soiptd_pd::margins::Margins;
 use crate::soiptd_pd::step_response::{StepResponse, StepResponseError};
-use crate::soiptd_pd::{self};
 
-/// The pair that has exact solutions.
-fn soiptd_pd(model: &Model, controller: &Controller) -> (Soiptd, Pd) {
+/// Parameters and gains of the pair that has exact solutions.
+fn process_and_pd(model: &Model, controller: &Controller) -> (Soiptd, Pd) {
     let (Model::Soiptd(process), Controller::Pd(pd)) = (model, controller);
     (*process, *pd)
 }
 
-/// Margins of the loop, stable or not.
+/// Stability margins of the loop. An unstable loop has margins too: its phase margin is not positive.
 ///
-/// `None` where the proportional gain is zero or of the wrong sign: the loop is unstable and need not cross `|L| = 1`.
+/// `None` if the proportional gain is zero or has the wrong sign. Such a loop is unstable, and its magnitude may never
+/// cross 1.
 #[must_use]
 pub fn margins(model: &Model, controller: &Controller) -> Option<Margins> {
-    let (process, pd) = soiptd_pd(model, controller);
+    let (process, pd) = process_and_pd(model, controller);
     soiptd_pd::margins(&process, pd)
 }
 
-/// Integral of the squared error of a unit step of the reference (output unit^2 s); `None` where the loop is unstable.
+/// Integral of the squared error (ISE) of a unit step of the reference (output unit^2 s). `None` if the loop is
+/// unstable.
 #[must_use]
 pub fn ise(model: &Model, controller: &Controller) -> Option<f64> {
-    let (process, pd) = soiptd_pd(model, controller);
+    let (process, pd) = process_and_pd(model, controller);
     soiptd_pd::ise(&process, pd)
 }
 
-/// The open loop at a positive frequency (rad/s); `None` where [`margins`] has none or the frequency is not positive.
+/// Open loop at a frequency (rad/s). `None` if the frequency is not positive and finite, or if [`margins`] returns
+/// `None` for this loop.
 #[must_use]
 pub fn loop_response(
     model: &Model,
     controller: &Controller,
     omega_rad_per_s: f64,
 ) -> Option<LoopResponse> {
-    let (process, pd) = soiptd_pd(model, controller);
+    let (process, pd) = process_and_pd(model, controller);
     soiptd_pd::loop_response(&process, pd, omega_rad_per_s)
 }
 
 /// Response of the continuous closed loop to a unit step of the reference, from rest.
 ///
 /// # Errors
-/// [`StepResponseError::Unstable`] where it grows without bound, [`StepResponseError::TooSlow`] where it takes over a
-/// million steps to settle.
+/// - [`StepResponseError::Unstable`]: the response grows without bound.
+/// - [`StepResponseError::TooSlow`]: the response takes more than 2^20 simulation steps to settle.
 pub fn step_response(
     model: &Model,
     controller: &Controller,
 ) -> Result<StepResponse, StepResponseError> {
-    let (process, pd) = soiptd_pd(model, controller);
+    let (process, pd) = process_and_pd(model, controller);
     soiptd_pd::step_response(&process, pd)
 }
 
@@ -62,7 +65,7 @@ pub fn step_response(
 mod tests {
     use super::*;
 
-    // L = C G by the frequency responses of both, to 1e-12: the same loop as the exact road's.
+    // The product of the frequency responses of controller and model, L = C G, to a relative 1e-12.
     #[test]
     fn the_open_loop_is_the_product_of_the_frequency_responses() {
         let model = Model::from(Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap());

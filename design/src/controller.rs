@@ -1,8 +1,16 @@
-//! Controllers: their form and gains.
+//! Controllers: form and gains.
 //!
 //! | form | law |
 //! |------|-----|
 //! | [`Form::Pd`] | `u = Kp (r - y) - Kd dy/dt` |
+//!
+//! | symbol | meaning | unit |
+//! |--------|---------|------|
+//! | `r` | reference | output unit |
+//! | `y` | output of the process | output unit |
+//! | `u` | output of the controller | input unit |
+//! | `Kp` | proportional gain | input unit / output unit |
+//! | `Kd` | derivative gain | input unit s / output unit |
 
 use num_complex::Complex64;
 use onecycle_onboard::Pd;
@@ -17,7 +25,7 @@ pub enum Form {
 }
 
 impl Form {
-    /// Short name, the same in JSON and on command lines.
+    /// Name in JSON and on command lines.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -25,7 +33,7 @@ impl Form {
         }
     }
 
-    /// Control law, in the symbols of its gains.
+    /// Control law as text.
     #[must_use]
     pub fn law(self) -> &'static str {
         match self {
@@ -34,7 +42,7 @@ impl Form {
     }
 }
 
-/// A controller: a form with its gains, in input unit / output unit and seconds.
+/// Controller: a form and its gains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Controller {
@@ -49,7 +57,7 @@ impl From<Pd> for Controller {
 }
 
 impl Controller {
-    /// Its form.
+    /// Form of the controller.
     #[must_use]
     pub fn form(&self) -> Form {
         match self {
@@ -73,7 +81,7 @@ impl Controller {
         }
     }
 
-    /// The gains of a PD; `None` for another form.
+    /// Gains of a PD. `None` for another form.
     #[must_use]
     pub fn pd(&self) -> Option<Pd> {
         match self {
@@ -81,7 +89,7 @@ impl Controller {
         }
     }
 
-    /// Frequency response of the feedback path, from `-y` to `u`, at a frequency (rad/s): input unit / output unit.
+    /// Frequency response of the feedback path, from `-y` to `u` (input unit / output unit), at a frequency (rad/s).
     #[must_use]
     pub fn frequency_response(&self, omega_rad_per_s: f64) -> Complex64 {
         Complex64::new(self.kp(), self.kd() * omega_rad_per_s)

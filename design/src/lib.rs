@@ -1,20 +1,21 @@
-//! From a process model to its controller: exact cost, margins, step response, optimal gains.
+//! From a process model to its controller: cost, stability margins, step response, optimal gains.
 //!
-//! Nothing is simulated to get a cost, nothing is searched on a grid to get an optimum, and a dead time stays a dead
-//! time: there is no Pade approximation.
+//! The cost is a closed form, not a simulation. The optimal gains are the root of a derivative, not the best point of a
+//! grid. The dead time is exact: there is no Pade approximation.
 //!
-//! | question | answer |
-//! |----------|--------|
-//! | Which controller is best for a model, or over draws from a posterior? | [`design()`], [`design_over()`] |
-//! | What does a controller cost? | [`ise()`]: squared error of a unit step, in closed form |
-//! | How far is the loop from instability? | [`margins()`] |
-//! | What is the open loop at a frequency? | [`loop_response()`] |
-//! | What does a step look like? | [`step_response()`] |
-//! | What do step and loop look like over the posterior? | [`bands::step_bands()`], [`bands::loop_bands()`] |
-//! | What does a cascade with a PID of the rate cost? | [`Cascade`] |
+//! | to compute | call |
+//! |------------|------|
+//! | the controller of least cost for a model | [`design()`] |
+//! | the controller of least expected cost for draws from a posterior | [`design_over()`] |
+//! | the cost of a controller: integral of the squared error (ISE) of a unit step | [`ise()`] |
+//! | phase, gain and delay margin | [`margins()`] |
+//! | the open loop at a frequency, for a Bode or Nyquist plot | [`loop_response()`] |
+//! | the response to a unit step of the reference | [`step_response()`] |
+//! | 90 % bands of step response and open loop for draws from a posterior | [`bands::step_bands()`], [`bands::loop_bands()`] |
+//! | cost and phase margin of a cascade with a PID rate loop | [`Cascade::cost()`] |
 //!
-//! [`Model`] and [`Controller`] are values. Today there is one structure and one form, whose exact solutions are in
-//! [`soiptd_pd`].
+//! The process is a [`Model`], the controller a [`Controller`]. Both are enums, with one variant each: an integrator
+//! with two lags and dead time (SOIPTD), and a PD. The exact solutions for this pair are in [`soiptd_pd`].
 //!
 //! ```
 //! use onecycle_design::{Model, Specification, design, step_response};
@@ -35,9 +36,9 @@
 
 pub mod bands;
 pub mod cascade;
-pub mod closed_loop;
-pub mod controller;
-pub mod model;
+mod closed_loop;
+mod controller;
+mod model;
 pub mod roots;
 pub mod soiptd_pd;
 pub mod tuning;

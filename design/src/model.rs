@@ -1,20 +1,20 @@
-//! Models: which process it is, and its numbers.
+//! Process models: structure and parameter values.
 //!
 //! | structure | transfer function | parameters |
 //! |-----------|-------------------|------------|
 //! | [`Structure::Soiptd`] | `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))` | `K`, `K/T_body`, `T_prop`, `T_body`, `tau` |
 //!
-//! A [`Structure`] is a value: reports, JSON and packs name it, and a function that takes a [`Model`] chooses its
-//! method by it.
+//! Symbols and units: [`Parameter`]. A [`Structure`] is named in reports, JSON and packs. A function that takes a
+//! [`Model`] chooses its method by the structure.
 
 use num_complex::Complex64;
 use onecycle_onboard::Soiptd;
 
-/// Which process: its integrators, lags, and dead time.
+/// Structure of a process: number of integrators and lags, dead time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Structure {
-    /// Second order plus integrator plus dead time: an integrator with two lags and a delay.
+    /// Second order plus integrator plus dead time: an integrator with two lags and dead time.
     Soiptd,
 }
 
@@ -22,7 +22,7 @@ impl Structure {
     /// Every structure.
     pub const ALL: [Self; 1] = [Self::Soiptd];
 
-    /// Short name, the same in JSON, on command lines and in packs.
+    /// Name in JSON, on command lines and in packs.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -30,7 +30,7 @@ impl Structure {
         }
     }
 
-    /// Transfer function, in the symbols of [`Structure::parameters`].
+    /// Transfer function as text, in the symbols of [`Parameter::symbol`].
     #[must_use]
     pub fn transfer_function(self) -> &'static str {
         match self {
@@ -38,7 +38,7 @@ impl Structure {
         }
     }
 
-    /// The parameters that are reported for it, in the order of a report.
+    /// Parameters to report for this structure, in the order of a report.
     #[must_use]
     pub fn parameters(self) -> &'static [Parameter] {
         match self {
@@ -53,27 +53,27 @@ impl Structure {
     }
 }
 
-/// A physical parameter of a model, or of the experiment that it was identified in.
+/// Physical parameter of a model, or of the experiment that identified it. For its unit see [`Parameter::unit`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[non_exhaustive]
 pub enum Parameter {
-    /// Velocity gain `K`; infinite without damping.
+    /// Velocity gain `K`: rate of the output per unit of input in steady state. Infinite without damping.
     K,
-    /// Acceleration gain `K/T_body`.
+    /// Acceleration gain `K/T_body`. Finite without damping.
     KOverTBody,
-    /// Lag of the actuator, the shorter of the two.
+    /// Actuator lag `T_prop`, the shorter of the two lags.
     TProp,
-    /// Lag of the body, the longer of the two; infinite without damping.
+    /// Body lag `T_body`, the longer of the two lags. Infinite without damping.
     TBody,
-    /// Damping `1/T_body`; zero for a double integrator.
+    /// Damping `1/T_body`. Zero for a double integrator.
     InverseTBody,
-    /// Dead time.
+    /// Dead time `tau`.
     Tau,
-    /// Constant that the process adds to the recorded input.
+    /// Constant disturbance at the process input, which the recording does not show.
     InputBias,
 }
 
-/// Unit of a parameter, in the units of the recording's input and output.
+/// Unit of a parameter, in terms of the units of the recorded input and output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Unit {
@@ -81,7 +81,7 @@ pub enum Unit {
     OutputPerInputSecond,
     /// Output unit / (input unit s^2).
     OutputPerInputSecondSquared,
-    /// Second.
+    /// s.
     Second,
     /// 1/s.
     PerSecond,
@@ -90,7 +90,7 @@ pub enum Unit {
 }
 
 impl Parameter {
-    /// Key in JSON, with its unit where that is one of time.
+    /// Key in JSON. It ends in the unit where the unit is one of time: `tau_s`.
     #[must_use]
     pub fn key(self) -> &'static str {
         match self {
@@ -118,7 +118,7 @@ impl Parameter {
         }
     }
 
-    /// Its unit.
+    /// Unit of the parameter.
     #[must_use]
     pub fn unit(self) -> Unit {
         match self {
@@ -131,11 +131,11 @@ impl Parameter {
     }
 }
 
-/// A process model: a structure with its numbers.
+/// Process model: a structure and its parameter values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Model {
-    /// An integrator with two lags and a delay.
+    /// [`Structure::Soiptd`]: an integrator with two lags and dead time.
     Soiptd(Soiptd),
 }
 
@@ -146,7 +146,7 @@ impl From<Soiptd> for Model {
 }
 
 impl Model {
-    /// Its structure.
+    /// Structure of the model.
     #[must_use]
     pub fn structure(&self) -> Structure {
         match self {
@@ -154,7 +154,7 @@ impl Model {
         }
     }
 
-    /// The integrator with two lags and a delay; `None` for another structure.
+    /// The integrator with two lags and dead time. `None` for another structure.
     #[must_use]
     pub fn soiptd(&self) -> Option<Soiptd> {
         match self {
@@ -162,8 +162,8 @@ impl Model {
         }
     }
 
-    /// Value of a parameter in its [unit](Parameter::unit), infinite where the parameter is; `None` where the structure
-    /// does not have it.
+    /// Value of a parameter in its [unit](Parameter::unit). `K` and `T_body` are infinite without damping. `None` if
+    /// the model does not have the parameter.
     #[must_use]
     pub fn parameter(&self, parameter: Parameter) -> Option<f64> {
         let Self::Soiptd(process) = self;
@@ -178,7 +178,7 @@ impl Model {
         }
     }
 
-    /// Frequency response `G(jw)` at a frequency (rad/s): output unit / input unit.
+    /// Frequency response `G(jw)` (output unit / input unit) at the frequency `w` (rad/s).
     #[must_use]
     pub fn frequency_response(&self, omega_rad_per_s: f64) -> Complex64 {
         let s = Complex64::new(0.0, omega_rad_per_s);
@@ -195,7 +195,8 @@ impl Model {
 mod tests {
     use super::*;
 
-    // K = 2, T_prop = 1, T_body = 1, tau = pi at 1 rad/s: e^(-j pi) = -1 and j (1 + j)^2 = -2, so G = 2 * -1 / -2 = 1.
+    // K = 2, T_prop = T_body = 1 s, tau = pi s, at 1 rad/s: e^(-j pi) = -1 and j (1 + j)^2 = -2, so
+    // G = 2 * -1 / -2 = 1.
     #[test]
     fn frequency_response_by_hand() {
         let model = Model::from(Soiptd::new(2.0, 1.0, 1.0, std::f64::consts::PI).unwrap());
@@ -203,7 +204,7 @@ mod tests {
         assert!((response - 1.0).norm() < 1e-15, "{response}");
     }
 
-    // A double integrator has no finite K and T_body, and no input bias belongs to a model.
+    // K and T_body of a double integrator are infinite. The input bias belongs to the experiment, not to the model.
     #[test]
     fn parameters_of_a_double_integrator() {
         let model = Model::from(Soiptd::from_acceleration_gain(3.0, 0.1, 0.0, 0.02).unwrap());

@@ -1,18 +1,18 @@
-//! One root of one function of one variable.
+//! Root of a function of one variable: hybrid of inverse quadratic interpolation and bisection.
 //!
 //! Reference: T. R. Chandrupatla, "A new hybrid quadratic/bisection algorithm for finding the zero
 //! of a nonlinear function without using derivatives", Advances in Engineering Software 28 (1997).
 
-/// Halvings that take any bracket within the range of `f64` down to one ulp; the interpolation
-/// needs some ten steps.
+/// Maximum number of steps. Interpolation usually needs about ten; 200 bisections shrink a bracket by `2^200`.
 const MAX_STEPS: usize = 200;
 
-/// Steps of factor four that cross the whole range of `f64`.
+/// Maximum number of bracketing steps: 1,100 factors of four cross the whole range of `f64`, about `2^2100`.
 const MAX_BRACKETINGS: usize = 1100;
 
-/// Where `f` changes sign between `a` and `b`, to `tolerance` and an ulp or two.
+/// Argument between `a` and `b` at which `f` changes sign, to `tolerance` plus one or two ulp.
 ///
-/// Expects `f(a)` and `f(b)` of opposite sign; otherwise returns the end with the smaller value.
+/// `f(a)` and `f(b)` must have opposite signs. Otherwise the result is one of the points tried, not a root.
+#[must_use]
 pub fn root(f: impl Fn(f64) -> f64, a: f64, b: f64, tolerance: f64) -> f64 {
     let (mut newest, mut f_newest) = (b, f(b));
     let (mut across, mut f_across) = (a, f(a));
@@ -20,7 +20,7 @@ pub fn root(f: impl Fn(f64) -> f64, a: f64, b: f64, tolerance: f64) -> f64 {
     for _ in 0..MAX_STEPS {
         let trial = newest + fraction * (across - newest);
         let f_trial = f(trial);
-        // Keep the sign change between `newest` and `across`; `previous` is the point let go.
+        // Keep the sign change between `newest` and `across`. `previous` is the point that is dropped.
         let (previous, f_previous);
         if (f_trial > 0.0) == (f_newest > 0.0) {
             (previous, f_previous) = (newest, f_newest);
@@ -39,7 +39,7 @@ pub fn root(f: impl Fn(f64) -> f64, a: f64, b: f64, tolerance: f64) -> f64 {
         if f_newest == 0.0 || least_fraction >= 0.5 || least_fraction.is_nan() {
             return best;
         }
-        // Inverse quadratic interpolation where it is monotone across the bracket, else bisection.
+        // Inverse quadratic interpolation if it is monotone across the bracket, otherwise bisection.
         let xi = (newest - across) / (previous - across);
         let phi = (f_newest - f_across) / (f_previous - f_across);
         fraction = if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
@@ -59,9 +59,11 @@ pub fn root(f: impl Fn(f64) -> f64, a: f64, b: f64, tolerance: f64) -> f64 {
     }
 }
 
-/// The positive frequency where `f`, positive below it and negative above it, changes sign.
+/// Positive argument at which `f` falls through zero: `f` is positive below it and negative above it.
 ///
-/// Searches outwards from `start`; `None` where the sign never changes within the range of `f64`.
+/// Searches upwards or downwards from `start` in factors of four. `None` if the sign does not change within the range
+/// of `f64`.
+#[must_use]
 pub fn falling_root(f: impl Fn(f64) -> f64, start: f64) -> Option<f64> {
     let start_is_below = f(start) > 0.0;
     let factor = if start_is_below { 4.0 } else { 0.25 };
@@ -88,12 +90,12 @@ mod tests {
     fn root_is_exact_to_an_ulp_or_two() {
         let x = root(|x| x.cos() - x, 0.0, 1.0, 0.0);
         assert!((x - 0.739_085_133_215_160_6).abs() < 3e-16, "{x}");
-        // A triple root, where interpolation is no help: 0.1 to within the flat region 1e-5.
+        // A triple root, where interpolation does not help: 0.1 to within 1e-5, where the function is flat.
         let x = root(|x| (x - 0.1).powi(3), -1.0, 2.0, 0.0);
         assert!((x - 0.1).abs() < 1e-5, "{x}");
     }
 
-    // 1e-7 - w changes sign at 1e-7, fourteen decades below the start.
+    // 1e-7 - w changes sign at 1e-7: 14 decades below the first start, 13 above the second.
     #[test]
     fn falling_root_searches_both_ways_and_gives_up() {
         for start in [1e7, 1e-20] {

@@ -1,14 +1,18 @@
-//! Exact solutions for an integrator with two lags and a delay (SOIPTD) under a PD.
+//! Exact solutions for an integrator with two lags and dead time (SOIPTD) under a PD.
 //!
-//! | file | what it computes |
-//! |------|------------------|
-//! | `open_loop` | the loop cut open: gain and phase crossover |
-//! | `margins` | phase, gain and delay margin |
-//! | `cost` | squared error of a unit step, in closed form |
-//! | `optimum` | the PD of least cost at a phase margin |
-//! | `deterioration` | what a controller costs on another process than its own |
-//! | `loop_response` | the open loop at a frequency |
-//! | `step_response`, `step_metrics` | the closed loop's step and its figures |
+//! ```text
+//! G(s) = K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))         u = Kp (r - y) - Kd dy/dt
+//! ```
+//!
+//! | module | content |
+//! |--------|---------|
+//! | [`open_loop`] | open loop, gain crossover, phase crossover |
+//! | [`mod@margins`] | phase, gain and delay margin |
+//! | [`cost`] | integral of the squared error (ISE) of a unit step, in closed form |
+//! | [`optimum`] | PD of least ISE at a phase margin |
+//! | [`mod@deterioration`] | cost of a controller on a process, relative to the optimum of that process |
+//! | [`mod@loop_response`] | open loop at a frequency |
+//! | [`mod@step_response`], [`step_metrics`] | response to a unit step, with its overshoot, rise time and settling time |
 
 pub mod cost;
 pub mod deterioration;

@@ -1,20 +1,23 @@
-//! From a model, or from all that the process may be, to a controller.
+//! Controller design for one model, or for draws from a posterior.
 //!
-//! [`design`] takes one model. [`design_over`] takes draws from the posterior and returns the controller of least
-//! expected cost over them:
+//! [`design()`] takes one model and returns the controller of least cost that keeps the specified phase margin.
+//! [`design_over()`] takes draws from a posterior and returns the controller of least expected loss:
 //!
 //! ```text
 //! choose C to minimise   mean_i min(|J(C, i) / J*_i - 1|, 1),    i drawn from the posterior
 //! ```
 //!
-//! `J*_i` is the least cost of draw `i` at the margin asked for. A controller that costs less than `J*_i` has less margin
-//! there, so a lower cost counts as a loss too. An unstable loop has no cost: one unstable draw would dominate the mean,
-//! so its loss is capped at 1, a doubled cost, some hundred times what identification usually costs.
+//! | symbol | meaning | unit |
+//! |--------|---------|------|
+//! | `J(C, i)` | cost of the controller `C` on draw `i`: ISE of a unit step | output unit^2 s |
+//! | `J*_i` | least cost on draw `i` at the specified phase margin | output unit^2 s |
 //!
-//! The candidates are the optima of the draws: each has the margin asked for on a process that is likely. A free search
-//! over both gains finds controllers of the same expected cost with a third of the margin.
-
-use std::fmt;
+//! A controller that costs less than `J*_i` leaves less phase margin on draw `i`, so a lower cost is a loss too. An
+//! unstable loop has no finite cost. One unstable draw would dominate the mean, so the loss of a draw is capped at 1,
+//! which stands for a doubled cost: about 100 times the usual loss through identification.
+//!
+//! The candidates are the optima of the draws: each of them keeps the specified margin on a likely process. An
+//! unconstrained search over both gains finds controllers of the same expected loss with a third of the margin.
 
 use crate::closed_loop::{ise, margins};
 use crate::controller::{Controller, Form};
@@ -23,21 +26,21 @@ use crate::soiptd_pd;
 use crate::soiptd_pd::margins::Margins;
 use crate::soiptd_pd::optimum::OptimumError;
 
-/// Draws that [`design_over`] needs: the mean of a distribution as wide as itself is then known to a tenth.
+/// Number of draws that [`design_over`] needs. If the loss varies as much as its mean, the mean of 96 draws has a
+/// relative standard error of `1/sqrt(96)`, a tenth.
 pub const DRAWS: usize = 96;
 
-/// What a controller has to be and to keep.
+/// Requirements on a controller. `Default`: the paper's, a PD with 20 degrees of phase margin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Specification {
     /// Form of the controller.
     pub form: Form,
-    /// Least phase margin (rad), between 0 and `pi/2`.
+    /// Minimum phase margin (rad), between 0 and `pi/2`.
     pub phase_margin_rad: f64,
 }
 
 impl Default for Specification {
-    /// The paper's: a PD with 20 degrees.
     fn default() -> Self {
         Self {
             form: Form::Pd,
@@ -47,7 +50,7 @@ impl Default for Specification {
 }
 
 impl Specification {
-    /// The same with another least phase margin (rad).
+    /// Sets the minimum phase margin (rad). [`design()`] refuses a value that is not between 0 and `pi/2`.
     #[must_use]
     pub fn with_phase_margin_rad(self, phase_margin_rad: f64) -> Self {
         Self {
@@ -57,7 +60,7 @@ impl Specification {
     }
 }
 
-/// A controller with what it costs and leaves on one model.
+/// Controller with its cost and margins on one model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Design {
@@ -65,33 +68,22 @@ pub struct Design {
     pub controller: Controller,
     /// Integral of the squared error of a unit step of the reference (output unit^2 s).
     pub ise: f64,
-    /// Margins of the loop.
+    /// Stability margins of the loop.
     pub margins: Margins,
 }
 
-/// Why there is no controller.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Why no controller was designed.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DesignError {
-    /// The phase margin asked for (rad) is not between 0 and `pi/2`.
+    /// The specified phase margin (rad) is not between 0 and `pi/2`.
+    #[error("the phase margin must lie between 0 and pi/2 rad, but is {0} rad")]
     PhaseMargin(f64),
-    /// The gain or the times of the model are so extreme that gains or cost overflow.
+    /// The gain or the time constants of the model are so large or small that the controller gains or the cost
+    /// overflow.
+    #[error("the optimal gains of this process are out of range")]
     Overflow,
 }
-
-impl fmt::Display for DesignError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::PhaseMargin(rad) => write!(
-                f,
-                "the phase margin must lie between 0 and pi/2 rad, but is {rad} rad"
-            ),
-            Self::Overflow => f.write_str("the optimal gains of this process are out of range"),
-        }
-    }
-}
-
-impl std::error::Error for DesignError {}
 
 impl From<OptimumError> for DesignError {
     fn from(error: OptimumError) -> Self {
@@ -102,10 +94,11 @@ impl From<OptimumError> for DesignError {
     }
 }
 
-/// The controller of least squared error that keeps the specification on `model`.
+/// Controller of least ISE among those that meet `specification` on `model`.
 ///
 /// # Errors
-/// [`DesignError`]: the margin is out of range, or the model is too extreme.
+/// - [`DesignError::PhaseMargin`]: the specified phase margin is not between 0 and `pi/2`.
+/// - [`DesignError::Overflow`]: the parameters of the model are near the limits of `f64`.
 pub fn design(model: &Model, specification: &Specification) -> Result<Design, DesignError> {
     let (Model::Soiptd(process), Form::Pd) = (model, specification.form);
     let best = soiptd_pd::pd(process, specification.phase_margin_rad)?;
@@ -116,11 +109,13 @@ pub fn design(model: &Model, specification: &Specification) -> Result<Design, De
     })
 }
 
-/// The controller of least expected cost over `draws`, with its cost and margins on `model`, the most probable one.
-/// [`DRAWS`] draws are enough; without any it is that of [`design`].
+/// Controller of least expected loss over `draws`, with its cost and margins on `model`, the most probable model.
+///
+/// [`DRAWS`] draws are enough. Without draws the result is that of [`design()`] for `model`. For the loss see the
+/// [module](self).
 ///
 /// # Errors
-/// Those of [`design`] for `model`; a draw without a controller is left out.
+/// The errors of [`design()`] for `model`. A draw for which [`design()`] fails is left out.
 pub fn design_over(
     model: &Model,
     draws: &[Model],
@@ -141,6 +136,7 @@ pub fn design_over(
     })
 }
 
+/// Mean loss of `controller` over models with their optima. For the loss see the [module](self).
 fn expected_loss(controller: &Controller, optima: &[(Model, Design)]) -> f64 {
     let loss = |(model, optimum): &(Model, Design)| {
         ise(model, controller).map_or(1.0, |cost| (cost / optimum.ise - 1.0).abs().min(1.0))
@@ -148,7 +144,7 @@ fn expected_loss(controller: &Controller, optima: &[(Model, Design)]) -> f64 {
     optima.iter().map(loss).sum::<f64>() / optima.len().max(1) as f64
 }
 
-/// A controller on a model that it was not made for; `None` where their loop is unstable.
+/// Cost and margins of a controller on a model. `None` if the loop is unstable.
 fn on(model: &Model, controller: Controller) -> Option<Design> {
     Some(Design {
         controller,
@@ -180,8 +176,8 @@ mod tests {
         Soiptd::new(1.0, 0.05, 1.0, 0.02).unwrap()
     }
 
-    // Of two gains that differ by 10 % one is three times as likely: the expected loss, a sum of absolute
-    // values, is least at that one's optimum, whichever is called the most probable.
+    // Two processes differ by 10 % in gain; the stronger one is drawn three times as often. The expected loss, a sum of
+    // absolute values, is then least at the optimum of the stronger one, although `model` is the weaker one.
     #[test]
     fn the_majority_decides() {
         let process = process();
@@ -199,8 +195,8 @@ mod tests {
         assert_eq!(chosen(&process(), &[]), own(&process()));
     }
 
-    // Half of the probability is on a gain three times as large, with which the optimum of the other is
-    // unstable: a loss of 1 there. The optimum of the large gain is stable on both.
+    // Half of the probability is on a process of three times the gain, on which the optimum of the weak process is
+    // unstable, a loss of 1. The optimum of the strong process is stable on both.
     #[test]
     fn an_unstable_loop_is_avoided() {
         let process = process();

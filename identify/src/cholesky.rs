@@ -1,6 +1,9 @@
-//! The root of a covariance.
+//! Cholesky factor of a covariance matrix.
 
-/// Lower triangular root of `covariance`; `None` where rounding has made it indefinite.
+/// Lower triangular `L` with `L L^T = covariance`. `None` if the matrix is not positive semidefinite.
+///
+/// A variance of zero (a recording without noise) gives a zero column. Rounding may make a pivot negative by 1e-9 of
+/// the variance.
 #[must_use]
 pub fn cholesky<const N: usize>(covariance: &[[f64; N]; N]) -> Option<[[f64; N]; N]> {
     let mut root = [[0.0; N]; N];
@@ -9,7 +12,6 @@ pub fn cholesky<const N: usize>(covariance: &[[f64; N]; N]) -> Option<[[f64; N];
             let known: f64 = (0..j).map(|k| root[i][k] * root[j][k]).sum();
             let rest = covariance[i][j] - known;
             if i == j {
-                // A variance of zero (a perfect recording) is no error.
                 if rest < -1e-9 * covariance[i][i] || !rest.is_finite() {
                     return None;
                 }

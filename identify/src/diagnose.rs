@@ -1,4 +1,5 @@
-//! What else a recording and a fit tell: harmonics without a model, whiteness of residuals, densities of draws.
+//! Diagnostics of a recording and a fit: frequency response at the harmonics without a model, whiteness of residuals,
+//! probability densities of draws.
 
 pub mod density;
 pub mod harmonics;

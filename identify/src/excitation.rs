@@ -1,22 +1,23 @@
-//! What excited the process while it was recorded.
+//! Excitation of the process during a recording.
 
-use crate::relay::reading::Reading;
+use crate::reading::Reading;
 
-/// The excitation that was found in a recording, and what was measured of it.
+/// Excitation found in a recording, and its measured properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Excitation {
-    /// A two-level relay that keeps the process oscillating steadily.
+    /// Two-level relay that keeps the process in a steady oscillation.
     Relay {
-        /// The oscillation.
+        /// Measured properties of the oscillation.
         oscillation: Oscillation,
-        /// The network's estimate from the last cycle alone; `None` without a pack or where the pack has no answer.
+        /// Estimate from the last cycle alone, by the network of the pack. `None` without a pack, or if the pack
+        /// returns no estimate.
         last_cycle: Option<Reading>,
     },
 }
 
 impl Excitation {
-    /// Short name, the same in JSON.
+    /// Name in JSON.
     #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
@@ -25,29 +26,29 @@ impl Excitation {
     }
 }
 
-/// A steady relay oscillation.
+/// Measured properties of a steady relay oscillation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Oscillation {
     /// Mean period of the cycles used (s).
     pub period_s: f64,
-    /// Half the peak-to-peak output, mean over the cycles used (output unit).
+    /// Amplitude: half the peak-to-peak output, mean over the cycles used (output unit).
     pub amplitude: f64,
     /// Number of cycles used for the fit.
     pub cycles_used: usize,
-    /// Number of cycles in the steady run that they end.
+    /// Number of cycles in the steady run that the cycles used belong to.
     pub cycles_steady: usize,
     /// Start of the cycles used (s).
     pub start_s: f64,
     /// End of the cycles used (s).
     pub end_s: f64,
-    /// Share of the period with the relay high, mean.
+    /// Share of the period with the relay high, 0 to 1, mean over the cycles used.
     pub duty: f64,
-    /// Half the distance between the relay's levels (input unit).
+    /// Half the distance between the levels of the relay (input unit).
     pub relay_amplitude: f64,
-    /// Middle between the relay's levels (input unit).
+    /// Middle between the levels of the relay (input unit).
     pub relay_centre: f64,
-    /// Standard deviation of the noise of one sample (output unit).
+    /// Standard deviation of the white noise of one sample (output unit).
     pub noise_sigma: f64,
     /// Sample period (s).
     pub sample_s: f64,

@@ -1,27 +1,29 @@
-//! From a recording to a process model with intervals, or to the reason why there is none.
+//! From a recording to a process model with 90 % intervals and a controller, or the reason why no process was
+//! identified.
 //!
-//! [`identify`] takes the columns of a recording ([`Signals`]) and returns an [`Identification`]: what excited the process
-//! ([`Excitation`]), the identified [`Model`](onecycle_design::Model) with a 90 % interval for each parameter and a
-//! controller, or a [`Verdict`] that says why there is none, and [`Remark`]s. All are values; sentences and advice are made
-//! by the program that shows them.
+//! [`identify`] takes the columns of a recording ([`Signals`]) and returns an [`Identification`]: the excitation of the
+//! process ([`Excitation`]), the process and its controller ([`Identified`]) or the reason why no process was
+//! identified ([`Verdict`]), and what limits the result ([`Remark`]). The results are facts without advice: the program
+//! that shows them adds it.
 //!
-//! | file | what it does |
-//! |------|--------------|
+//! | file | content |
+//! |------|---------|
 //! | `relay` | identification from a steady relay oscillation, with the estimator of the board |
-//! | `posterior` | draws from the distribution of the parameters, intervals |
-//! | `outcome`, `verdict`, `remark` | the result |
-//! | `diagnose` | harmonics without a model, whiteness of residuals, densities of draws |
+//! | `posterior` | draws from the distribution of the parameters, 90 % intervals |
+//! | `excitation`, `outcome`, `verdict`, `remark` | the result |
+//! | [`diagnose`] | frequency response at the harmonics without a model, whiteness of residuals, densities of draws |
 
 pub mod cholesky;
 pub mod diagnose;
-pub mod excitation;
-pub mod outcome;
-pub mod posterior;
-pub mod relay;
-pub mod remark;
-pub mod settings;
-pub mod signals;
-pub mod verdict;
+mod excitation;
+mod outcome;
+mod posterior;
+mod reading;
+mod relay;
+mod remark;
+mod settings;
+mod signals;
+mod verdict;
 
 use onecycle_onboard::pack::Pack;
 
@@ -31,22 +33,32 @@ pub use diagnose::whiteness::{Whiteness, whiteness};
 pub use excitation::{Excitation, Oscillation};
 pub use outcome::{Fit, FitPoint, Identification, Identified};
 pub use posterior::{Draw, Estimate, Interval, Posterior};
+pub use reading::Reading;
 pub use relay::find_oscillation;
-pub use relay::reading::Reading;
 pub use remark::Remark;
 pub use settings::{MOST_CYCLES, Method, Options};
 pub use signals::Signals;
 pub use verdict::Verdict;
 
-/// Identifies the process behind a recording, with the built-in pack.
+/// Identifies the process from a recording, with the built-in pack.
+///
+/// The recording must hold a relay test. The method:
+///
+/// 1. Find the relay in the input, and the runs of steady cycles.
+/// 2. Average the last cycles of the longest run into bins.
+/// 3. Read the last cycle with the network of the pack: start of the fit, prior, known or unknown process.
+/// 4. Fit the process by variable projection.
+/// 5. Refuse the fit if the output is clipped, or if residual or model error are too large. Then repeat from step 2
+///    with fewer cycles, or with the last run.
+/// 6. Draw from the posterior; choose the controller of least expected cost.
 #[must_use]
 pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
     identify_by(signals, options, Pack::embedded().ok().as_ref())
 }
 
-/// Identifies the process behind a recording, with a pack of one's own or without one.
+/// As [`identify`], with another pack or without one.
 ///
-/// Without a pack [`Method::Map`] fits without a prior, and [`Method::Classify`] refuses.
+/// Without a pack [`Method::Map`] fits without a prior, and [`Method::Classify`] returns [`Verdict::Unknown`].
 #[must_use]
 pub fn identify_by(
     signals: &Signals<'_>,

@@ -1,28 +1,28 @@
-//! Result of an identification: values only. Sentences and advice are made by the program that shows them.
+//! Result of an identification.
 
 use onecycle_design::{Design, Model, StepMetrics};
 use onecycle_onboard::refine::Refined;
 
 use crate::excitation::{Excitation, Oscillation};
 use crate::posterior::{Estimate, Interval, Posterior};
-use crate::relay::reading::Reading;
+use crate::reading::Reading;
 use crate::remark::Remark;
 use crate::verdict::Verdict;
 
-/// Everything that a recording says.
+/// Result of an identification.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Identification {
-    /// What excited the process; `None` where nothing usable was found.
+    /// Excitation of the process. `None` if the recording has no usable excitation.
     pub excitation: Option<Excitation>,
-    /// The process, or why there is none.
+    /// Process and controller, or the reason why no process was identified.
     pub outcome: Result<Identified, Verdict>,
-    /// What limits the result, or deserves attention.
+    /// What limits the result or deserves attention.
     pub remarks: Vec<Remark>,
 }
 
 impl Identification {
-    /// The relay oscillation, where there is one.
+    /// Relay oscillation. `None` if the recording has none.
     #[must_use]
     pub fn oscillation(&self) -> Option<&Oscillation> {
         self.excitation.as_ref().map(|excitation| {
@@ -31,7 +31,8 @@ impl Identification {
         })
     }
 
-    /// The network's estimate from the last cycle; `None` without an oscillation, a pack or an answer.
+    /// Estimate from the last cycle by the network of the pack. `None` without an oscillation, without a pack, or if
+    /// the pack returns no estimate.
     #[must_use]
     pub fn last_cycle(&self) -> Option<&Reading> {
         self.excitation.as_ref().and_then(|excitation| {
@@ -41,48 +42,49 @@ impl Identification {
     }
 }
 
-/// An identified process and the controller designed for it.
+/// Identified process and its controller.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Identified {
-    /// The most probable model.
+    /// Most probable model.
     pub model: Model,
-    /// Its parameters and the input bias, each with a 90 % interval.
+    /// Parameters of the model and the input bias, each with a 90 % interval.
     pub estimate: Estimate,
-    /// Draws from the distribution of the model.
+    /// Probability distribution of the model.
     pub posterior: Posterior,
-    /// Probability that all parameters of the model are within their intervals at once; `None` where there are no
+    /// Probability that all parameters of the model lie within their intervals at once. `None` if there are no
     /// intervals.
     pub joint_probability: Option<f64>,
-    /// The controller of least expected cost, with its cost and margins on [`Identified::model`].
+    /// Controller of least expected cost over the posterior, with its cost and margins on [`Identified::model`].
     pub design: Design,
-    /// Its phase margin (rad), with the 90 % interval over the posterior.
+    /// Phase margin of the controller (rad), with its 90 % interval over the posterior.
     pub phase_margin_rad: Interval,
-    /// Predicted response to a unit step of the reference; `None` where it is too slow to simulate.
+    /// Predicted response to a unit step of the reference. `None` if it is too slow to simulate.
     pub step: Option<StepMetrics>,
-    /// How well the model fits.
+    /// Quality of the fit.
     pub fit: Fit,
 }
 
-/// How well the model fits the recording.
+/// Quality of the fit of the model to the recording.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Fit {
-    /// Root mean square of the residual beyond the noise, over that of the oscillation.
+    /// Root mean square of the residual in excess of the noise, divided by that of the oscillation.
     pub misfit: f64,
-    /// The estimator's result: covariance, residual, noise, error of the model.
+    /// Result of the estimator: covariance, residual, noise, model error.
     pub refined: Refined,
     /// Measured and fitted output over the cycles used.
     pub points: Vec<FitPoint>,
 }
 
-/// One point of the fit: a bin of the window.
+/// Measured and fitted output in one bin: the mean over a few consecutive samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FitPoint {
-    /// Mean time of its samples (s).
+    /// Mean time of the samples (s).
     pub time_s: f64,
-    /// Mean of its samples (output unit).
+    /// Mean of the samples (output unit).
     pub measured: f64,
-    /// Mean of the model's output over the same instants (output unit).
+    /// Mean of the output of the model at the times of the samples (output unit).
     pub fitted: f64,
 }

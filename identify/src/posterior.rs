@@ -1,8 +1,8 @@
-//! Intervals of the physical parameters from the estimator's covariance.
+//! Posterior distribution of the physical parameters, and 90 % intervals, from the covariance of the estimator.
 //!
-//! The estimator's coordinates are those in which its error is Gaussian; the parameters are not
-//! linear in them, least of all near equal lags and near no damping. So the Gaussian is drawn
-//! from, every draw mapped, and quantiles taken: nothing is linearised, and a time constant whose
+//! The error of the estimator is Gaussian in its own coordinates (`onecycle_onboard::refine::coordinate`). The physical
+//! parameters are nonlinear in these, most of all near equal lags and near zero damping. So draws from the Gaussian are
+//! mapped to parameters, and the intervals are quantiles of the draws. Nothing is linearised. A time constant whose
 //! inverse may be zero is unbounded above.
 
 use onecycle_design::bands::quantiles;
@@ -15,28 +15,29 @@ use rand_pcg::Pcg64Mcg;
 
 use crate::cholesky::cholesky;
 
-/// Draws: the 5 % quantile of so many is known to 0.35 of a per cent point.
+/// Number of draws. The standard error of the probability below the 5 % quantile is `sqrt(0.05 * 0.95 / 4000)`, 0.35 of
+/// a percentage point.
 const DRAWS: usize = 4000;
-/// Any seed would do; a fixed one gives the same bits for the same recording.
+/// Seed of the draws: arbitrary, fixed so that the same recording gives the same bits.
 const SEED: u64 = 0x1c7c_1e00;
 
-/// Standard deviation of an instrument's scale and clock: better ones are rare, and a perfect fit
-/// promises no more.
+/// Relative standard deviation of the scale and of the clock of the instruments. Better ones are rare, so no fit makes
+/// the intervals narrower than this.
 const INSTRUMENT: f64 = 1e-3;
 
-/// An estimate and the interval that holds the truth with a probability of 90 %; `None` stands
-/// for unbounded.
+/// Estimate with its 90 % interval. `None` stands for infinite or unbounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
-    /// Best value; `None` where it is infinite.
+    /// Most probable value. `None` if it is infinite.
     pub estimate: Option<f64>,
-    /// Lower end.
+    /// Lower end. `None` if the interval is unbounded below.
     pub low: Option<f64>,
-    /// Upper end.
+    /// Upper end. `None` if the interval is unbounded above.
     pub high: Option<f64>,
 }
 
 impl Interval {
+    /// Interval with these ends, widened to hold the estimate.
     fn new(estimate: f64, ends: Option<(f64, f64)>) -> Self {
         let finite = |value: f64| value.is_finite().then_some(value);
         let (low, high) = ends.map_or((None, None), |(low, high)| {
@@ -49,20 +50,21 @@ impl Interval {
         }
     }
 
-    /// Whether `value` lies inside; infinity does where the upper end is unbounded.
+    /// Whether `value` lies within the interval. Infinity does if the interval is unbounded above.
     #[must_use]
     pub fn holds(&self, value: f64) -> bool {
         self.low.is_none_or(|low| low <= value) && self.high.is_none_or(|high| value <= high)
     }
 
-    /// Width over twice the estimate: the relative half width; `None` where unbounded.
+    /// Half width of the interval as a fraction of the magnitude of the estimate. `None` if the interval is unbounded
+    /// or the estimate infinite.
     #[must_use]
     pub fn relative_half_width(&self) -> Option<f64> {
         Some((self.high? - self.low?) / (2.0 * self.estimate?.abs()))
     }
 }
 
-/// Parameters of a model and the input bias, each with its interval.
+/// Parameters of a model and the input bias, each with its 90 % interval.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     structure: Structure,
@@ -76,7 +78,7 @@ impl Estimate {
         self.structure
     }
 
-    /// Interval of a parameter; `None` where it is not reported.
+    /// Interval of a parameter. `None` if the structure does not report the parameter.
     #[must_use]
     pub fn get(&self, parameter: Parameter) -> Option<Interval> {
         (self.intervals.iter())
@@ -84,38 +86,40 @@ impl Estimate {
             .map(|(_, interval)| *interval)
     }
 
-    /// All parameters with their intervals: those of the structure in its order, then the input bias.
+    /// All parameters with their intervals: first those of the structure in the order of [`Structure::parameters`],
+    /// then the input bias.
     pub fn iter(&self) -> impl Iterator<Item = (Parameter, Interval)> + '_ {
         self.intervals.iter().copied()
     }
 }
 
-/// One draw from the posterior, in physical parameters.
+/// Draw from the posterior, in physical parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw {
-    /// Velocity gain `K`: output unit / (input unit s), infinite without damping.
+    /// Velocity gain `K` (output unit / (input unit s)). Infinite without damping.
     k: f64,
-    /// Acceleration gain `K/T_body`: output unit / (input unit s^2).
+    /// Acceleration gain `K/T_body` (output unit / (input unit s^2)).
     k_over_t_body: f64,
-    /// Lag of the actuator (s).
+    /// Actuator lag (s).
     t_prop_s: f64,
-    /// Lag of the body (s), infinite without damping.
+    /// Body lag (s). Infinite without damping.
     t_body_s: f64,
     /// Dead time (s).
     tau_s: f64,
-    /// Constant that the process adds to the recorded input (input unit).
+    /// Constant disturbance at the process input (input unit).
     input_bias: f64,
-    /// Whether the coordinates drawn were those of a process. Others are brought to the nearest one.
+    /// Whether the drawn coordinates belong to a process. If not (complex poles, negative damping or negative dead
+    /// time), the parameters are those of the nearest process.
     is_process: bool,
 }
 
 impl Draw {
-    /// From the estimator's coordinates; `sign` is the gain's.
+    /// Draw at these coordinates of the estimator. `sign` is the sign of the gain.
     fn of(at: &[f64; 5], sign: f64) -> Self {
         let sum_per_s = at[coordinate::LN_POLE_SUM].exp();
         let ratio = at[coordinate::POLE_RATIO];
         let fast_per_s = 0.5 * sum_per_s * (1.0 + (1.0 - 4.0 * ratio).max(0.0).sqrt());
-        // No damping, or less than none: the body's lag is beyond all bounds.
+        // Zero or negative damping: the body lag is infinite.
         let slow_per_s = (ratio * sum_per_s * sum_per_s / fast_per_s).clamp(0.0, fast_per_s);
         let k_over_t_body = sign * at[coordinate::LN_JERK_GAIN].exp() / fast_per_s;
         Self {
@@ -129,11 +133,13 @@ impl Draw {
         }
     }
 
+    /// Phase margin (rad) that a controller leaves on this draw. `None` if the loop has no margins.
     fn phase_margin_rad(&self, controller: &Controller) -> Option<f64> {
         margins(&self.model()?, controller).map(|margins| margins.phase_margin_rad)
     }
 
-    /// Value of a parameter in its unit, which may be infinite; NaN where the model has no such parameter.
+    /// Value of a parameter in its [unit](Parameter::unit). `K` and `T_body` are infinite without damping. NaN if the
+    /// model does not have the parameter.
     #[must_use]
     pub fn value(&self, parameter: Parameter) -> f64 {
         match parameter {
@@ -148,7 +154,7 @@ impl Draw {
         }
     }
 
-    /// The model; `None` where the parameters are out of range.
+    /// Model with these parameters. `None` if they are out of range.
     #[must_use]
     pub fn model(&self) -> Option<Model> {
         let damping_per_s = 1.0 / self.t_body_s;
@@ -162,20 +168,20 @@ impl Draw {
     }
 }
 
-/// The most probable model, and draws from the distribution about it.
+/// Probability distribution of the process: the most probable model, and 4,000 draws.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
     best: Draw,
-    /// Empty where the estimator gives no covariance.
+    /// Empty if the estimator returned no covariance.
     draws: Vec<Draw>,
 }
 
 impl Posterior {
-    /// From the estimator's result on samples every `sample_s`.
+    /// Posterior of the result of the estimator, for samples every `sample_s` (s).
     ///
-    /// A recording does not say where within a sample its stamp stands: the delay is uncertain by
-    /// a uniform error of one sample period on top of the estimator's. Gain and poles are uncertain by
-    /// the scale and the clock of the instruments.
+    /// Two uncertainties are added to the covariance of the estimator. A recording does not tell where within the
+    /// sample period its time stamps lie, so the dead time has a uniform error of one sample period. Scale and clock of
+    /// the instruments make gain and poles uncertain by 0.1 %.
     #[must_use]
     pub fn new(refined: &Refined, sample_s: f64) -> Self {
         let process = &refined.process;
@@ -196,7 +202,7 @@ impl Posterior {
             cholesky(&covariance)
         });
         let mut rng = Pcg64Mcg::seed_from_u64(SEED);
-        // In pairs on either side of the centre: so few as a handful have their mean there.
+        // Draws in pairs on opposite sides of the centre, so that the mean of any even number of draws is the centre.
         let mut pair = |root: &[[f64; 5]; 5]| {
             let normal: [f64; 5] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
             [1.0, -1.0].map(|side| {
@@ -215,7 +221,7 @@ impl Posterior {
         }
     }
 
-    /// The parameters of the model and the input bias, with their 90 % intervals.
+    /// Parameters of the model and the input bias, with their 90 % intervals.
     #[must_use]
     pub fn estimate(&self) -> Estimate {
         let structure = Structure::Soiptd;
@@ -233,14 +239,14 @@ impl Posterior {
         }
     }
 
-    /// All draws, none where the estimator gives no covariance.
+    /// All draws. Empty if the estimator returned no covariance.
     #[must_use]
     pub fn draws(&self) -> &[Draw] {
         &self.draws
     }
 
-    /// The models of the first `most` draws that are processes. A draw beyond what a process can be has no weight here:
-    /// the nearest process would get too much.
+    /// Models of the first `most` draws whose coordinates belong to a process. The other draws are left out; replacing
+    /// them by the nearest process would give that process too much weight.
     #[must_use]
     pub fn models(&self, most: usize) -> Vec<Model> {
         self.draws
@@ -251,8 +257,8 @@ impl Posterior {
             .collect()
     }
 
-    /// Probability that all parameters of the model are within their intervals at once; `None` where the estimator gives
-    /// no covariance.
+    /// Probability that all parameters of the model lie within the intervals of `within` at once. `None` if the
+    /// estimator returned no covariance.
     #[must_use]
     pub fn joint_probability(&self, within: &Estimate) -> Option<f64> {
         let of_model: Vec<(Parameter, Interval)> = (within.iter())
@@ -268,7 +274,7 @@ impl Posterior {
         (!self.draws.is_empty()).then(|| count as f64 / self.draws.len() as f64)
     }
 
-    /// Parameters of [`Posterior::correlations`], in its order.
+    /// Parameters of [`Posterior::correlations`], in the order of its rows and columns.
     pub const CORRELATED: [Parameter; 5] = [
         Parameter::KOverTBody,
         Parameter::TProp,
@@ -277,7 +283,8 @@ impl Posterior {
         Parameter::InputBias,
     ];
 
-    /// Correlations of [`Posterior::CORRELATED`]; `None` where the estimator gives no covariance.
+    /// Correlation coefficients of the parameters [`Posterior::CORRELATED`], 5 x 5. `None` if the estimator returned no
+    /// covariance.
     #[must_use]
     pub fn correlations(&self) -> Option<[[f64; 5]; 5]> {
         let of = |draw: &Draw| Self::CORRELATED.map(|parameter| draw.value(parameter));
@@ -296,7 +303,7 @@ impl Posterior {
                 }
             }
         }
-        // A parameter without spread is correlated with itself alone.
+        // A parameter of zero variance has no correlation with the others.
         let entry = |i: usize, j: usize| {
             let size = (covariance[i][i] * covariance[j][j]).sqrt();
             if i == j {
@@ -311,7 +318,7 @@ impl Posterior {
         (!self.draws.is_empty()).then_some(rows)
     }
 
-    /// Phase margin (rad) that a controller leaves, with its 90 % interval.
+    /// Phase margin (rad) that a controller leaves on the most probable model, with its 90 % interval over the draws.
     #[must_use]
     pub fn phase_margin_rad(&self, controller: &Controller) -> Interval {
         let best = self.best.phase_margin_rad(controller);
@@ -321,7 +328,7 @@ impl Posterior {
         )
     }
 
-    /// Phase margins (rad) that a controller leaves on the draws.
+    /// Phase margins (rad) that a controller leaves on the draws. Draws without margins are left out.
     #[must_use]
     pub fn phase_margins_rad(&self, controller: &Controller) -> Vec<f64> {
         let margin = |draw: &Draw| draw.phase_margin_rad(controller);

@@ -2,18 +2,19 @@
 
 use onecycle_design::Specification;
 
-/// Largest number of cycles that a fit can use.
+/// Maximum number of cycles that a fit can use: the window of the estimator has room for the switches of 50 cycles.
 pub const MOST_CYCLES: usize = 50;
 
-/// Settings of an identification. `Default`: the last eight cycles, [`Method::Map`], a PD with 20 degrees of phase margin.
+/// Settings of an identification. `Default`: the last 8 cycles, [`Method::Map`], a PD with 20 degrees of phase margin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Options {
-    /// Number of steady cycles to fit, the last ones; at most [`MOST_CYCLES`].
+    /// Number of cycles to fit, counted from the end of the steady oscillation: 1 to [`MOST_CYCLES`]. More cycles
+    /// narrow the intervals; fewer follow a process that drifts.
     pub cycles: usize,
-    /// What the controller has to keep.
+    /// Requirements on the controller.
     pub specification: Specification,
-    /// How the process is found.
+    /// Method of estimation.
     pub method: Method,
 }
 
@@ -28,7 +29,7 @@ impl Default for Options {
 }
 
 impl Options {
-    /// Fits the last `cycles` steady cycles, 1 to [`MOST_CYCLES`]; values beyond are brought to the nearest of these.
+    /// Fits the last `cycles` steady cycles. Values outside 1 to [`MOST_CYCLES`] are set to the nearest limit.
     #[must_use]
     pub fn cycles(self, cycles: usize) -> Self {
         Self {
@@ -37,7 +38,8 @@ impl Options {
         }
     }
 
-    /// Asks for a controller with at least this phase margin (rad), between 0 and `pi/2`.
+    /// Requires this phase margin (rad) at least, between 0 and `pi/2`. A value outside this range leads to the verdict
+    /// [`NoController`](crate::Verdict::NoController).
     #[must_use]
     pub fn phase_margin_rad(self, phase_margin_rad: f64) -> Self {
         Self {
@@ -46,14 +48,14 @@ impl Options {
         }
     }
 
-    /// Finds the process by `method`.
+    /// Estimates the process by `method`.
     #[must_use]
     pub fn method(self, method: Method) -> Self {
         Self { method, ..self }
     }
 }
 
-/// How the process is found.
+/// Method of estimation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(
     feature = "serde",
@@ -62,12 +64,13 @@ impl Options {
 )]
 #[non_exhaustive]
 pub enum Method {
-    /// By the network of the pack alone, from the last cycle.
+    /// The estimate of the network of the pack, from the last cycle alone.
     Classify,
-    /// By least squares alone, without a pack.
+    /// Least squares without a pack.
     Refine,
-    /// The most probable process: least squares that starts where the network points to, with the prior of the pack's
-    /// family of processes.
+    /// Maximum a posteriori: least squares that starts at the estimate of the network, with the prior of the pack.
+    /// Without a pack, or if no process of the pack's family explains the last cycle, it is the same as
+    /// [`Method::Refine`].
     #[default]
     Map,
 }

@@ -1,37 +1,39 @@
-//! Why no process was identified.
+//! Verdicts: why no process was identified.
 
 use std::fmt;
 
 use onecycle_design::DesignError;
 use onecycle_onboard::refine::DomainEdge;
 
-/// A refusal: the facts behind it. It displays as one clause that says what was seen; what to do about it is for the
-/// program that shows it.
+/// Reason why no process was identified.
+///
+/// `Display` writes one clause that says what is wrong, without a capital and without a full stop. Advice is left to
+/// the program that shows it. Programs compare [`Verdict::kind`].
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Verdict {
-    /// The input is the same throughout.
+    /// The input never changes.
     ConstantInput,
-    /// The output is the same throughout.
+    /// The output never changes.
     ConstantOutput,
-    /// Values so large or small that their squares overflow or vanish.
+    /// The largest magnitude of the input or the output is outside 1e-100 to 1e100: squares would overflow or vanish.
     Units,
     /// The input changes, but not between two levels.
     NoRelay {
-        /// Whether the output does: the columns are swapped.
+        /// Whether the output switches between two levels: the columns are probably swapped.
         output_is_relay: bool,
     },
-    /// The input changes its level a few times, then stays where it is.
+    /// The input changes its level a few times, then stays at one value.
     FewSwitches {
         /// Number of changes between levels that are held.
         switches: usize,
     },
-    /// Too few usable cycles: none, one in a recording with gaps, or two or three that are not all alike.
+    /// Too few usable cycles: none, a single one in a recording with gaps, or two or three that are not alike.
     TooShort {
         /// Number of complete cycles.
         cycles: usize,
     },
-    /// The cycles differ too much from each other.
+    /// The oscillation is not steady: the cycles differ too much from each other.
     NotSteady {
         /// Number of complete cycles.
         cycles: usize,
@@ -40,38 +42,38 @@ pub enum Verdict {
         /// Length that such a run must have.
         needed: usize,
     },
-    /// Too few samples in the cycles.
+    /// The cycles have too few samples.
     TooCoarse {
-        /// Number of samples.
+        /// Number of samples in the cycles.
         points: usize,
     },
     /// The output is clipped.
     Saturated {
-        /// Share of the time that it spends at its limit.
+        /// Share of the time that the output spends at its limit.
         part: f64,
     },
-    /// The fit leaves too much unexplained.
+    /// The best fit leaves too much of the oscillation unexplained.
     NotThisProcess {
-        /// Root mean square of the residual beyond the noise, over that of the oscillation.
+        /// Root mean square of the residual in excess of the noise, divided by that of the oscillation.
         misfit: f64,
     },
     /// No process of the pack's family explains the last cycle.
     Unknown {
-        /// Misfit score of the best one, with limit 1; `None` where the pack has no answer.
+        /// Misfit score, whose limit is 1. `None` without a pack, or if the pack returns no estimate.
         score: Option<f64>,
     },
-    /// The intervals hold processes on which the controller is unstable.
+    /// The controller is unstable on some processes within the intervals.
     TooUncertain,
-    /// The best fit lies on a limit of the estimator's domain.
+    /// The best fit lies on a limit of the search domain of the estimator.
     EdgeOfDomain(DomainEdge),
     /// The output does not follow the input.
     NoFit,
-    /// The process was found, but has no controller within the specification.
+    /// A process was identified, but no controller meets the specification.
     NoController(DesignError),
 }
 
 impl Verdict {
-    /// Fixed name for programs: `verdict.kind` in JSON.
+    /// Name for programs: `verdict.kind` in JSON. Related variants share a name.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {
@@ -97,7 +99,9 @@ impl fmt::Display for Verdict {
         match self {
             Self::ConstantInput => f.write_str("no relay in the input: it never changes"),
             Self::ConstantOutput => f.write_str("no response: the output never changes"),
-            Self::Units => f.write_str("the values are too large or too small to compute with"),
+            Self::Units => f.write_str(
+                "unusable units: the largest magnitude of the input or the output is outside 1e-100 to 1e100",
+            ),
             Self::NoRelay { .. } | Self::FewSwitches { .. } => self.write_input(f),
             Self::TooShort { .. }
             | Self::TooCoarse { .. }
@@ -113,8 +117,8 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The clauses, by what they are about.
 impl Verdict {
+    /// Clause of a verdict on the input.
     fn write_input(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::FewSwitches { switches } => {
@@ -133,18 +137,21 @@ impl Verdict {
         }
     }
 
+    /// Clause of a verdict on the oscillation.
     fn write_oscillation(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooShort { cycles: 0 } => f.write_str(
-                "too short: the relay has no complete cycle, from one switch to the next but one",
+                "too short: no complete cycle of the relay, from a rise to the next rise or from a fall to the next \
+                 fall",
             ),
             Self::TooShort { cycles: 1 } => {
-                f.write_str("too short: one complete cycle of the relay, and gaps in the recording")
+                f.write_str("too short: one complete cycle of the relay in a recording with gaps")
             }
             Self::TooShort { cycles } => write!(
                 f,
-                "too short: {cycles} complete cycles of the relay, which are not alike"
+                "too short: {cycles} complete cycles of the relay, which differ in period or amplitude"
             ),
+            // The least number is that of the estimator.
             Self::TooCoarse { points } => write!(
                 f,
                 "too short: the cycles hold {points} samples, and at least 16 are needed"
@@ -155,7 +162,7 @@ impl Verdict {
                 needed,
             } => write!(
                 f,
-                "no steady oscillation: of {cycles} cycles at most {alike} in a row are alike, and {needed} are needed"
+                "no steady oscillation: at most {alike} of {cycles} cycles in a row are alike, and {needed} are needed"
             ),
             Self::Saturated { part } => write!(
                 f,
@@ -166,6 +173,7 @@ impl Verdict {
         }
     }
 
+    /// Clause of a verdict on the fit or the controller.
     fn write_model(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::NotThisProcess { misfit } => write!(
@@ -179,10 +187,10 @@ impl Verdict {
                 "unknown: no process of the pack's family explains the last cycle (misfit score {score:.1}, limit 1)"
             ),
             Self::Unknown { score: None } => {
-                f.write_str("unknown: the pack cannot read the last cycle")
+                f.write_str("unknown: there is no estimate from the last cycle")
             }
             Self::TooUncertain => f.write_str(
-                "too uncertain: the intervals hold processes on which the controller is unstable",
+                "too uncertain: the controller is unstable on some processes within the intervals",
             ),
             Self::EdgeOfDomain(edge) => write!(
                 f,

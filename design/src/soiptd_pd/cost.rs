@@ -1,6 +1,6 @@
-//! Integral of the squared error of a unit step, in closed form.
+//! Integral of the squared error (ISE) of a unit step, in closed form.
 //!
-//! The controller differentiates the measurement only, `u = Kp (r - y) - Kd dy/dt`, so the error is
+//! The controller differentiates the measurement only, `u = Kp (r - y) - Kd dy/dt`. The error of a unit step is
 //!
 //! ```text
 //!               1 + Kd s G                               Kp G
@@ -10,10 +10,11 @@
 //! J = int_0^inf e^2 dt = 1/pi int_0^inf |E(jw)|^2 dw        (output unit^2 s, Parseval)
 //! ```
 //!
-//! With `L = D(s) e^(-tau s) / C(s)` the integrand splits into `X(s) + X(-s)`, where `X` is analytic
-//! right of the imaginary axis but for the zeros of `P(s) = C(s) C(-s) - D(s) D(-s)`, a cubic in
-//! `q = s^2` without any delay in it, and for a pole at zero. Closing the contour leaves a
-//! residue at zero and one at each root `q_k`, `s_k = sqrt(q_k)` (`kp`, `kd` times `K/T_body`):
+//! With `L = D(s) e^(-tau s) / C(s)` (symbols: [`open_loop`](crate::soiptd_pd::open_loop)) the integrand splits into
+//! `X(s) + X(-s)`. Right of the imaginary axis `X` is analytic except at the zeros of `P(s) = C(s) C(-s) - D(s) D(-s)`,
+//! a cubic in `q = s^2` that does not contain the dead time, and except for a pole at zero. Closing the contour gives a
+//! residue at zero and one at each root `q_k`, with `s_k = sqrt(q_k)` and the gains `kp`, `kd` multiplied by
+//! `K/T_body`:
 //!
 //! ```text
 //!      kd        kp^2      1 - L(s_k)
@@ -21,13 +22,13 @@
 //!      kp     k  2 s_k q_k dP/dq(q_k)   1 + L(s_k)
 //! ```
 //!
-//! The root `q_1 = -wc^2` is the gain crossover, where the fraction is `j cot(PM/2)`: the resonance
-//! of a small margin comes out exactly. The other two lie in the right half plane and their terms
-//! form a divided difference, so that nothing is singular where they meet.
+//! The root `q_1 = -wc^2` belongs to the gain crossover `wc`, where the last fraction is `j cot(PM/2)`. So the
+//! resonance at a small phase margin `PM` is exact. The other two roots lie in the right half plane. Their terms form a
+//! divided difference, which is regular where the two roots coincide.
 //!
-//! Reference for the contour: K. Walton, H. Gorecki, "On the evaluation of cost functionals, with
-//! particular emphasis on time-delay systems", IMA J. Math. Control Inf. 1 (1984). The cost is
-//! the paper's equation 9 (Ayyad, Chehadeh, Awad, Zweiri 2020), for infinite time and not averaged.
+//! References: the cost is the paper's equation 9 (Ayyad, Chehadeh, Awad, Zweiri 2020) over infinite time, not
+//! averaged. The contour is that of K. Walton, H. Gorecki, "On the evaluation of cost functionals, with particular
+//! emphasis on time-delay systems", IMA J. Math. Control Inf. 1 (1984).
 
 use std::f64::consts::PI;
 
@@ -36,21 +37,21 @@ use onecycle_onboard::{Pd, Soiptd};
 
 use crate::soiptd_pd::open_loop::OpenLoop;
 
-/// Two roots nearer to each other than this fraction of their mean are taken together by a contour
-/// integral: there their difference would lose 1/0.03, one and a half digits, and more.
+/// If half the distance of two roots is below this fraction of their mean, a contour integral replaces the divided
+/// difference, which would lose a factor of 1/0.03, 1.5 digits, or more.
 const CONFLUENT_FRACTION: f64 = 0.03;
 
-/// Radius of that contour as a fraction of the mean: ten times the roots' half distance, and away
-/// from the branch point at zero by as much as makes 0.3^24 = 3e-13 the error of 24 nodes.
+/// Radius of that contour as a fraction of the mean of the roots: ten times their half distance, and 0.3 of the
+/// distance to the branch point at zero, which makes the error of 24 nodes 0.3^24 = 3e-13.
 const CONTOUR_FRACTION: f64 = 0.3;
 
-/// Half of the 24 nodes; the other half are their conjugates.
+/// Half of the 24 nodes of the contour. The other half are the complex conjugates.
 const CONTOUR_NODE_PAIRS: u32 = 12;
 
 /// ISE of a unit step of the reference (output unit^2 s), exact to rounding.
 ///
-/// `None` where the closed loop is unstable, that is where its phase margin is not positive or
-/// `Kp` is zero or of the wrong sign: the integral does not exist. `Kd` may have either sign.
+/// `None` if the closed loop is unstable: its phase margin is not positive, or `Kp` is zero or has the wrong sign. `Kd`
+/// may have either sign.
 #[must_use]
 pub fn ise(process: &Soiptd, pd: Pd) -> Option<f64> {
     let open_loop = OpenLoop::new(process, pd)?;
@@ -58,7 +59,9 @@ pub fn ise(process: &Soiptd, pd: Pd) -> Option<f64> {
     ise_at_crossover(&open_loop, omega, open_loop.phase_above_minus_pi(omega))
 }
 
-/// ISE of a loop whose gain crossover `omega` and phase margin are known; `None` where unstable.
+/// ISE (output unit^2 s) of a loop whose gain crossover `omega` (rad/s) and phase margin (rad) are known. `None` if the
+/// loop is unstable.
+#[must_use]
 pub fn ise_at_crossover(open_loop: &OpenLoop, omega: f64, phase_margin_rad: f64) -> Option<f64> {
     let OpenLoop {
         kp,
@@ -72,9 +75,9 @@ pub fn ise_at_crossover(open_loop: &OpenLoop, omega: f64, phase_margin_rad: f64)
     }
     let crossover_sq = omega * omega;
     let lag_sq = lag_s * lag_s;
-    // -T_prop^2 (q_2 + q_3), by Vieta from the quadratic term of P and q_1.
+    // T_prop^2 (q_2 + q_3), by Vieta from the quadratic term of P and q_1.
     let pair_sum = 1.0 + lag_sq * (damping * damping + crossover_sq);
-    // -dP/dq at q_1 = T_prop^2 (q_1 - q_2)(q_1 - q_3): only positive terms.
+    // -dP/dq at q_1 = T_prop^2 (q_1 - q_2)(q_1 - q_3): a sum of positive terms, no cancellation.
     let slope =
         lag_sq * crossover_sq * crossover_sq + pair_sum * crossover_sq + kp * kp / crossover_sq;
     let resonance = kp * kp / (2.0 * omega * crossover_sq * slope * (0.5 * phase_margin_rad).tan());
@@ -90,8 +93,8 @@ pub fn ise_at_crossover(open_loop: &OpenLoop, omega: f64, phase_margin_rad: f64)
     cost.is_finite().then_some(cost)
 }
 
-/// `g(q) = -kp^2 / (2 T_prop^2 q^(3/2) (q - q_1)) (1 - L)/(1 + L)`: what the two roots besides the
-/// crossover contribute is its divided difference `g[q_2, q_3]`.
+/// Contribution of the roots `q_2` and `q_3`: the divided difference `g[q_2, q_3]` of
+/// `g(q) = -kp^2 / (2 T_prop^2 q^(3/2) (q - q_1)) (1 - L)/(1 + L)`.
 struct Rest<'a> {
     open_loop: &'a OpenLoop,
     /// `-q_1` (1/s^2).
@@ -116,7 +119,7 @@ impl Rest<'_> {
         }
     }
 
-    /// Cauchy's integral of `g(q) / ((q - q_2)(q - q_3))` round both, by the trapezoidal rule.
+    /// Cauchy integral of `g(q) / ((q - q_2)(q - q_3))` around both roots, by the trapezoidal rule.
     fn divided_difference_by_contour(&self, mean: f64, half_distance_sq: f64) -> f64 {
         let sum: f64 = (0..CONTOUR_NODE_PAIRS)
             .map(|k| {

@@ -1,12 +1,14 @@
-//! What a controller costs on a process, relative to that process's own optimum (the `J_ij` of the
-//! paper's equation 8; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//! Deterioration: cost of a controller on a process, relative to the optimum of that process.
 //!
 //! ```text
 //! deterioration = (J(process, controller) - J*) / J*,    J* = J(process, its optimum)
 //! ```
 //!
-//! `J*` is the least cost *at a phase margin*, so the figure can be negative: a controller that
-//! leaves less margin may follow a step faster. It means something only beside the margin.
+//! `J` is the ISE of a unit step (output unit^2 s). `J*` is the least cost *at a phase margin*, so the deterioration
+//! can be negative: a controller that leaves less margin may follow a step faster. Read it together with the phase
+//! margin.
+//!
+//! Reference: the `J_ij` of the paper's equation 8 (Ayyad, Chehadeh, Awad, Zweiri 2020).
 
 use onecycle_onboard::{Pd, Soiptd};
 
@@ -14,22 +16,22 @@ use crate::soiptd_pd::cost::ise;
 use crate::soiptd_pd::margins::margins;
 use crate::soiptd_pd::optimum::Optimum;
 
-/// How a controller made for one process fares on another.
+/// Performance of a controller on a process that it was not designed for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Deterioration {
     /// The loop is stable.
     Stable {
-        /// Cost above the optimum, as a fraction of it.
+        /// Cost minus the cost of the optimum, as a fraction of the cost of the optimum.
         relative: f64,
-        /// Phase margin that is left (rad).
+        /// Phase margin of the loop (rad).
         phase_margin_rad: f64,
     },
-    /// The loop is unstable: its cost does not exist.
+    /// The loop is unstable, so it has no finite cost.
     Unstable,
 }
 
 impl Deterioration {
-    /// Cost above the optimum, as a fraction of it; `None` where unstable.
+    /// Cost minus the cost of the optimum, as a fraction of the cost of the optimum. `None` if the loop is unstable.
     #[must_use]
     pub fn relative(&self) -> Option<f64> {
         match *self {
@@ -39,8 +41,8 @@ impl Deterioration {
     }
 }
 
-/// Deterioration of `process` under `controller`; `optimum` is that of the same process, at the
-/// margin or floor that the comparison is about.
+/// Deterioration of `controller` on `process`. `optimum` is the optimum of the same process, at the phase margin of the
+/// comparison.
 #[must_use]
 pub fn deterioration(controller: Pd, process: &Soiptd, optimum: &Optimum) -> Deterioration {
     match (ise(process, controller), margins(process, controller)) {
@@ -57,7 +59,7 @@ mod tests {
     use super::*;
     use crate::soiptd_pd::optimum::pd_at_phase_margin;
 
-    // Its own optimum deteriorates nothing; five times its gain passes the gain margin of 2.26.
+    // The deterioration of the optimum itself is zero. Five times its gains exceed the gain margin of 2.26: unstable.
     #[test]
     fn own_optimum_and_unstable_gain() {
         let process = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
@@ -81,8 +83,8 @@ mod tests {
         assert_eq!(Deterioration::Unstable.relative(), None);
     }
 
-    // The margin is bought with cost: the best PD at 15 deg is cheaper than the best at 20 deg, by
-    // 6.02 % on (0.3, 2, 0.1), and the margin beside the figure says why.
+    // T_prop, T_body, tau = 0.3, 2, 0.1 s: the optimum at 15 deg costs 6.02 % less than the optimum at 20 deg, because
+    // it leaves less phase margin.
     #[test]
     fn less_margin_may_cost_less() {
         let process = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();

@@ -1,22 +1,24 @@
-//! The PD of a simulated loop, as a function of its state.
+//! PD law of a simulated loop as a function of the state, in units of the simulation step.
 
 use crate::soiptd_pd::open_loop::OpenLoop;
 use crate::soiptd_pd::propagation::{Node, State};
 
-/// The controller in units of the step: `u` and `du/dt` from the state.
+/// PD in units of the simulation step and of the acceleration gain: `u` and `du/dt` from the state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Feedback {
     kp: f64,
     kd: f64,
+    /// `1/T_body` times the step.
     pub(crate) damping: f64,
 }
 
 impl Feedback {
-    /// With everything in units of the step already.
+    /// From values already in units of the step.
     pub(crate) fn new(kp: f64, kd: f64, damping: f64) -> Self {
         Self { kp, kd, damping }
     }
 
+    /// The PD of `open_loop` at a simulation step of `step_s`.
     pub(crate) fn of(open_loop: &OpenLoop, step_s: f64) -> Self {
         let OpenLoop {
             kp, kd, damping, ..
@@ -24,12 +26,12 @@ impl Feedback {
         Self::new(kp * step_s * step_s, kd * step_s, damping * step_s)
     }
 
-    /// Rate of change of the rate.
+    /// Second derivative of the output.
     pub(crate) fn acceleration(&self, state: &State) -> f64 {
         state[2] - self.damping * state[1]
     }
 
-    /// `u` with the reference at 1.
+    /// `u` for a reference of 1.
     pub(crate) fn node(&self, state: &State) -> Node {
         let response = self.response(state);
         Node {
@@ -38,7 +40,7 @@ impl Feedback {
         }
     }
 
-    /// `u` with the reference at 0: linear in the state.
+    /// `u` for a reference of 0: linear in the state.
     pub(crate) fn response(&self, state: &State) -> Node {
         Node {
             value: -self.kp * state[0] - self.kd * state[1],

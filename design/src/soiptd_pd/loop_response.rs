@@ -1,7 +1,7 @@
-//! The loop cut open, at one frequency: what a Bode or a Nyquist plot is drawn from.
+//! Open loop `L(jw) = (Kp + j w Kd) G(jw)` at a frequency, for Bode and Nyquist plots.
 //!
-//! `L(jw) = (Kp + j w Kd) G(jw)`, whose crossovers are those of [`margins`](crate::soiptd_pd::margins::margins()): the paper's
-//! equations 12 and 13 (Ayyad, Chehadeh, Awad, Zweiri 2020) are its phase where its magnitude is one.
+//! The phase of `L` where its magnitude is 1 is the constraint of the paper's equations 12 and 13 (Ayyad, Chehadeh,
+//! Awad, Zweiri 2020). The crossovers are those of [`margins`](crate::soiptd_pd::margins::margins()).
 
 use std::f64::consts::PI;
 
@@ -9,20 +9,20 @@ use onecycle_onboard::{Pd, Soiptd};
 
 use crate::soiptd_pd::open_loop::OpenLoop;
 
-/// Controller times process at one frequency. See the [module](self).
+/// Open loop at one frequency: controller times process.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LoopResponse {
-    /// Magnitude `|L(jw)|`; falls monotonically.
+    /// Magnitude `|L(jw)|` (1). It falls monotonically with the frequency.
     pub magnitude: f64,
-    /// Phase of `L(jw)` (rad), unwrapped: from `-pi/2` at the lowest frequencies (`-pi` without damping),
-    /// several turns down where the dead time is long.
+    /// Unwrapped phase of `L(jw)` (rad). It starts at `-pi/2` (`-pi` without damping); a long dead time takes it down
+    /// by several turns.
     pub phase_rad: f64,
 }
 
-/// The loop of `process` under `pd` at a positive frequency (rad/s).
+/// Open loop of `process` under `pd` at a frequency (rad/s).
 ///
-/// `None` where [`margins`](crate::soiptd_pd::margins::margins()) has none, the proportional gain being zero or of the wrong
-/// sign, and at a frequency that is not positive and finite.
+/// `None` if the frequency is not positive and finite, or if the proportional gain is zero or has the wrong sign (then
+/// [`margins`](crate::soiptd_pd::margins::margins()) returns `None` too).
 #[must_use]
 pub fn loop_response(process: &Soiptd, pd: Pd, omega_rad_per_s: f64) -> Option<LoopResponse> {
     let open_loop = OpenLoop::new(process, pd)?;
@@ -40,8 +40,8 @@ mod tests {
     use super::*;
     use crate::soiptd_pd::margins::margins;
 
-    /// The paper's hexacopter at its optimum, the slowest multirotor, a double integrator, a dead time of
-    /// many turns at high frequency; and a mirrored process under mirrored gains.
+    /// The paper's hexacopter at its optimum; the slowest multirotor; a double integrator; a dead time that turns the
+    /// phase by many turns; a process of negative gain under negative gains.
     fn loops() -> Vec<(Soiptd, Pd)> {
         let pd = |kp, kd| Pd { kp, kd };
         let double = Soiptd::from_acceleration_gain(3.0, 0.05, 0.0, 0.02).unwrap();
@@ -55,9 +55,8 @@ mod tests {
         ]
     }
 
-    // exp(-j w tau) (Kp + j w Kd) A / (j w (j w T_prop + 1)(j w + 1/T_body)), multiplied out: 1e-12 of the
-    // magnitude, and of the phase a whole number of turns and 1e-12 rad (a few ulp of the 60 rad or so of the
-    // longest dead time are 3e-14).
+    // Equals the complex product exp(-j w tau) (Kp + j w Kd) A / (j w (j w T_prop + 1)(j w + 1/T_body)) to a relative
+    // 1e-12. The largest phase is about 60 rad, where a few ulp are 3e-14.
     #[test]
     fn it_is_the_product_of_complex_numbers() {
         for (process, pd) in loops() {
@@ -74,8 +73,8 @@ mod tests {
         }
     }
 
-    // Unwrapped: it starts at -pi/2 (-pi without damping) and moves by less than a quarter turn between
-    // neighbours a thousandth apart, down to more than three turns at 12 rad/s and a dead time of 5 s.
+    // The unwrapped phase starts at -pi/2 (-pi without damping) and changes by less than pi/4 between frequencies 0.1 %
+    // apart. With a dead time of 5 s it falls below -6 pi at 12 rad/s.
     #[test]
     fn the_phase_has_no_jumps() {
         for (process, pd) in loops() {
@@ -98,8 +97,8 @@ mod tests {
         }
     }
 
-    // By what margins mean: |L| = 1 and the phase -pi + PM at the gain crossover, the phase -pi and
-    // |L| = 1/GM at the phase crossover; to 1e-12, the roots being exact to an ulp or two.
+    // Definition of the margins: |L| = 1 and phase -pi + PM at the gain crossover; phase -pi and |L| = 1/GM at the
+    // phase crossover. To 1e-12, since the roots are exact to one or two ulp.
     #[test]
     fn it_has_the_margins() {
         let mut phase_crossovers = 0;
@@ -115,7 +114,7 @@ mod tests {
                 phase_crossovers += 1;
             }
         }
-        // All five have a dead time, which takes every phase below -pi in the end.
+        // All five loops have dead time, so the phase of each falls below -pi at some frequency.
         assert_eq!(phase_crossovers, 5);
     }
 

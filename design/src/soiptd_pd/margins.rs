@@ -1,35 +1,35 @@
-//! Stability margins of a process under a PD.
+//! Stability margins of an integrator with two lags and dead time under a PD.
 //!
-//! The loop `L = (Kp + Kd s) G` has one gain crossover, where its magnitude falls through one, and
-//! at most one phase crossover, where its unwrapped phase falls through `-pi`. It is stable exactly
-//! when its phase margin is positive. Two things follow for this family of processes:
+//! The open loop `L = (Kp + Kd s) G` has one gain crossover, where its magnitude falls through 1, and at most one phase
+//! crossover, where its unwrapped phase falls through `-pi`. The loop is stable if and only if its phase margin is
+//! positive. Two consequences for this structure:
 //!
-//! - a stable loop stays stable when its gain is lowered, however far: there is no lower gain
-//!   margin to report, not even for double integrators;
-//! - an unstable loop without a phase crossover is unstable at every gain.
+//! - A stable loop stays stable at every lower gain. So there is no lower gain margin, not even for double integrators.
+//! - An unstable loop without a phase crossover is unstable at every gain.
 //!
-//! The phase margin is the constraint of the paper's equations 12 and 13 (Ayyad, Chehadeh, Awad,
-//! Zweiri 2020).
+//! Reference: the phase margin is the constraint of the paper's equations 12 and 13 (Ayyad, Chehadeh, Awad, Zweiri
+//! 2020).
 
 use onecycle_onboard::{Pd, Soiptd};
 
 use crate::soiptd_pd::open_loop::OpenLoop;
 
-/// How far a loop is from the limit of stability. See the [module](self).
+/// Stability margins of a loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Margins {
-    /// Phase that the loop can lose at the gain crossover (rad), below `pi`; not positive where it
-    /// is unstable. Unwrapped: several turns below zero are told apart.
+    /// Phase that the loop can lose at the gain crossover before it becomes unstable (rad), below `pi`. Zero or
+    /// negative for an unstable loop; unwrapped, so it can be several turns below zero.
     pub phase_margin_rad: f64,
-    /// Frequency where `|L| = 1` (rad/s).
+    /// Gain crossover: frequency at which `|L| = 1` (rad/s).
     pub gain_crossover_rad_per_s: f64,
-    /// Factor by which the gain can grow, `1/|L|` at the phase crossover; below one where the loop
-    /// is unstable. `None` without a phase crossover: no gain changes stability.
+    /// Factor by which the gain can grow before the loop becomes unstable: `1/|L|` at the phase crossover. Below 1 for
+    /// an unstable loop. `None` if there is no phase crossover: then the gain does not decide stability.
     pub gain_margin: Option<f64>,
-    /// Frequency where the unwrapped phase of `L` is `-pi` (rad/s); `None` where it never is.
+    /// Phase crossover: frequency at which the unwrapped phase of `L` is `-pi` (rad/s). `None` if there is none.
     pub phase_crossover_rad_per_s: Option<f64>,
-    /// Dead time that the loop can bear on top of its own (s); negative where it is unstable: the
-    /// dead time to be taken away.
+    /// Additional dead time that the loop tolerates before it becomes unstable (s). For an unstable loop it is
+    /// negative: the dead time that must be removed.
     pub delay_margin_s: f64,
 }
 
@@ -41,10 +41,10 @@ impl Margins {
     }
 }
 
-/// Margins of `process` under `pd`, stable or not.
+/// Stability margins of `process` under `pd`. An unstable loop has margins too.
 ///
-/// `None` where the proportional gain is zero or of the wrong sign (its product with the gain of
-/// the process is not positive): the loop is unstable and need not cross `|L| = 1` at all.
+/// `None` if the proportional gain is zero or has the wrong sign (its product with the gain of the process is not
+/// positive). Such a loop is unstable, and its magnitude may never cross 1.
 #[must_use]
 pub fn margins(process: &Soiptd, pd: Pd) -> Option<Margins> {
     let open_loop = OpenLoop::new(process, pd)?;
@@ -71,8 +71,8 @@ mod tests {
         (a - b).abs() <= tolerance * b.abs()
     }
 
-    // Kp = 1, Kd = 0, K = 2, T_prop = T_body = 1: 4/w^2 = (1 + w^2)^2 gives w = 1 and a margin of
-    // pi/2 - 2 atan 1 = 0. The phase crossover is there too, with |L| = 2/(1 (1+1)) = 1.
+    // Kp = 1, Kd = 0, K = 2, T_prop = T_body = 1 s: 4/w^2 = (1 + w^2)^2 gives a gain crossover of 1 rad/s and a phase
+    // margin of pi/2 - 2 atan 1 = 0. The phase crossover is 1 rad/s too, with |L| = 2/(1 (1+1)) = 1.
     #[test]
     fn limit_of_stability_by_hand() {
         let process = Soiptd::new(2.0, 1.0, 1.0, 0.0).unwrap();
@@ -83,9 +83,9 @@ mod tests {
         assert!(close(m.gain_margin.unwrap(), 1.0, 1e-15));
     }
 
-    // Double integrator, A = 1, Kp = 1, Kd = 2, T_prop = 1/2, no delay. The phase above -pi is
-    // atan(2 w) - atan(w/2) > 0 at every w: no phase crossover and no gain limit. With T_prop = 4
-    // it is negative at every w: unstable at every gain.
+    // Double integrator, A = 1, Kp = 1, Kd = 2, T_prop = 1/2, no dead time. The phase above -pi is atan(2 w) -
+    // atan(w/2) > 0 at every w: no phase crossover, stable at every gain. With T_prop = 4 the phase above -pi is
+    // negative at every w: unstable at every gain.
     #[test]
     fn double_integrators_without_delay_have_no_gain_limit() {
         for (t_prop, stable) in [(0.5, true), (4.0, false)] {
@@ -96,8 +96,8 @@ mod tests {
         }
     }
 
-    // Damping far above the crossover leaves K e^(-tau s)/s: at Kp K = 1/s the crossover is 1 rad/s,
-    // the margin pi/2 - tau, the phase crossover pi/(2 tau), the gain margin the same number.
+    // With lags of 1e-12 s the process is K e^(-tau s)/s. At K Kp = 1/s the gain crossover is 1 rad/s, the phase margin
+    // pi/2 - tau, the phase crossover pi/(2 tau) rad/s, the gain margin pi/(2 tau).
     #[test]
     fn integrator_with_delay_by_hand() {
         let process = Soiptd::new(1.0, 1e-12, 1e-12, 0.25).unwrap();

@@ -1,4 +1,4 @@
-//! The loop cut open: controller times process, all that stability and cost depend on.
+//! Open loop of an integrator with two lags and dead time under a PD: gain and phase crossover.
 //!
 //! ```text
 //!                             D(s) e^(-tau s)
@@ -6,7 +6,7 @@
 //!                                  C(s)          D(s) = kp + kd s
 //! ```
 //!
-//! with the gains of the controller multiplied by the acceleration gain `A = K/T_body`:
+//! The controller gains are multiplied by the acceleration gain `A = K/T_body`:
 //!
 //! | symbol | name        | unit  |
 //! |--------|-------------|-------|
@@ -16,18 +16,18 @@
 //! | T_prop | `lag_s`     | s     |
 //! | tau    | `tau_s`     | s     |
 //!
-//! With `kp > 0` the magnitude falls monotonically, from infinity to zero, so there is exactly one
-//! gain crossover, and the loop is stable exactly when its unwrapped phase there is above `-pi`.
+//! For `kp > 0` the magnitude falls monotonically from infinity to zero. So there is exactly one gain crossover, and
+//! the loop is stable if and only if its unwrapped phase at the gain crossover is above `-pi`.
 
 use num_complex::Complex64;
 use onecycle_onboard::{Pd, Soiptd};
 
 use crate::roots::falling_root;
 
-/// Steps that Newton's method is allowed; it takes about six.
+/// Maximum number of Newton steps. About six are needed.
 const MAX_NEWTON_STEPS: usize = 60;
 
-/// A loop with positive proportional gain. See the [module](self) for symbols and units.
+/// Open loop with a positive proportional gain. For symbols see the [module](self).
 #[derive(Clone, Copy, Debug)]
 pub struct OpenLoop {
     /// `A Kp` (1/s^2).
@@ -43,8 +43,11 @@ pub struct OpenLoop {
 }
 
 impl OpenLoop {
-    /// `None` where `Kp K` is not positive: that loop is unstable whatever the rest (its closed
-    /// loop has a real pole at or right of zero), and its crossover need not exist.
+    /// Open loop of `process` under `pd`.
+    ///
+    /// `None` if `K Kp` is not positive and finite or `K Kd` is not finite. A loop with `K Kp <= 0` is unstable (a real
+    /// closed-loop pole is zero or positive), and its gain crossover may not exist.
+    #[must_use]
     pub fn new(process: &Soiptd, pd: Pd) -> Option<Self> {
         let gain = process.k_over_t_body();
         let (kp, kd) = (gain * pd.kp, gain * pd.kd);
@@ -58,9 +61,10 @@ impl OpenLoop {
         })
     }
 
-    /// The loop whose gain crossover is `omega` and whose controller leads there by `lead_rad`.
+    /// Open loop of `process` whose gain crossover is `omega` (rad/s), where the controller adds the phase `lead_rad`.
+    #[must_use]
     pub fn crossing_at(process: &Soiptd, omega: f64, lead_rad: f64) -> Self {
-        // 1/|G| for A = 1, but for the integrator.
+        // 1/|G| for A = 1, without the integrator.
         let lags =
             (omega * process.t_prop_s()).hypot(1.0) * process.inv_t_body_per_s().hypot(omega);
         Self {
@@ -72,7 +76,8 @@ impl OpenLoop {
         }
     }
 
-    /// Gains of the controller that closes this loop around `process`.
+    /// Gains of the PD that has this open loop with `process`.
+    #[must_use]
     pub fn pd(&self, process: &Soiptd) -> Pd {
         let gain = process.k_over_t_body();
         Pd {
@@ -85,13 +90,15 @@ impl OpenLoop {
     ///
     /// `T_prop^2 x^3 + (1 + (T_prop/T_body)^2) x^2 - (kd^2 - 1/T_body^2) x - kp^2 = 0`.
     ///
-    /// Newton's method falls onto it monotonically from any bound above, for the cubic is convex.
+    /// The cubic is convex for positive `x`, so Newton's method converges monotonically from an upper bound of the
+    /// root.
+    #[must_use]
     pub fn gain_crossover(&self) -> f64 {
         let c3 = self.lag_s * self.lag_s;
         let c2 = 1.0 + (self.lag_s * self.damping).powi(2);
         let c1 = (self.kd - self.damping) * (self.kd + self.damping);
         let c0 = self.kp * self.kp;
-        // Two bounds: the root without the cubic term, and that without the quadratic one.
+        // Two upper bounds: the root without the cubic term and a bound without the quadratic term.
         let discriminant = (c1 * c1 + 4.0 * c2 * c0).sqrt();
         let without_cubic = if c1 > 0.0 {
             (discriminant + c1) / (2.0 * c2)
@@ -112,23 +119,26 @@ impl OpenLoop {
         x.sqrt()
     }
 
-    /// `pi` plus the unwrapped phase of `L(jw)` (rad): the phase margin where `w` is the crossover.
+    /// `pi` plus the unwrapped phase of `L(jw)` (rad) at `omega` (rad/s). At the gain crossover this is the phase
+    /// margin.
+    #[must_use]
     pub fn phase_above_minus_pi(&self, omega: f64) -> f64 {
         process_phase_above_minus_pi(self.damping, self.lag_s, self.tau_s, omega)
             + self.lead_rad(omega)
     }
 
     /// Phase that the controller adds at `omega` (rad), between `-pi/2` and `pi/2`.
+    #[must_use]
     pub fn lead_rad(&self, omega: f64) -> f64 {
         (self.kd * omega).atan2(self.kp)
     }
 
-    /// Frequency (rad/s) where the phase passes `-pi`, at most once and downwards; `None` where it
-    /// never does.
+    /// Phase crossover (rad/s): frequency at which the unwrapped phase falls through `-pi`. `None` if it never does.
     ///
-    /// Once only: with `h(w) = atan(w kd/kp) - atan(w T_prop) - w tau` the phase above `-pi` is
-    /// `atan(1/(w T_body)) + h(w)`. `h` rises from zero, if at all, and then falls for good, and
-    /// where it is positive so is the sum; from there on both terms fall.
+    /// There is at most one. With `h(w) = atan(w kd/kp) - atan(w T_prop) - w tau` the phase above `-pi` is `atan(1/(w
+    /// T_body)) + h(w)`. Starting from zero, `h` may first rise and then falls for good. Where `h` is positive the sum
+    /// is positive too; beyond that both terms fall, so the sum crosses zero at most once.
+    #[must_use]
     pub fn phase_crossover(&self) -> Option<f64> {
         if self.tau_s > 0.0 {
             falling_root(
@@ -136,33 +146,36 @@ impl OpenLoop {
                 self.gain_crossover(),
             )
         } else {
-            // Im L = 0, solved by hand.
+            // No dead time: Im L = 0 has this closed-form solution.
             let fall = self.kp * self.lag_s - self.kd * (1.0 + self.damping * self.lag_s);
             let omega = (self.kp * self.damping / fall).sqrt();
             (omega.is_finite() && omega > 0.0).then_some(omega)
         }
     }
 
-    /// Magnitude `|L(jw)|`.
+    /// Magnitude `|L(jw)|` at `omega` (rad/s).
+    #[must_use]
     pub fn magnitude(&self, omega: f64) -> f64 {
         self.kp.hypot(self.kd * omega)
             / (omega * (omega * self.lag_s).hypot(1.0) * self.damping.hypot(omega))
     }
 
-    /// Numerator `D(s) e^(-tau s)` and denominator `C(s)`.
+    /// Numerator `D(s) e^(-tau s)` and denominator `C(s)` of the open loop.
+    #[must_use]
     pub fn fraction(&self, s: Complex64) -> (Complex64, Complex64) {
         let delayed = (-s * self.tau_s).exp() * (s * self.kd + self.kp);
         (delayed, s * (s * self.lag_s + 1.0) * (s + self.damping))
     }
 }
 
-/// `pi` plus the unwrapped phase of the process alone (rad); falls monotonically with `omega`.
+/// `pi` plus the unwrapped phase of the process alone (rad). Falls monotonically with `omega`.
 fn process_phase_above_minus_pi(damping: f64, lag_s: f64, tau_s: f64, omega: f64) -> f64 {
     damping.atan2(omega) - (omega * lag_s).atan() - omega * tau_s
 }
 
-/// Lead that gives the loop of `process` the phase margin at the gain crossover `omega` (rad);
-/// rises monotonically with `omega`.
+/// Lead (rad) that the controller must add at the gain crossover `omega` (rad/s) for this phase margin. Rises
+/// monotonically with `omega`.
+#[must_use]
 pub fn lead_for_margin(process: &Soiptd, omega: f64, phase_margin_rad: f64) -> f64 {
     phase_margin_rad
         - process_phase_above_minus_pi(

@@ -1,8 +1,7 @@
-//! The PD that minimises the ISE of a process at a phase margin (the paper's equations 11 to 13;
-//! Ayyad, Chehadeh, Awad, Zweiri 2020).
+//! PD of least ISE at a phase margin.
 //!
-//! A gain crossover `w` and a phase margin fix the controller in closed form, so the search is over
-//! the crossover alone:
+//! A gain crossover `w` (rad/s) and a phase margin `PM` (rad) determine the PD in closed form, so the search is over
+//! the gain crossover alone:
 //!
 //! ```text
 //! lead(w) = PM - pi - arg G(jw)        rises with w; from 0 to pi/2 both gains are positive
@@ -10,11 +9,13 @@
 //! Kd = sin(lead) / (w |G(jw)|)
 //! ```
 //!
-//! The cost is scanned and its derivative then solved for zero: the cost itself is flat at its
-//! minimum and would give the gains to eight digits at best.
+//! The cost is scanned over the crossover; then the root of its derivative is solved for. The cost is flat at its
+//! minimum, so minimising the cost itself would give the gains to eight digits at best.
 //!
-//! The paper's constraint is an equality. A margin above it is cheaper only where the dead time
-//! dominates the lags; [`pd`] looks for it, [`pd_at_phase_margin`] does not.
+//! The paper's constraint is an equality. [`pd_at_phase_margin`] keeps it. [`pd`] also tries larger margins, which cost
+//! less only if the dead time dominates the lags.
+//!
+//! Reference: the paper's equations 11 to 13 (Ayyad, Chehadeh, Awad, Zweiri 2020).
 
 use std::f64::consts::FRAC_PI_2;
 
@@ -25,53 +26,56 @@ use crate::soiptd_pd::cost::ise_at_crossover;
 use crate::soiptd_pd::margins::{Margins, margins};
 use crate::soiptd_pd::open_loop::{OpenLoop, lead_for_margin};
 
-/// Points of the scan per unit of the search coordinate: the valley is about one unit wide.
+/// Points of the scan per unit of the search coordinate. The minimum of the cost is about one unit wide.
 const SCAN_POINTS_PER_UNIT: f64 = 3.0;
 
-/// Part of the highest crossover that the scan leaves out at either end; the cost there is some
-/// 1e4 times that of the valley.
+/// Fraction of the highest crossover that the scan leaves out at either end. The cost there is about 1e4 times the
+/// minimum.
 const LEFT_OUT: f64 = 1e-4;
 
-/// Step of the central differences, in natural logarithms: its sixth power is below rounding.
+/// Step of the central differences, in natural logarithms. Its sixth power, 4e-15, is the order of their relative
+/// error.
 const DIFFERENCE_STEP: f64 = 1.0 / 256.0;
 
-/// Of the search coordinate and of the margin (rad): what rounding leaves of the differences.
+/// Tolerance of the search coordinate and of the margin (rad): the rounding error of the differences.
 const TOLERANCE: f64 = 1e-12;
 
-/// No margin above this is cheaper than it (rad), 57 deg: the free optimum has the largest margin,
-/// 51 deg, where the dead time is everything.
+/// Upper bound of the phase margin of an unconstrained optimum (rad), 57 deg. The largest such margin, 51 deg, is that
+/// of a process that is nothing but dead time.
 const LARGEST_FREE_MARGIN_RAD: f64 = 1.0;
 
-/// The best PD of a process, what it costs and what it leaves.
+/// Optimal PD of a process, with its cost and margins.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Optimum {
-    /// Gains, of the sign of the process's gain.
+    /// Gains. They have the sign of the gain of the process.
     pub pd: Pd,
     /// Integral of the squared error of a unit step (output unit^2 s).
     pub ise: f64,
-    /// Lead of the controller at the gain crossover (rad), 0 to `pi/2`.
+    /// Phase that the controller adds at the gain crossover (rad), 0 to `pi/2`.
     pub lead_rad: f64,
-    /// Margins of the loop.
+    /// Stability margins of the loop.
     pub margins: Margins,
 }
 
-/// Why a process has no optimal PD.
+/// Why no optimal PD was found.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum OptimumError {
-    /// The phase margin asked for is outside the open interval from zero to `pi/2`. Inside it every
-    /// process has a PD; from `pi/2` a double integrator has none.
+    /// The specified phase margin (rad) is not between 0 and `pi/2`. Every process has a PD for a margin between these;
+    /// a double integrator has none for a margin of `pi/2` or more.
     #[error("the phase margin must lie between 0 and pi/2 rad, but is {0} rad")]
     PhaseMargin(f64),
-    /// The gain or the times are so extreme that gains or cost overflow.
+    /// The gain or the time constants of the process are so large or small that the gains or the cost overflow.
     #[error("the process is too extreme for its optimal gains to be representable")]
     Overflow,
 }
 
-/// ISE-optimal PD among those with exactly this phase margin.
+/// PD of least ISE among those with exactly this phase margin.
 ///
 /// # Errors
-/// [`OptimumError::PhaseMargin`] outside `(0, pi/2)`; [`OptimumError::Overflow`] for processes near
-/// the limits of `f64`.
+/// - [`OptimumError::PhaseMargin`]: the phase margin is not between 0 and `pi/2`.
+/// - [`OptimumError::Overflow`]: the parameters of the process are near the limits of `f64`.
 pub fn pd_at_phase_margin(
     process: &Soiptd,
     phase_margin_rad: f64,
@@ -79,10 +83,10 @@ pub fn pd_at_phase_margin(
     at_margin(process, phase_margin_rad)?.optimum(process)
 }
 
-/// ISE-optimal PD among those with at least this phase margin.
+/// PD of least ISE among those with at least this phase margin.
 ///
 /// # Errors
-/// Those of [`pd_at_phase_margin`].
+/// The errors of [`pd_at_phase_margin`].
 pub fn pd(process: &Soiptd, phase_margin_floor_rad: f64) -> Result<Optimum, OptimumError> {
     let at_floor = at_margin(process, phase_margin_floor_rad)?;
     if at_floor.slope_along_margin(process) >= 0.0
@@ -102,38 +106,39 @@ pub fn pd(process: &Soiptd, phase_margin_floor_rad: f64) -> Result<Optimum, Opti
     at_margin(process, free)?.optimum(process)
 }
 
-/// A gain crossover and a phase margin: the coordinates of a PD in which the search runs.
+/// PD given by its gain crossover and phase margin, the coordinates of the search.
 #[derive(Clone, Copy, Debug)]
-struct Design {
+struct SearchPoint {
     crossover_rad_per_s: f64,
     phase_margin_rad: f64,
 }
 
-/// The best crossover at a margin.
-fn at_margin(process: &Soiptd, phase_margin_rad: f64) -> Result<Design, OptimumError> {
+/// Point of least cost at a phase margin.
+fn at_margin(process: &Soiptd, phase_margin_rad: f64) -> Result<SearchPoint, OptimumError> {
     if !(phase_margin_rad > 0.0 && phase_margin_rad < FRAC_PI_2) {
         return Err(OptimumError::PhaseMargin(phase_margin_rad));
     }
     let highest = highest_crossover(process, phase_margin_rad).ok_or(OptimumError::Overflow)?;
-    // The search coordinate z = ln(highest/w - 1) resolves both ends, however near the optimum.
-    let design = |z: f64| Design {
+    // The search coordinate z = ln(highest/w - 1) resolves optima near either end of the range of crossovers.
+    let point = |z: f64| SearchPoint {
         crossover_rad_per_s: highest / (1.0 + z.exp()),
         phase_margin_rad,
     };
-    let cost = |z| design(z).cost(process);
-    let point = |i: usize| LEFT_OUT.ln() + i as f64 / SCAN_POINTS_PER_UNIT;
+    let cost = |z| point(z).cost(process);
+    let node = |i: usize| LEFT_OUT.ln() + i as f64 / SCAN_POINTS_PER_UNIT;
 
     let cells = (-2.0 * LEFT_OUT.ln() * SCAN_POINTS_PER_UNIT).ceil() as usize;
     let (best, _) = (0..=cells)
-        .map_while(|i| cost(point(i)).map(|cost| (i, cost)))
+        .map_while(|i| cost(node(i)).map(|cost| (i, cost)))
         .min_by(|a, b| a.1.total_cmp(&b.1))
         .ok_or(OptimumError::Overflow)?;
     let slope = |z: f64| derivative(cost, z).unwrap_or(f64::INFINITY);
-    let (low, high) = (point(best.saturating_sub(1)), point(best + 1));
-    Ok(design(root(slope, low, high, TOLERANCE)))
+    let (low, high) = (node(best.saturating_sub(1)), node(best + 1));
+    Ok(point(root(slope, low, high, TOLERANCE)))
 }
 
-/// Gain crossover (rad/s) at which the margin takes a lead of `pi/2`, all of it derivative.
+/// Gain crossover (rad/s) at which the phase margin needs a lead of `pi/2`, that is `Kp` = 0. No PD with positive gains
+/// has a higher one at this margin.
 fn highest_crossover(process: &Soiptd, phase_margin_rad: f64) -> Option<f64> {
     let start = 1.0 / (process.t_prop_s() + process.tau_s());
     falling_root(
@@ -142,14 +147,14 @@ fn highest_crossover(process: &Soiptd, phase_margin_rad: f64) -> Option<f64> {
     )
 }
 
-impl Design {
+impl SearchPoint {
     fn open_loop(&self, process: &Soiptd) -> OpenLoop {
         let lead_rad = lead_for_margin(process, self.crossover_rad_per_s, self.phase_margin_rad);
         OpenLoop::crossing_at(process, self.crossover_rad_per_s, lead_rad)
     }
 
-    /// `None` unless both gains are positive: a lag by a negative `kd` is never the optimum (the
-    /// least lead of any optimum is 30 deg, again where the dead time is everything).
+    /// ISE (output unit^2 s). `None` if `kp` is not positive or `kd` is negative. A negative `kd` is never optimal: the
+    /// least lead of any optimum is 30 deg, for a process that is nothing but dead time.
     fn cost(&self, process: &Soiptd) -> Option<f64> {
         let open_loop = self.open_loop(process);
         if open_loop.kp <= 0.0 || open_loop.kd < 0.0 {
@@ -158,8 +163,8 @@ impl Design {
         ise_at_crossover(&open_loop, self.crossover_rad_per_s, self.phase_margin_rad)
     }
 
-    /// Derivative of the least cost with respect to the logarithm of the margin; at the best
-    /// crossover the cost is stationary in it, so that its change does not count.
+    /// Derivative of the least cost with respect to the logarithm of the phase margin. The cost is stationary in the
+    /// crossover at the best crossover, so the crossover is held fixed.
     fn slope_along_margin(&self, process: &Soiptd) -> f64 {
         let cost = |ln_margin: f64| {
             Self {
@@ -186,7 +191,7 @@ impl Design {
     }
 }
 
-/// Central difference over seven points; `None` where the function is not defined on all of them.
+/// Derivative by the sixth-order central difference. `None` if `f` is undefined at one of its six points.
 fn derivative(f: impl Fn(f64) -> Option<f64>, x: f64) -> Option<f64> {
     let difference = |n: f64| Some(f(x + n * DIFFERENCE_STEP)? - f(x - n * DIFFERENCE_STEP)?);
     let sum = 45.0 * difference(1.0)? - 9.0 * difference(2.0)? + difference(3.0)?;

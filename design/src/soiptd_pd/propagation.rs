@@ -1,31 +1,37 @@
-//! Exact propagation of the undelayed process under an input that is a cubic over the step.
+//! Exact time step of the process without its dead time, under an input that is a cubic polynomial over the step.
 //!
 //! ```text
 //! dy/dt = v,   dv/dt = f - v/T_body,   df/dt = (u - f)/T_prop          (K/T_body = 1)
 //! u(s) = u0 + u1 s + u2 s^2/2 + u3 s^3/6,   s from 0 to 1 over the step
 //! ```
 //!
-//! The cubic is a chain of integrators put before the process; the exponential of the seven-state
-//! chain gives the step. Stiffness (an actuator much faster than the step) costs nothing.
-//! The unit of time is the caller's; his step makes well-scaled numbers.
+//! | symbol | meaning | unit |
+//! |--------|---------|------|
+//! | `y` | output | output unit |
+//! | `v` | rate | output unit / time |
+//! | `f` | force, as an acceleration | output unit / time^2 |
+//! | `u` | input | output unit / time^2 |
+//!
+//! A chain of integrators in front of the process generates the cubic. The matrix exponential of this chain of seven
+//! states gives the step. A stiff process (actuator much faster than the step) needs no smaller step. The caller
+//! chooses the unit of time; with the simulation step as unit the numbers are well scaled.
 
-/// Output, rate, force: `[y, v, f]` in (output unit, the same / time, the same / time^2).
+/// State `[y, v, f]`. For symbols see the module.
 pub(crate) type State = [f64; 3];
 
-/// Order of the chain: the state, the input and its three derivatives.
+/// Number of states of the chain: `y`, `v`, `f`, the input and its three derivatives.
 const ORDER: usize = 7;
 
-/// Terms of the Taylor series: with a norm of 1/4 the rest is below 1e-18.
+/// Terms of the Taylor series. For a matrix of norm 1/4 the truncation error is below 1e-18.
 const TAYLOR_TERMS: u32 = 12;
 
 type Matrix = [[f64; ORDER]; ORDER];
 
-/// A cubic over a step whose duration is the unit of time: its value and three derivatives at the
-/// start.
+/// Cubic polynomial over a step: value and three derivatives at the start, with the step as unit of time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Cubic(pub(crate) [f64; 4]);
 
-/// Value of a function and its derivative times the step, at a node of the grid.
+/// Value and slope of a function at a node of the time grid. The slope is per step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Node {
     pub(crate) value: f64,
@@ -33,7 +39,7 @@ pub(crate) struct Node {
 }
 
 impl Cubic {
-    /// Hermite's cubic between two nodes.
+    /// Hermite cubic between two nodes.
     pub(crate) fn hermite(start: Node, end: Node) -> Self {
         let rise = end.value - start.value;
         Self([
@@ -44,7 +50,7 @@ impl Cubic {
         ])
     }
 
-    /// Its piece from the fraction `start` of the step, `length` long, which becomes the new unit.
+    /// Part of the cubic from the fraction `start` of the step on. Its `length` becomes the new unit of time.
     pub(crate) fn piece(self, start: f64, length: f64) -> Self {
         let Self([u0, u1, u2, u3]) = self;
         let s = start;
@@ -67,7 +73,7 @@ impl Cubic {
     }
 }
 
-/// `state(t + d) = from_state state(t) + from_input cubic`, for one duration.
+/// Linear map over a fixed duration `d`: `state(t + d) = from_state state(t) + from_input cubic`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Propagation {
     /// 3 x 3.
@@ -77,7 +83,7 @@ pub(crate) struct Propagation {
 }
 
 impl Propagation {
-    /// Over `duration`, with the poles `-damping` and `-actuator`, all in one unit of time.
+    /// Map over `duration` for the poles `-damping` and `-actuator`, all three in the same unit of time.
     pub(crate) fn over(damping: f64, actuator: f64, duration: f64) -> Self {
         let mut chain = [[0.0; ORDER]; ORDER];
         chain[0][1] = duration;
@@ -100,6 +106,7 @@ impl Propagation {
         step
     }
 
+    /// State at the end of the duration.
     #[inline]
     pub(crate) fn apply(&self, state: &State, input: Cubic) -> State {
         let mut next = [0.0; 3];
@@ -113,7 +120,7 @@ impl Propagation {
     }
 }
 
-/// Matrix exponential by Taylor's series, scaling and squaring.
+/// Matrix exponential by Taylor series with scaling and squaring.
 fn exponential(matrix: &Matrix) -> Matrix {
     let norm = matrix
         .iter()
@@ -169,8 +176,8 @@ mod tests {
 
     use super::*;
 
-    // A constant input must give the closed form of the on-board transition, damped or not, at
-    // equal lags and where the actuator is 1e4 times as fast as the step.
+    // Under a constant input the step equals the closed form of the on-board transition: with and without damping, with
+    // equal lags, and with an actuator 1e4 times as fast as the step.
     #[test]
     fn constant_input_matches_the_transition() {
         for (t_prop, damping) in [(0.3, 0.5), (0.3, 1.0 / 0.3), (0.05, 0.0), (1e-4, 2.0)] {
@@ -184,8 +191,8 @@ mod tests {
         }
     }
 
-    // u = s^3/6 into pure integrators (the actuator 1e-9 of the step, no damping): v = s^4/24 and
-    // y = s^5/120 at s = 1, up to the lag of 1e-9.
+    // u = s^3/6 into two integrators (actuator lag 1e-9 of the step, no damping): v = s^4/24 and y = s^5/120 at s = 1,
+    // up to the lag of 1e-9.
     #[test]
     fn cubic_input_is_integrated_exactly() {
         let step = Propagation::over(0.0, 1e9, 1.0);
@@ -195,7 +202,7 @@ mod tests {
         assert!((y - 1.0 / 120.0).abs() < 1e-8, "{y}");
     }
 
-    // 2 - s + 3 s^2 - s^3 through its nodes at 0 and 1: (2, -1) and (3, 2); at 0.3 it is 1.943.
+    // 2 - s + 3 s^2 - s^3 has the nodes (value, slope) = (2, -1) at 0 and (3, 2) at 1. At 0.3 it is 1.943.
     #[test]
     fn hermite_and_its_pieces_are_the_cubic() {
         let cubic = Cubic::hermite(

@@ -1,39 +1,39 @@
-//! Figures of a step response, read off between its nodes.
+//! Overshoot, rise time, settling time and peak input of a step response.
 //!
-//! The output, its rate and its acceleration are known at the nodes; between them it is Hermite's
-//! quintic, the input Hermite's cubic. Crossings are bisected, extrema are where the slope of the
-//! interpolant changes sign.
+//! Output, rate and acceleration are known at the nodes of the time grid. Between nodes the output is the Hermite
+//! quintic, the input the Hermite cubic. Level crossings and extrema are roots of the interpolant or of its slope.
 
 use crate::roots::root;
 use crate::soiptd_pd::feedback::Feedback;
 use crate::soiptd_pd::propagation::{Cubic, State};
 
-/// Error beyond which the response has not settled.
+/// Half width of the settling band, as a fraction of the step: the common 2 %.
 const SETTLING_BAND: f64 = 0.02;
 
-/// Outputs between which the rise is timed.
+/// Outputs at which the rise time starts and ends: the common 10 % and 90 %.
 const RISE: (f64, f64) = (0.1, 0.9);
 
-/// Of times, as a fraction of a step.
+/// Tolerance of times, as a fraction of a simulation step.
 const TOLERANCE: f64 = 1e-12;
 
-/// Figures of a unit-step response. Times count from the step of the reference, dead time included.
+/// Characteristics of a unit-step response. Times count from the step of the reference, so they include the dead time.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StepMetrics {
-    /// Highest output above the reference, as a fraction of it; zero where there is none.
+    /// Largest output above the reference, as a fraction of the step. Zero if the output never exceeds the reference.
     pub overshoot: f64,
-    /// When the output is highest (s); `None` where it approaches the reference from below.
+    /// Time of the largest output (s). `None` if the output never exceeds the reference.
     pub peak_time_s: Option<f64>,
-    /// From 10 % to 90 % of the reference (s).
+    /// Rise time from 10 % to 90 % of the step (s).
     pub rise_time_s: f64,
-    /// After this the output stays within 2 % of the reference (s).
+    /// Time after which the output stays within 2 % of the reference (s).
     pub settling_time_s: f64,
-    /// Largest magnitude of the controller's output (input unit).
+    /// Largest magnitude of the controller output (input unit).
     pub peak_input: f64,
 }
 
-/// Figures of the response whose nodes lie `step_s` apart from `start_s` on; `input_unit` is that
-/// of the feedback in input units, positive.
+/// Characteristics of a response whose nodes start at `start_s` and lie `step_s` apart. `input_unit` (positive)
+/// converts the output of `feedback` to input units.
 pub(crate) fn metrics(
     states: &[State],
     feedback: &Feedback,
@@ -65,7 +65,7 @@ pub(crate) fn metrics(
     }
 }
 
-/// Cell of the highest output, the fraction of it where that is, and the output there.
+/// Largest local maximum: index of its cell, position as a fraction of the cell, output. All zero if there is none.
 fn peak(cells: &[Quintic]) -> (usize, f64, f64) {
     cells
         .iter()
@@ -81,7 +81,7 @@ fn peak(cells: &[Quintic]) -> (usize, f64, f64) {
         )
 }
 
-/// Largest magnitude of the input, in the unit of the feedback.
+/// Largest magnitude of the output of `feedback`, in its unit.
 fn peak_input(states: &[State], feedback: &Feedback) -> f64 {
     let rest = feedback.node(&[0.0; 3]).value.abs();
     states.windows(2).fold(rest, |largest, ends| {
@@ -98,7 +98,7 @@ fn peak_input(states: &[State], feedback: &Feedback) -> f64 {
     })
 }
 
-/// The output between two nodes, in units of the step.
+/// Output between two nodes: Hermite quintic, in units of the simulation step.
 #[derive(Clone, Copy, Debug)]
 struct Quintic {
     start: f64,
@@ -139,8 +139,8 @@ impl Quintic {
 mod tests {
     use super::*;
 
-    // s^5 - s: -0.3 + 0.3^5 = -0.29757 at 0.3, slope 5 * 0.0081 - 1 = -0.9595. Without damping the
-    // acceleration is the force: states (y, y', y'') at 0 and 1.
+    // s^5 - s has the value 0.3^5 - 0.3 = -0.29757 and the slope 5 * 0.0081 - 1 = -0.9595 at 0.3. Without damping the
+    // acceleration equals the force, so the states are (y, y', y'') at 0 and 1.
     #[test]
     fn quintic_is_exact_for_a_quintic() {
         let undamped = Feedback::new(1.0, 1.0, 0.0);

@@ -1,17 +1,19 @@
 //! Response of the closed loop to a unit step of the reference, by the method of steps.
 //!
-//! In units of the step `h` and of the acceleration gain (see [`crate::soiptd_pd::cost`] for the loop):
+//! In units of the simulation step `h` and of the acceleration gain (for symbols see [`crate::soiptd_pd::open_loop`]):
 //!
 //! ```text
 //! dy/dt = v,  dv/dt = f - v/T_body,  df/dt = (u(t - tau) - f)/T_prop,  u = kp (1 - y) - kd v
 //! ```
 //!
-//! The state is zero up to `t = tau`, where the grid begins; `u` is `kp` until then and once
-//! differentiable from then on. Between nodes it is Hermite's cubic through `u` and `du/dt`, and
-//! the process follows that cubic exactly. So the only error is that of the cubic, of order `h^4`,
-//! and a fast actuator needs no small step for stability. A dead time longer than `h` is made a
-//! whole number of steps; a shorter one reaches into the step being taken, whose end is then
-//! solved for (a linear equation in `u` and `du/dt` there).
+//! The state is zero until `t = tau`, where the time grid begins. Until then `u` is `kp`; from then on `u` is once
+//! differentiable. Between nodes `u` is replaced by the Hermite cubic through `u` and `du/dt`, and the process follows
+//! this cubic exactly. So the only error is that of the cubic, of order `h^4`, and a fast actuator needs no small step
+//! for stability.
+//!
+//! If the dead time is longer than `h`, the step is reduced until the dead time is a whole number of steps. If it is
+//! shorter, the delayed input depends on the end of the step being taken; then `u` and `du/dt` at that end follow from
+//! a linear equation.
 //!
 //! Reference: A. Bellen, M. Zennaro, "Numerical Methods for Delay Differential Equations" (Oxford,
 //! 2003), sections 1.2 and 3.2.
@@ -25,49 +27,51 @@ use crate::soiptd_pd::open_loop::OpenLoop;
 use crate::soiptd_pd::propagation::{Cubic, Node, Propagation, State};
 use crate::soiptd_pd::step_metrics::{StepMetrics, metrics};
 
-/// Steps per radian of the gain crossover: the cubic's error is `(1/64)^4 / 384 = 2e-10`.
+/// Steps per radian of the gain crossover: the error of the cubic is `(1/64)^4 / 384 = 2e-10`.
 const STEPS_PER_RADIAN: f64 = 64.0;
 
-/// Steps per lag of the actuator, which smooths `u` after each dead time.
+/// Steps per actuator lag, the time scale on which `u` changes after each dead time.
 const STEPS_PER_LAG: f64 = 8.0;
 
-/// For an actuator this much faster than the crossover the steps get no smaller.
+/// Maximum number of steps per radian of the gain crossover, reached by a very fast actuator.
 const MOST_STEPS_PER_RADIAN: f64 = 2048.0;
 
-/// The simulation ends when the error has stayed below this for a period of the crossover and two
-/// dead times: what is left of the ISE is of the order of its square.
+/// The simulation ends when the error has stayed below this for one period of the gain crossover plus two dead times.
+/// The ISE that is cut off is of the order of its square, 1e-10.
 const RESIDUE: f64 = 1e-5;
 
-/// Bound on the work, some 0.1 s: enough for a phase margin of 0.1 deg.
+/// Maximum number of steps: about 0.1 s of computation, enough for a phase margin of 0.1 deg.
 const MAX_STEPS: usize = 1 << 20;
 
-/// One instant of the response.
+/// Sample of a step response.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Sample {
     /// Time since the step of the reference (s).
     pub t_s: f64,
-    /// Output (output unit); the reference is 1.
+    /// Process output (output unit). The reference is 1.
     pub y: f64,
-    /// Output of the controller, before the dead time (input unit).
+    /// Controller output, before the dead time (input unit).
     pub u: f64,
 }
 
-/// The response until it has settled for good.
+/// Response to a unit step of the reference, until it has settled.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct StepResponse {
-    /// At `t = 0`, then evenly spaced from the end of the first dead time on.
+    /// Samples: one at `t = 0`, then evenly spaced from the end of the dead time on.
     pub samples: Vec<Sample>,
-    /// Figures read off the response between samples.
+    /// Overshoot, rise time, settling time and peak input, interpolated between samples.
     pub metrics: StepMetrics,
-    /// Integral of the squared error (output unit^2 s): the independent check of
+    /// Integral of the squared error (output unit^2 s) by quadrature of the response: an independent check of
     /// [`ise`](crate::soiptd_pd::cost::ise()).
     pub ise: f64,
 }
 
 impl StepResponse {
-    /// Output and controller's output at a time (s), on the straight line between samples: `(1/64)^2 / 8`, 3e-5 of
-    /// the step, beside the curve at most. Before the step of the reference it is that at its beginning, after the
-    /// last sample that one.
+    /// Process output (output unit) and controller output (input unit) at a time (s), by linear interpolation. The
+    /// interpolation error is at most about `(1/64)^2 / 8` = 3e-5 of the step. Before the first sample the values are
+    /// those of the first sample, after the last sample those of the last.
     #[must_use]
     pub fn at(&self, t_s: f64) -> (f64, f64) {
         let next = self.samples.partition_point(|sample| sample.t_s <= t_s);
@@ -90,15 +94,15 @@ impl StepResponse {
     }
 }
 
-/// Why there is no settled response.
+/// Why there is no step response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
 pub enum StepResponseError {
     /// The closed loop is unstable: the response grows without bound.
     #[error("the closed loop is unstable")]
     Unstable,
-    /// The loop is stable, but takes over a million steps to settle: it is within some 0.1 deg or
-    /// 0.1 % of gain of the limit of stability, or has a mode a thousand times slower than its
-    /// crossover.
+    /// The loop is stable but needs more than 2^20 simulation steps to settle. It is within about 0.1 deg or 0.1 % of
+    /// gain of the stability limit, or has a mode a thousand times slower than its gain crossover.
     #[error("the closed loop takes too long to settle to be simulated")]
     TooSlow,
 }
@@ -106,7 +110,8 @@ pub enum StepResponseError {
 /// Response of the continuous loop to a unit step of the reference, from rest.
 ///
 /// # Errors
-/// Says why the response never settles. See [`StepResponseError`].
+/// - [`StepResponseError::Unstable`]: the response grows without bound.
+/// - [`StepResponseError::TooSlow`]: the response takes too long to settle.
 pub fn step_response(process: &Soiptd, pd: Pd) -> Result<StepResponse, StepResponseError> {
     let open_loop = OpenLoop::new(process, pd).ok_or(StepResponseError::Unstable)?;
     let crossover = open_loop.gain_crossover();
@@ -142,10 +147,12 @@ pub fn step_response(process: &Soiptd, pd: Pd) -> Result<StepResponse, StepRespo
     })
 }
 
-/// Step of the simulation and the dead time in whole steps; zero where it is shorter than one.
+/// Time grid of the simulation.
 #[derive(Clone, Copy, Debug)]
 struct Grid {
+    /// Simulation step (s).
     step_s: f64,
+    /// Dead time in whole steps. Zero if the dead time is shorter than a step.
     delay_steps: usize,
 }
 
@@ -169,7 +176,7 @@ impl Grid {
     }
 }
 
-/// States at the nodes, the first at `t = tau`.
+/// States at the nodes of the grid, the first at `t = tau`, until the loop has settled.
 fn simulate(
     open_loop: &OpenLoop,
     crossover: f64,
@@ -201,28 +208,32 @@ fn simulate(
     Ok(states)
 }
 
-/// One step, by the length of the dead time.
+/// Method of one simulation step.
 enum Stepper {
-    /// The dead time is this many whole steps: its input is all history.
+    /// The dead time is a whole number of steps, so the delayed input is known before the step.
     Whole {
         delay_steps: usize,
         step: Propagation,
     },
-    /// The dead time is this fraction of a step, less than one.
+    /// The dead time is shorter than a step.
     Part {
+        /// Dead time as a fraction of the step.
         fraction: f64,
+        /// First part of the step, whose delayed input belongs to the previous step and is known.
         tail: Propagation,
+        /// Second part of the step, whose delayed input belongs to this step.
         head: Box<Head>,
     },
 }
 
-/// The part of a step whose input is being made in that same step.
+/// Part of a step whose delayed input depends on the state at the end of the same step.
 struct Head {
     feedback: Feedback,
-    /// Length of the part, as a fraction of the step.
+    /// Length of the part as a fraction of the step.
     length: f64,
     propagation: Propagation,
-    /// Inverse of `1 - d(u, du/dt as they follow)/d(u, du/dt as assumed)` at the end.
+    /// Inverse of `I - M`, where `M` maps `(u, du/dt)` assumed at the end of the step to the values that the PD then
+    /// returns.
     closure: [[f64; 2]; 2],
 }
 
@@ -246,9 +257,9 @@ impl Stepper {
         }
     }
 
-    /// The state a step after `state`; `inputs` holds `u` up to that of `state`.
+    /// State one step after `state`. `inputs` holds `u` at all nodes up to that of `state`.
     fn step(&self, state: &State, inputs: &[Node]) -> State {
-        // Until the grid begins the input is its first value, without slope.
+        // Before the grid begins the input is constant.
         let newest = inputs.len() - 1;
         let cell = |steps_ago: usize| match newest.checked_sub(steps_ago) {
             Some(n) => Cubic::hermite(inputs[n], inputs[n + 1]),
@@ -292,13 +303,13 @@ impl Head {
         head
     }
 
-    /// State at the end if the input goes from `start` to `end` over the step.
+    /// State at the end of the step if the input goes from `start` to `end` over the step.
     fn end(&self, state: &State, start: Node, end: Node) -> State {
         self.propagation
             .apply(state, Cubic::hermite(start, end).piece(0.0, self.length))
     }
 
-    /// State at the end, where the input is what the controller makes of that state.
+    /// State at the end of the step, where the input is the output of the PD at that state.
     fn finish(&self, state: &State, start: Node) -> State {
         let assumed = Node {
             value: 0.0,
@@ -314,12 +325,12 @@ impl Head {
     }
 }
 
-/// Integral of the squared error: the dead time, then the trapezoidal rule with Euler and
-/// Maclaurin's corrections.
+/// Integral of the squared error (output unit^2 s): the dead time, during which the error is 1, plus the trapezoidal
+/// rule with the Euler-Maclaurin end corrections.
 ///
-/// In units of the step they are the differences over the whole range of `-g'/12 + g'''/720`, with
-/// `g = (1 - y)^2`. At the end only `g' = -2 (1 - y) v` is worth counting; at the start `g'` is zero
-/// and `g''' = -2 y'''`, where `y''' = df/dt = kp / T_prop`.
+/// In units of the step the corrections are the differences of `-g'/12 + g'''/720` between both ends, with
+/// `g = (1 - y)^2`. At the end only `g' = -2 (1 - y) v` is significant. At the start `g'` is zero and `g''' = -2 y'''`,
+/// where `y''' = df/dt = kp / T_prop`.
 fn squared_error(states: &[State], open_loop: &OpenLoop, step_s: f64) -> f64 {
     let square = |state: &State| (1.0 - state[0]).powi(2);
     let end = states.last().copied().unwrap_or_default();

@@ -1,53 +1,60 @@
-//! Regions of highest density of a scatter of draws: what contours are drawn from.
+//! Highest density regions of draws in two dimensions, for contour plots.
 //!
-//! The density is a sum of Gaussian kernels, one a draw, in the coordinates `z` in which the scatter is as
-//! wide as it is high and without correlation: with the root `L` of its covariance,
+//! The density is a sum of Gaussian kernels, one a draw, in whitened coordinates `z` (unit covariance):
 //!
 //! ```text
 //! z = L^-1 (p - mean),   f(p) = sum_i exp(-|z - z_i|^2 / (2 h^2)),   h = n^(-1/6)
 //! ```
 //!
-//! `h` is Scott's rule. A kernel as narrow as the scatter, along and across, does not smear a strong
-//! correlation into a blob.
+//! | symbol | meaning |
+//! |--------|---------|
+//! | `p` | point `(x, y)` |
+//! | `L` | Cholesky factor of the covariance of the draws |
+//! | `h` | bandwidth, by Scott's rule |
+//! | `n` | number of draws |
 //!
-//! The smallest region that holds a given probability is where the density is above a level. **The level is
-//! read off the draws**: above it lies that part of them, at densities that are read off the grid as a
-//! contour is. So a region holds what it says though kernels widen the scatter and cells are coarse: that
-//! of 50 % of 4,000 draws would hold 52.1 % of a Gaussian by the volume under the sum, and over 60 % of a narrow
-//! banana.
+//! Kernels in whitened coordinates have the shape of the scatter, so they do not smear strongly correlated draws.
 //!
-//! References: D. W. Scott, "Multivariate Density Estimation" (1992); R. J. Hyndman, "Computing and graphing
-//! highest density regions", The American Statistician 50 (1996), whose level by quantile this is.
+//! The smallest region that holds a given probability is where the density is above a level. **The level is a quantile
+//! of the densities at the draws**, interpolated from the grid as a contour is. So a region holds the stated
+//! probability although kernels widen the scatter and cells are coarse. With a level from the volume under the density,
+//! the 50 % region of 4,000 draws would hold 52.1 % of a Gaussian, and over 60 % of a narrow banana.
+//!
+//! References: D. W. Scott, "Multivariate Density Estimation" (1992); level by quantile: R. J. Hyndman, "Computing and
+//! graphing highest density regions", The American Statistician 50 (1996).
 
 use crate::cholesky::cholesky;
 
-/// A scatter on a grid. See the [module](self).
+/// Highest density regions of draws on a grid. For the method see the [module](self).
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Density {
-    /// Middles of the cells along the first axis, ascending (its unit).
+    /// Centres of the cells along the first axis, ascending (unit of the first coordinate).
     pub x: Vec<f64>,
-    /// Middles of the cells along the second axis, ascending (its unit).
+    /// Centres of the cells along the second axis, ascending (unit of the second coordinate).
     pub y: Vec<f64>,
-    /// One row a `y`, one value an `x`: probability content of the smallest region that holds the middle of
-    /// the cell, from 0 at the mode to 1 far out.
+    /// Probability of the smallest region that contains the centre of the cell: 0 at the mode to 1 far out. `y.len()`
+    /// rows of `x.len()` values.
     pub content: Vec<Vec<f64>>,
 }
 
-/// Part of the draws that may lie beyond either side of the grid, before it is widened.
+/// Share of the draws that the range of the grid leaves out on each side of each axis.
 const CUT: f64 = 0.0025;
-/// Part of the grid's range that is added on either side.
+/// Widening of the grid on each side, as a fraction of that range.
 const MARGIN: f64 = 0.2;
-/// Kernels end at so many bandwidths, with a hundredth of their height.
+/// Radius at which kernels are cut off, in bandwidths. A kernel has fallen to `exp(-4.5)`, 1 %, there.
 const KERNEL_END: f64 = 3.0;
-/// Deviation of `y` at a given `x`, in that of `y`, below which the draws lie on a line.
+/// Standard deviation of `y` at a given `x`, as a fraction of that of `y`, below which the draws lie on a line.
 const LEAST_SPREAD: f64 = 1e-6;
-/// The same in heights of a cell, where a scatter that is thinner is drawn so wide: no grid shows less.
+/// Least standard deviation of `y` at a given `x`, in cells. Narrower scatters are drawn this wide, since the grid
+/// cannot show less.
 const LEAST_CELLS: f64 = 1.0;
 
-/// Contents on `cells` times `cells` cells over the draws, but for the outermost.
+/// Highest density regions of `points`, draws `(x, y)`, on a grid of `cells` times `cells` cells. The grid leaves out
+/// the outermost draws.
 ///
-/// `None` where the draws are on a line or a point, not all finite, or where there are fewer than two
-/// cells. Time grows as draws times cells squared.
+/// `None` if the draws lie on a line or a point, if one is not finite, or if `cells` is below 2. The time grows with
+/// the number of draws times the square of `cells`.
 #[must_use]
 pub fn density(points: &[(f64, f64)], cells: usize) -> Option<Density> {
     if cells < 2 || points.is_empty() {
@@ -55,7 +62,7 @@ pub fn density(points: &[(f64, f64)], cells: usize) -> Option<Density> {
     }
     let x = Axis::over(points.iter().map(|point| point.0).collect(), cells)?;
     let y = Axis::over(points.iter().map(|point| point.1).collect(), cells)?;
-    // Those far out would widen the kernels of all others.
+    // Outliers would widen the kernels of all draws.
     let near: Vec<(f64, f64)> = (points.iter().copied())
         .filter(|point| x.cell_of(point.0).is_some() && y.cell_of(point.1).is_some())
         .collect();
@@ -77,18 +84,19 @@ pub fn density(points: &[(f64, f64)], cells: usize) -> Option<Density> {
     })
 }
 
-/// One side of the grid.
+/// Axis of the grid.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
-    /// Middle of the first cell.
+    /// Centre of the first cell.
     first: f64,
-    /// Size of a cell.
+    /// Width of a cell.
     cell: f64,
+    /// Number of cells.
     cells: usize,
 }
 
 impl Axis {
-    /// Over all values but the outermost; `None` where these have no range.
+    /// Axis over all values except the outermost. `None` if these are all equal or a value is not finite.
     fn over(mut values: Vec<f64>, cells: usize) -> Option<Self> {
         values.sort_unstable_by(f64::total_cmp);
         let cut = (CUT * values.len() as f64) as usize;
@@ -106,8 +114,8 @@ impl Axis {
         self.first + self.cell * cell as f64
     }
 
-    /// The cell whose middle is at or below `value` and how far it is on to the next, in cells; `None` where
-    /// it is not between two.
+    /// Last cell whose centre is at or below `value`, and the distance of `value` from the centre in cells. `None` if
+    /// `value` does not lie between two centres.
     fn cell_of(&self, value: f64) -> Option<(usize, f64)> {
         let cells = (value - self.first) / self.cell;
         let inside = cells >= 0.0 && cells < (self.cells - 1) as f64;
@@ -115,7 +123,7 @@ impl Axis {
     }
 }
 
-/// Linear between the middles of cells, zero beyond them.
+/// Density by bilinear interpolation between the centres of cells. Zero outside the grid.
 fn interpolated(columns: &[Vec<f64>], x: Option<(usize, f64)>, y: Option<(usize, f64)>) -> f64 {
     let (Some((i, u)), Some((j, v))) = (x, y) else {
         return 0.0;
@@ -124,18 +132,19 @@ fn interpolated(columns: &[Vec<f64>], x: Option<(usize, f64)>, y: Option<(usize,
     along(&columns[i]) * (1.0 - u) + along(&columns[i + 1]) * u
 }
 
-/// Draws in coordinates of unit covariance, and the way there.
+/// Draws in whitened coordinates, and the transformation to them.
 struct Scatter {
     mean: (f64, f64),
-    /// Lower triangular root of the covariance, without its zero: `xx`, `yx`, `yy`.
+    /// Cholesky factor of the covariance: entries `xx`, `yx`, `yy`.
     root: [f64; 3],
+    /// Bandwidth `h`.
     bandwidth: f64,
-    /// The draws, by the first coordinate.
+    /// Draws in whitened coordinates, sorted by the first.
     kernels: Vec<(f64, f64)>,
 }
 
 impl Scatter {
-    /// Of draws on a grid whose cells are `cell_y` high.
+    /// Draws on a grid whose cells have the height `cell_y`. `None` if they lie on a line or a point.
     fn of(points: &[(f64, f64)], cell_y: f64) -> Option<Self> {
         let count = points.len() as f64;
         let mean_of = |of: &dyn Fn(&(f64, f64)) -> f64| points.iter().map(of).sum::<f64>() / count;
@@ -162,14 +171,14 @@ impl Scatter {
         })
     }
 
-    /// Densities at one `x`, in a unit of no meaning.
+    /// Densities, up to a constant factor, in the cells of the axis `y` at one `x`.
     fn column(&self, x: f64, y: &Axis) -> Vec<f64> {
         let [xx_root, yx_root, yy_root] = self.root;
         let first = (x - self.mean.0) / xx_root;
         let end = KERNEL_END * self.bandwidth;
         let index = |from: f64| self.kernels.partition_point(|kernel| kernel.0 < from);
         let kernel = |distance: f64| (-0.5 * (distance / self.bandwidth).powi(2)).exp();
-        // The second coordinate along the column, counted in cells from the first one.
+        // Second whitened coordinate of the first cell of the column, and its increment from cell to cell.
         let start = (y.first - self.mean.1 - yx_root * first) / yy_root;
         let step = y.cell / yy_root;
         let mut column = vec![0.0; y.cells];
@@ -197,7 +206,7 @@ mod tests {
 
     const CELLS: usize = 64;
 
-    /// Gaussian draws of unit variance about (5, -3), the second coordinate in thousandths.
+    /// Gaussian draws about (5, -3) with standard deviations of 1 and 0.001.
     fn draws(seed: u64, count: usize, correlation: f64) -> Vec<(f64, f64)> {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
@@ -210,7 +219,7 @@ mod tests {
             .collect()
     }
 
-    /// Content at a point, linear between the middles of cells; 1 outside of them.
+    /// Content at a point, by bilinear interpolation between the centres of cells. 1 outside the grid.
     fn content_at(density: &Density, (x, y): (f64, f64)) -> f64 {
         let place = |axis: &[f64], value: f64| {
             let cells = (value - axis[0]) / (axis[1] - axis[0]);
@@ -224,6 +233,7 @@ mod tests {
         row(j) * (1.0 - v) + row(j + 1) * v
     }
 
+    /// Share of the points `fresh` within the region of this content.
     fn part_within(density: &Density, fresh: &[(f64, f64)], content: f64) -> f64 {
         let inside = fresh
             .iter()
@@ -231,8 +241,8 @@ mod tests {
         inside.count() as f64 / fresh.len() as f64
     }
 
-    // The regions of 50 % and 90 % of 4,000 draws hold 50 % and 90 % of 40,000 others: to 2 %, of which the
-    // 4,000 themselves make 0.8 % (one deviation) and the 40,000 make 0.25 %.
+    // The 50 % and 90 % regions of 4,000 draws hold 50 % and 90 % of 40,000 other draws, to 2 %. The standard deviation
+    // is 0.8 % from the 4,000 draws and 0.25 % from the 40,000.
     #[test]
     fn regions_hold_what_they_say() {
         for (seed, correlation) in [(1, 0.0), (2, 0.6), (3, -0.95), (4, 0.99), (5, -0.99)] {
@@ -248,8 +258,8 @@ mod tests {
         }
     }
 
-    // The same of a banana, y = (x - 5)^2 with a deviation of 0.3 across: kernels as wide as that would
-    // make the region of 50 % hold over 60 % if the volume under the sum were its content.
+    // The same for a banana, y = (x - 5)^2 plus noise of standard deviation 0.3. With a level from the volume under the
+    // density the 50 % region would hold over 60 %.
     #[test]
     fn regions_of_a_banana_too() {
         let bent = |draws: Vec<(f64, f64)>| -> Vec<(f64, f64)> {
@@ -264,10 +274,10 @@ mod tests {
         }
     }
 
-    // A Gaussian's region of content c has the radius r of 1 - exp(-r^2/2) in deviations: 0.1175 at 0.5,
-    // 0.3935 at 1, 0.8647 at 2, whatever the direction; a blob, or rows and columns exchanged, would not.
-    // The few hundred draws near a place leave its density, and so its content, uncertain by some 0.05: three
-    // of these, and of the mean of 8 directions a third of it.
+    // For a Gaussian the content at a radius of r standard deviations is 1 - exp(-r^2/2) in every direction: 0.1175 at
+    // 0.5, 0.3935 at 1, 0.8647 at 2. This fails for a smeared density or exchanged axes. A few hundred draws near each
+    // point make its content uncertain by 0.05; the tolerances are three of these for a point and one for the mean of 8
+    // points.
     #[test]
     fn contents_are_those_of_ellipses() {
         let correlation = 0.99;
@@ -289,9 +299,9 @@ mod tests {
         }
     }
 
-    // 0 at the mode, 1 in the corners off the diagonal, where no kernel reaches, ascending axes; draws a
-    // thousand deviations out, five of 4,000, are within the 0.25 % that the grid leaves out and move it by
-    // less than half a deviation.
+    // Contents are 0 at the mode and 1 in the corners off the diagonal, where no kernel reaches; axes ascend. Five of
+    // 4,000 draws, 1000 standard deviations out, are within the 0.25 % that the grid leaves out and move it by less
+    // than half a standard deviation.
     #[test]
     fn the_grid_is_over_the_draws() {
         let mut points = draws(7, 4000, 0.5);
@@ -314,11 +324,12 @@ mod tests {
         assert!(all().any(|&content| content == 0.0));
         assert_eq!(found.content[0][CELLS - 1], 1.0);
         assert_eq!(found.content[CELLS - 1][0], 1.0);
-        // The mode is the centre of the draws but for a few cells: 0.1 is at 0.46 deviations.
+        // The mode is within a few cells of the centre: a content of 0.1 is at 0.46 standard deviations.
         assert!(content_at(&found, (5.0, -3.0)) < 0.1);
     }
 
-    // Thinner than a cell: there is something to draw, a cell high.
+    // A scatter thinner than a cell is drawn with a standard deviation of one cell, so at most 8 cells of a column are
+    // filled.
     #[test]
     fn a_thin_scatter_is_drawn_a_cell_high() {
         let found = density(&draws(8, 4000, 0.999_999), CELLS).unwrap();

@@ -1,43 +1,53 @@
-//! Are residuals white? What a model leaves of a recording should be noise, and noise forgets itself.
+//! Whiteness of residuals: autocorrelation and Ljung-Box test.
+//!
+//! If a model explains a recording, its residuals are white noise.
 //!
 //! ```text
 //! r_k = sum_t (e_t - m)(e_(t+k) - m) / sum_t (e_t - m)^2          k = 1 .. lags
 //! Q   = n (n + 2) sum_k r_k^2 / (n - k)
 //! ```
 //!
-//! with the mean `m` of the `n` residuals. Of white ones each `r_k` is Gaussian with a deviation of
-//! `1/sqrt(n)`, and `Q` is chi-square with `lags - parameters` degrees of freedom, the fit having used up
-//! `parameters` of them. All numbers are ratios: the unit of the residuals does not matter.
+//! | symbol | meaning |
+//! |--------|---------|
+//! | `e_t` | residuals at even times, `n` of them, with the mean `m` |
+//! | `r_k` | autocorrelation at the lag `k` |
+//! | `Q` | portmanteau statistic |
+//!
+//! For white residuals each `r_k` is Gaussian with the standard deviation `1/sqrt(n)`, and `Q` has a chi-square
+//! distribution with `lags - parameters` degrees of freedom, where `parameters` is the number of fitted parameters. All
+//! results are ratios, so the unit of the residuals does not matter.
 //!
 //! Reference: G. M. Ljung, G. E. P. Box, "On a measure of lack of fit in time series models",
 //! Biometrika 65 (1978).
 
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-/// How much residuals remember. See the [module](self).
+/// Autocorrelation of residuals and test for whiteness. For symbols see the [module](self).
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Whiteness {
-    /// Autocorrelation at the lags `1..=lags`, each between -1 and 1.
+    /// Autocorrelations `r_k` at the lags `1..=lags`, each between -1 and 1.
     pub autocorrelation: Vec<f64>,
-    /// Half the width of the band that holds 95 % of the autocorrelations of white residuals.
+    /// Half width of the band that holds 95 % of the autocorrelations of white residuals: `1.96/sqrt(n)`.
     pub band: f64,
-    /// Portmanteau statistic of Ljung and Box, `Q`.
+    /// Portmanteau statistic `Q` of Ljung and Box.
     pub portmanteau: f64,
-    /// Probability that white residuals have a larger one.
+    /// Probability that white residuals have a larger `Q`.
     pub probability: f64,
-    /// Lags outside of the band; of white residuals one in twenty.
+    /// Number of lags whose autocorrelation is outside the band; 5 % of the lags for white residuals.
     pub outside: usize,
 }
 
-/// Standard deviations that hold 95 % of a Gaussian.
+/// Number of standard deviations on either side that hold 95 % of a Gaussian.
 const BAND_DEVIATIONS: f64 = 1.96;
-/// Spread, in the largest residual, below which all are the same but for rounding.
+/// Standard deviation of the residuals, as a fraction of the largest, below which they differ by rounding only.
 const ROUNDING: f64 = 1e-12;
 
-/// How white `residuals` are, in order and at even times, after a fit of so many parameters.
+/// Tests `residuals`, in order and at even times, for whiteness at the first `lags` lags, after a fit of `parameters`
+/// parameters.
 ///
-/// `None` where there are no more residuals than lags, no more lags than parameters, or where the
-/// residuals are all the same or not all finite.
+/// `None` if there are not more residuals than lags or not more lags than parameters, if all residuals are equal, or if
+/// one is not finite.
 #[must_use]
 pub fn whiteness(residuals: &[f64], lags: usize, parameters: usize) -> Option<Whiteness> {
     if residuals.len() <= lags || lags <= parameters {
@@ -45,7 +55,7 @@ pub fn whiteness(residuals: &[f64], lags: usize, parameters: usize) -> Option<Wh
     }
     let count = residuals.len() as f64;
     let largest = (residuals.iter()).fold(0.0_f64, |largest, residual| largest.max(residual.abs()));
-    // In units of the largest: no square is lost or too large. All zero makes them NaN.
+    // In units of the largest residual no square overflows or vanishes. If all are zero, this gives NaN, refused below.
     let scaled: Vec<f64> = residuals
         .iter()
         .map(|residual| residual / largest)
@@ -84,7 +94,7 @@ mod tests {
 
     use super::*;
 
-    /// `e_t = memory e_(t-1)` and white noise, after a run-up.
+    /// Autoregressive noise `e_t = memory e_(t-1) + white noise`, without its first 50 values.
     fn noise(seed: u64, count: usize, memory: f64) -> Vec<f64> {
         let mut rng = Pcg64Mcg::seed_from_u64(seed);
         let mut last = 0.0;
@@ -96,9 +106,9 @@ mod tests {
         (0..50 + count).map(|_| step()).skip(50).collect()
     }
 
-    // 1, 2, 3, 4 about 2.5: -1.5, -0.5, 0.5, 1.5, squares 5. r_1 = (0.75 - 0.25 + 0.75)/5 = 0.25,
-    // r_2 = (-0.75 - 0.75)/5 = -0.3; Q = 4 6 (0.0625/3 + 0.09/2) = 1.58; two degrees of freedom:
-    // exp(-0.79); the band 0.98. With one parameter one degree: erfc(sqrt(0.79)) = 0.2087607.
+    // 1, 2, 3, 4 about their mean 2.5: -1.5, -0.5, 0.5, 1.5, sum of squares 5. r_1 = (0.75 - 0.25 + 0.75)/5 = 0.25,
+    // r_2 = (-0.75 - 0.75)/5 = -0.3, Q = 4 6 (0.0625/3 + 0.09/2) = 1.58, band 1.96/2 = 0.98. Two degrees of freedom:
+    // probability exp(-0.79). With one parameter, one degree of freedom: erfc(sqrt(0.79)) = 0.2087607.
     #[test]
     fn four_numbers_by_hand() {
         let found = whiteness(&[1.0, 2.0, 3.0, 4.0], 2, 0).unwrap();
@@ -119,8 +129,8 @@ mod tests {
         );
     }
 
-    // +1, -1 in turn, 100 of them: r_k = (-1)^k (100 - k)/100, and Q = 100 102 sum (100 - k)/1e4
-    // = 1.02 (99 + 98 + 97) = 299.88. Units and an offset change nothing.
+    // 100 alternating residuals +1, -1: r_k = (-1)^k (100 - k)/100 and Q = 100 102 sum (100 - k)/1e4
+    // = 1.02 (99 + 98 + 97) = 299.88. A unit and an offset change nothing.
     #[test]
     fn alternating_residuals_by_hand() {
         for (unit, offset) in [(1.0, 0.0), (1e-200, 0.0), (1e200, 0.0), (1.0, 1000.0)] {
@@ -137,9 +147,9 @@ mod tests {
         }
     }
 
-    // The 5 % points that every table of chi-square has: 3.841, 11.070, 18.307, 31.410 for 1, 5, 10, 20 degrees
-    // of freedom, to the half unit of their last digit (the density there is below 0.03); and with four
-    // degrees (1 + x/2) exp(-x/2), far out too.
+    // 5 % points from tables of the chi-square distribution: 3.841, 11.070, 18.307, 31.410 for 1, 5, 10, 20 degrees of
+    // freedom, exact to half a unit of the last digit, where the density is below 0.03. For four degrees of freedom the
+    // probability is (1 + x/2) exp(-x/2), tested up to x = 1000.
     #[test]
     fn chi_square_is_that_of_the_tables() {
         let tail = |freedom: f64, x: f64| ChiSquared::new(freedom).unwrap().sf(x);
@@ -152,9 +162,9 @@ mod tests {
         }
     }
 
-    // White noise is called coloured at 5 % by one in twenty: of 300 seeds 15, with a deviation of 3.8;
-    // within three of them. Lags outside of the band: of 300 x 20 one in twenty too, 300 with a deviation
-    // of 17, a few less for 200 residuals, whose r_k are a little narrower (variance (n-k)/(n(n+2))).
+    // At the 5 % level the test rejects white noise in 5 % of the cases: 15 of 300 seeds with a standard deviation of
+    // 3.8; accepted within three deviations. Autocorrelations outside the band: 5 % of 300 x 20, that is 300 with a
+    // standard deviation of 17, and slightly fewer for n = 200, where the variance of r_k is (n-k)/(n(n+2)).
     #[test]
     fn white_noise_is_white() {
         let found: Vec<Whiteness> = (0..300)
@@ -167,14 +177,14 @@ mod tests {
         assert!((4..=26).contains(&rejected), "{rejected}");
         let outside: usize = found.iter().map(|found| found.outside).sum();
         assert!((220..=340).contains(&outside), "{outside}");
-        // Uniform: the mean of 300 is 0.5 with a deviation of 0.017.
+        // The probabilities are uniform: the mean of 300 is 0.5 with a standard deviation of 0.017.
         let mean = found.iter().map(|found| found.probability).sum::<f64>() / 300.0;
         assert!((mean - 0.5).abs() < 0.06, "{mean}");
     }
 
-    // With a memory of 0.3 the first lag of 200 residuals is 0.3 with a deviation of 0.067, above the
-    // band of 0.139 in all but one of a hundred; Q is near 200 0.09/(1 - 0.09) = 20 above its mean of 10,
-    // whose 5 % point is 18.3, so that most are found. With 0.6 (Q some 110 above) all are.
+    // With a memory of 0.3 the first autocorrelation of 200 residuals is 0.3 with a standard deviation of 0.067, above
+    // the band of 0.139 in 99 of 100 cases. Q is about 200 0.09/(1 - 0.09) = 20 above its mean of 10, and its 5 % point
+    // is 18.3, so most cases are rejected. With a memory of 0.6 Q is about 110 above, so all are.
     #[test]
     fn memory_is_found() {
         let found = |memory: f64| -> Vec<Whiteness> {

@@ -1,47 +1,80 @@
-//! The relay in a recorded input: is it one, and when is it high?
+//! Detection of a two-level relay in a recorded input.
 //!
-//! The levels may move (a trim), the record may begin and end with something else, and the input
-//! may carry a little noise. What makes it a relay is that between its jumps it hardly moves.
+//! The levels may drift (a trim of the relay), the recording may begin and end without the relay, and the input may
+//! carry some noise. The criterion is that the input hardly moves between its jumps: the distance of the two levels is
+//! large compared with the spread about them.
 
 use std::ops::Range;
 
-/// Distance of the two levels' means in units of the spread about them. A relay is far above; a
-/// sine has 4.1, a triangle 3.5, noise 2.7.
-const LEAST_SEPARATION: f64 = 5.0;
-/// Jumps of this part of the range mark where the relay begins and ends.
-const LARGE_JUMP: f64 = 0.4;
-/// Half the width of the band around the middle that holds the level, as a part of the levels'
-/// distance.
-const HYSTERESIS: f64 = 0.2;
+use crate::signals::Signals;
+use crate::verdict::Verdict;
 
-/// What a recorded input is.
+/// Least distance between the two levels, in standard deviations of the input about its nearer level. A sine has 4.1, a
+/// triangle 3.5, Gaussian noise 2.7, a relay far more.
+const LEAST_SEPARATION: f64 = 5.0;
+/// Least jump at which the relay's part of the recording begins and ends, as a fraction of the range of the input.
+const LARGE_JUMP: f64 = 0.4;
+/// Half width of the hysteresis band about the middle of the levels, as a fraction of their distance.
+const HYSTERESIS: f64 = 0.2;
+/// Least number of equal consecutive points that make a level. Fewer are a spike of the log.
+const HELD: usize = 3;
+/// Range of the largest magnitude of a signal. Within it squares and sums of squares stay far from the limits of f64.
+const MAGNITUDES: Range<f64> = 1e-100..1e100;
+
+/// Relay of a recording.
+///
+/// # Errors
+/// The verdict on a recording without a relay in its input, with a constant output, or with unusable magnitudes.
+pub(super) fn find_relay(signals: &Signals<'_>) -> Result<RelayInput, Verdict> {
+    for signal in [signals.input, signals.output] {
+        let most = (signal.iter()).fold(0.0_f64, |most, value| most.max(value.abs()));
+        if most != 0.0 && !MAGNITUDES.contains(&most) {
+            return Err(Verdict::Units);
+        }
+    }
+    match find(signals.input) {
+        InputKind::Relay(_) if signals.output.windows(2).all(|pair| pair[0] == pair[1]) => {
+            Err(Verdict::ConstantOutput)
+        }
+        InputKind::Relay(relay) => Ok(relay),
+        InputKind::Constant => Err(Verdict::ConstantInput),
+        InputKind::FewSwitches { switches } => Err(Verdict::FewSwitches { switches }),
+        InputKind::NotTwoLevels => {
+            let output_is_relay = matches!(find(signals.output), InputKind::Relay(_));
+            Err(Verdict::NoRelay { output_is_relay })
+        }
+    }
+}
+
+/// Kind of a signal.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum InputKind {
+enum InputKind {
     /// It never changes.
     Constant,
-    /// It changes its level a few times, then stays where it is.
+    /// It changes its level a few times, then stays at one value.
     FewSwitches {
         /// Number of changes between levels that are held.
         switches: usize,
     },
     /// It changes, but not between two levels.
     NotTwoLevels,
-    /// A relay.
+    /// It switches between two levels.
     Relay(RelayInput),
 }
 
-/// A relay found in an input.
+/// Two-level relay in a recorded input.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct RelayInput {
-    /// Points from the first large jump to the last.
+    /// Points from just before the first large jump to the end of the level after the last one.
     pub(super) span: Range<usize>,
-    /// Mean of the low level and of the high one (input unit).
-    pub(super) low: f64,
-    pub(super) high: f64,
+    /// Mean of the low level (input unit).
+    low: f64,
+    /// Mean of the high level (input unit).
+    high: f64,
 }
 
 impl RelayInput {
-    /// Means of the low and of the high level over a part of the input (input unit).
+    /// Means of the low and the high level over a part of the input (input unit).
     pub(super) fn means(&self, input: &[f64]) -> (f64, f64) {
         let mut sums = [(0.0, 0.0); 2];
         for (&u, high) in input.iter().zip(self.levels(input)) {
@@ -53,7 +86,8 @@ impl RelayInput {
         (low, high)
     }
 
-    /// Whether the relay is high at each point, with hysteresis about the middle of the levels.
+    /// Whether the relay is high, for each point of a part of the input. Uses hysteresis about the middle of the
+    /// levels.
     pub(super) fn levels<'a>(&self, input: &'a [f64]) -> impl Iterator<Item = bool> + use<'a> {
         let middle = 0.5 * (self.low + self.high);
         let band = HYSTERESIS * (self.high - self.low);
@@ -69,8 +103,8 @@ impl RelayInput {
     }
 }
 
-/// Looks for a relay in `input`.
-pub(super) fn find(input: &[f64]) -> InputKind {
+/// Determines whether `input` switches between two levels.
+fn find(input: &[f64]) -> InputKind {
     let mut sorted = input.to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
     let [least, .., most] = *without_spikes(&sorted) else {
@@ -93,7 +127,7 @@ pub(super) fn find(input: &[f64]) -> InputKind {
         return InputKind::NotTwoLevels;
     };
     let last = jumps.next_back().unwrap_or(first);
-    // The level after the last jump belongs to the relay too, for as long as it is held.
+    // The level after the last jump belongs to the relay as long as the input keeps its value.
     let held = input[last..]
         .iter()
         .take_while(|&&u| u == input[last])
@@ -101,17 +135,14 @@ pub(super) fn find(input: &[f64]) -> InputKind {
     let span = first - 1..last + held;
     let mut sorted = input[span.clone()].to_vec();
     sorted.sort_unstable_by(f64::total_cmp);
-    // One switch may leave a single sample on its level: spikes are put aside second.
+    // First without discarding spikes: an input that switches once may have a single sample on one level.
     match two_levels(&sorted).or_else(|| two_levels(without_spikes(&sorted))) {
         Some((low, high)) => InputKind::Relay(RelayInput { span, low, high }),
         None => InputKind::NotTwoLevels,
     }
 }
 
-/// Points in a row at one value that make a level; fewer are a spike of the log.
-const HELD: usize = 3;
-
-/// Number of changes between values that are held.
+/// Number of changes between levels that are held.
 fn held_switches(input: &[f64]) -> usize {
     let held = input
         .chunk_by(|a, b| a == b)
@@ -120,14 +151,16 @@ fn held_switches(input: &[f64]) -> usize {
     levels.windows(2).filter(|pair| pair[0] != pair[1]).count()
 }
 
-/// All but the outermost per cent at either end, which may be spikes of the log.
+/// Values in ascending order without the lowest and the highest per cent, which may be spikes of the log.
 fn without_spikes(sorted: &[f64]) -> &[f64] {
     let aside = sorted.len() / 100;
     &sorted[aside..sorted.len() - aside]
 }
 
-/// Means of the two groups that differ most from each other (Otsu 1979), if they are levels; of
-/// values in ascending order.
+/// Means of the low and the high level of values in ascending order. `None` if the values are not two levels.
+///
+/// The values are split where the variance between the two groups is largest. Reference: N. Otsu, "A threshold
+/// selection method from gray-level histograms", IEEE Trans. Syst. Man Cybern. 9 (1979).
 fn two_levels(sorted: &[f64]) -> Option<(f64, f64)> {
     let count = sorted.len() as f64;
     let total: f64 = sorted.iter().sum();
@@ -177,12 +210,12 @@ mod tests {
         };
         assert!(relay.span.start >= 199 && relay.span.end <= 1202);
         let switches = relay.levels(&input[relay.span.clone()]).collect::<Vec<_>>();
-        // The rise out of the pause, and the nineteen edges inside the wave.
+        // One rise after the pause, and 19 edges inside the ten periods of the wave.
         assert_eq!(switches.windows(2).filter(|w| w[0] != w[1]).count(), 20);
     }
 
-    // A relay that was switched on, reached its upper level and then stayed at zero: two changes in a hundredth of the
-    // recording. A spike of two samples is no change of level.
+    // A relay that was switched on, reached its upper level and then stayed at zero: two changes within 1 % of the
+    // recording. In a constant input a spike of two samples is not a change of level.
     #[test]
     fn a_test_that_failed_is_not_constant() {
         let mut input = vec![0.0; 5000];

@@ -1,5 +1,10 @@
-//! The oscillation in a recording: its cycles, the run that is steady, the window to fit.
+//! Steady oscillation in a recording: cycles of the relay, steady runs of cycles, stretches to fit and their windows.
+//!
+//! A *cycle* runs from one switch of the relay to the next switch in the same direction. A *steady run* is a sequence
+//! of cycles that are alike in period and amplitude (`onecycle_onboard::cycle`). A *stretch* is the end of a steady
+//! run: the cycles that one attempt fits.
 
+use std::iter;
 use std::ops::Range;
 
 use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
@@ -7,24 +12,27 @@ use onecycle_onboard::refine::{Refined, residuals};
 use onecycle_onboard::window::Window;
 
 use super::input::RelayInput;
+use crate::excitation::Oscillation;
 use crate::outcome::FitPoint;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
 
-/// Bins and edges of the window: with eight cycles, some 30 to 60 bins a cycle.
+/// Window that is fitted. With eight cycles it has 30 to 60 bins per cycle.
 pub(super) type FitWindow = Window<BINS, EDGES>;
-/// Rows of the window: 512 bins, and five that the estimator keeps for itself.
-pub(super) const BINS: usize = 517;
-/// Edges of the input in the window; a relay makes two a cycle and a trim none of its own.
+/// Rows of the window: 512 bins, and 5 rows that the window reserves for the estimator.
+const BINS: usize = 517;
+/// Room for edges of the input: two for each of [`MOST_CYCLES`](crate::MOST_CYCLES) = 50 cycles and for the input
+/// before them, with a margin. A trim of the relay changes the levels at the switches, so it adds no edge.
 const EDGES: usize = 128;
 
-/// A steady run has this part of all cycles of the recording at the least: some cycles are alike
-/// by chance in any unsteady one.
+/// Least length of a steady run as a share of all cycles in the recording. In an unsteady oscillation some consecutive
+/// cycles are alike by chance.
 const LEAST_SHARE: f64 = 0.25;
-/// Periods of input before the window that tell its state at the beginning.
+/// Length of the input before the window, in periods. It determines the state of the process at the start of the
+/// window.
 const PAST_PERIODS: f64 = 1.5;
 
-/// The switch that a cycle begins and ends with.
+/// Switch of the relay at which a cycle begins and ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Beginning {
     /// From low to high.
@@ -33,39 +41,43 @@ pub(super) enum Beginning {
     Fall,
 }
 
-/// The input before the window, where the recording does not reach back far enough.
+/// Assumption on the input before the recording begins, if the recording starts less than [`PAST_PERIODS`] before the
+/// window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Past {
-    /// The first that is recorded, for ever.
+    /// The input has always had its first recorded value.
     Held,
-    /// The same as over the window: of an oscillation that is known to be steady.
+    /// The input is periodic: the cycles of the window preceded the recording.
     Repeated,
 }
 
-/// The steady oscillation of a recording.
+/// Consecutive cycles of a steady oscillation that one attempt fits.
 #[derive(Clone, Debug)]
 pub(super) struct Stretch {
-    /// What its cycles begin with.
+    /// Switch at which the cycles begin.
     pub(super) beginning: Beginning,
-    /// The cycles to fit, in order.
+    /// Cycles to fit, in order of time.
     pub(super) cycles: Vec<Cycle>,
-    /// Cycles of the whole steady run.
-    pub(super) steady: usize,
+    /// Number of cycles in the steady run to which they belong.
+    steady: usize,
     /// Mean period of the cycles to fit (s).
     pub(super) period_s: f64,
 }
 
-/// The oscillations to try, `most` cycles at most: the end of the longest steady run, then that of
-/// the last one; of each, half as many cycles and half again, as far as two. Where the recording has one
-/// complete cycle and no more, this one.
-pub(super) fn candidates(
+/// Stretches of the recording to try, in this order: ends of the longest steady run, then ends of the last steady run.
+/// The first stretch of a run has `most` cycles or, if these are fewer, all cycles of the run; each further stretch has
+/// half as many, down to two. If the recording has a single complete cycle, the only stretch is that cycle.
+///
+/// # Errors
+/// [`Verdict::TooShort`] or [`Verdict::NotSteady`].
+pub(super) fn stretches(
     signals: &Signals<'_>,
     relay: &RelayInput,
     most: usize,
 ) -> Result<Vec<Stretch>, Verdict> {
     let (beginning, cycles) = all_cycles(signals, relay);
     let count = cycles.len();
-    // Among gaps a single cycle only happens to have none: nobody knows what the others are like.
+    // With gaps in the data, a single cycle does not prove steadiness: the cycles with gaps may differ from it.
     if count == 0 || count == 1 && has_gap(signals, relay) {
         return Err(Verdict::TooShort { cycles: count });
     }
@@ -74,13 +86,13 @@ pub(super) fn candidates(
     }
     let runs = steady_runs(&cycles);
     let alike = runs.iter().map(Range::len).max().unwrap_or(0);
-    // Two cycles that are alike have to do where there are no more.
+    // A recording with two cycles only must do with two that are alike.
     let least = if count == 2 {
         2
     } else {
         ((LEAST_SHARE * count as f64).ceil() as usize).max(3)
     };
-    // Of equals the last: max_by_key returns it.
+    // Among runs of equal length max_by_key returns the last.
     let longest = runs
         .iter()
         .filter(|run| run.len() >= least)
@@ -99,28 +111,27 @@ pub(super) fn candidates(
         .iter()
         .rfind(|run| run.len() >= least)
         .filter(|&last| last != longest);
-    let mut candidates = Vec::new();
-    for run in std::iter::once(longest).chain(last) {
-        let mut size = run.len().min(most);
-        loop {
-            let end = &cycles[run.end - size..run.end];
-            candidates.push(Stretch::of(beginning, end, run.len()));
-            if size <= 2 {
-                break;
-            }
-            size = (size / 2).max(2);
-        }
+    let mut stretches = Vec::new();
+    for run in iter::once(longest).chain(last) {
+        let halved = |size: &usize| (*size > 2).then(|| (size / 2).max(2));
+        let sizes = iter::successors(Some(run.len().min(most)), halved);
+        stretches.extend(
+            sizes.map(|size| Stretch::of(beginning, &cycles[run.end - size..run.end], run.len())),
+        );
     }
-    Ok(candidates)
+    Ok(stretches)
 }
 
+/// Whether the relay's part of the recording has a gap.
 fn has_gap(signals: &Signals<'_>, relay: &RelayInput) -> bool {
     let inside = relay.span.start + 1..relay.span.end;
     signals.breaks.iter().any(|at| inside.contains(at))
 }
 
-/// The recording's cycles from rise to rise. Where these are fewer than two, the last one may end where the
-/// recording does, and if there are more from fall to fall, or as many and later, those.
+/// Cycles of the recording from rise to rise.
+///
+/// If these are fewer than two, a cycle may also end at the end of the recording, and cycles from fall to fall are used
+/// instead if there are more of them, or equally many that start later.
 fn all_cycles(signals: &Signals<'_>, relay: &RelayInput) -> (Beginning, Vec<Cycle>) {
     let (mut rises, last) = cycles_from(Beginning::Rise, signals, relay);
     if rises.len() >= 2 {
@@ -140,8 +151,8 @@ fn all_cycles(signals: &Signals<'_>, relay: &RelayInput) -> (Beginning, Vec<Cycl
     }
 }
 
-/// Complete cycles of the relay, none across a break of the recording, and one more that the recording's
-/// end leaves without the samples that would confirm its own.
+/// Complete cycles of the relay that contain no gap; and the cycle whose last switch is so near to the end of the
+/// recording that too few samples follow to confirm the new level.
 fn cycles_from(
     beginning: Beginning,
     signals: &Signals<'_>,
@@ -162,7 +173,7 @@ fn cycles_from(
     (cycles, detector.finish())
 }
 
-/// All runs of consecutive cycles that are alike.
+/// Runs of consecutive cycles that are alike, as ranges of indices.
 fn steady_runs(cycles: &[Cycle]) -> Vec<Range<usize>> {
     let mut runs: Vec<Range<usize>> = Vec::new();
     let mut run = SteadyRun::default();
@@ -183,7 +194,7 @@ fn steady_runs(cycles: &[Cycle]) -> Vec<Range<usize>> {
     runs
 }
 
-/// Measured and fitted outputs over the bins of the window.
+/// Measured and fitted output in the bins of the window. Empty if the process cannot be fitted to the window.
 pub(super) fn fit_points(window: &FitWindow, period_s: f64, refined: &Refined) -> Vec<FitPoint> {
     let mut residual = [0.0; BINS];
     if residuals(window, period_s, &refined.process, &mut residual).is_err() {
@@ -218,25 +229,52 @@ impl Stretch {
         }
     }
 
-    /// Its last cycle alone.
+    /// The last cycle alone.
     pub(super) fn last(&self) -> Self {
         let last = &self.cycles[self.cycles.len() - 1..];
         Self::of(self.beginning, last, self.steady)
     }
 
-    /// The points of the recording from the first cycle's beginning to the last one's end.
+    /// Points of the recording from the beginning of the first cycle to the end of the last cycle.
     pub(super) fn points(&self, signals: &Signals<'_>) -> Range<usize> {
         let (first, last) = (self.cycles[0], self.cycles[self.cycles.len() - 1]);
         let index = |time_s: f64| signals.time_s.partition_point(|&t| t < time_s - 1e-9);
         index(first.start_s)..index(last.start_s + last.period_s)
     }
 
-    /// Whether it is the only complete cycle of its recording.
+    /// Whether it is the only complete cycle of the recording.
     pub(super) fn is_alone(&self) -> bool {
         self.steady == 1
     }
 
-    /// The cycles and the input before them in a window for the estimator.
+    /// Measured properties of the oscillation over the stretch, whose window is `window`.
+    pub(super) fn describe(
+        &self,
+        signals: &Signals<'_>,
+        relay: &RelayInput,
+        window: &FitWindow,
+    ) -> Oscillation {
+        let (first, last) = (self.cycles[0], self.cycles[self.cycles.len() - 1]);
+        let mean = |of: fn(&Cycle) -> f64| {
+            self.cycles.iter().map(of).sum::<f64>() / self.cycles.len() as f64
+        };
+        let (low, high) = relay.means(&signals.input[self.points(signals)]);
+        Oscillation {
+            period_s: self.period_s,
+            amplitude: mean(|cycle| cycle.amplitude),
+            cycles_used: self.cycles.len(),
+            cycles_steady: self.steady,
+            start_s: first.start_s,
+            end_s: last.start_s + last.period_s,
+            duty: mean(|cycle| cycle.duty),
+            relay_amplitude: 0.5 * (high - low),
+            relay_centre: 0.5 * (high + low),
+            noise_sigma: window.noise_sigma(),
+            sample_s: window.sample_s(),
+        }
+    }
+
+    /// Window for the estimator: the outputs of the cycles, and the input over the cycles and before them.
     pub(super) fn window(
         &self,
         signals: &Signals<'_>,
@@ -250,10 +288,10 @@ impl Stretch {
             .unwrap_or_else(|| two_level_window(outputs, &inputs, relay))
     }
 
-    /// The outputs of the cycles, without any input yet.
+    /// Window with the outputs of the cycles and no input.
     fn output_window(&self, signals: &Signals<'_>, points: &Range<usize>) -> FitWindow {
         let times_s = &signals.time_s[points.clone()];
-        // The mean increment here, so that stamps do not drift off the even grid.
+        // The sample period is the mean over the stretch, so that time stamps do not drift off the even grid.
         let whole_s = times_s[times_s.len() - 1] - times_s[0];
         let instants = (whole_s / (signals.sample_period_s * f64::from(signals.samples_per_point)))
             .round()
@@ -266,7 +304,7 @@ impl Stretch {
         window
     }
 
-    /// First point of the past: a period and a half before the window, or behind a break.
+    /// First point of the input before the window: [`PAST_PERIODS`] before the window, but not before a gap.
     fn past(&self, signals: &Signals<'_>, points: &Range<usize>) -> usize {
         let from_s = signals.time_s[points.start] - PAST_PERIODS * self.period_s;
         let index = signals.time_s.partition_point(|&t| t < from_s);
@@ -274,7 +312,7 @@ impl Stretch {
         index.max(behind.copied().unwrap_or(0))
     }
 
-    /// Times and values of the input, from the past to the end of the window.
+    /// Times (s) and values of the input, from [`PAST_PERIODS`] before the window to the end of the window.
     fn inputs(&self, signals: &Signals<'_>, points: &Range<usize>, past: Past) -> Vec<(f64, f64)> {
         let begin = self.past(signals, points);
         let at = |index: usize| (signals.time_s[index], signals.input[index]);
@@ -296,7 +334,7 @@ impl Stretch {
     }
 }
 
-/// The window with every change of the input; `None` where it changes too often.
+/// Window with every change of the input. `None` if the input has more than [`EDGES`] changes.
 fn exact_window(mut window: FitWindow, inputs: &[(f64, f64)]) -> Option<FitWindow> {
     for &(time_s, input) in inputs {
         window.push_input(time_s, input).ok()?;
@@ -304,7 +342,7 @@ fn exact_window(mut window: FitWindow, inputs: &[(f64, f64)]) -> Option<FitWindo
     Some(window)
 }
 
-/// The window with the input's mean between the switches of the relay.
+/// Window with the mean input between switches of the relay.
 fn two_level_window(mut window: FitWindow, inputs: &[(f64, f64)], relay: &RelayInput) -> FitWindow {
     let values: Vec<f64> = inputs.iter().map(|&(_, input)| input).collect();
     let levels: Vec<bool> = relay.levels(&values).collect();
@@ -312,7 +350,7 @@ fn two_level_window(mut window: FitWindow, inputs: &[(f64, f64)], relay: &RelayI
     for stretch in levels.chunk_by(|a, b| a == b) {
         let stretch = begin..begin + stretch.len();
         let mean = values[stretch.clone()].iter().sum::<f64>() / stretch.len() as f64;
-        // Two switches a cycle and at most eight cycles: there is room.
+        // Two switches in each of at most 50 cycles, and 1.5 periods before them: below the room of 128 edges.
         let _ = window.push_input(inputs[begin].0, mean);
         begin = stretch.end;
     }

@@ -1,18 +1,18 @@
-//! Clipped outputs: a sensor or a signal at its limit stays at one exact value.
+//! Detection of a clipped output: a sensor or a signal at its limit stays at one exact value.
 
-/// Part of a cycle at one exact extreme that no oscillation spends there; the top of a sine within
-/// one of a hundred quanta of its amplitude takes 4.5 %.
+/// Largest share of the time that an output that is not clipped spends at its exact maximum or minimum. A sine whose
+/// amplitude is 100 quanta of the sensor spends 4.5 % of the time within one quantum of its maximum.
 const MOST_FLAT: f64 = 0.06;
-/// Fewer equal samples in a row are chance.
+/// Least number of equal consecutive samples that count as flat. Fewer occur by chance.
 const FEWEST_EQUAL: usize = 4;
 
-/// Part of the cycles that the output spends in flat stretches at its exact maximum or minimum;
-/// `None` where that is no more than a quantised sensor would show.
+/// Share of the time that the output spends in flat stretches at its exact maximum or minimum, over `cycles` cycles.
+/// `None` if the output is not clipped: the share is no larger than a quantised sensor explains.
 pub(super) fn flat_part(output: &[f64], cycles: usize) -> Option<f64> {
     let most = output.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let least = output.iter().copied().fold(f64::INFINITY, f64::min);
     let quantum = smallest_step(output);
-    // Time that a sine of this amplitude spends within a quantum of each of its extremes.
+    // Share of the time that a sine of this amplitude spends within one quantum of its maximum.
     let quantised = (1.0 - quantum / (0.5 * (most - least)))
         .clamp(-1.0, 1.0)
         .acos()
@@ -29,7 +29,7 @@ pub(super) fn flat_part(output: &[f64], cycles: usize) -> Option<f64> {
     })
 }
 
-/// Smallest change between neighbouring samples: at most the sensor's quantum.
+/// Smallest change between neighbouring samples: an estimate of the quantum of the sensor.
 fn smallest_step(output: &[f64]) -> f64 {
     output
         .windows(2)
@@ -52,7 +52,7 @@ mod tests {
     fn clipping_is_seen_and_quantisation_is_not() {
         assert_eq!(flat_part(&sine(|y| y), 4), None);
         assert_eq!(flat_part(&sine(|y| (y / 0.05).round() * 0.05), 4), None);
-        // A sine clipped at 0.8 stays there acos(0.8)/pi = 20.5 % of the time.
+        // A sine clipped at 0.8 spends acos(0.8)/pi = 20.5 % of the time at the limit.
         let part = flat_part(&sine(|y| y.min(0.8)), 4).unwrap();
         assert!((part - 0.205).abs() < 0.005, "{part}");
     }

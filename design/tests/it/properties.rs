@@ -1,5 +1,5 @@
-//! Laws that hold for every process, on random ones: time scales from 1e-4 s to 1e5 s, dead times
-//! from none to dominating, with and without damping, gains of either sign.
+//! Properties that hold for every process, tested on random processes: time scales from 1e-4 s to 1e5 s, dead times
+//! from zero to dominating, with and without damping, gains of either sign.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -20,16 +20,17 @@ fn config(seed: u64) -> Config {
     }
 }
 
-/// Ten to a power from this range.
+/// Ten to the power of a uniform number in this range.
 fn decades(from: f64, to: f64) -> impl Strategy<Value = f64> {
     (from..to).prop_map(|power: f64| 10_f64.powf(power))
 }
 
+/// Zero in one case of eight, otherwise a value of `strategy`.
 fn or_zero(strategy: impl Strategy<Value = f64>) -> impl Strategy<Value = f64> {
     (0..8, strategy).prop_map(|(die, value)| if die == 0 { 0.0 } else { value })
 }
 
-/// Gain, lag, damping and dead time relative to a time scale, and that time scale (s).
+/// Random processes: gain, actuator lag, damping and dead time relative to a random time scale.
 fn processes() -> impl Strategy<Value = Soiptd> {
     let gain =
         (any::<bool>(), decades(-3.0, 3.0)).prop_map(|(up, gain)| if up { gain } else { -gain });
@@ -76,7 +77,7 @@ proptest! {
         prop_assert!(floor.ise <= exact.ise);
     }
 
-    // Along the constraint the controller is fixed by its crossover.
+    // At a given phase margin the gain crossover determines the controller.
     #[test]
     fn no_other_crossover_is_better(process in processes(), margin in phase_margins()) {
         let best = pd_at_phase_margin(&process, margin).unwrap();
@@ -95,7 +96,7 @@ proptest! {
         }
     }
 
-    // The optimum at a floor is no worse than that at any margin above it.
+    // The optimum at a minimum margin costs no more than the optimum at any larger margin.
     #[test]
     fn no_larger_margin_is_better(process in processes(), floor in phase_margins()) {
         let best = pd(&process, floor).unwrap();
@@ -118,7 +119,7 @@ proptest! {
         prop_assert!(close(other.ise, best.ise, 1e-12));
     }
 
-    // t -> alpha t at the same A = K/T_body: J alpha, Kp / alpha^2, Kd / alpha.
+    // Scaling time by alpha at the same K/T_body multiplies J by alpha, Kp by 1/alpha^2 and Kd by 1/alpha.
     #[test]
     fn time_scales_everything(
         process in processes(), margin in phase_margins(), alpha in decades(-3.0, 3.0),
@@ -172,7 +173,7 @@ proptest! {
         prop_assert!(margins(&process, times_gain(best.pd, gain)).unwrap().is_stable());
     }
 
-    // Whatever the gains: a finite positive cost where the margin is positive, and none elsewhere.
+    // For all gains: the cost is finite and positive if the loop is stable, and absent otherwise.
     #[test]
     fn cost_is_positive_or_absent(
         process in processes(), kp in decades(-6.0, 6.0), kd in decades(-6.0, 6.0), signs in 0..4,
@@ -190,8 +191,8 @@ proptest! {
 proptest! {
     #![proptest_config(Config { cases: 60, ..config(2) })]
 
-    // The simulation and the closed form share nothing but the crossover. Lags as short as 1e-4 of
-    // the dead time are not resolved, which costs up to 1e-5.
+    // Simulation and closed form share only the gain crossover. The simulation does not resolve lags as short as 1e-4
+    // of the dead time, which costs up to 1e-5.
     #[test]
     fn simulation_confirms_the_cost(process in processes(), margin_deg in 15.0..70.0_f64) {
         let best = pd_at_phase_margin(&process, margin_deg.to_radians()).unwrap();

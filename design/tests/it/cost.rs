@@ -1,5 +1,4 @@
-//! The closed form of the cost against quadrature of Parseval's integral and against solutions by
-//! hand.
+//! Closed form of the cost against quadrature of Parseval's integral and against hand calculations.
 
 use num_complex::Complex64;
 use onecycle_design::soiptd_pd::cost::ise;
@@ -10,8 +9,8 @@ use onecycle_onboard::{Pd, Soiptd};
 /// Nodes of the reference quadrature.
 const NODES: usize = 60_000;
 
-/// `1/pi int |E(jw)|^2 dw` by the trapezoidal rule in `x`, `ln w = ln wc + width sinh x`: dense at
-/// the resonance, 17 decades to either side of it.
+/// `1/pi int |E(jw)|^2 dw` by the trapezoidal rule in `x`, `ln w = ln wc + width sinh x`: dense at the resonance, 17
+/// decades to either side of it.
 fn ise_by_quadrature(process: &Soiptd, pd: Pd) -> f64 {
     let margins = margins(process, pd).expect("the gains have the right sign");
     let width = margins.phase_margin_rad.min(1.0);
@@ -27,7 +26,7 @@ fn ise_by_quadrature(process: &Soiptd, pd: Pd) -> f64 {
     sum * dx / std::f64::consts::PI
 }
 
-/// `E(jw) = (1 + Kd s G) / (s (1 + (Kp + Kd s) G))`, as it stands.
+/// `E(jw) = (1 + Kd s G) / (s (1 + (Kp + Kd s) G))`, evaluated as written.
 fn error_spectrum(process: &Soiptd, pd: Pd, omega: f64) -> Complex64 {
     let s = Complex64::new(0.0, omega);
     let g = process.k_over_t_body() * (-s * process.tau_s()).exp()
@@ -43,8 +42,8 @@ fn assert_close(a: f64, b: f64, tolerance: f64, what: &str) {
     );
 }
 
-// Acceleration gain, T_prop, 1/T_body, tau, phase margin in degrees: damped and not, equal lags,
-// no delay and nothing but delay, half a degree and sixty.
+// Columns: acceleration gain, T_prop (s), 1/T_body (1/s), tau (s), phase margin (deg). With and without damping, equal
+// lags, no dead time, dominating dead time, margins from 0.5 to 60 deg.
 #[test]
 fn closed_form_matches_quadrature() {
     for (gain, t_prop, damping, tau, margin_deg) in [
@@ -70,7 +69,7 @@ fn closed_form_matches_quadrature() {
             &label,
         );
         assert_close(best.ise, ise(&process, best.pd).unwrap(), 1e-11, &label);
-        // Far from the optimum: an eighth of the rate feedback and a gain that leaves some margin.
+        // Far from the optimum: an eighth of Kd, and a Kp small enough for a stable loop.
         let slow = Pd {
             kp: 0.02 * best.pd.kp,
             kd: 0.125 * best.pd.kd,
@@ -84,9 +83,9 @@ fn closed_form_matches_quadrature() {
     }
 }
 
-// T_prop = 1, 1/T_body = 1/2, tau = 0.2. At kp = 9/8 and kd^2 = 5/2 - kp^2 the crossover is at
-// 1 rad/s, the two other roots of P have the sum 9/4 and the product kp^2: they meet at 9/8. Around
-// there they are real or complex and, within 3 % of each other, taken by a contour.
+// T_prop = 1 s, 1/T_body = 1/2 1/s, tau = 0.2 s. At kp = 9/8 and kd^2 = 5/2 - kp^2 the gain crossover is 1 rad/s, and
+// the two other roots of P have the sum 9/4 and the product kp^2: both are 9/8. For nearby kp they are real or complex,
+// and the contour integral is used where half their distance is below 3 % of their mean.
 #[test]
 fn closed_form_is_regular_where_roots_meet() {
     let process = Soiptd::from_acceleration_gain(1.0, 1.0, 0.5, 0.2).unwrap();
@@ -128,7 +127,7 @@ fn delay_free_cost_matches_the_lyapunov_solution() {
                 / (2.0 * d0 * d3 * (d1 * d2 - d0 * d3));
         let process = Soiptd::from_acceleration_gain(1.0, t_prop, damping, 0.0).unwrap();
         let label = format!("{t_prop} {damping} {kp} {kd}");
-        // Where the margin is small (1.99 of 2) both forms lose its relative size, 1/400.
+        // At kp = 1.99 (stable below 2) both forms lose a factor of about 400 in precision.
         assert_close(
             ise(&process, Pd { kp, kd }).unwrap(),
             lyapunov,
@@ -158,9 +157,9 @@ fn delay_free_cost_by_hand() {
     }
 }
 
-// A dead time that leaves the phase margin PM -> 0 makes the resonance alone count: J PM tends to a
-// constant, and its difference from that is proportional to PM. Between 1e-7 rad and 1e-5 or 1e-6 rad
-// the changes are as 99 to 9.
+// As the dead time takes the phase margin PM to zero, the resonance dominates the cost: J PM tends to a constant, and
+// its difference from the constant is proportional to PM. Relative to 1e-7 rad the changes at 1e-5 and 1e-6 rad are as
+// 99 to 9.
 #[test]
 fn cost_grows_like_the_inverse_of_a_small_margin() {
     let process = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();

@@ -1,0 +1,11 @@
+//! Tests of the public interface: exact solutions against hand calculations, quadrature and random processes.
+
+#![expect(
+    clippy::unwrap_used,
+    reason = "the lint does not recognise helper functions as parts of tests"
+)]
+
+mod cost;
+mod properties;
+mod step_response;
+mod values;

@@ -1,0 +1,132 @@
+//! Rules that decide which remarks a result gets.
+
+use onecycle_design::Parameter;
+
+use crate::excitation::Oscillation;
+use crate::outcome::{Identification, Identified};
+use crate::reading::Reading;
+use crate::remark::Remark;
+use crate::settings::Options;
+
+/// Noise over amplitude above which the relay needs its protection against switching on noise.
+const MUCH_NOISE: f64 = 0.05;
+/// Samples per period below which one sample is more than 10 degrees of the oscillation, half of a phase margin of 20
+/// degrees.
+const FEW_SAMPLES: f64 = 360.0 / 10.0;
+/// Relative half widths of intervals above which a parameter is weakly determined.
+const WIDE: [(Parameter, f64); 3] = [
+    (Parameter::KOverTBody, 0.1),
+    (Parameter::TProp, 0.3),
+    (Parameter::TBody, 0.5),
+];
+/// Width of the interval of the dead time over the period above which the dead time is weakly determined: 0.03 periods
+/// are 11 degrees of phase.
+const WIDE_DELAY: f64 = 0.03;
+/// Input bias over relay amplitude above which the bias is large. A relay that is asymmetric on purpose, usually by
+/// 0.2, shows a bias of 0.2.
+const MUCH_BIAS: f64 = 0.25;
+/// Misfit above which the model visibly differs from the process.
+const MUCH_MISFIT: f64 = 0.01;
+/// Lower end of the phase margin over the specified phase margin below which the margin is in doubt.
+const LITTLE_MARGIN: f64 = 0.75;
+/// Overshoot above which a step response rings for long.
+const MUCH_OVERSHOOT: f64 = 0.4;
+
+/// Remarks on `found`.
+pub(super) fn remarks(found: &Identification, options: &Options, has_pack: bool) -> Vec<Remark> {
+    let mut remarks = Vec::new();
+    if let Some(oscillation) = found.oscillation() {
+        let is_known = found.last_cycle().is_some_and(Reading::is_known);
+        of_oscillation(oscillation, is_known, options, &mut remarks);
+        if found.outcome.is_ok() {
+            match found.last_cycle() {
+                Some(reading) if reading.is_known() => {}
+                Some(reading) => remarks.push(Remark::Unknown(reading.classification.score)),
+                None if has_pack => remarks.push(Remark::Unread),
+                None => {}
+            }
+        }
+        if let Ok(identified) = &found.outcome {
+            of_process(identified, oscillation, &mut remarks);
+            of_controller(identified, options, &mut remarks);
+        }
+    }
+    remarks
+}
+
+fn of_oscillation(
+    oscillation: &Oscillation,
+    is_known: bool,
+    options: &Options,
+    remarks: &mut Vec<Remark>,
+) {
+    let used = oscillation.cycles_used;
+    if oscillation.cycles_steady == 1 {
+        remarks.push(Remark::OneCycle { is_known });
+    } else if oscillation.cycles_steady < 3 || (used < options.cycles && used < 4) {
+        remarks.push(Remark::FewCycles { used });
+    }
+    let noise = oscillation.noise_sigma / oscillation.amplitude;
+    if noise > MUCH_NOISE {
+        remarks.push(Remark::Noisy(noise));
+    }
+    let samples = oscillation.period_s / oscillation.sample_s;
+    if samples < FEW_SAMPLES {
+        remarks.push(Remark::Coarse(samples));
+    }
+}
+
+fn of_process(identified: &Identified, oscillation: &Oscillation, remarks: &mut Vec<Remark>) {
+    let estimate = &identified.estimate;
+    let gain = identified.model.parameter(Parameter::KOverTBody);
+    if gain.is_some_and(|gain| gain < 0.0) {
+        remarks.push(Remark::NegativeGain);
+    }
+    if let Some(t_body) = estimate.get(Parameter::TBody)
+        && t_body.high.is_none()
+    {
+        remarks.push(Remark::DampingNotSeen(t_body.low));
+    }
+    for (parameter, most) in WIDE {
+        let width = estimate
+            .get(parameter)
+            .and_then(|interval| interval.relative_half_width());
+        if let Some(relative_half_width) = width.filter(|&width| width > most) {
+            remarks.push(Remark::Weak {
+                parameter,
+                relative_half_width,
+            });
+        }
+    }
+    let tau = estimate.get(Parameter::Tau);
+    if let Some((low_s, high_s)) = tau.and_then(|tau| tau.low.zip(tau.high))
+        && high_s - low_s > WIDE_DELAY * oscillation.period_s
+    {
+        remarks.push(Remark::WeakDelay { low_s, high_s });
+    }
+    let bias = identified.fit.refined.input_bias;
+    let untrimmed = bias + oscillation.relay_centre;
+    let bias = untrimmed.abs() / oscillation.relay_amplitude;
+    if bias > MUCH_BIAS {
+        remarks.push(Remark::Biased(bias));
+    }
+    if identified.fit.misfit > MUCH_MISFIT {
+        remarks.push(Remark::Misfit(identified.fit.misfit));
+    }
+}
+
+fn of_controller(identified: &Identified, options: &Options, remarks: &mut Vec<Remark>) {
+    let margin = identified.phase_margin_rad;
+    if let Some(low) = margin
+        .low
+        .filter(|&low| low < LITTLE_MARGIN * options.specification.phase_margin_rad)
+    {
+        remarks.push(Remark::MarginMayBeLess(low));
+    }
+    if let Some(step) = identified
+        .step
+        .filter(|step| step.overshoot > MUCH_OVERSHOOT)
+    {
+        remarks.push(Remark::Overshoot(step.overshoot));
+    }
+}

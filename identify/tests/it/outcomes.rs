@@ -1,0 +1,148 @@
+//! Outcomes of an identification on a simulated relay test without noise.
+
+use onecycle_design::{DesignError, Parameter, Structure, margins};
+use onecycle_identify::{
+    Excitation, Identification, MOST_CYCLES, Method, Options, Signals, Verdict, identify,
+    identify_by,
+};
+use onecycle_onboard::{Relay, RelaySettings, Soiptd};
+use onecycle_plant::FixedStepProcess;
+
+/// Sample period (s).
+const SAMPLE_S: f64 = 1e-3;
+
+/// Eight seconds of the paper's hexacopter under a relay: time (s), input, output.
+fn relay_test() -> [Vec<f64>; 3] {
+    let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
+    let mut axis = FixedStepProcess::new(&process, SAMPLE_S);
+    let settings = RelaySettings::new(0.5, RelaySettings::DISTINGUISHING_BETA);
+    let mut relay = Relay::new(settings).unwrap();
+    let mut columns = [vec![], vec![], vec![]];
+    for tick in 0..8000 {
+        let output = axis.output();
+        let input = f64::from(relay.step(-output as f32, SAMPLE_S as f32));
+        for (column, value) in columns
+            .iter_mut()
+            .zip([SAMPLE_S * f64::from(tick), input, output])
+        {
+            column.push(value);
+        }
+        axis.step(input);
+    }
+    columns
+}
+
+fn signals([time_s, input, output]: &[Vec<f64>; 3]) -> Signals<'_> {
+    Signals {
+        time_s,
+        input,
+        output,
+        samples_per_point: 1,
+        sample_period_s: SAMPLE_S,
+        breaks: &[],
+    }
+}
+
+fn identified_with(options: &Options) -> Identification {
+    identify(&signals(&relay_test()), options)
+}
+
+// A report prints the estimate in this order: the parameters of the structure, then the input bias.
+#[test]
+fn an_estimate_lists_its_parameters_in_the_order_of_the_structure() {
+    let found = identified_with(&Options::default()).outcome.unwrap();
+    let listed: Vec<Parameter> = found
+        .estimate
+        .iter()
+        .map(|(parameter, _)| parameter)
+        .collect();
+    let expected = [
+        Parameter::K,
+        Parameter::KOverTBody,
+        Parameter::TProp,
+        Parameter::TBody,
+        Parameter::Tau,
+        Parameter::InputBias,
+    ];
+    assert_eq!(listed, expected);
+    assert_eq!(found.estimate.structure(), Structure::Soiptd);
+    assert_eq!(listed[..5], *found.estimate.structure().parameters());
+    for (parameter, interval) in found.estimate.iter() {
+        assert_eq!(found.estimate.get(parameter), Some(interval));
+    }
+    // Reported elsewhere than in the estimate.
+    assert_eq!(found.estimate.get(Parameter::InverseTBody), None);
+}
+
+// The estimate is the model's, and margins and interval are those of the controller.
+#[test]
+fn model_estimate_and_margins_agree() {
+    let found = identified_with(&Options::default()).outcome.unwrap();
+    for &parameter in found.model.structure().parameters() {
+        let value = found.model.parameter(parameter).unwrap();
+        let estimate = found.estimate.get(parameter).unwrap().estimate.unwrap();
+        // The estimate has gone through the coordinates of the estimator and back: rounding.
+        assert!((estimate / value - 1.0).abs() < 1e-9, "{parameter:?}");
+    }
+    let controller = &found.design.controller;
+    assert_eq!(
+        margins(&found.model, controller),
+        Some(found.design.margins)
+    );
+    assert!(
+        found
+            .phase_margin_rad
+            .holds(found.design.margins.phase_margin_rad)
+    );
+}
+
+// A phase margin out of range is a verdict that names the value. The oscillation is reported all the same.
+#[test]
+fn a_phase_margin_out_of_range_is_a_verdict() {
+    for margin_rad in [0.0, -1.0, 2.0, f64::INFINITY, f64::NAN] {
+        let found = identified_with(&Options::default().phase_margin_rad(margin_rad));
+        let Err(Verdict::NoController(DesignError::PhaseMargin(named))) = found.outcome else {
+            panic!("{margin_rad}: {:?}", found.outcome);
+        };
+        assert_eq!(named.to_bits(), margin_rad.to_bits());
+        assert!(found.oscillation().is_some());
+        assert_eq!(
+            found.excitation.as_ref().map(Excitation::name),
+            Some("relay")
+        );
+    }
+}
+
+#[test]
+fn the_number_of_cycles_has_limits() {
+    assert_eq!(Options::default().cycles, 8);
+    assert_eq!(Options::default().cycles(0).cycles, 1);
+    assert_eq!(Options::default().cycles(1000).cycles, MOST_CYCLES);
+    // The field is public, so a value out of range is possible. It is limited where it is used: to 1, and to all steady
+    // cycles, which are fewer than 50 here.
+    let oscillation = |cycles: usize| {
+        let mut options = Options::default();
+        options.cycles = cycles;
+        *identified_with(&options).oscillation().unwrap()
+    };
+    assert_eq!(oscillation(0).cycles_used, 1);
+    let all = oscillation(usize::MAX);
+    assert_eq!(all.cycles_used, all.cycles_steady);
+    assert!((10..MOST_CYCLES).contains(&all.cycles_used), "{all:?}");
+}
+
+// Without a pack, classification has nothing to classify by; least squares needs none.
+#[test]
+fn without_a_pack_least_squares_is_left() {
+    let columns = relay_test();
+    let outcome = |method| {
+        let options = Options::default().method(method);
+        identify_by(&signals(&columns), &options, None).outcome
+    };
+    assert_eq!(
+        outcome(Method::Classify),
+        Err(Verdict::Unknown { score: None })
+    );
+    let fitted = outcome(Method::Map).unwrap();
+    assert_eq!(Ok(fitted), outcome(Method::Refine));
+}
