@@ -12,6 +12,7 @@ mod pictures;
 mod report;
 mod settings;
 mod style;
+mod words;
 
 use std::process::ExitCode;
 

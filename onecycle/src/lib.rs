@@ -90,10 +90,7 @@
 //! use onecycle::{CsvOptions, Options, Pack};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
-//! let columns = CsvOptions {
-//!     output_column: Some("output".into()),
-//!     ..CsvOptions::default()
-//! };
+//! let columns = CsvOptions::default().output_column("output");
 //! let recording = onecycle::read("../examples/simulated_hover.csv", &columns)?;
 //! let options = Options {
 //!     cycles: 2,
@@ -157,7 +154,7 @@ pub use {onecycle_link as link, onecycle_onboard as onboard, onecycle_plant as p
 // Recordings.
 #[doc(inline)]
 pub use onecycle_link::{
-    ColumnRef, CsvOptions, Gap, Note, ReadError, Recording, RecordingError, TimeUnit, read,
+    ChosenBy, ColumnLabel, ColumnRef, CsvOptions, Gap, Note, ReadError, Recording, RecordingError, TimeUnit, read,
     read_from, write_csv,
 };
 

@@ -8,6 +8,8 @@ use onecycle_link::{Column, Recording};
 use onecycle_onboard::{Pd, Soiptd};
 use serde::Serialize;
 
+use crate::words;
+
 /// Changes with every change that a reader of the report could notice.
 const IDENTIFY_SCHEMA: &str = "onecycle.identify/1";
 const TUNE_SCHEMA: &str = "onecycle.tune/1";
@@ -180,7 +182,11 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         margins: identified.map(|i| margins(&i.controller.margins, Some(&i.phase_margin_rad))),
         step: identified.and_then(|i| i.step.as_ref()).map(step),
         remarks: found.remarks.iter().map(ToString::to_string).collect(),
-        notes: recording.notes().iter().map(ToString::to_string).collect(),
+        notes: recording
+            .notes()
+            .iter()
+            .map(words::recording::note)
+            .collect(),
     })
 }
 

@@ -11,6 +11,7 @@ use onecycle_onboard::classify::Verdict;
 
 use super::number::{bounded, seconds, significant};
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
+use crate::words;
 
 /// Widest line of remarks, as terminals are.
 const WIDTH: usize = 96;
@@ -66,7 +67,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     let units = Units::of(recording);
     let _ = writeln!(text, "{}", painted(HEADING, file));
     for note in recording.notes() {
-        remark(&mut text, "  note: ", &note.to_string());
+        remark(&mut text, "  note: ", &words::recording::note(note));
     }
     if let Some(oscillation) = &found.oscillation {
         describe_oscillation(&mut text, oscillation, &units);

@@ -1,7 +1,7 @@
-//! What separates the columns of a file.
+//! Detects the separator of the columns.
 //!
-//! The first lines are split by every separator in turn. The one that leaves the most cells that
-//! are numbers wins; of equals, the first of tab, semicolon, bar, comma, blanks.
+//! The first lines are split by each separator in turn. The separator with the largest fraction of
+//! numbers among its cells wins; of equals, the first of tab, semicolon, bar, comma, blanks.
 
 use std::io::Read;
 
@@ -9,18 +9,18 @@ use super::error::ReadError;
 use super::number::{self, Cell};
 use super::records::Records;
 
-/// Most bytes, and most rows, looked at.
+/// Maximum number of bytes and of rows that are split.
 const LOOK_BYTES: usize = 1 << 16;
 const LOOK_ROWS: usize = 200;
 
-/// What separates the columns of a file.
+/// Separator of the columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Separator {
     Tab,
     Semicolon,
     Bar,
     Comma,
-    /// One blank or more.
+    /// One or more blanks or tabs.
     Blanks,
 }
 
@@ -33,7 +33,7 @@ impl Separator {
         Self::Blanks,
     ];
 
-    /// The separator in a clean line.
+    /// The byte that separates the cells of a clean line.
     pub(super) fn byte(self) -> u8 {
         match self {
             Self::Tab => b'\t',
@@ -44,7 +44,7 @@ impl Separator {
         }
     }
 
-    /// Detects the separator from the head of a text, which may be the whole of it.
+    /// Detects the separator from the head of a text; `whole` if `head` is the entire text.
     pub(super) fn detect(head: &[u8], whole: bool) -> Result<Self, ReadError> {
         let look = &head[..head.len().min(LOOK_BYTES)];
         let complete = look
@@ -68,11 +68,11 @@ impl Separator {
 /// How well a separator splits the first lines.
 #[derive(Debug, Clone, Copy, Default)]
 struct Score {
-    /// Cells that are numbers, in rows of at least two cells.
+    /// Number of cells that are numbers, in rows of at least two cells.
     numbers: usize,
-    /// All cells.
+    /// Number of cells.
     cells: usize,
-    /// Rows of at least two cells.
+    /// Number of rows of at least two cells.
     rows: usize,
 }
 
@@ -92,7 +92,7 @@ impl Score {
         Ok(score)
     }
 
-    /// A larger fraction of numbers; without any numbers, more rows that it splits.
+    /// Whether the fraction of numbers is larger; without any numbers, whether more rows are split.
     fn beats(&self, other: &Self) -> bool {
         let ours = self.numbers as u128 * other.cells.max(1) as u128;
         let theirs = other.numbers as u128 * self.cells.max(1) as u128;
