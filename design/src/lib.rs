@@ -7,3 +7,8 @@ pub mod roots;
 pub mod soiptd_pd;
 
 pub use soiptd_pd::*;
+
+// Compiles and runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

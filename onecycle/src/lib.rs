@@ -154,8 +154,8 @@ pub use {onecycle_link as link, onecycle_onboard as onboard, onecycle_plant as p
 // Recordings.
 #[doc(inline)]
 pub use onecycle_link::{
-    ChosenBy, ColumnLabel, ColumnRef, CsvOptions, Gap, Note, ReadError, Recording, RecordingError, TimeUnit, read,
-    read_from, write_csv,
+    ChosenBy, ColumnLabel, ColumnRef, CsvOptions, Gap, Note, ReadError, Recording, RecordingError,
+    TimeUnit, read, read_from, write_csv,
 };
 
 // What a recording tells.
@@ -225,3 +225,8 @@ pub fn with_signals<T>(recording: &Recording, read: impl FnOnce(&Signals<'_>) ->
         breaks: &breaks,
     })
 }
+
+// Compiles and runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
