@@ -127,7 +127,7 @@ struct Table<'a> {
     builder: RecordingBuilder,
     clock: Clock,
     sample_rate_hz: f64,
-    /// Rows so far.
+    /// Number of rows so far.
     rows: u64,
     /// The last time stamp as in the file, for an error that says time goes back.
     last_stamp: Stamp,

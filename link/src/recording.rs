@@ -290,7 +290,7 @@ impl Recording {
         &self.columns
     }
 
-    /// What the reader chose, forgave or dropped.
+    /// What the reader chose, assumed or dropped.
     pub fn notes(&self) -> &[Note] {
         &self.notes
     }

@@ -35,7 +35,7 @@ impl TimeUnit {
         })
     }
 
-    /// Its symbol, as `ms`.
+    /// Its symbol, such as `ms`.
     pub fn symbol(self) -> &'static str {
         match self {
             Self::Hours => "h",

@@ -8,7 +8,7 @@ pub(crate) fn refusal(error: &ReadError) -> String {
     advised(error.to_string(), advice_on_file(error))
 }
 
-/// What the reader chose, corrected or dropped, and how to change a guess.
+/// What the reader chose, assumed or dropped, and the flag that changes a guess.
 pub(crate) fn note(note: &Note) -> String {
     let advice = match note {
         Note::ColumnsChosen {

@@ -36,7 +36,8 @@ const NOTED_JITTER: f64 = 0.1;
 /// Gathers samples into a [`Recording`] and averages them when there are too many to keep.
 ///
 /// Samples that are not finite and samples that repeat a time stamp are dropped and counted.
-/// [`finish`](Self::finish) returns an error if more than 1 % or 5 % of the samples were dropped.
+/// [`finish`](Self::finish) returns an error if more than 1 % of the samples lack a number or more
+/// than 5 % repeat a time stamp.
 #[derive(Debug, Clone)]
 pub struct RecordingBuilder {
     columns: Columns,
@@ -462,7 +463,7 @@ impl Group {
     }
 }
 
-/// A number of rows, and the position of the first.
+/// A count of rows with the position of the first.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
     count: u64,

@@ -1,4 +1,4 @@
-//! What a reader chose, forgave or dropped.
+//! What a reader chose, assumed or dropped.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 use super::{ColumnLabel, Position, Role};
 use crate::time_unit::TimeUnit;
 
-/// What a reader chose, forgave or dropped; `Display` states the fact.
+/// What a reader chose, assumed or dropped; `Display` states the fact.
 ///
 /// A note is not an error. It derives `Error` only so that each clause stands at its variant.
 #[derive(Debug, Clone, PartialEq, Error)]

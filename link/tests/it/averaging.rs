@@ -161,7 +161,7 @@ fn gaps_and_jitter_of_a_short_recording() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(512))]
 
-    /// Means of the output and the integral of the input survive averaging.
+    /// Averaging keeps the mean of the output and the integral of the input.
     #[test]
     fn averages_are_exact(
         samples in prop::collection::vec((0.2..1.8_f64, -1.0..1.0_f64, -1.0..1.0_f64), 2..2000),
@@ -175,7 +175,7 @@ proptest! {
         prop_assert!(recording.len() <= 64);
         prop_assert!(recording.gaps().is_empty());
 
-        // All but what is left over at the end, whose first sample ends the last point.
+        // All samples but those of an incomplete last group; the first of these ends the last point.
         let used = recording.len() * recording.samples_per_point();
         prop_assert!(samples.len() - used < recording.samples_per_point());
         let output: Vec<f64> = samples[..used].iter().map(|sample| sample.2).collect();
