@@ -19,6 +19,7 @@ mod number;
 mod options;
 mod preview;
 mod records;
+mod separator;
 mod text;
 mod write;
 
@@ -30,7 +31,6 @@ use ::csv::ByteRecord;
 
 use self::clock::{Clock, Stamp};
 use self::columns::Choice;
-use self::dialect::Separator;
 use self::error::quoted;
 use self::number::{Cell, Mark};
 use self::preview::Preview;
@@ -78,7 +78,7 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
         return Err(ReadError::BadSampleRate { rate_hz });
     }
     let text = Text::open(bytes)?;
-    let separator = Separator::detect(&text.head, text.whole)?;
+    let separator = dialect::detect(&text.head, text.whole)?;
     let preview = Preview::of(&text, separator)?;
     let choice = columns::choose(&preview, options)?;
     let mut table = Table::new(&preview, choice, options);

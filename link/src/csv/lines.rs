@@ -7,8 +7,8 @@
 
 use std::io::{self, Read};
 
-use super::dialect::Separator;
 use super::error::ReadError;
+use super::separator::Separator;
 
 /// Number of bytes read at a time.
 const PIECE_BYTES: u64 = 1 << 15;

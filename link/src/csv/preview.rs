@@ -1,10 +1,10 @@
 //! Preview of a table: its header and its first rows.
 
-use super::dialect::Separator;
 use super::error::{ReadError, quoted};
 use super::names::{Name, is_unit};
 use super::number::{self, Cell};
 use super::records::Records;
+use super::separator::Separator;
 use super::text::Text;
 use crate::recording::ColumnLabel;
 

@@ -4,9 +4,9 @@ use std::io::Read;
 
 use ::csv::{ByteRecord, ErrorKind, ReaderBuilder, Terminator};
 
-use super::dialect::Separator;
 use super::error::ReadError;
 use super::lines::{Lines, State};
+use super::separator::Separator;
 
 /// Buffer of the CSV splitter, in bytes.
 const BUFFER_BYTES: usize = 1 << 15;
