@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 
 use onecycle_link::ReadError;
 
+use crate::words;
+
 /// Exit codes, as `--help` lists them.
 pub(crate) mod exit {
     /// A process was identified.
@@ -26,7 +28,7 @@ pub(crate) enum Failure {
     #[error("{0}")]
     Usage(String),
     /// A recording that cannot be read.
-    #[error("{}{reason}", located(path, reason))]
+    #[error("{}{}", located(path, reason), words::recording::refusal(reason))]
     Recording {
         path: PathBuf,
         #[source]

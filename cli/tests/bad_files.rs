@@ -186,7 +186,7 @@ fn a_few_duplicate_stamps() {
         }
     });
     let report = identify(table.csv(), &[]).identified();
-    report.noted(&["repeated a stamp", "line 51"]);
+    report.noted(&["repeated a time stamp", "line 51"]);
     is_hover(&report, 0.02);
 }
 
@@ -196,7 +196,12 @@ fn many_duplicate_stamps() {
         (sample.time_s * 100.0).floor() / 100.0
     });
     let outcome = identify(&text, &[]);
-    let wanted = ["repeat the stamp", "line 3", "at most 5 %", "sample rate"];
+    let wanted = [
+        "repeat the time stamp",
+        "line 3",
+        "at most 5 %",
+        "sample rate",
+    ];
     outcome.refused(UNREADABLE, &wanted);
     // The advice works.
     let report = identify(&text, &["--sample-rate", "1000"]).identified();
@@ -272,7 +277,7 @@ fn sample_jitter() {
     }
     let text = simulate(&HOVER, &["--jitter", "25%", "--seed", "1"]);
     let report = identify(text, &[]).identified();
-    report.noted(&["increments of time vary"]);
+    report.noted(&["sample period varies"]);
     report.near("k_over_t_body", HOVER_K_OVER_T_BODY, 0.02);
 }
 

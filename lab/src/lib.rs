@@ -5,3 +5,8 @@ pub mod judge;
 pub mod learn;
 pub mod paper;
 pub mod space;
+
+// Compiles and runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -121,13 +121,12 @@ struct Golden {
 // Seven inputs of order one through three layers of sums: a few units of 2^-24 = 6e-8 each.
 #[test]
 fn pytorch_models_give_pytorchs_numbers() {
-    let golden: Golden =
-        serde_json::from_str(include_str!("../../golden/torch_onnx.json")).unwrap();
+    let golden: Golden = serde_json::from_str(include_str!("golden/torch_onnx.json")).unwrap();
     let rows = golden.inputs.len() / INPUTS;
     let inputs = Matrix::from_rows(rows, INPUTS, golden.inputs).unwrap();
     for bytes in [
-        &include_bytes!("../../golden/torch_onnx.onnx")[..],
-        include_bytes!("../../golden/torch_onnx_script.onnx"),
+        &include_bytes!("golden/torch_onnx.onnx")[..],
+        include_bytes!("golden/torch_onnx_script.onnx"),
     ] {
         let imported = import(bytes).unwrap();
         let kinds = [dense(7), Layer::Tanh, dense(6), Layer::Relu, dense(3)];
@@ -462,7 +461,7 @@ proptest! {
     fn no_change_of_a_model_makes_it_panic(
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),
     ) {
-        let mut bytes = include_bytes!("../../golden/torch_onnx_script.onnx").to_vec();
+        let mut bytes = include_bytes!("golden/torch_onnx_script.onnx").to_vec();
         for (index, byte) in changes {
             let index = index.index(bytes.len());
             bytes[index] = byte;

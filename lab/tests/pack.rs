@@ -281,9 +281,9 @@ struct Golden {
 // sums of 5 and 8 terms near one, a few units of 6e-8.
 #[test]
 fn pytorch_tensors_are_read() {
-    let golden = include_str!("../../golden/torch_steps.json");
+    let golden = include_str!("golden/torch_steps.json");
     let golden: Golden = serde_json::from_str(golden).unwrap();
-    let bytes = include_bytes!("../../golden/torch_steps.safetensors");
+    let bytes = include_bytes!("golden/torch_steps.safetensors");
     let network = network_of_tensors(bytes, &[Activation::Relu, Activation::None]).unwrap();
     let rows = golden.inputs.len() / network.inputs();
     let inputs = Matrix::from_rows(rows, network.inputs(), golden.inputs).unwrap();

@@ -1,4 +1,4 @@
-//! A forgiving reader of text tables.
+//! CSV reader: text tables of any dialect to recordings.
 //!
 //! ```text
 //! bytes -> text      byte order marks, UTF-16; refuses what is not text     text.rs
@@ -16,8 +16,10 @@ mod error;
 mod lines;
 mod names;
 mod number;
+mod options;
 mod preview;
 mod records;
+mod separator;
 mod text;
 mod write;
 
@@ -29,58 +31,27 @@ use ::csv::ByteRecord;
 
 use self::clock::{Clock, Stamp};
 use self::columns::Choice;
-use self::dialect::Separator;
 use self::error::quoted;
 use self::number::{Cell, Mark};
 use self::preview::Preview;
 use self::records::{Records, Row};
 use self::text::Text;
 use crate::recording::{
-    Column, Columns, MAX_POINTS, Note, Position, Recording, RecordingBuilder, RecordingError,
+    Column, ColumnLabel, Columns, Note, Position, Recording, RecordingBuilder, RecordingError,
 };
+use crate::time_unit::TimeUnit;
 
-pub use columns::ColumnRef;
 pub use error::ReadError;
-pub use names::TimeUnit;
+pub use options::{ColumnRef, CsvOptions};
 pub use write::write_csv;
 
-/// Slowest and fastest sample rate that a caller may give, in hertz.
+/// Range of sample rates that a caller may give, in hertz.
 pub const SAMPLE_RATES_HZ: std::ops::RangeInclusive<f64> = 1e-6..=1e9;
-
-/// What the caller knows of a file; by default nothing.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CsvOptions {
-    /// Column of the time stamps.
-    pub time_column: Option<ColumnRef>,
-    /// Column of the input.
-    pub input_column: Option<ColumnRef>,
-    /// Column of the output.
-    pub output_column: Option<ColumnRef>,
-    /// Sample rate in hertz; time is then counted by rows, and no time column is read.
-    pub sample_rate_hz: Option<f64>,
-    /// Unit of the time column, whatever its header says.
-    pub time_unit: Option<TimeUnit>,
-    /// Most points to keep; [`MAX_POINTS`] unless a test wants less.
-    pub max_points: usize,
-}
-
-impl Default for CsvOptions {
-    fn default() -> Self {
-        Self {
-            time_column: None,
-            input_column: None,
-            output_column: None,
-            sample_rate_hz: None,
-            time_unit: None,
-            max_points: MAX_POINTS,
-        }
-    }
-}
 
 /// Reads a recording from a file.
 ///
 /// # Errors
-/// A [`ReadError`] says why the file is no recording, where, and what to do.
+/// [`ReadError`] says why the file does not make a recording, and where.
 pub fn read(path: impl AsRef<Path>, options: &CsvOptions) -> Result<Recording, ReadError> {
     let path = path.as_ref();
     let unopened = |reason| ReadError::Open {
@@ -89,13 +60,13 @@ pub fn read(path: impl AsRef<Path>, options: &CsvOptions) -> Result<Recording, R
     };
     let file = File::open(path).map_err(unopened)?;
     match read_from(file, options) {
-        // A folder opens, but does not read.
+        // On Unix a folder can be opened but not read.
         Err(ReadError::Interrupted { line: 0, reason }) => Err(unopened(reason)),
         result => result,
     }
 }
 
-/// Reads a recording from bytes, in one pass and in bounded memory. Needs no buffered reader.
+/// Reads a recording from bytes, in one pass and in bounded memory. `bytes` need not be buffered.
 ///
 /// # Errors
 /// As [`read`].
@@ -107,7 +78,7 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
         return Err(ReadError::BadSampleRate { rate_hz });
     }
     let text = Text::open(bytes)?;
-    let separator = Separator::detect(&text.head, text.whole)?;
+    let separator = dialect::detect(&text.head, text.whole)?;
     let preview = Preview::of(&text, separator)?;
     let choice = columns::choose(&preview, options)?;
     let mut table = Table::new(&preview, choice, options);
@@ -132,7 +103,7 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
     Ok(table.builder.finish()?)
 }
 
-/// Forgives a last line that lacks cells, or whose last cell was cut off.
+/// Accepts a last line that lacks cells, or whose last cell was cut off.
 fn forgive_last_line(
     records: &mut Records<impl Read>,
     line: u64,
@@ -156,11 +127,11 @@ struct Table<'a> {
     builder: RecordingBuilder,
     clock: Clock,
     sample_rate_hz: f64,
-    /// Rows so far.
+    /// Number of rows so far.
     rows: u64,
-    /// The last stamp, for the sentence that says time goes back.
+    /// The last time stamp as in the file, for an error that says time goes back.
     last_stamp: Stamp,
-    /// How the numbers of this file write their decimals.
+    /// The decimal mark of the file: point or comma.
     mark: Mark,
 }
 
@@ -168,17 +139,13 @@ impl<'a> Table<'a> {
     fn new(preview: &'a Preview, choice: Choice, options: &CsvOptions) -> Self {
         let column = |column: usize| match &preview.names {
             Some(names) => names[column].column(),
-            None => Column::named(&preview.label(column)),
+            None => Column::named(&preview.label(column).to_string()),
         };
-        let rows = Column {
-            name: "row".to_owned(),
-            unit: None,
-        };
-        let mut builder = RecordingBuilder::new(Columns {
-            time: choice.time.map_or(rows, column),
-            input: column(choice.input),
-            output: column(choice.output),
-        })
+        let mut builder = RecordingBuilder::new(Columns::new(
+            choice.time.map_or_else(|| Column::named("row"), column),
+            column(choice.input),
+            column(choice.output),
+        ))
         .with_max_points(options.max_points);
 
         builder.note(choice.note(preview));
@@ -198,9 +165,9 @@ impl<'a> Table<'a> {
         }
         let sample_rate_hz = options.sample_rate_hz.unwrap_or(1.0);
         if let Some(time) = choice.ignored {
-            let name = preview.label(time);
+            let column = preview.label(time);
             builder.note(Note::TimeIgnored {
-                name,
+                column,
                 sample_rate_hz,
             });
         }
@@ -255,7 +222,7 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    /// The stamp in a column, as in the file and in seconds.
+    /// The time stamp in a column, as in the file and in seconds.
     fn time(&mut self, row: &Row<'_>, column: usize) -> Result<(Stamp, f64), ReadError> {
         let cell = &row.cells[column];
         let Some((stamp, mark)) = clock::parse(cell) else {
@@ -289,7 +256,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    /// Refuses decimal points beside decimal commas: one of them separates thousands.
+    /// Refuses a file with both decimal points and decimal commas: one of them separates thousands.
     fn check_mark(&mut self, mark: Mark, row: &Row<'_>, column: usize) -> Result<(), ReadError> {
         if mark == Mark::None || mark == self.mark {
             return Ok(());
@@ -302,8 +269,8 @@ impl<'a> Table<'a> {
         Err(ReadError::MixedDecimals { line, column, text })
     }
 
-    /// Line, column and cell as a sentence names them.
-    fn place(&self, row: &Row<'_>, column: usize) -> (u64, String, String) {
+    /// Line, column and cell as an error names them.
+    fn place(&self, row: &Row<'_>, column: usize) -> (u64, ColumnLabel, String) {
         (
             row.line,
             self.preview.label(column),
@@ -312,7 +279,7 @@ impl<'a> Table<'a> {
     }
 }
 
-/// Whether a row fits, its empty cells at the end aside.
+/// Whether a row has `width` cells, not counting empty cells at its end.
 fn fits(cells: &ByteRecord, width: usize) -> bool {
     cells.len() > width
         && cells

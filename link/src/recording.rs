@@ -1,14 +1,15 @@
-//! The one type that every reader yields.
+//! The recording of an experiment: what every reader returns.
 //!
 //! A recording is a sequence of points. Point `i` starts at `time_s[i]`; `input[i]` is held from
-//! there until `time_s[i + 1]`; `output[i]` is measured there. A recording too long to keep is
-//! averaged in groups of `n = samples_per_point` consecutive samples as it is read: `output[i]`
-//! is then the mean of `n` samples, so it belongs to the time `time_s[i] + (n - 1) / 2 * T` with
-//! `T = sample_period_s`, and `input[i]` is the mean over time of the held input.
+//! `time_s[i]` until `time_s[i + 1]`; `output[i]` is measured at `time_s[i]`. A recording with more
+//! than [`MAX_POINTS`] samples is averaged in groups of `n = samples_per_point` consecutive samples
+//! as it is read: `output[i]` is then the mean of `n` samples, so it belongs to the time
+//! `time_s[i] + (n - 1) / 2 * T` with `T = sample_period_s`, and `input[i]` is the mean over time
+//! of the held input.
 //!
-//! No group reaches across a gap. The samples left over before a gap, and after the last full
-//! group, are fewer than `n`; they are dropped and counted in a note, so that every point has
-//! exactly `n` samples. Across a gap the input is not known.
+//! No group reaches across a gap. The samples of an incomplete group, before a gap or at the end,
+//! are dropped and counted in a note, so that every point has exactly `n` samples. During a gap
+//! the input is unknown.
 
 mod builder;
 mod error;
@@ -20,25 +21,27 @@ use std::fmt;
 pub(crate) use builder::FAR_START_S;
 pub use builder::RecordingBuilder;
 pub use error::RecordingError;
-pub use note::Note;
+pub(crate) use note::counted;
+pub use note::{ChosenBy, Note};
 
-/// Most points that a recording keeps: 2^22, three columns of which take 96 MiB.
+/// Maximum number of points in a recording: 2^22; three columns of `f64` then take 96 MiB.
 pub const MAX_POINTS: usize = 1 << 22;
 
 /// An increment of time longer than this many median increments is a gap.
 ///
-/// Five: a logger that loses one or two samples in a row only jitters, and a logger that flushes
-/// to a card for longer has lost part of the cycle.
+/// With five, one or two lost samples in a row count as jitter. A longer loss, as when a logger
+/// flushes to its card, hides part of the cycle.
 pub const GAP_PERIODS: f64 = 5.0;
 
-/// Which of the three signals a column holds.
+/// Which signal a column holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Role {
     /// Time stamps.
     Time,
-    /// What the relay commands.
+    /// Input of the process: the command of the relay.
     Input,
-    /// What the sensor measures.
+    /// Output of the process: the measurement.
     Output,
 }
 
@@ -57,12 +60,13 @@ impl fmt::Display for Role {
     }
 }
 
-/// Where a sample stands in its source.
+/// Position of a sample in its source.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Position {
-    /// Line of a text file, from 1.
+    /// Line of a text file, counted from 1.
     Line(u64),
-    /// Sample of a vector or of a log, from 0.
+    /// Index in a vector or in a log, counted from 0.
     Sample(u64),
 }
 
@@ -75,12 +79,34 @@ impl fmt::Display for Position {
     }
 }
 
+/// A column of a table as errors and notes name it.
+///
+/// `Display` gives `"pv" (column 2)`, or `column 2` if the column has no name.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct ColumnLabel {
+    /// Name in the header, shortened to 32 printable characters; `None` without a header.
+    pub name: Option<String>,
+    /// Number, counted from 1.
+    pub number: usize,
+}
+
+impl fmt::Display for ColumnLabel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match &self.name {
+            Some(name) => write!(f, "\"{name}\" (column {})", self.number),
+            None => write!(f, "column {}", self.number),
+        }
+    }
+}
+
 /// Name and unit of a column as the source gives them.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Column {
     /// Name, without the unit.
     pub name: String,
-    /// Unit, if the source gives one. Values are never converted, except time, to seconds.
+    /// Unit, if the source gives one. Time is converted to seconds; other values are not converted.
     pub unit: Option<String>,
 }
 
@@ -92,10 +118,18 @@ impl Column {
             unit: None,
         }
     }
+
+    /// The column with this unit.
+    #[must_use]
+    pub fn with_unit(mut self, unit: &str) -> Self {
+        self.unit = Some(unit.to_owned());
+        self
+    }
 }
 
 /// The three columns of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
 pub struct Columns {
     /// Column of the time stamps.
     pub time: Column,
@@ -106,6 +140,15 @@ pub struct Columns {
 }
 
 impl Columns {
+    /// The columns of time, input and output.
+    pub fn new(time: Column, input: Column, output: Column) -> Self {
+        Self {
+            time,
+            input,
+            output,
+        }
+    }
+
     /// The column of a signal.
     pub fn of(&self, role: Role) -> &Column {
         match role {
@@ -116,15 +159,16 @@ impl Columns {
     }
 }
 
-/// A stretch without samples.
+/// A gap in the recording: no samples for longer than [`GAP_PERIODS`] median increments of time.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Gap {
     /// Index of the first point after the gap; at least 1.
     pub index: usize,
-    /// Stamp of the last sample before the gap, in seconds. In an averaged recording: of the
+    /// Time of the last sample before the gap, in seconds. In an averaged recording: time of the
     /// first sample that was dropped because the gap left its group incomplete.
     pub start_s: f64,
-    /// Stamp of the first sample after the gap, in seconds.
+    /// Time of the first sample after the gap, in seconds.
     pub end_s: f64,
 }
 
@@ -145,14 +189,14 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// A recording from three vectors of equal length, as a simulator has them.
+    /// Makes a recording from three vectors of equal length, as a simulator has them.
     ///
-    /// Stricter than a reader: nothing is dropped. More than [`MAX_POINTS`] samples are averaged,
-    /// and a time that starts beyond 1e7 s is counted from its first stamp, as in every recording.
+    /// Unlike a reader it drops no sample. As in every recording, more than [`MAX_POINTS`] samples
+    /// are averaged, and a time that starts beyond 1e7 s is counted from its first time stamp.
     ///
     /// # Errors
-    /// Lengths that differ, fewer than two samples, a number that is not finite or beyond 1e300,
-    /// time that does not increase, or stamps too large to resolve their own increments.
+    /// The lengths differ, there are fewer than two samples, a number is not finite or beyond
+    /// 1e300, time does not increase, or the time stamps are too large to resolve the sample period.
     pub fn from_samples(
         time_s: &[f64],
         input: &[f64],
@@ -165,14 +209,11 @@ impl Recording {
                 output: output.len(),
             });
         }
-        let mut builder = RecordingBuilder::new(Columns {
-            time: Column {
-                name: "time".to_owned(),
-                unit: Some("s".to_owned()),
-            },
-            input: Column::named("input"),
-            output: Column::named("output"),
-        });
+        let mut builder = RecordingBuilder::new(Columns::new(
+            Column::named("time").with_unit("s"),
+            Column::named("input"),
+            Column::named("output"),
+        ));
         let mut before_s = f64::NEG_INFINITY;
         for (index, ((&time_s, &input), &output)) in (0..).zip(time_s.iter().zip(input).zip(output))
         {
@@ -206,7 +247,7 @@ impl Recording {
         &self.time_s
     }
 
-    /// Input of each point, held from its start until the next, in the unit of its column.
+    /// Input of each point, held until the next point starts, in the unit of its column.
     pub fn input(&self) -> &[f64] {
         &self.input
     }
@@ -216,30 +257,30 @@ impl Recording {
         &self.output
     }
 
-    /// Consecutive samples averaged into each point: 1, or a power of two for a long recording.
+    /// Consecutive samples averaged into each point: 1, or a power of two in a long recording.
     pub fn samples_per_point(&self) -> usize {
         self.samples_per_point
     }
 
     /// Sample period of the source in seconds: the mean of all increments that are not gaps.
     ///
-    /// A point of an averaged recording spans [`Self::samples_per_point`] of these.
+    /// A point of an averaged recording spans [`Self::samples_per_point`] sample periods.
     pub fn sample_period_s(&self) -> f64 {
         self.sample_period_s
     }
 
-    /// Delay from the start of a point to the mean time of its measurement, in seconds:
-    /// `(samples_per_point - 1) / 2 * sample_period_s`, so 0 unless averaged.
+    /// Delay from the start of a point to the mean time of its measurements, in seconds:
+    /// `(samples_per_point - 1) / 2 * sample_period_s`; 0 if the recording is not averaged.
     pub fn output_delay_s(&self) -> f64 {
         (self.samples_per_point - 1) as f64 / 2.0 * self.sample_period_s
     }
 
-    /// Standard deviation of the increments of time that are not gaps, over the sample period.
+    /// Standard deviation of the increments of time, without gaps, divided by the sample period.
     pub fn jitter(&self) -> f64 {
         self.jitter
     }
 
-    /// Stretches without samples, longer than [`GAP_PERIODS`] median increments, in order.
+    /// Gaps in order of time.
     pub fn gaps(&self) -> &[Gap] {
         &self.gaps
     }
@@ -249,7 +290,7 @@ impl Recording {
         &self.columns
     }
 
-    /// What the reader chose, forgave or dropped: one sentence each.
+    /// What the reader chose, assumed or dropped.
     pub fn notes(&self) -> &[Note] {
         &self.notes
     }

@@ -33,3 +33,8 @@ pub use control::Pd;
 pub use process::{Soiptd, SoiptdError};
 pub use relay::{Relay, RelayError, RelayPhase, RelaySettings};
 pub use transition::Transition;
+
+// Compiles and runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -120,8 +120,8 @@ pub use builder::{Identify, with_signals};
 // Recordings.
 #[doc(inline)]
 pub use onecycle_link::{
-    ColumnRef, CsvOptions, Gap, Note, ReadError, Recording, RecordingError, TimeUnit, read,
-    read_from, write_csv,
+    ChosenBy, ColumnLabel, ColumnRef, CsvOptions, Gap, Note, ReadError, Recording, RecordingError,
+    TimeUnit, read, read_from, write_csv,
 };
 
 // Identification.
@@ -147,3 +147,8 @@ pub use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 pub use onecycle_onboard::{Relay, RelayError, RelaySettings};
 #[doc(inline)]
 pub use onecycle_plant::{Experiment, FixedStepProcess, Sensor, Trace};
+
+// Compiles the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,8 +1,4 @@
-//! What is flown: exact simulation of the delayed process and its closed loops.
-//!
-//! The input of a sampled loop is constant between samples, so propagation is exact: no ODE
-//! solver, no step-size error, and a delay of any length. The exception is [`multirotor`], a whole
-//! vehicle, whose equations are not linear: it is integrated.
+#![doc = include_str!("../README.md")]
 
 pub mod closed_loop;
 pub mod delay;

@@ -69,14 +69,12 @@ fn check_page(path: &Path, recording: &Path) -> Result<(), Failure> {
 
 fn read(arguments: &Identify) -> Result<Recording, Failure> {
     let column = |name: &Option<String>| name.as_deref().map(ColumnRef::from);
-    let options = CsvOptions {
-        time_column: column(&arguments.time),
-        input_column: column(&arguments.input),
-        output_column: column(&arguments.output),
-        sample_rate_hz: arguments.sample_rate,
-        time_unit: arguments.time_unit,
-        ..CsvOptions::default()
-    };
+    let mut options = CsvOptions::default();
+    options.time_column = column(&arguments.time);
+    options.input_column = column(&arguments.input);
+    options.output_column = column(&arguments.output);
+    options.sample_rate_hz = arguments.sample_rate;
+    options.time_unit = arguments.time_unit;
     let result = if arguments.file == Path::new("-") {
         onecycle::read_from(std::io::stdin().lock(), &options)
     } else {

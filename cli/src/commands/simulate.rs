@@ -76,15 +76,11 @@ fn run_relay(experiment: &Experiment, mut relay: Relay, seed: u64) -> Trace {
 
 /// The trace with all its samples, however many.
 fn recording(trace: &Trace) -> Result<Recording, Failure> {
-    let column = |name: &str| Column {
-        name: name.to_owned(),
-        unit: None,
-    };
-    let columns = Columns {
-        time: column("time"),
-        input: column("input"),
-        output: column("output"),
-    };
+    let columns = Columns::new(
+        Column::named("time"),
+        Column::named("input"),
+        Column::named("output"),
+    );
     let mut builder = RecordingBuilder::new(columns).with_max_points(trace.len() + 2);
     for (index, time_s) in (0..).zip(&trace.time_s) {
         let (input, output) = (trace.input[index as usize], trace.output[index as usize]);

@@ -6,6 +6,7 @@ use onecycle::{
 use onecycle_link::Column;
 use serde::{Serialize, Serializer};
 
+use crate::words::recording::note;
 use crate::words::remark::sentence;
 use crate::words::verdict::advice;
 
@@ -181,7 +182,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         step: identified.and_then(|i| i.step.as_ref()).map(step),
         remarks: found.remarks.iter().map(sentence).collect(),
         remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
-        notes: recording.notes().iter().map(ToString::to_string).collect(),
+        notes: recording.notes().iter().map(note).collect(),
     })
 }
 

@@ -11,6 +11,7 @@ use onecycle_identify::Reading;
 use super::number::{bounded, seconds, significant};
 use super::units::Units;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
+use crate::words::recording;
 use crate::words::remark::sentence as remark_sentence;
 use crate::words::sentence;
 use crate::words::verdict::advice;
@@ -24,7 +25,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     let units = Units::of(recording);
     let _ = writeln!(text, "{}", painted(HEADING, file));
     for note in recording.notes() {
-        remark(&mut text, "  note: ", &note.to_string());
+        remark(&mut text, "  note: ", &recording::note(note));
     }
     if let Some(oscillation) = found.oscillation() {
         describe_oscillation(&mut text, oscillation, &units);

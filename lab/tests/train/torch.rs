@@ -1,4 +1,4 @@
-//! Numbers of PyTorch, from `golden/torch_steps.py`, in f64 from the same f32 weights: what differs
+//! Numbers of PyTorch, from `tests/golden/torch_steps.py`, in f64 from the same f32 weights: what differs
 //! is our rounding.
 
 use std::collections::BTreeMap;
@@ -36,7 +36,7 @@ struct Density {
 }
 
 fn file(name: &str) -> Vec<u8> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../golden");
+    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
     std::fs::read(folder.join(name)).unwrap()
 }
 

@@ -1,13 +1,13 @@
-//! Stamps of a time column to seconds.
+//! Converts time stamps to seconds.
 
 use std::fmt;
 
-use super::names::TimeUnit;
 use super::number::{self, Cell};
 use super::preview::Preview;
 use crate::recording::{FAR_START_S, Note};
+use crate::time_unit::TimeUnit;
 
-/// A stamp as in the file. Digits alone stay whole, for microseconds since 1970 need all of them.
+/// A time stamp as in the file. Integers stay exact: microseconds since 1970 need all digits.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Stamp {
     Whole(i64),
@@ -23,12 +23,12 @@ impl fmt::Display for Stamp {
     }
 }
 
-/// Turns stamps into seconds.
+/// Converts time stamps to seconds.
 #[derive(Debug)]
 pub(super) struct Clock {
     unit: TimeUnit,
     started: bool,
-    /// The first stamp, subtracted from all, if it is whole and far from zero.
+    /// Subtracted from all time stamps: the first one if it is an integer far from zero, else 0.
     origin: i64,
 }
 
@@ -41,7 +41,7 @@ impl Clock {
         }
     }
 
-    /// Starts at the first stamp; the note says if time is counted from it.
+    /// Starts at the first time stamp; returns a note if time is counted from it.
     pub(super) fn start(&mut self, first: Stamp) -> Option<Note> {
         if std::mem::replace(&mut self.started, true) {
             return None;
@@ -68,7 +68,7 @@ impl Clock {
     }
 }
 
-/// The stamp in a cell; NaN if it is missing, none if it is text.
+/// The time stamp in a cell; NaN if it is missing, `None` if it is text.
 pub(super) fn parse(cell: &[u8]) -> Option<(Stamp, number::Mark)> {
     if let Some(stamp) = number::parse_whole(cell) {
         return Some((Stamp::Whole(stamp), number::Mark::None));
@@ -80,7 +80,7 @@ pub(super) fn parse(cell: &[u8]) -> Option<(Stamp, number::Mark)> {
     }
 }
 
-/// The unit of a time column: what the caller says, else what its header says, else a guess.
+/// The unit of a time column: as the caller says, else as its header says, else guessed.
 pub(super) fn unit_of(
     preview: &Preview,
     column: usize,
@@ -89,29 +89,19 @@ pub(super) fn unit_of(
     let name = preview.names.as_ref().and_then(|names| names.get(column));
     match forced.or_else(|| name.and_then(|name| name.time_unit())) {
         Some(TimeUnit::Seconds) => (TimeUnit::Seconds, None),
-        Some(unit) => (
-            unit,
-            Some(Note::TimeUnit {
-                unit: unit.symbol(),
-            }),
-        ),
+        Some(unit) => (unit, Some(Note::TimeUnit { unit })),
         None => {
             let unit = guess(preview.column(column), preview.is_whole(column));
-            (
-                unit,
-                Some(Note::TimeUnitGuessed {
-                    unit: unit.symbol(),
-                }),
-            )
+            (unit, Some(Note::TimeUnitGuessed { unit }))
         }
     }
 }
 
-/// Guesses the unit of stamps.
+/// Guesses the unit of the time stamps.
 ///
-/// Stamps with decimals are seconds. Whole stamps beyond 1e17, 1e14, 1e11 and 1e8 count ns, us,
-/// ms and s since 1970 (which is 1.7e9 s ago). Other whole stamps go by their median increment:
-/// from 1e6 ns, from 1000 us, else ms, which fits sample rates from 1 Hz to 1 kHz.
+/// Time stamps with decimals are in seconds. Integers that start at 1e17, 1e14, 1e11 or 1e8 and
+/// more count ns, us, ms or s since 1970 (1.7e9 s ago). For other integers the median increment
+/// decides: ns from 1e6, us from 1000, else ms. This fits sample rates from 1 Hz to 1 kHz.
 fn guess(stamps: impl Iterator<Item = f64> + Clone, whole: bool) -> TimeUnit {
     let stamps = stamps.filter(|stamp| !stamp.is_nan());
     let first = stamps.clone().next().unwrap_or(0.0).abs();
@@ -155,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn whole_stamps_lose_no_digit() {
+    fn integer_stamps_are_exact() {
         let mut clock = Clock::new(TimeUnit::Nanoseconds);
         let first = 1_700_000_000_123_456_789;
         assert!(clock.start(Stamp::Whole(first)).is_some());
@@ -166,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn near_stamps_stay_as_they_are() {
+    fn stamps_near_zero_are_not_shifted() {
         let mut clock = Clock::new(TimeUnit::Microseconds);
         assert_eq!(clock.start(Stamp::Whole(12_345_678)), None);
         assert_eq!(clock.seconds(Stamp::Whole(12_345_678)), 12.345678);

@@ -1,54 +1,36 @@
-//! Which column holds which signal.
+//! Chooses the columns of time, input and output.
 //!
-//! 1. What the options say.
-//! 2. Names: `t`, `time`, ...; `u`, `input`, `relay`, ...; `y`, `pv`, `output`, ...
-//! 3. Without any names, time is the first column.
-//! 4. A single signal and a single column left over belong together.
-//! 5. If input and output are left over with two columns, the input of a relay test is the column
-//!    with 2 to 8 different values, when the other has at least three times as many.
+//! 1. As the options say.
+//! 2. By name: `t`, `time`, ...; `u`, `input`, `relay`, ...; `y`, `pv`, `output`, ...
+//! 3. Without a header, time is the first column.
+//! 4. If one signal and one column are left, they belong together.
+//! 5. If input, output and two columns are left, the input is the column with 2 to 8 different
+//!    values, provided that the other column has at least three times as many.
 
 use std::collections::HashSet;
 
-use super::CsvOptions;
 use super::error::{ReadError, quoted};
 use super::names::{Name, key};
+use super::options::{ColumnRef, CsvOptions};
 use super::preview::Preview;
-use crate::recording::{Note, Role};
+use crate::recording::{ChosenBy, ColumnLabel, Note, Role};
 
-/// Most different values of a relay: two levels, with some for its start, its end and its bias.
+/// Maximum number of different values of a relay: two levels, and some for start, end and bias.
 const MOST_LEVELS: usize = 8;
 
-/// How many more values the output must take.
+/// The output must take at least this many times the values of the input.
 const MORE_VALUES: usize = 3;
-
-/// A column chosen by the caller.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum ColumnRef {
-    /// By name, with or without its unit, in any case.
-    Name(String),
-    /// By number, from 1.
-    Number(usize),
-}
-
-impl From<&str> for ColumnRef {
-    /// A number if it is one, else a name.
-    fn from(text: &str) -> Self {
-        text.trim()
-            .parse()
-            .map_or_else(|_| Self::Name(text.trim().to_owned()), Self::Number)
-    }
-}
 
 /// The columns to read, from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Choice {
-    /// None when the sample rate is given.
+    /// `None` if the sample rate is given.
     pub(super) time: Option<usize>,
     pub(super) input: usize,
     pub(super) output: usize,
     /// A time column that is not read because the sample rate is given.
     pub(super) ignored: Option<usize>,
-    how: &'static str,
+    by: ChosenBy,
 }
 
 impl Choice {
@@ -57,7 +39,7 @@ impl Choice {
             time: self.time.map(|column| preview.label(column)),
             input: preview.label(self.input),
             output: preview.label(self.output),
-            how: self.how,
+            by: self.by,
         }
     }
 }
@@ -128,16 +110,16 @@ pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, 
         input: input.ok_or_else(|| unknown(Role::Input))?,
         output: output.ok_or_else(|| unknown(Role::Output))?,
         ignored,
-        how: match preview.names {
-            _ if all_given => "as the options say",
-            _ if by_values => "by how few values the input takes",
-            Some(_) => "by name",
-            None => "by position",
+        by: match preview.names {
+            _ if all_given => ChosenBy::Caller,
+            _ if by_values => ChosenBy::Values,
+            Some(_) => ChosenBy::Name,
+            None => ChosenBy::Position,
         },
     })
 }
 
-/// Refuses dates and times of day as time, and where no time is found, as what should be.
+/// Refuses dates and times of day in the time column, or in any column if there is no time column.
 fn check_clock_time(preview: &Preview, time: Option<usize>) -> Result<(), ReadError> {
     match &preview.clock_time {
         Some((column, text)) if time.is_none_or(|time| time == *column) => {
@@ -152,7 +134,7 @@ fn check_clock_time(preview: &Preview, time: Option<usize>) -> Result<(), ReadEr
     }
 }
 
-/// The column that the caller names.
+/// Finds the column that the caller names.
 fn find(wanted: &ColumnRef, role: Role, preview: &Preview) -> Result<usize, ReadError> {
     let missing = |wanted| {
         Err(ReadError::NoSuchColumn {
@@ -164,7 +146,7 @@ fn find(wanted: &ColumnRef, role: Role, preview: &Preview) -> Result<usize, Read
     match wanted {
         ColumnRef::Number(number) => match number.checked_sub(1) {
             Some(column) if column < preview.width => Ok(column),
-            _ => missing(format!("number {number}")),
+            _ => missing(ColumnRef::Number(*number)),
         },
         ColumnRef::Name(wanted) => {
             let names = preview.names.as_deref().unwrap_or_default();
@@ -183,7 +165,7 @@ fn find(wanted: &ColumnRef, role: Role, preview: &Preview) -> Result<usize, Read
             let found = found.unwrap_or_else(|| all(&alike));
             match single(found, role, preview)? {
                 Some(column) => Ok(column),
-                None => missing(format!("\"{}\"", quoted(wanted.as_bytes()))),
+                None => missing(ColumnRef::Name(quoted(wanted.as_bytes()))),
             }
         }
     }
@@ -213,7 +195,7 @@ fn check_distinct(
     Ok(())
 }
 
-/// Columns that are named for a role and not given to another.
+/// Columns whose name stands for this signal and that are not chosen for another.
 fn named(preview: &Preview, role: Role, given: &[Option<usize>]) -> Vec<usize> {
     let names = preview.names.as_deref().unwrap_or_default();
     (0..names.len())
@@ -221,7 +203,7 @@ fn named(preview: &Preview, role: Role, given: &[Option<usize>]) -> Vec<usize> {
         .collect()
 }
 
-/// The only candidate, or none.
+/// The only candidate, or `None` without candidates.
 fn single(found: Vec<usize>, role: Role, preview: &Preview) -> Result<Option<usize>, ReadError> {
     match *found {
         [] => Ok(None),
@@ -236,7 +218,7 @@ fn single(found: Vec<usize>, role: Role, preview: &Preview) -> Result<Option<usi
     }
 }
 
-/// The first column, if there are no names, it is free, and it never goes back.
+/// The first column, if the file has no header, the column is free, and its values never decrease.
 fn first_is_time(preview: &Preview, input: Option<usize>, output: Option<usize>) -> Option<usize> {
     let free = preview.names.is_none() && input != Some(0) && output != Some(0);
     let stamps = preview.column(0).filter(|stamp| !stamp.is_nan());
@@ -245,7 +227,7 @@ fn first_is_time(preview: &Preview, input: Option<usize>, output: Option<usize>)
     (free && rises && changes).then_some(0)
 }
 
-/// Input and output of two columns, by the number of their values.
+/// Tells input and output of two columns apart by their number of different values.
 fn tell_apart(preview: &Preview, a: usize, b: usize) -> Result<(usize, usize), ReadError> {
     let values = |column| {
         let bits = preview
@@ -267,7 +249,7 @@ fn tell_apart(preview: &Preview, a: usize, b: usize) -> Result<(usize, usize), R
     }
 }
 
-fn all_labels(preview: &Preview) -> Vec<String> {
+fn all_labels(preview: &Preview) -> Vec<ColumnLabel> {
     (0..preview.width)
         .map(|column| preview.label(column))
         .collect()

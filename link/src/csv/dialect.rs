@@ -1,78 +1,47 @@
-//! What separates the columns of a file.
+//! Detects the separator of the columns.
 //!
-//! The first lines are split by every separator in turn. The one that leaves the most cells that
-//! are numbers wins; of equals, the first of tab, semicolon, bar, comma, blanks.
+//! The first lines are split by each separator in turn. The separator with the largest fraction of
+//! numbers among its cells wins; of equals, the first of tab, semicolon, bar, comma, blanks.
 
 use std::io::Read;
 
 use super::error::ReadError;
 use super::number::{self, Cell};
 use super::records::Records;
+use super::separator::Separator;
 
-/// Most bytes, and most rows, looked at.
+/// Maximum number of bytes and of rows that are split.
 const LOOK_BYTES: usize = 1 << 16;
 const LOOK_ROWS: usize = 200;
 
-/// What separates the columns of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Separator {
-    Tab,
-    Semicolon,
-    Bar,
-    Comma,
-    /// One blank or more.
-    Blanks,
-}
-
-impl Separator {
-    const ALL: [Self; 5] = [
-        Self::Tab,
-        Self::Semicolon,
-        Self::Bar,
-        Self::Comma,
-        Self::Blanks,
-    ];
-
-    /// The separator in a clean line.
-    pub(super) fn byte(self) -> u8 {
-        match self {
-            Self::Tab => b'\t',
-            Self::Semicolon => b';',
-            Self::Bar => b'|',
-            Self::Comma => b',',
-            Self::Blanks => b' ',
+/// Detects the separator from the head of a text; `whole` if `head` is the entire text.
+pub(super) fn detect(head: &[u8], whole: bool) -> Result<Separator, ReadError> {
+    let look = &head[..head.len().min(LOOK_BYTES)];
+    let complete = look
+        .iter()
+        .rposition(|&byte| byte == b'\n' || byte == b'\r');
+    let look = match complete {
+        Some(end) if !whole || look.len() < head.len() => &look[..=end],
+        _ => look,
+    };
+    let mut best = (Separator::Comma, Score::default());
+    for separator in Separator::ALL {
+        let score = Score::of(look, separator)?;
+        if score.beats(&best.1) {
+            best = (separator, score);
         }
     }
-
-    /// Detects the separator from the head of a text, which may be the whole of it.
-    pub(super) fn detect(head: &[u8], whole: bool) -> Result<Self, ReadError> {
-        let look = &head[..head.len().min(LOOK_BYTES)];
-        let complete = look
-            .iter()
-            .rposition(|&byte| byte == b'\n' || byte == b'\r');
-        let look = match complete {
-            Some(end) if !whole || look.len() < head.len() => &look[..=end],
-            _ => look,
-        };
-        let mut best = (Self::Comma, Score::default());
-        for separator in Self::ALL {
-            let score = Score::of(look, separator)?;
-            if score.beats(&best.1) {
-                best = (separator, score);
-            }
-        }
-        Ok(best.0)
-    }
+    Ok(best.0)
 }
 
 /// How well a separator splits the first lines.
 #[derive(Debug, Clone, Copy, Default)]
 struct Score {
-    /// Cells that are numbers, in rows of at least two cells.
+    /// Number of cells that are numbers, in rows of at least two cells.
     numbers: usize,
-    /// All cells.
+    /// Number of cells.
     cells: usize,
-    /// Rows of at least two cells.
+    /// Number of rows of at least two cells.
     rows: usize,
 }
 
@@ -92,7 +61,7 @@ impl Score {
         Ok(score)
     }
 
-    /// A larger fraction of numbers; without any numbers, more rows that it splits.
+    /// Whether the fraction of numbers is larger; without any numbers, whether more rows are split.
     fn beats(&self, other: &Self) -> bool {
         let ours = self.numbers as u128 * other.cells.max(1) as u128;
         let theirs = other.numbers as u128 * self.cells.max(1) as u128;
@@ -104,42 +73,48 @@ impl Score {
 mod tests {
     use super::*;
 
-    fn detect(text: &str) -> Separator {
-        Separator::detect(text.as_bytes(), true).unwrap()
+    fn separator_of(text: &str) -> Separator {
+        detect(text.as_bytes(), true).unwrap()
     }
 
     #[test]
     fn the_plain_separators() {
-        assert_eq!(detect("t,y,u\n0,1,2\n1,2,3\n"), Separator::Comma);
-        assert_eq!(detect("t;y;u\n0;1;2\n"), Separator::Semicolon);
-        assert_eq!(detect("t\ty\tu\n0\t1\t2\n"), Separator::Tab);
-        assert_eq!(detect("t|y|u\n0|1|2\n"), Separator::Bar);
-        assert_eq!(detect("t y u\n0  1   2\n"), Separator::Blanks);
+        assert_eq!(separator_of("t,y,u\n0,1,2\n1,2,3\n"), Separator::Comma);
+        assert_eq!(separator_of("t;y;u\n0;1;2\n"), Separator::Semicolon);
+        assert_eq!(separator_of("t\ty\tu\n0\t1\t2\n"), Separator::Tab);
+        assert_eq!(separator_of("t|y|u\n0|1|2\n"), Separator::Bar);
+        assert_eq!(separator_of("t y u\n0  1   2\n"), Separator::Blanks);
     }
 
     #[test]
     fn decimal_commas_do_not_separate() {
         assert_eq!(
-            detect("0,001;1,5;2,5\n0,002;1,5;2,5\n"),
+            separator_of("0,001;1,5;2,5\n0,002;1,5;2,5\n"),
             Separator::Semicolon
         );
-        assert_eq!(detect("0,001\t1,5\t2,5\n"), Separator::Tab);
-        assert_eq!(detect("0,001  1,5  2,5\n"), Separator::Blanks);
-        assert_eq!(detect("\"0,001\",\"1,5\",\"2,5\"\n"), Separator::Comma);
+        assert_eq!(separator_of("0,001\t1,5\t2,5\n"), Separator::Tab);
+        assert_eq!(separator_of("0,001  1,5  2,5\n"), Separator::Blanks);
+        assert_eq!(
+            separator_of("\"0,001\",\"1,5\",\"2,5\"\n"),
+            Separator::Comma
+        );
     }
 
     #[test]
     fn blanks_beside_a_separator_do_not_count() {
-        assert_eq!(detect("time (s), pv, u\n0.1, 1, 2\n"), Separator::Comma);
-        assert_eq!(detect("1 ,2 ,3\n4 ,5 ,6\n"), Separator::Comma);
-        assert_eq!(detect("0.1,\t2.5,\t3\n"), Separator::Comma);
+        assert_eq!(
+            separator_of("time (s), pv, u\n0.1, 1, 2\n"),
+            Separator::Comma
+        );
+        assert_eq!(separator_of("1 ,2 ,3\n4 ,5 ,6\n"), Separator::Comma);
+        assert_eq!(separator_of("0.1,\t2.5,\t3\n"), Separator::Comma);
     }
 
     #[test]
     fn a_row_cut_by_the_head_does_not_count() {
         let head = "0;1\n0,5";
         assert_eq!(
-            Separator::detect(head.as_bytes(), false).unwrap(),
+            detect(head.as_bytes(), false).unwrap(),
             Separator::Semicolon
         );
     }

@@ -5,143 +5,123 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
-use crate::recording::{RecordingError, Role};
+use super::options::ColumnRef;
+use crate::recording::{ColumnLabel, RecordingError, Role, counted};
 
-/// Why a file does not make a recording. Each says what is wrong, where, and what to do, in one
-/// sentence.
+/// Why a file does not make a recording. `Display` states what is wrong and where; what to do
+/// about it is up to the caller. Text from the file is shortened to 32 printable characters.
 #[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ReadError {
-    /// The operating system does not open the file.
+    /// The operating system cannot open the file.
     #[error("cannot open {}: {reason}", path.display())]
     Open {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// Error of the operating system.
         #[source]
         reason: io::Error,
     },
-    /// Reading broke off.
+    /// The operating system stopped reading.
     #[error("reading stopped after line {line}: {reason}")]
     Interrupted {
         /// Last line that was read.
         line: u64,
-        /// What the operating system says.
+        /// Error of the operating system.
         #[source]
         reason: io::Error,
     },
-    /// There is nothing in the file.
-    #[error("the file is empty; expected rows of time, output and input")]
+    /// The file is empty.
+    #[error("the file is empty")]
     Empty,
     /// The file is not text.
-    #[error("this is not a text table but {looks_like}; export the recording as CSV first")]
+    #[error("this is not a text table but {looks_like}")]
     NotText {
-        /// What it looks like.
+        /// What the content looks like, with an article: `a PNG image`.
         looks_like: &'static str,
     },
     /// A NUL byte in the middle of the text.
-    #[error("line {line} holds a NUL byte, so the file is damaged; cut it before that line")]
+    #[error("line {line} holds a NUL byte, so the file is damaged")]
     NulByte {
-        /// Where.
+        /// Line in the file, from 1.
         line: u64,
     },
-    /// A line beyond any table.
-    #[error("line {line} is longer than {limit} bytes; a recording has one short row a line")]
+    /// A line is too long for a table.
+    #[error("line {line} is longer than {limit} bytes")]
     LineTooLong {
-        /// Where.
+        /// Line in the file, from 1.
         line: u64,
         /// Longest line accepted, in bytes.
         limit: usize,
     },
-    /// A quote that opens and does not close on its line.
-    #[error("line {line} opens a quote that it does not close; remove the quote")]
+    /// A quote is not closed on its line.
+    #[error("line {line} opens a quote and does not close it")]
     UnclosedQuote {
-        /// Where.
+        /// Line in the file, from 1.
         line: u64,
     },
-    /// Only a header, only comments, or no numbers at all.
-    #[error(
-        "there is no row of numbers in the first {lines} line(s); \
-         expected rows of time, output and input"
-    )]
+    /// The file has only a header, only comments, or no numbers at all.
+    #[error("found no row of numbers in {}", counted(*.lines, "line"))]
     NoData {
-        /// Lines looked at.
+        /// Number of lines searched.
         lines: u64,
     },
-    /// One column only.
-    #[error(
-        "line {line} has a single column; separate time, output and input by comma, semicolon, \
-         tab, | or blanks"
-    )]
+    /// The table has only one column.
+    #[error("line {line} has a single column")]
     OneColumn {
         /// First line of numbers.
         line: u64,
     },
-    /// A row with more or fewer cells than the others.
-    #[error(
-        "line {line} has {found} cells where {expected} are expected; correct the line, or \
-         separate the columns by semicolons if they hold decimal commas"
-    )]
+    /// A row has more or fewer cells than the header or the first row.
+    #[error("line {line} has {} where {expected} are expected", counted(*.found as u64, "cell"))]
     RaggedRow {
-        /// Where.
+        /// Line in the file, from 1.
         line: u64,
         /// Cells of the header, or of the first row.
         expected: usize,
         /// Cells on this line.
         found: usize,
     },
-    /// A cell that is not a number.
-    #[error(
-        "line {line}, column {}: \"{text}\" is not a number; correct it or leave it empty \
-         (thousands separators are not supported)",
-        without_word(.column)
-    )]
+    /// A cell is not a number.
+    #[error("line {line}, {column}: \"{text}\" is not a number")]
     NotANumber {
-        /// Where.
+        /// Line in the file, from 1.
         line: u64,
-        /// Column as name and number.
-        column: String,
-        /// The cell, shortened.
+        /// Column.
+        column: ColumnLabel,
+        /// The cell.
         text: String,
     },
-    /// Both decimal points and decimal commas.
+    /// The file has both decimal points and decimal commas.
     #[error(
-        "line {line}, column {}: \"{text}\" mixes decimal comma and decimal point with \
-         earlier cells; use one of them (thousands separators are not supported)",
-        without_word(.column)
+        "line {line}, {column}: \"{text}\" and earlier cells mix decimal commas and decimal points"
     )]
     MixedDecimals {
-        /// Where.
+        /// Line in the file, from 1.
         line: u64,
-        /// Column as name and number.
-        column: String,
-        /// The cell, shortened.
+        /// Column.
+        column: ColumnLabel,
+        /// The cell.
         text: String,
     },
-    /// Time as a time of day or a date.
-    #[error(
-        "line {line}, column {}: \"{text}\" is a date or a time of day; \
-         export seconds from the start instead, or give the sample rate with --sample-rate",
-        without_word(.column)
-    )]
+    /// A time stamp is a time of day or a date.
+    #[error("line {line}, {column}: \"{text}\" is a date or a time of day")]
     ClockTime {
-        /// Where.
+        /// Line in the file, from 1.
         line: u64,
-        /// Column as name and number.
-        column: String,
-        /// The cell, shortened.
+        /// Column.
+        column: ColumnLabel,
+        /// The cell.
         text: String,
     },
-    /// Time goes back.
-    #[error(
-        "time goes back on line {line}: {after} follows {before}; \
-         keep one run and cut the rest"
-    )]
+    /// A time stamp is smaller than the one before it.
+    #[error("time goes back on line {line}: {after} follows {before}")]
     TimeGoesBack {
-        /// Where.
+        /// Line in the file, from 1.
         line: u64,
-        /// Stamp before, as in the file.
+        /// Time stamp before, as in the file.
         before: String,
-        /// Stamp on the line, as in the file.
+        /// Time stamp on the line, as in the file.
         after: String,
     },
     /// The column that the caller named does not exist.
@@ -149,59 +129,50 @@ pub enum ReadError {
     NoSuchColumn {
         /// For which signal.
         role: Role,
-        /// What the caller gave.
-        wanted: String,
-        /// Columns there are.
-        columns: Vec<String>,
+        /// The column that the caller named.
+        wanted: ColumnRef,
+        /// All columns of the file.
+        columns: Vec<ColumnLabel>,
     },
-    /// No column looks like this signal.
-    #[error(
-        "no column is known to be the {role}; choose it with --{role}{}: \
-         the columns are {}",
-        if *.role == Role::Time { ", or give the sample rate with --sample-rate" } else { "" },
-        listed(.columns)
-    )]
+    /// No column is recognised as this signal.
+    #[error("no column is known to be the {role}; the columns are {}", listed(.columns))]
     UnknownColumn {
         /// Which signal.
         role: Role,
-        /// Columns there are.
-        columns: Vec<String>,
+        /// All columns of the file.
+        columns: Vec<ColumnLabel>,
     },
     /// Several columns may be this signal.
-    #[error(
-        "{} may all be the {role}; choose one with --{role}",
-        listed(.candidates)
-    )]
+    #[error("several columns may be the {role}: {}", listed(.candidates))]
     AmbiguousColumn {
         /// Which signal.
         role: Role,
-        /// Columns that may be it.
-        candidates: Vec<String>,
+        /// The columns.
+        candidates: Vec<ColumnLabel>,
     },
     /// Input and output cannot be told apart by their values.
     #[error(
-        "{} and {} cannot be told apart by their values; choose them with \
-         --input and --output",
+        "the values of {} and {} do not show which is the input and which the output",
         .columns[0], .columns[1]
     )]
     InputOrOutput {
         /// The two columns.
-        columns: [String; 2],
+        columns: [ColumnLabel; 2],
     },
-    /// One column for two signals.
-    #[error("{column} cannot be both the {first} and the {second}; choose another column")]
+    /// The caller chose one column for two signals.
+    #[error("{column} cannot be both the {first} and the {second}")]
     SameColumn {
         /// The column.
-        column: String,
+        column: ColumnLabel,
         /// One signal.
         first: Role,
         /// The other.
         second: Role,
     },
-    /// A sample rate that is not one.
-    #[error("a sample rate of {rate_hz} Hz is not usable; give one between 1e-6 and 1e9 Hz")]
+    /// The sample rate that the caller gave is out of range.
+    #[error("a sample rate of {rate_hz} Hz is not between 1e-6 and 1e9 Hz")]
     BadSampleRate {
-        /// What was given, in hertz.
+        /// The sample rate given, in hertz.
         rate_hz: f64,
     },
     /// The rows do not make a recording.
@@ -209,16 +180,12 @@ pub enum ReadError {
     Recording(#[from] RecordingError),
 }
 
-/// Most columns that an error lists.
+/// Maximum number of columns that an error lists.
 const MOST_LISTED: usize = 12;
 
-/// A column's label behind the word `column`, which one without a name begins with.
-fn without_word(label: &str) -> &str {
-    label.strip_prefix("column ").unwrap_or(label)
-}
-
-fn listed(columns: &[String]) -> String {
-    let mut list = columns[..columns.len().min(MOST_LISTED)].join(", ");
+fn listed(columns: &[ColumnLabel]) -> String {
+    let shown = columns.iter().take(MOST_LISTED).map(ToString::to_string);
+    let mut list = shown.collect::<Vec<_>>().join(", ");
     if columns.len() > MOST_LISTED {
         list += &format!(" and {} more", columns.len() - MOST_LISTED);
     }
@@ -228,7 +195,7 @@ fn listed(columns: &[String]) -> String {
 /// Longest text that an error or a note quotes, in characters.
 const MOST_QUOTED: usize = 32;
 
-/// Text from the file as a sentence may quote it: short, on one line, printable.
+/// Text from the file as an error may quote it: short, on one line, printable.
 pub(super) fn quoted(text: &[u8]) -> String {
     let text = String::from_utf8_lossy(&text[..text.len().min(4 * MOST_QUOTED)]).into_owned();
     let mut short: String = text

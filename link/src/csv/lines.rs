@@ -1,45 +1,45 @@
-//! Text to clean lines, which a record reader can take as they are.
+//! Cleans the lines of a text, so that the record reader can take them unchanged.
 //!
-//! Every line of the file becomes one line that ends in LF, so line numbers stay true. Comments
-//! and blank lines become empty lines. Where blanks separate columns, every run of them becomes
-//! one blank. A line keeps its quotes, and must close them: a cell that ran on over lines would
-//! swallow the file.
+//! Each line of the file becomes one line that ends in LF, so line numbers stay correct. Comments
+//! and blank lines become empty lines. Where blanks separate columns, each run of blanks becomes
+//! one blank. Quotes are kept and must be closed on their line: otherwise one missing quote would
+//! make the rest of the file a single cell.
 
 use std::io::{self, Read};
 
-use super::dialect::Separator;
 use super::error::ReadError;
+use super::separator::Separator;
 
-/// How much is read at a time.
+/// Number of bytes read at a time.
 const PIECE_BYTES: u64 = 1 << 15;
 
-/// Longest line; a row of ten thousand short cells.
+/// Longest line accepted, in bytes: a row of ten thousand short cells.
 const LONGEST_LINE: usize = 1 << 16;
 
 /// A reader of clean lines.
 pub(super) struct Lines<R> {
     text: R,
     separator: Separator,
-    /// Read and not yet cleaned: part of one line.
+    /// Bytes read and not yet cleaned: part of one line.
     raw: Vec<u8>,
-    /// Clean lines, handed out up to `sent`.
+    /// Clean lines; the first `sent` bytes have been handed out.
     clean: Vec<u8>,
     sent: usize,
     state: State,
 }
 
-/// What is known of the lines so far.
+/// Facts about the lines read so far.
 #[derive(Default)]
 pub(super) struct State {
     /// Number of lines read.
     pub(super) lines: u64,
-    /// The last comment before the first line that is not one, without its mark.
+    /// The last comment before the table, without its mark, and its line.
     pub(super) comment: Option<(u64, Vec<u8>)>,
     /// Whether the text ended without a line ending.
     pub(super) ends_open: bool,
-    /// The last line, if it was dropped because it ends within quotes.
+    /// Number of the last line, if it was dropped because it ends within quotes.
     pub(super) cut_line: Option<u64>,
-    /// Why reading stopped, if not for the operating system.
+    /// Why reading stopped, unless the operating system stopped it.
     pub(super) fault: Option<ReadError>,
     preface_over: bool,
     after_cr: bool,
@@ -63,7 +63,7 @@ impl<R: Read> Lines<R> {
         &mut self.state
     }
 
-    /// Reads a piece and cleans the lines that it completes.
+    /// Reads the next bytes and cleans the lines that they complete.
     fn refill(&mut self) -> io::Result<()> {
         self.clean.clear();
         self.sent = 0;
@@ -173,7 +173,7 @@ impl<R: Read> Read for Lines<R> {
 mod tests {
     use super::*;
 
-    /// Hands out one byte at a time, so that every boundary is tried.
+    /// Hands out one byte at a time, so that a line is cut at every byte.
     struct Drip<'a>(&'a [u8]);
 
     impl Read for Drip<'_> {

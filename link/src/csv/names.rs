@@ -1,8 +1,9 @@
-//! Names of columns, their units, and what they stand for.
+//! Column names: their units and the signals they stand for.
 
 use crate::recording::{Column, Role};
+use crate::time_unit::TimeUnit;
 
-/// What people call the time, lower case, words joined by `_`, without unit.
+/// Usual names of the time, in lower case, words joined by `_`, without unit.
 const TIME: [&str; 15] = [
     "t",
     "time",
@@ -21,7 +22,7 @@ const TIME: [&str; 15] = [
     "micros",
 ];
 
-/// What people call the input of the process.
+/// Usual names of the input of the process.
 const INPUT: [&str; 37] = [
     "u",
     "input",
@@ -62,7 +63,7 @@ const INPUT: [&str; 37] = [
     "excitation",
 ];
 
-/// What people call the output of the process.
+/// Usual names of the output of the process.
 const OUTPUT: [&str; 25] = [
     "y",
     "pv",
@@ -91,7 +92,7 @@ const OUTPUT: [&str; 25] = [
     "pv_value",
 ];
 
-/// Units that a name may end in after `_`, or a row of units may hold, besides those of time.
+/// Units other than those of time: at the end of a name after `_`, or in a row of units.
 const UNITS: [&str; 58] = [
     "rad", "deg", "rad/s", "deg/s", "rad_s", "deg_s", "rads", "degs", "rpm", "m", "mm", "cm", "km",
     "m/s", "m_s", "m/s2", "m/s^2", "n", "nm", "n.m", "n*m", "kn", "v", "mv", "a", "ma", "w", "kw",
@@ -99,66 +100,6 @@ const UNITS: [&str; 58] = [
     "kg", "g", "l", "l/min", "l/s", "m3/h", "hz", "khz", "%", "pct", "percent", "-", "1", "norm",
     "counts", "raw", "none",
 ];
-
-/// A unit of time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TimeUnit {
-    /// 3600 s.
-    Hours,
-    /// 60 s.
-    Minutes,
-    /// s.
-    Seconds,
-    /// 1e-3 s.
-    Milliseconds,
-    /// 1e-6 s.
-    Microseconds,
-    /// 1e-9 s.
-    Nanoseconds,
-}
-
-impl TimeUnit {
-    /// The unit that people write so: `s`, `ms`, `usec`, `minutes`, ... in any case.
-    pub fn from_name(name: &str) -> Option<Self> {
-        Some(match name.trim().to_lowercase().as_str() {
-            "h" | "hr" | "hrs" | "hour" | "hours" => Self::Hours,
-            "min" | "mins" | "minute" | "minutes" => Self::Minutes,
-            "s" | "sec" | "secs" | "second" | "seconds" => Self::Seconds,
-            "ms" | "msec" | "msecs" | "millis" | "millisecond" | "milliseconds" => {
-                Self::Milliseconds
-            }
-            "us" | "\u{b5}s" | "\u{3bc}s" | "\u{fffd}s" | "usec" | "usecs" | "micros"
-            | "microsecond" | "microseconds" => Self::Microseconds,
-            "ns" | "nsec" | "nsecs" | "nanos" | "nanosecond" | "nanoseconds" => Self::Nanoseconds,
-            _ => return None,
-        })
-    }
-
-    /// Its symbol.
-    pub fn symbol(self) -> &'static str {
-        match self {
-            Self::Hours => "h",
-            Self::Minutes => "min",
-            Self::Seconds => "s",
-            Self::Milliseconds => "ms",
-            Self::Microseconds => "us",
-            Self::Nanoseconds => "ns",
-        }
-    }
-
-    /// A time in this unit, in seconds.
-    pub fn seconds(self, time: f64) -> f64 {
-        // Division by a whole number is rounded once; the factor 1e-3 would be rounded twice.
-        match self {
-            Self::Hours => time * 3600.0,
-            Self::Minutes => time * 60.0,
-            Self::Seconds => time,
-            Self::Milliseconds => time / 1e3,
-            Self::Microseconds => time / 1e6,
-            Self::Nanoseconds => time / 1e9,
-        }
-    }
-}
 
 /// A name in a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -172,7 +113,7 @@ pub(super) struct Name {
 }
 
 impl Name {
-    /// Takes `pv [rad]`, `time (ms)`, `t / s`, `u_N` or `TimeUS` apart.
+    /// Splits `pv [rad]`, `time (ms)`, `t / s`, `u_N` or `TimeUS` into name and unit.
     pub(super) fn parse(cell: &str) -> Self {
         let full = cell.trim().trim_matches(['"', '\'']).trim().to_owned();
         let (bare, unit) = match in_brackets(&full).or_else(|| after_mark(&full)) {
@@ -185,7 +126,7 @@ impl Name {
         Self { full, bare, unit }
     }
 
-    /// The name with the unit that a second row gives.
+    /// The name with the unit from a row of units.
     pub(super) fn with_unit(mut self, unit: &str) -> Self {
         let unit = unit
             .trim()
@@ -197,7 +138,7 @@ impl Name {
         self
     }
 
-    /// What the name stands for, if it is a usual one.
+    /// The signal that the name stands for, if it is a usual name.
     pub(super) fn role(&self) -> Option<Role> {
         let keys = [key(&self.full), key(&self.bare)];
         let is_one_of = |names: &[&str]| keys.iter().any(|key| names.contains(&key.as_str()));
@@ -212,7 +153,7 @@ impl Name {
         }
     }
 
-    /// The unit of time that the name gives, be it `seconds` or `millis`.
+    /// The unit of time that the name gives, also in names such as `seconds` or `millis`.
     pub(super) fn time_unit(&self) -> Option<TimeUnit> {
         match &self.unit {
             Some(unit) => TimeUnit::from_name(unit),
@@ -288,7 +229,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_and_units_come_apart() {
+    fn names_and_units_are_split() {
         for (text, bare, unit) in [
             ("time (ms)", "time", Some("ms")),
             ("t[s]", "t", Some("s")),

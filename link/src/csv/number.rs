@@ -1,21 +1,21 @@
-//! One cell to one number.
+//! Parses a cell as a number.
 //!
 //! A decimal is `m * 10^e` with whole `m`. When `m <= 2^53` and `|e| <= 22`, both `m` and
 //! `10^|e|` are exact doubles, so one multiplication or division rounds correctly (Clinger 1990,
 //! "How to read floating point numbers accurately"). Everything else goes to the standard parser.
 
-/// What a cell holds.
+/// Content of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Cell {
-    /// A finite number, and how it writes its decimals.
+    /// A finite number and its decimal mark.
     Number(f64, Mark),
-    /// Nothing, or a word that logs write for no number; also an infinity.
+    /// An empty cell, a word that logs write for a missing number, or an infinity.
     Missing,
     /// Anything else.
     Text,
 }
 
-/// How a number writes its decimals.
+/// Decimal mark of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mark {
     None,
@@ -23,7 +23,7 @@ pub(super) enum Mark {
     Comma,
 }
 
-/// What logs write where there is no number, in lower case.
+/// What logs write for a missing number, in lower case.
 const MISSING: [&str; 17] = [
     "",
     "nan",
@@ -44,7 +44,7 @@ const MISSING: [&str; 17] = [
     "-infinity",
 ];
 
-/// Longest number, in bytes; no logger writes a longer one.
+/// Longest number accepted, in bytes; no logger writes a longer one.
 const LONGEST: usize = 128;
 
 /// Powers of ten that a double holds exactly.
@@ -53,7 +53,7 @@ const POWERS: [f64; 23] = [
     1e17, 1e18, 1e19, 1e20, 1e21, 1e22,
 ];
 
-/// Reads a cell, blanks and left-over quotes around it aside.
+/// Parses a cell after removing blanks and quotes around it.
 pub(super) fn parse(cell: &[u8]) -> Cell {
     let cell = bare(cell);
     let Some(decimal) = Decimal::scan(cell) else {
@@ -70,7 +70,7 @@ pub(super) fn parse(cell: &[u8]) -> Cell {
     }
 }
 
-/// Reads a cell of digits alone, exactly.
+/// Parses an integer exactly; `None` if the cell is anything else or does not fit.
 pub(super) fn parse_whole(cell: &[u8]) -> Option<i64> {
     let cell = bare(cell);
     let (negative, digits) = signed(cell);
@@ -99,7 +99,7 @@ pub(super) fn is_clock_time(cell: &[u8]) -> bool {
             .all(|byte| byte.is_ascii_digit() || b":-/.,TZ+ APMapm".contains(byte))
 }
 
-/// The cell without blanks and quotes around it.
+/// The cell without the blanks and quotes around it.
 pub(super) fn bare(cell: &[u8]) -> &[u8] {
     let cell = cell.trim_ascii();
     match cell {
@@ -124,12 +124,12 @@ fn signed(cell: &[u8]) -> (bool, &[u8]) {
     }
 }
 
-/// A decimal number taken apart.
+/// Parts of a decimal number.
 struct Decimal {
     negative: bool,
-    /// All digits as one number, as long as they fit.
+    /// All digits as one integer, while they fit.
     digits: u64,
-    /// Whether they did.
+    /// Whether all digits fit.
     fits: bool,
     /// Power of ten.
     exponent: i32,
@@ -137,7 +137,7 @@ struct Decimal {
 }
 
 impl Decimal {
-    /// Takes `+12,5e-3` apart; `None` if it is not a decimal number.
+    /// Splits a number such as `+12,5e-3` into its parts; `None` if it is not a decimal number.
     fn scan(cell: &[u8]) -> Option<Self> {
         if cell.len() > LONGEST {
             return None;
@@ -190,7 +190,7 @@ impl Decimal {
     }
 }
 
-/// The digits after the `e` of a number.
+/// The exponent after the `e` of a number.
 fn power(cell: &[u8]) -> Option<i32> {
     let (negative, digits) = signed(cell);
     if digits.is_empty() || !digits.iter().all(u8::is_ascii_digit) {
@@ -203,7 +203,7 @@ fn power(cell: &[u8]) -> Option<i32> {
     Some(if negative { -size } else { size })
 }
 
-/// The standard parser, after writing the number in its dialect.
+/// Parses with the standard parser, after replacing `,` by `.` and `d` by `e`.
 fn slow_value(cell: &[u8]) -> Option<f64> {
     let mut plain = [0; LONGEST];
     let plain = plain.get_mut(..cell.len())?;
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn tells_nothing_from_text() {
+    fn missing_numbers_and_text() {
         for missing in [
             "", "  ", "nan", "NaN", "NA", "null", "-inf", "1e999", "-1.#IND",
         ] {
@@ -276,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn knows_a_clock() {
+    fn clock_times() {
         for clock in [
             "12:00:01.5",
             "2024-01-31",

@@ -1,47 +1,48 @@
-//! A first look at a table: its header and its first rows.
+//! Preview of a table: its header and its first rows.
 
-use super::dialect::Separator;
 use super::error::{ReadError, quoted};
 use super::names::{Name, is_unit};
 use super::number::{self, Cell};
 use super::records::Records;
+use super::separator::Separator;
 use super::text::Text;
+use crate::recording::ColumnLabel;
 
-/// Lines before the first numbers that may be a header or words before it.
+/// Maximum number of lines before the first row of numbers: the header and text before it.
 const MOST_LEADING: usize = 100;
 
-/// Rows kept; enough to see the relay switch.
+/// Maximum number of rows kept: enough to see the relay switch.
 const MOST_ROWS: usize = 50_000;
 
-/// What the first look finds.
+/// Header and first rows of a table.
 pub(super) struct Preview {
-    /// Names of the columns, if the file gives any; as many as `width`.
+    /// Names of the columns, `width` of them, if the file gives any.
     pub(super) names: Option<Vec<Name>>,
     /// Line of the names, if they come from a comment.
     pub(super) comment_line: Option<u64>,
-    /// Lines of words before the header.
+    /// Number of lines of text before the header.
     pub(super) skipped: usize,
     /// Number of columns.
     pub(super) width: usize,
     /// First line of numbers.
     pub(super) first_line: u64,
-    /// Column and text of the first cell on that line that is a date or a time of day.
+    /// Column and text of the first cell on that line that is a date or a time of day, if any.
     pub(super) clock_time: Option<(usize, String)>,
-    /// First rows, one after the other, NaN where there is no number.
+    /// First rows, row by row; NaN where a cell is not a number.
     cells: Vec<f64>,
-    /// For each column, whether all its numbers are digits only.
+    /// For each column, whether all its numbers are integers.
     whole: Vec<bool>,
 }
 
 impl Preview {
-    /// Looks at the head of a text.
+    /// Reads the head of a text.
     pub(super) fn of(text: &Text<'_>, separator: Separator) -> Result<Self, ReadError> {
         let mut records = Records::new(text.head.as_slice(), separator);
         let mut leading: Vec<Leading> = Vec::new();
         let mut preview: Option<Self> = None;
         while let Some(row) = records.next()? {
             if let Some(preview) = &mut preview {
-                // A row cut by the end of the head is ragged, or its last cell is short.
+                // The end of the head may cut its last row.
                 if preview.cells.len() < MOST_ROWS * preview.width {
                     preview.add(row.cells.iter());
                 }
@@ -66,7 +67,7 @@ impl Preview {
         Ok(preview)
     }
 
-    /// The preview with its first row of numbers, after lines of words.
+    /// Starts the preview with its first row of numbers, after lines of text.
     fn start(line: u64, cells: &[&[u8]], leading: &[Leading]) -> Result<Self, ReadError> {
         let fitting = |row: &Leading| row.width() > 1 && fits(cells, row.width());
         let header = leading
@@ -121,7 +122,7 @@ impl Preview {
         self.cells.truncate(self.cells.len() - column % self.width);
     }
 
-    /// Takes the names from a comment, if it has as many words as there are columns.
+    /// Takes the names from a comment if it has one word for each column.
     fn take_comment(&mut self, line: u64, comment: &[u8], separator: Separator) {
         let comment = comment.trim_ascii();
         let cells: Vec<&[u8]> = match separator {
@@ -141,29 +142,29 @@ impl Preview {
         }
     }
 
-    /// Column as a sentence names it.
-    pub(super) fn label(&self, column: usize) -> String {
-        let number = column + 1;
-        match self.names.as_ref().and_then(|names| names.get(column)) {
-            Some(name) if !name.full.is_empty() => {
-                format!("\"{}\" (column {number})", quoted(name.full.as_bytes()))
-            }
-            _ => format!("column {number}"),
+    /// Name and number of a column as errors and notes give them.
+    pub(super) fn label(&self, column: usize) -> ColumnLabel {
+        let name = self.names.as_ref().and_then(|names| names.get(column));
+        ColumnLabel {
+            name: name
+                .filter(|name| !name.full.is_empty())
+                .map(|name| quoted(name.full.as_bytes())),
+            number: column + 1,
         }
     }
 
-    /// Numbers of a column in the first rows, NaN where there are none.
+    /// Numbers of a column in the first rows; NaN where a cell is not a number.
     pub(super) fn column(&self, column: usize) -> impl Iterator<Item = f64> + Clone {
         self.cells.iter().skip(column).step_by(self.width).copied()
     }
 
-    /// Whether the numbers of a column are digits only.
+    /// Whether the numbers of a column are integers.
     pub(super) fn is_whole(&self, column: usize) -> bool {
         self.whole[column]
     }
 }
 
-/// Whether a row fits a number of columns; empty cells at its end do not count.
+/// Whether a row has `width` cells, not counting empty cells at its end.
 pub(super) fn fits<T: AsRef<[u8]>>(cells: &[T], width: usize) -> bool {
     cells.len() >= width
         && cells[width..]
@@ -171,7 +172,7 @@ pub(super) fn fits<T: AsRef<[u8]>>(cells: &[T], width: usize) -> bool {
             .all(|cell| number::bare(cell.as_ref()).is_empty())
 }
 
-/// A line of words before the numbers.
+/// A line of text before the numbers.
 struct Leading {
     cells: Vec<String>,
 }
@@ -183,7 +184,7 @@ impl Leading {
         }
     }
 
-    /// The names in the first cells, with the units of the next line if it has any.
+    /// The names in the first cells, with the units of the next line if that is a row of units.
     fn names(&self, width: usize, next: Option<&Self>) -> Vec<Name> {
         let units = next.filter(|next| next.is_units());
         let unit = |column| units.and_then(|units| units.cells.get(column));
@@ -195,7 +196,7 @@ impl Leading {
         with_units.collect()
     }
 
-    /// Cells up to the last that is not empty.
+    /// Number of cells up to the last that is not empty.
     fn width(&self) -> usize {
         self.cells
             .iter()
@@ -203,7 +204,7 @@ impl Leading {
             .map_or(0, |last| last + 1)
     }
 
-    /// Whether it is a row of units: all units, or some with the others empty.
+    /// Whether it is a row of units: every cell is a unit or empty, and one is a unit.
     fn is_units(&self) -> bool {
         let mut cells = self
             .cells
@@ -222,7 +223,7 @@ fn is_number(cell: &[u8]) -> bool {
     matches!(number::parse(cell), Cell::Number(..))
 }
 
-/// Whether a row holds a number, or NaN and the like and not one word.
+/// Whether a row is data: it holds a number, or only words for a missing number such as NaN.
 fn is_data<'a>(cells: impl Iterator<Item = &'a [u8]> + Clone) -> bool {
     let filled = cells
         .filter(|cell| !number::bare(cell).is_empty())
@@ -232,12 +233,16 @@ fn is_data<'a>(cells: impl Iterator<Item = &'a [u8]> + Clone) -> bool {
         || (words == 0 && filled.count() > 0)
 }
 
-/// A file of clock times has no numbers in the first column, and often nothing but words in the
-/// first rows.
+/// Refuses a line that starts with a date or a time of day. Such a file may have no row that counts
+/// as data, so this is found before the columns are chosen.
 fn check_leading(line: u64, first: Option<&[u8]>) -> Result<(), ReadError> {
     match first {
         Some(cell) if number::is_clock_time(cell) => {
-            let (column, text) = ("1".to_owned(), quoted(cell));
+            let column = ColumnLabel {
+                name: None,
+                number: 1,
+            };
+            let text = quoted(cell);
             Err(ReadError::ClockTime { line, column, text })
         }
         _ => Ok(()),

@@ -1,17 +1,17 @@
-//! Clean lines to rows of cells, each with its line number.
+//! Splits clean lines into rows of cells with their line numbers.
 
 use std::io::Read;
 
 use ::csv::{ByteRecord, ErrorKind, ReaderBuilder, Terminator};
 
-use super::dialect::Separator;
 use super::error::ReadError;
 use super::lines::{Lines, State};
+use super::separator::Separator;
 
-/// Bytes handed to the splitter at a time.
+/// Buffer of the CSV splitter, in bytes.
 const BUFFER_BYTES: usize = 1 << 15;
 
-/// Rows of a text.
+/// The rows of a text.
 pub(super) struct Records<R> {
     reader: ::csv::Reader<Lines<R>>,
     record: ByteRecord,
@@ -19,9 +19,9 @@ pub(super) struct Records<R> {
 
 /// One row.
 pub(super) struct Row<'a> {
-    /// Its line in the file, from 1.
+    /// Line in the file, from 1.
     pub(super) line: u64,
-    /// Its cells, quotes removed, blanks kept.
+    /// Cells; quotes are removed, blanks are kept.
     pub(super) cells: &'a ByteRecord,
 }
 
@@ -40,11 +40,11 @@ impl<R: Read> Records<R> {
         }
     }
 
-    /// The next row, or none at the end of the text.
+    /// The next row, or `None` at the end of the text.
     pub(super) fn next(&mut self) -> Result<Option<Row<'_>>, ReadError> {
         match self.reader.read_byte_record(&mut self.record) {
             // A clean line is one record and ends in LF, which the reader has just counted. (The
-            // position of the record itself is that of the empty lines before it.)
+            // position of the record itself would be that of the empty lines before it.)
             Ok(true) => {
                 let line = self.reader.position().line() - 1;
                 Ok(Some(Row {
@@ -57,7 +57,7 @@ impl<R: Read> Records<R> {
         }
     }
 
-    /// What is known of the lines read so far, ahead of the rows.
+    /// Facts about the lines read so far; the buffer makes them run ahead of the rows.
     pub(super) fn state(&mut self) -> &mut State {
         self.reader.get_mut().state()
     }
@@ -80,7 +80,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn rows_know_their_lines() {
+    fn rows_have_their_line_numbers() {
         let text = "# one\n\nt,u\r\n\"1\",2\n\n\n% six\n3,4,\n\n9";
         let mut records = Records::new(text.as_bytes(), Separator::Comma);
         let mut found = Vec::new();

@@ -1,14 +1,14 @@
-//! Bytes to text: byte order marks, UTF-16, and files that are no text at all.
+//! Decodes bytes to text: byte order marks, UTF-16, and files that are not text.
 
 use std::io::{self, Read};
 
 use super::error::ReadError;
 
-/// How much of a file is looked at before it is read.
+/// Bytes of a file that are examined before it is read.
 const HEAD_BYTES: usize = 1 << 20;
 
-/// First bytes of files that people take for tables. MATLAB, PDF and ROS bag files begin like
-/// text, so these are looked for before anything else.
+/// First bytes of file formats that are sometimes mistaken for tables. MATLAB, PDF and ROS bag files
+/// begin like text, so these bytes are checked first.
 const MAGIC: [(&[u8], &str); 21] = [
     (b"\x89PNG", "a PNG image"),
     (b"\xff\xd8\xff", "a JPEG image"),
@@ -35,18 +35,18 @@ const MAGIC: [(&[u8], &str); 21] = [
 
 /// The text of a file as UTF-8 without a byte order mark.
 pub(super) struct Text<'a> {
-    /// Its first bytes, for a first look; the whole text if it is no longer.
+    /// The first bytes, or the entire text if it is shorter than the head.
     pub(super) head: Vec<u8>,
-    /// What comes after.
+    /// The text after the head.
     pub(super) rest: Box<dyn Read + 'a>,
-    /// Whether `head` is the whole text.
+    /// Whether `head` is the entire text.
     pub(super) whole: bool,
     /// Whether the file is UTF-16.
     pub(super) utf16: bool,
 }
 
 impl<'a> Text<'a> {
-    /// Looks at the head of a file.
+    /// Reads the head of a file.
     pub(super) fn open(mut file: impl Read + 'a) -> Result<Self, ReadError> {
         let start = take(&mut file, 4)?;
         let (skip, big_endian) = match *start {
@@ -92,7 +92,7 @@ fn take(file: &mut impl Read, count: usize) -> Result<Vec<u8>, ReadError> {
     }
 }
 
-/// What a head that is not text looks like.
+/// What the file looks like, if it is not text.
 fn binary(head: &[u8]) -> Option<&'static str> {
     if let Some((_, looks_like)) = MAGIC.iter().find(|(magic, _)| head.starts_with(magic)) {
         return Some(looks_like);
@@ -111,13 +111,13 @@ fn binary(head: &[u8]) -> Option<&'static str> {
     }
 }
 
-/// UTF-16 to UTF-8 as it is read.
+/// Converts UTF-16 to UTF-8 while reading.
 struct Utf16<R> {
     file: R,
     big_endian: bool,
     /// Bytes not yet decoded: an odd byte, or the first half of a surrogate pair.
     bytes: Vec<u8>,
-    /// Text not yet handed out, backwards.
+    /// Decoded text not yet handed out, in reverse order.
     text: Vec<u8>,
 }
 
@@ -133,7 +133,7 @@ impl<R: Read> Read for Utf16<R> {
 }
 
 impl<R: Read> Utf16<R> {
-    /// Decodes one more piece; false at the end of the file.
+    /// Decodes the next bytes; false at the end of the file.
     fn decode(&mut self) -> io::Result<bool> {
         let before = self.bytes.len();
         let mut piece = [0; 4096];
@@ -198,7 +198,7 @@ mod tests {
     }
 
     #[test]
-    fn says_what_is_not_text() {
+    fn files_that_are_not_text() {
         let refusal = |bytes: &[u8]| match Text::open(bytes) {
             Err(error) => error.to_string(),
             Ok(_) => panic!("taken for text"),

@@ -1,17 +1,16 @@
-//! A recording to our own dialect of CSV.
+//! Writes a recording as CSV.
 
 use std::io::{self, BufWriter, Write};
 
 use crate::recording::Recording;
 
-/// Writes a recording as lines of `time_s,output,input` under comments that start with `#`.
+/// Writes a recording as rows of `time_s,output,input` after comments that start with `#`.
 ///
-/// Numbers are the shortest that read back to the same bits. Of an averaged recording the points
-/// are written; a comment says how many samples each stands for, but reading it back does not
-/// restore that.
+/// Each number is the shortest that reads back to the same bits. An averaged recording is written
+/// point by point; a comment gives the samples per point, but the reader does not read it.
 ///
 /// # Errors
-/// What the writer fails with.
+/// The errors of `out`.
 pub fn write_csv(out: impl Write, recording: &Recording, comments: &[&str]) -> io::Result<()> {
     let mut out = BufWriter::new(out);
     for line in comments

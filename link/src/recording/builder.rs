@@ -1,42 +1,43 @@
-//! Samples in, one by one; a recording out, in bounded memory.
+//! Builds a recording from samples, one by one, in bounded memory.
 //!
 //! ```text
 //! n <- 1
 //! for each sample:
-//!     add it to the group; the group has n samples: store it as a point
-//!     the next stamp is beyond a gap: drop the samples of an incomplete group
-//!     the store is full and one more point comes: average the points in pairs, n <- 2 n
+//!     add it to the group; if the group has n samples, store their mean as a point
+//!     if a gap follows, drop an incomplete group
+//!     if the store is full when a point is due, average the points in pairs, n <- 2 n
 //! ```
 
 use super::rhythm::Rhythm;
 use super::{Columns, Gap, MAX_POINTS, Note, Position, Recording, RecordingError, Role};
 
-/// Numbers beyond this are refused; their differences and products with weights stay finite.
+/// Largest number accepted: differences of such numbers and their weighted sums stay finite.
 const LARGEST: f64 = 1e300;
 
-/// Time that starts beyond this many seconds is counted from its first stamp. At 1e7 s (115 days
-/// since power-up) a stamp still resolves 2 ns.
+/// A time that starts beyond this many seconds is counted from its first time stamp. At 1e7 s (115
+/// days since power-up) a time stamp still resolves 2 ns.
 pub(crate) const FAR_START_S: f64 = 1e7;
 
-/// Rows without a number, as a fraction of all rows.
+/// Maximum fraction of rows that lack a number.
 const MOST_MISSING: f64 = 0.01;
 
-/// Rows that repeat a stamp, as a fraction of all rows.
+/// Maximum fraction of rows that repeat a time stamp.
 const MOST_DUPLICATES: f64 = 0.05;
 
-/// Samples dropped because of gaps, as a fraction of all samples.
+/// Maximum fraction of samples dropped because of gaps.
 const MOST_DROPPED: f64 = 0.1;
 
-/// Rounding of the stamps, as a fraction of the sample period.
+/// Maximum rounding of a time stamp, as a fraction of the sample period.
 const COARSEST_STAMP: f64 = 0.01;
 
-/// Jitter worth a note.
+/// Jitter above which the recording gets a note.
 const NOTED_JITTER: f64 = 0.1;
 
-/// Gathers samples into a [`Recording`], averaging when there are too many to keep.
+/// Gathers samples into a [`Recording`] and averages them when there are too many to keep.
 ///
-/// Rows that are not finite and rows that repeat a stamp are dropped and counted; too many of
-/// them are refused at the end.
+/// Samples that are not finite and samples that repeat a time stamp are dropped and counted.
+/// [`finish`](Self::finish) returns an error if more than 1 % of the samples lack a number or more
+/// than 5 % repeat a time stamp.
 #[derive(Debug, Clone)]
 pub struct RecordingBuilder {
     columns: Columns,
@@ -49,9 +50,9 @@ pub struct RecordingBuilder {
     gaps: Vec<Gap>,
     samples_per_point: usize,
     group: Group,
-    /// The newest sample waits here: how long it is held is known with the next.
+    /// The newest sample: how long its input is held is known only when the next one arrives.
     newest: Option<Sample>,
-    /// Known once the store was full; a shorter recording has it found at the end.
+    /// Found when the store is full for the first time, or else at the end.
     rhythm: Option<Rhythm>,
 
     origin_s: f64,
@@ -63,7 +64,7 @@ pub struct RecordingBuilder {
 }
 
 impl RecordingBuilder {
-    /// Nothing recorded yet; at most [`MAX_POINTS`] points will be kept.
+    /// An empty recording that keeps at most [`MAX_POINTS`] points.
     pub fn new(columns: Columns) -> Self {
         Self {
             columns,
@@ -86,7 +87,7 @@ impl RecordingBuilder {
         }
     }
 
-    /// Keeps at most this many points instead (at least 4, rounded down to an even number).
+    /// Keeps at most this many points (at least 4, rounded down to an even number).
     #[must_use]
     pub fn with_max_points(mut self, max_points: usize) -> Self {
         self.max_points = max_points.max(4) & !1;
@@ -98,11 +99,12 @@ impl RecordingBuilder {
         self.notes.push(note);
     }
 
-    /// Adds a sample: the stamp in seconds, the input held from there on, the output measured
-    /// there. A sample that is not finite, or repeats the stamp before, is dropped and counted.
+    /// Adds a sample: its time stamp in seconds, the input held from that time on, and the output
+    /// measured at that time. A sample that is not finite, or repeats the time stamp before, is
+    /// dropped and counted.
     ///
     /// # Errors
-    /// A stamp before the last one, or a number beyond 1e300.
+    /// The time stamp is smaller than the one before, or a number is beyond 1e300.
     pub fn push(
         &mut self,
         at: Position,
@@ -151,10 +153,10 @@ impl RecordingBuilder {
         Ok(())
     }
 
-    /// The recording.
+    /// Returns the recording.
     ///
     /// # Errors
-    /// Too few rows, too many dropped, or stamps that cannot resolve the sample period.
+    /// Too few samples, too many dropped, or time stamps that cannot resolve the sample period.
     pub fn finish(mut self) -> Result<Recording, RecordingError> {
         let (rhythm, newest) = self.check()?;
         self.group.add(newest, rhythm.median_s());
@@ -186,7 +188,7 @@ impl RecordingBuilder {
         })
     }
 
-    /// Refuses too few rows, too many missing or repeated, and coarse stamps.
+    /// Refuses too few rows, too many missing or repeated ones, and coarse time stamps.
     fn check(&mut self) -> Result<(Rhythm, Sample), RecordingError> {
         let rows = self.rows;
         let missing: u64 = self.missing.iter().map(|tally| tally.count).sum();
@@ -200,7 +202,8 @@ impl RecordingBuilder {
             return Err(RecordingError::TooManyMissing {
                 count: missing,
                 rows,
-                column: format!("the {role} ({})", self.columns.of(role).name),
+                role,
+                column: self.columns.of(role).name.clone(),
                 first,
             });
         }
@@ -231,7 +234,7 @@ impl RecordingBuilder {
         Ok((rhythm, newest))
     }
 
-    /// Puts the newest sample into the group, now that the stamp after it is known.
+    /// Puts the newest sample into the group, now that the next time stamp is known.
     fn settle(&mut self, sample: Sample, next_s: f64) {
         if self.rhythm.is_none() && self.time_s.len() == self.max_points {
             self.rhythm = Some(self.find_rhythm(sample.time_s));
@@ -261,7 +264,7 @@ impl RecordingBuilder {
         }
     }
 
-    /// Rhythm and gaps of the samples stored so far, each still a point, and the stamp after.
+    /// Rhythm and gaps of the samples stored so far (each is still one point) up to `next_s`.
     fn find_rhythm(&mut self, next_s: f64) -> Rhythm {
         let stamps = || self.time_s.iter().copied().chain([next_s]);
         let increments_s = stamps().zip(stamps().skip(1)).map(|(a, b)| b - a).collect();
@@ -280,7 +283,7 @@ impl RecordingBuilder {
         rhythm
     }
 
-    /// Stores the group as a point if it is full, making room if there is none.
+    /// Stores the group as a point if it is full; averages the stored points if there is no room.
     fn store_full_group(&mut self, median_s: f64) {
         if self.group.samples == self.samples_per_point && self.time_s.len() == self.max_points {
             self.average_in_pairs(median_s);
@@ -293,8 +296,8 @@ impl RecordingBuilder {
         }
     }
 
-    /// Halves the points and doubles their samples. A point without a partner before a gap is
-    /// dropped; without a partner at the end, it becomes the first half of the group.
+    /// Averages the points in pairs, so that each has twice as many samples. A single point left
+    /// before a gap is dropped; a single point left at the end becomes the first half of the group.
     fn average_in_pairs(&mut self, median_s: f64) {
         let stored = self.time_s.len();
         let point_s = self.samples_per_point as f64 * median_s;
@@ -361,7 +364,7 @@ impl RecordingBuilder {
         }
     }
 
-    /// Adds a gap, or lengthens the last one when no point came in between.
+    /// Adds a gap, or extends the last gap if no point lies between the two.
     fn add_gap(&mut self, gap: Gap) {
         match self.gaps.last_mut() {
             Some(last) if last.index == gap.index => last.end_s = gap.end_s,
@@ -419,7 +422,7 @@ struct Sample {
     output: f64,
 }
 
-/// Consecutive samples without a gap between: their mean output, their mean input over time.
+/// Consecutive samples without a gap between them: mean output, and mean of the input over time.
 #[derive(Debug, Clone, Default)]
 struct Group {
     start_s: f64,
@@ -452,7 +455,7 @@ impl Group {
         }
         let held_s = self.held_s + next.held_s;
         let samples = self.samples + next.samples;
-        // Written so that the mean of equal numbers is that number, to the bit.
+        // In this form the mean of equal numbers is exactly that number.
         self.input += (next.input - self.input) * (next.held_s / held_s);
         self.output += (next.output - self.output) * (next.samples as f64 / samples as f64);
         self.held_s = held_s;
@@ -460,7 +463,7 @@ impl Group {
     }
 }
 
-/// How many rows, and the first of them.
+/// A count of rows with the position of the first.
 #[derive(Debug, Clone, Copy, Default)]
 struct Tally {
     count: u64,

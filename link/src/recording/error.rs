@@ -5,13 +5,13 @@ use thiserror::Error;
 use super::note::counted;
 use super::{Position, Role};
 
-/// Why samples do not make a recording. Each says what to do in one sentence.
+/// Why samples do not make a recording. `Display` states the fact; what to do about it is up to
+/// the caller.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum RecordingError {
-    /// The vectors of a simulator have different lengths.
-    #[error(
-        "time, input and output have {time}, {input} and {output} values; give as many of each"
-    )]
+    /// The three vectors have different lengths.
+    #[error("time, input and output have {time}, {input} and {output} values")]
     LengthsDiffer {
         /// Number of time stamps.
         time: usize,
@@ -20,95 +20,90 @@ pub enum RecordingError {
         /// Number of outputs.
         output: usize,
     },
-    /// A simulator gave NaN or an infinity.
-    #[error("the {role} at {at} is not a finite number; cut the recording before it")]
+    /// A value is NaN or infinite.
+    #[error("the {role} at {at} is not a finite number")]
     NotFinite {
         /// Where.
         at: Position,
         /// Which signal.
         role: Role,
     },
-    /// A number no experiment yields, and too large to calculate with.
-    #[error("the {role} at {at} is {value:e}, beyond 1e300; check the units or cut that row")]
+    /// A value is too large to calculate with.
+    #[error("the {role} at {at} is {value:e}, beyond 1e300")]
     TooLarge {
         /// Where.
         at: Position,
         /// Which signal.
         role: Role,
-        /// The number, in the unit of the column; time in seconds.
+        /// The value, in the unit of the column; time in seconds.
         value: f64,
     },
-    /// Time goes back (or, in vectors, stands still).
-    #[error(
-        "time does not increase at {at}: {after_s:?} s follows {before_s:?} s; \
-         keep one run and cut the rest"
-    )]
+    /// A time stamp is smaller than the one before it. In vectors, also one that is equal.
+    #[error("time does not increase at {at}: {after_s:?} s follows {before_s:?} s")]
     TimeGoesBack {
         /// Where.
         at: Position,
-        /// Time before, in seconds.
+        /// Time stamp before, in seconds.
         before_s: f64,
-        /// Time at `at`, in seconds.
+        /// Time stamp at `at`, in seconds.
         after_s: f64,
     },
-    /// All rows have the same stamp.
-    #[error(
-        "time does not change: all {rows} rows have the same stamp; \
-         choose another column with --time or give the sample rate with --sample-rate"
-    )]
+    /// All rows have the same time stamp.
+    #[error("time does not change: all {rows} rows have the same time stamp")]
     TimeConstant {
         /// Number of rows.
         rows: u64,
     },
-    /// Fewer than two rows.
+    /// Fewer than two rows have numbers.
     #[error("only {} with numbers; a recording needs at least 2", counted(*.rows, "row"))]
     TooShort {
         /// Number of rows with numbers.
         rows: u64,
     },
-    /// More than 1 % of the rows have no number in a column.
+    /// More than 1 % of the rows lack a number.
     #[error(
-        "{count} of {rows} rows have no number in {column}, the first at {first}; \
-         at most 1 % may be missing: choose another column or cut the recording"
+        "{count} of {rows} rows have no number in the {role} ({column}), the first at {first}; \
+         at most 1 % may be missing"
     )]
     TooManyMissing {
-        /// Rows without a number in any column.
+        /// Rows that lack a number in any of the three columns.
         count: u64,
         /// All rows.
         rows: u64,
-        /// The column that lacks most, by role and name.
+        /// The signal that lacks the most numbers.
+        role: Role,
+        /// Name of its column.
         column: String,
-        /// First row where it does.
+        /// First row that lacks a number in this column.
         first: Position,
     },
-    /// More than 5 % of the rows repeat the stamp before.
+    /// More than 5 % of the rows repeat the time stamp of the row before.
     #[error(
-        "{count} of {rows} rows repeat the stamp of the row before, the first at {first}; \
-         at most 5 % may: the time column is too coarse, so give the sample rate with --sample-rate"
+        "{count} of {rows} rows repeat the time stamp of the row before, the first at {first}; \
+         at most 5 % may"
     )]
     TooManyDuplicates {
-        /// Rows that repeat a stamp.
+        /// Rows that repeat a time stamp.
         count: u64,
         /// All rows.
         rows: u64,
         /// The first of them.
         first: Position,
     },
-    /// Stamps so large that their increment is rounded by more than 1 %.
+    /// Rounding of the largest time stamp exceeds 1 % of the sample period.
     #[error(
-        "stamps as large as {largest_s:e} s cannot resolve a sample period of {period_s:e} s; \
-         subtract the first stamp before writing the file, or give the sample rate with --sample-rate"
+        "time stamps as large as {largest_s:.3e} s cannot resolve a sample period of {period_s:.3e} s"
     )]
     StampsTooCoarse {
-        /// Largest stamp in seconds.
+        /// Largest time stamp in seconds.
         largest_s: f64,
         /// Sample period in seconds.
         period_s: f64,
     },
-    /// A recording too long to keep, and too broken up to average.
+    /// The recording is too long to keep every sample and has too many gaps to be averaged.
     #[error(
-        "the recording must be averaged in groups of {samples_per_point}, but gaps break up the \
-         groups of {dropped} of its {samples} samples; cut it to one stretch without gaps"
+        "the recording is so long that groups of {samples_per_point} samples are averaged, but \
+         gaps leave {dropped} of its {samples} samples in incomplete groups"
     )]
     TooManyGaps {
         /// Samples in a group.

@@ -1,136 +1,166 @@
-//! What a reader chose, forgave or dropped.
+//! What a reader chose, assumed or dropped.
+
+use std::fmt;
 
 use thiserror::Error;
 
-use super::{Position, Role};
+use super::{ColumnLabel, Position, Role};
+use crate::time_unit::TimeUnit;
 
-/// What a reader chose, forgave or dropped; `Display` gives one plain sentence.
+/// What a reader chose, assumed or dropped; `Display` states the fact.
 ///
-/// A note is no error; it is derived as one so that each sentence stands at its variant.
+/// A note is not an error. It derives `Error` only so that each clause stands at its variant.
 #[derive(Debug, Clone, PartialEq, Error)]
+#[non_exhaustive]
 pub enum Note {
-    /// Which columns were read, and why these.
+    /// Which columns were read, and how they were chosen.
     #[error(
-        "time is {}, input is {input}, output is {output}, found {how}",
-        time.as_deref().unwrap_or("counted by rows")
+        "time is {}, input is {input}, output is {output}, {by}",
+        time.as_ref().map_or("counted by rows".to_owned(), ToString::to_string)
     )]
     ColumnsChosen {
-        /// Time column as `"t" (column 1)`, or nothing when the sample rate was given.
-        time: Option<String>,
+        /// Time column; `None` if the caller gave the sample rate.
+        time: Option<ColumnLabel>,
         /// Input column.
-        input: String,
+        input: ColumnLabel,
         /// Output column.
-        output: String,
-        /// How they were found: "by name", ...
-        how: &'static str,
+        output: ColumnLabel,
+        /// What decided.
+        by: ChosenBy,
     },
     /// The names of the columns were taken from a comment.
-    #[error("took the names of the columns from the comment on line {line}")]
+    #[error("the names of the columns come from the comment on line {line}")]
     HeaderInComment {
         /// Line of the comment.
         line: u64,
     },
-    /// Lines of words were skipped.
+    /// Lines of text before the header were skipped.
     #[error("skipped {} before the header", counted(*.count as u64, "line"))]
     LinesSkipped {
-        /// How many.
+        /// Number of lines.
         count: usize,
     },
     /// The file was UTF-16.
     #[error("the file is UTF-16 text")]
     Utf16,
-    /// The time column says that it is not in seconds, or the caller said so.
-    #[error("the time column is in {unit}")]
+    /// The time column is not in seconds, as its header or the caller says.
+    #[error("the time column is in {}", .unit.symbol())]
     TimeUnit {
         /// Its unit.
-        unit: &'static str,
+        unit: TimeUnit,
     },
-    /// The time column says nothing of its unit, so it was guessed from the stamps.
-    #[error("the time column gives no unit: took its stamps to be in {unit}")]
+    /// The header gives no unit of time, so it was guessed from the time stamps.
+    #[error("the time column gives no unit; its time stamps were read in {}", .unit.symbol())]
     TimeUnitGuessed {
         /// The unit assumed.
-        unit: &'static str,
+        unit: TimeUnit,
     },
-    /// Time starts so far from zero that it is counted from the first stamp.
-    #[error("time is counted from the first stamp, {first}")]
+    /// Time starts so far from zero that it is counted from the first time stamp.
+    #[error("time is counted from the first time stamp, {first}")]
     CountedFromFirst {
-        /// First stamp as in the file.
+        /// First time stamp as in the file, with its unit.
         first: String,
     },
-    /// The sample rate was given, so the time column was not read.
-    #[error("did not read {name}, for the sample rate is given: {sample_rate_hz} Hz")]
+    /// The caller gave the sample rate, so the time column was not read.
+    #[error("did not read {column} because the sample rate is given: {sample_rate_hz} Hz")]
     TimeIgnored {
-        /// The time column, as `"t" (column 1)`.
-        name: String,
+        /// The time column.
+        column: ColumnLabel,
         /// Sample rate in hertz.
         sample_rate_hz: f64,
     },
-    /// The last line was cut off.
-    #[error("dropped the last line, {line}, which is incomplete")]
+    /// The last line was cut off and was dropped.
+    #[error("dropped the last line, {line}, because it is incomplete")]
     LastLineIncomplete {
         /// Its number.
         line: u64,
     },
-    /// Rows without a number were dropped.
+    /// Rows that lack a number were dropped.
     #[error(
         "dropped {} whose {role} is not a number, the first at {first}",
         counted(*.count, "row")
     )]
     RowsDropped {
-        /// The column that is not a number.
+        /// The signal that is not a number.
         role: Role,
-        /// How many rows.
+        /// Number of rows.
         count: u64,
         /// The first of them.
         first: Position,
     },
-    /// Rows that repeat a stamp were dropped.
-    #[error("dropped {} that repeated a stamp, the first at {first}", counted(*.count, "row"))]
+    /// Rows that repeat the time stamp of the row before were dropped.
+    #[error("dropped {} that repeated a time stamp, the first at {first}", counted(*.count, "row"))]
     DuplicatesDropped {
-        /// How many rows.
+        /// Number of rows.
         count: u64,
         /// The first of them.
         first: Position,
     },
-    /// The recording was too long to keep and was averaged.
+    /// The recording was too long to keep every sample and was averaged.
     #[error(
-        "averaged the recording in groups of {samples_per_point} samples, \
-         {dropped} left over before gaps and at the end"
+        "averaged the recording in groups of {samples_per_point} samples; dropped {} in \
+         incomplete groups before gaps and at the end",
+        counted(*.dropped, "sample")
     )]
     Averaged {
         /// Samples in a point.
         samples_per_point: usize,
-        /// Samples left over before gaps and at the end.
+        /// Samples dropped because their group was incomplete, before gaps and at the end.
         dropped: u64,
     },
-    /// There are gaps.
+    /// The recording has gaps.
     #[error(
-        "found {}, the longest of {} s at {at_s:?} s",
+        "found {}, the longest of {} s from {at_s:?} s",
         counted(*.count as u64, "gap"), rounded(*.longest_s)
     )]
     Gaps {
-        /// How many.
+        /// Number of gaps.
         count: usize,
-        /// Longest gap in seconds.
+        /// Length of the longest gap in seconds.
         longest_s: f64,
-        /// Where the longest gap starts, in seconds.
+        /// Start of the longest gap in seconds.
         at_s: f64,
     },
-    /// The increments of time vary by more than 10 % of the sample period.
+    /// The sample period varies by more than 10 %.
     #[error(
-        "the increments of time vary by {:.0} % around {} s",
+        "the sample period varies by {:.0} % (standard deviation) around {} s",
         100.0 * .jitter, rounded(*.sample_period_s)
     )]
     Jitter {
-        /// Standard deviation of the increments over the sample period.
+        /// Standard deviation of the increments of time over the sample period.
         jitter: f64,
         /// Sample period in seconds.
         sample_period_s: f64,
     },
 }
 
+/// What decided which column holds which signal.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ChosenBy {
+    /// The caller named all of them.
+    Caller,
+    /// The names in the header.
+    Name,
+    /// The order of the columns: the file has no header.
+    Position,
+    /// The number of different values: few in the input of a relay test, many in its output.
+    Values,
+}
+
+impl fmt::Display for ChosenBy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Caller => "as chosen",
+            Self::Name => "found by name",
+            Self::Position => "found by position",
+            Self::Values => "found by how few values the input takes",
+        })
+    }
+}
+
 /// `1 row`, `2 rows`.
-pub(super) fn counted(count: u64, noun: &str) -> String {
+pub(crate) fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 

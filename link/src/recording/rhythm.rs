@@ -1,8 +1,8 @@
-//! The sample clock of a recording: period, jitter, and what counts as a gap.
+//! Sample period, jitter and gaps of a recording.
 //!
-//! The median increment is robust against gaps but knows only the increments that occur (2 ms or
-//! 3 ms for 400 Hz in whole milliseconds). So it only tells gaps apart; the period is the mean of
-//! all increments that are not gaps, and the jitter is their standard deviation.
+//! The median increment of time is robust against gaps, but it is one of the increments that occur
+//! (2 ms or 3 ms for 400 Hz in whole milliseconds). It therefore serves only to detect gaps. The
+//! period is the mean of all increments that are not gaps, the jitter their standard deviation.
 
 use super::GAP_PERIODS;
 
@@ -17,7 +17,7 @@ pub(super) struct Rhythm {
 }
 
 impl Rhythm {
-    /// Nothing gathered yet; the median is that of the given increments.
+    /// Starts without increments; the median is that of `increments_s`.
     pub(super) fn around_median(mut increments_s: Vec<f64>) -> Self {
         let middle = increments_s.len() / 2;
         let median_s = if increments_s.is_empty() {
@@ -35,7 +35,7 @@ impl Rhythm {
         }
     }
 
-    /// Gathers an increment, unless it is a gap; says whether it is.
+    /// Whether the increment is a gap; if not, adds it to mean and standard deviation.
     pub(super) fn is_gap(&mut self, increment_s: f64) -> bool {
         let ratio = increment_s / self.median_s;
         if ratio > GAP_PERIODS {
@@ -87,7 +87,7 @@ mod tests {
     }
 
     #[test]
-    fn a_gap_counts_for_nothing() {
+    fn gaps_do_not_count() {
         let mut rhythm = Rhythm::around_median(vec![1.0, 1.0, 100.0, 1.0]);
         assert!(rhythm.is_gap(100.0));
         assert!(rhythm.is_gap(5.000_001));

@@ -13,7 +13,7 @@ use crate::report::number::{degrees, percent};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Settings {
-    /// A file of `experiments`.
+    /// A recipe of `cli/reproduction`.
     recipe: RecipeName,
     /// Losses, a column each.
     losses: Vec<Choice>,
@@ -31,9 +31,9 @@ enum RecipeName {
 impl Settings {
     fn recipe(&self) -> Result<Recipe, Failure> {
         let text = match self.recipe {
-            RecipeName::PaperNetwork => include_str!("../../../../experiments/paper_network.toml"),
+            RecipeName::PaperNetwork => include_str!("../../../reproduction/paper_network.toml"),
             RecipeName::PaperNetworkSmall => {
-                include_str!("../../../../experiments/paper_network_small.toml")
+                include_str!("../../../reproduction/paper_network_small.toml")
             }
         };
         let recipe: Recipe = toml::from_str(text).map_err(Failure::usage)?;

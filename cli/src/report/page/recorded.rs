@@ -6,6 +6,7 @@ use onecycle_link::Column;
 use super::significant;
 use crate::pages::page::{self, Section};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series};
+use crate::words;
 
 /// Pieces that a long recording is cut into, each drawn by its extremes: more than a screen is wide.
 const PIECES: usize = 1500;
@@ -39,7 +40,11 @@ pub(super) fn section(recording: &Recording, found: Option<&Oscillation>) -> Sec
     if let Some(found) = found {
         body += &page::facts(&facts(found));
     }
-    let notes: Vec<String> = recording.notes().iter().map(ToString::to_string).collect();
+    let notes: Vec<String> = recording
+        .notes()
+        .iter()
+        .map(words::recording::note)
+        .collect();
     body += &page::list(&notes);
     Section {
         id: "recording".to_owned(),

@@ -1,45 +1,30 @@
-//! Whatever the bytes, the reader neither panics nor returns what is not a recording; and what
-//! this crate writes it reads back to the bit.
+//! For any bytes, the reader does not panic and returns either a valid recording or an error. A
+//! written recording reads back to the same bits.
 
 use onecycle_link::{ColumnRef, CsvOptions, Recording, TimeUnit, read_from, write_csv};
 use proptest::prelude::*;
 
-/// A good file with something of everything.
+/// A valid file with many features of the dialects.
 const SEED: &str = "\u{feff}# run 7\r\nnoted by hand\r\n\"time (ms)\";pv [rad];u_N;mode\r\n\
     ms;rad;N;\r\n0;0,00;1;A\r\n10;0,02;1;A\r\n20;0,05;-1;B\r\n% pause\r\n30;4,;-1;B\r\n40;+4e-2;-1;B\r\n50;\"0,01\";1;\r\n60;-,5;1;A\r\n";
 
-/// Options that a hostile caller may give.
+/// Options that are tried with each file.
 fn all_options() -> Vec<CsvOptions> {
-    let plain = CsvOptions {
-        max_points: 8,
-        ..CsvOptions::default()
-    };
+    let short = || CsvOptions::default().max_points(8);
     vec![
         CsvOptions::default(),
-        plain.clone(),
-        CsvOptions {
-            sample_rate_hz: Some(1e3),
-            ..plain.clone()
-        },
-        CsvOptions {
-            sample_rate_hz: Some(1e-6),
-            input_column: Some("u".into()),
-            ..plain.clone()
-        },
-        CsvOptions {
-            time_unit: Some(TimeUnit::Hours),
-            ..plain.clone()
-        },
-        CsvOptions {
-            time_column: Some(ColumnRef::Number(1)),
-            input_column: Some(ColumnRef::Number(2)),
-            output_column: Some(ColumnRef::Number(3)),
-            ..plain
-        },
+        short(),
+        short().sample_rate_hz(1e3),
+        short().sample_rate_hz(1e-6).input_column("u"),
+        short().time_unit(TimeUnit::Hours),
+        short()
+            .time_column(ColumnRef::Number(1))
+            .input_column(ColumnRef::Number(2))
+            .output_column(ColumnRef::Number(3)),
     ]
 }
 
-/// Reads with all options; whether any of them gave a recording.
+/// Reads with all options; returns whether any of them gave a recording.
 fn survives(bytes: &[u8]) -> bool {
     let mut any = false;
     for options in all_options() {
@@ -49,8 +34,8 @@ fn survives(bytes: &[u8]) -> bool {
                 assert_sound(&recording, options.max_points);
             }
             Err(error) => {
-                let sentence = error.to_string();
-                assert!(sentence.len() < 2000 && !sentence.contains(['\n', '\r', '\0']));
+                let text = error.to_string();
+                assert!(text.len() < 2000 && !text.contains(['\n', '\r', '\0']));
             }
         }
     }
@@ -96,13 +81,13 @@ fn every_cut_and_every_byte_of_a_good_file() {
     }
     assert!(
         recordings > 1000,
-        "only {recordings}: the mutations hardly reach the rows"
+        "only {recordings} recordings: most mutations fail before the rows"
     );
 }
 
 #[test]
 fn many_mutations_at_once() {
-    // A fixed multiplicative generator (Knuth's MMIX constants), so that a failure repeats.
+    // Linear congruential generator with Knuth's MMIX constants, so that a failure can be repeated.
     let mut state: u64 = 1;
     let mut random = move |below: usize| {
         state = state
@@ -131,11 +116,11 @@ fn many_mutations_at_once() {
     }
     assert!(
         recordings > 1000,
-        "only {recordings}: the mutations hardly reach the rows"
+        "only {recordings} recordings: most mutations fail before the rows"
     );
 }
 
-/// A number as hostile logs write it.
+/// A cell: mostly a number of any size, sometimes text.
 fn cell() -> impl Strategy<Value = String> {
     prop_oneof![
         8 => (-1000..1000_i32).prop_map(|value| value.to_string()),

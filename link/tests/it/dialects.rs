@@ -1,4 +1,4 @@
-//! One small file for each thing that the reader forgives.
+//! One small file for each dialect and each defect that the reader accepts.
 
 use onecycle_link::{ColumnRef, CsvOptions, Note, ReadError, Recording, TimeUnit, read, read_from};
 
@@ -6,7 +6,7 @@ fn try_read(text: &[u8]) -> Result<Recording, ReadError> {
     read_from(text, &CsvOptions::default())
 }
 
-/// The recording that most files here hold.
+/// Asserts that the file holds the recording of most tests here.
 #[track_caller]
 fn assert_plain(text: &[u8]) -> Recording {
     let recording = try_read(text).expect("a recording");
@@ -51,7 +51,7 @@ fn comments_and_blank_lines_anywhere() {
 }
 
 #[test]
-fn line_endings_and_marks() {
+fn line_endings_and_byte_order_marks() {
     let text = "t,pv,u\n0,0.25,1\n0.5,-1.5,1\n1,2,-1\n";
     assert_plain(text.replace('\n', "\r\n").as_bytes());
     assert_plain(text.replace('\n', "\r").as_bytes());
@@ -89,17 +89,14 @@ fn columns_by_name_in_any_order() {
     assert_eq!(recording.columns().output.name, "Measurement");
     assert_eq!(recording.columns().output.unit.as_deref(), Some("rad"));
     assert!(notes(&recording).contains("input is \"Relay\" (column 1)"));
-    // One column left over for one signal left over.
+    // One signal and one column are left.
     assert_plain(b"t,roll,u\n0,0.25,1\n0.5,-1.5,1\n1,2,-1\n");
 }
 
 #[test]
 fn columns_by_option() {
     let text = b"t,a,b\n0,0.25,1\n0.5,-1.5,1\n1,2,-1\n";
-    let mut options = CsvOptions {
-        input_column: Some("B".into()),
-        ..CsvOptions::default()
-    };
+    let mut options = CsvOptions::default().input_column("B");
     assert_eq!(
         read_from(&text[..], &options).unwrap().input(),
         [1.0, 1.0, -1.0]
@@ -109,12 +106,9 @@ fn columns_by_option() {
         read_from(&text[..], &options).unwrap().input(),
         [0.25, -1.5, 2.0]
     );
-    // An option decides between two candidates.
+    // An option chooses between two candidates.
     let text = b"t,y,pv,u\n0,0,0.25,1\n0.5,0,-1.5,1\n1,0,2,-1\n";
-    let options = CsvOptions {
-        output_column: Some("pv".into()),
-        ..CsvOptions::default()
-    };
+    let options = CsvOptions::default().output_column("pv");
     assert_eq!(
         read_from(&text[..], &options).unwrap().output(),
         [0.25, -1.5, 2.0]
@@ -143,7 +137,7 @@ fn without_header_the_relay_is_the_column_of_few_values() {
         assert_eq!(recording.input(), input);
         assert_eq!(recording.output(), output);
         assert!(notes(&recording).contains("found by how few values the input takes"));
-        assert!(notes(&recording).contains("took its stamps to be in s"));
+        assert!(notes(&recording).contains("its time stamps were read in s"));
     }
 }
 
@@ -166,16 +160,14 @@ fn lines_of_words_before_the_header() {
 }
 
 #[test]
-fn a_rule_under_the_header() {
+fn a_line_of_dashes_under_the_header() {
     assert_plain(b"t|pv|u\n---\n0|0.25|1\n0.5|-1.5|1\n1|2|-1\n");
-    // Names that could all be units are names all the same.
+    // A header of names that could all be units is still a header.
     let text = b"s,v,a\n0,0.25,1\n0.5,-1.5,1\n1,2,-1\n";
-    let options = CsvOptions {
-        time_column: Some("s".into()),
-        input_column: Some("a".into()),
-        output_column: Some("v".into()),
-        ..CsvOptions::default()
-    };
+    let options = CsvOptions::default()
+        .time_column("s")
+        .input_column("a")
+        .output_column("v");
     assert_eq!(
         read_from(&text[..], &options).unwrap().output(),
         [0.25, -1.5, 2.0]
@@ -204,7 +196,9 @@ fn units_of_time() {
         let text = format!("{header},pv,u\n0,0.25,1\n500,-1.5,1\n1000,2,-1\n");
         let recording = assert_plain(text.as_bytes());
         assert!(
-            recording.notes().contains(&Note::TimeUnit { unit: "ms" }),
+            recording.notes().contains(&Note::TimeUnit {
+                unit: TimeUnit::Milliseconds
+            }),
             "{header}"
         );
     }
@@ -216,11 +210,8 @@ fn units_of_time() {
     assert_plain(b"time (\xb5s),pv,u\n0,0.25,1\n500000,-1.5,1\n1000000,2,-1\n");
     assert_plain(b"time [ns],pv,u\n0,0.25,1\n500000000,-1.5,1\n1000000000,2,-1\n");
     let text = b"t,pv,u\n0,0.25,1\n500,-1.5,1\n1000,2,-1\n";
-    assert!(notes(&assert_plain(text)).contains("took its stamps to be in ms"));
-    let options = CsvOptions {
-        time_unit: Some(TimeUnit::Minutes),
-        ..CsvOptions::default()
-    };
+    assert!(notes(&assert_plain(text)).contains("its time stamps were read in ms"));
+    let options = CsvOptions::default().time_unit(TimeUnit::Minutes);
     assert_eq!(
         read_from(&text[..], &options).unwrap().time_s()[1],
         30_000.0
@@ -238,10 +229,7 @@ fn stamps_since_1970() {
 
 #[test]
 fn sample_rate_instead_of_time() {
-    let options = CsvOptions {
-        sample_rate_hz: Some(2.0),
-        ..CsvOptions::default()
-    };
+    let options = CsvOptions::default().sample_rate_hz(2.0);
     let without = read_from(&b"pv,u\n0.25,1\n-1.5,1\n2,-1\n"[..], &options).unwrap();
     assert_eq!(without.time_s(), [0.0, 0.5, 1.0]);
     assert_eq!(without.columns().time.name, "row");
@@ -257,7 +245,7 @@ fn sample_rate_instead_of_time() {
         (14.5, 29.0, 1.0)
     );
     assert!(notes(&bare).contains("did not read column 1"));
-    // A dropped row leaves its place in time.
+    // A dropped row still counts as a sample period.
     let rows: String = (0..200)
         .map(|i| {
             if i == 7 {
@@ -325,7 +313,8 @@ fn a_few_repeated_stamps() {
     assert_eq!(recording.len(), 99);
     assert_eq!(recording.output()[40..42], [40.0, 42.0]);
     assert!(
-        notes(&recording).contains("dropped 1 row that repeated a stamp, the first at line 43")
+        notes(&recording)
+            .contains("dropped 1 row that repeated a time stamp, the first at line 43")
     );
 }
 

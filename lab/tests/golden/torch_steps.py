@@ -4,7 +4,7 @@ Everything is computed in float64 from inputs and weights that are exact in floa
 differs from these numbers is the rounding of the program under test.
 
     python3 -m venv .venv && .venv/bin/pip install torch==2.15.0 safetensors==0.8.0
-    .venv/bin/python golden/torch_steps.py
+    .venv/bin/python lab/tests/golden/torch_steps.py
 
 writes torch_steps.json and, with the weights before the first step, torch_steps.safetensors.
 """
