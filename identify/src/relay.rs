@@ -10,7 +10,7 @@ use onecycle_design::decision::{self, Decision};
 use onecycle_design::{pd, step_response};
 use onecycle_onboard::judgement::{MOST_MISFIT, MOST_RESPONSE_ERROR, misfit};
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::refine::{Beforehand, RefineError, Refined, ShapePrior, refine_with};
+use onecycle_onboard::refine::{PriorKnowledge, RefineError, Refined, ShapePrior, refine_with};
 
 use self::input::{InputKind, RelayInput};
 use self::oscillation::{FitWindow, Oscillation, Past};
@@ -192,7 +192,7 @@ fn attempt(
     } else {
         let period_s = oscillation.period_s;
         let starts = known.map(|reading| reading.classification.starts(period_s));
-        let beforehand = Beforehand {
+        let beforehand = PriorKnowledge {
             starts: starts.as_ref().map_or(&[], |starts| starts),
             prior: pack
                 .filter(|_| known.is_some())

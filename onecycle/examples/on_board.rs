@@ -10,7 +10,7 @@ use std::error::Error;
 
 use onecycle::onboard::control::{Measurement, PdLaw};
 use onecycle::onboard::guard::Limits;
-use onecycle::onboard::tuner::{Phase, Tuner, TunerSettings};
+use onecycle::onboard::tuner::{Tuner, TunerPhase, TunerSettings};
 use onecycle::plant::FixedStepProcess;
 use onecycle::{Pd, RelaySettings, Sensor, Soiptd};
 use rand::SeedableRng;
@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("{:6.3} s  {}", f64::from(tick) * TICK_S, phase.name());
         }
         // The output is the safe controller's since this very tick; a pilot lands and reads why.
-        if let (Phase::Aborted, Some(reason)) = (phase, tuner.reason()) {
+        if let (TunerPhase::Aborted, Some(reason)) = (phase, tuner.reason()) {
             return Err(reason.to_string().into());
         }
     }

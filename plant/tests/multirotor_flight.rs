@@ -6,7 +6,8 @@
 use std::f64::consts::PI;
 
 use onecycle_plant::multirotor::{
-    Attitude, Command, Flight, GRAVITY_M_PER_S2, Nudge, Parts, State, Vec3, Vehicle, VehicleError,
+    Attitude, Command, Flight, GRAVITY_M_PER_S2, Nudge, Parts, Vec3, Vehicle, VehicleError,
+    VehicleState,
 };
 use rand_pcg::Pcg64;
 
@@ -30,9 +31,9 @@ fn ideal() -> Parts {
 
 fn falling(parts: Parts) -> Flight {
     let vehicle = Vehicle::new(parts).unwrap();
-    let state = State {
+    let state = VehicleState {
         position_m: HIGH,
-        ..State::standing(&vehicle)
+        ..VehicleState::standing(&vehicle)
     };
     Flight::new(vehicle, state).unwrap()
 }
@@ -101,18 +102,18 @@ fn motors_lag() {
 fn tumbling_keeps_energy_and_angular_momentum() {
     let vehicle = Vehicle::new(ideal()).unwrap();
     let inertia = vehicle.parts().body.inertia_kg_m2;
-    let state = State {
+    let state = VehicleState {
         position_m: HIGH,
         rates_rad_per_s: Vec3::new(6.0, 0.1, 0.2),
         world_from_body: Attitude::from_angles(0.4, -0.3, 2.0),
-        ..State::standing(&vehicle)
+        ..VehicleState::standing(&vehicle)
     };
-    let energy_j = |state: &State| {
+    let energy_j = |state: &VehicleState| {
         0.5 * state
             .rates_rad_per_s
             .dot(inertia.scaled_by(state.rates_rad_per_s))
     };
-    let momentum = |state: &State| {
+    let momentum = |state: &VehicleState| {
         let in_body = inertia.scaled_by(state.rates_rad_per_s);
         state.world_from_body.axes().world_from_body(in_body)
     };
@@ -190,7 +191,7 @@ fn the_rotors_damp_every_motion() {
             lateral * (x * x + y * y) / inertia.z,
         ),
     ] {
-        let state = State {
+        let state = VehicleState {
             velocity_m_per_s: velocity,
             rates_rad_per_s: rates,
             ..hover
@@ -286,11 +287,11 @@ fn late_angles_go_the_short_way_round() {
     let mut parts = ideal();
     parts.sensors.angles.delay_s = 4e-4;
     let vehicle = Vehicle::new(parts).unwrap();
-    let state = State {
+    let state = VehicleState {
         position_m: HIGH,
         world_from_body: Attitude::from_angles(0.0, 0.0, PI - 0.0505),
         rates_rad_per_s: Vec3::new(0.0, 0.0, 1.0),
-        ..State::standing(&vehicle)
+        ..VehicleState::standing(&vehicle)
     };
     let mut flight = Flight::new(vehicle, state).unwrap();
     let mut rng = Pcg64::new(1, 1);
@@ -344,12 +345,12 @@ fn a_payload_is_taken_up_and_dropped() {
 fn the_middle_does_not_jump_with_the_payload() {
     let bare = Vehicle::new(ideal()).unwrap();
     let loaded = bare.with_payload(0.4, 0.05).unwrap();
-    let state = State {
+    let state = VehicleState {
         position_m: Vec3::new(1.0, 2.0, 3.0),
         velocity_m_per_s: Vec3::new(0.3, -0.2, 0.1),
         world_from_body: Attitude::from_angles(0.3, 0.2, 0.1),
         rates_rad_per_s: Vec3::new(2.0, -1.0, 0.5),
-        ..State::standing(&loaded)
+        ..VehicleState::standing(&loaded)
     };
     let mut flight = Flight::new(loaded, state).unwrap();
     let before = flight.reading();

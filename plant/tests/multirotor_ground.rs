@@ -5,7 +5,7 @@
 
 use onecycle_plant::multirotor::ground::ground_effect;
 use onecycle_plant::multirotor::{
-    Attitude, Command, Flight, Nudge, Parts, State, Vec3, Vehicle, Wind,
+    Attitude, Command, Flight, Nudge, Parts, Vec3, Vehicle, VehicleState, Wind,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
@@ -87,7 +87,7 @@ fn it_floats_on_the_ground_effect() {
 #[test]
 fn it_lands_without_a_bounce() {
     let vehicle = Vehicle::quadrotor();
-    let mut state = State::standing(&vehicle);
+    let mut state = VehicleState::standing(&vehicle);
     state.position_m.z += 0.001;
     state.velocity_m_per_s.z = -0.5;
     let mut flight = Flight::new(vehicle, state).unwrap();
@@ -103,7 +103,7 @@ fn it_lands_without_a_bounce() {
 #[test]
 fn it_rights_itself_on_its_feet() {
     let vehicle = Vehicle::quadrotor();
-    let mut state = State::standing(&vehicle);
+    let mut state = VehicleState::standing(&vehicle);
     state.position_m.z += 0.05;
     state.velocity_m_per_s = Vec3::new(0.5, -0.3, -0.4);
     state.world_from_body = Attitude::from_angles(0.25, -0.1, 1.0);
@@ -119,7 +119,7 @@ fn it_rights_itself_on_its_feet() {
 #[test]
 fn it_lies_on_its_guards() {
     let vehicle = Vehicle::quadrotor();
-    let mut state = State::standing(&vehicle);
+    let mut state = VehicleState::standing(&vehicle);
     state.position_m.z = 3.0;
     state.world_from_body = Attitude::from_angles(std::f64::consts::PI, 0.0, 0.0);
     let mut flight = Flight::new(vehicle, state).unwrap();
@@ -134,7 +134,7 @@ fn it_lies_on_its_guards() {
 #[test]
 fn a_crash_ends_at_the_ground() {
     let vehicle = Vehicle::quadrotor();
-    let mut state = State::standing(&vehicle);
+    let mut state = VehicleState::standing(&vehicle);
     state.position_m.z += 0.01;
     state.velocity_m_per_s.z = -30.0;
     let mut flight = Flight::new(vehicle, state).unwrap();
@@ -210,7 +210,7 @@ proptest! {
         seed in 0_u64..1000,
     ) {
         let vehicle = Vehicle::quadrotor().with_payload(payload_kg, 0.05).unwrap();
-        let mut state = State::standing(&vehicle);
+        let mut state = VehicleState::standing(&vehicle);
         state.position_m.z += height_m;
         if height_m > 1.0 {
             state.world_from_body = Attitude::from_angles(roll_rad, 0.3, 0.0);

@@ -7,7 +7,7 @@ use onecycle_design::soiptd_pd::step_metrics::StepMetrics;
 use onecycle_identify::{Identification, Identified, Interval, OscillationFound, Reading};
 use onecycle_link::Recording;
 use onecycle_onboard::Soiptd;
-use onecycle_onboard::classify::Verdict;
+use onecycle_onboard::classify::Familiarity;
 
 use super::number::{bounded, seconds, significant};
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
@@ -72,13 +72,13 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         describe_oscillation(&mut text, oscillation, &units);
         if let Some(reading) = &found.reading {
             let Reading { classification, .. } = reading;
-            let is_known = classification.verdict == Verdict::Known;
+            let is_known = classification.familiarity == Familiarity::Known;
             let _ = writeln!(
                 text,
                 "  last cycle  {} (score {}, known up to 1)",
                 painted(
                     if is_known { HOLDS } else { REMARK },
-                    &classification.verdict.to_string()
+                    &classification.familiarity.to_string()
                 ),
                 significant(classification.score)
             );

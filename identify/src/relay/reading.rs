@@ -1,7 +1,7 @@
 //! What a pack reads off the last cycle alone: where to start, what is likely, whether it is known.
 
 use onecycle_onboard::SoiptdError;
-use onecycle_onboard::classify::{Classification, Verdict, classify_by};
+use onecycle_onboard::classify::{Classification, Familiarity, classify_by};
 use onecycle_onboard::cycle::Cycle;
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{Refined, coordinate, residuals};
@@ -72,7 +72,7 @@ impl Reading {
     /// Whether the cycle is of the pack's family.
     #[must_use]
     pub fn is_known(&self) -> bool {
-        self.classification.verdict == Verdict::Known
+        self.classification.familiarity == Familiarity::Known
     }
 
     /// The posterior's mean as a fit of the window would be.

@@ -2,11 +2,11 @@
 
 use rand::Rng;
 
-use super::dynamics::{Held, State};
+use super::dynamics::{Held, VehicleState};
 use super::error::{VehicleError, charged};
 use super::frames::Vec3;
 use super::mixer::Command;
-use super::sensors::{History, Reading};
+use super::sensors::{History, SensorReading};
 use super::vehicle::Vehicle;
 use super::wind::{Gusts, Nudge, Wind};
 
@@ -20,7 +20,7 @@ const ROUNDING: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub struct Flight {
     vehicle: Vehicle,
-    state: State,
+    state: VehicleState,
     time_s: f64,
     wind: Wind,
     gusts: Gusts,
@@ -34,7 +34,7 @@ impl Flight {
     /// On the ground, at rest, in calm air.
     #[must_use]
     pub fn standing(vehicle: Vehicle) -> Self {
-        Self::begin(vehicle, State::standing(&vehicle))
+        Self::begin(vehicle, VehicleState::standing(&vehicle))
     }
 
     /// From any state, in calm air. Altitude zero is where the vehicle would stand.
@@ -42,7 +42,7 @@ impl Flight {
     /// # Errors
     /// [`VehicleError::NotFinite`] when something in the state is not, [`VehicleError::Charge`] for a
     /// charge outside 0..1.
-    pub fn new(vehicle: Vehicle, state: State) -> Result<Self, VehicleError> {
+    pub fn new(vehicle: Vehicle, state: VehicleState) -> Result<Self, VehicleError> {
         if !state.is_finite() {
             return Err(VehicleError::NotFinite { name: "state" });
         }
@@ -50,7 +50,7 @@ impl Flight {
         Ok(Self::begin(vehicle, state))
     }
 
-    fn begin(vehicle: Vehicle, state: State) -> Self {
+    fn begin(vehicle: Vehicle, state: VehicleState) -> Self {
         let ground_height_m = vehicle.standing_height_m();
         let reading = reading_of(&vehicle, &state, ground_height_m);
         Self {
@@ -111,19 +111,19 @@ impl Flight {
     }
 
     /// What the sensors read now, with noise drawn from `rng`.
-    pub fn sense<R: Rng + ?Sized>(&self, rng: &mut R) -> Reading {
+    pub fn sense<R: Rng + ?Sized>(&self, rng: &mut R) -> SensorReading {
         self.history.read(&self.vehicle.parts().sensors, rng)
     }
 
     /// What sensors without noise or delay would read now.
     #[must_use]
-    pub fn reading(&self) -> Reading {
+    pub fn reading(&self) -> SensorReading {
         reading_of(&self.vehicle, &self.state, self.ground_height_m)
     }
 
     /// Where and how everything is now.
     #[must_use]
-    pub fn state(&self) -> &State {
+    pub fn state(&self) -> &VehicleState {
         &self.state
     }
 
@@ -189,11 +189,11 @@ impl Flight {
     }
 }
 
-fn reading_of(vehicle: &Vehicle, state: &State, ground_height_m: f64) -> Reading {
+fn reading_of(vehicle: &Vehicle, state: &VehicleState, ground_height_m: f64) -> SensorReading {
     let axes = state.world_from_body.axes();
     let arm = -vehicle.parts().body.centre_of_mass_m;
     let turning = state.rates_rad_per_s.cross(arm);
-    Reading {
+    SensorReading {
         position_m: state.position_m + axes.world_from_body(arm)
             - Vec3::new(0.0, 0.0, ground_height_m),
         velocity_m_per_s: state.velocity_m_per_s + axes.world_from_body(turning),

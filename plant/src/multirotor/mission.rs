@@ -7,7 +7,7 @@ use rand::Rng;
 use super::flight::Flight;
 use super::frames::Vec3;
 use super::hover::Axis;
-use super::pilot::{MissionError, Pilot, Record, Tuned, hovering};
+use super::pilot::{FlightRecord, MissionError, Pilot, Tuned, hovering};
 use super::vehicle::{Parts, Vehicle};
 use super::wind::{Nudge, Wind};
 
@@ -74,7 +74,7 @@ impl Mission {
 #[derive(Clone, Debug)]
 pub struct Flown {
     /// Every tick.
-    pub records: Vec<Record>,
+    pub records: Vec<FlightRecord>,
     /// What was tuned, in order.
     pub tuned: Vec<Tuned>,
     /// What happened when (s).

@@ -7,8 +7,8 @@ use std::fmt;
 
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::{Abort, Limits};
-use onecycle_onboard::identification::Identified;
-use onecycle_onboard::tuner::{Phase, TakeOffSettings, Tuner, TunerError, TunerSettings};
+use onecycle_onboard::identification::TuningResult;
+use onecycle_onboard::tuner::{TakeOffSettings, Tuner, TunerError, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 use rand::Rng;
 
@@ -18,7 +18,7 @@ use super::flight::Flight;
 use super::frames::Vec3;
 use super::hover::Axis;
 use super::mixer::Command;
-use super::sensors::Reading;
+use super::sensors::SensorReading;
 use super::vehicle::Vehicle;
 
 /// Time between ticks (s): the paper's 1 kHz.
@@ -47,8 +47,8 @@ impl Axis {
 
     /// Its output in a reading (m or rad), and the rate of that.
     #[must_use]
-    pub fn of(self, reading: &Reading) -> (f64, f64) {
-        let Reading {
+    pub fn of(self, reading: &SensorReading) -> (f64, f64) {
+        let SensorReading {
             position_m,
             velocity_m_per_s,
             angles_rad,
@@ -143,24 +143,24 @@ pub struct Tuned {
     /// When its controller was proven (s).
     pub until_s: f64,
     /// What was found.
-    pub identified: Identified,
+    pub identified: TuningResult,
     /// The process of the vehicle as it was then.
     pub truth: Soiptd,
 }
 
 /// A tick of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Record {
+pub struct FlightRecord {
     /// Its time (s).
     pub time_s: f64,
     /// What was true.
-    pub reading: Reading,
+    pub reading: SensorReading,
     /// What the tuners were told, in the order of [`Axis::ALL`] (m or rad).
     pub measured: [f64; 4],
     /// The commands held from then on.
     pub commands: [f64; 4],
     /// What the tuners were doing.
-    pub phases: [Phase; 4],
+    pub phases: [TunerPhase; 4],
 }
 
 /// Why a mission ended early.
@@ -211,7 +211,7 @@ pub struct Pilot<R> {
     rng: R,
     tuners: [Tuner<'static>; 4],
     ticks: u64,
-    records: Vec<Record>,
+    records: Vec<FlightRecord>,
 }
 
 impl<R: Rng> Pilot<R> {
@@ -256,12 +256,12 @@ impl<R: Rng> Pilot<R> {
             self.references[Axis::Roll.index()] = roll_rad;
             self.references[Axis::Pitch.index()] = pitch_rad;
         }
-        let mut record = Record {
+        let mut record = FlightRecord {
             time_s,
             reading: self.flight.reading(),
             measured: [0.0; 4],
             commands: [0.0; 4],
-            phases: [Phase::Idle; 4],
+            phases: [TunerPhase::Idle; 4],
         };
         for axis in Axis::ALL {
             let (index, (value, rate)) = (axis.index(), axis.of(&sensed));
@@ -307,7 +307,7 @@ impl<R: Rng> Pilot<R> {
             self.tick();
             for &axis in axes {
                 let tuner = self.tuner(axis);
-                if tuner.phase() == Phase::Aborted || self.time_s() - from_s > MOST_S {
+                if tuner.phase() == TunerPhase::Aborted || self.time_s() - from_s > MOST_S {
                     return Err(MissionError::NotTuned(axis, tuner.reason()));
                 }
                 if tuner.is_proven()
@@ -339,14 +339,14 @@ impl<R: Rng> Pilot<R> {
 
     /// All ticks so far.
     #[must_use]
-    pub fn into_records(self) -> Vec<Record> {
+    pub fn into_records(self) -> Vec<FlightRecord> {
         self.records
     }
 }
 
 /// Roll and pitch (rad) that bring the vehicle back above where it began, with a double pole at 0.8 1/s: a
 /// tilt of `a` accelerates by `g a`, to the right or forward.
-fn tilt(sensed: &Reading) -> [f64; 2] {
+fn tilt(sensed: &SensorReading) -> [f64; 2] {
     const POLE_PER_S: f64 = 0.8;
     const MOST_RAD: f64 = 0.25;
     let (at, speed) = (sensed.position_m, sensed.velocity_m_per_s);

@@ -83,7 +83,7 @@ impl Sensors {
 
 /// What can be measured: of the middle of the vehicle, between the hubs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reading {
+pub struct SensorReading {
     /// Position (m, world); `z` is the altitude, zero where the vehicle stood.
     pub position_m: Vec3,
     /// Velocity (m/s, world); `z` is the climb.
@@ -97,12 +97,12 @@ pub struct Reading {
 /// The last readings without noise, as far back as the longest delay.
 #[derive(Clone, Debug)]
 pub(super) struct History {
-    past: VecDeque<(f64, Reading)>,
-    latest: (f64, Reading),
+    past: VecDeque<(f64, SensorReading)>,
+    latest: (f64, SensorReading),
 }
 
 impl History {
-    pub(super) fn new(time_s: f64, reading: Reading) -> Self {
+    pub(super) fn new(time_s: f64, reading: SensorReading) -> Self {
         Self {
             past: VecDeque::new(),
             latest: (time_s, reading),
@@ -110,7 +110,7 @@ impl History {
     }
 
     /// Adds what is true at a later time, and forgets what no sensor needs any more.
-    pub(super) fn push(&mut self, time_s: f64, reading: Reading, sensors: &Sensors) {
+    pub(super) fn push(&mut self, time_s: f64, reading: SensorReading, sensors: &Sensors) {
         self.past.push_back(self.latest);
         self.latest = (time_s, reading);
         let oldest_s = time_s - sensors.longest_delay_s();
@@ -120,10 +120,10 @@ impl History {
     }
 
     /// What the sensors read now.
-    pub(super) fn read<R: Rng + ?Sized>(&self, sensors: &Sensors, rng: &mut R) -> Reading {
+    pub(super) fn read<R: Rng + ?Sized>(&self, sensors: &Sensors, rng: &mut R) -> SensorReading {
         let ago = |channel: &Channel| self.ago(channel.delay_s);
         let read = |channel: &Channel, at: Vec3, rng: &mut R| channel.read(at, rng);
-        Reading {
+        SensorReading {
             position_m: read(&sensors.position, ago(&sensors.position).position_m, rng),
             velocity_m_per_s: read(
                 &sensors.velocity,
@@ -135,7 +135,7 @@ impl History {
         }
     }
 
-    fn ago(&self, delay_s: f64) -> Reading {
+    fn ago(&self, delay_s: f64) -> SensorReading {
         let time_s = self.latest.0 - delay_s;
         let after = self.past.partition_point(|(t, _)| *t <= time_s);
         let Some(before) = after.checked_sub(1).and_then(|i| self.past.get(i)) else {
@@ -147,12 +147,12 @@ impl History {
     }
 }
 
-fn between(a: &Reading, b: &Reading, share: f64) -> Reading {
+fn between(a: &SensorReading, b: &SensorReading, share: f64) -> SensorReading {
     let mix = |a: Vec3, b: Vec3| a + (b - a) * share;
     // The short way round, and back into -pi..pi.
     let wrapped = |angle: f64| angle - 2.0 * PI * (angle / (2.0 * PI)).round();
     let angle = |a: f64, b: f64| wrapped(a + share * wrapped(b - a));
-    Reading {
+    SensorReading {
         position_m: mix(a.position_m, b.position_m),
         velocity_m_per_s: mix(a.velocity_m_per_s, b.velocity_m_per_s),
         angles_rad: Vec3::new(
