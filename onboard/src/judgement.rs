@@ -12,9 +12,10 @@
 
 use core::f64::consts::PI;
 
-use libm::{atan2, exp, hypot, log, sqrt};
+use libm::{atan2, exp, log, sqrt};
 
 use crate::control::Pd;
+use crate::crossover;
 use crate::process::Soiptd;
 use crate::refine::{Refined, coordinate};
 use crate::window::Window;
@@ -81,8 +82,7 @@ pub(crate) struct Spread {
 impl Spread {
     /// About a process and its controller; `None` where their loop has no gain crossover.
     pub(crate) fn new(process: &Soiptd, pd: &Pd) -> Option<Self> {
-        let start = pd.kd * process.k_over_t_body();
-        let crossover_rad_per_s = gain_crossover(process, pd, start)?;
+        let crossover_rad_per_s = gain_crossover(process, pd)?;
         Some(Self {
             here: followed(process, pd, crossover_rad_per_s),
             slopes: [[0.0; FOLLOWED]; COORDINATES],
@@ -111,7 +111,7 @@ impl Spread {
         let unit = Soiptd::from_pole_sum(1.0, exp(ln_sum), ratio, tau_s).ok()?;
         let gain = process.jerk_gain() * exp(ln_gain) * unit.t_prop_s();
         let beside = unit.with_gain_scaled(gain).ok()?;
-        let crossover = gain_crossover(&beside, pd, self.crossover_rad_per_s)?;
+        let crossover = gain_crossover(&beside, pd)?;
         let there = followed(&beside, pd, crossover);
         for (slope, (there, here)) in self.slopes[index]
             .iter_mut()
@@ -154,44 +154,17 @@ fn followed(process: &Soiptd, pd: &Pd, crossover_rad_per_s: f64) -> [f64; FOLLOW
     ]
 }
 
-/// Frequency (rad/s) where `|(kp + j kd w) G(jw)|`, which falls, is one. Newton's method on
-/// logarithms, halving the bracket where it leaves it.
-fn gain_crossover(process: &Soiptd, pd: &Pd, start_rad_per_s: f64) -> Option<f64> {
-    const MOST_STEPS: u32 = 40;
-    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    let mut x = log(start_rad_per_s.abs());
-    if !x.is_finite() {
-        return None;
-    }
-    for _ in 0..MOST_STEPS {
-        let omega = exp(x);
-        let value = log(hypot(pd.kp, pd.kd * omega) * process.magnitude(omega));
-        if value > 0.0 {
-            low = x;
-        } else {
-            high = x;
-        }
-        let part = |of: f64, rest: f64| of * of / (of * of + rest * rest);
-        let slope = part(pd.kd * omega, pd.kp)
-            - part(omega * process.t_prop_s(), 1.0)
-            - 1.0
-            - part(omega, process.inv_t_body_per_s());
-        let newton = x - (value / slope).clamp(-2.0, 2.0);
-        if (newton - x).abs() < 1e-10 {
-            return Some(exp(newton));
-        }
-        let is_inside = newton > low && newton < high;
-        let next = if is_inside {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        if !next.is_finite() {
-            return None;
-        }
-        x = next;
-    }
-    None
+/// Gain crossover of the loop (rad/s); `None` where the magnitude never is one.
+fn gain_crossover(process: &Soiptd, pd: &Pd) -> Option<f64> {
+    let gain = process.k_over_t_body();
+    let omega = crossover::gain_crossover(
+        gain * pd.kp,
+        gain * pd.kd,
+        process.inv_t_body_per_s(),
+        process.t_prop_s(),
+        crossover::power_of_two_cube_root,
+    );
+    (omega > 0.0 && omega.is_finite()).then_some(omega)
 }
 
 #[cfg(test)]

@@ -45,6 +45,7 @@
 pub mod classify;
 mod complex;
 pub mod control;
+pub mod crossover;
 pub mod cycle;
 mod distortion;
 mod fit_score;
