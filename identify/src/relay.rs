@@ -8,7 +8,7 @@ mod saturation;
 
 use onecycle_design::decision::{self, Decision};
 use onecycle_design::{pd, step_response};
-use onecycle_onboard::judgement::{MOST_MISFIT, MOST_RESPONSE_ERROR, misfit};
+use onecycle_onboard::judgement::{MOST_MISFIT, largest_response_error, misfit};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{PriorKnowledge, RefineError, Refined, ShapePrior, refine_with};
 
@@ -264,7 +264,8 @@ fn design(
     options: &Options,
 ) -> Result<Identified, Verdict> {
     let misfit = misfit(refined, window);
-    if misfit > MOST_MISFIT || refined.response_error > MOST_RESPONSE_ERROR {
+    let most_error = largest_response_error(options.phase_margin_rad);
+    if misfit > MOST_MISFIT || refined.response_error > most_error {
         return Err(Verdict::NotThisProcess { misfit });
     }
     if let Some(edge) = refined.edge {

@@ -22,9 +22,8 @@ use core::fmt;
 use crate::classify::{Classifier, Familiarity};
 use crate::control::Pd;
 use crate::cycle::{Cycle, CycleDetector, SteadyRun};
-use crate::gains::LeadTable;
 use crate::judgement::{
-    COORDINATES, Deviations, HALF_90_PERCENT, MOST_MISFIT, MOST_RESPONSE_ERROR, Spread, misfit,
+    COORDINATES, Deviations, HALF_90_PERCENT, MOST_MISFIT, Spread, largest_response_error, misfit,
 };
 use crate::pack::Pack;
 use crate::process::Soiptd;
@@ -402,7 +401,9 @@ impl<'a> StagedIdentification<'a> {
     fn judge(&mut self, room: &mut Workspace) -> Result<(), Refusal> {
         let refined = self.refined.ok_or(Refusal::NoFit)?;
         let misfit = misfit(&refined, &room.coarse);
-        if misfit > MOST_MISFIT || refined.response_error > MOST_RESPONSE_ERROR {
+        let table = self.pack.gains_table().ok_or(Refusal::NoGains)?;
+        let most_error = largest_response_error(table.phase_margin_rad());
+        if misfit > MOST_MISFIT || refined.response_error > most_error {
             return Err(Refusal::Misfit(misfit.max(refined.response_error)));
         }
         if let Some(edge) = refined.edge {
@@ -414,8 +415,7 @@ impl<'a> StagedIdentification<'a> {
 
     fn gains(&mut self) -> Result<(), Refusal> {
         let refined = self.refined.ok_or(Refusal::NoFit)?;
-        let table =
-            LeadTable::from_bytes(self.pack.lead_table().bytes).map_err(|_| Refusal::NoGains)?;
+        let table = self.pack.gains_table().ok_or(Refusal::NoGains)?;
         let pd = table.pd(&refined.process).map_err(|_| Refusal::NoGains)?;
         self.design = Some(Design {
             pd,

@@ -38,7 +38,6 @@ use core::ptr;
 
 use onecycle_onboard::classify::{Classification, Classifier, Familiarity};
 use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
-use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{PriorKnowledge, Refined, Refiner, ShapePrior};
 use onecycle_onboard::signature::Signature;
@@ -158,8 +157,7 @@ fn identify() -> Result<Found, &'static CStr> {
         prior: ShapePrior::of_pack(&pack),
     };
     let refined = refine(&coarse, test.period_s, &beforehand)?;
-    let table = LeadTable::from_bytes(pack.lead_table().bytes)
-        .map_err(|_| c"there is no table of leads")?;
+    let table = pack.gains_table().ok_or(c"the pack has no lead table")?;
     let gains = table
         .pd_at_phase_margin(&refined.process)
         .map_err(|_| c"the table has no gains")?;

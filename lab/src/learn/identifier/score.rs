@@ -2,7 +2,6 @@
 //! network, its score, its table.
 
 use onecycle_onboard::classify::{Classification, Familiarity, classify_by};
-use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::pack::Pack;
 
 use crate::judge::evaluate::Costs;
@@ -99,8 +98,8 @@ fn outcome(pack: &Pack<'_>, record: &Record) -> Option<Outcome> {
     let truth = &record.example.process;
     let margin_rad = f64::from(pack.domain().phase_margin_rad);
     let best = pd_at_phase_margin(truth, margin_rad).ok()?;
-    let pd = LeadTable::from_bytes(pack.lead_table().bytes)
-        .ok()?
+    let pd = pack
+        .gains_table()?
         .pd_at_phase_margin(&found.candidates[0].process)
         .ok()?;
     Some(Outcome {
