@@ -7,9 +7,7 @@
 
 use std::error::Error;
 
-use onecycle::{Experiment, Recording, Relay, RelaySettings, Sensor, Soiptd, Trace};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use onecycle::{Experiment, Noise, Recording, Relay, RelaySettings, Sensor, Soiptd, Trace};
 
 /// Time between samples (s).
 const SAMPLE_S: f64 = 0.001;
@@ -73,5 +71,5 @@ fn relay_test(process: &Soiptd) -> Result<Trace, Box<dyn Error>> {
         trim_gain: RelaySettings::TRIM_GAIN,
         ..RelaySettings::new(AMPLITUDE, RelaySettings::DISTINGUISHING_BETA)
     })?;
-    Ok(experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(1)))
+    Ok(experiment.run(&mut relay, &mut Noise::from_seed(1)))
 }

@@ -11,10 +11,8 @@ use std::error::Error;
 use onecycle::onboard::control::{Measurement, PdLaw};
 use onecycle::onboard::guard::Limits;
 use onecycle::onboard::tuner::{Tuner, TunerPhase, TunerSettings};
-use onecycle::plant::FixedStepProcess;
+use onecycle::plant::{FixedStepProcess, Noise};
 use onecycle::{Pd, RelaySettings, Sensor, Soiptd};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 
 /// Time between ticks (s).
 const TICK_S: f64 = 0.001;
@@ -115,7 +113,7 @@ fn truth() -> Result<Soiptd, onecycle::SoiptdError> {
 struct Axis {
     process: FixedStepProcess,
     sensor: Sensor,
-    noise: Pcg64Mcg,
+    noise: Noise,
 }
 
 impl Axis {
@@ -126,7 +124,7 @@ impl Axis {
                 noise_sigma: NOISE_SIGMA,
                 ..Sensor::default()
             },
-            noise: Pcg64Mcg::seed_from_u64(1),
+            noise: Noise::from_seed(1),
         })
     }
 

@@ -183,7 +183,7 @@ pub use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 #[doc(inline)]
 pub use onecycle_onboard::{Relay, RelayError, RelaySettings};
 #[doc(inline)]
-pub use onecycle_plant::{Experiment, Sensor, Trace};
+pub use onecycle_plant::{Experiment, Noise, Sensor, Trace};
 
 /// The process behind a recorded relay test and its controller, with the default [`Options`] and the pack that is
 /// built in.

@@ -3,8 +3,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Experiment, FixedStepProcess, Sensor, VariableStepProcess};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Experiment, FixedStepProcess, Noise, Sensor, VariableStepProcess};
 
 const STEPS: usize = 1_000_000;
 const SAMPLE_S: f64 = 1e-3;
@@ -69,7 +68,7 @@ fn relay_experiment(bencher: Bencher, noise_sigma: f64) {
         let mut sum = 0.0;
         experiment.observe(
             &mut relay(),
-            &mut Pcg64::new(1, 1),
+            &mut Noise::from_seed(1),
             |_, input, output, _| {
                 sum += input * output;
             },

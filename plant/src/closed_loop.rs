@@ -2,9 +2,8 @@
 
 use onecycle_onboard::relay::Relay;
 use onecycle_onboard::{Pd, Soiptd};
-use rand::{Rng, RngExt};
 
-use crate::{FixedStepProcess, Sensor, Trace, VariableStepProcess};
+use crate::{FixedStepProcess, NoiseSource, Sensor, Trace, VariableStepProcess};
 
 /// What a controller sees at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,9 +92,9 @@ impl Experiment {
 
     /// Runs the experiment and keeps every sample.
     #[must_use]
-    pub fn run(&self, controller: &mut impl Controller, rng: &mut impl Rng) -> Trace {
+    pub fn run(&self, controller: &mut impl Controller, noise: &mut impl NoiseSource) -> Trace {
         let mut trace = Trace::with_capacity(self.samples());
-        self.observe(controller, rng, |time_s, input, output, true_output| {
+        self.observe(controller, noise, |time_s, input, output, true_output| {
             trace.push(time_s, input, output, true_output);
         });
         trace
@@ -106,18 +105,18 @@ impl Experiment {
     pub fn observe(
         &self,
         controller: &mut impl Controller,
-        rng: &mut impl Rng,
+        noise: &mut impl NoiseSource,
         mut observer: impl FnMut(f64, f64, f64, f64),
     ) {
         if self.jitter > 0.0 {
-            return self.observe_jittered(controller, rng, observer);
+            return self.observe_jittered(controller, noise, observer);
         }
         let mut process = FixedStepProcess::new(&self.process, self.sample_s);
         process.displace(self.initial_output, 0.0);
         for sample in 0..self.samples() {
             let output = process.output();
             let sensed = Sensed {
-                output: self.sensor.read(output, rng),
+                output: self.sensor.read(output, noise),
                 rate: process.rate(),
             };
             let input = controller.step(self.sample_s, self.reference, sensed);
@@ -129,7 +128,7 @@ impl Experiment {
     fn observe_jittered(
         &self,
         controller: &mut impl Controller,
-        rng: &mut impl Rng,
+        noise: &mut impl NoiseSource,
         mut observer: impl FnMut(f64, f64, f64, f64),
     ) {
         let mut process = VariableStepProcess::new(&self.process);
@@ -138,13 +137,13 @@ impl Experiment {
         for _ in 0..self.samples() {
             let output = process.output();
             let sensed = Sensed {
-                output: self.sensor.read(output, rng),
+                output: self.sensor.read(output, noise),
                 rate: process.rate(),
             };
             let input = controller.step(dt_s, self.reference, sensed);
             observer(time_s, input, sensed.output, output);
-            let normal: f64 = rng.sample(rand_distr::StandardNormal);
-            dt_s = self.sample_s * (1.0 + self.jitter * normal).clamp(0.1, 1.9);
+            let relative = 1.0 + self.jitter * noise.standard_normal();
+            dt_s = self.sample_s * relative.clamp(0.1, 1.9);
             process.advance(input + self.input_bias, dt_s);
             time_s += dt_s;
         }

@@ -8,15 +8,15 @@
 //!
 //! ```
 //! use onecycle_plant::multirotor::{Axis, Command, Flight, Vehicle};
-//! use rand_pcg::Pcg64;
+//! use onecycle_plant::Noise;
 //!
 //! let vehicle = Vehicle::quadrotor();
-//! let (mut flight, mut rng) = (Flight::standing(vehicle), Pcg64::new(1, 1));
+//! let (mut flight, mut noise) = (Flight::standing(vehicle), Noise::from_seed(1));
 //! for _ in 0..500 {
-//!     flight.step(Command { thrust: 0.6, ..Command::default() }, 2e-3, &mut rng);
+//!     flight.step(Command { thrust: 0.6, ..Command::default() }, 2e-3, &mut noise);
 //! }
 //! // Up and away after a second at more than the thrust of hover.
-//! assert!(flight.sense(&mut rng).position_m.z > 0.5);
+//! assert!(flight.sense(&mut noise).position_m.z > 0.5);
 //! // The paper's T_body of altitude, 1.6886 s.
 //! let altitude = vehicle.linearised(Axis::Altitude)?;
 //! assert!((1.0 / altitude.inv_t_body_per_s() - 1.6886).abs() < 0.005);

@@ -1,14 +1,13 @@
 //! The sensor's noise and rounding against their predicted statistics.
 
-use onecycle_plant::Sensor;
-use rand_pcg::Pcg64;
+use onecycle_plant::{Noise, Sensor};
 
 const READINGS: usize = 100_000;
 
 fn errors(sensor: &Sensor, output: f64) -> Vec<f64> {
-    let mut rng = Pcg64::new(7, 7);
+    let mut noise = Noise::from_seed(7);
     (0..READINGS)
-        .map(|_| sensor.read(output, &mut rng) - output)
+        .map(|_| sensor.read(output, &mut noise) - output)
         .collect()
 }
 
@@ -59,7 +58,7 @@ fn readings_are_multiples_of_the_quantum() {
         noise_sigma: 0.0,
         quantum: 0.25,
     };
-    let mut rng = Pcg64::new(0, 0);
+    let mut noise = Noise::from_seed(0);
     for (output, reading) in [
         (0.3, 0.25),
         (0.38, 0.5),
@@ -67,7 +66,7 @@ fn readings_are_multiples_of_the_quantum() {
         (0.0, 0.0),
         (7.26, 7.25),
     ] {
-        assert_eq!(sensor.read(output, &mut rng), reading);
+        assert_eq!(sensor.read(output, &mut noise), reading);
     }
 }
 
@@ -89,7 +88,7 @@ fn rounding_adds_a_twelfth_of_the_squared_quantum() {
 
 #[test]
 fn a_perfect_sensor_draws_nothing() {
-    let mut used = Pcg64::new(3, 3);
+    let mut used = Noise::from_seed(3);
     assert_eq!(Sensor::default().read(0.123, &mut used), 0.123);
-    assert_eq!(used, Pcg64::new(3, 3));
+    assert_eq!(used, Noise::from_seed(3));
 }

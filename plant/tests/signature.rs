@@ -7,8 +7,7 @@ use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::signature::{LENGTH, Signature};
 use onecycle_onboard::window::Window;
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Controller, Experiment, Sensed, Trace};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Controller, Experiment, Noise, Sensed, Trace};
 
 /// The paper's hover process and the period of its limit cycle at 1 ms.
 const HOVER_S: [f64; 3] = [0.0321, 1.6886, 0.0237];
@@ -43,7 +42,7 @@ impl Controller for Reversed {
 }
 
 fn run(experiment: &Experiment, controller: &mut impl Controller) -> Trace {
-    experiment.run(controller, &mut Pcg64::new(0, 0))
+    experiment.run(controller, &mut Noise::from_seed(0))
 }
 
 fn last_cycle(trace: &Trace) -> Cycle {

@@ -11,8 +11,6 @@ use onecycle_lab::paper::grid::Pieces;
 use onecycle_onboard::tuner::TunerPhase;
 use onecycle_plant::multirotor::pilot::TICK_S;
 use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, Tuned, fly};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 
 use super::workers::Workers;
 use crate::args::Fly;
@@ -90,7 +88,7 @@ pub(crate) fn run(arguments: &Fly) -> Result<ExitCode, Failure> {
 }
 
 fn one(mission: Mission, seed: u64, is_kept: bool) -> Result<Flight, Failure> {
-    let mut flown = fly(mission, Pcg64Mcg::seed_from_u64(seed)).map_err(Failure::usage)?;
+    let mut flown = fly(mission, seed).map_err(Failure::usage)?;
     let judged = (flown.tuned.iter())
         .map(|tuned| judged(tuned).map(|cost| (*tuned, cost)))
         .collect::<Result<_, _>>()

@@ -1,7 +1,5 @@
 //! A flight: a vehicle, where it is, the air around it.
 
-use rand::Rng;
-
 use super::dynamics::{Held, VehicleState};
 use super::error::{VehicleError, charged};
 use super::frames::Vec3;
@@ -9,6 +7,7 @@ use super::mixer::Command;
 use super::sensors::{History, SensorReading};
 use super::vehicle::Vehicle;
 use super::wind::{Gusts, Nudge, Wind};
+use crate::NoiseSource;
 
 /// Longest inner step (s): a twentieth of the quadrotor's motor lag, a tenth of a leg's time.
 pub const LONGEST_STEP_S: f64 = 1e-3;
@@ -66,9 +65,9 @@ impl Flight {
     }
 
     /// Moves on by `dt_s` with the command held, in equal inner steps of at most
-    /// [`LONGEST_STEP_S`]; `rng` is drawn from where there are gusts only. A time that is not above
+    /// [`LONGEST_STEP_S`]; takes numbers from `noise` only where there are gusts. A time that is not above
     /// zero, or not finite, does not pass. See [`Command::clamped`] for commands out of range.
-    pub fn step<R: Rng + ?Sized>(&mut self, command: Command, dt_s: f64, rng: &mut R) {
+    pub fn step(&mut self, command: Command, dt_s: f64, noise: &mut impl NoiseSource) {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return;
         }
@@ -84,12 +83,12 @@ impl Flight {
             let count = (until_s / LONGEST_STEP_S * (1.0 - ROUNDING))
                 .ceil()
                 .max(1.0);
-            self.inner_step(speed_shares, until_s / count, rng);
+            self.inner_step(speed_shares, until_s / count, noise);
             left_s -= until_s / count;
         }
     }
 
-    fn inner_step<R: Rng + ?Sized>(&mut self, speed_shares: [f64; 4], dt_s: f64, rng: &mut R) {
+    fn inner_step(&mut self, speed_shares: [f64; 4], dt_s: f64, noise: &mut impl NoiseSource) {
         let gust = self.gusts.velocity_m_per_s();
         let held = Held {
             parts: self.vehicle.parts(),
@@ -100,7 +99,7 @@ impl Flight {
         };
         self.state = held.step(&self.state, dt_s);
         self.time_s += dt_s;
-        self.gusts.step(&self.wind, dt_s, rng);
+        self.gusts.step(&self.wind, dt_s, noise);
         self.nudge.duration_s -= dt_s;
         if self.nudge.duration_s <= ROUNDING * dt_s {
             self.nudge = Nudge::default();
@@ -110,9 +109,9 @@ impl Flight {
             .push(self.time_s, reading, &self.vehicle.parts().sensors);
     }
 
-    /// What the sensors read now, with noise drawn from `rng`.
-    pub fn sense<R: Rng + ?Sized>(&self, rng: &mut R) -> SensorReading {
-        self.history.read(&self.vehicle.parts().sensors, rng)
+    /// What the sensors read now, noise and delay included.
+    pub fn sense(&self, noise: &mut impl NoiseSource) -> SensorReading {
+        self.history.read(&self.vehicle.parts().sensors, noise)
     }
 
     /// What sensors without noise or delay would read now.

@@ -10,7 +10,6 @@ use onecycle_onboard::guard::{Abort, Limits};
 use onecycle_onboard::identification::TuningResult;
 use onecycle_onboard::tuner::{TakeOffSettings, Tuner, TunerError, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
-use rand::Rng;
 
 use super::body::GRAVITY_M_PER_S2;
 use super::error::VehicleError;
@@ -20,6 +19,7 @@ use super::hover::Axis;
 use super::mixer::Command;
 use super::sensors::SensorReading;
 use super::vehicle::Vehicle;
+use crate::Noise;
 
 /// Time between ticks (s): the paper's 1 kHz.
 pub const TICK_S: f64 = 0.001;
@@ -200,7 +200,7 @@ impl From<TunerError> for MissionError {
 }
 
 /// Four tuners on a vehicle in flight.
-pub struct Pilot<R> {
+pub struct Pilot {
     /// The vehicle.
     pub flight: Flight,
     /// Where each axis should be (m or rad).
@@ -208,13 +208,13 @@ pub struct Pilot<R> {
     /// Whether roll and pitch are steered so that the vehicle stays above where it began. While they are
     /// tuned they are not: a tuner keeps the reference of its start.
     pub holds_position: bool,
-    rng: R,
+    noise: Noise,
     tuners: [Tuner<'static>; 4],
     ticks: u64,
     records: Vec<FlightRecord>,
 }
 
-impl<R: Rng> Pilot<R> {
+impl Pilot {
     /// With the settings of each axis, in the order of [`Axis::ALL`].
     ///
     /// # Errors
@@ -222,14 +222,14 @@ impl<R: Rng> Pilot<R> {
     pub fn new(
         flight: Flight,
         settings: &[TunerSettings; 4],
-        rng: R,
+        noise: Noise,
     ) -> Result<Self, MissionError> {
         let [altitude, roll, pitch, yaw] = settings.each_ref().map(Tuner::new);
         Ok(Self {
             flight,
             references: [0.0; 4],
             holds_position: false,
-            rng,
+            noise,
             tuners: [altitude?, roll?, pitch?, yaw?],
             ticks: 0,
             records: Vec::new(),
@@ -250,7 +250,7 @@ impl<R: Rng> Pilot<R> {
 
     /// One tick of sensors, tuners and vehicle.
     pub fn tick(&mut self) {
-        let (time_s, sensed) = (self.time_s(), self.flight.sense(&mut self.rng));
+        let (time_s, sensed) = (self.time_s(), self.flight.sense(&mut self.noise));
         if self.holds_position {
             let [roll_rad, pitch_rad] = tilt(&sensed);
             self.references[Axis::Roll.index()] = roll_rad;
@@ -279,7 +279,7 @@ impl<R: Rng> Pilot<R> {
             pitch,
             yaw,
         };
-        self.flight.step(command, TICK_S, &mut self.rng);
+        self.flight.step(command, TICK_S, &mut self.noise);
         self.records.push(record);
         self.ticks += 1;
     }

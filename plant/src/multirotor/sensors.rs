@@ -8,11 +8,9 @@
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 
-use rand::Rng;
-
 use super::error::{VehicleError, at_least_zero};
 use super::frames::Vec3;
-use crate::Sensor;
+use crate::{NoiseSource, Sensor};
 
 /// One channel; all its components are alike.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,11 +28,11 @@ impl Channel {
         at_least_zero(name, self.sensor.quantum)
     }
 
-    fn read<R: Rng + ?Sized>(&self, at: Vec3, rng: &mut R) -> Vec3 {
+    fn read(&self, at: Vec3, noise: &mut impl NoiseSource) -> Vec3 {
         Vec3::new(
-            self.sensor.read(at.x, rng),
-            self.sensor.read(at.y, rng),
-            self.sensor.read(at.z, rng),
+            self.sensor.read(at.x, noise),
+            self.sensor.read(at.y, noise),
+            self.sensor.read(at.z, noise),
         )
     }
 }
@@ -120,18 +118,19 @@ impl History {
     }
 
     /// What the sensors read now.
-    pub(super) fn read<R: Rng + ?Sized>(&self, sensors: &Sensors, rng: &mut R) -> SensorReading {
+    pub(super) fn read(&self, sensors: &Sensors, noise: &mut impl NoiseSource) -> SensorReading {
         let ago = |channel: &Channel| self.ago(channel.delay_s);
-        let read = |channel: &Channel, at: Vec3, rng: &mut R| channel.read(at, rng);
+        let Sensors {
+            position,
+            velocity,
+            angles,
+            rates,
+        } = sensors;
         SensorReading {
-            position_m: read(&sensors.position, ago(&sensors.position).position_m, rng),
-            velocity_m_per_s: read(
-                &sensors.velocity,
-                ago(&sensors.velocity).velocity_m_per_s,
-                rng,
-            ),
-            angles_rad: read(&sensors.angles, ago(&sensors.angles).angles_rad, rng),
-            rates_rad_per_s: read(&sensors.rates, ago(&sensors.rates).rates_rad_per_s, rng),
+            position_m: position.read(ago(position).position_m, noise),
+            velocity_m_per_s: velocity.read(ago(velocity).velocity_m_per_s, noise),
+            angles_rad: angles.read(ago(angles).angles_rad, noise),
+            rates_rad_per_s: rates.read(ago(rates).rates_rad_per_s, noise),
         }
     }
 
