@@ -200,7 +200,7 @@ fn attempt(
         };
         refine_with(window, period_s, &beforehand).map_err(|error| match error {
             RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
-            RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
+            _ => Verdict::NoFit,
         })?
     };
     design(&refined, window, oscillation.period_s, options)

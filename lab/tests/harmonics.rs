@@ -181,10 +181,7 @@ fn squared_errors(errors: &[(Harmonic, Complex64)]) -> f64 {
 fn the_scatter_under_noise_is_the_deviation() {
     let process = process(PROCESSES[4]);
     let trace = settled(process, 0.0);
-    let sensor = Sensor {
-        noise_sigma: 0.01 * trace.amplitude_of_last(1000),
-        quantum: 0.0,
-    };
+    let sensor = Sensor::noisy(0.01 * trace.amplitude_of_last(1000));
     for (cycles, most) in [(8, 3), (2, 1)] {
         let clean = signals_of(&trace, SAMPLE_S);
         let exact = harmonics(&clean, &found_in(&clean, cycles), most);

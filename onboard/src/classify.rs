@@ -122,6 +122,7 @@ pub struct CyclePosterior {
 
 /// Why outputs are no classification.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ClassifyError {
     /// An output that is not finite: which, and its value.
     Output(usize, f32),

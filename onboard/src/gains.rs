@@ -48,6 +48,7 @@ const NEWTON_TOLERANCE: f64 = 1e-9;
 
 /// Why a table has no gains for a process.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum GainsError {
     /// The dead time, in shorter lags, is above [`LARGEST_DELAY_IN_LAGS`].
     DeadTime(f64),

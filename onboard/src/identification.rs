@@ -47,6 +47,7 @@ pub const MOST_CYCLES: u8 = 4;
 
 /// Why a cycle has led to no controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Refusal {
     /// The last cycle has no signature: the output does not move or samples are missing.
     NoSignature,
@@ -132,6 +133,7 @@ pub struct Observed {
 /// What is done next: see the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Stage {
     /// Waits for a steady oscillation and a rise.
     Wait,

@@ -121,6 +121,7 @@ pub struct Refined {
 
 /// Why there is no fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RefineError {
     /// Fewer usable bins than unknowns ask for.
     TooFewBins(usize),

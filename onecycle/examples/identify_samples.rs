@@ -58,14 +58,9 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Eight seconds under the relay that also flies.
 fn relay_test(process: &Soiptd) -> Result<Trace, Box<dyn Error>> {
-    let experiment = Experiment {
-        input_bias: 0.2 * f64::from(AMPLITUDE),
-        sensor: Sensor {
-            noise_sigma: NOISE_SIGMA,
-            ..Sensor::default()
-        },
-        ..Experiment::new(*process, SAMPLE_S, 8.0)
-    };
+    let experiment = Experiment::new(*process, SAMPLE_S, 8.0)
+        .with_input_bias(0.2 * f64::from(AMPLITUDE))
+        .with_sensor(Sensor::noisy(NOISE_SIGMA));
     let mut relay = Relay::new(RelaySettings {
         noise_sigma: NOISE_SIGMA as f32,
         trim_gain: RelaySettings::TRIM_GAIN,

@@ -120,10 +120,7 @@ impl Axis {
     fn new() -> Result<Self, onecycle::SoiptdError> {
         Ok(Self {
             process: FixedStepProcess::new(&truth()?, TICK_S),
-            sensor: Sensor {
-                noise_sigma: NOISE_SIGMA,
-                ..Sensor::default()
-            },
+            sensor: Sensor::noisy(NOISE_SIGMA),
             noise: Noise::from_seed(1),
         })
     }

@@ -39,10 +39,7 @@ fn step(bencher: Bencher) {
 fn step_in_gusts_and_sense(bencher: Bencher) {
     bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
         let ((mut flight, command), mut noise) = (hovering(), Noise::from_seed(1));
-        let gusts = Wind {
-            gust_sigma_m_per_s: Vec3::new(1.0, 1.0, 0.5),
-            ..Wind::CALM
-        };
+        let gusts = Wind::CALM.with_gusts(Vec3::new(1.0, 1.0, 0.5), 1.0);
         flight.set_wind(gusts).expect("in range");
         let mut sum = 0.0;
         for _ in 0..STEPS {

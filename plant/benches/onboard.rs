@@ -28,14 +28,9 @@ fn relay() -> Relay {
 /// Ten seconds of the paper's hover process under the relay.
 fn experiment() -> Trace {
     let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).expect("the times are positive");
-    let experiment = Experiment {
-        sensor: Sensor {
-            noise_sigma: NOISE_SIGMA,
-            quantum: 0.0,
-        },
-        input_bias: 0.1,
-        ..Experiment::new(process, SAMPLE_S, 10.0)
-    };
+    let experiment = Experiment::new(process, SAMPLE_S, 10.0)
+        .with_sensor(Sensor::noisy(NOISE_SIGMA))
+        .with_input_bias(0.1);
     experiment.run(&mut relay(), &mut Noise::from_seed(1))
 }
 

@@ -122,10 +122,7 @@ fn onecycle() -> Result<Measured, Box<dyn Error>> {
     );
     let relay_steps_per_s = STEPS as f64 / begin.elapsed().as_secs_f64();
 
-    let experiment = Experiment {
-        reference: 1.0,
-        ..experiment
-    };
+    let experiment = experiment.with_reference(1.0);
     let mut controller = SampledPd(Pd {
         kp: 192.918,
         kd: 29.523,

@@ -57,13 +57,8 @@ fn variable_step_process(bencher: Bencher) {
 /// Relay, process, observer; with noise on the sensor or without.
 #[divan::bench(args = [0.0, NOISE_SIGMA])]
 fn relay_experiment(bencher: Bencher, noise_sigma: f64) {
-    let experiment = Experiment {
-        sensor: Sensor {
-            noise_sigma,
-            quantum: 0.0,
-        },
-        ..Experiment::new(hover(), SAMPLE_S, STEPS as f64 * SAMPLE_S)
-    };
+    let experiment = Experiment::new(hover(), SAMPLE_S, STEPS as f64 * SAMPLE_S)
+        .with_sensor(Sensor::noisy(noise_sigma));
     bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
         let mut sum = 0.0;
         experiment.observe(

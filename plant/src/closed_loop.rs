@@ -48,6 +48,7 @@ impl Controller for SampledPd {
 
 /// The process and its surroundings. Start from [`Experiment::new`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Experiment {
     /// The process.
     pub process: Soiptd,
@@ -81,6 +82,39 @@ impl Experiment {
             sensor: Sensor::default(),
             jitter: 0.0,
             initial_output: 0.0,
+        }
+    }
+
+    /// The same experiment at this reference (output unit).
+    #[must_use]
+    pub fn with_reference(self, reference: f64) -> Self {
+        Self { reference, ..self }
+    }
+
+    /// The same experiment with this constant added to the input (input unit).
+    #[must_use]
+    pub fn with_input_bias(self, input_bias: f64) -> Self {
+        Self { input_bias, ..self }
+    }
+
+    /// The same experiment with this sensor.
+    #[must_use]
+    pub fn with_sensor(self, sensor: Sensor) -> Self {
+        Self { sensor, ..self }
+    }
+
+    /// The same experiment with this jitter of the sample period, a fraction of it.
+    #[must_use]
+    pub fn with_jitter(self, jitter: f64) -> Self {
+        Self { jitter, ..self }
+    }
+
+    /// The same experiment from this output (output unit).
+    #[must_use]
+    pub fn with_initial_output(self, initial_output: f64) -> Self {
+        Self {
+            initial_output,
+            ..self
         }
     }
 

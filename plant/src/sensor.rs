@@ -4,6 +4,7 @@ use crate::noise::NoiseSource;
 
 /// A sensor; the default one is perfect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Sensor {
     /// Standard deviation of white noise at the samples (output unit).
     pub noise_sigma: f64,
@@ -12,6 +13,21 @@ pub struct Sensor {
 }
 
 impl Sensor {
+    /// A sensor with white noise of this standard deviation (output unit) and unlimited resolution.
+    #[must_use]
+    pub fn noisy(noise_sigma: f64) -> Self {
+        Self {
+            noise_sigma,
+            quantum: 0.0,
+        }
+    }
+
+    /// The same sensor with this resolution (output unit).
+    #[must_use]
+    pub fn with_quantum(self, quantum: f64) -> Self {
+        Self { quantum, ..self }
+    }
+
     /// The reading of `output`; takes a number from `noise` only where the sensor is noisy.
     #[inline]
     pub fn read(&self, output: f64, noise: &mut impl NoiseSource) -> f64 {

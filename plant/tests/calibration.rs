@@ -32,14 +32,9 @@ fn noisy_relay(process: &Soiptd, sigma: f64, bias: f64, rng: &mut Pcg64) -> (Tra
         trim_gain: RelaySettings::TRIM_GAIN,
         ..RelaySettings::new(1.0, RelaySettings::DISTINGUISHING_BETA)
     };
-    let experiment = Experiment {
-        sensor: Sensor {
-            noise_sigma,
-            quantum: 0.0,
-        },
-        input_bias: bias,
-        ..Experiment::new(*process, 1e-3, 0.2 + 30.0 * period_s)
-    };
+    let experiment = Experiment::new(*process, 1e-3, 0.2 + 30.0 * period_s)
+        .with_sensor(Sensor::noisy(noise_sigma))
+        .with_input_bias(bias);
     (
         experiment.run(&mut Relay::new(settings).unwrap(), &mut Continued(rng)),
         noise_sigma,

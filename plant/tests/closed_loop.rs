@@ -15,12 +15,10 @@ fn noise(seed: u64) -> Noise {
 #[test]
 fn a_bias_leaves_the_predicted_error() {
     let process = Soiptd::new(1.5, 0.03, 1.2, 0.02).unwrap();
-    let experiment = Experiment {
-        reference: 0.7,
-        input_bias: -0.25,
-        initial_output: 0.2,
-        ..Experiment::new(process, 1e-3, 20.0)
-    };
+    let experiment = Experiment::new(process, 1e-3, 20.0)
+        .with_reference(0.7)
+        .with_input_bias(-0.25)
+        .with_initial_output(0.2);
     let pd = Pd { kp: 8.0, kd: 2.5 };
     let trace = experiment.run(&mut SampledPd(pd), &mut noise(0));
     let error = experiment.reference - trace.true_output[trace.len() - 1];
@@ -42,10 +40,7 @@ fn sampled_at_400_ms(sample_s: f64) -> f64 {
         kp: POLE * POLE / 3.0,
         kd: POLE,
     };
-    let experiment = Experiment {
-        reference: 1.0,
-        ..Experiment::new(process, sample_s, 0.4 + sample_s)
-    };
+    let experiment = Experiment::new(process, sample_s, 0.4 + sample_s).with_reference(1.0);
     let trace = experiment.run(&mut SampledPd(pd), &mut noise(0));
     let last = trace.len() - 1;
     assert!((trace.time_s[last] - 0.4).abs() < 1e-12);
@@ -80,14 +75,9 @@ fn noisy_relay(seed: u64, jitter: f64) -> Trace {
         noise_sigma: 3e-5,
         ..RelaySettings::new(1.0, -0.73)
     };
-    let experiment = Experiment {
-        sensor: Sensor {
-            noise_sigma: 3e-5,
-            quantum: 0.0,
-        },
-        jitter,
-        ..Experiment::new(process, 1e-3, 10.0)
-    };
+    let experiment = Experiment::new(process, 1e-3, 10.0)
+        .with_sensor(Sensor::noisy(3e-5))
+        .with_jitter(jitter);
     experiment.run(&mut Relay::new(settings).unwrap(), &mut noise(seed))
 }
 
@@ -142,12 +132,10 @@ fn time_always_advances() {
 fn both_propagations_run_the_same_loop() {
     let process = Soiptd::new(1.5, 0.03, 1.2, 0.0213).unwrap();
     let run = |jitter| {
-        let experiment = Experiment {
-            reference: 1.0,
-            input_bias: 0.1,
-            jitter,
-            ..Experiment::new(process, 1e-3, 2.0)
-        };
+        let experiment = Experiment::new(process, 1e-3, 2.0)
+            .with_reference(1.0)
+            .with_input_bias(0.1)
+            .with_jitter(jitter);
         experiment
             .run(&mut SampledPd(Pd { kp: 8.0, kd: 2.5 }), &mut noise(0))
             .true_output

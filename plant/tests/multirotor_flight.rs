@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use onecycle_plant::Noise;
 use onecycle_plant::multirotor::{
     Attitude, Command, Flight, GRAVITY_M_PER_S2, Nudge, Parts, Vec3, Vehicle, VehicleError,
-    VehicleState,
+    VehicleState, Wind,
 };
 
 /// So high that the ground effect, (0.0762 / 4 z)^2, is below rounding.
@@ -438,10 +438,7 @@ fn ticks_of_whole_steps_are_the_same_flight() {
         let (mut flight, command) = hovering(Parts::quadrotor());
         let mut noise = Noise::from_seed(2);
         flight
-            .set_wind(onecycle_plant::multirotor::Wind {
-                gust_sigma_m_per_s: Vec3::new(1.0, 1.0, 1.0),
-                ..onecycle_plant::multirotor::Wind::CALM
-            })
+            .set_wind(Wind::CALM.with_gusts(Vec3::new(1.0, 1.0, 1.0), 1.0))
             .unwrap();
         let inner_s = 2.0_f64.powi(-10);
         for _ in 0..1024 / steps {

@@ -217,11 +217,7 @@ proptest! {
         }
         let mut noise = Noise::from_seed(seed);
         let mut flight = Flight::new(vehicle, state).unwrap();
-        flight.set_wind(Wind {
-            steady_m_per_s: Vec3::new(5.0, 0.0, 0.0),
-            gust_sigma_m_per_s: Vec3::new(2.0, 2.0, 1.0),
-            gust_correlation_s: 0.5,
-        }).unwrap();
+        flight.set_wind(Wind::steady(Vec3::new(5.0, 0.0, 0.0)).with_gusts(Vec3::new(2.0, 2.0, 1.0), 0.5)).unwrap();
         flight.nudge(Nudge {
             force_n: Vec3::new(force_n, 0.0, -force_n),
             torque_nm: Vec3::new(0.01 * force_n, 0.0, 0.0),

@@ -255,14 +255,12 @@ fn a_closed_loop_flies_as_its_process() {
     let vehicle = Vehicle::new(lasting()).unwrap();
     let hover = vehicle.hover(1.0, Vec3::ZERO).unwrap();
     let mut noise = Noise::from_seed(1);
-    let experiment = Experiment {
-        reference: STEP_M,
-        ..Experiment::new(
-            hover.linearised(Axis::Altitude).unwrap(),
-            TICK_S,
-            SAMPLES as f64 * TICK_S,
-        )
-    };
+    let experiment = Experiment::new(
+        hover.linearised(Axis::Altitude).unwrap(),
+        TICK_S,
+        SAMPLES as f64 * TICK_S,
+    )
+    .with_reference(STEP_M);
     let expected = experiment.run(&mut controller, &mut noise).true_output;
 
     let start = Vec3::new(0.0, 0.0, 50.0);

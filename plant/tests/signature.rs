@@ -21,10 +21,8 @@ fn process(k: f64, scale: f64) -> Soiptd {
 
 /// Thirty periods with a bias of the input, so that the halves of a cycle differ.
 fn experiment(k: f64, scale: f64) -> Experiment {
-    Experiment {
-        input_bias: 0.2,
-        ..Experiment::new(process(k, scale), scale * SAMPLE_S, 30.0 * scale * PERIOD_S)
-    }
+    Experiment::new(process(k, scale), scale * SAMPLE_S, 30.0 * scale * PERIOD_S)
+        .with_input_bias(0.2)
 }
 
 fn relay() -> Relay {
@@ -96,11 +94,9 @@ fn a_negative_gain_is_the_same_signature() {
 fn gain_and_offset_leave_only_rounding() {
     let (unit, _) = signature::<512>(&run(&experiment(1.0, 1.0), &mut relay()));
     let (large, _) = signature::<512>(&run(&experiment(37.3, 1.0), &mut relay()));
-    let away = Experiment {
-        reference: 5.3,
-        initial_output: 5.3,
-        ..experiment(1.0, 1.0)
-    };
+    let away = experiment(1.0, 1.0)
+        .with_reference(5.3)
+        .with_initial_output(5.3);
     let (offset, _) = signature::<512>(&run(&away, &mut relay()));
     assert!(apart(&large.values, &unit.values) < 2.4e-7);
     assert!(apart(&offset.values, &unit.values) < 2.4e-7);
@@ -145,10 +141,7 @@ fn resolutions_agree() {
 #[test]
 fn signs_and_sizes_are_those_of_the_cycle() {
     for input_bias in [-0.5, -0.2, 0.0, 0.2, 0.5] {
-        let biased = Experiment {
-            input_bias,
-            ..experiment(1.0, 1.0)
-        };
+        let biased = experiment(1.0, 1.0).with_input_bias(input_bias);
         let trace = run(&biased, &mut relay());
         let (cycle, (signature, _)) = (last_cycle(&trace), signature::<512>(&trace));
         assert_eq!(signature.sign, 1.0);

@@ -405,10 +405,7 @@ impl Case {
             settings.trim_gain = RelaySettings::TRIM_GAIN;
         }
         let mut relay = Relay::new(settings)?;
-        let sensor = Sensor {
-            noise_sigma: self.sigma,
-            quantum: 0.0,
-        };
+        let sensor = Sensor::noisy(self.sigma);
         let mut plant = Plant::new(&self.process, &self.defect, self.scale, sample_s);
         let samples = ((preroll_s + PERIODS * self.scale.period_s) / sample_s).round() as usize;
         let mut trace = Trace::with_capacity(samples);

@@ -72,6 +72,7 @@ impl Mission {
 
 /// A mission as it was flown.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Flown {
     /// Every tick.
     pub records: Vec<FlightRecord>,

@@ -135,6 +135,7 @@ impl Axis {
 
 /// What was found for an axis, and what is true of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Tuned {
     /// The axis.
     pub axis: Axis,
@@ -150,6 +151,7 @@ pub struct Tuned {
 
 /// A tick of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct FlightRecord {
     /// Its time (s).
     pub time_s: f64,
@@ -165,6 +167,7 @@ pub struct FlightRecord {
 
 /// Why a mission ended early.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum MissionError {
     /// The vehicle has a parameter out of range or cannot hover.
     Vehicle(VehicleError),

@@ -16,6 +16,7 @@ use crate::NoiseSource;
 
 /// The wind, the same everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Wind {
     /// Steady part (m/s, world): where the air goes.
     pub steady_m_per_s: Vec3,
@@ -36,6 +37,16 @@ impl Wind {
             steady_m_per_s,
             gust_sigma_m_per_s: Vec3::ZERO,
             gust_correlation_s: 1.0,
+        }
+    }
+
+    /// The same wind with gusts of this standard deviation (m/s, world) and correlation time (s).
+    #[must_use]
+    pub fn with_gusts(self, gust_sigma_m_per_s: Vec3, gust_correlation_s: f64) -> Self {
+        Self {
+            gust_sigma_m_per_s,
+            gust_correlation_s,
+            ..self
         }
     }
 
