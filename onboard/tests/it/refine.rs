@@ -1,11 +1,6 @@
 //! The estimator on noise-free experiments: what made them comes back.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{FitWindow, Simulation, every, last_cycles, run};
+use crate::common::{FitWindow, Simulation, every, last_cycles, run};
 use onecycle_onboard::refine::{
     DomainEdge, PriorKnowledge, RefineError, Refined, Shape, ShapePrior, refine, refine_with,
 };

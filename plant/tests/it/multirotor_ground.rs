@@ -1,8 +1,5 @@
 //! On the ground and onto it, and whatever is commanded.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_plant::Noise;
 use onecycle_plant::multirotor::ground::ground_effect;
 use onecycle_plant::multirotor::{

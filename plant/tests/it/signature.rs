@@ -1,8 +1,5 @@
 //! Signatures of simulated relay experiments: what they must not depend on, and by how much they do.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::signature::{LENGTH, Signature};
 use onecycle_onboard::window::Window;

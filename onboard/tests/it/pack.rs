@@ -1,8 +1,5 @@
 //! Packs that are as they must be, and bytes that are not.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::floats::Floats;
 use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::network::{Activation, Weights};

@@ -1,11 +1,6 @@
 //! Refinement and classification in slices: the same results, in no more slices than they say.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{every, run};
+use crate::common::{every, run};
 use onecycle_onboard::classify::{Classifier, classify_by};
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::pack::Pack;

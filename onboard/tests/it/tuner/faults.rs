@@ -12,7 +12,7 @@ use onecycle_onboard::guard::{Abort, Limits};
 use onecycle_onboard::tuner::{Tuner, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 
-use crate::axis::{Axis, Noise};
+use super::axis::{Axis, Noise};
 
 const SAMPLE_S: f64 = 0.002;
 /// Longer than any test here takes to its controller and four periods beyond.

@@ -1,8 +1,5 @@
 //! Closed loops whose outcome can be predicted by hand.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, Noise, SampledPd, Sensor, Trace};
 

@@ -1,8 +1,5 @@
 //! Free flight against mechanics by hand.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use std::f64::consts::PI;
 
 use onecycle_plant::Noise;

@@ -1,8 +1,5 @@
 //! The tuner on simulated axes: from rest, from the ground, and everything that can go wrong.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 mod axis;
 mod faults;
 

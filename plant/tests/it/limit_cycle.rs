@@ -1,8 +1,5 @@
 //! Limit cycles of the bare relay against an independent prototype of the same loop.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, Noise};

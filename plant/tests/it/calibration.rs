@@ -1,8 +1,5 @@
 //! Whether the estimator's covariance is what it says: errors of noisy experiments, in its own units.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::refine::{Refined, coordinate, refine};
 use onecycle_onboard::window::Window;

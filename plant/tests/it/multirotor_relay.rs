@@ -1,8 +1,5 @@
 //! The relay test on the vehicle and on its process: what an identification sees.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
 use onecycle_plant::multirotor::{Axis, Command, Flight, Hover, Parts, Vec3, Vehicle};
 use onecycle_plant::{Controller, Experiment, Noise, SampledPd, Sensed, Trace};

@@ -6,9 +6,6 @@
 //! the delay (an eighth of the second derivative times 1 ms^2, 3e-7 of the output after a second)
 //! and the Runge-Kutta rule.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::Pd;
 use onecycle_plant::multirotor::{Axis, Command, Flight, Hover, Nudge, Parts, Vec3, Vehicle, Wind};
 use onecycle_plant::{Controller, Experiment, FixedStepProcess, Noise, SampledPd, Sensed};
