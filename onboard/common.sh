@@ -1,4 +1,7 @@
-# Sourced by the scripts in the folders beside it. `what` names what they are about.
+# Sourced by the scripts in the folders beside it. `what` names the check, `here` is the script's folder.
+
+# One target folder for all of them: they compile onecycle-onboard with the same options, so it is compiled once.
+target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/board
 
 fail() { # SENTENCE [LOG]
     echo "$what failed: $1" >&2

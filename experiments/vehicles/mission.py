@@ -6,7 +6,9 @@ its oscillations in `oscillation`: see f450.py.
 
 import collections
 import dataclasses
+import itertools
 import math
+import multiprocessing
 import random
 
 from tuner import Tuner
@@ -124,28 +126,43 @@ def fly(interface, vehicle, axis, disturbance):
     return found, tuned_s, metrics(predicted(found, step, rest_s), step), metrics(flown, step)
 
 
-def report(title, vehicle_of, axes, interface):
-    """All axes clean and with noise and bias; prints a line each. Returns whether all is as predicted."""
+def line_of(title, axis, label, flight):
+    """What a flight has shown in one line, and whether its step was as predicted."""
+    found, tuned_s, (overshoot, settling), (flown_overshoot, flown_settling) = flight
+    is_right = math.isclose(
+        flown_overshoot, overshoot, rel_tol=TOLERANCE, abs_tol=LEAST
+    ) and math.isclose(flown_settling, settling, rel_tol=TOLERANCE)
+    line = (
+        f"{title:22} {axis.name:8} {label:22} tuned in {tuned_s:4.1f} s  "
+        f"K/T_body {found.k_over_t_body:8.3f}  T_prop {1e3 * found.t_prop_s:5.1f} ms  "
+        f"tau {1e3 * found.tau_s:5.1f} ms  Kp {found.kp:7.3f}  Kd {found.kd:7.4f}  "
+        f"overshoot {100 * overshoot:5.1f} % -> {100 * flown_overshoot:5.1f} %  "
+        f"settling {settling:5.3f} s -> {flown_settling:5.3f} s"
+        f"{'' if is_right else '   NOT AS PREDICTED'}"
+    )
+    return line, is_right
+
+
+def report(title, vehicle, axes, interface):
+    """Flies every axis without disturbances and with noise and bias; prints a line for each flight. Each flight is
+    a process of its own, forked from this one, so that all begin with the same vehicle. Returns whether every step
+    was as predicted."""
+    disturbances = {"clean": Disturbance(), "1 % noise, bias 0.3 h": Disturbance(noise=0.01, bias=0.3)}
+    context = multiprocessing.get_context("fork")
+    receivers = []
+    for axis, (label, disturbance) in itertools.product(axes, disturbances.items()):
+        receiver, sender = context.Pipe(duplex=False)
+        receivers.append(receiver)
+
+        def flight():
+            sender.send(line_of(title, axis, label, fly(interface, vehicle, axis, disturbance)))
+
+        context.Process(target=flight).start()
+        sender.close()
     is_right = True
-    for axis in axes:
-        for label, disturbance in [
-            ("clean", Disturbance()),
-            ("1 % noise, bias 0.3 h", Disturbance(noise=0.01, bias=0.3)),
-        ]:
-            found, tuned_s, (overshoot, settling), (flown_overshoot, flown_settling) = fly(
-                interface, vehicle_of(), axis, disturbance
-            )
-            right = math.isclose(
-                flown_overshoot, overshoot, rel_tol=TOLERANCE, abs_tol=LEAST
-            ) and math.isclose(flown_settling, settling, rel_tol=TOLERANCE)
-            is_right = is_right and right
-            print(
-                f"{title:22} {axis.name:8} {label:22} tuned in {tuned_s:4.1f} s  "
-                f"K/T_body {found.k_over_t_body:8.3f}  T_prop {1e3 * found.t_prop_s:5.1f} ms  "
-                f"tau {1e3 * found.tau_s:5.1f} ms  Kp {found.kp:7.3f}  Kd {found.kd:7.4f}  "
-                f"overshoot {100 * overshoot:5.1f} % -> {100 * flown_overshoot:5.1f} %  "
-                f"settling {settling:5.3f} s -> {flown_settling:5.3f} s"
-                f"{'' if right else '   NOT AS PREDICTED'}",
-                flush=True,
-            )
+    for receiver in receivers:
+        # Without a line the process has failed and has said why: EOFError.
+        line, is_as_predicted = receiver.recv()
+        print(line, flush=True)
+        is_right = is_right and is_as_predicted
     return is_right

@@ -1,25 +1,32 @@
 #!/usr/bin/env bash
-# Tunes vehicles that others have written, the tuner for firmware in the loop through its C interface: JSBSim's
-# F450, and with --rotorpy also rotorpy's quadrotors (minutes). Each axis clean and with noise and a bias: the
-# step that follows must overshoot and settle as predicted. Status 1 when one does not.
+# Tunes vehicle models of other simulators with the tuner for firmware, called through its C interface: JSBSim's
+# F450, and with --rotorpy also rotorpy's quadrotors (minutes). Each axis is tuned without disturbances and with noise
+# and a bias; the step that follows must overshoot and settle as predicted, otherwise the status is 1.
 # PYTHON names an interpreter that has the packages of requirements.txt; without it they are installed into a
-# virtual environment that is removed again.
+# temporary virtual environment.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/c
+target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/board
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
 cargo build --quiet --release --locked --manifest-path "$here/../../onboard/c/Cargo.toml" --target-dir "$target"
 if [[ -z ${PYTHON:-} ]]; then
-    python3 -m venv "$scratch/venv"
-    PYTHON=$scratch/venv/bin/python
     requirements=requirements.txt
     [[ " $* " != *" --rotorpy "* ]] || requirements=requirements-rotorpy.txt
-    "$PYTHON" -m pip install --quiet --disable-pip-version-check -r "$here/$requirements"
+    PYTHON=$scratch/venv/bin/python
+    # A pip of its own would take seconds to install; the one of the machine will do, where there is one.
+    if python3 -m pip --python "$(command -v python3)" --version >/dev/null 2>&1; then
+        python3 -m venv --without-pip "$scratch/venv"
+        pip=(python3 -m pip --python "$PYTHON")
+    else
+        python3 -m venv "$scratch/venv"
+        pip=("$PYTHON" -m pip)
+    fi
+    "${pip[@]}" install --quiet --disable-pip-version-check --no-compile -r "$here/$requirements"
 fi
-# JSBSim prints what it thinks of its own aircraft's files, to both outputs.
+# JSBSim prints messages about its own aircraft files to both outputs.
 status=0
 "$PYTHON" "$here/run.py" "$target/release/libonecycle.a" "$@" >"$scratch/said" 2>"$scratch/errors" || status=$?
 grep -a ' tuned in ' "$scratch/said" || true

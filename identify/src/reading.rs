@@ -1,7 +1,7 @@
 //! Estimate of the process from one cycle, by the network of a pack.
 
 use onecycle_onboard::SoiptdError;
-use onecycle_onboard::classify::{Classification, Verdict};
+use onecycle_onboard::classify::{Classification, Familiarity};
 use onecycle_onboard::refine::{Refined, coordinate, residuals};
 use onecycle_onboard::window::Window;
 
@@ -27,7 +27,7 @@ impl Reading {
     /// Whether a process of the pack's family explains the cycle.
     #[must_use]
     pub fn is_known(&self) -> bool {
-        self.classification.verdict == Verdict::Known
+        self.classification.familiarity == Familiarity::Known
     }
 
     /// The estimate in the form of a fit of `window`, with the residual of the estimated process.

@@ -22,9 +22,9 @@ mod remarks;
 mod saturation;
 
 use onecycle_design::{Model, Specification, design_over, step_response, tuning};
-use onecycle_onboard::judgement::{MOST_MISFIT, MOST_RESPONSE_ERROR, misfit};
+use onecycle_onboard::judgement::{MOST_MISFIT, largest_response_error, misfit};
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::refine::{Beforehand, RefineError, Refined, ShapePrior, refine_with};
+use onecycle_onboard::refine::{PriorKnowledge, RefineError, Refined, ShapePrior, refine_with};
 
 use self::input::{RelayInput, find_relay};
 use self::oscillation::{FitWindow, Past, Stretch};
@@ -167,7 +167,7 @@ impl Search<'_> {
     ) -> Result<Refined, Verdict> {
         let known = reading.filter(|reading| reading.is_known());
         let starts = known.map(|reading| reading.classification.starts(period_s));
-        let beforehand = Beforehand {
+        let beforehand = PriorKnowledge {
             starts: starts.as_ref().map_or(&[], |starts| starts),
             prior: (self.pack)
                 .filter(|_| known.is_some())
@@ -175,7 +175,7 @@ impl Search<'_> {
         };
         refine_with(window, period_s, &beforehand).map_err(|error| match error {
             RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
-            RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
+            _ => Verdict::NoFit,
         })
     }
 
@@ -183,7 +183,7 @@ impl Search<'_> {
     fn judge(&self, refined: &Refined, window: &FitWindow) -> Result<f64, Verdict> {
         let misfit = misfit(refined, window);
         let most_error = match self.refusal {
-            None => MOST_RESPONSE_ERROR,
+            None => largest_response_error(self.options.specification.phase_margin_rad),
             Some(_) => MOST_ERROR_OF_SECOND_CHOICE,
         };
         if misfit > MOST_MISFIT || refined.response_error > most_error {

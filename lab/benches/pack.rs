@@ -3,7 +3,6 @@
 
 use divan::{Bencher, black_box};
 use onecycle_onboard::classify::classify_by;
-use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::pack::{DEFAULT, Pack};
 use onecycle_onboard::signature::Signature;
 
@@ -49,7 +48,9 @@ fn gains(bencher: Bencher) {
     let pack = pack();
     let found = classify_by(&pack, &signature(), 1.0, NOISE).expect("the cycle is one");
     let process = found.candidates[0].process;
-    let table = LeadTable::from_bytes(pack.lead_table().bytes).expect("the table is whole");
+    let table = pack
+        .gains_table()
+        .expect("the built-in pack has a lead table");
     bencher.bench_local(|| table.pd(black_box(&process)));
 }
 

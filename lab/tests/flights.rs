@@ -7,8 +7,6 @@
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::flights::judged;
 use onecycle_plant::multirotor::{Axis, Mission, fly};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 
 const SEEDS: u64 = 100;
 
@@ -17,7 +15,7 @@ const SEEDS: u64 = 100;
 fn hundred(mission: Mission) -> (usize, f64, f64, f64) {
     let (mut axes, mut worst, mut least_deg, mut longest_s) = (0, 0.0_f64, 180.0_f64, 0.0_f64);
     for seed in 0..SEEDS {
-        let flown = fly(mission, Pcg64Mcg::seed_from_u64(seed)).unwrap();
+        let flown = fly(mission, seed).unwrap();
         assert_eq!(flown.failure, None, "{} {seed}", mission.name());
         axes = flown.tuned.len();
         for tuned in &flown.tuned {
@@ -77,7 +75,7 @@ fn disturbed() {
 #[test]
 fn tuning_pays() {
     let sags = [Mission::Disturbed, Mission::DisturbedUntuned].map(|mission| {
-        let flown = fly(mission, Pcg64Mcg::seed_from_u64(1)).unwrap();
+        let flown = fly(mission, 1).unwrap();
         let at = |wanted: &str| {
             flown
                 .events

@@ -10,9 +10,7 @@ use onecycle_lab::experiments::signals_of;
 use onecycle_lab::judge::campaign::Campaign;
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::relay::Relay;
-use onecycle_plant::{Experiment, Sensor, Trace};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use onecycle_plant::{Experiment, Noise, Sensor, Trace};
 
 const SAMPLE_S: f64 = 1e-3;
 /// T_prop, T_body, tau (s): slow and quick multirotors of the paper's space and its hexacopter.
@@ -162,7 +160,7 @@ fn uneven_stamps_will_do() {
     let mut relay = Relay::new(Campaign::QUIET.relay_settings()).unwrap();
     let mut experiment = Experiment::new(process, SAMPLE_S, 15.0);
     experiment.jitter = 0.2;
-    let trace = experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(1));
+    let trace = experiment.run(&mut relay, &mut Noise::from_seed(1));
     let signals = signals_of(&trace, SAMPLE_S);
     let first = harmonics(&signals, &found_in(&signals, 8), 1)[0];
     assert!(error(&process, &first) < 1e-3, "{first:?}");
@@ -183,20 +181,17 @@ fn squared_errors(errors: &[(Harmonic, Complex64)]) -> f64 {
 fn the_scatter_under_noise_is_the_deviation() {
     let process = process(PROCESSES[4]);
     let trace = settled(process, 0.0);
-    let sensor = Sensor {
-        noise_sigma: 0.01 * trace.amplitude_of_last(1000),
-        quantum: 0.0,
-    };
+    let sensor = Sensor::noisy(0.01 * trace.amplitude_of_last(1000));
     for (cycles, most) in [(8, 3), (2, 1)] {
         let clean = signals_of(&trace, SAMPLE_S);
         let exact = harmonics(&clean, &found_in(&clean, cycles), most);
         let mut errors = vec![Vec::new(); exact.len()];
         for seed in 0..200 {
-            let mut rng = Pcg64Mcg::seed_from_u64(seed);
+            let mut noise = Noise::from_seed(seed);
             let output: Vec<f64> = trace
                 .output
                 .iter()
-                .map(|y| sensor.read(*y, &mut rng))
+                .map(|y| sensor.read(*y, &mut noise))
                 .collect();
             let signals = Signals {
                 output: &output,

@@ -18,7 +18,7 @@ use onecycle_lab::learn::train::{
     Trainer,
 };
 use onecycle_onboard::Soiptd;
-use onecycle_onboard::classify::{Calibration, OUTPUTS, Posterior, Verdict, classify};
+use onecycle_onboard::classify::{Calibration, CyclePosterior, Familiarity, OUTPUTS, classify};
 use onecycle_onboard::cycle::Cycle;
 use onecycle_onboard::signature::{LENGTH, Signature};
 use onecycle_onboard::window::Window;
@@ -213,7 +213,7 @@ fn harm_is_a_promise_broken() {
 fn the_board_reads_the_trainers_gaussian() {
     let outputs: [f32; OUTPUTS] = std::array::from_fn(|k| (k as f32 * 1.7).sin());
     let trained = Gaussian::from_outputs(VALUES, &outputs).unwrap();
-    let posterior = Posterior::from_outputs(&outputs, &SCALE);
+    let posterior = CyclePosterior::from_outputs(&outputs, &SCALE);
     for a in 0..VALUES {
         assert_eq!(posterior.mean[a], trained.mean[a] / SCALE[a]);
         for b in 0..VALUES {
@@ -287,12 +287,12 @@ fn a_perfect_cycle_scores_nothing() {
     let values = example.values();
     let found = score(values);
     assert!(found.score < 1e-6, "{}", found.score);
-    assert_eq!(found.verdict, Verdict::Known);
+    assert_eq!(found.familiarity, Familiarity::Known);
     let truth = example.process.t_prop_s();
     assert!((found.candidates[0].process.t_prop_s() / truth - 1.0).abs() < 1e-5);
     let mut late = values;
     late[2] += 0.04;
-    assert_eq!(score(late).verdict, Verdict::Unknown);
+    assert_eq!(score(late).familiarity, Familiarity::Unknown);
 }
 
 fn batch(examples: &[Example]) -> Batch {
@@ -396,7 +396,7 @@ fn a_small_network_knows_what_it_does_not_know() {
                 let case = case(&recipe, kind, n).unwrap()?;
                 scored(&case, &case.run().unwrap(), &road)
             })
-            .filter(|scored| scored.verdict == Verdict::Unknown)
+            .filter(|scored| scored.verdict == Familiarity::Unknown)
             .count()
     };
     let of_family = unknown(Kind::InFamily, 1000..1100);

@@ -1,26 +1,25 @@
 #!/usr/bin/env bash
-# The tuner for firmware in C: builds the static library, checks that onecycle.h is what its source says,
-# compiles the example with gcc, tunes its simulated axis, and compares every output with the tuner in
-# Rust, bit by bit. Prints what a tuner takes; one sentence and status 1 when any of it fails.
-# `run.sh header` writes onecycle.h anew (with the cbindgen of the version below).
+# Checks the tuner for firmware in C: builds the static library, compares onecycle.h with the source, compiles the
+# example with gcc, tunes its simulated axis, and compares every output with the tuner in Rust, bit by bit.
+# Prints the memory of a tuner. On failure it prints one sentence and exits with status 1.
+# `run.sh header` writes onecycle.h (with the version of cbindgen below).
 set -euo pipefail
 
 CBINDGEN_VERSION=0.29.2
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/c
-library=$target/release/libonecycle.a
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$here"
 what="the C interface"
 source ../common.sh
+library=$target/release/libonecycle.a
 
 header() { # FILE
     [[ $(cbindgen --version 2>/dev/null) == "cbindgen $CBINDGEN_VERSION" ]] ||
-        fail "it needs cbindgen: cargo install --locked --debug cbindgen --version $CBINDGEN_VERSION"
+        fail "cbindgen is missing or of another version: cargo install --locked --debug cbindgen --version $CBINDGEN_VERSION"
     cbindgen --quiet --config cbindgen.toml --crate onecycle-c --output "$1" . 2>"$scratch/log" ||
-        fail "cbindgen does not read the source." "$scratch/log"
+        fail "cbindgen cannot read the source." "$scratch/log"
 }
 
 if [[ ${1:-} == header ]]; then
@@ -31,7 +30,7 @@ fi
 header "$scratch/onecycle.h"
 same_libm
 cmp -s onecycle.h "$scratch/onecycle.h" ||
-    fail "onecycle.h is not what src/ says: run onboard/c/run.sh header."
+    fail "onecycle.h differs from src/: run onboard/c/run.sh header."
 
 cargo build --release --locked --target-dir "$target" >"$scratch/log" 2>&1 ||
     fail "it does not build." "$scratch/log"
@@ -40,7 +39,7 @@ gcc -std=c99 -O2 -Wall -Wextra -Werror -pedantic -ffp-contract=off examples/axis
 "$scratch/axis" trace >"$scratch/trace" 2>"$scratch/said" ||
     fail "the example finds no controller." "$scratch/said"
 # The same axis, tuned in Rust.
-cargo run --quiet --release --locked --manifest-path ../cortex-m/Cargo.toml --target-dir "$target/../cortex-m" \
+cargo run --quiet --release --locked --manifest-path ../cortex-m/Cargo.toml --target-dir "$target" \
     --bin host >"$scratch/lines" 2>"$scratch/log" || fail "the axis in Rust finds no controller." "$scratch/log"
 awk '$1 == "tick" { print $5 }' "$scratch/lines" >"$scratch/there"
 cmp -s "$scratch/trace" "$scratch/there" ||
@@ -48,7 +47,6 @@ cmp -s "$scratch/trace" "$scratch/there" ||
 ticks=$(wc -l <"$scratch/trace")
 [[ $ticks -gt 0 ]] || fail "the example has written no output."
 
-# A tuner's memory is the one number that a caller's build must have room for.
 words=$(awk '$2 == "ONECYCLE_TUNER_WORDS" { print $3 }' onecycle.h)
 cat <<END
 C interface: ok; a simulated axis tuned from C, $ticks outputs, the same bits as in Rust

@@ -1,11 +1,10 @@
 #!/usr/bin/env bash
-# Instructions of the tuner's ticks on x86-64, counted by valgrind's callgrind over the flight that run.sh flies:
-# the mean over its 20,000 ticks, and what each part of a tick takes of them. The same number whatever else the
-# machine does. `callgrind.sh` needs valgrind.
+# Counts the instructions of a tick of the tuner on x86-64 with valgrind's callgrind, over the flight of run.sh:
+# the mean of its 20,000 ticks and the share of each function. The load of the machine does not change the numbers.
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/cortex-m
+target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/board
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$here"

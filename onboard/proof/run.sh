@@ -1,32 +1,29 @@
 #!/usr/bin/env bash
-# Proves that onecycle-onboard needs neither std, a heap nor libc: builds the program of src/lib.rs
-# and start.c with nothing else, runs it, and shows that the same build fails as soon as it asks for
-# a heap or for std. Prints what the program takes; one sentence and status 1 when the proof fails or it
-# takes more than it may.
+# Proves that onecycle-onboard needs no std, no heap and no libc: links src/lib.rs and start.c with nothing else,
+# runs the program, and shows that the build fails as soon as the program uses a heap or std.
+# Prints the memory that the program takes. On failure it prints one sentence and exits with status 1.
 set -euo pipefail
 
-# Most bytes on a board: of weights, of all code and tables, of memory for one axis.
+# Limits in bytes: weights of the network, all code and tables, memory for one axis.
 most_weights=14000
 most_code=96000
 most_memory=24000
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-target=$(realpath -m "${CARGO_TARGET_DIR:-$here/../../target}")/onboard-proof
-library=$target/release/libonecycle_onboard_proof.a
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cd "$here"
 what="onboard proof"
 source ../common.sh
 
-build() { # FEATURES LOG
-    rm -f "$library"
-    cargo build --release --locked --target-dir "$target" --features "$1" >"$2" 2>&1
+build() { # LOG OPTION...
+    cargo build --locked --target-dir "$target" "${@:2}" >"$1" 2>&1
 }
 
-link() { # PROGRAM LOG
+link() { # PROFILE PROGRAM LOG
     gcc -nostdlib -static -O2 -Wall -Wextra -Werror -ffreestanding -ffunction-sections \
-        -fno-stack-protector -mno-red-zone -Wl,--gc-sections start.c "$library" -o "$1" >"$2" 2>&1
+        -fno-stack-protector -mno-red-zone -Wl,--gc-sections start.c \
+        "$target/$1/libonecycle_onboard_proof.a" -o "$2" >"$3" 2>&1
 }
 
 [[ $(uname -sm) == "Linux x86_64" ]] || fail "it runs on x86-64 Linux only, not on $(uname -sm)."
@@ -35,13 +32,13 @@ for tool in cargo gcc nm size; do
 done
 same_libm
 
-build "" "$scratch/log" || fail "it does not build without std." "$scratch/log"
-link "$scratch/proof" "$scratch/log" || fail "it does not link without libc." "$scratch/log"
+build "$scratch/log" --release || fail "it does not build without std." "$scratch/log"
+link release "$scratch/proof" "$scratch/log" || fail "it does not link without libc." "$scratch/log"
 
 nm "$scratch/proof" >"$scratch/symbols"
 nm --undefined-only "$scratch/proof" >"$scratch/undefined"
 [[ ! -s $scratch/undefined ]] || fail "the program has undefined symbols." "$scratch/undefined"
-grep -q ' onecycle_proof$' "$scratch/symbols" || fail "the program has lost what it is to run."
+grep -q ' onecycle_proof$' "$scratch/symbols" || fail "the program does not contain the test."
 if grep -E '[ _](malloc|calloc|realloc|free|posix_memalign|mmap|brk|sbrk)$|__r(ust|dl|g)_?.*alloc' \
     "$scratch/symbols" >"$scratch/heap"; then
     fail "the program has a heap." "$scratch/heap"
@@ -67,21 +64,21 @@ within "the weights" "$weights" "$most_weights"
 within "code and tables" "$code" "$most_code"
 within "data and stack" "$memory" "$most_memory"
 
-# The proof must be able to fail, and for the reason meant.
-if build use-alloc "$scratch/log"; then
-    fail "it builds although it asks for a heap: the check shows nothing."
+# The proof must be able to fail, and for the intended reason.
+if build "$scratch/log" --release --features use-alloc; then
+    fail "it builds although it uses a heap: the check shows nothing."
 fi
 grep -q 'no global memory allocator found' "$scratch/log" ||
     fail "the control with a heap fails for another reason than its heap." "$scratch/log"
-build use-std "$scratch/log" || fail "the control with std does not build." "$scratch/log"
-if link "$scratch/control" "$scratch/log"; then
-    fail "it links although it asks for std: the check shows nothing."
+# Unoptimised: the references to libc are the same, and std takes long to optimise.
+build "$scratch/log" --features use-std || fail "the control with std does not build." "$scratch/log"
+if link debug "$scratch/control" "$scratch/log"; then
+    fail "it links although it uses std: the check shows nothing."
 fi
 grep -q 'undefined reference to .malloc' "$scratch/log" ||
     fail "the control with std fails for another reason than libc." "$scratch/log"
-rm -f "$library"
 
-# The frames of x86-64 are larger than a Cortex-M's by its pointers and what it spills; arrays are the same.
+# Stack frames on x86-64 are larger than on a Cortex-M, because pointers are; arrays are the same.
 cat <<END
 onboard proof: ok; no std, no heap, no libc; one relay test from rest to the gains of the controller
   weights          $weights bytes of $most_weights

@@ -66,13 +66,13 @@ pub const CANDIDATES: usize = 5;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Classification {
     /// The process's values and how well they are known.
-    pub posterior: Posterior,
+    pub posterior: CyclePosterior,
     /// Processes along the posterior's longest axis, most probable first.
-    pub candidates: [Candidate; CANDIDATES],
+    pub candidates: [CandidateProcess; CANDIDATES],
     /// How badly the posterior's mean explains the cycle; one is the limit.
     pub score: f64,
     /// Whether the cycle is of the family.
-    pub verdict: Verdict,
+    pub familiarity: Familiarity,
 }
 
 impl Classification {
@@ -86,14 +86,14 @@ impl Classification {
 
 /// Whether a cycle is of the family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
+pub enum Familiarity {
     /// It is: the processes explain it.
     Known,
     /// It is not, and no controller should be made from it.
     Unknown,
 }
 
-impl fmt::Display for Verdict {
+impl fmt::Display for Familiarity {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Known => "known: a process of this kind explains it",
@@ -104,7 +104,7 @@ impl fmt::Display for Verdict {
 
 /// One process and the share of the posterior that it stands for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Candidate {
+pub struct CandidateProcess {
     /// The process, its gain for a relay of amplitude one.
     pub process: Soiptd,
     /// Its share.
@@ -113,7 +113,7 @@ pub struct Candidate {
 
 /// A Gaussian over the values of the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Posterior {
+pub struct CyclePosterior {
     /// Its mean.
     pub mean: [f64; VALUES],
     /// A root of its covariance, `covariance = root root^T`: upper triangular.
@@ -122,6 +122,7 @@ pub struct Posterior {
 
 /// Why outputs are no classification.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum ClassifyError {
     /// An output that is not finite: which, and its value.
     Output(usize, f32),
@@ -158,7 +159,7 @@ impl From<SoiptdError> for ClassifyError {
     }
 }
 
-impl Posterior {
+impl CyclePosterior {
     /// From the outputs of a network whose values were trained times `scale`.
     #[must_use]
     pub fn from_outputs(outputs: &[f32; OUTPUTS], scale: &[f64; VALUES]) -> Self {
@@ -310,7 +311,7 @@ mod tests {
     #[test]
     fn the_root_is_that_of_the_covariance() {
         let scale = [1.0, 8.0, 8.0, 1.0];
-        let posterior = Posterior::from_outputs(&OUTPUT, &scale);
+        let posterior = CyclePosterior::from_outputs(&OUTPUT, &scale);
         let below = [
             [0.0; 4],
             [0.5, 0.0, 0.0, 0.0],
@@ -345,7 +346,7 @@ mod tests {
         let l = |size: f32| libm::logf(size);
         let mut outputs = [0.0; OUTPUTS];
         outputs[4..8].copy_from_slice(&[l(2.0), l(4.0), l(8.0), l(1.0)]);
-        let posterior = Posterior::from_outputs(&outputs, &[1.0; VALUES]);
+        let posterior = CyclePosterior::from_outputs(&outputs, &[1.0; VALUES]);
         let axis = posterior.longest_axis(&[1.0; VALUES]);
         for (axis, expected) in axis.iter().zip([0.0, 0.0, 0.0, 1.0]) {
             assert!((axis - expected).abs() < 1e-7, "{axis:?}");
@@ -384,9 +385,9 @@ mod tests {
         };
         let statistic = at(1.0).score;
         assert!(statistic > 100.0 && statistic.is_finite(), "{statistic}");
-        assert_eq!(at(1.0).verdict, Verdict::Unknown);
-        assert_eq!(at(0.999 * statistic).verdict, Verdict::Unknown);
-        assert_eq!(at(1.001 * statistic).verdict, Verdict::Known);
+        assert_eq!(at(1.0).familiarity, Familiarity::Unknown);
+        assert_eq!(at(0.999 * statistic).familiarity, Familiarity::Unknown);
+        assert_eq!(at(1.001 * statistic).familiarity, Familiarity::Known);
     }
 
     // Outputs whose diagonal is 3 on average are e^-3 wide; 0.3 wider than usual at 0.1 is three standard
@@ -421,7 +422,7 @@ mod tests {
         let noise_sigma = 0.01 * signature().amplitude;
         let found = classify(&OUTPUT, &signature(), 0.4, noise_sigma, &calibration).unwrap();
         assert!((found.score - 2.5).abs() < 1e-12, "{}", found.score);
-        assert_eq!(found.verdict, Verdict::Unknown);
+        assert_eq!(found.familiarity, Familiarity::Unknown);
     }
 
     #[test]

@@ -48,6 +48,7 @@ const NEWTON_TOLERANCE: f64 = 1e-9;
 
 /// Why a table has no gains for a process.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum GainsError {
     /// The dead time, in shorter lags, is above [`LARGEST_DELAY_IN_LAGS`].
     DeadTime(f64),
@@ -74,7 +75,7 @@ impl fmt::Display for GainsError {
 impl core::error::Error for GainsError {}
 
 /// The numbers of a table, wherever they lie.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Numbers<'a> {
     Floats(&'a [f32]),
     LittleEndian(&'a [[u8; 4]]),
@@ -118,7 +119,7 @@ impl Numbers<'_> {
 /// # Ok(())
 /// # }
 /// ```
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeadTable<'a> {
     nodes: Nodes,
     numbers: Numbers<'a>,
@@ -194,7 +195,9 @@ impl<'a> LeadTable<'a> {
         gains(process, self.phase_margin_rad(), lead_rad)
     }
 
-    fn phase_margin_rad(&self) -> f64 {
+    /// Phase margin that the table is made for (rad), between 0 and `pi/2`.
+    #[must_use]
+    pub fn phase_margin_rad(&self) -> f64 {
         f64::from(self.nodes.phase_margin_rad)
     }
 

@@ -13,22 +13,21 @@
 //! - **refine**: the most probable process from there; **judge**: is it one to be believed?
 //! - **gains** from the pack's table; **design**: how far may their margin be off?
 //!
-//! [`Identification::observe`] takes a sample, [`Identification::advance`] does one slice of the work, of a
+//! [`StagedIdentification::observe`] takes a sample, [`StagedIdentification::advance`] does one slice of the work, of a
 //! few thousand operations at most (the table is in [`refine`](crate::refine)): a board without double
 //! precision does one at each tick, others more.
 
 use core::fmt;
 
-use crate::classify::{Classifier, Verdict};
+use crate::classify::{Classifier, Familiarity};
 use crate::control::Pd;
 use crate::cycle::{Cycle, CycleDetector, SteadyRun};
-use crate::gains::LeadTable;
 use crate::judgement::{
-    COORDINATES, Deviations, HALF_90_PERCENT, MOST_MISFIT, MOST_RESPONSE_ERROR, Spread, misfit,
+    COORDINATES, Deviations, HALF_90_PERCENT, MOST_MISFIT, Spread, largest_response_error, misfit,
 };
 use crate::pack::Pack;
 use crate::process::Soiptd;
-use crate::refine::{Beforehand, DomainEdge, Refined, Refiner, ShapePrior};
+use crate::refine::{DomainEdge, PriorKnowledge, Refined, Refiner, ShapePrior};
 use crate::signature::Signature;
 use crate::window::{Edge, Window};
 
@@ -48,6 +47,7 @@ pub const MOST_CYCLES: u8 = 4;
 
 /// Why a cycle has led to no controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum Refusal {
     /// The last cycle has no signature: the output does not move or samples are missing.
     NoSignature,
@@ -94,7 +94,7 @@ impl fmt::Display for Refusal {
 
 /// What the test has told.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Identified {
+pub struct TuningResult {
     /// The most probable process.
     pub process: Soiptd,
     /// How well it is known.
@@ -133,6 +133,7 @@ pub struct Observed {
 /// What is done next: see the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Stage {
     /// Waits for a steady oscillation and a rise.
     Wait,
@@ -185,15 +186,15 @@ struct Design {
     followed: usize,
 }
 
-/// Room for the work of one axis: nearly all of its memory, and all zeros at first.
-pub struct Room {
+/// Workspace for the work of one axis: nearly all of its memory, and all zeros at first.
+pub struct Workspace {
     coarse: Window<BINS, EDGES>,
     fine: Window<FINE_BINS, 0>,
     classifier: Classifier,
     refiner: Refiner<BINS>,
 }
 
-impl Room {
+impl Workspace {
     /// For any axis.
     pub const NEW: Self = Self {
         coarse: Window::NONE,
@@ -203,8 +204,8 @@ impl Room {
     };
 }
 
-/// The identification of one axis, in a [`Room`] that is always the same. See the [module](self).
-pub struct Identification<'a> {
+/// The identification of one axis, in a [`Workspace`] that is always the same. See the [module](self).
+pub struct StagedIdentification<'a> {
     pack: Pack<'a>,
     cycles: u8,
     detector: CycleDetector,
@@ -221,7 +222,7 @@ pub struct Identification<'a> {
     stage: Stage,
 }
 
-impl<'a> Identification<'a> {
+impl<'a> StagedIdentification<'a> {
     /// Of samples every `sample_s`, from so many cycles, with a pack.
     #[must_use]
     pub fn new(pack: Pack<'a>, sample_s: f64, cycles: u8) -> Self {
@@ -263,14 +264,14 @@ impl<'a> Identification<'a> {
         self.stage
     }
 
-    /// Whether cycles are complete and wait for [`Identification::advance`].
+    /// Whether cycles are complete and wait for [`StagedIdentification::advance`].
     #[must_use]
     pub fn has_work(&self) -> bool {
         !matches!(self.stage, Stage::Wait | Stage::Collect)
     }
 
     /// Takes a sample of the running test; those that come while there is work tell of the oscillation only.
-    pub fn observe(&mut self, room: &mut Room, sample: &Observed) {
+    pub fn observe(&mut self, room: &mut Workspace, sample: &Observed) {
         let cycle = self
             .detector
             .push(sample.time_s, sample.is_high, sample.output);
@@ -288,7 +289,7 @@ impl<'a> Identification<'a> {
     }
 
     /// New windows from this rise on, the first that of the cycles' input.
-    fn open(&mut self, room: &mut Room, sample: &Observed) {
+    fn open(&mut self, room: &mut Workspace, sample: &Observed) {
         room.coarse.begin(sample.time_s, self.sample_s);
         for edge in self.past.edges() {
             // There are fewer than the window holds.
@@ -305,7 +306,7 @@ impl<'a> Identification<'a> {
 
     fn collect(
         &mut self,
-        room: &mut Room,
+        room: &mut Workspace,
         sample: &Observed,
         rises_now: bool,
         cycle: Option<Cycle>,
@@ -336,7 +337,7 @@ impl<'a> Identification<'a> {
         }
     }
 
-    fn take(&mut self, room: &mut Room, sample: &Observed) {
+    fn take(&mut self, room: &mut Workspace, sample: &Observed) {
         if room.coarse.push_input(sample.time_s, sample.input).is_err() {
             self.stage = Stage::Wait;
         }
@@ -346,7 +347,7 @@ impl<'a> Identification<'a> {
 
     /// One slice of the work; `None` where there is none or more to come. After a refusal another cycle is
     /// waited for.
-    pub fn advance(&mut self, room: &mut Room) -> Option<Result<Identified, Refusal>> {
+    pub fn advance(&mut self, room: &mut Workspace) -> Option<Result<TuningResult, Refusal>> {
         let outcome = match (self.stage, self.last) {
             (Stage::Sign, Some(cycle)) => self.sign(room, &cycle).map(|()| None),
             (Stage::Classify, Some(cycle)) => self.classify(room, &cycle).map(|()| None),
@@ -361,7 +362,7 @@ impl<'a> Identification<'a> {
         Some(outcome)
     }
 
-    fn sign(&mut self, room: &mut Room, cycle: &Cycle) -> Result<(), Refusal> {
+    fn sign(&mut self, room: &mut Workspace, cycle: &Cycle) -> Result<(), Refusal> {
         let signature = Signature::new(&room.fine, cycle).map_err(|_| Refusal::NoSignature)?;
         let noise_sigma = room.fine.noise_sigma();
         room.classifier
@@ -371,16 +372,16 @@ impl<'a> Identification<'a> {
         Ok(())
     }
 
-    fn classify(&mut self, room: &mut Room, cycle: &Cycle) -> Result<(), Refusal> {
+    fn classify(&mut self, room: &mut Workspace, cycle: &Cycle) -> Result<(), Refusal> {
         let Some(read) = room.classifier.advance(&self.pack) else {
             return Ok(());
         };
         let read = read.map_err(|_| Refusal::Unknown(f64::INFINITY))?;
-        if read.verdict == Verdict::Unknown {
+        if read.familiarity == Familiarity::Unknown {
             return Err(Refusal::Unknown(read.score));
         }
         self.score = read.score;
-        let beforehand = Beforehand {
+        let beforehand = PriorKnowledge {
             starts: &read.starts(cycle.period_s),
             prior: ShapePrior::of_pack(&self.pack),
         };
@@ -391,7 +392,7 @@ impl<'a> Identification<'a> {
         Ok(())
     }
 
-    fn refine(&mut self, room: &mut Room) -> Result<(), Refusal> {
+    fn refine(&mut self, room: &mut Workspace) -> Result<(), Refusal> {
         if let Some(refined) = room.refiner.advance(&room.coarse) {
             self.refined = Some(refined.map_err(|_| Refusal::NoFit)?);
             self.stage = Stage::Judge;
@@ -399,10 +400,12 @@ impl<'a> Identification<'a> {
         Ok(())
     }
 
-    fn judge(&mut self, room: &mut Room) -> Result<(), Refusal> {
+    fn judge(&mut self, room: &mut Workspace) -> Result<(), Refusal> {
         let refined = self.refined.ok_or(Refusal::NoFit)?;
         let misfit = misfit(&refined, &room.coarse);
-        if misfit > MOST_MISFIT || refined.response_error > MOST_RESPONSE_ERROR {
+        let table = self.pack.gains_table().ok_or(Refusal::NoGains)?;
+        let most_error = largest_response_error(table.phase_margin_rad());
+        if misfit > MOST_MISFIT || refined.response_error > most_error {
             return Err(Refusal::Misfit(misfit.max(refined.response_error)));
         }
         if let Some(edge) = refined.edge {
@@ -414,8 +417,7 @@ impl<'a> Identification<'a> {
 
     fn gains(&mut self) -> Result<(), Refusal> {
         let refined = self.refined.ok_or(Refusal::NoFit)?;
-        let table =
-            LeadTable::from_bytes(self.pack.lead_table().bytes).map_err(|_| Refusal::NoGains)?;
+        let table = self.pack.gains_table().ok_or(Refusal::NoGains)?;
         let pd = table.pd(&refined.process).map_err(|_| Refusal::NoGains)?;
         self.design = Some(Design {
             pd,
@@ -426,7 +428,7 @@ impl<'a> Identification<'a> {
         Ok(())
     }
 
-    fn design(&mut self, cycle: &Cycle) -> Result<Option<Identified>, Refusal> {
+    fn design(&mut self, cycle: &Cycle) -> Result<Option<TuningResult>, Refusal> {
         let (Some(refined), Some(design)) = (&self.refined, &mut self.design) else {
             return Ok(None);
         };
@@ -450,7 +452,7 @@ impl<'a> Identification<'a> {
         if !is_sure {
             return Err(uncertain(deviations.phase_margin_rad));
         }
-        Ok(Some(Identified {
+        Ok(Some(TuningResult {
             process: refined.process,
             deviations,
             pd: *pd,

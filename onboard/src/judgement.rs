@@ -12,9 +12,10 @@
 
 use core::f64::consts::PI;
 
-use libm::{atan2, exp, hypot, log, sqrt};
+use libm::{atan2, exp, log, sin, sqrt};
 
 use crate::control::Pd;
+use crate::crossover;
 use crate::process::Soiptd;
 use crate::refine::{Refined, coordinate};
 use crate::window::Window;
@@ -22,9 +23,25 @@ use crate::window::Window;
 /// Part of the oscillation that a process of this kind never leaves unexplained.
 pub const MOST_MISFIT: f64 = 0.05;
 
-/// Relative error of the response that turns it by the paper's phase margin of 20 degrees: a model
-/// so wrong promises nothing.
-pub const MOST_RESPONSE_ERROR: f64 = 0.34;
+/// Largest relative error of the response that is accepted at a phase margin of 20 degrees.
+const RESPONSE_ERROR_AT_20_DEGREES: f64 = 0.34;
+
+/// Largest relative error of the response that is accepted at any margin: beyond it the intervals, which are linear
+/// in the error, are off by more than a quarter, `-ln(1 - 0.4) = 0.51`.
+const MOST_RESPONSE_ERROR: f64 = 0.4;
+
+/// Largest relative error of the response with which a controller of this phase margin (rad, 0 to pi) is certainly
+/// stable; a model with a larger error is refused.
+///
+/// At the gain crossover `|L| = 1` and the distance of `L` from -1 is `2 sin(margin/2)`: a relative error below it
+/// cannot take the loop there. At the paper's 20 degrees that is 0.347. The limit used is in proportion to it, 0.34
+/// at 20 degrees (the sine of 20 degrees, 0.342, rounded down), and 0.4 at most: a larger margin must not excuse a
+/// model that is wrong by half.
+#[must_use]
+pub fn largest_response_error(phase_margin_rad: f64) -> f64 {
+    let relative = sin(0.5 * phase_margin_rad) / sin(PI / 18.0);
+    (RESPONSE_ERROR_AT_20_DEGREES * relative).min(MOST_RESPONSE_ERROR)
+}
 
 /// Standard deviations to either side that hold 90 % of a Gaussian; 95 % of it lie above the lower end.
 pub const HALF_90_PERCENT: f64 = 1.645;
@@ -81,8 +98,7 @@ pub(crate) struct Spread {
 impl Spread {
     /// About a process and its controller; `None` where their loop has no gain crossover.
     pub(crate) fn new(process: &Soiptd, pd: &Pd) -> Option<Self> {
-        let start = pd.kd * process.k_over_t_body();
-        let crossover_rad_per_s = gain_crossover(process, pd, start)?;
+        let crossover_rad_per_s = gain_crossover(process, pd)?;
         Some(Self {
             here: followed(process, pd, crossover_rad_per_s),
             slopes: [[0.0; FOLLOWED]; COORDINATES],
@@ -111,7 +127,7 @@ impl Spread {
         let unit = Soiptd::from_pole_sum(1.0, exp(ln_sum), ratio, tau_s).ok()?;
         let gain = process.jerk_gain() * exp(ln_gain) * unit.t_prop_s();
         let beside = unit.with_gain_scaled(gain).ok()?;
-        let crossover = gain_crossover(&beside, pd, self.crossover_rad_per_s)?;
+        let crossover = gain_crossover(&beside, pd)?;
         let there = followed(&beside, pd, crossover);
         for (slope, (there, here)) in self.slopes[index]
             .iter_mut()
@@ -154,44 +170,17 @@ fn followed(process: &Soiptd, pd: &Pd, crossover_rad_per_s: f64) -> [f64; FOLLOW
     ]
 }
 
-/// Frequency (rad/s) where `|(kp + j kd w) G(jw)|`, which falls, is one. Newton's method on
-/// logarithms, halving the bracket where it leaves it.
-fn gain_crossover(process: &Soiptd, pd: &Pd, start_rad_per_s: f64) -> Option<f64> {
-    const MOST_STEPS: u32 = 40;
-    let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
-    let mut x = log(start_rad_per_s.abs());
-    if !x.is_finite() {
-        return None;
-    }
-    for _ in 0..MOST_STEPS {
-        let omega = exp(x);
-        let value = log(hypot(pd.kp, pd.kd * omega) * process.magnitude(omega));
-        if value > 0.0 {
-            low = x;
-        } else {
-            high = x;
-        }
-        let part = |of: f64, rest: f64| of * of / (of * of + rest * rest);
-        let slope = part(pd.kd * omega, pd.kp)
-            - part(omega * process.t_prop_s(), 1.0)
-            - 1.0
-            - part(omega, process.inv_t_body_per_s());
-        let newton = x - (value / slope).clamp(-2.0, 2.0);
-        if (newton - x).abs() < 1e-10 {
-            return Some(exp(newton));
-        }
-        let is_inside = newton > low && newton < high;
-        let next = if is_inside {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
-        if !next.is_finite() {
-            return None;
-        }
-        x = next;
-    }
-    None
+/// Gain crossover of the loop (rad/s); `None` where the magnitude never is one.
+fn gain_crossover(process: &Soiptd, pd: &Pd) -> Option<f64> {
+    let gain = process.k_over_t_body();
+    let omega = crossover::gain_crossover(
+        gain * pd.kp,
+        gain * pd.kd,
+        process.inv_t_body_per_s(),
+        process.t_prop_s(),
+        crossover::power_of_two_cube_root,
+    );
+    (omega > 0.0 && omega.is_finite()).then_some(omega)
 }
 
 #[cfg(test)]
@@ -213,6 +202,18 @@ mod tests {
             let margin = Spread::new(&process, &pd).unwrap().phase_margin_rad();
             assert!((margin.to_degrees() - expected).abs() < 1e-6, "{margin}");
         }
+    }
+
+    // 0.34 sin(5 deg) / sin(10 deg) = 0.34 / (2 cos(5 deg)) = 0.1706. At 20 degrees the limit of the paper's margin,
+    // exactly; 0.34 sin(15 deg) / sin(10 deg) = 0.507 would be a model that is wrong by half.
+    #[test]
+    fn the_limit_of_the_error_follows_the_margin() {
+        let at = |degrees: f64| largest_response_error(degrees.to_radians());
+        assert_eq!(at(20.0), 0.34);
+        assert!((at(10.0) - 0.17 / libm::cos(PI / 36.0)).abs() < 1e-15);
+        assert!(at(10.0) < 0.3 && 0.3 < at(20.0));
+        assert_eq!([at(30.0), at(45.0), at(60.0)], [0.4; 3]);
+        assert_eq!(at(0.0), 0.0);
     }
 
     // A dead time known to a millisecond moves the margin by the crossover times that, a gain by its

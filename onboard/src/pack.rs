@@ -53,6 +53,7 @@ mod forward;
 mod sections;
 
 use crate::floats::Floats;
+use crate::gains::LeadTable;
 use crate::network::{Activation, Dense, Weights};
 use crate::signature::LENGTH;
 
@@ -103,6 +104,7 @@ pub struct Pack<'a> {
     calibration: Floats<'a>,
     prior: Prior,
     lead_table: LeadTableBytes<'a>,
+    gains_table: Option<LeadTable<'a>>,
     self_tests: Floats<'a>,
     card: &'a str,
 }
@@ -163,6 +165,7 @@ impl<'a> Pack<'a> {
         };
 
         let lead_table = lead_table(&mut cursor)?;
+        let gains_table = LeadTable::from_bytes(lead_table.bytes).ok();
 
         cursor.enter(Section::SelfTest);
         let count = cursor.count()?;
@@ -185,6 +188,7 @@ impl<'a> Pack<'a> {
                 calibration,
                 prior,
                 lead_table,
+                gains_table,
                 self_tests,
                 card,
             }),
@@ -275,7 +279,14 @@ impl<'a> Pack<'a> {
         &self.prior
     }
 
-    /// The table of leads.
+    /// The lead table, checked when the pack was read; `None` where its numbers are not those of a table that
+    /// [`LeadTable`] reads. Taking it costs nothing.
+    #[must_use]
+    pub fn gains_table(&self) -> Option<&LeadTable<'a>> {
+        self.gains_table.as_ref()
+    }
+
+    /// The lead table as it lies in the pack.
     #[must_use]
     pub fn lead_table(&self) -> LeadTableBytes<'a> {
         self.lead_table

@@ -33,6 +33,7 @@ pub struct Soiptd {
 
 /// Why a set of parameters is not a process: the offending parameter and its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum SoiptdError {
     /// The gain is zero or not finite.
     Gain(f64),

@@ -121,6 +121,7 @@ pub struct Refined {
 
 /// Why there is no fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RefineError {
     /// Fewer usable bins than unknowns ask for.
     TooFewBins(usize),
@@ -141,12 +142,12 @@ pub fn refine<const BINS: usize, const EDGES: usize>(
     window: &Window<BINS, EDGES>,
     period_s: f64,
 ) -> Result<Refined, RefineError> {
-    refine_with(window, period_s, &Beforehand::default())
+    refine_with(window, period_s, &PriorKnowledge::default())
 }
 
 /// What is known before the fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Beforehand<'a> {
+pub struct PriorKnowledge<'a> {
     /// Shapes to start from, beside those that the oscillation itself suggests: the first [`GIVEN`].
     pub starts: &'a [Shape],
     /// How likely shapes are.
@@ -160,7 +161,7 @@ pub struct Beforehand<'a> {
 pub fn refine_with<const BINS: usize, const EDGES: usize>(
     window: &Window<BINS, EDGES>,
     period_s: f64,
-    beforehand: &Beforehand<'_>,
+    beforehand: &PriorKnowledge<'_>,
 ) -> Result<Refined, RefineError> {
     let mut refiner = Refiner::new();
     refiner.begin(window, period_s, beforehand)?;
@@ -183,7 +184,7 @@ pub fn residuals<const BINS: usize, const EDGES: usize>(
     residuals: &mut [f64; BINS],
 ) -> Result<usize, RefineError> {
     let mut refiner = Refiner::new();
-    refiner.begin(window, period_s, &Beforehand::default())?;
+    refiner.begin(window, period_s, &PriorKnowledge::default())?;
     refiner.residuals(window, &shape_of(process, period_s), residuals)?;
     Ok(window.bins().len())
 }

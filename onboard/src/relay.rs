@@ -45,6 +45,7 @@ const TRIM_LOST: f32 = 4.0;
 
 /// What the relay is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum RelayPhase {
     /// Output zero, noise being measured.
     Preroll,

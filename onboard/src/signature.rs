@@ -66,6 +66,7 @@ pub struct Signature {
 
 /// Why a cycle has no signature.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum SignatureError {
     /// The period is not a positive, finite time.
     Period(f64),

@@ -23,7 +23,7 @@ mod settings;
 use ::core::ops::{Deref, DerefMut};
 
 use crate::control::Measurement;
-use crate::identification::Room;
+use crate::identification::Workspace;
 use crate::pack::Pack;
 
 pub use self::core::Core;
@@ -32,7 +32,7 @@ pub use crate::take_off::TakeOffSettings;
 
 /// What a tuner is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Phase {
+pub enum TunerPhase {
     /// Nothing yet: the safe controller.
     Idle,
     /// Lifting the vehicle from the ground.
@@ -47,7 +47,7 @@ pub enum Phase {
     Aborted,
 }
 
-impl Phase {
+impl TunerPhase {
     /// Its name, for logs.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -65,7 +65,7 @@ impl Phase {
 /// The tuner of one axis. See the [module](self).
 pub struct Tuner<'a> {
     core: Core<'a>,
-    room: Room,
+    room: Workspace,
 }
 
 impl Tuner<'static> {
@@ -87,7 +87,7 @@ impl<'a> Tuner<'a> {
     pub fn with_pack(settings: &TunerSettings, pack: Pack<'a>) -> Result<Self, TunerError> {
         Ok(Self {
             core: Core::of(&settings.checked()?, pack),
-            room: Room::NEW,
+            room: Workspace::NEW,
         })
     }
 

@@ -41,6 +41,7 @@ impl Bin {
 
 /// Why a window could not be filled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum WindowError {
     /// More edges of the input than the window holds.
     TooManyEdges(usize),

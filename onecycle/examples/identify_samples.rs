@@ -8,10 +8,8 @@
 use std::error::Error;
 
 use onecycle::{
-    Experiment, Identify, Parameter, Recording, Relay, RelaySettings, Sensor, Soiptd, Trace,
+    Experiment, Identify, Noise, Parameter, Recording, Relay, RelaySettings, Sensor, Soiptd, Trace,
 };
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
 
 /// Time between samples (s).
 const SAMPLE_S: f64 = 0.001;
@@ -63,18 +61,13 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// Eight seconds under the relay that also flies.
 fn relay_test(process: &Soiptd) -> Result<Trace, Box<dyn Error>> {
-    let experiment = Experiment {
-        input_bias: 0.2 * f64::from(AMPLITUDE),
-        sensor: Sensor {
-            noise_sigma: NOISE_SIGMA,
-            ..Sensor::default()
-        },
-        ..Experiment::new(*process, SAMPLE_S, 8.0)
-    };
+    let experiment = Experiment::new(*process, SAMPLE_S, 8.0)
+        .with_input_bias(0.2 * f64::from(AMPLITUDE))
+        .with_sensor(Sensor::noisy(NOISE_SIGMA));
     let mut relay = Relay::new(RelaySettings {
         noise_sigma: NOISE_SIGMA as f32,
         trim_gain: RelaySettings::TRIM_GAIN,
         ..RelaySettings::new(AMPLITUDE, RelaySettings::DISTINGUISHING_BETA)
     })?;
-    Ok(experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(1)))
+    Ok(experiment.run(&mut relay, &mut Noise::from_seed(1)))
 }

@@ -11,10 +11,8 @@ use std::error::Error;
 use onecycle::{Pd, RelaySettings, Sensor, Soiptd};
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::Limits;
-use onecycle_onboard::tuner::{Phase, Tuner, TunerSettings};
-use onecycle_plant::FixedStepProcess;
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use onecycle_onboard::tuner::{Tuner, TunerPhase, TunerSettings};
+use onecycle_plant::{FixedStepProcess, Noise};
 
 /// Time between ticks (s).
 const TICK_S: f64 = 0.001;
@@ -43,7 +41,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             println!("{:6.3} s  {}", f64::from(tick) * TICK_S, phase.name());
         }
         // The output is the safe controller's since this very tick; a pilot lands and reads why.
-        if let (Phase::Aborted, Some(reason)) = (phase, tuner.reason()) {
+        if let (TunerPhase::Aborted, Some(reason)) = (phase, tuner.reason()) {
             return Err(reason.to_string().into());
         }
     }
@@ -115,18 +113,15 @@ fn truth() -> Result<Soiptd, onecycle::SoiptdError> {
 struct Axis {
     process: FixedStepProcess,
     sensor: Sensor,
-    noise: Pcg64Mcg,
+    noise: Noise,
 }
 
 impl Axis {
     fn new() -> Result<Self, onecycle::SoiptdError> {
         Ok(Self {
             process: FixedStepProcess::new(&truth()?, TICK_S),
-            sensor: Sensor {
-                noise_sigma: NOISE_SIGMA,
-                ..Sensor::default()
-            },
-            noise: Pcg64Mcg::seed_from_u64(1),
+            sensor: Sensor::noisy(NOISE_SIGMA),
+            noise: Noise::from_seed(1),
         })
     }
 

@@ -2,8 +2,8 @@
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
+use onecycle_plant::Noise;
 use onecycle_plant::multirotor::{Command, Flight, Vec3, Vehicle, Wind};
-use rand_pcg::Pcg64;
 
 const STEPS: usize = 20_000;
 
@@ -26,9 +26,9 @@ fn hovering() -> (Flight, Command) {
 #[divan::bench]
 fn step(bencher: Bencher) {
     bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
-        let ((mut flight, command), mut rng) = (hovering(), Pcg64::new(1, 1));
+        let ((mut flight, command), mut noise) = (hovering(), Noise::from_seed(1));
         for _ in 0..STEPS {
-            flight.step(black_box(command), 1e-3, &mut rng);
+            flight.step(black_box(command), 1e-3, &mut noise);
         }
         flight.state().position_m.z
     });
@@ -38,16 +38,13 @@ fn step(bencher: Bencher) {
 #[divan::bench]
 fn step_in_gusts_and_sense(bencher: Bencher) {
     bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
-        let ((mut flight, command), mut rng) = (hovering(), Pcg64::new(1, 1));
-        let gusts = Wind {
-            gust_sigma_m_per_s: Vec3::new(1.0, 1.0, 0.5),
-            ..Wind::CALM
-        };
+        let ((mut flight, command), mut noise) = (hovering(), Noise::from_seed(1));
+        let gusts = Wind::CALM.with_gusts(Vec3::new(1.0, 1.0, 0.5), 1.0);
         flight.set_wind(gusts).expect("in range");
         let mut sum = 0.0;
         for _ in 0..STEPS {
-            flight.step(black_box(command), 1e-3, &mut rng);
-            sum += flight.sense(&mut rng).position_m.z;
+            flight.step(black_box(command), 1e-3, &mut noise);
+            sum += flight.sense(&mut noise).position_m.z;
         }
         sum
     });
@@ -57,9 +54,9 @@ fn step_in_gusts_and_sense(bencher: Bencher) {
 #[divan::bench]
 fn step_on_the_ground(bencher: Bencher) {
     bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
-        let (mut flight, mut rng) = (Flight::standing(Vehicle::quadrotor()), Pcg64::new(1, 1));
+        let (mut flight, mut noise) = (Flight::standing(Vehicle::quadrotor()), Noise::from_seed(1));
         for _ in 0..STEPS {
-            flight.step(black_box(Command::default()), 1e-3, &mut rng);
+            flight.step(black_box(Command::default()), 1e-3, &mut noise);
         }
         flight.state().position_m.z
     });

@@ -6,8 +6,7 @@ use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::refine::refine;
 use onecycle_onboard::window::Window;
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Experiment, Sensor, Trace};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Experiment, Noise, Sensor, Trace};
 
 const SAMPLE_S: f64 = 1e-3;
 /// Of the amplitude of the hover process's limit cycle, 0.003: one per cent.
@@ -29,15 +28,10 @@ fn relay() -> Relay {
 /// Ten seconds of the paper's hover process under the relay.
 fn experiment() -> Trace {
     let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).expect("the times are positive");
-    let experiment = Experiment {
-        sensor: Sensor {
-            noise_sigma: NOISE_SIGMA,
-            quantum: 0.0,
-        },
-        input_bias: 0.1,
-        ..Experiment::new(process, SAMPLE_S, 10.0)
-    };
-    experiment.run(&mut relay(), &mut Pcg64::new(1, 1))
+    let experiment = Experiment::new(process, SAMPLE_S, 10.0)
+        .with_sensor(Sensor::noisy(NOISE_SIGMA))
+        .with_input_bias(0.1);
+    experiment.run(&mut relay(), &mut Noise::from_seed(1))
 }
 
 /// The last cycles of the experiment, two periods of input before them, and their period.

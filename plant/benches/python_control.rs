@@ -11,8 +11,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Experiment, SampledPd};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Experiment, Noise, SampledPd};
 
 /// Runs of each, in turn.
 const ROUNDS: usize = 3;
@@ -111,18 +110,19 @@ fn onecycle() -> Result<Measured, Box<dyn Error>> {
     let mut relay = Relay::new(RelaySettings::bare(1.0, RelaySettings::DISTINGUISHING_BETA))?;
     let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
     let begin = Instant::now();
-    experiment.observe(&mut relay, &mut Pcg64::new(0, 0), |time_s, _, output, _| {
-        if (8.0..9.0).contains(&time_s) {
-            lowest = lowest.min(output);
-            highest = highest.max(output);
-        }
-    });
+    experiment.observe(
+        &mut relay,
+        &mut Noise::from_seed(0),
+        |time_s, _, output, _| {
+            if (8.0..9.0).contains(&time_s) {
+                lowest = lowest.min(output);
+                highest = highest.max(output);
+            }
+        },
+    );
     let relay_steps_per_s = STEPS as f64 / begin.elapsed().as_secs_f64();
 
-    let experiment = Experiment {
-        reference: 1.0,
-        ..experiment
-    };
+    let experiment = experiment.with_reference(1.0);
     let mut controller = SampledPd(Pd {
         kp: 192.918,
         kd: 29.523,
@@ -130,13 +130,17 @@ fn onecycle() -> Result<Measured, Box<dyn Error>> {
     let mut sample = 0_usize;
     let (mut pd_output, mut sum) = (0.0, 0.0);
     let begin = Instant::now();
-    experiment.observe(&mut controller, &mut Pcg64::new(0, 0), |_, _, output, _| {
-        if sample == 300 {
-            pd_output = output;
-        }
-        sample += 1;
-        sum += output;
-    });
+    experiment.observe(
+        &mut controller,
+        &mut Noise::from_seed(0),
+        |_, _, output, _| {
+            if sample == 300 {
+                pd_output = output;
+            }
+            sample += 1;
+            sum += output;
+        },
+    );
     black_box(sum);
     Ok(Measured {
         relay_steps_per_s,

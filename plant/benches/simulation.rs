@@ -3,8 +3,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Experiment, FixedStepProcess, Sensor, VariableStepProcess};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Experiment, FixedStepProcess, Noise, Sensor, VariableStepProcess};
 
 const STEPS: usize = 1_000_000;
 const SAMPLE_S: f64 = 1e-3;
@@ -58,18 +57,13 @@ fn variable_step_process(bencher: Bencher) {
 /// Relay, process, observer; with noise on the sensor or without.
 #[divan::bench(args = [0.0, NOISE_SIGMA])]
 fn relay_experiment(bencher: Bencher, noise_sigma: f64) {
-    let experiment = Experiment {
-        sensor: Sensor {
-            noise_sigma,
-            quantum: 0.0,
-        },
-        ..Experiment::new(hover(), SAMPLE_S, STEPS as f64 * SAMPLE_S)
-    };
+    let experiment = Experiment::new(hover(), SAMPLE_S, STEPS as f64 * SAMPLE_S)
+        .with_sensor(Sensor::noisy(noise_sigma));
     bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
         let mut sum = 0.0;
         experiment.observe(
             &mut relay(),
-            &mut Pcg64::new(1, 1),
+            &mut Noise::from_seed(1),
             |_, input, output, _| {
                 sum += input * output;
             },

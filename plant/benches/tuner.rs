@@ -10,7 +10,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use onecycle_onboard::control::Measurement;
-use onecycle_onboard::tuner::{Phase, Tuner, TunerSettings};
+use onecycle_onboard::tuner::{Tuner, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 use onecycle_plant::FixedStepProcess;
 
@@ -45,12 +45,12 @@ fn flight(slices: u16) -> Vec<Tick> {
         }
         let measurement = Measurement::of(axis.output() as f32).with_rate(axis.rate() as f32);
         let name = match tuner.phase() {
-            Phase::Idle => "safe",
-            Phase::Relay => "relay",
-            Phase::Identify => "identify",
-            Phase::Control if tuner.is_proven() => "control",
-            Phase::Control => "control, checked",
-            Phase::TakeOff | Phase::Aborted => "other",
+            TunerPhase::Idle => "safe",
+            TunerPhase::Relay => "relay",
+            TunerPhase::Identify => "identify",
+            TunerPhase::Control if tuner.is_proven() => "control",
+            TunerPhase::Control => "control, checked",
+            TunerPhase::TakeOff | TunerPhase::Aborted => "other",
         };
         let begin = Instant::now();
         let output = black_box(tuner.step(

@@ -2,9 +2,8 @@
 
 use onecycle_onboard::relay::Relay;
 use onecycle_onboard::{Pd, Soiptd};
-use rand::{Rng, RngExt};
 
-use crate::{FixedStepProcess, Sensor, Trace, VariableStepProcess};
+use crate::{FixedStepProcess, NoiseSource, Sensor, Trace, VariableStepProcess};
 
 /// What a controller sees at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,6 +48,7 @@ impl Controller for SampledPd {
 
 /// The process and its surroundings. Start from [`Experiment::new`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Experiment {
     /// The process.
     pub process: Soiptd,
@@ -85,6 +85,39 @@ impl Experiment {
         }
     }
 
+    /// The same experiment at this reference (output unit).
+    #[must_use]
+    pub fn with_reference(self, reference: f64) -> Self {
+        Self { reference, ..self }
+    }
+
+    /// The same experiment with this constant added to the input (input unit).
+    #[must_use]
+    pub fn with_input_bias(self, input_bias: f64) -> Self {
+        Self { input_bias, ..self }
+    }
+
+    /// The same experiment with this sensor.
+    #[must_use]
+    pub fn with_sensor(self, sensor: Sensor) -> Self {
+        Self { sensor, ..self }
+    }
+
+    /// The same experiment with this jitter of the sample period, a fraction of it.
+    #[must_use]
+    pub fn with_jitter(self, jitter: f64) -> Self {
+        Self { jitter, ..self }
+    }
+
+    /// The same experiment from this output (output unit).
+    #[must_use]
+    pub fn with_initial_output(self, initial_output: f64) -> Self {
+        Self {
+            initial_output,
+            ..self
+        }
+    }
+
     /// Number of samples in the duration.
     #[must_use]
     pub fn samples(&self) -> usize {
@@ -93,9 +126,9 @@ impl Experiment {
 
     /// Runs the experiment and keeps every sample.
     #[must_use]
-    pub fn run(&self, controller: &mut impl Controller, rng: &mut impl Rng) -> Trace {
+    pub fn run(&self, controller: &mut impl Controller, noise: &mut impl NoiseSource) -> Trace {
         let mut trace = Trace::with_capacity(self.samples());
-        self.observe(controller, rng, |time_s, input, output, true_output| {
+        self.observe(controller, noise, |time_s, input, output, true_output| {
             trace.push(time_s, input, output, true_output);
         });
         trace
@@ -106,18 +139,18 @@ impl Experiment {
     pub fn observe(
         &self,
         controller: &mut impl Controller,
-        rng: &mut impl Rng,
+        noise: &mut impl NoiseSource,
         mut observer: impl FnMut(f64, f64, f64, f64),
     ) {
         if self.jitter > 0.0 {
-            return self.observe_jittered(controller, rng, observer);
+            return self.observe_jittered(controller, noise, observer);
         }
         let mut process = FixedStepProcess::new(&self.process, self.sample_s);
         process.displace(self.initial_output, 0.0);
         for sample in 0..self.samples() {
             let output = process.output();
             let sensed = Sensed {
-                output: self.sensor.read(output, rng),
+                output: self.sensor.read(output, noise),
                 rate: process.rate(),
             };
             let input = controller.step(self.sample_s, self.reference, sensed);
@@ -129,7 +162,7 @@ impl Experiment {
     fn observe_jittered(
         &self,
         controller: &mut impl Controller,
-        rng: &mut impl Rng,
+        noise: &mut impl NoiseSource,
         mut observer: impl FnMut(f64, f64, f64, f64),
     ) {
         let mut process = VariableStepProcess::new(&self.process);
@@ -138,13 +171,13 @@ impl Experiment {
         for _ in 0..self.samples() {
             let output = process.output();
             let sensed = Sensed {
-                output: self.sensor.read(output, rng),
+                output: self.sensor.read(output, noise),
                 rate: process.rate(),
             };
             let input = controller.step(dt_s, self.reference, sensed);
             observer(time_s, input, sensed.output, output);
-            let normal: f64 = rng.sample(rand_distr::StandardNormal);
-            dt_s = self.sample_s * (1.0 + self.jitter * normal).clamp(0.1, 1.9);
+            let relative = 1.0 + self.jitter * noise.standard_normal();
+            dt_s = self.sample_s * relative.clamp(0.1, 1.9);
             process.advance(input + self.input_bias, dt_s);
             time_s += dt_s;
         }

@@ -8,15 +8,15 @@
 //!
 //! ```
 //! use onecycle_plant::multirotor::{Axis, Command, Flight, Vehicle};
-//! use rand_pcg::Pcg64;
+//! use onecycle_plant::Noise;
 //!
 //! let vehicle = Vehicle::quadrotor();
-//! let (mut flight, mut rng) = (Flight::standing(vehicle), Pcg64::new(1, 1));
+//! let (mut flight, mut noise) = (Flight::standing(vehicle), Noise::from_seed(1));
 //! for _ in 0..500 {
-//!     flight.step(Command { thrust: 0.6, ..Command::default() }, 2e-3, &mut rng);
+//!     flight.step(Command { thrust: 0.6, ..Command::default() }, 2e-3, &mut noise);
 //! }
 //! // Up and away after a second at more than the thrust of hover.
-//! assert!(flight.sense(&mut rng).position_m.z > 0.5);
+//! assert!(flight.sense(&mut noise).position_m.z > 0.5);
 //! // The paper's T_body of altitude, 1.6886 s.
 //! let altitude = vehicle.linearised(Axis::Altitude)?;
 //! assert!((1.0 / altitude.inv_t_body_per_s() - 1.6886).abs() < 0.005);
@@ -41,7 +41,7 @@ pub mod wind;
 
 pub use battery::Battery;
 pub use body::{Body, GRAVITY_M_PER_S2};
-pub use dynamics::State;
+pub use dynamics::VehicleState;
 pub use error::VehicleError;
 pub use flight::Flight;
 pub use frames::{Attitude, Vec3};
@@ -49,8 +49,8 @@ pub use ground::Legs;
 pub use hover::{Axis, Hover};
 pub use mission::{Flown, Mission, fly};
 pub use mixer::Command;
-pub use pilot::{MissionError, Pilot, Record, Tuned};
+pub use pilot::{FlightRecord, MissionError, Pilot, Tuned};
 pub use rotor::Rotors;
-pub use sensors::{Channel, Reading, Sensors};
+pub use sensors::{Channel, SensorReading, Sensors};
 pub use vehicle::{Parts, Vehicle};
 pub use wind::{Nudge, Wind};

@@ -1,10 +1,10 @@
 //! What the sensor makes of the output: white noise, then rounding to its quantum.
 
-use rand::Rng;
-use rand_distr::{Distribution, StandardNormal};
+use crate::noise::NoiseSource;
 
 /// A sensor; the default one is perfect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct Sensor {
     /// Standard deviation of white noise at the samples (output unit).
     pub noise_sigma: f64,
@@ -13,13 +13,27 @@ pub struct Sensor {
 }
 
 impl Sensor {
-    /// The reading of `output`, with noise drawn from `rng`.
+    /// A sensor with white noise of this standard deviation (output unit) and unlimited resolution.
+    #[must_use]
+    pub fn noisy(noise_sigma: f64) -> Self {
+        Self {
+            noise_sigma,
+            quantum: 0.0,
+        }
+    }
+
+    /// The same sensor with this resolution (output unit).
+    #[must_use]
+    pub fn with_quantum(self, quantum: f64) -> Self {
+        Self { quantum, ..self }
+    }
+
+    /// The reading of `output`; takes a number from `noise` only where the sensor is noisy.
     #[inline]
-    pub fn read<R: Rng + ?Sized>(&self, output: f64, rng: &mut R) -> f64 {
+    pub fn read(&self, output: f64, noise: &mut impl NoiseSource) -> f64 {
         let mut reading = output;
         if self.noise_sigma > 0.0 {
-            let noise: f64 = StandardNormal.sample(rng);
-            reading += self.noise_sigma * noise;
+            reading += self.noise_sigma * noise.standard_normal();
         }
         if self.quantum > 0.0 {
             reading = (reading / self.quantum).round() * self.quantum;

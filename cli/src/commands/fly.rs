@@ -8,11 +8,9 @@ use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::evaluate::{Cycles, CyclesError};
 use onecycle_lab::judge::flights::{judged, trace};
 use onecycle_lab::paper::grid::Pieces;
-use onecycle_onboard::tuner::Phase;
+use onecycle_onboard::tuner::TunerPhase;
 use onecycle_plant::multirotor::pilot::TICK_S;
-use onecycle_plant::multirotor::{Axis, Flown, Mission, Record, Tuned, fly};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, Tuned, fly};
 
 use super::workers::Workers;
 use crate::args::Fly;
@@ -90,7 +88,7 @@ pub(crate) fn run(arguments: &Fly) -> Result<ExitCode, Failure> {
 }
 
 fn one(mission: Mission, seed: u64, is_kept: bool) -> Result<Flight, Failure> {
-    let mut flown = fly(mission, Pcg64Mcg::seed_from_u64(seed)).map_err(Failure::usage)?;
+    let mut flown = fly(mission, seed).map_err(Failure::usage)?;
     let judged = (flown.tuned.iter())
         .map(|tuned| judged(tuned).map(|cost| (*tuned, cost)))
         .collect::<Result<_, _>>()
@@ -112,14 +110,18 @@ fn one(mission: Mission, seed: u64, is_kept: bool) -> Result<Flight, Failure> {
 /// The last cycles of the relay, one by one.
 fn cycles(flown: &Flown) -> Result<Cycles, CyclesError> {
     let index = Axis::Altitude.index();
-    let oscillates =
-        |record: &&Record| matches!(record.phases[index], Phase::Relay | Phase::Identify);
-    let records: Vec<Record> = flown.records.iter().filter(oscillates).copied().collect();
+    let oscillates = |record: &&FlightRecord| {
+        matches!(
+            record.phases[index],
+            TunerPhase::Relay | TunerPhase::Identify
+        )
+    };
+    let records: Vec<FlightRecord> = flown.records.iter().filter(oscillates).copied().collect();
     Cycles::of(&trace(&records, Axis::Altitude), TICK_S, CYCLES)
 }
 
 /// Every tick: what was true, what was measured and commanded, what each tuner was doing.
-fn csv(file: &mut dyn Write, records: &[Record]) -> io::Result<()> {
+fn csv(file: &mut dyn Write, records: &[FlightRecord]) -> io::Result<()> {
     let mut out = io::BufWriter::new(file);
     write!(
         out,

@@ -6,9 +6,7 @@ use std::process::ExitCode;
 
 use onecycle_link::{Column, Columns, Position, Recording, RecordingBuilder, write_csv};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Controller, Experiment, Sensed, Trace};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use onecycle_plant::{Controller, Experiment, Noise, Sensed, Trace};
 
 use crate::args::Simulate;
 use crate::failure::{Failure, exit};
@@ -66,11 +64,11 @@ impl Controller for Reversed {
 }
 
 fn run_relay(experiment: &Experiment, mut relay: Relay, seed: u64) -> Trace {
-    let mut rng = Pcg64Mcg::seed_from_u64(seed);
+    let mut noise = Noise::from_seed(seed);
     if experiment.process.k_over_t_body() > 0.0 {
-        experiment.run(&mut relay, &mut rng)
+        experiment.run(&mut relay, &mut noise)
     } else {
-        experiment.run(&mut Reversed(relay), &mut rng)
+        experiment.run(&mut Reversed(relay), &mut noise)
     }
 }
 

@@ -6,7 +6,7 @@ use onecycle::{Controller, Model, margins};
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::evaluate::{Cycles, PHASE_MARGIN_DEG};
 use onecycle_onboard::judgement::HALF_90_PERCENT;
-use onecycle_plant::multirotor::{Axis, Flown, Mission, Record, Tuned};
+use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, Tuned};
 
 use super::number::percent;
 use super::page::stability::Loop;
@@ -360,7 +360,7 @@ fn cycles_table(cycles: &Cycles) -> String {
 }
 
 fn pictures(mission: Mission, flown: &Flown) -> Vec<Figure> {
-    let series = |name: &str, value: &dyn Fn(&Record) -> f64| {
+    let series = |name: &str, value: &dyn Fn(&FlightRecord) -> f64| {
         let every = flown.records.len().div_ceil(POINTS).max(1);
         let points = flown.records.iter().step_by(every);
         Series::of_points(

@@ -20,14 +20,11 @@
 //! the loop is stable if and only if its unwrapped phase at the gain crossover is above `-pi`.
 
 use num_complex::Complex64;
-use onecycle_onboard::{Pd, Soiptd};
+use onecycle_onboard::{Pd, Soiptd, crossover};
 
 use crate::roots::falling_root;
 
-/// Maximum number of Newton steps. About six are needed.
-const MAX_NEWTON_STEPS: usize = 60;
-
-/// Open loop with a positive proportional gain. For symbols see the [module](self).
+/// A loop with positive proportional gain. See the [module](self) for symbols and units.
 #[derive(Clone, Copy, Debug)]
 pub struct OpenLoop {
     /// `A Kp` (1/s^2).
@@ -86,37 +83,9 @@ impl OpenLoop {
         }
     }
 
-    /// Gain crossover (rad/s): `|D|^2 = |C|^2` is a cubic in `x = w^2` with one positive root,
-    ///
-    /// `T_prop^2 x^3 + (1 + (T_prop/T_body)^2) x^2 - (kd^2 - 1/T_body^2) x - kp^2 = 0`.
-    ///
-    /// The cubic is convex for positive `x`, so Newton's method converges monotonically from an upper bound of the
-    /// root.
-    #[must_use]
+    /// Gain crossover (rad/s), as on board: see [`onecycle_onboard::crossover`].
     pub fn gain_crossover(&self) -> f64 {
-        let c3 = self.lag_s * self.lag_s;
-        let c2 = 1.0 + (self.lag_s * self.damping).powi(2);
-        let c1 = (self.kd - self.damping) * (self.kd + self.damping);
-        let c0 = self.kp * self.kp;
-        // Two upper bounds: the root without the cubic term and a bound without the quadratic term.
-        let discriminant = (c1 * c1 + 4.0 * c2 * c0).sqrt();
-        let without_cubic = if c1 > 0.0 {
-            (discriminant + c1) / (2.0 * c2)
-        } else {
-            2.0 * c0 / (discriminant - c1)
-        };
-        let without_quadratic = (c1.max(0.0) / c3).sqrt() + (c0 / c3).cbrt();
-        let mut x = without_cubic.min(without_quadratic);
-        for _ in 0..MAX_NEWTON_STEPS {
-            let value = ((c3 * x + c2) * x - c1) * x - c0;
-            let slope = (3.0 * c3 * x + 2.0 * c2) * x - c1;
-            let next = x - value / slope;
-            if next >= x || next.is_nan() {
-                break;
-            }
-            x = next;
-        }
-        x.sqrt()
+        crossover::gain_crossover(self.kp, self.kd, self.damping, self.lag_s, f64::cbrt)
     }
 
     /// `pi` plus the unwrapped phase of `L(jw)` (rad) at `omega` (rad/s). At the gain crossover this is the phase

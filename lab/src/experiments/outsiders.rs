@@ -30,12 +30,12 @@ pub mod plant;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Controller, Sensed, Sensor, Trace};
+use onecycle_plant::{Controller, NoiseSource, Sensed, Sensor, Trace};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use self::plant::{Plant, Scale};
-use crate::experiments::Recipe;
+use crate::experiments::{DrawnNoise, Recipe};
 use crate::learn::dataset::{ExampleError, PREROLL_SAMPLES};
 use crate::space::limit_cycle::symmetric;
 
@@ -296,7 +296,13 @@ impl Defect {
     }
 
     /// What the sensor makes of the output at this time.
-    fn sense(&self, output: f64, time_s: f64, sensor: &Sensor, rng: &mut impl Rng) -> f64 {
+    fn sense(
+        &self,
+        output: f64,
+        time_s: f64,
+        sensor: &Sensor,
+        noise: &mut impl NoiseSource,
+    ) -> f64 {
         match *self {
             Self::Tone {
                 amplitude,
@@ -304,10 +310,10 @@ impl Defect {
                 phase_rad,
             } if time_s >= 0.0 => {
                 let tone = amplitude * (rad_per_s * time_s + phase_rad).sin();
-                sensor.read(output + tone, rng)
+                sensor.read(output + tone, noise)
             }
-            Self::Clipping { limit } => sensor.read(output, rng).clamp(-limit, limit),
-            _ => sensor.read(output, rng),
+            Self::Clipping { limit } => sensor.read(output, noise).clamp(-limit, limit),
+            _ => sensor.read(output, noise),
         }
     }
 }
@@ -385,6 +391,7 @@ impl Case {
     /// Where the relay's settings are out of range.
     pub fn run(&self) -> Result<Trace, ExampleError> {
         let mut rng = self.rng.clone();
+        let mut noise = DrawnNoise(&mut rng);
         let sample_s = self.sample_s;
         let mut settings = RelaySettings::new(1.0, self.beta as f32);
         let mut preroll_s = PREROLL_SAMPLES * sample_s;
@@ -398,10 +405,7 @@ impl Case {
             settings.trim_gain = RelaySettings::TRIM_GAIN;
         }
         let mut relay = Relay::new(settings)?;
-        let sensor = Sensor {
-            noise_sigma: self.sigma,
-            quantum: 0.0,
-        };
+        let sensor = Sensor::noisy(self.sigma);
         let mut plant = Plant::new(&self.process, &self.defect, self.scale, sample_s);
         let samples = ((preroll_s + PERIODS * self.scale.period_s) / sample_s).round() as usize;
         let mut trace = Trace::with_capacity(samples);
@@ -409,7 +413,7 @@ impl Case {
             let time_s = sample as f64 * sample_s;
             let output = plant.output();
             let since_s = time_s - preroll_s;
-            let seen = self.defect.sense(output, since_s, &sensor, &mut rng);
+            let seen = self.defect.sense(output, since_s, &sensor, &mut noise);
             let sensed = Sensed {
                 output: seen,
                 rate: plant.rate(),

@@ -9,7 +9,7 @@ use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
 use onecycle_onboard::process::{Soiptd, SoiptdError};
 use onecycle_onboard::refine::{Refined, coordinate};
 use onecycle_onboard::relay::{Relay, RelayError, RelaySettings};
-use onecycle_plant::{Experiment, Trace};
+use onecycle_plant::{Experiment, Noise, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -289,8 +289,7 @@ impl Campaign {
         experiment.sensor.noise_sigma = case.sigma;
         experiment.initial_output = self.offset * case.amplitude;
         // The noise has a stream of its own: cases differ in it, not in their draws.
-        let mut rng = Pcg64Mcg::seed_from_u64(!case.seed);
-        let trace = experiment.run(&mut relay, &mut rng);
+        let trace = experiment.run(&mut relay, &mut Noise::from_seed(!case.seed));
         Ok((trace, relay))
     }
 }

@@ -1,7 +1,7 @@
 //! What the tuning of a flight was worth: held against the process that the vehicle was at that moment.
 
 use onecycle_plant::Trace;
-use onecycle_plant::multirotor::{Axis, Record, Tuned};
+use onecycle_plant::multirotor::{Axis, FlightRecord, Tuned};
 
 use crate::judge::evaluate::Judge;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
@@ -17,7 +17,7 @@ pub fn judged(tuned: &Tuned) -> Result<Deterioration, OptimumError> {
 
 /// The signals of an axis in flight, as its tuner saw them.
 #[must_use]
-pub fn trace(records: &[Record], axis: Axis) -> Trace {
+pub fn trace(records: &[FlightRecord], axis: Axis) -> Trace {
     let mut trace = Trace::with_capacity(records.len());
     for record in records {
         let index = axis.index();

@@ -1,7 +1,7 @@
 //! What is made of a case: by a network and the score of one cycle, and by the identification of one,
 //! two and eight.
 
-use onecycle_onboard::classify::{Calibration, Classification, OUTPUTS, Verdict, classify};
+use onecycle_onboard::classify::{Calibration, Classification, Familiarity, OUTPUTS, classify};
 use onecycle_onboard::signature::Signature;
 use onecycle_plant::Trace;
 
@@ -32,7 +32,7 @@ pub struct Scored {
     /// The score; one is the limit.
     pub score: f64,
     /// Whether the cycle is of the family.
-    pub verdict: Verdict,
+    pub verdict: Familiarity,
     /// What the controller of the most probable candidate would do.
     pub harm: Harm,
 }
@@ -120,7 +120,7 @@ pub fn scored(case: &Case, trace: &Trace, road: &Road<'_>) -> Option<Scored> {
     let found = seen.classify(&(road.network)(&seen.signature), &road.calibration)?;
     Some(Scored {
         score: found.score,
-        verdict: found.verdict,
+        verdict: found.familiarity,
         harm: Harm::of(case, &found.candidates[0].process),
     })
 }

@@ -44,7 +44,7 @@ use rand_pcg::Pcg64Mcg;
 use crate::judge::campaign::cycles;
 use crate::space::limit_cycle::symmetric;
 
-use crate::experiments::{Recipe, RecipeError};
+use crate::experiments::{DrawnNoise, Recipe, RecipeError};
 pub use onecycle_onboard::pack::VALUES;
 
 /// One experiment: what is seen, and what it is of.
@@ -129,7 +129,7 @@ impl Recipe {
         let mut experiment = Experiment::new(process, sample_s, duration_s);
         experiment.input_bias = bias;
         experiment.sensor.noise_sigma = noise_sigma;
-        let trace = experiment.run(&mut Relay::new(settings)?, &mut rng);
+        let trace = experiment.run(&mut Relay::new(settings)?, &mut DrawnNoise(&mut rng));
         Ok(last_steady_cycle(&trace)
             .and_then(|cycle| signature(&trace, &cycle, sample_s))
             .map(|(signature, period_s)| Example {

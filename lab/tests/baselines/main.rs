@@ -13,9 +13,7 @@ use onecycle_design::soiptd_pd::deterioration::deterioration;
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 use onecycle_lab::judge::baselines::{Rival, RivalError};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Controller, Experiment, Trace};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use onecycle_plant::{Controller, Experiment, Noise, Trace};
 
 const SAMPLE_S: f64 = 1e-3;
 
@@ -42,7 +40,7 @@ fn processes() -> [Soiptd; 4] {
 fn run(process: Soiptd, bias: f64, duration_s: f64, controller: &mut impl Controller) -> Trace {
     let mut experiment = Experiment::new(process, SAMPLE_S, duration_s);
     experiment.input_bias = bias;
-    experiment.run(controller, &mut Pcg64Mcg::seed_from_u64(1))
+    experiment.run(controller, &mut Noise::from_seed(1))
 }
 
 /// The paper's relay, without protection, on a process without noise, for so many of its periods.
@@ -72,5 +70,5 @@ fn run_noisy(
     let mut experiment = Experiment::new(case.process, SAMPLE_S, duration_s);
     experiment.input_bias = case.bias;
     experiment.sensor.noise_sigma = case.sigma;
-    experiment.run(controller, &mut Pcg64Mcg::seed_from_u64(1))
+    experiment.run(controller, &mut Noise::from_seed(1))
 }

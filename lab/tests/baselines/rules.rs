@@ -6,9 +6,7 @@ use onecycle_lab::experiments::signals_of;
 use onecycle_lab::judge::baselines::RivalError;
 use onecycle_lab::judge::baselines::rules::{Rule, calibrated, identify};
 use onecycle_lab::space::Space;
-use onecycle_plant::{Controller, Experiment, Sensed};
-use rand::SeedableRng;
-use rand_pcg::Pcg64Mcg;
+use onecycle_plant::{Controller, Experiment, Noise, Sensed};
 
 use super::{SAMPLE_S, cost, margin, process, processes, relay_test};
 
@@ -46,7 +44,7 @@ fn the_rule_is_the_optimum_at_the_optimum_s_crossover() {
         let periods = (40.0 * t_body_s / period_s).ceil() + 8.0;
         let experiment = Experiment::new(process, sample_s, periods * period_s);
         let mut wave = SquareWave { half, sample: 0 };
-        let trace = experiment.run(&mut wave, &mut Pcg64Mcg::seed_from_u64(1));
+        let trace = experiment.run(&mut wave, &mut Noise::from_seed(1));
         let rule = Rule::FirstHarmonic {
             phase_margin_rad: margin(),
         };

@@ -10,9 +10,9 @@ use core::mem::MaybeUninit;
 
 use onecycle_onboard::control::Measurement;
 use onecycle_onboard::guard::Abort;
-use onecycle_onboard::identification::Room;
+use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::{Core, Phase, TunerError};
+use onecycle_onboard::tuner::{Core, TunerError, TunerPhase};
 
 pub use self::settings::{OnecycleSettings, OnecycleStatus};
 
@@ -27,7 +27,7 @@ const ALIVE: u64 = u64::from_le_bytes(*b"ONECYCLE");
 struct Placed {
     alive: u64,
     core: MaybeUninit<Core<'static>>,
-    room: MaybeUninit<Room>,
+    room: MaybeUninit<Workspace>,
 }
 
 const _: () = assert!(
@@ -163,7 +163,7 @@ impl OnecycleTuner {
         (placed.alive == ALIVE).then(|| unsafe { placed.core.assume_init_ref() })
     }
 
-    fn parts(&mut self) -> Option<(&mut Core<'static>, &mut Room)> {
+    fn parts(&mut self) -> Option<(&mut Core<'static>, &mut Workspace)> {
         let placed = self.placed_mut();
         // SAFETY: as in `core`.
         (placed.alive == ALIVE)
@@ -175,7 +175,9 @@ impl OnecycleTuner {
 ///
 /// # Safety
 /// Null, or what it points to is valid, aligned and nobody else's meanwhile.
-unsafe fn parts_at<'a>(tuner: *mut OnecycleTuner) -> Option<(&'a mut Core<'static>, &'a mut Room)> {
+unsafe fn parts_at<'a>(
+    tuner: *mut OnecycleTuner,
+) -> Option<(&'a mut Core<'static>, &'a mut Workspace)> {
     // SAFETY: the caller's promise.
     unsafe { tuner.as_mut() }.and_then(OnecycleTuner::parts)
 }
@@ -209,7 +211,7 @@ pub unsafe extern "C" fn onecycle_tuner_init(
     match checked.and_then(|checked| Ok((checked, pack?))) {
         Ok((checked, pack)) => {
             placed.core.write(Core::of(&checked, pack));
-            placed.room.write(Room::NEW);
+            placed.room.write(Workspace::NEW);
             placed.alive = ALIVE;
             OnecycleStatus::Ok
         }
@@ -290,12 +292,12 @@ pub unsafe extern "C" fn onecycle_tuner_phase(tuner: *const OnecycleTuner) -> On
     // SAFETY: the caller's promise.
     let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
     tuner.map_or(OnecyclePhase::None, |tuner| match tuner.phase() {
-        Phase::Idle => OnecyclePhase::Idle,
-        Phase::TakeOff => OnecyclePhase::TakeOff,
-        Phase::Relay => OnecyclePhase::Relay,
-        Phase::Identify => OnecyclePhase::Identify,
-        Phase::Control => OnecyclePhase::Control,
-        Phase::Aborted => OnecyclePhase::Aborted,
+        TunerPhase::Idle => OnecyclePhase::Idle,
+        TunerPhase::TakeOff => OnecyclePhase::TakeOff,
+        TunerPhase::Relay => OnecyclePhase::Relay,
+        TunerPhase::Identify => OnecyclePhase::Identify,
+        TunerPhase::Control => OnecyclePhase::Control,
+        TunerPhase::Aborted => OnecyclePhase::Aborted,
     })
 }
 

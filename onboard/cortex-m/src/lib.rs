@@ -19,7 +19,7 @@ use core::hint::black_box;
 use onecycle_onboard::RelaySettings;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::Limits;
-use onecycle_onboard::identification::{Identified, Room};
+use onecycle_onboard::identification::{TuningResult, Workspace};
 use onecycle_onboard::tuner::{Core, TunerSettings};
 
 use crate::axis::{Axis, K_OVER_T_BODY, TICK_S};
@@ -74,7 +74,7 @@ pub fn settings() -> TunerSettings {
 /// the reference.
 pub fn fly(
     tuner: &mut Core<'_>,
-    room: &mut Room,
+    room: &mut Workspace,
     mut lap: impl FnMut() -> u64,
     mut say: impl FnMut(&mut Line),
 ) -> bool {
@@ -123,7 +123,7 @@ pub fn fly(
 #[inline(never)]
 fn step(
     tuner: &mut Core<'_>,
-    room: &mut Room,
+    room: &mut Workspace,
     time_s: f64,
     measurement: &Measurement,
     reference: f32,
@@ -133,7 +133,7 @@ fn step(
 
 /// All that was found, by name.
 #[must_use]
-pub fn numbers(found: &Identified) -> [(&'static str, f64); 17] {
+pub fn numbers(found: &TuningResult) -> [(&'static str, f64); 17] {
     let (process, deviations) = (&found.process, &found.deviations);
     [
         ("k_over_t_body", process.k_over_t_body()),

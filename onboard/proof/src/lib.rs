@@ -36,11 +36,10 @@ use core::ffi::{CStr, c_char};
 use core::ops::RangeInclusive;
 use core::ptr;
 
-use onecycle_onboard::classify::{Classification, Classifier, Verdict};
+use onecycle_onboard::classify::{Classification, Classifier, Familiarity};
 use onecycle_onboard::cycle::{Cycle, CycleDetector, SteadyRun};
-use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::refine::{Beforehand, Refined, Refiner, ShapePrior};
+use onecycle_onboard::refine::{PriorKnowledge, Refined, Refiner, ShapePrior};
 use onecycle_onboard::signature::Signature;
 use onecycle_onboard::transition::State;
 use onecycle_onboard::window::{Edge, Window};
@@ -153,13 +152,12 @@ fn identify() -> Result<Found, &'static CStr> {
     let pack = Pack::embedded().map_err(|_| c"there is no pack")?;
     let test = measure(&mut coarse)?;
     let read = read(&test, &pack)?;
-    let beforehand = Beforehand {
+    let beforehand = PriorKnowledge {
         starts: &read.starts(test.period_s),
         prior: ShapePrior::of_pack(&pack),
     };
     let refined = refine(&coarse, test.period_s, &beforehand)?;
-    let table = LeadTable::from_bytes(pack.lead_table().bytes)
-        .map_err(|_| c"there is no table of leads")?;
+    let table = pack.gains_table().ok_or(c"the pack has no lead table")?;
     let gains = table
         .pd_at_phase_margin(&refined.process)
         .map_err(|_| c"the table has no gains")?;
@@ -215,7 +213,7 @@ fn read(test: &Test, pack: &Pack<'_>) -> Result<Classification, &'static CStr> {
 fn refine(
     window: &Window<BINS, EDGES>,
     period_s: f64,
-    beforehand: &Beforehand<'_>,
+    beforehand: &PriorKnowledge<'_>,
 ) -> Result<Refined, &'static CStr> {
     let mut refiner = Refiner::new();
     refiner
@@ -293,7 +291,7 @@ fn judge(found: &Found) -> Result<(), &'static CStr> {
         c"the amplitude is not the predicted one",
     )?;
     check(
-        found.read.verdict == Verdict::Known,
+        found.read.familiarity == Familiarity::Known,
         c"the pack does not know the cycle",
     )?;
     // The gain read is for a relay of amplitude one.

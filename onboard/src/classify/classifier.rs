@@ -3,8 +3,8 @@
 use libm::{exp, hypot, sqrt};
 
 use super::{
-    CANDIDATES, Calibration, Candidate, Classification, ClassifyError, OUTPUTS, Posterior, Verdict,
-    process_of,
+    CANDIDATES, Calibration, CandidateProcess, Classification, ClassifyError, CyclePosterior,
+    Familiarity, OUTPUTS, process_of,
 };
 use crate::fit_score::{Cycle, Doubt, Statistic};
 use crate::pack::{Forward, Pack, VALUES};
@@ -48,9 +48,9 @@ enum Stage {
     /// What its outputs say.
     Posterior,
     /// Processes along the posterior's longest axis.
-    Candidates(Posterior),
+    Candidates(CyclePosterior),
     /// How well its mean explains the cycle.
-    Score(Posterior, [Candidate; CANDIDATES]),
+    Score(CyclePosterior, [CandidateProcess; CANDIDATES]),
 }
 
 impl Default for Classifier {
@@ -173,19 +173,19 @@ impl Classifier {
                     posterior,
                     candidates,
                     score,
-                    verdict: if score <= 1.0 {
-                        Verdict::Known
+                    familiarity: if score <= 1.0 {
+                        Familiarity::Known
                     } else {
-                        Verdict::Unknown
+                        Familiarity::Unknown
                     },
                 }))
             }
         }
     }
 
-    fn posterior(&self) -> Posterior {
+    fn posterior(&self) -> CyclePosterior {
         let calibration = &self.calibration;
-        let mut posterior = Posterior::from_outputs(&self.outputs, &calibration.scale);
+        let mut posterior = CyclePosterior::from_outputs(&self.outputs, &calibration.scale);
         for (row, temperature) in posterior.root.iter_mut().zip(calibration.temperature) {
             row.iter_mut().for_each(|value| *value *= temperature);
         }
@@ -196,17 +196,20 @@ impl Classifier {
         posterior
     }
 
-    fn candidates(&self, posterior: &Posterior) -> Result<[Candidate; CANDIDATES], SoiptdError> {
+    fn candidates(
+        &self,
+        posterior: &CyclePosterior,
+    ) -> Result<[CandidateProcess; CANDIDATES], SoiptdError> {
         let axis = posterior.longest_axis(&self.calibration.scale);
         let at = |deviations: f64| -> [f64; VALUES] {
             core::array::from_fn(|k| posterior.mean[k] + deviations * axis[k])
         };
-        let mut candidates = [Candidate {
+        let mut candidates = [CandidateProcess {
             process: process_of(&posterior.mean, &self.signature, self.period_s)?,
             probability: NODES[0].1,
         }; CANDIDATES];
         for (candidate, (deviations, probability)) in candidates.iter_mut().zip(NODES).skip(1) {
-            *candidate = Candidate {
+            *candidate = CandidateProcess {
                 process: process_of(&at(deviations), &self.signature, self.period_s)?,
                 probability,
             };
@@ -224,7 +227,7 @@ impl Classifier {
     }
 
     /// What the score asks about.
-    fn cycle(&self, posterior: &Posterior) -> Cycle {
+    fn cycle(&self, posterior: &CyclePosterior) -> Cycle {
         let (calibration, noise, samples) = (&self.calibration, self.noise(), self.samples());
         Cycle {
             parts: core::array::from_fn(|part| f64::from(self.signature.values[part])),

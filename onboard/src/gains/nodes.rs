@@ -46,6 +46,7 @@ pub struct Nodes {
 
 /// Why numbers are not a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum LeadTableError {
     /// There are too few numbers, or too many.
     Length {

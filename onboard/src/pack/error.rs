@@ -6,6 +6,7 @@ use super::{HEADER, MOST_LAYERS, OUTPUTS, VERSION, WIDEST};
 
 /// A part of a pack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum Section {
     /// Layers of the network.
     Network,
@@ -45,6 +46,7 @@ impl fmt::Display for Section {
 
 /// What is wrong with the bytes of a pack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum PackError {
     /// There are none.
     Empty,

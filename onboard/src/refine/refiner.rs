@@ -11,14 +11,14 @@ use super::linear_fit::{Bench, Jacobian, LinearFit, PARTS};
 use super::problem::Problem;
 use super::search::{MOST_STEPS, MOST_TRIALS, Next, SEARCHED, Search};
 use super::uncertainty::Uncertainty;
-use super::{ALL, Beforehand, GIVEN, LINEAR, RefineError, Refined, SHAPE};
+use super::{ALL, GIVEN, LINEAR, PriorKnowledge, RefineError, Refined, SHAPE};
 use crate::window::Window;
 use crate::{distortion, response};
 
 /// All state of a refinement: 120 bytes for each of `BINS` and 6.8 kB, so make it where it stays.
 ///
 /// ```
-/// use onecycle_onboard::refine::{Beforehand, Refiner};
+/// use onecycle_onboard::refine::{PriorKnowledge, Refiner};
 /// use onecycle_onboard::window::Window;
 ///
 /// // Under a square wave of 0.2 s, a lag of 0.1 s and two integrations lag by half a turn and more.
@@ -34,7 +34,7 @@ use crate::{distortion, response};
 ///     force += 1e-3 * (input - force) / 0.1;
 /// }
 /// let mut refiner = Refiner::new();
-/// refiner.begin(&window, 0.2, &Beforehand::default()).map_err(|_| "window")?;
+/// refiner.begin(&window, 0.2, &PriorKnowledge::default()).map_err(|_| "window")?;
 /// // One slice in each tick of a controller.
 /// let refined = loop {
 ///     if let Some(outcome) = refiner.advance(&window) {
@@ -109,7 +109,7 @@ impl<const BINS: usize> Refiner<BINS> {
         &mut self,
         window: &Window<BINS, EDGES>,
         period_s: f64,
-        beforehand: &Beforehand<'_>,
+        beforehand: &PriorKnowledge<'_>,
     ) -> Result<(), RefineError> {
         self.stage = Stage::Idle;
         self.problem.set(window, period_s, beforehand.prior)?;

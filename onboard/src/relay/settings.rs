@@ -11,8 +11,12 @@ pub struct RelaySettings {
     pub beta: f32,
     /// Time for which the noise is measured with zero output (s); 0 starts at once.
     pub preroll_s: f32,
-    /// Standard deviation of the measurement noise, or its least value when there is a pre-roll
-    /// (output unit). A quantised sensor deserves its quantum here.
+    /// Standard deviation of the measurement noise (output unit); with a pre-roll the lower limit of the measured
+    /// one. For a quantised sensor give its quantum.
+    ///
+    /// At zero no distance is too small for the relay: it leaves the kick at the first error other than zero, be it
+    /// 1e-13, and counts any reversal as an extremum. A noise-free simulation then builds its oscillation up from
+    /// rounding size; a real sensor makes the relay chatter.
     pub noise_sigma: f32,
     /// Smoothing of the error: fraction of the half period; 0 switches it off.
     pub smoothing: f32,

@@ -1,10 +1,10 @@
 //! All of a tuner but the room of its work: its phases, its guard, its laws.
 
-use super::Phase;
+use super::TunerPhase;
 use super::settings::{CheckedSettings, TunerSettings};
 use crate::control::{Measurement, PdLaw, RateEstimate};
 use crate::guard::{Abort, Guard, Motion};
-use crate::identification::{Identification, Identified, Observed, Room, Stage};
+use crate::identification::{Observed, Stage, StagedIdentification, TuningResult, Workspace};
 use crate::pack::Pack;
 use crate::prediction::{Beginning, Prediction};
 use crate::relay::Relay;
@@ -18,11 +18,11 @@ const CHECKED_PERIODS: f64 = 4.0;
 /// oscillation with a force that is known roughly, and noise and gusts go on.
 const MOST_MISMATCH: f32 = 1.5;
 
-/// The tuner of one axis but for the [`Room`] of its work, which it must always be given the same: so that firmware can
+/// The tuner of one axis but for the [`Workspace`] of its work, which it must always be given the same: so that firmware can
 /// make each where it is to stay. See [`tuner`](super).
 pub struct Core<'a> {
     settings: TunerSettings,
-    phase: Phase,
+    phase: TunerPhase,
     reason: Option<Abort>,
     guard: Guard,
     last_time_s: Option<f64>,
@@ -39,9 +39,9 @@ pub struct Core<'a> {
     offset: f32,
     relay: Relay,
     since_switch_s: f32,
-    identification: Identification<'a>,
+    identification: StagedIdentification<'a>,
     attempts_left: u8,
-    identified: Option<Identified>,
+    identified: Option<TuningResult>,
     law: PdLaw,
     prediction: Option<Prediction>,
     unchecked_s: f32,
@@ -54,7 +54,7 @@ impl<'a> Core<'a> {
     pub fn of(checked: &CheckedSettings, pack: Pack<'a>) -> Self {
         let CheckedSettings { settings, relay } = checked;
         Self {
-            phase: Phase::Idle,
+            phase: TunerPhase::Idle,
             reason: None,
             guard: Guard::new(settings.limits),
             last_time_s: None,
@@ -67,7 +67,7 @@ impl<'a> Core<'a> {
             offset: 0.0,
             relay: relay.clone(),
             since_switch_s: 0.0,
-            identification: Identification::new(
+            identification: StagedIdentification::new(
                 pack,
                 f64::from(settings.sample_s),
                 settings.cycles,
@@ -81,15 +81,15 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// Begins the test at the next tick; only from [`Phase::Idle`].
+    /// Begins the test at the next tick; only from [`TunerPhase::Idle`].
     pub fn start(&mut self) {
-        if self.phase != Phase::Idle {
+        if self.phase != TunerPhase::Idle {
             return;
         }
         if self.settings.take_off.is_some() {
-            self.phase = Phase::TakeOff;
+            self.phase = TunerPhase::TakeOff;
         } else {
-            self.phase = Phase::Relay;
+            self.phase = TunerPhase::Relay;
             if self.settings.bias_filter_s > 0.0 {
                 self.offset = self.usual;
                 self.reference = self.usual_value;
@@ -100,21 +100,21 @@ impl<'a> Core<'a> {
 
     /// The operator ends the test, or the controller that came of it; the next tick's output is safe.
     pub fn abort(&mut self) {
-        if self.phase != Phase::Idle {
+        if self.phase != TunerPhase::Idle {
             self.end(Abort::Operator);
         }
     }
 
-    /// Ready for another test, all that was learned forgotten; only from [`Phase::Aborted`] and
-    /// [`Phase::Control`].
+    /// Ready for another test, all that was learned forgotten; only from [`TunerPhase::Aborted`] and
+    /// [`TunerPhase::Control`].
     pub fn reset(&mut self) {
-        if !matches!(self.phase, Phase::Aborted | Phase::Control) {
+        if !matches!(self.phase, TunerPhase::Aborted | TunerPhase::Control) {
             return;
         }
         let Ok(relay) = Relay::new(self.settings.relay) else {
             return;
         };
-        self.phase = Phase::Idle;
+        self.phase = TunerPhase::Idle;
         self.reason = None;
         self.guard = Guard::new(self.settings.limits);
         self.last_time_s = None;
@@ -134,7 +134,7 @@ impl<'a> Core<'a> {
     #[inline]
     pub fn step(
         &mut self,
-        room: &mut Room,
+        room: &mut Workspace,
         time_s: f64,
         measurement: &Measurement,
         reference: f32,
@@ -144,16 +144,19 @@ impl<'a> Core<'a> {
             self.end(reason);
         }
         let output = match self.phase {
-            Phase::Idle => self.idle(dt_s),
-            Phase::TakeOff => self.take_off(dt_s),
-            Phase::Relay | Phase::Identify => self.offset + self.excite(dt_s),
-            Phase::Control => self.control(),
-            Phase::Aborted => self.safe(),
+            TunerPhase::Idle => self.idle(dt_s),
+            TunerPhase::TakeOff => self.take_off(dt_s),
+            TunerPhase::Relay | TunerPhase::Identify => self.offset + self.excite(dt_s),
+            TunerPhase::Control => self.control(),
+            TunerPhase::Aborted => self.safe(),
         };
         let output = self.within_limits(output);
-        if matches!(self.phase, Phase::TakeOff | Phase::Relay | Phase::Identify) {
+        if matches!(
+            self.phase,
+            TunerPhase::TakeOff | TunerPhase::Relay | TunerPhase::Identify
+        ) {
             self.identify(room, time_s, output);
-            if self.phase == Phase::Aborted {
+            if self.phase == TunerPhase::Aborted {
                 return self.within_limits(self.safe());
             }
         }
@@ -178,7 +181,8 @@ impl<'a> Core<'a> {
 
     /// Takes the sample in, unless it must not be used.
     fn watch(&mut self, dt_s: f32, measurement: &Measurement, reference: f32) -> Result<(), Abort> {
-        let is_test = !matches!(self.phase, Phase::Idle | Phase::Aborted) && !self.is_proven();
+        let is_test =
+            !matches!(self.phase, TunerPhase::Idle | TunerPhase::Aborted) && !self.is_proven();
         self.guard.check_data(measurement, reference, dt_s)?;
         self.value = measurement.value;
         let rate = self.rate.step(measurement, dt_s, self.settings.rate_lag_s);
@@ -187,18 +191,18 @@ impl<'a> Core<'a> {
             return Ok(());
         }
         self.test_s += dt_s;
-        let has_relay = matches!(self.phase, Phase::Relay | Phase::Identify);
+        let has_relay = matches!(self.phase, TunerPhase::Relay | TunerPhase::Identify);
         self.guard.check_motion(&Motion {
             distance: self.value - self.reference,
             rate,
-            test_s: (self.phase != Phase::Control).then_some(self.test_s),
+            test_s: (self.phase != TunerPhase::Control).then_some(self.test_s),
             since_switch_s: has_relay.then_some(self.since_switch_s + dt_s),
         })
     }
 
     fn end(&mut self, reason: Abort) {
-        if !matches!(self.phase, Phase::Idle | Phase::Aborted) {
-            self.phase = Phase::Aborted;
+        if !matches!(self.phase, TunerPhase::Idle | TunerPhase::Aborted) {
+            self.phase = TunerPhase::Aborted;
             self.reason = Some(reason);
             self.law = self.settings.safe;
             self.prediction = None;
@@ -228,7 +232,7 @@ impl<'a> Core<'a> {
         }
         let output = self.offset + self.excite(dt_s);
         if self.relay.switches() >= AIRBORNE_SWITCHES {
-            self.phase = Phase::Relay;
+            self.phase = TunerPhase::Relay;
         }
         output
     }
@@ -246,7 +250,7 @@ impl<'a> Core<'a> {
     }
 
     /// Shows the identification this tick, and lets it do a slice of its work.
-    fn identify(&mut self, room: &mut Room, time_s: f64, output: f32) {
+    fn identify(&mut self, room: &mut Workspace, time_s: f64, output: f32) {
         let observed = Observed {
             time_s,
             input: f64::from(output),
@@ -255,7 +259,7 @@ impl<'a> Core<'a> {
             undone: self.relay.undone(),
         };
         self.identification.observe(room, &observed);
-        if self.phase == Phase::TakeOff {
+        if self.phase == TunerPhase::TakeOff {
             return;
         }
         let outcome = (0..self.settings.slices).find_map(|_| self.identification.advance(room));
@@ -263,19 +267,19 @@ impl<'a> Core<'a> {
             Some(Ok(identified)) => self.enter_control(time_s, &identified),
             Some(Err(refusal)) => {
                 self.attempts_left -= 1;
-                self.phase = Phase::Relay;
+                self.phase = TunerPhase::Relay;
                 if self.attempts_left == 0 {
                     self.end(Abort::Refused(refusal));
                 }
             }
-            None if self.identification.has_work() => self.phase = Phase::Identify,
+            None if self.identification.has_work() => self.phase = TunerPhase::Identify,
             None => {}
         }
     }
 
     /// The new controller from the next tick on, about the input that holds the process at rest: the relay
     /// could hold no bias beyond its own amplitude.
-    fn enter_control(&mut self, time_s: f64, identified: &Identified) {
+    fn enter_control(&mut self, time_s: f64, identified: &TuningResult) {
         let centre = self.offset + self.relay.trim();
         let h = self.settings.relay.amplitude;
         let at_rest = -identified.input_bias as f32;
@@ -301,7 +305,7 @@ impl<'a> Core<'a> {
             },
         ));
         self.unchecked_s = (CHECKED_PERIODS * identified.period_s) as f32;
-        self.phase = Phase::Control;
+        self.phase = TunerPhase::Control;
     }
 
     fn control(&mut self) -> f32 {
@@ -328,7 +332,7 @@ impl<'a> Core<'a> {
 
     /// What it is doing.
     #[must_use]
-    pub fn phase(&self) -> Phase {
+    pub fn phase(&self) -> TunerPhase {
         self.phase
     }
 
@@ -340,11 +344,11 @@ impl<'a> Core<'a> {
 
     /// What the test has told: process, deviations, gains.
     #[must_use]
-    pub fn identified(&self) -> Option<&Identified> {
+    pub fn identified(&self) -> Option<&TuningResult> {
         self.identified.as_ref()
     }
 
-    /// The law in force in [`Phase::Control`]; the safe one in any other phase.
+    /// The law in force in [`TunerPhase::Control`]; the safe one in any other phase.
     #[must_use]
     pub fn law(&self) -> &PdLaw {
         &self.law
@@ -353,7 +357,7 @@ impl<'a> Core<'a> {
     /// Whether the new controller is in force and its response was as predicted.
     #[must_use]
     pub fn is_proven(&self) -> bool {
-        self.phase == Phase::Control && self.prediction.is_none()
+        self.phase == TunerPhase::Control && self.prediction.is_none()
     }
 
     /// What the identification does next.

@@ -16,12 +16,12 @@
 use super::body::GRAVITY_M_PER_S2;
 use super::frames::{Attitude, Axes, Vec3};
 use super::ground::ground_effect;
-use super::rotor::PLACES;
+use super::rotor::ROTOR_POSITIONS;
 use super::vehicle::{Parts, Vehicle};
 
 /// Everything that moves.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct State {
+pub struct VehicleState {
     /// Centre of mass (m, world); the ground is at `z = 0`.
     pub position_m: Vec3,
     /// Its velocity (m/s, world).
@@ -30,13 +30,13 @@ pub struct State {
     pub world_from_body: Attitude,
     /// Rates about the axes of the body (rad/s).
     pub rates_rad_per_s: Vec3,
-    /// Speeds of the rotors (rad/s), in the order of [`PLACES`].
+    /// Speeds of the rotors (rad/s), in the order of [`ROTOR_POSITIONS`].
     pub rotors_rad_per_s: [f64; 4],
     /// Charge of the battery, 0..1.
     pub charge: f64,
 }
 
-impl State {
+impl VehicleState {
     /// On its feet, level, facing east, rotors at rest, battery full.
     #[must_use]
     pub fn standing(vehicle: &Vehicle) -> Self {
@@ -92,7 +92,7 @@ pub(super) struct Held<'a> {
 impl Held<'_> {
     /// The state `dt_s` later. The centre of mass never ends below the ground: where the legs are
     /// pressed so far, in a crash, it stops there.
-    pub(super) fn step(&self, state: &State, dt_s: f64) -> State {
+    pub(super) fn step(&self, state: &VehicleState, dt_s: f64) -> VehicleState {
         let first = self.slope(state);
         let second = self.slope(&state.plus(&first, 0.5 * dt_s));
         let third = self.slope(&state.plus(&second, 0.5 * dt_s));
@@ -112,7 +112,7 @@ impl Held<'_> {
     }
 
     /// Time derivatives, in the places of what they are derivatives of.
-    fn slope(&self, state: &State) -> State {
+    fn slope(&self, state: &VehicleState) -> VehicleState {
         let parts = self.parts;
         let axes = state.world_from_body.axes();
         let rates = state.rates_rad_per_s;
@@ -120,7 +120,7 @@ impl Held<'_> {
         let mut force = parts.body.drag_n(air);
         let mut torque = self.torque_nm;
         let mut power_w = 0.0;
-        for (place, speed) in PLACES.into_iter().zip(state.rotors_rad_per_s) {
+        for (place, speed) in ROTOR_POSITIONS.into_iter().zip(state.rotors_rad_per_s) {
             let arm = parts.rotors.hub_m(place) - parts.body.centre_of_mass_m;
             let height_m = state.position_m.z + axes.world_from_body(arm).z;
             let ratio = ground_effect(parts.rotors.radius_m, height_m);
@@ -140,7 +140,7 @@ impl Held<'_> {
         let net = torque - rates.cross(inertia.scaled_by(rates));
         let voltage_v = parts.battery.voltage_v(state.charge, power_w);
         let full_speed = parts.rotors.full_speed_at_rad_per_s(voltage_v);
-        State {
+        VehicleState {
             position_m: state.velocity_m_per_s,
             velocity_m_per_s: acceleration,
             world_from_body: state.world_from_body.derivative(rates),
@@ -153,7 +153,7 @@ impl Held<'_> {
     }
 
     /// Force (N, world) and torque (N m, body) of the ground on feet and guards.
-    fn contact(&self, state: &State, axes: &Axes) -> (Vec3, Vec3) {
+    fn contact(&self, state: &VehicleState, axes: &Axes) -> (Vec3, Vec3) {
         let (rotors, legs) = (&self.parts.rotors, &self.parts.legs);
         let centre = self.parts.body.centre_of_mass_m;
         let (mut force, mut torque) = (Vec3::ZERO, Vec3::ZERO);
@@ -161,7 +161,7 @@ impl Held<'_> {
         if state.position_m.z > reach_m + centre.norm() {
             return (force, torque);
         }
-        for place in PLACES {
+        for place in ROTOR_POSITIONS {
             for height_m in [-legs.height_m, legs.guard_m] {
                 let arm = rotors.hub_m(place) + Vec3::new(0.0, 0.0, height_m) - centre;
                 let above_m = state.position_m.z + axes.world_from_body(arm).z;

@@ -6,6 +6,7 @@ use super::frames::Vec3;
 
 /// Why something is no vehicle, no wind or no flight: the parameter and its value.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VehicleError {
     /// It has to be above zero and finite.
     #[error("the {name} must be above zero and finite, but is {value}")]

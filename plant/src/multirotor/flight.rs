@@ -1,14 +1,13 @@
 //! A flight: a vehicle, where it is, the air around it.
 
-use rand::Rng;
-
-use super::dynamics::{Held, State};
+use super::dynamics::{Held, VehicleState};
 use super::error::{VehicleError, charged};
 use super::frames::Vec3;
 use super::mixer::Command;
-use super::sensors::{History, Reading};
+use super::sensors::{History, SensorReading};
 use super::vehicle::Vehicle;
 use super::wind::{Gusts, Nudge, Wind};
+use crate::NoiseSource;
 
 /// Longest inner step (s): a twentieth of the quadrotor's motor lag, a tenth of a leg's time.
 pub const LONGEST_STEP_S: f64 = 1e-3;
@@ -20,7 +19,7 @@ const ROUNDING: f64 = 1e-9;
 #[derive(Clone, Debug)]
 pub struct Flight {
     vehicle: Vehicle,
-    state: State,
+    state: VehicleState,
     time_s: f64,
     wind: Wind,
     gusts: Gusts,
@@ -34,7 +33,7 @@ impl Flight {
     /// On the ground, at rest, in calm air.
     #[must_use]
     pub fn standing(vehicle: Vehicle) -> Self {
-        Self::begin(vehicle, State::standing(&vehicle))
+        Self::begin(vehicle, VehicleState::standing(&vehicle))
     }
 
     /// From any state, in calm air. Altitude zero is where the vehicle would stand.
@@ -42,7 +41,7 @@ impl Flight {
     /// # Errors
     /// [`VehicleError::NotFinite`] when something in the state is not, [`VehicleError::Charge`] for a
     /// charge outside 0..1.
-    pub fn new(vehicle: Vehicle, state: State) -> Result<Self, VehicleError> {
+    pub fn new(vehicle: Vehicle, state: VehicleState) -> Result<Self, VehicleError> {
         if !state.is_finite() {
             return Err(VehicleError::NotFinite { name: "state" });
         }
@@ -50,7 +49,7 @@ impl Flight {
         Ok(Self::begin(vehicle, state))
     }
 
-    fn begin(vehicle: Vehicle, state: State) -> Self {
+    fn begin(vehicle: Vehicle, state: VehicleState) -> Self {
         let ground_height_m = vehicle.standing_height_m();
         let reading = reading_of(&vehicle, &state, ground_height_m);
         Self {
@@ -66,9 +65,9 @@ impl Flight {
     }
 
     /// Moves on by `dt_s` with the command held, in equal inner steps of at most
-    /// [`LONGEST_STEP_S`]; `rng` is drawn from where there are gusts only. A time that is not above
+    /// [`LONGEST_STEP_S`]; takes numbers from `noise` only where there are gusts. A time that is not above
     /// zero, or not finite, does not pass. See [`Command::clamped`] for commands out of range.
-    pub fn step<R: Rng + ?Sized>(&mut self, command: Command, dt_s: f64, rng: &mut R) {
+    pub fn step(&mut self, command: Command, dt_s: f64, noise: &mut impl NoiseSource) {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return;
         }
@@ -84,12 +83,12 @@ impl Flight {
             let count = (until_s / LONGEST_STEP_S * (1.0 - ROUNDING))
                 .ceil()
                 .max(1.0);
-            self.inner_step(speed_shares, until_s / count, rng);
+            self.inner_step(speed_shares, until_s / count, noise);
             left_s -= until_s / count;
         }
     }
 
-    fn inner_step<R: Rng + ?Sized>(&mut self, speed_shares: [f64; 4], dt_s: f64, rng: &mut R) {
+    fn inner_step(&mut self, speed_shares: [f64; 4], dt_s: f64, noise: &mut impl NoiseSource) {
         let gust = self.gusts.velocity_m_per_s();
         let held = Held {
             parts: self.vehicle.parts(),
@@ -100,7 +99,7 @@ impl Flight {
         };
         self.state = held.step(&self.state, dt_s);
         self.time_s += dt_s;
-        self.gusts.step(&self.wind, dt_s, rng);
+        self.gusts.step(&self.wind, dt_s, noise);
         self.nudge.duration_s -= dt_s;
         if self.nudge.duration_s <= ROUNDING * dt_s {
             self.nudge = Nudge::default();
@@ -110,20 +109,20 @@ impl Flight {
             .push(self.time_s, reading, &self.vehicle.parts().sensors);
     }
 
-    /// What the sensors read now, with noise drawn from `rng`.
-    pub fn sense<R: Rng + ?Sized>(&self, rng: &mut R) -> Reading {
-        self.history.read(&self.vehicle.parts().sensors, rng)
+    /// What the sensors read now, noise and delay included.
+    pub fn sense(&self, noise: &mut impl NoiseSource) -> SensorReading {
+        self.history.read(&self.vehicle.parts().sensors, noise)
     }
 
     /// What sensors without noise or delay would read now.
     #[must_use]
-    pub fn reading(&self) -> Reading {
+    pub fn reading(&self) -> SensorReading {
         reading_of(&self.vehicle, &self.state, self.ground_height_m)
     }
 
     /// Where and how everything is now.
     #[must_use]
-    pub fn state(&self) -> &State {
+    pub fn state(&self) -> &VehicleState {
         &self.state
     }
 
@@ -189,11 +188,11 @@ impl Flight {
     }
 }
 
-fn reading_of(vehicle: &Vehicle, state: &State, ground_height_m: f64) -> Reading {
+fn reading_of(vehicle: &Vehicle, state: &VehicleState, ground_height_m: f64) -> SensorReading {
     let axes = state.world_from_body.axes();
     let arm = -vehicle.parts().body.centre_of_mass_m;
     let turning = state.rates_rad_per_s.cross(arm);
-    Reading {
+    SensorReading {
         position_m: state.position_m + axes.world_from_body(arm)
             - Vec3::new(0.0, 0.0, ground_height_m),
         velocity_m_per_s: state.velocity_m_per_s + axes.world_from_body(turning),

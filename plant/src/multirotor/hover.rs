@@ -25,7 +25,7 @@
 
 use onecycle_onboard::Soiptd;
 
-use super::dynamics::State;
+use super::dynamics::VehicleState;
 use super::error::{VehicleError, charged, finite};
 use super::frames::{Attitude, Vec3};
 use super::vehicle::Vehicle;
@@ -121,8 +121,8 @@ impl Hover {
 
     /// The state there, with the middle at `position_m` (m, world).
     #[must_use]
-    pub fn state(&self, position_m: Vec3) -> State {
-        State {
+    pub fn state(&self, position_m: Vec3) -> VehicleState {
+        VehicleState {
             position_m: position_m + self.vehicle.parts().body.centre_of_mass_m,
             velocity_m_per_s: Vec3::ZERO,
             world_from_body: Attitude::LEVEL,

@@ -2,14 +2,14 @@
 
 use onecycle_onboard::RelaySettings;
 use onecycle_onboard::tuner::TunerSettings;
-use rand::Rng;
 
 use super::flight::Flight;
 use super::frames::Vec3;
 use super::hover::Axis;
-use super::pilot::{MissionError, Pilot, Record, Tuned, hovering};
+use super::pilot::{FlightRecord, MissionError, Pilot, Tuned, hovering};
 use super::vehicle::{Parts, Vehicle};
 use super::wind::{Nudge, Wind};
+use crate::Noise;
 
 /// The payload of the paper (kg): 30 % of the vehicle.
 pub const PAYLOAD_KG: f64 = 0.4;
@@ -72,9 +72,10 @@ impl Mission {
 
 /// A mission as it was flown.
 #[derive(Clone, Debug)]
+#[non_exhaustive]
 pub struct Flown {
     /// Every tick.
-    pub records: Vec<Record>,
+    pub records: Vec<FlightRecord>,
     /// What was tuned, in order.
     pub tuned: Vec<Tuned>,
     /// What happened when (s).
@@ -83,46 +84,47 @@ pub struct Flown {
     pub failure: Option<MissionError>,
 }
 
-/// Flies a mission; the generator makes noise and gusts.
+/// Flies a mission, with the sensor noise and the gusts of this seed.
 ///
 /// # Errors
 /// Where the vehicle or its settings cannot be; a test that ends early is no error but a
 /// [`failure`](Flown::failure).
-pub fn fly<R: Rng>(mission: Mission, rng: R) -> Result<Flown, MissionError> {
+pub fn fly(mission: Mission, seed: u64) -> Result<Flown, MissionError> {
+    let noise = Noise::from_seed(seed);
     match mission {
-        Mission::Altitude => from_the_ground(Vehicle::quadrotor(), rng, &[]),
+        Mission::Altitude => from_the_ground(Vehicle::quadrotor(), noise, &[]),
         Mission::Payload => {
             let vehicle = Vehicle::quadrotor().with_payload(PAYLOAD_KG, 0.0)?;
-            from_the_ground(vehicle, rng, &[])
+            from_the_ground(vehicle, noise, &[])
         }
         Mission::Vehicle => from_the_ground(
             Vehicle::quadrotor(),
-            rng,
+            noise,
             &[&[Axis::Roll, Axis::Pitch, Axis::Yaw]],
         ),
-        Mission::Cycles => cycles(rng),
-        Mission::Roll => roll(rng, true),
-        Mission::RollUncompensated => roll(rng, false),
-        Mission::Disturbed => disturbed(rng, true),
-        Mission::DisturbedUntuned => disturbed(rng, false),
+        Mission::Cycles => cycles(noise),
+        Mission::Roll => roll(noise, true),
+        Mission::RollUncompensated => roll(noise, false),
+        Mission::Disturbed => disturbed(noise, true),
+        Mission::DisturbedUntuned => disturbed(noise, false),
     }
 }
 
 /// A script in the making.
-struct Script<R> {
-    pilot: Pilot<R>,
+struct Script {
+    pilot: Pilot,
     tuned: Vec<Tuned>,
     events: Vec<(f64, &'static str)>,
 }
 
-impl<R: Rng> Script<R> {
+impl Script {
     fn new(
         flight: Flight,
         settings: &[TunerSettings; 4],
         references: [f64; 4],
-        rng: R,
+        noise: Noise,
     ) -> Result<Self, MissionError> {
-        let mut pilot = Pilot::new(flight, settings, rng)?;
+        let mut pilot = Pilot::new(flight, settings, noise)?;
         pilot.references = references;
         pilot.holds_position = true;
         Ok(Self {
@@ -159,16 +161,16 @@ fn in_the_air() -> [TunerSettings; 4] {
     Axis::ALL.map(Axis::settings)
 }
 
-fn from_the_ground<R: Rng>(
+fn from_the_ground(
     vehicle: Vehicle,
-    rng: R,
+    noise: Noise,
     then: &[&[Axis]],
 ) -> Result<Flown, MissionError> {
     let [_, roll, pitch, yaw] = in_the_air();
     let altitude = Axis::Altitude.settings_for_take_off();
     let settings = [altitude, roll, pitch, yaw];
     let flight = Flight::standing(vehicle);
-    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
+    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], noise)?;
     let outcome = (|| {
         // A moment to see where it stands.
         script.pilot.run(0.1);
@@ -193,19 +195,19 @@ fn hovering_settings(vehicle: &Vehicle) -> Result<[TunerSettings; 4], MissionErr
     Ok(settings)
 }
 
-fn cycles<R: Rng>(rng: R) -> Result<Flown, MissionError> {
+fn cycles(noise: Noise) -> Result<Flown, MissionError> {
     let vehicle = Vehicle::quadrotor();
     let mut settings = hovering_settings(&vehicle)?;
     // All that the tuner takes at once: with the three that it waits for there are seven.
     settings[Axis::Altitude.index()].cycles = onecycle_onboard::identification::MOST_CYCLES;
     let flight = hovering(vehicle, ALTITUDE_M)?;
-    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
+    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], noise)?;
     script.pilot.run(3.0);
     let outcome = script.tune(&[Axis::Altitude]);
     Ok(script.end(outcome))
 }
 
-fn roll<R: Rng>(rng: R, is_compensated: bool) -> Result<Flown, MissionError> {
+fn roll(noise: Noise, is_compensated: bool) -> Result<Flown, MissionError> {
     let mut parts = Parts::quadrotor();
     parts.body.centre_of_mass_m = Vec3::new(0.0, OFF_CENTRE_M, 0.0);
     let vehicle = Vehicle::new(parts)?;
@@ -220,7 +222,7 @@ fn roll<R: Rng>(rng: R, is_compensated: bool) -> Result<Flown, MissionError> {
         roll.bias_filter_s = 0.0;
     }
     let flight = hovering(vehicle, ALTITUDE_M)?;
-    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
+    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], noise)?;
     let outcome = (|| {
         script.pilot.run(4.0);
         script.tune(&[Axis::Roll])?;
@@ -230,11 +232,11 @@ fn roll<R: Rng>(rng: R, is_compensated: bool) -> Result<Flown, MissionError> {
     Ok(script.end(outcome))
 }
 
-fn disturbed<R: Rng>(rng: R, is_tuned: bool) -> Result<Flown, MissionError> {
+fn disturbed(noise: Noise, is_tuned: bool) -> Result<Flown, MissionError> {
     let vehicle = Vehicle::quadrotor();
     let settings = hovering_settings(&vehicle)?;
     let flight = hovering(vehicle, ALTITUDE_M)?;
-    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], rng)?;
+    let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], noise)?;
     let outcome = (|| {
         script.pilot.run(3.0);
         if is_tuned {

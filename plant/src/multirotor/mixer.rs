@@ -5,7 +5,7 @@
 //! whole range. Then the collective thrust is moved by as little as leaves them room. Yaw gets what
 //! remains.
 
-use super::rotor::PLACES;
+use super::rotor::ROTOR_POSITIONS;
 
 /// What the controllers ask for.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,11 +40,12 @@ impl Command {
         }
     }
 
-    /// What each motor gets, 0..1 of its full static thrust, in the order of [`PLACES`].
+    /// What each motor gets, 0..1 of its full static thrust, in the order of [`ROTOR_POSITIONS`].
     #[must_use]
     pub fn motors(&self) -> [f64; 4] {
         let command = self.clamped();
-        let tilt = PLACES.map(|place| place.left * command.roll - place.forward * command.pitch);
+        let tilt =
+            ROTOR_POSITIONS.map(|place| place.left * command.roll - place.forward * command.pitch);
         // The pattern is antisymmetric: its extremes are plus and minus `extreme`.
         let extreme = tilt.iter().copied().fold(0.0, f64::max);
         let scale = if extreme > 0.5 { 0.5 / extreme } else { 1.0 };
@@ -52,7 +53,7 @@ impl Command {
         let thrust = command.thrust.clamp(room, 1.0 - room);
         let base = tilt.map(|part| thrust + scale * part);
         let mut share: f64 = 1.0;
-        for (place, motor) in PLACES.iter().zip(base) {
+        for (place, motor) in ROTOR_POSITIONS.iter().zip(base) {
             let part = -place.spin * command.yaw;
             if part > 0.0 {
                 share = share.min((1.0 - motor) / part);
@@ -61,7 +62,9 @@ impl Command {
             }
         }
         let share = share.max(0.0);
-        std::array::from_fn(|i| (base[i] - PLACES[i].spin * share * command.yaw).clamp(0.0, 1.0))
+        std::array::from_fn(|i| {
+            (base[i] - ROTOR_POSITIONS[i].spin * share * command.yaw).clamp(0.0, 1.0)
+        })
     }
 }
 
@@ -71,8 +74,8 @@ mod tests {
 
     /// The command that four motors amount to: the mixer inverted.
     fn unmixed(motors: [f64; 4]) -> Command {
-        let sum = |sign: fn(&super::super::rotor::Place) -> f64| {
-            PLACES
+        let sum = |sign: fn(&super::super::rotor::RotorPosition) -> f64| {
+            ROTOR_POSITIONS
                 .iter()
                 .zip(motors)
                 .map(|(p, u)| sign(p) * u)

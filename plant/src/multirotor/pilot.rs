@@ -7,10 +7,9 @@ use std::fmt;
 
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::{Abort, Limits};
-use onecycle_onboard::identification::Identified;
-use onecycle_onboard::tuner::{Phase, TakeOffSettings, Tuner, TunerError, TunerSettings};
+use onecycle_onboard::identification::TuningResult;
+use onecycle_onboard::tuner::{TakeOffSettings, Tuner, TunerError, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
-use rand::Rng;
 
 use super::body::GRAVITY_M_PER_S2;
 use super::error::VehicleError;
@@ -18,8 +17,9 @@ use super::flight::Flight;
 use super::frames::Vec3;
 use super::hover::Axis;
 use super::mixer::Command;
-use super::sensors::Reading;
+use super::sensors::SensorReading;
 use super::vehicle::Vehicle;
+use crate::Noise;
 
 /// Time between ticks (s): the paper's 1 kHz.
 pub const TICK_S: f64 = 0.001;
@@ -47,8 +47,8 @@ impl Axis {
 
     /// Its output in a reading (m or rad), and the rate of that.
     #[must_use]
-    pub fn of(self, reading: &Reading) -> (f64, f64) {
-        let Reading {
+    pub fn of(self, reading: &SensorReading) -> (f64, f64) {
+        let SensorReading {
             position_m,
             velocity_m_per_s,
             angles_rad,
@@ -135,6 +135,7 @@ impl Axis {
 
 /// What was found for an axis, and what is true of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Tuned {
     /// The axis.
     pub axis: Axis,
@@ -143,28 +144,30 @@ pub struct Tuned {
     /// When its controller was proven (s).
     pub until_s: f64,
     /// What was found.
-    pub identified: Identified,
+    pub identified: TuningResult,
     /// The process of the vehicle as it was then.
     pub truth: Soiptd,
 }
 
 /// A tick of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Record {
+#[non_exhaustive]
+pub struct FlightRecord {
     /// Its time (s).
     pub time_s: f64,
     /// What was true.
-    pub reading: Reading,
+    pub reading: SensorReading,
     /// What the tuners were told, in the order of [`Axis::ALL`] (m or rad).
     pub measured: [f64; 4],
     /// The commands held from then on.
     pub commands: [f64; 4],
     /// What the tuners were doing.
-    pub phases: [Phase; 4],
+    pub phases: [TunerPhase; 4],
 }
 
 /// Why a mission ended early.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum MissionError {
     /// The vehicle has a parameter out of range or cannot hover.
     Vehicle(VehicleError),
@@ -200,7 +203,7 @@ impl From<TunerError> for MissionError {
 }
 
 /// Four tuners on a vehicle in flight.
-pub struct Pilot<R> {
+pub struct Pilot {
     /// The vehicle.
     pub flight: Flight,
     /// Where each axis should be (m or rad).
@@ -208,13 +211,13 @@ pub struct Pilot<R> {
     /// Whether roll and pitch are steered so that the vehicle stays above where it began. While they are
     /// tuned they are not: a tuner keeps the reference of its start.
     pub holds_position: bool,
-    rng: R,
+    noise: Noise,
     tuners: [Tuner<'static>; 4],
     ticks: u64,
-    records: Vec<Record>,
+    records: Vec<FlightRecord>,
 }
 
-impl<R: Rng> Pilot<R> {
+impl Pilot {
     /// With the settings of each axis, in the order of [`Axis::ALL`].
     ///
     /// # Errors
@@ -222,14 +225,14 @@ impl<R: Rng> Pilot<R> {
     pub fn new(
         flight: Flight,
         settings: &[TunerSettings; 4],
-        rng: R,
+        noise: Noise,
     ) -> Result<Self, MissionError> {
         let [altitude, roll, pitch, yaw] = settings.each_ref().map(Tuner::new);
         Ok(Self {
             flight,
             references: [0.0; 4],
             holds_position: false,
-            rng,
+            noise,
             tuners: [altitude?, roll?, pitch?, yaw?],
             ticks: 0,
             records: Vec::new(),
@@ -250,18 +253,18 @@ impl<R: Rng> Pilot<R> {
 
     /// One tick of sensors, tuners and vehicle.
     pub fn tick(&mut self) {
-        let (time_s, sensed) = (self.time_s(), self.flight.sense(&mut self.rng));
+        let (time_s, sensed) = (self.time_s(), self.flight.sense(&mut self.noise));
         if self.holds_position {
             let [roll_rad, pitch_rad] = tilt(&sensed);
             self.references[Axis::Roll.index()] = roll_rad;
             self.references[Axis::Pitch.index()] = pitch_rad;
         }
-        let mut record = Record {
+        let mut record = FlightRecord {
             time_s,
             reading: self.flight.reading(),
             measured: [0.0; 4],
             commands: [0.0; 4],
-            phases: [Phase::Idle; 4],
+            phases: [TunerPhase::Idle; 4],
         };
         for axis in Axis::ALL {
             let (index, (value, rate)) = (axis.index(), axis.of(&sensed));
@@ -279,7 +282,7 @@ impl<R: Rng> Pilot<R> {
             pitch,
             yaw,
         };
-        self.flight.step(command, TICK_S, &mut self.rng);
+        self.flight.step(command, TICK_S, &mut self.noise);
         self.records.push(record);
         self.ticks += 1;
     }
@@ -307,7 +310,7 @@ impl<R: Rng> Pilot<R> {
             self.tick();
             for &axis in axes {
                 let tuner = self.tuner(axis);
-                if tuner.phase() == Phase::Aborted || self.time_s() - from_s > MOST_S {
+                if tuner.phase() == TunerPhase::Aborted || self.time_s() - from_s > MOST_S {
                     return Err(MissionError::NotTuned(axis, tuner.reason()));
                 }
                 if tuner.is_proven()
@@ -339,14 +342,14 @@ impl<R: Rng> Pilot<R> {
 
     /// All ticks so far.
     #[must_use]
-    pub fn into_records(self) -> Vec<Record> {
+    pub fn into_records(self) -> Vec<FlightRecord> {
         self.records
     }
 }
 
 /// Roll and pitch (rad) that bring the vehicle back above where it began, with a double pole at 0.8 1/s: a
 /// tilt of `a` accelerates by `g a`, to the right or forward.
-fn tilt(sensed: &Reading) -> [f64; 2] {
+fn tilt(sensed: &SensorReading) -> [f64; 2] {
     const POLE_PER_S: f64 = 0.8;
     const MOST_RAD: f64 = 0.25;
     let (at, speed) = (sensed.position_m, sensed.velocity_m_per_s);

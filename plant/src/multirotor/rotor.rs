@@ -18,7 +18,7 @@ use super::frames::Vec3;
 
 /// The signs of the four rotors, in the order front left, rear left, rear right, front right.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Place {
+pub struct RotorPosition {
     /// +1 in front, -1 behind.
     pub forward: f64,
     /// +1 on the left, -1 on the right.
@@ -28,14 +28,14 @@ pub struct Place {
 }
 
 /// The four places.
-pub const PLACES: [Place; 4] = [
-    Place::new(1.0, 1.0, 1.0),
-    Place::new(-1.0, 1.0, -1.0),
-    Place::new(-1.0, -1.0, 1.0),
-    Place::new(1.0, -1.0, -1.0),
+pub const ROTOR_POSITIONS: [RotorPosition; 4] = [
+    RotorPosition::new(1.0, 1.0, 1.0),
+    RotorPosition::new(-1.0, 1.0, -1.0),
+    RotorPosition::new(-1.0, -1.0, 1.0),
+    RotorPosition::new(1.0, -1.0, -1.0),
 ];
 
-impl Place {
+impl RotorPosition {
     const fn new(forward: f64, left: f64, spin: f64) -> Self {
         Self {
             forward,
@@ -76,7 +76,7 @@ impl Rotors {
     /// Where a rotor's hub is (m, body, from the middle).
     #[must_use]
     #[inline]
-    pub fn hub_m(&self, place: Place) -> Vec3 {
+    pub fn hub_m(&self, place: RotorPosition) -> Vec3 {
         Vec3::new(
             place.forward * self.hub_forward_m,
             place.left * self.hub_left_m,
@@ -101,7 +101,7 @@ impl Rotors {
     /// Torque of a rotor on the body about up (N m).
     #[must_use]
     #[inline]
-    pub fn reaction_nm(&self, place: Place, speed_rad_per_s: f64) -> f64 {
+    pub fn reaction_nm(&self, place: RotorPosition, speed_rad_per_s: f64) -> f64 {
         let thrust_n = self.thrust_n_s2 * speed_rad_per_s * speed_rad_per_s;
         -place.spin * self.torque_per_thrust_m * thrust_n
     }

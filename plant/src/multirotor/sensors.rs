@@ -8,11 +8,9 @@
 use std::collections::VecDeque;
 use std::f64::consts::PI;
 
-use rand::Rng;
-
 use super::error::{VehicleError, at_least_zero};
 use super::frames::Vec3;
-use crate::Sensor;
+use crate::{NoiseSource, Sensor};
 
 /// One channel; all its components are alike.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -30,11 +28,11 @@ impl Channel {
         at_least_zero(name, self.sensor.quantum)
     }
 
-    fn read<R: Rng + ?Sized>(&self, at: Vec3, rng: &mut R) -> Vec3 {
+    fn read(&self, at: Vec3, noise: &mut impl NoiseSource) -> Vec3 {
         Vec3::new(
-            self.sensor.read(at.x, rng),
-            self.sensor.read(at.y, rng),
-            self.sensor.read(at.z, rng),
+            self.sensor.read(at.x, noise),
+            self.sensor.read(at.y, noise),
+            self.sensor.read(at.z, noise),
         )
     }
 }
@@ -83,7 +81,7 @@ impl Sensors {
 
 /// What can be measured: of the middle of the vehicle, between the hubs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Reading {
+pub struct SensorReading {
     /// Position (m, world); `z` is the altitude, zero where the vehicle stood.
     pub position_m: Vec3,
     /// Velocity (m/s, world); `z` is the climb.
@@ -97,12 +95,12 @@ pub struct Reading {
 /// The last readings without noise, as far back as the longest delay.
 #[derive(Clone, Debug)]
 pub(super) struct History {
-    past: VecDeque<(f64, Reading)>,
-    latest: (f64, Reading),
+    past: VecDeque<(f64, SensorReading)>,
+    latest: (f64, SensorReading),
 }
 
 impl History {
-    pub(super) fn new(time_s: f64, reading: Reading) -> Self {
+    pub(super) fn new(time_s: f64, reading: SensorReading) -> Self {
         Self {
             past: VecDeque::new(),
             latest: (time_s, reading),
@@ -110,7 +108,7 @@ impl History {
     }
 
     /// Adds what is true at a later time, and forgets what no sensor needs any more.
-    pub(super) fn push(&mut self, time_s: f64, reading: Reading, sensors: &Sensors) {
+    pub(super) fn push(&mut self, time_s: f64, reading: SensorReading, sensors: &Sensors) {
         self.past.push_back(self.latest);
         self.latest = (time_s, reading);
         let oldest_s = time_s - sensors.longest_delay_s();
@@ -120,22 +118,23 @@ impl History {
     }
 
     /// What the sensors read now.
-    pub(super) fn read<R: Rng + ?Sized>(&self, sensors: &Sensors, rng: &mut R) -> Reading {
+    pub(super) fn read(&self, sensors: &Sensors, noise: &mut impl NoiseSource) -> SensorReading {
         let ago = |channel: &Channel| self.ago(channel.delay_s);
-        let read = |channel: &Channel, at: Vec3, rng: &mut R| channel.read(at, rng);
-        Reading {
-            position_m: read(&sensors.position, ago(&sensors.position).position_m, rng),
-            velocity_m_per_s: read(
-                &sensors.velocity,
-                ago(&sensors.velocity).velocity_m_per_s,
-                rng,
-            ),
-            angles_rad: read(&sensors.angles, ago(&sensors.angles).angles_rad, rng),
-            rates_rad_per_s: read(&sensors.rates, ago(&sensors.rates).rates_rad_per_s, rng),
+        let Sensors {
+            position,
+            velocity,
+            angles,
+            rates,
+        } = sensors;
+        SensorReading {
+            position_m: position.read(ago(position).position_m, noise),
+            velocity_m_per_s: velocity.read(ago(velocity).velocity_m_per_s, noise),
+            angles_rad: angles.read(ago(angles).angles_rad, noise),
+            rates_rad_per_s: rates.read(ago(rates).rates_rad_per_s, noise),
         }
     }
 
-    fn ago(&self, delay_s: f64) -> Reading {
+    fn ago(&self, delay_s: f64) -> SensorReading {
         let time_s = self.latest.0 - delay_s;
         let after = self.past.partition_point(|(t, _)| *t <= time_s);
         let Some(before) = after.checked_sub(1).and_then(|i| self.past.get(i)) else {
@@ -147,12 +146,12 @@ impl History {
     }
 }
 
-fn between(a: &Reading, b: &Reading, share: f64) -> Reading {
+fn between(a: &SensorReading, b: &SensorReading, share: f64) -> SensorReading {
     let mix = |a: Vec3, b: Vec3| a + (b - a) * share;
     // The short way round, and back into -pi..pi.
     let wrapped = |angle: f64| angle - 2.0 * PI * (angle / (2.0 * PI)).round();
     let angle = |a: f64, b: f64| wrapped(a + share * wrapped(b - a));
-    Reading {
+    SensorReading {
         position_m: mix(a.position_m, b.position_m),
         velocity_m_per_s: mix(a.velocity_m_per_s, b.velocity_m_per_s),
         angles_rad: Vec3::new(

@@ -10,14 +10,13 @@
 //!
 //! so variance `sigma^2` and autocorrelation `exp(-t / T)` do not depend on the step.
 
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
-
 use super::error::{VehicleError, at_least_zero, finite, positive};
 use super::frames::Vec3;
+use crate::NoiseSource;
 
 /// The wind, the same everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Wind {
     /// Steady part (m/s, world): where the air goes.
     pub steady_m_per_s: Vec3,
@@ -38,6 +37,16 @@ impl Wind {
             steady_m_per_s,
             gust_sigma_m_per_s: Vec3::ZERO,
             gust_correlation_s: 1.0,
+        }
+    }
+
+    /// The same wind with gusts of this standard deviation (m/s, world) and correlation time (s).
+    #[must_use]
+    pub fn with_gusts(self, gust_sigma_m_per_s: Vec3, gust_correlation_s: f64) -> Self {
+        Self {
+            gust_sigma_m_per_s,
+            gust_correlation_s,
+            ..self
         }
     }
 
@@ -69,14 +78,14 @@ impl Gusts {
     }
 
     /// Moves on by `dt_s`; draws nothing where the wind has no gusts.
-    pub fn step<R: Rng + ?Sized>(&mut self, wind: &Wind, dt_s: f64, rng: &mut R) {
+    pub fn step(&mut self, wind: &Wind, dt_s: f64, noise: &mut impl NoiseSource) {
         if wind.gust_sigma_m_per_s == Vec3::ZERO {
             self.velocity_m_per_s = Vec3::ZERO;
             return;
         }
         let kept = (-dt_s / wind.gust_correlation_s).exp();
         let fresh = (1.0 - kept * kept).sqrt();
-        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        let mut normal = || noise.standard_normal();
         let drawn = Vec3::new(normal(), normal(), normal());
         self.velocity_m_per_s =
             self.velocity_m_per_s * kept + wind.gust_sigma_m_per_s.scaled_by(drawn) * fresh;
@@ -104,9 +113,8 @@ impl Nudge {
 
 #[cfg(test)]
 mod tests {
-    use rand_pcg::Pcg64;
-
     use super::*;
+    use crate::Noise;
 
     // sigma = 1.5 m/s, T = 0.2 s, N = 400,000 steps of 10 ms, rho = exp(-1/20). Variance: relative
     // standard error sqrt(2/N (1 + rho^2)/(1 - rho^2)) = sqrt(2/N * 20.02) = 1.0 %. Autocorrelation at
@@ -121,10 +129,10 @@ mod tests {
             gust_correlation_s: 0.2,
             ..Wind::CALM
         };
-        let (mut gusts, mut rng) = (Gusts::default(), Pcg64::new(11, 5));
+        let (mut gusts, mut noise) = (Gusts::default(), Noise::from_seed(11));
         let series: Vec<Vec3> = (0..STEPS)
             .map(|_| {
-                gusts.step(&wind, 0.01, &mut rng);
+                gusts.step(&wind, 0.01, &mut noise);
                 gusts.velocity_m_per_s()
             })
             .collect();
@@ -147,9 +155,9 @@ mod tests {
     // Without sigma the gusts are zero and the generator stays as it was.
     #[test]
     fn no_gusts_draw_nothing() {
-        let (mut gusts, mut rng) = (Gusts::default(), Pcg64::new(1, 1));
-        gusts.step(&Wind::steady(Vec3::new(5.0, 0.0, 0.0)), 0.01, &mut rng);
+        let (mut gusts, mut noise) = (Gusts::default(), Noise::from_seed(1));
+        gusts.step(&Wind::steady(Vec3::new(5.0, 0.0, 0.0)), 0.01, &mut noise);
         assert_eq!(gusts, Gusts::default());
-        assert_eq!(rng, Pcg64::new(1, 1));
+        assert_eq!(noise, Noise::from_seed(1));
     }
 }

@@ -7,7 +7,7 @@ use onecycle_lab::experiments::outsiders::Kind;
 use onecycle_lab::judge::campaign::Campaign;
 use onecycle_lab::judge::outsiders::{CYCLES, Judgement, Road, judge};
 use onecycle_lab::learn::dataset::ExampleError;
-use onecycle_onboard::classify::{Calibration, ClassifyError, Verdict};
+use onecycle_onboard::classify::{Calibration, ClassifyError, Familiarity};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::Signature;
 use rayon::prelude::*;
@@ -103,7 +103,7 @@ fn by_score(outcomes: &[Judgement], harmful: bool) -> [usize; 2] {
             .filter_map(|outcome| outcome.scored)
             .filter(move |scored| scored.harm.is_harmful() == harmful)
     };
-    let unknown = scored().filter(|scored| scored.verdict == Verdict::Unknown);
+    let unknown = scored().filter(|scored| scored.verdict == Familiarity::Unknown);
     [scored().count(), unknown.count()]
 }
 
@@ -124,7 +124,8 @@ fn silent(outcomes: &[Judgement]) -> usize {
         .filter(|outcome| {
             let is_accepted = (outcome.identified.last().copied().flatten())
                 .is_some_and(|harm| harm.is_harmful());
-            let is_known = (outcome.scored).is_none_or(|scored| scored.verdict == Verdict::Known);
+            let is_known =
+                (outcome.scored).is_none_or(|scored| scored.verdict == Familiarity::Known);
             is_accepted && is_known
         })
         .count()

@@ -16,7 +16,7 @@ use std::f64::consts::TAU;
 
 use onecycle_onboard::cycle::Cycle;
 use onecycle_onboard::{Soiptd, SoiptdError};
-use onecycle_plant::{Controller, Experiment, Trace};
+use onecycle_plant::{Controller, Experiment, Noise, Trace};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
@@ -256,6 +256,6 @@ impl Truth {
         let mut experiment = Experiment::new(self.process, SAMPLE_S, duration_s);
         experiment.input_bias = self.input_bias;
         experiment.sensor.noise_sigma = self.noise_sigma;
-        experiment.run(relay, &mut Pcg64Mcg::seed_from_u64(!self.seed))
+        experiment.run(relay, &mut Noise::from_seed(!self.seed))
     }
 }

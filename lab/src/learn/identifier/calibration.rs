@@ -1,6 +1,6 @@
 //! What a trained network is told beside its weights: how much to trust itself, where its family ends.
 
-use onecycle_onboard::classify::{Calibration, Posterior};
+use onecycle_onboard::classify::{Calibration, CyclePosterior};
 use onecycle_onboard::pack::{Domain, OutputScaling, Pack, Prior};
 use onecycle_onboard::signature::LENGTH;
 
@@ -36,7 +36,7 @@ pub fn calibrated(
     let mut squares = [0.0; VALUES];
     for record in chosen {
         let outputs = pack.outputs(&record.example.signature.values);
-        let posterior = Posterior::from_outputs(&outputs, &scale);
+        let posterior = CyclePosterior::from_outputs(&outputs, &scale);
         for (k, square) in squares.iter_mut().enumerate() {
             let variance: f64 = posterior.root[k].iter().map(|root| root * root).sum();
             let error = record.values[k] - posterior.mean[k];

@@ -1,8 +1,7 @@
 //! What a pack is worth on experiments that it has not learnt from, computed as the board does: its
 //! network, its score, its table.
 
-use onecycle_onboard::classify::{Classification, Verdict, classify_by};
-use onecycle_onboard::gains::LeadTable;
+use onecycle_onboard::classify::{Classification, Familiarity, classify_by};
 use onecycle_onboard::pack::Pack;
 
 use crate::judge::evaluate::Costs;
@@ -95,12 +94,12 @@ pub fn scores(pack: &Pack<'_>, records: &[&Record]) -> Scores {
 
 /// `None` where the cycle is unknown.
 fn outcome(pack: &Pack<'_>, record: &Record) -> Option<Outcome> {
-    let found = classified(pack, record).filter(|found| found.verdict == Verdict::Known)?;
+    let found = classified(pack, record).filter(|found| found.familiarity == Familiarity::Known)?;
     let truth = &record.example.process;
     let margin_rad = f64::from(pack.domain().phase_margin_rad);
     let best = pd_at_phase_margin(truth, margin_rad).ok()?;
-    let pd = LeadTable::from_bytes(pack.lead_table().bytes)
-        .ok()?
+    let pd = pack
+        .gains_table()?
         .pd_at_phase_margin(&found.candidates[0].process)
         .ok()?;
     Some(Outcome {

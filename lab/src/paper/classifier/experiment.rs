@@ -10,6 +10,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::ClassifierError;
+use crate::experiments::DrawnNoise;
 use crate::learn::dataset::last_steady_cycle;
 use crate::space::limit_cycle::symmetric;
 use crate::space::{FieldError, Space, first_out_of_range};
@@ -148,7 +149,10 @@ impl Trials {
             experiment.input_bias = bias;
             experiment.sensor.noise_sigma = sigma * quiet.amplitude;
             // The longer experiment begins as the shorter one did.
-            let trace = experiment.run(&mut Relay::new(settings)?, &mut rng.clone());
+            let trace = experiment.run(
+                &mut Relay::new(settings)?,
+                &mut DrawnNoise(&mut rng.clone()),
+            );
             let settled = last_steady_cycle(&trace).filter(|cycle| cycle.period_s < longest_s);
             if let Some(cycle) = settled.and_then(|cycle| sampled(&trace, &cycle)) {
                 return Ok(Some(Trial { process, cycle }));

@@ -18,7 +18,7 @@ use core::panic::PanicInfo;
 use core::ptr;
 
 use onecycle_flight::{Line, fly, settings};
-use onecycle_onboard::identification::Room;
+use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::Core;
 
@@ -102,7 +102,7 @@ static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
 };
 
 static mut CORE: MaybeUninit<Core<'static>> = MaybeUninit::uninit();
-static mut ROOM: Room = Room::NEW;
+static mut ROOM: Workspace = Workspace::NEW;
 
 extern "C" fn run() -> ! {
     start_timer();
@@ -122,7 +122,7 @@ extern "C" fn run() -> ! {
     let is_tuned = fly(core, room, laps(), say);
     for (name, bytes) in [
         ("flash", (&raw const __flash_end).addr()),
-        ("tuner", size_of::<Core<'static>>() + size_of::<Room>()),
+        ("tuner", size_of::<Core<'static>>() + size_of::<Workspace>()),
         (
             "static",
             distance(&raw const __data_start, &raw const __bss_end),

@@ -4,7 +4,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use onecycle_flight::{fly, numbers, settings};
-use onecycle_onboard::identification::Room;
+use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::Core;
 
@@ -12,7 +12,7 @@ fn main() -> ExitCode {
     let (Ok(checked), Ok(pack)) = (settings().checked(), Pack::embedded()) else {
         return ExitCode::FAILURE;
     };
-    let (mut tuner, mut room) = (Core::of(&checked, pack), Room::NEW);
+    let (mut tuner, mut room) = (Core::of(&checked, pack), Workspace::NEW);
     let mut lines = Vec::new();
     // Nothing is counted here.
     let is_tuned = fly(

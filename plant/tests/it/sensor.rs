@@ -1,14 +1,13 @@
 //! The sensor's noise and rounding against their predicted statistics.
 
-use onecycle_plant::Sensor;
-use rand_pcg::Pcg64;
+use onecycle_plant::{Noise, Sensor};
 
 const READINGS: usize = 100_000;
 
 fn errors(sensor: &Sensor, output: f64) -> Vec<f64> {
-    let mut rng = Pcg64::new(7, 7);
+    let mut noise = Noise::from_seed(7);
     (0..READINGS)
-        .map(|_| sensor.read(output, &mut rng) - output)
+        .map(|_| sensor.read(output, &mut noise) - output)
         .collect()
 }
 
@@ -30,13 +29,7 @@ fn variance(values: &[f64]) -> f64 {
 #[test]
 fn noise_is_white_with_the_given_sigma() {
     let sigma = 0.02;
-    let errors = errors(
-        &Sensor {
-            noise_sigma: sigma,
-            quantum: 0.0,
-        },
-        1.5,
-    );
+    let errors = errors(&Sensor::noisy(sigma), 1.5);
     let n = READINGS as f64;
     assert!(mean(&errors).abs() < 3.0 * sigma / n.sqrt());
     assert!((variance(&errors) / (sigma * sigma) - 1.0).abs() < 3.0 * (2.0 / n).sqrt());
@@ -55,11 +48,8 @@ fn noise_is_white_with_the_given_sigma() {
 // A quantum of a quarter (a power of two, so multiples are exact): 0.3 reads 0.25, 0.38 reads 0.5.
 #[test]
 fn readings_are_multiples_of_the_quantum() {
-    let sensor = Sensor {
-        noise_sigma: 0.0,
-        quantum: 0.25,
-    };
-    let mut rng = Pcg64::new(0, 0);
+    let sensor = Sensor::default().with_quantum(0.25);
+    let mut noise = Noise::from_seed(0);
     for (output, reading) in [
         (0.3, 0.25),
         (0.38, 0.5),
@@ -67,7 +57,7 @@ fn readings_are_multiples_of_the_quantum() {
         (0.0, 0.0),
         (7.26, 7.25),
     ] {
-        assert_eq!(sensor.read(output, &mut rng), reading);
+        assert_eq!(sensor.read(output, &mut noise), reading);
     }
 }
 
@@ -75,13 +65,7 @@ fn readings_are_multiples_of_the_quantum() {
 #[test]
 fn rounding_adds_a_twelfth_of_the_squared_quantum() {
     let (sigma, quantum) = (0.02, 0.03);
-    let errors = errors(
-        &Sensor {
-            noise_sigma: sigma,
-            quantum,
-        },
-        0.4,
-    );
+    let errors = errors(&Sensor::noisy(sigma).with_quantum(quantum), 0.4);
     let expected = sigma * sigma + quantum * quantum / 12.0;
     let tolerance = 3.0 * (2.0 / READINGS as f64).sqrt();
     assert!((variance(&errors) / expected - 1.0).abs() < tolerance);
@@ -89,7 +73,7 @@ fn rounding_adds_a_twelfth_of_the_squared_quantum() {
 
 #[test]
 fn a_perfect_sensor_draws_nothing() {
-    let mut used = Pcg64::new(3, 3);
+    let mut used = Noise::from_seed(3);
     assert_eq!(Sensor::default().read(0.123, &mut used), 0.123);
-    assert_eq!(used, Pcg64::new(3, 3));
+    assert_eq!(used, Noise::from_seed(3));
 }

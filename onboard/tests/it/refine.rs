@@ -1,13 +1,8 @@
 //! The estimator on noise-free experiments: what made them comes back.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{FitWindow, Simulation, every, last_cycles, run};
+use crate::common::{FitWindow, Simulation, every, last_cycles, run};
 use onecycle_onboard::refine::{
-    Beforehand, DomainEdge, RefineError, Refined, Shape, ShapePrior, refine, refine_with,
+    DomainEdge, PriorKnowledge, RefineError, Refined, Shape, ShapePrior, refine, refine_with,
 };
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 
@@ -255,7 +250,7 @@ fn a_prior_counts_for_what_it_is_worth() {
     let with = |size: f64| {
         let root =
             core::array::from_fn(|i| core::array::from_fn(|j| if i == j { size } else { 0.0 }));
-        let beforehand = Beforehand {
+        let beforehand = PriorKnowledge {
             starts: &[off],
             prior: ShapePrior::new(off, &root),
         };

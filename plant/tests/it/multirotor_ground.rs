@@ -1,15 +1,12 @@
 //! On the ground and onto it, and whatever is commanded.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
+use onecycle_plant::Noise;
 use onecycle_plant::multirotor::ground::ground_effect;
 use onecycle_plant::multirotor::{
-    Attitude, Command, Flight, Nudge, Parts, State, Vec3, Vehicle, Wind,
+    Attitude, Command, Flight, Nudge, Parts, Vec3, Vehicle, VehicleState, Wind,
 };
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
-use rand_pcg::Pcg64;
 
 /// A battery that neither sags nor runs down.
 fn steady() -> Vehicle {
@@ -28,10 +25,10 @@ fn thrust(thrust: f64) -> Command {
 
 /// Flies `duration_s` with the command held and returns the highest altitude (m).
 fn fly(flight: &mut Flight, command: Command, duration_s: f64) -> f64 {
-    let mut rng = Pcg64::new(1, 1);
+    let mut noise = Noise::from_seed(1);
     let mut highest = f64::NEG_INFINITY;
     for _ in 0..(duration_s / 1e-3).round() as usize {
-        flight.step(command, 1e-3, &mut rng);
+        flight.step(command, 1e-3, &mut noise);
         highest = highest.max(flight.reading().position_m.z);
     }
     highest
@@ -87,7 +84,7 @@ fn it_floats_on_the_ground_effect() {
 #[test]
 fn it_lands_without_a_bounce() {
     let vehicle = Vehicle::quadrotor();
-    let mut state = State::standing(&vehicle);
+    let mut state = VehicleState::standing(&vehicle);
     state.position_m.z += 0.001;
     state.velocity_m_per_s.z = -0.5;
     let mut flight = Flight::new(vehicle, state).unwrap();
@@ -103,7 +100,7 @@ fn it_lands_without_a_bounce() {
 #[test]
 fn it_rights_itself_on_its_feet() {
     let vehicle = Vehicle::quadrotor();
-    let mut state = State::standing(&vehicle);
+    let mut state = VehicleState::standing(&vehicle);
     state.position_m.z += 0.05;
     state.velocity_m_per_s = Vec3::new(0.5, -0.3, -0.4);
     state.world_from_body = Attitude::from_angles(0.25, -0.1, 1.0);
@@ -119,7 +116,7 @@ fn it_rights_itself_on_its_feet() {
 #[test]
 fn it_lies_on_its_guards() {
     let vehicle = Vehicle::quadrotor();
-    let mut state = State::standing(&vehicle);
+    let mut state = VehicleState::standing(&vehicle);
     state.position_m.z = 3.0;
     state.world_from_body = Attitude::from_angles(std::f64::consts::PI, 0.0, 0.0);
     let mut flight = Flight::new(vehicle, state).unwrap();
@@ -134,13 +131,13 @@ fn it_lies_on_its_guards() {
 #[test]
 fn a_crash_ends_at_the_ground() {
     let vehicle = Vehicle::quadrotor();
-    let mut state = State::standing(&vehicle);
+    let mut state = VehicleState::standing(&vehicle);
     state.position_m.z += 0.01;
     state.velocity_m_per_s.z = -30.0;
     let mut flight = Flight::new(vehicle, state).unwrap();
-    let (mut lowest, mut rng) = (f64::INFINITY, Pcg64::new(1, 1));
+    let (mut lowest, mut noise) = (f64::INFINITY, Noise::from_seed(1));
     for _ in 0..100 {
-        flight.step(Command::default(), 1e-3, &mut rng);
+        flight.step(Command::default(), 1e-3, &mut noise);
         lowest = lowest.min(flight.state().position_m.z);
     }
     assert_eq!(lowest, 0.0);
@@ -210,25 +207,21 @@ proptest! {
         seed in 0_u64..1000,
     ) {
         let vehicle = Vehicle::quadrotor().with_payload(payload_kg, 0.05).unwrap();
-        let mut state = State::standing(&vehicle);
+        let mut state = VehicleState::standing(&vehicle);
         state.position_m.z += height_m;
         if height_m > 1.0 {
             state.world_from_body = Attitude::from_angles(roll_rad, 0.3, 0.0);
         }
-        let mut rng = Pcg64::new(u128::from(seed), 1);
+        let mut noise = Noise::from_seed(seed);
         let mut flight = Flight::new(vehicle, state).unwrap();
-        flight.set_wind(Wind {
-            steady_m_per_s: Vec3::new(5.0, 0.0, 0.0),
-            gust_sigma_m_per_s: Vec3::new(2.0, 2.0, 1.0),
-            gust_correlation_s: 0.5,
-        }).unwrap();
+        flight.set_wind(Wind::steady(Vec3::new(5.0, 0.0, 0.0)).with_gusts(Vec3::new(2.0, 2.0, 1.0), 0.5)).unwrap();
         flight.nudge(Nudge {
             force_n: Vec3::new(force_n, 0.0, -force_n),
             torque_nm: Vec3::new(0.01 * force_n, 0.0, 0.0),
             duration_s: 0.05,
         }).unwrap();
         for (command, dt_s) in commands {
-            flight.step(command, dt_s, &mut rng);
+            flight.step(command, dt_s, &mut noise);
             let state = flight.state();
             prop_assert!(state.is_finite(), "{state:?}");
             prop_assert!((state.world_from_body.norm() - 1.0).abs() < 1e-15);

@@ -1,14 +1,10 @@
 //! Signatures of simulated relay experiments: what they must not depend on, and by how much they do.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::signature::{LENGTH, Signature};
 use onecycle_onboard::window::Window;
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Controller, Experiment, Sensed, Trace};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Controller, Experiment, Noise, Sensed, Trace};
 
 /// The paper's hover process and the period of its limit cycle at 1 ms.
 const HOVER_S: [f64; 3] = [0.0321, 1.6886, 0.0237];
@@ -22,10 +18,8 @@ fn process(k: f64, scale: f64) -> Soiptd {
 
 /// Thirty periods with a bias of the input, so that the halves of a cycle differ.
 fn experiment(k: f64, scale: f64) -> Experiment {
-    Experiment {
-        input_bias: 0.2,
-        ..Experiment::new(process(k, scale), scale * SAMPLE_S, 30.0 * scale * PERIOD_S)
-    }
+    Experiment::new(process(k, scale), scale * SAMPLE_S, 30.0 * scale * PERIOD_S)
+        .with_input_bias(0.2)
 }
 
 fn relay() -> Relay {
@@ -43,7 +37,7 @@ impl Controller for Reversed {
 }
 
 fn run(experiment: &Experiment, controller: &mut impl Controller) -> Trace {
-    experiment.run(controller, &mut Pcg64::new(0, 0))
+    experiment.run(controller, &mut Noise::from_seed(0))
 }
 
 fn last_cycle(trace: &Trace) -> Cycle {
@@ -97,11 +91,9 @@ fn a_negative_gain_is_the_same_signature() {
 fn gain_and_offset_leave_only_rounding() {
     let (unit, _) = signature::<512>(&run(&experiment(1.0, 1.0), &mut relay()));
     let (large, _) = signature::<512>(&run(&experiment(37.3, 1.0), &mut relay()));
-    let away = Experiment {
-        reference: 5.3,
-        initial_output: 5.3,
-        ..experiment(1.0, 1.0)
-    };
+    let away = experiment(1.0, 1.0)
+        .with_reference(5.3)
+        .with_initial_output(5.3);
     let (offset, _) = signature::<512>(&run(&away, &mut relay()));
     assert!(apart(&large.values, &unit.values) < 2.4e-7);
     assert!(apart(&offset.values, &unit.values) < 2.4e-7);
@@ -146,10 +138,7 @@ fn resolutions_agree() {
 #[test]
 fn signs_and_sizes_are_those_of_the_cycle() {
     for input_bias in [-0.5, -0.2, 0.0, 0.2, 0.5] {
-        let biased = Experiment {
-            input_bias,
-            ..experiment(1.0, 1.0)
-        };
+        let biased = experiment(1.0, 1.0).with_input_bias(input_bias);
         let trace = run(&biased, &mut relay());
         let (cycle, (signature, _)) = (last_cycle(&trace), signature::<512>(&trace));
         assert_eq!(signature.sign, 1.0);

@@ -1,9 +1,7 @@
 //! Packs that are as they must be, and bytes that are not.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::floats::Floats;
+use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::network::{Activation, Weights};
 use onecycle_onboard::pack::{
     DEFAULT, HEADER, MAGIC, OUTPUTS, Pack, PackError, Section, Sizes, VERSION, content_hash,
@@ -131,6 +129,8 @@ fn everything_comes_back() {
     assert_eq!((table.values.len(), table.get(0)), (6, Some(10.0)));
     assert_eq!((table.get(5), table.get(6)), (Some(22.0), None));
     assert_eq!(table.bytes, &bytes[LEAD_TABLE + 12..SELF_TEST]);
+    // Its numbers are no lead table: the first, a phase margin, is negative.
+    assert_eq!(pack.gains_table(), None);
     assert_eq!(pack.card(), "{  }");
     assert_eq!(pack.content_hash(), content_hash(&bytes[HEADER..]));
     // Two layers of 2 biases, 2 scales, 68 bytes; 14 biases, 28 weights.
@@ -204,7 +204,13 @@ fn the_hash_is_fnv_1a() {
 #[test]
 fn a_build_without_a_pack_says_so() {
     match Pack::embedded() {
-        Ok(pack) => assert!(pack.self_test().is_some_and(|worst| worst < 1e-5)),
+        Ok(pack) => {
+            assert!(pack.self_test().is_some_and(|worst| worst < 1e-5));
+            let table = pack.gains_table().unwrap();
+            assert_eq!(LeadTable::from_bytes(pack.lead_table().bytes), Ok(*table));
+            let margin = f64::from(pack.domain().phase_margin_rad);
+            assert_eq!(table.phase_margin_rad(), margin);
+        }
         Err(error) => assert_eq!((error, DEFAULT), (PackError::Empty, &[][..])),
     }
 }

@@ -1,16 +1,11 @@
 //! Refinement and classification in slices: the same results, in no more slices than they say.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{every, run};
+use crate::common::{every, run};
 use onecycle_onboard::classify::{Classifier, classify_by};
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{
-    Beforehand, RefineError, Refined, Refiner, ShapePrior, refine, refine_with, residuals,
+    PriorKnowledge, RefineError, Refined, Refiner, ShapePrior, refine, refine_with, residuals,
 };
 use onecycle_onboard::signature::Signature;
 use onecycle_onboard::window::Window;
@@ -77,7 +72,7 @@ fn a_refinement_takes_no_more_slices_than_it_says() {
         let (window, _, cycle) = last_cycle(&process(), noise);
         let mut refiner = Refiner::new();
         refiner
-            .begin(&window, cycle.period_s, &Beforehand::default())
+            .begin(&window, cycle.period_s, &PriorKnowledge::default())
             .unwrap();
         let most = refiner.most_slices(&window);
         let (outcome, slices) = finish(&mut refiner, &window);
@@ -98,19 +93,27 @@ fn a_refiner_can_be_begun_anew_at_any_time() {
     let other = Soiptd::from_acceleration_gain(-1.0, 0.2, 0.5, 0.1).unwrap();
     let (other_window, _, other_cycle) = last_cycle(&other, 0.05);
     let starts = [[2.5, 0.1, 0.05], [4.0, 0.01, 0.1]];
-    let beforehand = Beforehand {
+    let beforehand = PriorKnowledge {
         starts: &starts,
         prior: ShapePrior::of_pack(&pack),
     };
     let expected = refine_with(&window, cycle.period_s, &beforehand).unwrap();
     let mut refiner = Refiner::new();
     refiner
-        .begin(&other_window, other_cycle.period_s, &Beforehand::default())
+        .begin(
+            &other_window,
+            other_cycle.period_s,
+            &PriorKnowledge::default(),
+        )
         .unwrap();
     let (_, all) = finish(&mut refiner, &other_window);
     for abandoned in [3, all / 20, all / 2, all - 40, all] {
         refiner
-            .begin(&other_window, other_cycle.period_s, &Beforehand::default())
+            .begin(
+                &other_window,
+                other_cycle.period_s,
+                &PriorKnowledge::default(),
+            )
             .unwrap();
         for _ in 0..abandoned {
             let _ = refiner.advance(&other_window);
@@ -126,7 +129,7 @@ fn nothing_comes_of_what_was_not_begun() {
     let (window, _, cycle) = last_cycle(&process(), 0.0);
     let mut refiner = Refiner::new();
     assert_eq!(refiner.advance(&window), Some(Err(RefineError::NoFit)));
-    let beforehand = Beforehand::default();
+    let beforehand = PriorKnowledge::default();
     refiner.begin(&window, cycle.period_s, &beforehand).unwrap();
     assert_eq!(
         refiner.begin(&Coarse::new(0.0, 1e-3), cycle.period_s, &beforehand),

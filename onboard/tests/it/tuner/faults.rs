@@ -9,10 +9,10 @@ use std::ops::Range;
 
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::{Abort, Limits};
-use onecycle_onboard::tuner::{Phase, Tuner, TunerSettings};
+use onecycle_onboard::tuner::{Tuner, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 
-use crate::axis::{Axis, Noise};
+use super::axis::{Axis, Noise};
 
 const SAMPLE_S: f64 = 0.002;
 /// Longer than any test here takes to its controller and four periods beyond.
@@ -88,7 +88,7 @@ enum Must {
 
 impl Judge {
     /// In a test, or out of one, where the phase has a relay or not.
-    fn tick(&mut self, told: &Told, phase: Phase, is_proven: bool) -> Must {
+    fn tick(&mut self, told: &Told, phase: TunerPhase, is_proven: bool) -> Must {
         let Measurement { value, rate, age_s } = told.measurement;
         let rate = rate.unwrap_or(0.0);
         let finite = value.is_finite() && rate.is_finite() && told.reference.is_finite();
@@ -114,9 +114,13 @@ impl Judge {
         }
         let mut must = Must::GoOn;
         for (applies, so_far_s, limit_s) in [
-            (phase != Phase::Control, self.test_s, self.limits.duration_s),
             (
-                matches!(phase, Phase::Relay | Phase::Identify),
+                phase != TunerPhase::Control,
+                self.test_s,
+                self.limits.duration_s,
+            ),
+            (
+                matches!(phase, TunerPhase::Relay | TunerPhase::Identify),
                 self.since_switch_s,
                 self.limits.no_switch_s,
             ),
@@ -274,10 +278,10 @@ impl Run {
                 "{} {output}",
                 context()
             );
-            if before == Phase::Aborted || must == Must::End {
-                assert_eq!(after, Phase::Aborted, "{}", context());
+            if before == TunerPhase::Aborted || must == Must::End {
+                assert_eq!(after, TunerPhase::Aborted, "{}", context());
             }
-            if after == Phase::Aborted {
+            if after == TunerPhase::Aborted {
                 let (value, rate) = judge.usable;
                 let safe = self.settings.safe.output(0.0, value, rate);
                 assert_eq!(output, safe.max(lowest).min(highest), "{}", context());
@@ -286,7 +290,7 @@ impl Run {
                     Some(Abort::Refused(_) | Abort::Mismatch(_) | Abort::Operator)
                 );
                 assert!(
-                    before == Phase::Aborted || must != Must::GoOn || by_model,
+                    before == TunerPhase::Aborted || must != Must::GoOn || by_model,
                     "{}",
                     context()
                 );
@@ -294,7 +298,7 @@ impl Run {
             } else {
                 assert!(is_a_way(before, after), "{}", context());
             }
-            if after != Phase::Control {
+            if after != TunerPhase::Control {
                 assert_eq!(*self.tuner.law(), self.settings.safe, "{}", context());
             }
             if self.tuner.relay().is_high() != was_high {
@@ -311,12 +315,17 @@ impl Run {
 }
 
 /// The arrows of the tuner's table, but for those to Aborted.
-fn is_a_way(from: Phase, to: Phase) -> bool {
+fn is_a_way(from: TunerPhase, to: TunerPhase) -> bool {
     from == to
         || matches!(
             (from, to),
-            (Phase::Relay, Phase::Identify | Phase::Control)
-                | (Phase::Identify, Phase::Relay | Phase::Control)
+            (
+                TunerPhase::Relay,
+                TunerPhase::Identify | TunerPhase::Control
+            ) | (
+                TunerPhase::Identify,
+                TunerPhase::Relay | TunerPhase::Control
+            )
         )
 }
 

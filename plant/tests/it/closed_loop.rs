@@ -1,14 +1,10 @@
 //! Closed loops whose outcome can be predicted by hand.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Experiment, SampledPd, Sensor, Trace};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Experiment, Noise, SampledPd, Sensor, Trace};
 
-fn rng(seed: u128) -> Pcg64 {
-    Pcg64::new(seed, 0)
+fn noise(seed: u64) -> Noise {
+    Noise::from_seed(seed)
 }
 
 // At rest the integrator's input is zero: kp (r - y) + bias = 0, so r - y = -bias / kp exactly. The
@@ -16,14 +12,12 @@ fn rng(seed: u128) -> Pcg64 {
 #[test]
 fn a_bias_leaves_the_predicted_error() {
     let process = Soiptd::new(1.5, 0.03, 1.2, 0.02).unwrap();
-    let experiment = Experiment {
-        reference: 0.7,
-        input_bias: -0.25,
-        initial_output: 0.2,
-        ..Experiment::new(process, 1e-3, 20.0)
-    };
+    let experiment = Experiment::new(process, 1e-3, 20.0)
+        .with_reference(0.7)
+        .with_input_bias(-0.25)
+        .with_initial_output(0.2);
     let pd = Pd { kp: 8.0, kd: 2.5 };
-    let trace = experiment.run(&mut SampledPd(pd), &mut rng(0));
+    let trace = experiment.run(&mut SampledPd(pd), &mut noise(0));
     let error = experiment.reference - trace.true_output[trace.len() - 1];
     assert!((error - 0.25 / 8.0).abs() < 1e-13, "{error}");
     // And the input that is left is minus the bias.
@@ -43,11 +37,8 @@ fn sampled_at_400_ms(sample_s: f64) -> f64 {
         kp: POLE * POLE / 3.0,
         kd: POLE,
     };
-    let experiment = Experiment {
-        reference: 1.0,
-        ..Experiment::new(process, sample_s, 0.4 + sample_s)
-    };
-    let trace = experiment.run(&mut SampledPd(pd), &mut rng(0));
+    let experiment = Experiment::new(process, sample_s, 0.4 + sample_s).with_reference(1.0);
+    let trace = experiment.run(&mut SampledPd(pd), &mut noise(0));
     let last = trace.len() - 1;
     assert!((trace.time_s[last] - 0.4).abs() < 1e-12);
     trace.true_output[last]
@@ -75,21 +66,16 @@ fn sampled_pd_converges_to_the_continuous_loop() {
     assert!(rests[1].abs() < 3e-6 && 0.5e-3 * w > 1.3e-3);
 }
 
-fn noisy_relay(seed: u128, jitter: f64) -> Trace {
+fn noisy_relay(seed: u64, jitter: f64) -> Trace {
     let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
     let settings = RelaySettings {
         noise_sigma: 3e-5,
         ..RelaySettings::new(1.0, -0.73)
     };
-    let experiment = Experiment {
-        sensor: Sensor {
-            noise_sigma: 3e-5,
-            quantum: 0.0,
-        },
-        jitter,
-        ..Experiment::new(process, 1e-3, 10.0)
-    };
-    experiment.run(&mut Relay::new(settings).unwrap(), &mut rng(seed))
+    let experiment = Experiment::new(process, 1e-3, 10.0)
+        .with_sensor(Sensor::noisy(3e-5))
+        .with_jitter(jitter);
+    experiment.run(&mut Relay::new(settings).unwrap(), &mut noise(seed))
 }
 
 #[test]
@@ -143,14 +129,12 @@ fn time_always_advances() {
 fn both_propagations_run_the_same_loop() {
     let process = Soiptd::new(1.5, 0.03, 1.2, 0.0213).unwrap();
     let run = |jitter| {
-        let experiment = Experiment {
-            reference: 1.0,
-            input_bias: 0.1,
-            jitter,
-            ..Experiment::new(process, 1e-3, 2.0)
-        };
+        let experiment = Experiment::new(process, 1e-3, 2.0)
+            .with_reference(1.0)
+            .with_input_bias(0.1)
+            .with_jitter(jitter);
         experiment
-            .run(&mut SampledPd(Pd { kp: 8.0, kd: 2.5 }), &mut rng(0))
+            .run(&mut SampledPd(Pd { kp: 8.0, kd: 2.5 }), &mut noise(0))
             .true_output
     };
     for (fixed, variable) in run(0.0).iter().zip(&run(1e-13)) {

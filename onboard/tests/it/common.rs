@@ -1,25 +1,22 @@
 //! A relay around a process, noise-free, from the crate's own transition: no simulator needed.
 
-// Each test binary uses its part of it.
-#![allow(dead_code, unreachable_pub)]
-
 use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::transition::State;
 use onecycle_onboard::window::Window;
 use onecycle_onboard::{Relay, Soiptd, Transition};
 
-pub type FitWindow = Window<260, 64>;
+pub(crate) type FitWindow = Window<260, 64>;
 
 /// Input from the sample on, and output at it.
 #[derive(Clone, Debug, Default)]
-pub struct Run {
-    pub time_s: Vec<f64>,
-    pub input: Vec<f64>,
-    pub output: Vec<f64>,
+pub(crate) struct Run {
+    pub(crate) time_s: Vec<f64>,
+    pub(crate) input: Vec<f64>,
+    pub(crate) output: Vec<f64>,
 }
 
 /// The delayed process under held inputs; the recorded input arrives `tau` late.
-pub struct Simulation {
+pub(crate) struct Simulation {
     process: Soiptd,
     state: State,
     now_s: f64,
@@ -28,7 +25,7 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    pub fn new(process: &Soiptd) -> Self {
+    pub(crate) fn new(process: &Soiptd) -> Self {
         let under_way = std::collections::VecDeque::new();
         Self {
             process: *process,
@@ -39,12 +36,12 @@ impl Simulation {
         }
     }
 
-    pub fn output(&self) -> f64 {
+    pub(crate) fn output(&self) -> f64 {
         self.process.k_over_t_body() * self.state.y
     }
 
     /// Holds the input at `u` until `until_s`.
-    pub fn hold(&mut self, u: f64, until_s: f64) {
+    pub(crate) fn hold(&mut self, u: f64, until_s: f64) {
         self.under_way
             .push_back((self.now_s + self.process.tau_s(), u));
         while let Some((arrival_s, arriving)) = self.under_way.front().copied() {
@@ -66,7 +63,7 @@ impl Simulation {
 }
 
 /// Runs the relay at these instants, under a constant input bias.
-pub fn run(
+pub(crate) fn run(
     process: &Soiptd,
     relay: &mut Relay,
     bias: f64,
@@ -90,13 +87,13 @@ pub fn run(
 }
 
 /// Even instants.
-pub fn every(sample_s: f64, count: usize) -> impl Iterator<Item = f64> {
+pub(crate) fn every(sample_s: f64, count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| k as f64 * sample_s)
 }
 
 /// The last `cycles` cycles and two periods of input before them in a window, and their period;
 /// `keep` says which samples are there.
-pub fn last_cycles(
+pub(crate) fn last_cycles(
     run: &Run,
     sample_s: f64,
     cycles: usize,

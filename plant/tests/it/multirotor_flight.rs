@@ -1,14 +1,12 @@
 //! Free flight against mechanics by hand.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use std::f64::consts::PI;
 
+use onecycle_plant::Noise;
 use onecycle_plant::multirotor::{
-    Attitude, Command, Flight, GRAVITY_M_PER_S2, Nudge, Parts, State, Vec3, Vehicle, VehicleError,
+    Attitude, Command, Flight, GRAVITY_M_PER_S2, Nudge, Parts, Vec3, Vehicle, VehicleError,
+    VehicleState, Wind,
 };
-use rand_pcg::Pcg64;
 
 /// So high that the ground effect, (0.0762 / 4 z)^2, is below rounding.
 const HIGH: Vec3 = Vec3::new(0.0, 0.0, 1e6);
@@ -30,9 +28,9 @@ fn ideal() -> Parts {
 
 fn falling(parts: Parts) -> Flight {
     let vehicle = Vehicle::new(parts).unwrap();
-    let state = State {
+    let state = VehicleState {
         position_m: HIGH,
-        ..State::standing(&vehicle)
+        ..VehicleState::standing(&vehicle)
     };
     Flight::new(vehicle, state).unwrap()
 }
@@ -48,9 +46,9 @@ fn hovering(parts: Parts) -> (Flight, Command) {
 }
 
 fn fly(flight: &mut Flight, command: Command, duration_s: f64) {
-    let mut rng = Pcg64::new(1, 1);
+    let mut noise = Noise::from_seed(1);
     for _ in 0..(duration_s / 1e-3).round() as usize {
-        flight.step(command, 1e-3, &mut rng);
+        flight.step(command, 1e-3, &mut noise);
     }
 }
 
@@ -101,18 +99,18 @@ fn motors_lag() {
 fn tumbling_keeps_energy_and_angular_momentum() {
     let vehicle = Vehicle::new(ideal()).unwrap();
     let inertia = vehicle.parts().body.inertia_kg_m2;
-    let state = State {
+    let state = VehicleState {
         position_m: HIGH,
         rates_rad_per_s: Vec3::new(6.0, 0.1, 0.2),
         world_from_body: Attitude::from_angles(0.4, -0.3, 2.0),
-        ..State::standing(&vehicle)
+        ..VehicleState::standing(&vehicle)
     };
-    let energy_j = |state: &State| {
+    let energy_j = |state: &VehicleState| {
         0.5 * state
             .rates_rad_per_s
             .dot(inertia.scaled_by(state.rates_rad_per_s))
     };
-    let momentum = |state: &State| {
+    let momentum = |state: &VehicleState| {
         let in_body = inertia.scaled_by(state.rates_rad_per_s);
         state.world_from_body.axes().world_from_body(in_body)
     };
@@ -190,7 +188,7 @@ fn the_rotors_damp_every_motion() {
             lateral * (x * x + y * y) / inertia.z,
         ),
     ] {
-        let state = State {
+        let state = VehicleState {
             velocity_m_per_s: velocity,
             rates_rad_per_s: rates,
             ..hover
@@ -266,12 +264,12 @@ fn readings_are_as_old_as_the_delay() {
         let mut parts = ideal();
         parts.sensors.velocity.delay_s = delay_s;
         let mut flight = falling(parts);
-        let mut rng = Pcg64::new(1, 1);
+        let mut noise = Noise::from_seed(1);
         let mut climbs = vec![0.0];
         for step in 1..100_usize {
-            flight.step(Command::default(), 1e-3, &mut rng);
+            flight.step(Command::default(), 1e-3, &mut noise);
             climbs.push(flight.state().velocity_m_per_s.z);
-            let late = flight.sense(&mut rng).velocity_m_per_s.z;
+            let late = flight.sense(&mut noise).velocity_m_per_s.z;
             let at = |ago: usize| step.checked_sub(ago).map_or(0.0, |i| climbs[i]);
             let expected = (1.0 - share) * at(37) + share * at(38);
             assert!((late - expected).abs() < 1e-14, "{late} {expected}");
@@ -286,19 +284,19 @@ fn late_angles_go_the_short_way_round() {
     let mut parts = ideal();
     parts.sensors.angles.delay_s = 4e-4;
     let vehicle = Vehicle::new(parts).unwrap();
-    let state = State {
+    let state = VehicleState {
         position_m: HIGH,
         world_from_body: Attitude::from_angles(0.0, 0.0, PI - 0.0505),
         rates_rad_per_s: Vec3::new(0.0, 0.0, 1.0),
-        ..State::standing(&vehicle)
+        ..VehicleState::standing(&vehicle)
     };
     let mut flight = Flight::new(vehicle, state).unwrap();
-    let mut rng = Pcg64::new(1, 1);
+    let mut noise = Noise::from_seed(1);
     for step in 1..100 {
-        flight.step(Command::default(), 1e-3, &mut rng);
+        flight.step(Command::default(), 1e-3, &mut noise);
         let past_pi = f64::from(step) * 1e-3 - 4e-4 - 0.0505;
         let expected = past_pi - PI * past_pi.signum();
-        let yaw_rad = flight.sense(&mut rng).angles_rad.z;
+        let yaw_rad = flight.sense(&mut noise).angles_rad.z;
         assert!((yaw_rad - expected).abs() < 1e-12, "{yaw_rad} {expected}");
     }
 }
@@ -310,13 +308,13 @@ fn readings_carry_noise() {
     const READINGS: usize = 10_000;
     let mut parts = ideal();
     parts.sensors.position.sensor.noise_sigma = 0.02;
-    let (flight, mut rng) = (
+    let (flight, mut noise) = (
         Flight::standing(Vehicle::new(parts).unwrap()),
-        Pcg64::new(4, 4),
+        Noise::from_seed(4),
     );
     let mut power = 0.0;
     for _ in 0..READINGS {
-        let reading = flight.sense(&mut rng);
+        let reading = flight.sense(&mut noise);
         power += reading.position_m.z * reading.position_m.z;
         assert_eq!(reading.rates_rad_per_s, Vec3::ZERO);
     }
@@ -344,12 +342,12 @@ fn a_payload_is_taken_up_and_dropped() {
 fn the_middle_does_not_jump_with_the_payload() {
     let bare = Vehicle::new(ideal()).unwrap();
     let loaded = bare.with_payload(0.4, 0.05).unwrap();
-    let state = State {
+    let state = VehicleState {
         position_m: Vec3::new(1.0, 2.0, 3.0),
         velocity_m_per_s: Vec3::new(0.3, -0.2, 0.1),
         world_from_body: Attitude::from_angles(0.3, 0.2, 0.1),
         rates_rad_per_s: Vec3::new(2.0, -1.0, 0.5),
-        ..State::standing(&loaded)
+        ..VehicleState::standing(&loaded)
     };
     let mut flight = Flight::new(loaded, state).unwrap();
     let before = flight.reading();
@@ -435,16 +433,13 @@ fn errors_name_the_parameter() {
 fn ticks_of_whole_steps_are_the_same_flight() {
     let run = |steps: usize| {
         let (mut flight, command) = hovering(Parts::quadrotor());
-        let mut rng = Pcg64::new(2, 2);
+        let mut noise = Noise::from_seed(2);
         flight
-            .set_wind(onecycle_plant::multirotor::Wind {
-                gust_sigma_m_per_s: Vec3::new(1.0, 1.0, 1.0),
-                ..onecycle_plant::multirotor::Wind::CALM
-            })
+            .set_wind(Wind::CALM.with_gusts(Vec3::new(1.0, 1.0, 1.0), 1.0))
             .unwrap();
         let inner_s = 2.0_f64.powi(-10);
         for _ in 0..1024 / steps {
-            flight.step(command, steps as f64 * inner_s, &mut rng);
+            flight.step(command, steps as f64 * inner_s, &mut noise);
         }
         *flight.state()
     };

@@ -1,14 +1,11 @@
 //! The tuner on simulated axes: from rest, from the ground, and everything that can go wrong.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 mod axis;
 mod faults;
 
 use onecycle_onboard::control::PdLaw;
 use onecycle_onboard::guard::Abort;
-use onecycle_onboard::tuner::{Phase, TakeOffSettings, Tuner, TunerSettings};
+use onecycle_onboard::tuner::{TakeOffSettings, Tuner, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 
 use self::axis::Axis;
@@ -123,13 +120,13 @@ fn a_response_that_is_not_the_predicted_one_falls_back() {
     let mut axis = Axis::new(height(), SAMPLE_S, 1);
     tuner.start();
     axis.fly(&mut tuner, 0.0, 20.0, |tuner, _| {
-        tuner.phase() == Phase::Control
+        tuner.phase() == TunerPhase::Control
     });
-    assert!(tuner.phase() == Phase::Control && !tuner.is_proven());
+    assert!(tuner.phase() == TunerPhase::Control && !tuner.is_proven());
     let amplitude = tuner.identified().unwrap().amplitude as f32;
     axis.becomes(height().with_gain_scaled(6.0).unwrap());
     axis.fly(&mut tuner, 0.0, 4.0, |tuner, _| {
-        tuner.phase() == Phase::Aborted
+        tuner.phase() == TunerPhase::Aborted
     });
     let Some(Abort::Mismatch(off)) = tuner.reason() else {
         panic!("{:?} {:?}", tuner.phase(), tuner.reason());
@@ -161,7 +158,7 @@ fn the_relay_begins_where_the_safe_controller_held_the_process() {
     assert!((tuner.offset() + 0.03).abs() < 1e-4, "{}", tuner.offset());
     axis.fly(&mut tuner, 0.0, 20.0, |tuner, axis| {
         assert!((axis.value() - 0.06).abs() < 0.03, "{}", axis.value());
-        tuner.phase() == Phase::Control
+        tuner.phase() == TunerPhase::Control
     });
     let found = tuner.identified().unwrap();
     assert!((found.input_bias - 0.03).abs() < 1e-3, "{found:?}");
@@ -177,12 +174,12 @@ fn after_a_reset_all_begins_anew() {
     tuner.abort();
     assert_eq!(
         (tuner.phase(), tuner.reason()),
-        (Phase::Aborted, Some(Abort::Operator))
+        (TunerPhase::Aborted, Some(Abort::Operator))
     );
     tuner.start();
-    assert_eq!(tuner.phase(), Phase::Aborted);
+    assert_eq!(tuner.phase(), TunerPhase::Aborted);
     tuner.reset();
-    assert_eq!((tuner.phase(), tuner.reason()), (Phase::Idle, None));
+    assert_eq!((tuner.phase(), tuner.reason()), (TunerPhase::Idle, None));
     let other = height().with_gain_scaled(2.0).unwrap();
     let mut axis = Axis::new(other, SAMPLE_S, 2);
     tuner.start();

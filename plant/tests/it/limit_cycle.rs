@@ -1,12 +1,8 @@
 //! Limit cycles of the bare relay against an independent prototype of the same loop.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::Experiment;
-use rand_pcg::Pcg64;
+use onecycle_plant::{Experiment, Noise};
 
 /// The last cycles of a run of the bare relay at 1 ms.
 fn steady_cycles(process: &Soiptd, amplitude: f32, periods_s: f64) -> Vec<Cycle> {
@@ -17,7 +13,7 @@ fn steady_cycles(process: &Soiptd, amplitude: f32, periods_s: f64) -> Vec<Cycle>
     let experiment = Experiment::new(*process, 1e-3, 60.0 * periods_s);
     experiment.observe(
         &mut relay,
-        &mut Pcg64::new(0, 0),
+        &mut Noise::from_seed(0),
         |time_s, input, output, _| {
             cycles.extend(detector.push(time_s, input > 0.0, output));
         },

@@ -1,17 +1,24 @@
 //! Whether the estimator's covariance is what it says: errors of noisy experiments, in its own units.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::refine::{Refined, coordinate, refine};
 use onecycle_onboard::window::Window;
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Experiment, Sensor, Trace};
+use onecycle_plant::{Experiment, NoiseSource, Sensor, Trace};
 use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 
 type FitWindow = Window<260, 64>;
+
+/// Noise from the generator that the processes are drawn from.
+struct Continued<'a>(&'a mut Pcg64);
+
+impl NoiseSource for Continued<'_> {
+    fn standard_normal(&mut self) -> f64 {
+        self.0.sample(StandardNormal)
+    }
+}
 
 fn noisy_relay(process: &Soiptd, sigma: f64, bias: f64, rng: &mut Pcg64) -> (Trace, f64) {
     let (omega, amplitude) = process.describing_function_oscillation(1.0, -0.73).unwrap();
@@ -22,16 +29,11 @@ fn noisy_relay(process: &Soiptd, sigma: f64, bias: f64, rng: &mut Pcg64) -> (Tra
         trim_gain: RelaySettings::TRIM_GAIN,
         ..RelaySettings::new(1.0, RelaySettings::DISTINGUISHING_BETA)
     };
-    let experiment = Experiment {
-        sensor: Sensor {
-            noise_sigma,
-            quantum: 0.0,
-        },
-        input_bias: bias,
-        ..Experiment::new(*process, 1e-3, 0.2 + 30.0 * period_s)
-    };
+    let experiment = Experiment::new(*process, 1e-3, 0.2 + 30.0 * period_s)
+        .with_sensor(Sensor::noisy(noise_sigma))
+        .with_input_bias(bias);
     (
-        experiment.run(&mut Relay::new(settings).unwrap(), rng),
+        experiment.run(&mut Relay::new(settings).unwrap(), &mut Continued(rng)),
         noise_sigma,
     )
 }

@@ -1,11 +1,6 @@
 //! The relay around processes, and under anything that a sensor may tell it.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{every, run};
+use crate::common::{every, run};
 use onecycle_onboard::{Relay, RelayError, RelaySettings, Soiptd};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};

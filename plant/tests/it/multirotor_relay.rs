@@ -1,12 +1,8 @@
 //! The relay test on the vehicle and on its process: what an identification sees.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
 use onecycle_plant::multirotor::{Axis, Command, Flight, Hover, Parts, Vec3, Vehicle};
-use onecycle_plant::{Controller, Experiment, SampledPd, Sensed, Trace};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Controller, Experiment, Noise, SampledPd, Sensed, Trace};
 
 const TICK_S: f64 = 1e-3;
 const SAMPLES: usize = 6000;
@@ -26,10 +22,10 @@ fn relay(amplitude: f64) -> Relay {
 fn flown(vehicle: Vehicle, hover: &Hover, axis: Axis, amplitude: f64) -> Trace {
     let mut flight = Flight::new(vehicle, hover.state(Vec3::new(0.0, 0.0, 1.0))).unwrap();
     let begin_m = flight.reading().position_m.z;
-    let (mut relay, mut rng) = (relay(amplitude), Pcg64::new(1, 1));
+    let (mut relay, mut noise) = (relay(amplitude), Noise::from_seed(1));
     let mut trace = Trace::default();
     for sample in 0..SAMPLES {
-        let (reading, truth) = (flight.sense(&mut rng), flight.reading());
+        let (reading, truth) = (flight.sense(&mut noise), flight.reading());
         // Crosses over at 331 rad/s^2 times 0.06: 20 rad/s.
         let hold = |angle: f64, rate: f64| {
             let sensed = Sensed {
@@ -57,14 +53,14 @@ fn flown(vehicle: Vehicle, hover: &Hover, axis: Axis, amplitude: f64) -> Trace {
             command.roll = input;
         }
         trace.push(sample as f64 * TICK_S, input, output, true_output);
-        flight.step(command, TICK_S, &mut rng);
+        flight.step(command, TICK_S, &mut noise);
     }
     trace
 }
 
 fn simulated(process: Soiptd, amplitude: f64) -> Trace {
     let experiment = Experiment::new(process, TICK_S, SAMPLES as f64 * TICK_S);
-    experiment.run(&mut relay(amplitude), &mut Pcg64::new(1, 1))
+    experiment.run(&mut relay(amplitude), &mut Noise::from_seed(1))
 }
 
 /// Mean period of the relay in the tail (s): upward edges are less than two samples from where they

@@ -11,9 +11,6 @@
 //!
 //! Each is zero at zero, has zero slope there, and solves the differential equation.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::Soiptd;
 use onecycle_plant::{FixedStepProcess, VariableStepProcess};
 

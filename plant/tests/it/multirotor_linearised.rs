@@ -6,13 +6,9 @@
 //! the delay (an eighth of the second derivative times 1 ms^2, 3e-7 of the output after a second)
 //! and the Runge-Kutta rule.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
 use onecycle_onboard::Pd;
 use onecycle_plant::multirotor::{Axis, Command, Flight, Hover, Nudge, Parts, Vec3, Vehicle, Wind};
-use onecycle_plant::{Controller, Experiment, FixedStepProcess, SampledPd, Sensed};
-use rand_pcg::Pcg64;
+use onecycle_plant::{Controller, Experiment, FixedStepProcess, Noise, SampledPd, Sensed};
 
 const TICK_S: f64 = 2e-3;
 /// So small that the quadratic drag, which is odd in the climb, stays below rounding.
@@ -85,7 +81,7 @@ impl Trial {
     /// Outputs of a flight from hover at 50 m with the input scaled.
     fn flown(&self, size: f64) -> Vec<f64> {
         let (vehicle, hover) = (Vehicle::new(self.parts).unwrap(), self.hover());
-        let mut rng = Pcg64::new(1, 1);
+        let mut noise = Noise::from_seed(1);
         let mut flight = Flight::new(vehicle, hover.state(Vec3::new(0.0, 0.0, 50.0))).unwrap();
         flight.set_wind(Wind::steady(self.wind)).unwrap();
         // Held where it is against a horizontal wind, as a perfect position controller would.
@@ -101,10 +97,10 @@ impl Trial {
             .unwrap();
         (0..self.ticks)
             .map(|tick| {
-                let reading = flight.sense(&mut rng);
+                let reading = flight.sense(&mut noise);
                 let input = size * (self.input)(tick);
                 let held = command(self.axis, hover.thrust_command(), input);
-                flight.step(held, TICK_S, &mut rng);
+                flight.step(held, TICK_S, &mut noise);
                 match self.axis {
                     Axis::Altitude => reading.position_m.z,
                     Axis::Roll => reading.angles_rad.x,
@@ -255,23 +251,21 @@ fn a_closed_loop_flies_as_its_process() {
     let mut controller = SampledPd(Pd { kp: 2.4, kd: 0.6 });
     let vehicle = Vehicle::new(lasting()).unwrap();
     let hover = vehicle.hover(1.0, Vec3::ZERO).unwrap();
-    let mut rng = Pcg64::new(1, 1);
-    let experiment = Experiment {
-        reference: STEP_M,
-        ..Experiment::new(
-            hover.linearised(Axis::Altitude).unwrap(),
-            TICK_S,
-            SAMPLES as f64 * TICK_S,
-        )
-    };
-    let expected = experiment.run(&mut controller, &mut rng).true_output;
+    let mut noise = Noise::from_seed(1);
+    let experiment = Experiment::new(
+        hover.linearised(Axis::Altitude).unwrap(),
+        TICK_S,
+        SAMPLES as f64 * TICK_S,
+    )
+    .with_reference(STEP_M);
+    let expected = experiment.run(&mut controller, &mut noise).true_output;
 
     let start = Vec3::new(0.0, 0.0, 50.0);
     let mut flight = Flight::new(vehicle, hover.state(start)).unwrap();
     let begin_m = flight.reading().position_m.z;
     let mut worst = 0.0_f64;
     for expected in &expected {
-        let reading = flight.sense(&mut rng);
+        let reading = flight.sense(&mut noise);
         let sensed = Sensed {
             output: reading.position_m.z - begin_m,
             rate: reading.velocity_m_per_s.z,
@@ -279,7 +273,7 @@ fn a_closed_loop_flies_as_its_process() {
         worst = worst.max((sensed.output - expected).abs());
         let input = controller.step(TICK_S, STEP_M, sensed);
         let held = command(Axis::Altitude, hover.thrust_command(), input);
-        flight.step(held, TICK_S, &mut rng);
+        flight.step(held, TICK_S, &mut noise);
     }
     // The loop did something, and settled.
     assert!((expected[SAMPLES - 1] / STEP_M - 1.0).abs() < 0.01);

@@ -1,0 +1,43 @@
+//! Noise of sensors and wind: a stream of independent standard normal numbers.
+//!
+//! The same seed gives the same numbers on every machine and in every version: the generator is the permuted
+//! congruential generator PCG XSL RR 128/64 (multiplicative), the normal numbers come from the ziggurat method.
+//!
+//! ```
+//! use onecycle_plant::{Noise, NoiseSource};
+//!
+//! let (mut one, mut same) = (Noise::from_seed(7), Noise::from_seed(7));
+//! assert_eq!(one.standard_normal(), same.standard_normal());
+//! ```
+//!
+//! Reference: M. E. O'Neill, "PCG: a family of simple fast space-efficient statistically good algorithms for random
+//! number generation", HMC-CS-2014-0905 (2014).
+
+use rand::{RngExt, SeedableRng};
+use rand_distr::StandardNormal;
+use rand_pcg::Pcg64Mcg;
+
+/// Where a simulation takes its noise from. Implement it to continue a generator of your own.
+pub trait NoiseSource {
+    /// The next number of mean zero and variance one.
+    fn standard_normal(&mut self) -> f64;
+}
+
+/// Noise from a seed. See the [module](self).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Noise(Pcg64Mcg);
+
+impl Noise {
+    /// The stream of this seed, from its beginning.
+    #[must_use]
+    pub fn from_seed(seed: u64) -> Self {
+        Self(Pcg64Mcg::seed_from_u64(seed))
+    }
+}
+
+impl NoiseSource for Noise {
+    #[inline]
+    fn standard_normal(&mut self) -> f64 {
+        self.0.sample(StandardNormal)
+    }
+}
