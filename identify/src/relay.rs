@@ -175,7 +175,7 @@ impl Search<'_> {
         };
         refine_with(window, period_s, &beforehand).map_err(|error| match error {
             RefineError::TooFewBins(points) => Verdict::TooCoarse { points },
-            RefineError::NoInput | RefineError::NoFit => Verdict::NoFit,
+            _ => Verdict::NoFit,
         })
     }
 
