@@ -18,13 +18,14 @@
 //! for (parameter, interval) in found.estimate.iter() {
 //!     println!("{} {:?}", parameter.symbol(), interval);
 //! }
-//! println!("Kp {:.3}, Kd {:.3}", found.design.controller.kp(), found.design.controller.kd());
+//! let controller = found.design.controller;
+//! println!("Kp {:.3}, Kd {:.3}", controller.kp(), controller.kd());
 //! # // The file names the true process; the 90 % intervals hold K/T_body = 0.5922 and tau = 23.7 ms.
 //! # let holds = |parameter, truth| found.estimate.get(parameter).is_some_and(|of| of.holds(truth));
 //! # assert!(holds(Parameter::KOverTBody, 0.592_206_56) && holds(Parameter::Tau, 0.0237));
 //! # // The optimal gains of the true process are 192.92 and 29.523; two cycles with 2 % noise are within 3 %.
-//! # assert!((found.design.controller.kp() / 192.92 - 1.0).abs() < 0.03);
-//! # assert!((found.design.controller.kd() / 29.523 - 1.0).abs() < 0.03);
+//! # assert!((controller.kp() / 192.92 - 1.0).abs() < 0.03);
+//! # assert!((controller.kd() / 29.523 - 1.0).abs() < 0.03);
 //! # Ok(())
 //! # }
 //! ```
@@ -63,8 +64,8 @@
 //! }
 //!
 //! // An error names the place.
-//! let error = onecycle::read_from("t,u,y\n0,1,x\n".as_bytes(), &CsvOptions::default()).unwrap_err();
-//! assert!(matches!(error, ReadError::NotANumber { line: 2, .. }));
+//! let damaged = onecycle::read_from("t,u,y\n0,1,x\n".as_bytes(), &CsvOptions::default());
+//! assert!(matches!(damaged, Err(ReadError::NotANumber { line: 2, .. })));
 //!
 //! let mut copy = Vec::new();
 //! onecycle::write_csv(&mut copy, &recording, &["roll axis"])?;
@@ -85,7 +86,8 @@
 //! // K, T_prop (s), T_body (s), tau (s).
 //! let truth = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?;
 //! let mut axis = FixedStepProcess::new(&truth, 1e-3);
-//! let mut relay = Relay::new(RelaySettings::new(0.5, RelaySettings::DISTINGUISHING_BETA))?;
+//! let settings = RelaySettings::new(0.5, RelaySettings::DISTINGUISHING_BETA);
+//! let mut relay = Relay::new(settings)?;
 //! let (mut time_s, mut input, mut output) = (vec![], vec![], vec![]);
 //! for tick in 0..8000 {
 //!     let measured = axis.output();
@@ -121,7 +123,7 @@
 //! let identified = found.outcome?;
 //! assert_eq!(identified.model.structure(), Structure::Soiptd);
 //!
-//! // The phase margin of your own gains, with its 90 % interval over the processes that the recording allows.
+//! // The phase margin (rad) of your own gains, with its 90 % interval over the posterior.
 //! let own = Controller::from(Pd { kp: 50.0, kd: 15.0 });
 //! let margin_rad = identified.posterior.phase_margin_rad(&own);
 //! assert!(margin_rad.low.is_some_and(|low| low > 40_f64.to_radians()));
@@ -142,8 +144,11 @@
 //! let recording = Recording::from_samples(&time_s, &[0.2; 1000], &[0.0; 1000])?;
 //! let found = Identify::new().run(&recording);
 //! match &found.outcome {
-//!     Ok(identified) => println!("{:?} {:?}", identified.design.controller, found.remarks),
+//!     Ok(identified) => println!("{:?}", identified.design.controller),
 //!     Err(verdict) => println!("{}: {verdict}", verdict.kind()),
+//! }
+//! for remark in &found.remarks {
+//!     println!("{}: {remark:?}", remark.kind());
 //! }
 //! assert_eq!(found.outcome, Err(Verdict::ConstantInput));
 //! # Ok(())
@@ -154,23 +159,25 @@
 //!
 //! ```
 //! use onecycle::{
-//!     Controller, DesignError, Model, Parameter, Pd, Soiptd, SoiptdError, Specification, StepResponseError, Unit,
-//!     design, ise, margins, step_response,
+//!     Controller, DesignError, Model, Parameter, Pd, Soiptd, SoiptdError, Specification,
+//!     StepResponseError, Unit, design, ise, margins, step_response,
 //! };
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let model = Model::from(Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?);
 //! assert_eq!(model.structure().name(), "soiptd");
-//! assert_eq!((model.parameter(Parameter::Tau), Parameter::Tau.unit()), (Some(0.0237), Unit::Second));
+//! assert_eq!(model.parameter(Parameter::Tau), Some(0.0237));
+//! assert_eq!(Parameter::Tau.unit(), Unit::Second);
 //!
 //! let asked = Specification::default().with_phase_margin_rad(45_f64.to_radians());
 //! let best = design(&model, &asked)?;
-//! println!("{}: {}", best.controller.form().name(), best.controller.form().law());
+//! let (kp, kd) = (best.controller.kp(), best.controller.kd());
+//! println!("{}, Kp {kp:.2}, Kd {kd:.3}", best.controller.form().law());
 //! let step = step_response(&model, &best.controller)?.metrics;
-//! println!("settles in {:.3} s, overshoots by {:.0} %", step.settling_time_s, 100.0 * step.overshoot);
+//! println!("settles in {:.3} s, overshoot {:.2}", step.settling_time_s, step.overshoot);
 //!
-//! // Half the gains: a larger squared error, and a larger margin against additional dead time.
-//! let half = Controller::from(Pd { kp: 0.5 * best.controller.kp(), kd: 0.5 * best.controller.kd() });
+//! // Half the gains: a larger squared error and a larger delay margin.
+//! let half = Controller::from(Pd { kp: 0.5 * kp, kd: 0.5 * kd });
 //! let slower = margins(&model, &half).ok_or("no positive gain")?;
 //! assert!(slower.delay_margin_s > best.margins.delay_margin_s);
 //! assert!(ise(&model, &half).is_some_and(|cost| cost > best.ise));
