@@ -6,12 +6,14 @@
 //! identified ([`Verdict`]), and what limits the result ([`Remark`]). The results are facts without advice: the program
 //! that shows them adds it.
 //!
-//! | file | content |
-//! |------|---------|
-//! | `relay` | identification from a steady relay oscillation, with the estimator of the board |
-//! | `posterior` | draws from the distribution of the parameters, 90 % intervals |
-//! | `excitation`, `outcome`, `verdict`, `remark` | the result |
-//! | [`diagnose`] | frequency response at the harmonics without a model, whiteness of residuals, densities of draws |
+//! | to obtain | call |
+//! |-----------|------|
+//! | process, intervals and controller, or a verdict | [`identify`], [`identify_by`] |
+//! | period, amplitude and noise of a steady oscillation | [`find_oscillation`] |
+//! | the phase margin of a controller over all likely processes | [`Posterior::phase_margin_rad`] |
+//! | the frequency response at the harmonics of the oscillation, without a model | [`harmonics`](fn@harmonics) |
+//! | a test of the residuals for whiteness | [`whiteness`](fn@whiteness) |
+//! | contours of the posterior | [`density`](fn@density) |
 
 pub mod cholesky;
 pub mod diagnose;
@@ -67,3 +69,8 @@ pub fn identify_by(
 ) -> Identification {
     relay::identify(signals, options, pack)
 }
+
+// Compiles and runs the code of the README.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -1,7 +1,7 @@
-//! From a process model to its controllers: `cargo run -p onecycle --example design`.
+//! Design a controller for a process model: `cargo run -p onecycle --example design`.
 //!
-//! The altitude of the paper's hexacopter at three phase margins: a larger margin costs squared error and speed, and gives
-//! less overshoot and a larger delay margin.
+//! The altitude of the paper's hexacopter at three phase margins. A larger phase margin gives less overshoot and a
+//! larger delay margin, but a larger squared error and a slower rise.
 
 #![expect(clippy::print_stdout, reason = "an example reports")]
 
@@ -10,7 +10,7 @@ use std::error::Error;
 use onecycle::{Model, Soiptd, Specification, design, step_response};
 
 fn main() -> Result<(), Box<dyn Error>> {
-    // K, T_prop (s), T_body (s), delay (s).
+    // K, T_prop (s), T_body (s), tau (s).
     let model = Model::from(Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?);
     println!("margin   Kp      Kd      ISE (s)  rise (s)  settling (s)  overshoot  delay margin");
     for phase_margin_deg in [20.0_f64, 45.0, 60.0] {

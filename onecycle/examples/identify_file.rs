@@ -1,6 +1,7 @@
-//! From a file to the process and its controller: `cargo run -p onecycle --example identify_file [FILE]`.
+//! Identify a process from a CSV file and print its controller:
+//! `cargo run -p onecycle --example identify_file [FILE]`.
 //!
-//! Without a file it reads the simulated hover that comes with the sources.
+//! Without FILE the example reads `examples/simulated_hover.csv` of the repository.
 
 #![expect(clippy::print_stdout, reason = "an example reports")]
 
@@ -30,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             oscillation.noise_sigma
         );
     }
-    // A verdict is a value, and an error where there is nothing to do without a process.
+    // A verdict is also an error, so `?` ends the program with its message.
     let identified = found.outcome?;
     report(&identified);
     for remark in &found.remarks {
@@ -55,7 +56,7 @@ fn report(identified: &Identified) {
         margins.phase_margin_rad.to_degrees(),
         1e3 * margins.delay_margin_s
     );
-    // Without delay and damping there is no gain margin: no gain makes the loop unstable.
+    // There is no gain margin if no gain makes the loop unstable: a process without dead time and damping.
     if let Some(gain_margin) = margins.gain_margin {
         println!("gain margin {gain_margin:.2}");
     }
@@ -69,7 +70,7 @@ fn report(identified: &Identified) {
     }
 }
 
-/// An absent end is unbounded: `T_body` and `K` where the damping is not visible.
+/// `None` stands for infinite: `T_body` and `K` are unbounded above if the recording does not show the damping.
 fn with_ends(interval: &Interval) -> String {
     let number =
         |value: Option<f64>| value.map_or("infinite".to_owned(), |value| format!("{value:.5}"));

@@ -1,7 +1,7 @@
-//! From samples in memory to the process: `cargo run -p onecycle --example identify_samples`.
+//! Identify a process from samples in memory: `cargo run -p onecycle --example identify_samples`.
 //!
-//! The attitude of a multirotor under a relay, with sensor noise and an input bias. The first 0.3 s of the same recording
-//! are too short for an answer, and the refusal is a value to handle like any other.
+//! The samples come from a simulated relay test of a multirotor axis with sensor noise and input bias. The first 0.3 s
+//! of the same recording are too short: the outcome is a verdict.
 
 #![expect(clippy::print_stdout, reason = "an example reports")]
 
@@ -11,11 +11,11 @@ use onecycle::{
     Experiment, Identify, Noise, Parameter, Recording, Relay, RelaySettings, Sensor, Soiptd, Trace,
 };
 
-/// Time between samples (s).
+/// Sample period (s).
 const SAMPLE_S: f64 = 0.001;
-/// Half the jump of the relay (input unit).
+/// Amplitude of the relay (input unit).
 const AMPLITUDE: f32 = 0.5;
-/// Noise of one sample (output unit): 2 % of the amplitude of the oscillation.
+/// Standard deviation of the noise of one sample (output unit): 2 % of the amplitude of the oscillation.
 const NOISE_SIGMA: f64 = 3e-5;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         &trace.output[..begin],
     )?;
     match Identify::new().run(&short).outcome {
-        Ok(_) => Err("0.3 s cannot tell the process".into()),
+        Ok(_) => Err("a process was identified from less than a cycle".into()),
         Err(verdict) => {
             println!("the first 0.3 s: {verdict}");
             Ok(())
@@ -59,7 +59,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
 }
 
-/// Eight seconds under the relay that also flies.
+/// Eight seconds under the relay of the firmware.
 fn relay_test(process: &Soiptd) -> Result<Trace, Box<dyn Error>> {
     let experiment = Experiment::new(*process, SAMPLE_S, 8.0)
         .with_input_bias(0.2 * f64::from(AMPLITUDE))

@@ -1,8 +1,13 @@
-//! The on-board tuner in a control loop: `cargo run -p onecycle --example on_board`.
+//! The tuner of the firmware in a control loop: `cargo run -p onecycle --example on_board`.
 //!
-//! The loop is what firmware runs at every tick; only [`Axis`], sensors and motors, is simulated. Five seconds under a
-//! safe controller, then the test: relay, identification in slices, the controller that was found, checked against its
-//! prediction. At 15 s the reference steps.
+//! The loop is what firmware runs at every tick. Only [`Axis`], the sensors and motors, is simulated.
+//!
+//! | time (s) | what happens |
+//! |----------|--------------|
+//! | 0 to 5 | a safe controller holds the axis |
+//! | from 5 | the tuner runs the relay test, identifies the process and switches to the new controller |
+//! | then | the tuner compares the response with its prediction |
+//! | 15 | the reference steps by 0.1 m |
 
 #![expect(clippy::print_stdout, reason = "an example reports")]
 
@@ -14,13 +19,15 @@ use onecycle_onboard::guard::Limits;
 use onecycle_onboard::tuner::{Tuner, TunerPhase, TunerSettings};
 use onecycle_plant::{FixedStepProcess, Noise};
 
-/// Time between ticks (s).
+/// Tick of the control loop (s).
 const TICK_S: f64 = 0.001;
-/// Standard deviation of a sample (m): 1 % of the oscillation's amplitude.
+/// Standard deviation of the noise of one sample (m): 1 % of the amplitude of the oscillation.
 const NOISE_SIGMA: f64 = 3e-5;
-/// When the test starts, when the reference steps, when it all ends (ticks).
+/// Start of the relay test (ticks).
 const START: u32 = 5_000;
+/// Step of the reference (ticks).
 const STEP: u32 = 15_000;
+/// End of the simulation (ticks).
 const END: u32 = 18_000;
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -31,7 +38,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         if tick == START {
             tuner.start();
         }
-        // These three lines are the firmware's.
+        // The next three statements are all that the firmware needs.
         let reference = if tick < STEP { 0.0 } else { 0.1 };
         let command = tuner.step(f64::from(tick) * TICK_S, &axis.measure(), reference);
         axis.command(command);
@@ -40,8 +47,13 @@ fn main() -> Result<(), Box<dyn Error>> {
             phase = tuner.phase();
             println!("{:6.3} s  {}", f64::from(tick) * TICK_S, phase.name());
         }
+<<<<<<< HEAD
         // The output is the safe controller's since this very tick; a pilot lands and reads why.
         if let (TunerPhase::Aborted, Some(reason)) = (phase, tuner.reason()) {
+=======
+        // From this tick on the output is that of the safe controller. The pilot lands and reads the reason.
+        if let (Phase::Aborted, Some(reason)) = (phase, tuner.reason()) {
+>>>>>>> wt-core
             return Err(reason.to_string().into());
         }
     }
@@ -53,7 +65,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// What the vehicle needs to be safe: see `docs/onboard.md` for how to choose.
+/// Settings with the limits of the vehicle. For their choice see `docs/onboard.md`.
 fn settings() -> TunerSettings {
     let new = TunerSettings::new(0.05, TICK_S as f32);
     TunerSettings {
@@ -70,7 +82,7 @@ fn settings() -> TunerSettings {
         },
         output_lowest: -0.5,
         output_highest: 0.5,
-        // Damped and slow; the thrust that hovers is only roughly known.
+        // Slow and well damped, since the hover thrust is only roughly known.
         safe: PdLaw::new(Pd { kp: 0.3, kd: 0.3 }, 0.0),
         bias_filter_s: 1.0,
         ..new
@@ -78,7 +90,7 @@ fn settings() -> TunerSettings {
 }
 
 fn report(tuner: &Tuner<'_>) -> Result<(), Box<dyn Error>> {
-    let found = tuner.identified().ok_or("the test has told nothing")?;
+    let found = tuner.identified().ok_or("no process was identified")?;
     let (process, truth) = (&found.process, truth()?);
     for (name, found, truth) in [
         ("K/T_body", process.k_over_t_body(), truth.k_over_t_body()),
@@ -100,16 +112,16 @@ fn report(tuner: &Tuner<'_>) -> Result<(), Box<dyn Error>> {
     if tuner.is_proven() {
         Ok(())
     } else {
-        Err("the controller has not proven itself".into())
+        Err("the response to the new controller differs from its prediction".into())
     }
 }
 
-/// The paper's altitude, thrust as a part of hover.
+/// Altitude of the paper's hexacopter (m), with the thrust as a fraction of the hover thrust.
 fn truth() -> Result<Soiptd, onecycle::SoiptdError> {
     Soiptd::from_acceleration_gain(9.81, 0.0321, 1.0 / 1.6886, 0.0237)
 }
 
-/// Sensors and motors.
+/// Simulated axis: process and sensor.
 struct Axis {
     process: FixedStepProcess,
     sensor: Sensor,
@@ -125,13 +137,13 @@ impl Axis {
         })
     }
 
-    /// Position with noise, rate without.
+    /// Position with noise and rate without noise.
     fn measure(&mut self) -> Measurement {
         let value = self.sensor.read(self.process.output(), &mut self.noise);
         Measurement::of(value as f32).with_rate(self.process.rate() as f32)
     }
 
-    /// Held until the next tick. It takes 1 % more thrust to hover than was assumed.
+    /// Holds the command until the next tick. Hovering needs 1 % more thrust than assumed.
     fn command(&mut self, command: f32) {
         self.process.step(f64::from(command) - 0.01);
     }

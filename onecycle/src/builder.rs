@@ -1,17 +1,21 @@
-//! The builder of an identification.
+//! Builder of an identification.
 
 use onecycle_identify::{Identification, Method, Options, Signals, identify_by};
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
 
-/// An identification to run: settings, and the pack that reads the last cycle.
+/// Identification to run: settings, and the pack whose network reads the last cycle.
 ///
 /// ```
+/// use onecycle::{Identify, Method, Pack};
+///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// let recording = onecycle::read("../examples/simulated_hover.csv", &Default::default())?;
-/// let found = onecycle::Identify::new()
+/// let found = Identify::new()
 ///     .cycles(2)
 ///     .phase_margin_rad(45_f64.to_radians())
+///     .pack(Pack::embedded()?)
+///     .method(Method::Map)
 ///     .run(&recording);
 /// let used = found.oscillation().map(|oscillation| oscillation.cycles_used);
 /// assert_eq!(used, Some(2));
@@ -32,8 +36,7 @@ impl Default for Identify<'_> {
 }
 
 impl<'a> Identify<'a> {
-    /// With the default settings: the last eight cycles, [`Method::Map`], a PD with 20 degrees of phase margin, and the
-    /// built-in pack.
+    /// Default settings: the last 8 cycles, [`Method::Map`], a PD with 20 degrees of phase margin, the built-in pack.
     pub fn new() -> Self {
         Self {
             options: Options::default(),
@@ -41,7 +44,8 @@ impl<'a> Identify<'a> {
         }
     }
 
-    /// Fits the last `cycles` steady cycles, 1 to 50; values beyond are brought to the nearest of these.
+    /// Fits the last `cycles` steady cycles. Values outside 1 to 50 are set to the nearest limit. More cycles narrow
+    /// the intervals; fewer follow a process that drifts.
     pub fn cycles(self, cycles: usize) -> Self {
         Self {
             options: self.options.cycles(cycles),
@@ -49,8 +53,8 @@ impl<'a> Identify<'a> {
         }
     }
 
-    /// Asks for a controller with at least this phase margin (rad), between 0 and `pi/2`. With a value out of this range
-    /// the result is the verdict [`NoController`](crate::Verdict::NoController).
+    /// Requires at least this phase margin (rad) of the controller. It must lie between 0 and `pi/2`; otherwise the
+    /// outcome is the verdict [`NoController`](crate::Verdict::NoController).
     pub fn phase_margin_rad(self, phase_margin_rad: f64) -> Self {
         Self {
             options: self.options.phase_margin_rad(phase_margin_rad),
@@ -58,7 +62,7 @@ impl<'a> Identify<'a> {
         }
     }
 
-    /// Finds the process by `method`.
+    /// Estimates the process by `method`.
     pub fn method(self, method: Method) -> Self {
         Self {
             options: self.options.method(method),
@@ -74,12 +78,13 @@ impl<'a> Identify<'a> {
         }
     }
 
-    /// Does not read the last cycle: [`Method::Map`] then fits without a prior, [`Method::Classify`] refuses.
+    /// Uses no pack. [`Method::Map`] then fits without a prior; [`Method::Classify`] returns the verdict
+    /// [`Unknown`](crate::Verdict::Unknown).
     pub fn without_pack(self) -> Self {
         Self { pack: None, ..self }
     }
 
-    /// Identifies the process behind `recording`. No cycle that has a gap is used.
+    /// Identifies the process from `recording`. Cycles with a gap are not used.
     #[must_use]
     pub fn run(&self, recording: &Recording) -> Identification {
         with_signals(recording, |signals| {
@@ -88,16 +93,74 @@ impl<'a> Identify<'a> {
     }
 }
 
-/// Calls `read` with the columns of a recording, as functions of `onecycle-identify` take them.
+/// Calls `read` with the columns of a recording, in the form that the functions of `onecycle-identify` take.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let recording = onecycle::read("../examples/simulated_hover.csv", &Default::default())?;
+/// let response = onecycle::with_signals(&recording, |signals| {
+///     let oscillation = onecycle_identify::find_oscillation(signals, 8)?;
+///     // Frequency response at the first three harmonics, without a model.
+///     Ok::<_, onecycle::Verdict>(onecycle_identify::harmonics(signals, &oscillation, 3))
+/// })?;
+/// assert_eq!(response[0].order, 1);
+/// # Ok(())
+/// # }
+/// ```
 pub fn with_signals<T>(recording: &Recording, read: impl FnOnce(&Signals<'_>) -> T) -> T {
     let breaks: Vec<usize> = recording.gaps().iter().map(|gap| gap.index).collect();
     read(&Signals {
         time_s: recording.time_s(),
         input: recording.input(),
         output: recording.output(),
-        // A power of two: above u32 after 2^54 samples.
+        // A power of two: above u32 only after 2^54 samples.
         samples_per_point: recording.samples_per_point() as u32,
         sample_period_s: recording.sample_period_s(),
         breaks: &breaks,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_those_of_the_options_and_the_built_in_pack() {
+        for identify in [Identify::new(), Identify::default()] {
+            assert_eq!(identify.options, Options::default());
+            let card = identify.pack.as_ref().map(Pack::card);
+            assert_eq!(card, Pack::embedded().ok().as_ref().map(Pack::card));
+            assert!(card.is_some());
+        }
+    }
+
+    // Each setter changes its own setting and leaves the others as they are.
+    #[test]
+    fn setters_are_those_of_the_options() {
+        let default = Options::default();
+        assert_eq!(Identify::new().cycles(3).options, default.cycles(3));
+        assert_eq!(Identify::new().cycles(0).options.cycles, 1);
+        let larger = Identify::new().phase_margin_rad(1.0);
+        assert_eq!(larger.options, default.phase_margin_rad(1.0));
+        let refined = Identify::new().method(Method::Refine);
+        assert_eq!(refined.options, default.method(Method::Refine));
+        assert!(larger.pack.is_some() && refined.without_pack().pack.is_none());
+    }
+
+    // A phase margin out of range is a verdict that names the value, not a panic.
+    #[test]
+    fn a_phase_margin_out_of_range_has_no_controller() {
+        let recording = onecycle_link::read("../examples/simulated_hover.csv", &Default::default());
+        let recording = recording.unwrap();
+        for margin_rad in [0.0, -0.1, 1.6, f64::NAN] {
+            let found = Identify::new().phase_margin_rad(margin_rad).run(&recording);
+            let verdict = found.outcome.unwrap_err();
+            assert_eq!(verdict.kind(), "no_controller");
+            assert!(
+                verdict
+                    .to_string()
+                    .contains(&format!("is {margin_rad} rad"))
+            );
+        }
+    }
 }

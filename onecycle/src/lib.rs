@@ -1,13 +1,13 @@
-//! From a recording of a relay test to a process model with error bars and its optimal controller.
+//! From a recording of a relay test to a process model with error bars and a controller with known margins.
 //!
-//! A process under a relay oscillates by itself. A recording of that oscillation gives the gain, the lags and the dead time
-//! of
+//! A process under a relay oscillates by itself. From a recording of this oscillation the library identifies
 //!
 //! ```text
 //! G(s) = K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))
 //! ```
 //!
-//! and with them the PD controller `u = Kp (r - y) - Kd dy/dt` of least squared error at a phase margin:
+//! with a 90 % interval for each parameter, and designs the PD `u = Kp (r - y) - Kd dy/dt` of least squared error at a
+//! phase margin:
 //!
 //! ```
 //! use onecycle::{Identify, Parameter};
@@ -18,29 +18,76 @@
 //! for (parameter, interval) in found.estimate.iter() {
 //!     println!("{} {:?}", parameter.symbol(), interval);
 //! }
-//! println!("Kp {:.3}, Kd {:.3}", found.design.controller.kp(), found.design.controller.kd());
-//! # // The file names its process, and the 90 % intervals hold it: K/T_body 0.5922, delay 23.7 ms.
+//! let controller = found.design.controller;
+//! println!("Kp {:.3}, Kd {:.3}", controller.kp(), controller.kd());
+//! # // The file names the true process; the 90 % intervals hold K/T_body = 0.5922 and tau = 23.7 ms.
 //! # let holds = |parameter, truth| found.estimate.get(parameter).is_some_and(|of| of.holds(truth));
 //! # assert!(holds(Parameter::KOverTBody, 0.592_206_56) && holds(Parameter::Tau, 0.0237));
-//! # // The optimum of that process is 192.92 and 29.523; two cycles with 2 % of noise are within 3 %.
-//! # assert!((found.design.controller.kp() / 192.92 - 1.0).abs() < 0.03);
-//! # assert!((found.design.controller.kd() / 29.523 - 1.0).abs() < 0.03);
+//! # // The optimal gains of the true process are 192.92 and 29.523; two cycles with 2 % noise are within 3 %.
+//! # assert!((controller.kp() / 192.92 - 1.0).abs() < 0.03);
+//! # assert!((controller.kd() / 29.523 - 1.0).abs() < 0.03);
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! # From samples in memory
+//! | task | names |
+//! |------|-------|
+//! | read and write recordings | [`read`], [`read_from`], [`CsvOptions`], [`ColumnRef`], [`TimeUnit`], [`Recording`], [`Gap`], [`Note`], [`write_csv`] |
+//! | identify | [`Identify`], [`Method`], [`Pack`] |
+//! | use the result | [`Identification`], [`Identified`], [`Estimate`], [`Interval`], [`Posterior`], [`Excitation`], [`Oscillation`] |
+//! | find out why there is no result, or what limits it | [`Verdict`], [`Remark`] |
+//! | describe a process | [`Model`], [`Structure`], [`Parameter`], [`Unit`], [`Soiptd`] |
+//! | design a controller | [`design()`], [`Specification`], [`Design`], [`Controller`], [`Form`], [`Pd`] |
+//! | analyse a loop | [`margins()`], [`Margins`], [`ise()`], [`step_response()`], [`StepResponse`], [`StepMetrics`] |
+//! | simulate a relay test | [`Experiment`], [`Sensor`], [`Trace`], [`FixedStepProcess`], [`Relay`], [`RelaySettings`] |
+//! | handle errors | [`ReadError`], [`RecordingError`], [`PackError`], [`DesignError`], [`StepResponseError`], [`SoiptdError`], [`RelayError`] |
 //!
-//! The input is held from each time stamp to the next; the output is measured at the stamp. Here a relay on a simulated
-//! process makes the samples.
+//! # Read a recording
+//!
+//! A CSV file needs three columns: time, input (output of the relay) and output (measurement). The reader recognises
+//! common names and units. [`CsvOptions`] state what it cannot know; [`Recording::notes`] lists what it assumed.
 //!
 //! ```
-//! use onecycle::{FixedStepProcess, Identify, Model, Recording, Relay, RelaySettings, Soiptd};
+//! use onecycle::{ColumnRef, CsvOptions, ReadError, TimeUnit};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let file = "stamp,torque,roll\n0,1,0.00\n10,1,0.02\n20,-1,0.05\n";
+//! let mut options = CsvOptions::default();
+//! options.time_unit = Some(TimeUnit::Milliseconds);
+//! options.output_column = Some(ColumnRef::Name("roll".to_owned()));
+//! let recording = onecycle::read_from(file.as_bytes(), &options)?;
+//! assert_eq!(recording.time_s(), [0.0, 0.01, 0.02]);
+//! assert_eq!(recording.input(), [1.0, 1.0, -1.0]);
+//! assert!(recording.gaps().is_empty());
+//! for note in recording.notes() {
+//!     println!("{note}");
+//! }
+//!
+//! // An error names the place.
+//! let damaged = onecycle::read_from("t,u,y\n0,1,x\n".as_bytes(), &CsvOptions::default());
+//! assert!(matches!(damaged, Err(ReadError::NotANumber { line: 2, .. })));
+//!
+//! let mut copy = Vec::new();
+//! onecycle::write_csv(&mut copy, &recording, &["roll axis"])?;
+//! # assert!(copy.starts_with(b"# roll axis\ntime_s,output,input\n"));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Identify from samples in memory
+//!
+//! [`Recording::from_samples`] takes three vectors. The input is held from each time stamp to the next; the output is
+//! measured at the time stamp. Here a [`Relay`] on a simulated process makes the samples, tick by tick as in firmware.
+//!
+//! ```
+//! use onecycle::{FixedStepProcess, Identify, Recording, Relay, RelaySettings, Soiptd};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // K, T_prop (s), T_body (s), tau (s).
 //! let truth = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?;
 //! let mut axis = FixedStepProcess::new(&truth, 1e-3);
-//! let mut relay = Relay::new(RelaySettings::new(0.5, RelaySettings::DISTINGUISHING_BETA))?;
+//! let settings = RelaySettings::new(0.5, RelaySettings::DISTINGUISHING_BETA);
+//! let mut relay = Relay::new(settings)?;
 //! let (mut time_s, mut input, mut output) = (vec![], vec![], vec![]);
 //! for tick in 0..8000 {
 //!     let measured = axis.output();
@@ -53,16 +100,41 @@
 //! let recording = Recording::from_samples(&time_s, &input, &output)?;
 //! let found = Identify::new().run(&recording).outcome?;
 //! // Without noise the model is exact.
-//! let Model::Soiptd(process) = found.model else { unreachable!() };
+//! let process = found.model.soiptd().ok_or("another structure")?;
 //! assert!((process.tau_s() - truth.tau_s()).abs() < 1e-8);
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! # When there is no answer
+//! [`Experiment`] runs the same test with sensor noise, input bias and jitter in one call and returns a [`Trace`]: see
+//! the example `identify_samples`.
 //!
-//! Where the recording does not support an answer there is a [`Verdict`] instead of numbers: a value with the facts, and a
-//! fixed name for programs. [`Remark`]s say what limits a result.
+//! # Use the result
+//!
+//! ```
+//! use onecycle::{Controller, Excitation, Identify, Pd, Structure};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let recording = onecycle::read("../examples/simulated_hover.csv", &Default::default())?;
+//! let found = Identify::new().run(&recording);
+//! if let Some(Excitation::Relay { oscillation, .. }) = &found.excitation {
+//!     println!("{} cycles of {:.3} s", oscillation.cycles_used, oscillation.period_s);
+//! }
+//! let identified = found.outcome?;
+//! assert_eq!(identified.model.structure(), Structure::Soiptd);
+//!
+//! // The phase margin (rad) of your own gains, with its 90 % interval over the posterior.
+//! let own = Controller::from(Pd { kp: 50.0, kd: 15.0 });
+//! let margin_rad = identified.posterior.phase_margin_rad(&own);
+//! assert!(margin_rad.low.is_some_and(|low| low > 40_f64.to_radians()));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # When no process is identified
+//!
+//! If the recording does not support an answer, the outcome is a [`Verdict`]: an error with the facts and with a fixed
+//! name for programs. If it does, [`Remark`]s say what limits the result.
 //!
 //! ```
 //! use onecycle::{Identify, Recording, Verdict};
@@ -72,8 +144,11 @@
 //! let recording = Recording::from_samples(&time_s, &[0.2; 1000], &[0.0; 1000])?;
 //! let found = Identify::new().run(&recording);
 //! match &found.outcome {
-//!     Ok(identified) => println!("{:?} {:?}", identified.design.controller, found.remarks),
+//!     Ok(identified) => println!("{:?}", identified.design.controller),
 //!     Err(verdict) => println!("{}: {verdict}", verdict.kind()),
+//! }
+//! for remark in &found.remarks {
+//!     println!("{}: {remark:?}", remark.kind());
 //! }
 //! assert_eq!(found.outcome, Err(Verdict::ConstantInput));
 //! # Ok(())
@@ -83,35 +158,57 @@
 //! # Design without a recording
 //!
 //! ```
-//! use onecycle::{Controller, Model, Pd, Soiptd, Specification, design, margins, step_response};
+//! use onecycle::{
+//!     Controller, DesignError, Model, Parameter, Pd, Soiptd, SoiptdError, Specification,
+//!     StepResponseError, Unit, design, ise, margins, step_response,
+//! };
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let model = Model::from(Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?);
+//! assert_eq!(model.structure().name(), "soiptd");
+//! assert_eq!(model.parameter(Parameter::Tau), Some(0.0237));
+//! assert_eq!(Parameter::Tau.unit(), Unit::Second);
+//!
 //! let asked = Specification::default().with_phase_margin_rad(45_f64.to_radians());
 //! let best = design(&model, &asked)?;
+//! let (kp, kd) = (best.controller.kp(), best.controller.kd());
+//! println!("{}, Kp {kp:.2}, Kd {kd:.3}", best.controller.form().law());
 //! let step = step_response(&model, &best.controller)?.metrics;
-//! println!("settles in {:.3} s, overshoots by {:.0} %", step.settling_time_s, 100.0 * step.overshoot);
+//! println!("settles in {:.3} s, overshoot {:.2}", step.settling_time_s, step.overshoot);
 //!
-//! // Half the gains are slower and further from instability.
-//! let half = Controller::from(Pd { kp: 0.5 * best.controller.kp(), kd: 0.5 * best.controller.kd() });
+//! // Half the gains: a larger squared error and a larger delay margin.
+//! let half = Controller::from(Pd { kp: 0.5 * kp, kd: 0.5 * kd });
 //! let slower = margins(&model, &half).ok_or("no positive gain")?;
 //! assert!(slower.delay_margin_s > best.margins.delay_margin_s);
-//! # // `design` keeps the margin that it is asked for, to rounding.
+//! assert!(ise(&model, &half).is_some_and(|cost| cost > best.ise));
+//!
+//! // Errors name the value that is out of range.
+//! let impossible = design(&model, &asked.with_phase_margin_rad(2.0));
+//! assert_eq!(impossible, Err(DesignError::PhaseMargin(2.0)));
+//! assert_eq!(Soiptd::new(1.0, 0.0321, 1.6886, -0.1), Err(SoiptdError::Tau(-0.1)));
+//! let unstable = Controller::from(Pd { kp: 1e4, kd: 0.0 });
+//! assert_eq!(step_response(&model, &unstable), Err(StepResponseError::Unstable));
+//! # // `design` keeps the specified margin, to rounding.
 //! # assert!((best.margins.phase_margin_rad.to_degrees() - 45.0).abs() < 1e-6);
 //! # Ok(())
 //! # }
 //! ```
 //!
-//! # What it is made of
+//! # Crates behind this one
 //!
-//! This crate collects the names that a user needs. The rest is in the crates behind it: `onecycle-link` (readers and
-//! writers), `onecycle-identify` (estimation), `onecycle-design` (cost, margins, bands), `onecycle-plant` (simulation, a
-//! whole multirotor), `onecycle-onboard` (firmware: relay, estimator and tuner without std and heap). The program is the
-//! crate `onecycle-cli`.
+//! | crate | content |
+//! |-------|---------|
+//! | `onecycle-link` | readers and writers of recordings |
+//! | `onecycle-identify` | estimation, diagnostics of a fit |
+//! | `onecycle-design` | cost, margins, step responses, bands over a posterior |
+//! | `onecycle-plant` | exact simulation, a whole multirotor |
+//! | `onecycle-onboard` | firmware without std and heap: relay, estimator, tuner (example `on_board`) |
+//! | `onecycle-cli` | the program |
 //!
-//! The library prints nothing, starts no thread and panics on no input. The method is that of A. Ayyad, M. Chehadeh,
-//! M. I. Awad, Y. Zweiri, "Real-time system identification using deep learning for linear processes with application to
-//! unmanned aerial vehicles", IEEE Access 8 (2020).
+//! The library prints nothing, starts no threads and does not panic on any input.
+//!
+//! Reference: A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, "Real-time system identification using deep learning for
+//! linear processes with application to unmanned aerial vehicles", IEEE Access 8 (2020).
 
 mod builder;
 
@@ -137,7 +234,7 @@ pub use onecycle_onboard::pack::{Pack, PackError};
 #[doc(inline)]
 pub use onecycle_design::{
     Controller, Design, DesignError, Form, Margins, Model, Parameter, Specification, StepMetrics,
-    StepResponse, StepResponseError, Structure, design, ise, margins, step_response,
+    StepResponse, StepResponseError, Structure, Unit, design, ise, margins, step_response,
 };
 #[doc(inline)]
 pub use onecycle_onboard::{Pd, Soiptd, SoiptdError};

@@ -104,9 +104,9 @@ impl OpenLoop {
 
     /// Phase crossover (rad/s): frequency at which the unwrapped phase falls through `-pi`. `None` if it never does.
     ///
-    /// There is at most one. With `h(w) = atan(w kd/kp) - atan(w T_prop) - w tau` the phase above `-pi` is `atan(1/(w
-    /// T_body)) + h(w)`. Starting from zero, `h` may first rise and then falls for good. Where `h` is positive the sum
-    /// is positive too; beyond that both terms fall, so the sum crosses zero at most once.
+    /// There is at most one. With `h(w) = atan(w kd/kp) - atan(w T_prop) - w tau` the phase above `-pi` is
+    /// `atan(1/(w T_body)) + h(w)`. Starting from zero, `h` may first rise and then falls without end. Where `h` is
+    /// positive the sum is positive too; beyond that both terms fall, so the sum crosses zero at most once.
     #[must_use]
     pub fn phase_crossover(&self) -> Option<f64> {
         if self.tau_s > 0.0 {

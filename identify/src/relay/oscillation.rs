@@ -84,35 +84,8 @@ pub(super) fn stretches(
     if count == 1 {
         return Ok(vec![Stretch::of(beginning, &cycles, 1)]);
     }
-    let runs = steady_runs(&cycles);
-    let alike = runs.iter().map(Range::len).max().unwrap_or(0);
-    // A recording with two cycles only must do with two that are alike.
-    let least = if count == 2 {
-        2
-    } else {
-        ((LEAST_SHARE * count as f64).ceil() as usize).max(3)
-    };
-    // Among runs of equal length max_by_key returns the last.
-    let longest = runs
-        .iter()
-        .filter(|run| run.len() >= least)
-        .max_by_key(|run| run.len());
-    let Some(longest) = longest else {
-        return Err(match count {
-            0..4 => Verdict::TooShort { cycles: count },
-            _ => Verdict::NotSteady {
-                cycles: count,
-                alike,
-                needed: least,
-            },
-        });
-    };
-    let last = runs
-        .iter()
-        .rfind(|run| run.len() >= least)
-        .filter(|&last| last != longest);
     let mut stretches = Vec::new();
-    for run in iter::once(longest).chain(last) {
+    for run in longest_and_last_run(&cycles)? {
         let halved = |size: &usize| (*size > 2).then(|| (size / 2).max(2));
         let sizes = iter::successors(Some(run.len().min(most)), halved);
         stretches.extend(
@@ -120,6 +93,32 @@ pub(super) fn stretches(
         );
     }
     Ok(stretches)
+}
+
+/// The longest steady run and, if that is another one, the last steady run. Runs that are too short do not count.
+fn longest_and_last_run(cycles: &[Cycle]) -> Result<Vec<Range<usize>>, Verdict> {
+    let count = cycles.len();
+    // A recording with two cycles only must do with two that are alike.
+    let needed = match count {
+        2 => 2,
+        _ => ((LEAST_SHARE * count as f64).ceil() as usize).max(3),
+    };
+    let mut runs = steady_runs(cycles);
+    let alike = runs.iter().map(Range::len).max().unwrap_or(0);
+    runs.retain(|run| run.len() >= needed);
+    // Among runs of equal length max_by_key returns the last.
+    let Some(longest) = runs.iter().max_by_key(|run| run.len()).cloned() else {
+        return Err(match count {
+            0..4 => Verdict::TooShort { cycles: count },
+            _ => Verdict::NotSteady {
+                cycles: count,
+                alike,
+                needed,
+            },
+        });
+    };
+    let last = runs.pop().filter(|last| *last != longest);
+    Ok(iter::once(longest).chain(last).collect())
 }
 
 /// Whether the relay's part of the recording has a gap.
