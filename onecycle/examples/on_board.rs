@@ -47,13 +47,8 @@ fn main() -> Result<(), Box<dyn Error>> {
             phase = tuner.phase();
             println!("{:6.3} s  {}", f64::from(tick) * TICK_S, phase.name());
         }
-<<<<<<< HEAD
-        // The output is the safe controller's since this very tick; a pilot lands and reads why.
-        if let (TunerPhase::Aborted, Some(reason)) = (phase, tuner.reason()) {
-=======
         // From this tick on the output is that of the safe controller. The pilot lands and reads the reason.
-        if let (Phase::Aborted, Some(reason)) = (phase, tuner.reason()) {
->>>>>>> wt-core
+        if let (TunerPhase::Aborted, Some(reason)) = (phase, tuner.reason()) {
             return Err(reason.to_string().into());
         }
     }
