@@ -12,7 +12,7 @@ use onecycle_onboard::control::Measurement;
 use onecycle_onboard::guard::Abort;
 use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::{Core, TunerError, TunerPhase};
+use onecycle_onboard::tuner::{TunerCore, TunerError, TunerPhase};
 
 pub use self::settings::{OnecycleSettings, OnecycleStatus};
 
@@ -26,8 +26,8 @@ const ALIVE: u64 = u64::from_le_bytes(*b"ONECYCLE");
 #[repr(C)]
 struct Placed {
     alive: u64,
-    core: MaybeUninit<Core<'static>>,
-    room: MaybeUninit<Workspace>,
+    core: MaybeUninit<TunerCore<'static>>,
+    workspace: MaybeUninit<Workspace>,
 }
 
 const _: () = assert!(
@@ -156,18 +156,22 @@ impl OnecycleTuner {
         unsafe { &mut *(&raw mut *self).cast() }
     }
 
-    fn core(&self) -> Option<&Core<'static>> {
+    fn core(&self) -> Option<&TunerCore<'static>> {
         let placed = self.placed();
         // SAFETY: the first word says that `onecycle_tuner_init` has written a tuner behind it, and
         // nothing else has been here since: that is what the caller of every function promises.
         (placed.alive == ALIVE).then(|| unsafe { placed.core.assume_init_ref() })
     }
 
-    fn parts(&mut self) -> Option<(&mut Core<'static>, &mut Workspace)> {
+    fn parts(&mut self) -> Option<(&mut TunerCore<'static>, &mut Workspace)> {
         let placed = self.placed_mut();
         // SAFETY: as in `core`.
-        (placed.alive == ALIVE)
-            .then(|| unsafe { (placed.core.assume_init_mut(), placed.room.assume_init_mut()) })
+        (placed.alive == ALIVE).then(|| unsafe {
+            (
+                placed.core.assume_init_mut(),
+                placed.workspace.assume_init_mut(),
+            )
+        })
     }
 }
 
@@ -177,7 +181,7 @@ impl OnecycleTuner {
 /// Null, or what it points to is valid, aligned and nobody else's meanwhile.
 unsafe fn parts_at<'a>(
     tuner: *mut OnecycleTuner,
-) -> Option<(&'a mut Core<'static>, &'a mut Workspace)> {
+) -> Option<(&'a mut TunerCore<'static>, &'a mut Workspace)> {
     // SAFETY: the caller's promise.
     unsafe { tuner.as_mut() }.and_then(OnecycleTuner::parts)
 }
@@ -210,8 +214,8 @@ pub unsafe extern "C" fn onecycle_tuner_init(
     let pack = Pack::embedded().map_err(|_| TunerError::Pack);
     match checked.and_then(|checked| Ok((checked, pack?))) {
         Ok((checked, pack)) => {
-            placed.core.write(Core::of(&checked, pack));
-            placed.room.write(Workspace::NEW);
+            placed.core.write(TunerCore::of(&checked, pack));
+            placed.workspace.write(Workspace::NEW);
             placed.alive = ALIVE;
             OnecycleStatus::Ok
         }
@@ -232,7 +236,7 @@ pub unsafe extern "C" fn onecycle_tuner_step(
     reference: f32,
 ) -> f32 {
     // SAFETY: the caller's promise.
-    let Some((core, room)) = (unsafe { parts_at(tuner) }) else {
+    let Some((core, workspace)) = (unsafe { parts_at(tuner) }) else {
         return 0.0;
     };
     // SAFETY: the caller's promise. No measurement is as good as one that is no number.
@@ -244,7 +248,7 @@ pub unsafe extern "C" fn onecycle_tuner_step(
                 age_s: measurement.age_s,
             }
         });
-    core.step(room, time_s, &measurement, reference)
+    core.step(workspace, time_s, &measurement, reference)
 }
 
 /// Begins the test at the next tick; only when idle.
@@ -309,7 +313,7 @@ pub unsafe extern "C" fn onecycle_tuner_phase(tuner: *const OnecycleTuner) -> On
 pub unsafe extern "C" fn onecycle_tuner_reason(tuner: *const OnecycleTuner) -> OnecycleReason {
     // SAFETY: the caller's promise.
     let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
-    match tuner.and_then(Core::reason) {
+    match tuner.and_then(TunerCore::reason) {
         None => OnecycleReason::None,
         Some(Abort::Operator) => OnecycleReason::Operator,
         Some(Abort::NotFinite) => OnecycleReason::NotFinite,

@@ -20,7 +20,7 @@ use onecycle_onboard::RelaySettings;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::Limits;
 use onecycle_onboard::identification::{TuningResult, Workspace};
-use onecycle_onboard::tuner::{Core, TunerSettings};
+use onecycle_onboard::tuner::{TunerCore, TunerSettings};
 
 use crate::axis::{Axis, K_OVER_T_BODY, TICK_S};
 pub use crate::line::Line;
@@ -73,8 +73,8 @@ pub fn settings() -> TunerSettings {
 /// `say` is given every line. Whether the controller that was found has proven itself, is of the right process and follows
 /// the reference.
 pub fn fly(
-    tuner: &mut Core<'_>,
-    room: &mut Workspace,
+    tuner: &mut TunerCore<'_>,
+    workspace: &mut Workspace,
     mut lap: impl FnMut() -> u64,
     mut say: impl FnMut(&mut Line),
 ) -> bool {
@@ -91,7 +91,7 @@ pub fn fly(
         }
         let (before, stage) = (tuner.phase(), tuner.stage());
         lap();
-        let output = step(tuner, room, time_s, &measurement, reference);
+        let output = step(tuner, workspace, time_s, &measurement, reference);
         let instructions = lap().saturating_sub(idle);
         let mut line = Line::default();
         line.word("tick")
@@ -122,13 +122,13 @@ pub fn fly(
 /// A call of its own, so that nothing of a tick is moved out of what is counted.
 #[inline(never)]
 fn step(
-    tuner: &mut Core<'_>,
-    room: &mut Workspace,
+    tuner: &mut TunerCore<'_>,
+    workspace: &mut Workspace,
     time_s: f64,
     measurement: &Measurement,
     reference: f32,
 ) -> f32 {
-    black_box(tuner.step(room, black_box(time_s), measurement, reference))
+    black_box(tuner.step(workspace, black_box(time_s), measurement, reference))
 }
 
 /// All that was found, by name.

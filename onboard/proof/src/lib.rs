@@ -152,11 +152,11 @@ fn identify() -> Result<Found, &'static CStr> {
     let pack = Pack::embedded().map_err(|_| c"there is no pack")?;
     let test = measure(&mut coarse)?;
     let read = read(&test, &pack)?;
-    let beforehand = PriorKnowledge {
+    let prior_knowledge = PriorKnowledge {
         starts: &read.starts(test.period_s),
         prior: ShapePrior::of_pack(&pack),
     };
-    let refined = refine(&coarse, test.period_s, &beforehand)?;
+    let refined = refine(&coarse, test.period_s, &prior_knowledge)?;
     let table = pack.gains_table().ok_or(c"the pack has no lead table")?;
     let gains = table
         .pd_at_phase_margin(&refined.process)
@@ -213,11 +213,11 @@ fn read(test: &Test, pack: &Pack<'_>) -> Result<Classification, &'static CStr> {
 fn refine(
     window: &Window<BINS, EDGES>,
     period_s: f64,
-    beforehand: &PriorKnowledge<'_>,
+    prior_knowledge: &PriorKnowledge<'_>,
 ) -> Result<Refined, &'static CStr> {
     let mut refiner = Refiner::new();
     refiner
-        .begin(window, period_s, beforehand)
+        .begin(window, period_s, prior_knowledge)
         .map_err(|_| c"the window is not to be fitted")?;
     for _ in 0..refiner.most_slices(window) {
         if let Some(refined) = refiner.advance(window) {

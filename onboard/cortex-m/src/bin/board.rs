@@ -20,7 +20,7 @@ use core::ptr;
 use onecycle_flight::{Line, fly, settings};
 use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::Core;
+use onecycle_onboard::tuner::TunerCore;
 
 /// Operations of semihosting, and what a program that ends as it should says (Arm, "Semihosting for AArch32
 /// and AArch64", 2.0).
@@ -101,8 +101,8 @@ static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
     vectors
 };
 
-static mut CORE: MaybeUninit<Core<'static>> = MaybeUninit::uninit();
-static mut ROOM: Workspace = Workspace::NEW;
+static mut CORE: MaybeUninit<TunerCore<'static>> = MaybeUninit::uninit();
+static mut WORKSPACE: Workspace = Workspace::NEW;
 
 extern "C" fn run() -> ! {
     start_timer();
@@ -116,13 +116,16 @@ extern "C" fn run() -> ! {
         leave("the tuner's settings are wrong", 1)
     };
     // SAFETY: nothing else names them, and this function runs once.
-    let (core, room) = unsafe { (&mut *(&raw mut CORE), &mut *(&raw mut ROOM)) };
-    let core = core.write(Core::of(&checked, pack));
+    let (core, workspace) = unsafe { (&mut *(&raw mut CORE), &mut *(&raw mut WORKSPACE)) };
+    let core = core.write(TunerCore::of(&checked, pack));
     let beginning = stack();
-    let is_tuned = fly(core, room, laps(), say);
+    let is_tuned = fly(core, workspace, laps(), say);
     for (name, bytes) in [
         ("flash", (&raw const __flash_end).addr()),
-        ("tuner", size_of::<Core<'static>>() + size_of::<Workspace>()),
+        (
+            "tuner",
+            size_of::<TunerCore<'static>>() + size_of::<Workspace>(),
+        ),
         (
             "static",
             distance(&raw const __data_start, &raw const __bss_end),
