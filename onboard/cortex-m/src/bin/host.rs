@@ -1,4 +1,4 @@
-//! The flight on the host: its lines to standard output, what was found in words to standard error.
+//! The flight on the host: its lines to standard output, the numbers found in words to standard error.
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -14,7 +14,7 @@ fn main() -> ExitCode {
     };
     let (mut tuner, mut workspace) = (TunerCore::of(&checked, pack), Workspace::NEW);
     let mut lines = Vec::new();
-    // Nothing is counted here.
+    // Instructions are not counted on the host.
     let is_tuned = fly(
         &mut tuner,
         &mut workspace,
