@@ -182,7 +182,7 @@ fn damaged_files_are_refused() {
         ("cut", &bytes[..length / 2], &cut_at),
         ("header", &bytes[..10], "cut off"),
         ("empty", &[], "no bytes"),
-        ("csv", b"time_s,pv,u\n0,1,2\n", "no pack of onecycle"),
+        ("csv", b"time_s,pv,u\n0,1,2\n", "not a pack of onecycle"),
         ("onnx", &onnx, "no pack of onecycle"),
         (
             "tensors",

@@ -45,7 +45,7 @@ int memcmp(const void *left, const void *right, size_t count)
     return 0;
 }
 
-/* Null, or a sentence for what went wrong: see src/lib.rs. */
+/* Null, or a sentence about the failure: see src/lib.rs. */
 const char *onecycle_proof(void);
 
 struct size {
@@ -53,7 +53,7 @@ struct size {
     size_t bytes;
 };
 
-/* Something that takes room; no name behind the last. */
+/* Name and size of an object; the name is null after the last. */
 struct size onecycle_proof_size(size_t index);
 
 /* The kernel enters with the stack aligned to 16; a C function expects a call to have moved it. */
@@ -112,8 +112,8 @@ __attribute__((noreturn)) void onecycle_proof_panicked(void)
     leave(101);
 }
 
-/* The stack below the caller is painted, and after the run its lowest byte that has changed is the
-   high-water mark: 8 bytes more or less where the last value there happens to be paint. */
+/* The stack below the caller is painted; after the run its lowest changed byte is the high-water mark, 8 bytes
+   more or less if the last value there equals the paint. */
 enum { PAINT = 0xa5, PAINTED = 1 << 20, MARGIN = 64 };
 
 __attribute__((noreturn, used)) void onecycle_proof_main(void)

@@ -1,47 +1,51 @@
-//! From a network's outputs to the process and its doubt, and to "unknown".
+//! Classification of a cycle: from the outputs of the network to the process, its uncertainty, and "unknown".
 //!
-//! The outputs are a Gaussian over four values of the process (the mean, the logarithms of the
-//! diagonal of `L`, then what is below it row by row; `precision = L L^T`), each times its
+//! The outputs are a Gaussian over four values of the process: the mean, the logarithms of the diagonal of `L`,
+//! then the elements below it row by row, where `precision = L L^T`. Each value is multiplied by its
 //! [`scale`](Calibration::scale):
 //!
 //! ```text
 //! ln((p1 + p2) T),   p1 p2 / (p1 + p2)^2,   tau / T,   ln(a / (K/(T_body T_prop) T^3))
 //! ```
 //!
-//! | symbol     | name        | meaning                                                     |
-//! |------------|-------------|-------------------------------------------------------------|
-//! | `T`        | `period_s`  | period of the cycle (s)                                     |
+//! | symbol     | name        | meaning                                                         |
+//! |------------|-------------|-----------------------------------------------------------------|
+//! | `T`        | `period_s`  | period of the cycle (s)                                         |
 //! | `a`        | `amplitude` | of the signature; the gain is that for a relay of amplitude one |
-//! | `p1`, `p2` |             | poles `1/T_prop`, `1/T_body` (1/s)                          |
+//! | `p1`, `p2` |             | poles `1/T_prop`, `1/T_body` (1/s)                              |
+//! | `l_i`      |             | logarithms of the diagonal of `L`                               |
+//! | `sigma`    | `noise_sigma` | noise of a sample (output unit)                               |
+//! | `N`        | `samples`   | samples in the period                                           |
+//! | `w_i`, `w_sigma`, `limit`, `most_noise` | [`Calibration`] | calibration of the score       |
 //!
-//! A network puts out some process whatever it is shown. Whether that process explains the cycle is
-//! asked of the cycle itself (`fit_score`): its harmonics against the process's response to the same
-//! wave, within the posterior and the noise. And a network that has not seen the like doubts: its
-//! posterior is wider than those of the family's cycles with as much noise and as many samples,
+//! A network puts out some process whatever its input is. Two questions decide whether to use it. Does the
+//! process explain the cycle? `fit_score` compares the harmonics of the cycle with the response of the process
+//! to the same wave, within the posterior and the noise. Is the posterior as narrow as usual? For a cycle unlike
+//! those of its training the network gives a wider posterior than for cycles of the family with the same noise
+//! and the same number of samples:
 //!
 //! ```text
 //! width = -mean l_i,   usual = w_0 + w_1 ln(sigma / (a sqrt(N)) + 1e-4) + w_2 ln N
 //! score = max((statistic + 2 (max(width - usual, 0) / w_sigma)^2) / limit,   sigma / (a most_noise))
 //! ```
 //!
-//! Above one the cycle is none of this family's, or noisier than any that the network knows: an
-//! oscillation that friction holds down.
+//! A cycle with a score above one does not belong to the family, or is noisier than any cycle that the network
+//! was trained for, such as an oscillation damped by friction.
 //!
-//! # In slices
+//! # Slices
 //!
-//! A [`Classifier`] does all of it a slice at a time, of which none takes longer than a controller's tick
-//! has to spare; [`classify`] and [`classify_by`] are the loop over them.
-//! Operations of the longest slices, on numbers of eight bytes unless it says four:
+//! A [`Classifier`] works in slices, each short enough for a control tick; [`classify`] and [`classify_by`] loop
+//! over them. Operations of the longest slices, in double precision unless marked f32:
 //!
-//! | slice                                        | operations | slices |
-//! |----------------------------------------------|------------|--------|
-//! | a layer of the network, of `n` by `m` (four) | `3 n m`    | layers |
-//! | the posterior                                | 400        | 1      |
-//! | its longest axis and the candidates          | 2,700      | 1      |
-//! | eight harmonics of the cycle                 | 1,500      | 2      |
-//! | three harmonics of a process                 | 1,800      | 2 x 5  |
-//! | the equations                                | 1,900      | 2      |
-//! | two to five rows of their least squares      | 1,300      | 2 x 2  |
+//! | slice                                          | operations | slices |
+//! |------------------------------------------------|------------|--------|
+//! | layer of the network, of `n` by `m` (f32)      | `3 n m`    | layers |
+//! | posterior                                      | 400        | 1      |
+//! | its longest axis and the candidates            | 2,700      | 1      |
+//! | eight harmonics of the cycle                   | 1,500      | 2      |
+//! | three harmonics of a process                   | 1,800      | 2 x 5  |
+//! | equations                                      | 1,900      | 2      |
+//! | two to five rows of their least squares        | 1,300      | 2 x 2  |
 
 mod calibration;
 mod classifier;
@@ -59,24 +63,24 @@ use crate::process::{Soiptd, SoiptdError};
 use crate::refine::{Shape, shape_of};
 use crate::signature::Signature;
 
-/// Candidates of a classification.
+/// Number of candidates of a classification.
 pub const CANDIDATES: usize = 5;
 
-/// What a cycle is read as.
+/// Classification of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Classification {
-    /// The process's values and how well they are known.
+    /// Values of the process with their covariance.
     pub posterior: CyclePosterior,
-    /// Processes along the posterior's longest axis, most probable first.
+    /// Processes along the longest axis of the posterior, most probable first.
     pub candidates: [CandidateProcess; CANDIDATES],
-    /// How badly the posterior's mean explains the cycle; one is the limit.
+    /// Misfit score of the mean of the posterior (limit 1).
     pub score: f64,
-    /// Whether the cycle is of the family.
+    /// Whether the cycle belongs to the family.
     pub familiarity: Familiarity,
 }
 
 impl Classification {
-    /// The candidates as shapes of an oscillation of this period (s), for a refinement to start from.
+    /// The candidates as shapes for an oscillation with period `period_s` (s), as starts of a fit.
     #[must_use]
     pub fn starts(&self, period_s: f64) -> [Shape; CANDIDATES] {
         self.candidates
@@ -84,12 +88,12 @@ impl Classification {
     }
 }
 
-/// Whether a cycle is of the family.
+/// Whether a cycle belongs to the pack's family of processes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Familiarity {
-    /// It is: the processes explain it.
+    /// A process of the family explains the cycle.
     Known,
-    /// It is not, and no controller should be made from it.
+    /// No process of the family explains the cycle; do not make a controller from it.
     Unknown,
 }
 
@@ -102,35 +106,35 @@ impl fmt::Display for Familiarity {
     }
 }
 
-/// One process and the share of the posterior that it stands for.
+/// A process and its share of the posterior.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CandidateProcess {
-    /// The process, its gain for a relay of amplitude one.
+    /// The process; its gain is that for a relay of amplitude one.
     pub process: Soiptd,
-    /// Its share.
+    /// Share of the posterior, 0 to 1.
     pub probability: f64,
 }
 
-/// A Gaussian over the values of the [module](self).
+/// Posterior of the process given one cycle: a Gaussian over the values of the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CyclePosterior {
-    /// Its mean.
+    /// Mean.
     pub mean: [f64; VALUES],
-    /// A root of its covariance, `covariance = root root^T`: upper triangular.
+    /// Upper triangular root of the covariance, `covariance = root root^T`.
     pub root: [[f64; VALUES]; VALUES],
 }
 
-/// Why outputs are no classification.
+/// Why outputs give no classification.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum ClassifyError {
-    /// An output that is not finite: which, and its value.
+    /// An output is not finite: index and value.
     Output(usize, f32),
-    /// The noise is negative or no number.
+    /// The noise is negative or not finite: its value.
     Noise(f64),
-    /// The values are no process.
+    /// The values are not those of a process.
     Process(SoiptdError),
-    /// The pack has another calibration than this score's.
+    /// The calibration of the pack has another length than that of this score.
     Pack,
 }
 
@@ -143,10 +147,15 @@ impl fmt::Display for ClassifyError {
             ),
             Self::Noise(value) => write!(
                 f,
-                "the noise must be zero or positive and finite, but is {value}: take the window's"
+                "the noise must be zero or positive and finite, but is {value}"
             ),
-            Self::Process(error) => write!(f, "the network's outputs are no process: {error}"),
-            Self::Pack => write!(f, "the pack has no calibration of the score: train it anew"),
+            Self::Process(error) => {
+                write!(f, "the outputs of the network are not a process: {error}")
+            }
+            Self::Pack => write!(
+                f,
+                "the pack has no calibration of the score: train it again"
+            ),
         }
     }
 }
@@ -160,7 +169,7 @@ impl From<SoiptdError> for ClassifyError {
 }
 
 impl CyclePosterior {
-    /// From the outputs of a network whose values were trained times `scale`.
+    /// Posterior from the outputs of a network trained with values times `scale`.
     #[must_use]
     pub fn from_outputs(outputs: &[f32; OUTPUTS], scale: &[f64; VALUES]) -> Self {
         let lower = |i: usize, j: usize| {
@@ -188,7 +197,8 @@ impl CyclePosterior {
         }
     }
 
-    /// Its longest axis, from the mean to one standard deviation, where each value counts in `scale`.
+    /// Longest axis, from the mean to one standard deviation, with each value multiplied by `scale` for the
+    /// length.
     #[must_use]
     pub fn longest_axis(&self, scale: &[f64; VALUES]) -> [f64; VALUES] {
         let covariance: [[f64; VALUES]; VALUES] = core::array::from_fn(|i| {
@@ -212,15 +222,14 @@ impl CyclePosterior {
     }
 }
 
-/// Steps of the power method: where the second axis is 0.9 of the longest, its part falls to 0.9^48 = 0.6 %.
+/// Steps of the power method: if the second axis is 0.9 of the longest, its share falls to 0.9^48 = 0.6 %.
 const AXIS_STEPS: usize = 24;
 
-/// Reads the process off a network's outputs for this cycle of `period_s`, and asks the cycle whether it
-/// is one. `noise_sigma` is the standard deviation of the noise on a sample (output unit), such as
-/// [`Window::noise_sigma`](crate::window::Window::noise_sigma).
+/// Classifies the outputs of a network for a cycle of `period_s` (s). `noise_sigma` is the standard deviation of
+/// the noise of a sample (output unit), for example [`Window::noise_sigma`](crate::window::Window::noise_sigma).
 ///
 /// # Errors
-/// Names the output, the noise or the parameter that is out of range.
+/// The output, the noise or the parameter that is out of range.
 pub fn classify(
     outputs: &[f32; OUTPUTS],
     signature: &Signature,
@@ -237,10 +246,10 @@ pub fn classify(
     }
 }
 
-/// [`classify`] with a pack's network and calibration.
+/// Classifies a signature with the network and the calibration of a pack.
 ///
 /// # Errors
-/// As [`classify`], and where the pack has no calibration.
+/// Those of [`classify`], and [`ClassifyError::Pack`] if the pack has no calibration.
 pub fn classify_by(
     pack: &Pack<'_>,
     signature: &Signature,
@@ -256,11 +265,11 @@ pub fn classify_by(
     }
 }
 
-/// The process of these values, whatever put them out: a ratio of poles and a dead time beyond what
-/// they can be are the nearest that can. Its faster pole is the actuator's.
+/// Process with these values. A pole ratio or a dead time out of range is replaced by the nearest valid one. The
+/// faster pole becomes that of the actuator.
 ///
 /// # Errors
-/// Where the period, the amplitude or a value is not finite.
+/// If the period, the amplitude or a value is not finite.
 pub fn process_of(
     values: &[f64; VALUES],
     signature: &Signature,
@@ -273,7 +282,7 @@ pub fn process_of(
         pole_ratio.clamp(0.0, MOST_POLE_RATIO),
         delay.max(0.0) * period_s,
     )?;
-    // The gain goes with the actuator's lag, which is known only with the poles.
+    // The gain is relative to the actuator's lag, which is known only with the poles.
     let jerk_gain = signature.amplitude / (exp(ln_amplitude) * period_s * period_s * period_s);
     unit.with_gain_scaled(jerk_gain * unit.t_prop_s())
 }
@@ -328,7 +337,7 @@ mod tests {
         };
         for a in 0..VALUES {
             for b in 0..VALUES {
-                // (L^T S root)_ab is a root of the unit matrix, and here that itself.
+                // (L^T S root)_ab is a root of the unit matrix, here the unit matrix itself.
                 let product: f64 = (0..VALUES)
                     .map(|i| factor(i, a) * posterior.root[i][b])
                     .sum();
@@ -340,7 +349,7 @@ mod tests {
         assert_eq!(mean, [2.2, 0.1125, 0.05, -5.8]);
     }
 
-    // Standard deviations 1/2, 1/4, 1/8, 1 without correlation: the last value's axis, of length one.
+    // Standard deviations 1/2, 1/4, 1/8 and 1 without correlation: the axis of the last value, of length one.
     #[test]
     fn the_longest_axis_of_a_diagonal() {
         let l = |size: f32| libm::logf(size);
@@ -353,7 +362,7 @@ mod tests {
         }
     }
 
-    // The moments of the rule are those of a standard normal: 1, 0, 1, 0, 3.
+    // The moments of the quadrature rule are those of a standard normal: 1, 0, 1, 0, 3.
     #[test]
     fn candidates_stand_for_the_posterior() {
         for (power, moment) in [(0, 1.0), (1, 0.0), (2, 1.0), (3, 0.0), (4, 3.0)] {
@@ -372,7 +381,7 @@ mod tests {
         assert!(found.candidates[0].process.k_over_t_body() < 0.0);
     }
 
-    // A cosine is no response of this process: the score is that of any limit over it, and crosses one
+    // A cosine is not the response of this process: the score is the statistic over the limit, and crosses one
     // where the limit does.
     #[test]
     fn the_limit_is_a_score_of_one() {
@@ -390,8 +399,8 @@ mod tests {
         assert_eq!(at(1.001 * statistic).familiarity, Familiarity::Known);
     }
 
-    // Outputs whose diagonal is 3 on average are e^-3 wide; 0.3 wider than usual at 0.1 is three standard
-    // deviations, twice nine more in the sum.
+    // Outputs whose diagonal is 3 on average are e^-3 wide. A width 0.3 above usual with a deviation of 0.1 is
+    // three standard deviations: twice nine more in the sum.
     #[test]
     fn doubt_counts() {
         assert_eq!(Calibration::width_of(&OUTPUT), -3.25);
@@ -410,8 +419,8 @@ mod tests {
         assert_eq!(at(-3.25), at(0.0));
     }
 
-    // Noise of a hundredth of the amplitude explains a cycle away, but not to a network that knows a
-    // 250th at most: 2.5.
+    // Noise of a hundredth of the amplitude would explain any cycle, but this network accepts a 250th at most:
+    // score 2.5.
     #[test]
     fn noise_beyond_what_is_known_counts() {
         let calibration = Calibration {

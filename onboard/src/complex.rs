@@ -1,4 +1,4 @@
-//! The few operations on complex numbers that frequency responses take.
+//! Complex numbers: the operations that frequency responses need.
 
 use core::ops::{Add, Mul, Neg};
 

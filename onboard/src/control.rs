@@ -1,10 +1,22 @@
-//! Proportional-derivative control with the derivative on the measurement only:
-//! `u = offset + kp (r - y) - kd dy/dt`.
+//! PD control with the derivative on the measurement only.
 //!
-//! The form behind the paper's cost (section 3 of its method). It is the cascade that autopilots
-//! fly: `u = rate_p (angle_p (r - y) - dy/dt)` with `angle_p = kp / kd` (1/s) and `rate_p = kd`.
+//! ```text
+//! u = offset + kp (r - y) - kd dy/dt
+//! ```
+//!
+//! | symbol | name         | unit                    |
+//! |--------|--------------|-------------------------|
+//! | u      | returned     | input unit              |
+//! | r, y   | `reference`, `value` | output unit     |
+//! | dy/dt  | `rate`       | output unit / s         |
+//! | kp     | `kp`         | input unit / output unit|
+//! | kd     | `kd`         | input unit s / output unit |
+//! | offset | `offset`     | input unit              |
+//!
+//! It is the controller of the paper's cost (section 3 of its method), and the cascade of autopilots: `u =
+//! rate_p (angle_p (r - y) - dy/dt)` with `angle_p = kp / kd` (1/s) and `rate_p = kd`.
 
-/// Gains of the controller. Units: `kp` input unit / output unit, `kd` the same times seconds.
+/// Gains of the controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pd {
     /// Proportional gain: input unit / output unit.
@@ -27,19 +39,19 @@ impl Pd {
     }
 }
 
-/// What a sensor says at a tick.
+/// Measurement at one tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measurement {
-    /// The process's output (output unit).
+    /// Output of the process (output unit).
     pub value: f32,
-    /// Its rate, where a sensor of its own tells it, such as a gyroscope (output unit / s).
+    /// Rate of the output (output unit / s), if a sensor such as a gyroscope measures it.
     pub rate: Option<f32>,
-    /// How old both are (s).
+    /// Age of both (s).
     pub age_s: f32,
 }
 
 impl Measurement {
-    /// A fresh value whose rate is to be found from its differences.
+    /// A fresh value without a measured rate; the rate is computed from differences.
     #[must_use]
     pub fn of(value: f32) -> Self {
         Self {
@@ -49,7 +61,7 @@ impl Measurement {
         }
     }
 
-    /// With the rate from a sensor of its own.
+    /// The same measurement with the rate from its own sensor.
     #[must_use]
     pub fn with_rate(self, rate: f32) -> Self {
         Self {
@@ -58,14 +70,14 @@ impl Measurement {
         }
     }
 
-    /// Whether every number in it is finite.
+    /// Whether all numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.value.is_finite() && self.rate.is_none_or(f32::is_finite) && self.age_s.is_finite()
     }
 }
 
-/// The rate of the output: measured, or the difference of the values behind a first-order lag.
+/// Rate of the output: measured, or the filtered difference of the values.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RateEstimate {
     last_value: Option<f32>,
@@ -73,8 +85,8 @@ pub struct RateEstimate {
 }
 
 impl RateEstimate {
-    /// The rate (output unit / s) at the next tick, `dt_s > 0` after the last; `lag_s` smooths a rate
-    /// that is not measured.
+    /// Rate (output unit / s) at the next tick, `dt_s > 0` after the last. `lag_s` is the time constant of the
+    /// filter for a rate that is not measured.
     #[inline]
     pub fn step(&mut self, measurement: &Measurement, dt_s: f32, lag_s: f32) -> f32 {
         let last = self.last_value.replace(measurement.value);
@@ -96,7 +108,7 @@ impl RateEstimate {
     }
 }
 
-/// The controller as it runs at every tick.
+/// The control law as it runs at every tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PdLaw {
     /// Proportional gain: input unit / output unit.
@@ -115,7 +127,7 @@ impl PdLaw {
         offset: 0.0,
     };
 
-    /// Of these gains about an offset.
+    /// The law with these gains and this offset.
     #[must_use]
     pub fn new(pd: Pd, offset: f32) -> Self {
         Self {
@@ -125,14 +137,14 @@ impl PdLaw {
         }
     }
 
-    /// The input (input unit) at a tick, without limits.
+    /// Input at a tick (input unit), not limited.
     #[inline]
     #[must_use]
     pub fn output(&self, reference: f32, value: f32, rate: f32) -> f32 {
         self.offset + self.kp * (reference - value) - self.kd * rate
     }
 
-    /// Whether every number in it is finite.
+    /// Whether all numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.kp.is_finite() && self.kd.is_finite() && self.offset.is_finite()
@@ -151,8 +163,8 @@ mod tests {
         assert_eq!(PdLaw::ZERO.output(2.0, 0.5, 0.5), 0.0);
     }
 
-    // Differences of a ramp of 2 a second at 1/64 s, behind a lag of 3/64 s: the step response of the
-    // lag, 2 (1 - (3/4)^n) after n of them; a measured rate is taken as it is.
+    // Differences of a ramp of 2 per second at 1/64 s, filtered with a lag of 3/64 s: the step response of the
+    // lag, 2 (1 - (3/4)^n) after n of them. A measured rate is used as it is.
     #[test]
     fn rates_from_differences_and_from_a_sensor() {
         let (dt_s, lag_s) = (1.0 / 64.0, 3.0 / 64.0);

@@ -30,11 +30,12 @@ const MAX_NEWTON_STEPS: usize = 60;
 /// Frequency (rad/s) at which the magnitude of the loop is one, to a few roundings.
 ///
 /// Newton's method falls onto the root monotonically from any bound above it, because the cubic is convex there.
-/// `cube_root_bound` gives the cube root of its argument or more, for that bound: [`power_of_two_cube_root`] on a
-/// board, where a cube root takes 3 kB of code, `f64::cbrt` elsewhere. The last bit may depend on the choice.
+/// `cube_root_bound` gives the cube root of its argument or a larger number, for that bound: on a board
+/// [`power_of_two_cube_root`], because a cube root takes 3 kB of code; elsewhere `f64::cbrt`. The last bit may
+/// depend on the choice.
 ///
-/// There is one root for `kp` other than zero. For `kp = 0` the result is zero or not a number where the magnitude
-/// stays below one.
+/// There is one root for `kp` other than zero. For `kp = 0` the result is zero or NaN if the magnitude stays
+/// below one.
 #[must_use]
 pub fn gain_crossover(
     kp: f64,
@@ -68,7 +69,7 @@ pub fn gain_crossover(
     sqrt(x)
 }
 
-/// A power of two that is the cube root of `value >= 0` or larger, by a factor of two at most.
+/// A power of two that is at least the cube root of `value >= 0` and at most twice as large.
 #[must_use]
 pub fn power_of_two_cube_root(value: f64) -> f64 {
     let (fraction, exponent) = frexp(value);
@@ -85,9 +86,9 @@ mod tests {
 
     use super::*;
 
-    // Without proportional gain and damping |L| = kd / (w sqrt(1 + w^2 T^2)): with kd = sqrt(2)/T one at w = 1/T.
-    // Without derivative gain and damping |L| = kp / (w^2 sqrt(1 + w^2 T^2)): with kp = sqrt(2)/T^2 the same.
-    // With damping 1/T as well |L| = kp / (w (1 + w^2 T^2) / T): with kp = 2/T^2 the same.
+    // Without proportional gain and damping |L| = kd / (w sqrt(1 + w^2 T^2)), which is 1 at w = 1/T for kd =
+    // sqrt(2)/T. Without derivative gain and damping |L| = kp / (w^2 sqrt(1 + w^2 T^2)): the same for kp =
+    // sqrt(2)/T^2. With a damping of 1/T as well |L| = kp / (w (1 + w^2 T^2) / T): the same for kp = 2/T^2.
     #[test]
     fn crossovers_by_hand() {
         for lag_s in [1e-3, 0.2, 50.0] {
@@ -104,14 +105,14 @@ mod tests {
         }
     }
 
-    // A loop of derivative gain alone that damping keeps below one: kd < 1/T_body.
+    // A loop with derivative gain only, which the damping keeps below one: kd < 1/T_body.
     #[test]
     fn a_magnitude_below_one_has_no_crossover() {
         let omega = gain_crossover(0.0, 1.0, 2.0, 0.1, cbrt);
         assert!(omega.is_nan() || omega == 0.0, "{omega}");
     }
 
-    // 8 = 2^3 = 0.5 * 2^4, so 2^(4/3), rounded up: 4; just below 8 it is 2.
+    // 8 = 0.5 * 2^4, so 2^(4/3) rounded up to a power of two: 4. Just below 8 it is 2.
     #[test]
     fn powers_of_two_by_hand() {
         for (value, expected) in [

@@ -1,16 +1,18 @@
-//! Cycles: from the relay's level and the measured output to complete, comparable oscillations.
+//! Cycle detection: from the relay's level and the measured output to complete cycles, and whether they are
+//! steady.
 //!
-//! A cycle runs from one rise of the relay to the next. A level that does not last (a switch that
-//! the relay took back, a glitch in a recording) starts no cycle.
+//! A cycle runs from one rise of the relay to the next. Times are in seconds, outputs in output units, the duty
+//! is the part of the period with the relay high. A level that does not last (a switch that the relay reversed,
+//! a glitch in a recording) starts no cycle.
 
-/// A level counts once it has lasted this part of the last half period: the relay's own dwell is
-/// longer, what it takes back is shorter.
+/// A level counts when it has lasted this part of the last half period. The dwell of the relay is longer; levels
+/// that the relay reverses are shorter.
 const LASTING: f64 = 0.25;
 
 /// One complete cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cycle {
-    /// Time of the rise that begins it (s).
+    /// Time of the rise at its beginning (s).
     pub start_s: f64,
     /// Duration (s).
     pub period_s: f64,
@@ -25,12 +27,12 @@ pub struct Cycle {
 /// Finds cycles in a stream of samples.
 #[derive(Clone, Debug, Default)]
 pub struct CycleDetector {
-    /// Level that counts, once there was one, and when it began.
+    /// The level that counts and its beginning (s), once there is one.
     level: Option<(bool, f64)>,
-    /// A new level that has yet to last, and when it began.
+    /// A new level that has not lasted yet, and its beginning (s).
     candidate: Option<(bool, f64)>,
     half_s: f64,
-    /// Rise that began the running cycle, and its fall.
+    /// Rise at the beginning of the running cycle (s), and its fall.
     rise_s: Option<f64>,
     fall_s: f64,
     lowest: f64,
@@ -38,7 +40,7 @@ pub struct CycleDetector {
 }
 
 impl CycleDetector {
-    /// No samples seen.
+    /// A detector that has seen no samples.
     #[must_use]
     pub fn new() -> Self {
         Self {
@@ -48,8 +50,8 @@ impl CycleDetector {
         }
     }
 
-    /// A sample: its time (s), whether the relay is high from it on, and the output. Returns the
-    /// cycle that is known to be complete now; it ended a little earlier.
+    /// Takes a sample: its time (s), whether the relay is high from then on, and the output. Returns the cycle
+    /// that is now known to be complete; it ended a little earlier.
     pub fn push(&mut self, time_s: f64, high: bool, output: f64) -> Option<Cycle> {
         self.lowest = self.lowest.min(output);
         self.highest = self.highest.max(output);
@@ -71,8 +73,8 @@ impl CycleDetector {
         self.turn(began_s, high)
     }
 
-    /// No more samples: a level that has begun counts, although it has not lasted yet. Returns the cycle
-    /// that this completes.
+    /// Ends the stream: a level that has begun counts although it has not lasted yet. Returns the cycle that
+    /// this completes.
     #[must_use]
     pub fn finish(mut self) -> Option<Cycle> {
         let (high, began_s) = self.candidate?;
@@ -100,28 +102,28 @@ impl CycleDetector {
     }
 }
 
-/// How far a cycle's period and amplitude may lie from the mean of the run it belongs to. Noise of
-/// 5 % of the amplitude moves them by up to 15 % under this relay and by twice that under one without
-/// its protection; a relay that has not settled, or a gust, by more.
+/// Tolerance for period and amplitude of a cycle against the mean of its run. Noise of 5 % of the amplitude
+/// moves them by up to 15 % under this relay and by up to 30 % under a relay without noise protection. A relay
+/// that has not settled, or a gust, moves them more.
 const ALIKE: f64 = 0.3;
 
-/// A run of consecutive cycles that are alike: the judgement of a steady oscillation.
+/// Run of consecutive cycles that are alike: decides whether the oscillation is steady.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SteadyRun {
-    /// Cycles in the run.
+    /// Number of cycles in the run.
     pub cycles: u32,
-    /// Their mean period (s).
+    /// Mean period (s).
     pub period_s: f64,
-    /// Their mean amplitude (output unit).
+    /// Mean amplitude (output unit).
     pub amplitude: f64,
-    /// Start of the first (s).
+    /// Start of the first cycle (s).
     pub start_s: f64,
-    /// End of the last (s).
+    /// End of the last cycle (s).
     pub end_s: f64,
 }
 
 impl SteadyRun {
-    /// Takes the next cycle in; a cycle unlike the run begins a new one. Returns whether it went on.
+    /// Adds the next cycle. A cycle unlike the run begins a new run. Returns whether the run continued.
     pub fn push(&mut self, cycle: &Cycle) -> bool {
         let alike = |value: f64, mean: f64| (value - mean).abs() <= ALIKE * mean;
         let goes_on = self.cycles > 0
@@ -141,7 +143,7 @@ impl SteadyRun {
         goes_on
     }
 
-    /// Whether the oscillation is steady: three cycles alike.
+    /// Whether the oscillation is steady: three cycles that are alike.
     #[must_use]
     pub fn is_steady(&self) -> bool {
         self.cycles >= 3
@@ -156,7 +158,7 @@ mod tests {
 
     use super::*;
 
-    /// Cycles of levels and outputs at consecutive samples of 1/64 s: exact in binary.
+    /// Cycles of levels and outputs at consecutive samples of 1/64 s, which is exact in binary.
     fn cycles(samples: impl IntoIterator<Item = (bool, f64)>) -> Vec<Cycle> {
         let mut detector = CycleDetector::new();
         samples
@@ -166,7 +168,7 @@ mod tests {
             .collect()
     }
 
-    /// High for 24 of 64 samples; the output a triangle from -1 to 3.
+    /// High for 24 of 64 samples; the output is a triangle from -1 to 3.
     fn square(k: usize) -> (bool, f64) {
         let phase = k % 64;
         let triangle = if phase < 32 {
@@ -177,12 +179,12 @@ mod tests {
         (phase < 24, triangle / 8.0 - 1.0)
     }
 
-    // The detector waits for a quarter of the last half period, 24 or 40 samples, before a level
-    // counts, and then dates it back: nothing of that wait may show.
+    // The detector waits for a quarter of the last half period, 24 or 40 samples, before a level counts, and
+    // then dates it back: the wait must not change the cycles.
     #[test]
     fn square_wave_is_found_exactly() {
         let found = cycles((0..64 * 6).map(square));
-        // The rise at sample 0 is not seen as one; rises at 1, 2, ... 5 s bound four cycles.
+        // The rise at sample 0 is not seen as a rise; the rises at 1, 2, ... 5 s bound four cycles.
         assert_eq!(found.len(), 4);
         for (index, cycle) in found.iter().enumerate() {
             assert_eq!(cycle.start_s, 1.0 + index as f64);
@@ -193,7 +195,7 @@ mod tests {
         }
     }
 
-    // Levels of up to 5 samples (below a quarter of 24) leave no trace, wherever they fall.
+    // Levels of up to 5 samples (below a quarter of 24) change nothing, wherever they occur.
     #[test]
     fn glitches_are_ignored() {
         let clean = cycles((0..64 * 6).map(square));
@@ -201,8 +203,8 @@ mod tests {
             let glitch = |k: usize| k > 128 && (0..5).contains(&((k + 64 - at) % 64));
             let found = cycles((0..64 * 6).map(|k| {
                 let (high, output) = square(k);
-                // None up to the wait behind an edge (10 samples): the level has not lasted yet
-                // there, and counts from behind the glitch.
+                // Not within the wait after an edge (10 samples): there the level has not lasted yet and counts
+                // from after the glitch.
                 let edge = [0, 24].iter().any(|edge| (at + 69 - edge) % 64 < 16);
                 (high != (glitch(k) && !edge), output)
             }));
@@ -210,8 +212,9 @@ mod tests {
         }
     }
 
-    // Rises at samples 64 and 128: the second counts six samples later (a quarter of the last half period that
-    // is over, 24), at sample 134. Ended before, the cycle is the same; without sample 128 there is none.
+    // Rises at samples 64 and 128: the second counts six samples later (a quarter of the last complete half
+    // period, 24), at sample 134. If the stream ends before that, the cycle is the same; without sample 128
+    // there is no cycle.
     #[test]
     fn the_last_edge_ends_a_cycle_that_samples_no_longer_confirm() {
         let complete = cycles((0..135).map(square));
@@ -249,8 +252,8 @@ mod tests {
         }
     }
 
-    // 1, 1.1, 1.2 are within 30 % of the running means 1 and 1.05; 1.5 is not within 30 % of 1.1 and
-    // begins a new run.
+    // 1, 1.1 and 1.2 are within 30 % of the running means 1 and 1.05; 1.5 is not within 30 % of 1.1 and begins a
+    // new run.
     #[test]
     fn steady_after_three_alike() {
         let mut run = SteadyRun::default();

@@ -1,16 +1,20 @@
-//! The even part of an actuator's force: what a quadratic actuator adds.
+//! Even part of the actuator's force: the effect of a quadratic actuator.
 //!
-//! A propeller's thrust is quadratic in its speed, and it is the speed that lags. Around hover, with
-//! the lagged input `x` scaled to the relay's levels at +1 and -1, the force is `b h (x + c x^2)`;
-//! a relay of a tenth of hover has `c = 0.025`. Under a symmetric relay the second term shows at
-//! even harmonics only and does no harm; under a biased one it would be taken for lag and gain.
+//! ```text
+//! force = b h (x + c x^2),   T_prop dx/dt = u/h - x
+//! ```
 //!
-//! Between edges `x` is an exponential, so `x^2` is averaged over each bin exactly; that average is
-//! taken as constant over the bin, which is off by a thousandth of a term that is itself small.
+//! The thrust of a propeller is quadratic in its speed, and it is the speed that lags. `x` is the lagged input
+//! in units of the relay's amplitude `h`, +1 and -1 at its levels; `b` is the acceleration gain. A relay of a
+//! tenth of hover has `c = 0.025`. Under a symmetric relay the second term appears at even harmonics only and
+//! does no harm. Under a biased relay it would be mistaken for lag and gain.
 //!
-//! Which of the two lags is the actuator's, and gets squared, has no smooth answer where they meet:
-//! the poles used here are the series of the true ones in the pole ratio, good to 1 % until one lag
-//! is less than four times the other, and smooth all the way.
+//! Between edges `x` is an exponential, so the average of `x^2` over a bin is exact. It is then taken as
+//! constant over the bin, with an error of a thousandth of a term that is small itself.
+//!
+//! Which of the two lags belongs to the actuator is not a smooth choice where they are equal. The poles used
+//! here are a series of the true ones in the pole ratio: accurate to 1 % if one lag is at least four times the
+//! other, and smooth everywhere.
 
 use libm::exp;
 
@@ -19,19 +23,19 @@ use crate::response::Grid;
 use crate::transition::Transition;
 use crate::window::Edge;
 
-/// Poles of actuator and body (1/s): of `sum (1 +- sqrt(1 - 4 ratio)) / 2`, the terms to the third.
+/// Poles of actuator and body (1/s): `sum (1 +- sqrt(1 - 4 ratio)) / 2` as a series to third order.
 fn smooth_poles(process: &Soiptd) -> (f64, f64) {
     let (sum, ratio) = process.pole_sum();
     let body = ratio + ratio * ratio + 2.0 * ratio * ratio * ratio;
     (sum * (1.0 - body), sum * body)
 }
 
-/// The mean square of the lagged input, bin by bin, from the beginning of the past on.
+/// Mean square of the lagged input, bin by bin, from the beginning of the past.
 #[derive(Clone, Copy, Debug)]
 struct Squares {
-    /// The next edge.
+    /// Next edge.
     edge: usize,
-    /// Middle and half range of the input's levels.
+    /// Middle and half range of the input's levels (input unit).
     middle: f64,
     half: f64,
     rate_per_s: f64,
@@ -44,7 +48,7 @@ struct Squares {
 }
 
 impl Squares {
-    /// `None` for an input of a single level.
+    /// `None` if the input has a single level.
     fn new(process: &Soiptd, grid: &Grid, edges: &[Edge]) -> Option<Self> {
         let first = edges.first()?;
         let (low, high) = edges
@@ -74,7 +78,7 @@ impl Squares {
         })
     }
 
-    /// Integral of `x^2` over a stretch of constant input, in units of the lag; `x` moves on.
+    /// Integral of `x^2` over a stretch of constant input, times the rate of the lag; `x` advances.
     fn stretch(&mut self, duration_s: f64, decay: f64) -> f64 {
         let off = self.lagged - self.level;
         let square = self.level * self.level * duration_s * self.rate_per_s
@@ -108,20 +112,20 @@ impl Squares {
     }
 }
 
-/// Bins that are followed in one call: each takes 45 operations. See the table in `refine`.
+/// Bins per slice: 45 operations each. See the table in `refine`.
 pub(crate) const SLICE_BINS: usize = 32;
-/// What an edge costs, in bins: two exponentials.
+/// Cost of an edge in bins: two exponentials.
 const EDGE_BINS: usize = 3;
 
-/// Mean outputs over the bins of the window when the force is `x^2` less its mean there, some bins at a
-/// time: the response to `x^2`, then that to its mean taken out.
+/// Mean outputs over the bins of the window when the force is `x^2` minus its mean there, some bins per slice:
+/// first the response to `x^2`, then the response to its mean is subtracted.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Course {
-    /// `None` for an input of a single level.
+pub(crate) struct DistortionCourse {
+    /// `None` if the input has a single level.
     squares: Option<Squares>,
     body: Body,
     past_bins: usize,
-    /// The next bin, from the beginning of the past.
+    /// Next bin, from the beginning of the past.
     index: usize,
     /// Sum of `x^2` over the bins of the window.
     total: f64,
@@ -133,7 +137,7 @@ pub(crate) struct Course {
 #[derive(Clone, Copy, Debug)]
 struct Body {
     step: Transition,
-    /// Where in its bin the mean time of the samples lies: they begin with it, so before its middle.
+    /// Position of the mean sample time within its bin: before the middle, because samples begin with the bin.
     centre: f64,
     y: f64,
     v: f64,
@@ -151,15 +155,15 @@ impl Body {
     }
 }
 
-impl Course {
-    /// At the beginning of the past.
+impl DistortionCourse {
+    /// Progress at the beginning of the past.
     pub(crate) fn new(process: &Soiptd, grid: &Grid, edges: &[Edge]) -> Self {
         let (_, damping_per_s) = smooth_poles(process);
         let instants = f64::from(grid.per_bin);
         Self {
             squares: Squares::new(process, grid, edges),
             body: Body {
-                // Without decay of the force a bin's transition is that under a constant force.
+                // Without decay of the force the transition of a bin is that under a constant force.
                 step: Transition::of_poles(damping_per_s, 0.0, instants * grid.sample_s),
                 centre: 0.5 * (instants - 1.0) / instants,
                 y: 0.0,
@@ -172,8 +176,8 @@ impl Course {
         }
     }
 
-    /// Follows it by [`SLICE_BINS`]. True where the means are complete: zeros for an input of a single
-    /// level.
+    /// Computes the next [`SLICE_BINS`] bins. True when the means are complete; they are zero for an input with
+    /// a single level.
     pub(crate) fn follow(&mut self, edges: &[Edge], means: &mut [f64]) -> bool {
         let bins = self.past_bins + means.len();
         match (self.squares, self.mean) {
@@ -230,14 +234,14 @@ mod tests {
     const STEP_S: f64 = 1e-5;
 
     fn follow(process: &Soiptd, edges: &[Edge], means: &mut [f64]) {
-        let mut course = Course::new(process, &grid(), edges);
+        let mut course = DistortionCourse::new(process, &grid(), edges);
         let (mut calls, mut before) = (1, 0);
         while !course.follow(edges, means) {
             let bins = course.index.saturating_sub(before);
             assert!(bins <= SLICE_BINS, "{bins}");
             (calls, before) = (calls + 1, course.index);
         }
-        // Twice the bins, and three more for each edge the first time.
+        // Twice the number of bins, and three more for each edge in the first pass.
         let bins = grid().past_bins + means.len();
         let most = 2 * bins.div_ceil(SLICE_BINS) + EDGE_BINS * edges.len() / SLICE_BINS + 1;
         assert!(calls <= most, "{calls} of {most}");
@@ -260,8 +264,8 @@ mod tests {
         })
     }
 
-    // By brute force: steps of 10 us of the lag, the square and the body; then the mean over the
-    // window taken from the force by superposition. The bins' averages are off by a thousandth.
+    // By brute force: steps of 10 us for lag, square and body; then the mean over the window is removed from the
+    // force by superposition. The averages over bins are off by a thousandth.
     #[test]
     fn agrees_with_small_steps() {
         let process = Soiptd::from_acceleration_gain(1.0, 0.05, 0.5, 0.02).unwrap();
@@ -287,7 +291,7 @@ mod tests {
         let (mut y, mut v) = (0.0, 0.0);
         let mut expected = [0.0; 100];
         for (n, square) in squares[..steps(120)].iter().enumerate() {
-            // Samples stand at whole milliseconds.
+            // Samples are at whole milliseconds.
             if n >= steps(20) && n % 100 == 0 {
                 expected[(n - steps(20)) / 1000] += 0.1 * y;
             }
@@ -308,7 +312,7 @@ mod tests {
         assert_eq!(found, [0.0; 10]);
     }
 
-    // Equal lags: 1 - (1/4 + 1/16 + 1/32) of the sum; far apart: the lags' own poles.
+    // Equal lags: 1 - (1/4 + 1/16 + 1/32) of the sum; lags far apart: their own poles.
     #[test]
     fn poles_are_those_of_the_lags_far_apart() {
         let process = Soiptd::from_acceleration_gain(1.0, 0.05, 0.5, 0.0).unwrap();

@@ -1,7 +1,7 @@
-//! How well a process explains the cycle that it was read off: the test behind "unknown".
+//! Misfit statistic of a cycle: how well the process read from it explains it. The basis of "unknown".
 //!
-//! A cycle of a process of the family is, in parts of the period `T = 1` and divided by its
-//! amplitude, with `s = j 2 pi n`, `S = (p1 + p2) T`, `r = p1 p2 / (p1 + p2)^2`, duty `d`,
+//! For a cycle of a process of the family, in units of the period `T` and of its amplitude, with `s = j 2 pi n`,
+//! `S = (p1 + p2) T`, `r = p1 p2 / (p1 + p2)^2` and duty `d`:
 //!
 //! ```text
 //!          e^(-s tau/T)     2 (1 - e^(-s d))      1
@@ -11,23 +11,29 @@
 //! x_k = 32/pi sin(pi k/32) sum_m y_n / n,    n = k + 32 m      means over 32 parts, k = 1..15
 //! ```
 //!
-//! The bias of the input is in harmonic zero alone and plays no part. What is left of the measured
-//! `x_k` is weighed against all that a cycle of the family may leave:
+//! | symbol       | meaning                                            | unit |
+//! |--------------|----------------------------------------------------|------|
+//! | `p1`, `p2`   | poles `1/T_prop`, `1/T_body`                       | 1/s  |
+//! | `a`          | amplitude of the cycle                             | output unit |
+//! | `y_n`, `x_k` | harmonics of the output, and of its means over parts | 1  |
 //!
-//! - noise, equal on all harmonics: a part is the mean of `N/32` samples;
-//! - the doubt about the process: the posterior of its values, through the slopes of `x_k`;
-//! - the state at the end of the cycle that is not quite that at its start, since noise moves the
-//!   switches: jumps of force, rate and output, whose responses are `1/(s Q)`, `1/Q`, `s/Q`;
-//! - a floor, for what a window of samples and a network leave in any case.
+//! The input bias is in harmonic zero only and has no influence. The remainder of the measured `x_k` is compared
+//! with everything that a cycle of the family may leave:
+//!
+//! - noise, equal for all harmonics: a part is the mean of `N/32` samples;
+//! - uncertainty of the process: the posterior of its values, through the derivatives of `x_k`;
+//! - a difference between the states at the end and at the start of the cycle, because noise moves the switches:
+//!   jumps of force, rate and output, with the responses `1/(s Q)`, `1/Q`, `s/Q`;
+//! - a floor for the errors of a window of samples and of the network.
 //!
 //! ```text
 //! statistic = min over values v and jumps c of   |x - x(v, c)|^2 / variance + |v|^2 + |c|^2
 //! ```
 //!
-//! with `v` and `c` counted in their standard deviations. `x` is linear in `c` and not in `v`: the
-//! minimum is found with the slopes at the process read, then with those where that minimum lies. If
-//! all were Gaussian and linear and the floor zero, it would be chi-squared with 30 degrees of freedom,
-//! for each of these only adds to the covariance.
+//! `v` and `c` are counted in standard deviations. `x` is linear in `c` but not in `v`: the minimum is found
+//! with the derivatives at the process read, then with those at that minimum. If everything were Gaussian and
+//! linear and the floor zero, the statistic would be chi-squared with 30 degrees of freedom, because each of
+//! these contributions only adds to the covariance.
 
 mod fit;
 mod response;
@@ -35,84 +41,84 @@ mod response;
 use core::f64::consts::PI;
 
 use self::fit::Explained;
-use self::response::Response;
+use self::response::PeriodicResponse;
 use crate::complex::Complex;
 use crate::pack::VALUES;
 use crate::signature::PARTS;
 
-/// Harmonics of the parts: those below the one that alternates.
+/// Number of harmonics of the parts: those below the alternating one.
 pub(crate) const HARMONICS: usize = PARTS / 2 - 1;
 
 /// Real parts of the harmonics, then imaginary parts.
 pub(crate) const ROWS: usize = 2 * HARMONICS;
 
-/// Jumps between a cycle's end and its start.
+/// Number of jumps between the end of a cycle and its start.
 pub(crate) const JUMPS: usize = 3;
 
-/// What may be left is a combination of so many.
+/// Number of columns that may explain the remainder.
 const COLUMNS: usize = VALUES + JUMPS;
 
 pub(crate) type Rows = [f64; ROWS];
 
-/// Harmonics of the measured parts that are summed in one slice.
+/// Harmonics of the measured parts per slice.
 const SUMMED: usize = 8;
 
-/// How far off a process that was read may be, and a cycle from that of any process.
+/// Uncertainty of the process read, and deviation of a cycle from the periodic response.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Doubt {
     /// Upper triangular root of the values' covariance.
     pub(crate) root: [[f64; VALUES]; VALUES],
     /// Standard deviation of the jumps.
     pub(crate) jump: f64,
-    /// Standard deviation of noise and floor together on a row.
+    /// Standard deviation of noise and floor together, per row.
     pub(crate) sigma: f64,
 }
 
-/// A cycle, and the process read off it.
+/// A cycle and the process read from it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Cycle {
-    /// Mean outputs over the parts, over the amplitude.
+pub(crate) struct ScoredCycle {
+    /// Mean outputs over the parts, divided by the amplitude.
     pub(crate) parts: [f64; PARTS],
     /// Values of the process: `ln S, r, tau/T, ln A`.
     pub(crate) mean: [f64; VALUES],
     pub(crate) doubt: Doubt,
     pub(crate) duty: f64,
-    /// Samples in the period.
+    /// Number of samples in the period.
     pub(crate) samples: f64,
 }
 
-/// The statistic of the [module](self), in slices.
+/// The statistic of the [module](self), computed in slices.
 #[derive(Clone, Debug)]
 pub(crate) struct Statistic {
-    cycle: Cycle,
+    cycle: ScoredCycle,
     observed: Rows,
-    response: Response,
-    /// Where the response is taken: deviations of the values from their mean, in columns of the root.
+    response: PeriodicResponse,
+    /// Where the response is evaluated: deviations of the values from their mean, in columns of the root.
     deviations: [f64; VALUES],
     explained: Explained,
-    /// What the slopes at the process read leave, and whether these are those where they lead.
+    /// Sum of squares left by the first pass, and whether the second pass is in progress.
     first: f64,
     is_second: bool,
     stage: Stage,
 }
 
-/// What is next.
+/// Next step.
 #[derive(Clone, Copy, Debug)]
 enum Stage {
-    /// Harmonics of the measured parts: those that are summed.
+    /// Harmonics of the measured parts: number already summed.
     Observed(usize),
-    /// Of the process.
+    /// Harmonics of the process.
     Response,
     /// The equations.
     Equations,
-    /// Their least squares.
+    /// Their least-squares solution.
     Explained,
 }
 
 impl Statistic {
-    /// Of no cycle yet.
+    /// All zeros: memory before the first use.
     pub(crate) const NONE: Self = Self {
-        cycle: Cycle {
+        cycle: ScoredCycle {
             parts: [0.0; PARTS],
             mean: [0.0; VALUES],
             doubt: Doubt {
@@ -124,7 +130,7 @@ impl Statistic {
             samples: 0.0,
         },
         observed: [0.0; ROWS],
-        response: Response::NONE,
+        response: PeriodicResponse::NONE,
         deviations: [0.0; VALUES],
         explained: Explained::NONE,
         first: 0.0,
@@ -132,15 +138,15 @@ impl Statistic {
         stage: Stage::Observed(0),
     };
 
-    /// Begins that of a cycle.
-    pub(crate) fn begin(&mut self, cycle: Cycle) {
+    /// Begins the statistic of a cycle.
+    pub(crate) fn begin(&mut self, cycle: ScoredCycle) {
         self.cycle = cycle;
         self.deviations = [0.0; VALUES];
         self.is_second = false;
         self.stage = Stage::Observed(0);
     }
 
-    /// One slice; the statistic after the last.
+    /// Does one slice; returns the statistic after the last.
     pub(crate) fn advance(&mut self) -> Option<f64> {
         let cycle = &self.cycle;
         match self.stage {
@@ -172,7 +178,7 @@ impl Statistic {
         None
     }
 
-    /// After the slopes at the process read, those where they lead; after these, the statistic.
+    /// After the pass at the process read, starts the pass at the minimum; after that one returns the statistic.
     fn judge(&mut self, left: f64) -> Option<f64> {
         if !self.is_second {
             (self.first, self.is_second) = (left, true);
@@ -183,19 +189,19 @@ impl Statistic {
             self.stage = Stage::Response;
             return None;
         }
-        // Great doubt leads to where a response overflows.
+        // With a large uncertainty the minimum may lie where a response overflows.
         let found = [left, self.first].into_iter().find(|one| one.is_finite());
         Some(found.map_or(f64::INFINITY, |statistic| statistic.max(0.0)))
     }
 }
 
-/// These harmonics of the means over equal parts.
+/// Adds these harmonics of the means over equal parts.
 fn add_harmonics(
     parts: &[f64; PARTS],
     harmonics: core::ops::RangeInclusive<usize>,
     rows: &mut Rows,
 ) {
-    // Turns by half a part.
+    // Rotations by half a part.
     let mut turns = [Complex::ONE; 2 * PARTS];
     let step = Complex::turn(-PI / PARTS as f64);
     for index in 1..turns.len() {
@@ -214,7 +220,7 @@ fn put(rows: &mut Rows, harmonic: usize, value: Complex) {
     rows[HARMONICS + harmonic - 1] = value.im;
 }
 
-/// The process these deviations off the mean, or the nearest that there is, and its own deviations.
+/// Process at these deviations from the mean, or the nearest valid one, and its deviations.
 fn nearest(
     mean: &[f64; VALUES],
     deviations: &[f64; VALUES],
@@ -234,7 +240,7 @@ fn nearest(
     (there, own)
 }
 
-/// Of equal lags.
+/// Pole ratio of equal lags.
 pub(crate) const MOST_POLE_RATIO: f64 = 0.25;
 
 #[cfg(test)]

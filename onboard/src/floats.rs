@@ -1,7 +1,7 @@
-//! Numbers as they lie in a file: `f32`, little endian, at any address, decoded where they are read.
+//! Rows of `f32` numbers read in place from little-endian bytes at any address.
 //!
-//! Flash and files hold bytes; a slice of `f32` would have to be aligned, and copied to be. Decoding
-//! four bytes is one load on a little-endian machine.
+//! Flash and files hold bytes. A slice of `f32` would have to be aligned, which needs a copy; decoding four
+//! bytes is a single load on a little-endian machine.
 //!
 //! ```
 //! use onecycle_onboard::floats::Floats;
@@ -10,56 +10,56 @@
 //! assert_eq!((floats.get(0), floats.get(1), floats.get(2)), (Some(1.0), Some(-2.0), None));
 //! ```
 
-/// A borrowed row of numbers. See the [module](self).
+/// Borrowed row of numbers. See the [module](self).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Floats<'a>(&'a [[u8; 4]]);
 
 impl<'a> Floats<'a> {
-    /// Of these bytes; `None` where they are not four for each number.
+    /// The numbers in these bytes; `None` if their length is not a multiple of four.
     #[must_use]
     pub fn new(bytes: &'a [u8]) -> Option<Self> {
         let (numbers, rest) = bytes.as_chunks();
         rest.is_empty().then_some(Self(numbers))
     }
 
-    /// How many there are.
+    /// Number of numbers.
     #[must_use]
     pub fn len(&self) -> usize {
         self.0.len()
     }
 
-    /// Whether there are none.
+    /// Whether the row is empty.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
-    /// Number `index`, counted from 0; `None` beyond the last.
+    /// Number `index`, counted from 0; `None` after the last.
     #[must_use]
     pub fn get(&self, index: usize) -> Option<f32> {
         self.0.get(index).copied().map(f32::from_le_bytes)
     }
 
-    /// One after another.
+    /// Iterator over the numbers.
     pub fn iter(&self) -> impl ExactSizeIterator<Item = f32> + use<'a> {
         self.0.iter().copied().map(f32::from_le_bytes)
     }
 
-    /// The first `N`; `None` where there are fewer.
+    /// The first `N` numbers; `None` if there are fewer.
     #[must_use]
     pub fn first<const N: usize>(&self) -> Option<[f32; N]> {
         let numbers: &[[u8; 4]; N] = self.0.first_chunk()?;
         Some(numbers.map(f32::from_le_bytes))
     }
 
-    /// `count` numbers from `first` on; `None` where there are fewer.
+    /// `count` numbers from `first` on; `None` if there are fewer.
     #[must_use]
     pub fn range(&self, first: usize, count: usize) -> Option<Self> {
         let end = first.checked_add(count)?;
         self.0.get(first..end).map(Self)
     }
 
-    /// Four bytes a number.
+    /// The bytes, four per number.
     pub(crate) fn chunks(&self) -> &'a [[u8; 4]] {
         self.0
     }

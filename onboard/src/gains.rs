@@ -1,32 +1,38 @@
-//! The optimal PD of a process from a table, on board: an interpolation instead of a search.
+//! Optimal PD gains from a table: an interpolation on board instead of a search.
 //!
-//! The best controller at a phase margin is one angle, the lead `psi` at its gain crossover. The
-//! angle has no unit, so it depends on the shape of the process alone, and the cost is flat in it at
-//! its optimum: an interpolated lead costs the square of its error. The crossover `w` then follows
-//! from the phase and the gains from the magnitude, both exactly, so that the margin is exact:
+//! At a given phase margin the best controller is one angle, its lead `psi` at the gain crossover. The angle
+//! depends on the shape of the process only, and the cost is flat in it at the optimum, so an interpolated lead
+//! costs the square of its error. The crossover `w` then follows from the phase and the gains from the
+//! magnitude, both exactly, so the margin is exact:
 //!
 //! ```text
 //! arg G(jw) + psi = PM - pi,    Kp = cos(psi) / |G(jw)|,    Kd = sin(psi) / (w |G(jw)|)
 //! ```
 //!
-//! Coordinates of the table, where `T_1 <= T_2` are the two lags in the order of their size (`G`
-//! does not know which one is the actuator's):
+//! | symbol | name               | unit                     |
+//! |--------|--------------------|--------------------------|
+//! | PM     | `phase_margin_rad` | rad                      |
+//! | psi    | `lead_rad`         | rad                      |
+//! | w      | `omega`            | rad/s                    |
+//! | Kp, Kd | `Pd`               | see [`Pd`]               |
+//!
+//! Coordinates of the table, with the two lags ordered by size, `T_1 <= T_2` (`G` does not change when they are
+//! exchanged):
 //!
 //! | coordinate                                | from               | to                     |
 //! |-------------------------------------------|--------------------|------------------------|
 //! | `x = tau / (T_1 + tau)`                   | 0, no dead time    | 20/21, `tau = 20 T_1`  |
 //! | `y = (2 T_1 + tau) / (T_1 + T_2 + tau)`   | 0, no damping      | 1, equal lags          |
 //!
-//! The nodes are equally spaced in `s`, `u = c s / (1 - s + c s)` with `u` a coordinate from 0 to 1
-//! and `c` the stretch of its axis: below one it puts more nodes where `u` is small.
+//! The nodes are equally spaced in `s`, where `u = c s / (1 - s + c s)` is a coordinate scaled to 0..1 and `c`
+//! the stretch of its axis. A stretch below one puts more nodes where `u` is small.
 //!
-//! A table is numbers of f32, or their little-endian bytes: the [`Nodes`], then for each node, the
-//! dead time's index first, [`FIELDS`] angles (rad): the lead of the best PD at the margin of the
-//! table; the margin of the best PD of all; the lead of that one. The last two answer where more
-//! margin than asked is cheaper: there the dead time dominates.
+//! A table is a row of f32, or of their little-endian bytes: the [`Nodes`], then [`FIELDS`] angles (rad) per
+//! node, with the index of the dead time first: lead of the best PD at the margin of the table; margin of the
+//! best PD of all; lead of that PD. The last two are used where a larger margin than the one asked for costs
+//! less, which is where the dead time dominates.
 //!
-//! Reference: the optimum is that of the paper's equations 11 to 13 (Ayyad, Chehadeh, Awad, Zweiri
-//! 2020).
+//! Reference: equations 11 to 13 of the paper.
 
 mod nodes;
 
@@ -43,16 +49,16 @@ use crate::process::Soiptd;
 /// Newton's method takes two to eleven steps, five on average.
 const MAX_NEWTON_STEPS: usize = 30;
 
-/// Of the crossover: a step below this leaves its square, that is, rounding.
+/// Relative step at which Newton's method ends: its square, the remaining error, is rounding.
 const NEWTON_TOLERANCE: f64 = 1e-9;
 
 /// Why a table has no gains for a process.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum GainsError {
-    /// The dead time, in shorter lags, is above [`LARGEST_DELAY_IN_LAGS`].
+    /// The dead time exceeds [`LARGEST_DELAY_IN_LAGS`] shorter lags: its number of shorter lags.
     DeadTime(f64),
-    /// The gain or the times are so extreme that the gains of the controller overflow.
+    /// Gain or times are so extreme that the gains of the controller overflow.
     Overflow,
 }
 
@@ -66,7 +72,7 @@ impl fmt::Display for GainsError {
             ),
             Self::Overflow => write!(
                 f,
-                "the process is too extreme for its gains to be representable"
+                "the gains for this process overflow: its gain or times are too extreme"
             ),
         }
     }
@@ -74,7 +80,7 @@ impl fmt::Display for GainsError {
 
 impl core::error::Error for GainsError {}
 
-/// The numbers of a table, wherever they lie.
+/// Numbers of a table: in memory, or as bytes in flash or a file.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Numbers<'a> {
     Floats(&'a [f32]),
@@ -97,14 +103,15 @@ impl Numbers<'_> {
     }
 }
 
-/// Optimal controllers of one phase margin, their numbers borrowed. See the [module](self).
+/// Lead table: optimal controllers of one phase margin, with borrowed numbers. Every number is checked when the
+/// table is made, so using it costs no check. See the [module](self).
 ///
 /// ```
 /// use onecycle_onboard::gains::{GainsError, LeadTable, Nodes};
 /// use onecycle_onboard::Soiptd;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// // A lead of 65 deg for every shape: what a single optimum says about all the others.
+/// The same lead of 65 degrees for every shape.
 /// let nodes = Nodes { phase_margin_rad: 0.35, delay_stretch: 1.0, lag_stretch: 1.0, points: 4 };
 /// let mut numbers = [1.134_f32; 52];
 /// numbers[..4].copy_from_slice(&nodes.header());
@@ -126,18 +133,19 @@ pub struct LeadTable<'a> {
 }
 
 impl<'a> LeadTable<'a> {
-    /// From the numbers of a table.
+    /// A table from its numbers.
     ///
     /// # Errors
-    /// Names the first number that cannot be one of a table.
+    /// The first number that is invalid.
     pub fn from_floats(floats: &'a [f32]) -> Result<Self, LeadTableError> {
         Self::new(Numbers::Floats(floats))
     }
 
-    /// From the numbers of a table as little-endian bytes, as a file or flash holds them.
+    /// A table from its numbers as little-endian bytes, as in a file or in flash.
     ///
     /// # Errors
-    /// Those of [`LeadTable::from_floats`]; [`LeadTableError::Bytes`] for a broken number.
+    /// Those of [`LeadTable::from_floats`], and [`LeadTableError::Bytes`] if the length is not a multiple of
+    /// four.
     pub fn from_bytes(bytes: &'a [u8]) -> Result<Self, LeadTableError> {
         match bytes.as_chunks() {
             (numbers, []) => Self::new(Numbers::LittleEndian(numbers)),
@@ -165,17 +173,16 @@ impl<'a> LeadTable<'a> {
         Ok(Self { nodes, numbers })
     }
 
-    /// Where its nodes lie, and its phase margin.
+    /// Position of the nodes, and phase margin.
     #[must_use]
     pub fn nodes(&self) -> &Nodes {
         &self.nodes
     }
 
-    /// Best PD among those with at least the margin of the table: the form to fly.
+    /// The best PD with at least the margin of the table: the one to use in flight.
     ///
     /// # Errors
-    /// [`GainsError::DeadTime`] outside the table; [`GainsError::Overflow`] for processes near the
-    /// limits of `f64`.
+    /// [`GainsError::DeadTime`] outside the table; [`GainsError::Overflow`] near the limits of `f64`.
     pub fn pd(&self, process: &Soiptd) -> Result<Pd, GainsError> {
         let [lead_rad, free_margin_rad, free_lead_rad] = self.angles(process)?;
         let floor_rad = self.phase_margin_rad();
@@ -186,7 +193,7 @@ impl<'a> LeadTable<'a> {
         }
     }
 
-    /// Best PD among those with exactly the margin of the table, the paper's constraint.
+    /// The best PD with exactly the margin of the table, which is the constraint of the paper.
     ///
     /// # Errors
     /// Those of [`LeadTable::pd`].
@@ -201,7 +208,7 @@ impl<'a> LeadTable<'a> {
         f64::from(self.nodes.phase_margin_rad)
     }
 
-    /// The angles at a process: a cubic through four nodes along either axis.
+    /// Angles at a process (rad): cubic interpolation over four nodes along either axis.
     fn angles(&self, process: &Soiptd) -> Result<[f64; FIELDS], GainsError> {
         let [delay, lag] = self.nodes.position(process)?;
         if !(delay.is_finite() && lag.is_finite()) {
@@ -241,12 +248,12 @@ fn gains(process: &Soiptd, phase_margin_rad: f64, lead_rad: f64) -> Result<Pd, G
     })
 }
 
-/// Frequency (rad/s) where the process lags by `lag_rad` beyond `-pi`:
+/// Frequency (rad/s) at which the process lags by `lag_rad` beyond `-pi`:
 ///
 /// `f(w) = atan(w T_prop) + w tau - atan(1/(w T_body)) = lag_rad`.
 ///
-/// `f` rises and is concave, so Newton's method climbs to the root from any point below it. Any
-/// tangent of `f` gets there too early: that at zero does, and so does that without damping.
+/// `f` rises and is concave, so Newton's method climbs to the root from any point below it. Tangents of `f` lie
+/// above it and give such points: the tangent at zero and the one without damping.
 fn crossover(process: &Soiptd, lag_rad: f64) -> Option<f64> {
     let (lag_s, tau_s) = (process.t_prop_s(), process.tau_s());
     let damping = process.inv_t_body_per_s();
@@ -295,9 +302,9 @@ mod tests {
         fabs(a - b) <= tolerance * fabs(b)
     }
 
-    // f is one arc tangent in these: w T = tan(lag) without damping or dead time; 2 atan(w T) -
-    // pi/2 = lag with equal lags; w tau - pi/2 + atan(w T_body) = lag with next to no T_prop, here
-    // with w T_body = 1. Newton stops at 1e-9 and leaves the square of that.
+    // In these cases f is one arc tangent: w T = tan(lag) without damping and dead time; 2 atan(w T) - pi/2 =
+    // lag with equal lags; w tau - pi/2 + atan(w T_body) = lag with negligible T_prop, here with w T_body = 1.
+    // Newton's method stops at 1e-9, with an error of the square of that.
     #[test]
     fn crossovers_by_hand() {
         for lag_rad in [0.01, 0.3, 1.0, 1.5] {
@@ -315,13 +322,13 @@ mod tests {
         let process = Soiptd::from_acceleration_gain(1.0, 1e-15, 2.0, 0.5).unwrap();
         let omega = crossover(&process, 1.0 - 0.25 * PI).unwrap();
         assert!(close(omega, 2.0, 1e-12), "{omega}");
-        // A double integrator never lags by less than pi.
+        // A double integrator always lags by pi or more.
         let process = Soiptd::from_acceleration_gain(1.0, 0.2, 0.0, 0.1).unwrap();
         assert_eq!(crossover(&process, -0.1), None);
     }
 
-    // A double integrator, A = -3, T = 0.2 s, at a lead pi/4 above the margin: w T = 1, so w = 5 and
-    // 1/|G| = 25 sqrt(2) / 3. Binary fractions of f32 are exact, so the lead is rounded only once.
+    // Double integrator with A = -3, T = 0.2 s and a lead of pi/4 above the margin: w T = 1, so w = 5 and 1/|G|
+    // = 25 sqrt(2) / 3. Binary fractions are exact in f32, so the lead is rounded only once.
     #[test]
     fn gains_by_hand() {
         let lead_rad = 0.25 + 0.25 * PI;
@@ -332,10 +339,10 @@ mod tests {
         let over_magnitude = -25.0 * sqrt(2.0) / 3.0;
         assert!(close(pd.kp, over_magnitude * cos(lead_rad), 1e-6));
         assert!(close(pd.kd, over_magnitude * sin(lead_rad) / 5.0, 1e-6));
-        // The free margin is below that of the table, which therefore binds.
+        // The free margin is below that of the table, so the table's margin applies.
         assert_eq!(table.pd(&process), Ok(pd));
 
-        // A free margin above it is taken, with its own lead: w T = tan(1.25 - 0.5).
+        // A free margin above that of the table is used, with its own lead: w T = tan(1.25 - 0.5).
         let numbers = table_of([1.0, 0.5, 1.25]);
         let table = LeadTable::from_floats(&numbers).unwrap();
         let pd = table.pd(&process).unwrap();
@@ -400,7 +407,7 @@ mod tests {
         assert_eq!(error(&right[..3]), length(HEADER, 3));
     }
 
-    // 20 shorter lags are the last of the table, whichever lag that is; 21 are outside it.
+    // 20 shorter lags are the end of the table, whichever lag is the shorter; 21 are outside.
     #[test]
     fn processes_outside_are_errors() {
         let numbers = table_of([1.0, 0.5, 1.25]);

@@ -1,31 +1,31 @@
-//! The limits of a test in flight: what must never happen, and what is said when it does.
+//! Guard of a test in flight: limits, and the reason when one is exceeded.
 //!
-//! Checked at every tick before any output is made, so a limit that is passed ends the test in that
-//! very tick. What is over is over: the first reason stays.
+//! All limits are checked at every tick before the output is computed, so exceeding one ends the test in the
+//! same tick. The first reason is kept.
 
 use core::fmt;
 
 use crate::control::Measurement;
 use crate::identification::Refusal;
 
-/// What must never happen. Every limit is positive; `f32::INFINITY` switches one off.
+/// Abort limits. Every limit is positive; `f32::INFINITY` switches it off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
-    /// Largest distance of the output from the reference (output unit). Until the process has first come
-    /// within half of it, as at a take-off, it counts from where the process began.
+    /// Largest distance of the output from the reference (output unit). Until the process has first come within
+    /// half of it, as in a take-off, the distance at the start is added.
     pub excursion: f32,
     /// Largest rate of the output (output unit / s).
     pub rate: f32,
-    /// Longest test, from its start to the controller's (s).
+    /// Longest test, from its start until a controller is found (s).
     pub duration_s: f32,
     /// Longest time without a switch of the relay (s).
     pub no_switch_s: f32,
-    /// Oldest sample, and longest time between ticks (s).
+    /// Largest age of a sample, and longest time between ticks (s).
     pub stale_s: f32,
 }
 
 impl Limits {
-    /// None but those of the data: finite samples, time that goes on.
+    /// No limits. Samples must still be finite and timestamps must increase.
     pub const NONE: Self = Self {
         excursion: f32::INFINITY,
         rate: f32::INFINITY,
@@ -34,7 +34,7 @@ impl Limits {
         stale_s: f32::INFINITY,
     };
 
-    /// The first limit that is not positive: its name and value.
+    /// The first limit that is not positive: name and value.
     pub(crate) fn out_of_range(&self) -> Option<(&'static str, f32)> {
         [
             ("the limit of the excursion", self.excursion),
@@ -48,29 +48,30 @@ impl Limits {
     }
 }
 
-/// The process has come near when it is within this part of the excursion allowed.
+/// Part of the allowed excursion within which the process has arrived at the reference.
 const NEAR: f32 = 0.5;
 
-/// Why a test ended in the safe controller.
+/// Why a test ended with the safe controller. Exhaustive, because the C interface has a code for each reason.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Abort {
-    /// The operator said so.
+    /// The operator aborted the test.
     Operator,
-    /// A time, a reference or a measurement that is no finite number.
+    /// A time, a reference or a measurement is not finite.
     NotFinite,
-    /// A sample of this age, or ticks so far apart (s); zero or less where time stood still or ran back.
+    /// A sample is too old or ticks are too far apart: the age (s). Zero or less if the timestamp did not
+    /// increase.
     Stale(f32),
-    /// The output was so far from the reference (output unit).
+    /// The output is too far from the reference: the distance (output unit).
     Excursion(f32),
-    /// The output moved so fast (output unit / s).
+    /// The output moves too fast: its rate (output unit / s).
     Rate(f32),
-    /// The test took so long (s).
+    /// The test takes too long: its duration (s).
     Duration(f32),
-    /// The relay did not switch for so long (s).
+    /// The relay has not switched for too long: the time (s).
     NoOscillation(f32),
-    /// No cycle that was looked at led to a controller: why the last one did not.
+    /// None of the identification attempts led to a controller: reason of the last refusal.
     Refused(Refusal),
-    /// The response under the new gains was so far from the predicted one (output unit).
+    /// The response with the new gains differs from the prediction: by how much (output unit).
     Mismatch(f32),
 }
 
@@ -78,37 +79,43 @@ impl fmt::Display for Abort {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Operator => write!(f, "aborted by the operator"),
-            Self::NotFinite => write!(f, "a sample is no finite number"),
-            Self::Stale(v) if *v <= 0.0 => write!(f, "the time does not go on"),
-            Self::Stale(v) => write!(f, "a sample is {v} s old"),
-            Self::Excursion(v) => write!(f, "the output is {v} away from the reference"),
-            Self::Rate(v) => write!(f, "the output moves by {v} a second"),
-            Self::Duration(v) => write!(f, "the test has taken {v} s"),
+            Self::NotFinite => write!(f, "a sample is not finite"),
+            Self::Stale(v) if *v <= 0.0 => write!(f, "the timestamp did not increase"),
+            Self::Stale(v) => write!(f, "a sample is {v} s old, or ticks are that far apart"),
+            Self::Excursion(v) => write!(
+                f,
+                "the output is {v} from the reference, which exceeds the limit"
+            ),
+            Self::Rate(v) => write!(
+                f,
+                "the output moves at {v} per second, which exceeds the limit"
+            ),
+            Self::Duration(v) => write!(f, "the test has taken {v} s, which exceeds the limit"),
             Self::NoOscillation(v) => write!(f, "the relay has not switched for {v} s"),
-            Self::Refused(why) => write!(f, "no controller: {why}"),
-            Self::Mismatch(v) => write!(f, "the response is {v} off the predicted one"),
+            Self::Refused(why) => write!(f, "no controller found: {why}"),
+            Self::Mismatch(v) => write!(f, "the response differs from the prediction by {v}"),
         }
     }
 }
 
-/// How the process moves in a test.
+/// Motion of the process in a test.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Motion {
-    /// From the reference (output unit).
+    /// Distance from the reference (output unit).
     pub(crate) distance: f32,
-    /// Of the output (output unit / s).
+    /// Rate of the output (output unit / s).
     pub(crate) rate: f32,
-    /// Since the test's start (s); `None` once it has led to a controller.
+    /// Time since the start of the test (s); `None` once a controller has been found.
     pub(crate) test_s: Option<f32>,
-    /// Since the relay's last switch (s); `None` where there is no relay.
+    /// Time since the last switch of the relay (s); `None` without a relay.
     pub(crate) since_switch_s: Option<f32>,
 }
 
-/// The limits and what they must remember.
+/// The limits and their state.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Guard {
     limits: Limits,
-    /// Distance from the reference at the start, until the process has come near (output unit).
+    /// Distance from the reference at the start (output unit), until the process has arrived.
     approach: Option<f32>,
 }
 
@@ -120,12 +127,12 @@ impl Guard {
         }
     }
 
-    /// A test begins at this distance from the reference.
+    /// Begins a test at this distance from the reference.
     pub(crate) fn begin(&mut self, distance: f32) {
         self.approach = Some(distance);
     }
 
-    /// Whether the numbers are such that anything can be computed from them; `dt_s` after the tick before.
+    /// Checks that sample and reference are finite and recent; `dt_s` is the time since the last tick.
     pub(crate) fn check_data(
         &self,
         measurement: &Measurement,
@@ -145,7 +152,7 @@ impl Guard {
         Ok(())
     }
 
-    /// Whether the test may go on.
+    /// Checks the limits of the motion.
     pub(crate) fn check_motion(&mut self, motion: &Motion) -> Result<(), Abort> {
         let distance = motion.distance.abs();
         if distance <= NEAR * self.limits.excursion {

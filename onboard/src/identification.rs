@@ -1,21 +1,21 @@
-//! From the samples of a running relay test to a process and its controller, a slice at a time.
+//! Identification on board, in slices: from the samples of a running relay test to a process and its controller.
 //!
 //! ```text
-//! wait -> collect -> sign -> classify -> refine -> judge -> gains -> design -> identified
+//! wait -> collect -> sign -> classify -> refine -> judge -> gains -> design -> result
 //!   ^         |         |        |          |        |        |         |
-//!   +---------+---------+--------+----------+--------+--------+---------+  another cycle
+//!   +---------+---------+--------+----------+--------+--------+---------+  next cycle
 //! ```
 //!
-//! - **wait** for three cycles alike and for the next rise of the relay;
-//! - **collect** the last cycles into two windows: a coarse one of all of them to refine, a fine one of the
-//!   last to read. A switch that the relay takes back spoils them;
-//! - **sign**, **classify**: the pack reads the last cycle, or does not know it;
-//! - **refine**: the most probable process from there; **judge**: is it one to be believed?
-//! - **gains** from the pack's table; **design**: how far may their margin be off?
+//! - **wait** for three cycles that are alike and for the next rise of the relay;
+//! - **collect** the last cycles into two windows: a coarse one of all cycles for the fit, a fine one of the
+//!   last cycle for the pack. If the relay reverses a switch, collection starts again;
+//! - **sign**, **classify**: the signature of the last cycle, and what the pack reads from it;
+//! - **refine**: the most probable process, starting from there; **judge**: whether to accept it;
+//! - **gains** from the pack's lead table; **design**: the uncertainty of their phase margin.
 //!
-//! [`StagedIdentification::observe`] takes a sample, [`StagedIdentification::advance`] does one slice of the work, of a
-//! few thousand operations at most (the table is in [`refine`](crate::refine)): a board without double
-//! precision does one at each tick, others more.
+//! [`StagedIdentification::observe`] takes a sample. [`StagedIdentification::advance`] does one slice of the
+//! work, a few thousand operations at most (see the table in [`refine`](crate::refine)). A board without double
+//! precision in hardware does one slice per tick, others several.
 
 use core::fmt;
 
@@ -31,44 +31,43 @@ use crate::refine::{DomainEdge, PriorKnowledge, Refined, Refiner, ShapePrior};
 use crate::signature::Signature;
 use crate::window::{Edge, Window};
 
-/// Rows of the window that is refined, five of them for what is known beforehand, and of the one that is
-/// read: at least 32 and 64 bins once they have been merged in pairs. A signature needs the finer ones, and a
-/// refinement takes 200 bytes for each of its own.
+/// Rows of the window for the fit, five of them reserved for prior knowledge: at least 32 bins after a merge.
+/// The fit takes 200 bytes per row.
 pub const BINS: usize = 69;
-/// Rows of the window that the pack reads.
+/// Rows of the window for the pack: at least 64 bins after a merge, which a signature needs.
 pub const FINE_BINS: usize = 133;
-/// Changes of the input in the window that is refined: [`PAST_EDGES`] and those of the cycles.
+/// Input edges in the window for the fit: [`PAST_EDGES`] and those of the cycles.
 pub const EDGES: usize = 20;
-/// Changes of the input before the window: four periods, with which a fit without noise is exact; without any
-/// it errs by 2e-6.
+/// Input edges before the window: four periods, with which a fit without noise is exact. Without any past its
+/// error is 2e-6.
 pub const PAST_EDGES: usize = 8;
-/// Most cycles that are refined together: as many as the edges leave room for.
+/// Maximum number of cycles that are fitted together, given by the number of edges.
 pub const MOST_CYCLES: u8 = 4;
 
-/// Why a cycle has led to no controller.
+/// Why a cycle led to no controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Refusal {
-    /// The last cycle has no signature: the output does not move or samples are missing.
+    /// The last cycle has no signature: the output is constant or samples are missing.
     NoSignature,
-    /// No process of the pack's family explains the last cycle: its score, one being the limit.
+    /// No process of the pack's family explains the last cycle: its misfit score (limit 1).
     Unknown(f64),
-    /// The window holds no process.
+    /// No process fits the window.
     NoFit,
     /// The fit leaves this part of the oscillation unexplained.
     Misfit(f64),
-    /// The best fit lies at a limit of the domain.
+    /// The best fit lies on a limit of the domain.
     Edge(DomainEdge),
-    /// The pack's table has no gains for the process.
+    /// The pack has no lead table, or its table has no gains for the process.
     NoGains,
-    /// The margin may be lost: it, and its standard deviation (rad).
+    /// The phase margin is too uncertain: margin and standard deviation (rad).
     TooUncertain(f64, f64),
 }
 
 impl fmt::Display for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoSignature => write!(f, "the last cycle has no shape"),
+            Self::NoSignature => write!(f, "the last cycle is constant or lacks samples"),
             Self::Unknown(score) => write!(
                 f,
                 "no process of the pack's family explains the last cycle (score {score:.1}, the \
@@ -80,11 +79,11 @@ impl fmt::Display for Refusal {
                 "the best fit leaves {:.1} % of the oscillation unexplained",
                 100.0 * part
             ),
-            Self::Edge(_) => write!(f, "the best fit is at the edge of the domain"),
-            Self::NoGains => write!(f, "the table has no gains for the process"),
+            Self::Edge(_) => write!(f, "the best fit lies on a limit of the domain"),
+            Self::NoGains => write!(f, "the lead table has no gains for the process"),
             Self::TooUncertain(margin, sigma) => write!(
                 f,
-                "the phase margin of {:.0} degrees is known to {:.0} degrees only",
+                "the phase margin is too uncertain: {:.0} degrees with a standard deviation of {:.0}",
                 margin.to_degrees(),
                 sigma.to_degrees()
             ),
@@ -92,69 +91,70 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// What the test has told.
+/// Result of a test: process, controller and their uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TuningResult {
     /// The most probable process.
     pub process: Soiptd,
-    /// How well it is known.
+    /// Standard deviations of its parameters and of the phase margin.
     pub deviations: Deviations,
-    /// Its controller: the best with at least the margin of the pack.
+    /// The best controller with at least the phase margin of the pack.
     pub pd: Pd,
-    /// Phase margin of that controller on the process (rad).
+    /// Phase margin of the controller with the process (rad).
     pub phase_margin_rad: f64,
-    /// Constant input that the recorded one lacks (input unit): minus what holds the process at rest.
+    /// Constant input that the recorded input does not contain (input unit). Minus this value holds the process
+    /// at rest.
     pub input_bias: f64,
-    /// How badly the pack's family explains the last cycle; one is the limit.
+    /// Misfit score of the last cycle against the pack's family (limit 1).
     pub score: f64,
     /// Period of the last cycle (s).
     pub period_s: f64,
     /// Half the peak-to-peak output of the last cycle (output unit).
     pub amplitude: f64,
-    /// Standard deviation of the noise on a sample (output unit).
+    /// Standard deviation of the noise of one sample (output unit).
     pub noise_sigma: f64,
 }
 
-/// A sample of the test.
+/// Sample of a test.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Observed {
-    /// Its time (s).
+pub struct TestSample {
+    /// Time (s).
     pub time_s: f64,
-    /// Input held from it on (input unit).
+    /// Input held from then on (input unit).
     pub input: f64,
     /// Output (output unit).
     pub output: f64,
-    /// Whether the relay is high from it on.
+    /// Whether the relay is high from then on.
     pub is_high: bool,
-    /// Switches that the relay has taken back so far.
+    /// Number of switches that the relay has reversed so far.
     pub undone: u32,
 }
 
-/// What is done next: see the [module](self).
+/// Next step of the identification. See the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 #[non_exhaustive]
 pub enum Stage {
-    /// Waits for a steady oscillation and a rise.
+    /// Wait for a steady oscillation and a rise.
     Wait,
-    /// Collects cycles.
+    /// Collect cycles.
     Collect,
-    /// Takes the signature of the last.
+    /// Compute the signature of the last cycle.
     Sign,
-    /// The pack reads it.
+    /// Classify the signature with the pack.
     Classify,
-    /// The process is found.
+    /// Fit the process.
     Refine,
-    /// Is it to be believed?
+    /// Accept or refuse the fit.
     Judge,
-    /// The pack's controller for it.
+    /// Take the gains from the lead table.
     Gains,
-    /// How far may its margin be off?
+    /// Compute the uncertainty of the phase margin.
     Design,
 }
 
 impl Stage {
-    /// Its name, for logs.
+    /// Name, for logs.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -170,7 +170,8 @@ impl Stage {
     }
 }
 
-/// Since the windows were opened: rises of the relay, complete cycles; and the switches taken back until then.
+/// Counters since the windows were opened: rises of the relay, complete cycles; and the switches reversed
+/// before.
 #[derive(Clone, Copy, Debug, Default)]
 struct Collected {
     rises: u8,
@@ -178,7 +179,7 @@ struct Collected {
     undone: u32,
 }
 
-/// A controller in the making: how many of the coordinates have been followed.
+/// Controller whose uncertainty is being computed: number of coordinates already followed.
 #[derive(Clone, Copy, Debug)]
 struct Design {
     pd: Pd,
@@ -186,7 +187,7 @@ struct Design {
     followed: usize,
 }
 
-/// Workspace for the work of one axis: nearly all of its memory, and all zeros at first.
+/// Work memory for one axis: nearly all memory of the tuner.
 pub struct Workspace {
     coarse: Window<BINS, EDGES>,
     fine: Window<FINE_BINS, 0>,
@@ -195,7 +196,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// For any axis.
+    /// A workspace for any axis, all zeros.
     pub const NEW: Self = Self {
         coarse: Window::NONE,
         fine: Window::NONE,
@@ -204,7 +205,7 @@ impl Workspace {
     };
 }
 
-/// The identification of one axis, in a [`Workspace`] that is always the same. See the [module](self).
+/// Identification of one axis. Every call must be given the same [`Workspace`]. See the [module](self).
 pub struct StagedIdentification<'a> {
     pack: Pack<'a>,
     cycles: u8,
@@ -214,7 +215,7 @@ pub struct StagedIdentification<'a> {
     was_high: bool,
     sample_s: f64,
     collected: Collected,
-    /// The last cycle, and what has been made of it so far.
+    /// The last cycle and the results so far.
     last: Option<Cycle>,
     score: f64,
     refined: Option<Refined>,
@@ -223,7 +224,7 @@ pub struct StagedIdentification<'a> {
 }
 
 impl<'a> StagedIdentification<'a> {
-    /// Of samples every `sample_s`, from so many cycles, with a pack.
+    /// An identification from `cycles` cycles with samples every `sample_s`.
     #[must_use]
     pub fn new(pack: Pack<'a>, sample_s: f64, cycles: u8) -> Self {
         Self {
@@ -243,7 +244,7 @@ impl<'a> StagedIdentification<'a> {
         }
     }
 
-    /// As new, where it lies.
+    /// Resets the identification in place.
     pub fn restart(&mut self) {
         self.detector = CycleDetector::new();
         self.run = SteadyRun::default();
@@ -258,20 +259,20 @@ impl<'a> StagedIdentification<'a> {
         self.past.edges()
     }
 
-    /// What it does next.
+    /// The next step.
     #[must_use]
     pub fn stage(&self) -> Stage {
         self.stage
     }
 
-    /// Whether cycles are complete and wait for [`StagedIdentification::advance`].
+    /// Whether complete cycles wait for [`StagedIdentification::advance`].
     #[must_use]
     pub fn has_work(&self) -> bool {
         !matches!(self.stage, Stage::Wait | Stage::Collect)
     }
 
-    /// Takes a sample of the running test; those that come while there is work tell of the oscillation only.
-    pub fn observe(&mut self, room: &mut Workspace, sample: &Observed) {
+    /// Takes a sample of the running test. While there is work, samples only update the cycle detection.
+    pub fn observe(&mut self, workspace: &mut Workspace, sample: &TestSample) {
         let cycle = self
             .detector
             .push(sample.time_s, sample.is_high, sample.output);
@@ -281,33 +282,33 @@ impl<'a> StagedIdentification<'a> {
         let rises = sample.is_high && !self.was_high;
         self.was_high = sample.is_high;
         match self.stage {
-            Stage::Wait if rises && self.run.is_steady() => self.open(room, sample),
-            Stage::Collect => self.collect(room, sample, rises, cycle),
+            Stage::Wait if rises && self.run.is_steady() => self.open(workspace, sample),
+            Stage::Collect => self.collect(workspace, sample, rises, cycle),
             _ => {}
         }
         self.past.push(sample.time_s, sample.input);
     }
 
-    /// New windows from this rise on, the first that of the cycles' input.
-    fn open(&mut self, room: &mut Workspace, sample: &Observed) {
-        room.coarse.begin(sample.time_s, self.sample_s);
+    /// Opens new windows at this rise, which is the first of the cycles.
+    fn open(&mut self, workspace: &mut Workspace, sample: &TestSample) {
+        workspace.coarse.begin(sample.time_s, self.sample_s);
         for edge in self.past.edges() {
-            // There are fewer than the window holds.
-            let _ = room.coarse.push_input(edge.time_s, edge.input);
+            // The window holds more edges than the past.
+            let _ = workspace.coarse.push_input(edge.time_s, edge.input);
         }
-        room.fine.begin(sample.time_s, self.sample_s);
+        workspace.fine.begin(sample.time_s, self.sample_s);
         self.collected = Collected {
             undone: sample.undone,
             ..Collected::default()
         };
         self.stage = Stage::Collect;
-        self.take(room, sample);
+        self.take(workspace, sample);
     }
 
     fn collect(
         &mut self,
-        room: &mut Workspace,
-        sample: &Observed,
+        workspace: &mut Workspace,
+        sample: &TestSample,
         rises_now: bool,
         cycle: Option<Cycle>,
     ) {
@@ -317,10 +318,10 @@ impl<'a> StagedIdentification<'a> {
             return;
         }
         so_far.rises += u8::from(rises_now);
-        // What comes behind the last cycle is no part of it, though it is not yet sure to have ended.
+        // Samples after the last cycle do not belong to it, although its end is not yet certain.
         let is_inside = so_far.rises < self.cycles;
         if let Some(cycle) = cycle
-            && cycle.start_s >= room.coarse.start_s()
+            && cycle.start_s >= workspace.coarse.start_s()
         {
             so_far.complete += 1;
             if so_far.complete == self.cycles {
@@ -330,29 +331,33 @@ impl<'a> StagedIdentification<'a> {
             }
         }
         if rises_now && is_inside {
-            room.fine.begin(sample.time_s, self.sample_s);
+            workspace.fine.begin(sample.time_s, self.sample_s);
         }
         if is_inside {
-            self.take(room, sample);
+            self.take(workspace, sample);
         }
     }
 
-    fn take(&mut self, room: &mut Workspace, sample: &Observed) {
-        if room.coarse.push_input(sample.time_s, sample.input).is_err() {
+    fn take(&mut self, workspace: &mut Workspace, sample: &TestSample) {
+        if workspace
+            .coarse
+            .push_input(sample.time_s, sample.input)
+            .is_err()
+        {
             self.stage = Stage::Wait;
         }
-        room.coarse.push_output(sample.time_s, sample.output);
-        room.fine.push_output(sample.time_s, sample.output);
+        workspace.coarse.push_output(sample.time_s, sample.output);
+        workspace.fine.push_output(sample.time_s, sample.output);
     }
 
-    /// One slice of the work; `None` where there is none or more to come. After a refusal another cycle is
-    /// waited for.
-    pub fn advance(&mut self, room: &mut Workspace) -> Option<Result<TuningResult, Refusal>> {
+    /// Does one slice of the work. `None` if there is no work or if it is not finished. After a refusal the
+    /// identification waits for another cycle.
+    pub fn advance(&mut self, workspace: &mut Workspace) -> Option<Result<TuningResult, Refusal>> {
         let outcome = match (self.stage, self.last) {
-            (Stage::Sign, Some(cycle)) => self.sign(room, &cycle).map(|()| None),
-            (Stage::Classify, Some(cycle)) => self.classify(room, &cycle).map(|()| None),
-            (Stage::Refine, Some(_)) => self.refine(room).map(|()| None),
-            (Stage::Judge, Some(_)) => self.judge(room).map(|()| None),
+            (Stage::Sign, Some(cycle)) => self.sign(workspace, &cycle).map(|()| None),
+            (Stage::Classify, Some(cycle)) => self.classify(workspace, &cycle).map(|()| None),
+            (Stage::Refine, Some(_)) => self.refine(workspace).map(|()| None),
+            (Stage::Judge, Some(_)) => self.judge(workspace).map(|()| None),
             (Stage::Gains, Some(_)) => self.gains().map(|()| None),
             (Stage::Design, Some(cycle)) => self.design(&cycle),
             _ => return None,
@@ -362,18 +367,19 @@ impl<'a> StagedIdentification<'a> {
         Some(outcome)
     }
 
-    fn sign(&mut self, room: &mut Workspace, cycle: &Cycle) -> Result<(), Refusal> {
-        let signature = Signature::new(&room.fine, cycle).map_err(|_| Refusal::NoSignature)?;
-        let noise_sigma = room.fine.noise_sigma();
-        room.classifier
+    fn sign(&mut self, workspace: &mut Workspace, cycle: &Cycle) -> Result<(), Refusal> {
+        let signature = Signature::new(&workspace.fine, cycle).map_err(|_| Refusal::NoSignature)?;
+        let noise_sigma = workspace.fine.noise_sigma();
+        workspace
+            .classifier
             .begin(&self.pack, &signature, cycle.period_s, noise_sigma)
             .map_err(|_| Refusal::Unknown(f64::INFINITY))?;
         self.stage = Stage::Classify;
         Ok(())
     }
 
-    fn classify(&mut self, room: &mut Workspace, cycle: &Cycle) -> Result<(), Refusal> {
-        let Some(read) = room.classifier.advance(&self.pack) else {
+    fn classify(&mut self, workspace: &mut Workspace, cycle: &Cycle) -> Result<(), Refusal> {
+        let Some(read) = workspace.classifier.advance(&self.pack) else {
             return Ok(());
         };
         let read = read.map_err(|_| Refusal::Unknown(f64::INFINITY))?;
@@ -381,28 +387,29 @@ impl<'a> StagedIdentification<'a> {
             return Err(Refusal::Unknown(read.score));
         }
         self.score = read.score;
-        let beforehand = PriorKnowledge {
+        let prior_knowledge = PriorKnowledge {
             starts: &read.starts(cycle.period_s),
             prior: ShapePrior::of_pack(&self.pack),
         };
-        room.refiner
-            .begin(&room.coarse, cycle.period_s, &beforehand)
+        workspace
+            .refiner
+            .begin(&workspace.coarse, cycle.period_s, &prior_knowledge)
             .map_err(|_| Refusal::NoFit)?;
         self.stage = Stage::Refine;
         Ok(())
     }
 
-    fn refine(&mut self, room: &mut Workspace) -> Result<(), Refusal> {
-        if let Some(refined) = room.refiner.advance(&room.coarse) {
+    fn refine(&mut self, workspace: &mut Workspace) -> Result<(), Refusal> {
+        if let Some(refined) = workspace.refiner.advance(&workspace.coarse) {
             self.refined = Some(refined.map_err(|_| Refusal::NoFit)?);
             self.stage = Stage::Judge;
         }
         Ok(())
     }
 
-    fn judge(&mut self, room: &mut Workspace) -> Result<(), Refusal> {
+    fn judge(&mut self, workspace: &mut Workspace) -> Result<(), Refusal> {
         let refined = self.refined.ok_or(Refusal::NoFit)?;
-        let misfit = misfit(&refined, &room.coarse);
+        let misfit = misfit(&refined, &workspace.coarse);
         let table = self.pack.gains_table().ok_or(Refusal::NoGains)?;
         let most_error = largest_response_error(table.phase_margin_rad());
         if misfit > MOST_MISFIT || refined.response_error > most_error {
@@ -466,7 +473,7 @@ impl<'a> StagedIdentification<'a> {
     }
 }
 
-/// The latest switches, for the window that opens behind them.
+/// The latest changes of the input, for the next window.
 #[derive(Clone, Copy, Debug, Default)]
 struct Past {
     edges: [Edge; PAST_EDGES],

@@ -1,14 +1,14 @@
-//! Whether a fit is to be believed, and how sure the controller's margin is.
+//! Acceptance of a fit, and the uncertainty of the controller's phase margin.
 //!
-//! To first order the parameters and the phase margin `m` of a fixed controller move with the
-//! coordinates `x` of the fit (`refine::coordinate`), whose covariance is `C`:
+//! To first order a quantity `m`, such as the phase margin of a fixed controller, moves with the coordinates `x`
+//! of the fit ([`coordinate`]), whose covariance is `C`:
 //!
 //! ```text
-//! sigma^2 = (dm/dx)^T C (dm/dx)
+//! sigma_m^2 = (dm/dx)^T C (dm/dx)
 //! ```
 //!
-//! The derivatives are differences between the process found and five beside it, so that the work comes
-//! in equal slices.
+//! The derivatives are differences between the process found and a neighbour along each coordinate, so that the
+//! work comes in equal slices.
 
 use core::f64::consts::PI;
 
@@ -20,22 +20,23 @@ use crate::process::Soiptd;
 use crate::refine::{Refined, coordinate};
 use crate::window::Window;
 
-/// Part of the oscillation that a process of this kind never leaves unexplained.
+/// Largest part of the oscillation that a process of this family leaves unexplained.
 pub const MOST_MISFIT: f64 = 0.05;
 
 /// Largest relative error of the response that is accepted at a phase margin of 20 degrees.
 const RESPONSE_ERROR_AT_20_DEGREES: f64 = 0.34;
 
-/// Largest relative error of the response that is accepted at any margin: beyond it the intervals, which are linear
-/// in the error, are off by more than a quarter, `-ln(1 - 0.4) = 0.51`.
+/// Largest relative error of the response that is accepted at any margin. The intervals are linear in the error;
+/// at 0.4 they are already too narrow by a quarter, because `-ln(1 - 0.4) = 0.51`.
 const MOST_RESPONSE_ERROR: f64 = 0.4;
 
-/// Largest relative error of the response with which a controller of this phase margin (rad, 0 to pi) is certainly
-/// stable; a model with a larger error is refused.
+/// Largest relative error of the response that is accepted for a controller with this phase margin (rad, 0 to
+/// pi).
 ///
-/// At the gain crossover `|L| = 1` and the distance of `L` from -1 is `2 sin(margin/2)`: a relative error below it
-/// cannot take the loop there. At the paper's 20 degrees that is 0.347. The limit used is in proportion to it, 0.34
-/// at 20 degrees (the sine of 20 degrees, 0.342, rounded down), and 0.4 at most: a larger margin must not excuse a
+/// At the gain crossover `|L| = 1`, and the distance of `L` from -1 is `2 sin(margin/2)`. A relative error of
+/// the response below that distance cannot move `L` to -1, so the loop stays stable. At the paper's 20 degrees
+/// the distance is 0.347. The limit is proportional to the distance and exactly 0.34 at 20 degrees (the sine of
+/// 20 degrees, 0.342, rounded down). It is 0.4 at most, from 23.6 degrees on: a larger margin must not accept a
 /// model that is wrong by half.
 #[must_use]
 pub fn largest_response_error(phase_margin_rad: f64) -> f64 {
@@ -43,10 +44,10 @@ pub fn largest_response_error(phase_margin_rad: f64) -> f64 {
     (RESPONSE_ERROR_AT_20_DEGREES * relative).min(MOST_RESPONSE_ERROR)
 }
 
-/// Standard deviations to either side that hold 90 % of a Gaussian; 95 % of it lie above the lower end.
+/// Standard deviations to either side that contain 90 % of a Gaussian; 95 % lie above the lower end.
 pub const HALF_90_PERCENT: f64 = 1.645;
 
-/// Residual beyond the noise, over the oscillation: root mean squares of the bins.
+/// Misfit: residual beyond the noise over the oscillation, both as root mean squares of the bins.
 #[must_use]
 pub fn misfit<const BINS: usize, const EDGES: usize>(
     refined: &Refined,
@@ -67,10 +68,10 @@ pub fn misfit<const BINS: usize, const EDGES: usize>(
     sqrt(excess / variance)
 }
 
-/// Standard deviations, to first order.
+/// Standard deviations to first order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviations {
-    /// Of `ln K/T_body`: relative.
+    /// Of `ln K/T_body`, that is, relative to `K/T_body`.
     pub ln_k_over_t_body: f64,
     /// Of `T_prop` (s).
     pub t_prop_s: f64,
@@ -78,16 +79,16 @@ pub struct Deviations {
     pub inv_t_body_per_s: f64,
     /// Of `tau` (s).
     pub tau_s: f64,
-    /// Of the phase margin that the controller has (rad).
+    /// Of the phase margin of the controller (rad).
     pub phase_margin_rad: f64,
 }
 
-/// What is followed from one coordinate to the next: the fields of [`Deviations`].
+/// Number of quantities that are differentiated: the fields of [`Deviations`].
 const FOLLOWED: usize = 5;
-/// Coordinates of the process: all but the input's bias.
+/// Number of coordinates of the process: all but the input bias.
 pub(crate) const COORDINATES: usize = 4;
 
-/// The derivatives, one coordinate at a time.
+/// Derivatives of the quantities, computed one coordinate at a time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Spread {
     here: [f64; FOLLOWED],
@@ -96,7 +97,7 @@ pub(crate) struct Spread {
 }
 
 impl Spread {
-    /// About a process and its controller; `None` where their loop has no gain crossover.
+    /// Derivatives about a process and its controller; `None` if their loop has no gain crossover.
     pub(crate) fn new(process: &Soiptd, pd: &Pd) -> Option<Self> {
         let crossover_rad_per_s = gain_crossover(process, pd)?;
         Some(Self {
@@ -106,14 +107,15 @@ impl Spread {
         })
     }
 
-    /// The phase margin at the process itself (rad).
+    /// Phase margin at the process itself (rad).
     pub(crate) fn phase_margin_rad(&self) -> f64 {
         self.here[FOLLOWED - 1]
     }
 
-    /// The slopes along one coordinate; `None` where there is no process beside this one.
+    /// Computes the derivatives along one coordinate; `None` if there is no valid process on that side.
     pub(crate) fn follow(&mut self, index: usize, process: &Soiptd, pd: &Pd) -> Option<()> {
-        // A thousandth: the square of it, the error, is far below any deviation that matters.
+        // The error of the difference is of the order of the step squared, 1e-6, far below any deviation that
+        // matters.
         const STEP: f64 = 1e-3;
         let (sum, ratio) = process.pole_sum();
         let mut moved = [log(sum), ratio, process.tau_s(), 0.0];
@@ -138,7 +140,7 @@ impl Spread {
         Some(())
     }
 
-    /// The deviations, once every coordinate has been followed.
+    /// The deviations, once all coordinates have been followed.
     pub(crate) fn deviations(&self, covariance: &[[f64; 5]; 5]) -> Deviations {
         let of = |field: usize| {
             let mut variance = 0.0;
@@ -170,7 +172,7 @@ fn followed(process: &Soiptd, pd: &Pd, crossover_rad_per_s: f64) -> [f64; FOLLOW
     ]
 }
 
-/// Gain crossover of the loop (rad/s); `None` where the magnitude never is one.
+/// Gain crossover of the loop (rad/s); `None` if the magnitude never is one.
 fn gain_crossover(process: &Soiptd, pd: &Pd) -> Option<f64> {
     let gain = process.k_over_t_body();
     let omega = crossover::gain_crossover(
@@ -187,9 +189,9 @@ fn gain_crossover(process: &Soiptd, pd: &Pd) -> Option<f64> {
 mod tests {
     use super::*;
 
-    // A/s^2 (T s + 1) with kp = 0: |kd A / w / sqrt(1 + w^2 T^2)| = 1. With kd A = sqrt(2)/T that is at
-    // w = 1/T; the phase there is -180 - 45 degrees, the lead 90: a margin of 45 degrees. With a dead
-    // time of pi/8 T, 22.5 degrees less.
+    // A/(s^2 (T s + 1)) with kp = 0: |kd A / w / sqrt(1 + w^2 T^2)| = 1. With kd A = sqrt(2)/T the crossover is
+    // w = 1/T. The phase of the process there is -180 - 45 degrees, the lead 90, so the margin is 45 degrees;
+    // with a dead time of pi/8 T it is 22.5 degrees less.
     #[test]
     fn a_margin_by_hand() {
         let lag_s = 0.2;
@@ -204,8 +206,8 @@ mod tests {
         }
     }
 
-    // 0.34 sin(5 deg) / sin(10 deg) = 0.34 / (2 cos(5 deg)) = 0.1706. At 20 degrees the limit of the paper's margin,
-    // exactly; 0.34 sin(15 deg) / sin(10 deg) = 0.507 would be a model that is wrong by half.
+    // 0.34 sin(5 deg) / sin(10 deg) = 0.17 / cos(5 deg) = 0.1706. At 20 degrees the limit is 0.34 exactly. At 30
+    // degrees 0.34 sin(15 deg) / sin(10 deg) = 0.507 would accept a model that is wrong by half.
     #[test]
     fn the_limit_of_the_error_follows_the_margin() {
         let at = |degrees: f64| largest_response_error(degrees.to_radians());
@@ -216,10 +218,9 @@ mod tests {
         assert_eq!(at(0.0), 0.0);
     }
 
-    // A dead time known to a millisecond moves the margin by the crossover times that, a gain by its
-    // slope: with the double integrator above, d margin / d ln A = -(90/2 deg part) derived as follows:
-    // ln|L| has the slope -1 - 1/2 in ln w at w = 1/T, so d ln w / d ln A = 2/3, and the phase falls by
-    // d atan(w T) / d ln w = 1/2: -1/3 rad.
+    // A dead time known to a millisecond moves the margin by the crossover times a millisecond. A gain moves it
+    // by -1/3 rad per unit of ln A: for the double integrator above, ln|L| has the slope -1 - 1/2 in ln w at w =
+    // 1/T, so d ln w / d ln A = 2/3, and the phase falls by d atan(w T) / d ln w = 1/2.
     #[test]
     fn deviations_by_hand() {
         let lag_s = 0.2;

@@ -1,7 +1,10 @@
-//! Least squares on a handful of columns by modified Gram-Schmidt.
+//! Least squares for a few columns by modified Gram-Schmidt orthogonalisation.
 //!
-//! Orthogonalised in order, right-hand side last, it is as stable as Householder's method (Bjorck
-//! 1967) and leaves what the estimator needs next: an orthonormal basis to project onto.
+//! The columns are orthogonalised in order and the right-hand side last. That is as stable as Householder's
+//! method, and it gives the orthonormal basis that the estimator projects onto.
+//!
+//! Reference: A. Bjorck, "Solving linear least squares problems by Gram-Schmidt orthogonalization", BIT 7
+//! (1967).
 
 /// `M` columns of `N` rows, of which the first `rows` are used.
 #[derive(Clone, Debug)]
@@ -10,11 +13,11 @@ pub(crate) struct Columns<const M: usize, const N: usize> {
     pub(crate) rows: usize,
 }
 
-/// Upper triangular factor: `r[i][j]` is the part of column `j` along basis vector `i`.
+/// Upper triangular factor: `r[i][j]` is the component of column `j` along basis vector `i`.
 pub(crate) type Triangle<const M: usize> = [[f64; M]; M];
 
-/// A column whose part outside the ones before it is smaller than this is their combination:
-/// a few hundred roundings of its own length.
+/// Relative length below which the remainder of a column counts as zero (the column is a combination of those
+/// before it): a few hundred roundings.
 const DEPENDENT: f64 = 1e-13;
 
 impl<const M: usize, const N: usize> Columns<M, N> {
@@ -28,19 +31,19 @@ impl<const M: usize, const N: usize> Columns<M, N> {
         norm(&self.column[j][..self.rows])
     }
 
-    /// Takes the part along the unit vector in column `i` out of column `j` behind it and returns it.
+    /// Removes the component along the unit vector in column `i` from the later column `j` and returns it.
     pub(crate) fn remove(&mut self, i: usize, j: usize) -> f64 {
         let (basis, rest) = self.column.split_at_mut(j);
         remove(&basis[i][..self.rows], &mut rest[0][..self.rows])
     }
 
-    /// The same of a vector that is no column.
+    /// Removes the component along the unit vector in column `i` from a vector and returns it.
     pub(crate) fn remove_from(&self, i: usize, vector: &mut [f64]) -> f64 {
         remove(&self.column[i][..self.rows], vector)
     }
 
-    /// Makes column `j` a unit vector and returns its length; one that is next to nothing of what it was
-    /// `before` depends on those before it, becomes zero and has no length.
+    /// Makes column `j` a unit vector and returns its length. A column that is negligible compared with its
+    /// length `before` depends on the columns before it: it becomes zero, and so does its length.
     pub(crate) fn normalise(&mut self, j: usize, before: f64) -> f64 {
         let length = self.length(j);
         let column = &mut self.column[j][..self.rows];
@@ -54,7 +57,7 @@ impl<const M: usize, const N: usize> Columns<M, N> {
     }
 }
 
-/// Takes the part along the unit vector `q` out of `vector` and returns its length.
+/// Removes the component along the unit vector `q` from `vector` and returns it.
 fn remove(q: &[f64], vector: &mut [f64]) -> f64 {
     let part = dot(q, vector);
     for (value, q) in vector.iter_mut().zip(q) {
@@ -63,7 +66,7 @@ fn remove(q: &[f64], vector: &mut [f64]) -> f64 {
     part
 }
 
-/// Inner product; four sums so that the processor need not wait for each.
+/// Inner product, in four partial sums so that the processor need not wait for each addition.
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; 4];
     let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
@@ -85,7 +88,7 @@ pub(crate) fn norm(vector: &[f64]) -> f64 {
     libm::sqrt(dot(vector, vector))
 }
 
-/// Solves `r x = right` for the first `N` rows and columns of upper triangular `r`; a zero on the diagonal
+/// Solves `r x = right` for the first `N` rows and columns of the upper triangular `r`. A zero on the diagonal
 /// gives a zero.
 pub(crate) fn back_substitute<const M: usize, const N: usize>(
     r: &Triangle<M>,
@@ -103,7 +106,8 @@ pub(crate) fn back_substitute<const M: usize, const N: usize>(
     x
 }
 
-/// Solves the symmetric positive definite `a x = right` by Cholesky's method; `None` if it is not.
+/// Solves the symmetric positive definite system `a x = right` by Cholesky's method; `None` if `a` is not
+/// positive definite.
 pub(crate) fn solve_symmetric(a: &[[f64; 3]; 3], right: &[f64; 3]) -> Option<[f64; 3]> {
     let mut l = [[0.0; 3]; 3];
     for i in 0..3 {
@@ -163,7 +167,7 @@ mod tests {
         let parts = [0, 1].map(|i| columns.remove_from(i, &mut y));
         let [a, b] = back_substitute(&r, &parts);
         assert!((a - 1.1).abs() < 1e-14 && (b - 1.1).abs() < 1e-14);
-        // Residual 0.8 - ... by hand: -0.1, 0.8, -1.3, 0.6: sum of squares 2.70.
+        // Residuals by hand: -0.1, 0.8, -1.3, 0.6; sum of squares 2.70.
         assert!((dot(&y, &y) - 2.70).abs() < 1e-13);
     }
 

@@ -1,23 +1,24 @@
-//! Dense layers of a small network, their weights borrowed as the bytes that they are.
+//! Dense layers of a small neural network, with the weights read where they lie.
 //!
 //! ```text
 //! y_o = f(b_o + sum_i w_oi x_i)              f32 weights
-//! y_o = f(b_o + s_o sum_i q_oi x_i)          bytes: q a whole number, -127..127
+//! y_o = f(b_o + s_o sum_i q_oi x_i)          byte weights: q is an integer, -127..127
 //!
-//! f: nothing, max(x, 0), tanh x
+//! f: identity, max(x, 0), tanh x
 //! ```
 //!
-//! Weights lie as PyTorch and the trainer keep them, a row for each output, and stay where they are:
-//! in flash or in a file, at any address. One byte a weight instead of four, with a scale for each
-//! row, needs no calibration, as the inputs stay f32 (R. Krishnamoorthi, "Quantizing deep
-//! convolutional networks for efficient inference", arXiv 1806.08342, section 3: symmetric, per
-//! channel).
+//! The weights are stored as in PyTorch and in the trainer, one row per output. They stay in flash or in the
+//! file, at any address. Weights of one byte with a scale per row need no calibration, because the inputs stay
+//! f32.
+//!
+//! Reference for the byte weights: R. Krishnamoorthi, "Quantizing deep convolutional networks for efficient
+//! inference", arXiv 1806.08342, section 3 (symmetric, per channel).
 //!
 //! ```
 //! use onecycle_onboard::floats::Floats;
 //! use onecycle_onboard::network::{Activation, Dense, Weights};
 //!
-//! // 0.5 (1 * 2 + 4 * 3) + 1 = 8 and 2 (-1 * 2 + 0 * 3) + 1 = -3, of which nothing is left.
+//! // 0.5 (1 * 2 + 4 * 3) + 1 = 8 and 2 (-1 * 2 + 0 * 3) + 1 = -3, which the activation sets to 0.
 //! let [half, one, two] = [0.5_f32, 1.0, 2.0].map(f32::to_le_bytes);
 //! let (scales, biases) = ([half, two].concat(), [one, one].concat());
 //! let weights = Weights::Bytes {
@@ -34,30 +35,30 @@
 
 use crate::floats::Floats;
 
-/// Sums that go on side by side in a row: a chain of additions would wait for each one's latency
-/// (3 to 4 cycles on a Cortex-M7 or a desktop core), and four of f32 fill a 128-bit register.
+/// Number of partial sums per row: a single chain of additions would wait for the latency of each (3 to 4 cycles
+/// on a Cortex-M7 or a desktop core), and four f32 fill a 128-bit register.
 const LANES: usize = 4;
 
-/// Weights of a layer, row by row, a row for each output.
+/// Weights of a layer, row by row, one row per output.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weights<'a> {
     /// `w`.
     Floats(Floats<'a>),
     /// `w = s q`.
     Bytes {
-        /// `q`: two's complement, a byte each.
+        /// `q`: one byte each, two's complement.
         rows: &'a [u8],
-        /// `s`: what a one of the row stands for, its largest weight over 127.
+        /// `s`: value of one unit of the row, its largest weight divided by 127.
         scales: Floats<'a>,
     },
 }
 
-/// What becomes of the sums.
+/// Activation function of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activation {
-    /// Nothing: they are the outputs.
+    /// Identity.
     None,
-    /// `max(x, 0)`; what is no number stays so.
+    /// `max(x, 0)`; a NaN stays a NaN.
     Relu,
     /// The hyperbolic tangent.
     Tanh,
@@ -73,8 +74,8 @@ pub struct Dense<'a> {
 }
 
 impl<'a> Dense<'a> {
-    /// A layer of so many inputs, and as many outputs as biases; `None` where there are no inputs or
-    /// not as many weights and scales as that makes.
+    /// A layer with this number of inputs and as many outputs as biases. `None` if there are no inputs or if the
+    /// numbers of weights and scales do not fit.
     #[must_use]
     pub fn new(
         inputs: usize,
@@ -108,26 +109,26 @@ impl<'a> Dense<'a> {
         self.biases.len()
     }
 
-    /// Its weights.
+    /// Weights.
     #[must_use]
     pub fn weights(&self) -> Weights<'a> {
         self.weights
     }
 
-    /// `b`.
+    /// Biases, `b`.
     #[must_use]
     pub fn biases(&self) -> Floats<'a> {
         self.biases
     }
 
-    /// What becomes of the sums.
+    /// Activation function.
     #[must_use]
     pub fn activation(&self) -> Activation {
         self.activation
     }
 
-    /// The outputs of as many inputs as the layer has. Inputs that are missing count as zeros;
-    /// inputs and outputs beyond the layer's are left alone.
+    /// Computes the outputs. Missing inputs count as zeros; inputs and outputs beyond the size of the layer are
+    /// ignored.
     pub fn forward(&self, inputs: &[f32], outputs: &mut [f32]) {
         let sums = outputs.iter_mut().zip(self.biases.iter());
         match self.weights {
@@ -147,14 +148,14 @@ impl<'a> Dense<'a> {
         let outputs = outputs.iter_mut().take(self.outputs());
         match self.activation {
             Activation::None => {}
-            // Not `max`, which would make a zero of what is no number.
+            // Not `max`, which would turn a NaN into zero.
             Activation::Relu => outputs.for_each(|x| *x = if *x < 0.0 { 0.0 } else { *x }),
             Activation::Tanh => outputs.for_each(|x| *x = libm::tanhf(*x)),
         }
     }
 }
 
-/// Sum of products as far as both go, the weights of `SIZE` bytes decoded by `weight`.
+/// Sum of products over the common length; `weight` decodes the `SIZE` bytes of a weight.
 fn dot<const SIZE: usize>(
     weights: &[[u8; SIZE]],
     inputs: &[f32],
@@ -195,9 +196,8 @@ mod tests {
         Floats::new(bytes).unwrap()
     }
 
-    // Row o is o + 1, o + 2, ...; inputs 1, 2, ... n: sum (o + i) i = o n (n + 1) / 2 +
-    // n (n + 1) (2 n + 1) / 6, and ten times o more. Whole numbers, so exact; n up to past two full
-    // rounds of the lanes.
+    // Row o is o + 1, o + 2, ...; the inputs are 1, 2, ... n: sum (o + i) i = o n (n + 1) / 2 + n (n + 1) (2 n +
+    // 1) / 6, plus ten times o. Integers, so exact; n reaches past two full rounds of partial sums.
     #[test]
     fn sums_are_exact_at_every_length() {
         for n in [1, 3, 4, 7, 8, 11] {
@@ -226,7 +226,7 @@ mod tests {
         }
     }
 
-    // Inputs 1, 2 and a third that is missing: 1 + 2 * 2 = 5, not 5 + 3 * x.
+    // Inputs 1 and 2 and a missing third: 1 + 2 * 2 = 5, not 5 + 3 * x.
     #[test]
     fn missing_inputs_count_as_zeros() {
         let (weights, biases) = (le(&[1.0, 2.0, 3.0]), le(&[0.0]));

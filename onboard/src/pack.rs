@@ -1,51 +1,51 @@
-//! A pack: everything an identifier knows, in one file that is read where it lies.
+//! Pack: network, calibration, prior and lead table in one file that is read in place.
 //!
-//! The file is checked once and borrowed from then on: nothing is copied, no heap is asked for, and
-//! bytes of any kind give a [`PackError`] at worst. All numbers are little endian, at any address.
+//! The file is checked once and then borrowed: nothing is copied, there is no heap, and any bytes give a
+//! [`PackError`] at worst. All numbers are little endian, at any address.
 //!
 //! | offset | type              | meaning                                                              |
 //! |--------|-------------------|----------------------------------------------------------------------|
-//! | 0      | 8 bytes           | `4f 4e 45 43 59 43 1a 0a`, "ONECYC" and two that text would lose     |
+//! | 0      | 8 bytes           | `4f 4e 45 43 59 43 1a 0a`, "ONECYC" and two bytes that text transfers would change |
 //! | 8      | u32               | version of the format, 1                                             |
 //! | 12     | u32               | length of the file (bytes)                                           |
-//! | 16     | u64               | FNV-1a of all bytes from 24 on                                       |
-//! | 24     |                   | the sections, one behind the other                                   |
+//! | 16     | u64               | FNV-1a hash of all bytes from 24 on                                  |
+//! | 24     |                   | the sections, in this order                                          |
 //!
 //! | section     | type              | meaning                                                         |
 //! |-------------|-------------------|-----------------------------------------------------------------|
-//! | network     | u32               | number of layers, 1 to 6; then of each layer:                   |
+//! | network     | u32               | number of layers, 1 to 6; then for each layer:                  |
 //! |             | u16, u16          | inputs and outputs, 1 to 128                                    |
 //! |             | u8                | weights: 0 f32, 1 bytes                                         |
 //! |             | u8                | activation: 0 none, 1 relu, 2 tanh                              |
 //! |             | u16               | 0                                                               |
 //! |             | outputs f32       | biases                                                          |
-//! |             | outputs f32       | only with bytes: scale of each row                              |
-//! |             | inputs x outputs  | weights, a row for each output: f32, or two's complement bytes  |
+//! |             | outputs f32       | only with byte weights: scale of each row                       |
+//! |             | inputs x outputs  | weights, one row per output: f32, or two's complement bytes     |
 //! | inputs      | 34 f32, 34 f32    | offsets, then scales: the network sees `(x - offset) scale`     |
-//! | outputs     | 4 f32             | scales: values are the network's means over them                |
-//! |             | 4 f32             | temperatures: times the standard deviations                     |
-//! |             | 4 f32, 4 f32      | lowest and highest of the values                                |
+//! | outputs     | 4 f32             | scales: values are the means of the network over these          |
+//! |             | 4 f32             | temperatures: factors for the standard deviations               |
+//! |             | 4 f32, 4 f32      | lowest and highest values                                       |
 //! | domain      | 3 times 2 f32     | lowest and highest `ln(T/dt)`, duty and beta                    |
-//! |             | f32               | phase margin that the gains are for (rad)                       |
-//! | unknown     | f32               | score from which a cycle is unknown                             |
+//! |             | f32               | phase margin of the gains (rad)                                 |
+//! | unknown     | f32               | score above which a cycle is unknown                            |
 //! |             | u32, that many f32| calibration of the score                                        |
 //! | prior       | 3 f32             | mean of the first three values over the family                  |
 //! |             | 3 times 3 f32     | root of their covariance, lower triangular, row by row          |
 //! | lead table  | u32, u32          | points `n` along its first axis, `m` along its second           |
-//! |             | u32               | numbers `k` of each point                                       |
-//! |             | 4 f32             | where the points lie                                            |
+//! |             | u32               | numbers `k` per point                                           |
+//! |             | 4 f32             | position of the points                                          |
 //! |             | n m k f32         | the numbers                                                     |
-//! | self-test   | u32, then of each:| how many cycles                                                 |
-//! |             | 34 f32, 14 f32    | a signature, and the outputs it must give                       |
+//! | self-test   | u32; then for each:| number of signatures                                           |
+//! |             | 34 f32, 14 f32    | a signature, and the outputs expected for it                    |
 //! | card        | u32, that many    | JSON in UTF-8: recipe, seeds, scores, versions; ends the file   |
 //!
-//! A reader refuses a version it does not know; whatever changes in the tables above changes the
-//! version. The 14 outputs of a network are the means of the four values, the logarithms of the
-//! diagonal of the Cholesky factor of their precision, and what is below it, row by row.
+//! A reader rejects versions that it does not know; any change of these tables changes the version. The 14
+//! outputs of a network are the means of the four values, the logarithms of the diagonal of the Cholesky factor
+//! of their precision, and the elements below it, row by row.
 //!
-//! Reference: G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, "The FNV non-cryptographic hash
-//! algorithm", draft-eastlake-fnv. Each step is invertible, so no change of a single byte goes
-//! unseen; it is no protection against intent.
+//! Reference: G. Fowler, L. C. Noll, K.-P. Vo, D. Eastlake, "The FNV non-cryptographic hash algorithm",
+//! draft-eastlake-fnv. Each step is invertible, so every change of a single byte is detected. The hash does not
+//! protect against intent.
 
 mod cursor;
 mod error;
@@ -62,35 +62,35 @@ pub use self::error::{PackError, Section};
 pub(crate) use self::forward::Forward;
 pub use self::sections::{Domain, LeadTableBytes, OutputScaling, Prior, Sizes};
 
-/// What every pack begins with.
+/// First bytes of every pack.
 pub const MAGIC: [u8; 8] = *b"ONECYC\x1a\n";
 /// Version of the format that this reader knows.
 pub const VERSION: u32 = 1;
-/// Bytes before the first section.
+/// Number of bytes before the first section.
 pub const HEADER: usize = 24;
 
-/// Values that describe a process.
+/// Number of values that describe a process.
 pub const VALUES: usize = 4;
-/// Outputs of the network: means, and the Cholesky factor of the precision.
+/// Number of outputs of the network: means, and the Cholesky factor of the precision.
 pub const OUTPUTS: usize = 2 * VALUES + VALUES * (VALUES - 1) / 2;
 
-/// Numbers that say where the points of the lead table lie.
+/// Numbers that give the position of the lead table's points.
 pub const AXES: usize = 4;
 
-/// Most layers: twice what any identifier needed so far.
+/// Maximum number of layers: twice what any pack has needed so far.
 pub const MOST_LAYERS: usize = 6;
-/// Widest layer: two rows of it are the scratch memory, 1 KiB of a board's stack.
+/// Maximum width of a layer: two rows of it are the work memory, 1 KiB of a board's stack.
 pub const WIDEST: usize = 128;
 
-/// Largest difference from the outputs of the self-test, relative where they are beyond one. The
-/// arithmetic is the same to the bit on every machine; sums in another order, as a later version
-/// may have them, are some 1e-6 off, and a wrong weight is off by a hundredth.
+/// Largest accepted difference from the outputs of the self-test, relative for outputs beyond one. The
+/// arithmetic has the same bits on every machine. Sums in another order, as in a later version, differ by 1e-6;
+/// a wrong weight differs by a hundredth.
 pub const SELF_TEST_TOLERANCE: f32 = 1e-5;
 
-/// The pack that is built in.
+/// The embedded pack.
 pub const DEFAULT: &[u8] = include_bytes!("../packs/default.pack");
 
-/// An identifier. See the [module](self).
+/// A pack whose bytes have been checked. See the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pack<'a> {
     bytes: &'a [u8],
@@ -110,7 +110,7 @@ pub struct Pack<'a> {
 }
 
 impl Pack<'static> {
-    /// The pack that is built in.
+    /// The embedded pack.
     ///
     /// # Errors
     /// [`PackError::Empty`] in a build without one.
@@ -123,7 +123,7 @@ impl<'a> Pack<'a> {
     /// Checks the bytes of a pack and borrows them.
     ///
     /// # Errors
-    /// Names what is wrong with them, and where.
+    /// What is wrong with the bytes, and where.
     pub fn read(bytes: &'a [u8]) -> Result<Self, PackError> {
         let (hash, body) = checked_body(bytes)?;
         let mut cursor = Cursor::new(body);
@@ -196,7 +196,7 @@ impl<'a> Pack<'a> {
         }
     }
 
-    /// The network's outputs for a signature: see the [module](self) for what they are.
+    /// Outputs of the network for a signature; the [module](self) gives their meaning.
     #[must_use]
     pub fn outputs(&self, signature: &[f32; LENGTH]) -> [f32; OUTPUTS] {
         let mut forward = Forward::NONE;
@@ -208,8 +208,8 @@ impl<'a> Pack<'a> {
         }
     }
 
-    /// The largest difference from what the signatures of the pack must give, relative where that is
-    /// beyond one; `None` where the pack has none.
+    /// Largest difference from the outputs of the self-test, relative for outputs beyond one; `None` if the pack
+    /// has no self-test.
     #[must_use]
     pub fn self_test(&self) -> Option<f32> {
         self.self_tests()
@@ -218,11 +218,11 @@ impl<'a> Pack<'a> {
                 (found.into_iter().zip(expected))
                     .map(|(found, expected)| (found - expected).abs() / expected.abs().max(1.0))
             })
-            // No number is the worst of all differences.
+            // NaN counts as the largest difference.
             .reduce(|worst, next| if next <= worst { worst } else { next })
     }
 
-    /// Signatures and the outputs they must give.
+    /// Signatures of the self-test and the outputs expected for them.
     pub fn self_tests(&self) -> impl Iterator<Item = ([f32; LENGTH], [f32; OUTPUTS])> + use<'a> {
         let (numbers, each) = (self.self_tests, LENGTH + OUTPUTS);
         (0..numbers.len() / each).filter_map(move |i| {
@@ -232,36 +232,36 @@ impl<'a> Pack<'a> {
         })
     }
 
-    /// The layers of the network, first to last.
+    /// Layers of the network, first to last.
     pub fn layers(&self) -> impl Iterator<Item = &Dense<'a>> {
         self.layers.iter().flatten()
     }
 
-    /// What is subtracted from the values of a signature.
+    /// Offsets that are subtracted from the values of a signature.
     #[must_use]
     pub fn input_offsets(&self) -> Floats<'a> {
         self.offsets
     }
 
-    /// What is then multiplied with.
+    /// Scales that the differences are multiplied by.
     #[must_use]
     pub fn input_scales(&self) -> Floats<'a> {
         self.scales
     }
 
-    /// From the network's outputs to values.
+    /// Scaling from the outputs of the network to values.
     #[must_use]
     pub fn output_scaling(&self) -> &OutputScaling {
         &self.output_scaling
     }
 
-    /// What the pack was made for.
+    /// Domain that the pack was made for.
     #[must_use]
     pub fn domain(&self) -> &Domain {
         &self.domain
     }
 
-    /// The score from which a cycle is unknown.
+    /// Score above which a cycle is unknown.
     #[must_use]
     pub fn unknown_threshold(&self) -> f32 {
         self.unknown_threshold
@@ -273,38 +273,37 @@ impl<'a> Pack<'a> {
         self.calibration
     }
 
-    /// How the shapes of the family are distributed.
+    /// Distribution of the shapes of the family.
     #[must_use]
     pub fn prior(&self) -> &Prior {
         &self.prior
     }
 
-    /// The lead table, checked when the pack was read; `None` where its numbers are not those of a table that
-    /// [`LeadTable`] reads. Taking it costs nothing.
+    /// The lead table, checked when the pack was read. `None` if its numbers are not those of a [`LeadTable`].
     #[must_use]
     pub fn gains_table(&self) -> Option<&LeadTable<'a>> {
         self.gains_table.as_ref()
     }
 
-    /// The lead table as it lies in the pack.
+    /// The lead table as stored in the pack.
     #[must_use]
     pub fn lead_table(&self) -> LeadTableBytes<'a> {
         self.lead_table
     }
 
-    /// JSON: recipe, seeds, scores, versions.
+    /// Card in JSON: recipe, seeds, scores, versions.
     #[must_use]
     pub fn card(&self) -> &'a str {
         self.card
     }
 
-    /// FNV-1a of everything behind the header: what names a pack.
+    /// FNV-1a hash of everything after the header; it identifies the pack.
     #[must_use]
     pub fn content_hash(&self) -> u64 {
         self.hash
     }
 
-    /// Bytes by what they are for.
+    /// Sizes of the parts of the pack.
     #[must_use]
     pub fn sizes(&self) -> Sizes {
         let weights = self.layers().map(|layer| {
@@ -323,7 +322,7 @@ impl<'a> Pack<'a> {
     }
 }
 
-/// FNV-1a, 64 bits.
+/// FNV-1a hash, 64 bits.
 #[must_use]
 pub fn content_hash(bytes: &[u8]) -> u64 {
     // Offset basis and prime of the reference.
@@ -334,7 +333,7 @@ pub fn content_hash(bytes: &[u8]) -> u64 {
     })
 }
 
-/// The hash of the sections, which is right, and their bytes.
+/// Checks the header and returns the hash and the bytes of the sections.
 fn checked_body(bytes: &[u8]) -> Result<(u64, &[u8]), PackError> {
     let found = bytes.len();
     if found == 0 {

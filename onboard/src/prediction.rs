@@ -1,17 +1,19 @@
-//! What the new controller must do if the process is the one identified: the closed loop, ahead of it.
+//! Prediction of the closed loop with the new controller, to check that the vehicle is the process identified.
 //!
-//! From the switch on the model runs beside the vehicle, with the same law, reference and limits:
+//! From the switch to the new controller on, a model runs beside the vehicle, with the same law, reference and
+//! limits:
 //!
 //! ```text
 //! y' = v,   v' = A f - v/T_body,   T_prop f' = u(t - tau) + u0 - f,   u = law(r, y, v)
 //! ```
 //!
-//! It begins at the measured output and rate; its force is what the relay's last switches, through the
-//! actuator's lag, have made of it. The loop is stable, so what is wrong with the beginning dies away, and
-//! what the vehicle then does otherwise it does because it is another process.
+//! with `A = K/T_body` and the input bias `u0`; other symbols as in [`Soiptd`]. The model begins at the measured
+//! output and rate, with the force that the relay's last switches give after the actuator's lag. The loop is
+//! stable, so the error of the initial state decays; a remaining difference shows that the vehicle is another
+//! process.
 //!
-//! Inputs of before the switch are known as edges, those of the model as a line of delay, in which one
-//! place holds as many ticks as the dead time needs.
+//! Inputs before the switch are known as edges. Inputs of the model go into a delay line, in which one place
+//! covers as many ticks as the dead time requires.
 
 use libm::{ceil, exp};
 
@@ -20,25 +22,25 @@ use crate::process::Soiptd;
 use crate::transition::{State, Transition};
 use crate::window::Edge;
 
-/// Places in the line of delay: a place is at most a hundredth of the dead time, or a tick.
+/// Places of the delay line. A place covers at most a hundredth of the dead time, or one tick.
 const PLACES: usize = 104;
 const MOST_PLACES: f64 = 100.0;
 
-/// Where and when the model begins.
+/// Initial state of the model.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Beginning<'a> {
-    /// The relay's last switches.
+    /// The last switches of the relay.
     pub(crate) edges: &'a [Edge],
     pub(crate) time_s: f64,
     pub(crate) value: f32,
     pub(crate) rate: f32,
-    /// Reference, the same until the response has been checked (output unit).
+    /// Reference (output unit), constant until the response has been checked.
     pub(crate) reference: f32,
     /// Constant input that is not recorded (input unit).
     pub(crate) input_bias: f64,
 }
 
-/// The model of the loop.
+/// Model of the closed loop.
 #[derive(Clone, Debug)]
 pub(crate) struct Prediction {
     law: PdLaw,
@@ -52,16 +54,16 @@ pub(crate) struct Prediction {
     /// Inputs of the last places, the latest at `next - 1`.
     line: [f32; PLACES],
     next: usize,
-    /// Dead time: whole places and the part of one.
+    /// Dead time: whole places, and the fraction of a place.
     places: usize,
     part: f32,
-    /// Ticks in a place, and those since the last.
+    /// Ticks per place, and ticks since the last place.
     every: u32,
     ticks: u32,
 }
 
 impl Prediction {
-    /// Of a process under a law whose output stays between two limits, called every `sample_s`.
+    /// A model of a process under a law with output limits, stepped every `sample_s`.
     pub(crate) fn new(
         process: &Soiptd,
         law: PdLaw,
@@ -92,7 +94,7 @@ impl Prediction {
             every: every as u32,
             ticks: 0,
         };
-        // The line as it would be had the model run all along: oldest first.
+        // Fill the line as if the model had run before, oldest input first.
         for place in (1..=PLACES).rev() {
             let middle_s = beginning.time_s - (place as f64 - 0.5) * place_s;
             prediction.push(input_at(beginning.edges, middle_s) as f32);
@@ -105,12 +107,12 @@ impl Prediction {
         self.next = (self.next + 1) % PLACES;
     }
 
-    /// The input so many places ago, zero being the latest.
+    /// Input of the given number of places ago; zero is the latest.
     fn ago(&self, places: usize) -> f32 {
         self.line[(self.next + 2 * PLACES - 1 - places) % PLACES]
     }
 
-    /// The output (output unit) at the next tick.
+    /// Output (output unit) at the next tick.
     #[inline]
     pub(crate) fn step(&mut self) -> f32 {
         if self.ticks == 0 {
@@ -123,18 +125,18 @@ impl Prediction {
             self.state = self.transition.apply(&self.state, input);
         }
         self.ticks = (self.ticks + 1) % self.every;
-        // Between the places, where the last one leads to.
+        // Between places the output of the next place is returned.
         (self.gain * self.state.y) as f32
     }
 }
 
-/// The recorded input at a time: the first edge's before all of them.
+/// Recorded input at a time; before the first edge it is that of the first edge.
 fn input_at(edges: &[Edge], time_s: f64) -> f64 {
     let held = edges.iter().rev().find(|edge| edge.time_s <= time_s);
     held.or(edges.first()).map_or(0.0, |edge| edge.input)
 }
 
-/// The actuator's force at the beginning: the edges that have arrived, through its lag.
+/// Force of the actuator at the beginning: the inputs that have arrived, after its lag.
 fn force(beginning: &Beginning<'_>, process: &Soiptd) -> f64 {
     let now_s = beginning.time_s - process.tau_s();
     let edges = beginning.edges;
@@ -160,8 +162,8 @@ mod tests {
 
     const SAMPLE_S: f64 = 0.001;
 
-    /// The largest distance between prediction and process over two seconds behind a switch, over the amplitude
-    /// before it; the dead time is `ticks` long, the relay switches every 0.2 s under a bias of 0.02.
+    /// Largest distance between prediction and process in the two seconds after a switch, relative to the
+    /// amplitude before. The dead time is `ticks` long; the relay switches every 0.2 s with a bias of 0.02.
     fn largest(ticks: usize, pd: Pd) -> f64 {
         let tau_s = ticks as f64 * SAMPLE_S;
         let process = Soiptd::from_acceleration_gain(4.0, 0.05, 0.5, tau_s).unwrap();
@@ -207,7 +209,7 @@ mod tests {
         largest / amplitude
     }
 
-    // The model is the process: what is left is single precision in the law.
+    // The model is the process; the difference is single precision in the law.
     #[test]
     fn it_is_the_process() {
         for ticks in [1, 7, 100] {
@@ -216,8 +218,8 @@ mod tests {
         }
     }
 
-    // Places of two and of four ticks: the edges before the switch and the law fall on them, up to four ticks
-    // late, which at a tenth of a rad a tick is worth a percent.
+    // Places of two and of four ticks: the edges before the switch and the outputs of the law are up to four
+    // ticks late, which at a tenth of a rad per tick costs a per cent.
     #[test]
     fn long_dead_times_share_places() {
         for ticks in [150, 380] {

@@ -1,4 +1,4 @@
-//! The process: an integrator with two lags and a delay (the paper's equation 1, "SOIPTD").
+//! Process model: integrator with two lags and delay (equation 1 of the paper, "SOIPTD").
 //!
 //! ```text
 //!              K e^(-tau s)                        K/T_body e^(-tau s)
@@ -14,8 +14,8 @@
 //! | 1/T_body | `inv_t_body_per_s` | 1/s, damping of the body    |
 //! | tau      | `tau_s`            | s, dead time                |
 //!
-//! The right-hand form is the one stored: without damping (`1/T_body = 0`) it is a double
-//! integrator and every formula stays regular, while `K` and `T_body` grow beyond all bounds.
+//! The form on the right is the one stored. Without damping (`1/T_body = 0`) the process is a double integrator
+//! and every formula stays regular, while `K` and `T_body` are infinite.
 
 use core::f64::consts::{FRAC_PI_2, PI};
 use core::fmt;
@@ -31,7 +31,7 @@ pub struct Soiptd {
     tau_s: f64,
 }
 
-/// Why a set of parameters is not a process: the offending parameter and its value.
+/// Invalid process parameter, with its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum SoiptdError {
@@ -39,7 +39,7 @@ pub enum SoiptdError {
     Gain(f64),
     /// `T_prop` is not a positive, finite time.
     TProp(f64),
-    /// `T_body` is not a positive time (infinite is allowed: no damping).
+    /// `T_body` is not a positive time. Infinity is valid and means no damping.
     TBody(f64),
     /// `tau` is negative or not finite.
     Tau(f64),
@@ -59,11 +59,11 @@ impl fmt::Display for SoiptdError {
 impl core::error::Error for SoiptdError {}
 
 impl Soiptd {
-    /// From the paper's parameters: velocity gain `k`, times in seconds.
+    /// A process from the parameters of the paper: velocity gain `k`, times in seconds.
     ///
     /// # Errors
-    /// Names the first parameter that is outside its physical range. For a process without
-    /// damping use [`Soiptd::from_acceleration_gain`].
+    /// The first parameter that is out of range. For a process without damping use
+    /// [`Soiptd::from_acceleration_gain`].
     pub fn new(k: f64, t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Result<Self, SoiptdError> {
         if !(t_body_s.is_finite() && t_body_s > 0.0) {
             return Err(SoiptdError::TBody(t_body_s));
@@ -74,10 +74,10 @@ impl Soiptd {
         Self::from_acceleration_gain(k / t_body_s, t_prop_s, 1.0 / t_body_s, tau_s)
     }
 
-    /// From the acceleration gain `K/T_body` and the damping rate `1/T_body`, which may be zero.
+    /// A process from the acceleration gain `K/T_body` and the damping rate `1/T_body`, which may be zero.
     ///
     /// # Errors
-    /// Names the first parameter that is outside its physical range.
+    /// The first parameter that is out of range.
     pub fn from_acceleration_gain(
         k_over_t_body: f64,
         t_prop_s: f64,
@@ -110,8 +110,8 @@ impl Soiptd {
         self.k_over_t_body
     }
 
-    /// `K/(T_body T_prop)`: the third derivative of the output where the input is one and all else rests
-    /// (output unit / (input unit s^3)); unlike `K/T_body`, the same whichever lag comes first.
+    /// `K/(T_body T_prop)` (output unit / (input unit s^3)): third derivative of the output right after a unit
+    /// step of the input, from rest. Unlike `K/T_body` it does not change when the two lags are exchanged.
     #[must_use]
     pub fn jerk_gain(&self) -> f64 {
         self.k_over_t_body / self.t_prop_s
@@ -152,7 +152,7 @@ impl Soiptd {
     /// The same process with its acceleration gain multiplied by `factor`.
     ///
     /// # Errors
-    /// [`SoiptdError::Gain`] when the product is zero or not finite.
+    /// [`SoiptdError::Gain`] if the product is zero or not finite.
     pub fn with_gain_scaled(&self, factor: f64) -> Result<Self, SoiptdError> {
         Self::from_acceleration_gain(
             self.k_over_t_body * factor,
@@ -170,8 +170,8 @@ impl Soiptd {
             / (w * hypot(1.0, w * self.t_prop_s) * hypot(self.inv_t_body_per_s, w))
     }
 
-    /// Unwrapped phase of `G(jw)` for a positive gain (rad): from `-pi/2` (or `-pi` without
-    /// damping) downwards, monotone in `w`.
+    /// Unwrapped phase of `G(jw)` for a positive gain (rad). It falls monotonically with `w`, from `-pi/2`, or
+    /// from `-pi` without damping.
     #[must_use]
     pub fn phase_rad(&self, omega_rad_per_s: f64) -> f64 {
         let w = omega_rad_per_s;
@@ -183,10 +183,10 @@ impl Soiptd {
         -FRAC_PI_2 - body - atan(w * self.t_prop_s) - w * self.tau_s
     }
 
-    /// Frequency (rad/s) where the phase of `G` is `phase_rad`; `None` where it never is.
+    /// Frequency (rad/s) at which the phase of `G` is `phase_rad`; `None` if there is no such frequency.
     #[must_use]
     pub fn frequency_at_phase(&self, phase_rad: f64) -> Option<f64> {
-        // The fastest time of the process bounds the frequency from above, the slowest from below.
+        // The fastest time of the process gives an upper bound of the frequency, the slowest a lower bound.
         let sum_s = self.t_prop_s + self.tau_s;
         let (mut low, mut high) = (
             log(1e-9 * (self.inv_t_body_per_s + 1.0 / sum_s)),
@@ -195,7 +195,7 @@ impl Soiptd {
         if self.phase_rad(exp(low)) < phase_rad || self.phase_rad(exp(high)) > phase_rad {
             return None;
         }
-        // Bisection on log frequency: 64 halvings of 50 nepers end below one ulp.
+        // Bisection in the logarithm of the frequency: 64 halvings of 50 nepers end below one rounding.
         for _ in 0..64 {
             let middle = 0.5 * (low + high);
             if self.phase_rad(exp(middle)) > phase_rad {
@@ -207,11 +207,11 @@ impl Soiptd {
         Some(exp(0.5 * (low + high)))
     }
 
-    /// Describing-function estimate of the relay oscillation (the paper's equations 6 and 7):
-    /// frequency (rad/s) where `arg G = -pi + asin(beta)` and amplitude `4 h / pi |G|`.
+    /// Describing-function estimate of the relay oscillation (equations 6 and 7 of the paper): frequency (rad/s)
+    /// at which `arg G = -pi + asin(beta)`, and amplitude `4 h / pi |G|`.
     ///
-    /// Good to 5..30 % only: a scale for durations and starts, never the truth. `None` where the
-    /// condition has no solution, such as a double integrator with `beta >= 0`.
+    /// The error is 5 to 30 %. Use the estimate for durations and starting values only. `None` if the condition
+    /// has no solution, for example for a double integrator with `beta >= 0`.
     #[must_use]
     pub fn describing_function_oscillation(
         &self,
@@ -222,10 +222,10 @@ impl Soiptd {
         Some((omega, 4.0 * relay_amplitude / PI * self.magnitude(omega)))
     }
 
-    /// The two poles besides the integrator as `(sum, product / sum^2)`: (1/s, between 0 and 1/4).
+    /// The two poles besides the integrator as `(sum, product / sum^2)`, in 1/s and without unit, 0 to 1/4.
     ///
-    /// `G` depends on the two lags through these alone, so they stay regular where the lags are
-    /// equal (1/4) and where damping vanishes (0). See [`Soiptd::from_pole_sum`].
+    /// `G` depends on the two lags only through these values. They are regular where the lags are equal (1/4)
+    /// and where damping vanishes (0). See [`Soiptd::from_pole_sum`].
     #[must_use]
     pub fn pole_sum(&self) -> (f64, f64) {
         let prop = 1.0 / self.t_prop_s;
@@ -233,10 +233,10 @@ impl Soiptd {
         (sum, prop * self.inv_t_body_per_s / (sum * sum))
     }
 
-    /// From the coordinates of [`Soiptd::pole_sum`]; the faster pole becomes the actuator's lag.
+    /// A process from the coordinates of [`Soiptd::pole_sum`]. The faster pole becomes the lag of the actuator.
     ///
     /// # Errors
-    /// Names the parameter that is outside its physical range.
+    /// The first parameter that is out of range.
     pub fn from_pole_sum(
         k_over_t_body: f64,
         pole_sum_per_s: f64,
@@ -245,7 +245,7 @@ impl Soiptd {
     ) -> Result<Self, SoiptdError> {
         let spread = sqrt((1.0 - 4.0 * pole_ratio).max(0.0));
         let fast = 0.5 * pole_sum_per_s * (1.0 + spread);
-        // The slow pole by Vieta's product: the difference would cancel as it vanishes.
+        // The slow pole from Vieta's product: the difference would lose its digits as the pole vanishes.
         let slow = pole_ratio * pole_sum_per_s * pole_sum_per_s / fast;
         Self::from_acceleration_gain(k_over_t_body, 1.0 / fast, slow, tau_s)
     }
@@ -259,7 +259,7 @@ mod tests {
         (a - b).abs() <= tolerance * b.abs()
     }
 
-    // Section 2 of the method: describing-function column of the table, h = 1, K = 1, beta = -0.73.
+    // Section 2 of the method, describing-function column of the table: h = 1, K = 1, beta = -0.73.
     #[test]
     fn describing_function_matches_the_table() {
         for (t_prop, t_body, tau, period, amplitude) in [
@@ -304,7 +304,7 @@ mod tests {
             let process = Soiptd::from_acceleration_gain(3.0, t_prop, inv_t_body, 0.02).unwrap();
             let (sum, ratio) = process.pole_sum();
             let back = Soiptd::from_pole_sum(3.0, sum, ratio, 0.02).unwrap();
-            // At equal poles the root loses half the digits, and only there.
+            // At equal poles the square root loses half of the digits.
             assert!(close(back.t_prop_s(), t_prop, 1e-7));
             assert!((back.inv_t_body_per_s() - inv_t_body).abs() <= 1e-7 * inv_t_body);
         }

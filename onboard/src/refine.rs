@@ -1,56 +1,61 @@
-//! The estimator: from a window of one or more cycles to the process, by variable projection.
+//! Fit of the process to a window of one or more cycles by variable projection.
 //!
-//! Given the two lags and the delay, the output is linear in everything else:
+//! For given lags and delay the output is linear in all other unknowns:
 //!
 //! ```text
 //! y(t) = b g(t) + b u0 s(t) + y0 + v0 r(t) + w0 q(t) + c d(t)
 //! ```
 //!
-//! with `b` the gain, `g` the response to the recorded input, `s` to a constant one (the unknown
-//! input bias `u0`), `r`, `q` to the unknown initial rate and acceleration, and `d` to the even part
-//! of the actuator's force (`distortion.rs`). So a search over three unknowns (Levenberg-Marquardt,
-//! box-constrained) with the six linear ones solved inside it: Golub and Pereyra (1973), with
-//! Kaufman's (1975) Jacobian.
+//! | symbol       | meaning                                                         | unit              |
+//! |--------------|-----------------------------------------------------------------|-------------------|
+//! | `b`          | acceleration gain                                               | output unit / (input unit s^2) |
+//! | `g`, `s`     | responses to the recorded input and to a constant input of one  | input unit s^2, s^2 |
+//! | `u0`         | input bias, not recorded                                        | input unit        |
+//! | `y0, v0, w0` | output, rate and acceleration at the beginning of the past      | output unit / s^k |
+//! | `r`, `q`     | responses to the initial rate and acceleration                  | s, s^2            |
+//! | `c`, `d`     | even part of the actuator's acceleration, and the response to it (`distortion.rs`) | output unit / s^2, s^2 |
 //!
-//! Two things are known beforehand and stand as rows of the equations. The acceleration at the
-//! beginning of the past cannot exceed what the relay can produce: without that, one that has died
-//! away before the window begins would be undetermined. And the even part of the force is small.
-//! Where the family of the process is known, so is how likely its shapes are (`prior.rs`): three rows
-//! more, and the estimate is the most probable process instead of that of least squares.
+//! Hence a search over three unknowns (Levenberg-Marquardt with box constraints) with the six linear unknowns
+//! eliminated. The three are the logarithm of the sum of the two poles, their product over the squared sum, and
+//! the delay. They are regular where the lags are equal (1/4) and where damping vanishes (0), so the double
+//! integrator is an ordinary point on the boundary of the domain.
 //!
-//! The three unknowns are the sum of the two poles (its logarithm), their product over the square
-//! of the sum, and the delay: regular where the lags are equal (1/4) and where damping vanishes
-//! (0), so the double integrator is an ordinary point of the domain's boundary.
+//! Prior knowledge adds rows to the equations. The initial acceleration cannot exceed what the relay produces;
+//! without that row an acceleration that has decayed before the window begins would be undetermined. The even
+//! part of the force is small. If the distribution of the shapes is known (`prior.rs`), three more rows make the
+//! estimate the most probable process instead of the least-squares one.
 //!
-//! # In slices
+//! References: G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973), variable projection; L. Kaufman, BIT 15
+//! (1975), the Jacobian.
 //!
-//! A [`Refiner`] does all of it a slice at a time, of which none takes longer than a controller's tick has
-//! to spare; [`refine`] and [`refine_with`] are the loop over them.
-//! Operations on numbers of eight bytes, a sine, an exponential or a logarithm counted as 45, of a window of
-//! 64 bins of up to 32 samples. A processor without such numbers in hardware (Cortex-M4F) takes 60 to 100
-//! cycles for each: the longest slice 130,000 to 220,000.
+//! # Slices
 //!
-//! | slice                                                          | operations | a fit | a step |
-//! |----------------------------------------------------------------|------------|-------|--------|
-//! | fundamental: 16 bins (95 each), or 8 edges (190 each)          | 1,600      |       |        |
-//! | a process, transition and sums of its bin                      | 1,500      | 1     | 4      |
-//! | response: 56 bins (32 each), an edge (1,200) for 40 of them    | 1,800      | 5 p + e | 4 (p + e) |
-//! | distortion, begun                                              | 900        | 1     | 4      |
-//! | distortion: 32 bins (45 each), an edge (110) for 3             | 1,600      | 4 p   | 16 p   |
-//! | 5 parts out of a column (4 a row and part), its length, weight | 1,900      | 6     | 4      |
-//! | 5 parts out of the outputs                                     | 1,600      | 2     |        |
-//! | normal equations, a step                                       | 1,800      |       | 1      |
-//! | a wave: 32 bins (54 each)                                      | 1,750      |       |        |
-//! | 5 parts out of a wave, what is left of it                      | 1,800      |       |        |
-//! | an error of the model                                          | 1,050      |       |        |
-//! | 8 lags of the residual                                         | 1,000      |       |        |
-//! | 5 squares of the covariance (250 each)                         | 1,250      |       |        |
-//! | the covariance in its coordinates, the process                 | 2,200      |       |        |
+//! A [`Refiner`] does the fit in slices, each short enough for a control tick; [`refine`] and [`refine_with`]
+//! loop over them. The table counts double-precision operations, with a sine, an exponential or a logarithm as
+//! 45, for a window of 64 bins of up to 32 samples. A processor without double precision in hardware
+//! (Cortex-M4F) takes 60 to 100 cycles per operation, so the longest slice takes 130,000 to 220,000 cycles.
 //!
-//! with `p` the bins of window and past over 56 and `e` the edges. An edge takes 1,500 where a lag is shorter
-//! than a sample. A refinement makes a fit at each start, and from the best three steps of the search, each
-//! with a fit or more, until one ends at the noise: some 2,100 slices, of 120 such windows 9,200 at most.
-//! [`Refiner::most_slices`] is the bound.
+//! | slice                                                          | operations | per fit | per step |
+//! |----------------------------------------------------------------|------------|---------|----------|
+//! | fundamental: 16 bins (95 each) or 8 edges (190 each)           | 1,600      |         |          |
+//! | process, transition, sums of a bin                             | 1,500      | 1       | 4        |
+//! | response: 56 bins (32 each); an edge (1,200) counts as 40      | 1,800      | 5 p + e | 4 (p + e) |
+//! | distortion, first part                                         | 900        | 1       | 4        |
+//! | distortion: 32 bins (45 each); an edge (110) counts as 3       | 1,600      | 4 p     | 16 p     |
+//! | 5 components removed from a column (4 per row), length, weight | 1,900      | 6       | 4        |
+//! | 5 components removed from the outputs                          | 1,600      | 2       |          |
+//! | normal equations and step                                      | 1,800      |         | 1        |
+//! | wave: 32 bins (54 each)                                        | 1,750      |         |          |
+//! | 5 components removed from a wave, its remainder                | 1,800      |         |          |
+//! | a model error                                                  | 1,050      |         |          |
+//! | 8 lags of the residual's autocorrelation                       | 1,000      |         |          |
+//! | 5 squares of the covariance (250 each)                         | 1,250      |         |          |
+//! | covariance in its coordinates, process                         | 2,200      |         |          |
+//!
+//! `p` is the number of bins of window and past divided by 56, `e` the number of edges. An edge takes 1,500
+//! operations if a lag is shorter than a sample. A refinement makes one fit per start, then searches from the
+//! best three until one search ends at the noise. It takes some 2,100 slices, and 9,200 at most on 120 typical windows;
+//! [`Refiner::most_slices`] gives the upper bound.
 
 mod descent;
 mod domain;
@@ -74,9 +79,9 @@ pub use self::refiner::Refiner;
 use crate::process::Soiptd;
 use crate::window::Window;
 
-/// Number of linear unknowns: y0, v0, w0, the distortion, the bias times the gain, the gain.
+/// Number of linear unknowns: y0, v0, w0, distortion, bias times gain, gain.
 const LINEAR: usize = 6;
-/// All unknowns.
+/// Number of all unknowns.
 const ALL: usize = LINEAR + SHAPE;
 
 /// Index of each coordinate in [`Refined::covariance`].
@@ -87,35 +92,35 @@ pub mod coordinate {
     pub const POLE_RATIO: usize = 1;
     /// Delay (s).
     pub const TAU_S: usize = 2;
-    /// Logarithm of the size of `K/(T_body T_prop)`: unlike `K/T_body`, the same whichever lag comes
-    /// first, so regular where they meet.
+    /// Logarithm of `|K/(T_body T_prop)|`. Unlike `K/T_body` it does not change when the lags are exchanged, so
+    /// it is regular where they are equal.
     pub const LN_JERK_GAIN: usize = 3;
     /// Input bias (input unit).
     pub const INPUT_BIAS: usize = 4;
 }
 
-/// The best process and how well it is known.
+/// Best process and its uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Refined {
-    /// The process of least squares.
+    /// Best process: least squares, or the most probable one with a prior.
     pub process: Soiptd,
-    /// Constant input that the recording does not show (input unit).
+    /// Constant input that is not recorded (input unit).
     pub input_bias: f64,
-    /// Covariance over the coordinates of [`coordinate`], from the noise and from the error of the
-    /// model that the residual betrays; `None` where a coordinate has no influence at all.
+    /// Covariance over the coordinates of [`coordinate`], from the noise and from the model error found in the
+    /// residual; `None` if a coordinate has no influence on the output.
     pub covariance: Option<[[f64; 5]; 5]>,
-    /// Relative error of the response at the harmonics of the oscillation that the residual betrays;
-    /// zero where noise explains it.
+    /// Relative error of the model's response at the harmonics of the oscillation, found in the residual; zero
+    /// if noise explains the residual.
     pub response_error: f64,
-    /// Standard deviation of the residual, for one sample (output unit).
+    /// Standard deviation of the residual for one sample (output unit).
     pub residual_sigma: f64,
-    /// Standard deviation of white noise seen in the samples themselves (output unit).
+    /// Standard deviation of the white noise in the samples (output unit).
     pub noise_sigma: f64,
-    /// Root mean square of the residual bins (output unit).
+    /// Root mean square of the residual in the bins (output unit).
     pub residual_rms: f64,
-    /// The limit of the domain that the fit lies on, if any.
+    /// The limit of the domain on which the fit lies, if any.
     pub edge: Option<DomainEdge>,
-    /// Steps of the search, over all starts.
+    /// Number of steps of the search from all starts.
     pub steps: u32,
 }
 
@@ -123,21 +128,21 @@ pub struct Refined {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RefineError {
-    /// Fewer usable bins than unknowns ask for.
+    /// Too few usable bins: their number.
     TooFewBins(usize),
-    /// The window's input never changes.
+    /// The input in the window is constant.
     NoInput,
     /// No start led to a process: the output does not follow the input.
     NoFit,
 }
 
-/// Most starts that may be given: the five candidates of a classification, and a few.
+/// Maximum number of additional starts: the five candidates of a classification and three more.
 pub const GIVEN: usize = 8;
 
-/// Fits the process to the window of an oscillation with the given period.
+/// Fits the process to the window of an oscillation with period `period_s` (s).
 ///
 /// # Errors
-/// A [`RefineError`] where the window does not hold what a fit needs.
+/// A [`RefineError`] if the window does not permit a fit.
 pub fn refine<const BINS: usize, const EDGES: usize>(
     window: &Window<BINS, EDGES>,
     period_s: f64,
@@ -145,26 +150,26 @@ pub fn refine<const BINS: usize, const EDGES: usize>(
     refine_with(window, period_s, &PriorKnowledge::default())
 }
 
-/// What is known before the fit.
+/// Prior knowledge for a fit.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PriorKnowledge<'a> {
-    /// Shapes to start from, beside those that the oscillation itself suggests: the first [`GIVEN`].
+    /// Shapes to start from, in addition to those derived from the oscillation; the first [`GIVEN`] are used.
     pub starts: &'a [Shape],
-    /// How likely shapes are.
+    /// Distribution of the shapes.
     pub prior: Option<ShapePrior>,
 }
 
-/// As [`refine`], with what is known beforehand.
+/// Like [`refine`], with prior knowledge.
 ///
 /// # Errors
-/// As [`refine`].
+/// Those of [`refine`].
 pub fn refine_with<const BINS: usize, const EDGES: usize>(
     window: &Window<BINS, EDGES>,
     period_s: f64,
-    beforehand: &PriorKnowledge<'_>,
+    prior_knowledge: &PriorKnowledge<'_>,
 ) -> Result<Refined, RefineError> {
     let mut refiner = Refiner::new();
-    refiner.begin(window, period_s, beforehand)?;
+    refiner.begin(window, period_s, prior_knowledge)?;
     loop {
         if let Some(outcome) = refiner.advance(window) {
             return outcome;
@@ -172,11 +177,11 @@ pub fn refine_with<const BINS: usize, const EDGES: usize>(
     }
 }
 
-/// What the best linear fit at a given process leaves of each bin (output unit): measured less
-/// fitted; zero in a bin that is not fitted. Returns the number of bins.
+/// Residual of the best linear fit of a given process in each bin (output unit): measured minus fitted, zero in
+/// bins that are not used. Returns the number of bins.
 ///
 /// # Errors
-/// As [`refine`].
+/// Those of [`refine`].
 pub fn residuals<const BINS: usize, const EDGES: usize>(
     window: &Window<BINS, EDGES>,
     period_s: f64,

@@ -1,29 +1,41 @@
-//! The modified relay feedback test (MRFT), noise-protected: error in, relay output out.
+//! Relay of the test: modified relay feedback test (MRFT) with protection against noise, bias and offsets.
 //!
-//! `u = trim +/- h`. The oscillation it excites has the phase `asin(beta)` (the paper's equations
-//! 4 and 5): a negative `beta` switches before the error crosses zero, a positive one after.
-//! Equation 4 taken literally is no oscillator for `beta < 0`; the relay meant is: while `u` is
-//! high, follow the maximum of the error since the last switch; once the error has fallen back to
-//! `-beta` times that maximum, switch low; and mirrored.
+//! ```text
+//! u = trim + h   while high, until  e <= -beta max(e since the switch)
+//! u = trim - h   while low,  until  e >= -beta min(e since the switch)
+//! ```
 //!
-//! What a real, noisy, biased process needs beyond that equation:
+//! | symbol | name        | unit                                                |
+//! |--------|-------------|-----------------------------------------------------|
+//! | e      | `error`     | output unit, reference minus measurement            |
+//! | u      | returned    | input unit                                          |
+//! | h      | `amplitude` | input unit, half the jump of the output             |
+//! | beta   | `beta`      | -1 to 1, sine of the phase of the oscillation       |
+//! | trim   | `trim`      | input unit, centre of the output                    |
+//! | sigma  | noise sigma | output unit, standard deviation of the noise        |
 //!
-//! - **pre-roll**: output zero while the noise `sigma` is measured;
-//! - **kick**: high until the error leaves the noise (6 sigma);
-//! - **ramp**: the first switches at zero crossings, as a plain relay, then `beta` step by step:
-//!   from a large offset a leading relay need not cross zero at all;
-//! - **smoothing** of the error over a few per cent of the half period;
-//! - **dwell** and **stand-off**: an extremum counts when the signal has come back from it by
-//!   3 sigma, it stands 6 sigma off the opposite one, and part of a half period has passed;
-//! - **undo**: a signal that passes the extremum behind the last switch proves it false: the
-//!   switch is taken back and the old excursion goes on;
-//! - **turn-back**: a signal that turns back before it has reached zero shows that the switch came
-//!   too early, far out or under a bias: back, and this time switch at zero;
-//! - **trim**: the mean of `u` over a cycle is minus the input bias; following it makes the
-//!   oscillation symmetric.
+//! The oscillation has the phase `asin(beta)` (equations 4 and 5 of the paper). With a negative `beta` the relay
+//! switches before the error crosses zero, with a positive one after. Equation 4 taken literally does not
+//! oscillate for `beta < 0`; the rule above is its meaning.
 //!
-//! Noise protection after Abdul Hay, Chehadeh, Boiko et al. (2021), "Unsupervised tuning of
-//! multirotor dynamics".
+//! A real process has noise, a bias and an initial offset. Therefore the relay adds to the rule:
+//!
+//! - **pre-roll**: the output is zero while sigma is measured;
+//! - **kick**: the output is high until the error exceeds 6 sigma;
+//! - **ramp**: from a large offset the first switches are those of a plain relay (`beta = 0`), then `beta` grows
+//!   in steps, because a leading relay need not reach zero from there;
+//! - **smoothing**: the error is smoothed over a few per cent of the half period;
+//! - **dwell** and **stand-off**: an extremum counts when the signal has returned from it by 3 sigma, when it is
+//!   6 sigma from the opposite extremum, and when part of a half period has passed;
+//! - **undo**: if the signal passes the extremum of the last switch, that extremum was false: the switch is
+//!   reversed and the old excursion continues;
+//! - **turn-back**: if the signal turns back before it has reached zero, the switch came too early (large offset
+//!   or bias): it is reversed, and the next switch is at zero;
+//! - **trim**: the mean of `u` over a cycle is minus the input bias; the trim follows it, so that the
+//!   oscillation becomes symmetric.
+//!
+//! Reference for the noise protection: A. Abdul Hay, M. Chehadeh, I. Boiko et al., "Unsupervised tuning of
+//! multirotor dynamics" (2021).
 
 mod settings;
 
@@ -31,53 +43,54 @@ use libm::sqrtf;
 
 pub use self::settings::{RelayError, RelaySettings};
 
-/// Error leaves the noise, or two extrema stand apart, by this many sigma.
+/// Distance in sigma at which the error has left the noise, and by which two extrema must differ.
 const CLEAR_OF_NOISE_SIGMA: f32 = 6.0;
-/// An extremum is behind when the signal has come back from it by this many sigma.
+/// Distance in sigma by which the signal must return from an extremum for the extremum to count.
 const COME_BACK_SIGMA: f32 = 3.0;
-/// An extremum is disproved when the signal passes it by this many sigma.
+/// Distance in sigma by which the signal must pass an extremum to disprove it.
 const DISPROVED_SIGMA: f32 = 2.5;
-/// The trim moves from the first cycle on that has been high and low: under a large bias there may be
-/// no second one.
+/// Number of switches after which the trim moves: one complete cycle. Under a large bias there may be no second
+/// one.
 const TRIM_FROM_SWITCH: u32 = 2;
-/// An excursion of this many half periods means that the trim has cost the relay its authority.
+/// Length of an excursion, in half periods, from which the trim has taken the authority from the relay: the trim
+/// is reset.
 const TRIM_LOST: f32 = 4.0;
 
-/// What the relay is doing.
+/// Phase of the relay.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum RelayPhase {
-    /// Output zero, noise being measured.
+    /// The output is zero; the noise is being measured.
     Preroll,
-    /// Output high until the error leaves the noise.
+    /// The output is high until the error leaves the noise.
     Kick,
-    /// Oscillating.
+    /// The relay oscillates.
     Oscillate,
 }
 
-/// One excursion of the error between two switches, in the sign that makes it positive.
+/// Excursion of the error between two switches. "Signed" errors are positive on the side of the excursion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Excursion {
-    /// Largest signed error since the switch.
+    /// Largest signed error since the switch (output unit).
     peak: f32,
-    /// Largest signed error of the excursion before, in its own sign.
+    /// Largest signed error of the previous excursion, positive on its own side (output unit).
     opposite_peak: f32,
     /// Time since the switch (s).
     elapsed_s: f32,
-    /// Duration of the excursion before (s).
+    /// Duration of the previous excursion (s).
     previous_s: f32,
-    /// Duration of the one before that (s).
+    /// Duration of the excursion before the previous one (s).
     before_previous_s: f32,
-    /// Whether to switch at zero, whatever `beta`: the signal has turned back once.
+    /// Whether to switch at zero instead of at `beta`, because the signal has turned back once.
     to_zero: bool,
-    /// Time since the last rise (s), and the part of it with the output high less that with it low.
+    /// Time since the last rise (s), and within it the time high minus the time low (s).
     cycle_s: f32,
     cycle_high_less_low_s: f32,
-    /// Centre of the relay's output when the excursion began.
+    /// Centre of the relay's output when the excursion began (input unit).
     trim: f32,
 }
 
-/// Noise measured from second differences, whose variance is six times that of white noise.
+/// Noise meter: second differences of white noise have six times its variance.
 #[derive(Clone, Copy, Debug, Default)]
 struct NoiseMeter {
     last: [f32; 2],
@@ -105,7 +118,7 @@ impl NoiseMeter {
     }
 }
 
-/// The relay: settings and state.
+/// The relay: settings and state. See the [module](self) for the switching rule.
 #[derive(Clone, Debug)]
 pub struct Relay {
     settings: RelaySettings,
@@ -119,22 +132,24 @@ pub struct Relay {
     smoothing_gain: f32,
     smoothed_sigma: f32,
     excursion: Excursion,
-    /// The last two excursions, latest first, while their switches can still be undone.
+    /// The last two excursions, latest first, as long as their switches can be reversed.
     undoable: [Option<Excursion>; 2],
     switches: u32,
     undone: u32,
-    /// Share of `beta` used while the output is high, and while it is low: halved where the signal
-    /// turned back, whole again when the trim moves.
+    /// Share of `beta` used while high and while low. Halved when the signal turns back, one again when the trim
+    /// moves.
     lead: [f32; 2],
-    /// What the trim aims for: the asymmetry, to the side that the first cycle leaned to.
+    /// Target of the trim: the asymmetry, with the sign of the first cycle's.
     aim: Option<f32>,
-    /// Whether the process was at rest within the noise when the relay began.
+    /// Whether the error was within the noise when the relay began.
     from_rest: bool,
 }
 
 impl Relay {
+    /// A relay with these settings, ready for its first tick.
+    ///
     /// # Errors
-    /// Names the setting that is out of range.
+    /// The first setting that is out of range.
     pub fn new(settings: RelaySettings) -> Result<Self, RelayError> {
         settings.validate()?;
         let rest = Excursion {
@@ -172,8 +187,8 @@ impl Relay {
         })
     }
 
-    /// One tick: the error `reference - measurement` (output unit) and the time since the last
-    /// tick (s) give the output to hold until the next (input unit).
+    /// One tick. Takes the error `reference - measurement` (output unit) and the time since the last tick (s);
+    /// returns the output to hold until the next tick (input unit).
     #[inline]
     pub fn step(&mut self, error: f32, dt_s: f32) -> f32 {
         match self.phase {
@@ -218,7 +233,7 @@ impl Relay {
     }
 
     fn follow(&mut self, error: f32, dt_s: f32) {
-        // A sample that is no number, or no finite one, tells nothing: only time goes on.
+        // A sample that is not finite carries no information; only time advances.
         if error.is_finite() {
             self.smoothed += self.smoothing_gain * (error - self.smoothed);
         }
@@ -233,7 +248,7 @@ impl Relay {
         }
     }
 
-    /// Smoothed error, positive on the side of the running excursion.
+    /// Smoothed error, positive on the side of the running excursion (output unit).
     fn signed(&self) -> f32 {
         self.sign * self.smoothed
     }
@@ -243,13 +258,13 @@ impl Relay {
         usize::from(!self.is_high())
     }
 
-    /// Whether the extremum behind the last switch was false: the signal has passed it.
+    /// Whether the extremum of the last switch was false: the signal has passed it.
     fn is_disproved(&self) -> bool {
         self.undoable[0]
             .is_some_and(|last| -self.signed() > last.peak + DISPROVED_SIGMA * self.smoothed_sigma)
     }
 
-    /// Whether the signal, not yet at zero, goes away from it again.
+    /// Whether the signal moves away from zero again before it has reached it.
     fn has_turned_back(&self) -> bool {
         let turned = self.excursion.peak - self.signed();
         self.undoable[0].is_some()
@@ -257,7 +272,7 @@ impl Relay {
             && turned > CLEAR_OF_NOISE_SIGMA * self.smoothed_sigma
     }
 
-    /// Whether the running excursion has a genuine extremum and has fallen back far enough.
+    /// Whether the running excursion has a genuine extremum and the error has fallen back far enough.
     fn is_due(&self) -> bool {
         let Excursion {
             peak,
@@ -279,7 +294,7 @@ impl Relay {
             && peak + opposite_peak >= CLEAR_OF_NOISE_SIGMA * self.smoothed_sigma
     }
 
-    /// The phase asked for at this switch: a plain relay first, then `beta` in equal steps.
+    /// `beta` for this switch: zero for the plain switches, then rising in equal steps.
     fn beta(&self) -> f32 {
         let plain = u32::from(self.settings.plain_switches);
         let ramp = u32::from(self.settings.ramp_switches);
@@ -293,7 +308,7 @@ impl Relay {
         }
     }
 
-    /// Mean of the last two excursions (s); zero until there are two.
+    /// Mean duration of the last two excursions (s); zero until there are two.
     fn half_period_s(&self) -> f32 {
         let Excursion {
             previous_s,
@@ -327,7 +342,8 @@ impl Relay {
         self.set_smoothing(dt_s);
     }
 
-    /// Moves the trim a share of the way to where the cycle that ended would have had its asymmetry.
+    /// Moves the trim by a share of the way to the value at which the last cycle would have had its target
+    /// asymmetry.
     fn begin_cycle(&mut self) {
         let h = self.settings.amplitude;
         let Excursion {
@@ -351,7 +367,7 @@ impl Relay {
         self.excursion.cycle_high_less_low_s = 0.0;
     }
 
-    /// Takes the last switch back and goes on with the excursion before it.
+    /// Reverses the last switch and continues the excursion before it.
     fn undo(&mut self, to_zero: bool) {
         if let Some(last) = self.undoable[0] {
             let wrong_s = self.excursion.elapsed_s;
@@ -385,11 +401,11 @@ impl Relay {
         self.smoothed_sigma = self.noise_sigma / sqrtf(n);
     }
 
-    /// Changes the phase of the oscillation, `asin(beta)`, from the next tick on; the running excursion
-    /// and all that was learned go on.
+    /// Changes the phase of the oscillation, `asin(beta)`, from the next tick on. The running excursion and the
+    /// state are kept.
     ///
     /// # Errors
-    /// [`RelayError::Beta`] unless `beta` is between -1 and 1; the relay stays as it was.
+    /// [`RelayError::Beta`] unless `beta` is between -1 and 1; the relay is unchanged then.
     pub fn set_beta(&mut self, beta: f32) -> Result<(), RelayError> {
         let settings = RelaySettings {
             beta,
@@ -412,19 +428,19 @@ impl Relay {
         self.sign > 0.0
     }
 
-    /// Switches made and not undone.
+    /// Number of switches made, without those reversed.
     #[must_use]
     pub fn switches(&self) -> u32 {
         self.switches
     }
 
-    /// Switches taken back.
+    /// Number of switches reversed.
     #[must_use]
     pub fn undone(&self) -> u32 {
         self.undone
     }
 
-    /// Centre of the output (input unit): minus the input bias, once settled.
+    /// Centre of the output (input unit). Once settled it is minus the input bias.
     #[must_use]
     pub fn trim(&self) -> f32 {
         self.excursion.trim

@@ -1,23 +1,28 @@
-//! Responses of the delayed process averaged over the bins of a window, exactly.
+//! Exact response of the delayed process, averaged over the bins of a window.
 //!
-//! A stretch of `m` samples has a transition and the sum of the outputs at its instants; both
-//! double in one multiplication, so a bin of any size costs a handful of them. An edge of the
-//! input inside a bin adds the step response that starts there. A response is followed some bins at
-//! a time, so that none takes longer than a controller's tick has to spare.
+//! ```text
+//! mean of bin k = 1/m sum of y(t_i) over the m instants t_i of the bin
+//! ```
+//!
+//! for the process with unit acceleration gain (`K/T_body = 1`), so `y` is in input unit s^2; times are in
+//! seconds. A stretch of `m` samples has a transition and the sum of the outputs at its instants. One
+//! multiplication doubles both, so a bin of any size takes a few multiplications. An edge of the input within a
+//! bin adds the step response that begins there. A response is computed some bins per slice, so that each slice
+//! fits into a control tick.
 
 use crate::process::Soiptd;
 use crate::transition::{State, Transition};
 use crate::window::{Edge, MOST_PER_BIN};
 
-/// Doublings of one sample that make the largest bin.
+/// Number of doublings of one sample that give the largest bin.
 const DOUBLINGS: usize = MOST_PER_BIN.ilog2() as usize + 1;
 
-/// `samples` steps: the transition over them and the sum of the outputs at their beginnings.
+/// Stretch of `samples` steps: its transition, and the sum of the outputs at the beginning of each step.
 #[derive(Clone, Copy, Debug)]
 struct Stretch {
     samples: f64,
     transition: Transition,
-    /// Sum of outputs after a unit rate, a unit force, under a unit input.
+    /// Sum of the outputs after a unit rate, after a unit force, and under a unit input.
     sum_v: f64,
     sum_f: f64,
     sum_u: f64,
@@ -89,19 +94,19 @@ impl Stretch {
     }
 }
 
-/// The bins: times relative to the first instant of the window.
+/// Grid of bins. Times are relative to the first instant of the window.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Grid {
     pub(crate) sample_s: f64,
     pub(crate) per_bin: u32,
-    /// Bins of the past that lie before the first one of the window.
+    /// Number of bins of the past before the first bin of the window.
     pub(crate) past_bins: usize,
     /// Absolute time of the first instant of the window (s).
     pub(crate) start_s: f64,
 }
 
 impl Grid {
-    /// Without bins.
+    /// No bins.
     pub(crate) const NONE: Self = Self {
         sample_s: 0.0,
         per_bin: 0,
@@ -110,8 +115,8 @@ impl Grid {
     };
 }
 
-/// What drives the process: its state at the beginning of the past, a constant input from then
-/// on, and a multiple of the recorded input.
+/// What drives the process: initial state at the beginning of the past, a constant input from then on, and a
+/// multiple of the recorded input.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Drive {
     pub(crate) initial: State,
@@ -120,7 +125,7 @@ pub(crate) struct Drive {
 }
 
 impl Drive {
-    /// At rest.
+    /// Nothing: at rest without input.
     pub(crate) const NONE: Self = Self {
         initial: State {
             y: 0.0,
@@ -132,28 +137,28 @@ impl Drive {
     };
 }
 
-/// Bins that are followed in one call; an edge of the input, whose step response costs as much as
-/// [`EDGE_BINS`] of them, counts for so many. See the table in `refine`.
+/// Bins per slice. An edge of the input, whose step response costs as much as [`EDGE_BINS`] bins, counts as that
+/// many. See the table in `refine`.
 pub(crate) const SLICE_BINS: usize = 56;
-/// What an edge costs, in bins: 1,200 operations against 32.
+/// Cost of an edge in bins: 1,200 operations against 32.
 const EDGE_BINS: usize = 40;
 
-/// How far the response to a drive has been followed.
+/// Progress of a response.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Course {
-    /// The next bin, from the beginning of the past, and the next edge.
+    /// Next bin, from the beginning of the past, and next edge.
     index: usize,
     edge: usize,
-    /// Input recorded, and input altogether, before that edge.
+    /// Recorded input and total input before that edge.
     recorded: f64,
     level: f64,
     state: State,
-    /// Sum over the bin and state at its end so far, where it was left before an edge.
+    /// Sum over the bin and state at its end, if the slice ended within the bin.
     open: Option<(f64, State)>,
 }
 
 impl Course {
-    /// Of nothing.
+    /// All zeros: memory before the first use.
     pub(crate) const NONE: Self = Self {
         index: 0,
         edge: 0,
@@ -163,7 +168,7 @@ impl Course {
         open: None,
     };
 
-    /// At the beginning of the past.
+    /// Progress at the beginning of the past.
     pub(crate) fn new(edges: &[Edge], drive: &Drive) -> Self {
         let recorded = edges.first().map_or(0.0, |first| first.input);
         Self {
@@ -177,7 +182,7 @@ impl Course {
     }
 }
 
-/// The process of unit acceleration gain on a grid of bins.
+/// Process with unit acceleration gain on a grid of bins.
 #[derive(Clone, Debug)]
 pub(crate) struct Response {
     body_per_s: f64,
@@ -190,7 +195,7 @@ pub(crate) struct Response {
 }
 
 impl Response {
-    /// Of no process yet: all zeros, which takes no room in the program.
+    /// All zeros, which takes no space in the program: memory before the first use.
     pub(crate) const NONE: Self = Self {
         body_per_s: 0.0,
         prop_per_s: 0.0,
@@ -200,7 +205,7 @@ impl Response {
         bin: Stretch::ZERO,
     };
 
-    /// Becomes that of another process or grid: in place, for it is two kilobytes.
+    /// Sets another process or grid in place, because the value takes two kilobytes.
     pub(crate) fn set(&mut self, process: &Soiptd, grid: &Grid) {
         self.body_per_s = process.inv_t_body_per_s();
         self.prop_per_s = 1.0 / process.t_prop_s();
@@ -228,8 +233,8 @@ impl Response {
         stretch
     }
 
-    /// Mean outputs over the next bins of the window, [`SLICE_BINS`] of them, the samples of bin `k`
-    /// being `offset_s[k]` late on average. True where they are complete.
+    /// Computes the mean outputs over the next [`SLICE_BINS`] bins of the window, where the samples of bin `k`
+    /// are `offset_s[k]` late on average. True when all bins are complete.
     pub(crate) fn follow(
         &self,
         (edges, drive): (&[Edge], &Drive),
@@ -288,7 +293,7 @@ impl Response {
         true
     }
 
-    /// Adds the response to a step of the input `after_s` behind the first instant of a bin.
+    /// Adds the response to a step of the input `after_s` after the first instant of a bin.
     fn add_edge(&self, after_s: f64, step: f64, sum: &mut f64, next: &mut State) {
         let waits = libm::ceil(after_s / self.grid.sample_s);
         let samples = self.grid.per_bin.saturating_sub(waits as u32);

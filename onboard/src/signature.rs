@@ -1,7 +1,7 @@
-//! The shape of one cycle as a vector of fixed length: what a small network reads a process off.
+//! Signature of a cycle: its shape as a vector of fixed length, from which the network reads a process.
 //!
-//! A cycle runs from one rise of the relay's output to the next, `0 <= t < T`. With `y_i` the mean
-//! output in the `i`-th of 32 equal parts of `T`,
+//! A cycle runs from one rise of the relay's output to the next, `0 <= t < T`. With `y_i` the mean output in the
+//! `i`-th of 32 equal parts of `T`:
 //!
 //! ```text
 //! c = mean y_i,   a = (max y_i - min y_i) / 2,   g = sign of the process's gain
@@ -20,47 +20,46 @@
 //! | `T_high/T` | `Cycle::duty`         | 1           |
 //! | `dt`       | `Window::sample_s`    | s           |
 //!
-//! Gain, offset and unit of the output leave `x` as it is, and so does the time scale of process and
-//! samples together; what is left is the ratio of the lags and the delay, the relay's `beta` and the
-//! bias of the input.
+//! `x` does not depend on gain, offset and unit of the output, nor on a common time scale of process and
+//! samples. It depends on the ratios of lags and delay, on the relay's `beta` and on the input bias.
 //!
-//! The relay (its `beta` between -1 and 1) holds the phase of a process of positive gain between
-//! -270 and -90 degrees, so the output is lower while the input is high. Where it is higher, the gain
-//! is negative: `(K, u, y)` and `(-K, u, -y)` have the same `x`.
+//! Sign: with `beta` between -1 and 1 the relay holds the phase of a process of positive gain between -270 and
+//! -90 degrees, so the output is lower while the input is high. If it is higher, the gain is negative: `(K, u,
+//! y)` and `(-K, u, -y)` have the same `x`.
 //!
-//! A bin of the window stands for the time around its samples, half a sample period beyond the first
-//! and the last, and is shared out in proportion where that straddles two parts. Taking the output as
-//! constant in the bin costs at most `w^2 |dy/dt| / (8 W)` for bins of duration `w` and parts of
-//! duration `W`: `25 / n^2` of the amplitude of a sine with `n` bins in a period.
+//! Accuracy: a bin of the window covers the time around its samples, from half a sample period before the first
+//! to half a sample period after the last. If it straddles two parts it is divided in proportion. The output is
+//! taken as constant within the bin, which costs at most `w^2 |dy/dt| / (8 W)` for bins of duration `w` and
+//! parts of duration `W`, that is `25 / n^2` of the amplitude of a sine with `n` bins in a period.
 
 use core::fmt;
 
 use crate::cycle::Cycle;
 use crate::window::{Bin, MOST_PER_BIN, Window};
 
-/// Parts of equal phase that the output is averaged over.
+/// Number of parts of equal phase over which the output is averaged.
 pub(crate) const PARTS: usize = 32;
 
-/// Length of a signature: the shape, the duty and the samples in a period.
+/// Length of a signature: shape, duty, samples in a period.
 pub const LENGTH: usize = PARTS + 2;
 
-/// A part has an output when samples cover this much of it; less is the edge of a neighbour.
+/// Part of a part that samples must cover; less is the edge of a neighbour.
 const LEAST_COVER: f64 = 0.5;
 
-/// An amplitude below this part of the largest mean may be rounding: half an epsilon for every
-/// addition, twice for a difference, with the most samples in a bin.
+/// Relative amplitude below which the output may be rounding only: half an epsilon per addition, twice for a
+/// difference, with the largest number of samples in a bin.
 const FLAT: f64 = f64::EPSILON * MOST_PER_BIN as f64;
 
-/// One normalised cycle. See the [module](self).
+/// Signature of a cycle. See the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Signature {
-    /// The shape in parts of equal phase, the duty, the logarithm of the samples in a period.
+    /// Shape in parts of equal phase, duty, logarithm of the samples in a period.
     pub values: [f32; LENGTH],
     /// Half the peak-to-peak of the parts' mean outputs (output unit).
     pub amplitude: f64,
     /// Mean of the output (output unit).
     pub centre: f64,
-    /// Sign of the process's gain, 1 or -1.
+    /// Sign of the gain of the process, 1 or -1.
     pub sign: f64,
 }
 
@@ -74,16 +73,16 @@ pub enum SignatureError {
     Duty(f64),
     /// The cycle begins before the window or ends after it.
     Outside {
-        /// Where the cycle begins (s).
+        /// Start of the cycle (s).
         start_s: f64,
-        /// Where it ends (s).
+        /// End of the cycle (s).
         end_s: f64,
     },
-    /// A part of the cycle without samples: which.
+    /// A part of the cycle has no samples: its number.
     NoSample(usize),
-    /// A part of the cycle whose mean output is no number: which.
+    /// The mean output of a part of the cycle is not finite: its number.
     NotFinite(usize),
-    /// The output does not move, but for rounding: its amplitude.
+    /// The output is constant up to rounding: its amplitude.
     Flat(f64),
 }
 
@@ -108,7 +107,7 @@ impl fmt::Display for SignatureError {
 impl core::error::Error for SignatureError {}
 
 impl Signature {
-    /// Of no cycle.
+    /// Memory of a signature, all zeros.
     pub(crate) const NONE: Self = Self {
         values: [0.0; LENGTH],
         amplitude: 0.0,
@@ -116,11 +115,11 @@ impl Signature {
         sign: 0.0,
     };
 
-    /// Of a cycle that lies in the window, which may hold more. The cycle's start, period and duty
-    /// are used; its amplitude and centre, those of single samples, are not.
+    /// Signature of a cycle that lies in the window. The window may be longer. Start, period and duty of the
+    /// cycle are used; its amplitude and centre, which are those of single samples, are not.
     ///
     /// # Errors
-    /// Names what the cycle lacks: see [`SignatureError`].
+    /// Why there is no signature: see [`SignatureError`].
     pub fn new<const BINS: usize, const EDGES: usize>(
         window: &Window<BINS, EDGES>,
         cycle: &Cycle,
@@ -170,7 +169,7 @@ fn validate<const BINS: usize, const EDGES: usize>(
     if !(cycle.duty > 0.0 && cycle.duty < 1.0) {
         return Err(SignatureError::Duty(cycle.duty));
     }
-    // From the first sample to where the one after the last would be; half a sample is rounding.
+    // From the first sample to where the sample after the last would be; half a sample is rounding.
     let slack_s = 0.5 * window.sample_s();
     let last = window.bins().last().copied().unwrap_or_default();
     let count = f64::from(last.count.max(1));
@@ -185,24 +184,24 @@ fn validate<const BINS: usize, const EDGES: usize>(
     })
 }
 
-/// Mean output of a bin, counted from the window's first (output unit).
+/// Mean output of a bin, minus the window's first output (output unit).
 fn mean(bin: &Bin) -> f64 {
     bin.output_sum / f64::from(bin.count)
 }
 
-/// What the bins of the window give to a part of the cycle.
+/// Contribution of the window's bins to a part of the cycle.
 #[derive(Clone, Copy, Default)]
 struct Part {
-    /// How much of it is covered, 0 to 1.
+    /// Covered fraction of the part, 0 to 1.
     cover: f64,
-    /// Outputs times what they cover (output unit).
+    /// Sum of outputs times the fraction that each covers (output unit).
     sum: f64,
 }
 
-/// Adds an output from `low` to `high`, counted in parts, to the parts it overlaps.
+/// Adds an output over the interval `low` to `high`, in units of a part, to the parts that it overlaps.
 fn share_out(parts: &mut [Part; PARTS], low: f64, high: f64, output: f64) {
     let low = low.max(0.0);
-    // Beyond the cycle the conversion saturates and nothing is left to add to.
+    // Beyond the cycle the conversion saturates, and no part is left.
     for (index, part) in parts.iter_mut().enumerate().skip(low as usize) {
         let overlap = high.min((index + 1) as f64) - low.max(index as f64);
         if overlap <= 0.0 {
@@ -227,7 +226,7 @@ fn means(parts: &[Part; PARTS]) -> Result<[f64; PARTS], SignatureError> {
     Ok(means)
 }
 
-/// 1 where the output is lower than its mean while the input is high, otherwise -1.
+/// Sign of the gain: 1 if the output is below its mean while the input is high, otherwise -1.
 fn sign_of_gain(means: &[f64; PARTS], centre: f64, duty: f64) -> f64 {
     let high_parts = duty * PARTS as f64;
     let while_high: f64 = (means.iter().enumerate())
@@ -247,18 +246,18 @@ mod tests {
     const PERIOD: usize = 128;
     const SAMPLE_S: f64 = 1.0 / 64.0;
 
-    /// Distance in parts from the triangle's lowest point, 12 parts behind the rise: 0 to 16.
+    /// Distance in parts from the lowest point of the triangle, 12 parts after the rise: 0 to 16.
     fn distance(parts: f64) -> f64 {
         let apart = (parts - 12.0).rem_euclid(32.0);
         apart.min(32.0 - apart)
     }
 
-    /// The triangle, four samples in a part: from -1 to 1, lower in the first half.
+    /// Triangle with four samples in a part, from -1 to 1, lower in the first half.
     fn triangle(sample: usize) -> f64 {
         distance(sample as f64 / 4.0) / 8.0 - 1.0
     }
 
-    /// Cycles of two seconds; the window begins `before` samples before this one.
+    /// Cycle of two seconds; the window begins `before` samples earlier.
     fn cycle(before: usize) -> Cycle {
         Cycle {
             start_s: 8.0 + before as f64 * SAMPLE_S,
@@ -286,9 +285,9 @@ mod tests {
         (0..samples).map(move |sample| (sample, output(sample)))
     }
 
-    // The bends lie between parts, so every part's mean is the output at its middle, distances 0.5,
-    // 1.5, ... 15.5 of 16: mean 8, half peak-to-peak 7.5, x_i = (distance - 8) / 7.5. All sums are
-    // exact in binary; a gain of 2 and an offset of 3 put the amplitude at 2 * 7.5 / 8 = 1.875.
+    // The bends lie between parts, so the mean of every part is the output at its middle, at the distances 0.5,
+    // 1.5, ... 15.5 of 16: mean 8, half peak-to-peak 7.5, x_i = (distance - 8) / 7.5. All sums are exact in
+    // binary. A gain of 2 and an offset of 3 give the amplitude 2 * 7.5 / 8 = 1.875.
     #[test]
     fn a_triangle_is_exact() {
         for gain in [2.0, -2.0] {
@@ -306,8 +305,8 @@ mod tests {
         }
     }
 
-    // What is before and behind the cycle in the window does not count, and samples that stand for
-    // [k - 1/2, k + 1/2] leave only half a sample at either end to the neighbours.
+    // Samples of the window before and after the cycle do not count. A sample covers [k - 1/2, k + 1/2], so at
+    // either end only half a sample comes from the neighbours.
     #[test]
     fn only_the_cycle_counts() {
         let alone = Signature::new(&window::<512>(outputs(triangle, PERIOD + 1)), &cycle(0));
@@ -324,8 +323,8 @@ mod tests {
         assert_eq!(among.centre, 0.0);
     }
 
-    // 25 / n^2 of a sine with n bins in a period; bins of 1, 2, 4, 8 and 16 of 1003 samples, the
-    // widest half a part, and none in step with the parts.
+    // 25 / n^2 for a sine with n bins in a period; bins of 1, 2, 4, 8 and 16 of 1003 samples, the largest half
+    // as long as a part, none aligned with the parts.
     #[test]
     fn resolutions_agree() {
         fn sine<const BINS: usize>() -> ([f32; LENGTH], f64) {
@@ -355,7 +354,7 @@ mod tests {
         }
     }
 
-    // The cycle takes samples 0 to 127, and the sample at its end is half a sample's worth.
+    // The cycle covers samples 0 to 127, and the sample at its end with half its width.
     #[test]
     fn a_cycle_outside_is_refused() {
         let samples = |count| window::<512>(outputs(triangle, count));
@@ -384,8 +383,8 @@ mod tests {
         );
     }
 
-    // Samples 41 to 45 are lost: part 10 is samples 40 to 44, half of the two at its ends, so an
-    // eighth of it is left; part 11, samples 44 to 48, keeps 46, 47 and half of 48: five eighths.
+    // Samples 41 to 45 are missing: part 10 covers samples 40 to 44 with half of the two at its ends, so an
+    // eighth is left; part 11, samples 44 to 48, keeps 46, 47 and half of 48: five eighths.
     #[test]
     fn a_part_without_samples_is_refused() {
         let lost = outputs(triangle, 200).filter(|(k, _)| !(41..46).contains(k));
@@ -397,7 +396,7 @@ mod tests {
         assert!(Signature::new(&window::<512>(fewer), &cycle(0)).is_ok());
     }
 
-    // A constant that differs from the window's first output has means off by rounding only.
+    // The means of a constant that differs from the window's first output differ by rounding only.
     #[test]
     fn a_flat_output_is_refused() {
         fn refused<const BINS: usize>(window: &Window<BINS, 4>, cycle: &Cycle) -> bool {

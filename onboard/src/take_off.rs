@@ -1,25 +1,32 @@
-//! The integrator that lifts a vehicle which has no controller yet: the paper's equation 17.
+//! Take-off: integrator that lifts a vehicle without a controller (equation 17 of the paper).
 //!
 //! ```text
-//! u_i(t) = k_i integral (r - y) dt    while y < r and dy/dt < the climb allowed
+//! u_i(t) = k_i integral (r - y) dt    while y < r and dy/dt < climb
 //! u_i(t) = u_i(t-)                    otherwise
 //! ```
 //!
-//! The paper writes "or" between the two conditions. With it the integral grows all the way up, however
-//! fast the climb, and the vehicle shoots over; with "and" it stands still as soon as the vehicle has left the
-//! ground, at about what holds it less the relay's amplitude (`docs/decisions/0013-tuner.md`).
+//! | symbol | name    | unit                        |
+//! |--------|---------|-----------------------------|
+//! | u_i    | returned| input unit                  |
+//! | k_i    | `gain`  | input unit / (output unit s)|
+//! | climb  | `climb` | output unit / s             |
+//! | r, y   | `error` is `r - y` | output unit      |
+//!
+//! The paper writes "or" between the two conditions. Then the integral would grow during the whole climb, and
+//! the vehicle would overshoot. With "and" it stops when the vehicle has left the ground, close to the thrust of
+//! hover minus the amplitude of the relay (`docs/decisions/0013-tuner.md`).
 
-/// How the integrator lifts.
+/// Settings of the take-off.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TakeOffSettings {
     /// Gain of the integrator, `k_i`: input unit / (output unit s).
     pub gain: f32,
-    /// Rate of the output above which it waits (output unit / s).
+    /// Rate of the output above which the integrator holds (output unit / s).
     pub climb: f32,
 }
 
 impl TakeOffSettings {
-    /// The first setting that is not positive and finite: its name and value.
+    /// The first setting that is not positive and finite: name and value.
     pub(crate) fn out_of_range(&self) -> Option<(&'static str, f32)> {
         [
             ("the integrator's gain", self.gain),
@@ -30,7 +37,7 @@ impl TakeOffSettings {
     }
 }
 
-/// The integral at the next tick (input unit).
+/// Integral at the next tick (input unit).
 #[inline]
 pub(crate) fn lift(
     settings: &TakeOffSettings,
@@ -50,7 +57,7 @@ pub(crate) fn lift(
 mod tests {
     use super::*;
 
-    // 0.5 a second for each unit of error: 0.25 + 0.5 * 2 * 0.25 = 0.5, exact in binary.
+    // 0.5 per second and unit of error: 0.25 + 0.5 * 2 * 0.25 = 0.5, exact in binary.
     #[test]
     fn it_lifts_below_the_reference_and_waits_while_climbing() {
         let settings = TakeOffSettings {

@@ -1,15 +1,17 @@
-//! Exact step of the undelayed process while its input is constant.
+//! Exact transition of the process without delay while its input is constant.
 //!
-//! State of `K/T_body = 1`: output `y`, rate `v`, force `f` (the actuator's output):
+//! State for `K/T_body = 1`: output `y`, rate `v`, force `f` (the output of the actuator):
 //!
 //! ```text
 //! dy/dt = v,   dv/dt = f - v/T_body,   df/dt = (u - f)/T_prop
 //! ```
 //!
-//! The matrix exponential of this chain holds the divided differences of `exp` at the nodes
-//! `0, 0, -d/T_body, -d/T_prop` (Opitz's formula), so nothing is singular where the lags are equal
-//! or where damping vanishes. It is taken by scaling and squaring: all entries are sums and
-//! products of positive numbers, hence accurate to a few ulps each, however small.
+//! The matrix exponential over a duration `d` contains the divided differences of `exp` at `0, 0, -d/T_body,
+//! -d/T_prop` (Opitz's formula), so nothing is singular where the lags are equal or where damping vanishes. It
+//! is computed by scaling and squaring. All entries are sums and products of positive numbers, so each is
+//! accurate to a few roundings, however small it is.
+//!
+//! Reference: N. J. Higham, "Functions of Matrices" (SIAM 2008), chapters 4 and 10.
 
 use libm::{exp, frexp, ldexp};
 
@@ -18,17 +20,17 @@ use crate::process::Soiptd;
 /// State of the process with unit acceleration gain, or its response to one of its inputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct State {
-    /// Output (output unit, per unit of acceleration gain).
+    /// Output (output unit per unit of acceleration gain).
     pub y: f64,
-    /// Rate of the output (1/s of it).
+    /// Rate of the output (the unit of `y` per second).
     pub v: f64,
-    /// Force: the input behind the actuator's lag (input unit).
+    /// Force: output of the actuator's lag (input unit).
     pub f: f64,
 }
 
-/// `state(t + d) = transition * state(t) + input column * u`, for one duration `d`.
+/// Transition over a duration `d`: `state(t + d) = matrix * state(t) + column * u`.
 ///
-/// Row `y`: `1, y_v, y_f | y_u`; row `v`: `0, v_v, v_f | v_u`; row `f`: `0, 0, f_f | f_u`.
+/// Rows of `matrix | column`. `y`: `1, y_v, y_f | y_u`; `v`: `0, v_v, v_f | v_u`; `f`: `0, 0, f_f | f_u`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Transition {
     /// Output after a unit rate.
@@ -50,7 +52,7 @@ pub struct Transition {
 }
 
 impl Transition {
-    /// No time passes.
+    /// Transition over no time.
     pub const IDENTITY: Self = Self {
         y_v: 0.0,
         y_f: 0.0,
@@ -62,7 +64,7 @@ impl Transition {
         f_u: 0.0,
     };
 
-    /// Nothing is left of any state.
+    /// All zeros: memory before the first use.
     pub(crate) const ZERO: Self = Self {
         y_v: 0.0,
         y_f: 0.0,
@@ -74,7 +76,7 @@ impl Transition {
         f_u: 0.0,
     };
 
-    /// Over `duration_s >= 0` of the process (its gain and delay play no part).
+    /// Transition over `duration_s >= 0` of the process. Its gain and delay have no influence.
     #[must_use]
     pub fn over(process: &Soiptd, duration_s: f64) -> Self {
         Self::of_poles(
@@ -84,10 +86,10 @@ impl Transition {
         )
     }
 
-    /// Over `duration_s` with the poles `-body`, `-prop` (1/s), both non-negative.
+    /// Transition over `duration_s` with the poles `-body` and `-prop` (1/s), both not negative.
     #[must_use]
     pub fn of_poles(body: f64, prop: f64, duration_s: f64) -> Self {
-        // Scale until the fastest pole moves by at most 1/4, then square back.
+        // Scale until the fastest pole moves by at most 1/4, then square.
         let (_, exponent) = frexp(body.max(prop) * duration_s);
         let squarings = (exponent + 2).max(0);
         let mut step = Self::taylor(body, prop, ldexp(duration_s, -squarings));
@@ -97,7 +99,7 @@ impl Transition {
         step
     }
 
-    /// Taylor series of the chain shifted by its fastest pole, so that no term is negative.
+    /// Taylor series of the chain, shifted by its fastest pole so that no term is negative.
     fn taylor(body: f64, prop: f64, d: f64) -> Self {
         let shift = body.max(prop);
         // Diagonal of the shifted matrix times d, in the order y, v, f, u.
@@ -112,7 +114,7 @@ impl Transition {
         // Terms fall by at least 1/4 / n: after 14 they are below 1e-19 of the sum.
         for n in 1..=14 {
             let inverse = 1.0 / f64::from(n);
-            // Each new row entry: old entry times its diagonal, plus its left neighbour's step.
+            // New entry of a row: old entry times its diagonal, plus the step from its left neighbour.
             (yu, yf, yv, yy) = (
                 (yu * du + yf * prop * d) * inverse,
                 (yf * df + yv * d) * inverse,
@@ -150,7 +152,7 @@ impl Transition {
         }
     }
 
-    /// This duration followed by `next`'s, the input constant throughout.
+    /// This duration followed by that of `next`, with the same input throughout.
     #[must_use]
     pub fn then(&self, next: &Self) -> Self {
         let end = |y: f64, v: f64, f: f64, u: f64| next.apply(&State { y, v, f }, u);
@@ -169,7 +171,7 @@ impl Transition {
         }
     }
 
-    /// State after the duration, under the constant input `u`.
+    /// State after the duration under the constant input `u`.
     #[must_use]
     #[inline]
     pub fn apply(&self, state: &State, u: f64) -> State {
@@ -180,7 +182,7 @@ impl Transition {
         }
     }
 
-    /// State after the duration from rest under a unit input: the step response.
+    /// Step response: state after the duration from rest under a unit input.
     #[must_use]
     pub fn step_response(&self) -> State {
         State {
@@ -202,8 +204,8 @@ mod tests {
         );
     }
 
-    // By partial fractions, which hold away from equal lags: with a = 1/T_body, p = 1/T_prop,
-    // E(q) = (1 - e^(-q d))/q, step response of the rate: E(a) - (e^(-a d) - e^(-p d))/(p - a).
+    // Partial fractions, valid away from equal lags: with a = 1/T_body, p = 1/T_prop and E(q) = (1 - e^(-q d))/q
+    // the step response of the rate is E(a) - (e^(-a d) - e^(-p d))/(p - a).
     #[test]
     fn agrees_with_partial_fractions() {
         for (a, p, d) in [
@@ -227,8 +229,8 @@ mod tests {
         }
     }
 
-    // Double integrator with lag, by hand: with x = d/T, f_u = 1 - e^-x, v_u = T (x - 1 + e^-x),
-    // y_u = T^2 (x^2/2 - x + 1 - e^-x); x = 1: 1 - 1/e, 1/e, 1/2 - 1/e.
+    // Double integrator with lag by hand: with x = d/T, f_u = 1 - e^-x, v_u = T (x - 1 + e^-x) and y_u = T^2
+    // (x^2/2 - x + 1 - e^-x). For x = 1: 1 - 1/e, 1/e, 1/2 - 1/e.
     #[test]
     fn double_integrator_by_hand() {
         let t = Transition::of_poles(0.0, 10.0, 0.1);
@@ -239,8 +241,7 @@ mod tests {
         assert_close(t.y_v, 0.1, 1e-15, "y_v");
     }
 
-    // Equal lags, by hand: p = 1, d = 1: v_f = d e^-d = 1/e, y_f = 1 - 2/e,
-    // v_u = 1 - 2/e, y_u = 3/e - 1.
+    // Equal lags by hand: for p = 1 and d = 1, v_f = d e^-d = 1/e, y_f = 1 - 2/e, v_u = 1 - 2/e, y_u = 3/e - 1.
     #[test]
     fn equal_lags_by_hand() {
         let t = Transition::of_poles(1.0, 1.0, 1.0);
@@ -253,8 +254,8 @@ mod tests {
 
     #[test]
     fn nothing_jumps_where_the_lags_meet() {
-        // Central difference over the meeting point: the response is smooth in the pole, so the
-        // middle value is the mean of its neighbours to second order, 1e-12 here.
+        // The response is smooth in the pole, so the value where the lags meet is the mean of its neighbours to
+        // second order, 1e-12 here.
         let at = |p: f64| Transition::of_poles(4.0, p, 0.7).y_u;
         assert_close(
             at(4.0),

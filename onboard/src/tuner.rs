@@ -1,21 +1,23 @@
-//! The switch from identification to control in flight: the paper's figure 1.
+//! Tuner of one axis in flight: from the safe controller through the relay test to the new controller (figure 1
+//! of the paper).
 //!
 //! | phase    | output                            | leaves when                                       | to       |
 //! |----------|-----------------------------------|---------------------------------------------------|----------|
-//! | Idle     | safe controller                   | [`Core::start`]                                  | TakeOff, or Relay without one |
+//! | Idle     | safe controller                   | [`TunerCore::start`]                              | TakeOff if set, else Relay |
 //! | TakeOff  | integrator and relay (eq. 17)     | the relay has switched twice about the reference  | Relay    |
-//! | Relay    | offset and relay                  | the cycles asked for are complete and steady      | Identify |
-//! | Identify | offset and relay, slices each tick | a controller has been found                       | Control  |
+//! | Relay    | offset and relay                  | the cycles are complete and steady                | Identify |
+//! | Identify | offset and relay; some slices of work per tick | a controller has been found          | Control  |
 //! |          |                                   | the cycles were refused and attempts are left     | Relay    |
-//! | Control  | the controller that was found     | (stays; proven when the response was as predicted)|          |
-//! | Aborted  | safe controller                   | [`Core::reset`]                                  | Idle     |
+//! | Control  | controller found                  | (stays; proven when the response was as predicted)|          |
+//! | Aborted  | safe controller                   | [`TunerCore::reset`]                              | Idle     |
 //!
-//! Every phase of a test goes to Aborted in the tick in which the guard says so ([`Abort`](crate::guard::Abort) has the
-//! reasons), and that tick's output is the safe controller's. Until the new controller has proven itself
-//! (predicted, then checked) the reference is that of the start; with a bias filter it is where the safe
-//! controller held the process, so that the relay begins at rest however far off that was.
+//! Every phase of a test changes to Aborted in the tick in which the guard finds a reason
+//! ([`Abort`](crate::guard::Abort)), and the output of that tick is that of the safe controller. Until the new
+//! controller has proven itself, the reference is that of the start of the test. With a bias filter it is the
+//! mean output under the safe controller, so that the relay begins at rest even if the safe controller has a
+//! steady-state error.
 //!
-//! One tick is bounded work without a heap; samples that are no numbers are never passed on.
+//! The work per tick is bounded, there is no heap, and samples that are not finite are never used.
 
 mod core;
 mod settings;
@@ -26,29 +28,29 @@ use crate::control::Measurement;
 use crate::identification::Workspace;
 use crate::pack::Pack;
 
-pub use self::core::Core;
+pub use self::core::TunerCore;
 pub use self::settings::{CheckedSettings, TunerError, TunerSettings};
 pub use crate::take_off::TakeOffSettings;
 
-/// What a tuner is doing.
+/// Phase of a tuner. Exhaustive, because the C interface has a code for each phase.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TunerPhase {
-    /// Nothing yet: the safe controller.
+    /// The safe controller runs; no test has begun.
     Idle,
-    /// Lifting the vehicle from the ground.
+    /// The vehicle is lifted from the ground.
     TakeOff,
-    /// Exciting the oscillation.
+    /// The relay excites the oscillation.
     Relay,
-    /// Finding process and controller from it while it goes on.
+    /// Process and controller are computed while the oscillation continues.
     Identify,
-    /// Flying the controller that was found.
+    /// The controller found runs.
     Control,
-    /// The test has ended in the safe controller.
+    /// The test has ended; the safe controller runs.
     Aborted,
 }
 
 impl TunerPhase {
-    /// Its name, for logs.
+    /// Name, for logs.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -62,17 +64,17 @@ impl TunerPhase {
     }
 }
 
-/// The tuner of one axis. See the [module](self).
+/// Tuner of one axis. See the [module](self).
 pub struct Tuner<'a> {
-    core: Core<'a>,
-    room: Workspace,
+    core: TunerCore<'a>,
+    workspace: Workspace,
 }
 
 impl Tuner<'static> {
-    /// With the pack that is built in.
+    /// A tuner with the embedded pack.
     ///
     /// # Errors
-    /// Names the setting that is out of range.
+    /// The first setting that is out of range.
     pub fn new(settings: &TunerSettings) -> Result<Self, TunerError> {
         let pack = Pack::embedded().map_err(|_| TunerError::Pack)?;
         Self::with_pack(settings, pack)
@@ -80,36 +82,36 @@ impl Tuner<'static> {
 }
 
 impl<'a> Tuner<'a> {
-    /// With a pack of one's own.
+    /// A tuner with another pack.
     ///
     /// # Errors
-    /// Names the setting that is out of range.
+    /// The first setting that is out of range.
     pub fn with_pack(settings: &TunerSettings, pack: Pack<'a>) -> Result<Self, TunerError> {
         Ok(Self {
-            core: Core::of(&settings.checked()?, pack),
-            room: Workspace::NEW,
+            core: TunerCore::of(&settings.checked()?, pack),
+            workspace: Workspace::NEW,
         })
     }
 
-    /// One tick: time (s), what the sensor says, where the output should be (output unit). Returns the
-    /// input to hold until the next tick (input unit), always finite and within the limits.
+    /// One tick. Takes time (s), measurement and reference (output unit); returns the input to hold until the
+    /// next tick (input unit), which is always finite and within the limits.
     #[inline]
     pub fn step(&mut self, time_s: f64, measurement: &Measurement, reference: f32) -> f32 {
         self.core
-            .step(&mut self.room, time_s, measurement, reference)
+            .step(&mut self.workspace, time_s, measurement, reference)
     }
 }
 
 impl<'a> Deref for Tuner<'a> {
-    type Target = Core<'a>;
+    type Target = TunerCore<'a>;
 
-    fn deref(&self) -> &Core<'a> {
+    fn deref(&self) -> &TunerCore<'a> {
         &self.core
     }
 }
 
 impl<'a> DerefMut for Tuner<'a> {
-    fn deref_mut(&mut self) -> &mut Core<'a> {
+    fn deref_mut(&mut self) -> &mut TunerCore<'a> {
         &mut self.core
     }
 }

@@ -1,15 +1,20 @@
-//! The window that is fitted: outputs averaged into bins, and the edges of the input.
+//! Window of a fit: outputs averaged into bins, and the edges of the input.
 //!
-//! Fixed size whatever its length: when the bins are full, neighbours are added in pairs and each
-//! bin holds twice the samples. A bin keeps the sum of its samples and of their deviations from
-//! the even grid, so the model's mean over the very same instants can be compared with it.
+//! ```text
+//! bin k:   sum of y(t_i) - y(t_0)   and   sum of t_i - t_start   over the samples of `per_bin` instants
+//! edges:   (time, input from then on)
+//! ```
+//!
+//! Times are in seconds, `y` in output units, inputs in input units. The memory is fixed: when all bins are in
+//! use, neighbours are added in pairs, and each bin then holds twice as many samples. A bin keeps the sum of the
+//! sample times, so that the model is averaged over the same times as the measurement.
 
-/// A time and the value of the input from then on.
+/// Change of the input: a time and the input from then on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Edge {
-    /// When the input changes (s).
+    /// Time of the change (s).
     pub time_s: f64,
-    /// What it changes to (input unit).
+    /// Input from then on (input unit).
     pub input: f64,
 }
 
@@ -20,14 +25,14 @@ impl Edge {
     };
 }
 
-/// The samples at `per_bin` consecutive instants of the even grid, as far as they are there.
+/// Samples at `per_bin` consecutive instants of the even grid; some may be missing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bin {
-    /// Samples in the bin.
+    /// Number of samples in the bin.
     pub count: u32,
-    /// Sum of the outputs, less the window's first (output unit).
+    /// Sum of the outputs, each minus the window's first output (output unit).
     pub output_sum: f64,
-    /// Sum of the samples' times since the window's start (s).
+    /// Sum of the sample times, each since the start of the window (s).
     pub time_sum_s: f64,
 }
 
@@ -43,17 +48,17 @@ impl Bin {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum WindowError {
-    /// More edges of the input than the window holds.
+    /// There are more edges of the input than the window holds: its capacity.
     TooManyEdges(usize),
 }
 
-/// Rows of its equations that the estimator keeps for what is known beforehand.
+/// Rows of the least-squares problem that are reserved for prior knowledge.
 pub(crate) const KNOWN_ROWS: usize = 5;
 
-/// Most instants in a bin; samples beyond what the bins then hold are ignored.
+/// Maximum number of instants in a bin; samples beyond the bins' capacity are ignored.
 pub(crate) const MOST_PER_BIN: u32 = 1 << 20;
 
-/// Up to `BINS - 5` bins and `EDGES` edges; `BINS` of at least 7.
+/// Window of up to `BINS - 5` bins and `EDGES` edges. `BINS` must be at least 7.
 #[derive(Clone, Debug)]
 pub struct Window<const BINS: usize, const EDGES: usize> {
     sample_s: f64,
@@ -71,10 +76,10 @@ pub struct Window<const BINS: usize, const EDGES: usize> {
 }
 
 impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
-    /// Bins to fill.
+    /// Number of bins available for samples.
     const ROOM: usize = BINS - KNOWN_ROWS;
 
-    /// An empty window of samples every `sample_s`, the first at `start_s`.
+    /// An empty window for samples every `sample_s`, the first at `start_s`.
     #[must_use]
     pub fn new(start_s: f64, sample_s: f64) -> Self {
         Self::of_groups(start_s, sample_s, 1)
@@ -88,7 +93,7 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         window
     }
 
-    /// Room for a window, all zeros: it takes nothing until [`Window::begin`].
+    /// Memory of a window, all zeros. It accepts no samples until [`Window::begin`].
     pub const NONE: Self = Self {
         sample_s: 0.0,
         start_s: 0.0,
@@ -103,13 +108,13 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         noise: NoiseMeter::NONE,
     };
 
-    /// Empty, as [`Window::new`], but where it lies.
+    /// Empties the window in place; otherwise like [`Window::new`].
     pub fn begin(&mut self, start_s: f64, sample_s: f64) {
         self.bins.fill(Bin::NONE);
         self.set(start_s, sample_s, 1);
     }
 
-    /// All but the bins, which are empty.
+    /// Sets everything but the bins, which must be empty.
     fn set(&mut self, start_s: f64, sample_s: f64, group: u32) {
         self.start_s = start_s;
         self.sample_s = sample_s;
@@ -121,11 +126,11 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         self.noise = NoiseMeter::NONE;
     }
 
-    /// The input from `time_s` on; times must not decrease. The first value is taken to have been
-    /// there for ever: give the window's past too, a period of it if there is one.
+    /// Sets the input from `time_s` on; times must not decrease. The first value is assumed to have been there
+    /// since ever, so add the past of the window too: one period or more.
     ///
     /// # Errors
-    /// [`WindowError::TooManyEdges`] when there is no room.
+    /// [`WindowError::TooManyEdges`] if there is no space for another edge.
     pub fn push_input(&mut self, time_s: f64, input: f64) -> Result<(), WindowError> {
         if self.edges().last().is_some_and(|edge| edge.input == input) {
             return Ok(());
@@ -138,8 +143,8 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         Ok(())
     }
 
-    /// The output at `time_s`, or its mean over the group of samples that begins there; times
-    /// before the start are ignored.
+    /// Adds the output at `time_s`, or its mean over the group of samples that begins there. Times before the
+    /// start are ignored.
     pub fn push_output(&mut self, time_s: f64, output: f64) {
         let first_output = *self.first_output.get_or_insert(output);
         let since_s = time_s - self.start_s;
@@ -193,13 +198,13 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         self.start_s
     }
 
-    /// Instants of the even grid in a bin.
+    /// Number of instants of the even grid per bin.
     #[must_use]
     pub fn per_bin(&self) -> u32 {
         self.per_bin
     }
 
-    /// The bins, in order; a bin without samples is in a gap.
+    /// The bins in order. A bin without samples lies in a gap.
     #[must_use]
     pub fn bins(&self) -> &[Bin] {
         &self.bins[..self.used]
@@ -211,16 +216,16 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
         &self.edges[..self.edge_count]
     }
 
-    /// Output that the bins' sums are counted from (output unit).
+    /// Output that is subtracted from all outputs in the bins (output unit).
     #[must_use]
     pub fn first_output(&self) -> f64 {
         self.first_output.unwrap_or(0.0)
     }
 
-    /// Standard deviation of white noise on a sample, from third differences (output unit).
+    /// Standard deviation of the white noise of one sample, from third differences (output unit).
     #[must_use]
     pub fn noise_sigma(&self) -> f64 {
-        // The mean of a group has its variance divided by the group's size.
+        // The variance of a mean is that of a sample divided by the size of the group.
         self.noise.sigma() * libm::sqrt(f64::from(self.group))
     }
 
@@ -231,12 +236,12 @@ impl<const BINS: usize, const EDGES: usize> Window<BINS, EDGES> {
     }
 }
 
-/// White noise has third differences of twenty times its variance; the output of a process with
-/// three integrations under a relay has next to none.
+/// Noise meter: third differences of white noise have twenty times its variance. Those of the output of three
+/// integrations under a relay are negligible.
 #[derive(Clone, Copy, Debug, Default)]
 struct NoiseMeter {
     last: [f64; 3],
-    /// Samples since the last gap, up to three.
+    /// Number of samples since the last gap, up to three.
     seen: u32,
     differences: u32,
     sum_of_squares: f64,
@@ -262,7 +267,7 @@ impl NoiseMeter {
         self.last = [output, a, b];
     }
 
-    /// Differences do not reach across a gap.
+    /// Starts anew after a gap: no difference spans it.
     fn restart(&mut self) {
         self.seen = 0;
     }
@@ -277,7 +282,7 @@ impl NoiseMeter {
 mod tests {
     use super::*;
 
-    /// Outputs 0, 1, 4, 9, ... at samples of 1/1024 s from 2 s on: all sums exact in binary.
+    /// Outputs 0, 1, 4, 9, ... at samples of 1/1024 s from 2 s on: all sums are exact in binary.
     fn squares<const BINS: usize>(samples: usize) -> Window<BINS, 4> {
         let mut window = Window::new(2.0, 1.0 / 1024.0);
         for k in 0..samples {
@@ -286,14 +291,14 @@ mod tests {
         window
     }
 
-    // Sums of the samples of every bin, whatever merging came before: an odd and an even number of
-    // bins, and as many samples as make the last bin whole, begun or single.
+    // The sums of every bin, after any number of merges: an odd and an even number of bins, and numbers of
+    // samples that leave the last bin full, started or with a single sample.
     #[test]
     fn merging_keeps_every_sum() {
         fn check<const BINS: usize>(samples: usize) {
             let window = squares::<BINS>(samples);
             let per_bin = window.per_bin() as usize;
-            // The least power of two that leaves the rows kept free.
+            // The least power of two that leaves the reserved rows free.
             let needed = samples.div_ceil(BINS - KNOWN_ROWS).next_power_of_two();
             assert_eq!(per_bin, needed);
             assert_eq!(window.bins().len(), samples.div_ceil(per_bin));
@@ -314,7 +319,7 @@ mod tests {
         }
     }
 
-    // Means over groups of four samples stand for the samples themselves.
+    // Means over groups of four samples give the same bins as the samples.
     #[test]
     fn groups_are_their_samples() {
         let samples = 256;
@@ -343,7 +348,7 @@ mod tests {
         for k in (0..10).chain(40..60) {
             window.push_output(f64::from(k), 1.0);
         }
-        // 60 instants in 15 bins of 4: bins 0 and 1 full, 2 half full, 3..10 empty.
+        // 60 instants in 15 bins of 4: bins 0 and 1 full, bin 2 half full, bins 3 to 9 empty.
         let counts = [4, 4, 2, 0, 0, 0, 0, 0, 0, 0, 4, 4, 4, 4, 4];
         assert_eq!(window.per_bin(), 4);
         assert!(window.bins().iter().map(|bin| bin.count).eq(counts));
@@ -381,10 +386,10 @@ mod tests {
         (*state >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
     }
 
-    // Third differences of white noise have the autocovariances 20, -15, 6, -1: the mean of n squares
-    // has a relative variance of (2 (400 + 2 (225 + 36 + 1)) / 400 + kurtosis) / n, the excess kurtosis
-    // of uniform noise -1.2, of a mean of five -0.24; sigma has half that relative error:
-    // 1.05 / sqrt(n), three of which are 1 % here.
+    // Third differences of white noise have the autocovariances 20, -15, 6, -1. The mean of n squares has a
+    // relative variance of (2 (400 + 2 (225 + 36 + 1)) / 400 + kurtosis) / n, where the excess kurtosis of
+    // uniform noise is -1.2 and that of a mean of five -0.24. Sigma has half that relative error: 1.05 /
+    // sqrt(n), three of which are 1 % here.
     #[test]
     fn white_noise_is_measured() {
         let expected = libm::sqrt(1.0 / 3.0);
@@ -403,8 +408,8 @@ mod tests {
         }
     }
 
-    // Third differences of A sin(w t) are A (w dt)^3: at 400 samples a period 3.9e-6 A, over
-    // sqrt(20) and a root mean square of 1/sqrt(2): 6.13e-7 A.
+    // Third differences of A sin(w t) are A (w dt)^3: 3.9e-6 A at 400 samples a period, divided by sqrt(20) and
+    // as root mean square by sqrt(2): 6.13e-7 A.
     #[test]
     fn a_smooth_oscillation_has_next_to_no_noise() {
         let mut window = Window::<67, 4>::new(0.0, 1e-3);
@@ -419,7 +424,7 @@ mod tests {
         );
     }
 
-    // 1e15 instants in 15 bins would take 2^46 a bin, more than the count can hold.
+    // 1e15 instants in 15 bins would need 2^46 per bin, more than the counter holds.
     #[test]
     fn a_time_far_ahead_is_survived() {
         let mut window = Window::<19, 4>::new(0.0, 1e-3);
@@ -428,7 +433,7 @@ mod tests {
         assert!(window.per_bin() > 0);
     }
 
-    // A smooth oscillation with every tenth sample missing has no noise.
+    // A smooth oscillation with every tenth sample missing shows no noise.
     #[test]
     fn lost_samples_are_no_noise() {
         let mut window = Window::<67, 4>::new(0.0, 1e-3);

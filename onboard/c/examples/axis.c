@@ -1,9 +1,9 @@
-/* Tunes one simulated axis: the altitude of a quadrotor held by a poor controller, its sensor noisy, its
- * hover thrust not quite the one assumed.
+/* Tunes one simulated axis: the altitude of a quadrotor under a poor controller, with a noisy sensor and a small
+ * error of the assumed hover thrust.
  *
  *     cc -std=c99 -O2 -ffp-contract=off axis.c libonecycle.a -o axis && ./axis
  *
- * With an argument it also writes the bits of every tick's output to standard output, a line each.
+ * With an argument it also writes the bits of the output of every tick to standard output, one line each.
  */
 #include <math.h>
 #include <stdint.h>
@@ -70,7 +70,7 @@ int main(int count, char **arguments)
     settings.bias_filter_s = 1.0f;
     onecycle_status status = onecycle_tuner_init(&tuner, &settings);
     if (status != ONECYCLE_STATUS_OK) {
-        fprintf(stderr, "the settings are wrong: status %d\n", (int)status);
+        fprintf(stderr, "settings rejected: status %d\n", (int)status);
         return 1;
     }
 
@@ -93,7 +93,7 @@ int main(int count, char **arguments)
 
     onecycle_result result;
     if (!onecycle_tuner_result(&tuner, &result) || !result.is_proven) {
-        fprintf(stderr, "no controller: phase %d, reason %d\n", (int)onecycle_tuner_phase(&tuner),
+        fprintf(stderr, "no controller found: phase %d, reason %d\n", (int)onecycle_tuner_phase(&tuner),
                 (int)onecycle_tuner_reason(&tuner));
         return 1;
     }

@@ -1,7 +1,7 @@
-//! The tuner for firmware in C. `onecycle.h` is generated from this file.
+//! C interface of the tuner for firmware. `onecycle.h` is generated from this file.
 //!
-//! `unsafe` stands here and where a program begins on a bare board, nowhere else: at the border to C,
-//! pointers are what the caller says they are. Everything behind it is safe code; nothing here computes.
+//! Only this crate and the entry point of a bare board use `unsafe`, because pointers from C are unchecked. The
+//! code behind the interface is safe; nothing is computed here.
 #![no_std]
 
 mod settings;
@@ -12,22 +12,22 @@ use onecycle_onboard::control::Measurement;
 use onecycle_onboard::guard::Abort;
 use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::{Core, TunerError, TunerPhase};
+use onecycle_onboard::tuner::{TunerCore, TunerError, TunerPhase};
 
 pub use self::settings::{OnecycleSettings, OnecycleStatus};
 
-/// Memory of a tuner, in words of eight bytes: what it takes on 64-bit machines, the largest.
+/// Size of a tuner in words of eight bytes, for 64-bit machines, where it is largest.
 pub const ONECYCLE_TUNER_WORDS: usize = 3700;
 
-/// Marks memory that holds a tuner: "ONECYCLE".
+/// Mark of memory that holds a tuner: "ONECYCLE".
 const ALIVE: u64 = u64::from_le_bytes(*b"ONECYCLE");
 
-/// What the memory holds once it is a tuner's.
+/// Layout of the memory of a tuner.
 #[repr(C)]
 struct Placed {
     alive: u64,
-    core: MaybeUninit<Core<'static>>,
-    room: MaybeUninit<Workspace>,
+    core: MaybeUninit<TunerCore<'static>>,
+    workspace: MaybeUninit<Workspace>,
 }
 
 const _: () = assert!(
@@ -35,75 +35,74 @@ const _: () = assert!(
         && align_of::<Placed>() <= align_of::<OnecycleTuner>()
 );
 
-/// Memory for one tuner: static, or wherever the caller has room. Its contents are no business of the
-/// caller's.
+/// Memory for one tuner, static or anywhere else. Its contents are private.
 #[repr(C)]
 pub struct OnecycleTuner {
-    /// The tuner.
+    /// Private.
     pub memory: [u64; ONECYCLE_TUNER_WORDS],
 }
 
-/// What the sensor says at a tick.
+/// Measurement at one tick.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct OnecycleMeasurement {
-    /// The output (output unit).
+    /// Output of the process (output unit).
     pub value: f32,
-    /// Its rate, where has_rate (output unit / s).
+    /// Rate of the output (output unit / s), valid if has_rate.
     pub rate: f32,
-    /// How old both are (s).
+    /// Age of value and rate (s).
     pub age_s: f32,
-    /// Whether the rate is measured; otherwise it is found from differences.
+    /// Whether the rate is measured. If not, it is computed from differences of the value.
     pub has_rate: bool,
 }
 
-/// What a tuner is doing.
+/// Phase of a tuner.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub enum OnecyclePhase {
-    /// There is no tuner in this memory.
+    /// The memory holds no tuner.
     None,
-    /// Nothing yet: the safe controller.
+    /// The safe controller runs; no test has begun.
     Idle,
-    /// Lifting the vehicle from the ground.
+    /// The vehicle is lifted from the ground.
     TakeOff,
-    /// Exciting the oscillation.
+    /// The relay excites the oscillation.
     Relay,
-    /// Finding process and controller from it while it goes on.
+    /// Process and controller are computed while the oscillation continues.
     Identify,
-    /// Flying the controller that was found.
+    /// The controller found runs.
     Control,
-    /// The test has ended in the safe controller.
+    /// The test has ended; the safe controller runs.
     Aborted,
 }
 
-/// Why a test was aborted.
+/// Reason of an abort.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub enum OnecycleReason {
-    /// It was not.
+    /// The test was not aborted.
     None,
-    /// The operator said so.
+    /// The operator aborted the test.
     Operator,
-    /// A time, a reference or a measurement that is no finite number.
+    /// A time, a reference or a measurement is not finite.
     NotFinite,
-    /// A sample too old, ticks too far apart, or time that does not go on.
+    /// A sample is too old, ticks are too far apart, or the timestamp did not increase.
     Stale,
-    /// The output was too far from the reference.
+    /// The output is too far from the reference.
     Excursion,
-    /// The output moved too fast.
+    /// The output moves too fast.
     Rate,
-    /// The test took too long.
+    /// The test takes too long.
     Duration,
-    /// The relay did not switch for too long.
+    /// The relay has not switched for too long.
     NoOscillation,
-    /// No cycle that was looked at led to a controller.
+    /// None of the identification attempts led to a controller.
     Refused,
-    /// The response under the new gains was not the predicted one.
+    /// The response with the new gains differs from the prediction.
     Mismatch,
 }
 
-/// What the test has told.
+/// Result of a test.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct OnecycleResult {
@@ -115,7 +114,7 @@ pub struct OnecycleResult {
     pub inv_t_body_per_s: f64,
     /// Dead time (s).
     pub tau_s: f64,
-    /// Standard deviation of ln(K/T_body): relative.
+    /// Standard deviation of ln(K/T_body), that is, relative to K/T_body.
     pub k_over_t_body_deviation: f64,
     /// Standard deviation of T_prop (s).
     pub t_prop_deviation_s: f64,
@@ -127,7 +126,7 @@ pub struct OnecycleResult {
     pub kp: f64,
     /// Derivative gain, on the measurement (input unit s / output unit).
     pub kd: f64,
-    /// Input that holds the process at rest, the controller's offset (input unit).
+    /// Offset of the controller: input that holds the process at rest (input unit).
     pub offset: f64,
     /// Phase margin (rad).
     pub phase_margin_rad: f64,
@@ -137,17 +136,17 @@ pub struct OnecycleResult {
     pub period_s: f64,
     /// Amplitude of the oscillation (output unit).
     pub amplitude: f64,
-    /// Noise on a sample (output unit).
+    /// Standard deviation of the noise of one sample (output unit).
     pub noise_sigma: f64,
-    /// How badly the family of processes explains the last cycle; one is the limit.
+    /// Misfit score of the last cycle against the family of processes (limit 1).
     pub score: f64,
-    /// Whether the controller is in force and its response was as predicted.
+    /// Whether the controller runs and its response was as predicted.
     pub is_proven: bool,
 }
 
 impl OnecycleTuner {
     fn placed(&self) -> &Placed {
-        // SAFETY: large enough and aligned, as is asserted above, and any bits are a `Placed`.
+        // SAFETY: the size and alignment are asserted above, and any bits are a valid `Placed`.
         unsafe { &*(&raw const *self).cast() }
     }
 
@@ -156,44 +155,48 @@ impl OnecycleTuner {
         unsafe { &mut *(&raw mut *self).cast() }
     }
 
-    fn core(&self) -> Option<&Core<'static>> {
+    fn core(&self) -> Option<&TunerCore<'static>> {
         let placed = self.placed();
-        // SAFETY: the first word says that `onecycle_tuner_init` has written a tuner behind it, and
-        // nothing else has been here since: that is what the caller of every function promises.
+        // SAFETY: the first word shows that `onecycle_tuner_init` has written a tuner, and the caller of every
+        // function promises that nothing else has written to the memory since.
         (placed.alive == ALIVE).then(|| unsafe { placed.core.assume_init_ref() })
     }
 
-    fn parts(&mut self) -> Option<(&mut Core<'static>, &mut Workspace)> {
+    fn parts(&mut self) -> Option<(&mut TunerCore<'static>, &mut Workspace)> {
         let placed = self.placed_mut();
         // SAFETY: as in `core`.
-        (placed.alive == ALIVE)
-            .then(|| unsafe { (placed.core.assume_init_mut(), placed.room.assume_init_mut()) })
+        (placed.alive == ALIVE).then(|| unsafe {
+            (
+                placed.core.assume_init_mut(),
+                placed.workspace.assume_init_mut(),
+            )
+        })
     }
 }
 
-/// A pointer from C as the parts of a tuner, where there is one.
+/// The parts of a tuner behind a pointer from C, if there is one.
 ///
 /// # Safety
-/// Null, or what it points to is valid, aligned and nobody else's meanwhile.
+/// The pointer is null, or what it points to is valid, aligned and not used by anybody else meanwhile.
 unsafe fn parts_at<'a>(
     tuner: *mut OnecycleTuner,
-) -> Option<(&'a mut Core<'static>, &'a mut Workspace)> {
+) -> Option<(&'a mut TunerCore<'static>, &'a mut Workspace)> {
     // SAFETY: the caller's promise.
     unsafe { tuner.as_mut() }.and_then(OnecycleTuner::parts)
 }
 
-/// Settings to start from: a noise-protected relay of this amplitude (input unit) at the distinguishing
-/// phase with trim, ticks every sample_s (s), two cycles; no take-off, no limits, nothing safe but zero.
+/// Default settings: a relay of this amplitude (input unit) with noise protection and trim at the distinguishing
+/// phase, ticks every sample_s (s), two cycles; no take-off, no abort limits; the fallback output is zero.
 #[unsafe(no_mangle)]
 pub extern "C" fn onecycle_settings_default(amplitude: f32, sample_s: f32) -> OnecycleSettings {
     OnecycleSettings::new(amplitude, sample_s)
 }
 
-/// Makes the memory a tuner with these settings; anything but ONECYCLE_STATUS_OK names what is wrong
-/// with them, and there is no tuner.
+/// Initialises a tuner in the memory. Any status but ONECYCLE_STATUS_OK names the setting that is out of range;
+/// the memory then holds no tuner.
 ///
 /// # Safety
-/// Both pointers are null or point to what they say.
+/// Both pointers are null or point to valid objects of their types.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_init(
     tuner: *mut OnecycleTuner,
@@ -210,8 +213,8 @@ pub unsafe extern "C" fn onecycle_tuner_init(
     let pack = Pack::embedded().map_err(|_| TunerError::Pack);
     match checked.and_then(|checked| Ok((checked, pack?))) {
         Ok((checked, pack)) => {
-            placed.core.write(Core::of(&checked, pack));
-            placed.room.write(Workspace::NEW);
+            placed.core.write(TunerCore::of(&checked, pack));
+            placed.workspace.write(Workspace::NEW);
             placed.alive = ALIVE;
             OnecycleStatus::Ok
         }
@@ -219,11 +222,11 @@ pub unsafe extern "C" fn onecycle_tuner_init(
     }
 }
 
-/// One tick: time (s), measurement, where the output should be (output unit). Returns the input to hold
-/// until the next tick (input unit), finite and within the limits; zero where there is no tuner.
+/// One tick: time (s), measurement, reference (output unit). Returns the input to hold until the next tick
+/// (input unit), which is finite and within the limits. Without a tuner it returns zero.
 ///
 /// # Safety
-/// Both pointers are null or point to what they say.
+/// Both pointers are null or point to valid objects of their types.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_step(
     tuner: *mut OnecycleTuner,
@@ -232,10 +235,10 @@ pub unsafe extern "C" fn onecycle_tuner_step(
     reference: f32,
 ) -> f32 {
     // SAFETY: the caller's promise.
-    let Some((core, room)) = (unsafe { parts_at(tuner) }) else {
+    let Some((core, workspace)) = (unsafe { parts_at(tuner) }) else {
         return 0.0;
     };
-    // SAFETY: the caller's promise. No measurement is as good as one that is no number.
+    // SAFETY: the caller's promise. A missing measurement counts as one that is not finite.
     let measurement =
         unsafe { measurement.as_ref() }.map_or(Measurement::of(f32::NAN), |measurement| {
             Measurement {
@@ -244,13 +247,13 @@ pub unsafe extern "C" fn onecycle_tuner_step(
                 age_s: measurement.age_s,
             }
         });
-    core.step(room, time_s, &measurement, reference)
+    core.step(workspace, time_s, &measurement, reference)
 }
 
-/// Begins the test at the next tick; only when idle.
+/// Begins the test at the next tick. Only in the phase idle.
 ///
 /// # Safety
-/// The pointer is null or points to a tuner's memory.
+/// The pointer is null or points to the memory of a tuner.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_start(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
@@ -259,10 +262,10 @@ pub unsafe extern "C" fn onecycle_tuner_start(tuner: *mut OnecycleTuner) {
     }
 }
 
-/// The operator ends the test, or the controller that came of it; the next tick's output is safe.
+/// Aborts the test, or stops the controller found. The output of the next tick is that of the safe controller.
 ///
 /// # Safety
-/// The pointer is null or points to a tuner's memory.
+/// The pointer is null or points to the memory of a tuner.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_abort(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
@@ -271,10 +274,10 @@ pub unsafe extern "C" fn onecycle_tuner_abort(tuner: *mut OnecycleTuner) {
     }
 }
 
-/// Ready for another test, all that was learned forgotten; only when aborted or in control.
+/// Resets the tuner for another test; results are forgotten. Only in the phases aborted and control.
 ///
 /// # Safety
-/// The pointer is null or points to a tuner's memory.
+/// The pointer is null or points to the memory of a tuner.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_reset(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
@@ -283,10 +286,10 @@ pub unsafe extern "C" fn onecycle_tuner_reset(tuner: *mut OnecycleTuner) {
     }
 }
 
-/// What the tuner is doing.
+/// Phase of the tuner.
 ///
 /// # Safety
-/// The pointer is null or points to a tuner's memory.
+/// The pointer is null or points to the memory of a tuner.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_phase(tuner: *const OnecycleTuner) -> OnecyclePhase {
     // SAFETY: the caller's promise.
@@ -301,15 +304,15 @@ pub unsafe extern "C" fn onecycle_tuner_phase(tuner: *const OnecycleTuner) -> On
     })
 }
 
-/// Why the test was aborted.
+/// Reason of the abort, if the test was aborted.
 ///
 /// # Safety
-/// The pointer is null or points to a tuner's memory.
+/// The pointer is null or points to the memory of a tuner.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_reason(tuner: *const OnecycleTuner) -> OnecycleReason {
     // SAFETY: the caller's promise.
     let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
-    match tuner.and_then(Core::reason) {
+    match tuner.and_then(TunerCore::reason) {
         None => OnecycleReason::None,
         Some(Abort::Operator) => OnecycleReason::Operator,
         Some(Abort::NotFinite) => OnecycleReason::NotFinite,
@@ -323,10 +326,10 @@ pub unsafe extern "C" fn onecycle_tuner_reason(tuner: *const OnecycleTuner) -> O
     }
 }
 
-/// What the test has told, into result; false, and nothing written, where it has not told anything yet.
+/// Writes the result of the test. Returns false, and writes nothing, if there is no result yet.
 ///
 /// # Safety
-/// Both pointers are null or point to what they say.
+/// Both pointers are null or point to valid objects of their types.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_result(
     tuner: *const OnecycleTuner,
@@ -366,7 +369,7 @@ pub unsafe extern "C" fn onecycle_tuner_result(
 
 #[panic_handler]
 fn panicked(_: &core::panic::PanicInfo<'_>) -> ! {
-    // No code behind this interface panics by intent; firmware's watchdog ends what cannot go on.
+    // No code behind this interface panics by intent; the watchdog of the firmware ends this loop.
     loop {
         core::hint::spin_loop();
     }

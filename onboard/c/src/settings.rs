@@ -1,54 +1,55 @@
-//! Settings as C sees them: flat, every unit in its name.
+//! Settings for C: a flat structure.
 
 use onecycle_onboard::control::PdLaw;
 use onecycle_onboard::guard::Limits;
 use onecycle_onboard::relay::{RelayError, RelaySettings};
 use onecycle_onboard::tuner::{TakeOffSettings, TunerError, TunerSettings};
 
-/// How an axis is tuned; start from onecycle_settings_default.
+/// Settings of a tuner. Start from onecycle_settings_default.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct OnecycleSettings {
-    /// Half the jump of the relay's output (input unit).
+    /// Half the jump of the relay's output (input unit), above zero.
     pub amplitude: f32,
     /// Sine of the phase of the oscillation, between -1 and 1.
     pub beta: f32,
-    /// Time for which the noise is measured with zero relay output (s); 0 starts at once.
+    /// Time during which the noise is measured with zero relay output (s); 0 starts at once.
     pub preroll_s: f32,
-    /// Noise of the measurement, or its least value when there is a pre-roll (output unit).
+    /// Standard deviation of the measurement noise (output unit); with a pre-roll its lower limit. At zero the
+    /// relay chatters on sensor noise.
     pub noise_sigma: f32,
-    /// Share of the measured bias that the trim takes up each cycle; 0 switches it off.
+    /// Share of the measured bias that the trim removes per cycle; 0 switches the trim off.
     pub trim_gain: f32,
-    /// What the trim leaves between the parts of a cycle with the relay high and low.
+    /// Asymmetry that the trim keeps: time high minus time low over the period, 0 to 1.
     pub asymmetry: f32,
     /// Time between ticks (s).
     pub sample_s: f32,
-    /// Cycles that are used together, 1 to 4.
+    /// Number of cycles that are fitted together, 1 to 4.
     pub cycles: u8,
-    /// Looks at cycles that may be refused before the test ends.
+    /// Maximum number of identification attempts.
     pub attempts: u8,
-    /// Slices of the identification in a tick, each of up to 2,700 operations in double precision; 1 where
-    /// those are emulated.
+    /// Slices of the identification per tick, each of up to 2,700 operations in double precision. Use 1 where
+    /// double precision is emulated.
     pub slices: u16,
     /// Whether the test begins with a take-off from the ground.
     pub take_off: bool,
-    /// Gain of the take-off's integrator (input unit / (output unit s)).
+    /// Gain of the take-off integrator (input unit / (output unit s)).
     pub take_off_gain: f32,
-    /// Rate of the output above which that integrator waits (output unit / s).
+    /// Rate of the output above which the take-off integrator holds (output unit / s).
     pub take_off_climb: f32,
-    /// Largest distance of the output from the reference (output unit); INFINITY for none.
+    /// Largest distance of the output from the reference (output unit); INFINITY switches the limit off.
     pub limit_excursion: f32,
-    /// Largest rate of the output (output unit / s); INFINITY for none.
+    /// Largest rate of the output (output unit / s); INFINITY switches the limit off.
     pub limit_rate: f32,
-    /// Longest test (s); INFINITY for none.
+    /// Longest test (s); INFINITY switches the limit off.
     pub limit_duration_s: f32,
-    /// Longest time without a switch of the relay (s); INFINITY for none.
+    /// Longest time without a switch of the relay (s); INFINITY switches the limit off.
     pub limit_no_switch_s: f32,
-    /// Oldest sample and longest time between ticks (s); INFINITY for none.
+    /// Largest age of a sample and longest time between ticks (s); INFINITY switches the limit off.
     pub limit_stale_s: f32,
-    /// Least output (input unit).
+    /// Lower limit of the output (input unit).
     pub output_lowest: f32,
-    /// Largest output (input unit).
+    /// Upper limit of the output (input unit).
     pub output_highest: f32,
     /// Proportional gain of the safe controller (input unit / output unit).
     pub safe_kp: f32,
@@ -56,40 +57,40 @@ pub struct OnecycleSettings {
     pub safe_kd: f32,
     /// Output of the safe controller at rest (input unit).
     pub safe_offset: f32,
-    /// Time constant of the means under the safe controller, of its output, which the relay is offset by, and
-    /// of the process's, which it oscillates about (s); 0 for none.
+    /// Time constant of the means under the safe controller (s). The mean of its output becomes the offset of
+    /// the relay, the mean of the process's output the reference of the test; 0 switches this off.
     pub bias_filter_s: f32,
-    /// Lag of a rate that is found from differences (s).
+    /// Time constant of the filter for a rate that is computed from differences (s).
     pub rate_lag_s: f32,
 }
 
-/// Whether there is a tuner, or what is wrong with its settings.
+/// Status of an initialisation.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub enum OnecycleStatus {
-    /// There is.
+    /// Settings accepted; the tuner is ready.
     Ok,
     /// A pointer is null.
     Null,
-    /// The relay's amplitude is not positive.
+    /// The amplitude of the relay is not positive.
     RelayAmplitude,
     /// beta is not between -1 and 1.
     RelayBeta,
     /// The asymmetry is not between 0 and 1.
     RelayAsymmetry,
-    /// Another number of the relay is negative or not finite.
+    /// Another setting of the relay is negative or not finite.
     RelaySetting,
-    /// A time, a gain or a limit that must be positive is not.
+    /// A time, a gain or a limit is not positive.
     Setting,
-    /// The cycles are not 1 to 4.
+    /// The number of cycles is not 1 to 4.
     Cycles,
-    /// There are no attempts, or no slices.
+    /// The number of attempts or of slices is zero.
     NoWork,
-    /// The least output is not below the largest.
+    /// The lower output limit is not below the upper one.
     OutputLimits,
-    /// The safe controller has a number that is not finite.
+    /// A gain or the offset of the safe controller is not finite.
     Safe,
-    /// The data that is built in cannot be read: the build is broken.
+    /// The embedded data cannot be read: the build is broken.
     Pack,
 }
 

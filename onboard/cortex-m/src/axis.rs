@@ -1,12 +1,12 @@
-//! The simulated axis: the altitude of a quadrotor with a noisy sensor and a hover thrust that is not quite
-//! the one assumed.
+//! Simulated axis: the altitude of a quadrotor with a noisy sensor and a small error of the assumed hover
+//! thrust.
 //!
 //! ```text
 //! T_prop f' = u(t - tau) - b - f        v' = (K/T_body) f - v/T_body        y' = v
 //! ```
 //!
-//! The process, its integration and its noise are those of `c/examples/axis.c`, operation for operation, so
-//! that what is found here is what is found there.
+//! with the bias `b` (part of hover), position `y` (m) and climb `v` (m/s). Process, integration and noise are
+//! those of `c/examples/axis.c`, operation for operation, so both find the same numbers.
 
 use onecycle_onboard::control::Measurement;
 
@@ -20,14 +20,14 @@ pub const T_PROP_S: f64 = 0.0321;
 const INV_T_BODY_PER_S: f64 = 0.5922;
 /// Dead time (ticks).
 const DELAY_TICKS: usize = 24;
-/// What the hover thrust is off the assumed one (part of hover).
+/// Error of the assumed hover thrust (part of hover).
 const BIAS: f64 = 0.01;
-/// Standard deviation of the noise (m), near enough: a sum of four uniform numbers has 0.58 of its factor.
+/// Factor of the noise (m): a sum of four uniform numbers has 0.58 of it as standard deviation.
 const NOISE: f64 = 0.0001;
-/// Euler steps a tick, rate before position: good to a part in a thousand.
+/// Euler steps per tick, rate before position: accurate to a part in a thousand.
 const PARTS: usize = 10;
 
-/// The axis at one instant.
+/// State of the axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
     value: f64,
@@ -52,19 +52,19 @@ impl Default for Axis {
 }
 
 impl Axis {
-    /// Where it truly is (m).
+    /// True position (m).
     #[must_use]
     pub fn value(&self) -> f64 {
         self.value
     }
 
-    /// What the sensors say: position with noise, rate without.
+    /// Measurement: position with noise, rate without.
     pub fn measure(&mut self) -> Measurement {
         let value = self.value + NOISE * self.noise();
         Measurement::of(value as f32).with_rate(self.rate as f32)
     }
 
-    /// One tick under this input.
+    /// Advances by one tick with this input.
     pub fn push(&mut self, input: f64) {
         let slot = &mut self.delayed[self.oldest];
         let late = *slot - BIAS;

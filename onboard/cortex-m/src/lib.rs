@@ -1,8 +1,8 @@
-//! The whole tuner flying one simulated axis, the same on a microcontroller and on the host.
+//! Flight of the whole tuner on one simulated axis, with the same code on a microcontroller and on the host.
 //!
-//! Twenty seconds at 1 kHz: five under the safe controller, then relay, identification, the controller that
-//! was found; at 18 s the reference steps by 0.1 m. Every tick becomes a line of text, and so does every
-//! number that was found, floating-point numbers as their bits: two machines agree when their lines do.
+//! Twenty seconds at 1 kHz: five under the safe controller, then relay, identification and the controller found;
+//! at 18 s the reference steps by 0.1 m. Every tick and every number found becomes a line of text, with
+//! floating-point numbers as their bits. Two machines agree if their lines do.
 //!
 //! ```text
 //! tick <number> <phase before> <phase after> <bits of the output> <instructions> <stage before>
@@ -20,7 +20,7 @@ use onecycle_onboard::RelaySettings;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::Limits;
 use onecycle_onboard::identification::{TuningResult, Workspace};
-use onecycle_onboard::tuner::{Core, TunerSettings};
+use onecycle_onboard::tuner::{TunerCore, TunerSettings};
 
 use crate::axis::{Axis, K_OVER_T_BODY, TICK_S};
 pub use crate::line::Line;
@@ -29,18 +29,18 @@ pub use crate::line::Line;
 const AMPLITUDE: f32 = 0.05;
 /// Twenty seconds.
 const TICKS: u32 = 20_000;
-/// Five seconds: five time constants of the filter of the safe controller's output.
+/// Five seconds: five time constants of the filter for the safe controller's output.
 const START_TICK: u32 = 5000;
-/// The reference's step: when (s), and by how much (m).
+/// Step of the reference: time (s) and height (m).
 const STEP_AT_S: f64 = 18.0;
 const STEP: f32 = 0.1;
 
-/// Largest relative error of `K/T_body`, near four of the standard deviations of 1.3 % that the tuner finds for
-/// it, and largest distance from the reference 2 s after its step (m): a tenth of the step, settled by then.
+/// Largest relative error of `K/T_body`: four standard deviations, each 1.3 % as the tuner reports. Largest
+/// distance from the reference 2 s after its step (m): a tenth of the step, which has settled by then.
 const GAIN_TOLERANCE: f64 = 0.05;
 const STEP_TOLERANCE: f64 = 0.01;
 
-/// What the axis is tuned with: those of `c/examples/axis.c`.
+/// Settings of the tuner, the same as in `c/examples/axis.c`.
 #[must_use]
 pub fn settings() -> TunerSettings {
     let new = TunerSettings::new(AMPLITUDE, TICK_S as f32);
@@ -69,17 +69,18 @@ pub fn settings() -> TunerSettings {
     }
 }
 
-/// Flies the axis with a tuner of these [`settings`]. `lap` tells the instructions since it was last called;
-/// `say` is given every line. Whether the controller that was found has proven itself, is of the right process and follows
+/// Flies the axis with a tuner of these [`settings`]. `lap` returns the instructions since its last call; `say`
+/// receives every line. Returns whether the controller has proven itself, belongs to the right process and
+/// follows the reference.
 /// the reference.
 pub fn fly(
-    tuner: &mut Core<'_>,
-    room: &mut Workspace,
+    tuner: &mut TunerCore<'_>,
+    workspace: &mut Workspace,
     mut lap: impl FnMut() -> u64,
     mut say: impl FnMut(&mut Line),
 ) -> bool {
     let mut axis = Axis::default();
-    // What counting itself takes, from the second call on.
+    // The second call returns what counting itself costs.
     lap();
     let idle = lap();
     for tick in 0..TICKS {
@@ -91,7 +92,7 @@ pub fn fly(
         }
         let (before, stage) = (tuner.phase(), tuner.stage());
         lap();
-        let output = step(tuner, room, time_s, &measurement, reference);
+        let output = step(tuner, workspace, time_s, &measurement, reference);
         let instructions = lap().saturating_sub(idle);
         let mut line = Line::default();
         line.word("tick")
@@ -119,19 +120,19 @@ pub fn fly(
         && (axis.value() - f64::from(STEP)).abs() < STEP_TOLERANCE
 }
 
-/// A call of its own, so that nothing of a tick is moved out of what is counted.
+/// Not inlined, so that no part of a tick is moved out of the count.
 #[inline(never)]
 fn step(
-    tuner: &mut Core<'_>,
-    room: &mut Workspace,
+    tuner: &mut TunerCore<'_>,
+    workspace: &mut Workspace,
     time_s: f64,
     measurement: &Measurement,
     reference: f32,
 ) -> f32 {
-    black_box(tuner.step(room, black_box(time_s), measurement, reference))
+    black_box(tuner.step(workspace, black_box(time_s), measurement, reference))
 }
 
-/// All that was found, by name.
+/// All numbers found, by name.
 #[must_use]
 pub fn numbers(found: &TuningResult) -> [(&'static str, f64); 17] {
     let (process, deviations) = (&found.process, &found.deviations);

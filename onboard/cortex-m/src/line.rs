@@ -1,10 +1,10 @@
-//! A line of words and whole numbers, without the formatting of Rust's core library, whose code would be
-//! counted as the tuner's.
+//! Line of words and integers, without the formatting of Rust's core library, whose code would count as the
+//! tuner's.
 
-/// Longest line that is used is half of this.
+/// Size of a line; the longest line in use is half of it.
 const MOST_BYTES: usize = 128;
 
-/// A line in the making. What does not fit is left out.
+/// A line. Text beyond its size is dropped.
 #[derive(Clone, Debug)]
 pub struct Line {
     bytes: [u8; MOST_BYTES],
@@ -21,7 +21,7 @@ impl Default for Line {
 }
 
 impl Line {
-    /// Appends a word, a space before it unless it is the first.
+    /// Appends a word, after a space unless it is the first.
     pub fn word(&mut self, word: &str) -> &mut Self {
         if self.length > 0 {
             self.push(b' ');
@@ -30,9 +30,9 @@ impl Line {
         self
     }
 
-    /// Appends a number, as [`Line::word`] does a word.
+    /// Appends a number like [`Line::word`] a word.
     pub fn number(&mut self, mut number: u64) -> &mut Self {
-        // The largest has 20 digits; filled from the right.
+        // The largest number has 20 digits; they are written from the right.
         let mut digits = [b'0'; 20];
         let mut first = digits.len();
         while first == digits.len() || number > 0 {
@@ -43,7 +43,7 @@ impl Line {
         self.word(core::str::from_utf8(&digits[first..]).unwrap_or_default())
     }
 
-    /// The line, ended by a line feed and a zero byte, as a string for C is.
+    /// The line with a line feed and a zero byte at its end, as a C string.
     pub fn ended(&mut self) -> &[u8] {
         self.length = self.length.min(MOST_BYTES - 2);
         self.push(b'\n');

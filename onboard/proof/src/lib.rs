@@ -1,30 +1,31 @@
-//! One relay test from rest to the controller, without std, heap and libc: all that flies in one program.
+//! Relay test from rest to the controller without std, heap and libc, with all parts of the tuner in one
+//! program.
 //!
 //! ```text
 //! relay -> cycles -> window -> signature -> network -> candidates -> refinement -> gains
 //! ```
 //!
-//! The process, exact on the sampling grid and without noise:
+//! The process is simulated exactly on the sampling grid and without noise:
 //!
 //! ```text
 //! K/T_body = 4 1/s^2, T_prop = 0.05 s, T_body = 0.5 s, tau = 0.02 s; h = 0.1, beta = -0.73
 //! ```
 //!
-//! What must come out, derived outside this crate:
+//! Expected results, derived outside this crate:
 //!
-//! - **period and amplitude**: the odd periodic solution of the process under a square wave, with
-//!   the switch where the error has fallen to 0.73 of its peak, has the half period 218.08 ms and
-//!   the amplitude 0.0019394 (matrix exponentials, root to 1e-12). A relay that looks once in 1 ms
-//!   switches 0..1 ms late, which acts as that much more delay: at most 221.55 ms and 0.0020113;
-//! - **what the network reads**: a multirotor of the family that the built-in pack is of, so known, and
-//!   the acceleration gain to a twentieth: the pack's worst of 8,000 costs 6 %;
-//! - **process**: the very one simulated, for without noise the model is exact. What is known beforehand
-//!   weighs as much as the noise of a sample, which is taken for a millionth of the oscillation at least: it
-//!   moves the estimate by the square of that, 1e-12, times the few hundred by which the cycle tells the
-//!   shape less well than its own size. 1e-9 is allowed;
-//! - **gains**: the search over exact costs (`onecycle tune`) ends at Kp = 28.423, Kd = 4.4638. The table
-//!   of leads, four-byte numbers between which it interpolates, is a thousandth of a radian off, which
-//!   changes the gains by a part in a hundred and their cost by one in a million.
+//! - **period and amplitude**: the odd periodic solution of the process under a square wave, with the switch
+//!   where the error has fallen to 0.73 of its peak, has the half period 218.08 ms and the amplitude 0.0019394
+//!   (matrix exponentials, root to 1e-12). A relay that is called every 1 ms switches 0 to 1 ms late, which acts
+//!   as additional delay: at most 221.55 ms and 0.0020113;
+//! - **reading of the network**: known, because the process is a multirotor of the embedded pack's family, and
+//!   the acceleration gain to 5 %: the worst of 8,000 cycles costs 6 %;
+//! - **process**: the simulated process, because without noise the model is exact. Prior knowledge weighs as
+//!   much as the noise of a sample, for which the lower limit is a millionth of the oscillation. It moves the
+//!   estimate by the square of that, 1e-12, times a few hundred, the ratio of the cycle's size to its
+//!   sensitivity to the shape. 1e-9 is allowed;
+//! - **gains**: the search over exact costs (`onecycle tune`) gives Kp = 28.423, Kd = 4.4638. The lead table
+//!   interpolates between four-byte numbers with an error of a thousandth of a radian, which changes the gains
+//!   by a part in a hundred and their cost by one in a million.
 #![no_std]
 
 #[cfg(feature = "use-alloc")]
@@ -56,42 +57,42 @@ const DELAY_SAMPLES: usize = 20;
 /// Half the jump of the relay (input unit).
 const AMPLITUDE: f64 = 0.1;
 
-/// Ten seconds, more than twenty periods: whoever has no window by then never will.
+/// Ten seconds, more than twenty periods: enough for a steady oscillation.
 const MOST_SAMPLES: u32 = 10_000;
-/// Rows of the window that is refined, and of the one that the pack reads: 55 bins and 110 of the cycle. A
-/// signature needs the finer ones, and a refinement takes 144 bytes for each of its own.
+/// Rows of the window for the fit and of the window for the pack: 55 bins and 110 bins of the cycle. A signature
+/// needs the finer ones; a fit takes 144 bytes per row.
 const BINS: usize = 69;
 const FINE_BINS: usize = 133;
 const EDGES: usize = 16;
 
-/// The layers of a pack and all else: see `Classifier`.
+/// Slices for the layers of a pack and the rest of a classification: see `Classifier`.
 const MOST_SLICES_TO_READ: u32 = 30;
 
 /// Two half periods, each between 218.08 and 221.55 ms.
 const PERIOD_S: RangeInclusive<f64> = 0.4361..=0.4432;
 /// Between 0.0019394 and 0.0020113.
 const OSCILLATION: RangeInclusive<f64> = 0.00193..=0.00202;
-/// Largest relative error of the acceleration gain that the network reads.
+/// Largest relative error of the acceleration gain read by the network.
 const READ_TOLERANCE: f64 = 0.05;
-/// Largest relative error of a refined parameter.
+/// Largest relative error of a fitted parameter.
 const TOLERANCE: f64 = 1e-9;
-/// Gains of the search, and the largest relative error of those of the table.
+/// Gains of the search, and the largest relative error of the table's gains.
 const OPTIMUM: Pd = Pd {
     kp: 28.423,
     kd: 4.4638,
 };
 const GAINS_TOLERANCE: f64 = 0.01;
 
-/// Something that takes room, and how much (bytes).
+/// Name and size (bytes) of an object.
 #[repr(C)]
 pub struct Size {
-    /// What it is; null behind the last.
+    /// Name; null after the last.
     name: *const c_char,
     bytes: usize,
 }
 
-/// Null when the process simulated is the process identified, else a sentence for what went wrong.
-// The only exported symbols: no other defines these names, which is what `unsafe` asks for.
+/// Null if the simulated process is identified, else a sentence about the failure. These are the only exported
+/// symbols: no other code defines their names, which is what `unsafe` requires.
 #[unsafe(no_mangle)]
 pub extern "C" fn onecycle_proof() -> *const c_char {
     match identify().and_then(|found| judge(&found)) {
@@ -100,7 +101,7 @@ pub extern "C" fn onecycle_proof() -> *const c_char {
     }
 }
 
-/// Sizes of the pack's parts and of what is kept in memory, one after the other.
+/// Sizes of the pack's parts and of the objects in memory, one after the other.
 #[unsafe(no_mangle)]
 pub extern "C" fn onecycle_proof_size(index: usize) -> Size {
     let of_pack = Pack::embedded()
@@ -138,7 +139,7 @@ pub extern "C" fn onecycle_proof_size(index: usize) -> Size {
     )
 }
 
-/// All that the board finds out.
+/// Results of the test.
 struct Found {
     run: SteadyRun,
     read: Classification,
@@ -146,21 +147,21 @@ struct Found {
     gains: Pd,
 }
 
-/// From the relay test to the gains, as on board: what is large is there only as long as it is needed.
+/// From the relay test to the gains, as on board: large objects exist only while they are needed.
 fn identify() -> Result<Found, &'static CStr> {
     let mut coarse = Window::NONE;
-    let pack = Pack::embedded().map_err(|_| c"there is no pack")?;
+    let pack = Pack::embedded().map_err(|_| c"there is no embedded pack")?;
     let test = measure(&mut coarse)?;
     let read = read(&test, &pack)?;
-    let beforehand = PriorKnowledge {
+    let prior_knowledge = PriorKnowledge {
         starts: &read.starts(test.period_s),
         prior: ShapePrior::of_pack(&pack),
     };
-    let refined = refine(&coarse, test.period_s, &beforehand)?;
+    let refined = refine(&coarse, test.period_s, &prior_knowledge)?;
     let table = pack.gains_table().ok_or(c"the pack has no lead table")?;
     let gains = table
         .pd_at_phase_margin(&refined.process)
-        .map_err(|_| c"the table has no gains")?;
+        .map_err(|_| c"the lead table has no gains for the process")?;
     Ok(Found {
         run: test.run,
         read,
@@ -169,17 +170,17 @@ fn identify() -> Result<Found, &'static CStr> {
     })
 }
 
-/// What is kept of a relay test beside the window to refine.
+/// Results of a relay test, besides the window for the fit.
 struct Test {
     run: SteadyRun,
     /// Period of the last cycle (s).
     period_s: f64,
     signature: Signature,
-    /// White noise on a sample (output unit).
+    /// Standard deviation of the white noise of one sample (output unit).
     noise_sigma: f64,
 }
 
-/// The relay test, and the signature of its last cycle, which the finer window is for.
+/// The relay test, and the signature of its last cycle from the finer window.
 #[inline(never)]
 fn measure(coarse: &mut Window<BINS, EDGES>) -> Result<Test, &'static CStr> {
     let mut fine = Window::NONE;
@@ -193,7 +194,7 @@ fn measure(coarse: &mut Window<BINS, EDGES>) -> Result<Test, &'static CStr> {
     })
 }
 
-/// What the pack reads off the cycle, a slice at a time.
+/// Classification of the cycle, slice by slice.
 #[inline(never)]
 fn read(test: &Test, pack: &Pack<'_>) -> Result<Classification, &'static CStr> {
     let mut classifier = Classifier::new();
@@ -202,32 +203,32 @@ fn read(test: &Test, pack: &Pack<'_>) -> Result<Classification, &'static CStr> {
         .map_err(|_| c"the pack has no calibration")?;
     for _ in 0..MOST_SLICES_TO_READ {
         if let Some(read) = classifier.advance(pack) {
-            return read.map_err(|_| c"the pack reads nothing");
+            return read.map_err(|_| c"the classification failed");
         }
     }
     Err(c"the classification takes more slices than it may")
 }
 
-/// The process of the window, a slice at a time.
+/// Fit of the window, slice by slice.
 #[inline(never)]
 fn refine(
     window: &Window<BINS, EDGES>,
     period_s: f64,
-    beforehand: &PriorKnowledge<'_>,
+    prior_knowledge: &PriorKnowledge<'_>,
 ) -> Result<Refined, &'static CStr> {
     let mut refiner = Refiner::new();
     refiner
-        .begin(window, period_s, beforehand)
-        .map_err(|_| c"the window is not to be fitted")?;
+        .begin(window, period_s, prior_knowledge)
+        .map_err(|_| c"the window cannot be fitted")?;
     for _ in 0..refiner.most_slices(window) {
         if let Some(refined) = refiner.advance(window) {
-            return refined.map_err(|_| c"the window holds no process");
+            return refined.map_err(|_| c"no process fits the window");
         }
     }
     Err(c"the refinement takes more slices than it may")
 }
 
-/// One step at a time, as on board: the process, the relay, the cycles, the window.
+/// Simulation as on board, step by step: process, relay, cycles, window.
 #[inline(never)]
 fn oscillate(
     coarse: &mut Window<BINS, EDGES>,
@@ -254,7 +255,7 @@ fn oscillate(
                 return Ok((run, cycle));
             }
         }
-        // From a rise on, so that the cycle that it begins lies in the windows.
+        // From a rise on, so that the cycle that begins there lies in the windows.
         let rises = relay.is_high() && !was_high;
         was_high = relay.is_high();
         if run.is_steady() && rises && !is_open {
@@ -284,11 +285,11 @@ fn judge(found: &Found) -> Result<(), &'static CStr> {
     let check = |holds: bool, sentence| if holds { Ok(()) } else { Err(sentence) };
     check(
         PERIOD_S.contains(&found.run.period_s),
-        c"the period is not the predicted one",
+        c"the period differs from the prediction",
     )?;
     check(
         OSCILLATION.contains(&found.run.amplitude),
-        c"the amplitude is not the predicted one",
+        c"the amplitude differs from the prediction",
     )?;
     check(
         found.read.familiarity == Familiarity::Known,
@@ -317,17 +318,17 @@ fn judge(found: &Found) -> Result<(), &'static CStr> {
     check(
         near(found.gains.kp, OPTIMUM.kp, GAINS_TOLERANCE)
             && near(found.gains.kd, OPTIMUM.kd, GAINS_TOLERANCE),
-        c"the gains are not the optimal ones",
+        c"the gains are not optimal",
     )
 }
 
-/// The latest switches, for the window that opens behind them.
+/// The latest switches, for the window that opens after them.
 #[derive(Default)]
 struct Past {
     edges: [Edge; PAST_EDGES],
 }
 
-/// Four periods of them: with the input known so far back the fit is exact, without any it errs by 2e-6.
+/// Four periods of switches: with that much past the fit is exact, without any its error is 2e-6.
 const PAST_EDGES: usize = 8;
 
 impl Past {
@@ -349,7 +350,7 @@ impl Past {
     }
 }
 
-/// Needs a heap: refused for want of an allocator.
+/// Needs a heap: the compiler rejects it because there is no allocator.
 #[cfg(feature = "use-alloc")]
 #[unsafe(no_mangle)]
 pub extern "C" fn onecycle_proof_control(length: usize) -> usize {
@@ -358,7 +359,7 @@ pub extern "C" fn onecycle_proof_control(length: usize) -> usize {
     values.iter().sum()
 }
 
-/// Needs the standard library and, through it, libc: refused by the linker.
+/// Needs the standard library and, through it, libc: the linker rejects it.
 #[cfg(feature = "use-std")]
 #[unsafe(no_mangle)]
 pub extern "C" fn onecycle_proof_control(length: usize) -> usize {
@@ -368,13 +369,12 @@ pub extern "C" fn onecycle_proof_control(length: usize) -> usize {
         .unwrap_or(0)
 }
 
-// With std linked its own handler is there, and a second one would be refused before the linker
-// has its say.
+// With std its own handler is linked; a second one would be rejected before the linker reports.
 #[cfg(not(feature = "use-std"))]
 mod panic {
     use core::panic::PanicInfo;
 
-    // Sound: start.c defines it so, and it does not come back.
+    // Sound: start.c defines this function, and it does not return.
     unsafe extern "C" {
         safe fn onecycle_proof_panicked() -> !;
     }

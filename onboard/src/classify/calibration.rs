@@ -1,40 +1,41 @@
-//! Where a network's cycles of the family end: what the score is measured in.
+//! Calibration of the misfit score: what is usual for the family's cycles with a given network.
 
 use libm::{log, sqrt};
 
 use super::OUTPUTS;
 use crate::pack::{Pack, VALUES};
 
-/// Numbers that a pack keeps.
+/// Numbers of a calibration in a pack.
 const NUMBERS: usize = 8;
 
-/// What belongs to a network, and where its cycles of the family end.
+/// Calibration that belongs to a network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
-    /// What the values were multiplied by to train the network.
+    /// Factors with which the values were multiplied in training.
     pub scale: [f64; VALUES],
-    /// What the network's standard deviations are multiplied by to hold the truth as often as they say.
+    /// Factors for the standard deviations of the network, so that they contain the truth as often as they
+    /// claim.
     pub temperature: [f64; VALUES],
     /// Lowest and highest values of the family.
     pub range: [[f64; VALUES]; 2],
-    /// Standard deviation of a harmonic of the family's cycles without noise, over the amplitude.
+    /// Standard deviation of a harmonic for cycles of the family without noise, over the amplitude.
     pub floor: f64,
-    /// Jump between the end of a cycle and its start, over the amplitude: without noise.
+    /// Jump between the end of a cycle and its start without noise, over the amplitude.
     pub jump: f64,
-    /// What noise adds to it, times the noise of a sample over the amplitude.
+    /// Increase of that jump with the noise: times the noise of a sample over the amplitude.
     pub jump_of_noise: f64,
-    /// Width of the posterior of a cycle of the family: `w_0`, `w_1`, `w_2`.
+    /// Usual width of the posterior: `w_0`, `w_1`, `w_2`.
     pub width: [f64; 3],
-    /// Standard deviation of the width about that.
+    /// Standard deviation of the width about the usual one.
     pub width_sigma: f64,
-    /// Largest sum that is of the family.
+    /// Largest sum that belongs to the family.
     pub limit: f64,
-    /// Largest noise of a sample, over the amplitude, that the network knows.
+    /// Largest noise of a sample over the amplitude for which the network was trained.
     pub most_noise: f64,
 }
 
 impl Calibration {
-    /// Room for one, all zeros.
+    /// All zeros: memory before the first use.
     pub(super) const ROOM: Self = Self {
         scale: [0.0; VALUES],
         temperature: [0.0; VALUES],
@@ -48,12 +49,12 @@ impl Calibration {
         most_noise: 0.0,
     };
 
-    /// Of no network yet: no width is too wide and no noise too much, and any statistic is of the family that chi-squared
-    /// of 30 degrees of freedom exceeds in 2 % of cases.
+    /// Calibration without a network: no width is too large, no noise too strong, and the limit is the value
+    /// that chi-squared with 30 degrees of freedom exceeds in 2 % of cases.
     ///
-    /// Jumps: twice the 0.3 % of the amplitude with noise of 0.5 % and less, 0.5 % with 2..3 %, that the true
-    /// processes leave of 600 trimmed cycles of multirotors, for those of untrimmed relays leave more; the
-    /// floor is what the trimmed ones leave without noise.
+    /// Jumps: on 600 cycles of multirotors with trim the true processes leave 0.3 % of the amplitude with noise
+    /// up to 0.5 %, and 0.5 % with noise of 2 to 3 %. The values are twice that, because relays without trim
+    /// leave more. The floor is what cycles with trim leave without noise.
     pub const UNTRAINED: Self = Self {
         scale: [1.0, 8.0, 8.0, 1.0],
         temperature: [1.0; VALUES],
@@ -67,7 +68,7 @@ impl Calibration {
         most_noise: f64::INFINITY,
     };
 
-    /// That of a pack; `None` where it has other numbers than these.
+    /// The calibration of a pack; `None` if its length is different.
     #[must_use]
     pub fn of_pack(pack: &Pack<'_>) -> Option<Self> {
         let numbers = pack.calibration();
@@ -99,7 +100,7 @@ impl Calibration {
         })
     }
 
-    /// What a pack keeps beside scaling and limit, in the order that it does.
+    /// Numbers of a pack besides scaling and limit, in the order of the pack.
     #[must_use]
     pub fn numbers(&self) -> [f64; NUMBERS] {
         let [w0, w1, w2] = self.width;
@@ -115,20 +116,20 @@ impl Calibration {
         ]
     }
 
-    /// The width of a posterior that these outputs tell.
+    /// Width of the posterior that these outputs describe.
     #[must_use]
     pub fn width_of(outputs: &[f32; OUTPUTS]) -> f64 {
         let sum: f32 = outputs[VALUES..2 * VALUES].iter().sum();
         -f64::from(sum) / VALUES as f64
     }
 
-    /// What the usual width is a combination of: noise over amplitude, samples in a period.
+    /// Regressors of the usual width, from noise over amplitude and samples in a period.
     #[must_use]
     pub fn width_terms(noise: f64, samples: f64) -> [f64; 3] {
         [1.0, log(noise / sqrt(samples) + QUIET), log(samples)]
     }
 
-    /// How much wider than usual, in standard deviations.
+    /// Excess of the width over the usual one, in standard deviations.
     pub(super) fn excess(&self, outputs: &[f32; OUTPUTS], noise: f64, samples: f64) -> f64 {
         let terms = Self::width_terms(noise, samples);
         let usual: f64 = terms.iter().zip(self.width).map(|(term, w)| w * term).sum();
@@ -136,5 +137,5 @@ impl Calibration {
     }
 }
 
-/// Noise of a cycle's mean, over the amplitude, below which a network's own error is the larger.
+/// Noise of a cycle's mean over the amplitude below which the error of the network dominates.
 const QUIET: f64 = 1e-4;

@@ -1,4 +1,4 @@
-//! The classification in slices: see the table in [`classify`](super).
+//! Classification in slices: see the table in [`classify`](super).
 
 use libm::{exp, hypot, sqrt};
 
@@ -6,13 +6,13 @@ use super::{
     CANDIDATES, Calibration, CandidateProcess, Classification, ClassifyError, CyclePosterior,
     Familiarity, OUTPUTS, process_of,
 };
-use crate::fit_score::{Cycle, Doubt, Statistic};
+use crate::fit_score::{Doubt, ScoredCycle, Statistic};
 use crate::pack::{Forward, Pack, VALUES};
 use crate::process::SoiptdError;
 use crate::signature::{PARTS, Signature};
 
-/// Nodes of the Gauss-Hermite rule of five points, in standard deviations, and their weights
-/// (Abramowitz and Stegun, table 25.10, times the square root of two, over that of pi).
+/// Nodes, in standard deviations, and weights of the Gauss-Hermite rule of five points (Abramowitz and Stegun,
+/// table 25.10, nodes times the square root of two, weights over that of pi).
 pub(super) const NODES: [(f64, f64); CANDIDATES] = [
     (0.0, 8.0 / 15.0),
     (1.355_626_179_974_266, 0.222_075_922_005_612_6),
@@ -21,11 +21,11 @@ pub(super) const NODES: [(f64, f64); CANDIDATES] = [
     (-2.856_970_013_872_806, 0.011_257_411_327_720_69),
 ];
 
-/// Weight of a doubt that is wider than usual. Of the harmful cycles out of the family 94, 96, 96 and 97 % are
-/// unknown with weights of 0, 1, 2 and 4, of the paper's multirotors 0.8, 1.1, 1.3 and 2.1 %.
+/// Weight of an excess width. With weights of 0, 1, 2 and 4 the score calls 94, 96, 96 and 97 % of the harmful
+/// out-of-family cycles unknown, and 0.8, 1.1, 1.3 and 2.1 % of the paper's multirotors.
 const DOUBT: f64 = 2.0;
 
-/// All state of a classification: 5.4 kB, so make it where it stays.
+/// State of a classification. It takes 5.4 kB, so make it where it stays.
 #[derive(Clone, Debug)]
 pub struct Classifier {
     signature: Signature,
@@ -38,18 +38,18 @@ pub struct Classifier {
     stage: Stage,
 }
 
-/// What is next.
+/// Next step.
 #[derive(Clone, Debug)]
 enum Stage {
-    /// Nothing: not begun, or over.
+    /// Not begun, or finished.
     Idle,
     /// A layer of the network.
     Network,
-    /// What its outputs say.
+    /// Posterior from the outputs of the network.
     Posterior,
-    /// Processes along the posterior's longest axis.
+    /// Processes along the longest axis of the posterior.
     Candidates(CyclePosterior),
-    /// How well its mean explains the cycle.
+    /// Misfit score of its mean.
     Score(CyclePosterior, [CandidateProcess; CANDIDATES]),
 }
 
@@ -60,7 +60,7 @@ impl Default for Classifier {
 }
 
 impl Classifier {
-    /// Room for a classification, all zeros.
+    /// A classification that has not begun, all zeros.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -75,11 +75,11 @@ impl Classifier {
         }
     }
 
-    /// Begins the classification of a cycle of `period_s` by a pack, whatever was under way; the arguments
-    /// are those of [`classify_by`](super::classify_by).
+    /// Begins the classification of a cycle of `period_s` (s) with a pack. A classification in progress is
+    /// dropped. The arguments are those of [`classify_by`](super::classify_by).
     ///
     /// # Errors
-    /// Where the pack has no calibration.
+    /// [`ClassifyError::Pack`] if the pack has no calibration.
     pub fn begin(
         &mut self,
         pack: &Pack<'_>,
@@ -101,7 +101,7 @@ impl Classifier {
         self.noise_sigma = noise_sigma;
     }
 
-    /// Begins behind the network, whose outputs these are.
+    /// Begins after the network, with its outputs.
     pub(super) fn begin_at(
         &mut self,
         outputs: &[f32; OUTPUTS],
@@ -115,11 +115,11 @@ impl Classifier {
         self.take(outputs)
     }
 
-    /// One slice of it, given the same pack each time; what came out after the last, and `None` before.
+    /// Does one slice; give it the same pack each time. Returns the result after the last slice, `None` before.
     ///
     /// # Errors
-    /// In what came out: names the output, the noise or the parameter that is out of range. Where nothing
-    /// was begun, output 0 is no number.
+    /// In the result: the output, the noise or the parameter that is out of range. If nothing was begun, output
+    /// 0 is NaN.
     pub fn advance(&mut self, pack: &Pack<'_>) -> Option<Result<Classification, ClassifyError>> {
         let outcome = if let Stage::Network = self.stage {
             let outputs = self.network.advance(pack)?;
@@ -133,7 +133,7 @@ impl Classifier {
         outcome
     }
 
-    /// The network's outputs, if they are numbers.
+    /// Takes the outputs of the network if they are finite.
     fn take(&mut self, outputs: &[f32; OUTPUTS]) -> Result<(), ClassifyError> {
         if let Some(index) = outputs.iter().position(|output| !output.is_finite()) {
             return Err(ClassifyError::Output(index, outputs[index]));
@@ -146,7 +146,7 @@ impl Classifier {
         Ok(())
     }
 
-    /// A slice behind the network.
+    /// A slice after the network.
     pub(super) fn read(&mut self) -> Option<Result<Classification, ClassifyError>> {
         match &mut self.stage {
             Stage::Idle | Stage::Network => Some(Err(ClassifyError::Output(0, f32::NAN))),
@@ -226,17 +226,17 @@ impl Classifier {
         exp(f64::from(self.signature.values[PARTS + 1]))
     }
 
-    /// What the score asks about.
-    fn cycle(&self, posterior: &CyclePosterior) -> Cycle {
+    /// Input of the score.
+    fn cycle(&self, posterior: &CyclePosterior) -> ScoredCycle {
         let (calibration, noise, samples) = (&self.calibration, self.noise(), self.samples());
-        Cycle {
+        ScoredCycle {
             parts: core::array::from_fn(|part| f64::from(self.signature.values[part])),
             mean: posterior.mean,
             doubt: Doubt {
                 root: posterior.root,
                 jump: calibration.jump + calibration.jump_of_noise * noise,
-                // A harmonic has 1/32 of the variance of a part, half of it real, and a part is the mean
-                // of N/32 samples.
+                // A harmonic has 1/32 of the variance of a part, half of it in the real part, and a part is the
+                // mean of N/32 samples.
                 sigma: hypot(calibration.floor, noise * sqrt(0.5 / samples)),
             },
             duty: f64::from(self.signature.values[PARTS]),

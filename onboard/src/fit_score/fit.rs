@@ -1,23 +1,23 @@
-//! Least squares within the doubt: the least `|y - A x|^2 + |x|^2`, which is
-//! `|y|^2 - b^T (A^T A + 1)^-1 b` with `b = A^T y`, by Cholesky's factor, some of its rows at a time.
+//! Regularised least squares: the minimum of `|y - A x|^2 + |x|^2`, which is `|y|^2 - b^T (A^T A + 1)^-1 b` with
+//! `b = A^T y`, by Cholesky factorisation, some rows per slice.
 
 use libm::sqrt;
 
 use super::{COLUMNS, ROWS, Rows};
 use crate::pack::VALUES;
 
-/// Inner products in one slice, but for those of a row that is begun.
+/// Inner products per slice; a row that has begun is completed.
 const PRODUCTS: usize = 16;
 
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Explained {
-    /// `y`.
+    /// Right-hand side `y`.
     left: Rows,
     factor: [[f64; COLUMNS]; COLUMNS],
     forward: [f64; COLUMNS],
-    /// Rows of the factor that are there.
+    /// Number of rows of the factor computed.
     rows: usize,
-    /// The best `x`.
+    /// Solution `x`.
     x: [f64; COLUMNS],
 }
 
@@ -35,7 +35,7 @@ impl Explained {
         self.rows = 0;
     }
 
-    /// One slice; the least sum of squares after the last.
+    /// Does one slice; returns the minimum after the last.
     pub(super) fn advance(&mut self, columns: &[Rows; COLUMNS]) -> Option<f64> {
         let mut products = 0;
         while self.rows < COLUMNS {
@@ -72,7 +72,7 @@ impl Explained {
         self.forward[i] = (dot(&columns[i], &self.left) - known) / factor[i][i];
     }
 
-    /// The values where the least is.
+    /// The values at the minimum.
     pub(super) fn values(&self) -> [f64; VALUES] {
         core::array::from_fn(|k| self.x[k])
     }

@@ -1,4 +1,4 @@
-//! What a process makes of a rectangular wave, and how that moves with its values.
+//! Periodic response of a process to a rectangular wave, and its derivatives with respect to the values.
 
 use core::f64::consts::{PI, TAU};
 
@@ -9,41 +9,41 @@ use crate::complex::Complex;
 use crate::pack::VALUES;
 use crate::signature::PARTS;
 
-/// Harmonics fall as `n^-4`, where the actuator is fast after a plateau of up to seven times, and their means by
-/// another fifth: those beyond 32 + 15 add less than 7 * 49^-4 / 5 = 3e-7 of the fundamental to any.
+/// Aliases that are summed. Harmonics fall as `n^-4`, with a fast actuator after a plateau of up to seven times,
+/// and the means by another fifth: those beyond 32 + 15 add less than 7 * 49^-4 / 5 = 3e-7 of the fundamental.
 const ALIASES: [i32; 3] = [-1, 0, 1];
 
-/// Harmonics in one slice.
+/// Harmonics per slice.
 const SLICE: usize = 3;
 
 #[derive(Clone, Debug)]
-pub(super) struct Response {
-    /// Harmonics of the parts.
+pub(super) struct PeriodicResponse {
+    /// Harmonics of the means over parts.
     pub(super) mean: Rows,
-    /// Derivatives with respect to the values, then jumps of force, rate and output, each of size one at
-    /// the fundamental; once the [equations](Self::equations) are made, their columns.
+    /// Derivatives with respect to the values, then jumps of force, rate and output, each of size one at the
+    /// fundamental. [`equations`](Self::equations) turns them into columns.
     pub(super) columns: [Rows; COLUMNS],
     terms: Terms,
-    /// Harmonics that are there.
+    /// Number of harmonics computed.
     done: usize,
-    /// Turns by the delay and by the time of the fall: of the last harmonic.
+    /// Rotations by the delay and by the time of the fall, for the last harmonic.
     late: Complex,
     fall: Complex,
 }
 
-/// What all harmonics share.
+/// Values that all harmonics share.
 #[derive(Clone, Copy, Debug)]
 struct Terms {
     pole_sum: f64,
     product: f64,
     gain: f64,
-    /// Turns by the delay and by the time of the fall: of the fundamental, and of harmonic 32.
+    /// Rotations by the delay and by the time of the fall, for the fundamental and for harmonic 32.
     by_one: [Complex; 2],
     by_all: [Complex; 2],
 }
 
-impl Response {
-    /// Of no process yet: all zeros, which takes no room in the program.
+impl PeriodicResponse {
+    /// All zeros, which takes no space in the program: memory before the first use.
     pub(super) const NONE: Self = Self {
         mean: [0.0; ROWS],
         columns: [[0.0; ROWS]; COLUMNS],
@@ -59,7 +59,7 @@ impl Response {
         fall: Complex::ZERO,
     };
 
-    /// Begins that of the process of these values `ln S, r, tau/T, ln A` to a wave of this duty.
+    /// Begins the response of the process with the values `ln S, r, tau/T, ln A` to a wave of this duty.
     pub(super) fn begin(&mut self, values: &[f64; VALUES], duty: f64) {
         let [ln_pole_sum, pole_ratio, delay, ln_amplitude] = *values;
         let pole_sum = exp(ln_pole_sum);
@@ -75,8 +75,8 @@ impl Response {
         (self.late, self.fall) = (Complex::ONE, Complex::ONE);
     }
 
-    /// The next harmonics, of a wave that is sampled so many times in a period and each sample held around
-    /// its time; true where all are there.
+    /// Computes the next harmonics of a wave with this number of samples per period, each sample held around its
+    /// time; true when all are complete.
     pub(super) fn advance(&mut self, samples: f64) -> bool {
         let end = HARMONICS.min(self.done + SLICE);
         for harmonic in self.done + 1..=end {
@@ -110,7 +110,7 @@ impl Response {
         true
     }
 
-    /// Mean and columns at an angular frequency, of the harmonic of this alias.
+    /// Mean and columns at an angular frequency, for the harmonic of this alias.
     fn at(&self, alias: i32, omega: f64, mean: f64) -> [Complex; 1 + COLUMNS] {
         let Terms {
             pole_sum,
@@ -156,8 +156,8 @@ impl Response {
         ]
     }
 
-    /// What of `observed` harmonics is to be explained within this doubt, the process being `deviations`
-    /// off the mean; the slopes and jumps become the columns it may be a combination of.
+    /// Right-hand side of the least squares: the difference of `observed` and the response, when the process is
+    /// at these `deviations` from the mean. Turns derivatives and jumps into the columns that may explain it.
     pub(super) fn equations(
         &mut self,
         observed: &Rows,

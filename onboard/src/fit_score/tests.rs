@@ -1,4 +1,4 @@
-//! The score's response against the time domain, and its statistic against what it should be.
+//! The response against the time domain, and the statistic against its expected distribution.
 
 use libm::sqrt;
 
@@ -6,7 +6,7 @@ use super::fit::dot;
 use super::*;
 use crate::transition::{State, Transition};
 
-/// Nodes and weights of Gauss and Legendre's rule of five points on -1..1.
+/// Nodes and weights of the Gauss-Legendre rule of five points on -1..1.
 const RULE: [(f64, f64); 5] = [
     (0.0, 0.568_888_888_888_888_9),
     (0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
@@ -15,7 +15,7 @@ const RULE: [(f64, f64); 5] = [
     (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
 ];
 
-/// The periodic response in the time domain, period one and `K/T_body` one.
+/// The periodic response in the time domain, with the period and `K/T_body` one.
 struct Wave {
     body: f64,
     prop: f64,
@@ -39,7 +39,7 @@ impl Wave {
         wave
     }
 
-    /// From the start: low, high behind the delay, low again; the mean input is zero.
+    /// From the start: low, high after the delay, low again; the mean input is zero.
     fn at(&self, time: f64) -> State {
         let [rise, fall] = self.cuts;
         let mean = 2.0 * (fall - rise) - 1.0;
@@ -72,7 +72,7 @@ impl Wave {
     }
 }
 
-/// Damping, actuator's pole, delay, duty: two multirotors, equal poles, no damping.
+/// Damping, pole of the actuator, delay, duty: two multirotors, equal poles, no damping.
 const SHAPES: [[f64; 4]; 4] = [
     [0.25, 13.0, 0.056, 0.5],
     [2.9, 38.0, 0.006, 0.47],
@@ -97,9 +97,9 @@ fn size(rows: &Rows) -> f64 {
 
 const NO_DOUBT: [[f64; VALUES]; VALUES] = [[0.0; VALUES]; VALUES];
 
-/// What this response, without a second one, leaves.
+/// The statistic after a single pass at this response.
 fn left(
-    response: &Response,
+    response: &PeriodicResponse,
     observed: &Rows,
     root: &[[f64; VALUES]; VALUES],
     jump: f64,
@@ -126,14 +126,14 @@ fn harmonics(parts: &[f64; PARTS]) -> Rows {
     rows
 }
 
-fn respond(values: &[f64; VALUES], duty: f64, samples: f64) -> Response {
-    let mut response = Response::NONE;
+fn respond(values: &[f64; VALUES], duty: f64, samples: f64) -> PeriodicResponse {
+    let mut response = PeriodicResponse::NONE;
     response.begin(values, duty);
     while !response.advance(samples) {}
     response
 }
 
-/// The parts of a cycle of these harmonics.
+/// Parts of a cycle with these harmonics.
 fn parts(harmonics: &Rows) -> [f64; PARTS] {
     core::array::from_fn(|part| {
         (1..=HARMONICS)
@@ -154,7 +154,7 @@ fn statistic(
     samples: f64,
 ) -> f64 {
     let mut statistic = Statistic::NONE;
-    statistic.begin(Cycle {
+    statistic.begin(ScoredCycle {
         parts,
         mean: *mean,
         doubt: *doubt,
@@ -168,14 +168,14 @@ fn statistic(
     }
 }
 
-// Against the time domain: what the aliases beyond 47 add is below 3e-7 of the fundamental, and a
-// statistic with a floor of 3e-4 of it below 30 (3e-7 / 3e-4)^2 = 3e-5.
+// Against the time domain: the aliases beyond 47 add less than 3e-7 of the fundamental, and to a statistic with
+// a floor of 3e-4 of it less than 30 (3e-7 / 3e-4)^2 = 3e-5.
 #[test]
 fn a_perfect_cycle_leaves_nothing() {
     for shape in SHAPES {
         let [body, prop, delay, duty] = shape;
         let observed = harmonics(&Wave::new(body, prop, delay, duty).parts());
-        // Held for no time.
+        // With so many samples a sample is held for no time.
         let response = respond(&values(shape), duty, 1e9);
         let fundamental = libm::hypot(observed[0], observed[HARMONICS]);
         for (row, (a, b)) in observed.iter().zip(response.mean).enumerate() {
@@ -189,8 +189,8 @@ fn a_perfect_cycle_leaves_nothing() {
     }
 }
 
-// A cycle that ends elsewhere than it began is the periodic one and free motion of the state. That
-// of a deviation (y, v, f) at the start is, in harmonics, jumps of what is lost over the cycle.
+// A cycle whose end differs from its start is the periodic one plus free motion of the state. In harmonics the
+// free motion of a deviation (y, v, f) at the start is a jump of what decays over the cycle.
 #[test]
 fn jumps_are_free_motions() {
     let [body, prop, delay, duty] = SHAPES[1];
@@ -209,13 +209,14 @@ fn jumps_are_free_motions() {
             1e-5 * amplitude,
         )
     });
-    // Without jumps some per cent over 1e-5 are left; with them the cost of their size, of order one,
-    // and their aliases beyond 47, 1e-3 of a jump of the output's size at most.
+    // Without jumps a few per cent over 1e-5 are left. With them the cost is that of their size, of order one,
+    // and of their aliases beyond 47, 1e-3 of the size of a jump of the output at most.
     assert!(stiff > 1e4, "{stiff}");
     assert!(free < 1e-3 * stiff, "{free} of {stiff}");
 }
 
-// Central differences of 1e-5 are good to 1e-9 of the slope, times some hundred for the curvature.
+// Central differences with a step of 1e-5 are accurate to 1e-9 of the derivative, times some hundred for the
+// curvature.
 #[test]
 fn slopes_are_derivatives() {
     for shape in SHAPES {
@@ -239,7 +240,8 @@ fn slopes_are_derivatives() {
     }
 }
 
-/// Normal numbers: twelve uniform ones of a linear congruential generator (Knuth's MMIX), less six.
+/// Normal numbers: the sum of twelve uniform numbers of a linear congruential generator (Knuth's MMIX) minus
+/// six.
 struct Normal(u64);
 
 impl Normal {
@@ -254,9 +256,9 @@ impl Normal {
     }
 }
 
-// Values, jumps and noise drawn from what they are taken for: chi-squared with 30 degrees of freedom
-// whatever the sizes of the columns, mean 30, variance 60. Of 4000 the mean is known to
-// sqrt(60/4000) = 0.12, the variance to 60 sqrt(2.4/4000) = 1.5.
+// Values, jumps and noise drawn from their assumed distributions: chi-squared with 30 degrees of freedom
+// whatever the sizes of the columns, with mean 30 and variance 60. The mean of 4000 draws has the standard
+// deviation sqrt(60/4000) = 0.12, the variance 60 sqrt(2.4/4000) = 1.5.
 #[test]
 fn noise_is_chi_squared() {
     let response = respond(&values(SHAPES[0]), 0.5, 200.0);
@@ -294,7 +296,7 @@ fn noise_is_chi_squared() {
     assert!((variance - 60.0).abs() < 5.0, "{variance}");
 }
 
-// Of what is left the statistic is a quadratic form: a defect twice as large counts four times.
+// The statistic is a quadratic form of the difference: twice the difference costs four times.
 #[test]
 fn grows_with_the_square_of_a_defect() {
     let response = respond(&values(SHAPES[0]), 0.5, 200.0);
@@ -313,8 +315,9 @@ fn grows_with_the_square_of_a_defect() {
     assert!(at(f64::NAN).is_nan());
 }
 
-// A cycle two standard deviations off in three values costs no more than |v|^2 = 12 where the slopes are
-// right. Those at the mean miss what is of second order in 0.6; those where they lead of that again.
+// A cycle two standard deviations off in three values costs at most |v|^2 = 12 with exact derivatives. The
+// derivatives at the mean neglect terms of second order in 0.6; those at the minimum neglect terms of second
+// order in the remainder.
 #[test]
 fn slopes_are_taken_where_they_lead() {
     let mean = values(SHAPES[0]);
@@ -344,7 +347,8 @@ fn slopes_are_taken_where_they_lead() {
     assert_eq!(of_nothing, f64::INFINITY);
 }
 
-// Beyond equal lags and before the input there is nothing: the nearest there is, and its deviations.
+// Outside the valid values (beyond equal lags, negative delay) the nearest valid values are used, with their own
+// deviations.
 #[test]
 fn the_nearest_is_a_process() {
     let mean = [2.0, 0.2, 0.01, 0.0];

@@ -1,7 +1,7 @@
-//! Where the nodes of a table of gains lie, and a cubic between them.
+//! Nodes of the lead table, and cubic interpolation between them.
 //!
-//! The coordinates `x` and `y` and the stretch `c` are those of the [table](super): shares of times,
-//! without unit, from 0 to at most 1.
+//! The coordinates `x` and `y` and the stretch `c` are those of the [table](super): ratios of times, from 0 to 1
+//! at most.
 
 use core::f64::consts::FRAC_PI_2;
 use core::fmt;
@@ -9,66 +9,66 @@ use core::fmt;
 use super::GainsError;
 use crate::process::Soiptd;
 
-/// Largest dead time of a table, in shorter lags. Beyond it, as both lags vanish, the lead changes
-/// faster than a small table follows.
+/// Largest dead time of a table in shorter lags. Beyond it both lags become negligible, and the lead changes
+/// faster than a small table can follow.
 pub const LARGEST_DELAY_IN_LAGS: f64 = 20.0;
 
-/// Dead time over dead time and shorter lag, at the largest dead time.
+/// `tau / (T_1 + tau)` at the largest dead time.
 const LARGEST_DELAY_SHARE: f64 = LARGEST_DELAY_IN_LAGS / (1.0 + LARGEST_DELAY_IN_LAGS);
 
-/// A dead time above the largest by this fraction is rounding.
+/// Relative excess of the largest dead time that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
-/// Numbers of the [`Nodes`] ahead of the angles: margin, two stretches, points.
+/// Numbers of the [`Nodes`] before the angles: margin, two stretches, number of points.
 pub const HEADER: usize = 4;
 
-/// Angles of a node: lead at the margin, free margin, lead at the free margin.
+/// Angles per node: lead at the margin, free margin, lead at the free margin.
 pub const FIELDS: usize = 3;
 
-/// Nodes that a cubic runs through.
+/// Number of nodes of a cubic.
 pub(super) const STENCIL: usize = 4;
 
-/// Largest number of points along an axis; the error of a table is rounding long before.
+/// Maximum number of points along an axis; long before that the error of a table is rounding.
 const MAX_POINTS: usize = 1000;
 
-/// Where the nodes of a table lie.
+/// Positions of the nodes of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nodes {
     /// Phase margin that the table is made for (rad), between 0 and `pi/2`.
     pub phase_margin_rad: f32,
-    /// `c` of the dead time's axis, above 0.
+    /// Stretch `c` of the axis of the dead time, above 0.
     pub delay_stretch: f32,
-    /// `c` of the axis of the lags, above 0.
+    /// Stretch `c` of the axis of the lags, above 0.
     pub lag_stretch: f32,
-    /// Points along either axis, 4 to 1000.
+    /// Number of points along either axis, 4 to 1000.
     pub points: usize,
 }
 
-/// Why numbers are not a table.
+/// Why numbers are not a lead table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum LeadTableError {
-    /// There are too few numbers, or too many.
+    /// Wrong number of numbers.
     Length {
-        /// Numbers that the header asks for, or its own length.
+        /// Number required by the header, or the length of the header.
         expected: usize,
-        /// Numbers that there are.
+        /// Number found.
         found: usize,
     },
-    /// The bytes are not whole numbers of four bytes.
+    /// The length of the bytes is not a multiple of four: the length.
     Bytes(usize),
     /// A number of the header is out of its range.
     Header {
-        /// Its position.
+        /// Its index.
         index: usize,
-        /// What it is.
+        /// Its value.
         value: f32,
     },
     /// An angle is not between 0 and `pi/2`.
     Angle {
-        /// Its position.
+        /// Its index.
         index: usize,
-        /// What it is (rad).
+        /// Its value (rad).
         value: f32,
     },
 }
@@ -100,7 +100,7 @@ impl fmt::Display for LeadTableError {
 impl core::error::Error for LeadTableError {}
 
 impl Nodes {
-    /// The numbers that a table begins with.
+    /// Header of a table with these nodes.
     #[must_use]
     pub fn header(&self) -> [f32; HEADER] {
         [
@@ -111,7 +111,7 @@ impl Nodes {
         ]
     }
 
-    /// Numbers of a table with these nodes.
+    /// Number of numbers of a table with these nodes.
     #[must_use]
     pub fn length(&self) -> usize {
         HEADER + FIELDS * self.points * self.points
@@ -139,8 +139,7 @@ impl Nodes {
         }
     }
 
-    /// The process at a node, of unit acceleration gain, dead time and shorter lag together one
-    /// second; `None` outside the table.
+    /// Process at a node, with unit acceleration gain and `T_1 + tau` of one second; `None` outside the table.
     #[must_use]
     pub fn process(&self, delay_index: usize, lag_index: usize) -> Option<Soiptd> {
         let coordinate = |index: usize, stretch: f32| {
@@ -158,7 +157,7 @@ impl Nodes {
         Soiptd::from_acceleration_gain(1.0, short_s, inv_long_per_s, tau_s).ok()
     }
 
-    /// Where a process lies, in cells from the first node.
+    /// Position of a process, in cells from the first node.
     pub(super) fn position(&self, process: &Soiptd) -> Result<[f64; 2], GainsError> {
         let (prop_s, body_s) = (process.t_prop_s(), 1.0 / process.inv_t_body_per_s());
         let (short_s, long_s) = (prop_s.min(body_s), prop_s.max(body_s));
@@ -183,8 +182,8 @@ pub(super) fn is_acute(angle_rad: f32) -> bool {
     angle_rad > 0.0 && f64::from(angle_rad) < FRAC_PI_2
 }
 
-/// Lagrange's cubic at a position among equally spaced points: the first of its four and their
-/// weights. At either end it is that of the last four.
+/// Lagrange's cubic at a position among equally spaced points: index of its first node and the four weights. In
+/// the first and last cell it is that of the neighbouring cell.
 pub(super) fn cubic(position: f64, points: usize) -> (usize, [f64; STENCIL]) {
     let first = (position as usize)
         .saturating_sub(1)
@@ -212,8 +211,8 @@ mod tests {
         points: 5,
     };
 
-    // Weights sum to one and reproduce t, t^2, t^3, also in the first and the last cell, where the
-    // cubic is that of the neighbours: t^3 at 0.3 is 0.027.
+    // The weights sum to one and reproduce t, t^2 and t^3, also in the first and the last cell, where the cubic
+    // is that of the neighbour: t^3 at 0.3 is 0.027.
     #[test]
     fn cubics_are_exact() {
         for (position, expected_first) in [

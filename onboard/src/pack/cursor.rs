@@ -1,9 +1,9 @@
-//! Where a reader stands: takes numbers off the front, and knows what it is reading.
+//! Reader that takes numbers from the front of the remaining bytes and knows the current section.
 
 use super::error::{PackError, Section};
 use crate::floats::Floats;
 
-/// The bytes to come, and the section they are of.
+/// Remaining bytes and current section.
 pub(super) struct Cursor<'a> {
     rest: &'a [u8],
     section: Section,
@@ -25,12 +25,12 @@ impl<'a> Cursor<'a> {
         self.rest.len()
     }
 
-    /// That the section goes on beyond the last byte.
+    /// Error: the section continues after the last byte.
     pub(super) fn ends(&self) -> PackError {
         PackError::Ends(self.section)
     }
 
-    /// All there is still to come.
+    /// All remaining bytes.
     pub(super) fn peek(&self) -> &'a [u8] {
         self.rest
     }
@@ -59,12 +59,12 @@ impl<'a> Cursor<'a> {
         self.array_of_bytes().map(u64::from_le_bytes)
     }
 
-    /// How many of something follow, which may be more than there is memory.
+    /// Number of following items, which may exceed the memory.
     pub(super) fn count(&mut self) -> Result<usize, PackError> {
         usize::try_from(self.u32()?).map_err(|_| self.ends())
     }
 
-    /// So many numbers, all of them finite.
+    /// The next `count` numbers, all finite.
     pub(super) fn finite(&mut self, count: usize) -> Result<Floats<'a>, PackError> {
         let length = count.checked_mul(size_of::<f32>()).ok_or(self.ends())?;
         let floats = Floats::new(self.bytes(length)?).ok_or(self.ends())?;
@@ -77,12 +77,12 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// As [`Self::finite`], copied.
+    /// The next `N` numbers, all finite, copied.
     pub(super) fn array<const N: usize>(&mut self) -> Result<[f32; N], PackError> {
         self.finite(N)?.first().ok_or(self.ends())
     }
 
-    /// As [`Self::array`], none zero or below.
+    /// The next `N` numbers, all positive, copied.
     pub(super) fn positive<const N: usize>(&mut self) -> Result<[f32; N], PackError> {
         let values = self.array()?;
         match values.iter().position(|&value| value <= 0.0) {
@@ -94,7 +94,7 @@ impl<'a> Cursor<'a> {
         }
     }
 
-    /// Refuses limits whose lower one is above.
+    /// Rejects limits whose lower value exceeds the upper one.
     pub(super) fn ordered(
         &self,
         mut limits: impl Iterator<Item = (f32, f32)>,

@@ -1,28 +1,28 @@
-//! Why bytes are no pack that can be used.
+//! Errors of reading a pack.
 
 use core::fmt;
 
 use super::{HEADER, MOST_LAYERS, OUTPUTS, VERSION, WIDEST};
 
-/// A part of a pack.
+/// Section of a pack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Section {
     /// Layers of the network.
     Network,
-    /// Normalisation of its inputs.
+    /// Normalisation of the network's inputs.
     Inputs,
-    /// Scaling of its outputs.
+    /// Scaling of the network's outputs.
     Outputs,
-    /// What the pack was made for.
+    /// Domain that the pack was made for.
     Domain,
-    /// Threshold and calibration of the unknown.
+    /// Threshold and calibration of the score.
     Unknown,
-    /// How the shapes of the family are distributed.
+    /// Distribution of the shapes of the family.
     Prior,
-    /// Table of leads.
+    /// Lead table.
     LeadTable,
-    /// Signatures with their outputs.
+    /// Self-test.
     SelfTest,
     /// Card.
     Card,
@@ -48,88 +48,90 @@ impl fmt::Display for Section {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum PackError {
-    /// There are none.
+    /// There are no bytes.
     Empty,
-    /// They begin with something else.
+    /// The first bytes are not those of a pack.
     NotAPack,
-    /// A version beyond this reader: which.
+    /// The version is newer than this reader: its number.
     Newer(u32),
-    /// Fewer than there were.
+    /// The file is too short.
     Truncated {
-        /// Bytes that there were.
+        /// Length in the header (bytes).
         expected: u64,
-        /// Bytes that there are.
+        /// Length found (bytes).
         found: usize,
     },
-    /// More than there were.
+    /// The file is too long.
     Longer {
-        /// Bytes that there were.
+        /// Length in the header (bytes).
         expected: u64,
-        /// Bytes that there are.
+        /// Length found (bytes).
         found: usize,
     },
-    /// Other than they were.
+    /// The content differs from its hash.
     Damaged {
-        /// The hash that the header names.
+        /// Hash in the header.
         expected: u64,
-        /// The hash of what there is.
+        /// Hash of the content.
         found: u64,
     },
-    /// A section that goes on beyond the end of the file.
+    /// A section continues after the end of the file.
     Ends(Section),
-    /// Bytes behind the last section: how many.
+    /// There are bytes after the last section: their number.
     Left(usize),
-    /// Too many layers, or none: how many.
+    /// Wrong number of layers: the number.
     Layers(usize),
-    /// A layer that is too wide, or has nothing in it.
+    /// A layer is too wide or empty.
     Width {
-        /// Which, from 0.
+        /// Index of the layer, from 0.
         layer: usize,
-        /// Its inputs or outputs.
+        /// Number of its inputs or outputs.
         width: usize,
     },
-    /// A layer whose weights or activation are of an unknown kind.
+    /// The weights or the activation of a layer are of an unknown kind.
     Kind {
-        /// Which, from 0.
+        /// Index of the layer, from 0.
         layer: usize,
     },
-    /// A layer that does not take what comes before it.
+    /// The inputs of a layer do not match the outputs before it.
     Fit {
-        /// Which, from 0.
+        /// Index of the layer, from 0.
         layer: usize,
-        /// What comes before it.
+        /// Number of outputs before it.
         expected: usize,
-        /// Its inputs.
+        /// Number of its inputs.
         found: usize,
     },
-    /// A last layer of so many outputs.
+    /// The last layer has a wrong number of outputs: the number.
     Outputs(usize),
-    /// A number that is not finite, or not positive where it must be.
+    /// A number is not finite, or not positive where it must be.
     Value {
-        /// Where.
+        /// Section.
         section: Section,
-        /// Which of its row, from 0.
+        /// Index in its row, from 0.
         index: usize,
     },
-    /// A lowest above its highest.
+    /// A lower limit exceeds its upper limit.
     Limits {
-        /// Where.
+        /// Section.
         section: Section,
-        /// Which, from 0.
+        /// Index of the limits, from 0.
         index: usize,
     },
     /// The card is not UTF-8.
     Card,
 }
 
-/// What helps where the file is whole but its contents are not.
+/// Advice if the file is complete but its contents are not valid.
 const REMAKE: &str = "make or export the pack again";
 
 impl fmt::Display for PackError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Empty => f.write_str("there is no pack: it has no bytes"),
-            Self::NotAPack => f.write_str("this is no pack of onecycle: it begins otherwise"),
+            Self::Empty => f.write_str("the pack is empty: it has no bytes"),
+            Self::NotAPack => {
+                f.write_str("this is not a pack of onecycle: its first bytes are wrong")
+            }
             Self::Newer(version) => write!(
                 f,
                 "the pack was made by a newer onecycle, in version {version} of the format, where \
@@ -145,7 +147,7 @@ impl fmt::Display for PackError {
             ),
             Self::Longer { expected, found } => write!(
                 f,
-                "the pack has {found} bytes where it says {expected}; copy it again"
+                "the pack has {found} bytes, but its header says {expected}; copy it again"
             ),
             Self::Damaged { expected, found } => write!(
                 f,
@@ -154,11 +156,11 @@ impl fmt::Display for PackError {
             ),
             Self::Ends(section) => write!(
                 f,
-                "the section {section} of the pack goes on beyond its end; {REMAKE}"
+                "the section {section} of the pack continues after its end; {REMAKE}"
             ),
             Self::Left(bytes) => write!(
                 f,
-                "{bytes} bytes of the pack belong to no section; {REMAKE}"
+                "{bytes} bytes follow the last section of the pack; {REMAKE}"
             ),
             Self::Layers(layers) => write!(
                 f,
@@ -179,7 +181,7 @@ impl fmt::Display for PackError {
                 found,
             } => write!(
                 f,
-                "layer {layer} of the network has {found} inputs where {expected} come in"
+                "layer {layer} of the network has {found} inputs, but gets {expected}"
             ),
             Self::Outputs(outputs) => write!(
                 f,
@@ -187,15 +189,13 @@ impl fmt::Display for PackError {
             ),
             Self::Value { section, index } => write!(
                 f,
-                "number {index} in the section {section} of the pack is none that can be there; \
-                 {REMAKE}"
+                "number {index} in the section {section} of the pack is out of range; {REMAKE}"
             ),
             Self::Limits { section, index } => write!(
                 f,
-                "limits {index} in the section {section} of the pack are the wrong way round; \
-                 {REMAKE}"
+                "limits {index} in the section {section} of the pack are reversed; {REMAKE}"
             ),
-            Self::Card => f.write_str("the card of the pack is not text in UTF-8"),
+            Self::Card => f.write_str("the card of the pack is not valid UTF-8"),
         }
     }
 }

@@ -1,24 +1,24 @@
-//! A pack's network, a layer at a time.
+//! Evaluation of the network, one layer per slice.
 
 use super::{OUTPUTS, Pack, WIDEST};
 use crate::signature::LENGTH;
 
-/// Inputs of the next layer.
+/// State of the evaluation.
 #[derive(Clone, Debug)]
 pub(crate) struct Forward {
-    /// They and the room for its outputs, in turn.
+    /// Inputs and outputs of the layer, alternating.
     rows: [[f32; WIDEST]; 2],
     layer: usize,
 }
 
 impl Forward {
-    /// Of no signature.
+    /// All zeros: memory before the first use.
     pub(crate) const NONE: Self = Self {
         rows: [[0.0; WIDEST]; 2],
         layer: 0,
     };
 
-    /// Begins with a signature as the network sees it.
+    /// Begins with a normalised signature.
     pub(crate) fn begin(&mut self, pack: &Pack<'_>, signature: &[f32; LENGTH]) {
         *self = Self::NONE;
         let normalised = (pack.offsets.iter().zip(pack.scales.iter())).zip(signature);
@@ -28,7 +28,7 @@ impl Forward {
         }
     }
 
-    /// The next layer; behind the last, the outputs.
+    /// Evaluates the next layer; returns the outputs after the last.
     pub(crate) fn advance(&mut self, pack: &Pack<'_>) -> Option<[f32; OUTPUTS]> {
         let [even, odd] = &mut self.rows;
         let (now, next) = if self.layer.is_multiple_of(2) {

@@ -1,35 +1,35 @@
-//! What the sections of a pack hold, as a reader is handed it.
+//! Contents of the sections of a pack.
 
 use super::{AXES, VALUES};
 use crate::floats::Floats;
 use crate::signature::LENGTH;
 
-/// From the network's outputs to values.
+/// Scaling from the outputs of the network to values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OutputScaling {
-    /// Values are the network's means over these.
+    /// Values are the means of the network divided by these.
     pub scales: [f32; VALUES],
-    /// Times the standard deviations that the network claims.
+    /// Factors for the standard deviations of the network.
     pub temperatures: [f32; VALUES],
-    /// Lowest values that are believed.
+    /// Lower limits of the values.
     pub lowest: [f32; VALUES],
-    /// Highest values that are believed.
+    /// Upper limits of the values.
     pub highest: [f32; VALUES],
 }
 
-/// How the shapes of the family are distributed: a Gaussian over the first three values.
+/// Distribution of the shapes of the family: a Gaussian over the first three values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Prior {
-    /// Its mean.
+    /// Mean.
     pub mean: [f32; 3],
-    /// The lower triangular root of its covariance.
+    /// Lower triangular root of the covariance.
     pub root: [[f32; 3]; 3],
 }
 
-/// What the pack was made for: lowest and highest of each.
+/// Domain that the pack was made for: lowest and highest value of each quantity.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Domain {
-    /// `ln(T/dt)`, samples in a period.
+    /// `ln(T/dt)`, the logarithm of the samples in a period.
     pub ln_samples: [f32; 2],
     /// Duty of a cycle.
     pub duty: [f32; 2],
@@ -40,7 +40,7 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// Whether a signature and the relay behind it are what the pack was made for.
+    /// Whether a signature, and the relay that produced it, are in the domain.
     #[must_use]
     pub fn holds(&self, signature: &[f32; LENGTH], beta: f32) -> bool {
         let [.., duty, ln_samples] = *signature;
@@ -54,40 +54,40 @@ impl Domain {
     }
 }
 
-/// The table of leads as it lies: what its numbers mean is for its reader to know.
+/// Lead table as stored. [`Pack::gains_table`](super::Pack::gains_table) has the checked table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeadTableBytes<'a> {
-    /// Points along the first axis.
+    /// Number of points along the first axis.
     pub n: usize,
-    /// Points along the second axis.
+    /// Number of points along the second axis.
     pub m: usize,
-    /// Numbers of each point.
+    /// Numbers per point.
     pub fields: usize,
-    /// Four that say where the points lie.
+    /// Position of the points.
     pub axes: [f32; AXES],
-    /// `n m` times as many as there are fields.
+    /// Numbers, `n m fields` of them.
     pub values: Floats<'a>,
-    /// The axes, then the values: little-endian f32, one behind the other.
+    /// Axes, then values, as little-endian f32.
     pub bytes: &'a [u8],
 }
 
 impl LeadTableBytes<'_> {
-    /// Number `index` of the values; `None` beyond the last.
+    /// Number `index` of the values; `None` after the last.
     #[must_use]
     pub fn get(&self, index: usize) -> Option<f32> {
         self.values.get(index)
     }
 }
 
-/// Bytes of a pack by what they are for.
+/// Sizes of the parts of a pack (bytes).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sizes {
     /// Weights, biases and scales of the layers.
     pub weights: usize,
-    /// The lead table, its axes included.
+    /// Lead table with its axes.
     pub table: usize,
-    /// The card.
+    /// Card.
     pub card: usize,
-    /// The file.
+    /// Whole file.
     pub total: usize,
 }

@@ -1,9 +1,9 @@
-//! One step of the search: Levenberg-Marquardt in a box, with Marquardt's scaling.
+//! Step of the search: Levenberg-Marquardt with box constraints and Marquardt's scaling.
 
 use super::domain::{HIGHEST, LOWEST, Shape};
 use crate::least_squares::{dot, solve_symmetric};
 
-/// Gradient and curvature of the sum of squares in the free coordinates.
+/// Gradient and approximate Hessian of the sum of squares in the free coordinates.
 #[derive(Clone, Copy)]
 pub(super) struct NormalEquations {
     curvature: [[f64; 3]; 3],
@@ -12,14 +12,14 @@ pub(super) struct NormalEquations {
 }
 
 impl NormalEquations {
-    /// Room for them, all zeros.
+    /// All zeros: memory before the first use.
     pub(super) const NONE: Self = Self {
         curvature: [[0.0; 3]; 3],
         gradient: [0.0; 3],
         free: [false; 3],
     };
 
-    /// From the derivatives' columns and the residual, as many rows of them as that has.
+    /// From the columns of derivatives and the residual; its length is the number of rows used.
     pub(super) fn new<const BINS: usize>(
         jacobian: &[[f64; BINS]],
         residual: &[f64],
@@ -39,7 +39,7 @@ impl NormalEquations {
         this
     }
 
-    /// The shape after a damped step (Marquardt's scaling) of the free coordinates.
+    /// Shape after a damped step of the free coordinates (Marquardt's scaling).
     pub(super) fn step(&self, shape: &Shape, damping: f64) -> Shape {
         let mut matrix = self.curvature;
         let mut right = self.gradient;

@@ -1,4 +1,4 @@
-//! Where the estimator searches: shapes in periods of the oscillation, and their limits.
+//! Domain of the search: shapes relative to the period of the oscillation, and their limits.
 
 use libm::log;
 
@@ -9,29 +9,29 @@ pub type Shape = [f64; SHAPE];
 /// Number of unknowns of the search.
 pub(super) const SHAPE: usize = 3;
 
-/// The domain, in periods: lags from 1/1000 of a period to one, delays to half a period. Wider
-/// than any relay oscillation of this process: its actuator and delay are at most its half period.
+/// Limits of the domain: lags from 1/1000 of a period to one period, delays up to half a period. Actuator and
+/// delay of a process under a relay take half a period at most, so the domain contains all of them.
 pub(super) const LOWEST: Shape = [0.0, 0.0, 0.0];
 pub(super) const HIGHEST: Shape = [6.9, 0.25, 0.5];
 
-/// A limit of the domain that the best fit lies on.
+/// Limit of the domain on which a best fit lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DomainEdge {
-    /// Both lags as slow as the oscillation allows.
+    /// Both lags are as slow as the oscillation permits.
     SlowLags,
-    /// The actuator's lag too fast to be seen.
+    /// The lag of the actuator is too fast to be observed.
     FastLag,
-    /// The delay as long as the oscillation allows.
+    /// The delay is as long as the oscillation permits.
     LongDelay,
 }
 
-/// The shape of a process under an oscillation of this period (s).
+/// Shape of a process under an oscillation with period `period_s` (s).
 pub(crate) fn shape_of(process: &Soiptd, period_s: f64) -> Shape {
     let (sum_per_s, ratio) = process.pole_sum();
     [log(sum_per_s * period_s), ratio, process.tau_s() / period_s]
 }
 
-/// The shape nearest to this one that is in the domain.
+/// Nearest shape in the domain.
 pub(super) fn clamp(shape: &Shape) -> Shape {
     let mut inside = *shape;
     for (value, (low, high)) in inside.iter_mut().zip(LOWEST.iter().zip(&HIGHEST)) {
@@ -40,9 +40,9 @@ pub(super) fn clamp(shape: &Shape) -> Shape {
     inside
 }
 
-/// The limit of the domain that a shape lies on.
+/// Limit of the domain on which a shape lies.
 pub(super) fn domain_edge(shape: &Shape) -> Option<DomainEdge> {
-    // The search stops short of a limit that it creeps up to.
+    // The search stops a little before a limit that it approaches.
     let near = |index: usize, limit: f64| {
         (shape[index] - limit).abs() < 1e-2 * (HIGHEST[index] - LOWEST[index])
     };

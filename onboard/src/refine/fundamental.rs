@@ -1,4 +1,4 @@
-//! What the fundamentals of input and output tell before any fit: where to start.
+//! Starting values from the fundamental of input and output.
 
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -9,33 +9,33 @@ use crate::window::{Bin, Edge, Window};
 
 /// Number of starts.
 pub(super) const STARTS: usize = 12;
-/// Damping rates of the starts, in 1/period: from next to none to a body faster than the relay.
+/// Damping rates of the starts (1/period): from negligible to a body faster than the relay.
 const DAMPINGS: [f64; 4] = [0.05, 0.5, 2.0, 5.0];
-/// Parts of the lag left beside the body's that the actuator takes; the delay takes the rest.
+/// Shares of the actuator in the phase lag that the body leaves; the rest is delay.
 const SHARES: [f64; 3] = [0.15, 0.5, 0.85];
 
-/// Largest lag of the actuator in the starts (rad).
+/// Largest phase lag of the actuator in the starts (rad).
 const MOST_ACTUATOR_RAD: f64 = 1.4;
 
 /// The oscillation at its fundamental frequency.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fundamental {
     period_s: f64,
-    /// Lag of the process (rad).
+    /// Phase lag of the process (rad).
     lag_rad: f64,
-    /// Bound of the acceleration that the input can produce (output unit / s^2).
+    /// Upper bound of the acceleration that the input produces (output unit / s^2).
     pub(super) acceleration: f64,
-    /// What half the range of the input accelerates the process by, from below (output unit / s^2).
+    /// Lower bound of the acceleration produced by half the range of the input (output unit / s^2).
     pub(super) relay_acceleration: f64,
-    /// Root mean square of the output about its first value (output unit).
+    /// Root mean square of the output minus its first value (output unit).
     pub(super) rms: f64,
 }
 
-/// Bins and edges that are summed in one slice: two sines each of the former, four of the latter.
+/// Bins or edges per slice, counting an edge twice: two sines per bin, four per edge.
 pub(super) const SLICE: usize = 16;
 const EDGE: usize = 2;
 
-/// Sums over the window under way.
+/// Sums over the part of the window that has been processed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
     bins: usize,
@@ -49,7 +49,7 @@ pub(super) struct Sums {
 }
 
 impl Sums {
-    /// One slice; the fundamental where that was the last.
+    /// Does one slice; returns the fundamental after the last.
     #[inline(never)]
     pub(super) fn advance<const BINS: usize, const EDGES: usize>(
         &mut self,
@@ -83,7 +83,7 @@ impl Sums {
         self.samples += count;
     }
 
-    /// Integrals of `u cos` and `u sin` over what the window has of the piece behind the next edge.
+    /// Adds the integrals of `u cos` and `u sin` over the part of the window after the next edge.
     fn add_edge<const BINS: usize, const EDGES: usize>(
         &mut self,
         window: &Window<BINS, EDGES>,
@@ -107,13 +107,13 @@ impl Sums {
         });
         let lag = atan2(self.y_sin, self.y_cos) - atan2(self.u_sin, self.u_cos);
         let lag = lag - TAU * floor(lag / TAU);
-        // |G| is less than b / w^2, by less than two; the largest input takes b to the bound.
+        // |G| is below b / w^2 by less than a factor of two; b times the largest input is the bound.
         let magnitude =
             hypot(self.y_cos, self.y_sin) / hypot(self.u_cos, self.u_sin).max(f64::MIN_POSITIVE);
         Fundamental {
             period_s,
-            // Under a relay a process lags by one to three quarters of a turn: `pi - asin(beta)`.
-            // Anything else is the lag of one whose gain is negative.
+            // A process under a relay lags by pi - asin(beta), between a quarter and three quarters of a turn.
+            // Any other value belongs to a negative gain.
             lag_rad: if lag < FRAC_PI_2 {
                 lag + PI
             } else if lag > 3.0 * FRAC_PI_2 {
@@ -129,7 +129,7 @@ impl Sums {
 }
 
 impl Fundamental {
-    /// Of no oscillation yet.
+    /// All zeros: memory before the first use.
     pub(super) const NONE: Self = Self {
         period_s: 0.0,
         lag_rad: 0.0,
@@ -138,14 +138,13 @@ impl Fundamental {
         rms: 0.0,
     };
 
-    /// A start, the first [`STARTS`] of them different, on the surface of processes that have the lag seen
-    /// at the fundamental.
+    /// Start number `n`; the first [`STARTS`] are different. All have the phase lag of the fundamental.
     pub(super) fn start(&self, n: usize) -> Shape {
         let omega = TAU / self.period_s;
         let body_per_s = DAMPINGS[n / SHARES.len() % DAMPINGS.len()] / self.period_s;
         let share = SHARES[n % SHARES.len()];
-        // What is left for actuator and delay once the body has taken its part; the actuator
-        // alone lags by less than a quarter turn.
+        // Lag of actuator and delay after that of the body is subtracted; the actuator alone lags by less than a
+        // quarter turn.
         let rest = (self.lag_rad - FRAC_PI_2 - atan(omega / body_per_s)).clamp(0.1, FRAC_PI_2);
         let actuator = (share * rest).min(MOST_ACTUATOR_RAD);
         let prop_per_s = omega / tan(actuator);

@@ -1,5 +1,5 @@
-//! The linear fit at one shape, and the derivatives by the shape: columns of the equations, an
-//! orthonormal basis of what they span, and what it leaves of the outputs.
+//! Linear fit at one shape, and its derivatives with respect to the shape: columns of the equations, their
+//! orthonormal basis, and the residual.
 
 use core::task::Poll;
 
@@ -10,13 +10,13 @@ use super::{ALL, LINEAR};
 use crate::least_squares::{Columns, Triangle, back_substitute, dot};
 use crate::window::Window;
 
-/// Parts that are taken out of a column in one slice.
+/// Number of components removed from a column per slice.
 pub(super) const PARTS: usize = 5;
 
-/// Where the model is made.
+/// Work memory for the model.
 pub(super) struct Bench<const BINS: usize> {
     pub(super) model: Model,
-    /// Rows to work in.
+    /// Rows for intermediate results.
     pub(super) rows: [[f64; BINS]; 3],
 }
 
@@ -28,7 +28,7 @@ impl<const BINS: usize> Bench<BINS> {
 }
 
 pub(super) struct LinearFit<const BINS: usize> {
-    /// Basis of the linear unknowns' columns; behind it the derivatives by the shape.
+    /// Orthonormal basis of the linear unknowns' columns, followed by the derivatives with respect to the shape.
     pub(super) basis: Columns<ALL, BINS>,
     pub(super) triangle: Triangle<ALL>,
     pub(super) coefficients: [f64; LINEAR],
@@ -38,20 +38,20 @@ pub(super) struct LinearFit<const BINS: usize> {
     stage: Stage,
 }
 
-/// What is next of a fit.
+/// Next step of a fit.
 enum Stage {
-    /// The process of the shape.
+    /// Set the process of the shape.
     Process,
-    /// A column of the model: which.
+    /// Compute a column of the model: its index.
     Model(usize),
-    /// The basis' vector from it.
+    /// Orthonormalise that column.
     Basis(Orthonormalisation),
-    /// What the basis leaves of the outputs: parts that are out already.
+    /// Remove the basis from the outputs: components found so far, and their number.
     Residual([f64; LINEAR], usize),
 }
 
 impl<const BINS: usize> LinearFit<BINS> {
-    /// None yet.
+    /// All zeros: memory before the first use.
     pub(super) const NONE: Self = Self {
         basis: Columns::NONE,
         triangle: [[0.0; ALL]; ALL],
@@ -68,7 +68,8 @@ impl<const BINS: usize> LinearFit<BINS> {
         self.stage = Stage::Process;
     }
 
-    /// One slice of it: its sum of squares, `None` where there is no such process or no finite fit.
+    /// Does one slice. Returns the sum of squares after the last: `None` in it if there is no such process or no
+    /// finite fit.
     #[inline(never)]
     pub(super) fn advance<const EDGES: usize>(
         &mut self,
@@ -135,11 +136,11 @@ impl<const BINS: usize> LinearFit<BINS> {
     }
 }
 
-/// Makes a column of a basis that is one up to there, some parts at a time.
+/// Orthonormalisation of a column against the basis before it, some components per slice.
 #[derive(Clone, Copy)]
 pub(super) struct Orthonormalisation {
     pub(super) column: usize,
-    /// Parts that are out, and the length before.
+    /// Number of components removed, and the length before.
     done: usize,
     before: f64,
 }
@@ -153,7 +154,7 @@ impl Orthonormalisation {
         }
     }
 
-    /// One slice; true where the column is a unit vector, or zero.
+    /// Does one slice; true when the column is a unit vector or zero.
     pub(super) fn advance<const BINS: usize>(
         &mut self,
         basis: &mut Columns<ALL, BINS>,
@@ -176,11 +177,11 @@ impl Orthonormalisation {
     }
 }
 
-/// Derivatives of the fitted model by the shape, the coefficients held: forward differences, or backward
-/// ones at a limit of the domain.
+/// Derivatives of the fitted model with respect to the shape at fixed coefficients: forward differences, or
+/// backward differences at a limit of the domain.
 #[derive(Clone, Copy)]
 pub(super) struct Jacobian {
-    /// Zero for the model at the shape itself, then the derivatives.
+    /// Zero for the model at the shape itself, then the index of the derivative plus one.
     point: usize,
     is_begun: bool,
 }
@@ -191,7 +192,7 @@ impl Jacobian {
         is_begun: false,
     };
 
-    /// One slice, into the columns behind the fit's basis; `None` where there is no process so near.
+    /// Does one slice, into the columns after the basis; `None` if there is no process beside the shape.
     #[inline(never)]
     pub(super) fn advance<const BINS: usize, const EDGES: usize>(
         &mut self,
@@ -240,7 +241,7 @@ impl Jacobian {
     }
 }
 
-/// Small enough for a truncation error of 1e-6, large enough for rounding of 1e-9.
+/// Step of the differences: truncation error 1e-6, rounding error 1e-9.
 const STEP: f64 = 1e-6;
 
 fn step_of(shape: &Shape, index: usize) -> f64 {

@@ -1,4 +1,4 @@
-//! The model over the rows, for one combination of the linear unknowns, some bins at a time.
+//! Model output over the rows for one combination of the linear unknowns, some bins per slice.
 
 use super::LINEAR;
 use super::domain::Shape;
@@ -12,24 +12,24 @@ use crate::window::Edge;
 pub(super) struct Model {
     process: Option<Soiptd>,
     response: Response,
-    /// The linear unknowns: y0, v0, w0, the distortion, the bias times the gain, the gain.
+    /// The linear unknowns: y0, v0, w0, distortion, bias times gain, gain.
     of: [f64; LINEAR],
     drive: Drive,
     part: Part,
 }
 
-/// What of it is under way.
-// With a tag of its own, zero for the first, so that an idle model is all zeros: no image in flash.
+/// Part of the model that is being computed. The tag of the first variant is zero, so that an idle model is all
+/// zeros and takes no space in flash.
 #[repr(u8)]
 enum Part {
     Response(response::Course),
-    /// The distortion, not begun.
+    /// The distortion, before its first slice.
     Distorted,
-    Distortion(distortion::Course),
+    Distortion(distortion::DistortionCourse),
 }
 
 impl Model {
-    /// Of no process yet.
+    /// All zeros: memory before the first use.
     pub(super) const NONE: Self = Self {
         process: None,
         response: Response::NONE,
@@ -38,7 +38,7 @@ impl Model {
         part: Part::Response(response::Course::NONE),
     };
 
-    /// Becomes that at a shape; `None` where there is no such process.
+    /// Sets the process of a shape; `None` if there is no such process.
     #[inline(never)]
     pub(super) fn set<const BINS: usize>(
         &mut self,
@@ -63,8 +63,8 @@ impl Model {
             return;
         };
         let [y, v, w, _, constant, recorded] = *of;
-        // The acceleration, unlike the force, is a state whichever of the lags comes first, as
-        // K/(T_body T_prop), unlike K/T_body, is a gain.
+        // The acceleration is used as a state because, unlike the force, it does not change when the lags are
+        // exchanged, like K/(T_body T_prop) unlike K/T_body.
         let f = w + process.inv_t_body_per_s() * v;
         let unit = process.t_prop_s();
         self.of = *of;
@@ -80,8 +80,8 @@ impl Model {
         };
     }
 
-    /// Follows it over some bins: weighted means, and what is known beforehand in the rows behind them.
-    /// True where the rows are complete; `even` is to work in.
+    /// Computes some bins: weighted means, and the rows of prior knowledge after them. True when the rows are
+    /// complete; `even` is work memory.
     #[inline(never)]
     pub(super) fn follow<const BINS: usize>(
         &mut self,
@@ -105,7 +105,7 @@ impl Model {
                 }
             }
             (Part::Distorted, Some(process)) => {
-                let course = distortion::Course::new(process, &problem.grid, edges);
+                let course = distortion::DistortionCourse::new(process, &problem.grid, edges);
                 self.part = Part::Distortion(course);
                 return false;
             }

@@ -1,6 +1,20 @@
-//! The error of the model that the residual betrays: a part of its response at every harmonic, by maximum
-//! likelihood of what the residual keeps of it. An even harmonic that a symmetric relay does not excite is
-//! measured against its neighbours: what is found there is distortion.
+//! Relative error `e` of the model's response, from the harmonics in the residual, by maximum likelihood.
+//!
+//! ```text
+//! r ~ N(0, left (left e^2 s^2 + 2 sigma^2 / N + 1e-12 s^2))     cosine and sine of each harmonic
+//! ```
+//!
+//! | symbol  | name          | meaning                                                    | unit        |
+//! |---------|---------------|------------------------------------------------------------|-------------|
+//! | `e`     | `error`       | relative error of the response, common to all harmonics    | 1           |
+//! | `r`     | `residual`    | amplitude of the wave in the residual                      | output unit |
+//! | `s`     | `scale`       | amplitude of the wave under a relative error of one        | output unit |
+//! | `left`  | `left`        | part of the wave's energy that the fit leaves              | 1           |
+//! | `sigma` | `noise_sigma` | noise of a sample                                          | output unit |
+//! | `N`     | `samples`     | samples in the window                                      | 1           |
+//!
+//! An even harmonic that a symmetric relay does not excite is measured against its neighbours: what is found
+//! there is distortion.
 
 use libm::{hypot, log, sqrt};
 
@@ -9,19 +23,18 @@ use super::problem::Problem;
 use super::tried::TRIED;
 use crate::least_squares::dot;
 
-/// Harmonics that are looked at; beyond them a relay oscillation has less than 1/1000 of its
-/// amplitude.
+/// Number of harmonics used; beyond them a relay oscillation has less than 1/1000 of its amplitude.
 pub(super) const HARMONICS: usize = 9;
-/// A cosine and a sine of each.
+/// A cosine and a sine for each harmonic.
 const WAVES: usize = 2 * HARMONICS;
-/// Part of a harmonic that must be left in the residual for it to tell anything.
+/// Part of a harmonic that the residual must keep for it to be used.
 const LEAST_LEFT: f64 = 1e-4;
-/// Gain in log likelihood that makes an error of the model more than chance (1 % of white noises).
+/// Gain in log likelihood above which a model error is significant (1 % of white noise exceeds it).
 const SIGNIFICANT: f64 = 2.7;
-/// Rounding of the fit itself, for recordings without any noise.
+/// Rounding error of the fit, for recordings without noise.
 const FLOOR: f64 = 1e-12;
 
-/// A cosine or sine over the bins, as far as the fit is concerned.
+/// Cosine or sine over the bins, and its relation to the fit.
 #[derive(Clone, Copy)]
 pub(super) struct Wave {
     /// Change of the unknowns per unit of the wave.
@@ -31,15 +44,16 @@ pub(super) struct Wave {
     /// Its amplitude in the output and in the residual (output unit).
     pub(super) output: f64,
     pub(super) residual: f64,
-    /// Root mean square of the amplitudes that an error of one would give it (output unit).
+    /// Root mean square of its amplitude under a relative error of one (output unit).
     pub(super) scale: f64,
 }
 
 pub(super) struct ModelError {
-    /// Cosine and sine of each harmonic in turn, up to half the bins' rate.
+    /// Cosine and sine of each harmonic in turn, up to half the sampling rate of the bins.
     waves: [Wave; WAVES],
     count: usize,
-    /// The next to try, and the most likely so far behind its log likelihood; `None` before zero is tried.
+    /// Index of the next error to try; the most probable so far with its log likelihood; `None` before zero has
+    /// been tried.
     next: usize,
     best: Option<(f64, f64)>,
 }
@@ -82,7 +96,7 @@ impl ModelError {
         set_scales(&mut self.waves[..self.count]);
     }
 
-    /// Tries the next error; true where all are.
+    /// Tries the next error; true when all have been tried.
     pub(super) fn advance<const BINS: usize>(&mut self, problem: &Problem<BINS>) -> bool {
         match (self.best, TRIED.get(self.next)) {
             (None, _) => self.best = Some((self.log_likelihood(0.0, problem) + SIGNIFICANT, 0.0)),
@@ -98,13 +112,12 @@ impl ModelError {
         self.next == TRIED.len()
     }
 
-    /// Relative error of the response that the harmonics left in the residual speak for; zero where
-    /// noise explains them.
+    /// Relative error of the response; zero if noise explains the harmonics in the residual.
     pub(super) fn found(&self) -> f64 {
         self.best.map_or(0.0, |(_, error)| error)
     }
 
-    /// What the error found moves the unknowns by, wave by wave.
+    /// Shift of the unknowns by the error found, wave by wave.
     pub(super) fn shift(&self, n: usize) -> Option<[f64; ALL]> {
         let wave = self.waves().get(n)?;
         Some(wave.shift.map(|value| value * self.found() * wave.scale))
@@ -127,8 +140,8 @@ impl ModelError {
     }
 }
 
-/// The scale of a harmonic is its size in the output, or the geometric mean of its neighbours'
-/// sizes where that is larger; half of the energy for the cosine and half for the sine.
+/// Sets the scale of each harmonic: its size in the output, or the geometric mean of its neighbours' sizes if
+/// that is larger. Half of the energy belongs to the cosine, half to the sine.
 fn set_scales(waves: &mut [Wave]) {
     let mut size = [0.0; HARMONICS];
     for (size, pair) in size.iter_mut().zip(waves.chunks_exact(2)) {

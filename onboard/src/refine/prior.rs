@@ -1,5 +1,5 @@
-//! What is known of the shape before the fit: a Gaussian over the unknowns of the search, three rows
-//! of the equations. With them the estimate is the most probable one, not the one of least squares.
+//! Prior distribution of the shape: a Gaussian over the unknowns of the search, as three rows of the equations.
+//! With them the estimate is the most probable process instead of the least-squares one.
 //!
 //! ```text
 //! rows = sigma W (shape - mean),   W^T W = covariance^-1
@@ -8,7 +8,7 @@
 use super::domain::{SHAPE, Shape};
 use crate::pack::Pack;
 
-/// A Gaussian over [`Shape`].
+/// Gaussian over [`Shape`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShapePrior {
     mean: Shape,
@@ -17,8 +17,8 @@ pub struct ShapePrior {
 }
 
 impl ShapePrior {
-    /// From the mean and the lower triangular root of the covariance; `None` unless its diagonal is
-    /// positive and all is finite.
+    /// From the mean and the lower triangular root of the covariance; `None` unless its diagonal is positive and
+    /// all numbers are finite.
     #[must_use]
     pub fn new(mean: Shape, root: &[Shape; SHAPE]) -> Option<Self> {
         let mut whitening = [[0.0; SHAPE]; SHAPE];
@@ -40,7 +40,7 @@ impl ShapePrior {
         is_right.then_some(Self { mean, whitening })
     }
 
-    /// What a pack knows of its family; `None` where that is no Gaussian.
+    /// The prior of a pack's family; `None` if its numbers are not a Gaussian.
     #[must_use]
     pub fn of_pack(pack: &Pack<'_>) -> Option<Self> {
         let prior = pack.prior();
@@ -48,7 +48,7 @@ impl ShapePrior {
         Self::new(prior.mean.map(f64::from), &root)
     }
 
-    /// The prior's rows at a shape, in standard deviations.
+    /// Rows of the prior at a shape, in standard deviations.
     #[must_use]
     pub fn deviations(&self, shape: &Shape) -> Shape {
         self.whitening

@@ -1,4 +1,4 @@
-//! What is fitted: the rows of the equations, their weights, and what is known beforehand.
+//! Least-squares problem: rows, weights, prior knowledge.
 
 use libm::{exp, sqrt};
 
@@ -9,28 +9,28 @@ use crate::process::Soiptd;
 use crate::response::Grid;
 use crate::window::{KNOWN_ROWS, Window};
 
-/// Rows for what is known beforehand: of the acceleration, of the distortion, of the shape.
+/// Rows of prior knowledge: acceleration, distortion, shape.
 pub(super) const KNOWN: usize = KNOWN_ROWS;
-/// Standard deviation of the distortion known beforehand, as a part of the force: that of a thrust
-/// quadratic in the rotor's speed under a relay of a twelfth of hover is 0.02.
+/// Prior standard deviation of the distortion as a part of the force. For a thrust quadratic in the rotor speed
+/// and a relay of a twelfth of hover it is 0.02.
 const DISTORTION: f64 = 0.02;
-/// Least number of bins for nine unknowns and a residual to judge them by.
+/// Minimum number of bins: nine unknowns and a residual to judge them by.
 const FEWEST_BINS: usize = 16;
 
 pub(super) struct Problem<const BINS: usize> {
     pub(super) grid: Grid,
     pub(super) period_s: f64,
-    /// Per row: square root of the number of samples (0 leaves the row out), mean deviation from
-    /// the middle of the bin (s).
+    /// Per row: square root of the number of samples (0 excludes the row), and mean deviation from the middle of
+    /// the bin (s).
     pub(super) weight: [f64; BINS],
     pub(super) offset_s: [f64; BINS],
     pub(super) rows: usize,
     pub(super) used: usize,
-    /// Standard deviation of a sample over that of the acceleration known beforehand.
+    /// Standard deviation of a sample over the prior one of the acceleration.
     pub(super) acceleration_row: f64,
-    /// Standard deviation of a sample over that of the distortion known beforehand.
+    /// Standard deviation of a sample over the prior one of the distortion.
     pub(super) distortion_row: f64,
-    /// White noise of a sample, and the same but for rounding (output unit).
+    /// White noise of a sample, and the same with a lower limit for rounding (output unit).
     pub(super) noise_sigma: f64,
     pub(super) sigma: f64,
     pub(super) prior: Option<ShapePrior>,
@@ -38,7 +38,7 @@ pub(super) struct Problem<const BINS: usize> {
 }
 
 impl<const BINS: usize> Problem<BINS> {
-    /// Of no window yet.
+    /// All zeros: memory before the first use.
     pub(super) const NONE: Self = Self {
         grid: Grid::NONE,
         period_s: 0.0,
@@ -54,7 +54,7 @@ impl<const BINS: usize> Problem<BINS> {
         fundamental: Fundamental::NONE,
     };
 
-    /// The rows of this window; what the oscillation tells is still to be [settled](Self::settle).
+    /// Sets the rows of this window. [`settle`](Self::settle) sets what depends on the oscillation.
     pub(super) fn set<const EDGES: usize>(
         &mut self,
         window: &Window<BINS, EDGES>,
@@ -65,7 +65,7 @@ impl<const BINS: usize> Problem<BINS> {
             return Err(RefineError::NoInput);
         };
         let bin_s = window.bin_s();
-        // The past is used from where the longest delay no longer reaches behind its first edge.
+        // The past is used from where the longest delay no longer reaches before its first edge.
         let known_from_s = first.time_s + HIGHEST[2] * period_s;
         self.grid = Grid {
             sample_s: window.sample_s(),
@@ -82,7 +82,7 @@ impl<const BINS: usize> Problem<BINS> {
         self.offset_s.fill(0.0);
         let half_bin_s = 0.5 * (bin_s - window.sample_s());
         for (k, bin) in window.bins().iter().enumerate() {
-            // A bin that lacks many of its samples, as the last one may, has another spread in time.
+            // A bin without some of its samples, such as the last one, has another spread in time.
             let is_last = k + 1 == window.bins().len();
             if bin.count == window.per_bin() || (!is_last && 8 * bin.count >= 7 * window.per_bin())
             {
@@ -98,9 +98,9 @@ impl<const BINS: usize> Problem<BINS> {
         Ok(())
     }
 
-    /// What is known of acceleration and distortion, from the oscillation's fundamental.
+    /// Sets the prior of acceleration and distortion from the fundamental of the oscillation.
     pub(super) fn settle(&mut self, fundamental: Fundamental) {
-        // A perfect recording leaves rounding of about a millionth.
+        // A perfect recording has rounding errors of about a millionth.
         self.sigma = self.noise_sigma.max(1e-6 * fundamental.rms);
         self.acceleration_row = if fundamental.acceleration > 0.0 {
             self.sigma / fundamental.acceleration
@@ -116,19 +116,19 @@ impl<const BINS: usize> Problem<BINS> {
         self.rows - KNOWN
     }
 
-    /// Sum of squares that white noise as seen in the samples would leave, and a quarter more.
+    /// Sum of squares that white noise of the samples' size would leave, plus a quarter.
     pub(super) fn cost_of_noise(&self) -> f64 {
         1.25 * self.noise_sigma * self.noise_sigma * self.used as f64
     }
 
-    /// The process of a shape and of unit acceleration gain, which there may not be.
+    /// Process of a shape with unit acceleration gain, if there is one.
     pub(super) fn process(&self, shape: &Shape) -> Option<Soiptd> {
         let [ln_sum, ratio, delay] = *shape;
         let sum_per_s = exp(ln_sum) / self.period_s;
         Soiptd::from_pole_sum(1.0, sum_per_s, ratio, delay * self.period_s).ok()
     }
 
-    /// The weighted outputs, and the prior's rows at a shape.
+    /// Weighted outputs, and the rows of the prior at a shape.
     pub(super) fn measured<const EDGES: usize>(
         &self,
         window: &Window<BINS, EDGES>,

@@ -1,4 +1,4 @@
-//! The refinement in slices: see the table in [`refine`](super).
+//! Fit in slices: see the table in [`refine`](super).
 
 use core::task::Poll;
 
@@ -15,13 +15,13 @@ use super::{ALL, GIVEN, LINEAR, PriorKnowledge, RefineError, Refined, SHAPE};
 use crate::window::Window;
 use crate::{distortion, response};
 
-/// All state of a refinement: 120 bytes for each of `BINS` and 6.8 kB, so make it where it stays.
+/// State of a fit. It takes 120 bytes for each of `BINS` and 6.8 kB, so make it where it stays.
 ///
 /// ```
 /// use onecycle_onboard::refine::{PriorKnowledge, Refiner};
 /// use onecycle_onboard::window::Window;
 ///
-/// // Under a square wave of 0.2 s, a lag of 0.1 s and two integrations lag by half a turn and more.
+/// Under a square wave of 0.2 s, a lag of 0.1 s and two integrations.
 /// let mut window = Window::<69, 16>::new(0.4, 1e-3);
 /// let (mut force, mut rate, mut output) = (0.0, 0.0, 0.0);
 /// for tick in 0..800 {
@@ -35,7 +35,7 @@ use crate::{distortion, response};
 /// }
 /// let mut refiner = Refiner::new();
 /// refiner.begin(&window, 0.2, &PriorKnowledge::default()).map_err(|_| "window")?;
-/// // One slice in each tick of a controller.
+/// One slice per control tick.
 /// let refined = loop {
 ///     if let Some(outcome) = refiner.advance(&window) {
 ///         break outcome.map_err(|_| "no fit")?;
@@ -55,27 +55,27 @@ pub struct Refiner<const BINS: usize> {
     stage: Stage,
 }
 
-/// What is next.
+/// Next step of a fit.
 enum Stage {
-    /// Nothing: not begun, or over.
+    /// Not begun, or finished.
     Idle,
-    /// Sums for the fundamental of the oscillation.
+    /// Sum the fundamental of the oscillation.
     Oscillation(Sums),
-    /// The linear fit at a start: which.
+    /// Linear fit at a start: its index.
     Start(usize),
-    /// That at one of the best starts, to search from there.
+    /// Linear fit at one of the best starts, to search from there.
     Best,
-    /// The derivatives by the shape.
+    /// Derivatives with respect to the shape.
     Derivatives(Jacobian),
-    /// What the linear unknowns take up, out of them: parts that are out, of all columns.
+    /// Project the linear columns out of the Jacobian: components removed so far, over all columns.
     Projection(usize),
-    /// The step.
+    /// Solve for the step.
     Step,
-    /// The linear fit where it leads.
+    /// Linear fit at the shape after the step.
     Trial,
-    /// That at the best shape of all.
+    /// Linear fit at the best shape of all.
     Last,
-    /// How well it is known.
+    /// Uncertainty of the best fit.
     Uncertainty,
 }
 
@@ -86,7 +86,7 @@ impl<const BINS: usize> Default for Refiner<BINS> {
 }
 
 impl<const BINS: usize> Refiner<BINS> {
-    /// Room for a refinement, all zeros.
+    /// A fit that has not begun, all zeros.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -101,20 +101,20 @@ impl<const BINS: usize> Refiner<BINS> {
         }
     }
 
-    /// Begins the refinement of a window of an oscillation with this period (s), whatever was under way.
+    /// Begins the fit of a window of an oscillation with period `period_s` (s). A fit in progress is dropped.
     ///
     /// # Errors
-    /// A [`RefineError`] where the window does not hold what a fit needs.
+    /// A [`RefineError`] if the window does not permit a fit.
     pub fn begin<const EDGES: usize>(
         &mut self,
         window: &Window<BINS, EDGES>,
         period_s: f64,
-        beforehand: &PriorKnowledge<'_>,
+        prior_knowledge: &PriorKnowledge<'_>,
     ) -> Result<(), RefineError> {
         self.stage = Stage::Idle;
-        self.problem.set(window, period_s, beforehand.prior)?;
+        self.problem.set(window, period_s, prior_knowledge.prior)?;
         self.given_count = 0;
-        for (place, given) in self.given.iter_mut().zip(beforehand.starts) {
+        for (place, given) in self.given.iter_mut().zip(prior_knowledge.starts) {
             *place = clamp(given);
             self.given_count += 1;
         }
@@ -123,10 +123,11 @@ impl<const BINS: usize> Refiner<BINS> {
         Ok(())
     }
 
-    /// One slice of it, given the same window each time; what came out after the last, and `None` before.
+    /// Does one slice; give it the same window each time. Returns the result after the last slice, `None`
+    /// before.
     ///
     /// # Errors
-    /// In what came out: [`RefineError::NoFit`], also where nothing was begun.
+    /// In the result: [`RefineError::NoFit`], also if no fit was begun.
     pub fn advance<const EDGES: usize>(
         &mut self,
         window: &Window<BINS, EDGES>,
@@ -214,7 +215,7 @@ impl<const BINS: usize> Refiner<BINS> {
         Ok(Poll::Pending)
     }
 
-    /// The linear fit at a start, those given first.
+    /// Begins the linear fit at a start; the given ones come first.
     fn start(&mut self, index: usize) {
         let start = match self.given[..self.given_count].get(index) {
             Some(given) => *given,
@@ -224,7 +225,7 @@ impl<const BINS: usize> Refiner<BINS> {
         self.stage = Stage::Start(index);
     }
 
-    /// The next start, or, with all ranked, the search from the best.
+    /// Begins the next start, or, when all are ranked, the search from the best.
     fn next_start(&mut self, index: usize) -> Result<(), RefineError> {
         if index < self.given_count + STARTS {
             self.start(index);
@@ -234,7 +235,7 @@ impl<const BINS: usize> Refiner<BINS> {
         self.search_from(best)
     }
 
-    /// Takes the next parts along the basis out of the derivatives.
+    /// Removes the next components along the basis from the derivatives.
     fn project(&mut self, from: usize) {
         let all = LINEAR * SHAPE;
         let end = all.min(from + PARTS);
@@ -265,14 +266,14 @@ impl<const BINS: usize> Refiner<BINS> {
         Ok(())
     }
 
-    /// Leaves this start for the next.
+    /// Ends the search from this start and begins the next.
     fn give_up(&mut self) -> Result<(), RefineError> {
         let next = self.search.next_start();
         self.search_from(next)
     }
 
-    /// Searches from a start; where there is none, ends with the best shape found. Its fit is made again
-    /// rather than kept, for want of room.
+    /// Searches from a start; without one, ends with the best shape found. Its fit is computed again, because
+    /// there is no memory to keep it.
     fn search_from(&mut self, start: Option<Shape>) -> Result<(), RefineError> {
         let (shape, stage) = match start {
             Some(shape) => (shape, Stage::Best),
@@ -306,7 +307,7 @@ impl<const BINS: usize> Refiner<BINS> {
         })
     }
 
-    /// What the linear fit at a shape leaves of each bin (output unit).
+    /// Residual of the linear fit at a shape in each bin (output unit).
     pub(super) fn residuals<const EDGES: usize>(
         &mut self,
         window: &Window<BINS, EDGES>,
@@ -337,17 +338,18 @@ impl<const BINS: usize> Refiner<BINS> {
         Ok(())
     }
 
-    /// Most slices that the refinement just begun may take. One of a typical window takes about a tenth:
-    /// ten steps of a search instead of sixty, and half as many failures.
+    /// Upper bound of the number of slices of the fit just begun. A typical window takes a tenth of it: ten
+    /// steps of a search instead of sixty, and half as many failures.
     #[must_use]
     pub fn most_slices<const EDGES: usize>(&self, window: &Window<BINS, EDGES>) -> usize {
         let (bins, edges) = (self.problem.bins(), window.edges().len());
         let whole = self.problem.grid.past_bins + bins;
-        // Bins without an edge are followed 56 at a time; each edge costs a slice and may end one.
+        // Bins without an edge are processed 56 at a time; each edge costs a slice and may end one.
         let still = whole / response::SLICE_BINS + 2;
         let moved = still + 2 * edges;
         let distorted = 2 * (whole / distortion::SLICE_BINS + 2) + edges;
-        // Process; columns, of which one is moved and one distorted; their orthonormalisation; the outputs.
+        // Process; columns, one of them with an initial state and one with distortion; orthonormalisation;
+        // outputs.
         let fit = 1 + 4 * still + moved + distorted + LINEAR + 2;
         let derivatives = (1 + SHAPE) * (1 + moved + distorted);
         let step = derivatives + LINEAR * SHAPE / PARTS + 1 + 1;

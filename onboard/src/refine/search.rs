@@ -1,59 +1,58 @@
-//! The search over shapes: the best of many starts, and from each of these Levenberg-Marquardt in a box.
+//! Search over shapes: ranks all starts, then runs Levenberg-Marquardt with box constraints from the best ones.
 //!
-//! Of a step that is tried and refused nothing is needed but its cost, and of the fit that it started
-//! from nothing but what the [`NormalEquations`] have: so one [`LinearFit`](super::linear_fit::LinearFit)
-//! serves both.
+//! A rejected step needs only its cost, and the fit at which a step began only its [`NormalEquations`], so a
+//! single [`LinearFit`](super::linear_fit::LinearFit) serves both.
 
 use super::descent::NormalEquations;
 use super::domain::{SHAPE, Shape, clamp};
 
-/// Starts that are searched to the end, after all were tried once.
+/// Number of starts that are searched to the end.
 pub(super) const SEARCHED: usize = 3;
-/// Limit of the search from one start; it takes about ten steps.
+/// Maximum number of steps from one start; ten are typical.
 pub(super) const MOST_STEPS: u32 = 60;
-/// The search ends when a step lowers the sum of squares by less than this part.
+/// The search ends when a step lowers the sum of squares by less than this fraction.
 const CONVERGED: f64 = 1e-9;
-/// Damping of a search's first step, beyond which nothing is tried, after a success and a failure.
+/// Damping: of the first step, upper limit, factor after a success, factor after a failure.
 const DAMPING: f64 = 1e-2;
 const MOST_DAMPING: f64 = 1e12;
 const SUCCESS: f64 = 0.1;
 const FAILURE: f64 = 8.0;
-/// Linear fits of a search at most. With `a` successes of [`MOST_STEPS`] the damping is beyond its limit
-/// after `log8(1e14 10^a) + 1` failures: 83.
+/// Maximum number of linear fits of a search. After `a` successes, [`MOST_STEPS`] at most, the damping exceeds
+/// its limit after `log8(1e14 10^a) + 1` failures: 83.
 pub(super) const MOST_TRIALS: u32 = MOST_STEPS + 83;
 
 pub(super) struct Search {
     /// The best starts and their sums of squares, best first.
     starts: [(Shape, f64); SEARCHED],
-    /// The one that is searched from.
+    /// Index of the start that is being searched from.
     place: usize,
-    /// Where the search from it is, and its sum of squares.
+    /// Present shape of that search, and its sum of squares.
     shape: Shape,
     cost: f64,
-    /// The sum of squares before the step under way.
+    /// Sum of squares before the step in progress.
     before: f64,
     damping: f64,
     normal: NormalEquations,
-    /// Steps from this start, and from all.
+    /// Steps from this start, and from all starts.
     taken: u32,
     pub(super) steps: u32,
-    /// The best of all searches.
+    /// Best result of all searches.
     best: Option<(Shape, f64)>,
 }
 
 /// What a search does next.
 #[derive(Clone, Copy)]
 pub(super) enum Next {
-    /// Another step, from the fit at hand.
+    /// Another step, from the present fit.
     Step,
-    /// A linear fit at this shape, whose step this is.
+    /// A linear fit at this shape, the result of a step.
     Try(Shape),
-    /// It has ended.
+    /// The search has ended.
     End,
 }
 
 impl Search {
-    /// Room for one, all zeros.
+    /// All zeros: memory before the first use.
     pub(super) const ROOM: Self = Self {
         starts: [([0.0; SHAPE], 0.0); SEARCHED],
         cost: 0.0,
@@ -62,7 +61,7 @@ impl Search {
         ..Self::NONE
     };
 
-    /// Without starts.
+    /// No starts.
     pub(super) const NONE: Self = Self {
         starts: [([0.0; SHAPE], f64::INFINITY); SEARCHED],
         place: 0,
@@ -84,12 +83,12 @@ impl Search {
         }
     }
 
-    /// The first start to search from.
+    /// First start to search from.
     pub(super) fn first(&self) -> Option<Shape> {
         self.start()
     }
 
-    /// The next one, if any.
+    /// Next start, if any.
     pub(super) fn next_start(&mut self) -> Option<Shape> {
         self.place += 1;
         self.start()
@@ -100,7 +99,7 @@ impl Search {
         cost.is_finite().then_some(*start)
     }
 
-    /// Begins at the fit of a start.
+    /// Begins the search at the fit of a start.
     pub(super) fn begin(&mut self, start: &Shape, cost: f64) -> Next {
         (self.shape, self.cost) = (*start, cost);
         self.damping = DAMPING;
@@ -117,7 +116,7 @@ impl Search {
         Next::Step
     }
 
-    /// Solves a step's equations.
+    /// Solves the equations of a step.
     pub(super) fn solve(&mut self, normal: NormalEquations) -> Next {
         self.normal = normal;
         self.before = self.cost;
@@ -132,7 +131,7 @@ impl Search {
         }
     }
 
-    /// Takes or refuses the shape that was tried, by its sum of squares.
+    /// Accepts or rejects the shape tried, by its sum of squares.
     pub(super) fn judge(&mut self, tried: &Shape, cost: Option<f64>) -> Next {
         match cost {
             Some(cost) if cost < self.cost => {
@@ -155,8 +154,8 @@ impl Search {
         }
     }
 
-    /// Keeps where the search has ended if it is the best; true where nothing better is to be found than
-    /// this sum of squares.
+    /// Keeps the result of a search if it is the best so far. True if its sum of squares is `enough` or less, so
+    /// that no further search is needed.
     pub(super) fn keep(&mut self, enough: f64) -> bool {
         let is_better = (self.best).is_none_or(|(_, least)| self.cost < least);
         if is_better {

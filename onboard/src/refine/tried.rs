@@ -1,7 +1,7 @@
-//! Relative errors of the response that are tried: from 1e-5 to 1, twelve a decade.
+//! Relative errors of the response that are tried: from 1e-5 to 1, twelve per decade, that is `exp10(n / 12 -
+//! 5)`.
 //!
-//! They are `exp10(n / 12 - 5)`, written out: the function with all that it calls is a tenth of a board's
-//! code, and here it is asked for these numbers alone.
+//! They are written out because `exp10` and the functions that it calls would be a tenth of the code on a board.
 
 /// Smallest first.
 pub(super) const TRIED: [f64; 61] = [

@@ -1,13 +1,13 @@
-//! How well the process is known: from the noise, and from what the model cannot be.
+//! Uncertainty of the process: from the noise, and from the error of the model.
 //!
-//! To first order a disturbance `d` of the fitted rows moves the unknowns by `R^-1 Q^T d` and
-//! leaves `d - Q Q^T d` in the residual, with `Q R` the derivatives of the model by all unknowns.
+//! To first order a disturbance `d` of the fitted rows moves the unknowns by `R^-1 Q^T d` and leaves `d - Q Q^T
+//! d` in the residual, where `Q R` is the matrix of the derivatives with respect to all unknowns.
 //!
-//! White noise gives the usual covariance. A process that is not quite of this kind errs by some
-//! part `e` of its response at each harmonic of the oscillation. The unknowns take up nearly all of
-//! that at the large low harmonics, so the residual shows next to nothing of it: `e` is found from
-//! the little that is left at each harmonic, by maximum likelihood (`model_error.rs`), and its full effect
-//! on the unknowns added. What else is in the residual and is not white counts by its degrees of freedom.
+//! White noise gives the usual covariance. A process outside the family errs by a fraction `e` of its response
+//! at each harmonic of the oscillation. The unknowns absorb nearly all of that at the large low harmonics, so
+//! little of it remains in the residual. `e` is estimated from that remainder by maximum likelihood
+//! (`model_error.rs`), and its full effect on the unknowns is added to the covariance. Any other residual that
+//! is not white counts by its degrees of freedom.
 
 use core::f64::consts::TAU;
 use core::task::Poll;
@@ -22,14 +22,14 @@ use super::{ALL, KNOWN, LINEAR, coordinate};
 use crate::least_squares::{back_substitute, dot};
 use crate::window::Window;
 
-/// Bins of a wave that are made in one slice: a sine each.
+/// Bins of a wave per slice: one sine each.
 const WAVE_BINS: usize = 32;
-/// Lags of the residual's autocorrelation in one slice.
+/// Lags of the residual's autocorrelation per slice.
 const LAGS: usize = 8;
-/// Squares that are added to the covariance in one slice.
+/// Squares added to the covariance per slice.
 const SQUARES: usize = 5;
 
-/// What is found out of it so far.
+/// State of the computation.
 pub(super) struct Uncertainty {
     error: ModelError,
     /// Covariance of all unknowns.
@@ -37,25 +37,25 @@ pub(super) struct Uncertainty {
     stage: Stage,
 }
 
-/// What is next.
+/// Next step of the computation.
 enum Stage {
-    /// The derivatives by the shape.
+    /// Derivatives with respect to the shape.
     Derivatives(Jacobian),
-    /// Their part of the basis.
+    /// Orthonormalisation of the derivatives.
     Basis(Orthonormalisation),
-    /// A wave: bins that are made.
+    /// A wave: its index, and the bins computed so far.
     Wave(usize, usize),
-    /// The wave without what the unknowns take up of it.
+    /// Removal of the unknowns' part from the wave.
     Part(usize, Projection),
-    /// The error of the model.
+    /// Error of the model.
     Error,
-    /// The residual's redundancy.
+    /// Redundancy of the residual.
     Redundancy(Redundancy),
-    /// The covariance: squares that are in it, standard deviation of a row.
+    /// Covariance: squares added so far, standard deviation of a row.
     Squares(usize, f64),
 }
 
-/// Parts of a wave that are out of it, and what it was.
+/// Removal of the basis from a wave: components so far, and sizes before.
 #[derive(Clone, Copy)]
 struct Projection {
     parts: [f64; ALL],
@@ -65,7 +65,7 @@ struct Projection {
 }
 
 impl Uncertainty {
-    /// Nothing yet.
+    /// All zeros: memory before the first use.
     pub(super) const NONE: Self = Self {
         error: ModelError::NONE,
         all: [[0.0; ALL]; ALL],
@@ -78,7 +78,7 @@ impl Uncertainty {
         self.stage = Stage::Derivatives(Jacobian::BEGIN);
     }
 
-    /// Most slices for so many bins.
+    /// Upper bound of the number of slices for a number of bins.
     pub(super) fn most_slices(bins: usize) -> usize {
         let of_wave = bins / WAVE_BINS + 1 + ALL / PARTS + 1;
         let squares = (ALL + 2 * HARMONICS) / SQUARES + 2;
@@ -91,8 +91,9 @@ impl Uncertainty {
             + squares
     }
 
-    /// One slice, of the fit at the best shape: covariance over the coordinates of
-    /// [`coordinate`] and relative error of the response; `None` where an unknown has no influence.
+    /// Does one slice of the uncertainty of the fit at the best shape. After the last it returns the covariance
+    /// over the coordinates of [`coordinate`] and the relative error of the response; `None` in it if an unknown
+    /// has no influence.
     #[inline(never)]
     pub(super) fn advance<const BINS: usize, const EDGES: usize>(
         &mut self,
@@ -166,7 +167,7 @@ impl Uncertainty {
         Poll::Pending
     }
 
-    /// The residual, but for harmonics that are explained as error of the model: no noise any more.
+    /// Residual that counts as noise: without the harmonics that are explained as model error.
     fn residual<'a, const BINS: usize>(
         &self,
         problem: &Problem<BINS>,
@@ -182,8 +183,8 @@ impl Uncertainty {
         &rows[..problem.bins()]
     }
 
-    /// Adds squares of the unknowns' shifts from number `from` on: by noise of `sigma` along each vector of
-    /// the basis, then by the error of each wave. False where there are none left.
+    /// Adds the squares of the unknowns' shifts from number `from` on: those by noise of `sigma` along each
+    /// basis vector, then those by the error of each wave. False when there are none left.
     fn add_squares<const BINS: usize>(
         &mut self,
         from: usize,
@@ -216,7 +217,7 @@ impl Projection {
         output: 0.0,
     };
 
-    /// Takes the next parts out of a wave; true where all are.
+    /// Removes the next components from a wave; true when all are removed.
     fn advance<const BINS: usize>(
         &mut self,
         problem: &Problem<BINS>,
@@ -238,8 +239,8 @@ impl Projection {
         self.done == ALL
     }
 
-    /// What the fit has to do with a wave that all parts are out of; what the residual keeps of it is taken
-    /// out of `rest`.
+    /// Relation of the fit to a wave from which all components have been removed. The part that the residual has
+    /// of it is removed from `rest`.
     fn wave<const BINS: usize>(
         &self,
         problem: &Problem<BINS>,
@@ -264,8 +265,8 @@ impl Projection {
     }
 }
 
-/// Makes the next bins of wave `n`, cosine or sine, whose phase goes on by `step_rad` a bin; true where all
-/// are `made`.
+/// Computes the next bins of wave `n`, cosine or sine, with a phase step of `step_rad` per bin; true when all
+/// bins are `made`.
 fn make_wave<const BINS: usize>(
     n: usize,
     step_rad: f64,
@@ -288,7 +289,7 @@ fn make_wave<const BINS: usize>(
     end == bins
 }
 
-/// The fitted output, and the residual to take the waves out of.
+/// Sets the fitted output, and the residual from which the waves will be removed.
 fn set_output<const BINS: usize, const EDGES: usize>(
     problem: &Problem<BINS>,
     window: &Window<BINS, EDGES>,
@@ -305,13 +306,14 @@ fn set_output<const BINS: usize, const EDGES: usize>(
     *rest = fit.residual;
 }
 
-/// How much less a residual tells than white noise of its size: the bins over its degrees of
-/// freedom, which are the bins over the sum of the squared autocorrelations (a pure harmonic has
-/// two). Only for the part that white noise does not explain.
+/// Redundancy of a residual: by how much its variance must be increased because it is not white. It is the
+/// number of bins over the degrees of freedom, where the degrees of freedom are the number of bins over the sum
+/// of squared autocorrelations (a pure harmonic has two). It applies only to the part that white noise does not
+/// explain.
 #[derive(Clone, Copy)]
 struct Redundancy {
     variance: f64,
-    /// Part of it that white noise does not explain.
+    /// Part of the variance that white noise does not explain.
     unexplained: f64,
     sum: f64,
     lag: usize,
@@ -329,7 +331,7 @@ impl Redundancy {
         }
     }
 
-    /// The next lags; after the last the variance times the redundancy.
+    /// Adds the next lags; after the last it returns the variance times the redundancy.
     fn advance(&mut self, residual: &[f64]) -> Option<f64> {
         let bins = residual.len();
         let mean_square = dot(residual, residual) / bins as f64;
@@ -364,7 +366,7 @@ fn add_square(sum: &mut [[f64; ALL]; ALL], vector: &[f64; ALL]) {
     }
 }
 
-/// The covariance of `map` times the unknowns behind the initial state.
+/// Covariance of `map` times the unknowns after the initial state.
 fn mapped(all: &[[f64; ALL]; ALL], map: &[[f64; 5]; 5]) -> [[f64; 5]; 5] {
     const BEFORE: usize = LINEAR - 2;
     let mut mapped = [[0.0; 5]; 5];
@@ -380,7 +382,7 @@ fn mapped(all: &[[f64; ALL]; ALL], map: &[[f64; 5]; 5]) -> [[f64; 5]; 5] {
     mapped
 }
 
-/// Derivatives of the coordinates of [`coordinate`] by (bias times gain, gain, shape).
+/// Derivatives of the coordinates of [`coordinate`] with respect to (bias times gain, gain, shape).
 fn coordinate_map(bias_gain: f64, gain: f64, period_s: f64) -> [[f64; 5]; 5] {
     let mut map = [[0.0; 5]; 5];
     map[coordinate::LN_POLE_SUM][2] = 1.0;

@@ -1,54 +1,54 @@
-//! How the relay switches, and what is out of range.
+//! Settings of the relay and their ranges.
 
 use core::fmt;
 
-/// How the relay switches. Start from [`RelaySettings::new`].
+/// Settings of the relay. Start from [`RelaySettings::new`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RelaySettings {
-    /// Half the jump of the output, `h` (input unit).
+    /// Half the jump of the output, `h` (input unit), above zero.
     pub amplitude: f32,
     /// Sine of the phase of the oscillation, between -1 and 1, both excluded.
     pub beta: f32,
-    /// Time for which the noise is measured with zero output (s); 0 starts at once.
+    /// Time during which the noise is measured with zero output (s); 0 starts at once.
     pub preroll_s: f32,
-    /// Standard deviation of the measurement noise (output unit); with a pre-roll the lower limit of the measured
-    /// one. For a quantised sensor give its quantum.
+    /// Standard deviation of the measurement noise (output unit). With a pre-roll it is the lower limit of the
+    /// measured value. For a quantised sensor set its quantum.
     ///
-    /// At zero no distance is too small for the relay: it leaves the kick at the first error other than zero, be it
-    /// 1e-13, and counts any reversal as an extremum. A noise-free simulation then builds its oscillation up from
-    /// rounding size; a real sensor makes the relay chatter.
+    /// At zero the relay chatters on sensor noise: it leaves the kick at the first error other than zero, be it
+    /// 1e-13, and counts every reversal as an extremum. A noise-free simulation then starts its oscillation from
+    /// rounding errors.
     pub noise_sigma: f32,
-    /// Smoothing of the error: fraction of the half period; 0 switches it off.
+    /// Smoothing time of the error as a fraction of the half period; 0 switches it off.
     pub smoothing: f32,
-    /// Least time between switches: fraction of the half period; 0 switches it off.
+    /// Minimum time between switches as a fraction of the half period; 0 switches it off.
     pub dwell: f32,
-    /// From an offset outside the noise: switches made as a plain relay (`beta = 0`) at first.
+    /// Number of first switches made as a plain relay (`beta = 0`) when the error starts outside the noise.
     pub plain_switches: u16,
-    /// From such an offset: switches over which `beta` then goes from zero to its value.
+    /// Number of switches over which `beta` then grows from zero to its value.
     pub ramp_switches: u16,
-    /// Share of the measured bias that the trim takes up each cycle; 0 switches it off.
+    /// Share of the measured bias that the trim removes per cycle; 0 switches the trim off.
     pub trim_gain: f32,
-    /// What the trim leaves between the parts of a cycle that the output is high and low, to whichever
-    /// side the bias is. Zero makes the oscillation symmetric; some asymmetry tells more of the process.
+    /// Asymmetry that the trim keeps: time high minus time low over the period, 0 to 1, on the side of the bias.
+    /// Zero makes the oscillation symmetric. An asymmetric oscillation carries more information about the
+    /// process.
     pub asymmetry: f32,
 }
 
 impl RelaySettings {
-    /// Phase of the paper's distinguishing oscillation, `asin(beta) = -46.89` degrees.
+    /// `beta` of the paper's distinguishing phase: `asin(beta) = -46.89` degrees.
     pub const DISTINGUISHING_BETA: f32 = -0.73;
 
-    /// Share of the bias that a trim takes up each cycle: near all of it, short of overshooting.
+    /// Share of the bias removed per cycle: nearly all of it, without overshoot.
     pub const TRIM_GAIN: f32 = 0.8;
 
-    /// An asymmetry that tells twice as much of a process as none and is well short of the 0.3 at which
-    /// the least stable ones lose their limit cycle (`docs/decisions/0011-asymmetry.md`).
+    /// Asymmetry that doubles the information of a cycle and is well below 0.3, where the least stable processes
+    /// lose their limit cycle (`docs/decisions/0011-asymmetry.md`).
     pub const ASYMMETRY: f32 = 0.2;
 
-    /// The trim stays within this part of the relay's amplitude: at the whole of it no switching could
-    /// hold the process.
+    /// Limit of the trim as a fraction of the amplitude: at 1 the relay could no longer reverse the process.
     pub const TRIM_LIMIT: f32 = 0.9;
 
-    /// Checks every setting.
+    /// Checks all settings.
     pub(super) fn validate(&self) -> Result<(), RelayError> {
         if !(self.amplitude.is_finite() && self.amplitude > 0.0) {
             return Err(RelayError::Amplitude(self.amplitude));
@@ -73,7 +73,7 @@ impl RelaySettings {
         Ok(())
     }
 
-    /// Noise-protected, without pre-roll and without trim.
+    /// Settings with noise protection, without pre-roll and without trim.
     #[must_use]
     pub fn new(amplitude: f32, beta: f32) -> Self {
         Self {
@@ -90,7 +90,7 @@ impl RelaySettings {
         }
     }
 
-    /// Equation 4 as meant, with no protection: for noise-free comparisons.
+    /// Settings of the bare switching rule without any protection, for noise-free comparisons.
     #[must_use]
     pub fn bare(amplitude: f32, beta: f32) -> Self {
         Self {
@@ -101,7 +101,7 @@ impl RelaySettings {
     }
 }
 
-/// A setting out of its range, with its value.
+/// Setting out of range, with its value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RelayError {
     /// The amplitude is not positive and finite.
@@ -110,7 +110,7 @@ pub enum RelayError {
     Beta(f32),
     /// The asymmetry is not between 0 and 1.
     Asymmetry(f32),
-    /// A time, a fraction or the noise is negative or not finite: its name and value.
+    /// A time, a fraction or the noise is negative or not finite: name and value.
     Setting(&'static str, f32),
 }
 

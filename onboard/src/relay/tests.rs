@@ -1,4 +1,4 @@
-//! The relay on made-up signals.
+//! The relay on synthetic signals.
 
 extern crate std;
 
@@ -15,7 +15,7 @@ fn relay(settings: RelaySettings) -> Relay {
     Relay::new(settings).unwrap()
 }
 
-/// Levels of the output for every error in turn, 1 ms apart.
+/// Levels of the output for each error in turn, 1 ms apart.
 fn levels(relay: &mut Relay, errors: impl IntoIterator<Item = f32>) -> Vec<bool> {
     errors
         .into_iter()
@@ -98,8 +98,8 @@ fn errors_name_the_setting() {
     }
 }
 
-// Second differences of the triangle 0, 1, 0, -1, 0, ... are 0, -2, 0, 2: the mean square is 2,
-// over 6 the variance 1/3. With 2002 samples, 2000 differences.
+// Second differences of the triangle 0, 1, 0, -1, 0, ... are 0, -2, 0, 2: the mean square is 2 and the variance,
+// a sixth of it, 1/3. 2002 samples give 2000 differences.
 #[test]
 fn preroll_measures_the_noise_and_puts_out_nothing() {
     let settings = RelaySettings {
@@ -127,7 +127,7 @@ fn the_given_noise_is_the_least() {
     assert_eq!(relay.noise_sigma(), 0.02);
 }
 
-// High until the error leaves six sigma, 0.06; then against it.
+// High until the error exceeds six sigma, 0.06; then against it.
 #[test]
 fn kick_ends_outside_the_noise() {
     for (error, high) in [(-0.0601, false), (0.0601, true)] {
@@ -145,8 +145,8 @@ fn kick_ends_outside_the_noise() {
     }
 }
 
-// Under A sin(wt) the fall is due where the sine has come down to -beta: wt = pi + asin(beta),
-// and the rise half a period on. Sample 500 + 1000 asin(beta) / 2 pi, the next whole one.
+// Under A sin(wt) the fall is due when the sine has fallen to -beta: wt = pi + asin(beta); the rise follows half
+// a period later. Sample 500 + 1000 asin(beta) / 2 pi, rounded up.
 #[test]
 fn beta_sets_the_phase_of_the_switches() {
     for beta in [-0.9, -0.73, -0.3, 0.2, 0.73] {
@@ -166,8 +166,8 @@ fn beta_sets_the_phase_of_the_switches() {
     }
 }
 
-// Two periods at beta = -0.73, then -0.3: the switches up to sample 2000 are due where -0.73 has them,
-// those behind it where -0.3 has them. A beta out of range is refused and changes nothing.
+// Two periods at beta = -0.73, then -0.3: switches up to sample 2000 are due for -0.73, later ones for -0.3. A
+// beta out of range is refused and changes nothing.
 #[test]
 fn a_changed_beta_moves_the_next_switches() {
     let mut relay = relay(RelaySettings::bare(1.0, -0.73));
@@ -193,7 +193,7 @@ fn positive_beta_is_the_classical_hysteresis() {
     let mut high = true;
     let errors: Vec<f32> = sine(6, amplitude, 0.0).collect();
     let classical = errors.iter().map(|&error| {
-        // The relay's peak is the largest sample, amplitude to the last bit at sample 250.
+        // The peak is the largest sample, which equals the amplitude exactly at sample 250.
         if error.abs() >= beta * amplitude {
             high = error > 0.0;
         }
@@ -205,7 +205,7 @@ fn positive_beta_is_the_classical_hysteresis() {
 
 #[test]
 fn negated_errors_negate_the_output() {
-    // From an offset, so that the first error tells the sign; without a trim, which moves at rises.
+    // From an offset, so that the first error gives the sign; without a trim, which moves at rises.
     let settings = RelaySettings {
         noise_sigma: 0.01,
         ..RelaySettings::new(1.0, -0.73)
@@ -223,9 +223,8 @@ fn negated_errors_negate_the_output() {
     assert!(up.switches() > 10);
 }
 
-// From an offset the first three switches are a plain relay's, at zero; after seven (three
-// plain, four of the ramp) the lead is the whole one, asin(0.73) = 46.89 deg = 130.2 samples,
-// and on the way there it never falls back.
+// From an offset the first three switches are those of a plain relay, at zero. After seven (three plain, four of
+// the ramp) the lead is complete, asin(0.73) = 46.89 deg = 130.2 samples; in between it never decreases.
 #[test]
 fn ramp_from_an_offset() {
     let mut relay = relay(RelaySettings::bare(1.0, -0.73));
@@ -248,9 +247,9 @@ fn ramp_from_an_offset() {
     );
 }
 
-// Sigma 0.1. Up to 1, back to 0.69: three sigma below the peak, 0.7, it counts and the relay
-// switches. Then on to 2: 2.5 sigma above the peak, 1.25, it is disproved (the signal has turned
-// back by six sigma only at 1.29). The genuine fall is due at 0.73 of 2.
+// Sigma 0.1. The signal rises to 1 and falls to 0.69: three sigma below the peak, at 0.7, the extremum counts
+// and the relay switches. Then it rises to 2: at 1.25, 2.5 sigma above the peak, the extremum is disproved (a
+// turn-back by six sigma would be at 1.29). The genuine fall is due at 0.73 of 2.
 #[test]
 fn a_false_extremum_is_undone() {
     let settings = RelaySettings {
@@ -269,8 +268,8 @@ fn a_false_extremum_is_undone() {
     }
 }
 
-// The switch at 0.73 was too early: the signal comes down to 0.3, goes back up to 0.6 (below
-// the old peak) and only then falls. Back at once; the next switch is at zero.
+// The switch at 0.73 came too early: the signal falls to 0.3, rises to 0.6 (below the old peak) and only then
+// falls for good. The switch is reversed at once; the next one is at zero.
 #[test]
 fn a_signal_that_turns_back_is_given_time() {
     let mut relay = relay(RelaySettings::bare(1.0, -0.73));
@@ -283,8 +282,8 @@ fn a_signal_that_turns_back_is_given_time() {
     assert!(errors[at[2]] <= 0.0 && errors[at[2] - 1] > 0.0);
 }
 
-// Half periods of 500 samples, then the error jumps about every 20: the next switch may not come
-// before 150, 0.3 of the last half period, and each after it not before 0.3 of the mean of two.
+// Half periods of 500 samples, then the error jumps about every 20 samples: the next switch may not come before
+// 150 samples, 0.3 of the last half period, and each one after it not before 0.3 of the mean of two.
 #[test]
 fn dwell_keeps_switches_apart() {
     let settings = RelaySettings {
@@ -304,8 +303,8 @@ fn dwell_keeps_switches_apart() {
     assert_eq!(at[6] - at[5], 150);
 }
 
-// Standing less than six sigma apart, extrema are noise: 5 sigma peak to peak never switch,
-// 7 sigma do. The kick ends at once from the offset; then the signal stays small.
+// Extrema less than six sigma apart are noise: 5 sigma peak to peak never switch, 7 sigma do. The kick ends at
+// once because of the offset; then the signal stays small.
 #[test]
 fn extrema_within_the_noise_do_not_switch() {
     for (peak_to_peak, some) in [(5.0, false), (7.0, true)] {
@@ -315,7 +314,7 @@ fn extrema_within_the_noise_do_not_switch() {
         };
         let mut relay = relay(settings);
         relay.step(0.065, DT_S);
-        // Forget the offset as a peak: a first crossing brings it down to the small signal.
+        // A first crossing replaces the offset as a peak by the small signal.
         levels(&mut relay, lines(&[0.065, -0.001, -0.005], 50));
         let before = relay.switches();
         assert_eq!(before, 1);
@@ -326,9 +325,8 @@ fn extrema_within_the_noise_do_not_switch() {
     }
 }
 
-// An average of n samples has 1/n of the variance and is (n - 1)/2 samples late. The smoothing's
-// response to a unit impulse g_k has sum g^2 = 1/n and sum k g = (n - 1)/2: here 3 % of half
-// periods of 500 samples, n = 15.
+// The average of n samples has 1/n of the variance and a delay of (n - 1)/2 samples. The impulse response g_k of
+// the smoothing has sum g^2 = 1/n and sum k g = (n - 1)/2; with 3 % of half periods of 500 samples, n = 15.
 #[test]
 fn smoothing_has_the_variance_and_delay_of_an_average() {
     let settings = RelaySettings {
@@ -354,8 +352,8 @@ fn smoothing_has_the_variance_and_delay_of_an_average() {
     assert!((relay.smoothed_sigma - 0.01 / sqrtf(n)).abs() < 1e-7);
 }
 
-// The input bias of a process cannot be seen in a synthetic error, its duty can: high for 0.6 of
-// every cycle, mean(u) = 0.2 h. The trim then moves by 0.8 of 0.2 h a cycle, up to its limit.
+// A synthetic error has no input bias, but its duty can show one: high for 0.6 of every cycle, mean(u) = 0.2 h.
+// The trim then moves by 0.8 of 0.2 h per cycle, up to its limit.
 #[test]
 fn trim_follows_the_mean_of_the_output() {
     let settings = RelaySettings {
@@ -374,7 +372,7 @@ fn trim_follows_the_mean_of_the_output() {
     let step = 0.8 * 2.0 * 0.2;
     let mut moves: Vec<f32> = trims.windows(2).map(|pair| pair[1] - pair[0]).collect();
     moves.retain(|moved| *moved > 0.0);
-    // The first moves are whole; the last is cut by the limit of 0.9 h.
+    // The first moves are complete; the last is cut by the limit of 0.9 h.
     assert!(
         moves[..4].iter().all(|moved| (moved - step).abs() < 0.01),
         "{trims:?}"

@@ -1,4 +1,4 @@
-//! Means over bins against outputs one by one.
+//! Means over bins against single outputs.
 
 extern crate std;
 
@@ -9,8 +9,7 @@ use super::*;
 
 const SAMPLE_S: f64 = 0.01;
 
-/// Outputs at the samples one by one: every stretch between an instant and an arriving edge has a
-/// transition of its own.
+/// Outputs at single samples: every stretch between an instant and an arriving edge has its own transition.
 fn outputs(
     process: &Soiptd,
     drive: &Drive,
@@ -81,7 +80,7 @@ const DRIVES: [Drive; 3] = [
 ];
 
 fn edges() -> Vec<Edge> {
-    // On an instant (0.30), between two, two in one sample, and later than the window's end.
+    // On an instant (0.30), between two instants, two in one sample, and after the end of the window.
     [
         (-3.0, 1.0),
         (0.0553, -1.0),
@@ -112,7 +111,7 @@ fn means(
         if is_complete {
             return (means, calls);
         }
-        // A bin that the call before had begun is no work of this one.
+        // A bin that the last call had begun is not work of this call.
         let done = before.index + usize::from(before.open.is_some());
         let (bins, edges) = (course.index.saturating_sub(done), course.edge - before.edge);
         assert!(
@@ -156,7 +155,7 @@ fn check(per_bin: u32, past_bins: usize, tau_s: f64) {
 fn bins_are_means_of_their_samples() {
     for per_bin in [1, 3, 64] {
         for past_bins in [0, 2] {
-            // None, part of a sample, whole samples, more than a small bin.
+            // No delay, part of a sample, whole samples, more than a small bin.
             for tau_s in [0.0, 0.0037, 0.02, 0.1173] {
                 check(per_bin, past_bins, tau_s);
             }
@@ -164,8 +163,8 @@ fn bins_are_means_of_their_samples() {
     }
 }
 
-// Samples late by d on average: d times the mean slope of their bin, its last output less its
-// first over its duration, is added; exactly that.
+// Samples d late on average add exactly d times the mean slope of their bin: its last output minus its first,
+// over its duration.
 #[test]
 fn late_samples_are_followed_to_first_order() {
     let process = processes(0.0173)[0];
@@ -198,8 +197,8 @@ fn no_edges_no_input() {
     assert_eq!(means, [0.0; 5]);
 }
 
-// 300 bins without edges: 5.4 times 56, six calls. Five edges, 40 bins' worth each, one more bin of the
-// second with the 16 left: at most one edge a call, so six calls at least and 1 + 300/56 + 2 * 5 at most.
+// 300 bins without edges: 5.4 times 56, six calls. With five edges, each worth 40 bins: 16 bins are left beside
+// an edge, so at most one edge per call; at least six calls, at most 1 + 300/56 + 2 * 5.
 #[test]
 fn a_call_follows_no_more_than_it_may() {
     let grid = Grid {

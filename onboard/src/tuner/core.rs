@@ -1,41 +1,41 @@
-//! All of a tuner but the room of its work: its phases, its guard, its laws.
+//! Tuner without its work memory: phases, guard, control laws.
 
 use super::TunerPhase;
 use super::settings::{CheckedSettings, TunerSettings};
 use crate::control::{Measurement, PdLaw, RateEstimate};
 use crate::guard::{Abort, Guard, Motion};
-use crate::identification::{Observed, Stage, StagedIdentification, TuningResult, Workspace};
+use crate::identification::{Stage, StagedIdentification, TestSample, TuningResult, Workspace};
 use crate::pack::Pack;
 use crate::prediction::{Beginning, Prediction};
 use crate::relay::Relay;
 use crate::take_off;
 
-/// Switches of the relay that end a take-off: the vehicle has been above the reference and come back.
+/// Switches of the relay that end a take-off: the vehicle has been above the reference and has returned.
 const AIRBORNE_SWITCHES: u32 = 2;
-/// Periods of the oscillation in which the response must be the predicted one.
+/// Periods of the oscillation over which the response is compared with the prediction.
 const CHECKED_PERIODS: f64 = 4.0;
-/// What the response may be off the predicted one, in amplitudes of the oscillation: it begins on the
-/// oscillation with a force that is known roughly, and noise and gusts go on.
+/// Tolerance of that comparison, in amplitudes of the oscillation: the prediction begins within the oscillation
+/// with an approximate force, and noise and gusts continue.
 const MOST_MISMATCH: f32 = 1.5;
 
-/// The tuner of one axis but for the [`Workspace`] of its work, which it must always be given the same: so that firmware can
-/// make each where it is to stay. See [`tuner`](super).
-pub struct Core<'a> {
+/// Tuner of one axis without its [`Workspace`], so that firmware can place both where they stay. Every call must
+/// be given the same workspace. See [`tuner`](super).
+pub struct TunerCore<'a> {
     settings: TunerSettings,
     phase: TunerPhase,
     reason: Option<Abort>,
     guard: Guard,
     last_time_s: Option<f64>,
-    /// The last sample that could be used.
+    /// The last valid sample.
     value: f32,
     rate: RateEstimate,
-    /// The reference in force; that of the start during a test.
+    /// The reference in use; during a test that of its start.
     reference: f32,
-    /// Means under the safe controller: of its output (input unit), of the process's (output unit).
+    /// Means under the safe controller: of its output (input unit), of the process's output (output unit).
     usual: f32,
     usual_value: f32,
     test_s: f32,
-    /// What the relay is offset by, then the new controller (input unit).
+    /// Offset of the relay, then of the new controller (input unit).
     offset: f32,
     relay: Relay,
     since_switch_s: f32,
@@ -47,8 +47,8 @@ pub struct Core<'a> {
     unchecked_s: f32,
 }
 
-impl<'a> Core<'a> {
-    /// Of settings that were checked.
+impl<'a> TunerCore<'a> {
+    /// A tuner with checked settings.
     #[must_use]
     #[inline]
     pub fn of(checked: &CheckedSettings, pack: Pack<'a>) -> Self {
@@ -81,7 +81,7 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// Begins the test at the next tick; only from [`TunerPhase::Idle`].
+    /// Begins the test at the next tick. Only in [`TunerPhase::Idle`].
     pub fn start(&mut self) {
         if self.phase != TunerPhase::Idle {
             return;
@@ -98,14 +98,15 @@ impl<'a> Core<'a> {
         self.guard.begin((self.value - self.reference).abs());
     }
 
-    /// The operator ends the test, or the controller that came of it; the next tick's output is safe.
+    /// Aborts the test, or stops the controller found. The output of the next tick is that of the safe
+    /// controller.
     pub fn abort(&mut self) {
         if self.phase != TunerPhase::Idle {
             self.end(Abort::Operator);
         }
     }
 
-    /// Ready for another test, all that was learned forgotten; only from [`TunerPhase::Aborted`] and
+    /// Resets the tuner for another test; results are forgotten. Only in [`TunerPhase::Aborted`] and
     /// [`TunerPhase::Control`].
     pub fn reset(&mut self) {
         if !matches!(self.phase, TunerPhase::Aborted | TunerPhase::Control) {
@@ -129,12 +130,12 @@ impl<'a> Core<'a> {
         self.prediction = None;
     }
 
-    /// One tick: time (s), what the sensor says, where the output should be (output unit). Returns the
-    /// input to hold until the next tick (input unit), always finite and within the limits.
+    /// One tick. Takes time (s), measurement and reference (output unit); returns the input to hold until the
+    /// next tick (input unit), which is always finite and within the limits.
     #[inline]
     pub fn step(
         &mut self,
-        room: &mut Workspace,
+        workspace: &mut Workspace,
         time_s: f64,
         measurement: &Measurement,
         reference: f32,
@@ -155,7 +156,7 @@ impl<'a> Core<'a> {
             self.phase,
             TunerPhase::TakeOff | TunerPhase::Relay | TunerPhase::Identify
         ) {
-            self.identify(room, time_s, output);
+            self.identify(workspace, time_s, output);
             if self.phase == TunerPhase::Aborted {
                 return self.within_limits(self.safe());
             }
@@ -179,7 +180,7 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// Takes the sample in, unless it must not be used.
+    /// Takes the sample after the guard has checked it.
     fn watch(&mut self, dt_s: f32, measurement: &Measurement, reference: f32) -> Result<(), Abort> {
         let is_test =
             !matches!(self.phase, TunerPhase::Idle | TunerPhase::Aborted) && !self.is_proven();
@@ -237,7 +238,7 @@ impl<'a> Core<'a> {
         output
     }
 
-    /// The relay's output at this tick.
+    /// Output of the relay at this tick.
     fn excite(&mut self, dt_s: f32) -> f32 {
         let was_high = self.relay.is_high();
         let output = self.relay.step(self.reference - self.value, dt_s);
@@ -249,20 +250,21 @@ impl<'a> Core<'a> {
         output
     }
 
-    /// Shows the identification this tick, and lets it do a slice of its work.
-    fn identify(&mut self, room: &mut Workspace, time_s: f64, output: f32) {
-        let observed = Observed {
+    /// Passes the sample of this tick to the identification and lets it do its slices of work.
+    fn identify(&mut self, workspace: &mut Workspace, time_s: f64, output: f32) {
+        let observed = TestSample {
             time_s,
             input: f64::from(output),
             output: f64::from(self.value),
             is_high: self.relay.is_high(),
             undone: self.relay.undone(),
         };
-        self.identification.observe(room, &observed);
+        self.identification.observe(workspace, &observed);
         if self.phase == TunerPhase::TakeOff {
             return;
         }
-        let outcome = (0..self.settings.slices).find_map(|_| self.identification.advance(room));
+        let outcome =
+            (0..self.settings.slices).find_map(|_| self.identification.advance(workspace));
         match outcome {
             Some(Ok(identified)) => self.enter_control(time_s, &identified),
             Some(Err(refusal)) => {
@@ -277,8 +279,8 @@ impl<'a> Core<'a> {
         }
     }
 
-    /// The new controller from the next tick on, about the input that holds the process at rest: the relay
-    /// could hold no bias beyond its own amplitude.
+    /// Switches to the new controller from the next tick on. Its offset holds the process at rest and stays
+    /// within an amplitude of the relay's centre, because the relay cannot hold a larger bias.
     fn enter_control(&mut self, time_s: f64, identified: &TuningResult) {
         let centre = self.offset + self.relay.trim();
         let h = self.settings.relay.amplitude;
@@ -330,37 +332,37 @@ impl<'a> Core<'a> {
             .min(self.settings.output_highest)
     }
 
-    /// What it is doing.
+    /// Phase of the tuner.
     #[must_use]
     pub fn phase(&self) -> TunerPhase {
         self.phase
     }
 
-    /// Why the test was aborted.
+    /// Reason of the abort, if the test was aborted.
     #[must_use]
     pub fn reason(&self) -> Option<Abort> {
         self.reason
     }
 
-    /// What the test has told: process, deviations, gains.
+    /// Result of the test: process, deviations, gains.
     #[must_use]
     pub fn identified(&self) -> Option<&TuningResult> {
         self.identified.as_ref()
     }
 
-    /// The law in force in [`TunerPhase::Control`]; the safe one in any other phase.
+    /// The law in use in [`TunerPhase::Control`]; the safe law in any other phase.
     #[must_use]
     pub fn law(&self) -> &PdLaw {
         &self.law
     }
 
-    /// Whether the new controller is in force and its response was as predicted.
+    /// Whether the new controller runs and its response was as predicted.
     #[must_use]
     pub fn is_proven(&self) -> bool {
         self.phase == TunerPhase::Control && self.prediction.is_none()
     }
 
-    /// What the identification does next.
+    /// Next step of the identification.
     #[must_use]
     pub fn stage(&self) -> Stage {
         self.identification.stage()

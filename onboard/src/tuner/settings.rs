@@ -1,4 +1,4 @@
-//! How a tuner works, and what is out of range.
+//! Settings of the tuner and their ranges.
 
 use core::fmt;
 
@@ -8,43 +8,43 @@ use crate::identification::MOST_CYCLES;
 use crate::relay::{Relay, RelayError, RelaySettings};
 use crate::take_off::TakeOffSettings;
 
-/// How an axis is tuned. Start from [`TunerSettings::new`].
+/// Settings of a tuner. Start from [`TunerSettings::new`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TunerSettings {
-    /// The relay of the test. Its amplitude adds to the offset that holds the process at rest. Its noise
-    /// should be the sensor's or be measured in a pre-roll: with none it switches on what is none, and takes
-    /// the least distance from the reference for one to return from.
+    /// Relay of the test. Its output is added to the offset that holds the process at rest. Set its noise to
+    /// that of the sensor, or let it be measured in a pre-roll: at zero the relay chatters on sensor noise.
     pub relay: RelaySettings,
     /// Time between ticks (s).
     pub sample_s: f32,
-    /// Cycles that are refined together, 1 to 4; the last one is also read.
+    /// Number of cycles that are fitted together, 1 to 4. The last one is also read by the pack.
     pub cycles: u8,
-    /// Looks at cycles that may be refused before the test ends.
+    /// Maximum number of identification attempts.
     pub attempts: u8,
-    /// Slices of the identification in a tick, each of up to 2,700 operations in double precision; some 2,000 to
-    /// 9,000 make one. Where those are emulated, 1.
+    /// Slices of the identification per tick; each takes up to 2,700 operations in double precision, and an
+    /// identification takes 2,000 to 9,000 slices. Use 1 where double precision is emulated.
     pub slices: u16,
-    /// The integrator that lifts the vehicle from the ground; `None` where the test begins in the air.
+    /// Take-off from the ground; `None` if the test begins in the air.
     pub take_off: Option<TakeOffSettings>,
-    /// What must never happen.
+    /// Abort limits.
     pub limits: Limits,
-    /// Least output (input unit).
+    /// Lower limit of the output (input unit).
     pub output_lowest: f32,
-    /// Largest output (input unit).
+    /// Upper limit of the output (input unit).
     pub output_highest: f32,
-    /// The controller before the test and after one that was aborted; [`PdLaw::ZERO`] for zero output.
+    /// Controller before a test and after an abort; [`PdLaw::ZERO`] for zero output.
     pub safe: PdLaw,
-    /// Time constant of the means under the safe controller (s): its output is what the relay is then offset
-    /// by, against a drift under a constant bias, and the process's what it oscillates about; zero for no such
-    /// compensation.
+    /// Time constant of the means under the safe controller (s). The mean of its output becomes the offset of
+    /// the relay, against a drift under a constant bias; the mean of the process's output becomes the reference
+    /// of the test. Zero switches this off.
     pub bias_filter_s: f32,
-    /// Lag of a rate that is found from differences (s).
+    /// Time constant of the filter for a rate that is computed from differences (s).
     pub rate_lag_s: f32,
 }
 
 impl TunerSettings {
-    /// A noise-protected relay of this amplitude at the distinguishing phase, with trim, from two cycles;
-    /// no take-off, no limits, nothing safe but zero: set what the vehicle needs.
+    /// A relay of this amplitude with noise protection and trim at the distinguishing phase, two cycles; no
+    /// take-off, no abort limits; the fallback output is zero. Set limits and a safe controller for a real
+    /// vehicle.
     #[must_use]
     pub fn new(amplitude: f32, sample_s: f32) -> Self {
         Self {
@@ -66,10 +66,10 @@ impl TunerSettings {
         }
     }
 
-    /// Checks every setting.
+    /// Checks all settings.
     ///
     /// # Errors
-    /// Names the first that is out of range.
+    /// The first setting that is out of range.
     pub fn checked(&self) -> Result<CheckedSettings, TunerError> {
         let positive = [("the sample period", self.sample_s)];
         let not_negative = [
@@ -107,29 +107,29 @@ impl TunerSettings {
     }
 }
 
-/// Settings that are in their ranges.
+/// Settings that have been checked.
 #[derive(Clone, Debug)]
 pub struct CheckedSettings {
     pub(super) settings: TunerSettings,
     pub(super) relay: Relay,
 }
 
-/// A setting out of its range.
+/// Setting out of range. Exhaustive, because the C interface has a code for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum TunerError {
-    /// Of the relay.
+    /// A setting of the relay.
     Relay(RelayError),
-    /// A time, a gain or a limit: its name and value.
+    /// A time, a gain or a limit: name and value.
     Setting(&'static str, f32),
-    /// The number of cycles.
+    /// The number of cycles: its value.
     Cycles(u8),
-    /// There are no attempts, or no slices.
+    /// The number of attempts or of slices is zero.
     NoWork,
-    /// The least output is not below the largest, or one is no number.
+    /// The lower output limit is not below the upper one, or one is NaN.
     OutputLimits(f32, f32),
-    /// The safe controller has a gain or an offset that is no finite number.
+    /// A gain or the offset of the safe controller is not finite.
     Safe,
-    /// The pack that is built in cannot be read.
+    /// The embedded pack cannot be read.
     Pack,
 }
 
@@ -139,15 +139,24 @@ impl fmt::Display for TunerError {
             Self::Relay(error) => error.fmt(f),
             Self::Setting(name, value) => write!(f, "{name} must be positive, but is {value}"),
             Self::Cycles(cycles) => {
-                write!(f, "the cycles must be 1 to {MOST_CYCLES}, but are {cycles}")
+                write!(
+                    f,
+                    "the number of cycles must be 1 to {MOST_CYCLES}, but is {cycles}"
+                )
             }
-            Self::NoWork => write!(f, "there must be at least one attempt and one slice a tick"),
+            Self::NoWork => write!(
+                f,
+                "there must be at least one attempt and one slice per tick"
+            ),
             Self::OutputLimits(lowest, highest) => write!(
                 f,
-                "the least output must be below the largest, but they are {lowest} and {highest}"
+                "the lower output limit must be below the upper one, but they are {lowest} and {highest}"
             ),
-            Self::Safe => write!(f, "the safe controller's numbers must be finite"),
-            Self::Pack => write!(f, "the pack cannot be read"),
+            Self::Safe => write!(
+                f,
+                "the gains and the offset of the safe controller must be finite"
+            ),
+            Self::Pack => write!(f, "the embedded pack cannot be read"),
         }
     }
 }

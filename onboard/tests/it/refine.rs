@@ -250,11 +250,11 @@ fn a_prior_counts_for_what_it_is_worth() {
     let with = |size: f64| {
         let root =
             core::array::from_fn(|i| core::array::from_fn(|j| if i == j { size } else { 0.0 }));
-        let beforehand = PriorKnowledge {
+        let prior_knowledge = PriorKnowledge {
             starts: &[off],
             prior: ShapePrior::new(off, &root),
         };
-        refine_with(&window, period_s, &beforehand).unwrap()
+        refine_with(&window, period_s, &prior_knowledge).unwrap()
     };
     assert_recovered(&with(1.0), &process, 0.0, 1e-6);
     let held = with(1e-12);

@@ -93,11 +93,11 @@ fn a_refiner_can_be_begun_anew_at_any_time() {
     let other = Soiptd::from_acceleration_gain(-1.0, 0.2, 0.5, 0.1).unwrap();
     let (other_window, _, other_cycle) = last_cycle(&other, 0.05);
     let starts = [[2.5, 0.1, 0.05], [4.0, 0.01, 0.1]];
-    let beforehand = PriorKnowledge {
+    let prior_knowledge = PriorKnowledge {
         starts: &starts,
         prior: ShapePrior::of_pack(&pack),
     };
-    let expected = refine_with(&window, cycle.period_s, &beforehand).unwrap();
+    let expected = refine_with(&window, cycle.period_s, &prior_knowledge).unwrap();
     let mut refiner = Refiner::new();
     refiner
         .begin(
@@ -118,7 +118,9 @@ fn a_refiner_can_be_begun_anew_at_any_time() {
         for _ in 0..abandoned {
             let _ = refiner.advance(&other_window);
         }
-        refiner.begin(&window, cycle.period_s, &beforehand).unwrap();
+        refiner
+            .begin(&window, cycle.period_s, &prior_knowledge)
+            .unwrap();
         let (outcome, _) = finish(&mut refiner, &window);
         assert_eq!(outcome, Ok(expected), "abandoned after {abandoned}");
     }
@@ -129,10 +131,12 @@ fn nothing_comes_of_what_was_not_begun() {
     let (window, _, cycle) = last_cycle(&process(), 0.0);
     let mut refiner = Refiner::new();
     assert_eq!(refiner.advance(&window), Some(Err(RefineError::NoFit)));
-    let beforehand = PriorKnowledge::default();
-    refiner.begin(&window, cycle.period_s, &beforehand).unwrap();
+    let prior_knowledge = PriorKnowledge::default();
+    refiner
+        .begin(&window, cycle.period_s, &prior_knowledge)
+        .unwrap();
     assert_eq!(
-        refiner.begin(&Coarse::new(0.0, 1e-3), cycle.period_s, &beforehand),
+        refiner.begin(&Coarse::new(0.0, 1e-3), cycle.period_s, &prior_knowledge),
         Err(RefineError::NoInput)
     );
     assert_eq!(refiner.advance(&window), Some(Err(RefineError::NoFit)));

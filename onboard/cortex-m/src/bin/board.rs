@@ -1,14 +1,14 @@
-//! The flight on a Cortex-M4F without an operating system: the machine `mps2-an386` as qemu emulates it.
+//! The flight on a Cortex-M4F without an operating system: the machine `mps2-an386`, emulated by qemu.
 //!
-//! Lines go out by semihosting, and so does the exit status. Behind those of the flight come
+//! Lines and the exit status are written by semihosting. After the lines of the flight come
 //!
 //! ```text
 //! bytes <flash | tuner | static | stack | beginning> <number>
 //! ```
 //!
-//! *flash* is all of the image: code, tables, pack, axis; *static* is all static memory, the tuner's with it.
-//! *stack* is its high-water mark, and *beginning* that before the first tick: it is painted at the reset, and
-//! the lowest word that has changed is looked for.
+//! *flash* is the whole image: code, tables, pack, axis. *static* is all static memory, including the tuner's.
+//! *stack* is the high-water mark of the stack and *beginning* that before the first tick: the stack is painted
+//! at reset, and the lowest changed word is searched.
 #![no_std]
 #![no_main]
 
@@ -20,10 +20,10 @@ use core::ptr;
 use onecycle_flight::{Line, fly, settings};
 use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::Core;
+use onecycle_onboard::tuner::TunerCore;
 
-/// Operations of semihosting, and what a program that ends as it should says (Arm, "Semihosting for AArch32
-/// and AArch64", 2.0).
+/// Operations of semihosting, and the reason code of a normal exit (Arm, "Semihosting for AArch32 and AArch64",
+/// 2.0).
 const WRITE0: u32 = 0x04;
 const EXIT_EXTENDED: u32 = 0x20;
 const APPLICATION_EXIT: u32 = 0x2_0026;
@@ -32,18 +32,18 @@ const APPLICATION_EXIT: u32 = 0x2_0026;
 const TIMER_CONTROL: *mut u32 = 0x4000_0000 as *mut u32;
 const TIMER_VALUE: *const u32 = 0x4000_0004 as *const u32;
 const TIMER_RELOAD: *mut u32 = 0x4000_0008 as *mut u32;
-/// run.sh lets an instruction take 2^7 ns of the emulated time, which are 3.2 counts of 40 ns: more than one,
-/// so that none is lost. The counter goes round in 1.3 thousand million instructions.
+/// In run.sh an instruction takes 2^7 ns of the emulated time, 3.2 counts of 40 ns, so every instruction is
+/// counted. The counter wraps after 1.3 thousand million instructions.
 const COUNTS_OF_TEN_INSTRUCTIONS: u64 = 32;
 
-/// A loop of two instructions, so often: what the counter is checked with, and what it may be off, for the few
-/// instructions around the loop.
+/// Rounds of a loop of two instructions that checks the counter, and the tolerance for the instructions around
+/// it.
 const CHECKED_ROUNDS: u32 = 10_000;
 const MOST_OFF: u64 = 10;
 
 const PAINT: u32 = 0xa5a5_a5a5;
 
-// What runs before Rust may: the floating-point unit on, data in place, the stack painted.
+// Startup before Rust code: enable the floating-point unit, copy data, clear bss, paint the stack.
 global_asm!(
     ".pushsection .text.onecycle_reset",
     ".global onecycle_reset",
@@ -92,7 +92,7 @@ unsafe extern "C" {
     static __flash_end: u32;
 }
 
-/// Reset and the exceptions of the core; the linker's script puts the stack's top before them.
+/// Reset and exception vectors; the linker script puts the initial stack pointer before them.
 #[unsafe(link_section = ".vectors")]
 #[used]
 static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
@@ -101,28 +101,31 @@ static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
     vectors
 };
 
-static mut CORE: MaybeUninit<Core<'static>> = MaybeUninit::uninit();
-static mut ROOM: Workspace = Workspace::NEW;
+static mut CORE: MaybeUninit<TunerCore<'static>> = MaybeUninit::uninit();
+static mut WORKSPACE: Workspace = Workspace::NEW;
 
 extern "C" fn run() -> ! {
     start_timer();
     if !counts_instructions() {
         leave(
-            "the timer does not count instructions: is -icount as run.sh sets it?",
+            "the timer does not count instructions: check -icount in run.sh",
             1,
         )
     }
     let (Ok(checked), Ok(pack)) = (settings().checked(), Pack::embedded()) else {
-        leave("the tuner's settings are wrong", 1)
+        leave("settings rejected", 1)
     };
-    // SAFETY: nothing else names them, and this function runs once.
-    let (core, room) = unsafe { (&mut *(&raw mut CORE), &mut *(&raw mut ROOM)) };
-    let core = core.write(Core::of(&checked, pack));
+    // SAFETY: nothing else uses these statics, and this function runs once.
+    let (core, workspace) = unsafe { (&mut *(&raw mut CORE), &mut *(&raw mut WORKSPACE)) };
+    let core = core.write(TunerCore::of(&checked, pack));
     let beginning = stack();
-    let is_tuned = fly(core, room, laps(), say);
+    let is_tuned = fly(core, workspace, laps(), say);
     for (name, bytes) in [
         ("flash", (&raw const __flash_end).addr()),
-        ("tuner", size_of::<Core<'static>>() + size_of::<Workspace>()),
+        (
+            "tuner",
+            size_of::<TunerCore<'static>>() + size_of::<Workspace>(),
+        ),
         (
             "static",
             distance(&raw const __data_start, &raw const __bss_end),
@@ -138,14 +141,14 @@ extern "C" fn run() -> ! {
     if is_tuned {
         leave("ok", 0)
     } else {
-        leave("there is no controller, or not the right one", 1)
+        leave("no controller found, or a wrong one", 1)
     }
 }
 
-/// Bytes of the stack at its deepest so far.
+/// Largest use of the stack so far (bytes).
 fn stack() -> usize {
     let (mut lowest, top) = (&raw const __stack_bottom, &raw const __stack_top);
-    // SAFETY: reads words between the stack's ends; the caller's own frame is none of the paint.
+    // SAFETY: reads words between the ends of the stack; the caller's frame is not part of the paint.
     while lowest < top && unsafe { ptr::read_volatile(lowest) } == PAINT {
         lowest = lowest.wrapping_add(1);
     }
@@ -164,7 +167,7 @@ fn start_timer() {
     }
 }
 
-/// Tells the instructions since it was last called, to the nearest.
+/// Returns a function that tells the instructions since its last call, rounded.
 fn laps() -> impl FnMut() -> u64 {
     let mut last = u32::MAX;
     move || {
@@ -176,7 +179,7 @@ fn laps() -> impl FnMut() -> u64 {
     }
 }
 
-/// Whether a loop of so many instructions is counted as such.
+/// Whether a loop with a known number of instructions is counted correctly.
 fn counts_instructions() -> bool {
     let mut lap = laps();
     lap();

@@ -1,4 +1,4 @@
-//! The flight on the host: its lines to standard output, what was found in words to standard error.
+//! The flight on the host: its lines to standard output, the numbers found in words to standard error.
 
 use std::io::Write;
 use std::process::ExitCode;
@@ -6,18 +6,18 @@ use std::process::ExitCode;
 use onecycle_flight::{fly, numbers, settings};
 use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::Core;
+use onecycle_onboard::tuner::TunerCore;
 
 fn main() -> ExitCode {
     let (Ok(checked), Ok(pack)) = (settings().checked(), Pack::embedded()) else {
         return ExitCode::FAILURE;
     };
-    let (mut tuner, mut room) = (Core::of(&checked, pack), Workspace::NEW);
+    let (mut tuner, mut workspace) = (TunerCore::of(&checked, pack), Workspace::NEW);
     let mut lines = Vec::new();
-    // Nothing is counted here.
+    // Instructions are not counted on the host.
     let is_tuned = fly(
         &mut tuner,
-        &mut room,
+        &mut workspace,
         || 0,
         |line| {
             let ended = line.ended();
