@@ -5,3 +5,6 @@ pub mod judge;
 pub mod learn;
 pub mod paper;
 pub mod space;
+
+/// This program and its version, as files name their maker.
+pub(crate) const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));

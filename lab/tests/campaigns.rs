@@ -5,9 +5,8 @@
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_identify::Method;
-use onecycle_lab::judge::campaign::{
-    Campaign, IdentificationOutcome, Measure, identification_outcome, relay_outcome,
-};
+use onecycle_lab::experiments::{Campaign, Measure};
+use onecycle_lab::judge::outcome::{IdentificationOutcome, identification_outcome, relay_outcome};
 
 fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
     Campaign {
@@ -37,8 +36,8 @@ fn the_relay_becomes_steady_and_never_runs_away() {
             ..campaign(Measure::Relay, 100, 0.05, trim)
         };
         for n in 0..campaign.cases {
-            let case = campaign.case(n).unwrap();
-            let outcome = relay_outcome(&campaign, &case).unwrap();
+            let case = campaign.experiment(n).unwrap();
+            let outcome = relay_outcome(&case).unwrap();
             assert!(
                 outcome.steady_at.is_some_and(|at| at <= 20),
                 "{case:?}: {outcome:?}"
@@ -58,7 +57,7 @@ fn the_relay_becomes_steady_and_never_runs_away() {
 
 fn outcomes(campaign: &Campaign) -> Vec<IdentificationOutcome> {
     (0..campaign.cases)
-        .map(|n| identification_outcome(campaign, &campaign.case(n).unwrap()).unwrap())
+        .map(|n| identification_outcome(campaign, &campaign.experiment(n).unwrap()).unwrap())
         .collect()
 }
 
@@ -115,11 +114,11 @@ fn intervals_hold_the_truth_nine_times_in_ten() {
 #[test]
 fn a_case_is_reproducible() {
     let campaign = campaign(Measure::Identification, 10, 0.03, true);
-    let case = campaign.case(7).unwrap();
-    assert_eq!(case, campaign.case(7).unwrap());
-    let (first, _) = campaign.run(&case, 5.0).unwrap();
-    let _ = campaign.run(&campaign.case(3).unwrap(), 5.0).unwrap();
-    let (again, _) = campaign.run(&case, 5.0).unwrap();
+    let case = campaign.experiment(7).unwrap();
+    assert_eq!(case, campaign.experiment(7).unwrap());
+    let (first, _) = case.run(5.0).unwrap();
+    let _ = campaign.experiment(3).unwrap().run(5.0).unwrap();
+    let (again, _) = case.run(5.0).unwrap();
     assert_eq!(first, again);
 }
 

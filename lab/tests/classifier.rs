@@ -7,11 +7,11 @@ use std::f64::consts::TAU;
 
 use onecycle_design::soiptd_pd::deterioration::deterioration;
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
+use onecycle_lab::experiments::{SAMPLE_S, SampledCycle};
 use onecycle_lab::learn::train::{Batch, Dataset, Matrix};
 use onecycle_lab::paper::classifier::{
     Classes, Examples, Fit, Gain, Harmonics, INPUTS, Measured, Prepared, Processes, Protocol,
-    Response, SAMPLE_S, SAMPLES, SampledCycle, Score, Trials, label, least_expected_cost,
-    most_likely,
+    Response, SAMPLES, Score, Trials, label, least_expected_cost, most_likely,
 };
 use onecycle_lab::paper::grid::{Grid, InTurn, Settings};
 use onecycle_lab::space::Space;

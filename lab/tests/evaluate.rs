@@ -11,11 +11,11 @@ use onecycle_design::cascade::Cascade;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_design::soiptd_pd::optimum::pd;
 use onecycle_identify::find_oscillation;
+use onecycle_lab::experiments::{Benchmark, RelayTest, Truth};
 use onecycle_lab::judge::baselines::rules;
 use onecycle_lab::judge::evaluate::files::{read_answers, read_truth, results_csv, truth_csv};
 use onecycle_lab::judge::evaluate::{
-    Answer, Benchmark, Contender, Costs, Judge, PHASE_MARGIN_DEG, Record, RelayTest, Summary,
-    Truth, Verdict, quantile, records,
+    Answer, Contender, Costs, Judge, PHASE_MARGIN_DEG, Record, Summary, Verdict, quantile, records,
 };
 use onecycle_lab::paper::grid::{InTurn, Pieces};
 use onecycle_lab::space::Space;
@@ -194,8 +194,7 @@ fn experiments_are_as_the_rules_say() {
                 .zip(0..)
                 .all(|(&t, k)| t == f64::from(k) / 1000.0)
         );
-        let seen = recorded.seen();
-        let found = find_oscillation(&seen.signals, 50).unwrap();
+        let found = find_oscillation(&recorded.signals(), 50).unwrap();
         assert_eq!(found.cycles_steady, 5, "{truth:?}");
         assert!(truth.noise_sigma < 0.04 * found.amplitude);
         if truth.is_trimmed {
@@ -233,7 +232,7 @@ fn other_relay_tests_are_of_the_same_process() {
         let levels: BTreeSet<u64> = asymmetric.input.iter().map(|u| u.to_bits()).collect();
         let expected = BTreeSet::from([(4.0_f64 / 3.0).to_bits(), (-2.0_f64 / 3.0).to_bits()]);
         assert_eq!(levels, expected);
-        let found = find_oscillation(&asymmetric.seen().signals, 4).unwrap();
+        let found = find_oscillation(&asymmetric.signals(), 4).unwrap();
         assert!(found.cycles_steady >= 10, "{truth:?}: {found:?}");
     }
 }
@@ -241,7 +240,7 @@ fn other_relay_tests_are_of_the_same_process() {
 fn all_records(contenders: &[Contender], pieces: &impl Pieces) -> Vec<Record> {
     let of_one = |index: usize| {
         let (truth, recorded) = FEW.experiment(index as u64 + 1).unwrap();
-        records(&truth, &recorded.seen().signals, contenders, &|| 0.0).unwrap()
+        records(&truth, &recorded.signals(), contenders, &|| 0.0).unwrap()
     };
     pieces.map(FEW.experiments as usize, of_one).concat()
 }
@@ -295,7 +294,7 @@ fn the_same_bits_on_any_number_of_threads() {
 #[test]
 fn every_method_answers_a_plain_experiment() {
     let (truth, recorded) = FEW.experiment(1).unwrap();
-    let found = records(&truth, &recorded.seen().signals, &Contender::ALL, &|| 0.0).unwrap();
+    let found = records(&truth, &recorded.signals(), &Contender::ALL, &|| 0.0).unwrap();
     for (record, contender) in found.iter().zip(Contender::ALL) {
         assert_eq!(record.method, contender.name());
         assert_ne!(record.outcome, Verdict::NoAnswer, "{record:?}");

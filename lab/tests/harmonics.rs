@@ -6,8 +6,7 @@
 use num_complex::Complex64;
 use onecycle_identify::{Harmonic, harmonics};
 use onecycle_identify::{OscillationFound, Signals, find_oscillation};
-use onecycle_lab::experiments::signals_of;
-use onecycle_lab::judge::campaign::Campaign;
+use onecycle_lab::experiments::{Campaign, signals_of};
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::relay::Relay;
 use onecycle_plant::{Experiment, Sensor, Trace};
@@ -33,9 +32,9 @@ fn process([t_prop, t_body, tau]: [f64; 3]) -> Soiptd {
 
 /// So long a test without noise that nothing is left of its beginning.
 fn settled(process: Soiptd, bias: f64) -> Trace {
-    let mut case = Campaign::QUIET.quiet_case(process, 1).unwrap();
-    case.bias = bias;
-    Campaign::QUIET.run(&case, 80.0).unwrap().0
+    let mut experiment = Campaign::QUIET.quiet_experiment(process, 1).unwrap();
+    experiment.input_bias = bias;
+    experiment.run(80.0).unwrap().0
 }
 
 fn found_in(signals: &Signals<'_>, cycles: usize) -> OscillationFound {
@@ -159,7 +158,8 @@ fn points_of_several_samples_are_as_exact() {
 #[test]
 fn uneven_stamps_will_do() {
     let process = process(PROCESSES[4]);
-    let mut relay = Relay::new(Campaign::QUIET.relay_settings()).unwrap();
+    let quiet = Campaign::QUIET.quiet_experiment(process, 1).unwrap();
+    let mut relay = Relay::new(quiet.relay).unwrap();
     let mut experiment = Experiment::new(process, SAMPLE_S, 15.0);
     experiment.jitter = 0.2;
     let trace = experiment.run(&mut relay, &mut Pcg64Mcg::seed_from_u64(1));
@@ -231,8 +231,8 @@ fn cycles_that_differ_are_worth_as_much() {
     };
     let errors: Vec<(Harmonic, Complex64)> = (0..50)
         .map(|number| {
-            let case = campaign.case(number).unwrap();
-            let trace = campaign.run(&case, 25.0).unwrap().0;
+            let case = campaign.experiment(number).unwrap();
+            let trace = case.run(25.0).unwrap().0;
             let signals = signals_of(&trace, SAMPLE_S);
             let first = harmonics(&signals, &found_in(&signals, 8), 1)[0];
             (first, truth(&case.process, first.omega_rad_per_s))

@@ -8,7 +8,7 @@ use onecycle_design::soiptd_pd::optimum::pd;
 use onecycle_identify::{
     Identification, Identified, Method, Options, Remark, Signals, Verdict, identify,
 };
-use onecycle_lab::judge::campaign::{Campaign, Case};
+use onecycle_lab::experiments::{Campaign, RelayExperiment};
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_plant::Trace;
@@ -27,15 +27,15 @@ const SAMPLE_S: f64 = 1e-3;
 
 /// An experiment to cut recordings out of.
 struct Experiment {
-    case: Case,
+    case: RelayExperiment,
     trace: Trace,
 }
 
 impl Experiment {
     fn first(count: u64) -> impl Iterator<Item = Self> {
         (0..count).map(|n| {
-            let case = CAMPAIGN.case(n).unwrap();
-            let (trace, _) = CAMPAIGN.run(&case, PERIODS).unwrap();
+            let case = CAMPAIGN.experiment(n).unwrap();
+            let (trace, _) = case.run(PERIODS).unwrap();
             Self { case, trace }
         })
     }
@@ -103,7 +103,7 @@ impl Experiment {
             found.t_prop_s.holds(truth.t_prop_s()),
             found.t_body_s.holds(truth.t_body_s().unwrap()),
             found.tau_s.holds(truth.tau_s()),
-            found.input_bias.holds(self.case.bias),
+            found.input_bias.holds(self.case.input_bias),
         ]
     }
 }

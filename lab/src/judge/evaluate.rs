@@ -16,8 +16,7 @@
 //!
 //! | module         | what it holds                                                            |
 //! |----------------|--------------------------------------------------------------------------|
-//! | [`experiment`] | the experiments: random processes of the paper's domain, two protocols   |
-//! | [`contender`]  | the methods, ours and the rivals                                         |
+//! | [`contender`]  | the methods: ours and the [baselines](crate::judge::baselines)          |
 //! | [`summary`]    | many verdicts in a row of numbers                                        |
 //! | [`files`]      | truth, answers and results as CSV                                        |
 //!
@@ -39,7 +38,6 @@
 
 pub mod contender;
 pub mod cycles;
-pub mod experiment;
 pub mod files;
 #[cfg(feature = "parquet")]
 pub mod parquet;
@@ -47,13 +45,15 @@ pub mod summary;
 
 use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 
-pub use self::contender::{Contender, RelayTest, Seen};
+pub use self::contender::{Contender, Seen};
 pub use self::cycles::{Cycles, CyclesError};
-pub use self::experiment::{Benchmark, ExperimentError, Recorded, Truth};
 pub use self::summary::{Costs, Summary, quantile};
 use onecycle_design::cascade::Cascade;
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd};
+use onecycle_identify::Signals;
+
+use crate::experiments::{ExperimentError, Truth};
 
 /// Least phase margin of all controllers (degrees): the paper's.
 pub const PHASE_MARGIN_DEG: f64 = 20.0;
@@ -260,23 +260,34 @@ impl Record {
     }
 }
 
-/// Every contender's record of an experiment. `recorded` is its recording; those whose relay test is
-/// another one get theirs, on the same process with the same bias, noise and seed. The clock tells
-/// seconds.
+/// Why an experiment cannot be evaluated; this never happens for experiments of the benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum EvaluationError {
+    /// The experiment cannot be run.
+    #[error("{0}")]
+    Experiment(#[from] ExperimentError),
+    /// The true process has no optimum to compare with.
+    #[error("{0}")]
+    Optimum(#[from] OptimumError),
+}
+
+/// Every contender's record of an experiment. `recorded` is the benchmark's recording; a contender with
+/// another relay test gets a recording of that test on the same process with the same bias, noise and
+/// seed. `clock` returns seconds.
 ///
 /// # Errors
-/// [`ExperimentError`] where the true process has no optimum or cannot be run.
+/// [`EvaluationError`]: the true process has no optimum or cannot be run.
 pub fn records(
     truth: &Truth,
-    recorded: &onecycle_identify::Signals<'_>,
+    recorded: &Signals<'_>,
     contenders: &[Contender],
     clock: &dyn Fn() -> f64,
-) -> Result<Vec<Record>, ExperimentError> {
+) -> Result<Vec<Record>, EvaluationError> {
     let judge = Judge::new(&truth.process)?;
     let mut records = Vec::with_capacity(contenders.len());
     for contender in contenders {
         let own = truth.recorded_by(contender.relay_test())?;
-        let seen = own.as_ref().map_or(Seen::of(*recorded), Recorded::seen);
+        let seen = own.as_ref().map_or(Seen::of(*recorded), Seen::of_recorded);
         let begin_s = clock();
         let answer = contender.answer(&seen);
         let seconds = clock() - begin_s;

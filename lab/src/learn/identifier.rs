@@ -34,8 +34,7 @@ use rand_pcg::Pcg64Mcg;
 pub use self::calibration::{Calibrated, MOST_UNKNOWN, calibrated};
 pub use self::score::{Reliability, Scores, scores};
 use crate::experiments;
-use crate::experiments::RecipeError;
-use crate::learn::dataset;
+use crate::experiments::{ExperimentError, RecipeError};
 use crate::learn::dataset::VALUES;
 use crate::learn::dataset::learning::{SCALE, Wanted, batch};
 use crate::learn::dataset::shards::Record;
@@ -139,7 +138,7 @@ pub enum IdentifierError {
     Table(#[from] lead_table::LeadTableError),
     /// An experiment cannot be made.
     #[error("{0}")]
-    Example(#[from] dataset::ExampleError),
+    Experiment(#[from] ExperimentError),
     /// The shapes of the family have no spread.
     #[error("the processes of the family are all alike: widen its space")]
     OneShape,

@@ -32,18 +32,19 @@ mod input;
 mod scoring;
 mod standard;
 
-use onecycle_onboard::{RelayError, SoiptdError};
+use onecycle_onboard::SoiptdError;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 pub use classes::{Class, Classes, Gain, Measured, Truth, label};
 pub use examples::{Examples, Processes};
-pub use experiment::{Protocol, SAMPLE_S, SampledCycle, Trial, Trials};
+pub use experiment::{Protocol, Trial, Trials};
 pub use harmonic::{Harmonics, Response};
 pub use input::{Fit, INPUTS, Prepared, SAMPLES};
 pub use scoring::{Rule, Score, least_expected_cost, most_likely, picks};
 pub use standard::{Standard, Standardised};
 
+use crate::experiments::ExperimentError;
 use crate::learn::train::{
     Layer, Loss, Method, Network, Schedule, Settings, TensorFileError, TrainError,
 };
@@ -67,9 +68,9 @@ pub enum ClassifierError {
     /// A process has no controller.
     #[error("{0}")]
     Optimum(#[from] OptimumError),
-    /// The relay's settings are out of range.
+    /// An experiment cannot be run.
     #[error("{0}")]
-    Relay(#[from] RelayError),
+    Experiment(#[from] ExperimentError),
     /// The relay does not make a class oscillate.
     #[error(
         "T_prop, T_body, tau of {0:?} s do not oscillate under this relay: choose a smaller beta"

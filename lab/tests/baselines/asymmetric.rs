@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
+use onecycle_lab::experiments::ExperimentError;
+use onecycle_lab::experiments::relays::AsymmetricRelay;
 use onecycle_lab::experiments::signals_of;
-use onecycle_lab::judge::baselines::RivalError;
-use onecycle_lab::judge::baselines::asymmetric::{AsymmetricRelay, HalfPeriods, identify};
+use onecycle_lab::judge::baselines::asymmetric::{HalfPeriods, identify};
 use onecycle_plant::{Controller, Sensed, Trace};
 
 use super::{SAMPLE_S, cost, margin, process, processes, run};
@@ -171,6 +172,6 @@ fn errors_name_the_setting() {
         (1.0, -1.0, -0.1, "the hysteresis", -0.1),
     ] {
         let error = AsymmetricRelay::new(high, low, hysteresis).unwrap_err();
-        assert_eq!(error, RivalError::Setting(name, value));
+        assert_eq!(error, ExperimentError::Setting(name, value));
     }
 }

@@ -62,15 +62,3 @@ fn cost(found: Result<Rival, RivalError>, truth: &Soiptd) -> Option<f64> {
     let best = pd_at_phase_margin(truth, margin()).unwrap();
     deterioration(found.unwrap().pd, truth, &best).relative()
 }
-
-/// The experiment of a campaign's case under another controller.
-fn run_noisy(
-    case: &onecycle_lab::judge::campaign::Case,
-    duration_s: f64,
-    controller: &mut impl Controller,
-) -> Trace {
-    let mut experiment = Experiment::new(case.process, SAMPLE_S, duration_s);
-    experiment.input_bias = case.bias;
-    experiment.sensor.noise_sigma = case.sigma;
-    experiment.run(controller, &mut Pcg64Mcg::seed_from_u64(1))
-}

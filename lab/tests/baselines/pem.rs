@@ -1,12 +1,11 @@
 //! The prediction error method.
 
 use onecycle_identify::{Signals, find_oscillation};
+use onecycle_lab::experiments::relays::SweptRelay;
 use onecycle_lab::experiments::signals_of;
+use onecycle_lab::experiments::{Campaign, Measure};
 use onecycle_lab::judge::baselines::RivalError;
-use onecycle_lab::judge::baselines::pem::{
-    Data, InitialState, InputBias, Settings, SweptRelay, fit, identify,
-};
-use onecycle_lab::judge::campaign::{Campaign, Measure};
+use onecycle_lab::judge::baselines::pem::{Data, InitialState, InputBias, Settings, fit, identify};
 use onecycle_onboard::{RelayError, RelaySettings};
 
 use super::{SAMPLE_S, cost, margin, process, relay_test, run};
@@ -172,20 +171,23 @@ fn the_sweep_survives_noise_and_bias() {
         ..Campaign::QUIET
     };
     for n in 0..campaign.cases {
-        let case = campaign.case(n).unwrap();
+        let case = campaign.experiment(n).unwrap();
         let settings = RelaySettings {
             preroll_s: 0.1,
             ..RelaySettings::new(1.0, -0.1)
         };
         let mut relay = SweptRelay::paper(settings).unwrap();
-        let trace = super::run_noisy(&case, SweptRelay::PAPER_DURATION_S, &mut relay);
+        let trace = case.simulate(&mut relay, SweptRelay::PAPER_DURATION_S);
         let tail = &trace.input[trace.len() - 4000..];
         assert!(tail.iter().any(|&u| u != tail[0]), "{case:?}");
         let farthest = trace
             .true_output
             .iter()
             .fold(0.0_f64, |most, y| most.max(y.abs()));
-        assert!(farthest < 30.0 * case.amplitude, "{case:?}: {farthest}");
+        assert!(
+            farthest < 30.0 * case.oscillation.amplitude,
+            "{case:?}: {farthest}"
+        );
     }
 }
 

@@ -29,7 +29,6 @@
 //! tells it by an asymmetry that such a bias may cancel.
 
 use onecycle_onboard::Soiptd;
-use onecycle_plant::{Controller, Sensed};
 
 use super::{Rival, RivalError, steady_cycles};
 use onecycle_identify::Signals;
@@ -37,52 +36,6 @@ use onecycle_identify::Signals;
 /// The lags of the process that stands for an integrator with dead time, over the dead time: far below
 /// all that a controller sees of it.
 const NO_LAG: f64 = 1e-6;
-
-/// A relay with two levels of its own and a hysteresis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AsymmetricRelay {
-    high: f64,
-    low: f64,
-    hysteresis: f64,
-    is_high: bool,
-}
-
-impl AsymmetricRelay {
-    /// High at first. The levels (input unit) lie on either side of zero; the error (output unit) must
-    /// pass the hysteresis, which stands above the noise, for the output to change.
-    ///
-    /// # Errors
-    /// [`RivalError::Setting`] for a level on the wrong side or a negative hysteresis.
-    pub fn new(high: f64, low: f64, hysteresis: f64) -> Result<Self, RivalError> {
-        if !(high.is_finite() && high > 0.0) {
-            return Err(RivalError::Setting("the high level", high));
-        }
-        if !(low.is_finite() && low < 0.0) {
-            return Err(RivalError::Setting("the low level", low));
-        }
-        if !(hysteresis.is_finite() && hysteresis >= 0.0) {
-            return Err(RivalError::Setting("the hysteresis", hysteresis));
-        }
-        Ok(Self {
-            high,
-            low,
-            hysteresis,
-            is_high: true,
-        })
-    }
-}
-
-impl Controller for AsymmetricRelay {
-    fn step(&mut self, _dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
-        let error = reference - sensed.output;
-        if error > self.hysteresis {
-            self.is_high = true;
-        } else if error < -self.hysteresis {
-            self.is_high = false;
-        }
-        if self.is_high { self.high } else { self.low }
-    }
-}
 
 /// A process of first order with dead time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -207,7 +160,7 @@ impl HalfPeriods {
     }
 }
 
-/// The integrator with dead time behind the recording of an [`AsymmetricRelay`] with this hysteresis
+/// The integrator with dead time behind the recording of an [`AsymmetricRelay`](crate::experiments::relays::AsymmetricRelay) with this hysteresis
 /// (output unit), means of the last steady cycles, `cycles` at most, and its PD of least ISE at a phase
 /// margin (rad).
 ///

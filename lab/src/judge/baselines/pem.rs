@@ -24,7 +24,6 @@
 //! [`Settings::fair`] is what a careful user would do today: a bias, and starts all over the domain.
 
 mod output_error;
-mod sweep;
 
 use std::ops::Range;
 
@@ -32,7 +31,6 @@ use onecycle_onboard::Soiptd;
 use slsqp::{Func, StopTols, minimize};
 
 use self::output_error::OutputError;
-pub use self::sweep::SweptRelay;
 use super::{Rival, RivalError, check_even, steady_cycles};
 use onecycle_identify::Signals;
 

@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use super::{Answer, PHASE_MARGIN_DEG};
+use crate::experiments::{CYCLES_KEPT, Recorded, RelayTest};
 use crate::judge::baselines::rules::Rule;
 use crate::judge::baselines::{Rival, RivalError, arx, asymmetric, gmvc, pem, rules};
 use crate::space::Space;
@@ -39,17 +40,6 @@ pub enum Contender {
     Asymmetric,
 }
 
-/// The experiment that a method reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RelayTest {
-    /// The one that all read: the relay at the distinguishing phase.
-    Recorded,
-    /// The same relay with its phase swept, from rest.
-    Swept,
-    /// A relay of two unequal levels with a hysteresis, from rest.
-    Asymmetric,
-}
-
 /// A recording and what its reader knows of the relay.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
@@ -68,11 +58,20 @@ impl<'a> Seen<'a> {
             hysteresis: 0.0,
         }
     }
+
+    /// A recording of a relay test.
+    #[must_use]
+    pub fn of_recorded(recorded: &'a Recorded) -> Self {
+        Self {
+            signals: recorded.signals(),
+            hysteresis: recorded.hysteresis,
+        }
+    }
 }
 
 /// Most cycles that the asymmetric relay's half periods are the means of: as many as the recordings of
 /// the others hold.
-const ASYMMETRIC_CYCLES: usize = super::experiment::CYCLES_KEPT;
+const ASYMMETRIC_CYCLES: usize = CYCLES_KEPT;
 
 /// Rows and columns of the shapes that the exact rule is made for: twice as many change its two numbers by
 /// less than 2 %.

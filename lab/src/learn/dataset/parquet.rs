@@ -21,7 +21,8 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type as Schema;
 
 use super::npz::{Column, Numbers};
-use super::shards::{PROGRAM, Record, columns};
+use super::shards::{Record, columns};
+use crate::PROGRAM;
 
 /// Writes a table, some rows at a time: 4096, as a file of a dataset has them, are a good number.
 pub struct Writer<W: Write + Send>(SerializedFileWriter<W>);

@@ -32,8 +32,9 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::npz::{self, Column, Numbers};
-use super::{Example, ExampleError, VALUES};
-use crate::experiments::{Recipe, RecipeError};
+use super::{Example, VALUES};
+use crate::PROGRAM;
+use crate::experiments::{ExperimentError, Recipe, RecipeError};
 use crate::paper::grid::Pieces;
 
 /// Changes with every change that a reader could notice.
@@ -44,8 +45,6 @@ pub const EXAMPLES_PER_SHARD: u64 = 4096;
 
 /// Most examples of a dataset: 3 GB or so.
 pub const MOST_EXAMPLES: u64 = 10_000_000;
-
-pub(crate) const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));
 
 /// One example as a file has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -240,12 +239,12 @@ impl Manifest {
     /// Makes a file: its bytes, and what the manifest will say of it.
     ///
     /// # Errors
-    /// See [`ExampleError`]; none of a valid recipe.
+    /// See [`ExperimentError`]; none of a valid recipe.
     pub fn make(
         &self,
         shard: usize,
         pieces: &impl Pieces,
-    ) -> Result<(Vec<u8>, Entry), ExampleError> {
+    ) -> Result<(Vec<u8>, Entry), ExperimentError> {
         let numbers = self.numbers(shard);
         let count = (numbers.end - numbers.start) as usize;
         let made = pieces.map(count, |k| self.recipe.record(numbers.start + k as u64));
@@ -293,8 +292,8 @@ impl Recipe {
     /// Example number `n` with what an error costs; `None` as of [`Self::example`].
     ///
     /// # Errors
-    /// See [`ExampleError`].
-    pub fn record(&self, n: u64) -> Result<Option<Record>, ExampleError> {
+    /// See [`ExperimentError`].
+    pub fn record(&self, n: u64) -> Result<Option<Record>, ExperimentError> {
         let made = self.example(n)?;
         Ok(made.and_then(|example| {
             let margin_rad = self.families[example.family].space.phase_margin_rad();

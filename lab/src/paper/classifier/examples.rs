@@ -4,9 +4,10 @@ use onecycle_onboard::Pd;
 
 use super::ClassifierError;
 use super::classes::{Classes, Gain, Measured, Truth, label};
-use super::experiment::{SampledCycle, Trials};
+use super::experiment::Trials;
 use super::harmonic::Harmonics;
 use super::input::{Fit, INPUTS, Prepared};
+use crate::experiments::SampledCycle;
 use crate::learn::train::{Batch, Dataset, Matrix};
 use crate::paper::grid::Pieces;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;

@@ -6,12 +6,11 @@
 
 use std::ops::ControlFlow;
 
-use onecycle_lab::experiments::Recipe;
-use onecycle_lab::experiments::outsiders::plant::{Plant, Scale};
-use onecycle_lab::experiments::outsiders::{Case, Defect, Kind, case};
+use onecycle_lab::experiments::defect::plant::DefectPlant;
+use onecycle_lab::experiments::{Defect, DefectKind, Oscillation, Recipe, RelayExperiment};
 use onecycle_lab::judge::calibrate::calibrate;
 use onecycle_lab::judge::harm::Harm;
-use onecycle_lab::judge::outsiders::{Road, judge, scored};
+use onecycle_lab::judge::out_of_family::{Classifier, PERIODS, evaluate, scored};
 use onecycle_lab::learn::dataset::{Example, VALUES};
 use onecycle_lab::learn::train::{
     Batch, Gaussian, Layer, Loss, Matrix, Method, Network, OneThread, Schedule, Settings, Shape,
@@ -29,9 +28,9 @@ use rand_pcg::Pcg64Mcg;
 const SCALE: [f64; VALUES] = [1.0, 8.0, 8.0, 1.0];
 
 /// The paper's hover process; period and amplitude of its oscillation.
-fn hover() -> (Soiptd, Scale) {
+fn hover() -> (Soiptd, Oscillation) {
     let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
-    let scale = Scale {
+    let scale = Oscillation {
         period_s: 0.42,
         amplitude: 0.00297,
     };
@@ -39,8 +38,8 @@ fn hover() -> (Soiptd, Scale) {
 }
 
 /// Outputs and rates of ten periods under a square wave of 140 samples a period, over the amplitude.
-fn course(process: &Soiptd, defect: &Defect, scale: Scale) -> Vec<[f64; 2]> {
-    let mut plant = Plant::new(process, defect, scale, 0.003);
+fn course(process: &Soiptd, defect: &Defect, scale: Oscillation) -> Vec<[f64; 2]> {
+    let mut plant = DefectPlant::new(process, defect, scale, 0.003);
     (0..1400)
         .map(|sample| {
             plant.step(square(sample));
@@ -119,7 +118,7 @@ fn linear_defects_are_what_they_say() {
         damping: 0.05,
         mass_ratio: 0.0,
     };
-    let fine = Scale {
+    let fine = Oscillation {
         period_s: scale.period_s / 100.0,
         ..scale
     };
@@ -149,7 +148,7 @@ fn kinks_are_resolved() {
         Defect::RateLimit { per_s: 12.0 },
     ] {
         // Half the period and half the amplitude: half the step, and the same creep.
-        let half = Scale {
+        let half = Oscillation {
             period_s: 0.5 * scale.period_s,
             amplitude: 0.5 * scale.amplitude,
         };
@@ -165,23 +164,26 @@ fn kinks_are_resolved() {
 #[test]
 fn a_case_is_always_the_same() {
     let recipe = Recipe::default();
-    for kind in Kind::OUTSIDE {
-        let made = case(&recipe, kind, 7).unwrap().unwrap();
-        assert_eq!(case(&recipe, kind, 7).unwrap().unwrap(), made);
+    for kind in DefectKind::OUTSIDE {
+        let made = recipe.experiment_with_defect(kind, 7).unwrap().unwrap();
+        let again = recipe.experiment_with_defect(kind, 7).unwrap().unwrap();
+        assert_eq!(again, made);
         let later = Recipe {
             seed: 8,
             ..recipe.clone()
         };
-        assert_eq!(case(&later, kind, 0).unwrap().unwrap(), made);
-        let plain = case(&recipe, Kind::InFamily, 7).unwrap().unwrap();
+        let first = later.experiment_with_defect(kind, 0).unwrap().unwrap();
+        assert_eq!(first, made);
+        let plain = recipe.experiment_with_defect(DefectKind::InFamily, 7);
+        let plain = plain.unwrap().unwrap();
         assert_eq!(made.process, plain.process);
-        assert_eq!(plain.defect, Defect::None);
+        assert_eq!(plain.defect(), Defect::None);
     }
     let spoilt = Recipe {
         sigma: -1.0,
         ..recipe
     };
-    assert!(case(&spoilt, Kind::Play, 0).is_err());
+    assert!(spoilt.experiment_with_defect(DefectKind::Play, 0).is_err());
 }
 
 // The process's own controller keeps its promise, to what the hold and the derivative at samples take:
@@ -191,20 +193,26 @@ fn a_case_is_always_the_same() {
 #[test]
 fn harm_is_a_promise_broken() {
     let plain = (0..20)
-        .filter_map(|n| case(&Recipe::default(), Kind::InFamily, n).unwrap())
+        .filter_map(|n| {
+            Recipe::default()
+                .experiment_with_defect(DefectKind::InFamily, n)
+                .unwrap()
+        })
         .find(|case| case.process.tau_s() > 0.5 * case.process.t_prop_s())
         .unwrap();
-    let of =
-        |case: &Case, gain: f64| Harm::of(case, &plain.process.with_gain_scaled(gain).unwrap());
+    let of = |case: &RelayExperiment, gain: f64| {
+        Harm::of(case, &plain.process.with_gain_scaled(gain).unwrap())
+    };
     let kept = of(&plain, 1.0).0;
     assert!((kept - 1.0).abs() < 0.015, "{kept}");
     assert!(!of(&plain, 1.0).is_harmful());
     assert!(of(&plain, 0.5).is_harmful(), "{:?}", of(&plain, 0.5));
     assert_eq!(of(&plain, 0.33).0, f64::INFINITY);
-    let foreign = case(&Recipe::default(), Kind::OtherCycle, 3)
+    let foreign = Recipe::default()
+        .experiment_with_defect(DefectKind::OtherCycle, 3)
         .unwrap()
         .unwrap();
-    assert!(foreign.defect.is_undriven() && of(&foreign, 1.0).is_harmful());
+    assert!(foreign.defect().is_undriven() && of(&foreign, 1.0).is_harmful());
 }
 
 // The board and the trainer read the same Gaussian off the same outputs: mean, and with L the
@@ -386,22 +394,22 @@ fn a_small_network_knows_what_it_does_not_know() {
         ..Calibration::UNTRAINED
     };
     let calibration = calibrate(&recipe, 0..250, &outputs, &start, 0.02).unwrap();
-    let road = Road {
+    let classifier = Classifier {
         network: &outputs,
         calibration,
     };
     let unknown = |kind, numbers: std::ops::Range<u64>| {
         numbers
             .filter_map(|n| {
-                let case = case(&recipe, kind, n).unwrap()?;
-                scored(&case, &case.run().unwrap(), &road)
+                let case = recipe.experiment_with_defect(kind, n).unwrap()?;
+                scored(&case, &case.run(PERIODS).unwrap().0, &classifier)
             })
             .filter(|scored| scored.verdict == Verdict::Unknown)
             .count()
     };
-    let of_family = unknown(Kind::InFamily, 1000..1100);
+    let of_family = unknown(DefectKind::InFamily, 1000..1100);
     assert!(of_family <= 5, "{of_family}");
-    let with_play = unknown(Kind::Play, 1000..1020);
+    let with_play = unknown(DefectKind::Play, 1000..1020);
     assert!(with_play >= 18, "{with_play}");
 }
 
@@ -410,11 +418,11 @@ fn a_small_network_knows_what_it_does_not_know() {
 #[test]
 fn the_identification_is_judged_without_a_network() {
     let recipe = Recipe::default();
-    let of = |kind| judge(&recipe, kind, 5, None).unwrap().unwrap();
-    let plain = of(Kind::InFamily);
+    let of = |kind| evaluate(&recipe, kind, 5, None).unwrap().unwrap();
+    let plain = of(DefectKind::InFamily);
     assert!(plain.is_steady && plain.scored.is_none());
     for harm in plain.identified {
         assert!(!harm.unwrap().is_harmful(), "{harm:?}");
     }
-    assert_eq!(of(Kind::Clipping).identified, [None; 3]);
+    assert_eq!(of(DefectKind::Clipping).identified, [None; 3]);
 }

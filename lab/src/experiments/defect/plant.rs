@@ -6,60 +6,52 @@
 //!
 //! | symbol  | meaning                                                                  |
 //! |---------|--------------------------------------------------------------------------|
-//! | `u_d`   | delayed input, behind the rate limit where there is one                  |
-//! | `F`     | the force itself, its dead zone, or a third lag behind it                |
-//! | `c`     | Coulomb friction in units of the input, smooth below a hundredth of the oscillation's rate `v_c` |
+//! | `u_d`   | delayed input, after the rate limit if there is one                      |
+//! | `F`     | the force `f`, the force outside the dead zone, or the force after a third lag |
+//! | `c`     | Coulomb friction (input unit), smoothed below `v_c`, a hundredth of the oscillation's rate |
 //! | `b`     | `K/T_body`                                                               |
 //!
-//! The classical Runge-Kutta method between the edges of the delayed input, which are met exactly. Without a
-//! defect the output is that of the exact simulation to 1e-8 of its amplitude; where a defect has kinks
-//! (dead zone, friction, play, rate limit), halving the step moves ten periods under a square wave by
-//! less than 1e-3 of the amplitude.
+//! Integrated by the classical Runge-Kutta method; steps end exactly at the edges of the delayed input.
+//! Without a defect the output agrees with the exact simulation to 1e-8 of its amplitude. For defects with
+//! kinks (dead zone, friction, backlash, rate limit), halving the step changes ten periods under a square
+//! wave by less than 1e-3 of the amplitude.
 
 use std::f64::consts::TAU;
 
 use onecycle_onboard::Soiptd;
 
 use super::Defect;
+use crate::experiments::oscillation::Oscillation;
 
-/// Steps in a period of the undisturbed oscillation, at the least: fifteen in a quarter of the fastest
-/// resonance's.
+/// Least number of steps in a period of the oscillation: fifteen in a quarter period of the fastest
+/// resonance.
 const STEPS_PER_PERIOD: f64 = 600.0;
 
-/// Of the rate of the oscillation, below which friction is smooth.
+/// Rate below which friction is smoothed, over the rate of the oscillation.
 const CREEP: f64 = 0.01;
 
-/// States: output, rate, force, and up to two of the defect.
+/// States: output, rate, force, and up to two states of the defect.
 type State = [f64; 5];
 
-/// Part of the input on a way of its own.
+/// Part of the input with a delay of its own.
 #[derive(Clone, Copy, Debug)]
 struct Path {
     share: f64,
-    /// Delay: whole steps, and what is left as a part of one.
+    /// Delay in whole steps, and the remaining fraction of a step.
     whole: usize,
     fraction: f64,
 }
 
-/// Scale of the undisturbed oscillation.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
-    /// Its period (s).
-    pub period_s: f64,
-    /// Its amplitude (output unit).
-    pub amplitude: f64,
-}
-
-/// A process with a defect at rest, to be stepped with a held input. See the [module](self).
+/// A process with a defect, to be stepped with a held input. See the [module](self).
 #[derive(Clone, Debug)]
-pub struct Plant {
+pub struct DefectPlant {
     process: Soiptd,
     defect: Defect,
     step_s: f64,
     finest_s: f64,
     creep: f64,
     state: State,
-    /// Input behind the rate limit; output behind the play.
+    /// Input after the rate limit; output after the backlash.
     slewed: f64,
     played: f64,
     paths: Vec<Path>,
@@ -67,10 +59,10 @@ pub struct Plant {
     newest: usize,
 }
 
-impl Plant {
-    /// At rest, to be stepped by `step_s > 0`; the limit cycles of something else begin near theirs.
+impl DefectPlant {
+    /// A plant at rest, to be stepped by `step_s > 0`; an undriven limit cycle starts near its own orbit.
     #[must_use]
-    pub fn new(process: &Soiptd, defect: &Defect, scale: Scale, step_s: f64) -> Self {
+    pub fn new(process: &Soiptd, defect: &Defect, oscillation: Oscillation, step_s: f64) -> Self {
         let path = |share, delay_s: f64| {
             let steps = delay_s / step_s;
             Path {
@@ -91,8 +83,8 @@ impl Plant {
             process: *process,
             defect: *defect,
             step_s,
-            finest_s: scale.period_s / STEPS_PER_PERIOD,
-            creep: CREEP * scale.amplitude * TAU / scale.period_s,
+            finest_s: oscillation.period_s / STEPS_PER_PERIOD,
+            creep: CREEP * oscillation.amplitude * TAU / oscillation.period_s,
             state: defect.start(),
             slewed: 0.0,
             played: 0.0,
@@ -143,7 +135,7 @@ impl Plant {
         }
     }
 
-    /// Mean over a step of the input behind the rate limit.
+    /// Mean over a step of the input after the rate limit.
     fn slew(&mut self, input: f64, step_s: f64) -> f64 {
         let Defect::RateLimit { per_s } = self.defect else {
             return input;
@@ -230,7 +222,7 @@ impl Plant {
         ]
     }
 
-    /// What a perfect sensor of this plant shows (output unit).
+    /// Reading of the plant's sensor, without noise (output unit).
     #[must_use]
     pub fn output(&self) -> f64 {
         let [y, v, _, extra, _] = self.state;
@@ -245,7 +237,7 @@ impl Plant {
         }
     }
 
-    /// Rate of that (output unit / s).
+    /// Rate of [`Self::output`] (output unit / s).
     #[must_use]
     pub fn rate(&self) -> f64 {
         let [y, v, f, extra, extra_rate] = self.state;
@@ -258,7 +250,7 @@ impl Plant {
             Defect::RateSensor => {
                 self.process.k_over_t_body() * f - self.process.inv_t_body_per_s() * v
             }
-            // The play is taken up, or nothing moves.
+            // The output moves only while the backlash is taken up.
             Defect::Play { half_width } => {
                 let pushed = (y - self.played).abs() >= half_width && (y - self.played) * v > 0.0;
                 if pushed { v } else { 0.0 }
