@@ -10,7 +10,8 @@ use onecycle_lab::learn::onnx::Normalisation;
 use onecycle_lab::learn::pack::{
     LeadTableContents, PackContents, PackedWeights, Precision, layers,
 };
-use onecycle_lab::learn::train::{Layer, Matrix, Network, OneThread, TensorFile};
+use onecycle_lab::learn::train::{Layer, Matrix, Network, TensorFile};
+use onecycle_lab::workers::OneThread;
 use onecycle_onboard::pack::{
     DEFAULT, Domain, HEADER, OUTPUTS, OutputScaling, Pack, Prior, content_hash,
 };

@@ -11,7 +11,8 @@
 use std::fs;
 
 use onecycle_lab::learn::onnx::{Normalisation, export};
-use onecycle_lab::learn::train::{Layer, Matrix, Network, OneThread, Tensor, TensorFile};
+use onecycle_lab::learn::train::{Layer, Matrix, Network, Tensor, TensorFile};
+use onecycle_lab::workers::OneThread;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 

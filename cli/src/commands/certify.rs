@@ -6,7 +6,7 @@ use indicatif::ProgressBar;
 use onecycle_lab::experiments::{Campaign, Measure};
 use onecycle_lab::judge::outcome::relay_outcome;
 use onecycle_lab::space::Space;
-use onecycle_lab::space::certificate::{Certificate, LeastStable, Summary};
+use onecycle_lab::space::certificate::{Certificate, CertificateSummary, LeastStable};
 use onecycle_lab::space::surface::Direction;
 use onecycle_onboard::Soiptd;
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ use crate::settings;
 /// Under one bias: what is certified, and in how many cases a simulation of the relay of the board
 /// came to a steady oscillation, without trim and with it.
 pub(crate) struct Row {
-    pub(crate) summary: Summary,
+    pub(crate) summary: CertificateSummary,
     pub(crate) settled: [usize; 2],
 }
 
@@ -130,7 +130,7 @@ fn row(space: &Space, shapes: &[Direction], bias: f64, bar: &ProgressBar) -> Res
             .sum::<Result<usize, Failure>>()?;
     }
     Ok(Row {
-        summary: Summary::of(bias, &certificates),
+        summary: CertificateSummary::of(bias, &certificates),
         settled,
     })
 }

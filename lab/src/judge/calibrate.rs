@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use onecycle_onboard::classify::{Calibration, OUTPUTS};
 
-use super::out_of_family::{Network, PERIODS, classification, relative_noise};
+use super::out_of_family::{NetworkFn, PERIODS, classification, relative_noise};
 use crate::experiments::{DefectKind, ExperimentError, Recipe, SteadyCycle};
 
 /// Largest noise that counts as known, over the largest noise seen: the noise measured in a hundred
@@ -23,7 +23,7 @@ const NOISE_ROOM: f64 = 1.1;
 pub fn calibrate(
     recipe: &Recipe,
     numbers: Range<u64>,
-    network: Network<'_>,
+    network: NetworkFn<'_>,
     start: &Calibration,
     unknown: f64,
 ) -> Result<Calibration, ExperimentError> {

@@ -160,7 +160,7 @@ impl Judge {
         let mut record = Record {
             experiment,
             method: method.to_owned(),
-            outcome: Verdict::NoAnswer,
+            outcome: LoopOutcome::NoAnswer,
             deterioration: None,
             phase_margin_deg: None,
             k_over_t_body_error: None,
@@ -183,9 +183,9 @@ impl Judge {
             } => {
                 record.deterioration = Some(relative);
                 record.phase_margin_deg = Some(phase_margin_rad.to_degrees());
-                Verdict::Stable
+                LoopOutcome::Stable
             }
-            Deterioration::Unstable => Verdict::Unstable,
+            Deterioration::Unstable => LoopOutcome::Unstable,
         };
         if let Some(errors) = answer.process.and_then(|found| errors(&found, &self.truth)) {
             [
@@ -211,7 +211,7 @@ fn errors(found: &Soiptd, truth: &Soiptd) -> Option<[f64; 3]> {
 /// How an answer fares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum LoopOutcome {
     /// Its loop is stable.
     Stable,
     /// Its loop is unstable.
@@ -228,7 +228,7 @@ pub struct Record {
     /// Name of the method.
     pub method: String,
     /// How its answer fares.
-    pub outcome: Verdict,
+    pub outcome: LoopOutcome,
     /// `J`, where the loop is stable.
     pub deterioration: Option<f64>,
     /// Phase margin on the true process (degrees), where the loop is stable.
@@ -250,11 +250,13 @@ impl Record {
     #[must_use]
     pub fn judged(&self) -> Option<Deterioration> {
         match (self.outcome, self.deterioration, self.phase_margin_deg) {
-            (Verdict::Stable, Some(relative), Some(margin_deg)) => Some(Deterioration::Stable {
-                relative,
-                phase_margin_rad: margin_deg.to_radians(),
-            }),
-            (Verdict::NoAnswer, ..) => None,
+            (LoopOutcome::Stable, Some(relative), Some(margin_deg)) => {
+                Some(Deterioration::Stable {
+                    relative,
+                    phase_margin_rad: margin_deg.to_radians(),
+                })
+            }
+            (LoopOutcome::NoAnswer, ..) => None,
             _ => Some(Deterioration::Unstable),
         }
     }

@@ -20,13 +20,13 @@ pub const PERIODS: f64 = 26.0;
 pub const CYCLES: [usize; 3] = [1, 2, 8];
 
 /// A network: outputs for a signature.
-pub type Network<'a> = &'a (dyn Fn(&Signature) -> [f32; OUTPUTS] + Sync);
+pub type NetworkFn<'a> = &'a (dyn Fn(&Signature) -> [f32; OUTPUTS] + Sync);
 
 /// A network with its calibration.
 #[derive(Clone, Copy)]
-pub struct Classifier<'a> {
+pub struct CycleClassifier<'a> {
     /// The network.
-    pub network: Network<'a>,
+    pub network: NetworkFn<'a>,
     /// Calibration of the network's posterior and score.
     pub calibration: Calibration,
 }
@@ -64,7 +64,7 @@ pub fn evaluate(
     recipe: &Recipe,
     kind: DefectKind,
     n: u64,
-    classifier: Option<&Classifier<'_>>,
+    classifier: Option<&CycleClassifier<'_>>,
 ) -> Result<Option<Evaluated>, ExperimentError> {
     let Some(experiment) = recipe.experiment_with_defect(kind, n)? else {
         return Ok(None);
@@ -104,7 +104,7 @@ pub(super) fn classification(
 pub fn scored(
     experiment: &RelayExperiment,
     trace: &Trace,
-    classifier: &Classifier<'_>,
+    classifier: &CycleClassifier<'_>,
 ) -> Option<Scored> {
     let cycle = SteadyCycle::last_of(trace, experiment.sample_s)?;
     let outputs = (classifier.network)(&cycle.signature);

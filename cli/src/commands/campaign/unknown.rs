@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use onecycle_lab::experiments::{Campaign, DefectKind, ExperimentError};
-use onecycle_lab::judge::out_of_family::{CYCLES, Classifier, Evaluated, evaluate};
+use onecycle_lab::judge::out_of_family::{CYCLES, CycleClassifier, Evaluated, evaluate};
 use onecycle_onboard::classify::{Calibration, ClassifyError, Verdict};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::Signature;
@@ -25,7 +25,7 @@ pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure>
         .map_err(|error| settings::out_of_range(file, error))?;
     let pack = Pack::embedded().map_err(Failure::usage)?;
     let network = |signature: &Signature| pack.outputs(&signature.values);
-    let classifier = Classifier {
+    let classifier = CycleClassifier {
         network: &network,
         calibration: Calibration::of_pack(&pack)
             .ok_or_else(|| Failure::usage(ClassifyError::Pack))?,

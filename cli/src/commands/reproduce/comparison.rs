@@ -2,7 +2,6 @@
 
 use onecycle_lab::experiments::Benchmark;
 use onecycle_lab::judge::evaluate::{Contender, EvaluationError, Record, Summary, records};
-use onecycle_lab::paper::grid::Pieces;
 use serde::Deserialize;
 
 use super::part::{Found, Row};

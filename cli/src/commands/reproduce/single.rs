@@ -6,7 +6,6 @@ use onecycle_lab::experiments::{Campaign, Recorded, RelayTest, Truth, signals_of
 use onecycle_lab::judge::baselines::pem;
 use onecycle_lab::judge::baselines::pem::Data;
 use onecycle_lab::judge::evaluate::{Contender, Judge, PHASE_MARGIN_DEG, Seen};
-use onecycle_lab::paper::grid::Pieces;
 use onecycle_onboard::Soiptd;
 use onecycle_plant::Trace;
 use serde::Deserialize;
@@ -105,12 +104,12 @@ impl Bench {
     /// What PEM from a start comes to: on set I, on set II, and on set I with the bias in its model.
     fn by_pem(&self, start_s: [f64; 3]) -> [Option<Deterioration>; 3] {
         let cases = [
-            (self.one(), pem::Settings::paper(Data::LastCycle)),
-            (self.swept.signals(), pem::Settings::paper(Data::Whole)),
-            (self.one(), pem::Settings::fair()),
+            (self.one(), pem::PemSettings::paper(Data::LastCycle)),
+            (self.swept.signals(), pem::PemSettings::paper(Data::Whole)),
+            (self.one(), pem::PemSettings::fair()),
         ];
         cases.map(|(signals, settings)| {
-            let settings = pem::Settings {
+            let settings = pem::PemSettings {
                 starts_s: vec![start_s],
                 ..settings
             };

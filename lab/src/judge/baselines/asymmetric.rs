@@ -30,7 +30,7 @@
 
 use onecycle_onboard::Soiptd;
 
-use super::{Rival, RivalError, steady_cycles};
+use super::{BaselineAnswer, BaselineError, steady_cycles};
 use onecycle_identify::Signals;
 
 /// The lags of the process that stands for an integrator with dead time, over the dead time: far below
@@ -72,12 +72,12 @@ impl HalfPeriods {
     /// reference zero with the input zero.
     ///
     /// # Errors
-    /// [`RivalError::NoOscillation`], [`RivalError::Uneven`].
+    /// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`].
     pub fn measure(
         signals: &Signals<'_>,
         hysteresis: f64,
         cycles: usize,
-    ) -> Result<Self, RivalError> {
+    ) -> Result<Self, BaselineError> {
         let (found, window) = steady_cycles(signals, cycles)?;
         let sum: f64 = signals.output[window].iter().sum();
         Ok(Self {
@@ -117,10 +117,10 @@ impl HalfPeriods {
     /// The model of first order.
     ///
     /// # Errors
-    /// [`RivalError::NotThisProcess`] where the half periods are those of no such process.
-    pub fn first_order(&self) -> Result<FirstOrder, RivalError> {
+    /// [`BaselineError::NotThisProcess`] where the half periods are those of no such process.
+    pub fn first_order(&self) -> Result<FirstOrder, BaselineError> {
         let no_such =
-            RivalError::NotThisProcess("its half periods are of no process of first order");
+            BaselineError::NotThisProcess("its half periods are of no process of first order");
         let input_integral = self.above * self.on_s - self.below * self.off_s;
         let gain = self.output_integral / input_integral;
         let Some(tau) = self
@@ -147,13 +147,13 @@ impl HalfPeriods {
     /// The integrator with dead time, as a process with lags of a millionth of it.
     ///
     /// # Errors
-    /// [`RivalError::NotThisProcess`] where no dead time is left, or no gain.
-    pub fn integrator(&self) -> Result<Soiptd, RivalError> {
+    /// [`BaselineError::NotThisProcess`] where no dead time is left, or no gain.
+    pub fn integrator(&self) -> Result<Soiptd, BaselineError> {
         let rise = self.above * self.on_s;
         let gain = self.output_span / rise;
         let delay_s = (rise - 2.0 * self.hysteresis / gain) / (self.above + self.below);
         if !(gain > 0.0 && delay_s > 0.0) {
-            return Err(RivalError::NotThisProcess("no dead time is left"));
+            return Err(BaselineError::NotThisProcess("no dead time is left"));
         }
         let lag_s = NO_LAG * delay_s;
         Ok(Soiptd::new(gain, lag_s, lag_s, delay_s)?)
@@ -171,8 +171,8 @@ pub fn identify(
     hysteresis: f64,
     cycles: usize,
     phase_margin_rad: f64,
-) -> Result<Rival, RivalError> {
+) -> Result<BaselineAnswer, BaselineError> {
     let half_periods = HalfPeriods::measure(signals, hysteresis, cycles)?;
     let process = half_periods.balanced().integrator()?;
-    Rival::of_process(process, phase_margin_rad)
+    BaselineAnswer::of_process(process, phase_margin_rad)
 }

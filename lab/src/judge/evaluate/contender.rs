@@ -5,7 +5,7 @@ use std::sync::LazyLock;
 use super::{Answer, PHASE_MARGIN_DEG};
 use crate::experiments::{CYCLES_KEPT, Recorded, RelayTest};
 use crate::judge::baselines::rules::Rule;
-use crate::judge::baselines::{Rival, RivalError, arx, asymmetric, gmvc, pem, rules};
+use crate::judge::baselines::{BaselineAnswer, BaselineError, arx, asymmetric, gmvc, pem, rules};
 use crate::space::Space;
 use crate::space::rule::TuningRule;
 use onecycle_identify::{Method, Options, Signals, identify};
@@ -78,7 +78,7 @@ const ASYMMETRIC_CYCLES: usize = CYCLES_KEPT;
 const RULE_SHAPES: usize = 8;
 
 /// The exact rule, made once: by the first experiment that asks for it.
-static EXACT_RULE: LazyLock<Result<TuningRule, RivalError>> =
+static EXACT_RULE: LazyLock<Result<TuningRule, BaselineError>> =
     LazyLock::new(|| rules::calibrated(&Space::MULTIROTOR, RULE_SHAPES, RULE_SHAPES));
 
 impl Contender {
@@ -142,14 +142,14 @@ impl Contender {
     /// That sentence.
     pub fn answer(self, seen: &Seen<'_>) -> Result<Answer, String> {
         let (signals, margin_rad) = (&seen.signals, PHASE_MARGIN_DEG.to_radians());
-        let by_pem = |settings: &pem::Settings| pem::identify(signals, settings, margin_rad);
+        let by_pem = |settings: &pem::PemSettings| pem::identify(signals, settings, margin_rad);
         let by_rule = |rule: &Rule| rules::identify(signals, rule, 1);
         let rival = match self {
             Self::OneCycle(cycles) => return ours(signals, cycles, Method::Map),
             Self::Network => return ours(signals, 1, Method::Classify),
-            Self::Pem => by_pem(&pem::Settings::paper(pem::Data::LastCycle)),
-            Self::PemSweep => by_pem(&pem::Settings::paper(pem::Data::Whole)),
-            Self::PemFair => by_pem(&pem::Settings::fair()),
+            Self::Pem => by_pem(&pem::PemSettings::paper(pem::Data::LastCycle)),
+            Self::PemSweep => by_pem(&pem::PemSettings::paper(pem::Data::Whole)),
+            Self::PemFair => by_pem(&pem::PemSettings::fair()),
             Self::Rules => by_rule(&Rule::of_relay(Space::MULTIROTOR.beta, margin_rad)),
             Self::RulesExact => EXACT_RULE
                 .clone()
@@ -157,8 +157,8 @@ impl Contender {
             Self::RulesHarmonic => by_rule(&Rule::FirstHarmonic {
                 phase_margin_rad: margin_rad,
             }),
-            Self::Arx => arx::identify(signals, &arx::Settings::PX4, margin_rad),
-            Self::ArxScaled => arx::Settings::scaled_to_oscillation(signals)
+            Self::Arx => arx::identify(signals, &arx::ArxSettings::PX4, margin_rad),
+            Self::ArxScaled => arx::ArxSettings::scaled_to_oscillation(signals)
                 .and_then(|settings| arx::identify(signals, &settings, margin_rad)),
             Self::ArxGmvc => return by_gmvc(signals).map_err(|error| error.to_string()),
             Self::Asymmetric => {
@@ -185,15 +185,15 @@ fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, 
 }
 
 /// PX4's whole road from a recording to gains.
-fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, RivalError> {
-    let settings = arx::Settings::scaled_to_oscillation(signals)?;
+fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, BaselineError> {
+    let settings = arx::ArxSettings::scaled_to_oscillation(signals)?;
     let model = arx::Model::of_differences(signals, &settings)?;
     let design = gmvc::Design::scaled_to_oscillation(signals)?;
     Ok(Answer::of_gains(design.cascade(&model)?))
 }
 
 /// A process gets the same controller whoever found it.
-fn of_rival(rival: Result<Rival, RivalError>) -> Result<Answer, String> {
+fn of_rival(rival: Result<BaselineAnswer, BaselineError>) -> Result<Answer, String> {
     let rival = rival.map_err(|error| error.to_string())?;
     match rival.process {
         Some(process) => Answer::of_process(process).map_err(|error| error.to_string()),

@@ -35,7 +35,7 @@ use super::npz::{self, Column, Numbers};
 use super::{Example, VALUES};
 use crate::PROGRAM;
 use crate::experiments::{ExperimentError, Recipe, RecipeError};
-use crate::paper::grid::Pieces;
+use crate::workers::Workers;
 
 /// Changes with every change that a reader could notice.
 pub const FORMAT: &str = "onecycle.dataset/1";
@@ -48,7 +48,7 @@ pub const MOST_EXAMPLES: u64 = 10_000_000;
 
 /// One example as a file has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Record {
+pub struct ExampleRecord {
     /// Of the example in its recipe.
     pub number: u64,
     /// The example.
@@ -243,13 +243,13 @@ impl Manifest {
     pub fn make(
         &self,
         shard: usize,
-        pieces: &impl Pieces,
+        workers: &dyn Workers,
     ) -> Result<(Vec<u8>, Entry), ExperimentError> {
         let numbers = self.numbers(shard);
         let count = (numbers.end - numbers.start) as usize;
-        let made = pieces.map(count, |k| self.recipe.record(numbers.start + k as u64));
-        let made: Vec<Option<Record>> = made.into_iter().collect::<Result<_, _>>()?;
-        let records: Vec<Record> = made.into_iter().flatten().collect();
+        let made = workers.map(count, |k| self.recipe.record(numbers.start + k as u64));
+        let made: Vec<Option<ExampleRecord>> = made.into_iter().collect::<Result<_, _>>()?;
+        let records: Vec<ExampleRecord> = made.into_iter().flatten().collect();
         let bytes = npz::write(&columns(&records));
         let entry = Entry {
             rows: records.len(),
@@ -262,7 +262,7 @@ impl Manifest {
     ///
     /// # Errors
     /// [`DatasetError::Unfinished`] or [`DatasetError::Damaged`].
-    pub fn records(&self, shard: usize, bytes: &[u8]) -> Result<Vec<Record>, DatasetError> {
+    pub fn records(&self, shard: usize, bytes: &[u8]) -> Result<Vec<ExampleRecord>, DatasetError> {
         let entry = self.shards.get(shard).and_then(Option::as_ref);
         let entry = entry.ok_or_else(|| DatasetError::Unfinished(file_name(shard)))?;
         let damaged = || DatasetError::Damaged(file_name(shard));
@@ -293,11 +293,11 @@ impl Recipe {
     ///
     /// # Errors
     /// See [`ExperimentError`].
-    pub fn record(&self, n: u64) -> Result<Option<Record>, ExperimentError> {
+    pub fn record(&self, n: u64) -> Result<Option<ExampleRecord>, ExperimentError> {
         let made = self.example(n)?;
         Ok(made.and_then(|example| {
             let margin_rad = self.families[example.family].space.phase_margin_rad();
-            Some(Record {
+            Some(ExampleRecord {
                 number: n,
                 example,
                 values: example.values(),
@@ -308,18 +308,18 @@ impl Recipe {
 }
 
 /// The columns of these records; of none, what columns there are.
-pub(super) fn columns(records: &[Record]) -> Vec<Column> {
-    let whole = |name, of: fn(&Record) -> u64| Column {
+pub(super) fn columns(records: &[ExampleRecord]) -> Vec<Column> {
+    let whole = |name, of: fn(&ExampleRecord) -> u64| Column {
         name,
         width: None,
         numbers: Numbers::U64(records.iter().map(of).collect()),
     };
-    let real = |name, of: fn(&Record) -> f64| Column {
+    let real = |name, of: fn(&ExampleRecord) -> f64| Column {
         name,
         width: None,
         numbers: Numbers::F64(records.iter().map(of).collect()),
     };
-    let four = |name, of: fn(&Record) -> [f64; 4]| Column {
+    let four = |name, of: fn(&ExampleRecord) -> [f64; 4]| Column {
         name,
         width: Some(4),
         numbers: Numbers::F64(records.iter().flat_map(of).collect()),
@@ -362,7 +362,7 @@ fn parameters(process: &Soiptd) -> [f64; 4] {
 }
 
 /// The records of these columns; `None` where a process is none.
-fn records(columns: &[Column], rows: usize) -> Option<Vec<Record>> {
+fn records(columns: &[Column], rows: usize) -> Option<Vec<ExampleRecord>> {
     let wholes = |name: &str| match &named(columns, name)?.numbers {
         Numbers::U64(numbers) => Some(numbers),
         _ => None,
@@ -398,7 +398,7 @@ fn records(columns: &[Column], rows: usize) -> Option<Vec<Record>> {
                 sigma: real("sigma", row)?,
                 samples_per_period: real("samples_per_period", row)?,
             };
-            Some(Record {
+            Some(ExampleRecord {
                 number: *wholes("number")?.get(row)?,
                 example,
                 values: four("values", row)?,

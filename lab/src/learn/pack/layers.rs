@@ -11,7 +11,8 @@ use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::LENGTH;
 
 use super::PackContentsError;
-use crate::learn::train::{Layer, Matrix, Network, OneThread, TrainError};
+use crate::learn::train::{Layer, Matrix, Network, TrainError};
+use crate::workers::OneThread;
 
 /// Largest whole number of a byte that has a negative.
 const LARGEST: f32 = 127.0;

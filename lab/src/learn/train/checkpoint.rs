@@ -13,7 +13,7 @@ use super::layer::Layer;
 use super::network::{Network, count_weights};
 use super::optimizer::Optimizer;
 use super::tensor_file::{Tensor, TensorFile, TensorFileError};
-use super::trainer::{Epoch, Settings, Trainer};
+use super::trainer::{Epoch, Trainer, TrainingSettings};
 
 /// Key of the metadata; changes with every change that a reader could notice.
 const FORMAT: &str = "onecycle.training/1";
@@ -35,7 +35,7 @@ pub enum CheckpointError {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Progress {
-    settings: Settings,
+    settings: TrainingSettings,
     inputs: usize,
     layers: Vec<Layer>,
     steps: u64,

@@ -19,8 +19,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::batch_norm::BatchNorm;
 use super::few_rows;
-use super::matrix::{Matrix, Workers};
+use super::matrix::Matrix;
 use super::{Purpose, TrainError, expect_size, stream};
+use crate::workers::Workers;
 
 /// A layer, as a user names it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -184,7 +185,9 @@ impl Stage {
             Self::Dense { weight, bias } => *output = dense(weight, bias, input, workers)?,
             Self::Relu => apply(input, output, relu),
             Self::Tanh => apply(input, output, f32::tanh),
-            Self::BatchNorm(norm) => norm.learn(input, output, memory)?,
+            Self::BatchNorm(norm) => {
+                norm.learn(input, output, (&mut memory.matrix, &mut memory.row))?;
+            }
             Self::Dropout { probability } => {
                 let mut rng = stream(draw.seed, Purpose::Dropout, draw.number);
                 let kept = (1.0 - *probability).recip() as f32;
@@ -225,7 +228,10 @@ impl Stage {
             }
             Self::Relu => by_output(&mut gradient, passed, |y| if y > 0.0 { 1.0 } else { 0.0 }),
             Self::Tanh => by_output(&mut gradient, passed, |y| 1.0 - y * y),
-            Self::BatchNorm(norm) => norm.backward(passed.memory, &mut gradient, into),
+            Self::BatchNorm(norm) => {
+                let normal = (&passed.memory.matrix, &passed.memory.row[..]);
+                norm.backward(normal, &mut gradient, into);
+            }
             Self::Dropout { .. } => multiply(&mut gradient, &passed.memory.matrix),
         }
         gradient

@@ -16,10 +16,11 @@
 use rand::Rng;
 
 use super::layer::{Draw, Layer, Memory, Passed, Stage};
-use super::matrix::{Matrix, Workers};
+use super::matrix::Matrix;
 use super::tensor_file::{Tensor, TensorFile, TensorFileError};
 use super::{TrainError, expect_size};
 use crate::space::FieldError;
+use crate::workers::Workers;
 
 /// Most weights of a network, 4 GB: beyond, a size is a mistake.
 const MOST_WEIGHTS: usize = 1 << 30;
