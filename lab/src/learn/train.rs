@@ -12,7 +12,7 @@
 //! | what does it learn: a class, a cost, a density?   | [`Loss`]                               |
 //! | how?                                              | [`OptimizerMethod`], [`Schedule`], [`TrainingSettings`] |
 //! | from what?                                        | [`Dataset`], which fills a [`Batch`]   |
-//! | how do weights come from PyTorch and go there?    | [`TensorFile`]: safetensors            |
+//! | how do networks come from PyTorch and go there?   | [`onnx`](crate::learn::onnx)           |
 //! | on how many threads?                              | [`Workers`](crate::workers::Workers), the caller's |
 //!
 //! Rows are samples throughout: inputs `batch x in`, weights of a dense layer `out x in`, outputs
@@ -47,7 +47,6 @@ mod network;
 mod optimizer;
 mod schedule;
 mod softmax;
-mod tensor_file;
 mod trainer;
 
 use rand::{Rng, SeedableRng};
@@ -62,7 +61,6 @@ pub use matrix::Matrix;
 pub use network::{Dropped, Network, Tape};
 pub use optimizer::{Optimizer, OptimizerMethod};
 pub use schedule::{Schedule, Shape};
-pub use tensor_file::{Tensor, TensorFile, TensorFileError};
 pub use trainer::{Epoch, Outcome, Trainer, TrainingSettings};
 
 use crate::space::FieldError;
@@ -97,6 +95,16 @@ pub enum TrainError {
     /// The variance of one sample.
     #[error("batch normalisation needs batches of at least two samples to learn from")]
     OneSample,
+    /// A number that no network can hold.
+    #[error("{layer}.{array} of the network holds {value:?}")]
+    Value {
+        /// Number of the layer, from 0.
+        layer: usize,
+        /// Name of the array.
+        array: &'static str,
+        /// The number.
+        value: f32,
+    },
     /// No data.
     #[error("there is no sample to {0}")]
     NoSample(&'static str),

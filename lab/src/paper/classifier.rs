@@ -46,7 +46,7 @@ pub use standard::{Standard, Standardised};
 
 use crate::experiments::ExperimentError;
 use crate::learn::train::{
-    Layer, Loss, Network, OptimizerMethod, Schedule, TensorFileError, TrainError, TrainingSettings,
+    Layer, Loss, Network, OptimizerMethod, Schedule, TrainError, TrainingSettings,
 };
 use crate::space::grid;
 use crate::space::grid::{Grid, GridError};
@@ -80,9 +80,6 @@ pub enum ClassifierError {
     /// Network and examples do not fit each other.
     #[error("{0}")]
     Train(#[from] TrainError),
-    /// Weights of another network.
-    #[error("{0}")]
-    Weights(#[from] TensorFileError),
     /// A loss that reads something else than classes and their costs.
     #[error(
         "losses: a classifier learns classes; take a loss that reads them, such as cross_entropy"

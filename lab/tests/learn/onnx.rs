@@ -1,13 +1,15 @@
 //! Networks out to ONNX and back, and in from PyTorch.
 
 use onecycle_lab::learn::onnx::{Normalisation, OnnxError, export, import};
-use onecycle_lab::learn::train::{Layer, Matrix, Network, TensorFile};
+use onecycle_lab::learn::train::{Layer, Matrix, Network};
 use onecycle_lab::workers::OneThread;
 use proptest::prelude::*;
 use prost::Message;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use serde::Deserialize;
+
+use crate::changed;
 
 const INPUTS: usize = 5;
 
@@ -18,20 +20,13 @@ fn dense(outputs: usize) -> Layer {
 /// Every tensor drawn, variances included.
 fn drawn(layers: &[Layer], seed: u64) -> Network {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
-    let mut network = Network::new(INPUTS, layers, &mut rng).unwrap();
-    let mut file = TensorFile::from_bytes(&network.save()).unwrap();
-    for tensor in &mut file.tensors {
-        (tensor.values)
-            .fill_with(|| rng.random_range(0.2..1.2) * [-1.0, 1.0][rng.random_range(0..2)]);
-        if tensor.name.ends_with("running_var") {
-            tensor
-                .values
-                .iter_mut()
-                .for_each(|value| *value = value.abs());
+    let network = Network::new(INPUTS, layers, &mut rng).unwrap();
+    changed(network, |name, values| {
+        values.fill_with(|| rng.random_range(0.2..1.2) * [-1.0, 1.0][rng.random_range(0..2)]);
+        if name.ends_with("running_var") {
+            values.iter_mut().for_each(|value| *value = value.abs());
         }
-    }
-    network.load(&file.to_bytes()).unwrap();
-    network
+    })
 }
 
 fn inputs(rows: usize) -> Matrix {
@@ -77,12 +72,12 @@ fn networks_come_back() {
         &[dense(4), Layer::Relu, Layer::Tanh],
     ] {
         let network = drawn(layers, 1);
-        let found = import(&export(&network, None).unwrap()).unwrap();
+        let found = import(&export(&network, None, &[]).unwrap()).unwrap();
         assert_eq!(
             (found.network, found.normalisation),
             (network.clone(), None)
         );
-        let bytes = export(&network, Some(&normalisation)).unwrap();
+        let bytes = export(&network, Some(&normalisation), &[]).unwrap();
         let found = import(&bytes).unwrap();
         assert_eq!(found.network, network);
         assert_eq!(found.normalisation.as_ref(), Some(&normalisation));
@@ -101,7 +96,9 @@ fn what_only_learning_needs_is_folded_or_dropped() {
         dense(3),
     ];
     let network = drawn(&layers, 2);
-    let found = import(&export(&network, None).unwrap()).unwrap().network;
+    let found = import(&export(&network, None, &[]).unwrap())
+        .unwrap()
+        .network;
     assert_eq!(found.layers(), [dense(8), Layer::Relu, dense(3)]);
     let inputs = inputs(50);
     let expected = network.evaluate(&inputs, &OneThread).unwrap();
@@ -473,7 +470,7 @@ proptest! {
 #[test]
 fn what_cannot_be_written_is_named() {
     let alone = drawn(&[Layer::BatchNorm], 3);
-    let error = export(&alone, None).unwrap_err().to_string();
+    let error = export(&alone, None, &[]).unwrap_err().to_string();
     assert!(
         error.contains("layer 0") && error.contains("batch normalisation"),
         "{error}"
@@ -484,11 +481,11 @@ fn what_cannot_be_written_is_named() {
         scales: vec![1.0; found],
     };
     assert_eq!(
-        export(&drawn(&[dense(2)], 4), Some(&normalisation)),
+        export(&drawn(&[dense(2)], 4), Some(&normalisation), &[]),
         Err(OnnxError::Normalisation { expected, found })
     );
     assert!(matches!(
-        export(&drawn(&[], 5), None),
+        export(&drawn(&[], 5), None, &[]),
         Err(OnnxError::Layer { .. })
     ));
 }

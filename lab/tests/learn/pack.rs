@@ -2,15 +2,15 @@
 
 use onecycle_lab::learn::pack::{
     LeadTableContents, PackContents, PackContentsError, PackedWeights, Precision, layers,
-    network_of_tensors, quantisation,
+    quantisation,
 };
-use onecycle_lab::learn::train::{Layer, Matrix, Network, Tensor, TensorFile};
-use onecycle_lab::workers::OneThread;
-use onecycle_onboard::network::Activation;
+use onecycle_lab::learn::train::{Layer, Network};
 use onecycle_onboard::pack::{Domain, OUTPUTS, OutputScaling, Pack, PackError, Prior};
 use onecycle_onboard::signature::LENGTH;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+
+use crate::changed;
 
 const HIDDEN: usize = 32;
 
@@ -26,15 +26,12 @@ fn drawn(activation: Layer, rng: &mut Pcg64Mcg) -> Network {
         activation,
         Layer::Dense { outputs: OUTPUTS },
     ];
-    let mut network = Network::new(LENGTH, &layers, rng).unwrap();
-    let mut file = TensorFile::from_bytes(&network.save()).unwrap();
-    for tensor in &mut file.tensors {
-        if tensor.name.ends_with("bias") {
-            (tensor.values).fill_with(|| rng.random_range(-0.5..0.5));
+    let network = Network::new(LENGTH, &layers, rng).unwrap();
+    changed(network, |name, values| {
+        if name.ends_with("bias") {
+            values.fill_with(|| rng.random_range(-0.5..0.5));
         }
-    }
-    network.load(&file.to_bytes()).unwrap();
-    network
+    })
 }
 
 /// A pack of the network, what the network sees of a signature being between -1 and 1.
@@ -134,10 +131,9 @@ fn every_weight_is_within_half_a_step() {
 // 0 0 has no scale; of -2 1 a step is 2 / 127 and 1 is 63.5 of them, away from zero.
 #[test]
 fn rows_of_zeros_stay_zeros() {
-    let mut network = Network::zeros(2, &[Layer::Dense { outputs: 2 }]).unwrap();
-    let mut file = TensorFile::from_bytes(&network.save()).unwrap();
-    file.tensors[0].values[2..].copy_from_slice(&[-2.0, 1.0]);
-    network.load(&file.to_bytes()).unwrap();
+    let network = Network::zeros(2, &[Layer::Dense { outputs: 2 }]).unwrap();
+    let numbers = [0.0, 0.0, -2.0, 1.0, 0.0, 0.0];
+    let network = network.with_numbers(&numbers).unwrap();
     let packed = &layers(&network, Precision::Bytes).unwrap()[0];
     let rows = vec![0, 0, -127, 64];
     let scales = vec![0.0, 2.0 / 127.0];
@@ -188,14 +184,12 @@ fn a_trained_network_is_packed_as_it_evaluates() {
         Layer::Dropout { probability: 0.3 },
         Layer::Dense { outputs: OUTPUTS },
     ];
-    let mut network = Network::new(LENGTH, &kinds, &mut rng).unwrap();
-    let mut file = TensorFile::from_bytes(&network.save()).unwrap();
-    for tensor in &mut file.tensors {
-        if tensor.shape.len() == 1 {
-            (tensor.values).fill_with(|| rng.random_range(0.5..1.5));
+    let network = Network::new(LENGTH, &kinds, &mut rng).unwrap();
+    let network = changed(network, |name, values| {
+        if !["1.weight", "5.weight"].contains(&name) {
+            values.fill_with(|| rng.random_range(0.5..1.5));
         }
-    }
-    network.load(&file.to_bytes()).unwrap();
+    });
     let bytes = contents(&network, Precision::Floats).to_bytes().unwrap();
     let pack = Pack::read(&bytes).unwrap();
     assert_eq!(pack.layers().count(), 2);
@@ -238,111 +232,4 @@ fn what_a_pack_cannot_hold_is_named() {
         contents(&network, Precision::Bytes).to_bytes(),
         Err(PackContentsError::Pack(width))
     );
-}
-
-// ---------------------------------------------------------------- tensors without their layers
-
-const TANH: [Activation; 3] = [Activation::Tanh, Activation::Tanh, Activation::None];
-
-#[test]
-fn tensors_and_activations_are_a_network() {
-    let network = drawn(Layer::Tanh, &mut Pcg64Mcg::seed_from_u64(25));
-    let found = network_of_tensors(&network.save(), &TANH).unwrap();
-    assert_eq!(found, network);
-
-    // Linear, BatchNorm1d, ReLU, Dropout, Linear: the first number without tensors is the relu's.
-    let kinds = [
-        Layer::Dense { outputs: 3 },
-        Layer::BatchNorm,
-        Layer::Relu,
-        Layer::Dropout { probability: 0.5 },
-        Layer::Dense { outputs: 2 },
-    ];
-    let network = Network::new(2, &kinds, &mut Pcg64Mcg::seed_from_u64(26)).unwrap();
-    let activations = [Activation::Relu, Activation::None];
-    let found = network_of_tensors(&network.save(), &activations).unwrap();
-    let inputs = Matrix::from_rows(1, 2, vec![0.5, -1.5]).unwrap();
-    assert_eq!(
-        found.evaluate(&inputs, &OneThread),
-        network.evaluate(&inputs, &OneThread)
-    );
-    assert_eq!(found.layers()[2], Layer::Relu);
-}
-
-#[derive(serde::Deserialize)]
-struct Golden {
-    inputs: Vec<f32>,
-    evaluated: Vec<f32>,
-}
-
-// Linear, BatchNorm1d, ReLU, Dropout, Linear of PyTorch, and its numbers in float64: two layers of
-// sums of 5 and 8 terms near one, a few units of 6e-8.
-#[test]
-fn pytorch_tensors_are_read() {
-    let golden = include_str!("../golden/torch_steps.json");
-    let golden: Golden = serde_json::from_str(golden).unwrap();
-    let bytes = include_bytes!("../golden/torch_steps.safetensors");
-    let network = network_of_tensors(bytes, &[Activation::Relu, Activation::None]).unwrap();
-    let rows = golden.inputs.len() / network.inputs();
-    let inputs = Matrix::from_rows(rows, network.inputs(), golden.inputs).unwrap();
-    let found = network.evaluate(&inputs, &OneThread).unwrap();
-    assert_eq!(found.values().len(), golden.evaluated.len());
-    for (found, expected) in found.values().iter().zip(golden.evaluated) {
-        assert!((found - expected).abs() < 1e-6, "{found} {expected}");
-    }
-}
-
-#[test]
-fn tensors_of_other_networks_are_refused() {
-    let network = drawn(Layer::Tanh, &mut Pcg64Mcg::seed_from_u64(27));
-    let refused = |bytes: &[u8], activations: &[Activation]| {
-        let error = network_of_tensors(bytes, activations).unwrap_err();
-        error.to_string()
-    };
-    let depth = refused(&network.save(), &TANH[1..]);
-    assert!(
-        depth.starts_with("the file has 3 dense layers where the pack has 2"),
-        "{depth}"
-    );
-    let gap = refused(
-        &Network::zeros(2, &[Layer::Dense { outputs: 2 }; 3])
-            .unwrap()
-            .save(),
-        &TANH,
-    );
-    assert!(gap.contains("behind layer 0"), "{gap}");
-    for name in [
-        "conv.weight",
-        "0",
-        "x.0.weight",
-        "1.kernel",
-        "4000000000.bias",
-    ] {
-        let file = TensorFile {
-            tensors: vec![Tensor {
-                name: name.to_owned(),
-                shape: vec![1],
-                values: vec![0.0],
-            }],
-            ..TensorFile::default()
-        };
-        let sentence = refused(&file.to_bytes(), &TANH);
-        assert!(
-            sentence.starts_with(&format!("tensor {name} is not named")),
-            "{sentence}"
-        );
-    }
-    let wide = |outputs, inputs| Network::zeros(inputs, &[Layer::Dense { outputs }]).unwrap();
-    let mut file = TensorFile::from_bytes(&wide(20, 3).save()).unwrap();
-    for mut tensor in wide(2, 9).tensors() {
-        tensor.name = tensor.name.replace("0.", "2.");
-        file.tensors.push(tensor);
-    }
-    assert_eq!(
-        refused(&file.to_bytes(), &TANH[1..]),
-        "tensor 2.weight must have shape [2, 20], but has [2, 9]"
-    );
-    let cut = network.save();
-    assert!(refused(&cut[..cut.len() - 1], &TANH).contains("claims bytes"));
-    assert!(refused(b"no", &TANH).contains("not safetensors"));
 }

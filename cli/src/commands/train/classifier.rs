@@ -5,7 +5,8 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
-use onecycle_lab::learn::train::{Dataset, Epoch, Loss, Network, TensorFile, Trainer};
+use onecycle_lab::learn::onnx;
+use onecycle_lab::learn::train::{Dataset, Epoch, Loss, Network, Trainer};
 use onecycle_lab::paper::classifier::{
     Classes, ClassifierError, ClassifierRecipe, Examples, Gain, PickRule, Protocol, Score,
     Standard, Standardised, picks,
@@ -204,11 +205,7 @@ fn better_rule(scores: &[Score; 2]) -> PickRule {
 
 fn write(path: &Path, network: &Network, card: &Card<'_>) -> Result<(), Failure> {
     let card = serde_json::to_string(card).map_err(Failure::usage)?;
-    let bytes = TensorFile {
-        tensors: network.tensors(),
-        metadata: [(FORMAT.to_owned(), card)].into(),
-    }
-    .to_bytes();
+    let bytes = onnx::export(network, None, &[(FORMAT, card)]).map_err(Failure::usage)?;
     write_file(path, |file| file.write_all(&bytes))
 }
 

@@ -20,9 +20,9 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type as Schema;
 
-use super::npz::{Column, Numbers};
 use super::shards::{ExampleRecord, columns};
 use crate::PROGRAM;
+use crate::learn::npz::{Column, Numbers};
 
 /// Writes a table, some rows at a time: 4096, as a file of a dataset has them, are a good number.
 pub struct Writer<W: Write + Send>(SerializedFileWriter<W>);

@@ -31,10 +31,10 @@ use onecycle_onboard::signature::{LENGTH, Signature};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::npz::{self, Column, Numbers};
 use super::{Example, VALUES};
 use crate::PROGRAM;
 use crate::experiments::{ExperimentError, Recipe, RecipeError};
+use crate::learn::npz::{self, Column, Numbers};
 use crate::workers::Workers;
 
 /// Changes with every change that a reader could notice.

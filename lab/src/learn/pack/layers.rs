@@ -155,6 +155,27 @@ fn quantised(weight: &Matrix) -> PackedWeights {
     PackedWeights::Bytes { rows, scales }
 }
 
+/// The network that these layers are.
+///
+/// # Errors
+/// Sizes or numbers that no network has.
+pub(super) fn network(layers: &[PackedLayer]) -> Result<Network, PackContentsError> {
+    let (mut kinds, mut numbers) = (Vec::new(), Vec::new());
+    for layer in layers {
+        numbers.extend(layer.values());
+        numbers.extend(&layer.biases);
+        let outputs = layer.biases.len();
+        kinds.push(Layer::Dense { outputs });
+        kinds.extend(match layer.activation {
+            Activation::None => None,
+            Activation::Relu => Some(Layer::Relu),
+            Activation::Tanh => Some(Layer::Tanh),
+        });
+    }
+    let inputs = layers.first().map_or(0, |layer| layer.inputs);
+    Ok(Network::zeros(inputs, &kinds)?.with_numbers(&numbers)?)
+}
+
 /// What the pack puts out for these signatures against what the network it is made of does.
 ///
 /// # Errors

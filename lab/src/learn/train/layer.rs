@@ -45,6 +45,12 @@ pub enum Layer {
     },
 }
 
+/// Arrays of a layer that are learnt, the first of them: weight and bias.
+pub(super) const PARAMETERS: usize = 2;
+
+/// Name of the array that holds variances.
+pub(super) const RUNNING_VARIANCE: &str = "running_var";
+
 /// A layer with its numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Stage {
@@ -118,40 +124,37 @@ impl Stage {
         }
     }
 
-    /// What is learnt, under PyTorch's names.
-    pub(super) fn parameters(&self) -> Vec<(&'static str, &Matrix)> {
+    /// All arrays under PyTorch's names: weight and bias, which are learnt, then running statistics.
+    pub(super) fn arrays(&self) -> Vec<(&'static str, &Matrix)> {
         match self {
             Self::Dense { weight, bias } => vec![("weight", weight), ("bias", bias)],
-            Self::BatchNorm(norm) => vec![("weight", &norm.weight), ("bias", &norm.bias)],
-            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
-        }
-    }
-
-    /// As [`Self::parameters`], to change.
-    pub(super) fn parameters_mut(&mut self) -> Vec<&mut Matrix> {
-        match self {
-            Self::Dense { weight, bias } => vec![weight, bias],
-            Self::BatchNorm(norm) => vec![&mut norm.weight, &mut norm.bias],
-            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
-        }
-    }
-
-    /// What is kept besides: running statistics.
-    pub(super) fn buffers(&self) -> Vec<(&'static str, &Matrix)> {
-        match self {
             Self::BatchNorm(norm) => vec![
+                ("weight", &norm.weight),
+                ("bias", &norm.bias),
                 ("running_mean", &norm.running_mean),
-                ("running_var", &norm.running_var),
+                (RUNNING_VARIANCE, &norm.running_var),
             ],
-            _ => Vec::new(),
+            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
         }
     }
 
-    /// As [`Self::buffers`], to change.
-    pub(super) fn buffers_mut(&mut self) -> Vec<&mut Matrix> {
+    /// What is learnt.
+    pub(super) fn parameters(&self) -> Vec<&Matrix> {
+        let arrays = self.arrays().into_iter().take(PARAMETERS);
+        arrays.map(|(_, matrix)| matrix).collect()
+    }
+
+    /// As [`Self::arrays`], to change.
+    pub(super) fn arrays_mut(&mut self) -> Vec<(&'static str, &mut Matrix)> {
         match self {
-            Self::BatchNorm(norm) => vec![&mut norm.running_mean, &mut norm.running_var],
-            _ => Vec::new(),
+            Self::Dense { weight, bias } => vec![("weight", weight), ("bias", bias)],
+            Self::BatchNorm(norm) => vec![
+                ("weight", &mut norm.weight),
+                ("bias", &mut norm.bias),
+                ("running_mean", &mut norm.running_mean),
+                (RUNNING_VARIANCE, &mut norm.running_var),
+            ],
+            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
         }
     }
 

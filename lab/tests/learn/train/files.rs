@@ -1,9 +1,9 @@
-//! Weights into files and out of them; batch normalisation folded away.
+//! Numbers of networks and trainings, saved and restored; batch normalisation folded into dense layers.
 
 use std::ops::ControlFlow;
 
 use onecycle_lab::learn::train::{
-    Batch, Dropped, Layer, Loss, Network, OptimizerMethod, Schedule, Tape, TensorFile, Trainer,
+    Batch, Dropped, Layer, Loss, Network, OptimizerMethod, Schedule, Tape, Trainer,
     TrainingSettings,
 };
 use onecycle_lab::workers::OneThread;
@@ -57,60 +57,43 @@ fn folded_network_is_the_same_function() {
     }
 }
 
+// Numbers go out and in again in the order of the arrays, whose names are PyTorch's.
 #[test]
-fn weights_come_back() {
+fn numbers_come_back() {
     let network = seasoned();
-    let mut other = Network::zeros(4, &network.layers()).unwrap();
-    other.load(&network.save()).unwrap();
-    assert_eq!(other, network);
-    let names: Vec<_> = network
-        .tensors()
-        .into_iter()
-        .map(|t| (t.name, t.shape))
+    let other = Network::zeros(4, &network.layers()).unwrap();
+    assert_eq!(other.with_numbers(&network.numbers()), Ok(network.clone()));
+    let arrays: Vec<_> = (network.arrays())
+        .map(|(name, matrix)| (name, matrix.rows(), matrix.columns()))
         .collect();
-    assert_eq!(names[0], ("0.weight".to_owned(), vec![6, 4]));
-    assert_eq!(names[1], ("0.bias".to_owned(), vec![6]));
-    assert_eq!(names[5], ("1.running_var".to_owned(), vec![6]));
+    assert_eq!(arrays[0], ("0.weight".to_owned(), 6, 4));
+    assert_eq!(arrays[1], ("0.bias".to_owned(), 1, 6));
+    assert_eq!(arrays[5], ("1.running_var".to_owned(), 1, 6));
 }
 
+// 6 x 4 weights, 6 biases and three rows of six stand before the first variance.
 #[test]
-fn files_of_other_networks_are_refused() {
+fn numbers_of_other_networks_are_refused() {
     let network = seasoned();
-    type Spoil = fn(&mut TensorFile);
-    let cases: [(Spoil, &str); 5] = [
-        (|f| drop(f.tensors.remove(1)), "tensor 0.bias is missing"),
-        (
-            |f| f.tensors[1].name = "0.bias2".to_owned(),
-            "tensor 0.bias is missing",
-        ),
-        (
-            |f| f.tensors[0].shape = vec![4, 6],
-            "tensor 0.weight must have shape [6, 4], but has [4, 6]",
-        ),
-        (
-            |f| f.tensors[5].values[0] = -1.0,
-            "tensor 1.running_var holds -1.0",
-        ),
-        (
-            |f| {
-                let mut more = f.tensors[1].clone();
-                more.name = "9.bias".to_owned();
-                f.tensors.push(more);
-            },
-            "tensor 9.bias belongs to another network",
-        ),
-    ];
-    for (spoil, sentence) in cases {
-        let mut file = TensorFile {
-            tensors: network.tensors(),
-            ..TensorFile::default()
-        };
-        spoil(&mut file);
-        let mut loaded = network.clone();
-        let error = loaded.load(&file.to_bytes()).unwrap_err();
-        assert_eq!(error.to_string(), sentence);
-        assert_eq!(loaded, network);
-    }
+    let numbers = network.numbers();
+    let refused = |numbers: &[f32]| {
+        let error = network.clone().with_numbers(numbers).unwrap_err();
+        error.to_string()
+    };
+    let count = numbers.len();
+    assert_eq!(
+        refused(&numbers[1..]),
+        format!("the count of numbers must be {count}, but is {}", count - 1)
+    );
+    let mut negative = numbers.clone();
+    negative[24 + 6 + 3 * 6] = -1.0;
+    assert_eq!(
+        refused(&negative),
+        "1.running_var of the network holds -1.0"
+    );
+    let mut infinite = numbers;
+    infinite[24] = f32::INFINITY;
+    assert_eq!(refused(&infinite), "0.bias of the network holds inf");
 }
 
 #[test]
@@ -135,34 +118,35 @@ fn checkpoints_are_checked() {
     let bytes = trainer.save().unwrap();
     assert_eq!(Trainer::resume(&bytes), Ok(trainer.clone()));
 
-    type Spoil = fn(&mut TensorFile);
-    let cases: [(Spoil, &str); 5] = [
-        (|f| f.metadata.clear(), "the file is not one of a training"),
-        (|f| drop(f.tensors.pop()), "tensor second.1 is missing"),
+    let replaced = |from: &str, to: &str| {
+        let end = bytes.iter().position(|&byte| byte == b'\n').unwrap();
+        let head = std::str::from_utf8(&bytes[..end]).unwrap();
+        assert!(head.contains(from), "{head}");
+        [head.replace(from, to).as_bytes(), &bytes[end..]].concat()
+    };
+    // Two networks and two moments of 3 x 2 weights and 3 biases.
+    let mut negative = bytes.clone();
+    let last = negative.len() - 1;
+    negative[last] |= 0x80;
+    for (bytes, sentence) in [
+        (b"no training".to_vec(), "the file is not one of a training"),
+        (b"{}\n".to_vec(), "missing field"),
+        (replaced("training/2", "training/3"), "another format"),
+        (bytes[..bytes.len() - 4].to_vec(), "it is cut off"),
+        (bytes[..bytes.len() - 1].to_vec(), "but it holds 35"),
         (
-            |f| replace(f, "\"outputs\":3", "\"outputs\":300000000"),
+            [&bytes[..], &[0; 4]].concat(),
+            "it goes on after its last number",
+        ),
+        (
+            replaced("\"outputs\":3", "\"outputs\":300000000"),
             "its layers have 900000000 numbers, but it holds 36",
         ),
-        (
-            |f| replace(f, "\"number\":1", "\"number\":2"),
-            "not numbered",
-        ),
-        (
-            |f| replace(f, "\"batch\":4", "\"batch\":0"),
-            "batch must be",
-        ),
-    ];
-    for (spoil, sentence) in cases {
-        let mut file = TensorFile::from_bytes(&bytes).unwrap();
-        spoil(&mut file);
-        let error = Trainer::resume(&file.to_bytes()).unwrap_err().to_string();
+        (replaced("\"number\":1", "\"number\":2"), "not numbered"),
+        (replaced("\"batch\":4", "\"batch\":0"), "batch must be"),
+        (negative, "a moment is -"),
+    ] {
+        let error = Trainer::resume(&bytes).unwrap_err().to_string();
         assert!(error.contains(sentence), "{error}");
-    }
-}
-
-fn replace(file: &mut TensorFile, from: &str, to: &str) {
-    for value in file.metadata.values_mut() {
-        assert!(value.contains(from), "{value}");
-        *value = value.replace(from, to);
     }
 }

@@ -1,7 +1,7 @@
 //! Every layer and every loss by central differences.
 
 use onecycle_lab::learn::train::{
-    Batch, Dropped, Gaussian, Layer, Loss, Matrix, Network, Tape, TensorFile, TrainError,
+    Batch, Dropped, Gaussian, Layer, Loss, Matrix, Network, Tape, TrainError,
 };
 use onecycle_lab::workers::OneThread;
 
@@ -36,24 +36,22 @@ fn worst_error(network: &Network, inputs: &Matrix) -> f64 {
         .unwrap();
     learning.backward(&mut tape, &c, &OneThread).unwrap();
 
-    let tensors = network.tensors();
-    let is_learnt = |name: &str| !name.contains("running");
+    let numbers = network.numbers();
     let mut gradients = tape.gradients().iter();
     let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
-    for (t, tensor) in tensors.iter().enumerate() {
-        if !is_learnt(&tensor.name) {
+    let mut first = 0;
+    for (name, matrix) in network.arrays() {
+        let start = first;
+        first += matrix.values().len();
+        if name.contains("running") {
             continue;
         }
         let gradient = gradients.next().unwrap();
         for (k, slope) in gradient.values().iter().enumerate() {
             let at = |steps: f32| {
-                let mut file = TensorFile {
-                    tensors: tensors.clone(),
-                    ..TensorFile::default()
-                };
-                file.tensors[t].values[k] += steps * H;
-                let mut moved = network.clone();
-                moved.take(&mut file, "").unwrap();
+                let mut moved = numbers.clone();
+                moved[start + k] += steps * H;
+                let moved = network.clone().with_numbers(&moved).unwrap();
                 weighted_sum(&moved, inputs, &c)
             };
             let difference =

@@ -1,4 +1,4 @@
-//! Columns of numbers in a file that NumPy reads: npz, a zip archive of npy arrays.
+//! Arrays in a file that NumPy reads: npz, a zip archive of npy arrays.
 //!
 //! ```text
 //! archive   for each column: local header, npy;  for each column: central header;  end
@@ -8,14 +8,17 @@
 //! ```
 //!
 //! References: PKWARE, "APPNOTE.TXT: .ZIP file format specification", version 6.3; NumPy,
-//! "numpy.lib.format", version 1.0. Written here in as many lines as crates for it would take to be
-//! called, and without the compressors that they bring along.
+//! "numpy.lib.format", version 1.0. Written here because crates for it take as many lines to call, and
+//! bring compressors along.
 
 /// Numbers of one type.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Numbers {
+pub enum Numbers {
+    /// Whole numbers.
     U64(Vec<u64>),
+    /// Single precision.
     F32(Vec<f32>),
+    /// Double precision.
     F64(Vec<f64>),
 }
 
@@ -65,12 +68,15 @@ impl Numbers {
     }
 }
 
-/// A named array of one dimension, or of two where its rows have a width.
+/// A named array of one dimension, or of two if its rows have a width.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Column {
-    pub(super) name: &'static str,
-    pub(super) width: Option<usize>,
-    pub(super) numbers: Numbers,
+pub struct Column {
+    /// Name of the array.
+    pub name: &'static str,
+    /// Numbers in a row of a two-dimensional array; `None` for one dimension.
+    pub width: Option<usize>,
+    /// All numbers, row by row.
+    pub numbers: Numbers,
 }
 
 impl Column {
@@ -78,7 +84,7 @@ impl Column {
         format!("{}.npy", self.name)
     }
 
-    /// All of the npy array before its numbers, of which there are so many rows.
+    /// The npy array before its numbers, for this number of rows.
     fn npy_header(&self, rows: usize) -> Vec<u8> {
         /// Magic string, version and length.
         const PREFIX: usize = 10;
@@ -132,11 +138,11 @@ fn crc(bytes: &[u8]) -> u32 {
     })
 }
 
-/// What stands before every member, without its name.
+/// Bytes of the header before every member, without its name.
 const LOCAL_HEADER: usize = 30;
 
-/// What both headers of a member have in common: version 2.0, no flags, stored, the first date there
-/// is, checksum, size twice, length of the name, nothing extra.
+/// The common part of both headers of a member: version 2.0, no flags, stored, the earliest date,
+/// checksum, size twice, length of the name, no extra field.
 fn common_header(name: &str, member: &[u8]) -> Vec<u8> {
     let mut header = Vec::new();
     for number in [20, 0, 0, 0, 1 << 5 | 1_u16] {
@@ -152,8 +158,9 @@ fn common_header(name: &str, member: &[u8]) -> Vec<u8> {
     header
 }
 
-/// The bytes of the archive, below 4 GiB.
-pub(super) fn write(columns: &[Column]) -> Vec<u8> {
+/// The bytes of an archive of these arrays, below 4 GiB.
+#[must_use]
+pub fn write(columns: &[Column]) -> Vec<u8> {
     let (mut bytes, mut directory) = (Vec::new(), Vec::new());
     for column in columns {
         let (name, member) = (column.member_name(), column.npy());
@@ -186,9 +193,10 @@ pub(super) fn write(columns: &[Column]) -> Vec<u8> {
     bytes
 }
 
-/// Columns of these names, widths and types, with so many rows each, from the bytes of an archive.
-/// `None` of bytes that [`write`] would not give back: nothing in them is trusted.
-pub(super) fn read(bytes: &[u8], like: &[Column], rows: usize) -> Option<Vec<Column>> {
+/// Reads an archive of arrays with the names, widths and types of `like` and this number of rows. `None`
+/// for any bytes that [`write`] would not have written: nothing in them is trusted.
+#[must_use]
+pub fn read(bytes: &[u8], like: &[Column], rows: usize) -> Option<Vec<Column>> {
     let mut at = 0_usize;
     let mut columns = Vec::new();
     for column in like {
