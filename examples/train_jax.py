@@ -1,14 +1,14 @@
-"""Trains the identifier's network on a dataset, in JAX, and writes it as a .safetensors file.
+"""Trains the identifier's network on a dataset, in JAX, and writes it as ONNX.
 
     onecycle dataset --examples 45000 --into multirotors
-    python examples/train_jax.py multirotors network.safetensors
+    python examples/train_jax.py multirotors network.onnx
+    onecycle pack import network.onnx --like default -o network.pack
 
 The dataset is a folder of npz files and a manifest.json; its last tenth validates. The network,
 34-H-H-14 with tanh, puts out a Gaussian of four scaled values: their mean, the logarithms of the
-diagonal of L, then what is below it row by row, with precision = L L^T. The file has the
-names and shapes of onecycle's own trainer, which reads it: 0.weight, 0.bias, 2.weight, ..
+diagonal of L, then the elements below it row by row, with precision = L L^T.
 
-Tried with Python 3.11, JAX 0.10.2, NumPy 2.4, safetensors 0.8.
+Tried with Python 3.11, JAX 0.10.2, NumPy 2.4, onnx 1.23.
 """
 
 import argparse
@@ -20,9 +20,10 @@ from pathlib import Path
 import jax
 import jax.numpy as jnp
 import numpy as np
-from safetensors.numpy import save_file
+import onnx
+from onnx import TensorProto, helper, numpy_helper
 
-# Values of the order of one, as onecycle_lab::dataset::learning has them.
+# Values of the order of one, as onecycle_lab::learn::dataset::learning has them.
 SCALE = np.array([1.0, 8.0, 8.0, 1.0])
 VALUES = 4
 OUTPUTS = 2 * VALUES + VALUES * (VALUES - 1) // 2
@@ -45,7 +46,7 @@ def load(folder):
 
 
 def initial(key, hidden):
-    """Weights out x in and biases, uniform up to 1 / sqrt(in), by the names of the file."""
+    """Weights out x in and biases, uniform up to 1 / sqrt(in), by their names."""
     parameters = {}
     for stage, (wide, high) in zip((0, 2, 4), ((34, hidden), (hidden, hidden), (hidden, OUTPUTS))):
         key, *keys = jax.random.split(key, 3)
@@ -128,10 +129,32 @@ def train(parameters, training, validation, arguments):
     return best
 
 
+def model(parameters):
+    """The network as ONNX: dense layers with tanh between them."""
+    nodes, current = [], "inputs"
+    for stage in (0, 2, 4):
+        constants = [f"{stage}.weight", f"{stage}.bias"]
+        output = f"sum_{stage}" if stage < 4 else "outputs"
+        nodes.append(helper.make_node("Gemm", [current, *constants], [output], transB=1))
+        if stage < 4:
+            current = f"tanh_{stage}"
+            nodes.append(helper.make_node("Tanh", [output], [current]))
+    rows = lambda name, columns: helper.make_tensor_value_info(
+        name, TensorProto.FLOAT, ["batch", columns]
+    )
+    numbers = [numpy_helper.from_array(values, name) for name, values in parameters.items()]
+    graph = helper.make_graph(
+        nodes, "network", [rows("inputs", 34)], [rows("outputs", OUTPUTS)], numbers
+    )
+    return helper.make_model(
+        graph, opset_imports=[helper.make_opsetid("", 17)], ir_version=8
+    )
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="the dataset")
-    parser.add_argument("out", type=Path, help="the .safetensors file to write")
+    parser.add_argument("out", type=Path, help="the .onnx file to write")
     parser.add_argument("--hidden", type=int, default=48)
     parser.add_argument("--epochs", type=int, default=60)
     parser.add_argument("--batch", type=int, default=64)
@@ -144,7 +167,7 @@ def main():
     parameters = initial(jax.random.key(arguments.seed), arguments.hidden)
     training, validation = (inputs[:split], values[:split]), (inputs[split:], values[split:])
     best = train(parameters, training, validation, arguments)
-    save_file(best, arguments.out)
+    onnx.save(model(best), arguments.out)
 
 
 if __name__ == "__main__":

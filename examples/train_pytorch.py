@@ -1,14 +1,14 @@
-"""Trains the identifier's network on a dataset, in PyTorch, and writes it as a .safetensors file.
+"""Trains the identifier's network on a dataset, in PyTorch, and writes it as ONNX.
 
     onecycle dataset --examples 45000 --into multirotors
-    python examples/train_pytorch.py multirotors network.safetensors
+    python examples/train_pytorch.py multirotors network.onnx
+    onecycle pack import network.onnx --like default -o network.pack
 
 The dataset is a folder of npz files and a manifest.json; its last tenth validates. The network,
 34-H-H-14 with tanh, puts out a Gaussian of four scaled values: their mean, the logarithms of the
-diagonal of L, then what is below it row by row, with precision = L L^T. The file has the
-names and shapes of onecycle's own trainer, which reads it: 0.weight, 0.bias, 2.weight, ..
+diagonal of L, then the elements below it row by row, with precision = L L^T.
 
-Tried with Python 3.11, PyTorch 2.15, NumPy 2.4, safetensors 0.8.
+Tried with Python 3.11, PyTorch 2.15, NumPy 2.4, onnx 1.23, onnxscript 0.7.
 """
 
 import argparse
@@ -18,9 +18,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from safetensors.torch import save_file
 
-# Values of the order of one, as onecycle_lab::dataset::learning has them.
+# Values of the order of one, as onecycle_lab::learn::dataset::learning has them.
 SCALE = np.array([1.0, 8.0, 8.0, 1.0])
 VALUES = 4
 OUTPUTS = 2 * VALUES + VALUES * (VALUES - 1) // 2
@@ -102,7 +101,7 @@ def train(model, training, validation, arguments):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path, help="the dataset")
-    parser.add_argument("out", type=Path, help="the .safetensors file to write")
+    parser.add_argument("out", type=Path, help="the .onnx file to write")
     parser.add_argument("--hidden", type=int, default=48)
     parser.add_argument("--epochs", type=int, default=60)
     parser.add_argument("--batch", type=int, default=64)
@@ -116,7 +115,15 @@ def main():
     model = network(arguments.hidden)
     training, validation = (inputs[:split], values[:split]), (inputs[split:], values[split:])
     best = train(model, training, validation, arguments)
-    save_file(best, arguments.out)
+    model.load_state_dict(best)
+    torch.onnx.export(
+        model.eval(),
+        (inputs[:2],),
+        arguments.out,
+        dynamo=True,
+        external_data=False,
+        dynamic_shapes=({0: torch.export.Dim("batch")},),
+    )
 
 
 if __name__ == "__main__":

@@ -4,18 +4,22 @@
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-use onecycle_lab::paper::grid::{Grid, Layout, Pieces, Settings, check};
 use onecycle_lab::space::Space;
 use onecycle_lab::space::candidate::{Candidate, Gains};
+use onecycle_lab::space::grid::{Grid, GridSettings, Layout, check};
+use onecycle_lab::workers::Workers;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 struct Threads(ThreadPool);
 
-impl Pieces for Threads {
-    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        self.0
-            .install(|| (0..count).into_par_iter().map(piece).collect())
+impl Workers for Threads {
+    fn count(&self) -> usize {
+        self.0.current_num_threads()
+    }
+
+    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
+        self.0.install(|| (0..parts).into_par_iter().for_each(part));
     }
 }
 
@@ -40,9 +44,9 @@ fn main() {
         let threads = Threads(pool.expect("threads start"));
         let of = threads.0.current_num_threads();
         for layout in [Layout::Rays, Layout::Fewest] {
-            let settings = Settings {
+            let settings = GridSettings {
                 layout,
-                ..Settings::default()
+                ..GridSettings::default()
             };
             let name = format!("{layout:?}, {of} thread(s)");
             let grid = whole(&name, || {

@@ -5,12 +5,14 @@
 
 mod common;
 
+use onecycle_lab::learn::npz::{self, Column, Numbers};
 use onecycle_lab::learn::onnx;
 use onecycle_lab::learn::onnx::Normalisation;
 use onecycle_lab::learn::pack::{
     LeadTableContents, PackContents, PackedWeights, Precision, layers,
 };
-use onecycle_lab::learn::train::{Layer, Matrix, Network, OneThread, TensorFile};
+use onecycle_lab::learn::train::{Layer, Matrix, Network};
+use onecycle_lab::workers::OneThread;
 use onecycle_onboard::pack::{
     DEFAULT, Domain, HEADER, OUTPUTS, OutputScaling, Pack, Prior, content_hash,
 };
@@ -174,7 +176,7 @@ fn damaged_files_are_refused() {
     let longer = [&bytes[..], b"more"].concat();
     let length = bytes.len();
     let cut_at = format!("cut off after {} of {length} bytes", length / 2);
-    let onnx = onnx::export(&network(4, OUTPUTS, 1), None).unwrap();
+    let onnx = onnx::export(&network(4, OUTPUTS, 1), None, &[]).unwrap();
     for (name, bytes, words) in [
         ("flipped", &flipped[..], "is damaged: its content hash"),
         ("newer", &newer, "made by a newer onecycle"),
@@ -184,11 +186,6 @@ fn damaged_files_are_refused() {
         ("empty", &[], "no bytes"),
         ("csv", b"time_s,pv,u\n0,1,2\n", "not a pack of onecycle"),
         ("onnx", &onnx, "no pack of onecycle"),
-        (
-            "tensors",
-            &network(4, OUTPUTS, 1).save(),
-            "no pack of onecycle",
-        ),
     ] {
         let path = folder.write(name, bytes);
         let (onnx, out) = (folder.name("out.onnx"), folder.name("out.pack"));
@@ -237,17 +234,19 @@ fn bad_arguments() {
 // ---------------------------------------------------------------- export and import
 
 fn samples(path: &str) -> (Matrix, Vec<f32>) {
-    let mut file = TensorFile::from_bytes(&std::fs::read(path).unwrap()).unwrap();
-    let inputs = file.take("inputs").unwrap();
-    let outputs = file.take("outputs").unwrap();
-    assert_eq!(outputs.shape, [inputs.shape[0], OUTPUTS]);
-    let [rows, columns] = inputs.shape[..] else {
-        unreachable!("inputs have rows and columns");
+    const ROWS: usize = 1000;
+    let column = |name, width| Column {
+        name,
+        width: Some(width),
+        numbers: Numbers::F32(Vec::new()),
     };
-    (
-        Matrix::from_rows(rows, columns, inputs.values).unwrap(),
-        outputs.values,
-    )
+    let like = [column("inputs", LENGTH), column("outputs", OUTPUTS)];
+    let read = npz::read(&std::fs::read(path).unwrap(), &like, ROWS).unwrap();
+    let [inputs, outputs] = [0, 1].map(|number| match &read[number].numbers {
+        Numbers::F32(values) => values.clone(),
+        _ => unreachable!("numbers are of single precision"),
+    });
+    (Matrix::from_rows(ROWS, LENGTH, inputs).unwrap(), outputs)
 }
 
 // The model, read back, is the pack's network behind its normalisation: the outputs differ by what
@@ -255,7 +254,7 @@ fn samples(path: &str) -> (Matrix, Vec<f32>) {
 #[test]
 fn what_is_exported_computes_the_same() {
     let (folder, path, bytes) = folder();
-    let (model, out) = (folder.name("a.onnx"), folder.name("a.safetensors"));
+    let (model, out) = (folder.name("a.onnx"), folder.name("a.npz"));
     assert_eq!(
         done(&["export", &path, "--onnx", &model, "--samples", &out]),
         ""
@@ -315,10 +314,10 @@ fn a_network_comes_back_from_onnx() {
 }
 
 #[test]
-fn a_network_comes_from_tensors() {
+fn a_network_of_other_widths_is_packed() {
     let (folder, path, _) = folder();
     let learnt = network(20, OUTPUTS, 9);
-    let model = folder.write("learnt.safetensors", &learnt.save());
+    let model = folder.write("learnt.onnx", &onnx::export(&learnt, None, &[]).unwrap());
     let out = folder.name("learnt.pack");
     let text = done(&["import", &model, "--like", &path, "-o", &out]);
     assert!(
@@ -339,11 +338,10 @@ fn a_network_comes_from_tensors() {
 fn networks_that_do_not_fit_are_refused() {
     let (folder, path, bytes) = folder();
     let out = folder.name("out.pack");
-    let onnx_of = |network: &Network| onnx::export(network, None).unwrap();
-    let deep = Network::zeros(LENGTH, &[Layer::Dense { outputs: OUTPUTS }]).unwrap();
+    let onnx_of = |network: &Network| onnx::export(network, None, &[]).unwrap();
     let narrow = Network::zeros(5, &[Layer::Dense { outputs: OUTPUTS }]).unwrap();
     for (name, bytes, words) in [
-        ("a.txt", &b"text"[..], "ends in .onnx or .safetensors"),
+        ("a.txt", &b"text"[..], "no ONNX model"),
         ("a.onnx", &bytes, "no ONNX model"),
         (
             "b.onnx",
@@ -355,12 +353,6 @@ fn networks_that_do_not_fit_are_refused() {
             "d.onnx",
             &onnx_of(&network(200, OUTPUTS, 1)),
             "1 to 128 wide",
-        ),
-        ("e.safetensors", &bytes, "safetensors"),
-        (
-            "f.safetensors",
-            &deep.save(),
-            "1 dense layers where the pack has 2",
         ),
     ] {
         let model = folder.write(name, bytes);

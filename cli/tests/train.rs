@@ -32,13 +32,8 @@ fn timeless(path: &str) -> Value {
 fn from_recipe_to_table_and_network_through_interruptions() {
     let folder = Scratch::new();
     let recipe = recipe(&folder);
-    let [whole, json, out, again] = [
-        "whole.safetensors",
-        "whole.json",
-        "out.safetensors",
-        "again.json",
-    ]
-    .map(|n| folder.name(n));
+    let [whole, json, out, again] =
+        ["whole.onnx", "whole.json", "out.onnx", "again.json"].map(|n| folder.name(n));
     let made = run(&["train", "--recipe", &recipe, "-o", &whole, "--json", &json]);
     assert_eq!(made.code, Some(0), "{made:?}");
     made.without_nan();
@@ -80,9 +75,9 @@ fn from_recipe_to_table_and_network_through_interruptions() {
         "--threads",
         "3",
     ];
-    for part in ["out.safetensors.1.part", "out.safetensors.2.part"] {
+    for part in ["out.onnx.1.part", "out.onnx.2.part"] {
         killed_when(&resumed, || folder.path(part).exists());
-        assert!(!folder.path("out.safetensors").exists());
+        assert!(!folder.path("out.onnx").exists());
     }
     let resumed = run(&resumed);
     assert_eq!(resumed.code, Some(0), "{resumed:?}");
@@ -155,8 +150,8 @@ fn wrong_recipes_are_refused_in_one_sentence() {
 fn a_part_of_something_else() {
     let folder = Scratch::new();
     let recipe = recipe(&folder);
-    let out = folder.name("out.safetensors");
-    let part = folder.path("out.safetensors.1.part");
+    let out = folder.name("out.onnx");
+    let part = folder.path("out.onnx.1.part");
     killed_when(&["train", "--recipe", &recipe, "-o", &out], || {
         part.exists()
     });
@@ -180,10 +175,10 @@ fn a_part_of_something_else() {
     ] {
         std::fs::write(&part, &bytes).unwrap();
         let refused = run(&["train", "--recipe", recipe, "-o", &out, "--resume"]);
-        refused.refused(UNREADABLE, &["out.safetensors.1.part", words]);
+        refused.refused(UNREADABLE, &["out.onnx.1.part", words]);
         assert!(std::fs::read(&part).unwrap() == bytes);
     }
-    let nowhere = folder.name("no/such/folder/out.safetensors");
+    let nowhere = folder.name("no/such/folder/out.onnx");
     let refused = run(&["train", "--recipe", &recipe, "-o", &nowhere]);
     refused.refused(NOT_WRITTEN, &["no/such/folder"]);
 }

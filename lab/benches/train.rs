@@ -1,12 +1,18 @@
 //! Samples a second in training: the paper's classifier and a small density, on one and two threads.
 
+#[path = "../tests/common/mod.rs"]
+mod common;
+
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use onecycle_lab::learn::train::{
-    Batch, Dropped, Layer, Loss, Matrix, Method, Network, OneThread, Optimizer, Tape, Workers,
+    Batch, Dropped, Layer, Loss, Matrix, Network, Optimizer, OptimizerMethod, Tape,
 };
+use onecycle_lab::workers::{OneThread, Workers};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
+
+use common::Threads;
 
 const BATCH: usize = 128;
 
@@ -14,25 +20,9 @@ fn main() {
     divan::main();
 }
 
-/// Two threads, started for every piece of work.
-struct TwoThreads;
-
-impl Workers for TwoThreads {
-    fn count(&self) -> usize {
-        2
-    }
-
-    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
-        std::thread::scope(|scope| {
-            scope.spawn(|| (0..parts).step_by(2).for_each(part));
-            (1..parts).step_by(2).for_each(part);
-        });
-    }
-}
-
 fn workers(threads: usize) -> &'static dyn Workers {
     if threads == 2 {
-        &TwoThreads
+        &Threads(2)
     } else {
         &OneThread
     }
@@ -85,7 +75,12 @@ fn batch(network: &Network) -> Batch {
 }
 
 /// Whole steps: forward, loss, backward, update.
-fn steps(bencher: Bencher, (mut network, loss): (Network, Loss), method: Method, threads: usize) {
+fn steps(
+    bencher: Bencher,
+    (mut network, loss): (Network, Loss),
+    method: OptimizerMethod,
+    threads: usize,
+) {
     let workers = workers(threads);
     let batch = batch(&network);
     let mut optimizer = Optimizer::new(method, &network).expect("the method is in range");
@@ -104,7 +99,7 @@ fn steps(bencher: Bencher, (mut network, loss): (Network, Loss), method: Method,
     });
 }
 
-const SGD: Method = Method::Sgd {
+const SGD: OptimizerMethod = OptimizerMethod::Sgd {
     momentum: 0.9,
     decay: 0.0,
 };
@@ -116,12 +111,12 @@ fn paper_network_sgd(bencher: Bencher, threads: usize) {
 
 #[divan::bench(args = [1, 2], sample_count = 20, sample_size = 1)]
 fn paper_network_adam(bencher: Bencher, threads: usize) {
-    steps(bencher, paper(), Method::ADAM, threads);
+    steps(bencher, paper(), OptimizerMethod::ADAM, threads);
 }
 
 #[divan::bench(args = [1, 2])]
 fn small_network_adam(bencher: Bencher, threads: usize) {
-    steps(bencher, small(), Method::ADAM, threads);
+    steps(bencher, small(), OptimizerMethod::ADAM, threads);
 }
 
 /// The paper's classifier at work on one sample.

@@ -1,34 +1,36 @@
 //! Random relay experiments: draw a process, run the relay, cut the cycles.
+//!
+//! ```text
+//! Recipe, Campaign, Benchmark   draw     -> RelayExperiment   run   -> Trace   cut   -> cycles, signature
+//! ```
+//!
+//! | module          | what it holds                                                             |
+//! |-----------------|---------------------------------------------------------------------------|
+//! | [`recipe`]      | which processes, how often, with which bias and noise: for learning       |
+//! | [`draw`]        | random draws of a recipe's experiments                                    |
+//! | [`defect`]      | defects that take a process out of the family                             |
+//! | [`campaign`]    | experiments on the paper's multirotors, described by a TOML file          |
+//! | [`benchmark`]   | the public benchmark: truths and recordings                               |
+//! | [`experiment`]  | one experiment: relay, pre-roll, noise, plant                             |
+//! | [`relays`]      | relays of other relay tests                                               |
+//! | [`oscillation`] | period and amplitude without bias, noise and defect                       |
+//! | [`cut`]         | cycles, signatures and samples of a recording                             |
 
-pub mod outsiders;
+pub mod benchmark;
+pub mod campaign;
+pub mod cut;
+pub mod defect;
+pub mod draw;
+pub mod experiment;
+pub mod oscillation;
 pub mod recipe;
+pub mod relays;
 
+pub use benchmark::{Benchmark, CYCLES_KEPT, IDENTIFICATION_PERIODS, Recorded, RelayTest, Truth};
+pub use campaign::{Campaign, MOST_CASES, Measure, SAMPLE_S};
+pub use cut::{SampledCycle, SteadyCycle, cycles, last_steady_cycle, signals_of};
+pub use defect::{Defect, DefectKind};
+pub use draw::Drawn;
+pub use experiment::{ExperimentError, RelayExperiment, RelaySetup, Simulation};
+pub use oscillation::Oscillation;
 pub use recipe::{Family, Recipe, RecipeError};
-
-use onecycle_identify::Signals;
-use onecycle_plant::{NoiseSource, Trace};
-use rand::{Rng, RngExt};
-use rand_distr::StandardNormal;
-
-/// Noise from the generator that the process of the experiment was drawn from: one stream for both.
-pub struct DrawnNoise<'a, R>(pub &'a mut R);
-
-impl<R: Rng> NoiseSource for DrawnNoise<'_, R> {
-    #[inline]
-    fn standard_normal(&mut self) -> f64 {
-        self.0.sample(StandardNormal)
-    }
-}
-
-/// A simulated experiment at an even sample period (s), as measured.
-#[must_use]
-pub fn signals_of(trace: &Trace, sample_period_s: f64) -> Signals<'_> {
-    Signals {
-        time_s: &trace.time_s,
-        input: &trace.input,
-        output: &trace.output,
-        samples_per_point: 1,
-        sample_period_s,
-        breaks: &[],
-    }
-}

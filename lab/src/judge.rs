@@ -2,8 +2,8 @@
 
 pub mod baselines;
 pub mod calibrate;
-pub mod campaign;
 pub mod evaluate;
 pub mod flights;
 pub mod harm;
-pub mod outsiders;
+pub mod out_of_family;
+pub mod outcome;

@@ -5,8 +5,7 @@ pub mod judge;
 pub mod learn;
 pub mod paper;
 pub mod space;
+pub mod workers;
 
-// Compiles and runs the code of the README.
-#[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+/// This program and its version, as files name their maker.
+pub(crate) const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));

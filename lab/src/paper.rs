@@ -1,4 +1,3 @@
-//! What only reproduces the paper: its classifier and its grid.
+//! The paper's classifier, which only reproduces the paper. Nothing outside this room uses it.
 
 pub mod classifier;
-pub mod grid;

@@ -11,6 +11,7 @@
 
 pub mod candidate;
 pub mod certificate;
+pub mod grid;
 pub mod limit_cycle;
 pub mod phase;
 pub mod rule;

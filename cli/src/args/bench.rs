@@ -4,7 +4,8 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Subcommand, ValueEnum};
-use onecycle_lab::judge::evaluate::{Benchmark, Contender, RelayTest};
+use onecycle_lab::experiments::{Benchmark, RelayTest};
+use onecycle_lab::judge::evaluate::Contender;
 
 use super::MOST_THREADS;
 

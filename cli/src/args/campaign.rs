@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use onecycle_identify::MOST_CYCLES;
-use onecycle_lab::judge::campaign::MOST_CASES;
+use onecycle_lab::experiments::MOST_CASES;
 
 use super::Method;
 

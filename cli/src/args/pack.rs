@@ -89,8 +89,8 @@ pub(crate) struct VerifyPack {
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle pack export default --onnx network.onnx\n",
-    "  onecycle pack export my.pack --onnx my.onnx --samples samples.safetensors\n",
-    "  python3 experiments/onnx_check.py my.onnx samples.safetensors\n"
+    "  onecycle pack export my.pack --onnx my.onnx --samples samples.npz\n",
+    "  python3 experiments/onnx_check.py my.onnx samples.npz\n"
 ))]
 pub(crate) struct ExportPack {
     /// The pack; default is the one built in
@@ -100,24 +100,24 @@ pub(crate) struct ExportPack {
     #[arg(long, value_name = "OUT.onnx")]
     pub(crate) onnx: PathBuf,
     /// Write random inputs and the outputs for them too, to check the model with
-    #[arg(long, value_name = "OUT.safetensors")]
+    #[arg(long, value_name = "OUT.npz")]
     pub(crate) samples: Option<PathBuf>,
 }
 
-/// Make a pack of a network that was learnt elsewhere; everything else is taken from another pack.
+/// Make a pack of a network that was trained elsewhere; everything else is taken from another pack.
 ///
-/// The network has 34 inputs and 14 outputs, as that of the other pack. An ONNX model brings its
-/// activations, and the normalisation of its inputs if it begins with one; a safetensors file has
-/// those of the other pack. Weights are kept in bytes where that pack keeps them so.
+/// The model is an ONNX file with 34 inputs and 14 outputs. If it begins with a normalisation of its
+/// inputs, the pack gets that one, else the normalisation of the other pack. Weights are stored in
+/// bytes if the other pack stores them in bytes.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle pack import learnt.onnx --like default -o learnt.pack\n",
-    "  onecycle pack import learnt.safetensors --like my.pack -o learnt.pack\n"
+    "  onecycle pack import learnt.onnx --like my.pack -o learnt.pack\n"
 ))]
 pub(crate) struct ImportPack {
-    /// The network: .onnx or .safetensors
-    #[arg(value_name = "MODEL")]
+    /// The network, an ONNX file
+    #[arg(value_name = "MODEL.onnx")]
     pub(crate) model: PathBuf,
     /// The pack that gives everything but the network; default is the one built in
     #[arg(long, value_name = "PACK|default")]

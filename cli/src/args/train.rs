@@ -16,7 +16,7 @@ use super::MOST_THREADS;
     "Examples:\n",
     "  onecycle train --recipe experiments/identifier.toml -o mine.pack\n",
     "  onecycle train --recipe cli/reproduction/paper_network_small.toml\n",
-    "  onecycle train --recipe cli/reproduction/paper_network.toml -o paper.safetensors --json table.json\n\n",
+    "  onecycle train --recipe cli/reproduction/paper_network.toml -o paper.onnx --json table.json\n\n",
     "With --out, every epoch is kept in OUT.1.part and so on until all is done: with --resume the same ",
     "command goes on from there, to the same bits.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or part, 5 output not written"
@@ -25,7 +25,7 @@ pub(crate) struct Train {
     /// The recipe, in TOML (see experiments/)
     #[arg(long, value_name = "FILE")]
     pub(crate) recipe: PathBuf,
-    /// Write the result to this file: the pack, or the best network as safetensors
+    /// Write the result to this file: the pack, or the best network as ONNX
     #[arg(long, short, value_name = "OUT")]
     pub(crate) out: Option<PathBuf>,
     /// Go on from where an interrupted run with the same recipe was

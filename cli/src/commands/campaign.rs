@@ -6,11 +6,11 @@ use std::process::ExitCode;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use onecycle::Model;
-use onecycle_lab::judge::campaign::{
-    Campaign, CaseError, IdentificationOutcome, Measure, RelayOutcome, SHAPE_AND_GAIN,
-    identification_outcome, relay_outcome,
-};
+use onecycle_lab::experiments::{Campaign, ExperimentError, Measure, RelayExperiment};
 use onecycle_lab::judge::evaluate::Costs;
+use onecycle_lab::judge::outcome::{
+    IdentificationOutcome, RelayOutcome, SHAPE_AND_GAIN, identification_outcome, relay_outcome,
+};
 use onecycle_onboard::refine::coordinate;
 use rayon::prelude::*;
 
@@ -33,7 +33,10 @@ pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
         .validate()
         .map_err(|error| settings::out_of_range(&arguments.file, error))?;
     let table = match campaign.measure {
-        Measure::Relay => relay_table(&campaign, &all(&campaign, relay_outcome)?),
+        Measure::Relay => {
+            let outcomes = all(&campaign, |_, experiment| relay_outcome(experiment))?;
+            relay_table(&campaign, &outcomes)
+        }
         Measure::Identification => {
             identification_table(&campaign, &all(&campaign, identification_outcome)?)
         }
@@ -46,14 +49,15 @@ pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
 /// Every case's outcome, in order whatever the number of threads.
 fn all<T: Send>(
     campaign: &Campaign,
-    outcome: impl Fn(&Campaign, &onecycle_lab::judge::campaign::Case) -> Result<T, CaseError> + Sync,
+    outcome: impl Fn(&Campaign, &RelayExperiment) -> Result<T, ExperimentError> + Sync,
 ) -> Result<Vec<T>, Failure> {
     let bar = progress_bar(campaign.cases);
     let done = AtomicU64::new(0);
     let outcomes = (0..campaign.cases)
         .into_par_iter()
         .map(|n| {
-            let result = campaign.case(n).and_then(|case| outcome(campaign, &case));
+            let experiment = campaign.experiment(n);
+            let result = experiment.and_then(|experiment| outcome(campaign, &experiment));
             bar.set_position(done.fetch_add(1, Ordering::Relaxed) + 1);
             result
         })

@@ -3,9 +3,10 @@
 use std::process::ExitCode;
 
 use indicatif::ProgressBar;
-use onecycle_lab::judge::campaign::{Campaign, Measure, relay_outcome};
+use onecycle_lab::experiments::{Campaign, Measure};
+use onecycle_lab::judge::outcome::relay_outcome;
 use onecycle_lab::space::Space;
-use onecycle_lab::space::certificate::{Certificate, LeastStable, Summary};
+use onecycle_lab::space::certificate::{Certificate, CertificateSummary, LeastStable};
 use onecycle_lab::space::surface::Direction;
 use onecycle_onboard::Soiptd;
 use rayon::prelude::*;
@@ -20,7 +21,7 @@ use crate::settings;
 /// Under one bias: what is certified, and in how many cases a simulation of the relay of the board
 /// came to a steady oscillation, without trim and with it.
 pub(crate) struct Row {
-    pub(crate) summary: Summary,
+    pub(crate) summary: CertificateSummary,
     pub(crate) settled: [usize; 2],
 }
 
@@ -129,7 +130,7 @@ fn row(space: &Space, shapes: &[Direction], bias: f64, bar: &ProgressBar) -> Res
             .sum::<Result<usize, Failure>>()?;
     }
     Ok(Row {
-        summary: Summary::of(bias, &certificates),
+        summary: CertificateSummary::of(bias, &certificates),
         settled,
     })
 }
@@ -172,11 +173,11 @@ fn settles(space: &Space, certificate: &Certificate, trim: bool) -> Result<bool,
         .times_s
         .map(|time_s| time_s * SIMULATED_PERIOD_S / period_s);
     let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).map_err(Failure::usage)?;
-    let mut case = campaign
-        .quiet_case(process, campaign.seed)
+    let mut experiment = campaign
+        .quiet_experiment(process, campaign.seed)
         .map_err(Failure::usage)?;
-    case.bias = certificate.bias;
-    case.sigma = SIMULATED_SIGMA * case.amplitude;
-    let outcome = relay_outcome(&campaign, &case).map_err(Failure::usage)?;
+    experiment.input_bias = certificate.bias;
+    experiment.noise_sigma = SIMULATED_SIGMA * experiment.oscillation.amplitude;
+    let outcome = relay_outcome(&experiment).map_err(Failure::usage)?;
     Ok(outcome.steady_at.is_some())
 }

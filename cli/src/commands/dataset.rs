@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use onecycle_lab::experiments::Recipe;
 use onecycle_lab::learn::dataset::shards::Manifest;
-use onecycle_lab::learn::identifier;
+use onecycle_lab::learn::identifier::IdentifierRecipe;
 
 use self::folder::Folder;
 use super::workers::{Lot, Workers};
@@ -94,7 +94,7 @@ fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
     // That of an identifier has the recipe of its experiments in a table.
     let table: toml::Table = settings::read(path)?;
     let recipe = if table.contains_key("experiments") {
-        settings::read::<identifier::Recipe>(path)?.experiments
+        settings::read::<IdentifierRecipe>(path)?.experiments
     } else {
         settings::read::<Recipe>(path)?
     };

@@ -7,7 +7,6 @@ use std::process::ExitCode;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::evaluate::{Cycles, CyclesError};
 use onecycle_lab::judge::flights::{judged, trace};
-use onecycle_lab::paper::grid::Pieces;
 use onecycle_onboard::tuner::TunerPhase;
 use onecycle_plant::multirotor::pilot::TICK_S;
 use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, Tuned, fly};

@@ -7,9 +7,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use onecycle_lab::paper::grid;
-use onecycle_lab::paper::grid::{Check, Grid, GridFile, Layout, Settings, check};
 use onecycle_lab::space::candidate::Gains;
+use onecycle_lab::space::grid;
+use onecycle_lab::space::grid::{Check, Grid, GridFile, GridSettings, Layout, check};
 
 use self::part::Part;
 use super::workers::Workers;
@@ -94,7 +94,7 @@ fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<Done, 
 }
 
 fn make(arguments: &args::Grid, workers: &Workers) -> Result<Done, Failure> {
-    let settings = Settings {
+    let settings = GridSettings {
         space: settings::space(arguments.space.as_deref())?,
         deterioration: arguments.deterioration,
         layout: if arguments.fewest {
@@ -131,7 +131,7 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<Done, Failure> {
     })
 }
 
-fn part_of(out: &Path, settings: &Settings, restart: bool) -> Result<Part, Failure> {
+fn part_of(out: &Path, settings: &GridSettings, restart: bool) -> Result<Part, Failure> {
     let mut path = out.as_os_str().to_owned();
     path.push(".part");
     let part = Part::open(PathBuf::from(path), settings, restart)?;
@@ -141,7 +141,11 @@ fn part_of(out: &Path, settings: &Settings, restart: bool) -> Result<Part, Failu
     Ok(part)
 }
 
-fn lay(settings: &Settings, part: Option<&mut Part>, workers: &Workers) -> Result<Grid, Failure> {
+fn lay(
+    settings: &GridSettings,
+    part: Option<&mut Part>,
+    workers: &Workers,
+) -> Result<Grid, Failure> {
     let Some(part) = part else {
         return Grid::build(settings, workers).map_err(Failure::usage);
     };

@@ -6,13 +6,13 @@ use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use onecycle_lab::learn::npz::{self, Column, Numbers};
 use onecycle_lab::learn::onnx;
 use onecycle_lab::learn::onnx::Normalisation;
 use onecycle_lab::learn::pack::{
-    PackContents, PackedWeights, Precision, Quantisation, layers, network_of_tensors, quantisation,
+    PackContents, PackedWeights, Precision, Quantisation, layers, quantisation,
 };
-use onecycle_lab::learn::train::{Network, Tensor, TensorFile};
-use onecycle_onboard::network::Activation;
+use onecycle_lab::learn::train::Network;
 use onecycle_onboard::pack::{DEFAULT, OUTPUTS, Pack, SELF_TEST_TOLERANCE};
 use onecycle_onboard::signature::LENGTH;
 use rand::{RngExt, SeedableRng};
@@ -84,8 +84,8 @@ fn export(arguments: &args::ExportPack) -> Result<ExitCode, Failure> {
         offsets: contents.input_offsets.to_vec(),
         scales: contents.input_scales.to_vec(),
     };
-    let model =
-        onnx::export(&network, Some(&normalisation)).map_err(|error| failed(error.to_string()))?;
+    let model = onnx::export(&network, Some(&normalisation), &[])
+        .map_err(|error| failed(error.to_string()))?;
     write_file(&arguments.onnx, |file| file.write_all(&model))?;
     if let Some(path) = &arguments.samples {
         let samples = samples_file(&pack);
@@ -94,24 +94,22 @@ fn export(arguments: &args::ExportPack) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// Random signatures and what the pack makes of them, as safetensors.
+/// Random signatures and the outputs of the pack for them, as npz.
 fn samples_file(pack: &Pack<'_>) -> Vec<u8> {
     let signatures = signatures(pack);
     let outputs = signatures
         .iter()
         .flat_map(|signature| pack.outputs(signature));
-    let tensor = |name: &str, columns, values| Tensor {
-        name: name.to_owned(),
-        shape: vec![SAMPLES, columns],
-        values,
+    let column = |name, width, numbers| Column {
+        name,
+        width: Some(width),
+        numbers: Numbers::F32(numbers),
     };
-    let outputs = tensor("outputs", OUTPUTS, outputs.collect());
-    let inputs = tensor("inputs", LENGTH, signatures.into_flattened());
-    TensorFile {
-        tensors: vec![inputs, outputs],
-        ..TensorFile::default()
-    }
-    .to_bytes()
+    let outputs = column("outputs", OUTPUTS, outputs.collect());
+    npz::write(&[
+        column("inputs", LENGTH, signatures.into_flattened()),
+        outputs,
+    ])
 }
 
 /// Random ones, within [`SPREAD`] once they are normalised.
@@ -140,12 +138,7 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
     let like = read(&arguments.like, &like_bytes)?;
     let mut contents = PackContents::read(&like)
         .map_err(|error| unreadable(&path(&arguments.like), error.to_string()))?;
-    let activations: Vec<_> = contents
-        .layers
-        .iter()
-        .map(|layer| layer.activation)
-        .collect();
-    let (normalisation, network) = learnt(&arguments.model, &activations)?;
+    let (normalisation, network) = learnt(&arguments.model)?;
     let failed = |reason: String| unreadable(&arguments.model, reason);
 
     let brings_normalisation = normalisation.is_some();
@@ -177,29 +170,11 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The network of a file, and the normalisation that it brings.
-fn learnt(
-    path: &Path,
-    activations: &[Activation],
-) -> Result<(Option<Normalisation>, Network), Failure> {
-    let failed = |reason: String| unreadable(path, reason);
-    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
-    match extension.to_str() {
-        Some("onnx") => {
-            let imported = onnx::import(&read_at_most(path, MOST_OF_A_MODEL)?)
-                .map_err(|error| failed(error.to_string()))?;
-            Ok((imported.normalisation, imported.network))
-        }
-        Some("safetensors") => {
-            let bytes = read_at_most(path, MOST_OF_A_MODEL)?;
-            let network = network_of_tensors(&bytes, activations)
-                .map_err(|error| failed(error.to_string()))?;
-            Ok((None, network))
-        }
-        _ => Err(failed(
-            "its name does not say what it is: a network ends in .onnx or .safetensors".to_owned(),
-        )),
-    }
+/// The network of an ONNX file, and the normalisation that it brings.
+fn learnt(path: &Path) -> Result<(Option<Normalisation>, Network), Failure> {
+    let imported = onnx::import(&read_at_most(path, MOST_OF_A_MODEL)?)
+        .map_err(|error| unreadable(path, error.to_string()))?;
+    Ok((imported.normalisation, imported.network))
 }
 
 /// How the pack keeps its weights.

@@ -12,7 +12,7 @@ use onecycle_lab::learn::train::{Dataset, Epoch, Outcome, Trainer};
 use serde::Deserialize;
 
 use self::part::Part;
-use crate::commands::workers::Workers;
+use crate::commands::workers::{Quiet, Workers};
 use crate::failure::Failure;
 use crate::{args, settings};
 
@@ -64,7 +64,7 @@ fn train(
     loop {
         let mut last = None;
         let outcome = trainer
-            .run(training, validation, workers, &mut |epoch| {
+            .run(training, validation, &Quiet(workers), &mut |epoch| {
                 last = Some(*epoch);
                 ControlFlow::Break(())
             })

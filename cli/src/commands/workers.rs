@@ -1,8 +1,7 @@
 //! Threads that work on pieces, and a bar that shows how far they are.
 
 use indicatif::ProgressBar;
-use onecycle_lab::learn::train;
-use onecycle_lab::paper::grid::Pieces;
+use onecycle_lab::workers;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -37,6 +36,16 @@ impl Workers {
         self.bar.set_position(done as u64);
     }
 
+    /// Runs pieces that the bar counts from zero; their results are in order.
+    pub(crate) fn map<T: Send>(
+        &self,
+        count: usize,
+        piece: impl Fn(usize) -> T + Send + Sync,
+    ) -> Vec<T> {
+        self.expect(count, 0);
+        self.run(count, piece)
+    }
+
     /// Runs pieces that the bar expects; their results are in order.
     pub(crate) fn run<T: Send>(
         &self,
@@ -65,29 +74,40 @@ impl Workers {
     }
 }
 
-impl Pieces for Workers {
-    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        self.expect(count, 0);
-        self.run(count, piece)
-    }
-}
-
-/// The same threads for one of several lots of work, which the bar expects together.
-pub(crate) struct Lot<'a>(pub(crate) &'a Workers);
-
-impl Pieces for Lot<'_> {
-    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        self.0.run(count, piece)
-    }
-}
-
-impl train::Workers for Workers {
+impl workers::Workers for Workers {
     fn count(&self) -> usize {
         self.threads()
     }
 
+    /// The bar counts the parts from zero.
     fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
-        self.pool
-            .install(|| (0..parts).into_par_iter().for_each(part));
+        self.expect(parts, 0);
+        self.run(parts, part);
+    }
+}
+
+/// The same threads for one of several lots of work that the bar expects together.
+pub(crate) struct Lot<'a>(pub(crate) &'a Workers);
+
+impl workers::Workers for Lot<'_> {
+    fn count(&self) -> usize {
+        self.0.threads()
+    }
+
+    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
+        self.0.run(parts, part);
+    }
+}
+
+/// The same threads for parts that the bar does not count.
+pub(crate) struct Quiet<'a>(pub(crate) &'a Workers);
+
+impl workers::Workers for Quiet<'_> {
+    fn count(&self) -> usize {
+        self.0.threads()
+    }
+
+    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
+        self.0.quietly(parts, part);
     }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use onecycle_lab::space::certificate::{Certificate, Summary};
+use onecycle_lab::space::certificate::{Certificate, CertificateSummary};
 use onecycle_onboard::Soiptd;
 use plotters::prelude::*;
 
@@ -150,7 +150,7 @@ fn draw_stability(area: &Area<'_>, certified: &Certified) -> Drawn {
         [(low, 1.0), (high, 1.0)],
         GREY.stroke_width(1),
     ))?;
-    type Radius = fn(&Summary) -> Option<f64>;
+    type Radius = fn(&CertificateSummary) -> Option<f64>;
     let curves: [(&str, RGBColor, Radius); 3] = [
         ("bare relay, where it has a cycle", RED, |s| s.bare.radius),
         ("with trim", BLUE, |s| s.trimmed_radius),

@@ -4,9 +4,9 @@
 use std::ops::Range;
 use std::path::Path;
 
-use onecycle_lab::paper::grid::{Grid, Settings, step};
 use onecycle_lab::space::Space;
 use onecycle_lab::space::candidate::{Candidate, CandidateError};
+use onecycle_lab::space::grid::{Grid, GridSettings, step};
 use onecycle_lab::space::surface::Direction;
 use plotters::prelude::*;
 
@@ -181,7 +181,11 @@ pub(crate) fn rays(space: &Space) -> [(&'static str, [f64; 3]); 2] {
     ]
 }
 
-fn draw_ray(area: &Area<'_>, settings: &Settings, (caption, times_s): (&str, [f64; 3])) -> Drawn {
+fn draw_ray(
+    area: &Area<'_>,
+    settings: &GridSettings,
+    (caption, times_s): (&str, [f64; 3]),
+) -> Drawn {
     let (alpha, points) = along(settings, times_s)?;
     let percent = 100.0 * settings.deterioration;
     let x = alpha.powf(-STEPS_ALONG)..alpha.powf(STEPS_ALONG);
@@ -240,7 +244,7 @@ fn draw_ray(area: &Area<'_>, settings: &Settings, (caption, times_s): (&str, [f6
 
 /// The grid's step along the ray through a process, and processes to either side of it.
 pub(crate) fn along(
-    settings: &Settings,
+    settings: &GridSettings,
     times_s: [f64; 3],
 ) -> Result<(f64, Vec<Along>), CandidateError> {
     let candidate = Candidate::new(&settings.space, settings.gains, times_s)?;

@@ -1,6 +1,6 @@
 //! The rules of the benchmark, and its leaderboard.
 
-use onecycle_lab::judge::evaluate::experiment::CYCLES_KEPT;
+use onecycle_lab::experiments::CYCLES_KEPT;
 use onecycle_lab::judge::evaluate::{PHASE_MARGIN_DEG, Record, Summary};
 use serde::Serialize;
 

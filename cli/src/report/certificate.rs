@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use onecycle_lab::space::Space;
-use onecycle_lab::space::certificate::{Certificate, Kind, Verdict};
+use onecycle_lab::space::certificate::{Certificate, CycleStability, RelayCounts};
 use onecycle_lab::space::limit_cycle::LimitCycle;
 use onecycle_lab::space::limit_cycle::sampled::{Motion, motion, symmetric_cycles};
 use onecycle_onboard::Soiptd;
@@ -55,7 +55,7 @@ fn without_bias(text: &mut String, certified: &Certified) {
     let one = certified
         .unbiased
         .iter()
-        .filter(|certificate| Verdict::of(&certificate.bare) == Verdict::Stable)
+        .filter(|certificate| CycleStability::of(&certificate.bare) == CycleStability::Stable)
         .count();
     let worst = &certified.least_stable;
     let [t_prop, t_body, tau] = worst.times_s.map(significant);
@@ -154,7 +154,7 @@ fn under_bias(text: &mut String, rows: &[Row]) {
     );
     for row in rows {
         let summary = &row.summary;
-        let Kind {
+        let RelayCounts {
             stable,
             coexisting,
             unstable,
@@ -182,7 +182,7 @@ fn under_bias(text: &mut String, rows: &[Row]) {
     }
 }
 
-fn stretch(kind: &Kind) -> String {
+fn stretch(kind: &RelayCounts) -> String {
     kind.stretch.map_or("-".to_owned(), |(low, high)| {
         format!("{low:.2} .. {high:.2}")
     })

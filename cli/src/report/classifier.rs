@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use onecycle_lab::learn::train::Loss;
-use onecycle_lab::paper::classifier::{INPUTS, Protocol, Rule, Score};
+use onecycle_lab::paper::classifier::{INPUTS, PickRule, Protocol, Score};
 use serde::Serialize;
 
 use super::json::to_text;
@@ -111,10 +111,10 @@ fn table(text: &mut String, set: &Set, number: usize, networks: &[Trained]) {
         "training",
     );
     for trained in networks {
-        for (rule, score) in Rule::ALL.into_iter().zip(&trained.scores[number]) {
+        for (rule, score) in PickRule::ALL.into_iter().zip(&trained.scores[number]) {
             let pick = match rule {
-                Rule::MostLikely => "most likely",
-                Rule::LeastExpectedCost => "least cost",
+                PickRule::MostLikely => "most likely",
+                PickRule::LeastExpectedCost => "least cost",
             };
             let seconds = format!("{} s", significant(trained.seconds));
             line(text, (name(&trained.loss), pick), score, &seconds);

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use onecycle_lab::paper::grid::{Check, Grid, Layout, Settings};
 use onecycle_lab::space::candidate::{CandidateError, Gains};
+use onecycle_lab::space::grid::{Check, Grid, GridSettings, Layout};
 use serde::Serialize;
 
 use super::json::to_text;
@@ -21,7 +21,7 @@ const SCHEMA: &str = "onecycle.grid.summary/1";
 #[derive(Serialize)]
 struct Summary<'a> {
     schema: &'static str,
-    settings: &'a Settings,
+    settings: &'a GridSettings,
     members: usize,
     members_per_row: Vec<usize>,
     alpha: Option<Alpha>,
@@ -80,7 +80,7 @@ pub(crate) fn json(done: &Done) -> String {
 /// The summary for people.
 pub(crate) fn text(done: &Done) -> String {
     let mut text = String::new();
-    let Settings {
+    let GridSettings {
         space,
         deterioration,
         layout,
@@ -237,7 +237,7 @@ pub(crate) fn html(done: &Done) -> Result<String, CandidateError> {
 }
 
 /// What neighbours on a ray cost each other.
-fn ray(settings: &Settings, name: &str, times_s: [f64; 3]) -> Result<Figure, CandidateError> {
+fn ray(settings: &GridSettings, name: &str, times_s: [f64; 3]) -> Result<Figure, CandidateError> {
     let (step, along) = picture::along(settings, times_s)?;
     let percent = 100.0 * settings.deterioration;
     let curve = |name, cost: fn(&picture::Along) -> f64| {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use onecycle_lab::learn::identifier::Recipe;
+use onecycle_lab::learn::identifier::IdentifierRecipe;
 use serde_json::{Value, json};
 
 use super::json::to_text;
@@ -12,7 +12,7 @@ use crate::commands::train::identifier::{Done, Scored};
 const SCHEMA: &str = "onecycle.identifier/1";
 
 /// What a pack says of itself.
-pub(crate) fn card(recipe: &Recipe, done: &Done) -> Value {
+pub(crate) fn card(recipe: &IdentifierRecipe, done: &Done) -> Value {
     json!({
         "program": concat!("onecycle ", env!("CARGO_PKG_VERSION")),
         "recipe": recipe,
@@ -26,7 +26,7 @@ pub(crate) fn card(recipe: &Recipe, done: &Done) -> Value {
     })
 }
 
-pub(crate) fn json(recipe: &Recipe, done: &Done) -> String {
+pub(crate) fn json(recipe: &IdentifierRecipe, done: &Done) -> String {
     let [simulated_s, learnt_s] = done.seconds;
     to_text(&json!({
         "schema": SCHEMA,

@@ -9,7 +9,7 @@
 //! | [`asymmetric`] | asymmetric relay, integrator with dead time   | that relay's recording           |
 //!
 //! All read a recording as [`Signals`], one sample a point and at an even period, and return a
-//! [`Rival`]: the controller they lead to and the process behind it, or the reason why there is none.
+//! [`BaselineAnswer`]: the controller they lead to and the process behind it, or the reason why there is none.
 //! Where there is a process the controller is its PD of least exact ISE at the phase margin asked for,
 //! so that identifiers are compared and nothing else. Only [`gmvc`] makes the controller that flies.
 //!
@@ -17,17 +17,18 @@
 //! use onecycle_lab::judge::baselines::{pem, rules};
 //! use onecycle_lab::experiments::signals_of;
 //! use onecycle_onboard::{Soiptd, Relay, RelaySettings};
-//! use onecycle_plant::{Experiment, Noise};
+//! use onecycle_plant::Experiment;
+//! use rand::SeedableRng;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let process = Soiptd::new(1.0, 0.02, 0.3, 0.01)?;
 //! let mut relay = Relay::new(RelaySettings::bare(1.0, -0.73))?;
-//! let mut noise = Noise::from_seed(1);
+//! let mut noise = rand_pcg::Pcg64Mcg::seed_from_u64(1);
 //! let trace = Experiment::new(process, 1e-3, 6.0).run(&mut relay, &mut noise);
 //! let signals = signals_of(&trace, 1e-3);
 //!
 //! let margin = 20_f64.to_radians();
-//! let by_pem = pem::identify(&signals, &pem::Settings::fair(), margin)?;
+//! let by_pem = pem::identify(&signals, &pem::PemSettings::fair(), margin)?;
 //! let by_rule = rules::identify(&signals, &rules::Rule::of_relay(-0.73, margin), 1)?;
 //! assert!((by_pem.pd.kp / by_rule.pd.kp - 1.0).abs() < 0.2);
 //! # Ok(())
@@ -47,7 +48,7 @@ use onecycle_identify::{Oscillation, Signals, Verdict, find_oscillation};
 
 /// What a rival makes of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rival {
+pub struct BaselineAnswer {
     /// The process it identifies; `None` for a rule that goes straight to the controller.
     pub process: Option<Soiptd>,
     /// The controller it leads to.
@@ -56,7 +57,7 @@ pub struct Rival {
 
 /// Why a rival has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RivalError {
+pub enum BaselineError {
     /// There is no steady oscillation where one is needed.
     #[error("{0}")]
     NoOscillation(Verdict),
@@ -83,9 +84,9 @@ pub enum RivalError {
     Optimum(#[from] OptimumError),
 }
 
-impl Rival {
+impl BaselineAnswer {
     /// The process with its PD of least ISE at a phase margin (rad).
-    fn of_process(process: Soiptd, phase_margin_rad: f64) -> Result<Self, RivalError> {
+    fn of_process(process: Soiptd, phase_margin_rad: f64) -> Result<Self, BaselineError> {
         Ok(Self {
             process: Some(process),
             pd: pd_at_phase_margin(&process, phase_margin_rad)?.pd,
@@ -98,11 +99,11 @@ impl Rival {
 const EVEN: f64 = 0.01;
 
 /// Checks that the recording is what every rival reads.
-fn check_even(signals: &Signals<'_>) -> Result<(), RivalError> {
+fn check_even(signals: &Signals<'_>) -> Result<(), BaselineError> {
     let samples = signals.time_s.len();
     let is_single = signals.samples_per_point == 1 && signals.breaks.is_empty();
     if !is_single || signals.input.len() != samples || signals.output.len() != samples {
-        return Err(RivalError::Uneven);
+        return Err(BaselineError::Uneven);
     }
     let sample_s = signals.sample_period_s;
     let strays = |(index, &time_s): (usize, &f64)| {
@@ -111,7 +112,7 @@ fn check_even(signals: &Signals<'_>) -> Result<(), RivalError> {
         stray_s.is_nan() || stray_s > EVEN * sample_s
     };
     if signals.time_s.iter().enumerate().any(strays) {
-        return Err(RivalError::Uneven);
+        return Err(BaselineError::Uneven);
     }
     Ok(())
 }
@@ -120,9 +121,9 @@ fn check_even(signals: &Signals<'_>) -> Result<(), RivalError> {
 fn steady_cycles(
     signals: &Signals<'_>,
     most: usize,
-) -> Result<(Oscillation, std::ops::Range<usize>), RivalError> {
+) -> Result<(Oscillation, std::ops::Range<usize>), BaselineError> {
     check_even(signals)?;
-    let found = find_oscillation(signals, most).map_err(RivalError::NoOscillation)?;
+    let found = find_oscillation(signals, most).map_err(BaselineError::NoOscillation)?;
     let half_s = 0.5 * signals.sample_period_s;
     let index = |time_s: f64| signals.time_s.partition_point(|&t| t < time_s - half_s);
     let window = index(found.start_s)..index(found.end_s);

@@ -1,43 +1,42 @@
-//! The calibration of a network: where its cycles of the family end.
+//! Calibration of a network's score on cycles of the family.
 //!
-//! How wide its posteriors usually are is a least-squares fit to cycles of the family; the limit of
-//! the score is what a given part of the same cycles exceeds, and the most noise is theirs. The cycles
-//! must be others than those it was trained with.
+//! The usual width of the posterior is a least-squares fit to cycles of the family. The limit of the score
+//! is the value that a given part of the same cycles exceeds, and the largest noise is theirs. The network
+//! must not have been trained with these cycles.
 
 use std::ops::Range;
 
 use onecycle_onboard::classify::{Calibration, OUTPUTS};
 
-use super::outsiders::{Classifier, Seen};
-use crate::experiments::Recipe;
-use crate::experiments::outsiders::{Kind, case};
-use crate::learn::dataset::ExampleError;
+use super::out_of_family::{NetworkFn, PERIODS, classification, relative_noise};
+use crate::experiments::{DefectKind, ExperimentError, Recipe, SteadyCycle};
 
-/// Noise that is taken for known, over the most that was seen: the meter itself errs by as much on a
-/// hundred samples.
+/// Largest noise that counts as known, over the largest noise seen: the noise measured in a hundred
+/// samples errs by as much.
 const NOISE_ROOM: f64 = 1.1;
 
-/// The calibration of a network from the cycles of these numbers of a recipe, so that `unknown` of them
-/// (0 to 1) are called unknown; scale and temperatures are those of `start`.
+/// Calibrates a network on the experiments of a recipe with these numbers, so that the fraction `unknown`
+/// (0 to 1) of their cycles is called unknown; scale and temperatures are those of `start`.
 ///
 /// # Errors
-/// See [`ExampleError`].
+/// [`ExperimentError`]: a field of the recipe is out of its range.
 pub fn calibrate(
     recipe: &Recipe,
     numbers: Range<u64>,
-    network: Classifier<'_>,
+    network: NetworkFn<'_>,
     start: &Calibration,
     unknown: f64,
-) -> Result<Calibration, ExampleError> {
+) -> Result<Calibration, ExperimentError> {
     let mut seen = Vec::new();
     for number in numbers {
-        if let Some(case) = case(recipe, Kind::InFamily, number)? {
-            let cycle = Seen::of(&case, &case.run()?);
+        if let Some(experiment) = recipe.experiment_with_defect(DefectKind::InFamily, number)? {
+            let (trace, _) = experiment.run(PERIODS)?;
+            let cycle = SteadyCycle::last_of(&trace, experiment.sample_s);
             seen.extend(cycle.map(|cycle| (cycle, network(&cycle.signature))));
         }
     }
     let mut calibration = Calibration {
-        // So that the scores below are the sums.
+        // With a limit of one the scores below are the bare sums.
         limit: 1.0,
         ..*start
     };
@@ -51,15 +50,15 @@ pub fn calibrate(
     }
     let most_noise = seen
         .iter()
-        .map(|(cycle, _)| cycle.noise())
+        .map(|(cycle, _)| relative_noise(cycle))
         .fold(0.0, f64::max);
     if most_noise > 0.0 {
         calibration.most_noise = NOISE_ROOM * most_noise;
     }
     let mut scores: Vec<f64> = seen
         .iter()
-        .filter_map(|(cycle, outputs): &(Seen, [f32; OUTPUTS])| {
-            Some(cycle.classify(outputs, &calibration)?.score)
+        .filter_map(|(cycle, outputs): &(SteadyCycle, [f32; OUTPUTS])| {
+            Some(classification(cycle, outputs, &calibration)?.score)
         })
         .collect();
     scores.sort_unstable_by(f64::total_cmp);
@@ -70,13 +69,13 @@ pub fn calibrate(
     Ok(calibration)
 }
 
-fn terms(cycle: &Seen) -> [f64; 3] {
+fn terms(cycle: &SteadyCycle) -> [f64; 3] {
     let [.., ln_samples] = cycle.signature.values;
-    Calibration::width_terms(cycle.noise(), f64::from(ln_samples).exp())
+    Calibration::width_terms(relative_noise(cycle), f64::from(ln_samples).exp())
 }
 
-/// Coefficients of three columns and what they leave (root mean square), by the normal equations;
-/// `None` where the columns do not determine them.
+/// Least-squares coefficients of three columns and the root mean square of the residual, by the normal
+/// equations; `None` if the columns do not determine the coefficients.
 fn least_squares(rows: &[([f64; 3], f64)]) -> Option<([f64; 3], f64)> {
     let mut matrix = [[0.0; 4]; 3];
     for (terms, value) in rows {
@@ -87,7 +86,7 @@ fn least_squares(rows: &[([f64; 3], f64)]) -> Option<([f64; 3], f64)> {
             matrix[i][3] += terms[i] * value;
         }
     }
-    // Gauss and Jordan; the matrix is positive definite, so that no pivot has to be looked for.
+    // Gauss-Jordan elimination; the matrix is positive definite, so no pivoting is needed.
     for pivot in 0..3 {
         let scale = matrix[pivot][pivot];
         if !(scale > 0.0 && scale.is_finite()) {

@@ -16,8 +16,7 @@
 //!
 //! | module         | what it holds                                                            |
 //! |----------------|--------------------------------------------------------------------------|
-//! | [`experiment`] | the experiments: random processes of the paper's domain, two protocols   |
-//! | [`contender`]  | the methods, ours and the rivals                                         |
+//! | [`contender`]  | the methods: ours and the [baselines](crate::judge::baselines)          |
 //! | [`summary`]    | many verdicts in a row of numbers                                        |
 //! | [`files`]      | truth, answers and results as CSV                                        |
 //!
@@ -39,7 +38,6 @@
 
 pub mod contender;
 pub mod cycles;
-pub mod experiment;
 pub mod files;
 #[cfg(feature = "parquet")]
 pub mod parquet;
@@ -47,13 +45,15 @@ pub mod summary;
 
 use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 
-pub use self::contender::{Contender, RelayTest, Seen};
+pub use self::contender::{Contender, Seen};
 pub use self::cycles::{Cycles, CyclesError};
-pub use self::experiment::{Benchmark, ExperimentError, Recorded, Truth};
 pub use self::summary::{Costs, Summary, quantile};
 use onecycle_design::cascade::Cascade;
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd};
+use onecycle_identify::Signals;
+
+use crate::experiments::{ExperimentError, Truth};
 
 /// Least phase margin of all controllers (degrees): the paper's.
 pub const PHASE_MARGIN_DEG: f64 = 20.0;
@@ -160,7 +160,7 @@ impl Judge {
         let mut record = Record {
             experiment,
             method: method.to_owned(),
-            outcome: Verdict::NoAnswer,
+            outcome: LoopOutcome::NoAnswer,
             deterioration: None,
             phase_margin_deg: None,
             k_over_t_body_error: None,
@@ -183,9 +183,9 @@ impl Judge {
             } => {
                 record.deterioration = Some(relative);
                 record.phase_margin_deg = Some(phase_margin_rad.to_degrees());
-                Verdict::Stable
+                LoopOutcome::Stable
             }
-            Deterioration::Unstable => Verdict::Unstable,
+            Deterioration::Unstable => LoopOutcome::Unstable,
         };
         if let Some(errors) = answer.process.and_then(|found| errors(&found, &self.truth)) {
             [
@@ -211,7 +211,7 @@ fn errors(found: &Soiptd, truth: &Soiptd) -> Option<[f64; 3]> {
 /// How an answer fares.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum LoopOutcome {
     /// Its loop is stable.
     Stable,
     /// Its loop is unstable.
@@ -228,7 +228,7 @@ pub struct Record {
     /// Name of the method.
     pub method: String,
     /// How its answer fares.
-    pub outcome: Verdict,
+    pub outcome: LoopOutcome,
     /// `J`, where the loop is stable.
     pub deterioration: Option<f64>,
     /// Phase margin on the true process (degrees), where the loop is stable.
@@ -250,33 +250,46 @@ impl Record {
     #[must_use]
     pub fn judged(&self) -> Option<Deterioration> {
         match (self.outcome, self.deterioration, self.phase_margin_deg) {
-            (Verdict::Stable, Some(relative), Some(margin_deg)) => Some(Deterioration::Stable {
-                relative,
-                phase_margin_rad: margin_deg.to_radians(),
-            }),
-            (Verdict::NoAnswer, ..) => None,
+            (LoopOutcome::Stable, Some(relative), Some(margin_deg)) => {
+                Some(Deterioration::Stable {
+                    relative,
+                    phase_margin_rad: margin_deg.to_radians(),
+                })
+            }
+            (LoopOutcome::NoAnswer, ..) => None,
             _ => Some(Deterioration::Unstable),
         }
     }
 }
 
-/// Every contender's record of an experiment. `recorded` is its recording; those whose relay test is
-/// another one get theirs, on the same process with the same bias, noise and seed. The clock tells
-/// seconds.
+/// Why an experiment cannot be evaluated; this never happens for experiments of the benchmark.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum EvaluationError {
+    /// The experiment cannot be run.
+    #[error("{0}")]
+    Experiment(#[from] ExperimentError),
+    /// The true process has no optimum to compare with.
+    #[error("{0}")]
+    Optimum(#[from] OptimumError),
+}
+
+/// Every contender's record of an experiment. `recorded` is the benchmark's recording; a contender with
+/// another relay test gets a recording of that test on the same process with the same bias, noise and
+/// seed. `clock` returns seconds.
 ///
 /// # Errors
-/// [`ExperimentError`] where the true process has no optimum or cannot be run.
+/// [`EvaluationError`]: the true process has no optimum or cannot be run.
 pub fn records(
     truth: &Truth,
-    recorded: &onecycle_identify::Signals<'_>,
+    recorded: &Signals<'_>,
     contenders: &[Contender],
     clock: &dyn Fn() -> f64,
-) -> Result<Vec<Record>, ExperimentError> {
+) -> Result<Vec<Record>, EvaluationError> {
     let judge = Judge::new(&truth.process)?;
     let mut records = Vec::with_capacity(contenders.len());
     for contender in contenders {
         let own = truth.recorded_by(contender.relay_test())?;
-        let seen = own.as_ref().map_or(Seen::of(*recorded), Recorded::seen);
+        let seen = own.as_ref().map_or(Seen::of(*recorded), Seen::of_recorded);
         let begin_s = clock();
         let answer = contender.answer(&seen);
         let seconds = clock() - begin_s;

@@ -1,7 +1,7 @@
 //! The shipped identifier: from a recipe to a pack, and what it is worth on cycles it has not seen.
 //!
 //! ```text
-//! Recipe -> Manifest -> records -> Trainer -> calibrate -> PackContents -> bytes
+//! IdentifierRecipe -> Manifest -> records -> Trainer -> calibrate -> PackContents -> bytes
 //!                                                              |
 //!                                                  Scores  <---+   as the board computes
 //! ```
@@ -17,7 +17,7 @@
 //! learning = 220000      # experiments to learn from
 //! choosing = 8000        # that choose the epoch and calibrate
 //! scoring = 8000         # that are scored
-//! # and what is left out of it: Recipe::default()
+//! # and what is left out of it: IdentifierRecipe::default()
 //!
 //! [experiments]          # a recipe of `dataset`
 //! ```
@@ -34,24 +34,24 @@ use rand_pcg::Pcg64Mcg;
 pub use self::calibration::{Calibrated, MOST_UNKNOWN, calibrated};
 pub use self::score::{Reliability, Scores, scores};
 use crate::experiments;
-use crate::experiments::RecipeError;
-use crate::learn::dataset;
+use crate::experiments::{ExperimentError, RecipeError};
 use crate::learn::dataset::VALUES;
 use crate::learn::dataset::learning::{SCALE, Wanted, batch};
-use crate::learn::dataset::shards::Record;
+use crate::learn::dataset::shards::ExampleRecord;
 use crate::learn::lead_table;
 use crate::learn::pack::{LeadTableContents, PackContents, PackContentsError, Precision, layers};
 use crate::learn::train::{
-    Batch, Gaussian, Layer, Loss, Method, Network, Schedule, Settings, Shape, TrainError,
+    Batch, Gaussian, Layer, Loss, Network, OptimizerMethod, Schedule, Shape, TrainError,
+    TrainingSettings,
 };
 use crate::space::{FieldError, first_out_of_range};
 
 /// How an identifier is made.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
-pub struct Recipe {
+pub struct IdentifierRecipe {
     /// What of; always `density` here.
-    pub network: Kind,
+    pub network: IdentifierKind,
     /// Widths of the hidden layers.
     pub hidden: Vec<usize>,
     /// Experiments to learn from.
@@ -83,15 +83,15 @@ pub struct Recipe {
 /// The kind of network, which tells recipes apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum IdentifierKind {
     /// A density over the values of a process.
     Density,
 }
 
-impl Default for Recipe {
+impl Default for IdentifierRecipe {
     fn default() -> Self {
         Self {
-            network: Kind::Density,
+            network: IdentifierKind::Density,
             hidden: vec![64, 64],
             learning: 220_000,
             choosing: 8_000,
@@ -139,13 +139,13 @@ pub enum IdentifierError {
     Table(#[from] lead_table::LeadTableError),
     /// An experiment cannot be made.
     #[error("{0}")]
-    Example(#[from] dataset::ExampleError),
+    Experiment(#[from] ExperimentError),
     /// The shapes of the family have no spread.
     #[error("the processes of the family are all alike: widen its space")]
     OneShape,
 }
 
-impl Recipe {
+impl IdentifierRecipe {
     /// Checks every field.
     ///
     /// # Errors
@@ -230,14 +230,14 @@ impl Recipe {
 
     /// How it learns.
     #[must_use]
-    pub fn settings(&self) -> Settings {
-        Settings {
+    pub fn settings(&self) -> TrainingSettings {
+        TrainingSettings {
             loss: Loss::CostAwareGaussian {
                 dimension: VALUES,
                 weight: self.cost_weight,
                 scale: self.cost_scale,
             },
-            method: Method::Adam {
+            method: OptimizerMethod::Adam {
                 b1: 0.9,
                 b2: 0.999,
                 decay: 0.0,
@@ -264,7 +264,7 @@ impl Recipe {
     pub fn pack(
         &self,
         network: &Network,
-        learnt: &[Record],
+        learnt: &[ExampleRecord],
         calibrated: &Calibrated,
     ) -> Result<PackContents, IdentifierError> {
         let precision = if self.bytes {
@@ -298,7 +298,7 @@ const SELF_TESTS: usize = 2;
 
 /// Rows to learn from.
 #[must_use]
-pub fn rows(records: &[Record]) -> Batch {
+pub fn rows(records: &[ExampleRecord]) -> Batch {
     batch(records, Wanted::ValuesAndSlopes)
 }
 

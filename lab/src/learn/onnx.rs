@@ -27,7 +27,7 @@
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let layers = [Layer::Dense { outputs: 8 }, Layer::Tanh, Layer::Dense { outputs: 2 }];
 //! let network = Network::new(3, &layers, &mut rand_pcg::Pcg64Mcg::seed_from_u64(1))?;
-//! let bytes = onnx::export(&network, None)?;
+//! let bytes = onnx::export(&network, None, &[])?;
 //! assert_eq!(onnx::import(&bytes)?.network, network);
 //! # Ok(())
 //! # }
@@ -38,7 +38,7 @@ mod export;
 mod import;
 mod message;
 
-use crate::learn::train::{TensorFileError, TrainError};
+use crate::learn::train::TrainError;
 
 pub use export::export;
 pub use import::{Imported, import};
@@ -87,10 +87,7 @@ pub enum OnnxError {
         /// Offsets or scales.
         found: usize,
     },
-    /// Numbers that no network holds.
-    #[error("{0}")]
-    Tensors(#[from] TensorFileError),
-    /// Sizes that no network has.
+    /// Sizes or numbers that no network has.
     #[error("{0}")]
     Train(#[from] TrainError),
 }

@@ -10,7 +10,6 @@
 //! machine that makes the pack; [`quantisation`] says how far they are from the network's own.
 
 mod layers;
-mod tensors;
 
 use onecycle_onboard::floats::Floats;
 use onecycle_onboard::network::Activation;
@@ -19,10 +18,9 @@ use onecycle_onboard::pack::{
 };
 use onecycle_onboard::signature::LENGTH;
 
-use crate::learn::train::{Network, TensorFileError, TrainError};
+use crate::learn::train::{Network, TrainError};
 
 pub use layers::{PackedLayer, PackedWeights, Precision, Quantisation, layers, quantisation};
-pub use tensors::{network_of_layers, network_of_tensors};
 
 /// What a pack holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -102,32 +100,7 @@ pub enum PackContentsError {
     /// The card is no JSON.
     #[error("the card of the pack is not JSON: {0}")]
     Card(String),
-    /// A file of tensors that is none of such a network.
-    #[error("{0}")]
-    Tensors(#[from] TensorFileError),
-    /// Tensors under names that are not those of layers.
-    #[error(
-        "tensor {0} is not named as those of a dense layer or batch normalisation are, such as \
-         0.weight or 2.bias"
-    )]
-    Name(String),
-    /// Another number of dense layers than there are activations for.
-    #[error(
-        "the file has {found} dense layers where the pack has {expected}, so their activations are \
-         not known: take a pack of as many layers, or a file that tells them (ONNX)"
-    )]
-    Depth {
-        /// Layers of the pack.
-        expected: usize,
-        /// Dense layers of the file.
-        found: usize,
-    },
-    /// No room for an activation between two layers of the file.
-    #[error(
-        "there is no number left for the activation behind layer {0}, as in 0.weight, 2.weight"
-    )]
-    NoGap(usize),
-    /// Sizes that no network has.
+    /// Sizes or numbers that no network has.
     #[error("{0}")]
     Train(#[from] TrainError),
 }
@@ -183,7 +156,7 @@ impl PackContents {
     /// # Errors
     /// Where the layers are none of a network.
     pub fn network(&self) -> Result<Network, PackContentsError> {
-        network_of_layers(&self.layers)
+        layers::network(&self.layers)
     }
 
     fn file(&self, self_tests: &[f32]) -> Vec<u8> {

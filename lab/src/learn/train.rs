@@ -10,17 +10,18 @@
 //! |---------------------------------------------------|----------------------------------------|
 //! | which network?                                    | [`Network`], a row of [`Layer`]s       |
 //! | what does it learn: a class, a cost, a density?   | [`Loss`]                               |
-//! | how?                                              | [`Method`], [`Schedule`], [`Settings`] |
+//! | how?                                              | [`OptimizerMethod`], [`Schedule`], [`TrainingSettings`] |
 //! | from what?                                        | [`Dataset`], which fills a [`Batch`]   |
-//! | how do weights come from PyTorch and go there?    | [`TensorFile`]: safetensors            |
-//! | on how many threads?                              | [`Workers`], the caller's              |
+//! | how do networks come from PyTorch and go there?   | [`onnx`](crate::learn::onnx)           |
+//! | on how many threads?                              | [`Workers`](crate::workers::Workers), the caller's |
 //!
 //! Rows are samples throughout: inputs `batch x in`, weights of a dense layer `out x in`, outputs
 //! `batch x out`. Conventions and names are those of PyTorch, so that numbers can be compared.
 //! The same seed gives the same bits, on any number of threads and through any interruption.
 //!
 //! ```
-//! use onecycle_lab::learn::train::{Layer, Matrix, Network, OneThread};
+//! use onecycle_lab::learn::train::{Layer, Matrix, Network};
+//! use onecycle_lab::workers::OneThread;
 //! use rand::SeedableRng;
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -46,7 +47,6 @@ mod network;
 mod optimizer;
 mod schedule;
 mod softmax;
-mod tensor_file;
 mod trainer;
 
 use rand::{Rng, SeedableRng};
@@ -57,12 +57,11 @@ pub use data::{Batch, Dataset};
 pub use density::Gaussian;
 pub use layer::Layer;
 pub use loss::Loss;
-pub use matrix::{Matrix, OneThread, Workers};
+pub use matrix::Matrix;
 pub use network::{Dropped, Network, Tape};
-pub use optimizer::{Method, Optimizer};
+pub use optimizer::{Optimizer, OptimizerMethod};
 pub use schedule::{Schedule, Shape};
-pub use tensor_file::{Tensor, TensorFile, TensorFileError};
-pub use trainer::{Epoch, Outcome, Settings, Trainer};
+pub use trainer::{Epoch, Outcome, Trainer, TrainingSettings};
 
 use crate::space::FieldError;
 
@@ -96,6 +95,16 @@ pub enum TrainError {
     /// The variance of one sample.
     #[error("batch normalisation needs batches of at least two samples to learn from")]
     OneSample,
+    /// A number that no network can hold.
+    #[error("{layer}.{array} of the network holds {value:?}")]
+    Value {
+        /// Number of the layer, from 0.
+        layer: usize,
+        /// Name of the array.
+        array: &'static str,
+        /// The number.
+        value: f32,
+    },
     /// No data.
     #[error("there is no sample to {0}")]
     NoSample(&'static str),

@@ -2,10 +2,10 @@
 //! (section III-C; Ayyad, Chehadeh, Awad, Zweiri 2020).
 //!
 //! ```text
-//! Recipe -> Classes, the members of a grid
+//! ClassifierRecipe -> Classes, the members of a grid
 //!        -> Examples: Trials under the relay -> SampledCycle -> Prepared, the network's 4520 inputs
 //!                                                            -> Measured, what tells the gain
-//!        -> Network 4520-3000-1000-N, a Loss each -> picks by either Rule -> Score
+//!        -> Network 4520-3000-1000-N, a Loss each -> picks by either PickRule -> Score
 //! ```
 //!
 //! Where the paper leaves something open, or something else is better, this is what is done:
@@ -32,24 +32,26 @@ mod input;
 mod scoring;
 mod standard;
 
-use onecycle_onboard::{RelayError, SoiptdError};
+use onecycle_onboard::SoiptdError;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-pub use classes::{Class, Classes, Gain, Measured, Truth, label};
+pub use classes::{Class, Classes, Gain, Measured, TrueProcess, label};
 pub use examples::{Examples, Processes};
-pub use experiment::{Protocol, SAMPLE_S, SampledCycle, Trial, Trials};
+pub use experiment::{Protocol, Trial, Trials};
 pub use harmonic::{Harmonics, Response};
 pub use input::{Fit, INPUTS, Prepared, SAMPLES};
-pub use scoring::{Rule, Score, least_expected_cost, most_likely, picks};
+pub use scoring::{PickRule, Score, least_expected_cost, most_likely, picks};
 pub use standard::{Standard, Standardised};
 
+use crate::experiments::ExperimentError;
 use crate::learn::train::{
-    Layer, Loss, Method, Network, Schedule, Settings, TensorFileError, TrainError,
+    Layer, Loss, Network, OptimizerMethod, Schedule, TrainError, TrainingSettings,
 };
-use crate::paper::grid;
-use crate::paper::grid::{Grid, GridError, Pieces};
+use crate::space::grid;
+use crate::space::grid::{Grid, GridError};
 use crate::space::{FieldError, Space, first_out_of_range};
+use crate::workers::Workers;
 use onecycle_design::soiptd_pd::optimum::OptimumError;
 
 /// Why there is no classifier.
@@ -67,9 +69,9 @@ pub enum ClassifierError {
     /// A process has no controller.
     #[error("{0}")]
     Optimum(#[from] OptimumError),
-    /// The relay's settings are out of range.
+    /// An experiment cannot be run.
     #[error("{0}")]
-    Relay(#[from] RelayError),
+    Experiment(#[from] ExperimentError),
     /// The relay does not make a class oscillate.
     #[error(
         "T_prop, T_body, tau of {0:?} s do not oscillate under this relay: choose a smaller beta"
@@ -78,9 +80,6 @@ pub enum ClassifierError {
     /// Network and examples do not fit each other.
     #[error("{0}")]
     Train(#[from] TrainError),
-    /// Weights of another network.
-    #[error("{0}")]
-    Weights(#[from] TensorFileError),
     /// A loss that reads something else than classes and their costs.
     #[error(
         "losses: a classifier learns classes; take a loss that reads them, such as cross_entropy"
@@ -91,9 +90,9 @@ pub enum ClassifierError {
 /// All that makes a classifier, its examples included.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Recipe {
+pub struct ClassifierRecipe {
     /// What it is a recipe of.
-    pub network: Kind,
+    pub network: ClassifierKind,
     /// Seed of experiments, first weights, shuffling and dropout; below 2^32.
     pub seed: u64,
     /// The processes; the paper's multirotors where it is left out.
@@ -126,7 +125,7 @@ pub struct Recipe {
     /// What the networks are tested on: random processes.
     pub tests: Vec<Test>,
     /// How a gradient becomes a step.
-    pub method: Method,
+    pub method: OptimizerMethod,
     /// The learning rate.
     pub schedule: Schedule,
     /// Samples a step.
@@ -143,7 +142,7 @@ pub struct Recipe {
 /// The word by which a file says that it is of a classifier.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum ClassifierKind {
     /// `network = "classifier"`.
     Classifier,
 }
@@ -193,7 +192,7 @@ enum Purpose {
     Test,
 }
 
-impl Recipe {
+impl ClassifierRecipe {
     /// Checks every field.
     ///
     /// # Errors
@@ -249,11 +248,11 @@ impl Recipe {
         Ok(())
     }
 
-    fn grid(&self) -> grid::Settings {
-        grid::Settings {
+    fn grid(&self) -> grid::GridSettings {
+        grid::GridSettings {
             space: self.space,
             deterioration: self.deterioration,
-            ..grid::Settings::default()
+            ..grid::GridSettings::default()
         }
     }
 
@@ -271,8 +270,8 @@ impl Recipe {
     ///
     /// # Errors
     /// Where the grid cannot be laid.
-    pub fn classes(&self, pieces: &impl Pieces) -> Result<Classes, ClassifierError> {
-        Classes::of(&Grid::build(&self.grid(), pieces)?)
+    pub fn classes(&self, workers: &dyn Workers) -> Result<Classes, ClassifierError> {
+        Classes::of(&Grid::build(&self.grid(), workers)?)
     }
 
     /// What is learnt from.
@@ -282,7 +281,7 @@ impl Recipe {
     pub fn training(
         &self,
         classes: &Classes,
-        pieces: &impl Pieces,
+        workers: &dyn Workers,
     ) -> Result<Examples, ClassifierError> {
         let trials = self.trials(Purpose::Training, self.seed, self.protocol);
         let processes = match self.class_every {
@@ -293,7 +292,7 @@ impl Recipe {
             (&trials, self.examples),
             processes,
             (classes, self.gain, self.fit),
-            pieces,
+            workers,
         )
     }
 
@@ -304,7 +303,7 @@ impl Recipe {
     pub fn verification(
         &self,
         classes: &Classes,
-        pieces: &impl Pieces,
+        workers: &dyn Workers,
     ) -> Result<Examples, ClassifierError> {
         let trials = self.trials(Purpose::Verification, self.seed, self.protocol);
         let count = self.verification * classes.len() as u64;
@@ -312,7 +311,7 @@ impl Recipe {
             (&trials, count),
             Processes::Classes,
             (classes, self.gain, self.fit),
-            pieces,
+            workers,
         )
     }
 
@@ -324,14 +323,14 @@ impl Recipe {
         &self,
         test: &Test,
         classes: &Classes,
-        pieces: &impl Pieces,
+        workers: &dyn Workers,
     ) -> Result<Examples, ClassifierError> {
         let trials = self.trials(Purpose::Test, test.seed, test.protocol);
         Examples::make(
             (&trials, test.systems),
             Processes::Random,
             (classes, self.gain, self.fit),
-            pieces,
+            workers,
         )
     }
 
@@ -359,11 +358,11 @@ impl Recipe {
 
     /// How the network of loss `number`, of those there are, is trained.
     #[must_use]
-    pub fn settings(&self, number: usize) -> Settings {
+    pub fn settings(&self, number: usize) -> TrainingSettings {
         let choice = &self.losses[number];
         let mut schedule = self.schedule;
         schedule.rate = choice.rate.unwrap_or(schedule.rate);
-        Settings {
+        TrainingSettings {
             loss: choice.loss,
             method: self.method,
             schedule,

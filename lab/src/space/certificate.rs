@@ -18,7 +18,7 @@ use crate::space::Space;
 use crate::space::limit_cycle::{LimitCycle, limit_cycles, symmetric, trimmed_spectral_radius};
 use crate::space::surface::Direction;
 
-pub use self::summary::{Kind, Summary};
+pub use self::summary::{CertificateSummary, RelayCounts};
 
 /// What holds of one process under one bias.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +43,7 @@ pub struct Certificate {
 /// What a list of limit cycles says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum CycleStability {
     /// One stable cycle.
     Stable,
     /// Two stable cycles or more: the start decides.
@@ -54,7 +54,7 @@ pub enum Verdict {
     NoCycle,
 }
 
-impl Verdict {
+impl CycleStability {
     /// Of these cycles.
     #[must_use]
     pub fn of<'a>(cycles: impl IntoIterator<Item = &'a LimitCycle>) -> Self {

@@ -1,18 +1,20 @@
-//! What several tests need.
+//! Helpers that several tests share.
 
-use onecycle_lab::paper::grid::Pieces;
+use onecycle_lab::workers::Workers;
 
-/// Pieces on two threads.
-pub(crate) struct Two;
+/// This many threads, started for every piece of work; each takes every so many parts.
+pub(crate) struct Threads(pub(crate) usize);
 
-impl Pieces for Two {
-    fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        let half = count / 2;
+impl Workers for Threads {
+    fn count(&self) -> usize {
+        self.0
+    }
+
+    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
         std::thread::scope(|scope| {
-            let upper = scope.spawn(|| (half..count).map(&piece).collect::<Vec<T>>());
-            let mut all: Vec<T> = (0..half).map(&piece).collect();
-            all.extend(upper.join().unwrap());
-            all
-        })
+            for thread in 0..self.0 {
+                scope.spawn(move || (thread..parts).step_by(self.0).for_each(part));
+            }
+        });
     }
 }

@@ -9,8 +9,8 @@
 
 use std::path::{Path, PathBuf};
 
+use onecycle_lab::experiments::{Benchmark, Truth};
 use onecycle_lab::judge::evaluate::files::{TableError, read_truth};
-use onecycle_lab::judge::evaluate::{Benchmark, Truth};
 use serde::{Deserialize, Serialize};
 
 use crate::args::Format;

@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::process::ExitCode;
 
+use onecycle_lab::experiments::{Benchmark, Recorded, Truth};
 use onecycle_lab::judge::evaluate::files::truth_csv;
-use onecycle_lab::judge::evaluate::{Benchmark, Recorded, Truth};
 use onecycle_link::{Recording, write_csv};
 
 use super::folder::{self, FORMAT, MANIFEST, Manifest, RULES, TRUTH, recording};

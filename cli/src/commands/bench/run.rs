@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use onecycle::with_signals;
+use onecycle_lab::experiments::Truth;
 use onecycle_lab::judge::evaluate::files::{read_answers, results_csv};
-use onecycle_lab::judge::evaluate::{Contender, Judge, Record, Truth, records};
+use onecycle_lab::judge::evaluate::{Contender, Judge, Record, records};
 
 use super::folder::{self, TRUTH, read_text, refused, unreadable};
 use super::part::{Head, Part};

@@ -6,7 +6,8 @@
 
 use std::path::Path;
 
-use onecycle_lab::judge::evaluate::{Contender, Recorded, RelayTest, Truth};
+use onecycle_lab::experiments::{Recorded, RelayTest, Truth};
+use onecycle_lab::judge::evaluate::Contender;
 use onecycle_link::{Recording, write_csv};
 
 use super::folder::{numbered, refuse_filled};

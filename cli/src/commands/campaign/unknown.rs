@@ -3,10 +3,8 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use onecycle_lab::experiments::outsiders::Kind;
-use onecycle_lab::judge::campaign::Campaign;
-use onecycle_lab::judge::outsiders::{CYCLES, Judgement, Road, judge};
-use onecycle_lab::learn::dataset::ExampleError;
+use onecycle_lab::experiments::{Campaign, DefectKind, ExperimentError};
+use onecycle_lab::judge::out_of_family::{CYCLES, CycleClassifier, Evaluated, evaluate};
 use onecycle_onboard::classify::{Calibration, ClassifyError, Familiarity};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::Signature;
@@ -27,27 +25,27 @@ pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure>
         .map_err(|error| settings::out_of_range(file, error))?;
     let pack = Pack::embedded().map_err(Failure::usage)?;
     let network = |signature: &Signature| pack.outputs(&signature.values);
-    let road = Road {
+    let classifier = CycleClassifier {
         network: &network,
         calibration: Calibration::of_pack(&pack)
             .ok_or_else(|| Failure::usage(ClassifyError::Pack))?,
     };
-    let kinds = || std::iter::once(Kind::InFamily).chain(Kind::OUTSIDE);
+    let kinds = || std::iter::once(DefectKind::InFamily).chain(DefectKind::OUTSIDE);
     let cases = |kind| match kind {
-        Kind::InFamily => IN_FAMILY * campaign.cases,
+        DefectKind::InFamily => IN_FAMILY * campaign.cases,
         _ => campaign.cases,
     };
     let bar = progress_bar(kinds().map(cases).sum());
     let mut rows = Vec::new();
     for kind in kinds() {
-        let outcomes: Vec<Option<Judgement>> = (0..cases(kind))
+        let outcomes: Vec<Option<Evaluated>> = (0..cases(kind))
             .into_par_iter()
             .map(|n| {
-                let outcome = judge(&recipe, kind, n, Some(&road));
+                let outcome = evaluate(&recipe, kind, n, Some(&classifier));
                 bar.inc(1);
                 outcome
             })
-            .collect::<Result<_, ExampleError>>()
+            .collect::<Result<_, ExperimentError>>()
             .map_err(Failure::usage)?;
         rows.push((kind, outcomes.into_iter().flatten().collect::<Vec<_>>()));
     }
@@ -55,7 +53,7 @@ pub(super) fn table(file: &Path, campaign: &Campaign) -> Result<String, Failure>
     Ok(text(campaign, &rows))
 }
 
-fn text(campaign: &Campaign, rows: &[(Kind, Vec<Judgement>)]) -> String {
+fn text(campaign: &Campaign, rows: &[(DefectKind, Vec<Evaluated>)]) -> String {
     let mut text = format!(
         "{} random processes with each defect, bias up to {} h, noise up to {} of the amplitude, trim {}\n\
          refused, and accepted although the controller costs over 10 % more than promised, of {} \
@@ -97,7 +95,7 @@ fn text(campaign: &Campaign, rows: &[(Kind, Vec<Judgement>)]) -> String {
 }
 
 /// Cases with a score that are harmful or not: all, and those called unknown.
-fn by_score(outcomes: &[Judgement], harmful: bool) -> [usize; 2] {
+fn by_score(outcomes: &[Evaluated], harmful: bool) -> [usize; 2] {
     let scored = || {
         (outcomes.iter())
             .filter_map(|outcome| outcome.scored)
@@ -108,7 +106,7 @@ fn by_score(outcomes: &[Judgement], harmful: bool) -> [usize; 2] {
 }
 
 /// Refused by the identification of so many cycles, and accepted but harmful.
-fn by_identification(outcomes: &[Judgement], k: usize) -> [usize; 2] {
+fn by_identification(outcomes: &[Evaluated], k: usize) -> [usize; 2] {
     let accepted = || {
         outcomes
             .iter()
@@ -119,7 +117,7 @@ fn by_identification(outcomes: &[Judgement], k: usize) -> [usize; 2] {
 }
 
 /// Harmful, accepted from the most cycles, and without a word on the last of them.
-fn silent(outcomes: &[Judgement]) -> usize {
+fn silent(outcomes: &[Evaluated]) -> usize {
     (outcomes.iter())
         .filter(|outcome| {
             let is_accepted = (outcome.identified.last().copied().flatten())

@@ -7,7 +7,9 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use onecycle_lab::experiments::Recipe;
-use onecycle_lab::learn::dataset::shards::{Entry, MANIFEST_NAME, Manifest, Record, file_name};
+use onecycle_lab::learn::dataset::shards::{
+    Entry, ExampleRecord, MANIFEST_NAME, Manifest, file_name,
+};
 
 use crate::failure::Failure;
 use crate::output::write_file;
@@ -82,7 +84,7 @@ impl Folder {
     }
 
     /// The experiments of all files, in order.
-    pub(crate) fn records(&self) -> Result<Vec<Record>, Failure> {
+    pub(crate) fn records(&self) -> Result<Vec<ExampleRecord>, Failure> {
         let mut records = Vec::with_capacity(self.manifest.rows());
         for shard in 0..self.manifest.shards.len() {
             records.extend(self.records_of(shard)?);
@@ -90,7 +92,7 @@ impl Folder {
         Ok(records)
     }
 
-    fn records_of(&self, shard: usize) -> Result<Vec<Record>, Failure> {
+    fn records_of(&self, shard: usize) -> Result<Vec<ExampleRecord>, Failure> {
         let path = self.path.join(file_name(shard));
         let bytes = std::fs::read(&path).map_err(|error| refused(&path, error.to_string()))?;
         let read = self.manifest.records(shard, &bytes);

@@ -13,7 +13,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader};
 use std::path::{Path, PathBuf};
 
-use onecycle_lab::paper::grid::{Ray, Settings};
+use onecycle_lab::space::grid::{GridSettings, Ray};
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
@@ -35,7 +35,7 @@ enum Line {
 struct Head {
     format: String,
     program: String,
-    settings: Settings,
+    settings: GridSettings,
 }
 
 /// The file, open for more, and what it holds; the costs stay where they are.
@@ -49,7 +49,11 @@ pub(super) struct Part {
 
 impl Part {
     /// Opens the file of these settings, or begins one.
-    pub(super) fn open(path: PathBuf, settings: &Settings, restart: bool) -> Result<Self, Failure> {
+    pub(super) fn open(
+        path: PathBuf,
+        settings: &GridSettings,
+        restart: bool,
+    ) -> Result<Self, Failure> {
         let head = Head {
             format: FORMAT.to_owned(),
             program: env!("CARGO_PKG_VERSION").to_owned(),

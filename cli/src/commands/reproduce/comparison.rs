@@ -1,7 +1,7 @@
 //! Table IV and the tuning rules: several methods on the same random processes, under both protocols.
 
-use onecycle_lab::judge::evaluate::{Benchmark, Contender, Record, Summary, records};
-use onecycle_lab::paper::grid::Pieces;
+use onecycle_lab::experiments::Benchmark;
+use onecycle_lab::judge::evaluate::{Contender, EvaluationError, Record, Summary, records};
 use serde::Deserialize;
 
 use super::part::{Found, Row};
@@ -36,14 +36,13 @@ pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Fail
     };
     let judged = workers.map(benchmark.experiments as usize, |index| {
         let (truth, recorded) = benchmark.experiment(index as u64 + 1)?;
-        let signals = recorded.seen().signals;
+        let signals = recorded.signals();
         Ok((
             truth.is_trimmed,
             records(&truth, &signals, &contenders, &thread_seconds)?,
         ))
     });
-    let judged: Result<Vec<(bool, Vec<Record>)>, onecycle_lab::judge::evaluate::ExperimentError> =
-        judged.into_iter().collect();
+    let judged: Result<Vec<(bool, Vec<Record>)>, EvaluationError> = judged.into_iter().collect();
     let judged = judged.map_err(Failure::usage)?;
     let mut found = Found::default();
     for is_trimmed in [false, true] {

@@ -1,7 +1,7 @@
 //! The paper's figures of signals: a cycle as its network sees it, and what PEM is given.
 
 use onecycle_identify::find_oscillation;
-use onecycle_lab::judge::evaluate::RelayTest;
+use onecycle_lab::experiments::{RelayTest, signals_of};
 use onecycle_lab::paper::classifier::{Fit, INPUTS, Prepared, Protocol, SAMPLES, Trials};
 use onecycle_lab::space::Space;
 use onecycle_plant::Trace;
@@ -29,7 +29,7 @@ pub(super) struct Settings {
 
 pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
     let (truth, trace) = settings.setup.run(settings.input_bias)?;
-    let found = find_oscillation(&onecycle_lab::experiments::signals_of(&trace, SAMPLE_S), 1);
+    let found = find_oscillation(&signals_of(&trace, SAMPLE_S), 1);
     let cycle = found.map_err(Failure::usage)?;
     let swept = truth
         .recorded_by(RelayTest::Swept)

@@ -1,8 +1,8 @@
 //! The grid of the paper's space.
 
-use onecycle_lab::paper::grid;
-use onecycle_lab::paper::grid::{Check, Grid, check};
 use onecycle_lab::space::candidate::Gains;
+use onecycle_lab::space::grid;
+use onecycle_lab::space::grid::{Check, Grid, check};
 use serde::Deserialize;
 
 use super::part::{Found, Row};
@@ -25,10 +25,10 @@ pub(super) struct Settings {
 
 pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Failure> {
     let grids = settings.gains.iter().map(|&gains| {
-        let wanted = grid::Settings {
+        let wanted = grid::GridSettings {
             deterioration: settings.deterioration,
             gains,
-            ..grid::Settings::default()
+            ..grid::GridSettings::default()
         };
         let grid = Grid::build(&wanted, workers).map_err(Failure::usage)?;
         let check =

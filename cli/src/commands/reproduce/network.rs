@@ -1,6 +1,6 @@
 //! Tables II and III: the paper's network with either softmax.
 
-use onecycle_lab::paper::classifier::{Choice, Recipe, Rule, Score, Test};
+use onecycle_lab::paper::classifier::{Choice, ClassifierRecipe, PickRule, Score, Test};
 use serde::Deserialize;
 
 use super::part::{Found, Row};
@@ -29,15 +29,15 @@ enum RecipeName {
 }
 
 impl Settings {
-    fn recipe(&self) -> Result<Recipe, Failure> {
+    fn recipe(&self) -> Result<ClassifierRecipe, Failure> {
         let text = match self.recipe {
             RecipeName::PaperNetwork => include_str!("../../../reproduction/paper_network.toml"),
             RecipeName::PaperNetworkSmall => {
                 include_str!("../../../reproduction/paper_network_small.toml")
             }
         };
-        let recipe: Recipe = toml::from_str(text).map_err(Failure::usage)?;
-        Ok(Recipe {
+        let recipe: ClassifierRecipe = toml::from_str(text).map_err(Failure::usage)?;
+        Ok(ClassifierRecipe {
             losses: self.losses.clone(),
             tests: vec![self.test],
             ..recipe
@@ -54,7 +54,7 @@ pub(super) fn find(
     let learnt = learn(&recipe, keep, workers, Failure::usage)?;
     let sets = learnt.done.sets.iter().enumerate();
     let tables = sets.map(|(number, set)| {
-        let of = |trained: &Trained| trained.scores[number][Rule::MostLikely as usize];
+        let of = |trained: &Trained| trained.scores[number][PickRule::MostLikely as usize];
         let scores = learnt.done.networks.iter().map(of);
         let [best, _] = set.best;
         table(&scores.chain([best]).collect::<Vec<_>>(), set.kind)

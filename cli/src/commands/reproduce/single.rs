@@ -2,13 +2,10 @@
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_identify::Signals;
+use onecycle_lab::experiments::{Campaign, Recorded, RelayTest, Truth, signals_of};
 use onecycle_lab::judge::baselines::pem;
 use onecycle_lab::judge::baselines::pem::Data;
-use onecycle_lab::judge::campaign::Campaign;
-use onecycle_lab::judge::evaluate::{
-    Contender, Judge, PHASE_MARGIN_DEG, Recorded, RelayTest, Seen, Truth,
-};
-use onecycle_lab::paper::grid::Pieces;
+use onecycle_lab::judge::evaluate::{Contender, Judge, PHASE_MARGIN_DEG, Seen};
 use onecycle_onboard::Soiptd;
 use onecycle_plant::Trace;
 use serde::Deserialize;
@@ -50,16 +47,16 @@ impl Setup {
             trim: self.is_trimmed,
             ..Campaign::QUIET
         };
-        let case = campaign.quiet_case(process, self.seed);
-        let mut case = case.map_err(Failure::usage)?;
-        case.bias = input_bias;
-        case.sigma = self.sigma * case.amplitude;
-        let (trace, _) = campaign.run(&case, self.periods).map_err(Failure::usage)?;
+        let experiment = campaign.quiet_experiment(process, self.seed);
+        let mut experiment = experiment.map_err(Failure::usage)?;
+        experiment.input_bias = input_bias;
+        experiment.noise_sigma = self.sigma * experiment.oscillation.amplitude;
+        let (trace, _) = experiment.run(self.periods).map_err(Failure::usage)?;
         let truth = Truth {
             number: 1,
             process,
             input_bias,
-            noise_sigma: case.sigma,
+            noise_sigma: experiment.noise_sigma,
             seed: self.seed,
             is_trimmed: self.is_trimmed,
         };
@@ -101,18 +98,18 @@ impl Bench {
     }
 
     fn one(&self) -> Signals<'_> {
-        onecycle_lab::experiments::signals_of(&self.trace, SAMPLE_S)
+        signals_of(&self.trace, SAMPLE_S)
     }
 
     /// What PEM from a start comes to: on set I, on set II, and on set I with the bias in its model.
     fn by_pem(&self, start_s: [f64; 3]) -> [Option<Deterioration>; 3] {
         let cases = [
-            (self.one(), pem::Settings::paper(Data::LastCycle)),
-            (self.swept.seen().signals, pem::Settings::paper(Data::Whole)),
-            (self.one(), pem::Settings::fair()),
+            (self.one(), pem::PemSettings::paper(Data::LastCycle)),
+            (self.swept.signals(), pem::PemSettings::paper(Data::Whole)),
+            (self.one(), pem::PemSettings::fair()),
         ];
         cases.map(|(signals, settings)| {
-            let settings = pem::Settings {
+            let settings = pem::PemSettings {
                 starts_s: vec![start_s],
                 ..settings
             };

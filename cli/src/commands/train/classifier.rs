@@ -5,16 +5,17 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
-use onecycle_lab::learn::train::{Dataset, Epoch, Loss, Network, TensorFile, Trainer};
+use onecycle_lab::learn::onnx;
+use onecycle_lab::learn::train::{Dataset, Epoch, Loss, Network, Trainer};
 use onecycle_lab::paper::classifier::{
-    Classes, ClassifierError, Examples, Gain, Protocol, Recipe, Rule, Score, Standard,
-    Standardised, picks,
+    Classes, ClassifierError, ClassifierRecipe, Examples, Gain, PickRule, Protocol, Score,
+    Standard, Standardised, picks,
 };
 use serde::Serialize;
 
 use super::part::Part;
 use crate::args;
-use crate::commands::workers::Workers;
+use crate::commands::workers::{Quiet, Workers};
 use crate::failure::{Failure, exit};
 use crate::output::{print, progress_bar_with_message, write_file, write_text};
 use crate::report::classifier as report;
@@ -26,7 +27,7 @@ const FORMAT: &str = "onecycle.classifier/1";
 /// What the command has done.
 #[derive(Serialize)]
 pub(crate) struct Done<'a> {
-    pub(crate) recipe: &'a Recipe,
+    pub(crate) recipe: &'a ClassifierRecipe,
     pub(crate) classes: usize,
     pub(crate) weights: usize,
     pub(crate) examples: usize,
@@ -68,23 +69,23 @@ pub(crate) struct Trained {
     pub(crate) history: Vec<Epoch>,
     /// Seconds of training in this run.
     pub(crate) seconds: f64,
-    /// Of every set the scores by [`Rule::ALL`].
+    /// Of every set the scores by [`PickRule::ALL`].
     pub(crate) scores: Vec<[Score; 2]>,
 }
 
 /// What is beside the weights of the best network.
 #[derive(Serialize)]
 struct Card<'a> {
-    recipe: &'a Recipe,
+    recipe: &'a ClassifierRecipe,
     loss: Loss,
-    rule: Rule,
+    rule: PickRule,
     /// `T_prop`, `T_body`, `tau` of every class (s).
     classes_s: Vec<[f64; 3]>,
 }
 
 /// What all losses have in common.
 struct Lesson<'a> {
-    recipe: &'a Recipe,
+    recipe: &'a ClassifierRecipe,
     classes: Classes,
     training: Examples,
     standard: Standard,
@@ -110,7 +111,7 @@ pub(crate) struct Keep<'a> {
     pub(crate) resume: bool,
 }
 
-pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
+pub(super) fn run(arguments: &args::Train, recipe: &ClassifierRecipe) -> Result<ExitCode, Failure> {
     let keep = Keep {
         beside: arguments.out.as_deref(),
         resume: arguments.resume,
@@ -133,7 +134,7 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
 
 /// Trains a network with every loss of a recipe and scores them; `failed` says whose recipe it is.
 pub(crate) fn learn<'a>(
-    recipe: &'a Recipe,
+    recipe: &'a ClassifierRecipe,
     keep: Keep<'_>,
     workers: &'a Workers,
     failed: impl Fn(ClassifierError) -> Failure,
@@ -167,7 +168,7 @@ pub(crate) fn learn<'a>(
 
 impl Keep<'_> {
     /// The file of the network of loss `number`, from zero.
-    fn part(&self, recipe: &Recipe, number: usize) -> Result<Option<Part>, Failure> {
+    fn part(&self, recipe: &ClassifierRecipe, number: usize) -> Result<Option<Part>, Failure> {
         let Some(out) = self.beside else {
             return Ok(None);
         };
@@ -176,7 +177,7 @@ impl Keep<'_> {
     }
 
     /// Removes what was kept: all is written.
-    pub(crate) fn remove(&self, recipe: &Recipe) -> Result<(), Failure> {
+    pub(crate) fn remove(&self, recipe: &ClassifierRecipe) -> Result<(), Failure> {
         for number in 0..recipe.losses.len() {
             if let Some(part) = self.part(recipe, number)? {
                 part.remove()?;
@@ -192,9 +193,9 @@ fn standing(scores: &[Score; 2]) -> (usize, f64) {
     (score.unstable, score.mean.unwrap_or(f64::INFINITY))
 }
 
-fn better_rule(scores: &[Score; 2]) -> Rule {
+fn better_rule(scores: &[Score; 2]) -> PickRule {
     let key = |score: &Score| (score.unstable, score.mean.unwrap_or(f64::INFINITY));
-    let [most_likely, least_expected] = Rule::ALL;
+    let [most_likely, least_expected] = PickRule::ALL;
     if key(&scores[1]) < key(&scores[0]) {
         least_expected
     } else {
@@ -204,16 +205,15 @@ fn better_rule(scores: &[Score; 2]) -> Rule {
 
 fn write(path: &Path, network: &Network, card: &Card<'_>) -> Result<(), Failure> {
     let card = serde_json::to_string(card).map_err(Failure::usage)?;
-    let bytes = TensorFile {
-        tensors: network.tensors(),
-        metadata: [(FORMAT.to_owned(), card)].into(),
-    }
-    .to_bytes();
+    let bytes = onnx::export(network, None, &[(FORMAT, card)]).map_err(Failure::usage)?;
     write_file(path, |file| file.write_all(&bytes))
 }
 
 impl<'a> Lesson<'a> {
-    fn prepare(recipe: &'a Recipe, workers: &'a Workers) -> Result<Self, ClassifierError> {
+    fn prepare(
+        recipe: &'a ClassifierRecipe,
+        workers: &'a Workers,
+    ) -> Result<Self, ClassifierError> {
         let classes = recipe.classes(workers)?;
         let training = recipe.training(&classes, workers)?;
         let mut sets = vec![recipe.verification(&classes, workers)?];
@@ -278,13 +278,13 @@ impl<'a> Lesson<'a> {
     fn scores(&self, network: &Network) -> Result<Vec<[Score; 2]>, ClassifierError> {
         let network = network.folded();
         let scores = self.sets.iter().map(|examples| {
-            let picks = picks(&network, examples, &self.classes, self.workers)?;
+            let picks = picks(&network, examples, &self.classes, &Quiet(self.workers))?;
             Ok(picks.map(|picks| Score::of_picks(&picks, examples, &self.classes)))
         });
         scores.collect()
     }
 
-    fn card(&self, best: usize, rule: Rule) -> Card<'a> {
+    fn card(&self, best: usize, rule: PickRule) -> Card<'a> {
         let classes = 0..self.classes.len();
         Card {
             recipe: self.recipe,

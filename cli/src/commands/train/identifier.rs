@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use onecycle_lab::learn::dataset::shards::Record;
+use onecycle_lab::learn::dataset::shards::ExampleRecord;
 use onecycle_lab::learn::identifier::{
-    Calibrated, IdentifierError, Recipe, Scores, calibrated, rows, scores,
+    Calibrated, IdentifierError, IdentifierRecipe, Scores, calibrated, rows, scores,
 };
 use onecycle_lab::learn::pack::{PackContents, Quantisation, quantisation};
 use onecycle_lab::learn::train::{Epoch, Network, Outcome, Trainer};
@@ -48,7 +48,7 @@ pub(crate) struct Scored {
     pub(crate) scores: Scores,
 }
 
-pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
+pub(super) fn run(arguments: &args::Train, recipe: &IdentifierRecipe) -> Result<ExitCode, Failure> {
     recipe
         .validate()
         .map_err(|error| settings::out_of_range(&arguments.recipe, error))?;
@@ -114,8 +114,8 @@ fn beside(path: &Path, ending: &str) -> PathBuf {
 }
 
 fn learn(
-    recipe: &Recipe,
-    [learning, choosing]: [&[Record]; 2],
+    recipe: &IdentifierRecipe,
+    [learning, choosing]: [&[ExampleRecord]; 2],
     part: &Part,
     arguments: &args::Train,
     workers: &Workers,
@@ -153,9 +153,9 @@ fn best_epoch(history: &[Epoch]) -> u64 {
 
 /// The calibrated pack, its card still empty, and what weights in bytes change.
 fn pack(
-    recipe: &Recipe,
+    recipe: &IdentifierRecipe,
     network: &Network,
-    [learning, choosing]: [&[Record]; 2],
+    [learning, choosing]: [&[ExampleRecord]; 2],
 ) -> Result<(PackContents, Quantisation), Failure> {
     let made = || -> Result<_, IdentifierError> {
         let first = recipe.pack(network, learning, &Calibrated::not_yet())?;
@@ -176,15 +176,15 @@ fn pack(
 /// Scores the pack, writes them on its card, and returns its bytes.
 fn finish(
     mut pack: PackContents,
-    recipe: &Recipe,
-    scoring: &[Record],
+    recipe: &IdentifierRecipe,
+    scoring: &[ExampleRecord],
     done: &mut Done,
 ) -> Result<Vec<u8>, IdentifierError> {
     let bytes = pack.to_bytes()?;
     let read = Pack::read(&bytes).map_err(onecycle_lab::learn::pack::PackContentsError::from)?;
     let families = recipe.experiments.families.len();
     let of = |family: Option<usize>| {
-        let cycles: Vec<&Record> = scoring
+        let cycles: Vec<&ExampleRecord> = scoring
             .iter()
             .filter(|record| family.is_none_or(|family| record.example.family + 1 == family))
             .collect();

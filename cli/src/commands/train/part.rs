@@ -3,13 +3,12 @@
 
 use std::path::{Path, PathBuf};
 
-use onecycle_lab::learn::train::{TensorFile, Trainer};
+use onecycle_lab::learn::train::Trainer;
 
 use crate::failure::Failure;
 use crate::output::write_file;
 
-/// Key of the recipe in the file; changes with the file, so that what another program left is not gone
-/// on with.
+/// Begins the first line of the file; a part of another version of the program is not continued.
 const RECIPE: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"), " recipe");
 
 /// The file of a network, and the recipe that must be the same.
@@ -35,15 +34,14 @@ impl Part {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             read => read.map_err(|error| self.unreadable(&error.to_string()))?,
         };
-        let trainer = Trainer::resume(&bytes).map_err(|error| {
-            self.unreadable(&format!("{error}: leave out --resume to begin anew"))
-        })?;
-        let file =
-            TensorFile::from_bytes(&bytes).map_err(|error| self.unreadable(&error.to_string()))?;
-        if file.metadata.get(RECIPE) != Some(&self.recipe) {
-            return Err(self.unreadable(
-                "another recipe or another version of the program made it: leave out --resume to \
-                 begin anew",
+        let unreadable =
+            |reason: &str| self.unreadable(&format!("{reason}: leave out --resume to begin anew"));
+        let end = bytes.iter().position(|&byte| byte == b'\n');
+        let (head, training) = bytes.split_at(end.map_or(0, |end| end + 1));
+        let trainer = Trainer::resume(training).map_err(|error| unreadable(&error.to_string()))?;
+        if head != self.head().as_bytes() {
+            return Err(unreadable(
+                "another recipe or another version of the program made it",
             ));
         }
         Ok(Some(trainer))
@@ -54,11 +52,16 @@ impl Part {
         let failed = |error: &dyn std::fmt::Display| {
             Failure::output(&self.path, std::io::Error::other(error.to_string()))
         };
-        let bytes = trainer.save().map_err(|error| failed(&error))?;
-        let mut file = TensorFile::from_bytes(&bytes).map_err(|error| failed(&error))?;
-        file.metadata.insert(RECIPE.to_owned(), self.recipe.clone());
-        let bytes = file.to_bytes();
-        write_file(&self.path, |file| file.write_all(&bytes))
+        let training = trainer.save().map_err(|error| failed(&error))?;
+        write_file(&self.path, |file| {
+            file.write_all(self.head().as_bytes())?;
+            file.write_all(&training)
+        })
+    }
+
+    /// The first line of the file: who made it from which recipe.
+    fn head(&self) -> String {
+        format!("{RECIPE} {}\n", self.recipe)
     }
 
     /// There is nothing left to go on with.

@@ -28,7 +28,7 @@ use std::f64::consts::{PI, SQRT_2, TAU};
 
 use onecycle_onboard::Soiptd;
 
-use super::{Rival, RivalError, check_even, steady_cycles};
+use super::{BaselineAnswer, BaselineError, check_even, steady_cycles};
 use onecycle_identify::{MOST_CYCLES, Signals};
 
 /// Coefficients, `a1`, `a2`, `b0`, `b1`, `b2`.
@@ -69,10 +69,10 @@ impl Estimator {
     /// and at most one.
     ///
     /// # Errors
-    /// [`RivalError::Setting`] for a factor out of its range.
-    pub fn new(forgetting: f64) -> Result<Self, RivalError> {
+    /// [`BaselineError::Setting`] for a factor out of its range.
+    pub fn new(forgetting: f64) -> Result<Self, BaselineError> {
         if !(forgetting > 0.0 && forgetting <= 1.0) {
-            return Err(RivalError::Setting("the forgetting factor", forgetting));
+            return Err(BaselineError::Setting("the forgetting factor", forgetting));
         }
         let mut covariance = [[0.0; COEFFICIENTS]; COEFFICIENTS];
         for (index, row) in covariance.iter_mut().enumerate() {
@@ -125,7 +125,7 @@ impl Estimator {
 
 /// The filters before the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
+pub struct ArxSettings {
     /// Cut-off of the low pass (Hz).
     pub low_pass_hz: f64,
     /// Cut-off of the high pass (Hz).
@@ -136,7 +136,7 @@ pub struct Settings {
     pub forgetting_s: f64,
 }
 
-impl Settings {
+impl ArxSettings {
     /// PX4's own: 30 Hz (the cut-off of its gyroscope, a parameter), 0.5 Hz, 10 ms (half the inverse of
     /// the first, 2 ms to 10 ms) and 60 s.
     pub const PX4: Self = Self {
@@ -155,8 +155,8 @@ impl Settings {
     /// mean cost is 3.5 %.
     ///
     /// # Errors
-    /// [`RivalError::NoOscillation`], [`RivalError::Uneven`].
-    pub fn scaled_to_oscillation(signals: &Signals<'_>) -> Result<Self, RivalError> {
+    /// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`].
+    pub fn scaled_to_oscillation(signals: &Signals<'_>) -> Result<Self, BaselineError> {
         let (found, _) = steady_cycles(signals, MOST_CYCLES)?;
         Ok(Self {
             low_pass_hz: 0.5 * SAMPLES_A_PERIOD / found.period_s,
@@ -166,7 +166,7 @@ impl Settings {
         })
     }
 
-    fn validate(&self, sample_s: f64) -> Result<(), RivalError> {
+    fn validate(&self, sample_s: f64) -> Result<(), BaselineError> {
         for (name, value, is_right) in [
             (
                 "the low pass",
@@ -182,7 +182,7 @@ impl Settings {
             ),
         ] {
             if !(value.is_finite() && value > 0.0 && is_right) {
-                return Err(RivalError::Setting(name, value));
+                return Err(BaselineError::Setting(name, value));
             }
         }
         Ok(())
@@ -192,15 +192,15 @@ impl Settings {
 /// A process from a recording of input and output, its rate by differences.
 ///
 /// # Errors
-/// [`RivalError::Uneven`], [`RivalError::TooShort`], [`RivalError::Setting`]; those of
+/// [`BaselineError::Uneven`], [`BaselineError::TooShort`], [`BaselineError::Setting`]; those of
 /// [`Model::process`].
 pub fn identify(
     signals: &Signals<'_>,
-    settings: &Settings,
+    settings: &ArxSettings,
     phase_margin_rad: f64,
-) -> Result<Rival, RivalError> {
+) -> Result<BaselineAnswer, BaselineError> {
     let model = Model::of_differences(signals, settings)?;
-    Rival::of_process(model.process(signals.sample_period_s)?, phase_margin_rad)
+    BaselineAnswer::of_process(model.process(signals.sample_period_s)?, phase_margin_rad)
 }
 
 /// The same with the rate (output unit / s) of a sensor of its own, a value a sample.
@@ -210,11 +210,11 @@ pub fn identify(
 pub fn identify_with_rate(
     signals: &Signals<'_>,
     rate: &[f64],
-    settings: &Settings,
+    settings: &ArxSettings,
     phase_margin_rad: f64,
-) -> Result<Rival, RivalError> {
+) -> Result<BaselineAnswer, BaselineError> {
     let model = Model::of(signals, rate, settings)?;
-    Rival::of_process(
+    BaselineAnswer::of_process(
         model.process(0.5 * signals.sample_period_s)?,
         phase_margin_rad,
     )
@@ -234,7 +234,10 @@ impl Model {
     ///
     /// # Errors
     /// Those of [`Model::of`].
-    pub fn of_differences(signals: &Signals<'_>, settings: &Settings) -> Result<Self, RivalError> {
+    pub fn of_differences(
+        signals: &Signals<'_>,
+        settings: &ArxSettings,
+    ) -> Result<Self, BaselineError> {
         let sample_s = signals.sample_period_s;
         let differences = signals
             .output
@@ -247,18 +250,18 @@ impl Model {
     /// Filters the signals and runs the estimator over them.
     ///
     /// # Errors
-    /// [`RivalError::Uneven`], also where the rate has another length, [`RivalError::TooShort`],
-    /// [`RivalError::Setting`], [`RivalError::NotThisProcess`] where a signal stands still.
+    /// [`BaselineError::Uneven`], also where the rate has another length, [`BaselineError::TooShort`],
+    /// [`BaselineError::Setting`], [`BaselineError::NotThisProcess`] where a signal stands still.
     pub fn of(
         signals: &Signals<'_>,
         rate: &[f64],
-        settings: &Settings,
-    ) -> Result<Self, RivalError> {
+        settings: &ArxSettings,
+    ) -> Result<Self, BaselineError> {
         check_even(signals)?;
         let sample_s = signals.sample_period_s;
         settings.validate(sample_s)?;
         if rate.len() != signals.input.len() {
-            return Err(RivalError::Uneven);
+            return Err(BaselineError::Uneven);
         }
         let every = ((settings.model_s / sample_s + 1e-9) as usize).max(1);
         let warm_up = (WARM_UP / (TAU * settings.high_pass_hz * sample_s)).ceil() as usize;
@@ -269,7 +272,7 @@ impl Model {
         };
         let (inputs, rates) = (filtered(signals.input), filtered(rate));
         if inputs.len() < 2 * COEFFICIENTS {
-            return Err(RivalError::TooShort {
+            return Err(BaselineError::TooShort {
                 samples: rate.len(),
             });
         }
@@ -278,7 +281,7 @@ impl Model {
         };
         let (input_size, rate_size) = (size(&inputs), size(&rates));
         if !(input_size > 0.0 && rate_size > 0.0) {
-            return Err(RivalError::NotThisProcess(
+            return Err(BaselineError::NotThisProcess(
                 "its input or its output stands still",
             ));
         }
@@ -301,8 +304,8 @@ impl Model {
     /// oscillate for two equal lags, a dead time below zero for none.
     ///
     /// # Errors
-    /// [`RivalError::NotThisProcess`] where the numbers are not finite; [`RivalError::Process`].
-    pub fn process(&self, late_s: f64) -> Result<Soiptd, RivalError> {
+    /// [`BaselineError::NotThisProcess`] where the numbers are not finite; [`BaselineError::Process`].
+    pub fn process(&self, late_s: f64) -> Result<Soiptd, BaselineError> {
         let [a1, a2, b0, b1, b2] = self.coefficients;
         let sum = b0 + b1 + b2;
         let discriminant = 0.25 * a1 * a1 - a2;
@@ -320,7 +323,7 @@ impl Model {
         let delay_s = self.sample_s * steps - late_s;
         let acceleration = sum / (gain_part * self.sample_s);
         if !(delay_s.is_finite() && acceleration.is_finite()) {
-            return Err(RivalError::NotThisProcess(
+            return Err(BaselineError::NotThisProcess(
                 "it has no finite gain or dead time",
             ));
         }
@@ -362,7 +365,7 @@ struct Filter {
 }
 
 impl Filter {
-    fn new(settings: &Settings, sample_s: f64) -> Self {
+    fn new(settings: &ArxSettings, sample_s: f64) -> Self {
         let warped = (PI * settings.low_pass_hz * sample_s).tan();
         let norm = 1.0 + SQRT_2 * warped + warped * warped;
         let time_s = 1.0 / (TAU * settings.high_pass_hz);

@@ -29,60 +29,13 @@
 //! tells it by an asymmetry that such a bias may cancel.
 
 use onecycle_onboard::Soiptd;
-use onecycle_plant::{Controller, Sensed};
 
-use super::{Rival, RivalError, steady_cycles};
+use super::{BaselineAnswer, BaselineError, steady_cycles};
 use onecycle_identify::Signals;
 
 /// The lags of the process that stands for an integrator with dead time, over the dead time: far below
 /// all that a controller sees of it.
 const NO_LAG: f64 = 1e-6;
-
-/// A relay with two levels of its own and a hysteresis.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct AsymmetricRelay {
-    high: f64,
-    low: f64,
-    hysteresis: f64,
-    is_high: bool,
-}
-
-impl AsymmetricRelay {
-    /// High at first. The levels (input unit) lie on either side of zero; the error (output unit) must
-    /// pass the hysteresis, which stands above the noise, for the output to change.
-    ///
-    /// # Errors
-    /// [`RivalError::Setting`] for a level on the wrong side or a negative hysteresis.
-    pub fn new(high: f64, low: f64, hysteresis: f64) -> Result<Self, RivalError> {
-        if !(high.is_finite() && high > 0.0) {
-            return Err(RivalError::Setting("the high level", high));
-        }
-        if !(low.is_finite() && low < 0.0) {
-            return Err(RivalError::Setting("the low level", low));
-        }
-        if !(hysteresis.is_finite() && hysteresis >= 0.0) {
-            return Err(RivalError::Setting("the hysteresis", hysteresis));
-        }
-        Ok(Self {
-            high,
-            low,
-            hysteresis,
-            is_high: true,
-        })
-    }
-}
-
-impl Controller for AsymmetricRelay {
-    fn step(&mut self, _dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
-        let error = reference - sensed.output;
-        if error > self.hysteresis {
-            self.is_high = true;
-        } else if error < -self.hysteresis {
-            self.is_high = false;
-        }
-        if self.is_high { self.high } else { self.low }
-    }
-}
 
 /// A process of first order with dead time.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -119,12 +72,12 @@ impl HalfPeriods {
     /// reference zero with the input zero.
     ///
     /// # Errors
-    /// [`RivalError::NoOscillation`], [`RivalError::Uneven`].
+    /// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`].
     pub fn measure(
         signals: &Signals<'_>,
         hysteresis: f64,
         cycles: usize,
-    ) -> Result<Self, RivalError> {
+    ) -> Result<Self, BaselineError> {
         let (found, window) = steady_cycles(signals, cycles)?;
         let sum: f64 = signals.output[window].iter().sum();
         Ok(Self {
@@ -164,10 +117,10 @@ impl HalfPeriods {
     /// The model of first order.
     ///
     /// # Errors
-    /// [`RivalError::NotThisProcess`] where the half periods are those of no such process.
-    pub fn first_order(&self) -> Result<FirstOrder, RivalError> {
+    /// [`BaselineError::NotThisProcess`] where the half periods are those of no such process.
+    pub fn first_order(&self) -> Result<FirstOrder, BaselineError> {
         let no_such =
-            RivalError::NotThisProcess("its half periods are of no process of first order");
+            BaselineError::NotThisProcess("its half periods are of no process of first order");
         let input_integral = self.above * self.on_s - self.below * self.off_s;
         let gain = self.output_integral / input_integral;
         let Some(tau) = self
@@ -194,20 +147,20 @@ impl HalfPeriods {
     /// The integrator with dead time, as a process with lags of a millionth of it.
     ///
     /// # Errors
-    /// [`RivalError::NotThisProcess`] where no dead time is left, or no gain.
-    pub fn integrator(&self) -> Result<Soiptd, RivalError> {
+    /// [`BaselineError::NotThisProcess`] where no dead time is left, or no gain.
+    pub fn integrator(&self) -> Result<Soiptd, BaselineError> {
         let rise = self.above * self.on_s;
         let gain = self.output_span / rise;
         let delay_s = (rise - 2.0 * self.hysteresis / gain) / (self.above + self.below);
         if !(gain > 0.0 && delay_s > 0.0) {
-            return Err(RivalError::NotThisProcess("no dead time is left"));
+            return Err(BaselineError::NotThisProcess("no dead time is left"));
         }
         let lag_s = NO_LAG * delay_s;
         Ok(Soiptd::new(gain, lag_s, lag_s, delay_s)?)
     }
 }
 
-/// The integrator with dead time behind the recording of an [`AsymmetricRelay`] with this hysteresis
+/// The integrator with dead time behind the recording of an [`AsymmetricRelay`](crate::experiments::relays::AsymmetricRelay) with this hysteresis
 /// (output unit), means of the last steady cycles, `cycles` at most, and its PD of least ISE at a phase
 /// margin (rad).
 ///
@@ -218,8 +171,8 @@ pub fn identify(
     hysteresis: f64,
     cycles: usize,
     phase_margin_rad: f64,
-) -> Result<Rival, RivalError> {
+) -> Result<BaselineAnswer, BaselineError> {
     let half_periods = HalfPeriods::measure(signals, hysteresis, cycles)?;
     let process = half_periods.balanced().integrator()?;
-    Rival::of_process(process, phase_margin_rad)
+    BaselineAnswer::of_process(process, phase_margin_rad)
 }

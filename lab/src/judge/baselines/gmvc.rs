@@ -45,7 +45,7 @@
 use std::f64::consts::PI;
 
 use super::arx::Model;
-use super::{RivalError, steady_cycles};
+use super::{BaselineError, steady_cycles};
 use onecycle_design::cascade::Cascade;
 use onecycle_identify::{MOST_CYCLES, Signals};
 
@@ -84,8 +84,8 @@ impl Design {
     /// The same in proportion to the oscillation: were it the vehicle's, it would be PX4's.
     ///
     /// # Errors
-    /// [`RivalError::NoOscillation`], [`RivalError::Uneven`].
-    pub fn scaled_to_oscillation(signals: &Signals<'_>) -> Result<Self, RivalError> {
+    /// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`].
+    pub fn scaled_to_oscillation(signals: &Signals<'_>) -> Result<Self, BaselineError> {
         let (found, _) = steady_cycles(signals, MOST_CYCLES)?;
         let (period_s, amplitude, relay) = VEHICLE;
         let slower = found.period_s / period_s;
@@ -103,9 +103,9 @@ impl Design {
     /// The gains for a model.
     ///
     /// # Errors
-    /// [`RivalError::NotThisProcess`] where proportional, integral or derivative are below zero: gains that
+    /// [`BaselineError::NotThisProcess`] where proportional, integral or derivative are below zero: gains that
     /// PX4 does not fly either.
-    pub fn cascade(&self, model: &Model) -> Result<Cascade, RivalError> {
+    pub fn cascade(&self, model: &Model) -> Result<Cascade, BaselineError> {
         let [a1, a2, b0, b1, b2] = model.coefficients;
         let (mu, rho) = (self.damping, model.sample_s / self.rise_time_s);
         let turn_rad = (4.0 * mu - 1.0).max(0.0).sqrt() * rho / (2.0 * mu);
@@ -121,7 +121,7 @@ impl Design {
         let rate_i = INTEGRAL_PART * (f0 + f1 + f2) / (model.sample_s * proportional);
         let rate_d = (model.sample_s * f2 / proportional).max(0.0);
         if !(rate_p > 0.0 && rate_p.is_finite() && rate_i > 0.0) {
-            return Err(RivalError::NotThisProcess(
+            return Err(BaselineError::NotThisProcess(
                 "the gains that follow from it are not positive",
             ));
         }

@@ -20,11 +20,10 @@
 //! The optimiser is Kraft's SLSQP (D. Kraft, "Algorithm 733: TOMP-Fortran modules for optimal control
 //! calculations", ACM Trans. Math. Softw. 20, 1994). The model is simulated exactly, the delay too.
 //!
-//! [`Settings::paper`] is what the paper describes: one start, the initial state estimated, no bias.
-//! [`Settings::fair`] is what a careful user would do today: a bias, and starts all over the domain.
+//! [`PemSettings::paper`] is what the paper describes: one start, the initial state estimated, no bias.
+//! [`PemSettings::fair`] is what a careful user would do today: a bias, and starts all over the domain.
 
 mod output_error;
-mod sweep;
 
 use std::ops::Range;
 
@@ -32,8 +31,7 @@ use onecycle_onboard::Soiptd;
 use slsqp::{Func, StopTols, minimize};
 
 use self::output_error::OutputError;
-pub use self::sweep::SweptRelay;
-use super::{Rival, RivalError, check_even, steady_cycles};
+use super::{BaselineAnswer, BaselineError, check_even, steady_cycles};
 use onecycle_identify::Signals;
 
 /// The samples that are fitted.
@@ -68,7 +66,7 @@ pub enum InputBias {
 
 /// How the fit is done.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
+pub struct PemSettings {
     /// Which samples.
     pub data: Data,
     /// The process at the first of them.
@@ -103,7 +101,7 @@ const MOST_EVALUATIONS: usize = 400;
 /// Relative change of the logarithms of the times, and of the cost, at which the search ends.
 const TOLERANCE: f64 = 1e-12;
 
-impl Settings {
+impl PemSettings {
     /// As the paper describes it: one start, the initial state estimated, the bias not modelled.
     ///
     /// The mean of the input is removed, which is the toolbox's habit and all that keeps the method on
@@ -151,7 +149,7 @@ impl Settings {
 
 /// The fit of least cost.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fit {
+pub struct OutputErrorFit {
     /// The process.
     pub process: Soiptd,
     /// The constant input (input unit), where it was estimated.
@@ -165,31 +163,31 @@ pub struct Fit {
 /// Fits the samples that the settings name and designs the PD of least ISE at a phase margin (rad).
 ///
 /// # Errors
-/// [`RivalError::NoOscillation`] where a cycle is asked for and none is steady; those of [`fit`]; the
+/// [`BaselineError::NoOscillation`] where a cycle is asked for and none is steady; those of [`fit`]; the
 /// process found may have no controller.
 pub fn identify(
     signals: &Signals<'_>,
-    settings: &Settings,
+    settings: &PemSettings,
     phase_margin_rad: f64,
-) -> Result<Rival, RivalError> {
+) -> Result<BaselineAnswer, BaselineError> {
     let window = match settings.data {
         Data::LastCycle => steady_cycles(signals, 1)?.1,
         Data::Whole => 0..signals.time_s.len(),
     };
     let found = fit(signals, window, settings)?;
-    Rival::of_process(found.process, phase_margin_rad)
+    BaselineAnswer::of_process(found.process, phase_margin_rad)
 }
 
 /// Fits the samples of a window of the recording.
 ///
 /// # Errors
-/// [`RivalError::Uneven`], [`RivalError::TooShort`], [`RivalError::Setting`] for a start that is no
-/// positive time, [`RivalError::NotThisProcess`] where no start leads to a fit.
+/// [`BaselineError::Uneven`], [`BaselineError::TooShort`], [`BaselineError::Setting`] for a start that is no
+/// positive time, [`BaselineError::NotThisProcess`] where no start leads to a fit.
 pub fn fit(
     signals: &Signals<'_>,
     window: Range<usize>,
-    settings: &Settings,
-) -> Result<Fit, RivalError> {
+    settings: &PemSettings,
+) -> Result<OutputErrorFit, BaselineError> {
     check_even(signals)?;
     let duration_s = window.len() as f64 * signals.sample_period_s;
     let model = OutputError::new(signals, window, settings)?;
@@ -197,13 +195,13 @@ pub fn fit(
     limits_s[2].1 = limits_s[2].1.min(settings.longest_delay * duration_s);
     let [.., (shortest_s, longest_s)] = limits_s;
     if longest_s.is_nan() || longest_s <= shortest_s {
-        return Err(RivalError::Setting("the longest delay", longest_s));
+        return Err(BaselineError::Setting("the longest delay", longest_s));
     }
-    let mut best: Option<Fit> = None;
+    let mut best: Option<OutputErrorFit> = None;
     for (start, times_s) in settings.starts_s.iter().enumerate() {
         for &time_s in times_s {
             if !(time_s.is_finite() && time_s > 0.0) {
-                return Err(RivalError::Setting("a time of a start", time_s));
+                return Err(BaselineError::Setting("a time of a start", time_s));
             }
         }
         let found =
@@ -213,7 +211,7 @@ pub fn fit(
             (best, found) => found.or(best),
         };
     }
-    best.ok_or(RivalError::NotThisProcess("no start leads to a fit"))
+    best.ok_or(BaselineError::NotThisProcess("no start leads to a fit"))
 }
 
 /// The times (s) at which SLSQP ends; `None` where the cost is not defined there.

@@ -30,7 +30,7 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use onecycle_onboard::Soiptd;
 
-use super::{Rival, RivalError, steady_cycles};
+use super::{BaselineAnswer, BaselineError, steady_cycles};
 use crate::space::Space;
 use crate::space::limit_cycle::symmetric;
 use crate::space::rule::TuningRule;
@@ -65,8 +65,8 @@ impl Rule {
 /// so that one process stands for every shape.
 ///
 /// # Errors
-/// [`RivalError::NotThisProcess`] where no shape has a limit cycle; its processes may have no controller.
-pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRule, RivalError> {
+/// [`BaselineError::NotThisProcess`] where no shape has a limit cycle; its processes may have no controller.
+pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRule, BaselineError> {
     let (mut ln_c1, mut ln_c3, mut count) = (0.0, 0.0, 0.0);
     for shape in space.shapes(rows, columns) {
         let Some((_, radius_s)) = space.radius_range_s(shape) else {
@@ -83,7 +83,7 @@ pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRu
         count += 1.0;
     }
     if count == 0.0 {
-        return Err(RivalError::NotThisProcess("no shape has a limit cycle"));
+        return Err(BaselineError::NotThisProcess("no shape has a limit cycle"));
     }
     Ok(TuningRule {
         beta: space.beta,
@@ -100,10 +100,14 @@ fn describing_function_ratio(amplitude: f64, relay_amplitude: f64) -> f64 {
 /// The PD of the rule, from the last steady cycles, `cycles` at most; the paper uses one.
 ///
 /// # Errors
-/// [`RivalError::NoOscillation`], [`RivalError::Uneven`]; [`RivalError::Setting`] for a rule whose gains
-/// are not positive; [`RivalError::NotThisProcess`] where the output stands still or the phase that was
+/// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`]; [`BaselineError::Setting`] for a rule whose gains
+/// are not positive; [`BaselineError::NotThisProcess`] where the output stands still or the phase that was
 /// measured leaves no lead between 0 and `pi/2`.
-pub fn identify(signals: &Signals<'_>, rule: &Rule, cycles: usize) -> Result<Rival, RivalError> {
+pub fn identify(
+    signals: &Signals<'_>,
+    rule: &Rule,
+    cycles: usize,
+) -> Result<BaselineAnswer, BaselineError> {
     let (found, window) = steady_cycles(signals, cycles)?;
     let (rule, ratio) = match *rule {
         Rule::Amplitude(rule) => (
@@ -117,7 +121,7 @@ pub fn identify(signals: &Signals<'_>, rule: &Rule, cycles: usize) -> Result<Riv
             let hold_rad = PI * signals.sample_period_s / found.period_s;
             let lead_rad = phase_margin_rad - (-response).arg() - hold_rad;
             if !(lead_rad > 0.0 && lead_rad < 0.5 * PI) {
-                return Err(RivalError::NotThisProcess(
+                return Err(BaselineError::NotThisProcess(
                     "the phase measured leaves no lead from 0 to pi/2",
                 ));
             }
@@ -126,12 +130,12 @@ pub fn identify(signals: &Signals<'_>, rule: &Rule, cycles: usize) -> Result<Riv
         }
     };
     if !(rule.c1 > 0.0 && rule.c3 >= 0.0) {
-        return Err(RivalError::Setting("c1 or c3 of the rule", rule.c1));
+        return Err(BaselineError::Setting("c1 or c3 of the rule", rule.c1));
     }
     if !(ratio.is_finite() && ratio > 0.0) {
-        return Err(RivalError::NotThisProcess("its output stands still"));
+        return Err(BaselineError::NotThisProcess("its output stands still"));
     }
-    Ok(Rival {
+    Ok(BaselineAnswer {
         process: None,
         pd: rule.pd(ratio, found.period_s),
     })

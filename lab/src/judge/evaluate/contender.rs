@@ -3,8 +3,9 @@
 use std::sync::LazyLock;
 
 use super::{Answer, PHASE_MARGIN_DEG};
+use crate::experiments::{CYCLES_KEPT, Recorded, RelayTest};
 use crate::judge::baselines::rules::Rule;
-use crate::judge::baselines::{Rival, RivalError, arx, asymmetric, gmvc, pem, rules};
+use crate::judge::baselines::{BaselineAnswer, BaselineError, arx, asymmetric, gmvc, pem, rules};
 use crate::space::Space;
 use crate::space::rule::TuningRule;
 use onecycle_identify::{Method, Options, Signals, identify};
@@ -39,17 +40,6 @@ pub enum Contender {
     Asymmetric,
 }
 
-/// The experiment that a method reads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RelayTest {
-    /// The one that all read: the relay at the distinguishing phase.
-    Recorded,
-    /// The same relay with its phase swept, from rest.
-    Swept,
-    /// A relay of two unequal levels with a hysteresis, from rest.
-    Asymmetric,
-}
-
 /// A recording and what its reader knows of the relay.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
@@ -68,18 +58,27 @@ impl<'a> Seen<'a> {
             hysteresis: 0.0,
         }
     }
+
+    /// A recording of a relay test.
+    #[must_use]
+    pub fn of_recorded(recorded: &'a Recorded) -> Self {
+        Self {
+            signals: recorded.signals(),
+            hysteresis: recorded.hysteresis,
+        }
+    }
 }
 
 /// Most cycles that the asymmetric relay's half periods are the means of: as many as the recordings of
 /// the others hold.
-const ASYMMETRIC_CYCLES: usize = super::experiment::CYCLES_KEPT;
+const ASYMMETRIC_CYCLES: usize = CYCLES_KEPT;
 
 /// Rows and columns of the shapes that the exact rule is made for: twice as many change its two numbers by
 /// less than 2 %.
 const RULE_SHAPES: usize = 8;
 
 /// The exact rule, made once: by the first experiment that asks for it.
-static EXACT_RULE: LazyLock<Result<TuningRule, RivalError>> =
+static EXACT_RULE: LazyLock<Result<TuningRule, BaselineError>> =
     LazyLock::new(|| rules::calibrated(&Space::MULTIROTOR, RULE_SHAPES, RULE_SHAPES));
 
 impl Contender {
@@ -143,14 +142,14 @@ impl Contender {
     /// That sentence.
     pub fn answer(self, seen: &Seen<'_>) -> Result<Answer, String> {
         let (signals, margin_rad) = (&seen.signals, PHASE_MARGIN_DEG.to_radians());
-        let by_pem = |settings: &pem::Settings| pem::identify(signals, settings, margin_rad);
+        let by_pem = |settings: &pem::PemSettings| pem::identify(signals, settings, margin_rad);
         let by_rule = |rule: &Rule| rules::identify(signals, rule, 1);
         let rival = match self {
             Self::OneCycle(cycles) => return ours(signals, cycles, Method::Map),
             Self::Network => return ours(signals, 1, Method::Classify),
-            Self::Pem => by_pem(&pem::Settings::paper(pem::Data::LastCycle)),
-            Self::PemSweep => by_pem(&pem::Settings::paper(pem::Data::Whole)),
-            Self::PemFair => by_pem(&pem::Settings::fair()),
+            Self::Pem => by_pem(&pem::PemSettings::paper(pem::Data::LastCycle)),
+            Self::PemSweep => by_pem(&pem::PemSettings::paper(pem::Data::Whole)),
+            Self::PemFair => by_pem(&pem::PemSettings::fair()),
             Self::Rules => by_rule(&Rule::of_relay(Space::MULTIROTOR.beta, margin_rad)),
             Self::RulesExact => EXACT_RULE
                 .clone()
@@ -158,8 +157,8 @@ impl Contender {
             Self::RulesHarmonic => by_rule(&Rule::FirstHarmonic {
                 phase_margin_rad: margin_rad,
             }),
-            Self::Arx => arx::identify(signals, &arx::Settings::PX4, margin_rad),
-            Self::ArxScaled => arx::Settings::scaled_to_oscillation(signals)
+            Self::Arx => arx::identify(signals, &arx::ArxSettings::PX4, margin_rad),
+            Self::ArxScaled => arx::ArxSettings::scaled_to_oscillation(signals)
                 .and_then(|settings| arx::identify(signals, &settings, margin_rad)),
             Self::ArxGmvc => return by_gmvc(signals).map_err(|error| error.to_string()),
             Self::Asymmetric => {
@@ -186,15 +185,15 @@ fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, 
 }
 
 /// PX4's whole road from a recording to gains.
-fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, RivalError> {
-    let settings = arx::Settings::scaled_to_oscillation(signals)?;
+fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, BaselineError> {
+    let settings = arx::ArxSettings::scaled_to_oscillation(signals)?;
     let model = arx::Model::of_differences(signals, &settings)?;
     let design = gmvc::Design::scaled_to_oscillation(signals)?;
     Ok(Answer::of_gains(design.cascade(&model)?))
 }
 
 /// A process gets the same controller whoever found it.
-fn of_rival(rival: Result<Rival, RivalError>) -> Result<Answer, String> {
+fn of_rival(rival: Result<BaselineAnswer, BaselineError>) -> Result<Answer, String> {
     let rival = rival.map_err(|error| error.to_string())?;
     match rival.process {
         Some(process) => Answer::of_process(process).map_err(|error| error.to_string()),

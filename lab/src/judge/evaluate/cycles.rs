@@ -4,6 +4,7 @@
 use onecycle_plant::Trace;
 
 use super::{Answer, Contender, Judge, Seen};
+use crate::experiments::signals_of;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_design::soiptd_pd::optimum::OptimumError;
 use onecycle_identify::{Signals, Verdict, find_oscillation};
@@ -40,7 +41,7 @@ impl Cycles {
     /// # Errors
     /// Where they are not steady or one of them tells no process.
     pub fn of(trace: &Trace, sample_s: f64, count: usize) -> Result<Self, CyclesError> {
-        let signals = crate::experiments::signals_of(trace, sample_s);
+        let signals = signals_of(trace, sample_s);
         let found = find_oscillation(&signals, count).map_err(CyclesError::Oscillation)?;
         let mut answers = Vec::with_capacity(count);
         for later in (0..count).rev() {

@@ -14,7 +14,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use csv::{ErrorKind, ReaderBuilder, Trim};
 use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 
-use super::{Answer, Record, Truth};
+use super::{Answer, Record};
+use crate::experiments::Truth;
 
 /// Columns of the parameters of a process.
 const PROCESS: [&str; 4] = ["K", "T_prop_s", "T_body_s", "tau_s"];

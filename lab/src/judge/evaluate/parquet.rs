@@ -20,8 +20,8 @@ use parquet::file::reader::{FileReader, RowGroupReader, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type as Schema;
 
-use super::Recorded;
-use crate::learn::dataset::shards::PROGRAM;
+use crate::PROGRAM;
+use crate::experiments::Recorded;
 
 /// Columns and how they are stored.
 const COLUMNS: [(&str, Type); 4] = [

@@ -9,7 +9,7 @@
 use onecycle_onboard::signature::{LENGTH, Signature};
 
 use super::VALUES;
-use super::shards::Record;
+use super::shards::ExampleRecord;
 use crate::learn::train::{Batch, Matrix};
 
 /// Of each value: a ratio of poles and a delay are at most 1/4 and about 1/8.
@@ -45,7 +45,7 @@ pub enum Wanted {
 
 /// A row for every record.
 #[must_use]
-pub fn batch(records: &[Record], wanted: Wanted) -> Batch {
+pub fn batch(records: &[ExampleRecord], wanted: Wanted) -> Batch {
     let columns = match wanted {
         Wanted::Values => VALUES,
         Wanted::ValuesAndSlopes => 2 * VALUES,

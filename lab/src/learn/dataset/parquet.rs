@@ -20,8 +20,9 @@ use parquet::file::properties::WriterProperties;
 use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type as Schema;
 
-use super::npz::{Column, Numbers};
-use super::shards::{PROGRAM, Record, columns};
+use super::shards::{ExampleRecord, columns};
+use crate::PROGRAM;
+use crate::learn::npz::{Column, Numbers};
 
 /// Writes a table, some rows at a time: 4096, as a file of a dataset has them, are a good number.
 pub struct Writer<W: Write + Send>(SerializedFileWriter<W>);
@@ -57,7 +58,7 @@ impl<W: Write + Send> Writer<W> {
     ///
     /// # Errors
     /// Those of what it writes to.
-    pub fn add(&mut self, records: &[Record]) -> io::Result<()> {
+    pub fn add(&mut self, records: &[ExampleRecord]) -> io::Result<()> {
         let mut group = self.0.next_row_group()?;
         for column in columns(records) {
             match &column.numbers {

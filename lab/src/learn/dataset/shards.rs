@@ -31,10 +31,11 @@ use onecycle_onboard::signature::{LENGTH, Signature};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::npz::{self, Column, Numbers};
-use super::{Example, ExampleError, VALUES};
-use crate::experiments::{Recipe, RecipeError};
-use crate::paper::grid::Pieces;
+use super::{Example, VALUES};
+use crate::PROGRAM;
+use crate::experiments::{ExperimentError, Recipe, RecipeError};
+use crate::learn::npz::{self, Column, Numbers};
+use crate::workers::Workers;
 
 /// Changes with every change that a reader could notice.
 pub const FORMAT: &str = "onecycle.dataset/1";
@@ -45,11 +46,9 @@ pub const EXAMPLES_PER_SHARD: u64 = 4096;
 /// Most examples of a dataset: 3 GB or so.
 pub const MOST_EXAMPLES: u64 = 10_000_000;
 
-pub(crate) const PROGRAM: &str = concat!("onecycle ", env!("CARGO_PKG_VERSION"));
-
 /// One example as a file has it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Record {
+pub struct ExampleRecord {
     /// Of the example in its recipe.
     pub number: u64,
     /// The example.
@@ -240,17 +239,17 @@ impl Manifest {
     /// Makes a file: its bytes, and what the manifest will say of it.
     ///
     /// # Errors
-    /// See [`ExampleError`]; none of a valid recipe.
+    /// See [`ExperimentError`]; none of a valid recipe.
     pub fn make(
         &self,
         shard: usize,
-        pieces: &impl Pieces,
-    ) -> Result<(Vec<u8>, Entry), ExampleError> {
+        workers: &dyn Workers,
+    ) -> Result<(Vec<u8>, Entry), ExperimentError> {
         let numbers = self.numbers(shard);
         let count = (numbers.end - numbers.start) as usize;
-        let made = pieces.map(count, |k| self.recipe.record(numbers.start + k as u64));
-        let made: Vec<Option<Record>> = made.into_iter().collect::<Result<_, _>>()?;
-        let records: Vec<Record> = made.into_iter().flatten().collect();
+        let made = workers.map(count, |k| self.recipe.record(numbers.start + k as u64));
+        let made: Vec<Option<ExampleRecord>> = made.into_iter().collect::<Result<_, _>>()?;
+        let records: Vec<ExampleRecord> = made.into_iter().flatten().collect();
         let bytes = npz::write(&columns(&records));
         let entry = Entry {
             rows: records.len(),
@@ -263,7 +262,7 @@ impl Manifest {
     ///
     /// # Errors
     /// [`DatasetError::Unfinished`] or [`DatasetError::Damaged`].
-    pub fn records(&self, shard: usize, bytes: &[u8]) -> Result<Vec<Record>, DatasetError> {
+    pub fn records(&self, shard: usize, bytes: &[u8]) -> Result<Vec<ExampleRecord>, DatasetError> {
         let entry = self.shards.get(shard).and_then(Option::as_ref);
         let entry = entry.ok_or_else(|| DatasetError::Unfinished(file_name(shard)))?;
         let damaged = || DatasetError::Damaged(file_name(shard));
@@ -293,12 +292,12 @@ impl Recipe {
     /// Example number `n` with what an error costs; `None` as of [`Self::example`].
     ///
     /// # Errors
-    /// See [`ExampleError`].
-    pub fn record(&self, n: u64) -> Result<Option<Record>, ExampleError> {
+    /// See [`ExperimentError`].
+    pub fn record(&self, n: u64) -> Result<Option<ExampleRecord>, ExperimentError> {
         let made = self.example(n)?;
         Ok(made.and_then(|example| {
             let margin_rad = self.families[example.family].space.phase_margin_rad();
-            Some(Record {
+            Some(ExampleRecord {
                 number: n,
                 example,
                 values: example.values(),
@@ -309,18 +308,18 @@ impl Recipe {
 }
 
 /// The columns of these records; of none, what columns there are.
-pub(super) fn columns(records: &[Record]) -> Vec<Column> {
-    let whole = |name, of: fn(&Record) -> u64| Column {
+pub(super) fn columns(records: &[ExampleRecord]) -> Vec<Column> {
+    let whole = |name, of: fn(&ExampleRecord) -> u64| Column {
         name,
         width: None,
         numbers: Numbers::U64(records.iter().map(of).collect()),
     };
-    let real = |name, of: fn(&Record) -> f64| Column {
+    let real = |name, of: fn(&ExampleRecord) -> f64| Column {
         name,
         width: None,
         numbers: Numbers::F64(records.iter().map(of).collect()),
     };
-    let four = |name, of: fn(&Record) -> [f64; 4]| Column {
+    let four = |name, of: fn(&ExampleRecord) -> [f64; 4]| Column {
         name,
         width: Some(4),
         numbers: Numbers::F64(records.iter().flat_map(of).collect()),
@@ -363,7 +362,7 @@ fn parameters(process: &Soiptd) -> [f64; 4] {
 }
 
 /// The records of these columns; `None` where a process is none.
-fn records(columns: &[Column], rows: usize) -> Option<Vec<Record>> {
+fn records(columns: &[Column], rows: usize) -> Option<Vec<ExampleRecord>> {
     let wholes = |name: &str| match &named(columns, name)?.numbers {
         Numbers::U64(numbers) => Some(numbers),
         _ => None,
@@ -399,7 +398,7 @@ fn records(columns: &[Column], rows: usize) -> Option<Vec<Record>> {
                 sigma: real("sigma", row)?,
                 samples_per_period: real("samples_per_period", row)?,
             };
-            Some(Record {
+            Some(ExampleRecord {
                 number: *wholes("number")?.get(row)?,
                 example,
                 values: four("values", row)?,

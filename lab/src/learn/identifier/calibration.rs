@@ -4,11 +4,11 @@ use onecycle_onboard::classify::{Calibration, CyclePosterior};
 use onecycle_onboard::pack::{Domain, OutputScaling, Pack, Prior};
 use onecycle_onboard::signature::LENGTH;
 
-use super::{IdentifierError, Recipe, output_scales};
+use super::{IdentifierError, IdentifierRecipe, output_scales};
 use crate::judge::calibrate::calibrate;
 use crate::learn::dataset::VALUES;
 use crate::learn::dataset::learning::LN_SAMPLES;
-use crate::learn::dataset::shards::Record;
+use crate::learn::dataset::shards::ExampleRecord;
 use crate::learn::pack::{LeadTableContents, PackContents};
 use onecycle_identify::cholesky::cholesky;
 
@@ -28,9 +28,9 @@ pub struct Calibrated(Calibration);
 /// # Errors
 /// Where an experiment cannot be made.
 pub fn calibrated(
-    recipe: &Recipe,
+    recipe: &IdentifierRecipe,
     pack: &Pack<'_>,
-    chosen: &[Record],
+    chosen: &[ExampleRecord],
 ) -> Result<Calibrated, IdentifierError> {
     let scale = output_scales().map(f64::from);
     let mut squares = [0.0; VALUES];
@@ -73,8 +73,8 @@ impl Calibrated {
     /// The pack but for network, table and self-test.
     pub(super) fn contents(
         &self,
-        recipe: &Recipe,
-        learnt: &[Record],
+        recipe: &IdentifierRecipe,
+        learnt: &[ExampleRecord],
     ) -> Result<PackContents, IdentifierError> {
         let mut input_offsets = [0.0; LENGTH];
         let mut input_scales = [1.0; LENGTH];
@@ -137,7 +137,7 @@ fn extremes<T: PartialOrd + Copy + From<f32>, const N: usize>(
 }
 
 /// Mean and root of the covariance of the shapes; `None` where they have no spread.
-fn prior(records: &[Record]) -> Option<Prior> {
+fn prior(records: &[ExampleRecord]) -> Option<Prior> {
     const SHAPE: usize = 3;
     let count = records.len() as f64;
     let mut mean = [0.0; SHAPE];

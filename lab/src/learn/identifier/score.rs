@@ -2,11 +2,12 @@
 //! network, its score, its table.
 
 use onecycle_onboard::classify::{Classification, Familiarity, classify_by};
+use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::pack::Pack;
 
 use crate::judge::evaluate::Costs;
 use crate::learn::dataset::VALUES;
-use crate::learn::dataset::shards::Record;
+use crate::learn::dataset::shards::ExampleRecord;
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 
@@ -63,7 +64,7 @@ struct Outcome {
 
 /// Scores of a pack on these records.
 #[must_use]
-pub fn scores(pack: &Pack<'_>, records: &[&Record]) -> Scores {
+pub fn scores(pack: &Pack<'_>, records: &[&ExampleRecord]) -> Scores {
     let mut scores = Scores {
         cycles: records.len(),
         ..Scores::default()
@@ -93,13 +94,13 @@ pub fn scores(pack: &Pack<'_>, records: &[&Record]) -> Scores {
 }
 
 /// `None` where the cycle is unknown.
-fn outcome(pack: &Pack<'_>, record: &Record) -> Option<Outcome> {
+fn outcome(pack: &Pack<'_>, record: &ExampleRecord) -> Option<Outcome> {
     let found = classified(pack, record).filter(|found| found.familiarity == Familiarity::Known)?;
     let truth = &record.example.process;
     let margin_rad = f64::from(pack.domain().phase_margin_rad);
     let best = pd_at_phase_margin(truth, margin_rad).ok()?;
-    let pd = pack
-        .gains_table()?
+    let pd = LeadTable::from_bytes(pack.lead_table().bytes)
+        .ok()?
         .pd_at_phase_margin(&found.candidates[0].process)
         .ok()?;
     Some(Outcome {
@@ -108,7 +109,7 @@ fn outcome(pack: &Pack<'_>, record: &Record) -> Option<Outcome> {
     })
 }
 
-fn classified(pack: &Pack<'_>, record: &Record) -> Option<Classification> {
+fn classified(pack: &Pack<'_>, record: &ExampleRecord) -> Option<Classification> {
     let example = &record.example;
     let noise_sigma = example.sigma * example.signature.amplitude;
     classify_by(pack, &example.signature, example.period_s, noise_sigma).ok()

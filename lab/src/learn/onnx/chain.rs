@@ -7,7 +7,7 @@
 //! ```
 
 use super::{Normalisation, OnnxError};
-use crate::learn::train::{Layer, Network, Tensor, TensorFile};
+use crate::learn::train::{Layer, Network};
 
 /// What a node does to a row of numbers.
 pub(super) enum Step {
@@ -155,25 +155,11 @@ impl Chain {
             let reason = "it has no dense layer (Gemm or MatMul)";
             return Err(OnnxError::Model(reason.to_owned()));
         };
-        let mut network = Network::zeros(first.inputs, &self.layers)?;
-        let numbers = (self.layers.iter().enumerate())
-            .filter(|(_, layer)| matches!(layer, Layer::Dense { .. }))
-            .map(|(number, _)| number);
-        let mut file = TensorFile::default();
-        for (number, dense) in numbers.zip(self.dense) {
-            let outputs = dense.bias.len();
-            file.tensors.push(Tensor {
-                name: format!("{number}.weight"),
-                shape: vec![outputs, dense.inputs],
-                values: dense.weight,
-            });
-            file.tensors.push(Tensor {
-                name: format!("{number}.bias"),
-                shape: vec![outputs],
-                values: dense.bias,
-            });
-        }
-        network.take(&mut file, "")?;
+        let network = Network::zeros(first.inputs, &self.layers)?;
+        let numbers: Vec<f32> = (self.dense.into_iter())
+            .flat_map(|dense| dense.weight.into_iter().chain(dense.bias))
+            .collect();
+        let network = network.with_numbers(&numbers)?;
         Ok((self.normalisation, network))
     }
 }

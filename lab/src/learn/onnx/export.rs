@@ -3,8 +3,8 @@
 use prost::Message;
 
 use super::message::{
-    Attribute, Dimension, FLOAT, Graph, INT, Model, Node, OperatorSet, Shape, Tensor, TensorType,
-    Type, ValueInfo,
+    Attribute, Dimension, FLOAT, Graph, INT, Model, Node, OperatorSet, Property, Shape, Tensor,
+    TensorType, Type, ValueInfo,
 };
 use super::{Normalisation, OnnxError};
 use crate::learn::train::{Layer, Network};
@@ -16,7 +16,8 @@ const OPSET: i64 = 17;
 const INPUT: &str = "inputs";
 const OUTPUT: &str = "outputs";
 
-/// The bytes of a model that computes what the network does, its inputs normalised first.
+/// The bytes of a model that computes what the network does, its inputs normalised first; `metadata` are
+/// keys and values that the model carries along.
 ///
 /// # Errors
 /// Where batch normalisation has no dense layer to be folded into, the network has no layer, or the
@@ -24,6 +25,7 @@ const OUTPUT: &str = "outputs";
 pub fn export(
     network: &Network,
     normalisation: Option<&Normalisation>,
+    metadata: &[(&str, String)],
 ) -> Result<Vec<u8>, OnnxError> {
     let folded = network.folded();
     let mut chain = Chain::default();
@@ -76,7 +78,7 @@ pub fn export(
     };
     last.output = vec![OUTPUT.to_owned()];
     Ok(chain
-        .model(network.inputs(), network.outputs())
+        .model(network.inputs(), network.outputs(), metadata)
         .encode_to_vec())
 }
 
@@ -120,7 +122,7 @@ impl Chain {
         });
     }
 
-    fn model(self, inputs: usize, outputs: usize) -> Model {
+    fn model(self, inputs: usize, outputs: usize, metadata: &[(&str, String)]) -> Model {
         Model {
             ir_version: IR_VERSION,
             producer_name: "onecycle".to_owned(),
@@ -136,6 +138,12 @@ impl Chain {
                 domain: String::new(),
                 version: OPSET,
             }],
+            metadata_props: (metadata.iter())
+                .map(|(key, value)| Property {
+                    key: (*key).to_owned(),
+                    value: value.clone(),
+                })
+                .collect(),
         }
     }
 }

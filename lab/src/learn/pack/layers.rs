@@ -11,7 +11,8 @@ use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::LENGTH;
 
 use super::PackContentsError;
-use crate::learn::train::{Layer, Matrix, Network, OneThread, TrainError};
+use crate::learn::train::{Layer, Matrix, Network, TrainError};
+use crate::workers::OneThread;
 
 /// Largest whole number of a byte that has a negative.
 const LARGEST: f32 = 127.0;
@@ -152,6 +153,27 @@ fn quantised(weight: &Matrix) -> PackedWeights {
         scales.push(scale);
     }
     PackedWeights::Bytes { rows, scales }
+}
+
+/// The network that these layers are.
+///
+/// # Errors
+/// Sizes or numbers that no network has.
+pub(super) fn network(layers: &[PackedLayer]) -> Result<Network, PackContentsError> {
+    let (mut kinds, mut numbers) = (Vec::new(), Vec::new());
+    for layer in layers {
+        numbers.extend(layer.values());
+        numbers.extend(&layer.biases);
+        let outputs = layer.biases.len();
+        kinds.push(Layer::Dense { outputs });
+        kinds.extend(match layer.activation {
+            Activation::None => None,
+            Activation::Relu => Some(Layer::Relu),
+            Activation::Tanh => Some(Layer::Tanh),
+        });
+    }
+    let inputs = layers.first().map_or(0, |layer| layer.inputs);
+    Ok(Network::zeros(inputs, &kinds)?.with_numbers(&numbers)?)
 }
 
 /// What the pack puts out for these signatures against what the network it is made of does.

@@ -15,7 +15,6 @@
 //! batch are the conventions of PyTorch's `BatchNorm1d`.
 
 use super::TrainError;
-use super::layer::Memory;
 use super::matrix::Matrix;
 
 /// Added to the variance: PyTorch's.
@@ -71,12 +70,12 @@ impl BatchNorm {
         }
     }
 
-    /// Remembers `x^` and `1 / sqrt(var + eps)`.
+    /// Leaves `x^` in `normal` and `1 / sqrt(var + eps)` in `scale` for [`Self::backward`].
     pub(super) fn learn(
         &mut self,
         input: &Matrix,
         output: &mut Matrix,
-        memory: &mut Memory,
+        (normal, scale): (&mut Matrix, &mut Vec<f64>),
     ) -> Result<(), TrainError> {
         if input.rows() < 2 {
             return Err(TrainError::OneSample);
@@ -95,15 +94,15 @@ impl BatchNorm {
         blend(self.running_mean.values_mut(), &mean, 1.0);
         blend(self.running_var.values_mut(), &var, unbiased);
 
-        memory.row.clear();
-        (memory.row).extend(var.iter().map(|var| (var + EPSILON).sqrt().recip()));
-        memory.matrix.reshape(input.rows(), input.columns());
+        scale.clear();
+        scale.extend(var.iter().map(|var| (var + EPSILON).sqrt().recip()));
+        normal.reshape(input.rows(), input.columns());
         output.reshape(input.rows(), input.columns());
         let (weight, bias) = (self.weight.values(), self.bias.values());
         for i in 0..input.rows() {
-            let normal = memory.matrix.row_mut(i);
+            let normal = normal.row_mut(i);
             for (j, x) in input.row(i).iter().enumerate() {
-                normal[j] = ((f64::from(*x) - mean[j]) * memory.row[j]) as f32;
+                normal[j] = ((f64::from(*x) - mean[j]) * scale[j]) as f32;
             }
             for (j, y) in output.row_mut(i).iter_mut().enumerate() {
                 *y = weight[j] * normal[j] + bias[j];
@@ -114,10 +113,15 @@ impl BatchNorm {
 
     /// The gradient of the outputs becomes that of the inputs; those of weight and bias go to
     /// `into`.
-    pub(super) fn backward(&self, memory: &Memory, gradient: &mut Matrix, into: &mut [Matrix]) {
+    pub(super) fn backward(
+        &self,
+        (normal, scale): (&Matrix, &[f64]),
+        gradient: &mut Matrix,
+        into: &mut [Matrix],
+    ) {
         let sums = gradient.column_sums();
         let mut products = vec![0.0; sums.len()];
-        for (dy, normal) in gradient.iter_rows().zip(memory.matrix.iter_rows()) {
+        for (dy, normal) in gradient.iter_rows().zip(normal.iter_rows()) {
             for ((product, dy), normal) in products.iter_mut().zip(dy).zip(normal) {
                 *product += f64::from(*dy) * f64::from(*normal);
             }
@@ -130,13 +134,13 @@ impl BatchNorm {
         let samples = gradient.rows() as f64;
         let columns: Vec<[f64; 3]> = (self.weight.values().iter().enumerate())
             .map(|(j, weight)| {
-                let scale = f64::from(*weight) * memory.row[j];
-                [scale, sums[j] / samples, products[j] / samples]
+                let slope = f64::from(*weight) * scale[j];
+                [slope, sums[j] / samples, products[j] / samples]
             })
             .collect();
         for i in 0..gradient.rows() {
             let dx = gradient.row_mut(i).iter_mut();
-            for ((dx, normal), [scale, mean, slope]) in dx.zip(memory.matrix.row(i)).zip(&columns) {
+            for ((dx, normal), [scale, mean, slope]) in dx.zip(normal.row(i)).zip(&columns) {
                 *dx = (scale * (f64::from(*dx) - mean - slope * f64::from(*normal))) as f32;
             }
         }

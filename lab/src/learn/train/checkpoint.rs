@@ -1,41 +1,38 @@
-//! A training between two epochs, as a file: safetensors.
+//! A training between two epochs, as the bytes of a file.
 //!
 //! ```text
-//! network.0.weight ..    the network as it is          first.0, first.1, ..    velocities or means
-//! best.0.weight ..       the one of least loss         second.0, ..            mean squares
-//! metadata "onecycle.training/1": JSON of settings, inputs, layers, steps and all epochs
+//! line 1    JSON: format "onecycle.training/2", settings, inputs, layers, steps, all epochs
+//! bytes     f32, little endian: numbers of the network as it is, of the best network, first moments,
+//!           second moments (Adam alone), each array row by row
 //! ```
 
 use serde::{Deserialize, Serialize};
 
 use super::TrainError;
 use super::layer::Layer;
-use super::network::{Network, count_weights};
+use super::network::{Network, check_values, count_weights};
 use super::optimizer::Optimizer;
-use super::tensor_file::{Tensor, TensorFile, TensorFileError};
-use super::trainer::{Epoch, Settings, Trainer};
+use super::trainer::{Epoch, Trainer, TrainingSettings};
 
-/// Key of the metadata; changes with every change that a reader could notice.
-const FORMAT: &str = "onecycle.training/1";
+/// Changes with every change that a reader could notice.
+const FORMAT: &str = "onecycle.training/2";
 
 /// What is wrong with a file of a training.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CheckpointError {
-    /// A tensor, or the file around it.
-    #[error("{0}")]
-    File(#[from] TensorFileError),
-    /// A setting, or a size of the network.
+    /// A setting, a size of the network, or a number that no network can hold.
     #[error("{0}")]
     Train(#[from] TrainError),
-    /// What is not a tensor.
+    /// The file is cut off, or is something else.
     #[error("the file is not one of a training: {0}")]
-    Metadata(String),
+    Malformed(String),
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Progress {
-    settings: Settings,
+struct Head {
+    format: String,
+    settings: TrainingSettings,
     inputs: usize,
     layers: Vec<Layer>,
     steps: u64,
@@ -43,103 +40,86 @@ struct Progress {
 }
 
 impl Trainer {
-    /// All there is between two epochs, as the bytes of a safetensors file.
+    /// The state between two epochs as bytes.
     ///
     /// # Errors
-    /// Never with settings and losses that were finite.
+    /// [`CheckpointError::Malformed`]; never with settings and losses that were finite.
     pub fn save(&self) -> Result<Vec<u8>, CheckpointError> {
-        let progress = Progress {
+        let head = Head {
+            format: FORMAT.to_owned(),
             settings: self.settings.clone(),
             inputs: self.network.inputs(),
             layers: self.network.layers(),
             steps: self.optimizer.steps(),
             history: self.history.clone(),
         };
-        let progress = serde_json::to_string(&progress)
-            .map_err(|error| CheckpointError::Metadata(error.to_string()))?;
-        let mut file = TensorFile::default();
-        file.metadata.insert(FORMAT.to_owned(), progress);
-        for (prefix, network) in [("network", &self.network), ("best", &self.best)] {
-            for mut tensor in network.tensors() {
-                tensor.name = format!("{prefix}.{}", tensor.name);
-                file.tensors.push(tensor);
-            }
+        let mut bytes = serde_json::to_vec(&head)
+            .map_err(|error| CheckpointError::Malformed(error.to_string()))?;
+        bytes.push(b'\n');
+        let networks = [&self.network, &self.best].map(Network::numbers);
+        let moments = self.optimizer.moments().into_iter().flatten();
+        let moments = moments.flat_map(|matrix| matrix.values());
+        for number in networks.iter().flatten().chain(moments) {
+            bytes.extend(number.to_le_bytes());
         }
-        for (prefix, moments) in ["first", "second"]
-            .into_iter()
-            .zip(self.optimizer.moments())
-        {
-            for (i, matrix) in moments.iter().enumerate() {
-                file.tensors.push(Tensor {
-                    name: format!("{prefix}.{i}"),
-                    shape: vec![matrix.rows(), matrix.columns()],
-                    values: matrix.values().to_vec(),
-                });
-            }
-        }
-        Ok(file.to_bytes())
+        Ok(bytes)
     }
 
-    /// The training that [`Self::save`] saved: what it does next has the bits it would have had.
+    /// The training that [`Self::save`] saved; it continues with the same bits as without the pause.
     ///
     /// # Errors
-    /// Says what is wrong with the file.
+    /// Says what is wrong with the bytes.
     pub fn resume(bytes: &[u8]) -> Result<Self, CheckpointError> {
-        let mut file = TensorFile::from_bytes(bytes)?;
-        let progress = (file.metadata.get(FORMAT))
-            .ok_or_else(|| CheckpointError::Metadata(format!("it has no {FORMAT}")))?;
-        let progress: Progress = serde_json::from_str(progress)
-            .map_err(|error| CheckpointError::Metadata(error.to_string()))?;
-        let Progress {
-            settings,
-            inputs,
-            layers,
-            steps,
-            history,
-        } = progress;
-        // Before memory is asked for: the file must hold the weights it speaks of.
-        let weights = count_weights(inputs, &layers).map_err(TrainError::from)?;
-        let held: usize = file.tensors.iter().map(|tensor| tensor.values.len()).sum();
-        if weights > held {
+        let malformed = |reason: &str| CheckpointError::Malformed(reason.to_owned());
+        let end = bytes.iter().position(|&byte| byte == b'\n');
+        let end = end.ok_or_else(|| malformed("its first line has no end"))?;
+        let head: Head = serde_json::from_slice(&bytes[..end])
+            .map_err(|error| CheckpointError::Malformed(error.to_string()))?;
+        if head.format != FORMAT {
+            return Err(malformed("it has another format"));
+        }
+        let numbers = head.history.iter().map(|epoch| epoch.number);
+        if !numbers.eq(1..=head.history.len() as u64) {
+            return Err(malformed("its epochs are not numbered from one"));
+        }
+        let (numbers, cut_off) = bytes[end + 1..].as_chunks();
+        // Before memory is asked for: the file must hold the weights that its first line promises.
+        let weights = count_weights(head.inputs, &head.layers).map_err(TrainError::from)?;
+        if !cut_off.is_empty() || weights > numbers.len() {
+            let held = numbers.len();
             let reason = format!("its layers have {weights} numbers, but it holds {held}");
-            return Err(CheckpointError::Metadata(reason));
+            return Err(CheckpointError::Malformed(reason));
         }
-        let numbers = history.iter().map(|epoch| epoch.number);
-        if !numbers.eq(1..=history.len() as u64) {
-            let reason = "its epochs are not numbered from one".to_owned();
-            return Err(CheckpointError::Metadata(reason));
+        let numbers: Vec<f32> = numbers.iter().copied().map(f32::from_le_bytes).collect();
+        let mut rest = &numbers[..];
+        let mut next = |length: usize| -> Result<&[f32], CheckpointError> {
+            let (first, after) =
+                (rest.split_at_checked(length)).ok_or_else(|| malformed("it is cut off"))?;
+            rest = after;
+            Ok(first)
+        };
+        let zeros = Network::zeros(head.inputs, &head.layers)?;
+        let network = zeros.clone().with_numbers(next(weights)?)?;
+        let best = zeros.with_numbers(next(weights)?)?;
+        let mut optimizer =
+            Optimizer::new(head.settings.method, &network).map_err(TrainError::from)?;
+        let (moments, steps) = optimizer.state_mut();
+        *steps = head.steps;
+        for (moments, is_square) in moments.into_iter().zip([false, true]) {
+            for matrix in moments {
+                let values = next(matrix.values().len())?;
+                check_values(values, is_square)
+                    .map_err(|value| malformed(&format!("a moment is {value:?}")))?;
+                matrix.values_mut().copy_from_slice(values);
+            }
         }
-        let mut network = Network::zeros(inputs, &layers)?;
-        let mut best = network.clone();
-        network.take(&mut file, "network.")?;
-        best.take(&mut file, "best.")?;
-        let mut optimizer = Optimizer::new(settings.method, &network).map_err(TrainError::from)?;
-        take_moments(&mut optimizer, &mut file, steps)?;
-        file.expect_nothing_left()?;
-        let mut trainer = Self::new(settings, network)?;
+        if !rest.is_empty() {
+            return Err(malformed("it goes on after its last number"));
+        }
+        let mut trainer = Self::new(head.settings, network)?;
         trainer.best = best;
         trainer.optimizer = optimizer;
-        trainer.history = history;
+        trainer.history = head.history;
         Ok(trainer)
     }
-}
-
-fn take_moments(
-    optimizer: &mut Optimizer,
-    file: &mut TensorFile,
-    steps_taken: u64,
-) -> Result<(), TensorFileError> {
-    let (moments, steps) = optimizer.state_mut();
-    *steps = steps_taken;
-    for ((prefix, moments), is_variance) in
-        (["first", "second"].into_iter().zip(moments)).zip([false, true])
-    {
-        for (i, matrix) in moments.iter_mut().enumerate() {
-            let tensor = file.take(&format!("{prefix}.{i}"))?;
-            tensor.expect_shape(&[matrix.rows(), matrix.columns()])?;
-            tensor.expect_values(is_variance)?;
-            matrix.values_mut().copy_from_slice(&tensor.values);
-        }
-    }
-    Ok(())
 }

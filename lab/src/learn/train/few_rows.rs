@@ -16,7 +16,8 @@ use std::sync::{Mutex, PoisonError};
 
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
-use super::matrix::{LEAST_DIVIDED, Matrix, Workers};
+use super::matrix::{LEAST_DIVIDED, Matrix};
+use crate::workers::Workers;
 
 /// Chains of a sum: two vectors of 16.
 const CHAINS: usize = 32;
@@ -187,7 +188,8 @@ mod tests {
 
     use super::*;
     use crate::learn::train::matrix::tests::{Threads, random};
-    use crate::learn::train::{Layer, Network, OneThread};
+    use crate::learn::train::{Layer, Network};
+    use crate::workers::OneThread;
 
     // 1/2 (1 + 2 + .. + 70) = 1242.5: halves of whole numbers, exact in any order.
     #[test]

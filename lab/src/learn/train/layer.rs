@@ -19,8 +19,9 @@ use rand_distr::{Distribution, StandardNormal};
 
 use super::batch_norm::BatchNorm;
 use super::few_rows;
-use super::matrix::{Matrix, Workers};
+use super::matrix::Matrix;
 use super::{Purpose, TrainError, expect_size, stream};
+use crate::workers::Workers;
 
 /// A layer, as a user names it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -43,6 +44,12 @@ pub enum Layer {
         probability: f64,
     },
 }
+
+/// Arrays of a layer that are learnt, the first of them: weight and bias.
+pub(super) const PARAMETERS: usize = 2;
+
+/// Name of the array that holds variances.
+pub(super) const RUNNING_VARIANCE: &str = "running_var";
 
 /// A layer with its numbers.
 #[derive(Clone, Debug, PartialEq)]
@@ -117,40 +124,37 @@ impl Stage {
         }
     }
 
-    /// What is learnt, under PyTorch's names.
-    pub(super) fn parameters(&self) -> Vec<(&'static str, &Matrix)> {
+    /// All arrays under PyTorch's names: weight and bias, which are learnt, then running statistics.
+    pub(super) fn arrays(&self) -> Vec<(&'static str, &Matrix)> {
         match self {
             Self::Dense { weight, bias } => vec![("weight", weight), ("bias", bias)],
-            Self::BatchNorm(norm) => vec![("weight", &norm.weight), ("bias", &norm.bias)],
-            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
-        }
-    }
-
-    /// As [`Self::parameters`], to change.
-    pub(super) fn parameters_mut(&mut self) -> Vec<&mut Matrix> {
-        match self {
-            Self::Dense { weight, bias } => vec![weight, bias],
-            Self::BatchNorm(norm) => vec![&mut norm.weight, &mut norm.bias],
-            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
-        }
-    }
-
-    /// What is kept besides: running statistics.
-    pub(super) fn buffers(&self) -> Vec<(&'static str, &Matrix)> {
-        match self {
             Self::BatchNorm(norm) => vec![
+                ("weight", &norm.weight),
+                ("bias", &norm.bias),
                 ("running_mean", &norm.running_mean),
-                ("running_var", &norm.running_var),
+                (RUNNING_VARIANCE, &norm.running_var),
             ],
-            _ => Vec::new(),
+            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
         }
     }
 
-    /// As [`Self::buffers`], to change.
-    pub(super) fn buffers_mut(&mut self) -> Vec<&mut Matrix> {
+    /// What is learnt.
+    pub(super) fn parameters(&self) -> Vec<&Matrix> {
+        let arrays = self.arrays().into_iter().take(PARAMETERS);
+        arrays.map(|(_, matrix)| matrix).collect()
+    }
+
+    /// As [`Self::arrays`], to change.
+    pub(super) fn arrays_mut(&mut self) -> Vec<(&'static str, &mut Matrix)> {
         match self {
-            Self::BatchNorm(norm) => vec![&mut norm.running_mean, &mut norm.running_var],
-            _ => Vec::new(),
+            Self::Dense { weight, bias } => vec![("weight", weight), ("bias", bias)],
+            Self::BatchNorm(norm) => vec![
+                ("weight", &mut norm.weight),
+                ("bias", &mut norm.bias),
+                ("running_mean", &mut norm.running_mean),
+                (RUNNING_VARIANCE, &mut norm.running_var),
+            ],
+            Self::Relu | Self::Tanh | Self::Dropout { .. } => Vec::new(),
         }
     }
 
@@ -184,7 +188,9 @@ impl Stage {
             Self::Dense { weight, bias } => *output = dense(weight, bias, input, workers)?,
             Self::Relu => apply(input, output, relu),
             Self::Tanh => apply(input, output, f32::tanh),
-            Self::BatchNorm(norm) => norm.learn(input, output, memory)?,
+            Self::BatchNorm(norm) => {
+                norm.learn(input, output, (&mut memory.matrix, &mut memory.row))?;
+            }
             Self::Dropout { probability } => {
                 let mut rng = stream(draw.seed, Purpose::Dropout, draw.number);
                 let kept = (1.0 - *probability).recip() as f32;
@@ -225,7 +231,10 @@ impl Stage {
             }
             Self::Relu => by_output(&mut gradient, passed, |y| if y > 0.0 { 1.0 } else { 0.0 }),
             Self::Tanh => by_output(&mut gradient, passed, |y| 1.0 - y * y),
-            Self::BatchNorm(norm) => norm.backward(passed.memory, &mut gradient, into),
+            Self::BatchNorm(norm) => {
+                let normal = (&passed.memory.matrix, &passed.memory.row[..]);
+                norm.backward(normal, &mut gradient, into);
+            }
             Self::Dropout { .. } => multiply(&mut gradient, &passed.memory.matrix),
         }
         gradient

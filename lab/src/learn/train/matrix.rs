@@ -7,6 +7,7 @@
 use std::sync::{Mutex, PoisonError};
 
 use super::kernel::{View, multiply};
+use crate::workers::Workers;
 
 /// A matrix, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -14,29 +15,6 @@ pub struct Matrix {
     rows: usize,
     columns: usize,
     values: Vec<f32>,
-}
-
-/// Threads, as the caller has them: this crate starts none.
-pub trait Workers: Sync {
-    /// How many parts are worked off at a time.
-    fn count(&self) -> usize;
-
-    /// Calls `part` with each of `0..parts` once, in any order, on any threads, and waits for all.
-    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync));
-}
-
-/// The caller's own thread.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct OneThread;
-
-impl Workers for OneThread {
-    fn count(&self) -> usize {
-        1
-    }
-
-    fn each(&self, parts: usize, part: &(dyn Fn(usize) + Sync)) {
-        (0..parts).for_each(part);
-    }
 }
 
 /// Multiply-adds below which a product is not divided: some 0.1 ms on one thread, ten times what
@@ -256,6 +234,7 @@ pub(crate) mod tests {
     use rand_pcg::Pcg64Mcg;
 
     use super::*;
+    use crate::workers::OneThread;
 
     /// As many threads as it says.
     pub(crate) struct Threads(pub(crate) usize);

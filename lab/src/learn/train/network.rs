@@ -9,17 +9,15 @@
 //! before a dense layer     b := b + W shift,     W := W diag(scale)
 //! ```
 //!
-//! Weights go in and out as [`TensorFile`]s, under the names PyTorch gives them in a
-//! `Sequential`: `0.weight` of shape `[out, in]`, `0.bias`, `1.running_mean`, and so on. Its
-//! `num_batches_tracked`, which nothing here reads, may be there or not.
+//! Networks go to other programs and come from them as ONNX ([`onnx`](crate::learn::onnx)).
 
 use rand::Rng;
 
-use super::layer::{Draw, Layer, Memory, Passed, Stage};
-use super::matrix::{Matrix, Workers};
-use super::tensor_file::{Tensor, TensorFile, TensorFileError};
+use super::layer::{Draw, Layer, Memory, PARAMETERS, Passed, RUNNING_VARIANCE, Stage};
+use super::matrix::Matrix;
 use super::{TrainError, expect_size};
 use crate::space::FieldError;
+use crate::workers::Workers;
 
 /// Most weights of a network, 4 GB: beyond, a size is a mistake.
 const MOST_WEIGHTS: usize = 1 << 30;
@@ -81,7 +79,7 @@ impl Network {
         Ok(network)
     }
 
-    /// As [`Self::new`], all weights zero, to be filled from a file.
+    /// As [`Self::new`], with all weights zero, to be filled by [`Self::with_numbers`].
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -126,14 +124,14 @@ impl Network {
 
     /// What is learnt: of every layer in turn its weight, `out x in` or a row, and its bias, a row.
     pub fn parameters(&self) -> impl Iterator<Item = &Matrix> {
-        (self.stages.iter())
-            .flat_map(Stage::parameters)
-            .map(|(_, matrix)| matrix)
+        self.stages.iter().flat_map(Stage::parameters)
     }
 
     /// As [`Self::parameters`], to change.
     pub(super) fn parameters_mut(&mut self) -> impl Iterator<Item = &mut Matrix> {
-        self.stages.iter_mut().flat_map(Stage::parameters_mut)
+        (self.stages.iter_mut())
+            .flat_map(|stage| stage.arrays_mut().into_iter().take(PARAMETERS))
+            .map(|(_, matrix)| matrix)
     }
 
     /// The outputs, `batch x out`, of inputs `batch x in`: no dropout, running statistics. Up to
@@ -268,84 +266,55 @@ impl Network {
         }
     }
 
-    /// Every tensor, parameters and running statistics, as PyTorch names and shapes it.
-    #[must_use]
-    pub fn tensors(&self) -> Vec<Tensor> {
-        let mut tensors = Vec::new();
-        for (i, stage) in self.stages.iter().enumerate() {
-            for (name, matrix) in stage.parameters().into_iter().chain(stage.buffers()) {
-                tensors.push(Tensor {
-                    name: format!("{i}.{name}"),
-                    shape: shape(stage, name, matrix),
-                    values: matrix.values().to_vec(),
-                });
-            }
-        }
-        tensors
+    /// Every array with its name: of each layer in turn weight and bias, then running mean and running
+    /// variance. The names are those of PyTorch in a `Sequential`: `0.weight`, `0.bias`, `1.running_mean`.
+    pub fn arrays(&self) -> impl Iterator<Item = (String, &Matrix)> {
+        (self.stages.iter().enumerate()).flat_map(|(i, stage)| {
+            let arrays = stage.arrays().into_iter();
+            arrays.map(move |(name, matrix)| (format!("{i}.{name}"), matrix))
+        })
     }
 
-    /// Takes every tensor from a file, each under its name after `prefix`, and leaves the rest
-    /// there.
+    /// All numbers of [`Self::arrays`], one array after the other, row by row.
+    #[must_use]
+    pub fn numbers(&self) -> Vec<f32> {
+        (self.arrays())
+            .flat_map(|(_, matrix)| matrix.values().iter().copied())
+            .collect()
+    }
+
+    /// The same layers with other numbers, in the order of [`Self::numbers`].
     ///
     /// # Errors
-    /// Names the first tensor that is missing, of another shape, or holds what no network can; the
-    /// network is then as it was.
-    pub fn take(&mut self, file: &mut TensorFile, prefix: &str) -> Result<(), TensorFileError> {
-        let mut taken = self.clone();
-        for (i, stage) in taken.stages.iter_mut().enumerate() {
-            let named = stage.parameters().into_iter().chain(stage.buffers());
-            let values = named
-                .map(|(name, matrix)| {
-                    let tensor = file.take(&format!("{prefix}{i}.{name}"))?;
-                    tensor.expect_shape(&shape(stage, name, matrix))?;
-                    tensor.expect_values(name == "running_var")?;
-                    Ok(tensor.values)
-                })
-                .collect::<Result<Vec<_>, TensorFileError>>()?;
-            let parameters = stage.parameters().len();
-            let mut values = values.into_iter();
-            for (matrix, values) in
-                (stage.parameters_mut().into_iter()).zip(values.by_ref().take(parameters))
-            {
-                matrix.values_mut().copy_from_slice(&values);
-            }
-            for (matrix, values) in stage.buffers_mut().into_iter().zip(values) {
-                matrix.values_mut().copy_from_slice(&values);
+    /// Another count of numbers; a number that is not finite, or a negative variance.
+    pub fn with_numbers(mut self, numbers: &[f32]) -> Result<Self, TrainError> {
+        let expected = self.arrays().map(|(_, matrix)| matrix.values().len()).sum();
+        expect_size("the count of numbers", expected, numbers.len())?;
+        let mut rest = numbers;
+        for (layer, stage) in self.stages.iter_mut().enumerate() {
+            for (array, matrix) in stage.arrays_mut() {
+                let (values, after) = rest.split_at(matrix.values().len());
+                rest = after;
+                check_values(values, array == RUNNING_VARIANCE).map_err(|value| {
+                    TrainError::Value {
+                        layer,
+                        array,
+                        value,
+                    }
+                })?;
+                matrix.values_mut().copy_from_slice(values);
             }
         }
-        *self = taken;
-        Ok(())
-    }
-
-    /// Takes every tensor from the bytes of a safetensors file that holds nothing else.
-    ///
-    /// # Errors
-    /// As [`Self::take`]; also names a tensor that is not the network's.
-    pub fn load(&mut self, bytes: &[u8]) -> Result<(), TensorFileError> {
-        let mut file = TensorFile::from_bytes(bytes)?;
-        let mut loaded = self.clone();
-        loaded.take(&mut file, "")?;
-        file.expect_nothing_left()?;
-        *self = loaded;
-        Ok(())
-    }
-
-    /// The bytes of a safetensors file with every tensor.
-    #[must_use]
-    pub fn save(&self) -> Vec<u8> {
-        TensorFile {
-            tensors: self.tensors(),
-            ..TensorFile::default()
-        }
-        .to_bytes()
+        Ok(self)
     }
 }
 
-/// The shape that PyTorch gives a tensor: vectors but for the weights of a dense layer.
-fn shape(stage: &Stage, name: &str, matrix: &Matrix) -> Vec<usize> {
-    match stage {
-        Stage::Dense { .. } if name == "weight" => vec![matrix.rows(), matrix.columns()],
-        _ => vec![matrix.columns()],
+/// The first number that no network can hold: not finite, or negative for a variance.
+pub(super) fn check_values(values: &[f32], is_variance: bool) -> Result<(), f32> {
+    let is_wrong = |value: &&f32| !value.is_finite() || is_variance && **value < 0.0;
+    match values.iter().find(is_wrong) {
+        None => Ok(()),
+        Some(&value) => Err(value),
     }
 }
 

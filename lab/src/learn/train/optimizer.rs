@@ -15,14 +15,15 @@ use std::sync::{Mutex, PoisonError};
 
 use super::TrainError;
 use super::expect_size;
-use super::matrix::{Matrix, Workers};
+use super::matrix::Matrix;
 use super::network::{Network, Tape};
 use crate::space::{FieldError, first_out_of_range};
+use crate::workers::Workers;
 
 /// How a gradient becomes a step.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum Method {
+pub enum OptimizerMethod {
     /// Stochastic gradient descent.
     Sgd {
         /// What is left of the velocity after a step, 0 to below 1.
@@ -50,7 +51,7 @@ const PART: usize = 1 << 17;
 /// A method with its memory of past gradients.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optimizer {
-    method: Method,
+    method: OptimizerMethod,
     steps: u64,
     /// Of every parameter the velocity or the mean gradient.
     first: Vec<Matrix>,
@@ -58,7 +59,7 @@ pub struct Optimizer {
     second: Vec<Matrix>,
 }
 
-impl Method {
+impl OptimizerMethod {
     /// Adam as its authors have it, without decay.
     pub const ADAM: Self = Self::Adam {
         b1: 0.9,
@@ -114,7 +115,7 @@ impl Optimizer {
     ///
     /// # Errors
     /// Names the first field of the method that is out of its range.
-    pub fn new(method: Method, network: &Network) -> Result<Self, FieldError> {
+    pub fn new(method: OptimizerMethod, network: &Network) -> Result<Self, FieldError> {
         method.validate()?;
         let zeros = || {
             (network.parameters())
@@ -126,8 +127,8 @@ impl Optimizer {
             steps: 0,
             first: zeros(),
             second: match method {
-                Method::Sgd { .. } => Vec::new(),
-                Method::Adam { .. } => zeros(),
+                OptimizerMethod::Sgd { .. } => Vec::new(),
+                OptimizerMethod::Adam { .. } => zeros(),
             },
         })
     }
@@ -202,12 +203,12 @@ impl Optimizer {
 
     fn factors(&self, rate: f64) -> Factors {
         match self.method {
-            Method::Sgd { momentum, decay } => Factors::Sgd {
+            OptimizerMethod::Sgd { momentum, decay } => Factors::Sgd {
                 momentum: momentum as f32,
                 decay: decay as f32,
                 rate: rate as f32,
             },
-            Method::Adam { b1, b2, decay } => {
+            OptimizerMethod::Adam { b1, b2, decay } => {
                 let steps = self.steps as f64;
                 Factors::Adam {
                     b1: [b1 as f32, (1.0 - b1) as f32],

@@ -13,21 +13,22 @@ use rand::seq::SliceRandom;
 
 use super::data::{Batch, Dataset};
 use super::loss::Loss;
-use super::matrix::{Matrix, Workers};
+use super::matrix::Matrix;
 use super::network::{Dropped, Network, Tape};
-use super::optimizer::{Method, Optimizer};
+use super::optimizer::{Optimizer, OptimizerMethod};
 use super::schedule::Schedule;
 use super::{Purpose, TrainError, expect_size, stream};
 use crate::space::FieldError;
+use crate::workers::Workers;
 
 /// How a network is trained.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Settings {
+pub struct TrainingSettings {
     /// What is to become small.
     pub loss: Loss,
     /// How a gradient becomes a step.
-    pub method: Method,
+    pub method: OptimizerMethod,
     /// The learning rate.
     pub schedule: Schedule,
     /// Samples a step; all of them where there are fewer.
@@ -41,7 +42,7 @@ pub struct Settings {
     pub seed: u64,
 }
 
-impl Settings {
+impl TrainingSettings {
     /// Checks every field.
     ///
     /// # Errors
@@ -99,7 +100,7 @@ pub enum Outcome {
 /// A network in training.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trainer {
-    pub(super) settings: Settings,
+    pub(super) settings: TrainingSettings,
     pub(super) network: Network,
     pub(super) best: Network,
     pub(super) optimizer: Optimizer,
@@ -120,7 +121,7 @@ impl Trainer {
     /// # Errors
     /// Names the first setting that is out of its range, or says that the network has another
     /// number of outputs than the loss takes.
-    pub fn new(settings: Settings, network: Network) -> Result<Self, TrainError> {
+    pub fn new(settings: TrainingSettings, network: Network) -> Result<Self, TrainError> {
         settings.validate()?;
         if let Some(outputs) = settings.loss.outputs() {
             expect_size("the number of outputs", outputs, network.outputs())?;
@@ -154,7 +155,7 @@ impl Trainer {
 
     /// Its settings.
     #[must_use]
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &TrainingSettings {
         &self.settings
     }
 

@@ -15,7 +15,7 @@ use onecycle_onboard::{Pd, Soiptd};
 use super::ClassifierError;
 use super::harmonic::{Harmonics, Response};
 use crate::learn::train::Matrix;
-use crate::paper::grid::Grid;
+use crate::space::grid::Grid;
 use crate::space::limit_cycle::symmetric;
 use onecycle_design::soiptd_pd::cost::ise;
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
@@ -73,7 +73,7 @@ pub struct Classes {
 
 /// A process with the controller that others are compared with.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Truth {
+pub struct TrueProcess {
     /// The process.
     pub process: Soiptd,
     /// Its best PD at the margin of the space.
@@ -116,7 +116,7 @@ impl Class {
     }
 }
 
-impl Truth {
+impl TrueProcess {
     /// Of a process at a margin.
     ///
     /// # Errors
@@ -224,13 +224,13 @@ impl Classes {
     ///
     /// # Errors
     /// Where it has none.
-    pub fn truth(&self, process: Soiptd) -> Result<Truth, ClassifierError> {
-        Truth::new(process, self.phase_margin_rad)
+    pub fn truth(&self, process: Soiptd) -> Result<TrueProcess, ClassifierError> {
+        TrueProcess::new(process, self.phase_margin_rad)
     }
 
     /// What the controller of every class costs on a process, at the gains that a cycle tells.
     #[must_use]
-    pub fn costs(&self, truth: &Truth, measured: &Measured) -> Vec<f32> {
+    pub fn costs(&self, truth: &TrueProcess, measured: &Measured) -> Vec<f32> {
         let costs = (self.classes.iter()).map(|class| truth.cost(class.controller(measured)));
         costs.map(|cost| cost as f32).collect()
     }

@@ -3,12 +3,13 @@
 use onecycle_onboard::Pd;
 
 use super::ClassifierError;
-use super::classes::{Classes, Gain, Measured, Truth, label};
-use super::experiment::{SampledCycle, Trials};
+use super::classes::{Classes, Gain, Measured, TrueProcess, label};
+use super::experiment::Trials;
 use super::harmonic::Harmonics;
 use super::input::{Fit, INPUTS, Prepared};
+use crate::experiments::SampledCycle;
 use crate::learn::train::{Batch, Dataset, Matrix};
-use crate::paper::grid::Pieces;
+use crate::workers::Workers;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 
 /// Which processes examples are of.
@@ -29,7 +30,7 @@ pub enum Processes {
 #[derive(Clone, Debug, PartialEq)]
 struct Example {
     prepared: Prepared,
-    truth: Truth,
+    truth: TrueProcess,
     /// From the harmonics, and from the amplitude.
     measured: [Measured; 2],
     costs: Vec<f32>,
@@ -65,9 +66,9 @@ impl Examples {
         (trials, count): (&Trials, u64),
         processes: Processes,
         (classes, gain, fit): (&Classes, Gain, Fit),
-        pieces: &impl Pieces,
+        workers: &dyn Workers,
     ) -> Result<Self, ClassifierError> {
-        let made = pieces.map(count as usize, |n| {
+        let made = workers.map(count as usize, |n| {
             let n = n as u64;
             let class = processes.class(n, classes.len());
             let trial = trials.trial(n, class.map(|class| classes.times_s(class)))?;

@@ -1,25 +1,17 @@
-//! The experiments: a random process, bias and noise under the relay of the board, and one steady
-//! cycle of what is recorded at 1 kHz.
+//! Trials: relay experiments on random processes of a space, sampled at 1 kHz, and the last steady cycle
+//! of each.
 //!
-//! Trial `n` of a seed is the same whatever else is run.
+//! Trial `n` of a seed does not depend on what else is run.
 
-use onecycle_onboard::cycle::Cycle;
-use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Experiment, Trace};
-use rand::{RngExt, SeedableRng};
-use rand_pcg::Pcg64Mcg;
+use onecycle_onboard::Soiptd;
 
 use super::ClassifierError;
-use crate::experiments::DrawnNoise;
-use crate::learn::dataset::last_steady_cycle;
-use crate::space::limit_cycle::symmetric;
+use crate::experiments::draw::{bias_and_noise, stream};
+use crate::experiments::experiment::PREROLL_SAMPLES;
+use crate::experiments::{
+    Oscillation, RelayExperiment, RelaySetup, SAMPLE_S, SampledCycle, last_steady_cycle,
+};
 use crate::space::{FieldError, Space, first_out_of_range};
-
-/// Sample period (s): the paper's.
-pub const SAMPLE_S: f64 = 1e-3;
-
-/// The relay measures its noise for this long (s).
-const PREROLL_S: f64 = 0.1;
 
 /// Periods of the noise-free oscillation that an experiment lasts, and that it lasts where it was not
 /// steady by then.
@@ -71,23 +63,6 @@ pub struct Trials {
     pub protocol: Protocol,
 }
 
-/// Both signals of a whole cycle, from a rise of the relay to the next.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SampledCycle {
-    /// Sample period (s).
-    pub sample_s: f64,
-    /// Input as commanded (input unit).
-    pub input: Vec<f32>,
-    /// Output as measured (output unit).
-    pub output: Vec<f32>,
-    /// How much higher the output is where the cycle ends than where it began (output unit), averaged
-    /// about both: what a steady state would not have.
-    pub drift: f64,
-}
-
-/// Part of the cycle on either side of its ends over which the drift is averaged.
-const DRIFT_PART: f64 = 1.0 / 32.0;
-
 /// A trial that came to a steady oscillation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
@@ -113,77 +88,59 @@ impl Trials {
         ])
     }
 
-    /// Trial number `n`, of a process with these times (s) or of a random one; `None` where the
-    /// oscillation does not become steady.
+    /// Trial number `n`, of a process with these times (s) or of a random one; `None` if the oscillation
+    /// does not become steady.
     ///
     /// # Errors
-    /// Where the times are no process.
+    /// [`ClassifierError`]: the times are outside their physical range.
     pub fn trial(
         &self,
         n: u64,
         times_s: Option<[f64; 3]>,
     ) -> Result<Option<Trial>, ClassifierError> {
-        let mut rng = Pcg64Mcg::seed_from_u64(self.seed.wrapping_add(n));
-        let random = self.space.random(&mut rng);
-        let bias = self.bias * rng.random_range(-1.0..=1.0);
-        let sigma = self.sigma * rng.random_range(0.0..=1.0);
-        let [t_prop_s, t_body_s, tau_s] = times_s.unwrap_or(random);
-        let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s)?;
-        let Some(quiet) = symmetric(&process, self.space.beta) else {
+        let Some(experiment) = self.experiment(n, times_s)? else {
             return Ok(None);
         };
-        let mut settings = RelaySettings::new(1.0, self.space.beta as f32);
-        settings.preroll_s = PREROLL_S as f32;
-        let is_trimmed = self.protocol.is_trimmed(n);
-        if is_trimmed {
-            settings.trim_gain = RelaySettings::TRIM_GAIN;
-        }
-        let (lengths, longest_s) = if is_trimmed {
-            (PERIODS, LONGEST_TRIMMED * quiet.period_s())
+        let (lengths, longest_s) = if self.protocol.is_trimmed(n) {
+            (PERIODS, LONGEST_TRIMMED * experiment.oscillation.period_s)
         } else {
             (UNTRIMMED_PERIODS, f64::INFINITY)
         };
         for periods in lengths {
-            let duration_s = PREROLL_S + periods * quiet.period_s();
-            let mut experiment = Experiment::new(process, SAMPLE_S, duration_s);
-            experiment.input_bias = bias;
-            experiment.sensor.noise_sigma = sigma * quiet.amplitude;
-            // The longer experiment begins as the shorter one did.
-            let trace = experiment.run(
-                &mut Relay::new(settings)?,
-                &mut DrawnNoise(&mut rng.clone()),
-            );
+            let (trace, _) = experiment.run(periods)?;
             let settled = last_steady_cycle(&trace).filter(|cycle| cycle.period_s < longest_s);
-            if let Some(cycle) = settled.and_then(|cycle| sampled(&trace, &cycle)) {
+            let cycle = settled.and_then(|cycle| SampledCycle::of(&trace, &cycle, SAMPLE_S));
+            if let Some(cycle) = cycle {
+                let process = experiment.process;
                 return Ok(Some(Trial { process, cycle }));
             }
         }
         Ok(None)
     }
-}
 
-fn sampled(trace: &Trace, cycle: &Cycle) -> Option<SampledCycle> {
-    let first = (cycle.start_s / SAMPLE_S).round() as usize;
-    let last = first + (cycle.period_s / SAMPLE_S).round() as usize;
-    let single = |signal: &[f64]| {
-        let values = signal.get(first..last)?;
-        Some(values.iter().map(|&value| value as f32).collect())
-    };
-    let around = ((DRIFT_PART * (last - first) as f64) as usize).clamp(1, first.max(1));
-    let mean_about = |k: usize| {
-        let end = (k + around).min(trace.len());
-        let values = &trace.output[k - around..end];
-        values.iter().sum::<f64>() / values.len() as f64
-    };
-    let is_inside = first >= around && last < trace.len();
-    Some(SampledCycle {
-        drift: if is_inside {
-            mean_about(last) - mean_about(first)
-        } else {
-            0.0
-        },
-        sample_s: SAMPLE_S,
-        input: single(&trace.input)?,
-        output: single(&trace.output)?,
-    })
+    /// The experiment of a trial; `None` if the relay does not make the process oscillate.
+    fn experiment(
+        &self,
+        n: u64,
+        times_s: Option<[f64; 3]>,
+    ) -> Result<Option<RelayExperiment>, ClassifierError> {
+        let mut rng = stream(self.seed, n);
+        let random = self.space.random(&mut rng);
+        let (bias, sigma) = bias_and_noise(self.bias, self.sigma, &mut rng);
+        let [t_prop_s, t_body_s, tau_s] = times_s.unwrap_or(random);
+        let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s)?;
+        let Some(oscillation) = Oscillation::exact(&process, self.space.beta) else {
+            return Ok(None);
+        };
+        let setup = RelaySetup {
+            beta: self.space.beta,
+            trim: self.protocol.is_trimmed(n),
+            sample_s: SAMPLE_S,
+            preroll_s: PREROLL_SAMPLES * SAMPLE_S,
+        };
+        let mut experiment = RelayExperiment::new(process, oscillation, setup, rng);
+        experiment.input_bias = bias;
+        experiment.noise_sigma = sigma * oscillation.amplitude;
+        Ok(Some(experiment))
+    }
 }

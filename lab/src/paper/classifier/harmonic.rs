@@ -33,7 +33,7 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use onecycle_onboard::Soiptd;
 
-use super::experiment::SampledCycle;
+use crate::experiments::SampledCycle;
 
 /// The response of a process at one frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -18,7 +18,7 @@
 //! to three times as many under a bias that is not trimmed: what is padded and beyond is cut off, after
 //! all has been centred and scaled.
 
-use super::experiment::SampledCycle;
+use crate::experiments::SampledCycle;
 
 /// Samples of either signal: the paper's.
 pub const SAMPLES: usize = 2260;

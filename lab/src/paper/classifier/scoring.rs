@@ -8,20 +8,21 @@
 use super::ClassifierError;
 use super::classes::{Classes, Gain};
 use super::examples::Examples;
-use crate::learn::train::{Batch, Dataset, Matrix, Network, Workers};
+use crate::learn::train::{Batch, Dataset, Matrix, Network};
+use crate::workers::Workers;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 
 /// How a class is picked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Rule {
+pub enum PickRule {
     /// The one with the largest output.
     MostLikely,
     /// The one that costs least on average.
     LeastExpectedCost,
 }
 
-impl Rule {
+impl PickRule {
     /// Both.
     pub const ALL: [Self; 2] = [Self::MostLikely, Self::LeastExpectedCost];
 }
@@ -111,7 +112,7 @@ impl Score {
     }
 }
 
-/// The classes that a network picks for every example, by each of [`Rule::ALL`].
+/// The classes that a network picks for every example, by each of [`PickRule::ALL`].
 ///
 /// # Errors
 /// Where the network has other inputs or outputs than the examples.

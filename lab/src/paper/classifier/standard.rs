@@ -15,7 +15,7 @@
 use super::ClassifierError;
 use super::examples::Examples;
 use super::input::INPUTS;
-use crate::learn::train::{Batch, Dataset, Layer, Network, TensorFile};
+use crate::learn::train::{Batch, Dataset, Layer, Network};
 
 /// Keeps numbers that are nearly always the same from counting more than others: a fiftieth of the
 /// amplitude, which is what noise moves them by.
@@ -69,33 +69,15 @@ impl Standard {
     pub fn before(&self, network: &Network) -> Result<Network, ClassifierError> {
         let mut layers = vec![Layer::BatchNorm];
         layers.extend(network.layers());
-        let mut whole = Network::zeros(INPUTS, &layers)?;
-        let mut file = TensorFile {
-            tensors: whole.tensors(),
-            ..TensorFile::default()
-        };
-        let single = |values: &[f64]| values.iter().map(|value| *value as f32).collect();
-        let variance: Vec<f64> = (self.deviation.iter())
-            .map(|deviation| deviation * deviation - EPSILON)
-            .collect();
-        for tensor in &mut file.tensors {
-            match tensor.name.as_str() {
-                "0.running_mean" => tensor.values = single(&self.mean),
-                "0.running_var" => tensor.values = single(&variance),
-                _ => {}
-            }
-        }
-        // The layers of the network come one later.
-        file.tensors.retain(|tensor| tensor.name.starts_with("0."));
-        for mut tensor in network.tensors() {
-            if let Some((number, name)) = tensor.name.split_once('.') {
-                let later = number.parse::<usize>().unwrap_or_default() + 1;
-                tensor.name = format!("{later}.{name}");
-            }
-            file.tensors.push(tensor);
-        }
-        whole.load(&file.to_bytes())?;
-        Ok(whole)
+        let single = |value: &f64| *value as f32;
+        let variance =
+            (self.deviation.iter()).map(|deviation| (deviation * deviation - EPSILON) as f32);
+        // Weight one and bias zero, then mean and variance.
+        let mut numbers = [[1.0; INPUTS], [0.0; INPUTS]].concat();
+        numbers.extend(self.mean.iter().map(single));
+        numbers.extend(variance);
+        numbers.extend(network.numbers());
+        Ok(Network::zeros(INPUTS, &layers)?.with_numbers(&numbers)?)
     }
 }
 

@@ -1,12 +1,12 @@
 //! Many certificates under one bias in one row.
 
-use super::{Certificate, Verdict};
+use super::{Certificate, CycleStability};
 use crate::space::Range;
 use crate::space::limit_cycle::LimitCycle;
 
 /// What holds of a set of processes under one bias.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct Summary {
+pub struct CertificateSummary {
     /// Constant added to the relay's output, whose amplitude is one.
     pub bias: f64,
     /// Number of processes.
@@ -14,9 +14,9 @@ pub struct Summary {
     /// How many of them have no cycle without bias, or an unstable one.
     pub unbiased_failures: usize,
     /// The bare relay.
-    pub bare: Kind,
+    pub bare: RelayCounts,
     /// The relay that turns back.
-    pub turned_back: Kind,
+    pub turned_back: RelayCounts,
     /// How many keep a stable cycle where the trim follows the bias.
     pub trimmed: usize,
     /// The largest spectral radius of those cycles.
@@ -25,7 +25,7 @@ pub struct Summary {
 
 /// What holds of a kind of relay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
-pub struct Kind {
+pub struct RelayCounts {
     /// Processes with one stable cycle.
     pub stable: usize,
     /// Processes with two stable cycles or more.
@@ -44,7 +44,7 @@ pub struct Kind {
     pub best_radius: Option<f64>,
 }
 
-impl Summary {
+impl CertificateSummary {
     /// Of certificates under one bias.
     #[must_use]
     pub fn of(bias: f64, certificates: &[Certificate]) -> Self {
@@ -56,8 +56,8 @@ impl Summary {
                 .iter()
                 .filter(|c| !c.unbiased.is_some_and(|cycle| cycle.is_stable()))
                 .count(),
-            bare: Kind::of(certificates.iter().map(|c| (c.unbiased, c.bare.clone()))),
-            turned_back: Kind::of(certificates.iter().map(|c| {
+            bare: RelayCounts::of(certificates.iter().map(|c| (c.unbiased, c.bare.clone()))),
+            turned_back: RelayCounts::of(certificates.iter().map(|c| {
                 let halved = c.turned_back.iter().map(|&(_, cycle)| cycle);
                 (c.unbiased, c.bare.iter().copied().chain(halved).collect())
             })),
@@ -67,18 +67,18 @@ impl Summary {
     }
 }
 
-impl Kind {
+impl RelayCounts {
     fn of(processes: impl Iterator<Item = (Option<LimitCycle>, Vec<LimitCycle>)>) -> Self {
         let mut kind = Self {
             stable_cycles: (usize::MAX, 0),
             ..Self::default()
         };
         for (unbiased, cycles) in processes {
-            match Verdict::of(&cycles) {
-                Verdict::Stable => kind.stable += 1,
-                Verdict::Coexisting => kind.coexisting += 1,
-                Verdict::Unstable => kind.unstable += 1,
-                Verdict::NoCycle => kind.no_cycle += 1,
+            match CycleStability::of(&cycles) {
+                CycleStability::Stable => kind.stable += 1,
+                CycleStability::Coexisting => kind.coexisting += 1,
+                CycleStability::Unstable => kind.unstable += 1,
+                CycleStability::NoCycle => kind.no_cycle += 1,
             }
             let stable = cycles.iter().filter(|cycle| cycle.is_stable());
             let (fewest, most) = kind.stable_cycles;

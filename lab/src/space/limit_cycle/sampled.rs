@@ -17,7 +17,7 @@ use super::{LimitCycle, symmetric};
 
 /// A limit cycle of the sampled relay without bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SampledCycle {
+pub struct SampledLimitCycle {
     /// Samples for which the output is high, and low.
     pub half_period: u32,
     /// Half the peak-to-peak output, also between samples (output unit).
@@ -30,7 +30,7 @@ const SAMPLES_BEYOND: f64 = 4.0;
 
 /// All symmetric cycles of the relay sampled every `sample_s`, the shortest first.
 #[must_use]
-pub fn symmetric_cycles(process: &Soiptd, beta: f64, sample_s: f64) -> Vec<SampledCycle> {
+pub fn symmetric_cycles(process: &Soiptd, beta: f64, sample_s: f64) -> Vec<SampledLimitCycle> {
     let Some(LimitCycle { high_s, .. }) = symmetric(process, beta) else {
         return Vec::new();
     };
@@ -44,7 +44,12 @@ pub fn symmetric_cycles(process: &Soiptd, beta: f64, sample_s: f64) -> Vec<Sampl
         .collect()
 }
 
-fn cycle_of(process: &Soiptd, beta: f64, sample_s: f64, half_period: u32) -> Option<SampledCycle> {
+fn cycle_of(
+    process: &Soiptd,
+    beta: f64,
+    sample_s: f64,
+    half_period: u32,
+) -> Option<SampledLimitCycle> {
     let high_s = f64::from(half_period) * sample_s;
     if process.tau_s() >= 2.0 * high_s {
         return None;
@@ -64,7 +69,7 @@ fn cycle_of(process: &Soiptd, beta: f64, sample_s: f64, half_period: u32) -> Opt
     let highest = course
         .iter()
         .fold(f64::NEG_INFINITY, |high, moment| high.max(moment.y));
-    Some(SampledCycle {
+    Some(SampledLimitCycle {
         half_period,
         amplitude: process.k_over_t_body().abs() * (mean - lowest).max(highest - mean),
     })

@@ -6,8 +6,8 @@ use onecycle_onboard::Soiptd;
 use onecycle_onboard::transition::{State, Transition};
 use onecycle_plant::FixedStepProcess;
 
-use super::{Fit, InitialState, InputBias, Settings};
-use crate::judge::baselines::RivalError;
+use super::{InitialState, InputBias, OutputErrorFit, PemSettings};
+use crate::judge::baselines::BaselineError;
 use onecycle_identify::Signals;
 
 /// Half the step of the central differences of the response over the logarithm of a time: its square,
@@ -47,8 +47,8 @@ impl<'a> OutputError<'a> {
     pub(super) fn new(
         signals: &Signals<'a>,
         window: Range<usize>,
-        settings: &Settings,
-    ) -> Result<Self, RivalError> {
+        settings: &PemSettings,
+    ) -> Result<Self, BaselineError> {
         let mut terms = vec![Term::Input];
         if settings.input_bias == InputBias::Estimated {
             terms.push(Term::Bias);
@@ -60,7 +60,7 @@ impl<'a> OutputError<'a> {
         // As many samples as parameters leave nothing to fit.
         let output = signals.output.get(window.clone());
         let Some(output) = output.filter(|_| samples > terms.len() + 3) else {
-            return Err(RivalError::TooShort { samples });
+            return Err(BaselineError::TooShort { samples });
         };
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
         let offset = match settings.input_bias {
@@ -83,12 +83,12 @@ impl<'a> OutputError<'a> {
     }
 
     /// The fit at these times (s); `None` where they are no process or the output does not follow.
-    pub(super) fn fit(&self, times_s: [f64; 3], start: usize) -> Option<Fit> {
+    pub(super) fn fit(&self, times_s: [f64; 3], start: usize) -> Option<OutputErrorFit> {
         let unit = unit_process(times_s)?;
         let (factors, residual) = self.solve(&unit);
         let gain = factors[0];
         let bias = self.terms.iter().position(|&term| term == Term::Bias);
-        Some(Fit {
+        Some(OutputErrorFit {
             process: unit.with_gain_scaled(gain).ok()?,
             input_bias: bias.map(|at| factors[at] / gain),
             cost: self.relative(&residual),
@@ -269,10 +269,10 @@ mod tests {
             breaks: &[],
         };
         for initial_state in [InitialState::Rest, InitialState::Estimated] {
-            let settings = Settings {
+            let settings = PemSettings {
                 initial_state,
                 input_bias: InputBias::Estimated,
-                ..Settings::paper(Data::Whole)
+                ..PemSettings::paper(Data::Whole)
             };
             let model = OutputError::new(&signals, 150..400, &settings).unwrap();
             let at = [0.035, 0.2, 0.0153];

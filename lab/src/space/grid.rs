@@ -1,0 +1,226 @@
+//! Grids: the processes that stand for a space, so that one of them is near every process of it
+//! (section III-B of the paper; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//!
+//! `J_(ij) = max(J_ij, J_ji)`, [`Candidate::distance`], says how far apart two processes are: what
+//! either one's optimal controller costs on the other, as a fraction above that one's own optimum.
+//! A grid is laid for a deterioration `J*`. What a user needs of it is the same for both layouts:
+//! every process of the space has a member within `J*`; [`check`] measures it.
+//!
+//! | layout             | members                                                             |
+//! |--------------------|---------------------------------------------------------------------|
+//! | [`Layout::Rays`]   | the paper's: along each of three coordinates `J*` apart, and what that leaves out; they tell processes apart, as a classifier needs them |
+//! | [`Layout::Fewest`] | as few as leave no process without one: a bank of controllers; how far apart they are is not said |
+//!
+//! Work is cut into independent parts that run on the caller's [`Workers`].
+//!
+//! ```
+//! use onecycle_lab::space::Space;
+//! use onecycle_lab::space::grid::{Grid, Layout, GridSettings, check};
+//! use onecycle_lab::workers::OneThread;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let space = Space { tau_s: (0.02, 0.02), ..Space::MULTIROTOR };
+//! let settings = GridSettings { space, deterioration: 0.3, ..GridSettings::default() };
+//! let grid = Grid::build(&settings, &OneThread)?;
+//! let found = check(&grid, 100, 1, &OneThread)?;
+//! assert!(found.worst.is_some_and(|worst| worst <= 0.3));
+//! # Ok(())
+//! # }
+//! ```
+
+use crate::space::candidate::{Candidate, CandidateError, Gains};
+use crate::space::surface::Direction;
+use crate::space::{FieldError, Space};
+use crate::workers::Workers;
+
+mod chain;
+mod coverage;
+mod draws;
+mod fewest;
+mod file;
+mod holes;
+mod index;
+mod rays;
+
+pub use coverage::{Check, check};
+pub use file::{FORMAT, FileError, GridFile, MemberRecord, rounded, write};
+pub use index::Index;
+pub use rays::{Ray, row, rows, step};
+
+/// How the members of a grid are chosen. See the [module](self).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Layout {
+    /// Rows, rays and rungs, `J*` apart.
+    #[default]
+    Rays,
+    /// A greedy cover.
+    Fewest,
+}
+
+/// What a grid is laid for.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GridSettings {
+    /// The processes that it stands for.
+    pub space: Space,
+    /// `J*`, as a fraction.
+    pub deterioration: f64,
+    /// How its members are chosen.
+    pub layout: Layout,
+    /// At which gains processes are compared.
+    pub gains: Gains,
+}
+
+impl Default for GridSettings {
+    /// The paper's: its space, its 10 %.
+    fn default() -> Self {
+        Self {
+            space: Space::MULTIROTOR,
+            deterioration: 0.1,
+            layout: Layout::Rays,
+            gains: Gains::SameAmplitude,
+        }
+    }
+}
+
+impl GridSettings {
+    /// Checks every field.
+    ///
+    /// # Errors
+    /// Names the first field that is out of its range.
+    pub fn validate(&self) -> Result<(), FieldError> {
+        self.space.validate()?;
+        if !(0.001..=1.0).contains(&self.deterioration) {
+            return Err(FieldError {
+                field: "deterioration",
+                range: "0.001 to 1, that is 0.1 % to 100 %",
+                value: self.deterioration,
+            });
+        }
+        Ok(())
+    }
+
+    fn candidate(&self, times_s: [f64; 3]) -> Result<Candidate, CandidateError> {
+        Candidate::new(&self.space, self.gains, times_s)
+    }
+}
+
+/// Where a member of [`Layout::Rays`] stands, all counted from zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Number of its row, by rising `theta`.
+    pub row: usize,
+    /// Number of its ray in the row, by rising `phi`.
+    pub ray: usize,
+    /// Number of its radius on the ray, by rising radius.
+    pub rung: usize,
+    /// Ratio of neighbouring radii on the ray.
+    pub alpha: f64,
+}
+
+/// A process of a grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Member {
+    /// The process and its controller.
+    pub candidate: Candidate,
+    /// Its shape.
+    pub direction: Direction,
+    /// Its radius (s).
+    pub radius_s: f64,
+    /// Where it stands; `None` in [`Layout::Fewest`] and of a member that closes a hole.
+    pub place: Option<Place>,
+}
+
+impl Member {
+    /// One that stands on no ray.
+    fn alone(candidate: Candidate) -> Self {
+        let (direction, radius_s) = Direction::of(candidate.times_s());
+        Self {
+            candidate,
+            direction,
+            radius_s,
+            place: None,
+        }
+    }
+}
+
+/// Why a grid cannot be laid.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub enum GridError {
+    /// A setting is out of its range.
+    #[error("{0}")]
+    GridSettings(#[from] FieldError),
+    /// A process of the space has no controller or no oscillation.
+    #[error("{0}")]
+    Candidate(#[from] CandidateError),
+}
+
+/// A grid. See the [module](self).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// What it was laid for.
+    pub settings: GridSettings,
+    /// Its members, at least one: by row, ray and rung, or by rising `Kd`.
+    pub members: Vec<Member>,
+}
+
+impl Grid {
+    /// Lays a grid.
+    ///
+    /// # Errors
+    /// See [`GridError`].
+    pub fn build(settings: &GridSettings, workers: &dyn Workers) -> Result<Self, GridError> {
+        settings.validate()?;
+        let members = match settings.layout {
+            Layout::Fewest => fewest::members(settings, workers)?,
+            Layout::Rays => {
+                let thetas_rad = rows(settings, workers)?;
+                let rows = workers.map(thetas_rad.len(), |k| row(settings, thetas_rad[k]));
+                let rows: Vec<Vec<Ray>> = rows.into_iter().collect::<Result<_, _>>()?;
+                return Self::of_rays(settings, &rows, workers);
+            }
+        };
+        Ok(Self {
+            settings: *settings,
+            members,
+        })
+    }
+
+    /// The grid of these rays, row by row, and of members in the holes that they leave.
+    ///
+    /// # Errors
+    /// See [`GridError`].
+    pub fn of_rays(
+        settings: &GridSettings,
+        rows: &[Vec<Ray>],
+        workers: &dyn Workers,
+    ) -> Result<Self, GridError> {
+        settings.validate()?;
+        let rows = workers.map(rows.len(), |row| {
+            let rays = rows[row].iter().enumerate();
+            let members = rays.map(|(number, ray)| ray.members(settings, row, number));
+            members
+                .collect::<Result<Vec<_>, _>>()
+                .map(|rays| rays.concat())
+        });
+        let rows: Vec<Vec<Member>> = rows.into_iter().collect::<Result<_, _>>()?;
+        let mut members = rows.concat();
+        holes::close(settings, &mut members, workers)?;
+        Ok(Self {
+            settings: *settings,
+            members,
+        })
+    }
+
+    /// `J_ij` of one member's controller `i` on every process `j`; `None` where it is unstable.
+    #[must_use]
+    pub fn costs(&self, i: usize) -> Vec<Option<f64>> {
+        let made = &self.members[i].candidate;
+        self.members
+            .iter()
+            .map(|member| made.cost_on(&member.candidate))
+            .map(|cost| cost.is_finite().then_some(cost))
+            .collect()
+    }
+}

@@ -1,0 +1,15 @@
+//! Experiments and evaluation: campaigns, baselines, the benchmark, out-of-family processes.
+
+// The lint excepts tests, but not their helpers.
+#![allow(clippy::unwrap_used, clippy::panic)]
+
+#[path = "../common/mod.rs"]
+mod common;
+
+mod baselines;
+mod campaigns;
+mod evaluate;
+mod flights;
+mod harmonics;
+mod one_cycle;
+mod out_of_family;

@@ -1,0 +1,473 @@
+//! Every layer and every loss by central differences.
+
+use onecycle_lab::learn::train::{
+    Batch, Dropped, Gaussian, Layer, Loss, Matrix, Network, Tape, TrainError,
+};
+use onecycle_lab::workers::OneThread;
+
+use super::{dense, network, random, rng};
+
+const DROPPED: Dropped = Dropped { seed: 5, step: 7 };
+
+/// `sum c_ij y_ij` of what the network puts out while learning.
+fn weighted_sum(network: &Network, inputs: &Matrix, c: &Matrix) -> f64 {
+    let mut tape = Tape::default();
+    let mut network = network.clone();
+    network
+        .forward(&mut tape, inputs, DROPPED, &OneThread)
+        .unwrap();
+    let outputs = tape.outputs().unwrap();
+    (outputs.values().iter().zip(c.values()))
+        .map(|(y, c)| f64::from(*y) * f64::from(*c))
+        .sum()
+}
+
+/// Largest error of a gradient by the largest gradient, over all parameters.
+///
+/// Outputs of size one are rounded by 6e-8; steps of 2^-7 to both sides divide that by 0.016, and
+/// the five-point formula leaves `h^4/30 = 1e-10` of the fifth derivative.
+fn worst_error(network: &Network, inputs: &Matrix) -> f64 {
+    const H: f32 = 1.0 / 128.0;
+    let c = random(inputs.rows(), network.outputs(), 99);
+    let mut tape = Tape::default();
+    let mut learning = network.clone();
+    learning
+        .forward(&mut tape, inputs, DROPPED, &OneThread)
+        .unwrap();
+    learning.backward(&mut tape, &c, &OneThread).unwrap();
+
+    let numbers = network.numbers();
+    let mut gradients = tape.gradients().iter();
+    let (mut worst, mut largest) = (0.0_f64, 0.0_f64);
+    let mut first = 0;
+    for (name, matrix) in network.arrays() {
+        let start = first;
+        first += matrix.values().len();
+        if name.contains("running") {
+            continue;
+        }
+        let gradient = gradients.next().unwrap();
+        for (k, slope) in gradient.values().iter().enumerate() {
+            let at = |steps: f32| {
+                let mut moved = numbers.clone();
+                moved[start + k] += steps * H;
+                let moved = network.clone().with_numbers(&moved).unwrap();
+                weighted_sum(&moved, inputs, &c)
+            };
+            let difference =
+                (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * f64::from(H));
+            worst = worst.max((difference - f64::from(*slope)).abs());
+            largest = largest.max(difference.abs());
+        }
+    }
+    assert!(gradients.next().is_none());
+    worst / largest
+}
+
+// What is rounded is some 6e-8/0.016 = 4e-6 an output; a dozen of them are summed.
+const TOLERANCE: f64 = 5e-5;
+
+#[test]
+fn dense_and_tanh() {
+    let network = network(4, &[dense(5), Layer::Tanh, dense(3)], 1);
+    let error = worst_error(&network, &random(6, 4, 2));
+    assert!(error < TOLERANCE, "{error}");
+}
+
+// Two steps of a weight move what goes into a ReLU by 1/64 at most: none is as near to its kink.
+#[test]
+fn relu() {
+    let inputs = random(4, 4, 4);
+    let before = network(4, &[dense(5)], 3).evaluate(&inputs, &OneThread);
+    let before = before.unwrap();
+    assert!(before.values().iter().all(|x| x.abs() > 1.0 / 64.0));
+    assert!(before.values().iter().any(|x| *x < 0.0));
+    let network = network(4, &[dense(5), Layer::Relu, dense(3)], 3);
+    let error = worst_error(&network, &inputs);
+    assert!(error < TOLERANCE, "{error}");
+}
+
+// The first bias has no effect: normalisation takes it out again, and its gradient is zero.
+#[test]
+fn batch_normalisation() {
+    let layers = [dense(5), Layer::BatchNorm, Layer::Tanh, dense(3)];
+    let network = network(4, &layers, 5);
+    let error = worst_error(&network, &random(16, 4, 6));
+    assert!(error < TOLERANCE, "{error}");
+}
+
+#[test]
+fn dropout() {
+    let layers = [
+        dense(12),
+        Layer::Tanh,
+        Layer::Dropout { probability: 0.5 },
+        dense(3),
+    ];
+    let network = network(4, &layers, 7);
+    let error = worst_error(&network, &random(6, 4, 8));
+    assert!(error < TOLERANCE, "{error}");
+}
+
+/// Four classes, one pick of them unstable.
+fn classified() -> (Matrix, Batch) {
+    let mut costs = random(5, 4, 11);
+    let classes = vec![2, 0, 1, 1, 3];
+    for (i, class) in classes.iter().enumerate() {
+        for cost in costs.row_mut(i) {
+            *cost = 0.4 * cost.abs();
+        }
+        costs.row_mut(i)[*class] = 0.0;
+    }
+    costs.row_mut(1)[3] = f32::INFINITY;
+    let batch = Batch {
+        inputs: Matrix::zeros(5, 1),
+        classes,
+        costs,
+        values: random(5, 3, 12),
+        weights: vec![1.0, 0.5, 2.0, 0.0, 0.25],
+    };
+    (random(5, 4, 13), batch)
+}
+
+/// Largest error of a loss's gradient. Outputs are multiples of the step 2^-10, so nothing is
+/// rounded but the gradient itself, to 6e-8 of its size; `h^4/30` is 3e-14.
+fn worst_error_of_loss(loss: Loss, outputs: &Matrix, batch: &Batch) -> f64 {
+    const H: f32 = 1.0 / 1024.0;
+    let mut gradient = Matrix::default();
+    loss.evaluate(outputs, batch, &mut gradient).unwrap();
+    let mut worst = 0.0_f64;
+    for (k, slope) in gradient.values().iter().enumerate() {
+        let at = |steps: f32| {
+            let mut moved = outputs.clone();
+            moved.values_mut()[k] += steps * H;
+            loss.evaluate(&moved, batch, &mut Matrix::default())
+                .unwrap()
+        };
+        let difference =
+            (8.0 * (at(1.0) - at(-1.0)) - (at(2.0) - at(-2.0))) / (12.0 * f64::from(H));
+        worst = worst.max((difference - f64::from(*slope)).abs());
+    }
+    worst
+}
+
+#[test]
+fn losses_of_classes() {
+    let (outputs, batch) = classified();
+    for loss in [
+        Loss::CrossEntropy,
+        Loss::ModifiedSoftmax { cap: 0.2 },
+        Loss::ShiftedSoftmax { cap: 0.2 },
+        Loss::CostAugmented {
+            scale: 3.0,
+            cap: 0.2,
+        },
+        Loss::ExpectedCost {
+            cap: 1.0,
+            cross_entropy: 0.0,
+            entropy: 0.0,
+        },
+        Loss::ExpectedCost {
+            cap: 1.0,
+            cross_entropy: 0.3,
+            entropy: 0.1,
+        },
+    ] {
+        let error = worst_error_of_loss(loss, &outputs, &batch);
+        assert!(error < 1e-7, "{loss:?} {error}");
+    }
+}
+
+#[test]
+fn losses_of_densities() {
+    let (_, batch) = classified();
+    for (loss, outputs) in [
+        (Loss::Gaussian { dimension: 3 }, 9),
+        (
+            Loss::GaussianMixture {
+                dimension: 3,
+                components: 4,
+            },
+            40,
+        ),
+    ] {
+        // Gradients are up to ten, and so is 6e-8 of them.
+        let error = worst_error_of_loss(loss, &random(5, outputs, 14), &batch);
+        assert!(error < 1e-6, "{loss:?} {error}");
+    }
+}
+
+// The cost of the mean is beyond its scale for some samples and below it for others; where all slopes
+// are zero, or nothing is asked of them, what is left is the Gaussian.
+#[test]
+fn loss_of_a_density_that_knows_costs() {
+    let (_, mut batch) = classified();
+    let plain = batch.clone();
+    batch.values = random(5, 6, 15);
+    let outputs = random(5, 9, 14);
+    for (weight, scale) in [(1.0, 0.25), (3.0, 10.0), (0.5, 2.0)] {
+        let loss = Loss::CostAwareGaussian {
+            dimension: 3,
+            weight,
+            scale,
+        };
+        let error = worst_error_of_loss(loss, &outputs, &batch);
+        assert!(error < 1e-6, "{loss:?} {error}");
+    }
+
+    for (i, row) in plain.values.iter_rows().enumerate() {
+        batch.values.row_mut(i)[..3].copy_from_slice(row);
+        if i == 2 {
+            batch.values.row_mut(i)[3..].fill(0.0);
+        }
+    }
+    let of = |loss: Loss, batch: &Batch| {
+        let mut gradient = Matrix::default();
+        let value = loss.evaluate(&outputs, batch, &mut gradient).unwrap();
+        (value, gradient)
+    };
+    let aware = |weight| Loss::CostAwareGaussian {
+        dimension: 3,
+        weight,
+        scale: 0.5,
+    };
+    let gaussian = of(Loss::Gaussian { dimension: 3 }, &plain);
+    assert_eq!(of(aware(0.0), &batch), gaussian);
+    let (value, gradient) = of(aware(1.0), &batch);
+    assert!(value > gaussian.0);
+    assert_eq!(gradient.row(2), gaussian.1.row(2));
+    assert_ne!(gradient.row(1), gaussian.1.row(1));
+}
+
+// One number, mean 3 above y, slope 2, so a cost of 6; scale 8: 5/4 of length. The density is a standard
+// normal one. 4 (5/4 - 1) = 1 comes to its loss, and 4 * 6/64 / (5/4) * 2 = 0.6 to its slope of 3.
+#[test]
+fn cost_of_a_mean_by_hand() {
+    let batch = Batch {
+        inputs: Matrix::zeros(1, 1),
+        values: Matrix::from_rows(1, 2, vec![0.0, 2.0]).unwrap(),
+        ..Batch::default()
+    };
+    let outputs = Matrix::from_rows(1, 2, vec![3.0, 0.0]).unwrap();
+    let loss = Loss::CostAwareGaussian {
+        dimension: 1,
+        weight: 4.0,
+        scale: 8.0,
+    };
+    let mut gradient = Matrix::default();
+    let value = loss.evaluate(&outputs, &batch, &mut gradient).unwrap();
+    let normal = 0.5 * std::f64::consts::TAU.ln() + 4.5;
+    assert!((value - normal - 1.0).abs() < 1e-12);
+    assert!((gradient.row(0)[0] - 3.6).abs() < 1e-6);
+}
+
+// gamma_k (p_k - y_k), by hand: of outputs 0 and ln 2, T = 1, J_0 = 1, p_0 = 1/(1 + 2), and of
+// outputs ln 2 and 0, p_0 = 4/(4 + 1). J for gamma, as the paper has it, would be 0 for k = T.
+#[test]
+fn gradient_of_the_modified_softmax() {
+    let outputs = Matrix::from_rows(2, 2, vec![0.0, 2_f32.ln(), 2_f32.ln(), 0.0]).unwrap();
+    let batch = Batch {
+        inputs: Matrix::zeros(2, 1),
+        classes: vec![1, 1],
+        costs: Matrix::from_rows(2, 2, vec![1.0, 0.0, 1.0, 0.0]).unwrap(),
+        ..Batch::default()
+    };
+    let mut gradient = Matrix::default();
+    let loss = Loss::ModifiedSoftmax { cap: 1.0 }
+        .evaluate(&outputs, &batch, &mut gradient)
+        .unwrap();
+    assert!(
+        (loss - 0.5 * (1.5_f64.ln() + 5_f64.ln())).abs() < 1e-7,
+        "{loss}"
+    );
+    // Halves: the mean of two samples.
+    for (slope, by_hand) in (gradient.values().iter()).zip([2.0 / 3.0, -1.0 / 3.0, 8.0 / 5.0, -0.8])
+    {
+        assert!((slope - 0.5 * by_hand).abs() < 1e-7, "{slope}");
+    }
+}
+
+// The same for outputs shifted alike; the paper's is not, and that is its degenerate optimum.
+#[test]
+fn only_the_shifted_softmax_ignores_a_shift() {
+    let (outputs, batch) = classified();
+    let mut shifted = outputs.clone();
+    shifted.values_mut().iter_mut().for_each(|a| *a -= 8.0);
+    let value = |loss: Loss, outputs| {
+        loss.evaluate(outputs, &batch, &mut Matrix::default())
+            .unwrap()
+    };
+    let loss = Loss::ShiftedSoftmax { cap: 0.2 };
+    assert_eq!(value(loss, &outputs), value(loss, &shifted));
+    let loss = Loss::ModifiedSoftmax { cap: 0.2 };
+    assert!(value(loss, &shifted) < 0.8 * value(loss, &outputs));
+}
+
+// Of one Gaussian, the logit makes no difference, and all else is the same to the last bit.
+#[test]
+fn mixture_of_one_is_the_gaussian() {
+    let (_, batch) = classified();
+    let single = random(5, 9, 15);
+    let mut mixture = Matrix::zeros(5, 10);
+    for i in 0..5 {
+        mixture.row_mut(i)[0] = i as f32 - 1.5;
+        mixture.row_mut(i)[1..].copy_from_slice(single.row(i));
+    }
+    let (mut of_single, mut of_mixture) = (Matrix::default(), Matrix::default());
+    let one = Loss::Gaussian { dimension: 3 }
+        .evaluate(&single, &batch, &mut of_single)
+        .unwrap();
+    let same = Loss::GaussianMixture {
+        dimension: 3,
+        components: 1,
+    }
+    .evaluate(&mixture, &batch, &mut of_mixture)
+    .unwrap();
+    assert!((one - same).abs() < 1e-14, "{one} {same}");
+    for i in 0..5 {
+        assert_eq!(of_mixture.row(i)[0], 0.0);
+        assert_eq!(&of_mixture.row(i)[1..], of_single.row(i));
+    }
+    // The type that users read agrees with the loss.
+    let by_type: f64 = (0..5)
+        .map(|i| {
+            let y: Vec<f64> = batch.values.row(i).iter().map(|y| f64::from(*y)).collect();
+            let gaussian = Gaussian::from_outputs(3, single.row(i)).unwrap();
+            f64::from(batch.weights[i]) / 3.75 * gaussian.negative_log_likelihood(&y)
+        })
+        .sum();
+    assert!((one - by_type).abs() < 1e-14, "{one} {by_type}");
+    assert_eq!(Gaussian::from_outputs(3, &[0.0; 8]), None);
+}
+
+// Two samples of which the second counts three times are four, of which three are the same.
+#[test]
+fn weights_count_samples() {
+    let (outputs, batch) = classified();
+    let pick = |rows: &[usize], weights: &[f32]| {
+        let mut picked = Batch::default();
+        onecycle_lab::learn::train::Dataset::fill(&batch, rows, &mut picked);
+        picked.weights = weights.to_vec();
+        let mut values = Vec::new();
+        rows.iter().for_each(|&i| values.extend(outputs.row(i)));
+        let outputs = Matrix::from_rows(rows.len(), 4, values).unwrap();
+        Loss::CrossEntropy
+            .evaluate(&outputs, &picked, &mut Matrix::default())
+            .unwrap()
+    };
+    let weighted = pick(&[0, 2], &[1.0, 3.0]);
+    assert!((weighted - pick(&[0, 2, 2, 2], &[])).abs() < 1e-15);
+}
+
+#[test]
+fn what_does_not_fit_is_named() {
+    let (outputs, batch) = classified();
+    let error = |loss: Loss, change: fn(&mut Batch)| {
+        let mut batch = batch.clone();
+        change(&mut batch);
+        loss.evaluate(&outputs, &batch, &mut Matrix::default())
+            .unwrap_err()
+            .to_string()
+    };
+    let softmax = Loss::ShiftedSoftmax { cap: 0.2 };
+    let gaussian = Loss::Gaussian { dimension: 2 };
+    for (found, sentence) in [
+        (
+            error(Loss::CrossEntropy, |b| b.classes[0] = 4),
+            "there is no class 4: the network has 4 outputs",
+        ),
+        (
+            error(Loss::CrossEntropy, |b| b.weights[0] = -1.0),
+            "the weights of samples must be finite and not negative, and their sum positive",
+        ),
+        (
+            error(Loss::CrossEntropy, |b| b.weights = vec![1.0]),
+            "the number of weights of samples must be 5, but is 1",
+        ),
+        (
+            error(softmax, |b| b.costs = Matrix::default()),
+            "the number of rows of costs must be 5, but is 0",
+        ),
+        (
+            error(gaussian, |_| {}),
+            "the number of outputs must be 5, but is 4",
+        ),
+        (
+            error(Loss::ModifiedSoftmax { cap: f64::NAN }, |_| {}),
+            "cap must be positive and finite, but is NaN",
+        ),
+    ] {
+        assert_eq!(found, sentence);
+    }
+}
+
+#[test]
+fn networks_refuse_what_they_cannot_take() {
+    let mut net = network(4, &[dense(5), Layer::BatchNorm], 1);
+    let error = net
+        .evaluate(&Matrix::zeros(2, 3), &OneThread)
+        .unwrap_err()
+        .to_string();
+    assert_eq!(error, "the number of inputs must be 4, but is 3");
+    let mut tape = Tape::default();
+    let one = Matrix::zeros(1, 4);
+    assert_eq!(
+        net.forward(&mut tape, &one, DROPPED, &OneThread),
+        Err(TrainError::OneSample)
+    );
+    let empty = net.backward(&mut Tape::default(), &one, &OneThread);
+    assert!(empty.is_err());
+    for (inputs, layer, field) in [
+        (0, dense(1), "inputs"),
+        (1, dense(0), "outputs"),
+        (1 << 20, dense(1 << 20), "outputs"),
+        (1, Layer::Dropout { probability: 1.0 }, "probability"),
+    ] {
+        let error = Network::new(inputs, &[layer], &mut rng(1)).unwrap_err();
+        assert!(error.to_string().starts_with(field), "{error}");
+    }
+}
+
+// Of 100,000 numbers 0.3 are left out, give or take five standard deviations of 0.0014, and the
+// others divided by 0.7; the same in the same step, others in the next, none when evaluating.
+#[test]
+fn dropout_leaves_out_its_share() {
+    let mut network = network(1000, &[Layer::Dropout { probability: 0.3 }], 1);
+    let ones = Matrix::from_rows(100, 1000, vec![1.0; 100_000]).unwrap();
+    let mut draw = |step| {
+        let mut tape = Tape::default();
+        network
+            .forward(&mut tape, &ones, Dropped { seed: 1, step }, &OneThread)
+            .unwrap();
+        tape.outputs().unwrap().clone()
+    };
+    let dropped = draw(1);
+    let left_out = dropped.values().iter().filter(|x| **x == 0.0).count();
+    assert!((left_out as f64 / 1e5 - 0.3).abs() < 0.007, "{left_out}");
+    let kept = (1.0_f64 / 0.7) as f32;
+    assert!(dropped.values().iter().all(|x| *x == 0.0 || *x == kept));
+    assert_eq!(draw(1), dropped);
+    assert_ne!(draw(2), dropped);
+    assert_eq!(network.evaluate(&ones, &OneThread), Ok(ones));
+}
+
+// Variance 2/50 of 50,000 weights, give or take five standard deviations of 2/50 sqrt(2/50,000).
+#[test]
+fn initial_weights_are_those_of_he() {
+    let network = network(50, &[dense(1000)], 1);
+    let mut parameters = network.parameters();
+    let weights = parameters.next().unwrap();
+    let squares: f64 = (weights.values().iter())
+        .map(|w| f64::from(*w).powi(2))
+        .sum();
+    let ratio = squares / 50_000.0 / (2.0 / 50.0);
+    assert!((ratio - 1.0).abs() < 0.032, "{ratio}");
+    assert!(
+        parameters
+            .next()
+            .unwrap()
+            .values()
+            .iter()
+            .all(|b| *b == 0.0)
+    );
+}
