@@ -1,8 +1,8 @@
-//! What is flown: exact simulation of the delayed process and its closed loops.
+//! Exact simulation of the process with delay and its closed loops, and of a multirotor.
 //!
-//! The input of a sampled loop is constant between samples, so propagation is exact: no ODE
-//! solver, no step-size error, and a delay of any length. The exception is [`multirotor`], a whole
-//! vehicle, whose equations are not linear: it is integrated.
+//! The input of a sampled loop is constant between samples, so the propagation is exact for any delay, without
+//! an ODE solver and without step-size error. The exception is [`multirotor`]: the equations of a whole vehicle
+//! are nonlinear and are integrated numerically.
 
 pub mod closed_loop;
 pub mod delay;
