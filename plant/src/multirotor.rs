@@ -14,7 +14,7 @@
 //! for _ in 0..500 {
 //!     flight.step(Command { thrust: 0.6, ..Command::default() }, 2e-3, &mut noise);
 //! }
-//! After a second at more than the thrust of hover it has climbed.
+//! // After a second at more than the thrust of hover it has climbed.
 //! assert!(flight.sense(&mut noise).position_m.z > 0.5);
 //! // The paper's T_body of altitude, 1.6886 s.
 //! let altitude = vehicle.linearised(Axis::Altitude)?;
