@@ -1,4 +1,4 @@
-"""JSBSim's DJI F450: brushless motors, propeller tables and drag of its own; LGPL-2.1, from PyPI."""
+"""JSBSim's DJI F450 with its own brushless motors, propeller tables and drag; LGPL-2.1, from PyPI."""
 
 import jsbsim
 
@@ -10,13 +10,13 @@ AXES = [
 ]
 
 MOTORS = ["FR", "AL", "FL", "AR"]
-# What a part of each command does to each motor: right, forward, to the right.
+# Effect of a unit of each command on each motor: roll to the right, pitch forward, yaw to the right.
 MIX = {"roll": [-1, 1, 1, -1], "pitch": [1, -1, 1, -1], "yaw": [1, 1, -1, -1]}
 FOOT_M = 0.3048
 
 
 class F450:
-    """Hovering 50 m above ground, every axis but the one that is tuned held by a controller of its own."""
+    """The F450 at hover 50 m above ground. Every axis except the one that is tuned has its own controller."""
 
     # Amplitudes of the oscillations under the relays above, from clean runs (m, rad).
     oscillation = {"altitude": 0.02, "roll": 0.02}

@@ -14,7 +14,7 @@ import random
 from tuner import Tuner
 
 TICK_S = 0.001
-# The predicted and the flown response may differ by this part, overshoots also by a hundredth of the step.
+# Tolerance between prediction and flight: relative, and for the overshoot also a hundredth of the step.
 TOLERANCE, LEAST = 0.2, 0.01
 # The response has settled when it stays within this part of the step.
 BAND = 0.05
@@ -22,7 +22,7 @@ BAND = 0.05
 
 @dataclasses.dataclass
 class Axis:
-    """What is tuned and how. Units: of the input, of the output, seconds."""
+    """Axis to tune and its settings, in units of the input, units of the output and seconds."""
 
     name: str
     amplitude: float
@@ -35,7 +35,7 @@ class Axis:
 
 @dataclasses.dataclass
 class Disturbance:
-    """Noise as a part of the oscillation's amplitude, a constant input as a part of the relay's."""
+    """Noise as a fraction of the amplitude of the oscillation, input bias as a fraction of that of the relay."""
 
     noise: float = 0.0
     bias: float = 0.0
@@ -50,8 +50,8 @@ def metrics(values, step):
 
 
 def predicted(found, step, seconds):
-    """The response of the process identified under the controller made for it: the trapezoidal rule in
-    tenths of a tick, the dead time as a line of ticks."""
+    """Response of the identified process under its controller, by the trapezoidal rule in tenths of a tick, with
+    the dead time as a delay line."""
     parts = 10
     h = TICK_S / parts
     line = collections.deque([0.0] * (1 + round(found.tau_s / h)))
@@ -72,7 +72,8 @@ def predicted(found, step, seconds):
 
 
 def fly(interface, vehicle, axis, disturbance):
-    """Returns what was found, and the metrics of the predicted and of the flown step."""
+    """Returns the result of the tuner, the duration of the test (s), and the metrics of the predicted and of the flown
+    step."""
     noise = random.Random(1)
     size = vehicle.oscillation[axis.name]
     sigma = disturbance.noise * size
@@ -80,7 +81,7 @@ def fly(interface, vehicle, axis, disturbance):
         interface,
         axis.amplitude,
         TICK_S,
-        # A sensor without noise still has a resolution.
+        # A sensor without noise still has a finite resolution.
         noise_sigma=max(sigma, 1e-3 * size),
         limit_excursion=axis.excursion,
         limit_rate=axis.rate,
@@ -117,7 +118,7 @@ def fly(interface, vehicle, axis, disturbance):
     found, tuned_s = tuner.result, tick * TICK_S - 5.0
     rest_s = 12.0 * found.kd / found.kp
     run(2.0 * rest_s, 0.0)
-    # So small that nothing saturates: the command jumps by three times the relay's.
+    # The command jumps by three times the amplitude of the relay, so nothing saturates.
     step = 3.0 * axis.amplitude / found.kp
     at_rest = sum(true_values[-500:]) / 500
     flown_from = len(true_values)
@@ -127,7 +128,7 @@ def fly(interface, vehicle, axis, disturbance):
 
 
 def line_of(title, axis, label, flight):
-    """What a flight has shown in one line, and whether its step was as predicted."""
+    """One line about a flight, and whether its step was as predicted."""
     found, tuned_s, (overshoot, settling), (flown_overshoot, flown_settling) = flight
     is_right = math.isclose(
         flown_overshoot, overshoot, rel_tol=TOLERANCE, abs_tol=LEAST
@@ -161,7 +162,7 @@ def report(title, vehicle, axes, interface):
         sender.close()
     is_right = True
     for receiver in receivers:
-        # Without a line the process has failed and has said why: EOFError.
+        # A process that fails prints its error and sends no line, which raises EOFError here.
         line, is_as_predicted = receiver.recv()
         print(line, flush=True)
         is_right = is_right and is_as_predicted

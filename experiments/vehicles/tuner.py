@@ -10,11 +10,11 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 
 class Interface:
-    """The compiled library and the names of its header; the header is the only description of it."""
+    """The compiled library, described by its header."""
 
     def __init__(self, archive, scratch):
         header = (ROOT / "onboard/c/onecycle.h").read_text()
-        # What remains without the preprocessor: the C++ guard, inclusions, one constant.
+        # The header without preprocessor lines and the C++ guard; constants are kept for substitution.
         inside_cpp, lines, constants = False, [], {}
         for line in header.splitlines():
             if line.startswith("#define ") and len(line.split()) == 3:
@@ -78,7 +78,7 @@ class Tuner:
 
     @property
     def result(self):
-        """What the test has told, or None."""
+        """Result of the test, or None."""
         result = self.interface.ffi.new("onecycle_result *")
         found = self.interface.library.onecycle_tuner_result(self.memory, result)
         return result if found else None

@@ -111,7 +111,7 @@ impl Numbers<'_> {
 /// use onecycle_onboard::Soiptd;
 ///
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// The same lead of 65 degrees for every shape.
+/// // The same lead of 65 degrees for every shape.
 /// let nodes = Nodes { phase_margin_rad: 0.35, delay_stretch: 1.0, lag_stretch: 1.0, points: 4 };
 /// let mut numbers = [1.134_f32; 52];
 /// numbers[..4].copy_from_slice(&nodes.header());

@@ -1,4 +1,4 @@
-//! Steps of the six-degree-of-freedom vehicle a second.
+//! Steps per second of the six-degree-of-freedom vehicle.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};

@@ -1,4 +1,4 @@
-//! What flies: a tick of the relay, a sample into the cycle detector and the window, a refinement.
+//! On-board code: a tick of the relay, a sample into cycle detector and window, a fit.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -9,7 +9,7 @@ use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, Noise, Sensor, Trace};
 
 const SAMPLE_S: f64 = 1e-3;
-/// Of the amplitude of the hover process's limit cycle, 0.003: one per cent.
+/// One per cent of the amplitude of the hover process's limit cycle, 0.003.
 const NOISE_SIGMA: f64 = 3e-5;
 
 fn main() {
@@ -34,7 +34,7 @@ fn experiment() -> Trace {
     experiment.run(&mut relay(), &mut Noise::from_seed(1))
 }
 
-/// The last cycles of the experiment, two periods of input before them, and their period.
+/// The last cycles of the experiment with two periods of input before them, and their period.
 fn last_cycles<const BINS: usize>(trace: &Trace, cycles: usize) -> (Window<BINS, 64>, f64) {
     let mut detector = CycleDetector::new();
     let mut found = Vec::new();
@@ -58,7 +58,7 @@ fn last_cycles<const BINS: usize>(trace: &Trace, cycles: usize) -> (Window<BINS,
     (window, period_s)
 }
 
-/// Items are ticks: their inverse is the time of one.
+/// An item is a tick.
 #[divan::bench]
 fn relay_tick(bencher: Bencher) {
     let errors: Vec<f32> = experiment()
@@ -78,7 +78,7 @@ fn relay_tick(bencher: Bencher) {
         });
 }
 
-/// Items are samples.
+/// An item is a sample.
 #[divan::bench]
 fn cycles_and_window(bencher: Bencher) {
     let trace = experiment();

@@ -1,6 +1,6 @@
-//! The same simulations here and in python-control, side by side in one run.
+//! The same simulations here and in python-control, in turn in one run.
 //!
-//! The environment variable `PYTHON` chooses the interpreter; `python3` otherwise.
+//! The environment variable `PYTHON` names the interpreter; the default is `python3`.
 
 #![expect(clippy::print_stdout, reason = "a bench reports")]
 
@@ -13,12 +13,12 @@ use std::time::Instant;
 use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, Noise, SampledPd};
 
-/// Runs of each, in turn.
+/// Number of runs of each.
 const ROUNDS: usize = 3;
 const STEPS: usize = 3_000_000;
 const SAMPLE_S: f64 = 1e-3;
 
-/// Steps a second of the relay loop and of the PD loop; the relay's amplitude and the PD's output
+/// Steps per second of the relay loop and of the PD loop; amplitude of the relay loop and output of the PD loop
 /// at 0.3 s.
 struct Measured {
     relay_steps_per_s: f64,
@@ -94,7 +94,7 @@ fn python_control(python: &str) -> Result<Measured, Box<dyn Error>> {
     })
 }
 
-/// The number behind `"key": ` in one flat line of JSON.
+/// Number after `"key": ` in a flat line of JSON.
 fn number(line: &str, key: &str) -> Result<f64, Box<dyn Error>> {
     let (_, rest) = line
         .split_once(&format!("\"{key}\": "))

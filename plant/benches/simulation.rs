@@ -1,4 +1,4 @@
-//! Steps a second of the process alone and of the whole relay experiment.
+//! Steps per second of the process alone and of the whole relay experiment.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -7,7 +7,7 @@ use onecycle_plant::{Experiment, FixedStepProcess, Noise, Sensor, VariableStepPr
 
 const STEPS: usize = 1_000_000;
 const SAMPLE_S: f64 = 1e-3;
-/// Of the amplitude of the hover process's limit cycle, 0.003: one per cent.
+/// One per cent of the amplitude of the hover process's limit cycle, 0.003.
 const NOISE_SIGMA: f64 = 3e-5;
 
 fn main() {
@@ -54,7 +54,7 @@ fn variable_step_process(bencher: Bencher) {
     });
 }
 
-/// Relay, process, observer; with noise on the sensor or without.
+/// Relay, process, observer; with and without noise.
 #[divan::bench(args = [0.0, NOISE_SIGMA])]
 fn relay_experiment(bencher: Bencher, noise_sigma: f64) {
     let experiment = Experiment::new(hover(), SAMPLE_S, STEPS as f64 * SAMPLE_S)

@@ -1,8 +1,8 @@
-//! Every tick of a tuner in flight, by what it does: the whole test of the paper's altitude, from rest to the proven
-//! controller.
+//! Time of every tick of a tuner in flight, by activity: the whole test of the paper's altitude, from rest to
+//! the proven controller.
 //!
-//! The same flight again and again, the same bits each time: of each tick the shortest time counts, so what the
-//! machine does beside it does not. Reading the clock is measured too and subtracted.
+//! The same flight is repeated with the same bits, and the shortest time of each tick counts, so other load of
+//! the machine has little influence. The time to read the clock is measured and subtracted.
 
 use std::collections::BTreeMap;
 use std::hint::black_box;
@@ -18,7 +18,7 @@ const SAMPLE_S: f64 = 1e-3;
 const SECONDS: f64 = 12.0;
 const FLIGHTS: usize = 20;
 
-/// A tick: what it was about, and how long it took (ns).
+/// A tick: activity and time (ns).
 type Tick = (&'static str, u64);
 
 fn flight(slices: u16) -> Vec<Tick> {
@@ -64,7 +64,7 @@ fn flight(slices: u16) -> Vec<Tick> {
     times
 }
 
-/// Least time that the clock tells between two readings (ns).
+/// Shortest time between two readings of the clock (ns).
 fn clock_ns() -> u64 {
     let readings = (0..10_000).map(|_| {
         let begin = Instant::now();

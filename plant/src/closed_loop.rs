@@ -1,23 +1,23 @@
-//! Any controller around any process: one experiment, sample by sample.
+//! Closed loop of any controller and the process, sample by sample.
 
 use onecycle_onboard::relay::Relay;
 use onecycle_onboard::{Pd, Soiptd};
 
 use crate::{FixedStepProcess, NoiseSource, Sensor, Trace, VariableStepProcess};
 
-/// What a controller sees at a sample.
+/// Measurement of a controller at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sensed {
-    /// Reading of the output (output unit).
+    /// Measured output (output unit).
     pub output: f64,
-    /// Rate of the output from a sensor of its own, such as a gyroscope (output unit / s).
+    /// Rate of the output (output unit / s) from its own sensor, for example a gyroscope.
     pub rate: f64,
 }
 
 /// A sampled controller.
 pub trait Controller {
-    /// The input to hold until the next sample (input unit), from the reference and what was
-    /// sensed (output unit), `dt_s` after the last call.
+    /// Returns the input to hold until the next sample (input unit). Takes the time since the last call (s), the
+    /// reference (output unit) and the measurement.
     fn step(&mut self, dt_s: f64, reference: f64, sensed: Sensed) -> f64;
 }
 
@@ -32,10 +32,10 @@ impl Controller for Relay {
     }
 }
 
-/// `u = kp (r - y) - kd dy/dt` at every sample, the rate from its own sensor.
+/// PD controller `u = kp (r - y) - kd dy/dt` at every sample, with the rate from its own sensor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledPd(
-    /// Its gains.
+    /// Gains.
     pub Pd,
 );
 
@@ -46,7 +46,7 @@ impl Controller for SampledPd {
     }
 }
 
-/// The process and its surroundings. Start from [`Experiment::new`].
+/// Simulated experiment: process and conditions. Start from [`Experiment::new`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Experiment {
@@ -62,15 +62,15 @@ pub struct Experiment {
     pub input_bias: f64,
     /// The sensor of the output.
     pub sensor: Sensor,
-    /// Standard deviation of the sample period as a fraction of it; each increment is kept
-    /// between 0.1 and 1.9 periods.
+    /// Standard deviation of the sample period as a fraction of it. Every increment is limited to 0.1 to 1.9
+    /// periods.
     pub jitter: f64,
     /// Output at the start (output unit).
     pub initial_output: f64,
 }
 
 impl Experiment {
-    /// A perfect sensor, no bias, no jitter, from rest at the reference zero.
+    /// An experiment with a perfect sensor, no bias and no jitter, from rest at the reference zero.
     #[must_use]
     pub fn new(process: Soiptd, sample_s: f64, duration_s: f64) -> Self {
         Self {
@@ -85,13 +85,13 @@ impl Experiment {
         }
     }
 
-    /// The same experiment at this reference (output unit).
+    /// The same experiment with this reference (output unit).
     #[must_use]
     pub fn with_reference(self, reference: f64) -> Self {
         Self { reference, ..self }
     }
 
-    /// The same experiment with this constant added to the input (input unit).
+    /// The same experiment with this input bias (input unit).
     #[must_use]
     pub fn with_input_bias(self, input_bias: f64) -> Self {
         Self { input_bias, ..self }
@@ -103,13 +103,13 @@ impl Experiment {
         Self { sensor, ..self }
     }
 
-    /// The same experiment with this jitter of the sample period, a fraction of it.
+    /// The same experiment with this jitter of the sample period (a fraction of it).
     #[must_use]
     pub fn with_jitter(self, jitter: f64) -> Self {
         Self { jitter, ..self }
     }
 
-    /// The same experiment from this output (output unit).
+    /// The same experiment with this output at the start (output unit).
     #[must_use]
     pub fn with_initial_output(self, initial_output: f64) -> Self {
         Self {
@@ -118,13 +118,13 @@ impl Experiment {
         }
     }
 
-    /// Number of samples in the duration.
+    /// Number of samples.
     #[must_use]
     pub fn samples(&self) -> usize {
         (self.duration_s / self.sample_s).round() as usize
     }
 
-    /// Runs the experiment and keeps every sample.
+    /// Runs the experiment and returns all samples.
     #[must_use]
     pub fn run(&self, controller: &mut impl Controller, noise: &mut impl NoiseSource) -> Trace {
         let mut trace = Trace::with_capacity(self.samples());
@@ -134,8 +134,8 @@ impl Experiment {
         trace
     }
 
-    /// Runs the experiment and hands every sample to `observer`: time (s), input as commanded,
-    /// output as measured, output as it was.
+    /// Runs the experiment and passes every sample to `observer`: time (s), commanded input, measured output,
+    /// true output.
     pub fn observe(
         &self,
         controller: &mut impl Controller,

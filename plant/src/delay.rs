@@ -1,21 +1,22 @@
-//! The delayed process at steps of any length, through the history of its input.
+//! Process with delay at steps of any length, with a history of its input.
 //!
-//! Slower than [`FixedStepProcess`](crate::FixedStepProcess) (a transition is computed for every
-//! stretch between events) and independent of it: jittered samples use it, and it checks the other.
+//! It computes a transition for every stretch between events, so it is slower than
+//! [`FixedStepProcess`](crate::FixedStepProcess) and independent of it. It serves jittered samples and tests of
+//! the other.
 
 use std::collections::VecDeque;
 
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::transition::{State, Transition};
 
-/// A process at rest, advanced with a held input by any duration.
+/// A process at rest that advances by any duration with a held input.
 #[derive(Clone, Debug)]
 pub struct VariableStepProcess {
     process: Soiptd,
     time_s: f64,
     state: State,
     arrived: f64,
-    /// Inputs on their way: arrival time (s) and value.
+    /// Inputs that have not arrived yet: arrival time (s) and value.
     under_way: VecDeque<(f64, f64)>,
 }
 
@@ -66,7 +67,7 @@ impl VariableStepProcess {
         self.process.k_over_t_body() * self.state.v
     }
 
-    /// Puts the output and its rate elsewhere, as a disturbance or an initial offset would.
+    /// Adds an offset to the output and to its rate, as a disturbance or an initial condition.
     pub fn displace(&mut self, output: f64, rate: f64) {
         self.state.y += output / self.process.k_over_t_body();
         self.state.v += rate / self.process.k_over_t_body();

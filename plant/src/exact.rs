@@ -1,17 +1,17 @@
-//! The delayed process at a fixed step: exact, and a dozen multiplications a step.
+//! Process with delay at a fixed step: exact, with a dozen multiplications per step.
 //!
-//! With `tau = (n + fraction) step`, the delayed input over a step is the one from `n + 1` steps
-//! ago for `fraction * step` and the one from `n` steps ago for the rest: one transition and two
-//! input columns, computed once.
+//! With `tau = (n + fraction) step` the delayed input over a step is the one of `n` and one steps ago for
+//! `fraction * step`, and then the one of `n` steps ago. Hence one transition and two input columns, which are
+//! computed once.
 
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::transition::{State, Transition};
 
-/// A process at rest, stepped with a held input. See the [module](self).
+/// A process at rest that advances in fixed steps with a held input. See the [module](self).
 #[derive(Clone, Debug)]
 pub struct FixedStepProcess {
     transition: Transition,
-    /// Response of the state to the input before the delayed edge, and to the one behind it.
+    /// Response of the state to the input before the delayed edge, and to the input after it.
     before_edge: State,
     behind_edge: State,
     gain: f64,
@@ -23,7 +23,7 @@ pub struct FixedStepProcess {
 }
 
 impl FixedStepProcess {
-    /// The process at rest, to be stepped by `step_s > 0`.
+    /// The process at rest, with steps of `step_s > 0`.
     #[must_use]
     pub fn new(process: &Soiptd, step_s: f64) -> Self {
         let steps = process.tau_s() / step_s;
@@ -42,7 +42,7 @@ impl FixedStepProcess {
         }
     }
 
-    /// One step with the input held at `u`.
+    /// Advances by one step with the input `u`.
     #[inline]
     pub fn step(&mut self, u: f64) {
         self.history[self.next] = u;
@@ -74,7 +74,7 @@ impl FixedStepProcess {
         self.gain * self.state.v
     }
 
-    /// Puts the output and its rate elsewhere, as a disturbance or an initial offset would.
+    /// Adds an offset to the output and to its rate, as a disturbance or an initial condition.
     pub fn displace(&mut self, output: f64, rate: f64) {
         self.state.y += output / self.gain;
         self.state.v += rate / self.gain;

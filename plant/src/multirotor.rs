@@ -1,10 +1,9 @@
-//! A multirotor in six degrees of freedom: what the paper's section IV-D flies.
+//! Multirotor in six degrees of freedom, for the flights of the paper's section IV-D.
 //!
-//! A [`Vehicle`] is what does not change: airframe, rotors, battery, legs, sensors. A [`Flight`] is a
-//! vehicle somewhere, in a wind, under a held [`Command`]; it is integrated in steps of at most 1 ms
-//! and read through sensors that are late and noisy. [`Vehicle::linearised`] is the exact
-//! [`Soiptd`](onecycle_onboard::Process) of an axis at hover, the truth an identification is held
-//! against.
+//! A [`Vehicle`] has the constant parts: airframe, rotors, battery, legs, sensors. A [`Flight`] is a vehicle
+//! with a state, in a wind, under a held [`Command`]. It is integrated in steps of at most 1 ms and measured by
+//! sensors with delay and noise. [`Vehicle::linearised`] is the exact [`Soiptd`](onecycle_onboard::Soiptd) of an
+//! axis at hover: the truth for an identification.
 //!
 //! ```
 //! use onecycle_plant::multirotor::{Axis, Command, Flight, Vehicle};
@@ -15,7 +14,7 @@
 //! for _ in 0..500 {
 //!     flight.step(Command { thrust: 0.6, ..Command::default() }, 2e-3, &mut noise);
 //! }
-//! // Up and away after a second at more than the thrust of hover.
+//! // After a second at more than the thrust of hover it has climbed.
 //! assert!(flight.sense(&mut noise).position_m.z > 0.5);
 //! // The paper's T_body of altitude, 1.6886 s.
 //! let altitude = vehicle.linearised(Axis::Altitude)?;

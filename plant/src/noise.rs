@@ -17,9 +17,9 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
-/// Where a simulation takes its noise from. Implement it to continue a generator of your own.
+/// Source of the noise of a simulation. Implement it to continue a generator of your own.
 pub trait NoiseSource {
-    /// The next number of mean zero and variance one.
+    /// The next independent number with mean zero and variance one.
     fn standard_normal(&mut self) -> f64;
 }
 

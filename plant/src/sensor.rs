@@ -1,14 +1,14 @@
-//! What the sensor makes of the output: white noise, then rounding to its quantum.
+//! Sensor of the output: white noise, then rounding to a quantum.
 
 use crate::noise::NoiseSource;
 
-/// A sensor; the default one is perfect.
+/// A sensor. The default is perfect.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Sensor {
-    /// Standard deviation of white noise at the samples (output unit).
+    /// Standard deviation of the white noise of a sample (output unit).
     pub noise_sigma: f64,
-    /// Resolution (output unit); 0 does not round.
+    /// Resolution (output unit); 0 means unlimited.
     pub quantum: f64,
 }
 
@@ -28,7 +28,7 @@ impl Sensor {
         Self { quantum, ..self }
     }
 
-    /// The reading of `output`; takes a number from `noise` only where the sensor is noisy.
+    /// Measured value of `output`. Takes a number from `noise` only if the sensor is noisy.
     #[inline]
     pub fn read(&self, output: f64, noise: &mut impl NoiseSource) -> f64 {
         let mut reading = output;

@@ -1,21 +1,21 @@
-//! What an experiment leaves: one row a sample.
+//! Trace of an experiment: one row per sample.
 
-/// Columns of equal length. Row `i`: the output was read at `time_s[i]`, then the input was held
-/// from `time_s[i]` to `time_s[i + 1]`.
+/// Columns of equal length. In row `i` the output is measured at `time_s[i]`, and the input is held from
+/// `time_s[i]` to `time_s[i + 1]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Time of the sample (s), increasing.
     pub time_s: Vec<f64>,
-    /// Input as commanded, without the bias (input unit).
+    /// Commanded input, without the bias (input unit).
     pub input: Vec<f64>,
-    /// Output as measured (output unit).
+    /// Measured output (output unit).
     pub output: Vec<f64>,
-    /// Output as it was (output unit).
+    /// True output (output unit).
     pub true_output: Vec<f64>,
 }
 
 impl Trace {
-    /// An empty trace with room for `samples` rows.
+    /// An empty trace with memory for `samples` rows.
     #[must_use]
     pub fn with_capacity(samples: usize) -> Self {
         Self {
@@ -47,8 +47,8 @@ impl Trace {
         self.true_output.push(true_output);
     }
 
-    /// Half the peak-to-peak true output of the last `samples` samples, or of all if there are fewer
-    /// (output unit); zero of none.
+    /// Half the peak-to-peak true output (output unit) of the last `samples` samples, or of all if there are
+    /// fewer; zero for an empty trace.
     #[must_use]
     pub fn amplitude_of_last(&self, samples: usize) -> f64 {
         let tail = &self.true_output[self.len().saturating_sub(samples)..];
@@ -61,7 +61,7 @@ impl Trace {
         0.5 * (high - low)
     }
 
-    /// Removes all samples and keeps the room.
+    /// Removes all samples and keeps the memory.
     pub fn clear(&mut self) {
         self.time_s.clear();
         self.input.clear();
@@ -74,7 +74,7 @@ impl Trace {
 mod tests {
     use super::*;
 
-    // Of 9, -1, 3, 2: the last three span from -1 to 3, all from -1 to 9.
+    // Of 9, -1, 3, 2 the last three span -1 to 3, and all span -1 to 9.
     #[test]
     fn amplitude_is_half_the_span_of_the_tail() {
         let mut trace = Trace::default();

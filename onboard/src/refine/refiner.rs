@@ -21,7 +21,7 @@ use crate::{distortion, response};
 /// use onecycle_onboard::refine::{PriorKnowledge, Refiner};
 /// use onecycle_onboard::window::Window;
 ///
-/// Under a square wave of 0.2 s, a lag of 0.1 s and two integrations.
+/// // Under a square wave of 0.2 s, a lag of 0.1 s and two integrations.
 /// let mut window = Window::<69, 16>::new(0.4, 1e-3);
 /// let (mut force, mut rate, mut output) = (0.0, 0.0, 0.0);
 /// for tick in 0..800 {
@@ -35,7 +35,7 @@ use crate::{distortion, response};
 /// }
 /// let mut refiner = Refiner::new();
 /// refiner.begin(&window, 0.2, &PriorKnowledge::default()).map_err(|_| "window")?;
-/// One slice per control tick.
+/// // One slice per control tick.
 /// let refined = loop {
 ///     if let Some(outcome) = refiner.advance(&window) {
 ///         break outcome.map_err(|_| "no fit")?;

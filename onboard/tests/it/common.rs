@@ -1,4 +1,4 @@
-//! A relay around a process, noise-free, from the crate's own transition: no simulator needed.
+//! A relay around a process without noise, simulated with the crate's own transition.
 
 use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::transition::State;
@@ -7,7 +7,7 @@ use onecycle_onboard::{Relay, Soiptd, Transition};
 
 pub(crate) type FitWindow = Window<260, 64>;
 
-/// Input from the sample on, and output at it.
+/// Input from each sample on, and output at it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Run {
     pub(crate) time_s: Vec<f64>,
@@ -15,7 +15,7 @@ pub(crate) struct Run {
     pub(crate) output: Vec<f64>,
 }
 
-/// The delayed process under held inputs; the recorded input arrives `tau` late.
+/// Process under held inputs; the recorded input arrives `tau` later.
 pub(crate) struct Simulation {
     process: Soiptd,
     state: State,
@@ -62,7 +62,7 @@ impl Simulation {
     }
 }
 
-/// Runs the relay at these instants, under a constant input bias.
+/// Runs the relay at these instants under a constant input bias.
 pub(crate) fn run(
     process: &Soiptd,
     relay: &mut Relay,
@@ -75,7 +75,7 @@ pub(crate) fn run(
     while let Some(time_s) = times_s.next() {
         let Some(&next_s) = times_s.peek() else { break };
         let output = simulation.output();
-        // An actuator of negative effect is turned round outside the relay.
+        // For a process of negative gain the relay's output is reversed.
         let sense = process.k_over_t_body().signum();
         let input = sense * f64::from(relay.step((-output) as f32, (next_s - time_s) as f32));
         run.time_s.push(time_s);
@@ -86,13 +86,13 @@ pub(crate) fn run(
     run
 }
 
-/// Even instants.
+/// Evenly spaced instants.
 pub(crate) fn every(sample_s: f64, count: usize) -> impl Iterator<Item = f64> {
     (0..count).map(move |k| k as f64 * sample_s)
 }
 
-/// The last `cycles` cycles and two periods of input before them in a window, and their period;
-/// `keep` says which samples are there.
+/// A window with the last `cycles` cycles and two periods of input before them, and their period; `keep` says
+/// which samples exist.
 pub(crate) fn last_cycles(
     run: &Run,
     sample_s: f64,

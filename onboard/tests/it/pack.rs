@@ -1,4 +1,4 @@
-//! Packs that are as they must be, and bytes that are not.
+//! Valid packs, and invalid bytes.
 
 use onecycle_onboard::floats::Floats;
 use onecycle_onboard::gains::LeadTable;
@@ -9,7 +9,7 @@ use onecycle_onboard::pack::{
 use onecycle_onboard::signature::LENGTH;
 use proptest::prelude::*;
 
-/// Where sections of the pack below begin, from the start of the file.
+/// Offsets of the sections of the pack below, from the start of the file.
 const SECOND_LAYER: usize = HEADER + 4 + 8 + 4 * 2 + 4 * 2 + 2 * LENGTH;
 const INPUTS: usize = SECOND_LAYER + 8 + 4 * OUTPUTS + 4 * OUTPUTS * 2;
 const OUTPUT_SCALING: usize = INPUTS + 4 * 2 * LENGTH;
@@ -21,7 +21,7 @@ const SELF_TEST: usize = LEAD_TABLE + 12 + 4 * 4 + 4 * 6;
 const CARD: usize = SELF_TEST + 4 + 4 * (LENGTH + OUTPUTS);
 const TOTAL: usize = CARD + 4 + 4;
 
-/// A network of two layers whose outputs are known: with `x' = (x - 1) 2`,
+/// A network of two layers with known outputs: with `x' = (x - 1) 2`,
 ///
 /// ```text
 /// h_0 = relu(0.5 (2 x'_0 - x'_1) + 1)      bytes, scale 0.5
@@ -78,7 +78,7 @@ fn le(values: impl IntoIterator<Item = f32>) -> Vec<u8> {
     values.into_iter().flat_map(f32::to_le_bytes).collect()
 }
 
-/// A file of these sections, its length and hash as they must be.
+/// A file of these sections with a valid length and hash.
 fn file(body: &[u8]) -> Vec<u8> {
     let mut bytes = MAGIC.to_vec();
     bytes.extend(VERSION.to_le_bytes());
@@ -88,7 +88,7 @@ fn file(body: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// What is read of the file with other bytes from `offset` on, its hash made to fit.
+/// Error for the file with other bytes from `offset` on and a valid hash.
 fn refused(offset: usize, bytes: &[u8]) -> PackError {
     let mut body = body();
     body[offset - HEADER..][..bytes.len()].copy_from_slice(bytes);
@@ -129,7 +129,7 @@ fn everything_comes_back() {
     assert_eq!((table.values.len(), table.get(0)), (6, Some(10.0)));
     assert_eq!((table.get(5), table.get(6)), (Some(22.0), None));
     assert_eq!(table.bytes, &bytes[LEAD_TABLE + 12..SELF_TEST]);
-    // Its numbers are no lead table: the first, a phase margin, is negative.
+    // These numbers are not a lead table: the first, a phase margin, is negative.
     assert_eq!(pack.gains_table(), None);
     assert_eq!(pack.card(), "{  }");
     assert_eq!(pack.content_hash(), content_hash(&bytes[HEADER..]));
@@ -164,14 +164,14 @@ fn outputs_are_those_by_hand() {
     assert!(pack.outputs(&[f32::NAN; LENGTH])[0].is_nan());
 }
 
-// Output 13 is 31 and must be 62: off by 31 / 62.
+// Output 13 is 31 and should be 62: the difference is 31 / 62.
 #[test]
 fn a_self_test_that_fails_is_seen() {
     let mut body = body();
     let last = CARD - HEADER - 4;
     body[last..last + 4].copy_from_slice(&62_f32.to_le_bytes());
     assert_eq!(Pack::read(&file(&body)).unwrap().self_test(), Some(0.5));
-    // Without any there is nothing to say.
+    // Without a self-test there is no difference.
     body.splice(SELF_TEST - HEADER..CARD - HEADER, 0_u32.to_le_bytes());
     assert_eq!(Pack::read(&file(&body)).unwrap().self_test(), None);
 }
@@ -193,7 +193,7 @@ fn domains_hold_what_is_between_their_limits() {
     assert!(!domain.holds(&at(f32::NAN, 5.0), -0.73));
 }
 
-// The values published with the algorithm.
+// Test values published with the algorithm.
 #[test]
 fn the_hash_is_fnv_1a() {
     assert_eq!(content_hash(b""), 0xcbf2_9ce4_8422_2325);
@@ -235,7 +235,7 @@ fn a_pack_cut_off_anywhere_is_refused() {
     );
 }
 
-// In the magic, the version, the length, the hash, or anywhere behind.
+// In the magic bytes, the version, the length, the hash, or anywhere after them.
 #[test]
 fn every_flipped_bit_is_seen() {
     let mut bytes = file(&body());
@@ -268,7 +268,7 @@ fn a_newer_pack_is_named() {
     assert!(sentence.contains("update"), "{sentence}");
 }
 
-// What only a wrong writer can make: the hash fits, what is behind it does not.
+// What only a faulty writer produces: the hash is valid, the content is not.
 #[test]
 fn every_section_is_checked() {
     let network = HEADER;
@@ -330,7 +330,7 @@ fn every_section_is_checked() {
 #[test]
 fn a_network_of_other_outputs_is_refused() {
     let mut body = body();
-    // The first layer alone.
+    // Only the first layer.
     body.drain(SECOND_LAYER - HEADER..INPUTS - HEADER);
     body[0] = 1;
     assert_eq!(Pack::read(&file(&body)), Err(PackError::Outputs(2)));
@@ -342,11 +342,11 @@ proptest! {
         prop_assert!(Pack::read(&bytes).is_err());
         let named = [&MAGIC[..], &VERSION.to_le_bytes(), &bytes].concat();
         prop_assert!(Pack::read(&named).is_err());
-        // Six of 2^32 begin with a number of layers that can be.
+        // Six of 2^32 values are a valid number of layers.
         prop_assert!(Pack::read(&file(&bytes)).is_err());
     }
 
-    // Whatever passes the checks can be used.
+    // A pack that passes the checks can be used.
     #[test]
     fn no_change_behind_the_hash_makes_it_panic(
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),

@@ -1,4 +1,4 @@
-//! The estimator on noise-free experiments: what made them comes back.
+//! The fit on noise-free experiments: it must return the process that produced them.
 
 use crate::common::{FitWindow, Simulation, every, last_cycles, run};
 use onecycle_onboard::refine::{
@@ -11,13 +11,13 @@ fn relay() -> Relay {
     Relay::new(RelaySettings::new(1.0, beta)).unwrap()
 }
 
-/// Period to expect (s), by the describing function.
+/// Expected period (s), by the describing function.
 fn scale_s(process: &Soiptd) -> f64 {
     let (omega, _) = process.describing_function_oscillation(1.0, -0.73).unwrap();
     std::f64::consts::TAU / omega
 }
 
-/// Sixteen periods of about 400 samples, of which the last `cycles` are fitted.
+/// Sixteen periods of about 400 samples; the last `cycles` are fitted.
 fn refined(process: &Soiptd, bias: f64, cycles: usize) -> Refined {
     let sample_s = scale_s(process) / 400.0;
     let run = run(process, &mut relay(), bias, every(sample_s, 16 * 400));
@@ -25,7 +25,7 @@ fn refined(process: &Soiptd, bias: f64, cycles: usize) -> Refined {
     refine(&window, period_s).unwrap()
 }
 
-/// Errors of what the response depends on, relative or in periods of the oscillation: gain over
+/// Errors of the quantities that the response depends on, relative or in periods of the oscillation: gain over
 /// lag, sum of the poles, their ratio, delay.
 fn errors(found: &Soiptd, process: &Soiptd) -> [f64; 4] {
     let relative = |a: f64, b: f64| (a / b - 1.0).abs();
@@ -61,7 +61,7 @@ fn undamped(t_prop_s: f64, tau_s: f64) -> Soiptd {
     Soiptd::from_acceleration_gain(2.0, t_prop_s, 0.0, tau_s).unwrap()
 }
 
-/// The corners of the multirotor domain, and beyond it.
+/// The corners of the multirotor domain, and processes beyond it.
 fn processes() -> [Soiptd; 13] {
     [
         new(0.0321, 1.6886, 0.0237),
@@ -69,7 +69,7 @@ fn processes() -> [Soiptd; 13] {
         new(0.3, 2.0, 0.0005),
         new(0.015, 0.2, 0.1),
         new(0.015, 0.2, 0.0005),
-        // No delay at all.
+        // No delay.
         new(0.1, 0.3, 0.0),
         // Double integrators with a lag.
         undamped(0.05, 0.03),
@@ -77,18 +77,17 @@ fn processes() -> [Soiptd; 13] {
         // Equal lags.
         new(0.2, 0.2, 0.05),
         new(0.2, 0.2, 0.0),
-        // The actuator slower than the body: the same response as with the lags exchanged.
+        // An actuator slower than the body: the same response as with the lags exchanged.
         new(0.3, 0.2, 0.05),
-        // A lag of a 200th of the period.
+        // A lag of 1/200 of the period.
         new(0.002, 1.0, 0.1),
         Soiptd::from_acceleration_gain(-7.0, 0.05, 1.0, 0.03).unwrap(),
     ]
 }
 
-// A perfect recording determines everything. What is left is rounding of the outputs, 1e-16,
-// against what one cycle tells about its least certain direction, the initial state against the
-// damping of a slow process: about 1e-9 of the size of either, and the knowledge of the initial
-// acceleration, a millionth of the output, that stands in the last row.
+// A perfect recording determines everything. The remaining error is the rounding of the outputs, 1e-16, divided
+// by the sensitivity of one cycle to its least certain direction (initial state against damping of a slow
+// process), about 1e-9; and the prior of the initial acceleration, a millionth of the output.
 #[test]
 fn perfect_recordings_are_recovered() {
     for process in processes() {
@@ -100,7 +99,7 @@ fn perfect_recordings_are_recovered() {
     }
 }
 
-// Away from equal lags the paper's parameters themselves are as certain.
+// Away from equal lags the parameters of the paper are as certain.
 #[test]
 fn the_papers_parameters_come_back() {
     let process = new(0.0321, 1.6886, 0.0237);
@@ -118,8 +117,8 @@ fn the_papers_parameters_come_back() {
     }
 }
 
-// The lags are equal at ratio 1/4; each is off by the root of the ratio's error. Of lags that are
-// exchanged the faster is called the actuator's, and the acceleration gain goes with it.
+// Equal lags have the ratio 1/4; the error of each is the square root of the ratio's. If the lags are exchanged,
+// the faster is taken as the actuator's, and the acceleration gain changes with it.
 #[test]
 fn lags_are_told_apart_by_their_speed() {
     let equal = refined(&new(0.2, 0.2, 0.05), 0.0, 2).process;
@@ -129,8 +128,8 @@ fn lags_are_told_apart_by_their_speed() {
     assert!((exchanged.k().unwrap() - 1.0).abs() < 1e-6);
 }
 
-// Periods from a millisecond to three hours. Scaled by powers of two, times and outputs are exact
-// multiples, so the estimator's every step is; scales of ten round differently, no more.
+// Periods from a millisecond to three hours. If times and outputs are scaled by powers of two, every step of the
+// fit is scaled exactly; scales of ten only round differently.
 #[test]
 fn time_has_no_scale() {
     let base = [0.1, 1.3, 0.07];
@@ -158,8 +157,8 @@ impl Uniform {
     }
 }
 
-/// Worst error over the processes, the sum of the poles left out where the lag is too short to be
-/// seen, of uneven samples: spread of the increments and share of samples lost.
+/// Worst error over the processes for uneven samples, with this spread of the increments and share of lost
+/// samples. The sum of the poles is left out where the lag is too short to be observed.
 fn worst_of_uneven_samples(spread: f64, lost: f64, cycles: usize) -> f64 {
     let mut worst = 0.0_f64;
     for process in processes() {
@@ -189,9 +188,9 @@ fn worst_of_uneven_samples(spread: f64, lost: f64, cycles: usize) -> f64 {
     worst
 }
 
-// Samples are compared with the model at their mean time, by its slope: what is left is of second
-// order, the variance of the times within a bin times half the acceleration, up to 2e-5 of the
-// amplitude here: a lag or a gain comes out a part in a thousand wrong at most.
+// The model is evaluated at the mean time of the samples, with its slope. The remaining error is of second
+// order, the variance of the times within a bin times half the acceleration: up to 2e-5 of the amplitude here,
+// which changes a lag or a gain by a part in a thousand at most.
 #[test]
 fn jittered_and_lost_samples_do_little_harm() {
     for (spread, lost, most) in [(0.02, 0.0, 1e-3), (0.0, 0.1, 8e-4), (0.02, 0.1, 1.5e-3)] {
@@ -213,7 +212,7 @@ fn a_window_without_a_relay_is_no_window() {
     assert_eq!(refine(&window, 0.4), Err(RefineError::NoInput));
 }
 
-// Eight unknowns ask for sixteen bins; 15 samples make 15.
+// Eight unknowns need sixteen bins; 15 samples give 15.
 #[test]
 fn a_short_window_says_how_short() {
     let mut window = FitWindow::new(0.0, 1e-3);
@@ -233,8 +232,8 @@ fn a_short_window_says_how_short() {
     ));
 }
 
-// Noise-free, the data settle a shape to a millionth against a prior of a standard deviation of one; against
-// one of 1e-12 about another shape they have no say, and the covariance says so too.
+// Without noise the data determine a shape to a millionth against a prior with a standard deviation of one.
+// Against a prior of 1e-12 about another shape they have no influence, and the covariance shows it.
 #[test]
 fn a_prior_counts_for_what_it_is_worth() {
     let process = new(0.05, 1.0, 0.03);
@@ -271,9 +270,9 @@ fn a_prior_counts_for_what_it_is_worth() {
     assert!(sigma < 1e-6, "{sigma}");
 }
 
-/// Two periods of a wave of one second, high for a third, through the process in open loop: it need not
-/// be one that a relay would make oscillate at that period. (Of a wave high for a half, a delay by half a
-/// period would be a change of sign.)
+/// Two periods of a wave of one second, high for a third, through the process in open loop: a relay need not
+/// make the process oscillate at that period. (With a wave high for a half, a delay of half a period would be a
+/// change of sign.)
 fn open_loop(process: &Soiptd) -> Refined {
     let sample_s = 1.0 / 256.0;
     let mut simulation = Simulation::new(process);
@@ -290,8 +289,8 @@ fn open_loop(process: &Soiptd) -> Refined {
     refine(&window, 1.0).unwrap()
 }
 
-// The domain, in periods: sum of the poles from 1 to e^6.9 = 992 and delays up to a half. Beyond
-// it the best fit lies on the limit, and says so.
+// The domain in periods: sum of the poles from 1 to e^6.9 = 992, delays up to a half. For a process outside it
+// the best fit lies on the limit and reports it.
 #[test]
 fn the_limits_of_the_domain_are_named() {
     // Poles 5/6 and 1/30: their sum is 0.867.
@@ -304,14 +303,14 @@ fn the_limits_of_the_domain_are_named() {
         open_loop(&new(1e-5, 5.0, 0.3)).edge,
         Some(DomainEdge::FastLag)
     );
-    // And inside, none.
+    // No limit for a process inside.
     let inside = new(0.1, 1.0, 0.1);
     let found = open_loop(&inside);
     assert_eq!(found.edge, None);
     assert!((found.process.tau_s() - 0.1).abs() < 1e-6, "{found:?}");
 }
 
-// Here the search ends a ten-thousandth short of the limit: the fit is as good, the verdict missing.
+// Here the search ends a ten-thousandth before the limit: the fit is as good, and the limit must be reported.
 #[test]
 fn a_lag_too_fast_to_be_seen_is_always_named() {
     for (t_prop_s, tau_s) in [(2e-4, 0.2), (2e-6, 0.2), (1e-8, 0.2)] {
@@ -320,7 +319,7 @@ fn a_lag_too_fast_to_be_seen_is_always_named() {
     }
 }
 
-// Nonsense in, an outcome out.
+// Meaningless input gives an outcome, not a panic.
 #[test]
 fn a_period_that_is_none_is_no_fit() {
     let process = new(0.05, 1.0, 0.03);

@@ -1,13 +1,13 @@
-//! The relay around processes, and under anything that a sensor may tell it.
+//! The relay around processes, and with any input from a sensor.
 
 use crate::common::{every, run};
 use onecycle_onboard::{Relay, RelayError, RelaySettings, Soiptd};
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
-// In steady state the mean of the input is minus the bias; the trim takes up 0.8 of what is left each
-// cycle, so it comes within rounding of it up to what the duty can resolve: half a sample in a half
-// cycle either way, 2 h dt / period = 0.005 h.
+// In steady state the mean of the input is minus the bias. The trim removes 0.8 of the remaining bias per cycle,
+// so it converges to the resolution of the duty: half a sample per half cycle on either side, 2 h dt / period =
+// 0.005 h.
 #[test]
 fn trim_converges_to_minus_the_bias() {
     let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
@@ -26,9 +26,8 @@ fn trim_converges_to_minus_the_bias() {
     }
 }
 
-// With an asymmetry of 0.2 the output is high for 0.6 of a cycle, or for 0.4 where the bias is positive, to
-// the half sample in a half cycle that the duty can resolve; the trim leaves a fifth of the relay's amplitude
-// of the bias.
+// With an asymmetry of 0.2 the output is high for 0.6 of a cycle, or for 0.4 if the bias is positive, to half a
+// sample per half cycle. The trim leaves a bias of a fifth of the relay's amplitude.
 #[test]
 fn the_trim_leaves_the_asymmetry_asked_for() {
     let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
@@ -63,7 +62,7 @@ fn the_trim_leaves_the_asymmetry_asked_for() {
     assert_eq!(Relay::new(settings).err(), Some(RelayError::Asymmetry(1.0)));
 }
 
-// Without a trim the duty carries the bias: mean(u) = h (2 duty - 1) = -bias over whole cycles.
+// Without a trim the duty balances the bias: mean(u) = h (2 duty - 1) = -bias over whole cycles.
 #[test]
 fn duty_carries_the_bias_without_a_trim() {
     let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
@@ -100,8 +99,7 @@ proptest! {
         ..Config::default()
     })]
 
-    // Whatever the errors, the output is zero in the pre-roll, then trim + h or trim - h, the trim
-    // within 0.9 h.
+    // For any errors the output is zero in the pre-roll, then trim + h or trim - h with a trim within 0.9 h.
     #[test]
     fn output_is_always_one_of_two_levels(
         errors in errors(),

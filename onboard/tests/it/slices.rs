@@ -1,4 +1,4 @@
-//! Refinement and classification in slices: the same results, in no more slices than they say.
+//! Fit and classification in slices: the same results, within the stated number of slices.
 
 use crate::common::{every, run};
 use onecycle_onboard::classify::{Classifier, classify_by};
@@ -20,8 +20,8 @@ fn process() -> Soiptd {
     Soiptd::from_acceleration_gain(4.0, 0.05, 2.0, 0.02).unwrap()
 }
 
-/// The last cycle of a relay test at 1 kHz, two periods of input before it; `noise` on the outputs in parts
-/// of the largest, by a fixed pattern.
+/// Last cycle of a relay test at 1 kHz, with two periods of input before it; `noise` is added to the outputs
+/// relative to the largest one, in a fixed pattern.
 fn last_cycle(process: &Soiptd, noise: f64) -> (Coarse, Fine, Cycle) {
     let settings = RelaySettings::new(1.0, RelaySettings::DISTINGUISHING_BETA);
     let run = run(
@@ -43,7 +43,7 @@ fn last_cycle(process: &Soiptd, noise: f64) -> (Coarse, Fine, Cycle) {
         }
         coarse.push_input(time_s, run.input[k]).unwrap();
         if time_s > begin_s - 5e-4 {
-            // Between -1 and 1, without a period.
+            // Between -1 and 1, not periodic.
             let rough = (1e4 * (k as f64).sin()).fract();
             let output = run.output[k] + noise * cycle.amplitude * rough;
             coarse.push_output(time_s, output);
@@ -53,7 +53,7 @@ fn last_cycle(process: &Soiptd, noise: f64) -> (Coarse, Fine, Cycle) {
     (coarse, fine, cycle)
 }
 
-/// What comes out, after how many slices.
+/// Result and number of slices.
 fn finish(refiner: &mut Refiner<BINS>, window: &Coarse) -> (Result<Refined, RefineError>, usize) {
     for slices in 1.. {
         if let Some(outcome) = refiner.advance(window) {
@@ -63,9 +63,9 @@ fn finish(refiner: &mut Refiner<BINS>, window: &Coarse) -> (Result<Refined, Refi
     unreachable!()
 }
 
-// A noisy cycle has all three searches end at the noise or before; its 12 fits, of some 50 slices, and as
-// many steps of some 150 each are thousands of slices, of which the bound, for 60 steps and as many refusals
-// from each of three starts, allows at least five times as many.
+// With a noisy cycle all three searches end at the noise or earlier. The 12 fits of 50 slices each and as many
+// steps of 150 slices are thousands of slices. The bound, for 60 steps and as many failures from each of three
+// starts, is at least five times as large.
 #[test]
 fn a_refinement_takes_no_more_slices_than_it_says() {
     for noise in [0.0, 0.01, 0.2] {
@@ -84,8 +84,8 @@ fn a_refinement_takes_no_more_slices_than_it_says() {
     }
 }
 
-// Whatever was under way, to the bit: abandoned in the fits at the starts, in the search, in the covariance,
-// and after the end.
+// A new fit gives the same bits whatever was in progress before: dropped in the fits at the starts, in the
+// search, in the covariance, and after the end.
 #[test]
 fn a_refiner_can_be_begun_anew_at_any_time() {
     let pack = Pack::embedded().unwrap();
@@ -145,9 +145,9 @@ fn nothing_comes_of_what_was_not_begun() {
     assert!(outcome.is_some_and(|outcome| outcome.is_err()));
 }
 
-// The residual of the fit at the process refined is that of the refinement: its root mean square over the
-// bins that are fitted, of which all hold as many samples but the last, is the one reported but for the
-// degrees of freedom, 9 of some 60 bins.
+// The residual of the fit at the refined process is that of the refinement: its root mean square over the fitted
+// bins, which all hold equally many samples except the last, equals the reported one up to the degrees of
+// freedom, 9 of 60 bins.
 #[test]
 fn residuals_are_those_of_the_refinement() {
     let (window, _, cycle) = last_cycle(&process(), 0.01);
@@ -163,8 +163,8 @@ fn residuals_are_those_of_the_refinement() {
     );
 }
 
-// A layer a slice, the posterior, the candidates, 15 harmonics 8 at a time, and twice the response, 3 of them
-// at a time, the equations, and 7 rows of the factor in two.
+// One slice per layer, the posterior, the candidates, 15 harmonics 8 at a time, and twice: the response 3
+// harmonics at a time, the equations, and 7 rows of the factor in two.
 #[test]
 fn a_classification_takes_as_many_slices_as_it_says() {
     let pack = Pack::embedded().unwrap();
@@ -175,7 +175,7 @@ fn a_classification_takes_as_many_slices_as_it_says() {
         let signature = Signature::new(&window, &cycle).unwrap();
         let noise_sigma = window.noise_sigma();
         let expected = classify_by(&pack, &signature, cycle.period_s, noise_sigma).unwrap();
-        // Abandoned after none, within the network, before the end, and after it.
+        // Dropped after no slice, within the network, before the end, and after it.
         for abandoned in [0, 1, slices - 1, slices] {
             for until in [abandoned, slices] {
                 classifier

@@ -1,4 +1,4 @@
-//! The tuner on simulated axes: from rest, from the ground, and everything that can go wrong.
+//! The tuner on simulated axes: from rest, from the ground, and with all kinds of faults.
 
 mod axis;
 mod faults;
@@ -12,12 +12,12 @@ use self::axis::Axis;
 
 const SAMPLE_S: f64 = 0.001;
 
-/// The paper's altitude: T_prop 32.1 ms, T_body 1.6886 s, dead time 24 ms, at 4 1/s^2 a unit.
+/// Altitude of the paper: T_prop 32.1 ms, T_body 1.6886 s, dead time 24 ms, acceleration gain 4 1/s^2.
 fn height() -> Soiptd {
     Soiptd::from_acceleration_gain(4.0, 0.0321, 1.0 / 1.6886, 0.024).unwrap()
 }
 
-/// Outputs of one at most, ten times the relay's.
+/// Outputs up to one, ten times the amplitude of the relay.
 fn settings() -> TunerSettings {
     TunerSettings {
         output_lowest: -1.0,
@@ -30,7 +30,7 @@ fn tuner(settings: &TunerSettings) -> Tuner<'static> {
     Tuner::new(settings).unwrap()
 }
 
-// Without noise the model is exact: the process comes back, and the margin is the pack's 20 degrees.
+// Without noise the model is exact: the process is recovered, and the margin is the 20 degrees of the pack.
 #[test]
 fn a_test_from_rest_ends_in_the_controller_of_the_process() {
     let mut tuner = tuner(&settings());
@@ -58,8 +58,9 @@ fn a_test_from_rest_ends_in_the_controller_of_the_process() {
     assert_eq!(*tuner.law(), PdLaw::new(found.pd, tuner.offset()));
 }
 
-// Hover needs 0.5 of the input and the relay has 0.1. From the ground, with nothing but the integrator and
-// the relay, to the controller; with noise of 2 mm. At no time more than half a metre above the metre asked for.
+// Hover needs 0.5 of the input and the relay has 0.1. From the ground, with only the integrator and the relay,
+// to the controller, with noise of 2 mm. The vehicle never exceeds the reference of one metre by more than half
+// a metre.
 #[test]
 fn from_the_ground_without_a_controller() {
     let settings = TunerSettings::new(0.1, SAMPLE_S as f32);
@@ -86,7 +87,7 @@ fn from_the_ground_without_a_controller() {
         axis.bias = -0.5;
         axis.has_ground = true;
         axis.noise_sigma = 0.0002;
-        // A tick for the reference to be known.
+        // One tick with the reference.
         axis.fly(&mut tuner, 1.0, SAMPLE_S, |_, _| false);
         tuner.start();
         let mut highest = 0.0_f64;
@@ -112,8 +113,8 @@ fn from_the_ground_without_a_controller() {
     }
 }
 
-// Without a limit of any kind: a gain that has grown sixfold by the time of the switch makes the new loop
-// unstable (its gain margin is about 2), which the prediction tells and ends in the safe controller.
+// Without limits: the gain grows sixfold at the switch to the new controller, which makes the loop unstable (its
+// gain margin is about 2). The comparison with the prediction detects it and returns to the safe controller.
 #[test]
 fn a_response_that_is_not_the_predicted_one_falls_back() {
     let mut tuner = tuner(&settings());
@@ -131,13 +132,13 @@ fn a_response_that_is_not_the_predicted_one_falls_back() {
     let Some(Abort::Mismatch(off)) = tuner.reason() else {
         panic!("{:?} {:?}", tuner.phase(), tuner.reason());
     };
-    // Found in the tick in which it passed 1.5 amplitudes.
+    // Detected in the tick in which the difference exceeded 1.5 amplitudes.
     assert!((1.5..1.7).contains(&(off / amplitude)), "{off} {amplitude}");
     assert_eq!(*tuner.law(), PdLaw::ZERO);
 }
 
-// A bias of 0.03 under Kp = 0.5 holds the process 0.06 off, with an output of -0.03: there the relay begins, half
-// its jump to either side, and nothing drifts.
+// A bias of 0.03 under Kp = 0.5 holds the process at an offset of 0.06 with an output of -0.03. The relay begins
+// there, with half its jump to either side, and nothing drifts.
 #[test]
 fn the_relay_begins_where_the_safe_controller_held_the_process() {
     let settings = TunerSettings {
@@ -164,7 +165,7 @@ fn the_relay_begins_where_the_safe_controller_held_the_process() {
     assert!((found.input_bias - 0.03).abs() < 1e-3, "{found:?}");
 }
 
-// What ended one test does not keep the next from succeeding, with what the next vehicle is.
+// After an aborted test the next one succeeds, also with another vehicle.
 #[test]
 fn after_a_reset_all_begins_anew() {
     let mut tuner = tuner(&settings());
@@ -216,9 +217,15 @@ const OUT_OF_RANGE: [(Change, &str); 12] = [
         |s| s.take_off = take_off(1.0, -1.0),
         "the climb allowed must be",
     ),
-    (|s| s.cycles = 5, "the cycles must be 1 to 4, but are 5"),
+    (
+        |s| s.cycles = 5,
+        "the number of cycles must be 1 to 4, but is 5",
+    ),
     (|s| s.slices = 0, "at least one attempt and one slice"),
-    (|s| s.output_lowest = 1.0, "the least output must be below"),
+    (
+        |s| s.output_lowest = 1.0,
+        "the lower output limit must be below",
+    ),
     (|s| s.safe.kp = f32::NAN, "must be finite"),
     (|s| s.relay.amplitude = -1.0, "amplitude must be positive"),
 ];
@@ -227,7 +234,7 @@ fn take_off(gain: f32, climb: f32) -> Option<TakeOffSettings> {
     Some(TakeOffSettings { gain, climb })
 }
 
-// Each setting out of range is named, and none makes a tuner.
+// Every setting out of range is named and rejected.
 #[test]
 fn settings_out_of_range_are_named() {
     assert_eq!(Tuner::new(&settings()).err(), None);

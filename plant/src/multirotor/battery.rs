@@ -1,13 +1,14 @@
-//! The battery: an open-circuit voltage that falls with the charge, behind a resistance.
+//! Battery: an open-circuit voltage that falls with the charge, and an internal resistance.
 //!
-//! Motors ask for a power `P`, so `P = V I` and `V = E - R I`:
+//! The motors draw a power `P`, so `P = V I` and `V = E - R I`:
 //!
 //! ```text
 //! V = (E + sqrt(E^2 - 4 R P)) / 2,   E = E_empty + (E_full - E_empty) charge,   d(charge)/dt = -I / C
 //! ```
 //!
-//! Beyond `P = E^2 / 4 R`, the most it can give, the voltage stays at `E / 2`. An empty battery stays
-//! at `E_empty`.
+//! `V` is the terminal voltage (V), `E` the open-circuit voltage (V), `R` the resistance (ohm), `C` the capacity
+//! (A s). Above the largest power `P = E^2 / 4 R` the voltage stays at `E / 2`. An empty battery stays at
+//! `E_empty`.
 
 /// A battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +38,7 @@ impl Battery {
         0.5 * (self.open_circuit_v(charge) + self.root_v(charge, power_w))
     }
 
-    /// How the voltage falls with the power drawn (V/W): `-R / sqrt(E^2 - 4 R P)`.
+    /// Derivative of the voltage by the power (V/W): `-R / sqrt(E^2 - 4 R P)`.
     #[must_use]
     pub fn sag_v_per_w(&self, charge: f64, power_w: f64) -> f64 {
         -self.resistance_ohm / self.root_v(charge, power_w)
@@ -62,8 +63,8 @@ mod tests {
         capacity_a_s: 10_000.0,
     };
 
-    // Half full: 14 V. Drawing 20 A leaves 12 V, so at 240 W the voltage is 12. More than
-    // 14^2 / 0.4 = 490 W cannot be drawn: half the open voltage, 7 V.
+    // Half full: 14 V. A current of 20 A leaves 12 V, so at 240 W the voltage is 12 V. More than 14^2 / 0.4 =
+    // 490 W is not available: half the open-circuit voltage, 7 V.
     #[test]
     fn the_voltage_sags_with_the_power() {
         assert!((BATTERY.voltage_v(0.5, 240.0) - 12.0).abs() < 1e-14);

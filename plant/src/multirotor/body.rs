@@ -1,26 +1,26 @@
-//! The airframe: mass, inertia, drag.
+//! Airframe: mass, inertia, drag.
 //!
 //! ```text
-//! F = -(linear + quadratic |v|) v,   v the velocity through the air, component by component
+//! F = -(linear + quadratic |v|) v,   v is the velocity through the air, component by component
 //! ```
 //!
-//! The linear part stands for what the fuselage loses in the wake of its rotors; the quadratic one
-//! is `rho C_D A / 2`. Both act at the centre of mass: the airframe alone damps no rotation.
+//! The linear part represents the momentum that the fuselage loses in the wake of its rotors; the quadratic part
+//! is `rho C_D A / 2`. Both act at the centre of mass: the airframe alone does not damp rotations.
 
 use super::frames::Vec3;
 
 /// Acceleration of gravity (m/s^2), the conventional value of the CGPM of 1901.
 pub const GRAVITY_M_PER_S2: f64 = 9.806_65;
 
-/// An airframe. Lengths are counted from its middle, the point half way between the four hubs.
+/// An airframe. Its origin is the middle, the point half way between the four hubs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
     /// Mass (kg).
     pub mass_kg: f64,
-    /// Moments of inertia about the axes of the body through the centre of mass (kg m^2);
-    /// products of inertia are taken as zero.
+    /// Moments of inertia about the axes of the body through the centre of mass (kg m^2); products of inertia
+    /// are assumed to be zero.
     pub inertia_kg_m2: Vec3,
-    /// Centre of mass (m, body). Off to the side it is the bias of roll and pitch.
+    /// Centre of mass (m, body). If it is off to the side, roll and pitch have a bias.
     pub centre_of_mass_m: Vec3,
     /// Linear drag (N s/m).
     pub linear_drag_n_s_per_m: Vec3,
@@ -44,9 +44,9 @@ impl Body {
         -coefficient.scaled_by(air_m_per_s)
     }
 
-    /// The airframe with a point mass `mass_kg` fixed `below_m` under its centre of mass: the centre
-    /// moves down by their share, the inertia of roll and pitch grows by the reduced mass times the
-    /// squared distance (Steiner).
+    /// The airframe with a point mass `mass_kg` fixed `below_m` below its centre of mass. The centre moves down
+    /// in proportion; the inertia of roll and pitch grows by the reduced mass times the squared distance
+    /// (Steiner).
     #[must_use]
     pub fn with_payload(&self, mass_kg: f64, below_m: f64) -> Self {
         let total_kg = self.mass_kg + mass_kg;

@@ -1,4 +1,4 @@
-//! The equations of motion of the rigid vehicle, and one step of their integration.
+//! Equations of motion of the rigid vehicle, and one step of their integration.
 //!
 //! ```text
 //! m dv/dt = m g + R (drag + sum of rotor forces) + contact + nudge            (world)
@@ -6,12 +6,11 @@
 //! dq/dt   = q w / 2,   dx/dt = v,   motors and battery as in their own files
 //! ```
 //!
-//! Left out: the angular momentum of the rotors (gyroscopic moments, and the lead that spinning up
-//! gives yaw), the dynamics of the inflow, the vortex ring state of a fast descent, wind that differs
-//! from place to place.
+//! Not modelled: angular momentum of the rotors (gyroscopic moments, and the lead that their acceleration gives
+//! yaw), dynamics of the inflow, vortex ring state in a fast descent, wind that varies in space.
 //!
-//! The classical Runge-Kutta rule, the command held: its error over a motor's lag `T` is `(h / T)^5 / 120`
-//! a step, 3e-9 at 1 ms and 20 ms.
+//! Integration by the classical Runge-Kutta rule with the command held. Its error over a motor's lag `T` is
+//! `(h / T)^5 / 120` per step, 3e-9 at 1 ms and 20 ms.
 
 use super::body::GRAVITY_M_PER_S2;
 use super::frames::{Attitude, Axes, Vec3};
@@ -19,12 +18,12 @@ use super::ground::ground_effect;
 use super::rotor::ROTOR_POSITIONS;
 use super::vehicle::{Parts, Vehicle};
 
-/// Everything that moves.
+/// State of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleState {
     /// Centre of mass (m, world); the ground is at `z = 0`.
     pub position_m: Vec3,
-    /// Its velocity (m/s, world).
+    /// Velocity of the centre of mass (m/s, world).
     pub velocity_m_per_s: Vec3,
     /// Attitude.
     pub world_from_body: Attitude,
@@ -51,7 +50,7 @@ impl VehicleState {
         }
     }
 
-    /// Whether nothing in it is infinite or not a number.
+    /// Whether all numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.position_m.is_finite()
@@ -62,7 +61,7 @@ impl VehicleState {
             && self.charge.is_finite()
     }
 
-    /// `self + slope * dt_s`; the attitude is left unnormalised.
+    /// `self + slope * dt_s`; the attitude is not normalised.
     fn plus(&self, slope: &Self, dt_s: f64) -> Self {
         Self {
             position_m: self.position_m + slope.position_m * dt_s,
@@ -77,21 +76,21 @@ impl VehicleState {
     }
 }
 
-/// What stays as it is over a step.
+/// Constants of a step.
 pub(super) struct Held<'a> {
     pub(super) parts: &'a Parts,
-    /// Square roots of what the motors get: their share of full speed.
+    /// Square roots of the motors' commands: their share of full speed.
     pub(super) speed_shares: [f64; 4],
     /// Wind with its gust (m/s, world).
     pub(super) wind_m_per_s: Vec3,
-    /// Force at the centre of mass (N, world) and torque (N m, body) from outside.
+    /// External force at the centre of mass (N, world) and torque (N m, body).
     pub(super) force_n: Vec3,
     pub(super) torque_nm: Vec3,
 }
 
 impl Held<'_> {
-    /// The state `dt_s` later. The centre of mass never ends below the ground: where the legs are
-    /// pressed so far, in a crash, it stops there.
+    /// State `dt_s` later. The centre of mass never ends below the ground: in a crash that compresses the legs
+    /// so far, it stops there.
     pub(super) fn step(&self, state: &VehicleState, dt_s: f64) -> VehicleState {
         let first = self.slope(state);
         let second = self.slope(&state.plus(&first, 0.5 * dt_s));
@@ -111,7 +110,7 @@ impl Held<'_> {
         next
     }
 
-    /// Time derivatives, in the places of what they are derivatives of.
+    /// Time derivatives, in the fields of the quantities.
     fn slope(&self, state: &VehicleState) -> VehicleState {
         let parts = self.parts;
         let axes = state.world_from_body.axes();

@@ -1,48 +1,52 @@
-//! What is no vehicle, no wind, no flight: errors that name the parameter.
+//! Errors of vehicle, wind and flight; each names the parameter.
 
 use onecycle_onboard::process::SoiptdError;
 
 use super::frames::Vec3;
 
-/// Why something is no vehicle, no wind or no flight: the parameter and its value.
+/// Parameter of a vehicle, a wind or a flight that is out of range, with its value.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum VehicleError {
-    /// It has to be above zero and finite.
+    /// The parameter must be above zero and finite.
     #[error("the {name} must be above zero and finite, but is {value}")]
     NotPositive {
-        /// Which.
+        /// Name.
         name: &'static str,
-        /// Its value (SI unit).
+        /// Value (SI unit).
         value: f64,
     },
-    /// It has to be zero or more, and finite.
+    /// The parameter must be zero or more, and finite.
     #[error("the {name} must be zero or more and finite, but is {value}")]
     Negative {
-        /// Which.
+        /// Name.
         name: &'static str,
-        /// Its value (SI unit).
+        /// Value (SI unit).
         value: f64,
     },
-    /// It has to be finite.
+    /// The parameter must be finite.
     #[error("the {name} must be finite")]
     NotFinite {
-        /// Which.
+        /// Name.
         name: &'static str,
     },
-    /// A battery is between empty and full.
+    /// The charge must be between 0 (empty) and 1 (full).
     #[error("the charge must be between 0 and 1, but is {0}")]
     Charge(f64),
     /// The empty battery has a higher voltage than the full one.
-    #[error("the battery must have at most its full {full_v} V when empty, but has {empty_v} V")]
+    #[error(
+        "the voltage of the empty battery must not exceed that of the full one, {full_v} V, but is {empty_v} V"
+    )]
     BatteryRises {
         /// Open-circuit voltage when full (V).
         full_v: f64,
         /// Open-circuit voltage when empty (V).
         empty_v: f64,
     },
-    /// No body can have these moments of inertia: each is at most the sum of the other two.
-    #[error("no body has moments of inertia of {x}, {y} and {z} kg m^2")]
+    /// Impossible moments of inertia: each is at most the sum of the other two.
+    #[error(
+        "moments of inertia of {x}, {y} and {z} kg m^2 are impossible: each is at most the sum of the others"
+    )]
     Inertia {
         /// About forward (kg m^2).
         x: f64,
@@ -51,14 +55,14 @@ pub enum VehicleError {
         /// About up (kg m^2).
         z: f64,
     },
-    /// Full thrust does not carry it.
-    #[error("hovering would take {thrust} of full thrust")]
+    /// Full thrust does not carry the vehicle.
+    #[error("the vehicle cannot hover: it would need {thrust} of its full thrust")]
     CannotHover {
-        /// Thrust command that hovering would take (1).
+        /// Thrust command that hover would need (1).
         thrust: f64,
     },
-    /// Its response at hover is no process.
-    #[error("the response at hover is no process: {0}")]
+    /// The response at hover is not a process.
+    #[error("the response at hover is not a process: {0}")]
     NoProcess(#[from] SoiptdError),
 }
 

@@ -1,4 +1,4 @@
-//! A flight: a vehicle, where it is, the air around it.
+//! Flight: a vehicle with its state and the air around it.
 
 use super::dynamics::{Held, VehicleState};
 use super::error::{VehicleError, charged};
@@ -9,10 +9,10 @@ use super::vehicle::Vehicle;
 use super::wind::{Gusts, Nudge, Wind};
 use crate::NoiseSource;
 
-/// Longest inner step (s): a twentieth of the quadrotor's motor lag, a tenth of a leg's time.
+/// Longest inner step (s): a twentieth of the quadrotor's motor lag, a tenth of the time constant of a leg.
 pub const LONGEST_STEP_S: f64 = 1e-3;
 
-/// Steps that differ by rounding only are not split: of a step.
+/// Relative difference of step lengths that counts as rounding.
 const ROUNDING: f64 = 1e-9;
 
 /// A vehicle in flight.
@@ -30,17 +30,17 @@ pub struct Flight {
 }
 
 impl Flight {
-    /// On the ground, at rest, in calm air.
+    /// A vehicle on the ground, at rest, in calm air.
     #[must_use]
     pub fn standing(vehicle: Vehicle) -> Self {
         Self::begin(vehicle, VehicleState::standing(&vehicle))
     }
 
-    /// From any state, in calm air. Altitude zero is where the vehicle would stand.
+    /// A vehicle in any state, in calm air. Altitude zero is where the vehicle would stand.
     ///
     /// # Errors
-    /// [`VehicleError::NotFinite`] when something in the state is not, [`VehicleError::Charge`] for a
-    /// charge outside 0..1.
+    /// [`VehicleError::NotFinite`] if a number of the state is not finite, [`VehicleError::Charge`] for a charge
+    /// outside 0..1.
     pub fn new(vehicle: Vehicle, state: VehicleState) -> Result<Self, VehicleError> {
         if !state.is_finite() {
             return Err(VehicleError::NotFinite { name: "state" });
@@ -64,9 +64,9 @@ impl Flight {
         }
     }
 
-    /// Moves on by `dt_s` with the command held, in equal inner steps of at most
-    /// [`LONGEST_STEP_S`]; takes numbers from `noise` only where there are gusts. A time that is not above
-    /// zero, or not finite, does not pass. See [`Command::clamped`] for commands out of range.
+    /// Advances by `dt_s` with a held command, in equal inner steps of at most [`LONGEST_STEP_S`]. Takes numbers
+    /// from `noise` only if there are gusts. A time that is not positive and finite is ignored. See
+    /// [`Command::clamped`] for commands out of range.
     pub fn step(&mut self, command: Command, dt_s: f64, noise: &mut impl NoiseSource) {
         if !(dt_s > 0.0 && dt_s.is_finite()) {
             return;
@@ -109,30 +109,30 @@ impl Flight {
             .push(self.time_s, reading, &self.vehicle.parts().sensors);
     }
 
-    /// What the sensors read now, noise and delay included.
+    /// Measurements of the sensors now, with noise and delay.
     pub fn sense(&self, noise: &mut impl NoiseSource) -> SensorReading {
         self.history.read(&self.vehicle.parts().sensors, noise)
     }
 
-    /// What sensors without noise or delay would read now.
+    /// True values of the measured quantities now.
     #[must_use]
     pub fn reading(&self) -> SensorReading {
         reading_of(&self.vehicle, &self.state, self.ground_height_m)
     }
 
-    /// Where and how everything is now.
+    /// Present state.
     #[must_use]
     pub fn state(&self) -> &VehicleState {
         &self.state
     }
 
-    /// How long it has been flown (s).
+    /// Time since the start (s).
     #[must_use]
     pub fn time_s(&self) -> f64 {
         self.time_s
     }
 
-    /// What flies.
+    /// The vehicle.
     #[must_use]
     pub fn vehicle(&self) -> &Vehicle {
         &self.vehicle
@@ -150,9 +150,9 @@ impl Flight {
         parts.battery.voltage_v(self.state.charge, power_w)
     }
 
-    /// Takes up or drops a payload: goes on with another vehicle, the middle, the attitude and the
-    /// rates as they are. What is taken up moves with the vehicle already; what is dropped keeps the
-    /// velocity it had.
+    /// Takes up or drops a payload: continues with another vehicle, with the middle, the attitude and the rates
+    /// unchanged. A payload that is taken up already moves with the vehicle; when one is dropped the vehicle
+    /// keeps its velocity.
     pub fn set_vehicle(&mut self, vehicle: Vehicle) {
         let axes = self.state.world_from_body.axes();
         let moved_m =
@@ -163,20 +163,20 @@ impl Flight {
         self.vehicle = vehicle;
     }
 
-    /// From now on this wind; gusts grow from what they are.
+    /// Sets the wind from now on; gusts develop from their present value.
     ///
     /// # Errors
-    /// Names the first of its parameters that is out of range.
+    /// The first parameter that is out of range.
     pub fn set_wind(&mut self, wind: Wind) -> Result<(), VehicleError> {
         wind.check()?;
         self.wind = wind;
         Ok(())
     }
 
-    /// A force and a torque from now on for their duration; one under way ends.
+    /// Applies a force and a torque from now on for their duration; a nudge in progress ends.
     ///
     /// # Errors
-    /// Names the first of its parameters that is out of range.
+    /// The first parameter that is out of range.
     pub fn nudge(&mut self, nudge: Nudge) -> Result<(), VehicleError> {
         nudge.check()?;
         self.nudge = if nudge.duration_s > 0.0 {

@@ -1,13 +1,13 @@
-//! Vectors and attitudes.
+//! Vectors, attitudes and frames.
 //!
-//! The world is east, north, up (x, y, z), the body forward, left, up: both right-handed. Roll is a
-//! positive turn about x (left side up), pitch about y (nose down), yaw about z (anticlockwise
-//! seen from above); the angles turn world into body in the order yaw, pitch, roll.
-//! `world_from_body` takes the components of a vector in the body to those in the world.
+//! The world frame is east, north, up (x, y, z), the body frame forward, left, up; both are right-handed. Roll
+//! is a positive rotation about x (left side up), pitch about y (nose down), yaw about z (anticlockwise seen
+//! from above). The angles rotate the world into the body in the order yaw, pitch, roll. `world_from_body`
+//! converts the components of a vector from the body to the world.
 
 use std::ops::{Add, AddAssign, Mul, Neg, Sub};
 
-/// Three components; the unit and the frame stand in the name of the variable.
+/// Vector of three components; names of variables give unit and frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Vec3 {
     /// East in the world, forward in the body.
@@ -19,7 +19,7 @@ pub struct Vec3 {
 }
 
 impl Vec3 {
-    /// No length.
+    /// Zero.
     pub const ZERO: Self = Self::new(0.0, 0.0, 0.0);
 
     /// From its components.
@@ -46,7 +46,7 @@ impl Vec3 {
         )
     }
 
-    /// Component by component.
+    /// Product component by component.
     #[must_use]
     #[inline]
     pub fn scaled_by(self, other: Self) -> Self {
@@ -60,7 +60,7 @@ impl Vec3 {
         self.dot(self).sqrt()
     }
 
-    /// Whether no component is infinite or not a number.
+    /// Whether all components are finite.
     #[must_use]
     pub fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite() && self.z.is_finite()
@@ -106,7 +106,7 @@ impl Mul<f64> for Vec3 {
     }
 }
 
-/// An attitude, as a quaternion: scalar and vector part.
+/// Attitude as a quaternion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Attitude {
     /// Scalar part, cosine of half the angle.
@@ -122,7 +122,7 @@ impl Attitude {
         vector: Vec3::ZERO,
     };
 
-    /// From the angles (rad).
+    /// Attitude of these angles (rad).
     #[must_use]
     pub fn from_angles(roll_rad: f64, pitch_rad: f64, yaw_rad: f64) -> Self {
         let (sr, cr) = (0.5 * roll_rad).sin_cos();
@@ -144,7 +144,7 @@ impl Attitude {
         let (w, Vec3 { x, y, z }) = (self.scalar, self.vector);
         Vec3::new(
             f64::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
-            // Rounding can carry the sine past one.
+            // Rounding can make the sine exceed one.
             (2.0 * (w * y - z * x)).clamp(-1.0, 1.0).asin(),
             f64::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z)),
         )
@@ -174,7 +174,7 @@ impl Attitude {
         }
     }
 
-    /// Derivative under rates of the body (rad/s, about its own axes): half the product with them.
+    /// Derivative under rates of the body (rad/s, about its own axes): half the product with the rates.
     #[must_use]
     #[inline]
     pub fn derivative(&self, rates_rad_per_s: Vec3) -> Self {
@@ -202,7 +202,7 @@ impl Attitude {
         (self.scalar * self.scalar + self.vector.dot(self.vector)).sqrt()
     }
 
-    /// The same attitude with norm one; level where there is none.
+    /// The same attitude with norm one; level if the norm is zero.
     #[must_use]
     #[inline]
     pub fn normalised(&self) -> Self {
@@ -217,14 +217,14 @@ impl Attitude {
     }
 }
 
-/// The axes of the body in the world: the columns of the matrix `world_from_body`.
+/// Axes of the body in the world: the columns of the matrix `world_from_body`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
-    /// Where forward points.
+    /// Direction of forward.
     pub forward: Vec3,
-    /// Where left points.
+    /// Direction of left.
     pub left: Vec3,
-    /// Where up points.
+    /// Direction of up.
     pub up: Vec3,
 }
 
@@ -256,8 +256,8 @@ mod tests {
         assert!((actual - expected).norm() < 1e-15, "{actual:?}");
     }
 
-    // A quarter turn about each axis, by hand: roll takes left to up, pitch up to forward (nose
-    // down: forward to down), yaw forward to left.
+    // A quarter turn about each axis by hand: roll takes left to up, pitch takes forward to down (nose down),
+    // yaw takes forward to left.
     #[test]
     fn quarter_turns_follow_the_right_hand() {
         let quarter = std::f64::consts::FRAC_PI_2;

@@ -1,28 +1,30 @@
-//! The ground, a level plane at height zero: what it does to a rotor above and to what touches it.
+//! Ground: a level plane at height zero, with ground effect on the rotors and contact forces.
 //!
-//! Ground effect at hover (I. C. Cheeseman and W. E. Bennett, "The effect of the ground on a
-//! helicopter rotor in forward flight", ARC R&M 3021, 1955), `R` the radius, `z` the rotor's height:
+//! Ground effect at hover with radius `R` and height `z` of the rotor (m):
 //!
 //! ```text
 //! thrust / thrust far from the ground = 1 / (1 - (R / 4 z)^2),   for z >= R / 2
 //! ```
 //!
-//! Contact: eight points, a foot and a guard at each hub, each a spring and damper that only push,
-//! with as much damping sideways, up to the friction:
+//! Reference: I. C. Cheeseman and W. E. Bennett, "The effect of the ground on a helicopter rotor in forward
+//! flight", ARC R&M 3021, 1955.
+//!
+//! Contact at eight points, a foot and a guard at each hub. Each is a spring with a damper that only pushes,
+//! with the same damping sideways up to the friction:
 //!
 //! ```text
 //! normal N = max(0, k depth - c rate of rise),   sideways min(c |v|, mu N) against v
 //! ```
 //!
-//! Sideways damping instead of stiction means that a standing vehicle creeps under a side force
-//! `F`, by `F / 4 c`: 2 mm/s for half a newton on the quadrotor here.
+//! Sideways damping instead of static friction means that a standing vehicle creeps under a side force `F` at
+//! `F / 4 c`: 2 mm/s for half a newton with the quadrotor here.
 
 use super::frames::Vec3;
 
-/// Below this height in radii the formula is not valid, and the ratio stays: 1/(1 - 1/4).
+/// Height in radii below which the formula is not valid and the factor stays at 1/(1 - 1/4).
 const LOWEST_RADII: f64 = 0.5;
 
-/// By how much the ground raises a rotor's thrust (1), at a height of its hub (m).
+/// Factor of the ground effect on a rotor's thrust (1), at the height of its hub (m).
 #[must_use]
 #[inline]
 pub fn ground_effect(radius_m: f64, height_m: f64) -> f64 {
@@ -30,12 +32,12 @@ pub fn ground_effect(radius_m: f64, height_m: f64) -> f64 {
     1.0 / (1.0 - ratio * ratio)
 }
 
-/// What the vehicle stands on.
+/// Legs and guards.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Legs {
     /// Height of the hubs above the feet, unloaded (m).
     pub height_m: f64,
-    /// Height of the guards above the hubs: what it lies on when it is upside down (m).
+    /// Height of the guards above the hubs, on which the vehicle lies upside down (m).
     pub guard_m: f64,
     /// Stiffness of each point (N/m).
     pub stiffness_n_per_m: f64,
@@ -82,8 +84,8 @@ mod tests {
         assert!(ground_effect(0.1, 100.0) - 1.0 < 1e-7);
     }
 
-    // k = 1000, c = 10, mu = 0.5, 1 cm deep: 10 N at rest; rising at 2 m/s nothing, never a pull.
-    // Sliding at 0.3 m/s 3 N, at 3 m/s no more than 5 N.
+    // k = 1000, c = 10, mu = 0.5, depth 1 cm: 10 N at rest; no force, and no pull, when rising at 2 m/s. Sliding
+    // at 0.3 m/s gives 3 N, at 3 m/s 5 N at most.
     #[test]
     fn a_point_pushes_and_rubs() {
         let legs = Legs {

@@ -1,8 +1,8 @@
-//! Hover, and the process that each axis is there.
+//! Hover, and the linear process of each axis there.
 //!
-//! Level, at rest, far from the ground, a wind `w` blowing with the vehicle held in it. With
-//! `omega` the speed of the rotors, `u` the thrust command, `P` the power, `V` the voltage,
-//! `k' = 2 k omega + k_z w_z` the thrust gained by speed, `d = omega / 2 u` the speed gained by command:
+//! Level, at rest, far from the ground, held in place in a wind `w`. Symbols: `omega` speed of the rotors
+//! (rad/s), `u` thrust command (1), `P` power (W), `V` voltage (V), `k' = 2 k omega + k_z w_z` derivative of the
+//! thrust by the speed, `d = omega / 2 u` derivative of the speed by the command:
 //!
 //! ```text
 //! altitude   b = (dV/dP) 3 P / V          how the battery's sag pulls the speed back, negative
@@ -13,15 +13,14 @@
 //! yaw        K/T_body = 4 q 2 k omega d / I_z,   1/T_body = 4 omega k_d (x^2 + y^2) / I_z
 //! ```
 //!
-//! with `x, y` the distances of the hubs from the middle and `h` their height above the centre of
-//! mass. Roll and pitch leave the total power as it is, so the battery's sag is of second order
-//! there. These are the derivatives of the equations of flight; the delay is that of the channel.
+//! `x, y` are the distances of the hubs from the middle and `h` their height above the centre of mass. Roll and
+//! pitch do not change the total power, so the sag of the battery is of second order there. The formulas are
+//! derivatives of the equations of flight; the delay is that of the channel.
 //!
-//! Outside the process: the ground effect, a spring of `-2 g (R/4)^2 / z^3` (-0.057 /s^2 at 0.5 m with
-//! the quadrotor); the charge used up; the second-order thrust (`onboard::distortion`); with a
-//! centre of mass below the hubs, the torque of lateral motion (roll tilts, the vehicle slides,
-//! the rotors' drag rights it); with one off to the side, or in a horizontal wind, the coupling
-//! of the axes.
+//! Not part of the linear process: the ground effect, a spring of `-2 g (R/4)^2 / z^3` (-0.057 /s^2 at 0.5 m for
+//! the quadrotor); the discharge of the battery; the second-order thrust (`onboard::distortion`); with a centre
+//! of mass below the hubs, the torque of lateral motion (roll tilts the vehicle, it slides, the drag of the
+//! rotors rights it); with a centre of mass off to the side, or in a horizontal wind, the coupling of the axes.
 
 use onecycle_onboard::Soiptd;
 
@@ -30,16 +29,16 @@ use super::error::{VehicleError, charged, finite};
 use super::frames::{Attitude, Vec3};
 use super::vehicle::Vehicle;
 
-/// What is steered, each by the command of its name.
+/// Steered axis, with the command of the same name.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
-    /// Thrust command to altitude (m).
+    /// From the thrust command to the altitude (m).
     Altitude,
-    /// Roll command to roll (rad).
+    /// From the roll command to roll (rad).
     Roll,
-    /// Pitch command to pitch (rad).
+    /// From the pitch command to pitch (rad).
     Pitch,
-    /// Yaw command to yaw (rad).
+    /// From the yaw command to yaw (rad).
     Yaw,
 }
 
@@ -59,14 +58,14 @@ impl Vehicle {
     /// Hover at a charge of 0..1 in a steady wind (m/s, world).
     ///
     /// # Errors
-    /// [`VehicleError::CannotHover`] when full thrust is not enough;
-    /// [`VehicleError::Charge`] for a charge outside 0..1, [`VehicleError::NotFinite`] for such a wind.
+    /// [`VehicleError::CannotHover`] if full thrust is not enough; [`VehicleError::Charge`] for a charge outside
+    /// 0..1; [`VehicleError::NotFinite`] for a wind that is not finite.
     pub fn hover(&self, charge: f64, wind_m_per_s: Vec3) -> Result<Hover, VehicleError> {
         charged(charge)?;
         finite("wind", wind_m_per_s)?;
         let parts = self.parts();
         let rotors = &parts.rotors;
-        // 4 (k omega^2 + k_z w_z omega) = weight - what the wind carries.
+        // 4 (k omega^2 + k_z w_z omega) = weight minus the vertical force of the wind.
         let load_n = parts.body.weight_n() - parts.body.drag_n(-wind_m_per_s).z;
         let half = 0.5 * rotors.axial_drag_n_s2_per_m * wind_m_per_s.z;
         let root = (half * half + 0.25 * rotors.thrust_n_s2 * load_n).max(0.0);
@@ -91,23 +90,23 @@ impl Vehicle {
         })
     }
 
-    /// The process of an axis at hover, battery full, air calm.
+    /// Process of an axis at hover with a full battery in calm air.
     ///
     /// # Errors
-    /// As [`Vehicle::hover`] and [`Hover::linearised`].
+    /// Those of [`Vehicle::hover`] and [`Hover::linearised`].
     pub fn linearised(&self, axis: Axis) -> Result<Soiptd, VehicleError> {
         self.hover(1.0, Vec3::ZERO)?.linearised(axis)
     }
 }
 
 impl Hover {
-    /// Thrust command that holds it there (1).
+    /// Thrust command at hover (1).
     #[must_use]
     pub fn thrust_command(&self) -> f64 {
         self.thrust_command
     }
 
-    /// Speed of the rotors (rad/s).
+    /// Speed of the rotors at hover (rad/s).
     #[must_use]
     pub fn rotor_rad_per_s(&self) -> f64 {
         self.rotor_rad_per_s
@@ -119,7 +118,7 @@ impl Hover {
         self.voltage_v
     }
 
-    /// The state there, with the middle at `position_m` (m, world).
+    /// State at hover, with the middle at `position_m` (m, world).
     #[must_use]
     pub fn state(&self, position_m: Vec3) -> VehicleState {
         VehicleState {
@@ -132,11 +131,11 @@ impl Hover {
         }
     }
 
-    /// The process of an axis: from its command (1) to its output (m or rad). See the
-    /// [module](self).
+    /// Process of an axis, from its command (1) to its output (m or rad). See the [module](self).
     ///
     /// # Errors
-    /// [`VehicleError::NoProcess`] where nothing is steered, as when an updraft carries the vehicle.
+    /// [`VehicleError::NoProcess`] if the command has no effect, for example when an updraft carries the
+    /// vehicle.
     pub fn linearised(&self, axis: Axis) -> Result<Soiptd, VehicleError> {
         let parts = self.vehicle.parts();
         let (rotors, body, sensors) = (&parts.rotors, &parts.body, &parts.sensors);
@@ -194,13 +193,13 @@ impl Hover {
         )?)
     }
 
-    /// `b`: relative change of the speed that the motors tend to, over that of their speed.
+    /// `b`: relative change of the motors' target speed per relative change of their speed.
     fn sag_feedback(&self) -> f64 {
         let battery = &self.vehicle.parts().battery;
         battery.sag_v_per_w(self.charge, self.power_w) * 3.0 * self.power_w / self.voltage_v
     }
 
-    /// Derivative of the airframe's drag by climb (N s/m): `linear + quadratic (|w| + w_z^2 / |w|)`.
+    /// Derivative of the airframe's drag by the climb (N s/m): `linear + quadratic (|w| + w_z^2 / |w|)`.
     fn vertical_drag_n_s_per_m(&self) -> f64 {
         let body = &self.vehicle.parts().body;
         let (speed, climb) = (self.wind_m_per_s.norm(), self.wind_m_per_s.z);

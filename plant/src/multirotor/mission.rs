@@ -1,4 +1,4 @@
-//! The paper's flights (section IV-D), each a script that reads as it is flown.
+//! Missions: the flights of the paper (section IV-D) as scripts.
 
 use onecycle_onboard::RelaySettings;
 use onecycle_onboard::tuner::TunerSettings;
@@ -11,38 +11,39 @@ use super::vehicle::{Parts, Vehicle};
 use super::wind::{Nudge, Wind};
 use crate::Noise;
 
-/// The payload of the paper (kg): 30 % of the vehicle.
+/// Payload of the paper (kg): 30 % of the vehicle.
 pub const PAYLOAD_KG: f64 = 0.4;
-/// Where the altitude is to be (m).
+/// Reference of the altitude (m).
 const ALTITUDE_M: f64 = 1.0;
-/// A step that shows the new controller (m, rad).
+/// Step of the reference that shows the new controller (m, rad).
 const STEP_M: f64 = 0.1;
-/// How far to the left the centre of mass lies where the roll has a bias (m): a third of the relay's torque.
+/// Offset of the centre of mass to the left in the missions with a bias of roll (m): a third of the relay's
+/// torque.
 const OFF_CENTRE_M: f64 = 3e-4;
 
-/// What is flown.
+/// A mission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mission {
-    /// From the ground without a controller of the altitude, to a step of it.
+    /// From the ground without a controller of the altitude, until a step of the altitude.
     Altitude,
-    /// The same with the paper's payload.
+    /// The same with the payload of the paper.
     Payload,
-    /// Altitude held by the relay for long enough to look at five cycles one by one.
+    /// Altitude under the relay long enough to look at five single cycles.
     Cycles,
-    /// Roll, its centre of mass off the middle, with the relay about what held it before.
+    /// Roll with the centre of mass off the middle; the relay is offset by the mean output before.
     Roll,
     /// The same with the relay about zero.
     RollUncompensated,
-    /// Weight, blows and wind on the tuned vehicle.
+    /// Weight, a blow and wind on the tuned vehicle.
     Disturbed,
-    /// The same on the one that was not tuned.
+    /// The same on the vehicle before tuning.
     DisturbedUntuned,
-    /// From the ground to all four axes tuned.
+    /// From the ground until all four axes are tuned.
     Vehicle,
 }
 
 impl Mission {
-    /// All of them.
+    /// All missions.
     pub const ALL: [Self; 8] = [
         Self::Altitude,
         Self::Payload,
@@ -54,7 +55,7 @@ impl Mission {
         Self::Vehicle,
     ];
 
-    /// Its name in arguments and files.
+    /// Name in arguments and files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -70,24 +71,24 @@ impl Mission {
     }
 }
 
-/// A mission as it was flown.
+/// A flown mission.
 #[derive(Clone, Debug)]
 #[non_exhaustive]
 pub struct Flown {
-    /// Every tick.
+    /// All ticks.
     pub records: Vec<FlightRecord>,
-    /// What was tuned, in order.
+    /// Tuned axes, in order.
     pub tuned: Vec<Tuned>,
-    /// What happened when (s).
+    /// Events and their times (s).
     pub events: Vec<(f64, &'static str)>,
-    /// Why it ended early, if it did.
+    /// Why the mission ended early, if it did.
     pub failure: Option<MissionError>,
 }
 
-/// Flies a mission, with the sensor noise and the gusts of this seed.
+/// Flies a mission with the sensor noise and the gusts of this seed.
 ///
 /// # Errors
-/// Where the vehicle or its settings cannot be; a test that ends early is no error but a
+/// If the vehicle or its settings are invalid. A test that ends early is not an error but a
 /// [`failure`](Flown::failure).
 pub fn fly(mission: Mission, seed: u64) -> Result<Flown, MissionError> {
     let noise = Noise::from_seed(seed);
@@ -110,7 +111,7 @@ pub fn fly(mission: Mission, seed: u64) -> Result<Flown, MissionError> {
     }
 }
 
-/// A script in the making.
+/// A mission in progress.
 struct Script {
     pilot: Pilot,
     tuned: Vec<Tuned>,
@@ -146,7 +147,7 @@ impl Script {
         Ok(())
     }
 
-    /// The flight as it was, whether or not all went well.
+    /// The flight up to its end, successful or not.
     fn end(self, outcome: Result<(), MissionError>) -> Flown {
         Flown {
             records: self.pilot.into_records(),
@@ -172,7 +173,7 @@ fn from_the_ground(
     let flight = Flight::standing(vehicle);
     let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], noise)?;
     let outcome = (|| {
-        // A moment to see where it stands.
+        // A moment to settle on the ground.
         script.pilot.run(0.1);
         script.tune(&[Axis::Altitude])?;
         for axes in then {
@@ -187,7 +188,7 @@ fn from_the_ground(
     Ok(script.end(outcome))
 }
 
-/// A poor controller of the altitude that knows what holds the vehicle.
+/// A poor controller of the altitude with the right hover thrust.
 fn hovering_settings(vehicle: &Vehicle) -> Result<[TunerSettings; 4], MissionError> {
     let mut settings = in_the_air();
     let hover = vehicle.hover(1.0, Vec3::ZERO)?;
@@ -198,7 +199,7 @@ fn hovering_settings(vehicle: &Vehicle) -> Result<[TunerSettings; 4], MissionErr
 fn cycles(noise: Noise) -> Result<Flown, MissionError> {
     let vehicle = Vehicle::quadrotor();
     let mut settings = hovering_settings(&vehicle)?;
-    // All that the tuner takes at once: with the three that it waits for there are seven.
+    // The maximum number of cycles; with the three before them that must be alike there are seven.
     settings[Axis::Altitude.index()].cycles = onecycle_onboard::identification::MOST_CYCLES;
     let flight = hovering(vehicle, ALTITUDE_M)?;
     let mut script = Script::new(flight, &settings, [ALTITUDE_M, 0.0, 0.0, 0.0], noise)?;
@@ -213,7 +214,7 @@ fn roll(noise: Noise, is_compensated: bool) -> Result<Flown, MissionError> {
     let vehicle = Vehicle::new(parts)?;
     let mut settings = hovering_settings(&vehicle)?;
     let roll = &mut settings[Axis::Roll.index()];
-    // The paper's relay has no trim; its offset is all that is against the bias.
+    // The relay of the paper has no trim; only its offset compensates the bias.
     roll.relay = RelaySettings {
         trim_gain: 0.0,
         ..roll.relay

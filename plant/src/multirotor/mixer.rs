@@ -1,19 +1,17 @@
-//! From a command to four motors, and what gives way when they saturate.
+//! Mixer: from a command to four motors, with priorities at saturation.
 //!
-//! The unit of every command is a motor's full static thrust: `u_i = thrust +- roll +- pitch +- yaw`.
-//! Roll and pitch come first: they are scaled down together only where they alone need more than the
-//! whole range. Then the collective thrust is moved by as little as leaves them room. Yaw gets what
-//! remains.
+//! The unit of every command is a motor's full static thrust: `u_i = thrust +- roll +- pitch +- yaw`. Roll and
+//! pitch have priority: they are scaled down together only if they alone exceed the range. Then the collective
+//! thrust changes by as little as makes room for them. Yaw gets the remaining range.
 
 use super::rotor::ROTOR_POSITIONS;
 
-/// What the controllers ask for.
+/// Command of the controllers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
     /// Collective thrust, 0..1 of full static thrust at nominal voltage.
     pub thrust: f64,
-    /// Torque that turns the left side up, -1..1: thrust taken from the right motors and given to the
-    /// left ones.
+    /// Torque that turns the left side up, -1..1: thrust moved from the right motors to the left motors.
     pub roll: f64,
     /// Torque that turns the nose down, -1..1.
     pub pitch: f64,
@@ -22,7 +20,7 @@ pub struct Command {
 }
 
 impl Command {
-    /// Within its ranges; what is infinite or not a number counts as zero.
+    /// The command limited to its ranges; infinite components and NaN become zero.
     #[must_use]
     pub fn clamped(&self) -> Self {
         let within = |value: f64, low: f64| {
@@ -40,7 +38,7 @@ impl Command {
         }
     }
 
-    /// What each motor gets, 0..1 of its full static thrust, in the order of [`ROTOR_POSITIONS`].
+    /// Command of each motor, 0..1 of its full static thrust, in the order of [`ROTOR_POSITIONS`].
     #[must_use]
     pub fn motors(&self) -> [f64; 4] {
         let command = self.clamped();
@@ -72,7 +70,7 @@ impl Command {
 mod tests {
     use super::*;
 
-    /// The command that four motors amount to: the mixer inverted.
+    /// The command that four motors correspond to: the inverse of the mixer.
     fn unmixed(motors: [f64; 4]) -> Command {
         let sum = |sign: fn(&super::super::rotor::RotorPosition) -> f64| {
             ROTOR_POSITIONS
@@ -110,16 +108,16 @@ mod tests {
         }
     }
 
-    // The four patterns are orthogonal: within the range, the motors give back the command.
+    // The four patterns are orthogonal: within the range the motors give the command back.
     #[test]
     fn the_mixer_has_an_inverse() {
         let asked = command(0.5, 0.1, -0.2, 0.15);
         assert_close(unmixed(asked.motors()), asked);
     }
 
-    // By hand. Thrust 0.9 with roll 0.3: the left motors would need 1.2, so thrust yields to 0.7.
-    // No thrust with roll 0.2: it rises to 0.2. Roll 0.8 and pitch 0.4 need 1.2: scaled to 1/3 and
-    // 1/6 about half thrust. Yaw 0.5 at thrust 0.8 has 0.2 of room; with roll 0.3 at thrust 0.7 none.
+    // By hand. Thrust 0.9 with roll 0.3: the left motors would need 1.2, so the thrust falls to 0.7. No thrust
+    // with roll 0.2: the thrust rises to 0.2. Roll 0.8 and pitch 0.4 need 1.2: scaled to 1/3 and 1/6 about half
+    // thrust. Yaw 0.5 at thrust 0.8 has a range of 0.2; with roll 0.3 at thrust 0.7 it has none.
     #[test]
     fn roll_and_pitch_before_thrust_before_yaw() {
         for (asked, given) in [
@@ -137,7 +135,7 @@ mod tests {
         }
     }
 
-    // Out of range clamps, what is no number is zero.
+    // Values out of range are limited; NaN becomes zero.
     #[test]
     fn wild_commands_are_tamed() {
         let wild = command(f64::NAN, 7.0, f64::NEG_INFINITY, -3.0);

@@ -1,7 +1,7 @@
-//! A vehicle with a tuner on each axis: what flies a mission.
+//! Vehicle with a tuner on each axis, for missions.
 //!
-//! Each axis is held by its own [`Tuner`] from the first tick on: by the poor controller that a builder
-//! would begin with, by the relay while it is tuned, by what came of it afterwards.
+//! From the first tick on each axis is controlled by its own [`Tuner`]: by the poor controller that a builder
+//! would begin with, then by the relay, then by the controller found.
 
 use std::fmt;
 
@@ -25,10 +25,10 @@ use crate::Noise;
 pub const TICK_S: f64 = 0.001;
 
 impl Axis {
-    /// All of them, in the order in which a vehicle is tuned.
+    /// All axes, in the order in which a vehicle is tuned.
     pub const ALL: [Self; 4] = [Self::Altitude, Self::Roll, Self::Pitch, Self::Yaw];
 
-    /// Its name.
+    /// Name of the axis.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -39,13 +39,13 @@ impl Axis {
         }
     }
 
-    /// Its place in [`Axis::ALL`].
+    /// Index in [`Axis::ALL`].
     #[must_use]
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// Its output in a reading (m or rad), and the rate of that.
+    /// Output of the axis in a reading (m or rad), and its rate.
     #[must_use]
     pub fn of(self, reading: &SensorReading) -> (f64, f64) {
         let SensorReading {
@@ -62,18 +62,19 @@ impl Axis {
         }
     }
 
-    /// What a builder sets for a quadrotor of a kilogram or two before anything is known of it. Commands
-    /// are parts of a motor's full static thrust, of which some 20 m/s^2, 300 and 25 rad/s^2 can be expected.
+    /// Settings for a quadrotor of one to two kilograms before anything is known about it. Commands are
+    /// fractions of a motor's full static thrust; one unit gives about 20 m/s^2 of altitude, 300 rad/s^2 of roll
+    /// and pitch and 25 rad/s^2 of yaw.
     #[must_use]
     pub fn settings(self) -> TunerSettings {
-        // The relay: a quarter of a g, ten rad/s^2 of roll and pitch, nine of yaw. The noise of a camera's
-        // half millimetre and of angles known to three hundredths of a degree.
+        // Relay: a quarter of g, 10 rad/s^2 of roll and pitch, 9 rad/s^2 of yaw. Noise: half a millimetre of a
+        // camera, three hundredths of a degree of angles.
         let (amplitude, noise_sigma) = match self {
             Self::Altitude => (0.12, 5e-4),
             Self::Roll | Self::Pitch => (0.03, 5e-4),
             Self::Yaw => (0.35, 5e-4),
         };
-        // The poor controller: damped, with poles of 1.5 to 4.5 1/s, a quarter of what comes of the tuning.
+        // Poor controller: damped, with poles of 1.5 to 4.5 1/s, a quarter of those after tuning.
         let (kp, kd) = match self {
             Self::Altitude => (0.11, 0.14),
             Self::Roll | Self::Pitch => (0.06, 0.02),
@@ -112,7 +113,7 @@ impl Axis {
         }
     }
 
-    /// As [`Axis::settings`] for a vehicle on the ground that nothing lifts yet.
+    /// Like [`Axis::settings`], for a vehicle on the ground.
     #[must_use]
     pub fn settings_for_take_off(self) -> TunerSettings {
         let settings = self.settings();
@@ -133,35 +134,35 @@ impl Axis {
     }
 }
 
-/// What was found for an axis, and what is true of it.
+/// Result for an axis, and the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Tuned {
     /// The axis.
     pub axis: Axis,
-    /// When its test began (s).
+    /// Start of its test (s).
     pub from_s: f64,
-    /// When its controller was proven (s).
+    /// Time at which its controller was proven (s).
     pub until_s: f64,
-    /// What was found.
+    /// Result of the test.
     pub identified: TuningResult,
-    /// The process of the vehicle as it was then.
+    /// Process of the vehicle at that time.
     pub truth: Soiptd,
 }
 
-/// A tick of a flight.
+/// One tick of a flight.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct FlightRecord {
-    /// Its time (s).
+    /// Time (s).
     pub time_s: f64,
-    /// What was true.
+    /// True values.
     pub reading: SensorReading,
-    /// What the tuners were told, in the order of [`Axis::ALL`] (m or rad).
+    /// Measurements of the tuners, in the order of [`Axis::ALL`] (m or rad).
     pub measured: [f64; 4],
-    /// The commands held from then on.
+    /// Commands held from then on.
     pub commands: [f64; 4],
-    /// What the tuners were doing.
+    /// Phases of the tuners.
     pub phases: [TunerPhase; 4],
 }
 
@@ -169,11 +170,11 @@ pub struct FlightRecord {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum MissionError {
-    /// The vehicle has a parameter out of range or cannot hover.
+    /// A parameter of the vehicle is out of range, or it cannot hover.
     Vehicle(VehicleError),
-    /// A tuner has a setting out of range.
+    /// A setting of a tuner is out of range.
     Settings(TunerError),
-    /// An axis was not tuned: why, `None` where it took too long.
+    /// An axis was not tuned: the reason, or `None` if it took too long.
     NotTuned(Axis, Option<Abort>),
 }
 
@@ -183,7 +184,7 @@ impl fmt::Display for MissionError {
             Self::Vehicle(error) => error.fmt(f),
             Self::Settings(error) => error.fmt(f),
             Self::NotTuned(axis, Some(reason)) => write!(f, "{}: {reason}", axis.name()),
-            Self::NotTuned(axis, None) => write!(f, "{}: it takes too long", axis.name()),
+            Self::NotTuned(axis, None) => write!(f, "{}: the test takes too long", axis.name()),
         }
     }
 }
@@ -202,14 +203,14 @@ impl From<TunerError> for MissionError {
     }
 }
 
-/// Four tuners on a vehicle in flight.
+/// Four tuners and a vehicle in flight.
 pub struct Pilot {
     /// The vehicle.
     pub flight: Flight,
-    /// Where each axis should be (m or rad).
+    /// References of the axes (m or rad).
     pub references: [f64; 4],
-    /// Whether roll and pitch are steered so that the vehicle stays above where it began. While they are
-    /// tuned they are not: a tuner keeps the reference of its start.
+    /// Whether roll and pitch are steered to keep the vehicle above its starting point. While they are tuned
+    /// they are not: a tuner keeps the reference of its start.
     pub holds_position: bool,
     noise: Noise,
     tuners: [Tuner<'static>; 4],
@@ -218,10 +219,10 @@ pub struct Pilot {
 }
 
 impl Pilot {
-    /// With the settings of each axis, in the order of [`Axis::ALL`].
+    /// A pilot with the settings of each axis, in the order of [`Axis::ALL`].
     ///
     /// # Errors
-    /// [`MissionError::Settings`] names the setting that is out of range.
+    /// [`MissionError::Settings`] if a setting is out of range.
     pub fn new(
         flight: Flight,
         settings: &[TunerSettings; 4],
@@ -287,19 +288,19 @@ impl Pilot {
         self.ticks += 1;
     }
 
-    /// Ticks for so long (s).
+    /// Runs ticks for this time (s).
     pub fn run(&mut self, seconds: f64) {
         for _ in 0..(seconds / TICK_S).round() as u64 {
             self.tick();
         }
     }
 
-    /// Tunes axes at the same time, until each has proven itself.
+    /// Tunes axes at the same time until each controller has proven itself.
     ///
     /// # Errors
-    /// [`MissionError::NotTuned`] names the axis that was not, and why.
+    /// [`MissionError::NotTuned`] with the axis and the reason.
     pub fn tune(&mut self, axes: &[Axis]) -> Result<Vec<Tuned>, MissionError> {
-        // Twice as long as the guards let a test take.
+        // Twice the time that the guards allow for a test.
         const MOST_S: f64 = 80.0;
         let from_s = self.time_s();
         for axis in axes {
@@ -330,24 +331,24 @@ impl Pilot {
         Ok(tuned)
     }
 
-    /// The process of an axis of the vehicle as it is now, in calm air.
+    /// Process of an axis of the present vehicle in calm air.
     ///
     /// # Errors
-    /// Where the vehicle cannot hover.
+    /// If the vehicle cannot hover.
     pub fn truth(&self, axis: Axis) -> Result<Soiptd, VehicleError> {
         let charge = self.flight.state().charge;
         let hover = self.flight.vehicle().hover(charge, Vec3::ZERO)?;
         hover.linearised(axis)
     }
 
-    /// All ticks so far.
+    /// All ticks of the flight.
     #[must_use]
     pub fn into_records(self) -> Vec<FlightRecord> {
         self.records
     }
 }
 
-/// Roll and pitch (rad) that bring the vehicle back above where it began, with a double pole at 0.8 1/s: a
+/// Roll and pitch (rad) that return the vehicle to the point above its start, with a double pole at 0.8 1/s. A
 /// tilt of `a` accelerates by `g a`, to the right or forward.
 fn tilt(sensed: &SensorReading) -> [f64; 2] {
     const POLE_PER_S: f64 = 0.8;
@@ -358,7 +359,7 @@ fn tilt(sensed: &SensorReading) -> [f64; 2] {
     [-tilt(wanted(at.y, speed.y)), tilt(wanted(at.x, speed.x))]
 }
 
-/// A vehicle that hovers at this altitude (m), full of charge.
+/// A flight at hover at this altitude (m) with a full battery.
 pub(super) fn hovering(vehicle: Vehicle, altitude_m: f64) -> Result<Flight, VehicleError> {
     let hover = vehicle.hover(1.0, Vec3::ZERO)?;
     Flight::new(vehicle, hover.state(Vec3::new(0.0, 0.0, altitude_m)))

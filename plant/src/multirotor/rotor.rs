@@ -1,4 +1,4 @@
-//! Four rotors and their motors.
+//! Four rotors with their motors.
 //!
 //! ```text
 //! lag      d(omega)/dt = (omega_ref - omega) / T
@@ -9,17 +9,19 @@
 //! power    q k |omega|^3 / efficiency
 //! ```
 //!
-//! `v` is the velocity of the hub through the air, so turning is damped like climbing. `k_z` is how
-//! the thrust falls with inflow, `k_d` the H-force. Both first-order forms: P. Martin and E. Salaun,
-//! "The true role of accelerometer feedback in quadrotor control", ICRA 2010; J. Svacha et al.,
-//! "Improving quadrotor trajectory tracking by compensating for aerodynamic effects", ICUAS 2017.
+//! `v` is the velocity of the hub through the air, so rotations are damped like climbs. `k_z` describes the loss
+//! of thrust with inflow, `k_d` the H-force.
+//!
+//! References for both first-order forms: P. Martin and E. Salaun, "The true role of accelerometer feedback in
+//! quadrotor control", ICRA 2010; J. Svacha et al., "Improving quadrotor trajectory tracking by compensating for
+//! aerodynamic effects", ICUAS 2017.
 
 use super::frames::Vec3;
 
-/// The signs of the four rotors, in the order front left, rear left, rear right, front right.
+/// Position of a rotor as signs. The order is front left, rear left, rear right, front right.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RotorPosition {
-    /// +1 in front, -1 behind.
+    /// +1 in front, -1 at the rear.
     pub forward: f64,
     /// +1 on the left, -1 on the right.
     pub left: f64,
@@ -27,7 +29,7 @@ pub struct RotorPosition {
     pub spin: f64,
 }
 
-/// The four places.
+/// Positions of the four rotors.
 pub const ROTOR_POSITIONS: [RotorPosition; 4] = [
     RotorPosition::new(1.0, 1.0, 1.0),
     RotorPosition::new(-1.0, 1.0, -1.0),
@@ -45,7 +47,7 @@ impl RotorPosition {
     }
 }
 
-/// The rotors, alike but for place and spin.
+/// The rotors; they differ only in position and spin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotors {
     /// Distance of a hub ahead of or behind the middle (m).
@@ -58,22 +60,22 @@ pub struct Rotors {
     pub thrust_n_s2: f64,
     /// `q`, torque over thrust (m).
     pub torque_per_thrust_m: f64,
-    /// `k_z`, thrust lost over speed and climb (N s^2/(rad m)).
+    /// `k_z`, loss of thrust over speed and climb (N s^2/(rad m)).
     pub axial_drag_n_s2_per_m: f64,
-    /// `k_d`, force against lateral motion over speed and motion (N s^2/(rad m)).
+    /// `k_d`, lateral force over speed and lateral motion (N s^2/(rad m)).
     pub lateral_drag_n_s2_per_m: f64,
     /// `T`, lag of the speed (s).
     pub lag_s: f64,
     /// Speed at full command and nominal voltage (rad/s).
     pub full_speed_rad_per_s: f64,
-    /// Voltage at which that is the speed (V).
+    /// Nominal voltage, at which that speed is reached (V).
     pub nominal_v: f64,
     /// Mechanical power over electrical power (1).
     pub efficiency: f64,
 }
 
 impl Rotors {
-    /// Where a rotor's hub is (m, body, from the middle).
+    /// Position of a rotor's hub (m, body, from the middle).
     #[must_use]
     #[inline]
     pub fn hub_m(&self, place: RotorPosition) -> Vec3 {
@@ -84,8 +86,8 @@ impl Rotors {
         )
     }
 
-    /// Force of a rotor (N, body) at its speed (rad/s), the velocity of its hub through the air (m/s,
-    /// body) and the ratio by which the ground raises the static thrust.
+    /// Force of a rotor (N, body), from its speed (rad/s), the velocity of its hub through the air (m/s, body)
+    /// and the factor of the ground effect on the static thrust.
     #[must_use]
     #[inline]
     pub fn force_n(&self, speed_rad_per_s: f64, hub_air_m_per_s: Vec3, ground_ratio: f64) -> Vec3 {
@@ -98,7 +100,7 @@ impl Rotors {
         )
     }
 
-    /// Torque of a rotor on the body about up (N m).
+    /// Torque of a rotor on the body about its up axis (N m).
     #[must_use]
     #[inline]
     pub fn reaction_nm(&self, place: RotorPosition, speed_rad_per_s: f64) -> f64 {
@@ -114,7 +116,7 @@ impl Rotors {
         self.torque_per_thrust_m * thrust_n * speed_rad_per_s.abs() / self.efficiency
     }
 
-    /// Speed that full command leads to at a voltage (rad/s).
+    /// Speed at full command and this voltage (rad/s).
     #[must_use]
     #[inline]
     pub fn full_speed_at_rad_per_s(&self, voltage_v: f64) -> f64 {

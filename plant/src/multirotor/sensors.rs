@@ -1,9 +1,9 @@
-//! What is measured, late and with noise.
+//! Sensors of the multirotor, with delay and noise.
 //!
-//! A channel reads what was true `delay_s` ago, by linear interpolation between the inner steps of
-//! the flight: exact where the delay is a multiple of them, else off by less than an eighth of the second
-//! derivative times the squared step, 2.5 micrometres at 20 m/s^2 and 1 ms. Until the flight is
-//! as old as the delay, it reads what was true at its beginning.
+//! A channel reads the true value of `delay_s` ago, by linear interpolation between the inner steps of the
+//! flight. That is exact if the delay is a multiple of the step; otherwise the error is below an eighth of the
+//! second derivative times the squared step, 2.5 micrometres at 20 m/s^2 and 1 ms. Before the flight is as old
+//! as the delay, a channel reads the initial value.
 
 use std::collections::VecDeque;
 use std::f64::consts::PI;
@@ -12,12 +12,12 @@ use super::error::{VehicleError, at_least_zero};
 use super::frames::Vec3;
 use crate::{NoiseSource, Sensor};
 
-/// One channel; all its components are alike.
+/// A channel; all its components have the same noise and delay.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Channel {
     /// Noise and quantum.
     pub sensor: Sensor,
-    /// Age of a reading (s).
+    /// Delay (s).
     pub delay_s: f64,
 }
 
@@ -37,7 +37,7 @@ impl Channel {
     }
 }
 
-/// The channels.
+/// All channels.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sensors {
     /// Position (m).
@@ -51,7 +51,7 @@ pub struct Sensors {
 }
 
 impl Sensors {
-    /// The same delays with neither noise nor quantum.
+    /// The same delays without noise and rounding.
     #[must_use]
     pub fn without_noise(&self) -> Self {
         let quiet = |channel: Channel| Channel {
@@ -79,12 +79,12 @@ impl Sensors {
     }
 }
 
-/// What can be measured: of the middle of the vehicle, between the hubs.
+/// Measured quantities, of the middle of the vehicle between the hubs.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SensorReading {
-    /// Position (m, world); `z` is the altitude, zero where the vehicle stood.
+    /// Position (m, world). `z` is the altitude, zero where the vehicle stood.
     pub position_m: Vec3,
-    /// Velocity (m/s, world); `z` is the climb.
+    /// Velocity (m/s, world). `z` is the climb.
     pub velocity_m_per_s: Vec3,
     /// Roll, pitch and yaw (rad) as x, y and z.
     pub angles_rad: Vec3,
@@ -92,7 +92,7 @@ pub struct SensorReading {
     pub rates_rad_per_s: Vec3,
 }
 
-/// The last readings without noise, as far back as the longest delay.
+/// The last true readings, as far back as the longest delay.
 #[derive(Clone, Debug)]
 pub(super) struct History {
     past: VecDeque<(f64, SensorReading)>,
@@ -107,7 +107,7 @@ impl History {
         }
     }
 
-    /// Adds what is true at a later time, and forgets what no sensor needs any more.
+    /// Adds the reading of a later time and removes those that no sensor needs any more.
     pub(super) fn push(&mut self, time_s: f64, reading: SensorReading, sensors: &Sensors) {
         self.past.push_back(self.latest);
         self.latest = (time_s, reading);
@@ -117,7 +117,7 @@ impl History {
         }
     }
 
-    /// What the sensors read now.
+    /// Present readings of the sensors.
     pub(super) fn read(&self, sensors: &Sensors, noise: &mut impl NoiseSource) -> SensorReading {
         let ago = |channel: &Channel| self.ago(channel.delay_s);
         let Sensors {
@@ -148,7 +148,7 @@ impl History {
 
 fn between(a: &SensorReading, b: &SensorReading, share: f64) -> SensorReading {
     let mix = |a: Vec3, b: Vec3| a + (b - a) * share;
-    // The short way round, and back into -pi..pi.
+    // By the shorter way, and back into -pi..pi.
     let wrapped = |angle: f64| angle - 2.0 * PI * (angle / (2.0 * PI)).round();
     let angle = |a: f64, b: f64| wrapped(a + share * wrapped(b - a));
     SensorReading {

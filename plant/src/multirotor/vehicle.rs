@@ -1,9 +1,9 @@
-//! A vehicle: its parts, checked; and one of the size of the paper's.
+//! Vehicle: its checked parts, and a quadrotor of the paper's size.
 //!
-//! The paper flies a Quanser QDrone, of which it gives no more than `T_prop`, `T_body` and `tau` of
-//! altitude (0.0321, 1.6886, 0.0237 s) and roll (0.02, 1.6889, 0.0121 s), and a payload of 400 g that
-//! is 30 % of the mass. [`Parts::quadrotor`] is a machine of that class: its numbers come from those
-//! or, where the paper is silent, from the physics beside each. They were not measured on a QDrone.
+//! The paper flies a Quanser QDrone. It gives only `T_prop`, `T_body` and `tau` of altitude (0.0321, 1.6886,
+//! 0.0237 s) and roll (0.02, 1.6889, 0.0121 s), and a payload of 400 g, 30 % of the mass. [`Parts::quadrotor`]
+//! is a vehicle of that class. Its numbers follow from those values or, where the paper gives none, from the
+//! physics noted beside each. They were not measured on a QDrone.
 
 use super::battery::Battery;
 use super::body::Body;
@@ -14,7 +14,7 @@ use super::rotor::Rotors;
 use super::sensors::{Channel, Sensors};
 use crate::Sensor;
 
-/// What a vehicle is made of.
+/// Parts of a vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parts {
     /// Airframe.
@@ -23,9 +23,9 @@ pub struct Parts {
     pub rotors: Rotors,
     /// Battery.
     pub battery: Battery,
-    /// What it stands on.
+    /// Legs and guards.
     pub legs: Legs,
-    /// What it measures.
+    /// Sensors.
     pub sensors: Sensors,
 }
 
@@ -35,29 +35,29 @@ impl Parts {
     pub fn quadrotor() -> Self {
         Self {
             body: Body {
-                // The paper's 400 g are 30 % of it.
+                // The paper's 400 g are 30 % of the mass.
                 mass_kg: 0.4 / 0.3,
-                // Radii of gyration 8.7, 7.9 and 10.5 cm of a frame 21 by 18 cm between hubs. With the
-                // rotors' damping the first gives the paper's T_body of roll.
+                // Radii of gyration of 8.7, 7.9 and 10.5 cm for a frame with 21 by 18 cm between hubs. With the
+                // damping of the rotors the first gives the paper's T_body of roll.
                 inertia_kg_m2: Vec3::new(0.0101, 0.0083, 0.0148),
                 centre_of_mass_m: Vec3::ZERO,
-                // Along z what the paper's T_body of altitude asks for beyond the rotors' 0.522;
-                // along x and y a third of it, as the side faces less of the wake.
+                // Along z: what the paper's T_body of altitude needs beyond the rotors' 0.522. Along x and y a
+                // third of it, because the side is less exposed to the wake.
                 linear_drag_n_s_per_m: Vec3::new(0.09, 0.09, 0.267),
-                // rho C_D A / 2 with C_D = 1: 200 cm^2 seen from the side, 500 cm^2 from above.
+                // rho C_D A / 2 with C_D = 1: 200 cm^2 from the side, 500 cm^2 from above.
                 quadratic_drag_n_s2_per_m2: Vec3::new(0.012, 0.012, 0.031),
             },
             rotors: Rotors {
-                // A machine of 40 cm with propellers of 6 inch.
+                // A vehicle of 40 cm with propellers of 6 inch.
                 hub_forward_m: 0.088,
                 hub_left_m: 0.107,
                 radius_m: 0.0762,
-                // C_T rho D^4 / 4 pi^2 with C_T = 0.12, usual for a 6x4.5 propeller.
+                // C_T rho D^4 / 4 pi^2 with C_T = 0.12, typical for a 6x4.5 propeller.
                 thrust_n_s2: 2.0087e-6,
                 // C_P D / (2 pi C_T) with C_P = 0.06.
                 torque_per_thrust_m: 0.0121,
-                // rotorpy's Hummingbird (radius 0.1 m: k_z 2.32e-4, k_d 1.19e-4) scaled by the cube of the
-                // diameter: 1.026e-4 and 0.526e-4. 0.2 % less gives roll the paper's T_body.
+                // Values of rotorpy's Hummingbird (radius 0.1 m: k_z 2.32e-4, k_d 1.19e-4) scaled by the cube of
+                // the diameter: 1.026e-4 and 0.526e-4. 0.2 % less gives the paper's T_body of roll.
                 axial_drag_n_s2_per_m: 1.024e-4,
                 lateral_drag_n_s2_per_m: 5.26e-5,
                 // The paper's T_prop of roll.
@@ -65,14 +65,14 @@ impl Parts {
                 // sqrt(2) times the 1276 rad/s of hover: twice the weight at nominal voltage.
                 full_speed_rad_per_s: 1804.0,
                 nominal_v: 14.8,
-                // Motor and its controller.
+                // Motor and motor controller.
                 efficiency: 0.8,
             },
             battery: Battery {
-                // Four lithium-polymer cells: 4.2 V when full, 3.3 V when empty under no load.
+                // Four lithium-polymer cells: 4.2 V full, 3.3 V empty, without load.
                 full_v: 16.8,
                 empty_v: 13.2,
-                // Cells of 7 milliohm, 12 for leads and connectors.
+                // Cells of 7 milliohm, and 12 milliohm for leads and connectors.
                 resistance_ohm: 0.04,
                 // 3.7 Ah: 13 minutes of hover.
                 capacity_a_s: 13_320.0,
@@ -80,7 +80,7 @@ impl Parts {
             legs: Legs {
                 height_m: 0.1,
                 guard_m: 0.05,
-                // All four give way by 1 mm under the weight, and are critically damped: 99 rad/s.
+                // All four legs yield by 1 mm under the weight and are critically damped: 99 rad/s.
                 stiffness_n_per_m: 3269.0,
                 damping_n_s_per_m: 66.0,
                 // Rubber on a floor.
@@ -99,17 +99,17 @@ impl Parts {
             },
             delay_s,
         };
-        // T_prop + tau of altitude as in the paper, 0.0558 s, of which the motors are 0.0179 s at hover:
-        // a motor has one lag, where the paper's classifier found 0.0321 s for altitude and 0.02 for roll.
+        // T_prop + tau of altitude as in the paper, 0.0558 s; the motors contribute 0.0179 s at hover. A motor
+        // has a single lag, while the paper's classifier found 0.0321 s for altitude and 0.02 s for roll.
         let position_delay_s = 0.0379;
         // The paper's tau of roll.
         let attitude_delay_s = 0.0121;
         Sensors {
-            // Markers are seen to half a millimetre; the velocity is fused with accelerometers.
+            // Resolution of half a millimetre for markers; the velocity is fused with accelerometers.
             position: channel(5e-4, position_delay_s),
             velocity: channel(0.01, position_delay_s),
-            // Three hundredths of a degree, as the estimate leans on the gyroscopes; those have
-            // 0.01 deg/s/sqrt(Hz) over 250 Hz.
+            // Three hundredths of a degree, because the estimate relies on gyroscopes; these have 0.01
+            // deg/s/sqrt(Hz) over 250 Hz.
             angles: channel(5e-4, attitude_delay_s),
             rates: channel(2.8e-3, attitude_delay_s),
         }
@@ -177,17 +177,17 @@ impl Parts {
     }
 }
 
-/// A vehicle whose parts are in their ranges.
+/// Vehicle whose parts have been checked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
     parts: Parts,
 }
 
 impl Vehicle {
-    /// Of these parts.
+    /// A vehicle of these parts.
     ///
     /// # Errors
-    /// Names the first parameter that is outside its physical range.
+    /// The first parameter that is out of range.
     pub fn new(parts: Parts) -> Result<Self, VehicleError> {
         parts.check()?;
         Ok(Self { parts })
@@ -201,17 +201,17 @@ impl Vehicle {
         }
     }
 
-    /// What it is made of.
+    /// Parts of the vehicle.
     #[must_use]
     #[inline]
     pub fn parts(&self) -> &Parts {
         &self.parts
     }
 
-    /// With a point mass `mass_kg` fixed `below_m` under its centre of mass.
+    /// The vehicle with a point mass `mass_kg` fixed `below_m` below its centre of mass.
     ///
     /// # Errors
-    /// [`VehicleError::Negative`] when either is below zero or not finite.
+    /// [`VehicleError::Negative`] if a value is below zero or not finite.
     pub fn with_payload(&self, mass_kg: f64, below_m: f64) -> Result<Self, VehicleError> {
         at_least_zero("mass of the payload", mass_kg)?;
         at_least_zero("distance of the payload", below_m)?;
@@ -221,7 +221,7 @@ impl Vehicle {
         })
     }
 
-    /// Height of the middle when it stands on level ground (m).
+    /// Height of the middle when the vehicle stands on level ground (m).
     #[must_use]
     pub fn standing_height_m(&self) -> f64 {
         let legs = &self.parts.legs;

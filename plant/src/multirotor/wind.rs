@@ -1,24 +1,25 @@
-//! Wind: a steady part and gusts; and nudges.
+//! Wind with a steady part and gusts, and nudges.
 //!
-//! Each component of the gusts is a first-order Gauss-Markov process, the spectrum that the Dryden
-//! model (MIL-F-8785C) gives the component along the flight, here for all three. Its exact
-//! discrete form over a step `h`, with `rho = exp(-h / T)`:
+//! Each component of the gusts is a first-order Gauss-Markov process. Its spectrum is the one that the Dryden
+//! model (MIL-F-8785C) has for the component along the flight, used here for all three. The exact discrete form
+//! over a step `h`, with `rho = exp(-h / T)`, is
 //!
 //! ```text
-//! g <- rho g + sigma sqrt(1 - rho^2) n,   n normal
+//! g <- rho g + sigma sqrt(1 - rho^2) n,   n standard normal
 //! ```
 //!
-//! so variance `sigma^2` and autocorrelation `exp(-t / T)` do not depend on the step.
+//! so that variance `sigma^2` and autocorrelation `exp(-t / T)` do not depend on the step. `g` and `sigma` are
+//! in m/s, `T` and `h` in s.
 
 use super::error::{VehicleError, at_least_zero, finite, positive};
 use super::frames::Vec3;
 use crate::NoiseSource;
 
-/// The wind, the same everywhere.
+/// Wind, the same everywhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Wind {
-    /// Steady part (m/s, world): where the air goes.
+    /// Steady part (m/s, world): velocity of the air.
     pub steady_m_per_s: Vec3,
     /// Standard deviation of the gusts (m/s, world).
     pub gust_sigma_m_per_s: Vec3,
@@ -63,21 +64,21 @@ impl Wind {
     }
 }
 
-/// What the gusts are now.
+/// Present gusts.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Gusts {
     velocity_m_per_s: Vec3,
 }
 
 impl Gusts {
-    /// The gust now (m/s, world).
+    /// Present gust (m/s, world).
     #[must_use]
     #[inline]
     pub fn velocity_m_per_s(&self) -> Vec3 {
         self.velocity_m_per_s
     }
 
-    /// Moves on by `dt_s`; draws nothing where the wind has no gusts.
+    /// Advances by `dt_s`; takes no numbers from `noise` if the wind has no gusts.
     pub fn step(&mut self, wind: &Wind, dt_s: f64, noise: &mut impl NoiseSource) {
         if wind.gust_sigma_m_per_s == Vec3::ZERO {
             self.velocity_m_per_s = Vec3::ZERO;
@@ -92,14 +93,14 @@ impl Gusts {
     }
 }
 
-/// A force and a torque for a while.
+/// A force and a torque for a limited time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Nudge {
     /// Force at the centre of mass (N, world).
     pub force_n: Vec3,
     /// Torque (N m, body).
     pub torque_nm: Vec3,
-    /// How long (s).
+    /// Duration (s).
     pub duration_s: f64,
 }
 
@@ -152,7 +153,7 @@ mod tests {
         );
     }
 
-    // Without sigma the gusts are zero and the generator stays as it was.
+    // Without sigma the gusts are zero and the noise is not used.
     #[test]
     fn no_gusts_draw_nothing() {
         let (mut gusts, mut noise) = (Gusts::default(), Noise::from_seed(1));

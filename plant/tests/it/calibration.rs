@@ -1,4 +1,4 @@
-//! Whether the estimator's covariance is what it says: errors of noisy experiments, in its own units.
+//! Calibration of the fit's covariance: errors of noisy experiments in units of it.
 
 use onecycle_onboard::cycle::CycleDetector;
 use onecycle_onboard::refine::{Refined, coordinate, refine};
@@ -38,13 +38,13 @@ fn noisy_relay(process: &Soiptd, sigma: f64, bias: f64, rng: &mut Pcg64) -> (Tra
     )
 }
 
-/// The last cycles of a trace and two periods of input before them.
+/// The last cycles of a trace with two periods of input before them.
 fn window(trace: &Trace, cycles: usize) -> (FitWindow, f64) {
     let mut detector = CycleDetector::new();
     let mut found = Vec::new();
     let mut trim = 0.0;
     for row in 1..trace.len() {
-        // The relay moves by twice its amplitude, or from zero by one; the trim alone by less.
+        // The relay moves by twice its amplitude, or by one from zero; the trim alone moves by less.
         let jump = trace.input[row] - trace.input[row - 1];
         if jump.abs() > 0.95 {
             trim = trace.input[row] - jump.signum();
@@ -80,7 +80,7 @@ fn window(trace: &Trace, cycles: usize) -> (FitWindow, f64) {
     (window, period_s)
 }
 
-/// Errors in the coordinates of the covariance, and that covariance.
+/// Errors in the coordinates of the covariance, and the covariance.
 fn errors(found: &Refined, process: &Soiptd, bias: f64) -> ([f64; 5], [[f64; 5]; 5]) {
     use coordinate::{INPUT_BIAS, LN_JERK_GAIN, LN_POLE_SUM, POLE_RATIO, TAU_S};
     let ((sum, ratio), (found_sum, found_ratio)) = (process.pole_sum(), found.process.pole_sum());
@@ -94,7 +94,7 @@ fn errors(found: &Refined, process: &Soiptd, bias: f64) -> ([f64; 5], [[f64; 5];
     (errors, found.covariance.unwrap())
 }
 
-/// `e^T C^-1 e` by Cholesky's factor.
+/// `e^T C^-1 e` by Cholesky factorisation.
 fn mahalanobis_squared(covariance: &[[f64; 5]; 5], errors: &[f64; 5]) -> f64 {
     let mut factor = [[0.0; 5]; 5];
     let mut white = [0.0; 5];
@@ -117,14 +117,14 @@ fn mahalanobis_squared(covariance: &[[f64; 5]; 5], errors: &[f64; 5]) -> f64 {
 struct Calibration {
     /// Mean of `e^T C^-1 e / 5`.
     joint: f64,
-    /// Mean of the squared error over the variance, of each coordinate.
+    /// Mean of the squared error over the variance, for each coordinate.
     marginal: [f64; 5],
     /// Mean of the residual's size over that of the noise.
     residual: f64,
 }
 
-/// Over random processes of the multirotor domain, the body at least half as slow again as the
-/// actuator: nearer to equal lags the ratio of the poles is at its bound as often as not.
+/// Over random processes of the multirotor domain whose body is at least half as slow again as the actuator:
+/// closer to equal lags the pole ratio is often at its limit.
 fn calibration(sigma: f64, cycles: usize, cases: usize) -> Calibration {
     let mut rng = Pcg64::seed_from_u64(11);
     let mut mean = Calibration {
@@ -151,9 +151,9 @@ fn calibration(sigma: f64, cycles: usize, cases: usize) -> Calibration {
     mean
 }
 
-// Where the linearisation holds, at noise of 0.3 % of the amplitude and less, squared errors in units
-// of their covariance have the mean 5, and 5/5 with a standard error of sqrt(2 / (5 n)) = 0.045 for
-// n = 200. The worst cases, where it no longer quite holds, weigh on its upper side.
+// Where the linearisation holds, at noise up to 0.3 % of the amplitude, squared errors in units of their
+// covariance have the mean 5; a fifth of it has a standard error of sqrt(2 / (5 n)) = 0.045 for n = 200. The
+// worst cases, where the linearisation is less accurate, raise the mean.
 #[test]
 fn errors_are_as_large_as_stated_jointly() {
     for (sigma, cycles) in [(0.001, 2), (0.003, 2), (0.003, 4)] {
@@ -164,13 +164,13 @@ fn errors_are_as_large_as_stated_jointly() {
         } = calibration(sigma, cycles, 200);
         assert!((0.87..1.2).contains(&joint), "{sigma} {cycles}: {joint}");
         for marginal in marginal {
-            // A standard error of sqrt(2 / n) = 0.1; three of them.
+            // Standard error sqrt(2 / n) = 0.1; three of them.
             assert!(
                 (0.7..1.3).contains(&marginal),
                 "{sigma} {cycles}: {marginal}"
             );
         }
-        // A standard deviation from over a hundred bins, two hundred times.
+        // Each standard deviation comes from over a hundred bins; there are two hundred of them.
         assert!(
             (residual - 1.0).abs() < 0.01,
             "{sigma} {cycles}: {residual}"
@@ -178,8 +178,7 @@ fn errors_are_as_large_as_stated_jointly() {
     }
 }
 
-// At one per cent the region of equal likelihood is curved, but each coordinate by itself is still
-// as certain as stated.
+// At one per cent the region of equal likelihood is curved, but each single coordinate is as certain as stated.
 #[test]
 fn errors_are_as_large_as_stated_one_by_one() {
     use coordinate::{INPUT_BIAS, LN_POLE_SUM, POLE_RATIO, TAU_S};
@@ -188,7 +187,7 @@ fn errors_are_as_large_as_stated_one_by_one() {
             marginal, residual, ..
         } = calibration(0.01, cycles, 200);
         for index in [LN_POLE_SUM, POLE_RATIO, TAU_S, INPUT_BIAS] {
-            // A standard error of sqrt(2 / n) = 0.1; three of them.
+            // Standard error sqrt(2 / n) = 0.1; three of them.
             let marginal = marginal[index];
             assert!(
                 (0.7..1.3).contains(&marginal),

@@ -1,4 +1,4 @@
-//! Closed loops whose outcome can be predicted by hand.
+//! Closed loops with results predicted by hand.
 
 use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, Noise, SampledPd, Sensor, Trace};
@@ -7,8 +7,8 @@ fn noise(seed: u64) -> Noise {
     Noise::from_seed(seed)
 }
 
-// At rest the integrator's input is zero: kp (r - y) + bias = 0, so r - y = -bias / kp exactly. The
-// loop's slowest pole is near 2.4/s: after 20 s e^-48, nothing but rounding is left.
+// At rest the input of the integrator is zero: kp (r - y) + bias = 0, so r - y = -bias / kp exactly. The slowest
+// pole of the loop is near 2.4/s: after 20 s only e^-48 is left.
 #[test]
 fn a_bias_leaves_the_predicted_error() {
     let process = Soiptd::new(1.5, 0.03, 1.2, 0.02).unwrap();
@@ -20,11 +20,11 @@ fn a_bias_leaves_the_predicted_error() {
     let trace = experiment.run(&mut SampledPd(pd), &mut noise(0));
     let error = experiment.reference - trace.true_output[trace.len() - 1];
     assert!((error - 0.25 / 8.0).abs() < 1e-13, "{error}");
-    // And the input that is left is minus the bias.
+    // The remaining input is minus the bias.
     assert!((trace.input[trace.len() - 1] - 0.25).abs() < 1e-12);
 }
 
-/// Pole of the loop below, three times (1/s).
+/// Triple pole of the loop below (1/s).
 const POLE: f64 = 10.0;
 
 /// Output at 0.4 s of the sampled loop with a triple pole.
@@ -44,10 +44,10 @@ fn sampled_at_400_ms(sample_s: f64) -> f64 {
     trace.true_output[last]
 }
 
-// Continuous: y = 1 - e^-x (1 + x + x^2/2), x = p t. Holding the input delays the feedback by half a
-// sample on average (not the reference, which jumps at a sample), so the sampled loop is off by
-// dt/2 w, w the derivative of kp G r / (1 + e^(-s d) C G) by d at zero:
-// W = p^5 (3 s + p) / (s + p)^6, w = p e^-x (x^4/8 - x^5/60). The rest is of second order.
+// Continuous loop: y = 1 - e^-x (1 + x + x^2/2) with x = p t. Holding the input delays the feedback by half a
+// sample on average (but not the reference, which jumps at a sample). So the sampled loop differs by dt/2 w,
+// where w is the derivative of kp G r / (1 + e^(-s d) C G) by d at zero: W = p^5 (3 s + p) / (s + p)^6, w = p
+// e^-x (x^4/8 - x^5/60). The remainder is of second order.
 #[test]
 fn sampled_pd_converges_to_the_continuous_loop() {
     let x = POLE * 0.4;
@@ -56,12 +56,12 @@ fn sampled_pd_converges_to_the_continuous_loop() {
     let rest = |sample_s: f64| sampled_at_400_ms(sample_s) - continuous - 0.5 * sample_s * w;
     let rests = [2e-3, 1e-3, 5e-4, 2.5e-4].map(rest);
     for pair in rests.windows(2) {
-        // Four, and what the third order adds: proportional to the sample, 0.027 at 2 ms.
+        // Four, plus the third order, which is proportional to the sample period: 0.027 at 2 ms.
         let ratio = pair[0] / pair[1];
         assert!((ratio - 4.0).abs() < 0.03, "{rests:?}: {ratio}");
     }
     assert!((rests[2] / rests[3] - 4.0).abs() < 0.01);
-    // What the first order leaves at 1 ms, and the first order: x = 4, w = 10 e^-4 (32 - 17.07).
+    // Remainder of the first order at 1 ms, and the first order: x = 4, w = 10 e^-4 (32 - 17.07).
     assert!((w - 2.735).abs() < 1e-3, "{w}");
     assert!(rests[1].abs() < 3e-6 && 0.5e-3 * w > 1.3e-3);
 }
@@ -89,8 +89,8 @@ fn same_seed_same_bits() {
     }
 }
 
-// Of n = 10,000 increments the mean has a standard error of 0.02/sqrt(n) periods, the standard
-// deviation one of 0.02/sqrt(2 n); three of each.
+// For n = 10,000 increments the mean has a standard error of 0.02/sqrt(n) periods, the standard deviation one of
+// 0.02/sqrt(2 n); three of each.
 #[test]
 fn jitter_has_the_given_spread() {
     let trace = noisy_relay(5, 0.02);
@@ -111,7 +111,7 @@ fn jitter_has_the_given_spread() {
 
 #[test]
 fn time_always_advances() {
-    // Half a period of jitter: 7 % of the increments lie outside 0.1..1.9 periods and are kept in.
+    // Jitter of half a period: 7 % of the increments are outside 0.1..1.9 periods and are limited.
     let trace = noisy_relay(5, 0.5);
     let mut at_limits = 0;
     for pair in trace.time_s.windows(2) {
@@ -119,12 +119,12 @@ fn time_always_advances() {
         assert!((0.1 - 1e-9..=1.9 + 1e-9).contains(&increment));
         at_limits += usize::from(!(0.1 + 1e-9..=1.9 - 1e-9).contains(&increment));
     }
-    // P(|x| > 1.8 sigma) = 0.0719: 719 of 10,000, give or take three times sqrt(719 * 0.93) = 26.
+    // P(|x| > 1.8 sigma) = 0.0719: 719 of 10,000, plus or minus three times sqrt(719 * 0.93) = 26.
     assert!((at_limits as f64 - 719.0).abs() < 78.0, "{at_limits}");
 }
 
-// No jitter: the fixed grid. A vanishing jitter: the variable propagation on nearly that grid, and
-// the same trajectory up to times and switches a part in 1e12 off.
+// Without jitter the fixed grid is used. A vanishing jitter uses the variable propagation on nearly that grid:
+// the same trajectory, with times and switches a part in 1e12 off.
 #[test]
 fn both_propagations_run_the_same_loop() {
     let process = Soiptd::new(1.5, 0.03, 1.2, 0.0213).unwrap();

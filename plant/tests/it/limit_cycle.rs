@@ -28,9 +28,9 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 
 type Row = ((f64, f64, f64), f64, (f64, f64));
 
-// h = 1, K = 1, beta = -0.73: T_prop, T_body, tau; steady period (s); amplitude and half a unit of its
-// last digit, as a prototype in another language found them at the same 1 ms. Periods here are whole
-// numbers of samples, cycle after cycle.
+// h = 1, K = 1, beta = -0.73. Columns: T_prop, T_body, tau; steady period (s); amplitude with half a unit of its
+// last digit, from a prototype in another language at the same 1 ms. Periods are whole numbers of samples in
+// every cycle.
 const TABLE: [Row; 5] = [
     ((0.3, 2.0, 0.1), 2.308, (0.0644, 5e-5)),
     ((0.3, 2.0, 0.0005), 1.496, (0.0221, 5e-5)),
@@ -54,14 +54,14 @@ fn limit_cycles_match_the_prototype() {
             (mean_amplitude - amplitude).abs() < digit,
             "{mean_amplitude} against {amplitude}"
         );
-        // Without a bias both halves are alike up to a sample.
+        // Without a bias both halves are equal up to a sample.
         let duty = mean(cycles.iter().map(|cycle| cycle.duty));
         assert!((duty - 0.5).abs() * period <= 1e-3, "duty {duty}");
     }
 }
 
-// The loop has no scale of its own for input and output: twice the relay on half the gain is the
-// same oscillation of the same output, to the bit, as all factors are powers of two.
+// The loop has no scale of its own for input and output: twice the relay on half the gain gives the same output
+// to the bit, because all factors are powers of two.
 #[test]
 fn amplitude_and_gain_trade_exactly() {
     let process = Soiptd::new(1.0, 0.0321, 1.6886, 0.0237).unwrap();
@@ -72,9 +72,8 @@ fn amplitude_and_gain_trade_exactly() {
     );
 }
 
-// The describing function is 5 to 30 % off the truth but for short lags and a long delay: it is a
-// scale, and the simulated period lies above it by what the prototype saw (its table: 4.6, 6.0, -0.3,
-// 10.4 and 7.2 %).
+// The describing function is off by 5 to 30 % except for short lags and a long delay, so it only gives a scale.
+// The simulated period exceeds it by the values of the prototype's table: 4.6, 6.0, -0.3, 10.4 and 7.2 %.
 #[test]
 fn describing_function_is_a_scale() {
     let excess = [0.046, 0.060, -0.003, 0.104, 0.072];

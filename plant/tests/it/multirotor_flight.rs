@@ -11,8 +11,7 @@ use onecycle_plant::multirotor::{
 /// So high that the ground effect, (0.0762 / 4 z)^2, is below rounding.
 const HIGH: Vec3 = Vec3::new(0.0, 0.0, 1e6);
 
-/// The quadrotor without drag, noise or delay, with a battery of nominal voltage that neither
-/// sags nor runs down.
+/// The quadrotor without drag, noise and delay, with a battery of constant nominal voltage.
 fn ideal() -> Parts {
     let mut parts = Parts::quadrotor();
     parts.body.linear_drag_n_s_per_m = Vec3::ZERO;
@@ -52,8 +51,8 @@ fn fly(flight: &mut Flight, command: Command, duration_s: f64) {
     }
 }
 
-// v = g t: 2 s at 9.80665; a parabola is exact for Runge-Kutta, so only 2000 roundings are left.
-// The position is rounded to 1e-10 at a height of 1000 km.
+// v = g t: 2 s at 9.80665. A parabola is exact for Runge-Kutta, so only 2000 roundings are left. The position is
+// rounded to 1e-10 at a height of 1000 km.
 #[test]
 fn it_falls_freely() {
     let mut flight = falling(ideal());
@@ -63,7 +62,7 @@ fn it_falls_freely() {
     assert!((state.position_m.z - HIGH.z + 2.0 * GRAVITY_M_PER_S2).abs() < 1e-6);
 }
 
-// Four times k omega^2 is the weight to rounding; after a second at that command nothing has moved.
+// Four times k omega^2 is the weight up to rounding; after a second at that command the vehicle has not moved.
 #[test]
 fn thrust_balances_weight_at_hover() {
     let (mut flight, command) = hovering(ideal());
@@ -76,8 +75,8 @@ fn thrust_balances_weight_at_hover() {
     assert!(flight.state().rates_rad_per_s.norm() < 1e-12);
 }
 
-// A quarter of the thrust is half the speed: omega = 902 (1 - exp(-t / T)). Runge-Kutta is off by
-// (h/T)^5 / 120 = 2.6e-9 a step, 20 steps a lag: 2e-8 after one lag, of the final speed.
+// A quarter of the thrust is half the speed: omega = 902 (1 - exp(-t / T)). The error of Runge-Kutta is (h/T)^5
+// / 120 = 2.6e-9 per step, with 20 steps per lag: 2e-8 of the final speed after one lag.
 #[test]
 fn motors_lag() {
     let mut flight = falling(ideal());
@@ -93,8 +92,8 @@ fn motors_lag() {
     }
 }
 
-// No drag, no torque: energy and the angular momentum in the world stay as they were while it
-// tumbles about its middle axis of inertia, the unstable one, for ten seconds.
+// Without drag and torque, energy and angular momentum in the world stay constant while the vehicle tumbles for
+// ten seconds about its middle axis of inertia, the unstable one.
 #[test]
 fn tumbling_keeps_energy_and_angular_momentum() {
     let vehicle = Vehicle::new(ideal()).unwrap();
@@ -124,12 +123,12 @@ fn tumbling_keeps_energy_and_angular_momentum() {
     assert!((energy_j(later) / energy_j(&state) - 1.0).abs() < 1e-10);
     assert!((momentum(later) - momentum(&state)).norm() < 1e-10 * momentum(&state).norm());
     assert!((later.world_from_body.norm() - 1.0).abs() < 1e-15);
-    // It did tumble: from 6 rad/s the rate about the middle axis went through zero.
+    // It did tumble: the rate about the middle axis changed from 6 rad/s through zero.
     assert!(lowest < -5.0, "{lowest}");
 }
 
-// d1 v + d2 v^2 = m g: v = (-0.267 + sqrt(0.267^2 + 4 0.031 13.0755)) / 0.062 = 16.68 m/s. The approach
-// has the time constant m / (d1 + 2 d2 v) = 1.02 s: gone after 40 s.
+// d1 v + d2 v^2 = m g: v = (-0.267 + sqrt(0.267^2 + 4 0.031 13.0755)) / 0.062 = 16.68 m/s. The approach has the
+// time constant m / (d1 + 2 d2 v) = 1.02 s and is complete after 40 s.
 #[test]
 fn it_reaches_terminal_velocity() {
     let mut flight = falling(Parts::quadrotor());
@@ -157,9 +156,9 @@ fn a_torque_is_integrated_twice() {
     assert!((reading.rates_rad_per_s - Vec3::new(1.0, 0.0, 0.0)).norm() < 1e-12);
 }
 
-// The rotors' drag at hover, its hubs level with the centre of mass, against one motion at a time: exp(-rate t)
-// with 4 k_d omega / m sideways, 4 k_z omega / m in climb, 4 k_z omega y^2 / I_x in roll,
-// 4 k_d omega (x^2 + y^2) / I_z in yaw. After a second, to a thousand roundings.
+// Drag of the rotors at hover, with the hubs level with the centre of mass, against one motion at a time:
+// exp(-rate t) with the rates 4 k_d omega / m sideways, 4 k_z omega / m in climb, 4 k_z omega y^2 / I_x in roll
+// and 4 k_d omega (x^2 + y^2) / I_z in yaw. After a second, to a thousand roundings.
 #[test]
 fn the_rotors_damp_every_motion() {
     let parts = Parts {
@@ -204,8 +203,8 @@ fn the_rotors_damp_every_motion() {
     }
 }
 
-// 3 N for 12.34 ms, no multiple of the step, on 4/3 kg: 27.765 mm/s, and no more afterwards. The
-// middle coasts on at that.
+// 3 N for 12.34 ms, which is not a multiple of the step, on 4/3 kg: 27.765 mm/s, constant afterwards. The middle
+// moves on at that velocity.
 #[test]
 fn a_nudge_is_its_impulse() {
     let mut flight = falling(ideal());
@@ -228,10 +227,9 @@ fn a_nudge_is_its_impulse() {
     );
 }
 
-// Ten seconds of hover draw 252 W at 16.2 V: 15.6 A, 1.17 % of 13320 A s. In each instant the
-// charge falls by P / (V C), so from the voltage read before and after: within the change of V.
-// At full thrust the motors settle at 1804 V / 14.8 of the sagging voltage: the lag of 20 ms trails
-// the falling voltage, by less than 1e-4 of it.
+// Ten seconds of hover draw 252 W at 16.2 V: 15.6 A, 1.17 % of 13320 A s. At each instant the charge falls by P
+// / (V C), so the result from the voltage before and after agrees within the change of V. At full thrust the
+// motors settle at 1804 V / 14.8 of the falling voltage; the lag of 20 ms trails it by less than 1e-4.
 #[test]
 fn the_battery_runs_down_and_sags() {
     let (mut flight, command) = hovering(Parts::quadrotor());
@@ -256,8 +254,8 @@ fn the_battery_runs_down_and_sags() {
     assert!(flight.voltage_v() < before_v - 0.5);
 }
 
-// Falling from rest at inner steps of 1 ms, a delay of 37 ms reads exactly what was there 37 steps ago;
-// of 37.4 ms, 0.6 of that and 0.4 of the step before. Until then it reads the beginning.
+// Falling from rest at inner steps of 1 ms: with a delay of 37 ms the reading is exactly that of 37 steps ago,
+// with 37.4 ms it is 0.6 of that and 0.4 of the step before. Before that it is the initial value.
 #[test]
 fn readings_are_as_old_as_the_delay() {
     for (delay_s, share) in [(0.037, 0.0), (0.0374, 0.4)] {
@@ -277,8 +275,8 @@ fn readings_are_as_old_as_the_delay() {
     }
 }
 
-// Yaw passes from pi to -pi at 1 rad/s between two inner steps: 0.4 ms late it reads the angle of then, by the
-// short way, where halfway between 3.14 and -3.14 would be far off.
+// Yaw passes from pi to -pi at 1 rad/s between two inner steps: with a delay of 0.4 ms the reading is the angle
+// of that time, by the shorter way; the mean of 3.14 and -3.14 would be far off.
 #[test]
 fn late_angles_go_the_short_way_round() {
     let mut parts = ideal();
@@ -301,8 +299,8 @@ fn late_angles_go_the_short_way_round() {
     }
 }
 
-// White noise of 2 cm on one channel: 10,000 readings, variance within three standard errors
-// sqrt(2 / n); the other channels read the truth.
+// White noise of 2 cm on one channel: the variance of 10,000 readings is within three standard errors sqrt(2 /
+// n); the other channels read the truth.
 #[test]
 fn readings_carry_noise() {
     const READINGS: usize = 10_000;
@@ -322,8 +320,8 @@ fn readings_carry_noise() {
     assert!((variance / 4e-4 - 1.0).abs() < 3.0 * (2.0 / READINGS as f64).sqrt());
 }
 
-// 0.4 kg more at the thrust of hover: the vehicle falls with g 0.4 / 1.7333 = 2.2631 m/s^2; dropped
-// after 0.1 s it keeps its 0.2263 m/s. Without drag, to rounding.
+// 0.4 kg more at the thrust of hover: the vehicle falls with g 0.4 / 1.7333 = 2.2631 m/s^2; when the payload is
+// dropped after 0.1 s it keeps its 0.2263 m/s. Without drag, to rounding.
 #[test]
 fn a_payload_is_taken_up_and_dropped() {
     let (mut flight, command) = hovering(ideal());
@@ -337,7 +335,7 @@ fn a_payload_is_taken_up_and_dropped() {
     assert!((flight.state().velocity_m_per_s.z - expected).abs() < 1e-12);
 }
 
-// Turning at 2 rad/s about roll, the centre of mass jumps when the payload goes; the middle does not.
+// While the vehicle rolls at 2 rad/s the centre of mass jumps when the payload is dropped; the middle does not.
 #[test]
 fn the_middle_does_not_jump_with_the_payload() {
     let bare = Vehicle::new(ideal()).unwrap();
@@ -358,9 +356,9 @@ fn the_middle_does_not_jump_with_the_payload() {
     assert!((flight.state().position_m - state.position_m).norm() > 0.01);
 }
 
-// Centre of mass 1 mm to the left: at hover the lift turns the vehicle to the left side down with
-// m g c / I_x = 1.2946 rad/s^2, so -1.62 mrad after 50 ms. A roll command of thrust times c / y holds it:
-// with the motors there from the start, nothing turns for a second.
+// Centre of mass 1 mm to the left: at hover the lift turns the left side down with m g c / I_x = 1.2946 rad/s^2,
+// so -1.62 mrad after 50 ms. A roll command of thrust times c / y balances it: with the motors at that command
+// from the start, the vehicle does not rotate for a second.
 #[test]
 fn an_offset_centre_of_mass_is_a_bias_of_roll() {
     let mut parts = ideal();
@@ -393,7 +391,7 @@ fn an_offset_centre_of_mass_is_a_bias_of_roll() {
     assert!(flight.reading().angles_rad.norm() < 1e-11);
 }
 
-// What is out of range is named; a vehicle twice too heavy cannot hover.
+// Values out of range are named; a vehicle that is twice too heavy cannot hover.
 #[test]
 fn errors_name_the_parameter() {
     let mut parts = Parts::quadrotor();
@@ -427,8 +425,8 @@ fn errors_name_the_parameter() {
     ));
 }
 
-// The same commands and seed give the same bits, however a second is divided into ticks of whole
-// inner steps.
+// The same commands and the same seed give the same bits, however a second is divided into ticks of whole inner
+// steps.
 #[test]
 fn ticks_of_whole_steps_are_the_same_flight() {
     let run = |steps: usize| {

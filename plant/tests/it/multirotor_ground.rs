@@ -1,4 +1,4 @@
-//! On the ground and onto it, and whatever is commanded.
+//! On the ground, landings, and arbitrary commands.
 
 use onecycle_plant::Noise;
 use onecycle_plant::multirotor::ground::ground_effect;
@@ -8,7 +8,7 @@ use onecycle_plant::multirotor::{
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 
-/// A battery that neither sags nor runs down.
+/// A battery of constant voltage.
 fn steady() -> Vehicle {
     let mut parts = Parts::quadrotor();
     parts.battery.resistance_ohm = 0.0;
@@ -23,7 +23,7 @@ fn thrust(thrust: f64) -> Command {
     }
 }
 
-/// Flies `duration_s` with the command held and returns the highest altitude (m).
+/// Flies `duration_s` with a held command and returns the highest altitude (m).
 fn fly(flight: &mut Flight, command: Command, duration_s: f64) -> f64 {
     let mut noise = Noise::from_seed(1);
     let mut highest = f64::NEG_INFINITY;
@@ -34,7 +34,7 @@ fn fly(flight: &mut Flight, command: Command, duration_s: f64) -> f64 {
     highest
 }
 
-// At rest nothing moves: the legs carry the weight to rounding error.
+// At rest the vehicle does not move: the legs carry the weight to rounding error.
 #[test]
 fn it_stands() {
     let mut flight = Flight::standing(Vehicle::quadrotor());
@@ -44,9 +44,9 @@ fn it_stands() {
     assert!(reading.angles_rad.norm() < 1e-12);
 }
 
-// Near the ground the rotors, 0.1 m up, lift 1/(1 - (0.0762/0.4)^2) = 1.0377 times as much: it takes off at
-// that much less than the thrust of hover. Half of it takes half the weight off the legs, which
-// give way by weight / 4 k = 1.0 mm: 0.5 mm up, within 0.5 % (the ratio changes with the height).
+// Near the ground the rotors, 0.1 m up, lift 1/(1 - (0.0762/0.4)^2) = 1.0377 times as much, so the vehicle takes
+// off at that much less than the thrust of hover. Half of that thrust takes half the weight off the legs, which
+// yield by weight / 4 k = 1.0 mm: 0.5 mm up, within 0.5 % (the factor changes with the height).
 #[test]
 fn it_takes_off_when_thrust_exceeds_weight() {
     let vehicle = steady();
@@ -66,8 +66,8 @@ fn it_takes_off_when_thrust_exceeds_weight() {
     assert!(fly(&mut flight, thrust(1.01 * take_off), 5.0) > 10.0 * give_m);
 }
 
-// In ground effect there is an equilibrium: 1/(1 - (R/4z)^2) = weight / static thrust. At 0.99 of the
-// thrust of hover, the rotors float at z = R/4 / sqrt(0.01) = 10 R/4 = 0.1905 m: 9 cm up on legs of 0.1 m.
+// In ground effect there is an equilibrium: 1/(1 - (R/4z)^2) = weight / static thrust. At 0.99 of the thrust of
+// hover the rotors float at z = R/4 / sqrt(0.01) = 10 R/4 = 0.1905 m: 9 cm up with legs of 0.1 m.
 #[test]
 fn it_floats_on_the_ground_effect() {
     let vehicle = steady();
@@ -78,9 +78,9 @@ fn it_floats_on_the_ground_effect() {
     assert!((rotors_m - 0.1905).abs() < 1e-4, "{rotors_m}");
 }
 
-// Dropped from 1.3 cm, it lands at 0.5 m/s. A critically damped leg that only pushes gives
-// back exp(-2) of the speed: 0.07 m/s, 0.24 mm above where the legs are relieved, 1 mm up.
-// Then it is at rest where it stood.
+// Dropped from 1.3 cm it lands at 0.5 m/s. A critically damped leg that only pushes returns exp(-2) of the
+// speed: 0.07 m/s, which rises 0.24 mm above the height of unloaded legs, 1 mm up. Then the vehicle rests where
+// it stood.
 #[test]
 fn it_lands_without_a_bounce() {
     let vehicle = Vehicle::quadrotor();
@@ -96,7 +96,7 @@ fn it_lands_without_a_bounce() {
     assert!(reading.velocity_m_per_s.norm() < 1e-9);
 }
 
-// Tilted by 0.25 rad and sliding: it falls onto its feet and rests level.
+// Tilted by 0.25 rad and sliding, it falls onto its feet and rests level.
 #[test]
 fn it_rights_itself_on_its_feet() {
     let vehicle = Vehicle::quadrotor();
@@ -112,7 +112,7 @@ fn it_rights_itself_on_its_feet() {
     assert!(reading.velocity_m_per_s.norm() < 1e-9);
 }
 
-// Upside down from 3 m: it lies on its guards, 5 cm above the hubs, less what they give way.
+// Upside down from 3 m, it lies on its guards, 5 cm above the hubs minus the compression.
 #[test]
 fn it_lies_on_its_guards() {
     let vehicle = Vehicle::quadrotor();
@@ -126,8 +126,8 @@ fn it_lies_on_its_guards() {
     assert!((flight.state().position_m.z - (0.05 - give_m)).abs() < 1e-9);
 }
 
-// At 30 m/s the legs would give way by v / omega / e = 30 / 99 / e = 0.11 m, more than the 0.1 m they are high:
-// the ground stops the centre of mass, and in the end it stands.
+// At 30 m/s the legs would yield by v / omega / e = 30 / 99 / e = 0.11 m, more than their height of 0.1 m: the
+// ground stops the centre of mass, and in the end the vehicle stands.
 #[test]
 fn a_crash_ends_at_the_ground() {
     let vehicle = Vehicle::quadrotor();
@@ -145,9 +145,9 @@ fn a_crash_ends_at_the_ground() {
     assert!(flight.reading().position_m.z.abs() < 1e-9);
 }
 
-// Half a newton sideways creeps at F / 4 c = 0.5 / 264 = 1.89 mm/s; 10 N, above mu m g = 7.85 N,
-// slides with (10 - 7.85) / m = 1.62 m/s^2 less the drag, at most 1 % at 0.16 m/s. Pushed at the centre
-// of mass, 0.1 m up, 10 N tips with 1 N m against m g 0.088 m = 1.15: it does not topple.
+// A side force of half a newton makes the vehicle creep at F / 4 c = 0.5 / 264 = 1.89 mm/s. 10 N exceeds mu m g
+// = 7.85 N: it slides with (10 - 7.85) / m = 1.62 m/s^2 minus the drag, 1 % at most at 0.16 m/s. The force acts
+// at the centre of mass, 0.1 m up: 1 N m against m g 0.088 m = 1.15 N m, so the vehicle does not topple.
 #[test]
 fn friction_holds_until_it_slides() {
     let vehicle = Vehicle::quadrotor();
@@ -194,9 +194,9 @@ proptest! {
         ..Config::default()
     })]
 
-    // 60 random commands of up to 0.3 s each, from the ground or from 3 m in any attitude, with a
-    // payload, gusts and a blow: everything stays finite, the attitude of norm one, the centre of mass above
-    // the ground.
+    // 60 random commands of up to 0.3 s each, from the ground or from 3 m in any attitude, with a payload, gusts
+    // and a blow: everything stays finite, the attitude keeps the norm one, the centre of mass stays above the
+    // ground.
     #[test]
     fn nothing_makes_it_leave_the_world(
         commands in prop::collection::vec((any_command(), 1e-4..0.3), 60),

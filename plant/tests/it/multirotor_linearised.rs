@@ -1,10 +1,9 @@
-//! The process of each axis at hover against small flights of the nonlinear vehicle.
+//! The linear process of each axis at hover against small flights of the nonlinear vehicle.
 //!
-//! Two flights from hover, with the input added and subtracted, halve into the linear response: even
-//! orders of the input cancel, and so does whatever the vehicle does by itself. The input switches
-//! every few ticks. What is left with a battery that does not run down: linear interpolation of
-//! the delay (an eighth of the second derivative times 1 ms^2, 3e-7 of the output after a second)
-//! and the Runge-Kutta rule.
+//! Half the difference of two flights from hover, with the input added and subtracted, is the linear response:
+//! even orders of the input cancel, and so does the motion without input. The input switches every few ticks.
+//! With a battery of constant charge two errors are left: linear interpolation of the delay (an eighth of the
+//! second derivative times 1 ms^2, 3e-7 of the output after a second), and the Runge-Kutta rule.
 
 use onecycle_onboard::Pd;
 use onecycle_plant::multirotor::{Axis, Command, Flight, Hover, Nudge, Parts, Vec3, Vehicle, Wind};
@@ -13,10 +12,10 @@ use onecycle_plant::{Controller, Experiment, FixedStepProcess, Noise, SampledPd,
 const TICK_S: f64 = 2e-3;
 /// So small that the quadratic drag, which is odd in the climb, stays below rounding.
 const SMALL: f64 = 1e-6;
-/// Of the largest output.
+/// Relative to the largest output.
 const EXACT: f64 = 1e-6;
 
-/// Noise-free, with a battery that does not run down while it sags.
+/// Without noise, with a battery that sags under load but keeps its charge.
 fn lasting() -> Parts {
     let mut parts = Parts::quadrotor();
     parts.sensors = parts.sensors.without_noise();
@@ -48,7 +47,7 @@ fn switched(tick: usize) -> f64 {
     }
 }
 
-/// What is flown, and how.
+/// Conditions of a flight.
 #[derive(Clone, Copy)]
 struct Trial {
     parts: Parts,
@@ -78,13 +77,13 @@ impl Trial {
         vehicle.hover(self.charge, self.wind).unwrap()
     }
 
-    /// Outputs of a flight from hover at 50 m with the input scaled.
+    /// Outputs of a flight from hover at 50 m with the input scaled by `size`.
     fn flown(&self, size: f64) -> Vec<f64> {
         let (vehicle, hover) = (Vehicle::new(self.parts).unwrap(), self.hover());
         let mut noise = Noise::from_seed(1);
         let mut flight = Flight::new(vehicle, hover.state(Vec3::new(0.0, 0.0, 50.0))).unwrap();
         flight.set_wind(Wind::steady(self.wind)).unwrap();
-        // Held where it is against a horizontal wind, as a perfect position controller would.
+        // Held in place against a horizontal wind, as by a perfect position controller.
         let rotors = &self.parts.rotors;
         let rotor_drag = 4.0 * rotors.lateral_drag_n_s2_per_m * hover.rotor_rad_per_s();
         let hold = -(self.parts.body.drag_n(-self.wind) + self.wind * rotor_drag);
@@ -111,7 +110,7 @@ impl Trial {
             .collect()
     }
 
-    /// Largest difference between flight and process over the largest output.
+    /// Largest difference between flight and process, relative to the largest output.
     fn mismatch(&self) -> f64 {
         let linear = self.hover().linearised(self.axis).unwrap();
         let mut process = FixedStepProcess::new(&linear, TICK_S);
@@ -149,7 +148,7 @@ fn every_axis_is_its_process() {
     assert_exact(lasting(), 0.33, Vec3::ZERO, &AXES);
 }
 
-// The paper's 30 %: at the centre of mass all axes, 5 cm below it altitude and yaw.
+// The paper's payload of 30 %: at the centre of mass for all axes, 5 cm below it for altitude and yaw.
 #[test]
 fn every_axis_is_its_process_with_a_payload() {
     let loaded = |below_m| Parts {
@@ -160,10 +159,10 @@ fn every_axis_is_its_process_with_a_payload() {
     assert_exact(loaded(0.05), 1.0, Vec3::ZERO, &[Axis::Altitude, Axis::Yaw]);
 }
 
-// Hubs h above the centre of mass: sliding at v, the rotors' drag c v rights the vehicle with c h v,
-// while the tilt makes it slide, v = g a t^3 / 6 after a step of angular acceleration a. So roll
-// falls short of a t^2 / 2 by c h / I g t^3 / 60 of it: with c = 0.306 N s/m, h = 11.54 mm and
-// I = 0.01087 kg m^2, 298 ms less 32 ms of lag and delay: 0.100 %. Damping takes some per cent of both.
+// Hubs at h above the centre of mass: at the velocity v the rotors' drag c v rights the vehicle with c h v,
+// while the tilt makes it slide with v = g a t^3 / 6 after a step of angular acceleration a. So roll falls short
+// of a t^2 / 2 by the fraction c h / I g t^3 / 60: with c = 0.306 N s/m, h = 11.54 mm, I = 0.01087 kg m^2 and
+// 298 ms minus 32 ms of lag and delay 0.100 %. Damping takes a few per cent of both.
 #[test]
 fn a_hanging_payload_rights_the_roll_a_little() {
     let mismatch = Trial {
@@ -179,8 +178,8 @@ fn a_hanging_payload_rights_the_roll_a_little() {
     assert!((mismatch / 1.0e-3 - 1.0).abs() < 0.1, "{mismatch:e}");
 }
 
-// An updraft unloads the rotors, a downdraft loads them: other speed, other damping, all axes exact.
-// A horizontal wind, the vehicle held in it, damps the climb through the quadratic drag.
+// An updraft unloads the rotors, a downdraft loads them: other speeds and damping, but all axes are exact. A
+// horizontal wind in which the vehicle is held damps the climb through the quadratic drag.
 #[test]
 fn wind_is_in_the_process() {
     assert_exact(lasting(), 1.0, Vec3::new(0.0, 0.0, 2.0), &AXES);
@@ -197,7 +196,7 @@ fn wind_is_in_the_process() {
     assert!((added - 0.155 * 0.75).abs() < 1e-12, "{added}");
 }
 
-// Without axial and lateral drag, angles are double integrators behind a lag.
+// Without axial and lateral drag the angles are double integrators with a lag.
 #[test]
 fn without_drag_the_angles_are_double_integrators() {
     let mut parts = lasting();
@@ -210,10 +209,10 @@ fn without_drag_the_angles_are_double_integrators() {
     assert_exact(parts, 1.0, Vec3::ZERO, &AXES[1..]);
 }
 
-// The battery that runs down, an input held for a second, in relative terms of thrust: the current added,
-// 1.39 du/u times 15.6 A, takes 7.6e-4 of what the input added a second; hover's own current lowers
-// voltage and gain by 4.8e-4 a second. Both grow with t, so a third of 1.24e-3 of the altitude after
-// the 0.944 s that lag and delay leave: 3.9e-4, of which damping takes less than of the altitude.
+// A battery that discharges, with an input held for a second, relative to the thrust. The additional current,
+// 1.39 du/u times 15.6 A, takes 7.6e-4 of the input's effect per second; the current of hover lowers voltage and
+// gain by 4.8e-4 per second. Both grow with t, so the altitude loses a third of 1.24e-3 over the 0.944 s that
+// lag and delay leave: 3.9e-4. Damping takes less of that than of the altitude.
 #[test]
 fn the_charge_used_up_is_outside_and_small() {
     let mismatch = Trial {
@@ -228,8 +227,8 @@ fn the_charge_used_up_is_outside_and_small() {
     assert!((mismatch / 3.9e-4 - 1.0).abs() < 0.15, "{mismatch:e}");
 }
 
-// A tenth of hover as the relay's amplitude: the even part of the thrust, x + c x^2 with c = 0.025,
-// cancels in the mean of both flights; the odd rest is of the order of c^2, below a thousandth.
+// A relay amplitude of a tenth of hover: the even part of the thrust, x + c x^2 with c = 0.025, cancels in the
+// mean of both flights; the odd remainder is of the order of c^2, below a thousandth.
 #[test]
 fn a_relays_amplitude_stays_near_the_process() {
     let mismatch = Trial {
@@ -241,9 +240,9 @@ fn a_relays_amplitude_stays_near_the_process() {
     assert!(mismatch < 1e-3, "{mismatch:e}");
 }
 
-// A loop closed around the real vehicle and around its process: a step of 5 cm, PD gains that cross over
-// at 12.5 rad/s, where lag and delay take 40 deg. The thrust moves by 0.12 of 0.47. At rest it is linear in
-// the command, so the two differ only while the motors lag: 1.4 % of the step, allowed 2 %.
+// A loop closed around the nonlinear vehicle and around its process: a step of 5 cm with PD gains that cross
+// over at 12.5 rad/s, where lag and delay take 40 degrees. The thrust moves by 0.12 of 0.47. The static thrust
+// is linear in the command, so the two differ only while the motors lag: by 1.4 % of the step, 2 % are allowed.
 #[test]
 fn a_closed_loop_flies_as_its_process() {
     const STEP_M: f64 = 0.05;
@@ -275,13 +274,13 @@ fn a_closed_loop_flies_as_its_process() {
         let held = command(Axis::Altitude, hover.thrust_command(), input);
         flight.step(held, TICK_S, &mut noise);
     }
-    // The loop did something, and settled.
+    // The loop moved, and it settled.
     assert!((expected[SAMPLES - 1] / STEP_M - 1.0).abs() < 0.01);
     assert!(worst / STEP_M < 0.02, "{}", worst / STEP_M);
 }
 
-// What the quadrotor was made for: the paper's T_body of altitude and roll and T_prop and tau of
-// roll within 0.5 %; of altitude the sum of T_prop and tau, 0.0558 s, within 0.1 ms.
+// What the quadrotor was designed for: the paper's T_body of altitude and roll, and T_prop and tau of roll,
+// within 0.5 %; for altitude the sum of T_prop and tau, 0.0558 s, within 0.1 ms.
 #[test]
 fn the_quadrotor_is_of_the_papers_class() {
     let vehicle = Vehicle::quadrotor();

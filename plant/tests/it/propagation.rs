@@ -1,4 +1,4 @@
-//! Propagation against solutions by hand: the method of steps, in closed form.
+//! Propagation against solutions by hand: the method of steps in closed form.
 //!
 //! Under `u = u_i` from `T_i` on, the output is the sum of shifted step responses,
 //! `y(t) = sum (u_i - u_(i-1)) s(t - T_i - tau)`, with `s` the step response without delay:
@@ -14,10 +14,10 @@
 use onecycle_onboard::Soiptd;
 use onecycle_plant::{FixedStepProcess, VariableStepProcess};
 
-/// Of the largest output: a thousand roundings of a run of a few hundred steps.
+/// Relative to the largest output: a thousand roundings over a few hundred steps.
 const TOLERANCE: f64 = 1e-12;
 
-/// Output and rate of the step response `t` after its beginning, by hand.
+/// Output and rate of the step response at the time `t` after the step, by hand.
 type ByHand = Box<dyn Fn(f64) -> (f64, f64)>;
 
 fn distinct_lags(k: f64, lag: f64, body: f64) -> ByHand {
@@ -49,7 +49,7 @@ fn no_damping(b: f64, lag: f64) -> ByHand {
     })
 }
 
-/// Superposed steps: `(begins_s, input)`, from rest under no input.
+/// Superposed steps `(begins_s, input)`, from rest without input.
 fn superposed(steps: &[(f64, f64)], tau_s: f64, by_hand: &ByHand, t: f64) -> (f64, f64) {
     let mut before = 0.0;
     let (mut y, mut v) = (0.0, 0.0);
@@ -68,7 +68,7 @@ fn superposed(steps: &[(f64, f64)], tau_s: f64, by_hand: &ByHand, t: f64) -> (f6
 /// Delays in sample periods: none, part of a step, whole steps, many steps.
 const DELAYS: [f64; 6] = [0.0, 0.4, 1.0, 3.0, 3.7, 57.3];
 
-/// Processes without their delay, and their step responses.
+/// Processes and their step responses without the delay.
 fn processes(tau_s: f64) -> [(Soiptd, ByHand); 4] {
     let new = |k, lag, body| Soiptd::new(k, lag, body, tau_s).unwrap();
     [
@@ -128,8 +128,8 @@ fn fixed_steps_match_the_method_of_steps() {
     }
 }
 
-// The same input edges, none of them on a common grid with the instants looked at: steps of
-// 3.7, 11.3 and 0.9 ms in turn, cut where the input changes.
+// The same input edges, none on a common grid with the output times: steps of 3.7, 11.3 and 0.9 ms in turn, cut
+// where the input changes.
 #[test]
 fn variable_steps_match_the_method_of_steps() {
     let steps: [(f64, f64); 3] = [(0.0, 1.0), (0.4123, -1.0), (1.3017, 0.5)];
@@ -168,8 +168,8 @@ fn after_200_steps(process: &Soiptd) -> f64 {
     simulated.output()
 }
 
-// The response is symmetric in the lags: with T (1 +/- e/2) it is the one of equal lags T up to a
-// term in e^2, a few tenths of it here. At e = 1e-3 partial fractions still hold to 1e-16 / 1e-3.
+// The response is symmetric in the lags: with the lags T (1 +/- e/2) it is that of equal lags T up to a term in
+// e^2, a few tenths of it here. At e = 1e-3 partial fractions are still accurate to 1e-16 / 1e-3.
 #[test]
 fn nothing_happens_where_the_lags_meet() {
     let tau_s = 0.0137;
@@ -183,15 +183,15 @@ fn nothing_happens_where_the_lags_meet() {
     assert!((at(0.0) - equal).abs() < 1e-13);
     assert!((at(1e-3) - near).abs() < 1e-12);
     assert!((at(1e-3) - equal).abs() < 0.5 * 1e-6);
-    // Neither e^2 = 1e-18 nor the division by the difference of the lags may be seen.
+    // Neither e^2 = 1e-18 nor a division by the difference of the lags may appear.
     for e in [1e-9, -1e-9] {
         assert!((at(e) - equal).abs() < 1e-13, "{e}: {}", at(e) - equal);
     }
 }
 
-// Without damping s = b (t^2/2 - T t + T^2 g), g = 1 - e^(-t/T). Damping a divides by 1 + a/s, so
-// s(a) = s - a I s + a^2 I^2 s - ..., I the integral: I s = b (t^3/6 - T t^2/2 + T^2 t - T^3 g).
-// The next term is a^3 t^5/120: below 1e-18 at a = 1e-6. At a = 1 partial fractions hold.
+// Without damping s = b (t^2/2 - T t + T^2 g) with g = 1 - e^(-t/T). Damping a divides by 1 + a/s, so s(a) = s -
+// a I s + a^2 I^2 s - ..., with the integral I: I s = b (t^3/6 - T t^2/2 + T^2 t - T^3 g). The next term is a^3
+// t^5/120: below 1e-18 at a = 1e-6. At a = 1 partial fractions are accurate.
 #[test]
 fn damping_fades_away_without_a_jump() {
     let (lag, tau_s) = (0.05, 0.0137);
@@ -259,8 +259,8 @@ mod random {
             ..Config::default()
         })]
 
-        // Two implementations that share the transition only: rounding of 200 steps, of which each
-        // is a few ulps of the largest output.
+        // Two implementations that share only the transition. The difference is the rounding of 200 steps, a few
+        // roundings of the largest output each.
         #[test]
         fn fixed_and_variable_steps_agree(
             gain in prop_oneof![-20.0..-0.1, 0.1..20.0],

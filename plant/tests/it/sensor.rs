@@ -1,4 +1,4 @@
-//! The sensor's noise and rounding against their predicted statistics.
+//! Noise and rounding of the sensor against their predicted statistics.
 
 use onecycle_plant::{Noise, Sensor};
 
@@ -24,8 +24,8 @@ fn variance(values: &[f64]) -> f64 {
         / values.len() as f64
 }
 
-// Of n normal readings the mean has a standard error sigma / sqrt(n), the variance sqrt(2/n) of
-// itself, a product of neighbours sigma^2 / sqrt(n): three of each.
+// For n normal readings the mean has a standard error of sigma / sqrt(n), the variance of sqrt(2/n) of itself, a
+// product of neighbours of sigma^2 / sqrt(n): three of each.
 #[test]
 fn noise_is_white_with_the_given_sigma() {
     let sigma = 0.02;

@@ -1,4 +1,4 @@
-//! Signatures of simulated relay experiments: what they must not depend on, and by how much they do.
+//! Signatures of simulated relay experiments: what they do not depend on, and how well.
 
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::signature::{LENGTH, Signature};
@@ -16,7 +16,7 @@ fn process(k: f64, scale: f64) -> Soiptd {
     Soiptd::new(k, t_prop_s, t_body_s, tau_s).unwrap()
 }
 
-/// Thirty periods with a bias of the input, so that the halves of a cycle differ.
+/// Thirty periods with an input bias, so that the halves of a cycle differ.
 fn experiment(k: f64, scale: f64) -> Experiment {
     Experiment::new(process(k, scale), scale * SAMPLE_S, 30.0 * scale * PERIOD_S)
         .with_input_bias(0.2)
@@ -27,7 +27,7 @@ fn relay() -> Relay {
     Relay::new(settings).unwrap()
 }
 
-/// The relay as it is wired to a process of negative gain.
+/// The relay with reversed output, for a process of negative gain.
 struct Reversed(Relay);
 
 impl Controller for Reversed {
@@ -51,7 +51,7 @@ fn last_cycle(trace: &Trace) -> Cycle {
         .unwrap()
 }
 
-/// Of the last cycle, in a window that begins seven samples before it; the bins of the window in a
+/// Signature of the last cycle, in a window that begins seven samples before it; and the number of bins per
 /// period.
 fn signature<const BINS: usize>(trace: &Trace) -> (Signature, f64) {
     let cycle = last_cycle(trace);
@@ -74,7 +74,7 @@ fn apart(a: &[f32; LENGTH], b: &[f32; LENGTH]) -> f32 {
         .fold(0.0, f32::max)
 }
 
-// The output is minus the other, to the bit, and so are its mean and its sign.
+// The output is minus the other to the bit, and so are its mean and its sign.
 #[test]
 fn a_negative_gain_is_the_same_signature() {
     let (positive, _) = signature::<512>(&run(&experiment(1.0, 1.0), &mut relay()));
@@ -85,8 +85,8 @@ fn a_negative_gain_is_the_same_signature() {
     assert_eq!(negative.amplitude, positive.amplitude);
 }
 
-// The switches do not move, and what is left is rounding, once of f64 and once of f32: values of up
-// to 6 (the samples in a period) within 2^-22.
+// The switches do not move; the difference is one rounding of f64 and one of f32: values up to 6 (the logarithm
+// of the samples in a period) within 2^-22.
 #[test]
 fn gain_and_offset_leave_only_rounding() {
     let (unit, _) = signature::<512>(&run(&experiment(1.0, 1.0), &mut relay()));
@@ -101,7 +101,7 @@ fn gain_and_offset_leave_only_rounding() {
     assert!((offset.centre - unit.centre - 5.3).abs() < 1e-9);
 }
 
-// Ten times slower in all its times, sampled ten times more slowly: the same numbers of samples.
+// Ten times slower in all times and sampled ten times more slowly: the same numbers of samples.
 #[test]
 fn the_time_scale_leaves_only_rounding() {
     let (fast, _) = signature::<512>(&run(&experiment(1.0, 1.0), &mut relay()));
@@ -110,8 +110,8 @@ fn the_time_scale_leaves_only_rounding() {
     assert!(apart < 2.4e-7, "{apart}");
 }
 
-// Bins of 1, 2, 4 and 8 samples: up to 25 / n^2 of the amplitude apart for n bins in a period, and
-// as much again for the mean and the scale.
+// Bins of 1, 2, 4 and 8 samples: up to 25 / n^2 of the amplitude apart for n bins per period, and as much again
+// for mean and scale.
 #[test]
 fn resolutions_agree() {
     let trace = run(&experiment(1.0, 1.0), &mut relay());
@@ -131,10 +131,10 @@ fn resolutions_agree() {
     }
 }
 
-// A bias makes one half the longer, and the sign is right on either side. The parts' amplitude is short
-// of the samples' by what averaging a sine over w = 2 pi / 32 takes off its top: w^2 / 24 = 1.6e-3
-// with the top in the middle of a part, w^2 / 6 = 6.4e-3 with it between two; the third harmonic
-// moves that by less than a fifth.
+// A bias makes one half longer; the sign is right on either side. The amplitude of the parts is smaller than
+// that of the samples by what averaging a sine over w = 2 pi / 32 takes off its top: w^2 / 24 = 1.6e-3 with the
+// top in the middle of a part, w^2 / 6 = 6.4e-3 with the top between two. The third harmonic changes that by
+// less than a fifth.
 #[test]
 fn signs_and_sizes_are_those_of_the_cycle() {
     for input_bias in [-0.5, -0.2, 0.0, 0.2, 0.5] {

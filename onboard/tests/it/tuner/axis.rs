@@ -1,11 +1,11 @@
-//! One axis for a tuner to tune: a process on the grid of its ticks, with a bias, noise and a ground.
+//! Simulated axis: a process on the grid of the ticks, with a bias, noise and a ground.
 
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::control::Measurement;
 use onecycle_onboard::transition::{State, Transition};
 use onecycle_onboard::tuner::Tuner;
 
-/// Noise of a generator of one's own, the same bits for the same seed: sums of twelve uniform numbers.
+/// Noise with the same bits for the same seed: sums of twelve uniform numbers.
 pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
@@ -22,13 +22,13 @@ impl Noise {
         low + (high - low) * self.uniform()
     }
 
-    /// Of unit variance.
+    /// Unit variance.
     pub(crate) fn normal(&mut self) -> f64 {
         (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
     }
 }
 
-/// The axis.
+/// The simulated axis.
 pub(crate) struct Axis {
     pub(crate) process: Soiptd,
     pub(crate) sample_s: f64,
@@ -44,7 +44,7 @@ pub(crate) struct Axis {
 }
 
 impl Axis {
-    /// At rest at zero; the dead time is rounded to ticks.
+    /// At rest at zero; the dead time is rounded to whole ticks.
     pub(crate) fn new(process: Soiptd, sample_s: f64, seed: u64) -> Self {
         let ticks = (process.tau_s() / sample_s).round() as usize;
         Self {
@@ -61,7 +61,7 @@ impl Axis {
         }
     }
 
-    /// Another process from now on, from the state that there is.
+    /// Continues as another process from the present state.
     pub(crate) fn becomes(&mut self, process: Soiptd) {
         let ratio = self.process.k_over_t_body() / process.k_over_t_body();
         self.state.y *= ratio;
@@ -99,7 +99,7 @@ impl Axis {
         self.tick += 1;
     }
 
-    /// Ticks under a tuner until `until` says so; the number of them.
+    /// Runs ticks under a tuner until `until` returns true; returns the number of ticks.
     pub(crate) fn fly(
         &mut self,
         tuner: &mut Tuner<'_>,

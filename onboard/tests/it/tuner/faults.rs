@@ -1,8 +1,8 @@
-//! 100,000 runs in which something goes wrong: no guard is late by a tick, and nothing but the controller
-//! of an unbroken test is ever in force.
+//! 100,000 runs with a fault: no guard is a tick late, and an unproven controller never stays in use after a
+//! fault.
 //!
-//! What must happen at a tick is worked out here from the samples alone, in double precision, and held
-//! against what the tuner does in that very tick.
+//! The required reaction is computed here from the samples alone, in double precision, and compared with the
+//! tuner in every tick.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -15,14 +15,14 @@ use onecycle_onboard::{RelaySettings, Soiptd};
 use super::axis::{Axis, Noise};
 
 const SAMPLE_S: f64 = 0.002;
-/// Longer than any test here takes to its controller and four periods beyond.
+/// Longer than any test here takes until its controller and four periods after.
 const SECONDS: f64 = 4.0;
-/// Ticks that a run goes on after its test has ended.
+/// Ticks after the end of a test.
 const AFTERWARDS: usize = 10;
-/// Single precision over a run: limits of time that are nearer than this are not judged.
+/// Rounding of single precision over a run: nearer to a limit of time both reactions are accepted.
 const ROUNDING_S: f64 = 2e-4;
 
-/// What goes wrong.
+/// Fault of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Fault {
     None,
@@ -62,14 +62,14 @@ const FAULTS: [Fault; 16] = [
     Fault::GainTurns,
 ];
 
-/// What the tuner is told at a tick.
+/// Input of the tuner at a tick.
 struct Told {
     time_s: f64,
     measurement: Measurement,
     reference: f32,
 }
 
-/// The samples so far, and what they ask for.
+/// The samples so far, and the reaction that they require.
 struct Judge {
     limits: Limits,
     last_s: f64,
@@ -82,12 +82,12 @@ struct Judge {
 enum Must {
     End,
     GoOn,
-    /// So near a limit of time that rounding decides.
+    /// So close to a limit of time that rounding decides.
     Either,
 }
 
 impl Judge {
-    /// In a test, or out of one, where the phase has a relay or not.
+    /// Required reaction at a tick, in a test or outside, with or without a relay.
     fn tick(&mut self, told: &Told, phase: TunerPhase, is_proven: bool) -> Must {
         let Measurement { value, rate, age_s } = told.measurement;
         let rate = rate.unwrap_or(0.0);
@@ -203,7 +203,7 @@ impl Run {
         }
     }
 
-    /// The next tick as the tuner is told of it; faults of the process are done to it.
+    /// Input of the tuner at the next tick. Faults of the process are applied to the process.
     fn told(&mut self, tick: usize, frozen: &mut Option<Measurement>) -> Told {
         let measurement = self.axis.measure();
         let mut told = Told {
@@ -245,7 +245,7 @@ impl Run {
         told
     }
 
-    /// The reason for which the test ended, if it did.
+    /// Fault of the run, and the reason for which the test ended, if it did.
     fn fly(mut self, seed: u64) -> (Fault, Option<Abort>, bool) {
         let mut judge = Judge {
             limits: self.settings.limits,
@@ -314,7 +314,7 @@ impl Run {
     }
 }
 
-/// The arrows of the tuner's table, but for those to Aborted.
+/// Transitions in the tuner's table, except those to Aborted.
 fn is_a_way(from: TunerPhase, to: TunerPhase) -> bool {
     from == to
         || matches!(
@@ -345,7 +345,7 @@ fn fly(seeds: Range<u64>) {
         };
         *ends.entry((fault, end)).or_default() += 1;
     }
-    // Every reason is met, so that nothing here is vacuous.
+    // Every reason must occur, so that no check is empty.
     for (fault, end) in [
         (Fault::None, "Proven"),
         (Fault::None, "Duration"),
