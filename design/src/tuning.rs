@@ -19,6 +19,8 @@
 //! The candidates are the optima of the draws: each of them keeps the specified margin on a likely process. An
 //! unconstrained search over both gains finds controllers of the same expected loss with a third of the margin.
 
+use std::f64::consts::FRAC_PI_2;
+
 use crate::closed_loop::{ise, margins};
 use crate::controller::{Controller, Form};
 use crate::model::Model;
@@ -58,6 +60,19 @@ impl Specification {
             ..self
         }
     }
+
+    /// Checks the values, as [`design()`] does.
+    ///
+    /// # Errors
+    /// [`DesignError::PhaseMargin`] outside the open interval from 0 to `pi/2`.
+    pub fn check(&self) -> Result<(), DesignError> {
+        let margin_rad = self.phase_margin_rad;
+        if margin_rad > 0.0 && margin_rad < FRAC_PI_2 {
+            Ok(())
+        } else {
+            Err(DesignError::PhaseMargin(margin_rad))
+        }
+    }
 }
 
 /// Controller with its cost and margins on one model.
@@ -81,7 +96,7 @@ pub enum DesignError {
     PhaseMargin(f64),
     /// The gain or the time constants of the model are so large or small that the controller gains or the cost
     /// overflow.
-    #[error("the optimal gains of this process are out of range")]
+    #[error("the process is too extreme: its optimal gains or their cost cannot be represented")]
     Overflow,
 }
 

@@ -95,6 +95,8 @@ struct Search<'a> {
 impl Search<'_> {
     /// The main loop: steps 1 to 8 of the [module](self).
     fn run(&mut self) -> Result<Identified, Verdict> {
+        let specification = &self.options.specification;
+        specification.check().map_err(Verdict::NoController)?;
         let relay = find_relay(self.signals)?;
         let most = self.options.cycles.clamp(1, MOST_CYCLES);
         for stretch in oscillation::stretches(self.signals, &relay, most)? {
