@@ -1,7 +1,8 @@
 //! onecycle itself, tract and candle.
 
 use candle_core::{Device, Tensor};
-use onecycle_lab::learn::train::{Layer, Matrix, Network, OneThread};
+use onecycle_lab::learn::train::{Layer, Matrix, Network};
+use onecycle_lab::workers::OneThread;
 use onecycle_onboard::classify::classify_by;
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::{LENGTH, Signature};

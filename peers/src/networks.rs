@@ -35,7 +35,7 @@ impl Case {
         samples: Vec<Vec<f32>>,
         model: PathBuf,
     ) -> Result<Self, Failure> {
-        std::fs::write(&model, onnx::export(&network, normalisation.as_ref())?)?;
+        std::fs::write(&model, onnx::export(&network, normalisation.as_ref(), &[])?)?;
         let expected = (samples.iter())
             .map(|sample| in_double(&network, normalisation.as_ref(), sample))
             .collect();

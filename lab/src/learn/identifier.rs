@@ -237,11 +237,7 @@ impl IdentifierRecipe {
                 weight: self.cost_weight,
                 scale: self.cost_scale,
             },
-            method: OptimizerMethod::Adam {
-                b1: 0.9,
-                b2: 0.999,
-                decay: 0.0,
-            },
+            method: OptimizerMethod::ADAM,
             schedule: Schedule {
                 rate: self.rate,
                 warm_up: WARM_UP_EPOCHS,

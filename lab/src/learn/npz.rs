@@ -194,7 +194,7 @@ pub fn write(columns: &[Column]) -> Vec<u8> {
 }
 
 /// Reads an archive of arrays with the names, widths and types of `like` and this number of rows. `None`
-/// for any bytes that [`write`] would not have written: nothing in them is trusted.
+/// for any bytes that [`write()`] would not have written: nothing in them is trusted.
 #[must_use]
 pub fn read(bytes: &[u8], like: &[Column], rows: usize) -> Option<Vec<Column>> {
     let mut at = 0_usize;

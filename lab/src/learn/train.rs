@@ -38,8 +38,6 @@ mod batch_norm;
 mod checkpoint;
 mod data;
 mod density;
-mod few_rows;
-mod kernel;
 mod layer;
 mod loss;
 mod matrix;

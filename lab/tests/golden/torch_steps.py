@@ -15,7 +15,7 @@ import pathlib
 import torch
 
 INPUTS, HIDDEN, CLASSES, BATCH = 5, 8, 4, 6
-DIMENSION, COMPONENTS = 3, 2
+DIMENSION = 3
 
 
 def exact(*shape):
@@ -72,16 +72,10 @@ def gaussian(outputs):
     return torch.distributions.MultivariateNormal(outputs[..., :d], precision_matrix=precision)
 
 
-def density(outputs, values, components):
+def density(outputs, values):
     """Negative log likelihood, its gradient."""
     outputs = outputs.double().requires_grad_()
-    if components == 1:
-        distribution = gaussian(outputs)
-    else:
-        shares = torch.distributions.Categorical(logits=outputs[:, :components])
-        blocks = outputs[:, components:].unflatten(1, (components, -1))
-        distribution = torch.distributions.MixtureSameFamily(shares, gaussian(blocks))
-    loss = -distribution.log_prob(values.double()).mean()
+    loss = -gaussian(outputs).log_prob(values.double()).mean()
     loss.backward()
     return {
         "outputs": numbers(outputs),
@@ -123,10 +117,7 @@ def main():
         "after_forward": tensors(net),
         "after_sgd": steps(sgd, inputs, classes),
         "after_adam": steps(adam, inputs, classes),
-        "gaussian": density(exact(BATCH, size), exact(BATCH, DIMENSION), 1),
-        "mixture": density(
-            exact(BATCH, COMPONENTS * (1 + size)), exact(BATCH, DIMENSION), COMPONENTS
-        ),
+        "gaussian": density(exact(BATCH, size), exact(BATCH, DIMENSION)),
     }
     (here / "torch_steps.json").write_text(json.dumps(golden, indent=1) + "\n")
 

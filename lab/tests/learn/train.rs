@@ -3,6 +3,7 @@
 mod files;
 mod gradients;
 mod learning;
+mod matrix;
 mod torch;
 
 use onecycle_lab::learn::train::{Layer, Matrix, Network};

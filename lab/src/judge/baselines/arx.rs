@@ -8,8 +8,7 @@
 //!
 //! Before the estimator stand, as there: a Butterworth low pass of second order and a high pass of first
 //! order on both signals, and only every so many samples go on. The rate is the difference of the
-//! recorded output, or a gyroscope's where there is one ([`identify_with_rate`]). Both signals are scaled
-//! to a root mean square of one, so that the initial covariance is weak whatever their units, and the
+//! recorded output. Both signals are scaled to a root mean square of one, so that the initial covariance is weak whatever their units, and the
 //! estimator waits until the high pass has forgotten what was before the recording.
 //!
 //! The model becomes a process by its poles and its first moments:
@@ -201,23 +200,6 @@ pub fn identify(
 ) -> Result<BaselineAnswer, BaselineError> {
     let model = Model::of_differences(signals, settings)?;
     BaselineAnswer::of_process(model.process(signals.sample_period_s)?, phase_margin_rad)
-}
-
-/// The same with the rate (output unit / s) of a sensor of its own, a value a sample.
-///
-/// # Errors
-/// Those of [`identify`].
-pub fn identify_with_rate(
-    signals: &Signals<'_>,
-    rate: &[f64],
-    settings: &ArxSettings,
-    phase_margin_rad: f64,
-) -> Result<BaselineAnswer, BaselineError> {
-    let model = Model::of(signals, rate, settings)?;
-    BaselineAnswer::of_process(
-        model.process(0.5 * signals.sample_period_s)?,
-        phase_margin_rad,
-    )
 }
 
 /// What the estimator ends with, in the units of the recording.

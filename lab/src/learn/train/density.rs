@@ -1,4 +1,4 @@
-//! A network's outputs as a density: a Gaussian of any dimension, or a mixture of several.
+//! A network's outputs as a density: a Gaussian of any dimension.
 //!
 //! ```text
 //! outputs of a Gaussian of dimension D:
@@ -7,20 +7,13 @@
 //!
 //! -ln N(y) = D/2 ln(2 pi) - sum_i l_i + w^T w / 2
 //! d/dmu = -L w,   d/dl_i = w_i (y - mu)_i L_ii - 1,   d/dL_ij = w_j (y - mu)_i
-//!
-//! outputs of a mixture of M: M logits a, then M Gaussians;  pi = softmax(a)
-//! -ln p(y) = -ln sum_m pi_m N_m(y),   r_m = pi_m N_m(y) / p(y)
-//! d/da_m = pi_m - r_m,   of the Gaussian m: r_m times its own
 //! ```
 //!
-//! The factor of the precision, not of the covariance, because then nothing is divided by.
-//! References: C. M. Bishop, "Mixture density networks", Aston University NCRG/94/004 (1994);
-//! P. M. Williams, "Using neural networks to model conditional multivariate densities", Neural
-//! Computation 8 (1996), for the factor.
+//! The network puts out the factor of the precision, not of the covariance, so that nothing is divided.
+//! Reference: P. M. Williams, "Using neural networks to model conditional multivariate densities", Neural
+//! Computation 8 (1996).
 
 use std::f64::consts::TAU;
-
-use super::softmax::normalise;
 
 /// A Gaussian that a network put out: of dimension `D` its mean, the logarithms of the diagonal of
 /// `L`, then what is below it, row by row.
@@ -123,44 +116,4 @@ pub(super) fn cost_of_mean(
         *to += weight * by_scale / (scale * length) * f64::from(*slope);
     }
     weight * (length - 1.0)
-}
-
-/// Rows of a mixture at work, as long as it has components.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Mixture {
-    /// Logits, then `pi`.
-    shares: Vec<f64>,
-    /// `ln pi_m N_m`, then `r`.
-    parts: Vec<f64>,
-}
-
-impl Mixture {
-    /// `-ln p(y)` and its derivatives with respect to the outputs.
-    pub(super) fn evaluate(
-        &mut self,
-        components: usize,
-        outputs: &[f32],
-        y: &[f32],
-        gradient: &mut [f64],
-    ) -> f64 {
-        let size = Gaussian::outputs(y.len()).max(1);
-        let (logits, blocks) = outputs.split_at(components);
-        let (of_logits, of_blocks) = gradient.split_at_mut(components);
-        self.shares.clear();
-        self.shares.extend(logits.iter().copied().map(f64::from));
-        let log_sum = normalise(&mut self.shares);
-        self.parts.clear();
-        for ((logit, block), gradient) in (logits.iter())
-            .zip(blocks.chunks_exact(size))
-            .zip(of_blocks.chunks_exact_mut(size))
-        {
-            (self.parts).push(f64::from(*logit) - log_sum - gaussian(block, y, gradient));
-        }
-        let loss = -normalise(&mut self.parts);
-        for (m, gradient) in of_blocks.chunks_exact_mut(size).enumerate() {
-            of_logits[m] = self.shares[m] - self.parts[m];
-            (gradient.iter_mut()).for_each(|slope| *slope *= self.parts[m]);
-        }
-        loss
-    }
 }

@@ -18,7 +18,6 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, StandardNormal};
 
 use super::batch_norm::BatchNorm;
-use super::few_rows;
 use super::matrix::Matrix;
 use super::{Purpose, TrainError, expect_size, stream};
 use crate::workers::Workers;
@@ -241,17 +240,14 @@ impl Stage {
     }
 }
 
-/// As [`dense`], and in the time that reading the weights takes where the inputs are a few rows.
+/// As [`dense`], for evaluation.
 pub(super) fn dense_evaluated(
     weight: &Matrix,
     bias: &Matrix,
     input: &Matrix,
     workers: &dyn Workers,
 ) -> Result<Matrix, TrainError> {
-    if input.rows() > few_rows::FEW {
-        return dense(weight, bias, input, workers);
-    }
-    let product = few_rows::times_transposed(input, weight, workers);
+    let product = input.times_transposed_once(weight, workers);
     with_bias(product, weight, bias, input)
 }
 

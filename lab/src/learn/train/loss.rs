@@ -13,7 +13,6 @@
 //! | expected cost        | `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`             |
 //! | Gaussian             | `-ln N(y)` of the mean and the precision that the network puts out    |
 //! | cost-aware Gaussian  | `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)`                   |
-//! | mixture of Gaussians | `-ln sum_m pi_m N_m(y)`                                               |
 //!
 //! **The paper's loss has no optimum but a degenerate one.** `gamma_TT = 1` is the least of the
 //! gammas, so adding a constant `-s` to all outputs, whatever the inputs, divides every
@@ -32,7 +31,7 @@
 //! functions", NAACL (2010), for the cost-augmented one.
 
 use super::data::Batch;
-use super::density::{Gaussian, Mixture, cost_of_mean, gaussian};
+use super::density::{Gaussian, cost_of_mean, gaussian};
 use super::matrix::Matrix;
 use super::softmax::{Logits, Shares, Softmax};
 use super::{TrainError, expect_size};
@@ -89,24 +88,15 @@ pub enum Loss {
         /// `c`, the cost up to which its square counts, and from which it counts itself.
         scale: f64,
     },
-    /// `-ln sum_m pi_m N_m(y)`, `pi_m ~ exp(a_m)`: outputs are the `a`, then the [`Gaussian`]s.
-    /// Reads values.
-    GaussianMixture {
-        /// Length of `y`.
-        dimension: usize,
-        /// Number of Gaussians.
-        components: usize,
-    },
 }
 
-/// Largest vector and most Gaussians: outputs grow with the square of the one, times the other.
+/// Largest dimension of a Gaussian: outputs grow with its square.
 const MOST_DIMENSIONS: usize = 1000;
 
 /// What is used again from sample to sample.
 #[derive(Default)]
 struct Scratch {
     softmax: Softmax,
-    mixture: Mixture,
     gradient: Vec<f64>,
 }
 
@@ -155,13 +145,6 @@ impl Loss {
                 share("weight", weight),
                 positive("scale", scale),
             ],
-            Self::GaussianMixture {
-                dimension,
-                components,
-            } => vec![
-                number("dimension", dimension),
-                number("components", components),
-            ],
         };
         first_out_of_range(checks)
     }
@@ -173,10 +156,6 @@ impl Loss {
             Self::Gaussian { dimension } | Self::CostAwareGaussian { dimension, .. } => {
                 Some(Gaussian::outputs(dimension))
             }
-            Self::GaussianMixture {
-                dimension,
-                components,
-            } => Some(components * (1 + Gaussian::outputs(dimension))),
             _ => None,
         }
     }
@@ -218,11 +197,7 @@ impl Loss {
 
     /// The loss of sample `i`, its derivatives in the scratch.
     fn sample(&self, outputs: &[f32], batch: &Batch, i: usize, scratch: &mut Scratch) -> f64 {
-        let Scratch {
-            softmax,
-            mixture,
-            gradient,
-        } = scratch;
+        let Scratch { softmax, gradient } = scratch;
         let capped = |cap: f64| move |k: usize| f64::from(batch.costs.row(i)[k]).min(cap);
         let truth = || (outputs, batch.classes[i]);
         match *self {
@@ -257,9 +232,6 @@ impl Loss {
                 gaussian(outputs, y, gradient)
                     + cost_of_mean(outputs, (y, slopes), (weight, scale), gradient)
             }
-            Self::GaussianMixture { components, .. } => {
-                mixture.evaluate(components, outputs, batch.values.row(i), gradient)
-            }
         }
     }
 
@@ -273,10 +245,7 @@ impl Loss {
             expect_size("the number of outputs", expected, outputs.columns())?;
         }
         match *self {
-            Self::Gaussian { dimension: length }
-            | Self::GaussianMixture {
-                dimension: length, ..
-            } => return expect_vectors(batch, length),
+            Self::Gaussian { dimension } => return expect_vectors(batch, dimension),
             Self::CostAwareGaussian { dimension, .. } => {
                 return expect_vectors(batch, 2 * dimension);
             }

@@ -134,8 +134,8 @@ impl Network {
             .map(|(_, matrix)| matrix)
     }
 
-    /// The outputs, `batch x out`, of inputs `batch x in`: no dropout, running statistics. Up to
-    /// eight samples come out the same to the bit in whatever company, more of them to rounding.
+    /// The outputs, `batch x out`, of inputs `batch x in`: no dropout, running statistics. A sample has the
+    /// same bits in any batch of two or more; alone it agrees to rounding.
     ///
     /// # Errors
     /// Where the inputs are not as many as the network's.

@@ -108,7 +108,7 @@ impl Softmax {
 }
 
 /// Makes probabilities of `z`; returns `ln sum exp(z)`.
-pub(super) fn normalise(z: &mut [f64]) -> f64 {
+fn normalise(z: &mut [f64]) -> f64 {
     let highest = z.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mut sum = 0.0;
     for value in z.iter_mut() {

@@ -1,11 +1,10 @@
 //! PX4's ARX(2,2).
 
+use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 use onecycle_identify::Signals;
 use onecycle_lab::experiments::signals_of;
-use onecycle_lab::judge::baselines::BaselineError;
-use onecycle_lab::judge::baselines::arx::{
-    ArxSettings, Estimator, Model, identify, identify_with_rate,
-};
+use onecycle_lab::judge::baselines::arx::{ArxSettings, Estimator, Model, identify};
+use onecycle_lab::judge::baselines::{BaselineAnswer, BaselineError};
 use onecycle_plant::FixedStepProcess;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -122,10 +121,12 @@ fn the_filters_decide() {
                 rate
             })
             .collect();
-        let by_sensor = cost(
-            identify_with_rate(&signals, &rate, &scaled, margin()),
-            &truth,
-        );
+        // From the rate itself, which is late by half a sample of the hold.
+        let model = Model::of(&signals, &rate, &scaled).unwrap();
+        let found = model.process(0.5 * SAMPLE_S).unwrap();
+        let pd = pd_at_phase_margin(&found, margin()).unwrap().pd;
+        let process = Some(found);
+        let by_sensor = cost(Ok(BaselineAnswer { process, pd }), &truth);
         for cost in [by_differences, by_sensor] {
             assert!(
                 cost.is_some_and(|cost| cost.abs() < 0.05),
@@ -152,7 +153,7 @@ fn errors_say_what_is_wrong() {
     };
     let found = identify(&signals, &settings, margin());
     assert_eq!(found, Err(BaselineError::Setting("the low pass", 500.0)));
-    let found = identify_with_rate(&signals, &[1.0; 7], &ArxSettings::PX4, margin());
+    let found = Model::of(&signals, &[1.0; 7], &ArxSettings::PX4);
     assert_eq!(found, Err(BaselineError::Uneven));
     assert!(matches!(
         Estimator::new(0.0),

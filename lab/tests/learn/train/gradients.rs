@@ -181,20 +181,10 @@ fn losses_of_classes() {
 #[test]
 fn losses_of_densities() {
     let (_, batch) = classified();
-    for (loss, outputs) in [
-        (Loss::Gaussian { dimension: 3 }, 9),
-        (
-            Loss::GaussianMixture {
-                dimension: 3,
-                components: 4,
-            },
-            40,
-        ),
-    ] {
-        // Gradients are up to ten, and so is 6e-8 of them.
-        let error = worst_error_of_loss(loss, &random(5, outputs, 14), &batch);
-        assert!(error < 1e-6, "{loss:?} {error}");
-    }
+    let loss = Loss::Gaussian { dimension: 3 };
+    // Gradients are up to ten, and so is 6e-8 of them.
+    let error = worst_error_of_loss(loss, &random(5, 9, 14), &batch);
+    assert!(error < 1e-6, "{error}");
 }
 
 // The cost of the mean is beyond its scale for some samples and below it for others; where all slopes
@@ -303,40 +293,22 @@ fn only_the_shifted_softmax_ignores_a_shift() {
     assert!(value(loss, &shifted) < 0.8 * value(loss, &outputs));
 }
 
-// Of one Gaussian, the logit makes no difference, and all else is the same to the last bit.
+// The type that users read agrees with the loss.
 #[test]
-fn mixture_of_one_is_the_gaussian() {
+fn the_loss_is_that_of_the_gaussian() {
     let (_, batch) = classified();
-    let single = random(5, 9, 15);
-    let mut mixture = Matrix::zeros(5, 10);
-    for i in 0..5 {
-        mixture.row_mut(i)[0] = i as f32 - 1.5;
-        mixture.row_mut(i)[1..].copy_from_slice(single.row(i));
-    }
-    let (mut of_single, mut of_mixture) = (Matrix::default(), Matrix::default());
-    let one = Loss::Gaussian { dimension: 3 }
-        .evaluate(&single, &batch, &mut of_single)
+    let outputs = random(5, 9, 15);
+    let loss = Loss::Gaussian { dimension: 3 }
+        .evaluate(&outputs, &batch, &mut Matrix::default())
         .unwrap();
-    let same = Loss::GaussianMixture {
-        dimension: 3,
-        components: 1,
-    }
-    .evaluate(&mixture, &batch, &mut of_mixture)
-    .unwrap();
-    assert!((one - same).abs() < 1e-14, "{one} {same}");
-    for i in 0..5 {
-        assert_eq!(of_mixture.row(i)[0], 0.0);
-        assert_eq!(&of_mixture.row(i)[1..], of_single.row(i));
-    }
-    // The type that users read agrees with the loss.
     let by_type: f64 = (0..5)
         .map(|i| {
             let y: Vec<f64> = batch.values.row(i).iter().map(|y| f64::from(*y)).collect();
-            let gaussian = Gaussian::from_outputs(3, single.row(i)).unwrap();
+            let gaussian = Gaussian::from_outputs(3, outputs.row(i)).unwrap();
             f64::from(batch.weights[i]) / 3.75 * gaussian.negative_log_likelihood(&y)
         })
         .sum();
-    assert!((one - by_type).abs() < 1e-14, "{one} {by_type}");
+    assert!((loss - by_type).abs() < 1e-14, "{loss} {by_type}");
     assert_eq!(Gaussian::from_outputs(3, &[0.0; 8]), None);
 }
 
