@@ -10,6 +10,7 @@ mod output;
 mod pages;
 mod pictures;
 mod report;
+mod results;
 mod settings;
 mod style;
 

@@ -3,6 +3,7 @@
 pub(crate) mod bench;
 pub(crate) mod certificate;
 pub(crate) mod classifier;
+pub(crate) mod cycles;
 pub(crate) mod dataset;
 pub(crate) mod fly;
 pub(crate) mod grid;

@@ -7,6 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use onecycle_lab::judge::evaluate::{Benchmark, Contender, RelayTest};
 
 use super::MOST_THREADS;
+use crate::results::bench::RecordingFormat;
 
 /// A benchmark for identifiers: relay experiments with their truth, and the score of any answers.
 #[derive(Debug, Args)]
@@ -29,13 +30,21 @@ pub(crate) enum BenchAction {
 }
 
 /// How recordings are kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
     /// A file an experiment
     Csv,
     /// One file [needs a build with --features parquet]
     Parquet,
+}
+
+impl From<Format> for RecordingFormat {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::Csv => Self::Csv,
+            Format::Parquet => Self::Parquet,
+        }
+    }
 }
 
 /// Most experiments of a benchmark: what four digits number.

@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use onecycle_identify;
 use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 

@@ -1,6 +1,6 @@
 //! `onecycle bench`: the public benchmark, made and run.
 
-pub(crate) mod folder;
+mod folder;
 mod make;
 mod part;
 mod recordings;

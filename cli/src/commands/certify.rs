@@ -5,7 +5,8 @@ use std::process::ExitCode;
 use indicatif::ProgressBar;
 use onecycle_lab::judge::campaign::{Campaign, Measure, relay_outcome};
 use onecycle_lab::space::Space;
-use onecycle_lab::space::certificate::{Certificate, LeastStable, Summary};
+use onecycle_lab::space::certificate::{Certificate, Summary};
+use onecycle_lab::space::limit_cycle::sampled::{motion, symmetric_cycles};
 use onecycle_lab::space::surface::Direction;
 use onecycle_onboard::Soiptd;
 use rayon::prelude::*;
@@ -15,45 +16,18 @@ use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, progress_bar};
 use crate::pictures::certify::draw;
 use crate::report::certificate;
+use crate::results::certify::{BiasRow, CertifiedProcess, CertifiedSpace, SampledRelay};
 use crate::settings;
-
-/// Under one bias: what is certified, and in how many cases a simulation of the relay of the board
-/// came to a steady oscillation, without trim and with it.
-pub(crate) struct Row {
-    pub(crate) summary: Summary,
-    pub(crate) settled: [usize; 2],
-}
-
-/// What is certified of a space.
-pub(crate) struct Certified {
-    pub(crate) space: Space,
-    pub(crate) least_stable: LeastStable,
-    /// Without bias, of every shape.
-    pub(crate) unbiased: Vec<Certificate>,
-    /// Without bias, at the corners of the box.
-    pub(crate) corners: Vec<Certificate>,
-    pub(crate) rows: Vec<Row>,
-}
-
-impl Certified {
-    /// Whether every process has a stable cycle without bias and, within the trim's limit, with the
-    /// trim under every bias.
-    pub(crate) fn holds(&self) -> bool {
-        self.least_stable.spectral_radius < 1.0
-            && self
-                .rows
-                .iter()
-                .all(|row| row.summary.trimmed == row.summary.processes)
-    }
-}
 
 pub(crate) fn run(arguments: &Certify) -> Result<ExitCode, Failure> {
     let space = settings::space(arguments.space.as_deref())?;
     if !arguments.process.is_empty() {
         let waiting = Waiting::on("looking for limit cycles");
-        let report = certificate::processes(arguments, &space)?;
+        let processes = (arguments.process.iter())
+            .map(|times| process(arguments, times.0, space.beta))
+            .collect::<Result<Vec<_>, Failure>>()?;
         drop(waiting);
-        print(&report)?;
+        print(&certificate::processes(&processes))?;
         return Ok(ExitCode::from(exit::DONE));
     }
     let certified = certify(arguments, space)?;
@@ -75,7 +49,7 @@ pub(crate) fn run(arguments: &Certify) -> Result<ExitCode, Failure> {
 /// Points of the climb's first lattice for each shape of the campaign's, along either coordinate.
 const FINER: usize = 2;
 
-fn certify(arguments: &Certify, space: Space) -> Result<Certified, Failure> {
+fn certify(arguments: &Certify, space: Space) -> Result<CertifiedSpace, Failure> {
     let side = arguments.shapes as usize;
     let shapes = space.shapes(side, side);
     let biases = arguments.biases();
@@ -84,7 +58,7 @@ fn certify(arguments: &Certify, space: Space) -> Result<Certified, Failure> {
     let least_stable = space
         .least_stable(FINER * side, FINER * side)
         .ok_or_else(|| Failure::usage("the space has no process"))?;
-    let certified = Certified {
+    let certified = CertifiedSpace {
         space,
         least_stable,
         unbiased: certificates(&space, &shapes, 0.0, &bar)?,
@@ -115,7 +89,12 @@ fn corners(space: &Space) -> Result<Vec<Certificate>, Failure> {
         .collect()
 }
 
-fn row(space: &Space, shapes: &[Direction], bias: f64, bar: &ProgressBar) -> Result<Row, Failure> {
+fn row(
+    space: &Space,
+    shapes: &[Direction],
+    bias: f64,
+    bar: &ProgressBar,
+) -> Result<BiasRow, Failure> {
     let certificates = certificates(space, shapes, bias, bar)?;
     let mut settled = [0; 2];
     for (settled, trim) in settled.iter_mut().zip([false, true]) {
@@ -128,7 +107,7 @@ fn row(space: &Space, shapes: &[Direction], bias: f64, bar: &ProgressBar) -> Res
             })
             .sum::<Result<usize, Failure>>()?;
     }
-    Ok(Row {
+    Ok(BiasRow {
         summary: Summary::of(bias, &certificates),
         settled,
     })
@@ -179,4 +158,35 @@ fn settles(space: &Space, certificate: &Certificate, trim: bool) -> Result<bool,
     case.sigma = SIMULATED_SIGMA * case.amplitude;
     let outcome = relay_outcome(&campaign, &case).map_err(Failure::usage)?;
     Ok(outcome.steady_at.is_some())
+}
+
+/// A process under every bias.
+fn process(arguments: &Certify, times_s: [f64; 3], beta: f64) -> Result<CertifiedProcess, Failure> {
+    let [t_prop_s, t_body_s, tau_s] = times_s;
+    let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).map_err(Failure::usage)?;
+    let under = |bias: f64| -> Result<_, Failure> {
+        let certificate = Certificate::new(times_s, beta, bias).map_err(Failure::usage)?;
+        let sampled =
+            (arguments.sample_rate).map(|rate_hz| sampled(&process, beta, bias, 1.0 / rate_hz));
+        Ok((certificate, sampled))
+    };
+    Ok(CertifiedProcess {
+        times_s,
+        beta,
+        biases: (arguments.biases().into_iter())
+            .map(under)
+            .collect::<Result<_, _>>()?,
+    })
+}
+
+fn sampled(process: &Soiptd, beta: f64, bias: f64, sample_s: f64) -> SampledRelay {
+    SampledRelay {
+        sample_s,
+        cycles: if bias == 0.0 {
+            symmetric_cycles(process, beta, sample_s)
+        } else {
+            vec![]
+        },
+        motion: motion(process, [beta; 2], bias, sample_s),
+    }
 }

@@ -4,10 +4,9 @@ pub(super) mod folder;
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use onecycle_lab::experiments::Recipe;
-use onecycle_lab::learn::dataset::shards::Manifest;
 use onecycle_lab::learn::identifier;
 
 use self::folder::Folder;
@@ -15,17 +14,8 @@ use super::workers::{Lot, Workers};
 use crate::args;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, tell};
+use crate::results::dataset::DatasetRun;
 use crate::{report, settings};
-
-/// What the command has done.
-pub(crate) struct Done {
-    pub(crate) manifest: Manifest,
-    /// Files that were there, whole.
-    pub(crate) kept: usize,
-    /// Experiments made, with and without an oscillation.
-    pub(crate) made: u64,
-    pub(crate) took: Duration,
-}
 
 pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     if arguments.parquet.is_some() && !cfg!(feature = "parquet") {
@@ -36,23 +26,24 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     let recipe = recipe(arguments.recipe.as_deref())?;
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
-    let (folder, kept, made) = filled(&arguments.into, recipe, arguments.examples, &workers)?;
+    let (folder, files_kept, experiments_made) =
+        filled(&arguments.into, recipe, arguments.examples, &workers)?;
     workers.finish();
     #[cfg(feature = "parquet")]
     if let Some(path) = &arguments.parquet {
         let _waiting = Waiting::on(format!("writing {}", path.display()));
         folder.write_parquet(path)?;
     }
-    let done = Done {
+    let run = DatasetRun {
         manifest: folder.into_manifest(),
-        kept,
-        made,
+        files_kept,
+        experiments_made,
         took: begin.elapsed(),
     };
     print(&if arguments.json {
-        report::dataset::json(&done)
+        report::dataset::json(&run)
     } else {
-        report::dataset::text(&done, &arguments.into)
+        report::dataset::text(&run, &arguments.into)
     })?;
     Ok(ExitCode::from(exit::DONE))
 }

@@ -16,6 +16,7 @@ use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, tell, write_file, write_text};
+use crate::results::grid::GridRun;
 use crate::{pictures, report, settings};
 
 /// Most members whose costs are written unasked: four million numbers, 40 MB.
@@ -25,21 +26,6 @@ const MOST_IN_MATRIX: usize = 2000;
 /// file: a second's work or so.
 const ROWS_PER_THREAD: usize = 2;
 const COSTS_PER_THREAD: usize = 64;
-
-/// What the command has done.
-pub(crate) struct Done {
-    pub(crate) grid: Grid,
-    pub(crate) check: Option<Check>,
-    pub(crate) has_matrix: bool,
-    pub(crate) took: Duration,
-}
-
-impl Done {
-    /// Whether no process was found without a member near; of no check, nothing was.
-    pub(crate) fn holds(&self) -> bool {
-        self.check.is_none_or(|check| check.beyond == 0)
-    }
-}
 
 pub(crate) fn run(arguments: &args::Grid) -> Result<ExitCode, Failure> {
     let begin = Instant::now();
@@ -69,7 +55,7 @@ pub(crate) fn run(arguments: &args::Grid) -> Result<ExitCode, Failure> {
     }))
 }
 
-fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<Done, Failure> {
+fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<GridRun, Failure> {
     let failed = |reason: String| Failure::Settings {
         path: path.to_owned(),
         reason,
@@ -85,7 +71,7 @@ fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<Done, 
         Some(_) => checked(arguments, &grid, workers)?,
         None => file.check,
     };
-    Ok(Done {
+    Ok(GridRun {
         grid,
         check,
         has_matrix: file.matrix.is_some(),
@@ -93,7 +79,7 @@ fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<Done, 
     })
 }
 
-fn make(arguments: &args::Grid, workers: &Workers) -> Result<Done, Failure> {
+fn make(arguments: &args::Grid, workers: &Workers) -> Result<GridRun, Failure> {
     let settings = Settings {
         space: settings::space(arguments.space.as_deref())?,
         deterioration: arguments.deterioration,
@@ -123,7 +109,7 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<Done, Failure> {
     if let Some(out) = &arguments.out {
         write(out, &grid, check.as_ref(), has_matrix, part)?;
     }
-    Ok(Done {
+    Ok(GridRun {
         grid,
         check,
         has_matrix,

@@ -9,11 +9,11 @@ use std::process::ExitCode;
 use onecycle_lab::learn::onnx;
 use onecycle_lab::learn::onnx::Normalisation;
 use onecycle_lab::learn::pack::{
-    PackContents, PackedWeights, Precision, Quantisation, layers, network_of_tensors, quantisation,
+    PackContents, PackedWeights, Precision, layers, network_of_tensors, quantisation,
 };
 use onecycle_lab::learn::train::{Network, Tensor, TensorFile};
 use onecycle_onboard::network::Activation;
-use onecycle_onboard::pack::{DEFAULT, OUTPUTS, Pack, SELF_TEST_TOLERANCE};
+use onecycle_onboard::pack::{DEFAULT, OUTPUTS, Pack};
 use onecycle_onboard::signature::LENGTH;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -23,6 +23,7 @@ use crate::args::{self, PackAction, PackSource};
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_file};
 use crate::report;
+use crate::results::pack::{ImportedPack, VerifiedPack};
 
 /// Most bytes of a pack: a thousand times what one takes. What is larger is something else.
 const MOST_OF_A_PACK: u64 = 1 << 24;
@@ -30,7 +31,7 @@ const MOST_OF_A_PACK: u64 = 1 << 24;
 const MOST_OF_A_MODEL: u64 = 1 << 31;
 
 /// Random signatures that networks are compared on, of seed 1.
-pub(crate) const SAMPLES: usize = 1000;
+const SAMPLES: usize = 1000;
 /// How far what the network sees of them lies from zero: two standard deviations of its inputs.
 const SPREAD: f32 = 2.0;
 
@@ -57,15 +58,13 @@ fn show(arguments: &args::ShowPack) -> Result<ExitCode, Failure> {
 fn verify(arguments: &args::VerifyPack) -> Result<ExitCode, Failure> {
     let bytes = bytes(&arguments.pack)?;
     let pack = read(&arguments.pack, &bytes)?;
-    let worst = pack.self_test();
-    print(&report::pack::verified(
-        &arguments.pack.to_string(),
-        &pack,
-        worst,
-    ))?;
-    // A difference that is no number is not below the tolerance.
-    let passes = worst.is_none_or(|worst| worst <= SELF_TEST_TOLERANCE);
-    Ok(ExitCode::from(if passes {
+    let verified = VerifiedPack {
+        name: arguments.pack.to_string(),
+        pack: &pack,
+        worst: pack.self_test(),
+    };
+    print(&report::pack::verified(&verified))?;
+    Ok(ExitCode::from(if verified.passes() {
         exit::DONE
     } else {
         exit::NO_PROCESS
@@ -165,15 +164,18 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
         .to_bytes()
         .map_err(|error| failed(error.to_string()))?;
     let pack = Pack::read(&made).map_err(|error| failed(error.to_string()))?;
-    let changed: Quantisation = quantisation(&pack, &network, &signatures(&pack))
+    let changed = quantisation(&pack, &network, &signatures(&pack))
         .map_err(|error| failed(error.to_string()))?;
     write_file(&arguments.out, |file| file.write_all(&made))?;
-    print(&report::pack::imported(
-        arguments,
-        &pack,
+    print(&report::pack::imported(&ImportedPack {
+        model: arguments.model.clone(),
+        like: arguments.like.to_string(),
+        out: arguments.out.clone(),
+        pack: &pack,
         brings_normalisation,
-        &changed,
-    ))?;
+        changed,
+        samples: SAMPLES,
+    }))?;
     Ok(ExitCode::from(exit::DONE))
 }
 

@@ -9,7 +9,8 @@ use onecycle_lab::space::phase::LocalRule;
 use crate::args::Phase;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, write_file};
-use crate::report::phase::{Found, json, text};
+use crate::report::phase::{json, text};
+use crate::results::phase::PhaseSearch;
 use crate::{pictures, settings};
 
 pub(crate) fn run(arguments: &Phase) -> Result<ExitCode, Failure> {
@@ -26,10 +27,10 @@ pub(crate) fn run(arguments: &Phase) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.picture {
         pictures::phase::write(path, &space, &optima, &phase)?;
     }
-    let found = Found {
-        space: &space,
-        optima: &optima,
-        phase: &phase,
+    let found = PhaseSearch {
+        space,
+        optima,
+        phase,
     };
     print(&if arguments.json {
         json(&found)

@@ -1,11 +1,11 @@
 //! `onecycle reproduce`: the paper's simulated results, each part worked out, kept and rendered.
 
 mod comparison;
-pub(crate) mod cycles;
+mod cycles;
 mod figures;
 mod grid;
 mod network;
-pub(crate) mod part;
+mod part;
 mod phase;
 mod single;
 
@@ -14,13 +14,14 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use self::part::{Part, Sheet};
+use self::part::Sheet;
 use super::train::classifier::Keep;
 use super::workers::Workers;
 use crate::args::{Name, Reproduce};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, tell, write_text};
 use crate::report::reproduction as report;
+use crate::results::reproduction::ReproducedPart;
 
 pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
@@ -50,7 +51,7 @@ pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
 }
 
 /// A part, worked out or as an earlier run has kept it.
-fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<Part, Failure> {
+fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<ReproducedPart, Failure> {
     let begin = Instant::now();
     let sheet = Sheet::of(name)?;
     let settings = sheet.settings(arguments.quick);

@@ -60,6 +60,16 @@ impl Workers {
             .install(|| (0..count).into_par_iter().map(piece).collect())
     }
 
+    /// Runs pieces that the bar counts from zero; their results are in order.
+    pub(crate) fn map<T: Send>(
+        &self,
+        count: usize,
+        piece: impl Fn(usize) -> T + Send + Sync,
+    ) -> Vec<T> {
+        self.expect(count, 0);
+        self.run(count, piece)
+    }
+
     pub(crate) fn finish(&self) {
         self.bar.finish_and_clear();
     }
@@ -67,8 +77,7 @@ impl Workers {
 
 impl Pieces for Workers {
     fn map<T: Send>(&self, count: usize, piece: impl Fn(usize) -> T + Send + Sync) -> Vec<T> {
-        self.expect(count, 0);
-        self.run(count, piece)
+        Self::map(self, count, piece)
     }
 }
 

@@ -5,6 +5,7 @@
 use std::fmt::Write;
 
 use super::bundle;
+use super::escape::escaped;
 use super::plot::Figure;
 
 /// A heading and what stands below it.
@@ -14,22 +15,6 @@ pub(crate) struct Section {
     pub(crate) title: String,
     /// Components.
     pub(crate) body: String,
-}
-
-/// Text as HTML has it.
-pub(crate) fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            other => out.push(other),
-        }
-    }
-    out
 }
 
 /// A paragraph of a class.

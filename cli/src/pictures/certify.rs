@@ -8,8 +8,8 @@ use onecycle_onboard::Soiptd;
 use plotters::prelude::*;
 
 use super::{Area, BLUE, CAPTION, Drawn, GREY, LABEL, RED, write_svg};
-use crate::commands::certify::Certified;
 use crate::failure::Failure;
+use crate::results::certify::CertifiedSpace;
 
 const SIZE: (u32, u32) = (1180, 480);
 const LOCI_WIDTH: u32 = 590;
@@ -27,7 +27,7 @@ const LEFT: std::ops::Range<f64> = 0.003..10.0;
 const GREEN: RGBColor = RGBColor(70, 140, 80);
 
 /// Draws both and writes them.
-pub(crate) fn draw(path: &Path, certified: &Certified) -> Result<(), Failure> {
+pub(crate) fn draw(path: &Path, certified: &CertifiedSpace) -> Result<(), Failure> {
     write_svg(path, SIZE, |area| {
         let (left, right) = area.split_horizontally(LOCI_WIDTH);
         draw_loci(&left, certified)?;
@@ -35,7 +35,7 @@ pub(crate) fn draw(path: &Path, certified: &Certified) -> Result<(), Failure> {
     })
 }
 
-fn draw_loci(area: &Area<'_>, certified: &Certified) -> Drawn {
+fn draw_loci(area: &Area<'_>, certified: &CertifiedSpace) -> Drawn {
     let beta = certified.space.beta;
     let mut chart = ChartBuilder::on(area)
         .caption("Processes at the corners, and the relay", CAPTION)
@@ -128,7 +128,7 @@ impl Locus {
     }
 }
 
-fn draw_stability(area: &Area<'_>, certified: &Certified) -> Drawn {
+fn draw_stability(area: &Area<'_>, certified: &CertifiedSpace) -> Drawn {
     let biases = || certified.rows.iter().map(|row| row.summary.bias);
     let low = biases().fold(0.0, f64::min);
     let high = biases().fold(0.1, f64::max);

@@ -5,21 +5,18 @@ use std::fmt::Write;
 use onecycle_lab::space::Space;
 use onecycle_lab::space::certificate::{Certificate, Kind, Verdict};
 use onecycle_lab::space::limit_cycle::LimitCycle;
-use onecycle_lab::space::limit_cycle::sampled::{Motion, motion, symmetric_cycles};
-use onecycle_onboard::Soiptd;
+use onecycle_lab::space::limit_cycle::sampled::Motion;
 use serde_json::{Value, json};
 
 use super::json;
 use super::number::significant;
-use crate::args::Certify;
-use crate::commands::certify::{Certified, Row};
-use crate::failure::Failure;
+use crate::results::certify::{BiasRow, CertifiedProcess, CertifiedSpace, SampledRelay};
 use crate::style::{HEADING, REFUSAL, headed, painted, verdict};
 
 /// The report on a space for people.
-pub(crate) fn text(certified: &Certified) -> String {
+pub(crate) fn text(certified: &CertifiedSpace) -> String {
     let mut text = String::new();
-    let Certified { space, rows, .. } = certified;
+    let CertifiedSpace { space, rows, .. } = certified;
     let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
     text.push_str(&headed(&format!(
         "Space   T_prop {}, T_body {}, tau {}\nRelay   beta {}, {:.2} deg\n\n",
@@ -50,7 +47,7 @@ pub(crate) fn text(certified: &Certified) -> String {
     text
 }
 
-fn without_bias(text: &mut String, certified: &Certified) {
+fn without_bias(text: &mut String, certified: &CertifiedSpace) {
     let shapes = certified.unbiased.len();
     let one = certified
         .unbiased
@@ -142,7 +139,7 @@ fn error(ratio: f64) -> String {
     format!("{:+.1} %", 100.0 * (ratio.recip() - 1.0))
 }
 
-fn under_bias(text: &mut String, rows: &[Row]) {
+fn under_bias(text: &mut String, rows: &[BiasRow]) {
     let processes = rows.first().map_or(0, |row| row.summary.processes);
     let _ = writeln!(
         text,
@@ -189,7 +186,7 @@ fn stretch(kind: &Kind) -> String {
 }
 
 /// The report on a space for programs.
-pub(crate) fn json(certified: &Certified) -> String {
+pub(crate) fn json(certified: &CertifiedSpace) -> String {
     let worst = &certified.least_stable;
     let [t_prop_s, t_body_s, tau_s] = worst.times_s;
     let rows: Vec<Value> = certified
@@ -234,27 +231,24 @@ fn corner(certificate: &Certificate) -> Value {
 }
 
 /// The report on single processes.
-pub(crate) fn processes(arguments: &Certify, space: &Space) -> Result<String, Failure> {
+pub(crate) fn processes(processes: &[CertifiedProcess]) -> String {
     let mut text = String::new();
-    for times in &arguments.process {
-        let [t_prop, t_body, tau] = times.0;
+    for process in processes {
+        let [t_prop, t_body, tau] = process.times_s;
         text.push_str(&headed(&format!(
-            "Soiptd   T_prop {t_prop} s, T_body {t_body} s, tau {tau} s, velocity gain 1; relay \
+            "Process  T_prop {t_prop} s, T_body {t_body} s, tau {tau} s, velocity gain 1; relay \
              amplitude 1, beta {}\n",
-            space.beta
+            process.beta
         )));
-        for bias in arguments.biases() {
-            let certificate =
-                Certificate::new(times.0, space.beta, bias).map_err(Failure::usage)?;
-            one_bias(&mut text, &certificate);
-            if let Some(rate_hz) = arguments.sample_rate {
-                let process = Soiptd::new(1.0, t_prop, t_body, tau).map_err(Failure::usage)?;
-                sampled(&mut text, &process, space.beta, bias, 1.0 / rate_hz);
+        for (certificate, sampled) in &process.biases {
+            one_bias(&mut text, certificate);
+            if let Some(sampled) = sampled {
+                sampled_relay(&mut text, sampled);
             }
         }
         text.push('\n');
     }
-    Ok(text)
+    text
 }
 
 fn one_bias(text: &mut String, certificate: &Certificate) {
@@ -309,19 +303,18 @@ fn described(cycle: &LimitCycle) -> String {
     )
 }
 
-fn sampled(text: &mut String, process: &Soiptd, beta: f64, bias: f64, sample_s: f64) {
-    if bias == 0.0 {
-        for cycle in symmetric_cycles(process, beta, sample_s) {
-            let _ = writeln!(
-                text,
-                "    sampled              period {} s ({} samples), amplitude {}",
-                significant(f64::from(2 * cycle.half_period) * sample_s),
-                2 * cycle.half_period,
-                significant(cycle.amplitude),
-            );
-        }
+fn sampled_relay(text: &mut String, sampled: &SampledRelay) {
+    let sample_s = sampled.sample_s;
+    for cycle in &sampled.cycles {
+        let _ = writeln!(
+            text,
+            "    sampled              period {} s ({} samples), amplitude {}",
+            significant(f64::from(2 * cycle.half_period) * sample_s),
+            2 * cycle.half_period,
+            significant(cycle.amplitude),
+        );
     }
-    let settled = match motion(process, [beta; 2], bias, sample_s) {
+    let settled = match &sampled.motion {
         None => return,
         Some(Motion::Stopped) => "the bare relay stops switching".to_owned(),
         Some(Motion::Wandering { period, mean }) => format!(

@@ -9,10 +9,11 @@ use serde::Serialize;
 use super::json::to_text;
 use super::number::significant;
 use super::text::wrapped;
-use crate::commands::grid::Done;
+use crate::pages::escape::escaped;
 use crate::pages::page::{self, Section, page};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series, Shape};
 use crate::pictures::grid as picture;
+use crate::results::grid::GridRun;
 use crate::style::{bare, headed, verdict};
 
 /// Changes with every change that a reader of the summary could notice.
@@ -63,29 +64,29 @@ fn members_per_row(grid: &Grid) -> Vec<usize> {
 }
 
 /// The summary for programs.
-pub(crate) fn json(done: &Done) -> String {
+pub(crate) fn json(run: &GridRun) -> String {
     to_text(&Summary {
         schema: SCHEMA,
-        settings: &done.grid.settings,
-        members: done.grid.members.len(),
-        members_per_row: members_per_row(&done.grid),
-        alpha: Alpha::of(&done.grid),
-        has_matrix: done.has_matrix,
-        check: done.check.as_ref(),
-        holds: done.check.map(|_| done.holds()),
-        seconds: done.took.as_secs_f64(),
+        settings: &run.grid.settings,
+        members: run.grid.members.len(),
+        members_per_row: members_per_row(&run.grid),
+        alpha: Alpha::of(&run.grid),
+        has_matrix: run.has_matrix,
+        check: run.check.as_ref(),
+        holds: run.check.map(|_| run.holds()),
+        seconds: run.took.as_secs_f64(),
     })
 }
 
 /// The summary for people.
-pub(crate) fn text(done: &Done) -> String {
+pub(crate) fn text(run: &GridRun) -> String {
     let mut text = String::new();
     let Settings {
         space,
         deterioration,
         layout,
         gains,
-    } = &done.grid.settings;
+    } = &run.grid.settings;
     let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
     let _ = writeln!(
         text,
@@ -109,10 +110,10 @@ pub(crate) fn text(done: &Done) -> String {
             Gains::Equal => "equal velocity gains",
         }
     );
-    members(&mut text, &done.grid);
-    let _ = writeln!(text, "Time     {} s", significant(done.took.as_secs_f64()));
+    members(&mut text, &run.grid);
+    let _ = writeln!(text, "Time     {} s", significant(run.took.as_secs_f64()));
     text = headed(&text);
-    if let Some(check) = &done.check {
+    if let Some(check) = &run.check {
         describe(&mut text, check, &limit);
     }
     text
@@ -178,13 +179,13 @@ fn describe(text: &mut String, check: &Check, limit: &str) {
 }
 
 /// The summary and its pictures on a page.
-pub(crate) fn html(done: &Done) -> Result<String, CandidateError> {
-    let grid = &done.grid;
+pub(crate) fn html(run: &GridRun) -> Result<String, CandidateError> {
+    let grid = &run.grid;
     let space = &grid.settings.space;
     let lead = page::paragraph(
         "lead",
         "Processes that stand for a space: every process of it has a member near, whose controller costs it little.",
-    ) + &format!("<pre>{}</pre>\n", page::escaped(&bare(&text(done))));
+    ) + &format!("<pre>{}</pre>\n", escaped(&bare(&text(run))));
     let mut shapes: Vec<_> = grid.members.iter().map(|member| member.direction).collect();
     shapes.dedup();
     let of = |name: &str, points: Vec<(f64, f64)>, hue| {

@@ -4,27 +4,20 @@ use std::fmt::Write;
 
 use onecycle_lab::space::Space;
 use onecycle_lab::space::phase::{AppliedRule, LocalRule};
-use onecycle_lab::space::phase::{DistinguishingPhase, LocalOptima};
 use serde::Serialize;
 
 use super::json::to_text;
 use super::number::significant;
+use crate::results::phase::PhaseSearch;
 
 const SCHEMA: &str = "onecycle.phase/1";
 
 /// Most lines of the table for people.
 const MOST_LINES: f64 = 16.0;
 
-/// What the command found, and in what.
-pub(crate) struct Found<'a> {
-    pub(crate) space: &'a Space,
-    pub(crate) optima: &'a LocalOptima,
-    pub(crate) phase: &'a DistinguishingPhase,
-}
-
 /// Plain text, at most 100 columns.
-pub(crate) fn text(found: &Found<'_>) -> String {
-    let Found { space, phase, .. } = found;
+pub(crate) fn text(found: &PhaseSearch) -> String {
+    let PhaseSearch { space, phase, .. } = found;
     let mut text = String::new();
     let shapes = match phase.rules.len() {
         1 => "one shape".to_owned(),
@@ -86,7 +79,7 @@ fn times([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> String {
 }
 
 /// What every phase costs, over whole degrees that hold all local rules.
-fn table(text: &mut String, found: &Found<'_>) {
+fn table(text: &mut String, found: &PhaseSearch) {
     let margin_deg = found.space.phase_margin_deg;
     let (low, high) = found.optima.lead_range_rad();
     let range_deg = (high - low).to_degrees();
@@ -157,10 +150,10 @@ struct Times {
 }
 
 /// Deteriorations are fractions, and null where they are infinite.
-pub(crate) fn json(found: &Found<'_>) -> String {
+pub(crate) fn json(found: &PhaseSearch) -> String {
     to_text(&Report {
         schema: SCHEMA,
-        space: found.space,
+        space: &found.space,
         distinguishing: Local::of(&found.phase.best),
         minimax: Rule::of(&found.phase.minimax),
         rules: found.phase.rules.iter().map(Local::of).collect(),

@@ -9,15 +9,12 @@
 
 use std::path::{Path, PathBuf};
 
+use onecycle_lab::judge::evaluate::Truth;
 use onecycle_lab::judge::evaluate::files::{TableError, read_truth};
-use onecycle_lab::judge::evaluate::{Benchmark, Truth};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
-use crate::args::Format;
 use crate::failure::Failure;
-
-/// Changes with the folder, so that results are never compared across versions.
-pub(crate) const FORMAT: &str = "onecycle.benchmark/1";
+use crate::results::bench::{BenchManifest, FORMAT};
 
 pub(super) const MANIFEST: &str = "benchmark.json";
 pub(super) const TRUTH: &str = "truth.csv";
@@ -25,15 +22,6 @@ pub(super) const RULES: &str = "README.md";
 pub(super) const RECORDINGS: &str = "recordings";
 #[cfg(feature = "parquet")]
 pub(super) const PARQUET: &str = "recordings.parquet";
-
-/// What a folder says of itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Manifest {
-    pub(crate) format: String,
-    #[serde(flatten)]
-    pub(crate) benchmark: Benchmark,
-    pub(crate) recordings: Format,
-}
 
 /// The recording of an experiment, in the folder.
 pub(super) fn recording(folder: &Path, number: u64) -> PathBuf {
@@ -61,7 +49,7 @@ pub(super) fn refuse_filled(out: &Path) -> Result<(), Failure> {
 }
 
 /// Reads what a folder holds besides the recordings.
-pub(super) fn read(folder: &Path) -> Result<(Manifest, Vec<Truth>), Failure> {
+pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure> {
     let path = folder.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(|error| {
         unreadable(
@@ -84,7 +72,7 @@ pub(super) fn read(folder: &Path) -> Result<(Manifest, Vec<Truth>), Failure> {
             ),
         ));
     }
-    let manifest: Manifest = serde_json::from_str(&text).map_err(malformed)?;
+    let manifest: BenchManifest = serde_json::from_str(&text).map_err(malformed)?;
     let path = folder.join(TRUTH);
     let truths = read_truth(&read_text(&path)?).map_err(|error| refused(&path, &error))?;
     if truths.len() as u64 != manifest.benchmark.experiments {

@@ -7,12 +7,13 @@ use onecycle_lab::judge::evaluate::files::truth_csv;
 use onecycle_lab::judge::evaluate::{Benchmark, Recorded, Truth};
 use onecycle_link::{Recording, write_csv};
 
-use super::folder::{self, FORMAT, MANIFEST, Manifest, RULES, TRUTH, recording};
+use super::folder::{self, MANIFEST, RULES, TRUTH, recording};
 use crate::args::{Format, MakeBench};
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_file};
 use crate::report;
+use crate::results::bench::{BenchManifest, FORMAT};
 
 pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
     if arguments.format == Format::Parquet && !cfg!(feature = "parquet") {
@@ -23,13 +24,13 @@ pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     folder::refuse_filled(out)?;
     let workers = Workers::new(arguments.threads)?;
-    let manifest = Manifest {
+    let manifest = BenchManifest {
         format: FORMAT.to_owned(),
         benchmark: Benchmark {
             experiments: arguments.cases,
             seed: arguments.seed,
         },
-        recordings: arguments.format,
+        recordings: arguments.format.into(),
     };
     // Beside the folder, so that it can be moved there.
     let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());

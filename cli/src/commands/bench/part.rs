@@ -9,15 +9,16 @@ use std::path::PathBuf;
 use onecycle_lab::judge::evaluate::Record;
 use serde::{Deserialize, Serialize};
 
-use super::folder::{Manifest, read_text, unreadable};
+use super::folder::{read_text, unreadable};
 use crate::failure::Failure;
 use crate::output::append_line;
+use crate::results::bench::BenchManifest;
 
 /// Whose results they are.
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Head {
     pub(super) program: String,
-    pub(super) benchmark: Manifest,
+    pub(super) benchmark: BenchManifest,
     pub(super) methods: Vec<String>,
 }
 

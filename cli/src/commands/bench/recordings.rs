@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use onecycle_link::{CsvOptions, Recording};
 
-use super::folder::{Manifest, recording};
-use crate::args::Format;
+use super::folder::recording;
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
+use crate::results::bench::{BenchManifest, RecordingFormat};
 
 /// Where recordings are read from.
 pub(super) enum Recordings {
@@ -20,13 +20,13 @@ pub(super) enum Recordings {
 
 impl Recordings {
     /// Of a folder with this manifest.
-    pub(super) fn open(folder: &Path, manifest: &Manifest) -> Result<Self, Failure> {
+    pub(super) fn open(folder: &Path, manifest: &BenchManifest) -> Result<Self, Failure> {
         match manifest.recordings {
-            Format::Csv => Ok(Self::Csv(folder.to_owned())),
+            RecordingFormat::Csv => Ok(Self::Csv(folder.to_owned())),
             #[cfg(feature = "parquet")]
-            Format::Parquet => table::Table::open(folder).map(Self::Parquet),
+            RecordingFormat::Parquet => table::Table::open(folder).map(Self::Parquet),
             #[cfg(not(feature = "parquet"))]
-            Format::Parquet => Err(super::folder::unreadable(
+            RecordingFormat::Parquet => Err(super::folder::unreadable(
                 &folder.join(super::folder::MANIFEST),
                 "this build cannot read Parquet: make one with cargo build --release --features \
                  parquet, make the folder with --format csv, for the same seed gives the same \

@@ -18,7 +18,7 @@ use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
 use crate::output::{print, tell, write_file};
 use crate::report;
-use crate::report::bench::Results;
+use crate::results::bench::BenchResults;
 
 pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
     let (manifest, truths) = folder::read(&arguments.folder)?;
@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
         )?;
         records.splice(0..0, ours);
     }
-    let results = Results::of(&head.benchmark, &records);
+    let results = BenchResults::of(&head.benchmark, &records);
     let text = report::bench::leaderboard(&results);
     let json = report::json::to_text(&results);
     if let Some(out) = out {

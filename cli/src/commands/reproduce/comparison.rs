@@ -1,15 +1,14 @@
 //! Table IV and the tuning rules: several methods on the same random processes, under both protocols.
 
 use onecycle_lab::judge::evaluate::{Benchmark, Contender, Record, Summary, records};
-use onecycle_lab::paper::grid::Pieces;
 use serde::Deserialize;
 
-use super::part::{Found, Row};
 use crate::commands::clock::thread_seconds;
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
 use crate::report::number::{percent, seconds};
+use crate::results::reproduction::{Numbers, Row};
 
 /// The experiments and the methods.
 #[derive(Deserialize)]
@@ -27,7 +26,7 @@ fn contender(name: &str) -> Result<Contender, Failure> {
     Contender::from_name(name).ok_or_else(|| Failure::usage(format!("there is no method '{name}'")))
 }
 
-pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Failure> {
+pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Numbers, Failure> {
     let contenders = settings.methods.iter().map(|(name, _)| contender(name));
     let contenders: Vec<Contender> = contenders.collect::<Result<_, _>>()?;
     let benchmark = Benchmark {
@@ -45,7 +44,7 @@ pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Fail
     let judged: Result<Vec<(bool, Vec<Record>)>, onecycle_lab::judge::evaluate::ExperimentError> =
         judged.into_iter().collect();
     let judged = judged.map_err(Failure::usage)?;
-    let mut found = Found::default();
+    let mut found = Numbers::default();
     for is_trimmed in [false, true] {
         let of_protocol = judged.iter().filter(|(trimmed, _)| *trimmed == is_trimmed);
         let records: Vec<&Vec<Record>> = of_protocol.map(|(_, records)| records).collect();

@@ -8,10 +8,10 @@ use onecycle_plant::Trace;
 use serde::Deserialize;
 
 use super::cycles::relative;
-use super::part::Found;
 use super::single::{SAMPLE_S, Setup};
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
+use crate::results::reproduction::Numbers;
 
 /// The processes and their experiments.
 #[derive(Deserialize)]
@@ -27,7 +27,7 @@ pub(super) struct Settings {
     input_bias: f64,
 }
 
-pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
+pub(super) fn find(settings: &Settings) -> Result<Numbers, Failure> {
     let (truth, trace) = settings.setup.run(settings.input_bias)?;
     let found = find_oscillation(&onecycle_lab::experiments::signals_of(&trace, SAMPLE_S), 1);
     let cycle = found.map_err(Failure::usage)?;
@@ -46,7 +46,7 @@ pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
             relative("input", trace, &trace.input, range_s),
         ]
     };
-    Ok(Found {
+    Ok(Numbers {
         tables: vec![],
         figures: vec![
             prepared(settings)?,

@@ -3,11 +3,12 @@
 use onecycle_lab::paper::classifier::{Choice, Recipe, Rule, Score, Test};
 use serde::Deserialize;
 
-use super::part::{Found, Row};
-use crate::commands::train::classifier::{Keep, Kind, Trained, learn};
+use crate::commands::train::classifier::{Keep, learn};
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
 use crate::report::number::{degrees, percent};
+use crate::results::classifier::{SetKind, TrainedNetwork};
+use crate::results::reproduction::{Numbers, Row};
 
 /// The recipe, and what of it is another here.
 #[derive(Deserialize)]
@@ -49,17 +50,17 @@ pub(super) fn find(
     settings: &Settings,
     keep: Keep<'_>,
     workers: &Workers,
-) -> Result<Found, Failure> {
+) -> Result<Numbers, Failure> {
     let recipe = settings.recipe()?;
     let learnt = learn(&recipe, keep, workers, Failure::usage)?;
-    let sets = learnt.done.sets.iter().enumerate();
+    let sets = learnt.run.sets.iter().enumerate();
     let tables = sets.map(|(number, set)| {
-        let of = |trained: &Trained| trained.scores[number][Rule::MostLikely as usize];
-        let scores = learnt.done.networks.iter().map(of);
+        let of = |trained: &TrainedNetwork| trained.scores[number][Rule::MostLikely as usize];
+        let scores = learnt.run.networks.iter().map(of);
         let [best, _] = set.best;
         table(&scores.chain([best]).collect::<Vec<_>>(), set.kind)
     });
-    let found = Found {
+    let found = Numbers {
         tables: tables.collect(),
         figures: vec![],
     };
@@ -67,7 +68,7 @@ pub(super) fn find(
     Ok(found)
 }
 
-fn table(scores: &[Score], kind: Kind) -> Vec<Row> {
+fn table(scores: &[Score], kind: SetKind) -> Vec<Row> {
     let row = |name: &str, cell: fn(&Score) -> String| Row::new(name, scores.iter().map(cell));
     let cost = |cost: Option<f64>| cost.map_or("-".to_owned(), percent);
     let accuracy = row("accuracy", |score| percent(score.accuracy));
@@ -82,6 +83,6 @@ fn table(scores: &[Score], kind: Kind) -> Vec<Row> {
         row("unstable", |score| score.unstable.to_string()),
         row("experiments", |score| score.examples.to_string()),
     ];
-    let accuracy = (kind == Kind::Verification).then_some(accuracy);
+    let accuracy = (kind == SetKind::Verification).then_some(accuracy);
     accuracy.into_iter().chain(costs).collect()
 }

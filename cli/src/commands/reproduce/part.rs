@@ -18,34 +18,8 @@ use serde::{Deserialize, Serialize};
 use crate::args::Name;
 use crate::failure::Failure;
 use crate::output::write_text;
-use crate::pages::plot::{Axis, Figure, Panel, Series};
-
-/// What the work of a part yields.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Found {
-    /// Rows of each table.
-    pub(crate) tables: Vec<Vec<Row>>,
-    /// Series of each figure.
-    pub(crate) figures: Vec<Vec<Series>>,
-}
-
-/// A row of our numbers.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Row {
-    /// What it is of; the paper's row has the same name.
-    pub(crate) name: String,
-    /// A cell a column.
-    pub(crate) cells: Vec<String>,
-}
-
-impl Row {
-    pub(crate) fn new(name: impl Into<String>, cells: impl IntoIterator<Item = String>) -> Self {
-        Self {
-            name: name.into(),
-            cells: cells.into_iter().collect(),
-        }
-    }
-}
+use crate::pages::plot::{Axis, Figure, Panel};
+use crate::results::reproduction::{ComparedCell, ComparedTable, Numbers, ReproducedPart, Row};
 
 /// A file of `experiments/reproduction`.
 #[derive(Clone, Debug, Deserialize)]
@@ -115,14 +89,14 @@ impl Sheet {
     }
 
     /// The part, once its numbers are found.
-    pub(super) fn part(self, name: Name, found: Found) -> Part {
+    pub(super) fn part(self, name: Name, found: Numbers) -> ReproducedPart {
         let tables = self.tables.into_iter().zip(found.tables);
         let figures = self.figures.into_iter().zip(found.figures);
-        Part {
+        ReproducedPart {
             name: name.as_str(),
             title: self.title,
             source: self.source,
-            tables: tables.map(|(sheet, rows)| Table::of(sheet, rows)).collect(),
+            tables: tables.map(|(sheet, rows)| compared(sheet, rows)).collect(),
             figures: figures
                 .map(|(FigureSheet { caption, x, y }, series)| {
                     Figure::single(&caption, x, Panel::new(y, series))
@@ -133,53 +107,24 @@ impl Sheet {
     }
 }
 
-/// A part, ready to be shown.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Part {
-    pub(crate) name: &'static str,
-    pub(crate) title: String,
-    /// Where the paper has it.
-    pub(crate) source: String,
-    pub(crate) tables: Vec<Table>,
-    pub(crate) figures: Vec<Figure>,
-    pub(crate) remarks: Vec<String>,
-}
-
-/// A table with the paper's numbers beside ours.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Table {
-    pub(crate) caption: String,
-    pub(crate) columns: Vec<String>,
-    /// Name of the row and its cells.
-    pub(crate) rows: Vec<(String, Vec<Cell>)>,
-}
-
-/// One value, ours and the paper's where it has one.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Cell {
-    pub(crate) ours: String,
-    pub(crate) paper: Option<String>,
-}
-
-impl Table {
-    fn of(sheet: TableSheet, rows: Vec<Row>) -> Self {
-        let row = |row: Row| {
-            let paper = sheet.paper.get(&row.name);
-            let cells = row.cells.into_iter().enumerate();
-            let cells = cells.map(|(column, ours)| Cell {
-                ours,
-                paper: paper
-                    .and_then(|cells| cells.get(column))
-                    .filter(|text| !text.is_empty())
-                    .cloned(),
-            });
-            (row.name, cells.collect())
-        };
-        Self {
-            rows: rows.into_iter().map(row).collect(),
-            caption: sheet.caption,
-            columns: sheet.columns,
-        }
+/// A table with the paper's cells beside the computed ones.
+fn compared(sheet: TableSheet, rows: Vec<Row>) -> ComparedTable {
+    let row = |row: Row| {
+        let paper = sheet.paper.get(&row.name);
+        let cells = row.cells.into_iter().enumerate();
+        let cells = cells.map(|(column, ours)| ComparedCell {
+            ours,
+            paper: paper
+                .and_then(|cells| cells.get(column))
+                .filter(|text| !text.is_empty())
+                .cloned(),
+        });
+        (row.name, cells.collect())
+    };
+    ComparedTable {
+        rows: rows.into_iter().map(row).collect(),
+        caption: sheet.caption,
+        columns: sheet.columns,
     }
 }
 
@@ -193,7 +138,7 @@ pub(super) fn typed<T: DeserializeOwned>(settings: &toml::Table) -> Result<T, Fa
 struct Kept {
     program: String,
     settings: toml::Table,
-    found: Found,
+    found: Numbers,
 }
 
 /// File of a part.
@@ -202,7 +147,7 @@ pub(super) fn path(folder: &Path, name: Name) -> PathBuf {
 }
 
 /// What an earlier run of this program has found with the same settings.
-pub(super) fn kept(path: &Path, settings: &toml::Table) -> Result<Option<Found>, Failure> {
+pub(super) fn kept(path: &Path, settings: &toml::Table) -> Result<Option<Numbers>, Failure> {
     let unreadable = |reason: String| Failure::Settings {
         path: path.to_owned(),
         reason: format!("{reason}: leave out --resume to begin anew"),
@@ -217,7 +162,7 @@ pub(super) fn kept(path: &Path, settings: &toml::Table) -> Result<Option<Found>,
 }
 
 /// Keeps what was found.
-pub(super) fn keep(path: &Path, settings: &toml::Table, found: &Found) -> Result<(), Failure> {
+pub(super) fn keep(path: &Path, settings: &toml::Table, found: &Numbers) -> Result<(), Failure> {
     let kept = Kept {
         program: env!("CARGO_PKG_VERSION").to_owned(),
         settings: settings.clone(),
@@ -253,7 +198,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = path(folder.path(), Name::Phase);
         let sheet = Sheet::of(Name::Phase).unwrap();
-        let found = Found {
+        let found = Numbers {
             tables: vec![vec![Row::new("one", ["1 %".to_owned()])]],
             figures: vec![],
         };

@@ -5,10 +5,9 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
-use onecycle_lab::learn::train::{Dataset, Epoch, Loss, Network, TensorFile, Trainer};
+use onecycle_lab::learn::train::{Dataset, Loss, Network, TensorFile, Trainer};
 use onecycle_lab::paper::classifier::{
-    Classes, ClassifierError, Examples, Gain, Protocol, Recipe, Rule, Score, Standard,
-    Standardised, picks,
+    Classes, ClassifierError, Examples, Gain, Recipe, Rule, Score, Standard, Standardised, picks,
 };
 use serde::Serialize;
 
@@ -18,59 +17,11 @@ use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
 use crate::output::{print, progress_bar_with_message, write_file, write_text};
 use crate::report::classifier as report;
+use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
 use crate::settings;
 
 /// Key of what is said beside the weights; changes with every change that a reader could notice.
 const FORMAT: &str = "onecycle.classifier/1";
-
-/// What the command has done.
-#[derive(Serialize)]
-pub(crate) struct Done<'a> {
-    pub(crate) recipe: &'a Recipe,
-    pub(crate) classes: usize,
-    pub(crate) weights: usize,
-    pub(crate) examples: usize,
-    pub(crate) unsteady: u64,
-    pub(crate) sets: Vec<Set>,
-    pub(crate) networks: Vec<Trained>,
-    /// Number of the network that was chosen, from zero.
-    pub(crate) best: usize,
-    pub(crate) seconds: f64,
-}
-
-/// Experiments that networks are scored on, and how the best picks there are would fare.
-#[derive(Serialize)]
-pub(crate) struct Set {
-    pub(crate) kind: Kind,
-    pub(crate) protocol: Protocol,
-    pub(crate) examples: usize,
-    pub(crate) unsteady: u64,
-    /// Gains from harmonics, gains from amplitudes.
-    pub(crate) best: [Score; 2],
-}
-
-/// What a set is of.
-#[derive(Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Kind {
-    /// The classes, which the best epoch is chosen by.
-    Verification,
-    /// Random processes.
-    Test,
-}
-
-/// What came of a loss.
-#[derive(Serialize)]
-pub(crate) struct Trained {
-    pub(crate) loss: Loss,
-    /// Why it ended.
-    pub(crate) outcome: &'static str,
-    pub(crate) history: Vec<Epoch>,
-    /// Seconds of training in this run.
-    pub(crate) seconds: f64,
-    /// Of every set the scores by [`Rule::ALL`].
-    pub(crate) scores: Vec<[Score; 2]>,
-}
 
 /// What is beside the weights of the best network.
 #[derive(Serialize)]
@@ -95,7 +46,7 @@ struct Lesson<'a> {
 
 /// What a recipe has led to.
 pub(crate) struct Learnt<'a> {
-    pub(crate) done: Done<'a>,
+    pub(crate) run: ClassifierRun<'a>,
     /// The best network.
     network: Network,
     card: Card<'a>,
@@ -123,10 +74,10 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
         write(out, &learnt.network, &learnt.card)?;
     }
     if let Some(path) = &arguments.json {
-        let text = report::json(&learnt.done);
+        let text = report::json(&learnt.run);
         write_text(path, &text)?;
     }
-    print(&report::text(&learnt.done))?;
+    print(&report::text(&learnt.run))?;
     keep.remove(recipe)?;
     Ok(ExitCode::from(exit::DONE))
 }
@@ -159,7 +110,7 @@ pub(crate) fn learn<'a>(
     let card = lesson.card(best, better_rule(&networks[best].scores[0]));
     let weights = network.folded().weights();
     Ok(Learnt {
-        done: lesson.done(networks, (best, weights), begin.elapsed()),
+        run: lesson.run(networks, (best, weights), begin.elapsed()),
         network,
         card,
     })
@@ -238,7 +189,7 @@ impl<'a> Lesson<'a> {
         part: Option<&Part>,
         resume: bool,
         bar: &ProgressBar,
-    ) -> Result<(Trained, Network), Failure> {
+    ) -> Result<(TrainedNetwork, Network), Failure> {
         let begin = Instant::now();
         let mut trainer = super::begun(part, resume, || {
             let network = self.recipe.network(self.classes.len())?;
@@ -265,7 +216,7 @@ impl<'a> Lesson<'a> {
             },
         )?;
         let network = (self.standard.before(trainer.best())).map_err(Failure::usage)?;
-        let trained = Trained {
+        let trained = TrainedNetwork {
             loss,
             outcome: super::described(outcome),
             history: trainer.history().to_vec(),
@@ -294,28 +245,28 @@ impl<'a> Lesson<'a> {
         }
     }
 
-    fn done(
+    fn run(
         &self,
-        networks: Vec<Trained>,
+        networks: Vec<TrainedNetwork>,
         (best, weights): (usize, usize),
         took: Duration,
-    ) -> Done<'a> {
-        let verification = (Kind::Verification, self.recipe.protocol);
+    ) -> ClassifierRun<'a> {
+        let verification = (SetKind::Verification, self.recipe.protocol);
         let tests = self
             .recipe
             .tests
             .iter()
-            .map(|test| (Kind::Test, test.protocol));
+            .map(|test| (SetKind::Test, test.protocol));
         let sets = [verification].into_iter().chain(tests).zip(&self.sets);
         let gains = [Gain::Harmonics, Gain::Amplitude];
-        Done {
+        ClassifierRun {
             recipe: self.recipe,
             classes: self.classes.len(),
             weights,
             examples: self.training.len(),
             unsteady: self.training.unsteady(),
             sets: sets
-                .map(|((kind, protocol), examples)| Set {
+                .map(|((kind, protocol), examples)| ScoredSet {
                     kind,
                     protocol,
                     examples: examples.len(),

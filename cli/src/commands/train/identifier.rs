@@ -6,12 +6,11 @@ use std::time::Instant;
 
 use onecycle_lab::learn::dataset::shards::Record;
 use onecycle_lab::learn::identifier::{
-    Calibrated, IdentifierError, Recipe, Scores, calibrated, rows, scores,
+    Calibrated, IdentifierError, Recipe, calibrated, rows, scores,
 };
 use onecycle_lab::learn::pack::{PackContents, Quantisation, quantisation};
 use onecycle_lab::learn::train::{Epoch, Network, Outcome, Trainer};
 use onecycle_onboard::pack::{Pack, Sizes};
-use serde::Serialize;
 
 use super::part::Part;
 use crate::args;
@@ -20,33 +19,8 @@ use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, progress_bar_with_message, write_file, write_text};
 use crate::report::identifier as report;
+use crate::results::identifier::{FamilyScores, IdentifierRun};
 use crate::settings;
-
-/// What the command has done.
-#[derive(Serialize)]
-pub(crate) struct Done {
-    pub(crate) examples: usize,
-    pub(crate) weights: usize,
-    pub(crate) outcome: &'static str,
-    pub(crate) epochs: u64,
-    pub(crate) best_epoch: u64,
-    pub(crate) scores: Vec<Scored>,
-    #[serde(skip)]
-    pub(crate) quantisation: Quantisation,
-    #[serde(skip)]
-    pub(crate) sizes: Sizes,
-    #[serde(skip)]
-    pub(crate) seconds: [f64; 2],
-}
-
-/// Scores of all cycles, or of one family's.
-#[derive(Serialize)]
-pub(crate) struct Scored {
-    /// Number of the family, from one; `None` of all.
-    pub(crate) family: Option<usize>,
-    #[serde(flatten)]
-    pub(crate) scores: Scores,
-}
 
 pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
     recipe
@@ -77,7 +51,7 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
     let (trainer, outcome) = learn(recipe, [learning, choosing], &part, arguments, &workers)?;
     let waiting = Waiting::on("calibrating");
     let (pack, quantisation) = pack(recipe, trainer.best(), [learning, choosing])?;
-    let mut done = Done {
+    let mut trained = IdentifierRun {
         examples: records.len(),
         weights: trainer.best().weights(),
         outcome: super::described(outcome),
@@ -89,15 +63,15 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
         seconds: [simulated_s, 0.0],
     };
     waiting.goes_on("scoring");
-    let bytes = finish(pack, recipe, scoring, &mut done).map_err(Failure::usage)?;
+    let bytes = finish(pack, recipe, scoring, &mut trained).map_err(Failure::usage)?;
     drop(waiting);
     write_file(out, |file| file.write_all(&bytes))?;
-    done.seconds[1] = begin.elapsed().as_secs_f64() - simulated_s;
+    trained.seconds[1] = begin.elapsed().as_secs_f64() - simulated_s;
     if let Some(path) = &arguments.json {
-        let text = report::json(recipe, &done);
+        let text = report::json(recipe, &trained);
         write_text(path, &text)?;
     }
-    print(&report::text(&done, out))?;
+    print(&report::text(&trained, out))?;
     part.remove()?;
     if arguments.dataset.is_none() {
         folder.remove()?;
@@ -178,7 +152,7 @@ fn finish(
     mut pack: PackContents,
     recipe: &Recipe,
     scoring: &[Record],
-    done: &mut Done,
+    trained: &mut IdentifierRun,
 ) -> Result<Vec<u8>, IdentifierError> {
     let bytes = pack.to_bytes()?;
     let read = Pack::read(&bytes).map_err(onecycle_lab::learn::pack::PackContentsError::from)?;
@@ -188,18 +162,18 @@ fn finish(
             .iter()
             .filter(|record| family.is_none_or(|family| record.example.family + 1 == family))
             .collect();
-        Scored {
+        FamilyScores {
             family,
             scores: scores(&read, &cycles),
         }
     };
-    done.scores = std::iter::once(None)
+    trained.scores = std::iter::once(None)
         .chain((1..=families).map(Some).filter(|_| families > 1))
         .map(of)
         .collect();
-    pack.card = report::card(recipe, done);
+    pack.card = report::card(recipe, trained);
     let bytes = pack.to_bytes()?;
     let read = Pack::read(&bytes).map_err(onecycle_lab::learn::pack::PackContentsError::from)?;
-    done.sizes = read.sizes();
+    trained.sizes = read.sizes();
     Ok(bytes)
 }

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::{Axis, Field, FieldKind, Figure, Hue, Marks, Note, Panel, Places, Series, Shape};
-use crate::pages::page::escaped;
+use crate::pages::escape::escaped;
 
 /// Part of the height between two panels.
 const BETWEEN: f64 = 0.06;
