@@ -254,9 +254,12 @@ pub(crate) struct Grid {
     /// Write the matrix of costs however large it is, not only up to 2000 members
     #[arg(long, requires = "out")]
     pub(crate) matrix: bool,
-    /// Begin anew, whatever an interrupted run has left
+    /// Discard the work of an interrupted run and start over
     #[arg(long, requires = "out")]
     pub(crate) restart: bool,
+    /// Without effect: interrupted runs are always resumed
+    #[arg(long = "resume", hide = true)]
+    _resume: bool,
     /// Check that this many random processes have a member near (1 to 10,000,000)
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_CHECKED))]

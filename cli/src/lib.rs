@@ -6,6 +6,7 @@
 mod args;
 mod commands;
 mod failure;
+mod journal;
 mod output;
 mod pages;
 mod pictures;

@@ -136,17 +136,12 @@ impl Drop for Waiting {
     }
 }
 
-/// Appends a value as a line of JSON to a file of this path. A whole line at a time reaches the system, so
-/// that an end by force cuts the last at most.
-pub(crate) fn append_line(
-    file: &mut File,
-    path: &Path,
-    line: &impl serde::Serialize,
-) -> Result<(), Failure> {
-    let mut text = serde_json::to_vec(line).map_err(Failure::usage)?;
-    text.push(b'\n');
-    file.write_all(&text)
-        .map_err(|error| Failure::output(path, error))
+/// A path with `.ENDING` added to its name.
+pub(crate) fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(ending);
+    name.into()
 }
 
 /// Writes a file through a temporary one beside it: whole, or not at all. A link leads to what it names, and a pipe or a

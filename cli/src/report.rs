@@ -1,6 +1,7 @@
 //! Results as text for people and as JSON for programs.
 
 pub(crate) mod bench;
+pub(crate) mod campaign;
 pub(crate) mod certificate;
 pub(crate) mod classifier;
 pub(crate) mod cycles;

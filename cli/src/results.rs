@@ -2,6 +2,7 @@
 //! reads arguments or prints.
 
 pub(crate) mod bench;
+pub(crate) mod campaign;
 pub(crate) mod certify;
 pub(crate) mod classifier;
 pub(crate) mod dataset;

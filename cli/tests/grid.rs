@@ -229,20 +229,22 @@ fn an_interrupted_run_is_gone_on_with() {
     };
     run(&to(&whole));
     let expected = std::fs::read(&whole).unwrap();
-    let part = folder.path("grid.json.part");
+    let work = folder.path("grid.json.part");
+    let part = work.join("journal.jsonl");
     let resumes = |left: &[u8]| {
+        std::fs::create_dir_all(&work).unwrap();
         std::fs::write(&part, left).unwrap();
         assert!(!folder.path("grid.json").exists());
         let resumed = run(&to(&out));
         assert_eq!(resumed.code, Some(0), "{resumed:?}");
         assert!(std::fs::read(&out).unwrap() == expected, "other bytes");
-        assert!(!part.exists());
+        assert!(!work.exists());
         std::fs::remove_file(&out).unwrap();
         resumed.stderr
     };
     // Settings, angles, and a row or two.
     let said = resumes(&killed(&to(&out), &part, 3));
-    assert!(said.starts_with("onecycle: going on after "), "{said}");
+    assert!(said.starts_with("onecycle: resuming after "), "{said}");
     assert!(
         said.contains(" rows of ") && said.lines().count() == 1,
         "{said}"
@@ -281,7 +283,7 @@ fn an_interrupted_run_is_gone_on_with() {
 fn a_part_of_something_else() {
     let (folder, space) = space();
     let out = folder.name("grid.json");
-    let part = folder.path("grid.json.part");
+    let part = folder.path("grid.json.part").join("journal.jsonl");
     let make = |more: &[&str]| run(&[&["grid", &space, "--out", &out], more].concat());
     let quick = ["--deterioration", "30%"];
     // Of other settings: kept, unless told otherwise.
@@ -295,7 +297,7 @@ fn a_part_of_something_else() {
         UNREADABLE,
         &[
             "grid.json.part",
-            "other settings (deterioration 4 %)",
+            "other settings, deterioration 0.04 instead of 0.3",
             "--restart",
         ],
     );
@@ -311,11 +313,11 @@ fn a_part_of_something_else() {
         ),
         (
             [lines[0], lines[2], lines[1], ""].join("\n"),
-            "line 2 is not what comes next",
+            "line 2 is out of order",
         ),
         (
             [lines[0], lines[1], "{\"costs\":[0.0]}", ""].join("\n"),
-            "line 3 is not what comes next",
+            "line 3 is out of order",
         ),
     ] {
         std::fs::write(&part, damaged).unwrap();
@@ -323,7 +325,7 @@ fn a_part_of_something_else() {
     }
     let restarted = make(&["--deterioration", "30%", "--restart"]);
     assert_eq!((restarted.code, restarted.stderr.as_str()), (Some(0), ""));
-    assert!(!part.exists());
+    assert!(!folder.path("grid.json.part").exists());
 }
 
 // ---------------------------------------------------------------- refusals

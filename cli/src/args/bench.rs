@@ -88,12 +88,13 @@ pub(crate) struct MakeBench {
     "Examples:\n",
     "  onecycle bench run relay-benchmark -o results\n",
     "  onecycle bench run relay-benchmark --methods none --answers mine=answers.csv\n",
-    "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair -o results --resume\n\n",
+    "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair -o results\n\n",
     "Methods that read the recordings: onecycle-1, onecycle-2, onecycle-4 (cycles), network, pem, \n",
     "pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc: all by default. Two read \n",
     "a relay test of their own, which is simulated on the true process with the same bias, noise and seed: \n",
     "pem-sweep, asymmetric. With 'none' only --answers are scored. Times are those of the processor.\n\n",
-    "With --out, what is done is kept in OUT.part: with --resume the same command goes on from there."
+    "With --out, finished experiments are kept in the folder OUT.part until the results are written: the same \n",
+    "command resumes an interrupted run, --restart starts over."
 ))]
 pub(crate) struct RunBench {
     /// The folder that `bench make` has written
@@ -113,9 +114,12 @@ pub(crate) struct RunBench {
     /// an experiment, as `identify` reads them
     #[arg(long, value_name = "DIR")]
     pub(crate) traces: Option<PathBuf>,
-    /// Go on from where an interrupted run of the same methods was
+    /// Discard the work of an interrupted run and start over
     #[arg(long, requires = "out")]
-    pub(crate) resume: bool,
+    pub(crate) restart: bool,
+    /// Without effect: interrupted runs are always resumed
+    #[arg(long = "resume", hide = true)]
+    _resume: bool,
     /// Threads to work with [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]

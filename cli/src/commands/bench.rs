@@ -2,7 +2,6 @@
 
 mod folder;
 mod make;
-mod part;
 mod recordings;
 mod run;
 mod traces;

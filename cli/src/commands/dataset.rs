@@ -26,8 +26,12 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     let recipe = recipe(arguments.recipe.as_deref())?;
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
-    let (folder, files_kept, experiments_made) =
-        filled(&arguments.into, recipe, arguments.examples, &workers)?;
+    let (folder, files_kept, experiments_made) = filled(
+        &arguments.into,
+        (recipe, arguments.examples),
+        arguments.restart,
+        &workers,
+    )?;
     workers.finish();
     #[cfg(feature = "parquet")]
     if let Some(path) = &arguments.parquet {
@@ -48,21 +52,21 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The folder of so many experiments of a recipe, all of them made; how many files were there, and how
-/// many experiments were missing.
+/// The folder of a recipe with this number of experiments, all made; the number of files that were there before, and of
+/// experiments that were missing.
 pub(super) fn filled(
     path: &Path,
-    recipe: Recipe,
-    examples: u64,
+    (recipe, examples): (Recipe, u64),
+    restart: bool,
     workers: &Workers,
 ) -> Result<(Folder, usize, u64), Failure> {
-    let waiting = Waiting::on(format!("looking at {}", path.display()));
-    let mut folder = Folder::open(path, recipe, examples)?;
+    let waiting = Waiting::on(format!("checking {}", path.display()));
+    let mut folder = Folder::open(path, recipe, examples, restart)?;
     let damaged = folder.drop_damaged();
     drop(waiting);
     if !damaged.is_empty() {
         tell(&format!(
-            "made again, for they are missing or damaged: {}",
+            "made again because they are missing or damaged: {}",
             damaged.join(", ")
         ));
     }
@@ -70,8 +74,9 @@ pub(super) fn filled(
     let kept = folder.manifest().shards.len() - missing.len();
     if kept > 0 && !missing.is_empty() {
         tell(&format!(
-            "going on after {kept} of {} files",
-            folder.manifest().shards.len()
+            "resuming after {kept} of {} files of {} (use --restart to start over)",
+            folder.manifest().shards.len(),
+            path.display()
         ));
     }
     let made = make(&mut folder, &missing, workers)?;

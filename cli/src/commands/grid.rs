@@ -1,9 +1,9 @@
 //! `onecycle grid`: processes that stand for a space; made, written, checked, drawn.
 
-mod part;
+mod kept;
 
 use std::io::{self, BufWriter};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
@@ -11,19 +11,18 @@ use onecycle_lab::paper::grid;
 use onecycle_lab::paper::grid::{Check, Grid, GridFile, Layout, Settings, check};
 use onecycle_lab::space::candidate::Gains;
 
-use self::part::Part;
+use self::kept::KeptGrid;
 use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print, tell, write_file, write_text};
+use crate::output::{Waiting, print, write_file, write_text};
 use crate::results::grid::GridRun;
 use crate::{pictures, report, settings};
 
 /// Most members whose costs are written unasked: four million numbers, 40 MB.
 const MOST_IN_MATRIX: usize = 2000;
 
-/// Rows of members, and of the matrix, that each thread works on before all are kept in the part
-/// file: a second's work or so.
+/// Rows of members, and of the matrix, of each thread between two writes to the journal: about a second of work.
 const ROWS_PER_THREAD: usize = 2;
 const COSTS_PER_THREAD: usize = 64;
 
@@ -95,19 +94,19 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<GridRun, Failure> {
         },
     };
     // A few members are made again sooner than they are read.
-    let mut part = match (&arguments.out, settings.layout) {
-        (Some(out), Layout::Rays) => Some(part_of(out, &settings, arguments.restart)?),
+    let mut kept = match (&arguments.out, settings.layout) {
+        (Some(out), Layout::Rays) => Some(KeptGrid::open(out, &settings, arguments.restart)?),
         _ => None,
     };
-    let grid = lay(&settings, part.as_mut(), workers)?;
+    let grid = lay(&settings, kept.as_mut(), workers)?;
     let has_matrix =
         arguments.out.is_some() && (arguments.matrix || grid.members.len() <= MOST_IN_MATRIX);
-    if let (true, Some(part)) = (has_matrix, &mut part) {
-        keep_costs(&grid, part, workers)?;
+    if let (true, Some(kept)) = (has_matrix, &mut kept) {
+        keep_costs(&grid, kept, workers)?;
     }
     let check = checked(arguments, &grid, workers)?;
     if let Some(out) = &arguments.out {
-        write(out, &grid, check.as_ref(), has_matrix, part)?;
+        write(out, &grid, check.as_ref(), has_matrix, kept)?;
     }
     Ok(GridRun {
         grid,
@@ -117,47 +116,41 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<GridRun, Failure> {
     })
 }
 
-fn part_of(out: &Path, settings: &Settings, restart: bool) -> Result<Part, Failure> {
-    let mut path = out.as_os_str().to_owned();
-    path.push(".part");
-    let part = Part::open(PathBuf::from(path), settings, restart)?;
-    if let Some(what) = part.what_is_done() {
-        tell(&format!("going on after {what} of {}", part.name()));
-    }
-    Ok(part)
-}
-
-fn lay(settings: &Settings, part: Option<&mut Part>, workers: &Workers) -> Result<Grid, Failure> {
-    let Some(part) = part else {
+fn lay(
+    settings: &Settings,
+    kept: Option<&mut KeptGrid>,
+    workers: &Workers,
+) -> Result<Grid, Failure> {
+    let Some(kept) = kept else {
         return Grid::build(settings, workers).map_err(Failure::usage);
     };
-    let thetas_rad = match part.thetas_rad() {
+    let thetas_rad = match kept.thetas_rad() {
         Some(thetas_rad) => thetas_rad.to_vec(),
         None => {
             let thetas_rad = grid::rows(settings, workers).map_err(Failure::usage)?;
-            part.keep_thetas(thetas_rad.clone())?;
+            kept.keep_thetas(thetas_rad.clone())?;
             thetas_rad
         }
     };
-    workers.expect(thetas_rad.len(), part.rows().len());
+    workers.expect(thetas_rad.len(), kept.rows().len());
     let at_once = ROWS_PER_THREAD * workers.threads();
-    for some in thetas_rad[part.rows().len()..].to_vec().chunks(at_once) {
+    for some in thetas_rad[kept.rows().len()..].to_vec().chunks(at_once) {
         for row in workers.run(some.len(), |k| grid::row(settings, some[k])) {
-            part.keep_row(row.map_err(Failure::usage)?)?;
+            kept.keep_row(row.map_err(Failure::usage)?)?;
         }
     }
-    Grid::of_rays(settings, part.rows(), workers).map_err(Failure::usage)
+    Grid::of_rays(settings, kept.rows(), workers).map_err(Failure::usage)
 }
 
-fn keep_costs(grid: &Grid, part: &mut Part, workers: &Workers) -> Result<(), Failure> {
+fn keep_costs(grid: &Grid, kept: &mut KeptGrid, workers: &Workers) -> Result<(), Failure> {
     let count = grid.members.len();
     let at_once = COSTS_PER_THREAD * workers.threads();
-    workers.expect(count, part.costs());
-    while part.costs() < count {
-        let first = part.costs();
+    workers.expect(count, kept.costs());
+    while kept.costs() < count {
+        let first = kept.costs();
         let some = at_once.min(count - first);
         for costs in workers.run(some, |k| costs(grid, first + k)) {
-            part.keep_costs(&costs)?;
+            kept.keep_costs(costs)?;
         }
     }
     Ok(())
@@ -186,14 +179,14 @@ fn write(
     grid: &Grid,
     check: Option<&Check>,
     has_matrix: bool,
-    part: Option<Part>,
+    kept: Option<KeptGrid>,
 ) -> Result<(), Failure> {
     write_file(path, |file| {
         let mut file = BufWriter::new(file);
-        match (&part, has_matrix) {
+        match (&kept, has_matrix) {
             (_, false) => grid::write(&mut file, grid, check, None),
-            (Some(part), true) => {
-                grid::write(&mut file, grid, check, Some(&mut part.read_costs()?))
+            (Some(kept), true) => {
+                grid::write(&mut file, grid, check, Some(&mut kept.read_costs()?))
             }
             (None, true) => {
                 let mut rows = (0..grid.members.len()).map(|i| Ok(costs(grid, i)));
@@ -202,5 +195,5 @@ fn write(
         }?;
         io::Write::flush(&mut file)
     })?;
-    part.map_or(Ok(()), Part::remove)
+    kept.map_or(Ok(()), KeptGrid::remove)
 }

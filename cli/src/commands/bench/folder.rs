@@ -48,6 +48,41 @@ pub(super) fn refuse_filled(out: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Fills a new or empty folder, whole or not at all: `fill` writes to a temporary one beside it.
+pub(super) fn write_whole(
+    out: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    refuse_filled(out)?;
+    let failed = |error| Failure::output(out, error);
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let staged = tempfile::Builder::new()
+        .prefix(".onecycle-bench-")
+        .tempdir_in(parent.unwrap_or(Path::new(".")))
+        .map_err(failed)?;
+    fill(staged.path())?;
+    set_usual_permissions(staged.path()).map_err(failed)?;
+    if out.exists() {
+        std::fs::remove_dir(out).map_err(failed)?;
+    }
+    std::fs::rename(staged.path(), out).map_err(failed)?;
+    // Moved, so there is nothing left to remove.
+    let _ = staged.keep();
+    Ok(())
+}
+
+/// Temporary folders are private; a folder that the user asked for is readable like any other.
+#[cfg(unix)]
+fn set_usual_permissions(folder: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o755))
+}
+
+#[cfg(not(unix))]
+fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
+    Ok(())
+}
+
 /// Reads what a folder holds besides the recordings.
 pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure> {
     let path = folder.join(MANIFEST);

@@ -18,13 +18,31 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// Goes on with the folder of this recipe, or begins one.
-    pub(crate) fn open(path: &Path, recipe: Recipe, examples: u64) -> Result<Self, Failure> {
+    /// Opens the folder of this recipe, or begins one; with `restart` a dataset that is there is removed first.
+    pub(crate) fn open(
+        path: &Path,
+        recipe: Recipe,
+        examples: u64,
+        restart: bool,
+    ) -> Result<Self, Failure> {
         let manifest_path = path.join(MANIFEST_NAME);
         let manifest = match std::fs::read_to_string(&manifest_path) {
-            Ok(text) => Manifest::read(&text)
-                .and_then(|manifest| manifest.go_on(&recipe, examples))
-                .map_err(|error| refused(&manifest_path, error.to_string()))?,
+            Ok(text) => {
+                let found = Manifest::read(&text);
+                let manifest = if restart {
+                    found
+                        .map(|found| remove_files(path, &found))
+                        .map(|removed| {
+                            removed?;
+                            Ok(Manifest::new(recipe, examples))
+                        })
+                } else {
+                    found
+                        .and_then(|found| found.go_on(&recipe, examples))
+                        .map(Ok)
+                };
+                manifest.map_err(|error| refused(&manifest_path, error.to_string()))??
+            }
             // What is no folder cannot be made one, and says so.
             Err(error)
                 if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) =>
@@ -127,6 +145,20 @@ impl Folder {
             file.write_all(text.as_bytes())
         })
     }
+}
+
+/// Removes the files of a dataset, those that are there.
+fn remove_files(path: &Path, manifest: &Manifest) -> Result<(), Failure> {
+    for name in (0..manifest.shards.len()).map(file_name) {
+        let file = path.join(name);
+        match std::fs::remove_file(&file) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(Failure::output(&file, error));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
 }
 
 /// Makes the folder where there is none, in one that there is; refuses one with anything in it.

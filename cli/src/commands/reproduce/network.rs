@@ -3,9 +3,10 @@
 use onecycle_lab::paper::classifier::{Choice, Recipe, Rule, Score, Test};
 use serde::Deserialize;
 
-use crate::commands::train::classifier::{Keep, learn};
+use crate::commands::train::classifier::{forget, learn};
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
+use crate::journal::Journal;
 use crate::report::number::{degrees, percent};
 use crate::results::classifier::{SetKind, TrainedNetwork};
 use crate::results::reproduction::{Numbers, Row};
@@ -48,11 +49,12 @@ impl Settings {
 
 pub(super) fn find(
     settings: &Settings,
-    keep: Keep<'_>,
+    journal: &Journal,
     workers: &Workers,
 ) -> Result<Numbers, Failure> {
     let recipe = settings.recipe()?;
-    let learnt = learn(&recipe, keep, workers, Failure::usage)?;
+    recipe.validate().map_err(Failure::usage)?;
+    let learnt = learn(&recipe, Some(journal), workers, Failure::usage)?;
     let sets = learnt.run.sets.iter().enumerate();
     let tables = sets.map(|(number, set)| {
         let of = |trained: &TrainedNetwork| trained.scores[number][Rule::MostLikely as usize];
@@ -64,7 +66,7 @@ pub(super) fn find(
         tables: tables.collect(),
         figures: vec![],
     };
-    keep.remove(&recipe)?;
+    forget(journal, &recipe)?;
     Ok(found)
 }
 

@@ -11,10 +11,11 @@ use onecycle_lab::paper::classifier::{
 };
 use serde::Serialize;
 
-use super::part::Part;
+use super::Kept;
 use crate::args;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
+use crate::journal::Journal;
 use crate::output::{print, progress_bar_with_message, write_file, write_text};
 use crate::report::classifier as report;
 use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
@@ -52,24 +53,14 @@ pub(crate) struct Learnt<'a> {
     card: Card<'a>,
 }
 
-/// Where a run keeps its networks while they learn.
-#[derive(Clone, Copy)]
-pub(crate) struct Keep<'a> {
-    /// The file that they stand beside; nothing is kept without.
-    pub(crate) beside: Option<&'a Path>,
-    /// Go on with those that are there.
-    pub(crate) resume: bool,
-}
-
 pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
-    let keep = Keep {
-        beside: arguments.out.as_deref(),
-        resume: arguments.resume,
-    };
+    let failed = |error| settings::out_of_range(&arguments.recipe, error);
+    recipe.validate().map_err(failed)?;
     let workers = Workers::new(arguments.threads)?;
-    let learnt = learn(recipe, keep, &workers, |error| {
-        settings::out_of_range(&arguments.recipe, error)
-    })?;
+    let journal = (arguments.out.as_deref())
+        .map(|out| super::journal(out, recipe, arguments.restart))
+        .transpose()?;
+    let learnt = learn(recipe, journal.as_ref(), &workers, failed)?;
     if let Some(out) = &arguments.out {
         write(out, &learnt.network, &learnt.card)?;
     }
@@ -78,27 +69,25 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
         write_text(path, &text)?;
     }
     print(&report::text(&learnt.run))?;
-    keep.remove(recipe)?;
+    journal.map_or(Ok(()), Journal::remove)?;
     Ok(ExitCode::from(exit::DONE))
 }
 
 /// Trains a network with every loss of a recipe and scores them; `failed` says whose recipe it is.
 pub(crate) fn learn<'a>(
     recipe: &'a Recipe,
-    keep: Keep<'_>,
+    journal: Option<&Journal>,
     workers: &'a Workers,
     failed: impl Fn(ClassifierError) -> Failure,
 ) -> Result<Learnt<'a>, Failure> {
     let begin = Instant::now();
-    recipe.validate().map_err(&failed)?;
     let lesson = Lesson::prepare(recipe, workers).map_err(failed)?;
     let bar = progress_bar_with_message(recipe.losses.len() as u64 * recipe.epochs);
     let mut networks = Vec::new();
     let mut best: Option<((usize, f64), usize, Network)> = None;
     for number in 0..recipe.losses.len() {
-        let part = keep.part(recipe, number)?;
         bar.set_position(number as u64 * recipe.epochs);
-        let (trained, network) = lesson.learn(number, part.as_ref(), keep.resume, &bar)?;
+        let (trained, network) = lesson.learn(number, journal, &bar)?;
         let key = standing(&trained.scores[0]);
         if best.as_ref().is_none_or(|(least, ..)| key < *least) {
             best = Some((key, number, network));
@@ -116,25 +105,12 @@ pub(crate) fn learn<'a>(
     })
 }
 
-impl Keep<'_> {
-    /// The file of the network of loss `number`, from zero.
-    fn part(&self, recipe: &Recipe, number: usize) -> Result<Option<Part>, Failure> {
-        let Some(out) = self.beside else {
-            return Ok(None);
-        };
-        let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
-        Ok(Some(Part::of(out, number + 1, kept)))
+/// Removes the networks of a recipe from a journal that outlives them.
+pub(crate) fn forget(journal: &Journal, recipe: &Recipe) -> Result<(), Failure> {
+    for number in 1..=recipe.losses.len() {
+        journal.remove_piece(&Kept { journal, number }.name())?;
     }
-
-    /// Removes what was kept: all is written.
-    pub(crate) fn remove(&self, recipe: &Recipe) -> Result<(), Failure> {
-        for number in 0..recipe.losses.len() {
-            if let Some(part) = self.part(recipe, number)? {
-                part.remove()?;
-            }
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 /// The less the better: unstable picks, then the mean cost, by the better rule.
@@ -186,12 +162,15 @@ impl<'a> Lesson<'a> {
     fn learn(
         &self,
         number: usize,
-        part: Option<&Part>,
-        resume: bool,
+        journal: Option<&Journal>,
         bar: &ProgressBar,
     ) -> Result<(TrainedNetwork, Network), Failure> {
         let begin = Instant::now();
-        let mut trainer = super::begun(part, resume, || {
+        let kept = journal.map(|journal| Kept {
+            journal,
+            number: number + 1,
+        });
+        let mut trainer = super::begun(kept.as_ref(), || {
             let network = self.recipe.network(self.classes.len())?;
             Ok::<_, ClassifierError>(Trainer::new(self.recipe.settings(number), network)?)
         })?;
@@ -206,7 +185,7 @@ impl<'a> Lesson<'a> {
             &mut trainer,
             [&training, &verification],
             self.workers,
-            part,
+            kept.as_ref(),
             |epoch| {
                 bar.set_position(number as u64 * self.recipe.epochs + epoch.number);
                 bar.set_message(format!(

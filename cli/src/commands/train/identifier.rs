@@ -1,6 +1,5 @@
 //! An identifier from nothing: experiments, training, calibration, scores, a pack.
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
@@ -12,12 +11,15 @@ use onecycle_lab::learn::pack::{PackContents, Quantisation, quantisation};
 use onecycle_lab::learn::train::{Epoch, Network, Outcome, Trainer};
 use onecycle_onboard::pack::{Pack, Sizes};
 
-use super::part::Part;
+use super::Kept;
 use crate::args;
 use crate::commands::dataset::filled;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print, progress_bar_with_message, write_file, write_text};
+use crate::journal::Journal;
+use crate::output::{
+    Waiting, print, progress_bar_with_message, with_ending, write_file, write_text,
+};
 use crate::report::identifier as report;
 use crate::results::identifier::{FamilyScores, IdentifierRun};
 use crate::settings;
@@ -32,9 +34,12 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
     let dataset = arguments.dataset.clone();
-    let path = dataset.unwrap_or_else(|| beside(out, "dataset"));
+    let path = dataset.unwrap_or_else(|| with_ending(out, "dataset"));
     let experiments = recipe.experiments.clone();
-    let (folder, ..) = filled(&path, experiments, recipe.experiments(), &workers)?;
+    // A dataset of the user's stays; one of an interrupted run goes with its work.
+    let restart = arguments.restart && arguments.dataset.is_none();
+    let wanted = (experiments, recipe.experiments());
+    let (folder, ..) = filled(&path, wanted, restart, &workers)?;
     workers.finish();
     let waiting = Waiting::on("reading the experiments");
     let records = folder.records()?;
@@ -46,9 +51,8 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
         let to = records.partition_point(|record| record.number < numbers.end);
         &records[from..to]
     });
-    let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
-    let part = Part::of(out, 1, kept);
-    let (trainer, outcome) = learn(recipe, [learning, choosing], &part, arguments, &workers)?;
+    let journal = super::journal(out, recipe, arguments.restart)?;
+    let (trainer, outcome) = learn(recipe, [learning, choosing], &journal, &workers)?;
     let waiting = Waiting::on("calibrating");
     let (pack, quantisation) = pack(recipe, trainer.best(), [learning, choosing])?;
     let mut trained = IdentifierRun {
@@ -72,29 +76,21 @@ pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, 
         write_text(path, &text)?;
     }
     print(&report::text(&trained, out))?;
-    part.remove()?;
+    journal.remove()?;
     if arguments.dataset.is_none() {
         folder.remove()?;
     }
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The path with another ending behind it.
-fn beside(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".");
-    name.push(ending);
-    PathBuf::from(name)
-}
-
 fn learn(
     recipe: &Recipe,
     [learning, choosing]: [&[Record]; 2],
-    part: &Part,
-    arguments: &args::Train,
+    journal: &Journal,
     workers: &Workers,
 ) -> Result<(Trainer, Outcome), Failure> {
-    let mut trainer = super::begun(Some(part), arguments.resume, || {
+    let kept = Kept { journal, number: 1 };
+    let mut trainer = super::begun(Some(&kept), || {
         recipe
             .network()
             .and_then(|network| Trainer::new(recipe.settings(), network))
@@ -105,7 +101,7 @@ fn learn(
         &mut trainer,
         [&training, &validation],
         workers,
-        Some(part),
+        Some(&kept),
         |epoch| {
             bar.set_position(epoch.number);
             bar.set_message(format!(

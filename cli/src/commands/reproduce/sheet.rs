@@ -9,15 +9,12 @@
 //! A sheet holds none of our numbers, and what is found none of the paper's.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::{Path, PathBuf};
 
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
 
 use crate::args::Name;
 use crate::failure::Failure;
-use crate::output::write_text;
 use crate::pages::plot::{Axis, Figure, Panel};
 use crate::results::reproduction::{ComparedCell, ComparedTable, Numbers, ReproducedPart, Row};
 
@@ -133,45 +130,6 @@ pub(super) fn typed<T: DeserializeOwned>(settings: &toml::Table) -> Result<T, Fa
     settings.clone().try_into().map_err(Failure::usage)
 }
 
-/// A part's file: what was found, and by which program with which settings.
-#[derive(Serialize, Deserialize)]
-struct Kept {
-    program: String,
-    settings: toml::Table,
-    found: Numbers,
-}
-
-/// File of a part.
-pub(super) fn path(folder: &Path, name: Name) -> PathBuf {
-    folder.join(format!("{}.json", name.as_str()))
-}
-
-/// What an earlier run of this program has found with the same settings.
-pub(super) fn kept(path: &Path, settings: &toml::Table) -> Result<Option<Numbers>, Failure> {
-    let unreadable = |reason: String| Failure::Settings {
-        path: path.to_owned(),
-        reason: format!("{reason}: leave out --resume to begin anew"),
-    };
-    let text = match fs::read_to_string(path) {
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        read => read.map_err(|error| unreadable(error.to_string()))?,
-    };
-    let kept: Kept = serde_json::from_str(&text).map_err(|error| unreadable(error.to_string()))?;
-    let is_same = kept.program == env!("CARGO_PKG_VERSION") && kept.settings == *settings;
-    Ok(is_same.then_some(kept.found))
-}
-
-/// Keeps what was found.
-pub(super) fn keep(path: &Path, settings: &toml::Table, found: &Numbers) -> Result<(), Failure> {
-    let kept = Kept {
-        program: env!("CARGO_PKG_VERSION").to_owned(),
-        settings: settings.clone(),
-        found: found.clone(),
-    };
-    let text = crate::report::json::to_text(&kept);
-    write_text(path, &text)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -190,21 +148,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    // What is kept is read back to the same bits with the same settings, and with no others.
-    #[test]
-    fn only_the_same_settings_are_read_back() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = path(folder.path(), Name::Phase);
-        let sheet = Sheet::of(Name::Phase).unwrap();
-        let found = Numbers {
-            tables: vec![vec![Row::new("one", ["1 %".to_owned()])]],
-            figures: vec![],
-        };
-        assert_eq!(kept(&path, &sheet.settings(true)).unwrap(), None);
-        keep(&path, &sheet.settings(true), &found).unwrap();
-        assert_eq!(kept(&path, &sheet.settings(true)).unwrap(), Some(found));
-        assert_eq!(kept(&path, &sheet.settings(false)).unwrap(), None);
     }
 }
