@@ -9,7 +9,6 @@ mod failure;
 mod journal;
 mod output;
 mod pages;
-mod pictures;
 mod report;
 mod results;
 mod settings;

@@ -13,8 +13,7 @@ use rayon::prelude::*;
 
 use crate::args::Certify;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print, progress_bar};
-use crate::pictures::certify::draw;
+use crate::output::{Waiting, print, progress_bar, write_text};
 use crate::report::certificate;
 use crate::results::certify::{BiasRow, CertifiedProcess, CertifiedSpace, SampledRelay};
 use crate::settings;
@@ -31,8 +30,8 @@ pub(crate) fn run(arguments: &Certify) -> Result<ExitCode, Failure> {
         return Ok(ExitCode::from(exit::DONE));
     }
     let certified = certify(arguments, space)?;
-    if let Some(path) = &arguments.picture {
-        draw(path, &certified)?;
+    if let Some(path) = &arguments.report {
+        write_text(path, &certificate::html(&certified))?;
     }
     print(&if arguments.json {
         certificate::json(&certified)

@@ -1,4 +1,4 @@
-//! `onecycle grid`: processes that stand for a space; made, written, checked, drawn.
+//! `onecycle grid`: processes that represent a space; made or read, checked, written.
 
 mod kept;
 
@@ -9,15 +9,15 @@ use std::time::{Duration, Instant};
 
 use onecycle_lab::paper::grid;
 use onecycle_lab::paper::grid::{Check, Grid, GridFile, Layout, Settings, check};
-use onecycle_lab::space::candidate::Gains;
+use onecycle_lab::space::candidate::{Candidate, CandidateError, Gains};
 
 use self::kept::KeptGrid;
 use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, write_file, write_text};
-use crate::results::grid::GridRun;
-use crate::{pictures, report, settings};
+use crate::results::grid::{CostsAlongRay, GridRun};
+use crate::{report, settings};
 
 /// Most members whose costs are written unasked: four million numbers, 40 MB.
 const MOST_IN_MATRIX: usize = 2000;
@@ -29,25 +29,22 @@ const COSTS_PER_THREAD: usize = 64;
 pub(crate) fn run(arguments: &args::Grid) -> Result<ExitCode, Failure> {
     let begin = Instant::now();
     let workers = Workers::new(arguments.threads)?;
-    let mut done = match &arguments.from {
+    let mut run = match &arguments.from {
         Some(path) => read(arguments, path, &workers)?,
         None => make(arguments, &workers)?,
     };
-    done.took = begin.elapsed();
+    run.took = begin.elapsed();
     workers.finish();
-    if let Some(path) = &arguments.picture {
-        pictures::grid::write(path, &done.grid)?;
-    }
     if let Some(path) = &arguments.report {
-        let page = report::grid::html(&done).map_err(Failure::usage)?;
-        write_text(path, &page)?;
+        run.rays = rays(&run.grid.settings).map_err(Failure::usage)?;
+        write_text(path, &report::grid::html(&run))?;
     }
     print(&if arguments.json {
-        report::grid::json(&done)
+        report::grid::json(&run)
     } else {
-        report::grid::text(&done)
+        report::grid::text(&run)
     })?;
-    Ok(ExitCode::from(if done.holds() {
+    Ok(ExitCode::from(if run.holds() {
         exit::DONE
     } else {
         exit::NO_PROCESS
@@ -74,6 +71,7 @@ fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<GridRu
         grid,
         check,
         has_matrix: file.matrix.is_some(),
+        rays: vec![],
         took: Duration::ZERO,
     })
 }
@@ -112,6 +110,7 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<GridRun, Failure> {
         grid,
         check,
         has_matrix,
+        rays: vec![],
         took: Duration::ZERO,
     })
 }
@@ -172,6 +171,40 @@ fn checked(
         .map(|processes| check(grid, processes, arguments.seed, workers))
         .transpose()
         .map_err(Failure::usage)
+}
+
+/// Points of a ray on either side of its middle, and how far they reach, in steps of the grid.
+const POINTS_ALONG: i32 = 200;
+const STEPS_ALONG: f64 = 1.8;
+
+/// Two rays of the space: the longest lags with the shortest dead time, and the other way round.
+fn rays(settings: &Settings) -> Result<Vec<CostsAlongRay>, CandidateError> {
+    let [t_prop_s, t_body_s, tau_s] = settings.space.ranges_s();
+    [
+        ("A ray of long lags", [t_prop_s.1, t_body_s.1, tau_s.0]),
+        ("A ray of long dead time", [t_prop_s.0, t_body_s.0, tau_s.1]),
+    ]
+    .into_iter()
+    .map(|(name, times_s)| {
+        let own = Candidate::new(&settings.space, settings.gains, times_s)?;
+        let step = grid::step(&own, settings.deterioration);
+        let mut ray = CostsAlongRay {
+            name,
+            step,
+            ratios: vec![],
+            own_on_other: vec![],
+            other_on_own: vec![],
+        };
+        for k in -POINTS_ALONG..=POINTS_ALONG {
+            let ratio = step.powf(STEPS_ALONG * f64::from(k) / f64::from(POINTS_ALONG));
+            let other = own.scaled(ratio)?;
+            ray.ratios.push(ratio);
+            ray.own_on_other.push(own.cost_on(&other));
+            ray.other_on_own.push(other.cost_on(&own));
+        }
+        Ok(ray)
+    })
+    .collect()
 }
 
 fn write(

@@ -1,9 +1,11 @@
-//! What is certified of a space of processes, or of single ones.
+//! The certificate of a space of processes, or of single ones: as text and as JSON; `page` has the figures.
+
+mod page;
 
 use std::fmt::Write;
 
 use onecycle_lab::space::Space;
-use onecycle_lab::space::certificate::{Certificate, Kind, Verdict};
+use onecycle_lab::space::certificate::{Certificate, Kind, Summary, Verdict};
 use onecycle_lab::space::limit_cycle::LimitCycle;
 use onecycle_lab::space::limit_cycle::sampled::Motion;
 use serde_json::{Value, json};
@@ -12,6 +14,8 @@ use super::json;
 use super::number::significant;
 use crate::results::certify::{BiasRow, CertifiedProcess, CertifiedSpace, SampledRelay};
 use crate::style::{HEADING, REFUSAL, headed, painted, verdict};
+
+pub(crate) use self::page::html;
 
 /// The report on a space for people.
 pub(crate) fn text(certified: &CertifiedSpace) -> String {
@@ -29,22 +33,18 @@ pub(crate) fn text(certified: &CertifiedSpace) -> String {
     without_bias(&mut text, certified);
     corners(&mut text, space, &certified.corners);
     under_bias(&mut text, rows);
-    let _ = writeln!(
-        text,
-        "\n{}",
-        if certified.holds() {
-            verdict(
-                true,
-                "Certified: stable without bias, and with the trim under every bias above.",
-            )
-        } else {
-            verdict(
-                false,
-                "Not certified: see the processes without a stable cycle above.",
-            )
-        }
-    );
+    let holds = certified.holds();
+    let _ = writeln!(text, "\n{}", verdict(holds, holds_text(holds)));
     text
+}
+
+/// The verdict in one sentence.
+fn holds_text(holds: bool) -> &'static str {
+    if holds {
+        "Certified: stable without bias, and with the trim under every bias."
+    } else {
+        "Not certified: some processes have no stable cycle."
+    }
 }
 
 fn without_bias(text: &mut String, certified: &CertifiedSpace) {
@@ -65,20 +65,18 @@ fn without_bias(text: &mut String, certified: &CertifiedSpace) {
         painted(HEADING, "Without bias"),
         percent(worst.spectral_radius),
     );
-    let ratios = || {
-        certified
-            .unbiased
-            .iter()
-            .filter_map(Certificate::describing_function_ratios)
-    };
-    let periods = ratios().map(|(period, _)| period);
-    let amplitudes = ratios().map(|(_, amplitude)| amplitude);
     let _ = writeln!(
         text,
         "  exact period over the describing function's: {}; amplitude: {}\n",
-        span(periods),
-        span(amplitudes),
+        span_of_ratios(certified, |(period, _)| period),
+        span_of_ratios(certified, |(_, amplitude)| amplitude),
     );
+}
+
+/// Range of exact periods or amplitudes over those of the describing function, of all shapes.
+fn span_of_ratios(certified: &CertifiedSpace, of: fn((f64, f64)) -> f64) -> String {
+    let ratios = (certified.unbiased.iter()).filter_map(Certificate::describing_function_ratios);
+    span(ratios.map(of))
 }
 
 /// `low .. high` of ratios.
@@ -158,12 +156,7 @@ fn under_bias(text: &mut String, rows: &[BiasRow]) {
             no_cycle,
             ..
         } = summary.bare;
-        let (fewest, most) = summary.turned_back.stable_cycles;
-        let cycles = if fewest == most {
-            fewest.to_string()
-        } else {
-            format!("{fewest}..{most}")
-        };
+        let cycles = cycle_count(summary);
         let _ = writeln!(
             text,
             "  {:<5} {:<6} {unstable:<8} {no_cycle:<4} {:<13} {cycles:<6} {:<18} {:<6} {:<7} {:<9} {}",
@@ -176,6 +169,14 @@ fn under_bias(text: &mut String, rows: &[BiasRow]) {
             row.settled[0],
             row.settled[1],
         );
+    }
+}
+
+/// Fewest and most stable cycles of the relay that turns back.
+fn cycle_count(summary: &Summary) -> String {
+    match summary.turned_back.stable_cycles {
+        (fewest, most) if fewest == most => fewest.to_string(),
+        (fewest, most) => format!("{fewest}..{most}"),
     }
 }
 

@@ -1,20 +1,20 @@
-//! What a grid is made of, and how near its members are to random processes: as text, and as a page with pictures.
+//! The members of a grid and how near they are to random processes: as text and as JSON; `page` has the figures.
+
+mod page;
 
 use std::fmt::Write;
 
 use onecycle_lab::paper::grid::{Check, Grid, Layout, Settings};
-use onecycle_lab::space::candidate::{CandidateError, Gains};
+use onecycle_lab::space::candidate::Gains;
 use serde::Serialize;
 
 use super::json::to_text;
 use super::number::significant;
 use super::text::wrapped;
-use crate::pages::escape::escaped;
-use crate::pages::page::{self, Section, page};
-use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series, Shape};
-use crate::pictures::grid as picture;
 use crate::results::grid::GridRun;
-use crate::style::{bare, headed, verdict};
+use crate::style::{headed, verdict};
+
+pub(crate) use self::page::html;
 
 /// Changes with every change that a reader of the summary could notice.
 const SCHEMA: &str = "onecycle.grid.summary/1";
@@ -176,89 +176,6 @@ fn describe(text: &mut String, check: &Check, limit: &str) {
             &format!("{beyond} of them are farther than {limit} from every member.\n"),
         ),
     });
-}
-
-/// The summary and its pictures on a page.
-pub(crate) fn html(run: &GridRun) -> Result<String, CandidateError> {
-    let grid = &run.grid;
-    let space = &grid.settings.space;
-    let lead = page::paragraph(
-        "lead",
-        "Processes that stand for a space: every process of it has a member near, whose controller costs it little.",
-    ) + &format!("<pre>{}</pre>\n", escaped(&bare(&text(run))));
-    let mut shapes: Vec<_> = grid.members.iter().map(|member| member.direction).collect();
-    shapes.dedup();
-    let of = |name: &str, points: Vec<(f64, f64)>, hue| {
-        Series::of_points(name, Marks::Points, points).hue(hue)
-    };
-    let outline = Series::of_points("border of the space", Marks::Line, picture::outline(space));
-    let surface = Figure::single(
-        "Rays of members on the surface of shapes.",
-        Axis::titled("T_body / T_prop").logarithmic(),
-        Panel::new(
-            Axis::titled("tau / r").logarithmic(),
-            vec![
-                outline.hue(Hue::Reference),
-                of(
-                    "rays",
-                    shapes.into_iter().map(picture::place).collect(),
-                    Hue::Model,
-                ),
-            ],
-        ),
-    );
-    let times = |x: usize, y: usize| {
-        let axis = |k: usize| Axis::titled(format!("{} (s)", ["T_prop", "T_body", "tau"][k]));
-        let members = grid.members.iter().map(|member| member.candidate.times_s());
-        let points = members.map(|times_s| (times_s[x], times_s[y]));
-        let panel = Panel::new(
-            axis(y).logarithmic(),
-            vec![of("", points.collect(), Hue::Model)],
-        );
-        Figure::single(
-            "Members in the space of times.",
-            axis(x).logarithmic(),
-            panel,
-        )
-        .shaped(Shape::Square)
-    };
-    let rays = picture::rays(space).map(|(name, times_s)| ray(&grid.settings, name, times_s));
-    let rays: Vec<Figure> = rays.into_iter().collect::<Result<_, _>>()?;
-    let section = |id: &str, title: &str, body: String| Section {
-        id: id.to_owned(),
-        title: title.to_owned(),
-        body,
-    };
-    let sections = [
-        section("shapes", "Shapes", page::figure(&surface)),
-        section("times", "Times", page::row(&[times(0, 1), times(0, 2)])),
-        section("rays", "Along a ray", page::row(&rays)),
-    ];
-    Ok(page("A grid of processes", &lead, &sections))
-}
-
-/// What neighbours on a ray cost each other.
-fn ray(settings: &Settings, name: &str, times_s: [f64; 3]) -> Result<Figure, CandidateError> {
-    let (step, along) = picture::along(settings, times_s)?;
-    let percent = 100.0 * settings.deterioration;
-    let curve = |name, cost: fn(&picture::Along) -> f64| {
-        let points = along.iter().map(|at| (at.alpha, 100.0 * cost(at)));
-        Series::of_points(name, Marks::Line, points)
-    };
-    let ends = [along.first(), along.last()].into_iter().flatten();
-    let limit = Series::of_points("J*", Marks::Dashes, ends.map(|at| (at.alpha, percent)));
-    let up = picture::STEPS_UP;
-    let panel = Panel::new(
-        Axis::titled("deterioration (%)").spanning(up.start * percent, up.end * percent),
-        vec![
-            curve("J_ij: the one's controller on the other", |at| at.there).hue(Hue::Model),
-            curve("J_ji: the other's on the one", |at| at.here).hue(Hue::Input),
-            limit.hue(Hue::Reference),
-        ],
-    );
-    let caption = format!("{name}: members at ratios of {step:.3}.");
-    let figure = Figure::single(&caption, Axis::titled("ratio of the radii"), panel);
-    Ok(figure.shaped(Shape::Square))
 }
 
 fn percent(fraction: f64) -> String {

@@ -1,4 +1,6 @@
-//! The report of a distinguishing phase, for people and as JSON.
+//! The report of a distinguishing phase: as text and as JSON; `page` has the figures.
+
+mod page;
 
 use std::fmt::Write;
 
@@ -8,12 +10,11 @@ use serde::Serialize;
 
 use super::json::to_text;
 use super::number::significant;
-use crate::results::phase::PhaseSearch;
+use crate::results::phase::{PhaseSearch, RoundPhase};
+
+pub(crate) use self::page::html;
 
 const SCHEMA: &str = "onecycle.phase/1";
-
-/// Most lines of the table for people.
-const MOST_LINES: f64 = 16.0;
 
 /// Plain text, at most 100 columns.
 pub(crate) fn text(found: &PhaseSearch) -> String {
@@ -78,36 +79,24 @@ fn times([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> String {
     )
 }
 
-/// What every phase costs, over whole degrees that hold all local rules.
+/// The deterioration of rules at round phases.
 fn table(text: &mut String, found: &PhaseSearch) {
-    let margin_deg = found.space.phase_margin_deg;
-    let (low, high) = found.optima.lead_range_rad();
-    let range_deg = (high - low).to_degrees();
-    let step_deg = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|step| range_deg < MOST_LINES * step)
-        .unwrap_or(10.0);
-    let first = ((margin_deg - high.to_degrees()) / step_deg).round() as i32;
-    let last = ((margin_deg - low.to_degrees()) / step_deg).round() as i32;
     let _ = writeln!(
         text,
         "\nPhase of the rule   local rules   deterioration (%)   costs most on (ms)\n\
          {:<20}{:>11}{:>12}{:>9}   {:>8}{:>9}{:>9}",
         "(deg)", "near it", "worst", "mean", "T_prop", "T_body", "tau"
     );
-    for multiple in (first..=last).rev() {
-        let phase_deg = f64::from(multiple) * step_deg;
-        let Ok(applied) = found.optima.apply((margin_deg - phase_deg).to_radians()) else {
-            continue;
-        };
-        let is_near = |local: &&LocalRule| {
-            (local.applied.phase_rad.to_degrees() / step_deg).round() as i32 == multiple
-        };
+    for line in &found.table {
+        let RoundPhase {
+            phase_deg,
+            local_rules,
+            applied,
+        } = line;
         let [t_prop, t_body, tau] = applied.worst_on_s.map(|time_s| significant(1e3 * time_s));
         let _ = writeln!(
             text,
-            "{phase_deg:<20}{:>11}{:>12.2}{:>9.2}   {t_prop:>8}{t_body:>9}{tau:>9}",
-            found.phase.rules.iter().filter(is_near).count(),
+            "{phase_deg:<20}{local_rules:>11}{:>12.2}{:>9.2}   {t_prop:>8}{t_body:>9}{tau:>9}",
             100.0 * applied.worst,
             100.0 * applied.mean,
         );

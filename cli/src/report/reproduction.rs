@@ -157,7 +157,8 @@ mod tests {
         assert!(text.contains("- Because.\n") && !text.contains(QUICK));
         assert!(markdown(&[part()], true).contains(QUICK));
         let html = html(&[part()], false);
-        assert!(html.contains("<td>0.31 %<small>paper: 0.52 %</small></td><td>3</td>"));
+        let cells = "<td data-column=\"mean |J|\">0.31 %<small>paper: 0.52 %</small></td><td data-column=\"n\">3</td>";
+        assert!(html.contains(cells), "{html}");
         assert!(html.contains("<li>Because.</li>"));
     }
 }

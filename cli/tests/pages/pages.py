@@ -19,7 +19,7 @@ from playwright.sync_api import sync_playwright
 SCREENS = {
     "desk": {"viewport": {"width": 1280, "height": 900}},
     "phone": {
-        "viewport": {"width": 390, "height": 844},
+        "viewport": {"width": 360, "height": 780},
         "device_scale_factor": 2,
         "is_mobile": True,
         "has_touch": True,
@@ -51,6 +51,8 @@ def made(program, examples, scratch):
         "refused": (recording("unsteady_ardupilot_alt.csv"), {"recording"}, 1),
         "tuned": (tune, {"stability", "step", "controller"}, 3),
         "grid": (["grid"], {"shapes", "times", "rays"}, 5),
+        "phase": (["phase"], {"cost", "shapes"}, 2),
+        "certificate": (["certify", "--shapes", "6"], {"corners", "bias"}, 2),
     }
     for name, (arguments, sections, plots) in pages.items():
         path = scratch / f"{name}.html"
@@ -111,6 +113,10 @@ def look(page, path, sections, least_plots):
         expect(abs(size["drawn"] - size["room"]) < 2, f"plot {number} is {size['drawn']} wide, with room for {size['room']}")
     width = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
     expect(width[0] <= width[1], f"the page is {width[0]} wide in a window of {width[1]}")
+    scrolls = page.eval_on_selector_all(
+        ".table, pre", "all => all.filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.innerText.slice(0, 60))"
+    )
+    expect(not scrolls, f"tables scroll sideways: {scrolls}")
     expect(path.stat().st_size < MOST_BYTES, f"{path.stat().st_size} bytes")
 
 

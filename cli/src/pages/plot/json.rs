@@ -157,10 +157,11 @@ fn trace(series: &Series, number: &str) -> Value {
 fn of_field(field: &Field, number: &str) -> Value {
     let mut trace = json!({
         "x": field.x, "y": field.y,
-        "yaxis": format!("y{number}"), "showlegend": false, "showscale": false, "kind": field.kind,
+        "yaxis": format!("y{number}"), "showlegend": false, "showscale": false,
     });
     match field.kind {
         FieldKind::Regions => {
+            trace["kind"] = json!("regions");
             trace["type"] = json!("contour");
             trace["hoverinfo"] = json!("x+y");
             let rows = field.z.iter();
@@ -173,12 +174,26 @@ fn of_field(field: &Field, number: &str) -> Value {
             trace["contours"] = json!({ "start": 1, "end": REGIONS.len(), "size": 1 });
         }
         FieldKind::Correlations => {
+            trace["kind"] = json!("diverging");
             trace["type"] = json!("heatmap");
             trace["z"] = json!(field.z);
             trace["zmin"] = json!(-1.0);
             trace["zmax"] = json!(1.0);
             trace["texttemplate"] = json!("%{z:.2f}");
             trace["hovertemplate"] = json!("%{x}, %{y}: %{z:.3f}<extra></extra>");
+        }
+        FieldKind::Diverging { middle, reach } => {
+            trace["kind"] = json!("diverging");
+            trace["type"] = json!("heatmap");
+            trace["z"] = json!(field.z);
+            trace["zmin"] = json!(middle - reach);
+            trace["zmax"] = json!(middle + reach);
+            trace["showscale"] = json!(true);
+            trace["colorbar"] = json!({
+                "orientation": "h", "x": 0.5, "xanchor": "center", "y": 1.02, "yanchor": "bottom",
+                "thickness": 12, "outlinewidth": 0,
+            });
+            trace["hovertemplate"] = json!("%{x:.3g}, %{y:.3g}: %{z:.1f}<extra></extra>");
         }
     }
     trace
