@@ -9,6 +9,7 @@ mod failure;
 mod journal;
 mod output;
 mod pages;
+mod reading;
 mod report;
 mod results;
 mod settings;

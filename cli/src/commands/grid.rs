@@ -15,7 +15,8 @@ use self::kept::KeptGrid;
 use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print, write_file, write_text};
+use crate::output::{print, write_file, write_text};
+use crate::reading::open_with_bar;
 use crate::results::grid::{CostsAlongRay, GridRun};
 use crate::{report, settings};
 
@@ -56,10 +57,9 @@ fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<GridRu
         path: path.to_owned(),
         reason,
     };
-    let waiting = Waiting::on(format!("reading {}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
+    let text = open_with_bar(path).and_then(io::read_to_string);
+    let text = text.map_err(|error| failed(error.to_string()))?;
     let file = GridFile::read(&text).map_err(|error| failed(error.to_string()))?;
-    drop(waiting);
     let grid = file
         .grid(workers)
         .map_err(|error| failed(error.to_string()))?;
