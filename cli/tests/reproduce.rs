@@ -11,18 +11,9 @@ use common::{Scratch, UNREADABLE, run};
 
 /// Parts that take seconds, and their sheets.
 const PARTS: [(&str, &str); 3] = [
-    (
-        "phase",
-        include_str!("../../experiments/reproduction/phase.toml"),
-    ),
-    (
-        "figures",
-        include_str!("../../experiments/reproduction/figures.toml"),
-    ),
-    (
-        "table_7",
-        include_str!("../../experiments/reproduction/table_7.toml"),
-    ),
+    ("phase", include_str!("../reproduction/phase.toml")),
+    ("figures", include_str!("../reproduction/figures.toml")),
+    ("table_7", include_str!("../reproduction/table_7.toml")),
 ];
 
 /// The paper's cells of a sheet.

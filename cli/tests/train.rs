@@ -9,7 +9,7 @@ use common::{NOT_WRITTEN, Scratch, UNREADABLE, killed_when, run};
 use serde_json::Value;
 
 /// Seconds of work: 2 losses, 6 epochs each.
-const RECIPE: &str = include_str!("../../experiments/paper_network_small.toml");
+const RECIPE: &str = include_str!("../reproduction/paper_network_small.toml");
 
 fn recipe(folder: &Scratch) -> String {
     folder.write("recipe.toml", RECIPE.as_bytes())

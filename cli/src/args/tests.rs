@@ -80,9 +80,11 @@ fn files_of_examples_are_there() {
         let help = after_help(&command);
         let lines = help.lines().filter(|line| line.starts_with(' '));
         let files = lines.flat_map(str::split_whitespace);
-        for file in
-            files.filter(|word| word.starts_with("examples/") || word.starts_with("experiments/"))
-        {
+        for file in files.filter(|word| {
+            ["examples/", "experiments/", "cli/"]
+                .iter()
+                .any(|folder| word.starts_with(folder))
+        }) {
             assert!(root.join(file).exists(), "{words}: {file}");
             count += 1;
         }

@@ -33,9 +33,9 @@ enum RecipeName {
 impl Settings {
     fn recipe(&self) -> Result<Recipe, Failure> {
         let text = match self.recipe {
-            RecipeName::PaperNetwork => include_str!("../../../../experiments/paper_network.toml"),
+            RecipeName::PaperNetwork => include_str!("../../../reproduction/paper_network.toml"),
             RecipeName::PaperNetworkSmall => {
-                include_str!("../../../../experiments/paper_network_small.toml")
+                include_str!("../../../reproduction/paper_network_small.toml")
             }
         };
         let recipe: Recipe = toml::from_str(text).map_err(Failure::usage)?;

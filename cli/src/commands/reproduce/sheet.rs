@@ -18,7 +18,7 @@ use crate::failure::Failure;
 use crate::pages::plot::{Axis, Figure, Panel};
 use crate::results::reproduction::{ComparedCell, ComparedTable, Numbers, ReproducedPart, Row};
 
-/// A file of `experiments/reproduction`.
+/// A file of `cli/reproduction`.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Sheet {
@@ -61,19 +61,19 @@ impl Sheet {
     /// The one of this name; those in the program are all well formed.
     pub(super) fn of(name: Name) -> Result<Self, Failure> {
         let text = match name {
-            Name::Phase => include_str!("../../../../experiments/reproduction/phase.toml"),
-            Name::Grid => include_str!("../../../../experiments/reproduction/grid.toml"),
-            Name::Figures => include_str!("../../../../experiments/reproduction/figures.toml"),
+            Name::Phase => include_str!("../../../reproduction/phase.toml"),
+            Name::Grid => include_str!("../../../reproduction/grid.toml"),
+            Name::Figures => include_str!("../../../reproduction/figures.toml"),
             Name::Table2And3 => {
-                include_str!("../../../../experiments/reproduction/table_2_and_3.toml")
+                include_str!("../../../reproduction/table_2_and_3.toml")
             }
-            Name::Table4 => include_str!("../../../../experiments/reproduction/table_4.toml"),
+            Name::Table4 => include_str!("../../../reproduction/table_4.toml"),
             Name::TuningRules => {
-                include_str!("../../../../experiments/reproduction/tuning_rules.toml")
+                include_str!("../../../reproduction/tuning_rules.toml")
             }
-            Name::Table5 => include_str!("../../../../experiments/reproduction/table_5.toml"),
-            Name::Table6 => include_str!("../../../../experiments/reproduction/table_6.toml"),
-            Name::Table7 => include_str!("../../../../experiments/reproduction/table_7.toml"),
+            Name::Table5 => include_str!("../../../reproduction/table_5.toml"),
+            Name::Table6 => include_str!("../../../reproduction/table_6.toml"),
+            Name::Table7 => include_str!("../../../reproduction/table_7.toml"),
         };
         toml::from_str(text).map_err(Failure::usage)
     }
