@@ -1,7 +1,7 @@
 //! Text as HTML has it.
 
 /// The text with every character escaped that HTML would read as markup.
-pub(crate) fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

@@ -81,12 +81,7 @@ pub(crate) fn json(run: &GridRun) -> String {
 /// The summary for people.
 pub(crate) fn text(run: &GridRun) -> String {
     let mut text = String::new();
-    let Settings {
-        space,
-        deterioration,
-        layout,
-        gains,
-    } = &run.grid.settings;
+    let space = &run.grid.settings.space;
     let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
     let _ = writeln!(
         text,
@@ -97,85 +92,106 @@ pub(crate) fn text(run: &GridRun) -> String {
         space.phase_margin_deg,
         space.beta,
     );
-    let limit = percent(*deterioration);
-    let _ = writeln!(
-        text,
-        "Grid     {}, {}",
-        match layout {
-            Layout::Rays => format!("neighbours {limit} apart"),
-            Layout::Fewest => format!("the fewest within {limit} of every process"),
-        },
-        match gains {
-            Gains::SameAmplitude => "gains by the amplitude",
-            Gains::Equal => "equal velocity gains",
-        }
-    );
-    members(&mut text, &run.grid);
+    let _ = writeln!(text, "Grid     {}", kind(&run.grid.settings));
+    let mut lead = "Members  ";
+    for line in members(&run.grid) {
+        wrapped(&mut text, lead, &line);
+        lead = "         ";
+    }
     let _ = writeln!(text, "Time     {} s", significant(run.took.as_secs_f64()));
     text = headed(&text);
     if let Some(check) = &run.check {
-        describe(&mut text, check, &limit);
+        let _ = writeln!(
+            text,
+            "\n{}",
+            headed(&format!(
+                "Check    {} random processes, seed {}",
+                check.processes, check.seed
+            ))
+        );
+        for (name, value) in check_facts(check) {
+            let _ = writeln!(text, "  {name:<28}{value}");
+        }
+        let limit = run.grid.settings.deterioration;
+        let _ = writeln!(
+            text,
+            "\n{}",
+            verdict(run.holds(), &check_verdict(check, limit))
+        );
     }
     text
 }
 
-fn members(text: &mut String, grid: &Grid) {
+/// How members are laid.
+fn kind(settings: &Settings) -> String {
+    let limit = percent(settings.deterioration);
+    let layout = match settings.layout {
+        Layout::Rays => format!("neighbours {limit} apart"),
+        Layout::Fewest => format!("the fewest within {limit} of every process"),
+    };
+    let gains = match settings.gains {
+        Gains::SameAmplitude => "gains by the amplitude",
+        Gains::Equal => "equal velocity gains",
+    };
+    format!("{layout}, {gains}")
+}
+
+/// Number of members and how they lie, in sentences of one line each.
+fn members(grid: &Grid) -> Vec<String> {
     let counts = members_per_row(grid);
     let count = grid.members.len();
     if counts.is_empty() {
-        let _ = writeln!(text, "Members  {count}");
-        return;
+        return vec![count.to_string()];
     }
     let rows: Vec<String> = counts.iter().map(ToString::to_string).collect();
-    let rows = format!("{count} in {} rows: {}", rows.len(), rows.join(" "));
-    wrapped(text, "Members  ", &rows);
+    let mut lines = vec![format!(
+        "{count} in {} rows: {}",
+        rows.len(),
+        rows.join(" ")
+    )];
     let alone = grid.members.iter().filter(|member| member.place.is_none());
     match alone.count() {
         0 => {}
-        alone => {
-            let _ = writeln!(text, "         and {alone} where the rows left holes");
-        }
+        alone => lines.push(format!("and {alone} where the rows left holes")),
     }
     if let Some(Alpha { least, most }) = Alpha::of(grid) {
-        let _ = writeln!(
-            text,
-            "         radii of a ray at ratios of {least:.3} to {most:.3}"
-        );
+        lines.push(format!(
+            "radii of a ray at ratios of {least:.3} to {most:.3}"
+        ));
     }
+    lines
 }
 
-fn describe(text: &mut String, check: &Check, limit: &str) {
+fn check_facts(check: &Check) -> [(&'static str, String); 4] {
     let [t_prop, t_body, tau] = check.worst_at_s.map(significant);
     let cost = |cost: Option<f64>| cost.map_or("unstable".to_owned(), percent);
-    text.push_str(&headed(&format!(
-        "\nCheck    {} random processes, seed {}\n  \
-         from the best member        worst {}, mean {}\n  \
-         its controller on them      worst {}, mean {}\n  \
-         least phase margin left     {}\n  \
-         farthest is                 T_prop {t_prop} s, T_body {t_body} s, tau {tau} s\n\n",
-        check.processes,
-        check.seed,
-        cost(check.worst),
-        cost(check.mean),
-        cost(check.worst_cost),
-        cost(check.mean_cost),
-        check
-            .least_margin_rad
-            .map_or("unstable".to_owned(), |margin| format!(
-                "{:.1} deg",
-                margin.to_degrees()
-            )),
-    )));
-    text.push_str(&match check.beyond {
-        0 => verdict(
-            true,
-            &format!("Every one of them is within {limit} of a member.\n"),
+    let margin = check.least_margin_rad;
+    let both = |worst, mean| format!("worst {}, mean {}", cost(worst), cost(mean));
+    [
+        ("from the best member", both(check.worst, check.mean)),
+        (
+            "its controller on them",
+            both(check.worst_cost, check.mean_cost),
         ),
-        beyond => verdict(
-            false,
-            &format!("{beyond} of them are farther than {limit} from every member.\n"),
+        (
+            "least phase margin left",
+            margin.map_or("unstable".to_owned(), |margin| {
+                format!("{:.1} deg", margin.to_degrees())
+            }),
         ),
-    });
+        (
+            "farthest is",
+            format!("T_prop {t_prop} s, T_body {t_body} s, tau {tau} s"),
+        ),
+    ]
+}
+
+fn check_verdict(check: &Check, limit: f64) -> String {
+    let limit = percent(limit);
+    match check.beyond {
+        0 => format!("Every one of them is within {limit} of a member."),
+        beyond => format!("{beyond} of them are farther than {limit} from every member."),
+    }
 }
 
 fn percent(fraction: f64) -> String {

@@ -25,6 +25,14 @@ SCREENS = {
         "has_touch": True,
     },
 }
+# Pairs of labels of one axis whose boxes meet.
+TOUCHING = """() => [...document.querySelectorAll(".plot")].flatMap((plot) =>
+    [".xtick text", ".ytick text", ".y2tick text"].flatMap((labels) => {
+        const all = [...plot.querySelectorAll(labels)].map((one) => [one.textContent, one.getBoundingClientRect()]);
+        const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+        return all.flatMap(([text, box], at) =>
+            all.slice(at + 1).filter(([, other]) => meet(box, other)).map(([other]) => `${text} and ${other}`));
+    }))"""
 # The largest that a page may be.
 MOST_BYTES = 6_000_000
 
@@ -114,9 +122,11 @@ def look(page, path, sections, least_plots):
     width = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
     expect(width[0] <= width[1], f"the page is {width[0]} wide in a window of {width[1]}")
     scrolls = page.eval_on_selector_all(
-        ".table, pre", "all => all.filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.innerText.slice(0, 60))"
+        ".table", "all => all.filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.innerText.slice(0, 60))"
     )
     expect(not scrolls, f"tables scroll sideways: {scrolls}")
+    touching = page.evaluate(TOUCHING)
+    expect(not touching, f"labels touch: {touching}")
     expect(path.stat().st_size < MOST_BYTES, f"{path.stat().st_size} bytes")
 
 

@@ -28,6 +28,8 @@ impl Figure {
                     .map(|note| annotation(note, panel, self, &number)),
             );
             let mut axis = axis(&panel.y, panel.field.as_ref().map(|field| &field.y));
+            let values = panel.series.iter().flat_map(|series| &series.y);
+            space_labels(&mut axis, &panel.y, values);
             axis["domain"] = json!(domain(index, self.panels.len()));
             if self.shape == Shape::ToScale {
                 axis["scaleanchor"] = json!("x");
@@ -37,6 +39,8 @@ impl Figure {
         let field = self.panels.iter().find_map(|panel| panel.field.as_ref());
         let mut x = axis(&self.x, field.map(|field| &field.x));
         x["anchor"] = json!(format!("y{lowest}"));
+        let series = self.panels.iter().flat_map(|panel| &panel.series);
+        space_labels(&mut x, &self.x, series.flat_map(|series| &series.x));
         layout.insert("xaxis".to_owned(), x);
         layout.insert("annotations".to_owned(), json!(annotations));
         if let Some((from, to)) = self.span {
@@ -97,6 +101,10 @@ fn axis(axis: &Axis, places: Option<&Places>) -> Value {
         "automargin": true,
         "zeroline": false,
     });
+    if kind == "category" {
+        // Upright where there is no room: slanted labels touch each other.
+        out["autotickangles"] = json!([0, 90]);
+    }
     if axis.is_bare {
         out["showticklabels"] = json!(false);
         out["showgrid"] = json!(false);
@@ -105,6 +113,29 @@ fn axis(axis: &Axis, places: Option<&Places>) -> Value {
         out["range"] = json!([scaled(axis, low), scaled(axis, high)]);
     }
     out
+}
+
+/// Most decades of an axis whose labels stand at 1, 2 and 5, and most labels of an axis of more decades.
+const FEW_DECADES: f64 = 2.5;
+const MOST_LABELS: f64 = 6.0;
+
+/// Sets the labels of a logarithmic axis: on its own plotly.js labels each of 1 to 9, and they touch.
+fn space_labels<'a>(out: &mut Value, axis: &Axis, values: impl Iterator<Item = &'a f64>) {
+    let (low, high) = axis.range.unwrap_or_else(|| {
+        let positive = values.filter(|value| **value > 0.0);
+        positive.fold((f64::INFINITY, 0.0), |(low, high), value| {
+            (value.min(low), value.max(high))
+        })
+    });
+    let decades = (high / low).log10();
+    // Less than a decade has even steps.
+    if axis.is_logarithmic && decades >= 1.0 {
+        out["dtick"] = if decades < FEW_DECADES {
+            json!("D2")
+        } else {
+            json!((decades / MOST_LABELS).ceil())
+        };
+    }
 }
 
 /// A coordinate as ranges and annotations have it.
@@ -279,6 +310,9 @@ mod tests {
         assert_eq!(layout["xaxis"]["anchor"], "y2");
         assert_eq!(layout["xaxis"]["range"], json!([-1.0, 3.0]));
         assert_eq!(layout["yaxis2"]["range"], json!([-1.0, 4.0]));
+        // Four decades: a label each.
+        assert_eq!(layout["xaxis"]["dtick"], 1.0);
+        assert_eq!(layout["yaxis2"]["dtick"], Value::Null);
         assert_eq!(layout["annotations"][0]["y"], 2.0);
         assert_eq!(layout["annotations"][0]["yref"], "y");
         let top = layout["yaxis2"]["domain"][1].as_f64().unwrap();

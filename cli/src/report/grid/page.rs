@@ -4,12 +4,10 @@
 use onecycle_lab::space::Space;
 use onecycle_lab::space::surface::Direction;
 
-use super::text;
-use crate::pages::escape::escaped;
+use super::{check_facts, check_verdict, kind, members};
 use crate::pages::page::{self, Section, page};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series, Shape};
 use crate::results::grid::{CostsAlongRay, GridRun};
-use crate::style::bare;
 
 /// Points on each side of the outline.
 const POINTS: i32 = 200;
@@ -20,11 +18,31 @@ const SHOWN: (f64, f64) = (-0.4, 2.5);
 
 /// The page of a grid.
 pub(crate) fn html(run: &GridRun) -> String {
-    let lead = page::paragraph(
+    let settings = &run.grid.settings;
+    let mut lead = page::paragraph(
         "lead",
         "Processes that represent a space: for every process of the space, the controller of one member costs at most \
          J* more than the optimum.",
-    ) + &format!("<pre>{}</pre>\n", escaped(&bare(&text(run))));
+    );
+    if let Some(check) = &run.check {
+        let (processes, seed) = (check.processes, check.seed);
+        let found = check_verdict(check, settings.deterioration);
+        let words = format!("{processes} random processes, seed {seed}. {found}");
+        lead += &page::verdict(run.holds(), &words);
+    }
+    let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
+    let margin = settings.space.phase_margin_deg;
+    let mut facts = vec![
+        ("T_prop", range(settings.space.t_prop_s)),
+        ("T_body", range(settings.space.t_body_s)),
+        ("tau", range(settings.space.tau_s)),
+        ("phase margin", format!("at least {margin} deg")),
+        ("relay beta", settings.space.beta.to_string()),
+        ("grid", kind(settings)),
+        ("members", members(&run.grid).join(", ")),
+    ];
+    facts.extend(run.check.iter().flat_map(check_facts));
+    lead += &page::facts(&facts);
     let rays: Vec<Figure> = (run.rays.iter())
         .map(|ray| along(ray, run.grid.settings.deterioration))
         .collect();
