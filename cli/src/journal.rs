@@ -110,7 +110,7 @@ impl Journal {
         match fs::read(&path) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(error) if error.kind() == ErrorKind::NotFound => Ok(None),
-            Err(error) => Err(refused(&path, error.to_string())),
+            Err(error) => Err(Failure::unreadable(&path, error)),
         }
     }
 
@@ -130,7 +130,7 @@ impl Journal {
 
     /// The refusal of a piece that cannot be used.
     pub(crate) fn refused_piece(&self, name: &str, reason: &str) -> Failure {
-        refused(&self.folder.join(name), format!("{reason}: {RESTART}"))
+        Failure::unreadable(&self.folder.join(name), format!("{reason}: {RESTART}"))
     }
 
     /// Removes the work folder: the output is written.
@@ -169,9 +169,10 @@ fn read<L: DeserializeOwned>(
     head: &Head,
     mut take: impl FnMut(L) -> Result<(), String>,
 ) -> Result<u64, Failure> {
-    let failed = |error: io::Error| refused(path, error.to_string());
-    let wrong =
-        |number: usize, reason: &str| refused(path, format!("line {number} {reason}: {RESTART}"));
+    let failed = |error: io::Error| Failure::unreadable(path, error);
+    let wrong = |number: usize, reason: &str| {
+        Failure::unreadable(path, format!("line {number} {reason}: {RESTART}"))
+    };
     let mut lines = BufReader::new(file.try_clone().map_err(failed)?);
     let (mut length, mut cut) = (0, None);
     let mut bytes = Vec::new();
@@ -212,7 +213,7 @@ impl Head {
         } else {
             return Ok(());
         };
-        Err(refused(
+        Err(Failure::unreadable(
             path,
             format!("unfinished work {there}: {RESTART}, or name another output to keep it"),
         ))
@@ -249,13 +250,6 @@ fn short(value: &Value) -> String {
         return text;
     }
     text.chars().take(SHORT).chain("...".chars()).collect()
-}
-
-fn refused(path: &Path, reason: String) -> Failure {
-    Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    }
 }
 
 #[cfg(test)]

@@ -64,17 +64,8 @@ fn say(style: Style, line: impl Display) {
     );
 }
 
-/// A bar on the error output, for so many pieces of work; nothing where that is no terminal.
+/// A bar on the error output for this many pieces of work, with a message behind it; hidden where that is no terminal.
 pub(crate) fn progress_bar(pieces: u64) -> ProgressBar {
-    let bar = ProgressBar::new(pieces);
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}") {
-        bar.set_style(style);
-    }
-    bar
-}
-
-/// The same with a message behind it.
-pub(crate) fn progress_bar_with_message(pieces: u64) -> ProgressBar {
     let bar = ProgressBar::new(pieces);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}  {msg}") {
         bar.set_style(style);

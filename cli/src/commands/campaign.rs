@@ -62,7 +62,7 @@ fn campaign(arguments: &args::Campaign) -> Result<Campaign, Failure> {
     }
     campaign
         .validate()
-        .map_err(|error| settings::out_of_range(&arguments.file, error))?;
+        .map_err(|error| Failure::unreadable(&arguments.file, error))?;
     Ok(campaign)
 }
 
@@ -89,7 +89,7 @@ fn of_kinds(
     let recipe = campaign.recipe();
     recipe
         .validate()
-        .map_err(|error| settings::out_of_range(&arguments.file, error))?;
+        .map_err(|error| Failure::unreadable(&arguments.file, error))?;
     let pack = Pack::embedded().map_err(Failure::usage)?;
     let network = |signature: &Signature| pack.outputs(&signature.values);
     let road = Road {

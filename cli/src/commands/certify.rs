@@ -2,18 +2,17 @@
 
 use std::process::ExitCode;
 
-use indicatif::ProgressBar;
 use onecycle_lab::judge::campaign::{Campaign, Measure, relay_outcome};
 use onecycle_lab::space::Space;
 use onecycle_lab::space::certificate::{Certificate, Summary};
 use onecycle_lab::space::limit_cycle::sampled::{motion, symmetric_cycles};
 use onecycle_lab::space::surface::Direction;
 use onecycle_onboard::Soiptd;
-use rayon::prelude::*;
 
+use super::workers::Workers;
 use crate::args::Certify;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print, progress_bar, write_text};
+use crate::output::{Waiting, print, write_text};
 use crate::report::certificate;
 use crate::results::certify::{BiasRow, CertifiedProcess, CertifiedSpace, SampledRelay};
 use crate::settings;
@@ -53,21 +52,22 @@ fn certify(arguments: &Certify, space: Space) -> Result<CertifiedSpace, Failure>
     let shapes = space.shapes(side, side);
     let biases = arguments.biases();
     // A certificate of each without bias; under each bias one, and two simulations.
-    let bar = progress_bar(((1 + 3 * biases.len()) * shapes.len()) as u64);
+    let workers = Workers::new(None)?;
+    workers.expect((1 + 3 * biases.len()) * shapes.len(), 0);
     let least_stable = space
         .least_stable(FINER * side, FINER * side)
         .ok_or_else(|| Failure::usage("the space has no process"))?;
     let certified = CertifiedSpace {
         space,
         least_stable,
-        unbiased: certificates(&space, &shapes, 0.0, &bar)?,
+        unbiased: certificates(&space, &shapes, 0.0, &workers)?,
         corners: corners(&space)?,
         rows: biases
             .iter()
-            .map(|&bias| row(&space, &shapes, bias, &bar))
+            .map(|&bias| row(&space, &shapes, bias, &workers))
             .collect::<Result<_, _>>()?,
     };
-    bar.finish_and_clear();
+    workers.finish();
     Ok(certified)
 }
 
@@ -92,19 +92,15 @@ fn row(
     space: &Space,
     shapes: &[Direction],
     bias: f64,
-    bar: &ProgressBar,
+    workers: &Workers,
 ) -> Result<BiasRow, Failure> {
-    let certificates = certificates(space, shapes, bias, bar)?;
+    let certificates = certificates(space, shapes, bias, workers)?;
     let mut settled = [0; 2];
     for (settled, trim) in settled.iter_mut().zip([false, true]) {
-        *settled = certificates
-            .par_iter()
-            .map(|certificate| {
-                let settles = settles(space, certificate, trim);
-                bar.inc(1);
-                settles.map(usize::from)
-            })
-            .sum::<Result<usize, Failure>>()?;
+        let all = workers.run(certificates.len(), |k| {
+            settles(space, &certificates[k], trim).map(usize::from)
+        });
+        *settled = all.into_iter().sum::<Result<usize, Failure>>()?;
     }
     Ok(BiasRow {
         summary: Summary::of(bias, &certificates),
@@ -116,17 +112,16 @@ fn certificates(
     space: &Space,
     shapes: &[Direction],
     bias: f64,
-    bar: &ProgressBar,
+    workers: &Workers,
 ) -> Result<Vec<Certificate>, Failure> {
-    shapes
-        .par_iter()
-        .filter_map(|&shape| space.middle_of_ray(shape))
-        .map(|times_s| {
-            let certificate = Certificate::new(times_s, space.beta, bias).map_err(Failure::usage);
-            bar.inc(1);
-            certificate
-        })
-        .collect()
+    let middles = shapes
+        .iter()
+        .filter_map(|&shape| space.middle_of_ray(shape));
+    let times_s: Vec<[f64; 3]> = middles.collect();
+    let certificates = workers.run(times_s.len(), |k| {
+        Certificate::new(times_s[k], space.beta, bias).map_err(Failure::usage)
+    });
+    certificates.into_iter().collect()
 }
 
 /// Period (s) that a simulated oscillation is scaled to: 400 samples at the campaign's 1 kHz.

@@ -96,7 +96,7 @@ fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
     };
     recipe
         .validate()
-        .map_err(|error| settings::out_of_range(path, error))?;
+        .map_err(|error| Failure::unreadable(path, error))?;
     Ok(recipe)
 }
 

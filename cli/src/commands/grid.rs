@@ -53,10 +53,7 @@ pub(crate) fn run(arguments: &args::Grid) -> Result<ExitCode, Failure> {
 }
 
 fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<GridRun, Failure> {
-    let failed = |reason: String| Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    };
+    let failed = |reason: String| Failure::unreadable(path, reason);
     let text = open_with_bar(path).and_then(io::read_to_string);
     let text = text.map_err(|error| failed(error.to_string()))?;
     let file = GridFile::read(&text).map_err(|error| failed(error.to_string()))?;

@@ -74,7 +74,7 @@ fn verify(arguments: &args::VerifyPack) -> Result<ExitCode, Failure> {
 fn export(arguments: &args::ExportPack) -> Result<ExitCode, Failure> {
     let bytes = bytes(&arguments.pack)?;
     let pack = read(&arguments.pack, &bytes)?;
-    let failed = |reason: String| unreadable(&path(&arguments.pack), reason);
+    let failed = |reason: String| Failure::unreadable(&path(&arguments.pack), reason);
     let contents = PackContents::read(&pack).map_err(|error| failed(error.to_string()))?;
     let network = contents
         .network()
@@ -138,14 +138,14 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
     let like_bytes = bytes(&arguments.like)?;
     let like = read(&arguments.like, &like_bytes)?;
     let mut contents = PackContents::read(&like)
-        .map_err(|error| unreadable(&path(&arguments.like), error.to_string()))?;
+        .map_err(|error| Failure::unreadable(&path(&arguments.like), error.to_string()))?;
     let activations: Vec<_> = contents
         .layers
         .iter()
         .map(|layer| layer.activation)
         .collect();
     let (normalisation, network) = learnt(&arguments.model, &activations)?;
-    let failed = |reason: String| unreadable(&arguments.model, reason);
+    let failed = |reason: String| Failure::unreadable(&arguments.model, reason);
 
     let brings_normalisation = normalisation.is_some();
     if let Some(Normalisation { offsets, scales }) = normalisation {
@@ -184,7 +184,7 @@ fn learnt(
     path: &Path,
     activations: &[Activation],
 ) -> Result<(Option<Normalisation>, Network), Failure> {
-    let failed = |reason: String| unreadable(path, reason);
+    let failed = |reason: String| Failure::unreadable(path, reason);
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     match extension.to_str() {
         Some("onnx") => {
@@ -238,13 +238,6 @@ fn path(source: &PackSource) -> PathBuf {
     }
 }
 
-fn unreadable(path: &Path, reason: String) -> Failure {
-    Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    }
-}
-
 pub(super) fn bytes(source: &PackSource) -> Result<Cow<'static, [u8]>, Failure> {
     match source {
         PackSource::Embedded => Ok(Cow::Borrowed(DEFAULT)),
@@ -253,12 +246,12 @@ pub(super) fn bytes(source: &PackSource) -> Result<Cow<'static, [u8]>, Failure> 
 }
 
 pub(super) fn read<'a>(source: &PackSource, bytes: &'a [u8]) -> Result<Pack<'a>, Failure> {
-    Pack::read(bytes).map_err(|error| unreadable(&path(source), error.to_string()))
+    Pack::read(bytes).map_err(|error| Failure::unreadable(&path(source), error.to_string()))
 }
 
 /// The bytes of a file, of which there may be so many.
 fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
-    let failed = |error: io::Error| unreadable(path, error.to_string());
+    let failed = |error: io::Error| Failure::unreadable(path, error.to_string());
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
     let read = file
@@ -267,7 +260,7 @@ fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
         .map_err(failed)?;
     if read as u64 > most {
         let reason = format!("it has more than {most} bytes, too many to be what is asked for");
-        return Err(unreadable(path, reason));
+        return Err(Failure::unreadable(path, reason));
     }
     Ok(bytes)
 }

@@ -10,7 +10,7 @@
 use std::path::{Path, PathBuf};
 
 use onecycle_lab::judge::evaluate::Truth;
-use onecycle_lab::judge::evaluate::files::{TableError, read_truth};
+use onecycle_lab::judge::evaluate::files::read_truth;
 use serde::Deserialize;
 
 use crate::failure::Failure;
@@ -87,7 +87,7 @@ fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
 pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure> {
     let path = folder.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(|error| {
-        unreadable(
+        Failure::unreadable(
             &path,
             format!("{error}: name a folder that onecycle bench make has written"),
         )
@@ -96,10 +96,10 @@ pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure
     struct Version {
         format: String,
     }
-    let malformed = |error: serde_json::Error| unreadable(&path, error.to_string());
+    let malformed = |error: serde_json::Error| Failure::unreadable(&path, error);
     let found: Version = serde_json::from_str(&text).map_err(malformed)?;
     if found.format != FORMAT {
-        return Err(unreadable(
+        return Err(Failure::unreadable(
             &path,
             format!(
                 "the folder is of version '{}', but this program scores '{FORMAT}': make it anew",
@@ -109,9 +109,10 @@ pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure
     }
     let manifest: BenchManifest = serde_json::from_str(&text).map_err(malformed)?;
     let path = folder.join(TRUTH);
-    let truths = read_truth(&read_text(&path)?).map_err(|error| refused(&path, &error))?;
+    let truths =
+        read_truth(&read_text(&path)?).map_err(|error| Failure::unreadable(&path, error))?;
     if truths.len() as u64 != manifest.benchmark.experiments {
-        return Err(unreadable(
+        return Err(Failure::unreadable(
             &path,
             format!(
                 "it has {} experiments, but {MANIFEST} says {}",
@@ -125,17 +126,5 @@ pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure
 
 /// The text of a file.
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| unreadable(path, error.to_string()))
-}
-
-/// A table that cannot be read: its file, its line and why.
-pub(super) fn refused(path: &Path, error: &TableError) -> Failure {
-    unreadable(path, error.to_string())
-}
-
-pub(super) fn unreadable(path: &Path, reason: String) -> Failure {
-    Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    }
+    std::fs::read_to_string(path).map_err(|error| Failure::unreadable(path, error))
 }

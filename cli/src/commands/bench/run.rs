@@ -9,7 +9,7 @@ use onecycle_lab::judge::evaluate::files::{read_answers, results_csv};
 use onecycle_lab::judge::evaluate::{Contender, Judge, Record, Truth, records};
 use serde_json::{Value, json};
 
-use super::folder::{self, TRUTH, read_text, refused, unreadable};
+use super::folder::{self, TRUTH, read_text};
 use super::recordings::Recordings;
 use super::traces;
 use crate::args::{self, RunBench};
@@ -131,7 +131,7 @@ fn answered(
                 records(lot[index], signals, methods, &thread_seconds)
             });
             records.map_err(|error| {
-                unreadable(truth, format!("experiment {}: {error}", numbers[index]))
+                Failure::unreadable(truth, format!("experiment {}: {error}", numbers[index]))
             })
         });
         for (truth, made) in lot.iter().zip(made) {
@@ -161,8 +161,8 @@ fn foreign(all: &[args::Answers], truths: &[Truth]) -> Result<Vec<Record>, Failu
             )));
         }
         let text = read_text(&answers.file)?;
-        let mut found =
-            read_answers(&text, &experiments).map_err(|error| refused(&answers.file, &error))?;
+        let mut found = read_answers(&text, &experiments)
+            .map_err(|error| Failure::unreadable(&answers.file, error))?;
         for truth in truths {
             let judge = Judge::new(&truth.process).map_err(Failure::usage)?;
             let (answer, seconds) = match found.remove(&truth.number) {

@@ -28,20 +28,14 @@ impl Folder {
         let manifest_path = path.join(MANIFEST_NAME);
         let manifest = match std::fs::read_to_string(&manifest_path) {
             Ok(text) => {
-                let found = Manifest::read(&text);
-                let manifest = if restart {
-                    found
-                        .map(|found| remove_files(path, &found))
-                        .map(|removed| {
-                            removed?;
-                            Ok(Manifest::new(recipe, examples))
-                        })
+                let refused = |error| Failure::unreadable(&manifest_path, error);
+                let found = Manifest::read(&text).map_err(refused)?;
+                if restart {
+                    remove_files(path, &found)?;
+                    Manifest::new(recipe, examples)
                 } else {
-                    found
-                        .and_then(|found| found.go_on(&recipe, examples))
-                        .map(Ok)
-                };
-                manifest.map_err(|error| refused(&manifest_path, error.to_string()))??
+                    found.go_on(&recipe, examples).map_err(refused)?
+                }
             }
             // What is no folder cannot be made one, and says so.
             Err(error)
@@ -50,7 +44,7 @@ impl Folder {
                 begin(path)?;
                 Manifest::new(recipe, examples)
             }
-            Err(error) => return Err(refused(&manifest_path, error.to_string())),
+            Err(error) => return Err(Failure::unreadable(&manifest_path, error)),
         };
         let path = path.to_owned();
         let folder = Self { path, manifest };
@@ -110,9 +104,9 @@ impl Folder {
 
     fn records_of(&self, shard: usize) -> Result<Vec<Record>, Failure> {
         let path = self.path.join(file_name(shard));
-        let bytes = std::fs::read(&path).map_err(|error| refused(&path, error.to_string()))?;
+        let bytes = std::fs::read(&path).map_err(|error| Failure::unreadable(&path, error))?;
         let read = self.manifest.records(shard, &bytes);
-        read.map_err(|error| refused(&path, error.to_string()))
+        read.map_err(|error| Failure::unreadable(&path, error))
     }
 
     /// Removes the files and the folder, where there is nothing else in it.
@@ -169,18 +163,11 @@ fn begin(path: &Path) -> Result<(), Failure> {
     let mut entries = std::fs::read_dir(path).map_err(|error| Failure::output(path, error))?;
     match entries.next() {
         None => Ok(()),
-        Some(_) => Err(refused(
+        Some(_) => Err(Failure::unreadable(
             path,
             format!(
                 "the folder is not empty and has no {MANIFEST_NAME}: name a new one for the dataset"
             ),
         )),
-    }
-}
-
-fn refused(path: &Path, reason: String) -> Failure {
-    Failure::Settings {
-        path: path.to_owned(),
-        reason,
     }
 }

@@ -13,7 +13,7 @@ use crate::results::reproduction::{Numbers, Row};
 /// The experiments and the methods.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct ComparisonSettings {
     /// Processes under either protocol.
     systems: u64,
     seed: u64,
@@ -26,7 +26,7 @@ fn contender(name: &str) -> Result<Contender, Failure> {
     Contender::from_name(name).ok_or_else(|| Failure::usage(format!("there is no method '{name}'")))
 }
 
-pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Numbers, Failure> {
+pub(super) fn find(settings: &ComparisonSettings, workers: &Workers) -> Result<Numbers, Failure> {
     let contenders = settings.methods.iter().map(|(name, _)| contender(name));
     let contenders: Vec<Contender> = contenders.collect::<Result<_, _>>()?;
     let benchmark = Benchmark {

@@ -15,7 +15,7 @@ use crate::results::reproduction::{Numbers, Row};
 /// The run.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct CyclesSettings {
     setup: Setup,
     /// Input bias, in parts of the relay's amplitude.
     input_bias: f64,
@@ -23,7 +23,7 @@ pub(super) struct Settings {
     cycles: usize,
 }
 
-pub(super) fn find(settings: &Settings) -> Result<Numbers, Failure> {
+pub(super) fn find(settings: &CyclesSettings) -> Result<Numbers, Failure> {
     let (truth, trace) = settings.setup.run(settings.input_bias)?;
     let cycles = Cycles::of(&trace, SAMPLE_S, settings.cycles).map_err(Failure::usage)?;
     let judge = Judge::new(&truth.process).map_err(Failure::usage)?;

@@ -14,7 +14,7 @@ use crate::results::reproduction::{Numbers, Row};
 /// What is laid and how it is checked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct GridCheckSettings {
     deterioration: f64,
     /// Grids, a column each: the gains at which processes are compared.
     gains: Vec<Gains>,
@@ -23,7 +23,7 @@ pub(super) struct Settings {
     seed: u64,
 }
 
-pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Numbers, Failure> {
+pub(super) fn find(settings: &GridCheckSettings, workers: &Workers) -> Result<Numbers, Failure> {
     let grids = settings.gains.iter().map(|&gains| {
         let wanted = grid::Settings {
             deterioration: settings.deterioration,

@@ -14,7 +14,7 @@ use crate::results::reproduction::{Numbers, Row};
 /// The recipe, and what of it is another here.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct NetworkSettings {
     /// A file of `experiments`.
     recipe: RecipeName,
     /// Losses, a column each.
@@ -30,7 +30,7 @@ enum RecipeName {
     PaperNetworkSmall,
 }
 
-impl Settings {
+impl NetworkSettings {
     fn recipe(&self) -> Result<Recipe, Failure> {
         let text = match self.recipe {
             RecipeName::PaperNetwork => include_str!("../../../reproduction/paper_network.toml"),
@@ -48,7 +48,7 @@ impl Settings {
 }
 
 pub(super) fn find(
-    settings: &Settings,
+    settings: &NetworkSettings,
     journal: &Journal,
     workers: &Workers,
 ) -> Result<Numbers, Failure> {

@@ -13,12 +13,12 @@ use crate::results::reproduction::{Numbers, Row};
 /// How finely the space is looked at.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct PhaseSettings {
     /// Shapes by the ratio of the lags, and by the dead time for each of these.
     shapes: [usize; 2],
 }
 
-pub(super) fn find(settings: &Settings) -> Result<Numbers, Failure> {
+pub(super) fn find(settings: &PhaseSettings) -> Result<Numbers, Failure> {
     let space = Space::MULTIROTOR;
     let [rows, columns] = settings.shapes;
     let optima = LocalOptima::of_shapes(&space, rows, columns).map_err(Failure::usage)?;

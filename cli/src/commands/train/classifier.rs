@@ -16,10 +16,9 @@ use crate::args;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
 use crate::journal::Journal;
-use crate::output::{print, progress_bar_with_message, write_file, write_text};
+use crate::output::{print, progress_bar, write_file, write_text};
 use crate::report::classifier as report;
 use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
-use crate::settings;
 
 /// Key of what is said beside the weights; changes with every change that a reader could notice.
 const FORMAT: &str = "onecycle.classifier/1";
@@ -54,7 +53,7 @@ pub(crate) struct Learnt<'a> {
 }
 
 pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
-    let failed = |error| settings::out_of_range(&arguments.recipe, error);
+    let failed = |error| Failure::unreadable(&arguments.recipe, error);
     recipe.validate().map_err(failed)?;
     let workers = Workers::new(arguments.threads)?;
     let journal = (arguments.out.as_deref())
@@ -82,7 +81,7 @@ pub(crate) fn learn<'a>(
 ) -> Result<Learnt<'a>, Failure> {
     let begin = Instant::now();
     let lesson = Lesson::prepare(recipe, workers).map_err(failed)?;
-    let bar = progress_bar_with_message(recipe.losses.len() as u64 * recipe.epochs);
+    let bar = progress_bar(recipe.losses.len() as u64 * recipe.epochs);
     let mut networks = Vec::new();
     let mut best: Option<((usize, f64), usize, Network)> = None;
     for number in 0..recipe.losses.len() {

@@ -17,17 +17,14 @@ use crate::commands::dataset::filled;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
 use crate::journal::Journal;
-use crate::output::{
-    Waiting, print, progress_bar_with_message, with_ending, write_file, write_text,
-};
+use crate::output::{Waiting, print, progress_bar, with_ending, write_file, write_text};
 use crate::report::identifier as report;
 use crate::results::identifier::{FamilyScores, IdentifierRun};
-use crate::settings;
 
 pub(super) fn run(arguments: &args::Train, recipe: &Recipe) -> Result<ExitCode, Failure> {
     recipe
         .validate()
-        .map_err(|error| settings::out_of_range(&arguments.recipe, error))?;
+        .map_err(|error| Failure::unreadable(&arguments.recipe, error))?;
     let out = arguments.out.as_deref().ok_or_else(|| {
         Failure::usage("an identifier is written to a pack: name the file with --out")
     })?;
@@ -95,7 +92,7 @@ fn learn(
             .network()
             .and_then(|network| Trainer::new(recipe.settings(), network))
     })?;
-    let bar = progress_bar_with_message(recipe.epochs);
+    let bar = progress_bar(recipe.epochs);
     let (training, validation) = (rows(learning), rows(choosing));
     let outcome = super::train(
         &mut trainer,
