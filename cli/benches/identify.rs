@@ -1,5 +1,5 @@
 //! `onecycle identify` as a whole process, from start to exit, on an 8 s, 1 kHz recording:
-//! `cargo bench -p onecycle --bench identify`. Target: 50 ms.
+//! `cargo bench -p onecycle-cli --bench identify`. Target: 50 ms.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -195,7 +195,7 @@ pub(crate) struct Tune {
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle phase\n",
-    "  onecycle phase experiments/double_integrators.toml --picture phase.svg --csv rules.csv\n"
+    "  onecycle phase experiments/double_integrators.toml --report phase.html --csv rules.csv\n"
 ))]
 pub(crate) struct Phase {
     /// The space, in TOML (see experiments/) [default: the paper's multirotors]
@@ -214,9 +214,9 @@ pub(crate) struct Phase {
     /// Write all rules to this file, whole or not at all
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
-    /// Draw the deterioration and the map of the shapes in this file, as SVG
-    #[arg(long, value_name = "FILE")]
-    pub(crate) picture: Option<PathBuf>,
+    /// Write a page with figures to this file, as HTML that needs no network
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) report: Option<PathBuf>,
 }
 
 /// Choose processes that stand for a space, so that one of them is near every process of it.
@@ -228,7 +228,7 @@ pub(crate) struct Phase {
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle grid --check 10000\n",
-    "  onecycle grid space.toml --deterioration 5% --out grid.json --picture grid.svg\n",
+    "  onecycle grid space.toml --deterioration 5% --out grid.json --report grid.html\n",
     "  onecycle grid --from grid.json --check 100000 --seed 2\n\n",
     "With --out, what is done is kept in GRID.json.part: the same command goes on from there.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 4 the check found a process farther ",
@@ -254,9 +254,12 @@ pub(crate) struct Grid {
     /// Write the matrix of costs however large it is, not only up to 2000 members
     #[arg(long, requires = "out")]
     pub(crate) matrix: bool,
-    /// Begin anew, whatever an interrupted run has left
+    /// Discard the work of an interrupted run and start over
     #[arg(long, requires = "out")]
     pub(crate) restart: bool,
+    /// Without effect: interrupted runs are always resumed
+    #[arg(long = "resume", hide = true)]
+    _resume: bool,
     /// Check that this many random processes have a member near (1 to 10,000,000)
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_CHECKED))]
@@ -271,9 +274,6 @@ pub(crate) struct Grid {
     /// Write a page with pictures to this file, as HTML that needs no network
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
-    /// Draw the grid in this file, as SVG
-    #[arg(long, value_name = "FILE")]
-    pub(crate) picture: Option<PathBuf>,
     /// Threads to work with [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]

@@ -34,9 +34,9 @@ pub(crate) enum Failure {
         #[source]
         reason: Box<ReadError>,
     },
-    /// A settings file that cannot be read.
+    /// Any other file that cannot be read or does not hold what it must.
     #[error("{file}: {reason}", file = path.display())]
-    Settings { path: PathBuf, reason: String },
+    Unreadable { path: PathBuf, reason: String },
     /// A file or the terminal that cannot be written.
     #[error("cannot write {target}: {reason}")]
     Output {
@@ -63,6 +63,17 @@ impl Failure {
         Self::Usage(reason.to_string())
     }
 
+    #[expect(
+        clippy::needless_pass_by_value,
+        reason = "map_err hands errors over by value"
+    )]
+    pub(crate) fn unreadable(path: &Path, reason: impl ToString) -> Self {
+        Self::Unreadable {
+            path: path.to_owned(),
+            reason: reason.to_string(),
+        }
+    }
+
     pub(crate) fn output(target: &Path, reason: io::Error) -> Self {
         Self::Output {
             target: target.display().to_string(),
@@ -78,7 +89,7 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => exit::USAGE,
-            Self::Recording { .. } | Self::Settings { .. } => exit::INPUT,
+            Self::Recording { .. } | Self::Unreadable { .. } => exit::INPUT,
             Self::Output { .. } => exit::OUTPUT,
         }
     }

@@ -6,10 +6,12 @@
 mod args;
 mod commands;
 mod failure;
+mod journal;
 mod output;
 mod pages;
-mod pictures;
+mod reading;
 mod report;
+mod results;
 mod settings;
 mod style;
 mod words;

@@ -64,17 +64,8 @@ fn say(style: Style, line: impl Display) {
     );
 }
 
-/// A bar on the error output, for so many pieces of work; nothing where that is no terminal.
+/// A bar on the error output for this many pieces of work, with a message behind it; hidden where that is no terminal.
 pub(crate) fn progress_bar(pieces: u64) -> ProgressBar {
-    let bar = ProgressBar::new(pieces);
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}") {
-        bar.set_style(style);
-    }
-    bar
-}
-
-/// The same with a message behind it.
-pub(crate) fn progress_bar_with_message(pieces: u64) -> ProgressBar {
     let bar = ProgressBar::new(pieces);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}  {msg}") {
         bar.set_style(style);
@@ -87,8 +78,8 @@ const QUICK: Duration = Duration::from_millis(500);
 /// Between two turns of what shows that work goes on.
 const TURN: Duration = Duration::from_millis(100);
 
-/// What is being done for an unknown time, shown on the error output if it takes longer than [`QUICK`] and that
-/// is a terminal; gone when it is dropped.
+/// Work in progress, shown on the error output if it takes longer than [`QUICK`] and that is a terminal; gone when this is
+/// dropped.
 pub(crate) struct Waiting {
     bar: ProgressBar,
     over: Option<Sender<()>>,
@@ -96,10 +87,20 @@ pub(crate) struct Waiting {
 }
 
 impl Waiting {
-    /// For work that this names, such as `reading log.csv`.
+    /// For work of unknown length with this name, such as `identifying`.
     pub(crate) fn on(work: impl Into<Cow<'static, str>>) -> Self {
-        let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::hidden());
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+        Self::shown_as("{spinner} {msg} {elapsed}", None, work)
+    }
+
+    /// For work on this many bytes.
+    pub(crate) fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
+        let template = "{wide_bar} {bytes}/{total_bytes} {eta}  {msg}";
+        Self::shown_as(template, Some(bytes), work)
+    }
+
+    fn shown_as(template: &str, length: Option<u64>, work: impl Into<Cow<'static, str>>) -> Self {
+        let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::hidden());
+        if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         bar.set_message(work);
@@ -119,9 +120,20 @@ impl Waiting {
         }
     }
 
-    /// The same with other work from now on.
+    /// Other work from now on.
     pub(crate) fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
         self.bar.set_message(work);
+    }
+
+    /// More bytes are done.
+    pub(crate) fn advance(&self, bytes: u64) {
+        self.bar.inc(bytes);
+    }
+
+    /// Bytes that are done, and all of them.
+    #[cfg(test)]
+    pub(crate) fn position(&self) -> (u64, Option<u64>) {
+        (self.bar.position(), self.bar.length())
     }
 }
 
@@ -136,17 +148,12 @@ impl Drop for Waiting {
     }
 }
 
-/// Appends a value as a line of JSON to a file of this path. A whole line at a time reaches the system, so
-/// that an end by force cuts the last at most.
-pub(crate) fn append_line(
-    file: &mut File,
-    path: &Path,
-    line: &impl serde::Serialize,
-) -> Result<(), Failure> {
-    let mut text = serde_json::to_vec(line).map_err(Failure::usage)?;
-    text.push(b'\n');
-    file.write_all(&text)
-        .map_err(|error| Failure::output(path, error))
+/// A path with `.ENDING` added to its name.
+pub(crate) fn with_ending(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".");
+    name.push(ending);
+    name.into()
 }
 
 /// Writes a file through a temporary one beside it: whole, or not at all. A link leads to what it names, and a pipe or a

@@ -1,8 +1,10 @@
 //! Results as text for people and as JSON for programs.
 
 pub(crate) mod bench;
+pub(crate) mod campaign;
 pub(crate) mod certificate;
 pub(crate) mod classifier;
+pub(crate) mod cycles;
 pub(crate) mod dataset;
 pub(crate) mod fly;
 pub(crate) mod grid;

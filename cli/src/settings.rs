@@ -9,13 +9,8 @@ use crate::failure::Failure;
 
 /// What a file holds, as far as its types go; its values are for the caller to check.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| failure(path, error.to_string()))?;
-    toml::from_str(&text).map_err(|error| failure(path, located(&text, &error)))
-}
-
-/// The refusal of a file one of whose values is out of its range.
-pub(crate) fn out_of_range(path: &Path, error: impl std::fmt::Display) -> Failure {
-    failure(path, error.to_string())
+    let text = std::fs::read_to_string(path).map_err(|error| Failure::unreadable(path, error))?;
+    toml::from_str(&text).map_err(|error| Failure::unreadable(path, located(&text, &error)))
 }
 
 /// The space that a file describes, the paper's multirotors without one.
@@ -26,15 +21,8 @@ pub(crate) fn space(path: Option<&Path>) -> Result<Space, Failure> {
     let space: Space = read(path)?;
     space
         .validate()
-        .map_err(|error| out_of_range(path, error))?;
+        .map_err(|error| Failure::unreadable(path, error))?;
     Ok(space)
-}
-
-fn failure(path: &Path, reason: String) -> Failure {
-    Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    }
 }
 
 /// The parser's complaint with line and key; its own report is a picture of several lines.

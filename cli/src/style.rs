@@ -35,11 +35,6 @@ pub(crate) fn painted(style: Style, text: &str) -> String {
     all
 }
 
-/// The text without any style.
-pub(crate) fn bare(text: &str) -> String {
-    anstream::adapter::strip_str(text).to_string()
-}
-
 /// That of a verdict: what holds, or not.
 pub(crate) fn verdict(holds: bool, text: &str) -> String {
     painted(if holds { HOLDS } else { REFUSAL }, text)
@@ -69,7 +64,9 @@ mod tests {
             format!("{green}one\x1b[0m\n\n{green}two\x1b[0m")
         );
         assert_eq!(painted(PLAIN, "as it is\n"), "as it is\n");
-        assert_eq!(bare(&painted(HOLDS, "one\n\ntwo")), "one\n\ntwo");
+        let painted = painted(HOLDS, "one\n\ntwo");
+        let bare = anstream::adapter::strip_str(&painted).to_string();
+        assert_eq!(bare, "one\n\ntwo");
     }
 
     #[test]

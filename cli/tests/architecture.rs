@@ -1,10 +1,21 @@
-//! The dependencies between the crates, as ARCHITECTURE.md draws them.
+//! The dependencies between crates, as ARCHITECTURE.md draws them, and between the files of each crate.
 //!
-//! Read from `cargo metadata`, dependencies for tests and builds included. What flies depends on
-//! nothing that does not fly, and what reads files knows nothing of how the identifier was made.
+//! Crates: read from `cargo metadata`, dependencies for tests and builds included. On-board code depends only on
+//! on-board code; nothing that ships depends on the research crate `lab`.
+//! Files: read from the sources. No file takes names from a file that, directly or not, takes names from it.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests are tests too, which the lint does not see"
+)]
+
+mod imports;
+
+use std::path::Path;
 use std::process::Command;
 
+use imports::{Files, circles};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
@@ -61,6 +72,8 @@ struct Metadata {
 #[derive(Deserialize)]
 struct Package {
     name: String,
+    #[serde(default)]
+    manifest_path: String,
     dependencies: Vec<Dependency>,
 }
 
@@ -208,4 +221,119 @@ fn dependencies_for_tests_are_not_shipped() {
     let metadata: Metadata = serde_json::from_value(metadata).expect("the graph is well formed");
     let shipped = metadata.shipped_dependencies("onecycle-onboard");
     assert_eq!(names(&shipped.unwrap()), ["libm", "cc"]);
+}
+
+// ---------------------------------------------------------------- files
+
+/// Circles that somebody else's change will break: the crate and a file of the circle. To be emptied when it is merged.
+const TO_BE_MERGED: [(&str, &str); 4] = [
+    ("onecycle-link", "csv/records.rs"),
+    ("onecycle-identify", "outcome.rs"),
+    ("onecycle-lab", "judge/campaign.rs"),
+    ("onecycle-lab", "learn/train/layer.rs"),
+];
+
+/// Adds the source files of a folder; programs beside the library are crates of their own.
+fn add_sources(folder: &Path, below: &str, files: &mut Files) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        let file = format!("{below}{name}");
+        if path.is_dir() {
+            add_sources(&path, &format!("{file}/"), files);
+        } else if file.ends_with(".rs") && file != "main.rs" {
+            files.insert(file, std::fs::read_to_string(&path).unwrap());
+        }
+    }
+}
+
+#[test]
+fn no_file_imports_in_a_circle() {
+    let mut found = Vec::new();
+    for package in workspace().packages {
+        let folder = Path::new(&package.manifest_path).parent().unwrap();
+        let mut files = Files::new();
+        add_sources(&folder.join("src"), "", &mut files);
+        assert!(files.contains_key("lib.rs"), "{}", package.name);
+        for circle in circles(&files) {
+            let is_allowed = TO_BE_MERGED.iter().any(|&(name, file)| {
+                name == package.name && circle.files.iter().any(|one| one == file)
+            });
+            if !is_allowed {
+                found.push(format!("{}: {}", package.name, circle.ties.join("\n  ")));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+fn made_up_files(files: &[(&str, &str)]) -> Files {
+    let owned = |(name, text): &(&str, &str)| ((*name).to_owned(), (*text).to_owned());
+    files.iter().map(owned).collect()
+}
+
+// The report takes `Done` through two re-exports of its home, `commands/grid.rs`, which calls the report by a path.
+// `settings.rs` is used by both and uses neither.
+#[test]
+fn a_circle_through_a_re_export_is_named() {
+    let files = made_up_files(&[
+        ("lib.rs", "mod commands; mod report; mod settings;"),
+        ("commands.rs", "mod grid; pub use self::grid::*;"),
+        (
+            "commands/grid.rs",
+            "use crate::{report as shown, settings}; pub struct Done;\n\
+             fn run() { if settings::IS_LOUD { println!(\"{}\", shown::text(&Done)); } }",
+        ),
+        (
+            "report.rs",
+            "use crate::commands::{self, Done}; use super::settings::IS_LOUD;\n\
+             pub fn text(done: &Done) -> String { String::new() }",
+        ),
+        ("settings.rs", "pub const IS_LOUD: bool = true;"),
+    ]);
+    let [circle] = &circles(&files)[..] else {
+        panic!("{:?}", circles(&files));
+    };
+    assert_eq!(circle.files, ["commands/grid.rs", "report.rs"]);
+    assert_eq!(
+        circle.ties,
+        [
+            "commands/grid.rs <- report.rs: crate::commands::Done",
+            "report.rs <- commands/grid.rs: shown::text",
+        ]
+    );
+}
+
+// Three files, each of which takes a name from the next; the last by a path alone, in the body of a function.
+#[test]
+fn a_long_circle_is_found() {
+    let files = made_up_files(&[
+        ("lib.rs", "mod a; mod b; mod c;"),
+        ("a.rs", "use super::b::B; pub struct A;"),
+        ("b.rs", "pub struct B(crate::c::C);"),
+        (
+            "c.rs",
+            "pub struct C; fn f() { let a = vec![crate::a::A]; }",
+        ),
+    ]);
+    assert_eq!(circles(&files)[0].files, ["a.rs", "b.rs", "c.rs"]);
+}
+
+// A parent uses its child, the child its parent's names; a unit test uses what the file must not; a comment and a text
+// use nothing; `other::x` is another crate's.
+#[test]
+fn what_is_allowed_is_no_circle() {
+    let files = made_up_files(&[
+        ("lib.rs", "mod low; mod high; pub const LIMIT: usize = 1;"),
+        (
+            "low.rs",
+            "mod part; use self::part::Part; use crate::LIMIT; pub struct Low(Part);\n\
+             // crate::high::High\n\
+             const TEXT: &str = \"crate::high::High\"; use other::high::High;\n\
+             #[cfg(test)] mod tests { use crate::high::High; }",
+        ),
+        ("low/part.rs", "use super::Low; pub struct Part;"),
+        ("high.rs", "use crate::low::Low; pub struct High(Low);"),
+    ]);
+    assert_eq!(circles(&files), []);
 }

@@ -212,8 +212,11 @@ fn results_are_the_same_bits_after_an_interruption() {
     // What an interrupted run leaves: what it is of, and a line an experiment.
     let head = serde_json::json!({
         "program": env!("CARGO_PKG_VERSION"),
-        "benchmark": report["benchmark"],
-        "methods": ["onecycle-1", "arx", "asymmetric"],
+        "command": "bench run",
+        "settings": {
+            "benchmark": report["benchmark"],
+            "methods": ["onecycle-1", "arx", "asymmetric"],
+        },
     });
     let results = report["results"].as_array().unwrap();
     let part = format!(
@@ -221,26 +224,40 @@ fn results_are_the_same_bits_after_an_interruption() {
         Value::from(&results[0..3]),
         Value::from(&results[3..6])
     );
-    folder.write("results.part", part.as_bytes());
-    let resumed = [&methods[..], &["-o", &out, "--resume", "--threads", "1"]].concat();
+    let leave = |part: &str| {
+        std::fs::create_dir_all(folder.path("results.part")).unwrap();
+        folder.write("results.part/journal.jsonl", part.as_bytes());
+    };
+    leave(&part);
+    let resumed = [&methods[..], &["-o", &out, "--threads", "1"]].concat();
     let outcome = bench_run(&path, &resumed);
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
-    assert_eq!(
-        outcome.stderr,
-        "onecycle: going on after 2 of 4 experiments\n"
+    assert!(
+        (outcome.stderr).starts_with("onecycle: resuming after 2 of 4 experiments of "),
+        "{outcome:?}"
     );
+    assert_eq!(outcome.stderr.lines().count(), 1);
     assert_eq!(without_time(&folder.path("results.csv")), whole);
     assert!(!folder.path("results.part").exists());
     // Another list of methods is another run.
-    folder.write("results.part", part.as_bytes());
-    let other = bench_run(&path, &["--methods", "rules", "-o", &out, "--resume"]);
+    leave(&part);
+    let other = bench_run(&path, &["--methods", "rules", "-o", &out]);
     other.refused(
         UNREADABLE,
-        &["results.part", "other methods", "leave out --resume"],
+        &["results.part", "other settings, methods", "--restart"],
     );
     let damaged = part.replacen("\"experiment\":1", "\"experiment\":x", 1);
-    folder.write("results.part", damaged.as_bytes());
+    leave(&damaged);
     bench_run(&path, &resumed).refused(UNREADABLE, &["line 2 is damaged"]);
+    // Discarded; the flag of earlier versions changes nothing.
+    let anew = [&resumed[..], &["--restart", "--resume"]].concat();
+    let outcome = bench_run(&path, &anew);
+    assert_eq!(
+        (outcome.code, &*outcome.stderr),
+        (Some(0), ""),
+        "{outcome:?}"
+    );
+    assert_eq!(without_time(&folder.path("results.csv")), whole);
 }
 
 // A folder a method that makes an experiment of its own, a file an experiment, twice the same bytes, and
@@ -283,7 +300,7 @@ fn traces_are_recordings() {
     let again = ["--methods", "pem-sweep", "--traces", &traces];
     bench_run(&path, &again).refused(2, &["is not empty"]);
     let none = ["--methods", "rules", "--traces", &traces];
-    bench_run(&path, &none).refused(2, &["no method makes an experiment of its own"]);
+    bench_run(&path, &none).refused(2, &["no method makes a relay test of its own"]);
 }
 
 // The same experiments in one Parquet file: the methods read the same numbers, so that results are the same
@@ -345,7 +362,7 @@ fn wrong_arguments_are_refused() {
     run(&["bench", "run", "x", "--methods", "arx,arx"]).misused(&["named twice"]);
     run(&["bench", "run", "x", "--answers", "file.csv"]).misused(&["mine=answers.csv"]);
     run(&["bench", "run", "x", "--answers", "arx=file.csv"]).misused(&["cannot be named 'arx'"]);
-    run(&["bench", "run", "x", "--resume"]).misused(&["required arguments"]);
+    run(&["bench", "run", "x", "--restart"]).misused(&["required arguments"]);
 }
 
 #[test]

@@ -1,11 +1,11 @@
-//! `certify`: its reports, its picture, its verdicts, and what it refuses.
+//! `certify`: its reports, its page, its verdicts, and what it refuses.
 
 // Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod common;
 
-use common::{NOT_WRITTEN, Scratch, UNREADABLE, is_svg, run};
+use common::{NOT_WRITTEN, Scratch, UNREADABLE, figures, reported, run};
 
 /// The exit code of a space that is not certified.
 const NOT_CERTIFIED: i32 = 4;
@@ -35,10 +35,7 @@ fn multirotors_are_certified() {
 
 #[test]
 fn the_report_for_people_fits_a_terminal() {
-    let folder = Scratch::new();
-    let picture = folder.name("out.svg");
-    let arguments = ["certify", "--shapes", "3", "--bias", "0,-0.4"];
-    let outcome = run(&[&arguments[..], &["--picture", &picture]].concat());
+    let (outcome, page) = reported(&["certify", "--shapes", "3", "--bias", "0,-0.4"]);
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     let text = &outcome.without_nan().stdout;
     assert!(
@@ -52,8 +49,17 @@ fn the_report_for_people_fits_a_terminal() {
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    is_svg(&std::fs::read_to_string(picture).unwrap());
-    assert_eq!(folder.files(), ["out.svg"]);
+    // Loci and exact cycles of the eight corners; three curves over two biases and the limit.
+    let figures = figures(&page);
+    let [loci, stability] = &figures[..] else {
+        panic!("{} figures", figures.len());
+    };
+    let series = loci["data"].as_array().unwrap();
+    assert_eq!(series.len(), 8 + 3);
+    assert_eq!(series[10]["x"].as_array().map(Vec::len), Some(8));
+    assert_eq!(stability["data"].as_array().map(Vec::len), Some(4));
+    assert_eq!(page.matches("<tr>").count(), 2 + 8 + 2);
+    assert!(page.contains("class=\"verdict good\">Certified: stable without bias"));
 }
 
 // A relay that lags by 50 degrees needs damping, of which there is none here.
@@ -117,7 +123,8 @@ fn arguments_that_are_none() {
     let folder = Scratch::new();
     let missing = folder.name("nosuch.toml");
     run(&["certify", &missing]).refused(UNREADABLE, &["nosuch.toml", "No such file"]);
-    let picture = folder.name("nosuch/out.svg");
-    let arguments = ["certify", "--shapes", "2", "--bias", "0", "--picture"];
-    run(&[&arguments[..], &[&picture]].concat()).refused(NOT_WRITTEN, &["out.svg"]);
+    let page = folder.name("nosuch/out.html");
+    let arguments = ["certify", "--shapes", "2", "--bias", "0", "--report"];
+    run(&[&arguments[..], &[&page]].concat()).refused(NOT_WRITTEN, &["out.html"]);
+    run(&["certify", "--picture", "out.svg"]).misused(&["--picture"]);
 }

@@ -8,7 +8,7 @@ mod common;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, is_svg, onecycle, run};
+use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, figures, onecycle, reported, run};
 use serde_json::Value;
 
 /// A part of the paper's space.
@@ -37,8 +37,8 @@ fn read(path: &str) -> Value {
 #[test]
 fn from_space_to_file_and_back() {
     let (folder, space) = space();
-    let [out, picture] = ["grid.json", "grid.svg"].map(|name| folder.name(name));
-    let files = ["--out", &out, "--picture", &picture];
+    let [out, page] = ["grid.json", "grid.html"].map(|name| folder.name(name));
+    let files = ["--out", &out, "--report", &page];
     let made = grid(&[&[space.as_str(), "--check", "500"], &files[..]].concat());
     assert_eq!(made.stderr, "");
     made.without_nan();
@@ -52,7 +52,8 @@ fn from_space_to_file_and_back() {
         assert!(made.stdout.contains(words), "{words}: {}", made.stdout);
     }
     assert_eq!(folder.files().len(), 3, "{:?}", folder.files());
-    is_svg(&std::fs::read_to_string(folder.path("grid.svg")).unwrap());
+    let page = std::fs::read_to_string(page).unwrap();
+    assert_eq!(figures(&page).len(), 5);
 
     let file = read(&out);
     assert_eq!(file["format"], "onecycle.grid/1");
@@ -109,13 +110,13 @@ fn the_fewest_and_equal_gains() {
     assert_eq!(file["settings"]["layout"], "fewest");
     assert_eq!(file["members"][0]["row"], Value::Null);
     assert_eq!(file["matrix"].as_array().unwrap().len() as u64, fewest);
-    let again = grid(&["--from", &out, "--picture", &folder.name("grid.svg")]);
+    let (again, page) = reported(&["grid", "--from", &out]);
     assert!(
         again.stdout.contains("the fewest within 10.00 %"),
         "{}",
         again.stdout
     );
-    is_svg(&std::fs::read_to_string(folder.path("grid.svg")).unwrap());
+    assert_eq!(figures(&page).len(), 5);
 }
 
 // The same bytes at one thread and at three; either spelling of a deterioration.
@@ -229,20 +230,22 @@ fn an_interrupted_run_is_gone_on_with() {
     };
     run(&to(&whole));
     let expected = std::fs::read(&whole).unwrap();
-    let part = folder.path("grid.json.part");
+    let work = folder.path("grid.json.part");
+    let part = work.join("journal.jsonl");
     let resumes = |left: &[u8]| {
+        std::fs::create_dir_all(&work).unwrap();
         std::fs::write(&part, left).unwrap();
         assert!(!folder.path("grid.json").exists());
         let resumed = run(&to(&out));
         assert_eq!(resumed.code, Some(0), "{resumed:?}");
         assert!(std::fs::read(&out).unwrap() == expected, "other bytes");
-        assert!(!part.exists());
+        assert!(!work.exists());
         std::fs::remove_file(&out).unwrap();
         resumed.stderr
     };
     // Settings, angles, and a row or two.
     let said = resumes(&killed(&to(&out), &part, 3));
-    assert!(said.starts_with("onecycle: going on after "), "{said}");
+    assert!(said.starts_with("onecycle: resuming after "), "{said}");
     assert!(
         said.contains(" rows of ") && said.lines().count() == 1,
         "{said}"
@@ -281,7 +284,7 @@ fn an_interrupted_run_is_gone_on_with() {
 fn a_part_of_something_else() {
     let (folder, space) = space();
     let out = folder.name("grid.json");
-    let part = folder.path("grid.json.part");
+    let part = folder.path("grid.json.part").join("journal.jsonl");
     let make = |more: &[&str]| run(&[&["grid", &space, "--out", &out], more].concat());
     let quick = ["--deterioration", "30%"];
     // Of other settings: kept, unless told otherwise.
@@ -295,7 +298,7 @@ fn a_part_of_something_else() {
         UNREADABLE,
         &[
             "grid.json.part",
-            "other settings (deterioration 4 %)",
+            "other settings, deterioration 0.04 instead of 0.3",
             "--restart",
         ],
     );
@@ -311,11 +314,11 @@ fn a_part_of_something_else() {
         ),
         (
             [lines[0], lines[2], lines[1], ""].join("\n"),
-            "line 2 is not what comes next",
+            "line 2 is out of order",
         ),
         (
             [lines[0], lines[1], "{\"costs\":[0.0]}", ""].join("\n"),
-            "line 3 is not what comes next",
+            "line 3 is out of order",
         ),
     ] {
         std::fs::write(&part, damaged).unwrap();
@@ -323,7 +326,7 @@ fn a_part_of_something_else() {
     }
     let restarted = make(&["--deterioration", "30%", "--restart"]);
     assert_eq!((restarted.code, restarted.stderr.as_str()), (Some(0), ""));
-    assert!(!part.exists());
+    assert!(!folder.path("grid.json.part").exists());
 }
 
 // ---------------------------------------------------------------- refusals
@@ -390,8 +393,9 @@ fn bad_files() {
     // Outputs that cannot be written, before and after the work.
     let nowhere = folder.name("nosuch/grid.json");
     run(&["grid", &space, "--out", &nowhere]).refused(NOT_WRITTEN, &["cannot write", "nosuch"]);
-    let nowhere = folder.name("nosuch/grid.svg");
-    run(&["grid", "--from", &out, "--picture", &nowhere]).refused(NOT_WRITTEN, &["grid.svg"]);
+    let nowhere = folder.name("nosuch/grid.html");
+    run(&["grid", "--from", &out, "--report", &nowhere]).refused(NOT_WRITTEN, &["grid.html"]);
+    run(&["grid", "--picture", "grid.svg"]).misused(&["--picture"]);
     // A space that is none.
     let backwards = SPACE.replace("[0.03, 0.1]", "[0.1, 0.03]");
     let path = folder.write("backwards.toml", backwards.as_bytes());

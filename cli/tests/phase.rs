@@ -1,11 +1,11 @@
 //! `phase`: its reports, its files, and what it refuses.
 
 // Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::panic)]
 
 mod common;
 
-use common::{NOT_WRITTEN, Outcome, Report, Scratch, UNREADABLE, is_svg, run};
+use common::{NOT_WRITTEN, Outcome, Report, Scratch, UNREADABLE, figures, notes, reported, run};
 use serde_json::Value;
 
 /// The files of this repository.
@@ -89,14 +89,14 @@ fn a_single_process_is_a_space() {
     let folder = Scratch::new();
     let text = "t_prop_s = [0.3, 0.3]\nt_body_s = [2, 2]\ntau_s = [0.1, 0.1]\n";
     let file = folder.write("one.toml", text.as_bytes());
-    let picture = folder.name("one.svg");
-    let outcome = phase(&[&file, "--picture", &picture]);
+    let (outcome, page) = reported(&["phase", &file]);
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
     let text = &outcome.without_nan().stdout;
     assert!(
         text.contains("one shape") && text.contains("-46.88"),
         "{text}"
     );
-    is_svg(&std::fs::read_to_string(picture).unwrap());
+    assert_eq!(figures(&page).len(), 2);
     assert!(report(&[&file]).number("/minimax/mean").abs() < 1e-12);
 }
 
@@ -131,26 +131,42 @@ fn the_table_has_a_row_for_every_rule() {
     assert_eq!(folder.files(), ["rules.csv"]);
 }
 
+// The best phase stands in the curve and in the text; the paper's stands there where the curve reaches it. The map has
+// six rows, and shows some and only phases of the local rules.
 #[test]
-fn the_picture_is_svg() {
-    let folder = Scratch::new();
-    let path = folder.name("phase.svg");
+fn the_page_has_the_curve_and_the_map() {
     for (space, has_paper) in [(MULTIROTOR, true), (DOUBLE_INTEGRATORS, false)] {
-        phase(&[space, "--rows", "6", "--columns", "6", "--picture", &path]);
-        let text = std::fs::read_to_string(&path).unwrap();
-        is_svg(&text);
-        assert!(text.matches("<rect").count() > 36);
-        assert!(text.contains("deterioration (%)"));
-        assert_eq!(text.contains("-46.89 deg"), has_paper);
+        let arguments = ["phase", space, "--rows", "6", "--columns", "6", "--json"];
+        let (outcome, page) = reported(&arguments);
+        let report = outcome.report();
+        let figures = figures(&page);
+        let [curve, map] = &figures[..] else {
+            panic!("{} figures", figures.len());
+        };
+        let best = format!("best {:.2} deg", report.number("/minimax/phase_deg"));
+        let notes = notes(&figures);
+        assert!(notes.contains(&best), "{best}: {notes:?}");
+        assert_eq!(notes.contains(&"paper -46.89 deg".to_owned()), has_paper);
+        let title = &curve["layout"]["yaxis"]["title"]["text"];
+        assert_eq!(title, "deterioration (%)");
+        let rows = map["data"][0]["z"].as_array().unwrap();
+        assert_eq!(rows.len(), 6);
+        let shown = rows.iter().flat_map(|row| row.as_array().unwrap());
+        let shown: Vec<f64> = shown.filter_map(Value::as_f64).collect();
+        let rules = report.0["rules"].as_array().unwrap();
+        let phases: Vec<f64> = rules
+            .iter()
+            .filter_map(|rule| rule["phase_deg"].as_f64())
+            .collect();
+        assert!(shown.len() > 36 && shown.iter().all(|phase| phases.contains(phase)));
     }
-    assert_eq!(folder.files(), ["phase.svg"]);
 }
 
 #[test]
 fn files_that_cannot_be_written() {
     let folder = Scratch::new();
     let path = folder.name("nosuch/file");
-    for option in ["--csv", "--picture"] {
+    for option in ["--csv", "--report"] {
         let outcome = run(&["phase", "--rows", "2", "--columns", "2", option, &path]);
         outcome.refused(NOT_WRITTEN, &["cannot write", "nosuch"]);
     }
@@ -213,4 +229,5 @@ fn arguments_that_are_none() {
         }
     }
     run(&["phase", "--nosuch"]).misused(&["--nosuch"]);
+    run(&["phase", "--picture", "phase.svg"]).misused(&["--picture"]);
 }

@@ -6,7 +6,7 @@ mod common;
 
 use std::fs;
 
-use common::{NOT_IDENTIFIED, NOT_WRITTEN, Outcome, Scratch, run};
+use common::{NOT_IDENTIFIED, NOT_WRITTEN, Scratch, figures, notes, reported, run};
 use serde_json::Value;
 
 const HOVER: &str = concat!(
@@ -17,34 +17,6 @@ const UNSTEADY: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../examples/unsteady_ardupilot_alt.csv"
 );
-
-/// What a run with `--report` printed, and the page that it wrote.
-fn reported(arguments: &[&str]) -> (Outcome, String) {
-    let folder = Scratch::new();
-    let path = folder.name("out.html");
-    let ran = run(&[arguments, &["--report", &path]].concat());
-    let page = fs::read_to_string(&path).unwrap();
-    (ran, page)
-}
-
-/// The figures of a page, as plotly.js is given them.
-fn figures(page: &str) -> Vec<Value> {
-    let parts = page.split("<script type=\"application/json\">").skip(1);
-    parts
-        .map(|part| serde_json::from_str(part.split("</script>").next().unwrap()).unwrap())
-        .collect()
-}
-
-/// All words that figures have beside their points.
-fn notes(figures: &[Value]) -> Vec<String> {
-    let annotations = figures
-        .iter()
-        .filter_map(|figure| figure["layout"]["annotations"].as_array());
-    annotations
-        .flatten()
-        .map(|note| note["text"].as_str().unwrap().to_owned())
-        .collect()
-}
 
 // Every section is there, the margins on both plots and the overshoot are those of --json, and every coordinate is a
 // number.

@@ -33,8 +33,8 @@ fn papers(sheet: &str) -> usize {
 }
 
 // Every number of the paper stands beside one that was found, so every row is there: 2 of the phase, 20 and
-// 1 of Table VII. Both files are there and nothing is left beside them but the parts. Gone on with, nothing
-// is worked out again and all is the same to the byte; a part made with other settings is made anew.
+// 1 of Table VII. Both files are there and nothing is left beside them but the parts. The same command
+// again computes nothing anew and all is the same to the byte; a part made with other settings is refused.
 #[test]
 fn quick_run_of_the_fast_parts() {
     let folder = Scratch::new();
@@ -53,8 +53,7 @@ fn quick_run_of_the_fast_parts() {
     assert_eq!(page.matches("<figure ").count(), 5);
     assert_eq!(page.matches("<small>paper: ").count(), expected);
 
-    let part = read("parts/phase.json");
-    arguments.push("--resume");
+    let part = read("parts/phase_quick/journal.jsonl");
     let again = run(&arguments);
     assert_eq!(again.code, Some(0), "{again:?}");
     assert_eq!(
@@ -69,16 +68,15 @@ fn quick_run_of_the_fast_parts() {
     assert_eq!(read("reproduction.html"), page);
 
     let other = part.replacen('8', "9", 1);
-    fs::write(format!("{out}/parts/phase.json"), other).unwrap();
-    let anew = run(&arguments);
-    assert_eq!(
-        anew.stderr
-            .matches("as an earlier run has found it")
-            .count(),
-        PARTS.len() - 1,
-        "{anew:?}"
-    );
-    assert_eq!(read("parts/phase.json"), part);
+    fs::write(format!("{out}/parts/phase_quick/journal.jsonl"), other).unwrap();
+    let refused = run(&arguments);
+    assert_eq!(refused.code, Some(UNREADABLE), "{refused:?}");
+    let words = "unfinished work has other settings, shapes[0] 9 instead of 8: use --restart";
+    assert!(refused.stderr.contains(words), "{refused:?}");
+    let anew = run(&["reproduce", "phase", "--quick", "-o", &out, "--restart"]);
+    assert_eq!(anew.code, Some(0), "{anew:?}");
+    assert!(!anew.stderr.contains("earlier run"), "{anew:?}");
+    assert_eq!(read("parts/phase_quick/journal.jsonl"), part);
 }
 
 // One sentence names the parts; a part that is no JSON is named with what to do.
@@ -92,13 +90,15 @@ fn what_it_refuses() {
 
     let folder = Scratch::new();
     let out = folder.name("out");
-    fs::create_dir_all(format!("{out}/parts")).unwrap();
-    fs::write(format!("{out}/parts/phase.json"), "{").unwrap();
+    fs::create_dir_all(format!("{out}/parts/phase_quick")).unwrap();
+    fs::write(format!("{out}/parts/phase_quick/journal.jsonl"), "{\n{\n").unwrap();
     let refused = run(&["reproduce", "phase", "--quick", "--resume", "-o", &out]);
     assert_eq!(refused.code, Some(UNREADABLE), "{refused:?}");
     assert!(
-        refused.stderr.contains("phase.json")
-            && refused.stderr.contains("leave out --resume to begin anew"),
+        refused.stderr.contains("phase_quick")
+            && refused
+                .stderr
+                .contains("line 1 is damaged: use --restart to start over"),
         "{refused:?}"
     );
 }

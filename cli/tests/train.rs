@@ -71,16 +71,23 @@ fn from_recipe_to_table_and_network_through_interruptions() {
         &out,
         "--json",
         &again,
-        "--resume",
         "--threads",
         "3",
     ];
-    for part in ["out.onnx.1.part", "out.onnx.2.part"] {
-        killed_when(&resumed, || folder.path(part).exists());
-        assert!(!folder.path("out.onnx").exists());
+    let work = folder.path("out.safetensors.part");
+    for network in ["network_1.safetensors", "network_2.safetensors"] {
+        killed_when(&resumed, || work.join(network).exists());
+        assert!(!folder.path("out.safetensors").exists());
     }
     let resumed = run(&resumed);
     assert_eq!(resumed.code, Some(0), "{resumed:?}");
+    for words in [" of network 1 of ", " of network 2 of "] {
+        let said = resumed
+            .stderr
+            .lines()
+            .filter(|line| line.contains(words) && line.contains("resuming after epoch "));
+        assert_eq!(said.count(), 1, "{words}: {}", resumed.stderr);
+    }
     assert!(
         std::fs::read(&whole).unwrap() == std::fs::read(&out).unwrap(),
         "other bytes"
@@ -141,7 +148,7 @@ fn wrong_recipes_are_refused_in_one_sentence() {
         refused.refused(UNREADABLE, &[&["bad.toml"], words].concat());
     }
     run(&["train", "--recipe", &folder.name("none.toml")]).refused(UNREADABLE, &["none.toml"]);
-    run(&["train", "--recipe", "x.toml", "--resume"]).misused(&["required"]);
+    run(&["train", "--recipe", "x.toml", "--restart"]).misused(&["required"]);
     run(&["train"]).misused(&["required"]);
 }
 
@@ -150,8 +157,8 @@ fn wrong_recipes_are_refused_in_one_sentence() {
 fn a_part_of_something_else() {
     let folder = Scratch::new();
     let recipe = recipe(&folder);
-    let out = folder.name("out.onnx");
-    let part = folder.path("out.onnx.1.part");
+    let out = folder.name("out.safetensors");
+    let part = folder.path("out.safetensors.part/network_1.safetensors");
     killed_when(&["train", "--recipe", &recipe, "-o", &out], || {
         part.exists()
     });
@@ -161,21 +168,13 @@ fn a_part_of_something_else() {
         RECIPE.replacen("seed = 1", "seed = 2", 1).as_bytes(),
     );
     for (recipe, bytes, words) in [
-        (&other, left.clone(), "another recipe"),
-        (
-            &recipe,
-            left[..left.len() / 2].to_vec(),
-            "leave out --resume",
-        ),
-        (
-            &recipe,
-            b"nothing of the kind".to_vec(),
-            "leave out --resume",
-        ),
+        (&other, left.clone(), "other settings, seed 1 instead of 2"),
+        (&recipe, left[..left.len() / 2].to_vec(), "use --restart"),
+        (&recipe, b"nothing of the kind".to_vec(), "use --restart"),
     ] {
         std::fs::write(&part, &bytes).unwrap();
-        let refused = run(&["train", "--recipe", recipe, "-o", &out, "--resume"]);
-        refused.refused(UNREADABLE, &["out.onnx.1.part", words]);
+        let refused = run(&["train", "--recipe", recipe, "-o", &out]);
+        refused.refused(UNREADABLE, &["out.safetensors.part", words]);
         assert!(std::fs::read(&part).unwrap() == bytes);
     }
     let nowhere = folder.name("no/such/folder/out.onnx");

@@ -7,7 +7,7 @@ mod common;
 
 use serde_json::Value;
 
-use common::{DOUBLE_INTEGRATOR, Outcome, Scratch, run, tune};
+use common::{DOUBLE_INTEGRATOR, Outcome, Scratch, killed_when, run, tune};
 
 // ---------------------------------------------------------------- tune
 
@@ -121,6 +121,39 @@ fn a_small_campaign() {
         "{}",
         table.stdout
     );
+}
+
+// Killed once the journal has a lot of cases, on any number of threads: the same table to the byte, on the standard
+// output and in its file, and the work folder goes. Another campaign is refused while it is there.
+#[test]
+fn a_campaign_is_resumed() {
+    let folder = Scratch::new();
+    let text = "measure = \"identification\"\ncases = 500\nseed = 1\nbias = 0.3\nsigma = 0.01\ntrim = true\n";
+    let path = folder.write("campaign.toml", text.as_bytes());
+    let expected = run(&["campaign", &path]);
+    assert_eq!(expected.code, Some(0), "{expected:?}");
+    let out = folder.name("table.txt");
+    let arguments = ["campaign", &path, "-o", &out];
+    let journal = folder.path("table.txt.part/journal.jsonl");
+    killed_when(&arguments, || {
+        let text = std::fs::read_to_string(&journal).unwrap_or_default();
+        text.lines().count() > 1
+    });
+    let other = run(&[&arguments[..], &["--sigma", "0.02"]].concat());
+    other.refused(
+        3,
+        &["table.txt.part", "settings, sigma null instead of 0.02"],
+    );
+    let resumed = run(&arguments);
+    assert_eq!(resumed.code, Some(0), "{resumed:?}");
+    assert!(
+        resumed.stderr.starts_with("onecycle: resuming after ")
+            && resumed.stderr.contains(" of 500 cases of "),
+        "{resumed:?}"
+    );
+    assert_eq!(resumed.stdout, expected.stdout);
+    assert_eq!(std::fs::read_to_string(&out).unwrap(), expected.stdout);
+    assert_eq!(folder.files().len(), 2, "{:?}", folder.files());
 }
 
 #[test]

@@ -8,6 +8,7 @@ use onecycle_lab::experiments::{Benchmark, RelayTest};
 use onecycle_lab::judge::evaluate::Contender;
 
 use super::MOST_THREADS;
+use crate::results::bench::RecordingFormat;
 
 /// A benchmark for identifiers: relay experiments with their truth, and the score of any answers.
 #[derive(Debug, Args)]
@@ -30,13 +31,21 @@ pub(crate) enum BenchAction {
 }
 
 /// How recordings are kept.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum, serde::Serialize, serde::Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
     /// A file an experiment
     Csv,
     /// One file [needs a build with --features parquet]
     Parquet,
+}
+
+impl From<Format> for RecordingFormat {
+    fn from(format: Format) -> Self {
+        match format {
+            Format::Csv => Self::Csv,
+            Format::Parquet => Self::Parquet,
+        }
+    }
 }
 
 /// Most experiments of a benchmark: what four digits number.
@@ -80,12 +89,13 @@ pub(crate) struct MakeBench {
     "Examples:\n",
     "  onecycle bench run relay-benchmark -o results\n",
     "  onecycle bench run relay-benchmark --methods none --answers mine=answers.csv\n",
-    "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair -o results --resume\n\n",
+    "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair -o results\n\n",
     "Methods that read the recordings: onecycle-1, onecycle-2, onecycle-4 (cycles), network, pem, \n",
     "pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc: all by default. Two read \n",
     "a relay test of their own, which is simulated on the true process with the same bias, noise and seed: \n",
     "pem-sweep, asymmetric. With 'none' only --answers are scored. Times are those of the processor.\n\n",
-    "With --out, what is done is kept in OUT.part: with --resume the same command goes on from there."
+    "With --out, finished experiments are kept in the folder OUT.part until the results are written: the same \n",
+    "command resumes an interrupted run, --restart starts over."
 ))]
 pub(crate) struct RunBench {
     /// The folder that `bench make` has written
@@ -105,9 +115,12 @@ pub(crate) struct RunBench {
     /// an experiment, as `identify` reads them
     #[arg(long, value_name = "DIR")]
     pub(crate) traces: Option<PathBuf>,
-    /// Go on from where an interrupted run of the same methods was
+    /// Discard the work of an interrupted run and start over
     #[arg(long, requires = "out")]
-    pub(crate) resume: bool,
+    pub(crate) restart: bool,
+    /// Without effect: interrupted runs are always resumed
+    #[arg(long = "resume", hide = true)]
+    _resume: bool,
     /// Threads to work with [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]

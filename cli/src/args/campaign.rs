@@ -15,6 +15,8 @@ use super::Method;
     "  onecycle campaign experiments/refine_1pct.toml --cases 1000\n",
     "  onecycle campaign experiments/d_test.toml --cycles 1 --method refine\n",
     "  onecycle campaign experiments/relay.toml --cases 10000 --sigma 0.02\n\n",
+    "With --out, finished cases are kept in the folder FILE.part until the table is written: the same\n",
+    "command resumes an interrupted run, --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 5 output not written"
 ))]
 pub(crate) struct Campaign {
@@ -35,4 +37,13 @@ pub(crate) struct Campaign {
     /// Scale all times by this factor, those of the sampling too
     #[arg(long, value_name = "FACTOR")]
     pub(crate) time_scale: Option<f64>,
+    /// Write the table to this file as well
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Discard the work of an interrupted run and start over
+    #[arg(long, requires = "out")]
+    pub(crate) restart: bool,
+    /// Without effect: interrupted runs are always resumed
+    #[arg(long = "resume", hide = true)]
+    _resume: bool,
 }

@@ -16,7 +16,7 @@ use super::{Share, sample_rate};
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle certify\n",
-    "  onecycle certify experiments/double_integrators.toml --bias 0,0.3,0.6 --picture out.svg\n",
+    "  onecycle certify experiments/double_integrators.toml --bias 0,0.3,0.6 --report out.html\n",
     "  onecycle certify --process 0.3,2,0.1 --bias 0,30% --sample-rate 1000\n\n",
     "Exit codes: 0 certified, 2 bad arguments, 3 unreadable space, 4 not certified, 5 output not ",
     "written"
@@ -25,7 +25,7 @@ pub(crate) struct Certify {
     /// The space, in TOML (see experiments/) [default: the paper's multirotors]
     pub(crate) space: Option<PathBuf>,
     /// One process instead of the space, may be repeated: T_prop,T_body,tau in seconds
-    #[arg(long, value_name = "T,T,T", conflicts_with_all = ["json", "picture", "shapes"])]
+    #[arg(long, value_name = "T,T,T", conflicts_with_all = ["json", "report", "shapes"])]
     pub(crate) process: Vec<Times>,
     /// Biases, in amplitudes of the relay or % of it [default: 0 to 0.9, of a process 0]
     #[arg(long, value_name = "BIAS,...", value_delimiter = ',', allow_hyphen_values = true,
@@ -42,9 +42,9 @@ pub(crate) struct Certify {
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
-    /// Draw loci and stability in this file, as SVG
-    #[arg(long, value_name = "FILE")]
-    pub(crate) picture: Option<PathBuf>,
+    /// Write a page with figures to this file, as HTML that needs no network
+    #[arg(long, value_name = "OUT.html")]
+    pub(crate) report: Option<PathBuf>,
 }
 
 impl Certify {

@@ -16,9 +16,9 @@ use super::MOST_THREADS;
     "Examples:\n",
     "  onecycle dataset --examples 40000 --into multirotors\n",
     "  onecycle dataset experiments/identifier.toml --examples 1000000 --into examples_to_learn\n",
-    "  python examples/train_pytorch.py multirotors network.onnx\n\n",
-    "What is done is kept: the same command goes on where it was stopped, with a larger --examples\n",
-    "it makes what is missing, and files that are damaged are made again.\n\n",
+    "  python examples/train_pytorch.py multirotors network.safetensors\n\n",
+    "The same command resumes an interrupted run. With a larger --examples it adds what is missing, and\n",
+    "damaged files are made again; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or a folder of something else, ",
     "5 output not written"
 ))]
@@ -33,6 +33,12 @@ pub(crate) struct Dataset {
     /// Folder to write to: a new one, or one of the same recipe
     #[arg(long, value_name = "DIR")]
     pub(crate) into: PathBuf,
+    /// Discard the files of an earlier run and start over
+    #[arg(long)]
+    pub(crate) restart: bool,
+    /// Without effect: interrupted runs are always resumed
+    #[arg(long = "resume", hide = true)]
+    _resume: bool,
     /// Write all examples to this one Parquet file as well [needs a build with --features parquet]
     #[arg(long, value_name = "FILE")]
     pub(crate) parquet: Option<PathBuf>,

@@ -15,10 +15,10 @@ use super::MOST_THREADS;
     "Examples:\n",
     "  onecycle reproduce\n",
     "  onecycle reproduce --quick\n",
-    "  onecycle reproduce table_4 table_5 -o out --resume\n\n",
+    "  onecycle reproduce table_4 table_5 -o out\n\n",
     "Parts: phase, grid, figures, table_2_and_3, table_4, tuning_rules, table_5, table_6, table_7.\n",
-    "What is done is kept in DIR/parts: with --resume, parts whose settings are the same are read from ",
-    "there, and a training goes on after its last epoch.\n\n",
+    "Finished parts are kept in DIR/parts and not computed again, and an interrupted training is\n",
+    "resumed after its last epoch; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable part, 5 output not written"
 ))]
 pub(crate) struct Reproduce {
@@ -31,9 +31,12 @@ pub(crate) struct Reproduce {
     /// Folder to write
     #[arg(long, short, value_name = "DIR", default_value = "reproduction")]
     pub(crate) out: PathBuf,
-    /// Keep what an earlier run has done with the same settings
+    /// Discard the parts of an earlier run and start over
     #[arg(long)]
-    pub(crate) resume: bool,
+    pub(crate) restart: bool,
+    /// Without effect: finished parts are always kept
+    #[arg(long = "resume", hide = true)]
+    _resume: bool,
     /// Threads to work with [default: one a core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]

@@ -16,9 +16,9 @@ use super::MOST_THREADS;
     "Examples:\n",
     "  onecycle train --recipe experiments/identifier.toml -o mine.pack\n",
     "  onecycle train --recipe cli/reproduction/paper_network_small.toml\n",
-    "  onecycle train --recipe cli/reproduction/paper_network.toml -o paper.onnx --json table.json\n\n",
-    "With --out, every epoch is kept in OUT.1.part and so on until all is done: with --resume the same ",
-    "command goes on from there, to the same bits.\n\n",
+    "  onecycle train --recipe cli/reproduction/paper_network.toml -o paper.safetensors --json table.json\n\n",
+    "With --out, every epoch is kept in the folder OUT.part until the result is written: the same command\n",
+    "resumes an interrupted run, to the same bits; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or part, 5 output not written"
 ))]
 pub(crate) struct Train {
@@ -28,9 +28,12 @@ pub(crate) struct Train {
     /// Write the result to this file: the pack, or the best network as ONNX
     #[arg(long, short, value_name = "OUT")]
     pub(crate) out: Option<PathBuf>,
-    /// Go on from where an interrupted run with the same recipe was
+    /// Discard the work of an interrupted run and start over
     #[arg(long, requires = "out")]
-    pub(crate) resume: bool,
+    pub(crate) restart: bool,
+    /// Without effect: interrupted runs are always resumed
+    #[arg(long = "resume", hide = true)]
+    _resume: bool,
     /// Folder for the experiments of an identifier, kept for other runs [default: OUT.dataset, which
     /// is removed in the end]
     #[arg(long, value_name = "DIR")]

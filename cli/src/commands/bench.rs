@@ -1,8 +1,7 @@
 //! `onecycle bench`: the public benchmark, made and run.
 
-pub(crate) mod folder;
+mod folder;
 mod make;
-mod part;
 mod recordings;
 mod run;
 mod traces;

@@ -1,24 +1,54 @@
-//! `onecycle campaign`: many random experiments, and a table of what became of them.
-
-mod unknown;
+//! `onecycle campaign`: many random experiments and a table of their outcomes.
 
 use std::process::ExitCode;
-use std::sync::atomic::{AtomicU64, Ordering};
 
-use onecycle::Model;
-use onecycle_lab::experiments::{Campaign, ExperimentError, Measure, RelayExperiment};
-use onecycle_lab::judge::evaluate::Costs;
-use onecycle_lab::judge::outcome::{
-    IdentificationOutcome, RelayOutcome, SHAPE_AND_GAIN, identification_outcome, relay_outcome,
-};
-use onecycle_onboard::refine::coordinate;
-use rayon::prelude::*;
+use onecycle_lab::experiments::{Campaign, DefectKind, ExperimentError, Measure, RelayExperiment};
+use onecycle_lab::judge::out_of_family::{CycleClassifier, evaluate};
+use onecycle_lab::judge::outcome::{identification_outcome, relay_outcome};
+use onecycle_onboard::classify::{Calibration, ClassifyError};
+use onecycle_onboard::pack::Pack;
+use onecycle_onboard::signature::Signature;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+use serde_json::json;
 
+use super::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{print, progress_bar};
+use crate::journal::Journal;
+use crate::output::{print, write_text};
+use crate::report::campaign as report;
+use crate::results::campaign::{IdentificationCase, OutsiderCase, RelayCase};
 use crate::{args, settings};
 
 pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
+    let campaign = campaign(arguments)?;
+    let (table, journal) = match campaign.measure {
+        Measure::Relay => {
+            let case =
+                |experiment: &RelayExperiment| relay_outcome(experiment).map(RelayCase::from);
+            let (cases, journal) = of_family(arguments, &campaign, case)?;
+            (report::relay(&campaign, &cases), journal)
+        }
+        Measure::Identification => {
+            let case = |experiment: &RelayExperiment| {
+                identification_outcome(&campaign, experiment)
+                    .map(|outcome| IdentificationCase::of(&outcome))
+            };
+            let (cases, journal) = of_family(arguments, &campaign, case)?;
+            (report::identification(&campaign, &cases), journal)
+        }
+        Measure::Unknown => of_kinds(arguments, &campaign)?,
+    };
+    if let Some(out) = &arguments.out {
+        write_text(out, &table)?;
+    }
+    print(&table)?;
+    journal.map_or(Ok(()), Journal::remove)?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+/// The campaign of the file with the changes of the arguments.
+fn campaign(arguments: &args::Campaign) -> Result<Campaign, Failure> {
     let mut campaign: Campaign = settings::read(&arguments.file)?;
     campaign.cases = arguments.cases.unwrap_or(campaign.cases);
     campaign.cycles = arguments
@@ -31,164 +61,137 @@ pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
     }
     campaign
         .validate()
-        .map_err(|error| settings::out_of_range(&arguments.file, error))?;
-    let table = match campaign.measure {
-        Measure::Relay => {
-            let outcomes = all(&campaign, |_, experiment| relay_outcome(experiment))?;
-            relay_table(&campaign, &outcomes)
-        }
-        Measure::Identification => {
-            identification_table(&campaign, &all(&campaign, identification_outcome)?)
-        }
-        Measure::Unknown => unknown::table(&arguments.file, &campaign)?,
-    };
-    print(&table)?;
-    Ok(ExitCode::from(exit::DONE))
+        .map_err(|error| Failure::unreadable(&arguments.file, error))?;
+    Ok(campaign)
 }
 
-/// Every case's outcome, in order whatever the number of threads.
-fn all<T: Send>(
+/// Outcomes of all cases of the campaign's family.
+fn of_family<T: Send + Serialize + DeserializeOwned>(
+    arguments: &args::Campaign,
     campaign: &Campaign,
-    outcome: impl Fn(&Campaign, &RelayExperiment) -> Result<T, ExperimentError> + Sync,
-) -> Result<Vec<T>, Failure> {
-    let bar = progress_bar(campaign.cases);
-    let done = AtomicU64::new(0);
-    let outcomes = (0..campaign.cases)
-        .into_par_iter()
-        .map(|n| {
-            let experiment = campaign.experiment(n);
-            let result = experiment.and_then(|experiment| outcome(campaign, &experiment));
-            bar.set_position(done.fetch_add(1, Ordering::Relaxed) + 1);
-            result
-        })
-        .collect::<Result<_, _>>()
-        .map_err(Failure::usage);
-    bar.finish_and_clear();
-    outcomes
+    outcome: impl Fn(&RelayExperiment) -> Result<T, ExperimentError> + Sync,
+) -> Result<(Vec<T>, Option<Journal>), Failure> {
+    finished(arguments, campaign.cases, |n| {
+        let outcome = campaign
+            .experiment(n)
+            .and_then(|experiment| outcome(&experiment));
+        outcome.map_err(Failure::usage)
+    })
 }
 
-/// A quantile as text, `-` where there are no values.
-fn quantile(values: &mut [f64], q: f64, decimals: usize) -> String {
-    or_dash(onecycle_lab::judge::evaluate::quantile(values, q), decimals)
-}
+/// Cases of the family for one case of each kind out of it: false alarms are rare and count most.
+const IN_FAMILY: u64 = 5;
 
-/// A value as text, `-` where there is none.
-fn or_dash(value: Option<f64>, decimals: usize) -> String {
-    value.map_or("-".to_owned(), |value| format!("{value:.decimals$}"))
-}
-
-fn relay_table(campaign: &Campaign, outcomes: &[RelayOutcome]) -> String {
-    let steady = outcomes
-        .iter()
-        .filter(|outcome| outcome.steady_at.is_some())
-        .count();
-    let run_away = outcomes.iter().filter(|outcome| !outcome.alive).count();
-    let undone: u32 = outcomes.iter().map(|outcome| outcome.undone).sum();
-    let mut at: Vec<f64> = outcomes
-        .iter()
-        .filter_map(|o| o.steady_at)
-        .map(f64::from)
-        .collect();
-    let mut ratio: Vec<f64> = outcomes
-        .iter()
-        .map(|outcome| outcome.period_ratio)
-        .collect();
-    let mut farthest: Vec<f64> = outcomes.iter().map(|outcome| outcome.excursion).collect();
-    format!(
-        "{} random processes, bias up to {} h, noise up to {} of the amplitude, offset {}, trim {}\n\
-         steady oscillation      {steady} ({:.2} %)\n\
-         run away                {run_away}\n\
-         cycles until steady     median {}, 99 % {}, most {}\n\
-         period / describing fn  {} .. {}, median {}\n\
-         farthest / amplitude    median {}, most {}\n\
-         switches taken back     {undone}\n",
-        outcomes.len(),
-        campaign.bias,
-        campaign.sigma,
-        campaign.offset,
-        if campaign.trim { "on" } else { "off" },
-        100.0 * steady as f64 / outcomes.len() as f64,
-        quantile(&mut at, 0.5, 0),
-        quantile(&mut at, 0.99, 0),
-        quantile(&mut at, 1.0, 0),
-        quantile(&mut ratio, 0.0, 2),
-        quantile(&mut ratio, 1.0, 2),
-        quantile(&mut ratio, 0.5, 2),
-        quantile(&mut farthest, 0.5, 1),
-        quantile(&mut farthest, 1.0, 1),
-    )
-}
-
-fn identification_table(campaign: &Campaign, outcomes: &[IdentificationOutcome]) -> String {
-    let refused = outcomes
-        .iter()
-        .filter(|outcome| outcome.found.outcome.is_err())
-        .count();
-    let identified = outcomes.len() - refused;
-    let costs = Costs::of(outcomes.iter().map(|outcome| outcome.deterioration));
-    let percent = |cost: Option<f64>, decimals| or_dash(cost.map(|cost| 100.0 * cost), decimals);
-    let bound = error_over_bound(outcomes);
-    let held = coverage(outcomes).map(|count| 100.0 * count as f64 / identified.max(1) as f64);
-    let [k, k_over_t_body, t_prop, t_body, tau, bias] = held;
-    format!(
-        "{} random processes, bias up to {} h, noise {}{} of the amplitude, trim {}, {} cycle(s)\n\
-         refused                 {refused}\n\
-         unstable                {}\n\
-         deterioration |J| (%)   mean {}, median {}, 95 % {}, 99 % {}, worst {}\n\
-         least phase margin      {} deg\n\
-         90 % intervals hold (%) K {k:.1}, K/T_body {k_over_t_body:.1}, T_prop {t_prop:.1}, \
-         T_body {t_body:.1}, tau {tau:.1}, bias {bias:.1}\n\
-         error / Cramer-Rao      {bound}\n",
-        outcomes.len(),
-        campaign.bias,
-        if campaign.sigma_uniform { "up to " } else { "" },
-        campaign.sigma,
-        if campaign.trim { "on" } else { "off" },
-        campaign.cycles,
-        costs.unstable,
-        percent(costs.mean, 3),
-        percent(costs.median, 3),
-        percent(costs.percentile_95, 2),
-        percent(costs.percentile_99, 2),
-        percent(costs.worst, 2),
-        or_dash(costs.least_phase_margin_deg, 1),
-    )
-}
-
-/// Root mean squares of the errors over their standard deviations, five of which count at most: a wild
-/// one is the cost's to show.
-fn error_over_bound(outcomes: &[IdentificationOutcome]) -> String {
-    let errors: Vec<_> = outcomes
-        .iter()
-        .filter_map(|outcome| outcome.errors)
-        .collect();
-    let rms = |k: usize| {
-        let square = |errors: &[f64; SHAPE_AND_GAIN]| errors[k].powi(2).min(25.0);
-        (errors.iter().map(square).sum::<f64>() / errors.len().max(1) as f64).sqrt()
+/// The table of processes in and out of the family.
+fn of_kinds(
+    arguments: &args::Campaign,
+    campaign: &Campaign,
+) -> Result<(String, Option<Journal>), Failure> {
+    let recipe = campaign.recipe();
+    recipe
+        .validate()
+        .map_err(|error| Failure::unreadable(&arguments.file, error))?;
+    let pack = Pack::embedded().map_err(Failure::usage)?;
+    let network = |signature: &Signature| pack.outputs(&signature.values);
+    let classifier = CycleClassifier {
+        network: &network,
+        calibration: Calibration::of_pack(&pack)
+            .ok_or_else(|| Failure::usage(ClassifyError::Pack))?,
     };
-    format!(
-        "pole sum {:.2}, pole ratio {:.2}, tau {:.2}, gain {:.2} (of {} cases)",
-        rms(coordinate::LN_POLE_SUM),
-        rms(coordinate::POLE_RATIO),
-        rms(coordinate::TAU_S),
-        rms(coordinate::LN_JERK_GAIN),
-        errors.len()
-    )
+    let kinds: Vec<DefectKind> = std::iter::once(DefectKind::InFamily)
+        .chain(DefectKind::OUTSIDE)
+        .collect();
+    let in_family = IN_FAMILY * campaign.cases;
+    let outside = campaign.cases * (kinds.len() as u64 - 1);
+    let (cases, journal) = finished(arguments, in_family + outside, |piece| {
+        let (kind, n) = match piece.checked_sub(in_family) {
+            None => (DefectKind::InFamily, piece),
+            Some(beyond) => {
+                let kind = kinds[1 + (beyond / campaign.cases) as usize];
+                (kind, beyond % campaign.cases)
+            }
+        };
+        let judged = evaluate(&recipe, kind, n, Some(&classifier)).map_err(Failure::usage)?;
+        Ok(judged.map(OutsiderCase::from))
+    })?;
+    let mut rest = &cases[..];
+    let rows = kinds.into_iter().map(|kind| {
+        let count = match kind {
+            DefectKind::InFamily => in_family,
+            _ => campaign.cases,
+        };
+        let (own, others) = rest.split_at(count as usize);
+        rest = others;
+        // Without its defect, a process may not oscillate at all: it is no case.
+        (kind, own.iter().copied().flatten().collect())
+    });
+    Ok((
+        report::unknown(campaign, &rows.collect::<Vec<_>>()),
+        journal,
+    ))
 }
 
-/// Of each parameter, in how many cases the interval holds the truth.
-fn coverage(outcomes: &[IdentificationOutcome]) -> [usize; 6] {
-    let mut held = [0; 6];
-    for outcome in outcomes {
-        let Ok(identified) = &outcome.found.outcome else {
-            continue;
-        };
-        let truth = Model::from(outcome.truth);
-        // The five parameters of the model, then the input bias.
-        for (count, (parameter, interval)) in held.iter_mut().zip(identified.estimate.iter()) {
-            let truth = truth.parameter(parameter).unwrap_or(outcome.bias);
-            *count += usize::from(interval.holds(truth));
+/// Cases of each thread between two writes to the journal: seconds of work.
+const LOT: usize = 64;
+
+/// Outcomes of all cases, in order for any number of threads. With an output file, finished cases are kept in its
+/// journal.
+fn finished<T: Send + Serialize + DeserializeOwned>(
+    arguments: &args::Campaign,
+    count: u64,
+    case: impl Fn(u64) -> Result<T, Failure> + Send + Sync,
+) -> Result<(Vec<T>, Option<Journal>), Failure> {
+    let mut done: Vec<T> = Vec::new();
+    let mut journal = match &arguments.out {
+        None => None,
+        Some(out) => {
+            let settings = settings(arguments)?;
+            let take = |lot: Vec<T>| {
+                done.extend(lot);
+                Ok(())
+            };
+            let folder = Journal::folder_of(out);
+            Some(Journal::open(
+                &folder,
+                "campaign",
+                &settings,
+                arguments.restart,
+                take,
+            )?)
         }
+    };
+    if !done.is_empty()
+        && let Some(journal) = &journal
+    {
+        journal.tell_resumed(&format!("{} of {count} cases", done.len()));
     }
-    held
+    let workers = Workers::new(None)?;
+    let count = count as usize;
+    workers.expect(count, done.len());
+    while done.len() < count {
+        let first = done.len();
+        let lot = (LOT * workers.threads()).min(count - first);
+        let lot = workers.run(lot, |k| case((first + k) as u64));
+        let lot: Vec<T> = lot.into_iter().collect::<Result<_, Failure>>()?;
+        if let Some(journal) = &mut journal {
+            journal.add(&lot)?;
+        }
+        done.extend(lot);
+    }
+    workers.finish();
+    Ok((done, journal))
+}
+
+/// What decides the outcomes: the file and the arguments that change it.
+fn settings(arguments: &args::Campaign) -> Result<serde_json::Value, Failure> {
+    let file: toml::Table = settings::read(&arguments.file)?;
+    let method = arguments.method.map(|method| format!("{method:?}"));
+    Ok(json!({
+        "file": file,
+        "cases": arguments.cases,
+        "cycles": arguments.cycles,
+        "method": method,
+        "sigma": arguments.sigma,
+        "time_scale": arguments.time_scale,
+    }))
 }

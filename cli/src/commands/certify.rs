@@ -2,64 +2,36 @@
 
 use std::process::ExitCode;
 
-use indicatif::ProgressBar;
 use onecycle_lab::experiments::{Campaign, Measure};
 use onecycle_lab::judge::outcome::relay_outcome;
 use onecycle_lab::space::Space;
-use onecycle_lab::space::certificate::{Certificate, CertificateSummary, LeastStable};
+use onecycle_lab::space::certificate::{Certificate, CertificateSummary};
+use onecycle_lab::space::limit_cycle::sampled::{motion, symmetric_cycles};
 use onecycle_lab::space::surface::Direction;
 use onecycle_onboard::Soiptd;
-use rayon::prelude::*;
 
+use super::workers::Workers;
 use crate::args::Certify;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print, progress_bar};
-use crate::pictures::certify::draw;
+use crate::output::{Waiting, print, write_text};
 use crate::report::certificate;
+use crate::results::certify::{BiasRow, CertifiedProcess, CertifiedSpace, SampledRelay};
 use crate::settings;
-
-/// Under one bias: what is certified, and in how many cases a simulation of the relay of the board
-/// came to a steady oscillation, without trim and with it.
-pub(crate) struct Row {
-    pub(crate) summary: CertificateSummary,
-    pub(crate) settled: [usize; 2],
-}
-
-/// What is certified of a space.
-pub(crate) struct Certified {
-    pub(crate) space: Space,
-    pub(crate) least_stable: LeastStable,
-    /// Without bias, of every shape.
-    pub(crate) unbiased: Vec<Certificate>,
-    /// Without bias, at the corners of the box.
-    pub(crate) corners: Vec<Certificate>,
-    pub(crate) rows: Vec<Row>,
-}
-
-impl Certified {
-    /// Whether every process has a stable cycle without bias and, within the trim's limit, with the
-    /// trim under every bias.
-    pub(crate) fn holds(&self) -> bool {
-        self.least_stable.spectral_radius < 1.0
-            && self
-                .rows
-                .iter()
-                .all(|row| row.summary.trimmed == row.summary.processes)
-    }
-}
 
 pub(crate) fn run(arguments: &Certify) -> Result<ExitCode, Failure> {
     let space = settings::space(arguments.space.as_deref())?;
     if !arguments.process.is_empty() {
         let waiting = Waiting::on("looking for limit cycles");
-        let report = certificate::processes(arguments, &space)?;
+        let processes = (arguments.process.iter())
+            .map(|times| process(arguments, times.0, space.beta))
+            .collect::<Result<Vec<_>, Failure>>()?;
         drop(waiting);
-        print(&report)?;
+        print(&certificate::processes(&processes))?;
         return Ok(ExitCode::from(exit::DONE));
     }
     let certified = certify(arguments, space)?;
-    if let Some(path) = &arguments.picture {
-        draw(path, &certified)?;
+    if let Some(path) = &arguments.report {
+        write_text(path, &certificate::html(&certified))?;
     }
     print(&if arguments.json {
         certificate::json(&certified)
@@ -76,26 +48,27 @@ pub(crate) fn run(arguments: &Certify) -> Result<ExitCode, Failure> {
 /// Points of the climb's first lattice for each shape of the campaign's, along either coordinate.
 const FINER: usize = 2;
 
-fn certify(arguments: &Certify, space: Space) -> Result<Certified, Failure> {
+fn certify(arguments: &Certify, space: Space) -> Result<CertifiedSpace, Failure> {
     let side = arguments.shapes as usize;
     let shapes = space.shapes(side, side);
     let biases = arguments.biases();
     // A certificate of each without bias; under each bias one, and two simulations.
-    let bar = progress_bar(((1 + 3 * biases.len()) * shapes.len()) as u64);
+    let workers = Workers::new(None)?;
+    workers.expect((1 + 3 * biases.len()) * shapes.len(), 0);
     let least_stable = space
         .least_stable(FINER * side, FINER * side)
         .ok_or_else(|| Failure::usage("the space has no process"))?;
-    let certified = Certified {
+    let certified = CertifiedSpace {
         space,
         least_stable,
-        unbiased: certificates(&space, &shapes, 0.0, &bar)?,
+        unbiased: certificates(&space, &shapes, 0.0, &workers)?,
         corners: corners(&space)?,
         rows: biases
             .iter()
-            .map(|&bias| row(&space, &shapes, bias, &bar))
+            .map(|&bias| row(&space, &shapes, bias, &workers))
             .collect::<Result<_, _>>()?,
     };
-    bar.finish_and_clear();
+    workers.finish();
     Ok(certified)
 }
 
@@ -116,20 +89,21 @@ fn corners(space: &Space) -> Result<Vec<Certificate>, Failure> {
         .collect()
 }
 
-fn row(space: &Space, shapes: &[Direction], bias: f64, bar: &ProgressBar) -> Result<Row, Failure> {
-    let certificates = certificates(space, shapes, bias, bar)?;
+fn row(
+    space: &Space,
+    shapes: &[Direction],
+    bias: f64,
+    workers: &Workers,
+) -> Result<BiasRow, Failure> {
+    let certificates = certificates(space, shapes, bias, workers)?;
     let mut settled = [0; 2];
     for (settled, trim) in settled.iter_mut().zip([false, true]) {
-        *settled = certificates
-            .par_iter()
-            .map(|certificate| {
-                let settles = settles(space, certificate, trim);
-                bar.inc(1);
-                settles.map(usize::from)
-            })
-            .sum::<Result<usize, Failure>>()?;
+        let all = workers.run(certificates.len(), |k| {
+            settles(space, &certificates[k], trim).map(usize::from)
+        });
+        *settled = all.into_iter().sum::<Result<usize, Failure>>()?;
     }
-    Ok(Row {
+    Ok(BiasRow {
         summary: CertificateSummary::of(bias, &certificates),
         settled,
     })
@@ -139,17 +113,16 @@ fn certificates(
     space: &Space,
     shapes: &[Direction],
     bias: f64,
-    bar: &ProgressBar,
+    workers: &Workers,
 ) -> Result<Vec<Certificate>, Failure> {
-    shapes
-        .par_iter()
-        .filter_map(|&shape| space.middle_of_ray(shape))
-        .map(|times_s| {
-            let certificate = Certificate::new(times_s, space.beta, bias).map_err(Failure::usage);
-            bar.inc(1);
-            certificate
-        })
-        .collect()
+    let middles = shapes
+        .iter()
+        .filter_map(|&shape| space.middle_of_ray(shape));
+    let times_s: Vec<[f64; 3]> = middles.collect();
+    let certificates = workers.run(times_s.len(), |k| {
+        Certificate::new(times_s[k], space.beta, bias).map_err(Failure::usage)
+    });
+    certificates.into_iter().collect()
 }
 
 /// Period (s) that a simulated oscillation is scaled to: 400 samples at the campaign's 1 kHz.
@@ -180,4 +153,35 @@ fn settles(space: &Space, certificate: &Certificate, trim: bool) -> Result<bool,
     experiment.noise_sigma = SIMULATED_SIGMA * experiment.oscillation.amplitude;
     let outcome = relay_outcome(&experiment).map_err(Failure::usage)?;
     Ok(outcome.steady_at.is_some())
+}
+
+/// A process under every bias.
+fn process(arguments: &Certify, times_s: [f64; 3], beta: f64) -> Result<CertifiedProcess, Failure> {
+    let [t_prop_s, t_body_s, tau_s] = times_s;
+    let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).map_err(Failure::usage)?;
+    let under = |bias: f64| -> Result<_, Failure> {
+        let certificate = Certificate::new(times_s, beta, bias).map_err(Failure::usage)?;
+        let sampled =
+            (arguments.sample_rate).map(|rate_hz| sampled(&process, beta, bias, 1.0 / rate_hz));
+        Ok((certificate, sampled))
+    };
+    Ok(CertifiedProcess {
+        times_s,
+        beta,
+        biases: (arguments.biases().into_iter())
+            .map(under)
+            .collect::<Result<_, _>>()?,
+    })
+}
+
+fn sampled(process: &Soiptd, beta: f64, bias: f64, sample_s: f64) -> SampledRelay {
+    SampledRelay {
+        sample_s,
+        cycles: if bias == 0.0 {
+            symmetric_cycles(process, beta, sample_s)
+        } else {
+            vec![]
+        },
+        motion: motion(process, [beta; 2], bias, sample_s),
+    }
 }

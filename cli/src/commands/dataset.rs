@@ -4,10 +4,9 @@ pub(super) mod folder;
 
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use onecycle_lab::experiments::Recipe;
-use onecycle_lab::learn::dataset::shards::Manifest;
 use onecycle_lab::learn::identifier::IdentifierRecipe;
 
 use self::folder::Folder;
@@ -15,17 +14,8 @@ use super::workers::{Lot, Workers};
 use crate::args;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, tell};
+use crate::results::dataset::DatasetRun;
 use crate::{report, settings};
-
-/// What the command has done.
-pub(crate) struct Done {
-    pub(crate) manifest: Manifest,
-    /// Files that were there, whole.
-    pub(crate) kept: usize,
-    /// Experiments made, with and without an oscillation.
-    pub(crate) made: u64,
-    pub(crate) took: Duration,
-}
 
 pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     if arguments.parquet.is_some() && !cfg!(feature = "parquet") {
@@ -36,42 +26,47 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     let recipe = recipe(arguments.recipe.as_deref())?;
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
-    let (folder, kept, made) = filled(&arguments.into, recipe, arguments.examples, &workers)?;
+    let (folder, files_kept, experiments_made) = filled(
+        &arguments.into,
+        (recipe, arguments.examples),
+        arguments.restart,
+        &workers,
+    )?;
     workers.finish();
     #[cfg(feature = "parquet")]
     if let Some(path) = &arguments.parquet {
         let _waiting = Waiting::on(format!("writing {}", path.display()));
         folder.write_parquet(path)?;
     }
-    let done = Done {
+    let run = DatasetRun {
         manifest: folder.into_manifest(),
-        kept,
-        made,
+        files_kept,
+        experiments_made,
         took: begin.elapsed(),
     };
     print(&if arguments.json {
-        report::dataset::json(&done)
+        report::dataset::json(&run)
     } else {
-        report::dataset::text(&done, &arguments.into)
+        report::dataset::text(&run, &arguments.into)
     })?;
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The folder of so many experiments of a recipe, all of them made; how many files were there, and how
-/// many experiments were missing.
+/// The folder of a recipe with this number of experiments, all made; the number of files that were there before, and of
+/// experiments that were missing.
 pub(super) fn filled(
     path: &Path,
-    recipe: Recipe,
-    examples: u64,
+    (recipe, examples): (Recipe, u64),
+    restart: bool,
     workers: &Workers,
 ) -> Result<(Folder, usize, u64), Failure> {
-    let waiting = Waiting::on(format!("looking at {}", path.display()));
-    let mut folder = Folder::open(path, recipe, examples)?;
+    let waiting = Waiting::on(format!("checking {}", path.display()));
+    let mut folder = Folder::open(path, recipe, examples, restart)?;
     let damaged = folder.drop_damaged();
     drop(waiting);
     if !damaged.is_empty() {
         tell(&format!(
-            "made again, for they are missing or damaged: {}",
+            "made again because they are missing or damaged: {}",
             damaged.join(", ")
         ));
     }
@@ -79,8 +74,9 @@ pub(super) fn filled(
     let kept = folder.manifest().shards.len() - missing.len();
     if kept > 0 && !missing.is_empty() {
         tell(&format!(
-            "going on after {kept} of {} files",
-            folder.manifest().shards.len()
+            "resuming after {kept} of {} files of {} (use --restart to start over)",
+            folder.manifest().shards.len(),
+            path.display()
         ));
     }
     let made = make(&mut folder, &missing, workers)?;
@@ -100,7 +96,7 @@ fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
     };
     recipe
         .validate()
-        .map_err(|error| settings::out_of_range(path, error))?;
+        .map_err(|error| Failure::unreadable(path, error))?;
     Ok(recipe)
 }
 

@@ -4,36 +4,21 @@ use std::fs;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::evaluate::{Cycles, CyclesError};
 use onecycle_lab::judge::flights::{judged, trace};
 use onecycle_onboard::tuner::TunerPhase;
 use onecycle_plant::multirotor::pilot::TICK_S;
-use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, Tuned, fly};
+use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, fly};
 
 use super::workers::Workers;
 use crate::args::Fly;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_file, write_text};
 use crate::report::fly as report;
+use crate::results::fly::{Flight, MissionFlights};
 
 /// Cycles that are looked at one by one: those of the paper's Table VII.
 const CYCLES: usize = 5;
-
-/// One flight and what it was worth.
-pub(crate) struct Flight {
-    pub(crate) flown: Flown,
-    /// Of each axis that was tuned.
-    pub(crate) judged: Vec<(Tuned, Deterioration)>,
-    /// Of [`Mission::Cycles`], where each of them tells a process.
-    pub(crate) cycles: Option<Cycles>,
-}
-
-/// A mission and its flights; ticks are kept of the first alone.
-pub(crate) struct Campaign {
-    pub(crate) mission: Mission,
-    pub(crate) flights: Vec<Flight>,
-}
 
 pub(crate) fn run(arguments: &Fly) -> Result<ExitCode, Failure> {
     let is_wanted = |mission: &Mission| {
@@ -56,29 +41,29 @@ pub(crate) fn run(arguments: &Fly) -> Result<ExitCode, Failure> {
     });
     workers.finish();
     let mut flights = flights.into_iter();
-    let mut campaigns = Vec::with_capacity(missions.len());
+    let mut flown = Vec::with_capacity(missions.len());
     for mission in missions {
         let flights: Result<Vec<Flight>, Failure> = flights.by_ref().take(seeds).collect();
-        campaigns.push(Campaign {
+        flown.push(MissionFlights {
             mission,
             flights: flights?,
         });
     }
-    print(&report::text(&campaigns))?;
+    print(&report::text(&flown))?;
     if let Some(out) = &arguments.out {
-        for campaign in &campaigns {
-            let path = out.join(format!("{}.csv", campaign.mission.name()));
-            if let Some(first) = campaign.flights.first() {
+        for one in &flown {
+            let path = out.join(format!("{}.csv", one.mission.name()));
+            if let Some(first) = one.flights.first() {
                 write_file(&path, |file| csv(file, &first.flown.records))?;
             }
         }
         let path = out.join("flights.html");
-        let page = report::html(&campaigns);
+        let page = report::html(&flown);
         write_text(&path, &page)?;
         print(&format!("{}\n", path.display()))?;
     }
-    let all_flown = (campaigns.iter().flat_map(|campaign| &campaign.flights))
-        .all(|flight| flight.flown.failure.is_none());
+    let all_flown =
+        (flown.iter().flat_map(|one| &one.flights)).all(|flight| flight.flown.failure.is_none());
     Ok(ExitCode::from(if all_flown {
         exit::DONE
     } else {

@@ -1,83 +1,62 @@
-//! `onecycle grid`: processes that stand for a space; made, written, checked, drawn.
+//! `onecycle grid`: processes that represent a space; made or read, checked, written.
 
-mod part;
+mod kept;
 
 use std::io::{self, BufWriter};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use onecycle_lab::space::candidate::Gains;
+use onecycle_lab::space::candidate::{Candidate, CandidateError, Gains};
 use onecycle_lab::space::grid;
 use onecycle_lab::space::grid::{Check, Grid, GridFile, GridSettings, Layout, check};
 
-use self::part::Part;
+use self::kept::KeptGrid;
 use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print, tell, write_file, write_text};
-use crate::{pictures, report, settings};
+use crate::output::{print, write_file, write_text};
+use crate::reading::open_with_bar;
+use crate::results::grid::{CostsAlongRay, GridRun};
+use crate::{report, settings};
 
 /// Most members whose costs are written unasked: four million numbers, 40 MB.
 const MOST_IN_MATRIX: usize = 2000;
 
-/// Rows of members, and of the matrix, that each thread works on before all are kept in the part
-/// file: a second's work or so.
+/// Rows of members, and of the matrix, of each thread between two writes to the journal: about a second of work.
 const ROWS_PER_THREAD: usize = 2;
 const COSTS_PER_THREAD: usize = 64;
-
-/// What the command has done.
-pub(crate) struct Done {
-    pub(crate) grid: Grid,
-    pub(crate) check: Option<Check>,
-    pub(crate) has_matrix: bool,
-    pub(crate) took: Duration,
-}
-
-impl Done {
-    /// Whether no process was found without a member near; of no check, nothing was.
-    pub(crate) fn holds(&self) -> bool {
-        self.check.is_none_or(|check| check.beyond == 0)
-    }
-}
 
 pub(crate) fn run(arguments: &args::Grid) -> Result<ExitCode, Failure> {
     let begin = Instant::now();
     let workers = Workers::new(arguments.threads)?;
-    let mut done = match &arguments.from {
+    let mut run = match &arguments.from {
         Some(path) => read(arguments, path, &workers)?,
         None => make(arguments, &workers)?,
     };
-    done.took = begin.elapsed();
+    run.took = begin.elapsed();
     workers.finish();
-    if let Some(path) = &arguments.picture {
-        pictures::grid::write(path, &done.grid)?;
-    }
     if let Some(path) = &arguments.report {
-        let page = report::grid::html(&done).map_err(Failure::usage)?;
-        write_text(path, &page)?;
+        run.rays = rays(&run.grid.settings).map_err(Failure::usage)?;
+        write_text(path, &report::grid::html(&run))?;
     }
     print(&if arguments.json {
-        report::grid::json(&done)
+        report::grid::json(&run)
     } else {
-        report::grid::text(&done)
+        report::grid::text(&run)
     })?;
-    Ok(ExitCode::from(if done.holds() {
+    Ok(ExitCode::from(if run.holds() {
         exit::DONE
     } else {
         exit::NO_PROCESS
     }))
 }
 
-fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<Done, Failure> {
-    let failed = |reason: String| Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    };
-    let waiting = Waiting::on(format!("reading {}", path.display()));
-    let text = std::fs::read_to_string(path).map_err(|error| failed(error.to_string()))?;
+fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<GridRun, Failure> {
+    let failed = |reason: String| Failure::unreadable(path, reason);
+    let text = open_with_bar(path).and_then(io::read_to_string);
+    let text = text.map_err(|error| failed(error.to_string()))?;
     let file = GridFile::read(&text).map_err(|error| failed(error.to_string()))?;
-    drop(waiting);
     let grid = file
         .grid(workers)
         .map_err(|error| failed(error.to_string()))?;
@@ -85,15 +64,16 @@ fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<Done, 
         Some(_) => checked(arguments, &grid, workers)?,
         None => file.check,
     };
-    Ok(Done {
+    Ok(GridRun {
         grid,
         check,
         has_matrix: file.matrix.is_some(),
+        rays: vec![],
         took: Duration::ZERO,
     })
 }
 
-fn make(arguments: &args::Grid, workers: &Workers) -> Result<Done, Failure> {
+fn make(arguments: &args::Grid, workers: &Workers) -> Result<GridRun, Failure> {
     let settings = GridSettings {
         space: settings::space(arguments.space.as_deref())?,
         deterioration: arguments.deterioration,
@@ -109,73 +89,64 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<Done, Failure> {
         },
     };
     // A few members are made again sooner than they are read.
-    let mut part = match (&arguments.out, settings.layout) {
-        (Some(out), Layout::Rays) => Some(part_of(out, &settings, arguments.restart)?),
+    let mut kept = match (&arguments.out, settings.layout) {
+        (Some(out), Layout::Rays) => Some(KeptGrid::open(out, &settings, arguments.restart)?),
         _ => None,
     };
-    let grid = lay(&settings, part.as_mut(), workers)?;
+    let grid = lay(&settings, kept.as_mut(), workers)?;
     let has_matrix =
         arguments.out.is_some() && (arguments.matrix || grid.members.len() <= MOST_IN_MATRIX);
-    if let (true, Some(part)) = (has_matrix, &mut part) {
-        keep_costs(&grid, part, workers)?;
+    if let (true, Some(kept)) = (has_matrix, &mut kept) {
+        keep_costs(&grid, kept, workers)?;
     }
     let check = checked(arguments, &grid, workers)?;
     if let Some(out) = &arguments.out {
-        write(out, &grid, check.as_ref(), has_matrix, part)?;
+        write(out, &grid, check.as_ref(), has_matrix, kept)?;
     }
-    Ok(Done {
+    Ok(GridRun {
         grid,
         check,
         has_matrix,
+        rays: vec![],
         took: Duration::ZERO,
     })
 }
 
-fn part_of(out: &Path, settings: &GridSettings, restart: bool) -> Result<Part, Failure> {
-    let mut path = out.as_os_str().to_owned();
-    path.push(".part");
-    let part = Part::open(PathBuf::from(path), settings, restart)?;
-    if let Some(what) = part.what_is_done() {
-        tell(&format!("going on after {what} of {}", part.name()));
-    }
-    Ok(part)
-}
-
 fn lay(
     settings: &GridSettings,
-    part: Option<&mut Part>,
+    kept: Option<&mut KeptGrid>,
     workers: &Workers,
 ) -> Result<Grid, Failure> {
-    let Some(part) = part else {
+    let Some(kept) = kept else {
         return Grid::build(settings, workers).map_err(Failure::usage);
     };
-    let thetas_rad = match part.thetas_rad() {
+    let thetas_rad = match kept.thetas_rad() {
         Some(thetas_rad) => thetas_rad.to_vec(),
         None => {
             let thetas_rad = grid::rows(settings, workers).map_err(Failure::usage)?;
-            part.keep_thetas(thetas_rad.clone())?;
+            kept.keep_thetas(thetas_rad.clone())?;
             thetas_rad
         }
     };
-    workers.expect(thetas_rad.len(), part.rows().len());
+    workers.expect(thetas_rad.len(), kept.rows().len());
     let at_once = ROWS_PER_THREAD * workers.threads();
-    for some in thetas_rad[part.rows().len()..].to_vec().chunks(at_once) {
+    for some in thetas_rad[kept.rows().len()..].to_vec().chunks(at_once) {
         for row in workers.run(some.len(), |k| grid::row(settings, some[k])) {
-            part.keep_row(row.map_err(Failure::usage)?)?;
+            kept.keep_row(row.map_err(Failure::usage)?)?;
         }
     }
-    Grid::of_rays(settings, part.rows(), workers).map_err(Failure::usage)
+    Grid::of_rays(settings, kept.rows(), workers).map_err(Failure::usage)
 }
 
-fn keep_costs(grid: &Grid, part: &mut Part, workers: &Workers) -> Result<(), Failure> {
+fn keep_costs(grid: &Grid, kept: &mut KeptGrid, workers: &Workers) -> Result<(), Failure> {
     let count = grid.members.len();
     let at_once = COSTS_PER_THREAD * workers.threads();
-    workers.expect(count, part.costs());
-    while part.costs() < count {
-        let first = part.costs();
+    workers.expect(count, kept.costs());
+    while kept.costs() < count {
+        let first = kept.costs();
         let some = at_once.min(count - first);
         for costs in workers.run(some, |k| costs(grid, first + k)) {
-            part.keep_costs(&costs)?;
+            kept.keep_costs(costs)?;
         }
     }
     Ok(())
@@ -199,19 +170,53 @@ fn checked(
         .map_err(Failure::usage)
 }
 
+/// Points of a ray on either side of its middle, and how far they reach, in steps of the grid.
+const POINTS_ALONG: i32 = 200;
+const STEPS_ALONG: f64 = 1.8;
+
+/// Two rays of the space: the longest lags with the shortest dead time, and the other way round.
+fn rays(settings: &GridSettings) -> Result<Vec<CostsAlongRay>, CandidateError> {
+    let [t_prop_s, t_body_s, tau_s] = settings.space.ranges_s();
+    [
+        ("A ray of long lags", [t_prop_s.1, t_body_s.1, tau_s.0]),
+        ("A ray of long dead time", [t_prop_s.0, t_body_s.0, tau_s.1]),
+    ]
+    .into_iter()
+    .map(|(name, times_s)| {
+        let own = Candidate::new(&settings.space, settings.gains, times_s)?;
+        let step = grid::step(&own, settings.deterioration);
+        let mut ray = CostsAlongRay {
+            name,
+            step,
+            ratios: vec![],
+            own_on_other: vec![],
+            other_on_own: vec![],
+        };
+        for k in -POINTS_ALONG..=POINTS_ALONG {
+            let ratio = step.powf(STEPS_ALONG * f64::from(k) / f64::from(POINTS_ALONG));
+            let other = own.scaled(ratio)?;
+            ray.ratios.push(ratio);
+            ray.own_on_other.push(own.cost_on(&other));
+            ray.other_on_own.push(other.cost_on(&own));
+        }
+        Ok(ray)
+    })
+    .collect()
+}
+
 fn write(
     path: &Path,
     grid: &Grid,
     check: Option<&Check>,
     has_matrix: bool,
-    part: Option<Part>,
+    kept: Option<KeptGrid>,
 ) -> Result<(), Failure> {
     write_file(path, |file| {
         let mut file = BufWriter::new(file);
-        match (&part, has_matrix) {
+        match (&kept, has_matrix) {
             (_, false) => grid::write(&mut file, grid, check, None),
-            (Some(part), true) => {
-                grid::write(&mut file, grid, check, Some(&mut part.read_costs()?))
+            (Some(kept), true) => {
+                grid::write(&mut file, grid, check, Some(&mut kept.read_costs()?))
             }
             (None, true) => {
                 let mut rows = (0..grid.members.len()).map(|i| Ok(costs(grid, i)));
@@ -220,5 +225,5 @@ fn write(
         }?;
         io::Write::flush(&mut file)
     })?;
-    part.map_or(Ok(()), Part::remove)
+    kept.map_or(Ok(()), KeptGrid::remove)
 }

@@ -9,11 +9,9 @@ use std::process::ExitCode;
 use onecycle_lab::learn::npz::{self, Column, Numbers};
 use onecycle_lab::learn::onnx;
 use onecycle_lab::learn::onnx::Normalisation;
-use onecycle_lab::learn::pack::{
-    PackContents, PackedWeights, Precision, Quantisation, layers, quantisation,
-};
+use onecycle_lab::learn::pack::{PackContents, PackedWeights, Precision, layers, quantisation};
 use onecycle_lab::learn::train::Network;
-use onecycle_onboard::pack::{DEFAULT, OUTPUTS, Pack, SELF_TEST_TOLERANCE};
+use onecycle_onboard::pack::{DEFAULT, OUTPUTS, Pack};
 use onecycle_onboard::signature::LENGTH;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -23,6 +21,7 @@ use crate::args::{self, PackAction, PackSource};
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_file};
 use crate::report;
+use crate::results::pack::{ImportedPack, VerifiedPack};
 
 /// Most bytes of a pack: a thousand times what one takes. What is larger is something else.
 const MOST_OF_A_PACK: u64 = 1 << 24;
@@ -30,7 +29,7 @@ const MOST_OF_A_PACK: u64 = 1 << 24;
 const MOST_OF_A_MODEL: u64 = 1 << 31;
 
 /// Random signatures that networks are compared on, of seed 1.
-pub(crate) const SAMPLES: usize = 1000;
+const SAMPLES: usize = 1000;
 /// How far what the network sees of them lies from zero: two standard deviations of its inputs.
 const SPREAD: f32 = 2.0;
 
@@ -57,15 +56,13 @@ fn show(arguments: &args::ShowPack) -> Result<ExitCode, Failure> {
 fn verify(arguments: &args::VerifyPack) -> Result<ExitCode, Failure> {
     let bytes = bytes(&arguments.pack)?;
     let pack = read(&arguments.pack, &bytes)?;
-    let worst = pack.self_test();
-    print(&report::pack::verified(
-        &arguments.pack.to_string(),
-        &pack,
-        worst,
-    ))?;
-    // A difference that is no number is not below the tolerance.
-    let passes = worst.is_none_or(|worst| worst <= SELF_TEST_TOLERANCE);
-    Ok(ExitCode::from(if passes {
+    let verified = VerifiedPack {
+        name: arguments.pack.to_string(),
+        pack: &pack,
+        worst: pack.self_test(),
+    };
+    print(&report::pack::verified(&verified))?;
+    Ok(ExitCode::from(if verified.passes() {
         exit::DONE
     } else {
         exit::NO_PROCESS
@@ -75,7 +72,7 @@ fn verify(arguments: &args::VerifyPack) -> Result<ExitCode, Failure> {
 fn export(arguments: &args::ExportPack) -> Result<ExitCode, Failure> {
     let bytes = bytes(&arguments.pack)?;
     let pack = read(&arguments.pack, &bytes)?;
-    let failed = |reason: String| unreadable(&path(&arguments.pack), reason);
+    let failed = |reason: String| Failure::unreadable(&path(&arguments.pack), reason);
     let contents = PackContents::read(&pack).map_err(|error| failed(error.to_string()))?;
     let network = contents
         .network()
@@ -137,9 +134,9 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
     let like_bytes = bytes(&arguments.like)?;
     let like = read(&arguments.like, &like_bytes)?;
     let mut contents = PackContents::read(&like)
-        .map_err(|error| unreadable(&path(&arguments.like), error.to_string()))?;
+        .map_err(|error| Failure::unreadable(&path(&arguments.like), error.to_string()))?;
     let (normalisation, network) = learnt(&arguments.model)?;
-    let failed = |reason: String| unreadable(&arguments.model, reason);
+    let failed = |reason: String| Failure::unreadable(&arguments.model, reason);
 
     let brings_normalisation = normalisation.is_some();
     if let Some(Normalisation { offsets, scales }) = normalisation {
@@ -158,22 +155,25 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
         .to_bytes()
         .map_err(|error| failed(error.to_string()))?;
     let pack = Pack::read(&made).map_err(|error| failed(error.to_string()))?;
-    let changed: Quantisation = quantisation(&pack, &network, &signatures(&pack))
+    let changed = quantisation(&pack, &network, &signatures(&pack))
         .map_err(|error| failed(error.to_string()))?;
     write_file(&arguments.out, |file| file.write_all(&made))?;
-    print(&report::pack::imported(
-        arguments,
-        &pack,
+    print(&report::pack::imported(&ImportedPack {
+        model: arguments.model.clone(),
+        like: arguments.like.to_string(),
+        out: arguments.out.clone(),
+        pack: &pack,
         brings_normalisation,
-        &changed,
-    ))?;
+        changed,
+        samples: SAMPLES,
+    }))?;
     Ok(ExitCode::from(exit::DONE))
 }
 
 /// The network of an ONNX file, and the normalisation that it brings.
 fn learnt(path: &Path) -> Result<(Option<Normalisation>, Network), Failure> {
     let imported = onnx::import(&read_at_most(path, MOST_OF_A_MODEL)?)
-        .map_err(|error| unreadable(path, error.to_string()))?;
+        .map_err(|error| Failure::unreadable(path, error.to_string()))?;
     Ok((imported.normalisation, imported.network))
 }
 
@@ -211,13 +211,6 @@ fn path(source: &PackSource) -> PathBuf {
     }
 }
 
-fn unreadable(path: &Path, reason: String) -> Failure {
-    Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    }
-}
-
 pub(super) fn bytes(source: &PackSource) -> Result<Cow<'static, [u8]>, Failure> {
     match source {
         PackSource::Embedded => Ok(Cow::Borrowed(DEFAULT)),
@@ -226,12 +219,12 @@ pub(super) fn bytes(source: &PackSource) -> Result<Cow<'static, [u8]>, Failure> 
 }
 
 pub(super) fn read<'a>(source: &PackSource, bytes: &'a [u8]) -> Result<Pack<'a>, Failure> {
-    Pack::read(bytes).map_err(|error| unreadable(&path(source), error.to_string()))
+    Pack::read(bytes).map_err(|error| Failure::unreadable(&path(source), error.to_string()))
 }
 
 /// The bytes of a file, of which there may be so many.
 fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
-    let failed = |error: io::Error| unreadable(path, error.to_string());
+    let failed = |error: io::Error| Failure::unreadable(path, error.to_string());
     let mut bytes = Vec::new();
     let file = File::open(path).map_err(failed)?;
     let read = file
@@ -240,7 +233,7 @@ fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
         .map_err(failed)?;
     if read as u64 > most {
         let reason = format!("it has more than {most} bytes, too many to be what is asked for");
-        return Err(unreadable(path, reason));
+        return Err(Failure::unreadable(path, reason));
     }
     Ok(bytes)
 }

@@ -1,12 +1,12 @@
 //! `onecycle reproduce`: the paper's simulated results, each part worked out, kept and rendered.
 
 mod comparison;
-pub(crate) mod cycles;
+mod cycles;
 mod figures;
 mod grid;
 mod network;
-pub(crate) mod part;
 mod phase;
+mod sheet;
 mod single;
 
 use std::fs;
@@ -14,13 +14,14 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use self::part::{Part, Sheet};
-use super::train::classifier::Keep;
+use self::sheet::{Sheet, typed};
 use super::workers::Workers;
 use crate::args::{Name, Reproduce};
 use crate::failure::{Failure, exit};
+use crate::journal::Journal;
 use crate::output::{Waiting, print, tell, write_text};
 use crate::report::reproduction as report;
+use crate::results::reproduction::{Numbers, ReproducedPart};
 
 pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
@@ -49,41 +50,44 @@ pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// A part, worked out or as an earlier run has kept it.
-fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<Part, Failure> {
+/// A part, computed now or by an earlier run.
+fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<ReproducedPart, Failure> {
     let begin = Instant::now();
     let sheet = Sheet::of(name)?;
     let settings = sheet.settings(arguments.quick);
-    let path = part::path(folder, name);
-    if arguments.resume
-        && let Some(found) = part::kept(&path, &settings)?
-    {
-        tell("  as an earlier run has found it");
-        return Ok(sheet.part(name, found));
+    let size = if arguments.quick { "_quick" } else { "" };
+    let mut kept = None;
+    let mut journal = Journal::open(
+        &folder.join(format!("{}{size}", name.as_str())),
+        &format!("reproduce {}", name.as_str()),
+        &settings,
+        arguments.restart,
+        |numbers: Numbers| match kept.replace(numbers) {
+            None => Ok(()),
+            Some(_) => Err("is out of order".to_owned()),
+        },
+    )?;
+    if let Some(numbers) = kept {
+        tell("  as an earlier run has found it (use --restart to start over)");
+        return Ok(sheet.part(name, numbers));
     }
     let workers = Workers::new(arguments.threads)?;
-    // The others have a bar.
+    // The other parts have a progress bar.
     let waiting = matches!(name, Name::Phase | Name::Figures | Name::Table7)
-        .then(|| Waiting::on("working it out"));
-    let found = match name {
-        Name::Phase => phase::find(&part::typed(&settings)?)?,
-        Name::Grid => grid::find(&part::typed(&settings)?, &workers)?,
-        Name::Figures => figures::find(&part::typed(&settings)?)?,
-        Name::Table2And3 => {
-            let keep = Keep {
-                beside: Some(&path),
-                resume: arguments.resume,
-            };
-            network::find(&part::typed(&settings)?, keep, &workers)?
-        }
-        Name::Table4 | Name::TuningRules => comparison::find(&part::typed(&settings)?, &workers)?,
-        Name::Table5 => single::starts(&part::typed(&settings)?, &workers)?,
-        Name::Table6 => single::biases(&part::typed(&settings)?, &workers)?,
-        Name::Table7 => cycles::find(&part::typed(&settings)?)?,
+        .then(|| Waiting::on("computing"));
+    let numbers = match name {
+        Name::Phase => phase::find(&typed(&settings)?)?,
+        Name::Grid => grid::find(&typed(&settings)?, &workers)?,
+        Name::Figures => figures::find(&typed(&settings)?)?,
+        Name::Table2And3 => network::find(&typed(&settings)?, &journal, &workers)?,
+        Name::Table4 | Name::TuningRules => comparison::find(&typed(&settings)?, &workers)?,
+        Name::Table5 => single::starts(&typed(&settings)?, &workers)?,
+        Name::Table6 => single::biases(&typed(&settings)?, &workers)?,
+        Name::Table7 => cycles::find(&typed(&settings)?)?,
     };
     drop(waiting);
     workers.finish();
-    part::keep(&path, &settings, &found)?;
+    journal.add(&numbers)?;
     tell(&format!("  {:.0} s", begin.elapsed().as_secs_f64()));
-    Ok(sheet.part(name, found))
+    Ok(sheet.part(name, numbers))
 }

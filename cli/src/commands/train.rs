@@ -2,18 +2,19 @@
 
 pub(crate) mod classifier;
 pub(crate) mod identifier;
-mod part;
 
 use std::fmt::Display;
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle_lab::learn::train::{Dataset, Epoch, Outcome, Trainer};
-use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde::{Deserialize, Serialize};
 
-use self::part::Part;
 use crate::commands::workers::{Quiet, Workers};
 use crate::failure::Failure;
+use crate::journal::Journal;
 use crate::{args, settings};
 
 /// What every recipe begins with; the rest is read when it is known what of it is.
@@ -40,25 +41,60 @@ pub(crate) fn run(arguments: &args::Train) -> Result<ExitCode, Failure> {
     }
 }
 
-/// The training that an interrupted run has left, where that is asked for and there is one, or a new one.
+/// The journal of a training with this recipe beside its output.
+fn journal(out: &Path, recipe: &impl Serialize, restart: bool) -> Result<Journal, Failure> {
+    // All that is kept are pieces.
+    let no_line = |_: IgnoredAny| Err("is unknown".to_owned());
+    Journal::open(&Journal::folder_of(out), "train", recipe, restart, no_line)
+}
+
+/// A network in training: where it is kept after each epoch.
+struct Kept<'a> {
+    journal: &'a Journal,
+    /// Number of the network, from 1.
+    number: usize,
+}
+
+impl Kept<'_> {
+    fn name(&self) -> String {
+        format!("network_{}.part", self.number)
+    }
+
+    /// The training of an interrupted run, if there is one.
+    fn read(&self) -> Result<Option<Trainer>, Failure> {
+        let name = self.name();
+        let Some(bytes) = self.journal.piece(&name)? else {
+            return Ok(None);
+        };
+        let trainer = Trainer::resume(&bytes)
+            .map_err(|error| self.journal.refused_piece(&name, &error.to_string()))?;
+        let (epochs, number) = (trainer.history().len(), self.number);
+        self.journal
+            .tell_resumed(&format!("epoch {epochs} of network {number}"));
+        Ok(Some(trainer))
+    }
+
+    fn write(&self, trainer: &Trainer) -> Result<(), Failure> {
+        let bytes = trainer.save().map_err(Failure::usage)?;
+        self.journal.keep_piece(&self.name(), &bytes)
+    }
+}
+
+/// The training that an interrupted run has left, or a new one.
 fn begun<E: Display>(
-    part: Option<&Part>,
-    resume: bool,
+    kept: Option<&Kept<'_>>,
     anew: impl FnOnce() -> Result<Trainer, E>,
 ) -> Result<Trainer, Failure> {
-    let left = match part {
-        Some(part) if resume => part.read()?,
-        _ => None,
-    };
+    let left = kept.map(Kept::read).transpose()?.flatten();
     left.map_or_else(|| anew().map_err(Failure::usage), Ok)
 }
 
-/// Trains to the end, an epoch at a time: after each it is told and kept.
+/// Trains to the end. After each epoch `told` is called and the training is kept.
 fn train(
     trainer: &mut Trainer,
     [training, validation]: [&dyn Dataset; 2],
     workers: &Workers,
-    part: Option<&Part>,
+    kept: Option<&Kept<'_>>,
     told: impl Fn(&Epoch),
 ) -> Result<Outcome, Failure> {
     loop {
@@ -71,8 +107,8 @@ fn train(
             .map_err(Failure::usage)?;
         if let Some(epoch) = last {
             told(&epoch);
-            if let Some(part) = part {
-                part.write(trainer)?;
+            if let Some(kept) = kept {
+                kept.write(trainer)?;
             }
         }
         if outcome != Outcome::Paused {

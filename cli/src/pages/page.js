@@ -2,10 +2,12 @@
 (() => {
   const root = document.documentElement;
   const asks = matchMedia("(prefers-color-scheme: dark)");
+  // Without a mouse the buttons would always be there, over the plot.
+  const hasButtons = matchMedia("(hover: hover)").matches;
   const palette = ["#3d85e0", "#dd7426", "#22a37a", "#c25fa8", "#b8901a", "#4fa8c4"];
   const plots = [...document.querySelectorAll(".plot")].map((place) => {
     const { data, layout } = JSON.parse(place.querySelector("script").textContent);
-    return { place, data, layout, width: 0 };
+    return { place, data, layout, width: 0, height: 0 };
   });
 
   // Colours of the theme, #rrggbb: of what a series shows, and of the page.
@@ -26,7 +28,7 @@
       const colorscale = [0, 1 / 3, 2 / 3, 1].map((at) => [at, mixed(theme.model, theme.back, 0.25 + 0.75 * at)]);
       return { ...trace, colorscale, line: { color: theme.model, width: 1 } };
     }
-    if (trace.kind === "correlations") {
+    if (trace.kind === "diverging") {
       const strong = (colour) => mixed(theme.back, colour, 0.75);
       const colorscale = [[0, strong(theme.input)], [0.5, theme.card], [1, strong(theme.model)]];
       return { ...trace, colorscale, textfont: { color: theme.text } };
@@ -43,7 +45,7 @@
     const axes = Object.entries(layout).filter(([name]) => /^[xy]axis/.test(name));
     const axis = (one) => ({ ...one, gridcolor: theme.line, linecolor: theme.line, zerolinecolor: theme.line });
     const { clientWidth: width, clientHeight: height } = place;
-    plot.width = width;
+    Object.assign(plot, { width, height });
     Plotly.react(place, data.map((trace) => coloured(trace, theme, next)), {
       ...layout,
       width,
@@ -58,7 +60,7 @@
       plot_bgcolor: "rgba(0,0,0,0)",
       hoverlabel: { bgcolor: theme.card, font: { color: theme.text } },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: theme.line, activecolor: theme.text },
-    }, { displaylogo: false, displayModeBar: place.closest(".small") ? false : "hover" });
+    }, { displaylogo: false, displayModeBar: hasButtons && !place.closest(".small") ? "hover" : false });
   };
 
   // What is on the screen is drawn at once, the rest while there is nothing else to do.
@@ -105,7 +107,8 @@
 
   // A window, and a phone that is turned, change the width.
   const follow = new ResizeObserver(() => {
-    const changed = plots.filter(({ place, width }) => width > 0 && width !== place.clientWidth);
+    const changed = plots.filter(({ place, width, height }) =>
+      width > 0 && (width !== place.clientWidth || height !== place.clientHeight));
     changed.forEach((plot) => draw(plot, colours()));
   });
   plots.forEach(({ place }) => follow.observe(place));

@@ -5,6 +5,7 @@
 use std::fmt::Write;
 
 use super::bundle;
+use super::escape::escaped;
 use super::plot::Figure;
 
 /// A heading and what stands below it.
@@ -16,20 +17,14 @@ pub(crate) struct Section {
     pub(crate) body: String,
 }
 
-/// Text as HTML has it.
-pub(crate) fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\'' => out.push_str("&#39;"),
-            other => out.push(other),
+impl Section {
+    pub(crate) fn new(id: &str, title: &str, body: String) -> Self {
+        Self {
+            id: id.to_owned(),
+            title: title.to_owned(),
+            body,
         }
     }
-    out
 }
 
 /// A paragraph of a class.
@@ -67,10 +62,18 @@ pub(crate) struct Cell<'a> {
     pub(crate) below: Option<String>,
 }
 
-/// A table; the first of the columns is of the names of the rows.
+/// Most columns beside each other on a phone; of more, each row becomes a list.
+const MOST_COLUMNS: usize = 5;
+
+/// A table; its first column has the names of the rows.
 pub(crate) fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'_>>)]) -> String {
+    let wide = if columns.len() > MOST_COLUMNS {
+        " wide"
+    } else {
+        ""
+    };
     let mut html = format!(
-        "<div class=\"table\"><table><caption>{}</caption><thead><tr>",
+        "<div class=\"table{wide}\"><table><caption>{}</caption><thead><tr>",
         escaped(caption)
     );
     for column in columns {
@@ -79,8 +82,9 @@ pub(crate) fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'
     html.push_str("</tr></thead><tbody>\n");
     for (name, cells) in rows {
         let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escaped(name));
-        for cell in cells {
-            let _ = write!(html, "<td>{}", escaped(cell.value));
+        for (cell, column) in cells.iter().zip(columns.iter().skip(1)) {
+            let (value, column) = (escaped(cell.value), escaped(column));
+            let _ = write!(html, "<td data-column=\"{column}\">{value}");
             if let Some(below) = &cell.below {
                 let _ = write!(html, "<small>{}</small>", escaped(below));
             }
@@ -90,6 +94,24 @@ pub(crate) fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'
     }
     html.push_str("</tbody></table></div>\n");
     html
+}
+
+/// A table of texts; each row is its name and its cells.
+pub(crate) fn plain_table<const N: usize>(
+    caption: &str,
+    columns: &[&str],
+    rows: impl IntoIterator<Item = (String, [String; N])>,
+) -> String {
+    let rows: Vec<(String, [String; N])> = rows.into_iter().collect();
+    let columns: Vec<String> = columns.iter().map(ToString::to_string).collect();
+    let cell = |value| Cell { value, below: None };
+    let rows: Vec<_> = (rows.iter())
+        .map(|(name, values)| {
+            let cells = values.iter().map(|value| cell(value.as_str()));
+            (name.as_str(), cells.collect())
+        })
+        .collect();
+    table(caption, &columns, &rows)
 }
 
 /// A plot with its caption.
@@ -155,8 +177,10 @@ mod tests {
             value: hostile,
             below: Some(hostile.to_owned()),
         };
-        let html = table(hostile, &[hostile.to_owned()], &[(hostile, vec![cell])]);
-        assert_eq!(html.matches(safe).count(), 5);
+        let columns = [hostile.to_owned(), hostile.to_owned()];
+        let html = table(hostile, &columns, &[(hostile, vec![cell])]);
+        // Caption, two headings, the row's name, the value, its column and the text below.
+        assert_eq!(html.matches(safe).count(), 7);
         let html = facts(&[(hostile.to_owned(), hostile.to_owned())]);
         assert_eq!(html.matches(safe).count(), 2);
         assert!(!html.contains("<b") && !html.contains("</script"));

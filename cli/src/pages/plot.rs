@@ -154,7 +154,8 @@ pub(crate) struct Note {
     pub(crate) away: (f64, f64),
 }
 
-/// Values over a plane, `z[row][column]` at `y[row]`, `x[column]`.
+/// Values over a plane, `z[row][column]` at `y[row]`, `x[column]`, or between `y[row]` and `y[row + 1]` where there is one
+/// more of these than rows, and columns likewise. NaN is left blank.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Field {
     pub(crate) kind: FieldKind,
@@ -172,13 +173,14 @@ pub(crate) enum Places {
 }
 
 /// What the values of a field are.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum FieldKind {
     /// Contents of the smallest regions, 0 to 1: lines about those of 50, 90 and 99 %.
     Regions,
     /// Correlations, -1 to 1: coloured squares with their numbers.
     Correlations,
+    /// Values on either side of a middle, with a scale beside them.
+    Diverging { middle: f64, reach: f64 },
 }
 
 /// One of the panels that stand above each other over the same abscissas.

@@ -1,38 +1,13 @@
 //! The rules of the benchmark, and its leaderboard.
 
 use onecycle_lab::experiments::CYCLES_KEPT;
-use onecycle_lab::judge::evaluate::{PHASE_MARGIN_DEG, Record, Summary};
-use serde::Serialize;
+use onecycle_lab::judge::evaluate::PHASE_MARGIN_DEG;
 
 use super::number::significant;
-use crate::args::Format;
-use crate::commands::bench::folder::{FORMAT, Manifest};
-
-/// Changes with every change that a reader of the results could notice.
-const SCHEMA: &str = "onecycle.benchmark.results/1";
-
-/// All that a run finds: what its JSON holds.
-#[derive(Serialize)]
-pub(crate) struct Results<'a> {
-    schema: &'static str,
-    benchmark: &'a Manifest,
-    leaderboard: Vec<Summary>,
-    results: &'a [Record],
-}
-
-impl<'a> Results<'a> {
-    pub(crate) fn of(benchmark: &'a Manifest, records: &'a [Record]) -> Self {
-        Self {
-            schema: SCHEMA,
-            benchmark,
-            leaderboard: Summary::of_all(records),
-            results: records,
-        }
-    }
-}
+use crate::results::bench::{BenchManifest, BenchResults, FORMAT, RecordingFormat};
 
 /// The leaderboard as Markdown: a row a method, the best score first.
-pub(crate) fn leaderboard(results: &Results<'_>) -> String {
+pub(crate) fn leaderboard(results: &BenchResults<'_>) -> String {
     let of = &results.benchmark.benchmark;
     let mut text = format!(
         "{} experiments, seed {}: costs and errors in %, processor times in ms; a score of 100 % is \
@@ -69,13 +44,13 @@ pub(crate) fn leaderboard(results: &Results<'_>) -> String {
 }
 
 /// What lies in the folder, what is asked for and how it is scored.
-pub(crate) fn rules(manifest: &Manifest) -> String {
+pub(crate) fn rules(manifest: &BenchManifest) -> String {
     let (experiments, seed) = (manifest.benchmark.experiments, manifest.benchmark.seed);
     let recordings = match manifest.recordings {
-        Format::Csv => format!(
+        RecordingFormat::Csv => format!(
             "`recordings/0001.csv` to `recordings/{experiments:04}.csv`: `time_s`, `output`, `input`"
         ),
-        Format::Parquet => {
+        RecordingFormat::Parquet => {
             "`recordings.parquet`: `experiment`, `time_s`, `output`, `input`, a row \
                             group an experiment"
                 .to_owned()
@@ -86,7 +61,7 @@ pub(crate) fn rules(manifest: &Manifest) -> String {
          {experiments} recordings of a relay test, seed {seed}, format {FORMAT}, made by onecycle {}. \
          From each, find the process, or the gains of its controller.\n\n\
          ## The experiments\n\n\
-         - Soiptd `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`: `T_prop` 0.015 to 0.3 s, `T_body` 0.2 \
+         - Process `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`: `T_prop` 0.015 to 0.3 s, `T_body` 0.2 \
          to 2 s, `tau` 0.0005 to 0.1 s, each uniform; `K` 0.1 to 10, uniform in logarithms.\n\
          - A modified relay feedback test at `beta` -0.73 and 1 kHz with the amplitude 1. The recorded \
          input is held from each sample to the next.\n\

@@ -1,25 +1,28 @@
-//! What is certified of a space of processes, or of single ones.
+//! The certificate of a space of processes, or of single ones: as text and as JSON; `page` has the figures.
+
+mod page;
 
 use std::fmt::Write;
 
 use onecycle_lab::space::Space;
-use onecycle_lab::space::certificate::{Certificate, CycleStability, RelayCounts};
+use onecycle_lab::space::certificate::{
+    Certificate, CertificateSummary, CycleStability, RelayCounts,
+};
 use onecycle_lab::space::limit_cycle::LimitCycle;
-use onecycle_lab::space::limit_cycle::sampled::{Motion, motion, symmetric_cycles};
-use onecycle_onboard::Soiptd;
+use onecycle_lab::space::limit_cycle::sampled::Motion;
 use serde_json::{Value, json};
 
 use super::json;
 use super::number::significant;
-use crate::args::Certify;
-use crate::commands::certify::{Certified, Row};
-use crate::failure::Failure;
+use crate::results::certify::{BiasRow, CertifiedProcess, CertifiedSpace, SampledRelay};
 use crate::style::{HEADING, REFUSAL, headed, painted, verdict};
 
+pub(crate) use self::page::html;
+
 /// The report on a space for people.
-pub(crate) fn text(certified: &Certified) -> String {
+pub(crate) fn text(certified: &CertifiedSpace) -> String {
     let mut text = String::new();
-    let Certified { space, rows, .. } = certified;
+    let CertifiedSpace { space, rows, .. } = certified;
     let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
     text.push_str(&headed(&format!(
         "Space   T_prop {}, T_body {}, tau {}\nRelay   beta {}, {:.2} deg\n\n",
@@ -32,25 +35,21 @@ pub(crate) fn text(certified: &Certified) -> String {
     without_bias(&mut text, certified);
     corners(&mut text, space, &certified.corners);
     under_bias(&mut text, rows);
-    let _ = writeln!(
-        text,
-        "\n{}",
-        if certified.holds() {
-            verdict(
-                true,
-                "Certified: stable without bias, and with the trim under every bias above.",
-            )
-        } else {
-            verdict(
-                false,
-                "Not certified: see the processes without a stable cycle above.",
-            )
-        }
-    );
+    let holds = certified.holds();
+    let _ = writeln!(text, "\n{}", verdict(holds, holds_text(holds)));
     text
 }
 
-fn without_bias(text: &mut String, certified: &Certified) {
+/// The verdict in one sentence.
+fn holds_text(holds: bool) -> &'static str {
+    if holds {
+        "Certified: stable without bias, and with the trim under every bias."
+    } else {
+        "Not certified: some processes have no stable cycle."
+    }
+}
+
+fn without_bias(text: &mut String, certified: &CertifiedSpace) {
     let shapes = certified.unbiased.len();
     let one = certified
         .unbiased
@@ -68,20 +67,18 @@ fn without_bias(text: &mut String, certified: &Certified) {
         painted(HEADING, "Without bias"),
         percent(worst.spectral_radius),
     );
-    let ratios = || {
-        certified
-            .unbiased
-            .iter()
-            .filter_map(Certificate::describing_function_ratios)
-    };
-    let periods = ratios().map(|(period, _)| period);
-    let amplitudes = ratios().map(|(_, amplitude)| amplitude);
     let _ = writeln!(
         text,
         "  exact period over the describing function's: {}; amplitude: {}\n",
-        span(periods),
-        span(amplitudes),
+        span_of_ratios(certified, |(period, _)| period),
+        span_of_ratios(certified, |(_, amplitude)| amplitude),
     );
+}
+
+/// Range of exact periods or amplitudes over those of the describing function, of all shapes.
+fn span_of_ratios(certified: &CertifiedSpace, of: fn((f64, f64)) -> f64) -> String {
+    let ratios = (certified.unbiased.iter()).filter_map(Certificate::describing_function_ratios);
+    span(ratios.map(of))
 }
 
 /// `low .. high` of ratios.
@@ -142,7 +139,7 @@ fn error(ratio: f64) -> String {
     format!("{:+.1} %", 100.0 * (ratio.recip() - 1.0))
 }
 
-fn under_bias(text: &mut String, rows: &[Row]) {
+fn under_bias(text: &mut String, rows: &[BiasRow]) {
     let processes = rows.first().map_or(0, |row| row.summary.processes);
     let _ = writeln!(
         text,
@@ -161,12 +158,7 @@ fn under_bias(text: &mut String, rows: &[Row]) {
             no_cycle,
             ..
         } = summary.bare;
-        let (fewest, most) = summary.turned_back.stable_cycles;
-        let cycles = if fewest == most {
-            fewest.to_string()
-        } else {
-            format!("{fewest}..{most}")
-        };
+        let cycles = cycle_count(summary);
         let _ = writeln!(
             text,
             "  {:<5} {:<6} {unstable:<8} {no_cycle:<4} {:<13} {cycles:<6} {:<18} {:<6} {:<7} {:<9} {}",
@@ -182,6 +174,14 @@ fn under_bias(text: &mut String, rows: &[Row]) {
     }
 }
 
+/// Fewest and most stable cycles of the relay that turns back.
+fn cycle_count(summary: &CertificateSummary) -> String {
+    match summary.turned_back.stable_cycles {
+        (fewest, most) if fewest == most => fewest.to_string(),
+        (fewest, most) => format!("{fewest}..{most}"),
+    }
+}
+
 fn stretch(kind: &RelayCounts) -> String {
     kind.stretch.map_or("-".to_owned(), |(low, high)| {
         format!("{low:.2} .. {high:.2}")
@@ -189,7 +189,7 @@ fn stretch(kind: &RelayCounts) -> String {
 }
 
 /// The report on a space for programs.
-pub(crate) fn json(certified: &Certified) -> String {
+pub(crate) fn json(certified: &CertifiedSpace) -> String {
     let worst = &certified.least_stable;
     let [t_prop_s, t_body_s, tau_s] = worst.times_s;
     let rows: Vec<Value> = certified
@@ -234,27 +234,24 @@ fn corner(certificate: &Certificate) -> Value {
 }
 
 /// The report on single processes.
-pub(crate) fn processes(arguments: &Certify, space: &Space) -> Result<String, Failure> {
+pub(crate) fn processes(processes: &[CertifiedProcess]) -> String {
     let mut text = String::new();
-    for times in &arguments.process {
-        let [t_prop, t_body, tau] = times.0;
+    for process in processes {
+        let [t_prop, t_body, tau] = process.times_s;
         text.push_str(&headed(&format!(
-            "Soiptd   T_prop {t_prop} s, T_body {t_body} s, tau {tau} s, velocity gain 1; relay \
+            "Process  T_prop {t_prop} s, T_body {t_body} s, tau {tau} s, velocity gain 1; relay \
              amplitude 1, beta {}\n",
-            space.beta
+            process.beta
         )));
-        for bias in arguments.biases() {
-            let certificate =
-                Certificate::new(times.0, space.beta, bias).map_err(Failure::usage)?;
-            one_bias(&mut text, &certificate);
-            if let Some(rate_hz) = arguments.sample_rate {
-                let process = Soiptd::new(1.0, t_prop, t_body, tau).map_err(Failure::usage)?;
-                sampled(&mut text, &process, space.beta, bias, 1.0 / rate_hz);
+        for (certificate, sampled) in &process.biases {
+            one_bias(&mut text, certificate);
+            if let Some(sampled) = sampled {
+                sampled_relay(&mut text, sampled);
             }
         }
         text.push('\n');
     }
-    Ok(text)
+    text
 }
 
 fn one_bias(text: &mut String, certificate: &Certificate) {
@@ -309,19 +306,18 @@ fn described(cycle: &LimitCycle) -> String {
     )
 }
 
-fn sampled(text: &mut String, process: &Soiptd, beta: f64, bias: f64, sample_s: f64) {
-    if bias == 0.0 {
-        for cycle in symmetric_cycles(process, beta, sample_s) {
-            let _ = writeln!(
-                text,
-                "    sampled              period {} s ({} samples), amplitude {}",
-                significant(f64::from(2 * cycle.half_period) * sample_s),
-                2 * cycle.half_period,
-                significant(cycle.amplitude),
-            );
-        }
+fn sampled_relay(text: &mut String, sampled: &SampledRelay) {
+    let sample_s = sampled.sample_s;
+    for cycle in &sampled.cycles {
+        let _ = writeln!(
+            text,
+            "    sampled              period {} s ({} samples), amplitude {}",
+            significant(f64::from(2 * cycle.half_period) * sample_s),
+            2 * cycle.half_period,
+            significant(cycle.amplitude),
+        );
     }
-    let settled = match motion(process, [beta; 2], bias, sample_s) {
+    let settled = match &sampled.motion {
         None => return,
         Some(Motion::Stopped) => "the bare relay stops switching".to_owned(),
         Some(Motion::Wandering { period, mean }) => format!(

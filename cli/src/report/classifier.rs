@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::json::to_text;
 use super::number::significant;
-use crate::commands::train::classifier::{Done, Kind, Set, Trained};
+use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
 
 /// Changes with every change that a reader of the table could notice.
 const SCHEMA: &str = "onecycle.train.classifier/1";
@@ -17,14 +17,14 @@ const SCHEMA: &str = "onecycle.train.classifier/1";
 struct Report<'a> {
     schema: &'static str,
     #[serde(flatten)]
-    done: &'a Done<'a>,
+    run: &'a ClassifierRun<'a>,
 }
 
 /// The table for programs.
-pub(crate) fn json(done: &Done<'_>) -> String {
+pub(crate) fn json(run: &ClassifierRun<'_>) -> String {
     to_text(&Report {
         schema: SCHEMA,
-        done,
+        run,
     })
 }
 
@@ -41,13 +41,13 @@ pub(crate) fn name(loss: &Loss) -> &'static str {
 }
 
 /// The table for people.
-pub(crate) fn text(done: &Done<'_>) -> String {
-    let recipe = done.recipe;
+pub(crate) fn text(run: &ClassifierRun<'_>) -> String {
+    let recipe = run.recipe;
     let mut text = String::new();
     let widths: Vec<String> = [INPUTS]
         .into_iter()
         .chain(recipe.hidden.iter().copied())
-        .chain([done.classes])
+        .chain([run.classes])
         .map(|width| width.to_string())
         .collect();
     let _ = writeln!(
@@ -57,19 +57,19 @@ pub(crate) fn text(done: &Done<'_>) -> String {
          Learnt    from {} experiments, {}, bias up to {} h, noise up to {} of the amplitude\n\
          Time      {} s",
         widths.join("-"),
-        done.weights,
-        done.classes,
+        run.weights,
+        run.classes,
         significant(100.0 * recipe.deterioration),
-        done.examples,
+        run.examples,
         described(recipe.protocol),
         recipe.bias,
         recipe.sigma,
-        significant(done.seconds),
+        significant(run.seconds),
     );
-    for (number, set) in done.sets.iter().enumerate() {
-        table(&mut text, set, number, &done.networks);
+    for (number, set) in run.sets.iter().enumerate() {
+        table(&mut text, set, number, &run.networks);
     }
-    let best = &done.networks[done.best];
+    let best = &run.networks[run.best];
     let _ = writeln!(
         text,
         "\nBest on the classes: {}, after epoch {} of {}.",
@@ -80,16 +80,16 @@ pub(crate) fn text(done: &Done<'_>) -> String {
             .map_or(0, |epoch| epoch.number),
         best.history.len(),
     );
-    for trained in done.networks.iter().filter(|one| one.outcome == "diverged") {
+    for trained in run.networks.iter().filter(|one| one.outcome == "diverged") {
         let _ = writeln!(text, "Diverged: {}.", name(&trained.loss));
     }
     text
 }
 
-fn table(text: &mut String, set: &Set, number: usize, networks: &[Trained]) {
+fn table(text: &mut String, set: &ScoredSet, number: usize, networks: &[TrainedNetwork]) {
     let of = match set.kind {
-        Kind::Verification => "of the classes",
-        Kind::Test => "of random processes",
+        SetKind::Verification => "of the classes",
+        SetKind::Test => "of random processes",
     };
     let _ = writeln!(
         text,

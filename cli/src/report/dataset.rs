@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::json::to_text;
 use super::number::significant;
-use crate::commands::dataset::Done;
+use crate::results::dataset::DatasetRun;
 
 /// Changes with every change that a reader of the summary could notice.
 const SCHEMA: &str = "onecycle.dataset.summary/1";
@@ -30,30 +30,31 @@ struct Summary<'a> {
 }
 
 impl<'a> Summary<'a> {
-    fn of(done: &'a Done) -> Self {
-        let (experiments, examples) = (done.manifest.examples, done.manifest.rows());
-        let seconds = done.took.as_secs_f64();
+    fn of(run: &'a DatasetRun) -> Self {
+        let (experiments, examples) = (run.manifest.examples, run.manifest.rows());
+        let seconds = run.took.as_secs_f64();
         Self {
             schema: SCHEMA,
-            recipe: &done.manifest.recipe,
+            recipe: &run.manifest.recipe,
             experiments,
             examples,
             without_oscillation: experiments.saturating_sub(examples as u64),
-            files: done.manifest.shards.len(),
-            files_kept: done.kept,
-            experiments_made: done.made,
+            files: run.manifest.shards.len(),
+            files_kept: run.files_kept,
+            experiments_made: run.experiments_made,
             seconds,
-            experiments_per_s: (done.made > 0).then(|| done.made as f64 / seconds),
+            experiments_per_s: (run.experiments_made > 0)
+                .then(|| run.experiments_made as f64 / seconds),
         }
     }
 }
 
-pub(crate) fn json(done: &Done) -> String {
-    to_text(&Summary::of(done))
+pub(crate) fn json(run: &DatasetRun) -> String {
+    to_text(&Summary::of(run))
 }
 
-pub(crate) fn text(done: &Done, folder: &Path) -> String {
-    let summary = Summary::of(done);
+pub(crate) fn text(run: &DatasetRun, folder: &Path) -> String {
+    let summary = Summary::of(run);
     let mut text = String::new();
     for (index, family) in summary.recipe.families.iter().enumerate() {
         text += &format!("Family {}   {}\n", index + 1, of_family(family));

@@ -8,12 +8,12 @@ use onecycle_lab::judge::evaluate::{Cycles, PHASE_MARGIN_DEG};
 use onecycle_onboard::judgement::HALF_90_PERCENT;
 use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, Tuned};
 
+use super::cycles::cross_table;
 use super::number::percent;
 use super::page::stability::Loop;
-use crate::commands::fly::{Campaign, Flight};
-use crate::commands::reproduce::cycles;
 use crate::pages::page::{self, Cell, Section, page};
 use crate::pages::plot::{self, Figure, Marks, Panel, Series};
+use crate::results::fly::{Flight, MissionFlights};
 use crate::style::{HEADING, painted, verdict};
 
 /// Points of a series: as many as a wide screen has.
@@ -37,7 +37,7 @@ fn title(mission: Mission) -> &'static str {
 }
 
 /// A mission's figures, each with a name.
-fn figures(campaign: &Campaign) -> Vec<(String, String)> {
+fn figures(campaign: &MissionFlights) -> Vec<(String, String)> {
     let flights = &campaign.flights;
     let done = flights
         .iter()
@@ -64,7 +64,7 @@ fn figures(campaign: &Campaign) -> Vec<(String, String)> {
 }
 
 /// What a mission is flown for.
-fn of_mission(campaign: &Campaign, figures: &mut Vec<(String, String)>) {
+fn of_mission(campaign: &MissionFlights, figures: &mut Vec<(String, String)>) {
     let flights = &campaign.flights;
     let longest = |value: &dyn Fn(&Flight) -> Option<f64>| {
         flights
@@ -246,7 +246,7 @@ fn departures(flown: &Flown) -> Vec<(&'static str, f64, f64)> {
 }
 
 /// Gains with the payload over those without.
-fn inflation(campaigns: &[Campaign]) -> Option<(f64, f64)> {
+fn inflation(campaigns: &[MissionFlights]) -> Option<(f64, f64)> {
     let gains = |wanted: Mission| {
         let campaign = campaigns
             .iter()
@@ -258,7 +258,7 @@ fn inflation(campaigns: &[Campaign]) -> Option<(f64, f64)> {
     Some((with.kp / without.kp, with.kd / without.kd))
 }
 
-fn inflated(campaigns: &[Campaign]) -> Option<(String, String)> {
+fn inflated(campaigns: &[MissionFlights]) -> Option<(String, String)> {
     let (kp, kd) = inflation(campaigns)?;
     Some((
         "gains with the payload over those without".to_owned(),
@@ -266,7 +266,7 @@ fn inflated(campaigns: &[Campaign]) -> Option<(String, String)> {
     ))
 }
 
-fn figures_of(campaign: &Campaign, campaigns: &[Campaign]) -> Vec<(String, String)> {
+fn figures_of(campaign: &MissionFlights, campaigns: &[MissionFlights]) -> Vec<(String, String)> {
     let mut figures = figures(campaign);
     if campaign.mission == Mission::Payload {
         figures.extend(inflated(campaigns));
@@ -275,7 +275,7 @@ fn figures_of(campaign: &Campaign, campaigns: &[Campaign]) -> Vec<(String, Strin
 }
 
 /// All missions as text.
-pub(crate) fn text(campaigns: &[Campaign]) -> String {
+pub(crate) fn text(campaigns: &[MissionFlights]) -> String {
     let mut text = String::new();
     for campaign in campaigns {
         let (name, title) = (campaign.mission.name(), title(campaign.mission));
@@ -293,7 +293,7 @@ pub(crate) fn text(campaigns: &[Campaign]) -> String {
 }
 
 /// All missions on a page.
-pub(crate) fn html(campaigns: &[Campaign]) -> String {
+pub(crate) fn html(campaigns: &[MissionFlights]) -> String {
     let lead = page::paragraph(
         "lead",
         "A simulated quadrotor of the size of the paper's (section IV-D), each axis held by the on-board tuner: the \
@@ -311,7 +311,7 @@ pub(crate) fn html(campaigns: &[Campaign]) -> String {
     page("Flights", &lead, &sections)
 }
 
-fn section(campaign: &Campaign, campaigns: &[Campaign]) -> Section {
+fn section(campaign: &MissionFlights, campaigns: &[MissionFlights]) -> Section {
     let mut body = page::facts(&figures_of(campaign, campaigns));
     if let Some(first) = campaign.flights.first() {
         if let Some(cycles) = &first.cycles {
@@ -345,7 +345,7 @@ fn open_loop(tuned: &Tuned) -> Option<Figure> {
 
 /// What the controller of each cycle costs on the process of every other.
 fn cycles_table(cycles: &Cycles) -> String {
-    let rows = cycles::table(cycles);
+    let rows = cross_table(cycles);
     let columns: Vec<String> = std::iter::once("controller of cycle".to_owned())
         .chain((1..=rows.len()).map(|number| format!("on cycle {number}")))
         .collect();

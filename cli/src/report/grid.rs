@@ -1,19 +1,20 @@
-//! What a grid is made of, and how near its members are to random processes: as text, and as a page with pictures.
+//! The members of a grid and how near they are to random processes: as text and as JSON; `page` has the figures.
+
+mod page;
 
 use std::fmt::Write;
 
-use onecycle_lab::space::candidate::{CandidateError, Gains};
+use onecycle_lab::space::candidate::Gains;
 use onecycle_lab::space::grid::{Check, Grid, GridSettings, Layout};
 use serde::Serialize;
 
 use super::json::to_text;
 use super::number::significant;
 use super::text::wrapped;
-use crate::commands::grid::Done;
-use crate::pages::page::{self, Section, page};
-use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series, Shape};
-use crate::pictures::grid as picture;
-use crate::style::{bare, headed, verdict};
+use crate::results::grid::GridRun;
+use crate::style::{headed, verdict};
+
+pub(crate) use self::page::html;
 
 /// Changes with every change that a reader of the summary could notice.
 const SCHEMA: &str = "onecycle.grid.summary/1";
@@ -63,29 +64,24 @@ fn members_per_row(grid: &Grid) -> Vec<usize> {
 }
 
 /// The summary for programs.
-pub(crate) fn json(done: &Done) -> String {
+pub(crate) fn json(run: &GridRun) -> String {
     to_text(&Summary {
         schema: SCHEMA,
-        settings: &done.grid.settings,
-        members: done.grid.members.len(),
-        members_per_row: members_per_row(&done.grid),
-        alpha: Alpha::of(&done.grid),
-        has_matrix: done.has_matrix,
-        check: done.check.as_ref(),
-        holds: done.check.map(|_| done.holds()),
-        seconds: done.took.as_secs_f64(),
+        settings: &run.grid.settings,
+        members: run.grid.members.len(),
+        members_per_row: members_per_row(&run.grid),
+        alpha: Alpha::of(&run.grid),
+        has_matrix: run.has_matrix,
+        check: run.check.as_ref(),
+        holds: run.check.map(|_| run.holds()),
+        seconds: run.took.as_secs_f64(),
     })
 }
 
 /// The summary for people.
-pub(crate) fn text(done: &Done) -> String {
+pub(crate) fn text(run: &GridRun) -> String {
     let mut text = String::new();
-    let GridSettings {
-        space,
-        deterioration,
-        layout,
-        gains,
-    } = &done.grid.settings;
+    let space = &run.grid.settings.space;
     let range = |(low, high): (f64, f64)| format!("{low} .. {high} s");
     let _ = writeln!(
         text,
@@ -96,168 +92,106 @@ pub(crate) fn text(done: &Done) -> String {
         space.phase_margin_deg,
         space.beta,
     );
-    let limit = percent(*deterioration);
-    let _ = writeln!(
-        text,
-        "Grid     {}, {}",
-        match layout {
-            Layout::Rays => format!("neighbours {limit} apart"),
-            Layout::Fewest => format!("the fewest within {limit} of every process"),
-        },
-        match gains {
-            Gains::SameAmplitude => "gains by the amplitude",
-            Gains::Equal => "equal velocity gains",
-        }
-    );
-    members(&mut text, &done.grid);
-    let _ = writeln!(text, "Time     {} s", significant(done.took.as_secs_f64()));
+    let _ = writeln!(text, "Grid     {}", kind(&run.grid.settings));
+    let mut lead = "Members  ";
+    for line in members(&run.grid) {
+        wrapped(&mut text, lead, &line);
+        lead = "         ";
+    }
+    let _ = writeln!(text, "Time     {} s", significant(run.took.as_secs_f64()));
     text = headed(&text);
-    if let Some(check) = &done.check {
-        describe(&mut text, check, &limit);
+    if let Some(check) = &run.check {
+        let _ = writeln!(
+            text,
+            "\n{}",
+            headed(&format!(
+                "Check    {} random processes, seed {}",
+                check.processes, check.seed
+            ))
+        );
+        for (name, value) in check_facts(check) {
+            let _ = writeln!(text, "  {name:<28}{value}");
+        }
+        let limit = run.grid.settings.deterioration;
+        let _ = writeln!(
+            text,
+            "\n{}",
+            verdict(run.holds(), &check_verdict(check, limit))
+        );
     }
     text
 }
 
-fn members(text: &mut String, grid: &Grid) {
+/// How members are laid.
+fn kind(settings: &GridSettings) -> String {
+    let limit = percent(settings.deterioration);
+    let layout = match settings.layout {
+        Layout::Rays => format!("neighbours {limit} apart"),
+        Layout::Fewest => format!("the fewest within {limit} of every process"),
+    };
+    let gains = match settings.gains {
+        Gains::SameAmplitude => "gains by the amplitude",
+        Gains::Equal => "equal velocity gains",
+    };
+    format!("{layout}, {gains}")
+}
+
+/// Number of members and how they lie, in sentences of one line each.
+fn members(grid: &Grid) -> Vec<String> {
     let counts = members_per_row(grid);
     let count = grid.members.len();
     if counts.is_empty() {
-        let _ = writeln!(text, "Members  {count}");
-        return;
+        return vec![count.to_string()];
     }
     let rows: Vec<String> = counts.iter().map(ToString::to_string).collect();
-    let rows = format!("{count} in {} rows: {}", rows.len(), rows.join(" "));
-    wrapped(text, "Members  ", &rows);
+    let mut lines = vec![format!(
+        "{count} in {} rows: {}",
+        rows.len(),
+        rows.join(" ")
+    )];
     let alone = grid.members.iter().filter(|member| member.place.is_none());
     match alone.count() {
         0 => {}
-        alone => {
-            let _ = writeln!(text, "         and {alone} where the rows left holes");
-        }
+        alone => lines.push(format!("and {alone} where the rows left holes")),
     }
     if let Some(Alpha { least, most }) = Alpha::of(grid) {
-        let _ = writeln!(
-            text,
-            "         radii of a ray at ratios of {least:.3} to {most:.3}"
-        );
+        lines.push(format!(
+            "radii of a ray at ratios of {least:.3} to {most:.3}"
+        ));
     }
+    lines
 }
 
-fn describe(text: &mut String, check: &Check, limit: &str) {
+fn check_facts(check: &Check) -> [(&'static str, String); 4] {
     let [t_prop, t_body, tau] = check.worst_at_s.map(significant);
     let cost = |cost: Option<f64>| cost.map_or("unstable".to_owned(), percent);
-    text.push_str(&headed(&format!(
-        "\nCheck    {} random processes, seed {}\n  \
-         from the best member        worst {}, mean {}\n  \
-         its controller on them      worst {}, mean {}\n  \
-         least phase margin left     {}\n  \
-         farthest is                 T_prop {t_prop} s, T_body {t_body} s, tau {tau} s\n\n",
-        check.processes,
-        check.seed,
-        cost(check.worst),
-        cost(check.mean),
-        cost(check.worst_cost),
-        cost(check.mean_cost),
-        check
-            .least_margin_rad
-            .map_or("unstable".to_owned(), |margin| format!(
-                "{:.1} deg",
-                margin.to_degrees()
-            )),
-    )));
-    text.push_str(&match check.beyond {
-        0 => verdict(
-            true,
-            &format!("Every one of them is within {limit} of a member.\n"),
+    let margin = check.least_margin_rad;
+    let both = |worst, mean| format!("worst {}, mean {}", cost(worst), cost(mean));
+    [
+        ("from the best member", both(check.worst, check.mean)),
+        (
+            "its controller on them",
+            both(check.worst_cost, check.mean_cost),
         ),
-        beyond => verdict(
-            false,
-            &format!("{beyond} of them are farther than {limit} from every member.\n"),
+        (
+            "least phase margin left",
+            margin.map_or("unstable".to_owned(), |margin| {
+                format!("{:.1} deg", margin.to_degrees())
+            }),
         ),
-    });
+        (
+            "farthest is",
+            format!("T_prop {t_prop} s, T_body {t_body} s, tau {tau} s"),
+        ),
+    ]
 }
 
-/// The summary and its pictures on a page.
-pub(crate) fn html(done: &Done) -> Result<String, CandidateError> {
-    let grid = &done.grid;
-    let space = &grid.settings.space;
-    let lead = page::paragraph(
-        "lead",
-        "Processes that stand for a space: every process of it has a member near, whose controller costs it little.",
-    ) + &format!("<pre>{}</pre>\n", page::escaped(&bare(&text(done))));
-    let mut shapes: Vec<_> = grid.members.iter().map(|member| member.direction).collect();
-    shapes.dedup();
-    let of = |name: &str, points: Vec<(f64, f64)>, hue| {
-        Series::of_points(name, Marks::Points, points).hue(hue)
-    };
-    let outline = Series::of_points("border of the space", Marks::Line, picture::outline(space));
-    let surface = Figure::single(
-        "Rays of members on the surface of shapes.",
-        Axis::titled("T_body / T_prop").logarithmic(),
-        Panel::new(
-            Axis::titled("tau / r").logarithmic(),
-            vec![
-                outline.hue(Hue::Reference),
-                of(
-                    "rays",
-                    shapes.into_iter().map(picture::place).collect(),
-                    Hue::Model,
-                ),
-            ],
-        ),
-    );
-    let times = |x: usize, y: usize| {
-        let axis = |k: usize| Axis::titled(format!("{} (s)", ["T_prop", "T_body", "tau"][k]));
-        let members = grid.members.iter().map(|member| member.candidate.times_s());
-        let points = members.map(|times_s| (times_s[x], times_s[y]));
-        let panel = Panel::new(
-            axis(y).logarithmic(),
-            vec![of("", points.collect(), Hue::Model)],
-        );
-        Figure::single(
-            "Members in the space of times.",
-            axis(x).logarithmic(),
-            panel,
-        )
-        .shaped(Shape::Square)
-    };
-    let rays = picture::rays(space).map(|(name, times_s)| ray(&grid.settings, name, times_s));
-    let rays: Vec<Figure> = rays.into_iter().collect::<Result<_, _>>()?;
-    let section = |id: &str, title: &str, body: String| Section {
-        id: id.to_owned(),
-        title: title.to_owned(),
-        body,
-    };
-    let sections = [
-        section("shapes", "Shapes", page::figure(&surface)),
-        section("times", "Times", page::row(&[times(0, 1), times(0, 2)])),
-        section("rays", "Along a ray", page::row(&rays)),
-    ];
-    Ok(page("A grid of processes", &lead, &sections))
-}
-
-/// What neighbours on a ray cost each other.
-fn ray(settings: &GridSettings, name: &str, times_s: [f64; 3]) -> Result<Figure, CandidateError> {
-    let (step, along) = picture::along(settings, times_s)?;
-    let percent = 100.0 * settings.deterioration;
-    let curve = |name, cost: fn(&picture::Along) -> f64| {
-        let points = along.iter().map(|at| (at.alpha, 100.0 * cost(at)));
-        Series::of_points(name, Marks::Line, points)
-    };
-    let ends = [along.first(), along.last()].into_iter().flatten();
-    let limit = Series::of_points("J*", Marks::Dashes, ends.map(|at| (at.alpha, percent)));
-    let up = picture::STEPS_UP;
-    let panel = Panel::new(
-        Axis::titled("deterioration (%)").spanning(up.start * percent, up.end * percent),
-        vec![
-            curve("J_ij: the one's controller on the other", |at| at.there).hue(Hue::Model),
-            curve("J_ji: the other's on the one", |at| at.here).hue(Hue::Input),
-            limit.hue(Hue::Reference),
-        ],
-    );
-    let caption = format!("{name}: members at ratios of {step:.3}.");
-    let figure = Figure::single(&caption, Axis::titled("ratio of the radii"), panel);
-    Ok(figure.shaped(Shape::Square))
+fn check_verdict(check: &Check, limit: f64) -> String {
+    let limit = percent(limit);
+    match check.beyond {
+        0 => format!("Every one of them is within {limit} of a member."),
+        beyond => format!("{beyond} of them are farther than {limit} from every member."),
+    }
 }
 
 fn percent(fraction: f64) -> String {

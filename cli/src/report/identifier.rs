@@ -6,46 +6,46 @@ use onecycle_lab::learn::identifier::IdentifierRecipe;
 use serde_json::{Value, json};
 
 use super::json::to_text;
-use crate::commands::train::identifier::{Done, Scored};
+use crate::results::identifier::{FamilyScores, IdentifierRun};
 
 /// Changes with every change that a reader could notice.
 const SCHEMA: &str = "onecycle.identifier/1";
 
 /// What a pack says of itself.
-pub(crate) fn card(recipe: &IdentifierRecipe, done: &Done) -> Value {
+pub(crate) fn card(recipe: &IdentifierRecipe, run: &IdentifierRun) -> Value {
     json!({
         "program": concat!("onecycle ", env!("CARGO_PKG_VERSION")),
         "recipe": recipe,
         "training": {
-            "examples": done.examples,
-            "outcome": done.outcome,
-            "epochs": done.epochs,
-            "best_epoch": done.best_epoch,
+            "examples": run.examples,
+            "outcome": run.outcome,
+            "epochs": run.epochs,
+            "best_epoch": run.best_epoch,
         },
-        "scores": done.scores,
+        "scores": run.scores,
     })
 }
 
-pub(crate) fn json(recipe: &IdentifierRecipe, done: &Done) -> String {
-    let [simulated_s, learnt_s] = done.seconds;
+pub(crate) fn json(recipe: &IdentifierRecipe, run: &IdentifierRun) -> String {
+    let [simulated_s, learnt_s] = run.seconds;
     to_text(&json!({
         "schema": SCHEMA,
-        "card": card(recipe, done),
-        "weights": done.weights,
+        "card": card(recipe, run),
+        "weights": run.weights,
         "bytes": {
-            "weights": done.sizes.weights,
-            "table": done.sizes.table,
-            "card": done.sizes.card,
-            "total": done.sizes.total,
+            "weights": run.sizes.weights,
+            "table": run.sizes.table,
+            "card": run.sizes.card,
+            "total": run.sizes.total,
         },
-        "quantisation_rms": done.quantisation.rms,
+        "quantisation_rms": run.quantisation.rms,
         "seconds": { "experiments": simulated_s, "training": learnt_s },
     }))
 }
 
-pub(crate) fn text(done: &Done, out: &Path) -> String {
-    let [simulated_s, learnt_s] = done.seconds;
-    let sizes = &done.sizes;
+pub(crate) fn text(run: &IdentifierRun, out: &Path) -> String {
+    let [simulated_s, learnt_s] = run.seconds;
+    let sizes = &run.sizes;
     let mut text = format!(
         "Identifier  {}\n  \
          {} examples in {simulated_s:.0} s, {} epochs in {learnt_s:.0} s ({}), the best {}\n  \
@@ -53,25 +53,25 @@ pub(crate) fn text(done: &Done, out: &Path) -> String {
          weights in bytes would put outputs {:.1e} off, of {:.1} (root mean squares)\n\n\
          One cycle of unseen processes, as the board computes\n",
         out.display(),
-        done.examples,
-        done.epochs,
-        done.outcome.replace('_', " "),
-        done.best_epoch,
-        done.weights,
+        run.examples,
+        run.epochs,
+        run.outcome.replace('_', " "),
+        run.best_epoch,
+        run.weights,
         sizes.weights,
         sizes.table,
         sizes.card,
         sizes.total,
-        done.quantisation.rms,
-        done.quantisation.size,
+        run.quantisation.rms,
+        run.quantisation.size,
     );
-    for scored in &done.scores {
+    for scored in &run.scores {
         text += &row(scored);
     }
     text
 }
 
-fn row(scored: &Scored) -> String {
+fn row(scored: &FamilyScores) -> String {
     let scores = &scored.scores;
     let name = scored.family.map_or("all families".to_owned(), |family| {
         format!("family {family}")

@@ -2,15 +2,13 @@
 
 use std::fmt::Write;
 
-use onecycle_lab::learn::pack::Quantisation;
 use onecycle_onboard::network::{Activation, Dense, Weights};
 use onecycle_onboard::pack::{Pack, SELF_TEST_TOLERANCE, Sizes, VERSION};
 use serde_json::{Value, json};
 
 use super::json::to_text;
 use super::number::significant;
-use crate::args::ImportPack;
-use crate::commands::pack::SAMPLES;
+use crate::results::pack::{ImportedPack, VerifiedPack};
 use crate::style::{headed, verdict};
 
 /// Changes with every change that a reader of the report could notice.
@@ -119,16 +117,17 @@ pub(crate) fn text(name: &str, pack: &Pack<'_>) -> String {
 }
 
 /// Whether a pack is whole and gives the outputs it must.
-pub(crate) fn verified(name: &str, pack: &Pack<'_>, worst: Option<f32>) -> String {
+pub(crate) fn verified(verified: &VerifiedPack<'_>) -> String {
+    let VerifiedPack { name, pack, worst } = verified;
     let head = format!(
         "{name}: {} bytes, hash {:016x} as it must be\n",
         pack.sizes().total,
         pack.content_hash()
     );
     let tests = pack.self_tests().count();
-    head + &match worst {
+    head + &match *worst {
         None => "It holds no signature to test its outputs with.\n".to_owned(),
-        Some(worst) if worst <= SELF_TEST_TOLERANCE => verdict(
+        Some(worst) if verified.passes() => verdict(
             true,
             &format!(
                 "{tests} signatures give the outputs they must, the largest difference {}.\n",
@@ -149,20 +148,23 @@ pub(crate) fn verified(name: &str, pack: &Pack<'_>, worst: Option<f32>) -> Strin
 }
 
 /// What became of a network.
-pub(crate) fn imported(
-    arguments: &ImportPack,
-    pack: &Pack<'_>,
-    brings_normalisation: bool,
-    changed: &Quantisation,
-) -> String {
-    let ImportPack { model, like, out } = arguments;
+pub(crate) fn imported(imported: &ImportedPack<'_>) -> String {
+    let ImportedPack {
+        model,
+        like,
+        out,
+        pack,
+        changed,
+        samples,
+        ..
+    } = imported;
     let [largest, rms, size] = [changed.largest, changed.rms, changed.size].map(significant);
     format!(
         "Pack     {out}, {total} bytes, hash {hash:016x}\n\
          Network  {network}, of {model}\n\
          Inputs   normalised as {normalisation} says\n\
          Rounding changes an output by {largest} at most, rms {rms}, where outputs are {size} \
-         ({SAMPLES} random signatures)\n\
+         ({samples} random signatures)\n\
          Scores   cleared: those of {like} were its network's\n\
          The domain, output scaling, temperatures, threshold of the unknown and table are those of\n\
          {like}; none of them was fitted to this network.\n",
@@ -171,10 +173,10 @@ pub(crate) fn imported(
         hash = pack.content_hash(),
         network = network(pack),
         model = model.display(),
-        normalisation = if brings_normalisation {
+        normalisation = if imported.brings_normalisation {
             model.display().to_string()
         } else {
-            like.to_string()
+            like.clone()
         },
     )
 }

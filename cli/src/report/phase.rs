@@ -1,30 +1,24 @@
-//! The report of a distinguishing phase, for people and as JSON.
+//! The report of a distinguishing phase: as text and as JSON; `page` has the figures.
+
+mod page;
 
 use std::fmt::Write;
 
 use onecycle_lab::space::Space;
 use onecycle_lab::space::phase::{AppliedRule, LocalRule};
-use onecycle_lab::space::phase::{DistinguishingPhase, LocalOptima};
 use serde::Serialize;
 
 use super::json::to_text;
 use super::number::significant;
+use crate::results::phase::{PhaseSearch, RoundPhase};
+
+pub(crate) use self::page::html;
 
 const SCHEMA: &str = "onecycle.phase/1";
 
-/// Most lines of the table for people.
-const MOST_LINES: f64 = 16.0;
-
-/// What the command found, and in what.
-pub(crate) struct Found<'a> {
-    pub(crate) space: &'a Space,
-    pub(crate) optima: &'a LocalOptima,
-    pub(crate) phase: &'a DistinguishingPhase,
-}
-
 /// Plain text, at most 100 columns.
-pub(crate) fn text(found: &Found<'_>) -> String {
-    let Found { space, phase, .. } = found;
+pub(crate) fn text(found: &PhaseSearch) -> String {
+    let PhaseSearch { space, phase, .. } = found;
     let mut text = String::new();
     let shapes = match phase.rules.len() {
         1 => "one shape".to_owned(),
@@ -85,36 +79,24 @@ fn times([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> String {
     )
 }
 
-/// What every phase costs, over whole degrees that hold all local rules.
-fn table(text: &mut String, found: &Found<'_>) {
-    let margin_deg = found.space.phase_margin_deg;
-    let (low, high) = found.optima.lead_range_rad();
-    let range_deg = (high - low).to_degrees();
-    let step_deg = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|step| range_deg < MOST_LINES * step)
-        .unwrap_or(10.0);
-    let first = ((margin_deg - high.to_degrees()) / step_deg).round() as i32;
-    let last = ((margin_deg - low.to_degrees()) / step_deg).round() as i32;
+/// The deterioration of rules at round phases.
+fn table(text: &mut String, found: &PhaseSearch) {
     let _ = writeln!(
         text,
         "\nPhase of the rule   local rules   deterioration (%)   costs most on (ms)\n\
          {:<20}{:>11}{:>12}{:>9}   {:>8}{:>9}{:>9}",
         "(deg)", "near it", "worst", "mean", "T_prop", "T_body", "tau"
     );
-    for multiple in (first..=last).rev() {
-        let phase_deg = f64::from(multiple) * step_deg;
-        let Ok(applied) = found.optima.apply((margin_deg - phase_deg).to_radians()) else {
-            continue;
-        };
-        let is_near = |local: &&LocalRule| {
-            (local.applied.phase_rad.to_degrees() / step_deg).round() as i32 == multiple
-        };
+    for line in &found.table {
+        let RoundPhase {
+            phase_deg,
+            local_rules,
+            applied,
+        } = line;
         let [t_prop, t_body, tau] = applied.worst_on_s.map(|time_s| significant(1e3 * time_s));
         let _ = writeln!(
             text,
-            "{phase_deg:<20}{:>11}{:>12.2}{:>9.2}   {t_prop:>8}{t_body:>9}{tau:>9}",
-            found.phase.rules.iter().filter(is_near).count(),
+            "{phase_deg:<20}{local_rules:>11}{:>12.2}{:>9.2}   {t_prop:>8}{t_body:>9}{tau:>9}",
             100.0 * applied.worst,
             100.0 * applied.mean,
         );
@@ -157,10 +139,10 @@ struct Times {
 }
 
 /// Deteriorations are fractions, and null where they are infinite.
-pub(crate) fn json(found: &Found<'_>) -> String {
+pub(crate) fn json(found: &PhaseSearch) -> String {
     to_text(&Report {
         schema: SCHEMA,
-        space: found.space,
+        space: &found.space,
         distinguishing: Local::of(&found.phase.best),
         minimax: Rule::of(&found.phase.minimax),
         rules: found.phase.rules.iter().map(Local::of).collect(),

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use crate::commands::reproduce::part::{Cell, Part};
 use crate::pages::page::{self, Section, page};
+use crate::results::reproduction::{ComparedCell, ReproducedPart};
 
 const TITLE: &str = "The paper's simulated results, reproduced";
 const LEAD: &str = "A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, \"Real-time system identification using deep \
@@ -23,7 +23,7 @@ fn command(is_quick: bool) -> &'static str {
 }
 
 /// Tables and remarks.
-pub(crate) fn markdown(parts: &[Part], is_quick: bool) -> String {
+pub(crate) fn markdown(parts: &[ReproducedPart], is_quick: bool) -> String {
     let mut text = format!(
         "# {TITLE}\n\n{LEAD}\n\nMade by `{}`, onecycle {}: not to be edited. The plots are on the page that \
          it writes beside this file.\n",
@@ -64,7 +64,7 @@ pub(crate) fn markdown(parts: &[Part], is_quick: bool) -> String {
     text
 }
 
-fn cell(cell: &Cell) -> String {
+fn cell(cell: &ComparedCell) -> String {
     match &cell.paper {
         Some(paper) => in_cell(&format!("**{}** (paper: {paper})", cell.ours)),
         None => in_cell(&cell.ours),
@@ -77,7 +77,7 @@ fn in_cell(text: &str) -> String {
 }
 
 /// Tables, plots and remarks on one page.
-pub(crate) fn html(parts: &[Part], is_quick: bool) -> String {
+pub(crate) fn html(parts: &[ReproducedPart], is_quick: bool) -> String {
     let mut lead = page::paragraph("lead", LEAD);
     if is_quick {
         lead += &page::paragraph("note", QUICK);
@@ -89,7 +89,7 @@ pub(crate) fn html(parts: &[Part], is_quick: bool) -> String {
     page(TITLE, &lead, &sections)
 }
 
-fn section(part: &Part) -> Section {
+fn section(part: &ReproducedPart) -> Section {
     let mut body = page::paragraph("source", &part.source);
     for table in &part.tables {
         let rows: Vec<_> = (table.rows.iter())
@@ -107,7 +107,7 @@ fn section(part: &Part) -> Section {
 }
 
 /// Ours, the paper's below it.
-fn beside(cell: &Cell) -> page::Cell<'_> {
+fn beside(cell: &ComparedCell) -> page::Cell<'_> {
     page::Cell {
         value: &cell.ours,
         below: cell.paper.as_ref().map(|paper| format!("paper: {paper}")),
@@ -117,18 +117,18 @@ fn beside(cell: &Cell) -> page::Cell<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commands::reproduce::part::Table;
+    use crate::results::reproduction::ComparedTable;
 
-    fn part() -> Part {
-        let cell = |ours: &str, paper: Option<&str>| Cell {
+    fn part() -> ReproducedPart {
+        let cell = |ours: &str, paper: Option<&str>| ComparedCell {
             ours: ours.to_owned(),
             paper: paper.map(str::to_owned),
         };
-        Part {
+        ReproducedPart {
             name: "table_9",
             title: "Nine".to_owned(),
             source: "Table IX".to_owned(),
-            tables: vec![Table {
+            tables: vec![ComparedTable {
                 caption: "of nothing".to_owned(),
                 columns: vec![String::new(), "mean |J|".to_owned(), "n".to_owned()],
                 rows: vec![(
@@ -157,7 +157,8 @@ mod tests {
         assert!(text.contains("- Because.\n") && !text.contains(QUICK));
         assert!(markdown(&[part()], true).contains(QUICK));
         let html = html(&[part()], false);
-        assert!(html.contains("<td>0.31 %<small>paper: 0.52 %</small></td><td>3</td>"));
+        let cells = "<td data-column=\"mean |J|\">0.31 %<small>paper: 0.52 %</small></td><td data-column=\"n\">3</td>";
+        assert!(html.contains(cells), "{html}");
         assert!(html.contains("<li>Because.</li>"));
     }
 }

@@ -441,19 +441,32 @@ pub(crate) fn tune(process: &[&str], arguments: &[&str]) -> Report {
     outcome.report()
 }
 
-/// Asserts that every element of the text is closed, and that it is numbers that it draws.
-pub(crate) fn is_svg(text: &str) {
-    assert!(text.starts_with("<svg "), "{}", &text[..80]);
-    assert!(text.trim_end().ends_with("</svg>"));
-    let mut open = Vec::new();
-    for element in text.split('<').skip(1) {
-        let (tag, _) = element.split_once('>').expect("a tag ends");
-        if let Some(name) = tag.strip_prefix('/') {
-            assert_eq!(open.pop(), Some(name.trim()));
-        } else if !tag.ends_with('/') {
-            open.push(tag.split_whitespace().next().unwrap());
-        }
-    }
-    assert!(open.is_empty(), "{open:?}");
-    assert!(!text.contains("NaN") && !text.contains("inf"));
+/// What a run with `--report` printed, and the page that it wrote.
+pub(crate) fn reported(arguments: &[&str]) -> (Outcome, String) {
+    let folder = Scratch::new();
+    let path = folder.name("out.html");
+    let ran = run(&[arguments, &["--report", &path]].concat());
+    let page = std::fs::read_to_string(&path).expect("there is a page");
+    (ran, page)
+}
+
+/// The figures of a page, as plotly.js is given them.
+pub(crate) fn figures(page: &str) -> Vec<Value> {
+    let parts = page.split("<script type=\"application/json\">").skip(1);
+    let texts = parts.map(|part| part.split("</script>").next().unwrap_or_default());
+    texts
+        .map(|text| serde_json::from_str(text).expect("a figure is JSON"))
+        .collect()
+}
+
+/// All notes at points of the figures.
+pub(crate) fn notes(figures: &[Value]) -> Vec<String> {
+    let annotations = figures
+        .iter()
+        .filter_map(|figure| figure["layout"]["annotations"].as_array());
+    annotations
+        .flatten()
+        .filter_map(|note| note["text"].as_str())
+        .map(str::to_owned)
+        .collect()
 }

@@ -19,12 +19,20 @@ from playwright.sync_api import sync_playwright
 SCREENS = {
     "desk": {"viewport": {"width": 1280, "height": 900}},
     "phone": {
-        "viewport": {"width": 390, "height": 844},
+        "viewport": {"width": 360, "height": 780},
         "device_scale_factor": 2,
         "is_mobile": True,
         "has_touch": True,
     },
 }
+# Pairs of labels of one axis whose boxes meet.
+TOUCHING = """() => [...document.querySelectorAll(".plot")].flatMap((plot) =>
+    [".xtick text", ".ytick text", ".y2tick text"].flatMap((labels) => {
+        const all = [...plot.querySelectorAll(labels)].map((one) => [one.textContent, one.getBoundingClientRect()]);
+        const meet = (a, b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+        return all.flatMap(([text, box], at) =>
+            all.slice(at + 1).filter(([, other]) => meet(box, other)).map(([other]) => `${text} and ${other}`));
+    }))"""
 # The largest that a page may be.
 MOST_BYTES = 6_000_000
 
@@ -51,6 +59,8 @@ def made(program, examples, scratch):
         "refused": (recording("unsteady_ardupilot_alt.csv"), {"recording"}, 1),
         "tuned": (tune, {"stability", "step", "controller"}, 3),
         "grid": (["grid"], {"shapes", "times", "rays"}, 5),
+        "phase": (["phase"], {"cost", "shapes"}, 2),
+        "certificate": (["certify", "--shapes", "6"], {"corners", "bias"}, 2),
     }
     for name, (arguments, sections, plots) in pages.items():
         path = scratch / f"{name}.html"
@@ -111,6 +121,12 @@ def look(page, path, sections, least_plots):
         expect(abs(size["drawn"] - size["room"]) < 2, f"plot {number} is {size['drawn']} wide, with room for {size['room']}")
     width = page.evaluate("[document.documentElement.scrollWidth, innerWidth]")
     expect(width[0] <= width[1], f"the page is {width[0]} wide in a window of {width[1]}")
+    scrolls = page.eval_on_selector_all(
+        ".table", "all => all.filter((one) => one.scrollWidth > one.clientWidth).map((one) => one.innerText.slice(0, 60))"
+    )
+    expect(not scrolls, f"tables scroll sideways: {scrolls}")
+    touching = page.evaluate(TOUCHING)
+    expect(not touching, f"labels touch: {touching}")
     expect(path.stat().st_size < MOST_BYTES, f"{path.stat().st_size} bytes")
 
 

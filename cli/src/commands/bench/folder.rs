@@ -9,15 +9,12 @@
 
 use std::path::{Path, PathBuf};
 
-use onecycle_lab::experiments::{Benchmark, Truth};
-use onecycle_lab::judge::evaluate::files::{TableError, read_truth};
-use serde::{Deserialize, Serialize};
+use onecycle_lab::experiments::Truth;
+use onecycle_lab::judge::evaluate::files::read_truth;
+use serde::Deserialize;
 
-use crate::args::Format;
 use crate::failure::Failure;
-
-/// Changes with the folder, so that results are never compared across versions.
-pub(crate) const FORMAT: &str = "onecycle.benchmark/1";
+use crate::results::bench::{BenchManifest, FORMAT};
 
 pub(super) const MANIFEST: &str = "benchmark.json";
 pub(super) const TRUTH: &str = "truth.csv";
@@ -25,15 +22,6 @@ pub(super) const RULES: &str = "README.md";
 pub(super) const RECORDINGS: &str = "recordings";
 #[cfg(feature = "parquet")]
 pub(super) const PARQUET: &str = "recordings.parquet";
-
-/// What a folder says of itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Manifest {
-    pub(crate) format: String,
-    #[serde(flatten)]
-    pub(crate) benchmark: Benchmark,
-    pub(crate) recordings: Format,
-}
 
 /// The recording of an experiment, in the folder.
 pub(super) fn recording(folder: &Path, number: u64) -> PathBuf {
@@ -60,11 +48,46 @@ pub(super) fn refuse_filled(out: &Path) -> Result<(), Failure> {
     }
 }
 
+/// Fills a new or empty folder, whole or not at all: `fill` writes to a temporary one beside it.
+pub(super) fn write_whole(
+    out: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    refuse_filled(out)?;
+    let failed = |error| Failure::output(out, error);
+    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let staged = tempfile::Builder::new()
+        .prefix(".onecycle-bench-")
+        .tempdir_in(parent.unwrap_or(Path::new(".")))
+        .map_err(failed)?;
+    fill(staged.path())?;
+    set_usual_permissions(staged.path()).map_err(failed)?;
+    if out.exists() {
+        std::fs::remove_dir(out).map_err(failed)?;
+    }
+    std::fs::rename(staged.path(), out).map_err(failed)?;
+    // Moved, so there is nothing left to remove.
+    let _ = staged.keep();
+    Ok(())
+}
+
+/// Temporary folders are private; a folder that the user asked for is readable like any other.
+#[cfg(unix)]
+fn set_usual_permissions(folder: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o755))
+}
+
+#[cfg(not(unix))]
+fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
+    Ok(())
+}
+
 /// Reads what a folder holds besides the recordings.
-pub(super) fn read(folder: &Path) -> Result<(Manifest, Vec<Truth>), Failure> {
+pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure> {
     let path = folder.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(|error| {
-        unreadable(
+        Failure::unreadable(
             &path,
             format!("{error}: name a folder that onecycle bench make has written"),
         )
@@ -73,10 +96,10 @@ pub(super) fn read(folder: &Path) -> Result<(Manifest, Vec<Truth>), Failure> {
     struct Version {
         format: String,
     }
-    let malformed = |error: serde_json::Error| unreadable(&path, error.to_string());
+    let malformed = |error: serde_json::Error| Failure::unreadable(&path, error);
     let found: Version = serde_json::from_str(&text).map_err(malformed)?;
     if found.format != FORMAT {
-        return Err(unreadable(
+        return Err(Failure::unreadable(
             &path,
             format!(
                 "the folder is of version '{}', but this program scores '{FORMAT}': make it anew",
@@ -84,11 +107,12 @@ pub(super) fn read(folder: &Path) -> Result<(Manifest, Vec<Truth>), Failure> {
             ),
         ));
     }
-    let manifest: Manifest = serde_json::from_str(&text).map_err(malformed)?;
+    let manifest: BenchManifest = serde_json::from_str(&text).map_err(malformed)?;
     let path = folder.join(TRUTH);
-    let truths = read_truth(&read_text(&path)?).map_err(|error| refused(&path, &error))?;
+    let truths =
+        read_truth(&read_text(&path)?).map_err(|error| Failure::unreadable(&path, error))?;
     if truths.len() as u64 != manifest.benchmark.experiments {
-        return Err(unreadable(
+        return Err(Failure::unreadable(
             &path,
             format!(
                 "it has {} experiments, but {MANIFEST} says {}",
@@ -102,17 +126,5 @@ pub(super) fn read(folder: &Path) -> Result<(Manifest, Vec<Truth>), Failure> {
 
 /// The text of a file.
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| unreadable(path, error.to_string()))
-}
-
-/// A table that cannot be read: its file, its line and why.
-pub(super) fn refused(path: &Path, error: &TableError) -> Failure {
-    unreadable(path, error.to_string())
-}
-
-pub(super) fn unreadable(path: &Path, reason: String) -> Failure {
-    Failure::Settings {
-        path: path.to_owned(),
-        reason,
-    }
+    std::fs::read_to_string(path).map_err(|error| Failure::unreadable(path, error))
 }

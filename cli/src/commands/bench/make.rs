@@ -7,12 +7,13 @@ use onecycle_lab::experiments::{Benchmark, Recorded, Truth};
 use onecycle_lab::judge::evaluate::files::truth_csv;
 use onecycle_link::{Recording, write_csv};
 
-use super::folder::{self, FORMAT, MANIFEST, Manifest, RULES, TRUTH, recording};
+use super::folder::{self, MANIFEST, RULES, TRUTH, recording};
 use crate::args::{Format, MakeBench};
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{print, write_file};
+use crate::output::{print, write_file, write_text};
 use crate::report;
+use crate::results::bench::{BenchManifest, FORMAT};
 
 pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
     if arguments.format == Format::Parquet && !cfg!(feature = "parquet") {
@@ -23,46 +24,33 @@ pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
     folder::refuse_filled(out)?;
     let workers = Workers::new(arguments.threads)?;
-    let manifest = Manifest {
+    let manifest = BenchManifest {
         format: FORMAT.to_owned(),
         benchmark: Benchmark {
             experiments: arguments.cases,
             seed: arguments.seed,
         },
-        recordings: arguments.format,
+        recordings: arguments.format.into(),
     };
-    // Beside the folder, so that it can be moved there.
-    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-    let failed = |error| Failure::output(out, error);
-    let staged = tempfile::Builder::new()
-        .prefix(".onecycle-bench-")
-        .tempdir_in(parent.unwrap_or(Path::new(".")))
-        .map_err(failed)?;
-    let truths = match arguments.format {
-        Format::Csv => write_recordings(staged.path(), &manifest.benchmark, &workers)?,
-        #[cfg(feature = "parquet")]
-        Format::Parquet => write_table(staged.path(), &manifest.benchmark, &workers)?,
-        #[cfg(not(feature = "parquet"))]
-        Format::Parquet => Vec::new(),
-    };
-    workers.finish();
-    let files = [
-        (MANIFEST, report::json::to_text(&manifest)),
-        (TRUTH, truth_csv(&truths)),
-        (RULES, report::bench::rules(&manifest)),
-    ];
-    for (name, text) in files {
-        write_file(&staged.path().join(name), |file| {
-            file.write_all(text.as_bytes())
-        })?;
-    }
-    set_usual_permissions(staged.path()).map_err(failed)?;
-    if out.exists() {
-        std::fs::remove_dir(out).map_err(failed)?;
-    }
-    std::fs::rename(staged.path(), out).map_err(failed)?;
-    // It is no longer there to be removed.
-    let _ = staged.keep();
+    folder::write_whole(out, |staged| {
+        let truths = match arguments.format {
+            Format::Csv => write_recordings(staged, &manifest.benchmark, &workers)?,
+            #[cfg(feature = "parquet")]
+            Format::Parquet => write_table(staged, &manifest.benchmark, &workers)?,
+            #[cfg(not(feature = "parquet"))]
+            Format::Parquet => Vec::new(),
+        };
+        workers.finish();
+        let files = [
+            (MANIFEST, report::json::to_text(&manifest)),
+            (TRUTH, truth_csv(&truths)),
+            (RULES, report::bench::rules(&manifest)),
+        ];
+        for (name, text) in files {
+            write_text(&staged.join(name), &text)?;
+        }
+        Ok(())
+    })?;
     print(&format!(
         "{} experiments in {}\n",
         arguments.cases,
@@ -128,16 +116,4 @@ fn write_table(
         writer.finish()
     })?;
     Ok(truths)
-}
-
-/// Temporary folders are private; what a user asked for is readable like any other.
-#[cfg(unix)]
-fn set_usual_permissions(folder: &Path) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o755))
-}
-
-#[cfg(not(unix))]
-fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
-    Ok(())
 }

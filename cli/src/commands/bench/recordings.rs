@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use onecycle_link::{CsvOptions, Recording};
 
-use super::folder::{Manifest, recording};
-use crate::args::Format;
+use super::folder::recording;
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
+use crate::results::bench::{BenchManifest, RecordingFormat};
 
 /// Where recordings are read from.
 pub(super) enum Recordings {
@@ -20,13 +20,13 @@ pub(super) enum Recordings {
 
 impl Recordings {
     /// Of a folder with this manifest.
-    pub(super) fn open(folder: &Path, manifest: &Manifest) -> Result<Self, Failure> {
+    pub(super) fn open(folder: &Path, manifest: &BenchManifest) -> Result<Self, Failure> {
         match manifest.recordings {
-            Format::Csv => Ok(Self::Csv(folder.to_owned())),
+            RecordingFormat::Csv => Ok(Self::Csv(folder.to_owned())),
             #[cfg(feature = "parquet")]
-            Format::Parquet => table::Table::open(folder).map(Self::Parquet),
+            RecordingFormat::Parquet => table::Table::open(folder).map(Self::Parquet),
             #[cfg(not(feature = "parquet"))]
-            Format::Parquet => Err(super::folder::unreadable(
+            RecordingFormat::Parquet => Err(Failure::unreadable(
                 &folder.join(super::folder::MANIFEST),
                 "this build cannot read Parquet: make one with cargo build --release --features \
                  parquet, make the folder with --format csv, for the same seed gives the same \
@@ -70,7 +70,7 @@ mod table {
     use onecycle_lab::judge::evaluate::parquet::Reader;
     use onecycle_link::Recording;
 
-    use crate::commands::bench::folder::{PARQUET, unreadable};
+    use crate::commands::bench::folder::PARQUET;
     use crate::failure::Failure;
 
     /// The file that holds all recordings.
@@ -85,12 +85,12 @@ mod table {
             let reader = File::open(&path).and_then(Reader::new);
             match reader {
                 Ok(reader) => Ok(Self { path, reader }),
-                Err(error) => Err(unreadable(&path, error.to_string())),
+                Err(error) => Err(Failure::unreadable(&path, error.to_string())),
             }
         }
 
         pub(super) fn read(&self, number: u64) -> Result<Recording, Failure> {
-            let wrong = |reason| unreadable(&self.path, reason);
+            let wrong = |reason| Failure::unreadable(&self.path, reason);
             let recorded = self.reader.recording(number);
             let recorded = recorded.map_err(|error| wrong(error.to_string()))?;
             Recording::from_samples(&recorded.time_s, &recorded.input, &recorded.output)

@@ -1,25 +1,26 @@
 //! `onecycle bench run`: every method on every recording, scored.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::with_signals;
 use onecycle_lab::experiments::Truth;
 use onecycle_lab::judge::evaluate::files::{read_answers, results_csv};
 use onecycle_lab::judge::evaluate::{Contender, Judge, Record, records};
+use serde_json::{Value, json};
 
-use super::folder::{self, TRUTH, read_text, refused, unreadable};
-use super::part::{Head, Part};
+use super::folder::{self, TRUTH, read_text};
 use super::recordings::Recordings;
 use super::traces;
 use crate::args::{self, RunBench};
 use crate::commands::clock::thread_seconds;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{print, tell, write_file};
+use crate::journal::Journal;
+use crate::output::{print, with_ending, write_file};
 use crate::report;
-use crate::report::bench::Results;
+use crate::results::bench::BenchResults;
 
 pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
     let (manifest, truths) = folder::read(&arguments.folder)?;
@@ -31,34 +32,37 @@ pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
         _ => Some(Recordings::open(&arguments.folder, &manifest)?),
     };
     if let Some(folder) = &arguments.traces {
-        traces::write(folder, &methods, &truths, &workers)?;
+        traces::check(folder, &methods)?;
     }
-    let head = Head {
-        program: env!("CARGO_PKG_VERSION").to_owned(),
-        benchmark: manifest,
-        methods: methods.iter().map(|method| method.name()).collect(),
-    };
     let out = arguments.out.as_deref();
-    let (mut part, done) = match out.filter(|_| !methods.is_empty()) {
+    let mut done = BTreeMap::new();
+    let mut journal = match out.filter(|_| !methods.is_empty()) {
         Some(out) => {
-            let (part, done) = Part::open(beside(out, "part"), &head, arguments.resume)?;
-            (Some(part), done)
+            let names: Vec<_> = methods.iter().map(|method| method.name()).collect();
+            let settings = json!({ "benchmark": manifest, "methods": names });
+            Some(opened(out, &settings, arguments.restart, &mut done)?)
         }
-        None => (None, BTreeMap::new()),
+        None => None,
     };
+    if !done.is_empty()
+        && let Some(journal) = &journal
+    {
+        let (kept, all) = (done.len(), truths.len());
+        journal.tell_resumed(&format!("{kept} of {all} experiments"));
+    }
     let mut records = foreign;
     if let Some(recordings) = &recordings {
         let ours = answered(
             recordings,
             &methods,
             &truths,
-            (part.as_mut(), done),
+            (journal.as_mut(), done),
             &workers,
             &arguments.folder.join(TRUTH),
         )?;
         records.splice(0..0, ours);
     }
-    let results = Results::of(&head.benchmark, &records);
+    let results = BenchResults::of(&manifest, &records);
     let text = report::bench::leaderboard(&results);
     let json = report::json::to_text(&results);
     if let Some(out) = out {
@@ -68,25 +72,41 @@ pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
             ("json", json.as_bytes()),
             ("md", text.as_bytes()),
         ] {
-            write_file(&beside(out, ending), |file| file.write_all(bytes))?;
+            write_file(&with_ending(out, ending), |file| file.write_all(bytes))?;
         }
     }
-    if let Some(part) = part {
-        part.remove()?;
+    if let Some(folder) = &arguments.traces {
+        traces::write(folder, &methods, &truths, &workers)?;
+    }
+    if let Some(journal) = journal {
+        journal.remove()?;
     }
     print(if arguments.json { &json } else { &text })?;
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// A name with an ending added.
-fn beside(out: &Path, ending: &str) -> PathBuf {
-    let mut path = out.as_os_str().to_owned();
-    path.push(".");
-    path.push(ending);
-    path.into()
+/// The journal beside the output; the records found in it go to `done`, by experiment.
+fn opened(
+    out: &Path,
+    settings: &Value,
+    restart: bool,
+    done: &mut BTreeMap<u64, Vec<Record>>,
+) -> Result<Journal, Failure> {
+    let take = |records: Vec<Record>| {
+        let experiment = records.first().map(|record| record.experiment);
+        done.extend(experiment.map(|experiment| (experiment, records)));
+        Ok(())
+    };
+    Journal::open(
+        &Journal::folder_of(out),
+        "bench run",
+        settings,
+        restart,
+        take,
+    )
 }
 
-/// Experiments between two lines of the part, for each thread: few, for an end by force loses them.
+/// Experiments of each thread between two writes to the journal: few, because a killed run loses them.
 const LOT: usize = 4;
 
 /// The records of all methods, by experiment, those that are done and those that are made now; `truth` is
@@ -95,7 +115,7 @@ fn answered(
     recordings: &Recordings,
     methods: &[Contender],
     truths: &[Truth],
-    (mut part, mut done): (Option<&mut Part>, BTreeMap<u64, Vec<Record>>),
+    (mut journal, mut done): (Option<&mut Journal>, BTreeMap<u64, Vec<Record>>),
     workers: &Workers,
     truth: &Path,
 ) -> Result<Vec<Record>, Failure> {
@@ -103,10 +123,6 @@ fn answered(
         .iter()
         .filter(|truth| !done.contains_key(&truth.number))
         .collect();
-    if !done.is_empty() {
-        let (kept, all) = (done.len(), truths.len());
-        tell(&format!("going on after {kept} of {all} experiments"));
-    }
     workers.expect(truths.len(), truths.len() - open.len());
     for lot in open.chunks(LOT * workers.threads()) {
         let numbers: Vec<u64> = lot.iter().map(|truth| truth.number).collect();
@@ -116,13 +132,13 @@ fn answered(
                 records(lot[index], signals, methods, &thread_seconds)
             });
             records.map_err(|error| {
-                unreadable(truth, format!("experiment {}: {error}", numbers[index]))
+                Failure::unreadable(truth, format!("experiment {}: {error}", numbers[index]))
             })
         });
         for (truth, made) in lot.iter().zip(made) {
             let made = made?;
-            if let Some(part) = part.as_deref_mut() {
-                part.keep(&made)?;
+            if let Some(journal) = journal.as_deref_mut() {
+                journal.add(&made)?;
             }
             done.insert(truth.number, made);
         }
@@ -146,8 +162,8 @@ fn foreign(all: &[args::Answers], truths: &[Truth]) -> Result<Vec<Record>, Failu
             )));
         }
         let text = read_text(&answers.file)?;
-        let mut found =
-            read_answers(&text, &experiments).map_err(|error| refused(&answers.file, &error))?;
+        let mut found = read_answers(&text, &experiments)
+            .map_err(|error| Failure::unreadable(&answers.file, error))?;
         for truth in truths {
             let judge = Judge::new(&truth.process).map_err(Failure::usage)?;
             let (answer, seconds) = match found.remove(&truth.number) {

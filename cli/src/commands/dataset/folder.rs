@@ -20,13 +20,25 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// Goes on with the folder of this recipe, or begins one.
-    pub(crate) fn open(path: &Path, recipe: Recipe, examples: u64) -> Result<Self, Failure> {
+    /// Opens the folder of this recipe, or begins one; with `restart` a dataset that is there is removed first.
+    pub(crate) fn open(
+        path: &Path,
+        recipe: Recipe,
+        examples: u64,
+        restart: bool,
+    ) -> Result<Self, Failure> {
         let manifest_path = path.join(MANIFEST_NAME);
         let manifest = match std::fs::read_to_string(&manifest_path) {
-            Ok(text) => Manifest::read(&text)
-                .and_then(|manifest| manifest.go_on(&recipe, examples))
-                .map_err(|error| refused(&manifest_path, error.to_string()))?,
+            Ok(text) => {
+                let refused = |error| Failure::unreadable(&manifest_path, error);
+                let found = Manifest::read(&text).map_err(refused)?;
+                if restart {
+                    remove_files(path, &found)?;
+                    Manifest::new(recipe, examples)
+                } else {
+                    found.go_on(&recipe, examples).map_err(refused)?
+                }
+            }
             // What is no folder cannot be made one, and says so.
             Err(error)
                 if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) =>
@@ -34,7 +46,7 @@ impl Folder {
                 begin(path)?;
                 Manifest::new(recipe, examples)
             }
-            Err(error) => return Err(refused(&manifest_path, error.to_string())),
+            Err(error) => return Err(Failure::unreadable(&manifest_path, error)),
         };
         let path = path.to_owned();
         let folder = Self { path, manifest };
@@ -94,9 +106,9 @@ impl Folder {
 
     fn records_of(&self, shard: usize) -> Result<Vec<ExampleRecord>, Failure> {
         let path = self.path.join(file_name(shard));
-        let bytes = std::fs::read(&path).map_err(|error| refused(&path, error.to_string()))?;
+        let bytes = std::fs::read(&path).map_err(|error| Failure::unreadable(&path, error))?;
         let read = self.manifest.records(shard, &bytes);
-        read.map_err(|error| refused(&path, error.to_string()))
+        read.map_err(|error| Failure::unreadable(&path, error))
     }
 
     /// Removes the files and the folder, where there is nothing else in it.
@@ -131,6 +143,20 @@ impl Folder {
     }
 }
 
+/// Removes the files of a dataset, those that are there.
+fn remove_files(path: &Path, manifest: &Manifest) -> Result<(), Failure> {
+    for name in (0..manifest.shards.len()).map(file_name) {
+        let file = path.join(name);
+        match std::fs::remove_file(&file) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(Failure::output(&file, error));
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
 /// Makes the folder where there is none, in one that there is; refuses one with anything in it.
 fn begin(path: &Path) -> Result<(), Failure> {
     if !path.exists() {
@@ -139,18 +165,11 @@ fn begin(path: &Path) -> Result<(), Failure> {
     let mut entries = std::fs::read_dir(path).map_err(|error| Failure::output(path, error))?;
     match entries.next() {
         None => Ok(()),
-        Some(_) => Err(refused(
+        Some(_) => Err(Failure::unreadable(
             path,
             format!(
                 "the folder is not empty and has no {MANIFEST_NAME}: name a new one for the dataset"
             ),
         )),
-    }
-}
-
-fn refused(path: &Path, reason: String) -> Failure {
-    Failure::Settings {
-        path: path.to_owned(),
-        reason,
     }
 }

@@ -4,17 +4,17 @@ use onecycle_lab::experiments::Benchmark;
 use onecycle_lab::judge::evaluate::{Contender, EvaluationError, Record, Summary, records};
 use serde::Deserialize;
 
-use super::part::{Found, Row};
 use crate::commands::clock::thread_seconds;
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
 use crate::report::number::{percent, seconds};
+use crate::results::reproduction::{Numbers, Row};
 
 /// The experiments and the methods.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct ComparisonSettings {
     /// Processes under either protocol.
     systems: u64,
     seed: u64,
@@ -27,7 +27,7 @@ fn contender(name: &str) -> Result<Contender, Failure> {
     Contender::from_name(name).ok_or_else(|| Failure::usage(format!("there is no method '{name}'")))
 }
 
-pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Failure> {
+pub(super) fn find(settings: &ComparisonSettings, workers: &Workers) -> Result<Numbers, Failure> {
     let contenders = settings.methods.iter().map(|(name, _)| contender(name));
     let contenders: Vec<Contender> = contenders.collect::<Result<_, _>>()?;
     let benchmark = Benchmark {
@@ -44,7 +44,7 @@ pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Fail
     });
     let judged: Result<Vec<(bool, Vec<Record>)>, EvaluationError> = judged.into_iter().collect();
     let judged = judged.map_err(Failure::usage)?;
-    let mut found = Found::default();
+    let mut found = Numbers::default();
     for is_trimmed in [false, true] {
         let of_protocol = judged.iter().filter(|(trimmed, _)| *trimmed == is_trimmed);
         let records: Vec<&Vec<Record>> = of_protocol.map(|(_, records)| records).collect();

@@ -1,21 +1,21 @@
 //! Table VII: cycles of one run, each identified by itself, and what the controller of each costs on the
 //! process of every other.
 
-use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::evaluate::{Cycles, Judge};
 use onecycle_plant::Trace;
 use serde::Deserialize;
 
-use super::part::{Found, Row};
-use super::single::{SAMPLE_S, Setup, shown};
+use super::single::{SAMPLE_S, Setup};
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
+use crate::report::cycles::{cost_cell, cross_table};
 use crate::report::number::percent;
+use crate::results::reproduction::{Numbers, Row};
 
 /// The run.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct CyclesSettings {
     setup: Setup,
     /// Input bias, in parts of the relay's amplitude.
     input_bias: f64,
@@ -23,17 +23,17 @@ pub(super) struct Settings {
     cycles: usize,
 }
 
-pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
+pub(super) fn find(settings: &CyclesSettings) -> Result<Numbers, Failure> {
     let (truth, trace) = settings.setup.run(settings.input_bias)?;
     let cycles = Cycles::of(&trace, SAMPLE_S, settings.cycles).map_err(Failure::usage)?;
     let judge = Judge::new(&truth.process).map_err(Failure::usage)?;
-    let mut rows = table(&cycles);
+    let mut rows = cross_table(&cycles);
     for (row, (answer, _)) in rows.iter_mut().zip(&cycles.answers) {
         row.cells
-            .push(shown(Some(judge.deterioration(answer.feedback))));
+            .push(cost_cell(Some(judge.deterioration(answer.feedback))));
     }
     let signal = |name, values| relative(name, &trace, values, cycles.range_s);
-    Ok(Found {
+    Ok(Numbers {
         tables: vec![
             rows,
             vec![Row::new(
@@ -46,24 +46,6 @@ pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
             signal("input", &trace.input),
         ]],
     })
-}
-
-/// A row for the controller of each cycle, a cell for each process.
-pub(crate) fn table(cycles: &Cycles) -> Vec<Row> {
-    let cells = |i: usize, row: &[Deterioration]| -> Vec<String> {
-        (row.iter().enumerate())
-            .map(|(j, cost)| {
-                if i == j {
-                    "-".to_owned()
-                } else {
-                    shown(Some(*cost))
-                }
-            })
-            .collect()
-    };
-    (cycles.cross().iter().enumerate())
-        .map(|(i, row)| Row::new((i + 1).to_string(), cells(i, row)))
-        .collect()
 }
 
 /// A signal over its largest size, from one time to another (s).

@@ -8,15 +8,15 @@ use onecycle_plant::Trace;
 use serde::Deserialize;
 
 use super::cycles::relative;
-use super::part::Found;
 use super::single::{SAMPLE_S, Setup};
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
+use crate::results::reproduction::Numbers;
 
 /// The processes and their experiments.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct SignalSettings {
     /// Of the network's cycle: `T_prop`, `T_body`, `tau` (s); largest bias and noise, and their seed.
     times_s: [f64; 3],
     bias: f64,
@@ -27,7 +27,7 @@ pub(super) struct Settings {
     input_bias: f64,
 }
 
-pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
+pub(super) fn find(settings: &SignalSettings) -> Result<Numbers, Failure> {
     let (truth, trace) = settings.setup.run(settings.input_bias)?;
     let found = find_oscillation(&signals_of(&trace, SAMPLE_S), 1);
     let cycle = found.map_err(Failure::usage)?;
@@ -46,7 +46,7 @@ pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
             relative("input", trace, &trace.input, range_s),
         ]
     };
-    Ok(Found {
+    Ok(Numbers {
         tables: vec![],
         figures: vec![
             prepared(settings)?,
@@ -57,7 +57,7 @@ pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
 }
 
 /// Both halves of the network's inputs, over their numbers.
-fn prepared(settings: &Settings) -> Result<Vec<Series>, Failure> {
+fn prepared(settings: &SignalSettings) -> Result<Vec<Series>, Failure> {
     let trials = Trials {
         space: Space::MULTIROTOR,
         seed: settings.seed,

@@ -5,16 +5,16 @@ use onecycle_lab::space::grid;
 use onecycle_lab::space::grid::{Check, Grid, check};
 use serde::Deserialize;
 
-use super::part::{Found, Row};
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
 use crate::report::number::{degrees, percent};
+use crate::results::reproduction::{Numbers, Row};
 
 /// What is laid and how it is checked.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct GridCheckSettings {
     deterioration: f64,
     /// Grids, a column each: the gains at which processes are compared.
     gains: Vec<Gains>,
@@ -23,7 +23,7 @@ pub(super) struct Settings {
     seed: u64,
 }
 
-pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Failure> {
+pub(super) fn find(settings: &GridCheckSettings, workers: &Workers) -> Result<Numbers, Failure> {
     let grids = settings.gains.iter().map(|&gains| {
         let wanted = grid::GridSettings {
             deterioration: settings.deterioration,
@@ -40,7 +40,7 @@ pub(super) fn find(settings: &Settings, workers: &Workers) -> Result<Found, Fail
         Row::new(name, grids.iter().map(cell))
     };
     let or_unstable = |cost: Option<f64>| cost.map_or("unstable".to_owned(), percent);
-    Ok(Found {
+    Ok(Numbers {
         tables: vec![vec![
             row("members", &|(grid, _)| grid.members.len().to_string()),
             row("random processes", &|(_, check)| {

@@ -3,17 +3,19 @@
 use onecycle_lab::paper::classifier::{Choice, ClassifierRecipe, PickRule, Score, Test};
 use serde::Deserialize;
 
-use super::part::{Found, Row};
-use crate::commands::train::classifier::{Keep, Kind, Trained, learn};
+use crate::commands::train::classifier::{forget, learn};
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
+use crate::journal::Journal;
 use crate::report::number::{degrees, percent};
+use crate::results::classifier::{SetKind, TrainedNetwork};
+use crate::results::reproduction::{Numbers, Row};
 
 /// The recipe, and what of it is another here.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
-    /// A recipe of `cli/reproduction`.
+pub(super) struct NetworkSettings {
+    /// A file of `experiments`.
     recipe: RecipeName,
     /// Losses, a column each.
     losses: Vec<Choice>,
@@ -28,7 +30,7 @@ enum RecipeName {
     PaperNetworkSmall,
 }
 
-impl Settings {
+impl NetworkSettings {
     fn recipe(&self) -> Result<ClassifierRecipe, Failure> {
         let text = match self.recipe {
             RecipeName::PaperNetwork => include_str!("../../../reproduction/paper_network.toml"),
@@ -46,28 +48,29 @@ impl Settings {
 }
 
 pub(super) fn find(
-    settings: &Settings,
-    keep: Keep<'_>,
+    settings: &NetworkSettings,
+    journal: &Journal,
     workers: &Workers,
-) -> Result<Found, Failure> {
+) -> Result<Numbers, Failure> {
     let recipe = settings.recipe()?;
-    let learnt = learn(&recipe, keep, workers, Failure::usage)?;
-    let sets = learnt.done.sets.iter().enumerate();
+    recipe.validate().map_err(Failure::usage)?;
+    let learnt = learn(&recipe, Some(journal), workers, Failure::usage)?;
+    let sets = learnt.run.sets.iter().enumerate();
     let tables = sets.map(|(number, set)| {
-        let of = |trained: &Trained| trained.scores[number][PickRule::MostLikely as usize];
-        let scores = learnt.done.networks.iter().map(of);
+        let of = |trained: &TrainedNetwork| trained.scores[number][PickRule::MostLikely as usize];
+        let scores = learnt.run.networks.iter().map(of);
         let [best, _] = set.best;
         table(&scores.chain([best]).collect::<Vec<_>>(), set.kind)
     });
-    let found = Found {
+    let found = Numbers {
         tables: tables.collect(),
         figures: vec![],
     };
-    keep.remove(&recipe)?;
+    forget(journal, &recipe)?;
     Ok(found)
 }
 
-fn table(scores: &[Score], kind: Kind) -> Vec<Row> {
+fn table(scores: &[Score], kind: SetKind) -> Vec<Row> {
     let row = |name: &str, cell: fn(&Score) -> String| Row::new(name, scores.iter().map(cell));
     let cost = |cost: Option<f64>| cost.map_or("-".to_owned(), percent);
     let accuracy = row("accuracy", |score| percent(score.accuracy));
@@ -82,6 +85,6 @@ fn table(scores: &[Score], kind: Kind) -> Vec<Row> {
         row("unstable", |score| score.unstable.to_string()),
         row("experiments", |score| score.examples.to_string()),
     ];
-    let accuracy = (kind == Kind::Verification).then_some(accuracy);
+    let accuracy = (kind == SetKind::Verification).then_some(accuracy);
     accuracy.into_iter().chain(costs).collect()
 }

@@ -5,20 +5,20 @@ use onecycle_lab::space::phase::LocalOptima;
 use onecycle_lab::space::phase::{AppliedRule, LocalRule};
 use serde::Deserialize;
 
-use super::part::{Found, Row};
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
 use crate::report::number::{degrees, percent};
+use crate::results::reproduction::{Numbers, Row};
 
 /// How finely the space is looked at.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(super) struct Settings {
+pub(super) struct PhaseSettings {
     /// Shapes by the ratio of the lags, and by the dead time for each of these.
     shapes: [usize; 2],
 }
 
-pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
+pub(super) fn find(settings: &PhaseSettings) -> Result<Numbers, Failure> {
     let space = Space::MULTIROTOR;
     let [rows, columns] = settings.shapes;
     let optima = LocalOptima::of_shapes(&space, rows, columns).map_err(Failure::usage)?;
@@ -27,7 +27,7 @@ pub(super) fn find(settings: &Settings) -> Result<Found, Failure> {
     let papers = optima.apply(lead_rad).map_err(Failure::usage)?;
     let rules = [&phase.best.applied, &phase.minimax, &papers];
     let row = |name: &str, cell: fn(&AppliedRule) -> String| Row::new(name, rules.map(cell));
-    Ok(Found {
+    Ok(Numbers {
         tables: vec![vec![
             row("phase", |rule| degrees(rule.phase_rad)),
             row("beta", |rule| format!("{:.3}", rule.rule.beta)),

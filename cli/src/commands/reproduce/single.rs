@@ -10,11 +10,11 @@ use onecycle_onboard::Soiptd;
 use onecycle_plant::Trace;
 use serde::Deserialize;
 
-use super::part::{Found, Row};
 use crate::commands::workers::Workers;
 use crate::failure::Failure;
 use crate::pages::plot::{Marks, Series};
-use crate::report::number::percent;
+use crate::report::cycles::cost_cell;
+use crate::results::reproduction::{Numbers, Row};
 
 /// Sample period (s): the paper's.
 pub(super) const SAMPLE_S: f64 = 1e-3;
@@ -125,15 +125,15 @@ impl Bench {
 }
 
 /// Table V: a row a start; set I, set II, set I with the bias in the model, and ours, which needs none.
-pub(super) fn starts(settings: &Starts, workers: &Workers) -> Result<Found, Failure> {
+pub(super) fn starts(settings: &Starts, workers: &Workers) -> Result<Numbers, Failure> {
     let bench = Bench::new(&settings.setup, settings.input_bias)?;
     let ours = bench.by(Contender::OneCycle(1));
     let rows = workers.map(settings.starts_s.len(), |index| {
         let start_s = settings.starts_s[index];
         let cells = bench.by_pem(start_s).into_iter().chain([ours]);
-        Row::new(name(start_s), cells.map(shown))
+        Row::new(name(start_s), cells.map(cost_cell))
     });
-    Ok(Found {
+    Ok(Numbers {
         tables: vec![rows],
         figures: vec![],
     })
@@ -165,7 +165,7 @@ const METHODS: [&str; 5] = [
 ];
 
 /// Table VI: a row a bias, a column a method.
-pub(super) fn biases(settings: &Biases, workers: &Workers) -> Result<Found, Failure> {
+pub(super) fn biases(settings: &Biases, workers: &Workers) -> Result<Numbers, Failure> {
     let judged = workers.map(settings.input_biases.len(), |index| {
         let bench = Bench::new(&settings.setup, settings.input_biases[index])?;
         let [one, two, with_bias] = bench.by_pem(settings.start_s);
@@ -176,7 +176,7 @@ pub(super) fn biases(settings: &Biases, workers: &Workers) -> Result<Found, Fail
     let judged: Vec<[Option<Deterioration>; 5]> =
         judged.into_iter().collect::<Result<_, Failure>>()?;
     let both = || settings.input_biases.iter().zip(&judged);
-    let rows = both().map(|(bias, judged)| Row::new(format!("{bias:.1} h"), judged.map(shown)));
+    let rows = both().map(|(bias, judged)| Row::new(format!("{bias:.1} h"), judged.map(cost_cell)));
     let series = METHODS.iter().enumerate().map(|(number, label)| {
         let points = both().filter_map(|(bias, judged)| {
             let relative = judged[number]?.relative()?;
@@ -184,17 +184,8 @@ pub(super) fn biases(settings: &Biases, workers: &Workers) -> Result<Found, Fail
         });
         Series::of_points(label, Marks::LineAndPoints, points)
     });
-    Ok(Found {
+    Ok(Numbers {
         tables: vec![rows.collect()],
         figures: vec![series.collect()],
     })
-}
-
-/// `J` as a cell.
-pub(super) fn shown(judged: Option<Deterioration>) -> String {
-    match judged {
-        Some(Deterioration::Stable { relative, .. }) => percent(relative),
-        Some(Deterioration::Unstable) => "unstable".to_owned(),
-        None => "no answer".to_owned(),
-    }
 }

@@ -6,72 +6,24 @@ use std::time::{Duration, Instant};
 
 use indicatif::ProgressBar;
 use onecycle_lab::learn::onnx;
-use onecycle_lab::learn::train::{Dataset, Epoch, Loss, Network, Trainer};
+use onecycle_lab::learn::train::{Dataset, Loss, Network, Trainer};
 use onecycle_lab::paper::classifier::{
-    Classes, ClassifierError, ClassifierRecipe, Examples, Gain, PickRule, Protocol, Score,
-    Standard, Standardised, picks,
+    Classes, ClassifierError, ClassifierRecipe, Examples, Gain, PickRule, Score, Standard,
+    Standardised, picks,
 };
 use serde::Serialize;
 
-use super::part::Part;
+use super::Kept;
 use crate::args;
 use crate::commands::workers::{Quiet, Workers};
 use crate::failure::{Failure, exit};
-use crate::output::{print, progress_bar_with_message, write_file, write_text};
+use crate::journal::Journal;
+use crate::output::{print, progress_bar, write_file, write_text};
 use crate::report::classifier as report;
-use crate::settings;
+use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
 
 /// Key of what is said beside the weights; changes with every change that a reader could notice.
 const FORMAT: &str = "onecycle.classifier/1";
-
-/// What the command has done.
-#[derive(Serialize)]
-pub(crate) struct Done<'a> {
-    pub(crate) recipe: &'a ClassifierRecipe,
-    pub(crate) classes: usize,
-    pub(crate) weights: usize,
-    pub(crate) examples: usize,
-    pub(crate) unsteady: u64,
-    pub(crate) sets: Vec<Set>,
-    pub(crate) networks: Vec<Trained>,
-    /// Number of the network that was chosen, from zero.
-    pub(crate) best: usize,
-    pub(crate) seconds: f64,
-}
-
-/// Experiments that networks are scored on, and how the best picks there are would fare.
-#[derive(Serialize)]
-pub(crate) struct Set {
-    pub(crate) kind: Kind,
-    pub(crate) protocol: Protocol,
-    pub(crate) examples: usize,
-    pub(crate) unsteady: u64,
-    /// Gains from harmonics, gains from amplitudes.
-    pub(crate) best: [Score; 2],
-}
-
-/// What a set is of.
-#[derive(Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Kind {
-    /// The classes, which the best epoch is chosen by.
-    Verification,
-    /// Random processes.
-    Test,
-}
-
-/// What came of a loss.
-#[derive(Serialize)]
-pub(crate) struct Trained {
-    pub(crate) loss: Loss,
-    /// Why it ended.
-    pub(crate) outcome: &'static str,
-    pub(crate) history: Vec<Epoch>,
-    /// Seconds of training in this run.
-    pub(crate) seconds: f64,
-    /// Of every set the scores by [`PickRule::ALL`].
-    pub(crate) scores: Vec<[Score; 2]>,
-}
 
 /// What is beside the weights of the best network.
 #[derive(Serialize)]
@@ -96,59 +48,47 @@ struct Lesson<'a> {
 
 /// What a recipe has led to.
 pub(crate) struct Learnt<'a> {
-    pub(crate) done: Done<'a>,
+    pub(crate) run: ClassifierRun<'a>,
     /// The best network.
     network: Network,
     card: Card<'a>,
 }
 
-/// Where a run keeps its networks while they learn.
-#[derive(Clone, Copy)]
-pub(crate) struct Keep<'a> {
-    /// The file that they stand beside; nothing is kept without.
-    pub(crate) beside: Option<&'a Path>,
-    /// Go on with those that are there.
-    pub(crate) resume: bool,
-}
-
 pub(super) fn run(arguments: &args::Train, recipe: &ClassifierRecipe) -> Result<ExitCode, Failure> {
-    let keep = Keep {
-        beside: arguments.out.as_deref(),
-        resume: arguments.resume,
-    };
+    let failed = |error| Failure::unreadable(&arguments.recipe, error);
+    recipe.validate().map_err(failed)?;
     let workers = Workers::new(arguments.threads)?;
-    let learnt = learn(recipe, keep, &workers, |error| {
-        settings::out_of_range(&arguments.recipe, error)
-    })?;
+    let journal = (arguments.out.as_deref())
+        .map(|out| super::journal(out, recipe, arguments.restart))
+        .transpose()?;
+    let learnt = learn(recipe, journal.as_ref(), &workers, failed)?;
     if let Some(out) = &arguments.out {
         write(out, &learnt.network, &learnt.card)?;
     }
     if let Some(path) = &arguments.json {
-        let text = report::json(&learnt.done);
+        let text = report::json(&learnt.run);
         write_text(path, &text)?;
     }
-    print(&report::text(&learnt.done))?;
-    keep.remove(recipe)?;
+    print(&report::text(&learnt.run))?;
+    journal.map_or(Ok(()), Journal::remove)?;
     Ok(ExitCode::from(exit::DONE))
 }
 
 /// Trains a network with every loss of a recipe and scores them; `failed` says whose recipe it is.
 pub(crate) fn learn<'a>(
     recipe: &'a ClassifierRecipe,
-    keep: Keep<'_>,
+    journal: Option<&Journal>,
     workers: &'a Workers,
     failed: impl Fn(ClassifierError) -> Failure,
 ) -> Result<Learnt<'a>, Failure> {
     let begin = Instant::now();
-    recipe.validate().map_err(&failed)?;
     let lesson = Lesson::prepare(recipe, workers).map_err(failed)?;
-    let bar = progress_bar_with_message(recipe.losses.len() as u64 * recipe.epochs);
+    let bar = progress_bar(recipe.losses.len() as u64 * recipe.epochs);
     let mut networks = Vec::new();
     let mut best: Option<((usize, f64), usize, Network)> = None;
     for number in 0..recipe.losses.len() {
-        let part = keep.part(recipe, number)?;
         bar.set_position(number as u64 * recipe.epochs);
-        let (trained, network) = lesson.learn(number, part.as_ref(), keep.resume, &bar)?;
+        let (trained, network) = lesson.learn(number, journal, &bar)?;
         let key = standing(&trained.scores[0]);
         if best.as_ref().is_none_or(|(least, ..)| key < *least) {
             best = Some((key, number, network));
@@ -160,31 +100,18 @@ pub(crate) fn learn<'a>(
     let card = lesson.card(best, better_rule(&networks[best].scores[0]));
     let weights = network.folded().weights();
     Ok(Learnt {
-        done: lesson.done(networks, (best, weights), begin.elapsed()),
+        run: lesson.run(networks, (best, weights), begin.elapsed()),
         network,
         card,
     })
 }
 
-impl Keep<'_> {
-    /// The file of the network of loss `number`, from zero.
-    fn part(&self, recipe: &ClassifierRecipe, number: usize) -> Result<Option<Part>, Failure> {
-        let Some(out) = self.beside else {
-            return Ok(None);
-        };
-        let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
-        Ok(Some(Part::of(out, number + 1, kept)))
+/// Removes the networks of a recipe from a journal that outlives them.
+pub(crate) fn forget(journal: &Journal, recipe: &ClassifierRecipe) -> Result<(), Failure> {
+    for number in 1..=recipe.losses.len() {
+        journal.remove_piece(&Kept { journal, number }.name())?;
     }
-
-    /// Removes what was kept: all is written.
-    pub(crate) fn remove(&self, recipe: &ClassifierRecipe) -> Result<(), Failure> {
-        for number in 0..recipe.losses.len() {
-            if let Some(part) = self.part(recipe, number)? {
-                part.remove()?;
-            }
-        }
-        Ok(())
-    }
+    Ok(())
 }
 
 /// The less the better: unstable picks, then the mean cost, by the better rule.
@@ -235,12 +162,15 @@ impl<'a> Lesson<'a> {
     fn learn(
         &self,
         number: usize,
-        part: Option<&Part>,
-        resume: bool,
+        journal: Option<&Journal>,
         bar: &ProgressBar,
-    ) -> Result<(Trained, Network), Failure> {
+    ) -> Result<(TrainedNetwork, Network), Failure> {
         let begin = Instant::now();
-        let mut trainer = super::begun(part, resume, || {
+        let kept = journal.map(|journal| Kept {
+            journal,
+            number: number + 1,
+        });
+        let mut trainer = super::begun(kept.as_ref(), || {
             let network = self.recipe.network(self.classes.len())?;
             Ok::<_, ClassifierError>(Trainer::new(self.recipe.settings(number), network)?)
         })?;
@@ -255,7 +185,7 @@ impl<'a> Lesson<'a> {
             &mut trainer,
             [&training, &verification],
             self.workers,
-            part,
+            kept.as_ref(),
             |epoch| {
                 bar.set_position(number as u64 * self.recipe.epochs + epoch.number);
                 bar.set_message(format!(
@@ -265,7 +195,7 @@ impl<'a> Lesson<'a> {
             },
         )?;
         let network = (self.standard.before(trainer.best())).map_err(Failure::usage)?;
-        let trained = Trained {
+        let trained = TrainedNetwork {
             loss,
             outcome: super::described(outcome),
             history: trainer.history().to_vec(),
@@ -294,28 +224,28 @@ impl<'a> Lesson<'a> {
         }
     }
 
-    fn done(
+    fn run(
         &self,
-        networks: Vec<Trained>,
+        networks: Vec<TrainedNetwork>,
         (best, weights): (usize, usize),
         took: Duration,
-    ) -> Done<'a> {
-        let verification = (Kind::Verification, self.recipe.protocol);
+    ) -> ClassifierRun<'a> {
+        let verification = (SetKind::Verification, self.recipe.protocol);
         let tests = self
             .recipe
             .tests
             .iter()
-            .map(|test| (Kind::Test, test.protocol));
+            .map(|test| (SetKind::Test, test.protocol));
         let sets = [verification].into_iter().chain(tests).zip(&self.sets);
         let gains = [Gain::Harmonics, Gain::Amplitude];
-        Done {
+        ClassifierRun {
             recipe: self.recipe,
             classes: self.classes.len(),
             weights,
             examples: self.training.len(),
             unsteady: self.training.unsteady(),
             sets: sets
-                .map(|((kind, protocol), examples)| Set {
+                .map(|((kind, protocol), examples)| ScoredSet {
                     kind,
                     protocol,
                     examples: examples.len(),

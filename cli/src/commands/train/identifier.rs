@@ -1,66 +1,42 @@
 //! An identifier from nothing: experiments, training, calibration, scores, a pack.
 
-use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
 use onecycle_lab::learn::dataset::shards::ExampleRecord;
 use onecycle_lab::learn::identifier::{
-    Calibrated, IdentifierError, IdentifierRecipe, Scores, calibrated, rows, scores,
+    Calibrated, IdentifierError, IdentifierRecipe, calibrated, rows, scores,
 };
 use onecycle_lab::learn::pack::{PackContents, Quantisation, quantisation};
 use onecycle_lab::learn::train::{Epoch, Network, Outcome, Trainer};
 use onecycle_onboard::pack::{Pack, Sizes};
-use serde::Serialize;
 
-use super::part::Part;
+use super::Kept;
 use crate::args;
 use crate::commands::dataset::filled;
 use crate::commands::workers::Workers;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print, progress_bar_with_message, write_file, write_text};
+use crate::journal::Journal;
+use crate::output::{Waiting, print, progress_bar, with_ending, write_file, write_text};
 use crate::report::identifier as report;
-use crate::settings;
-
-/// What the command has done.
-#[derive(Serialize)]
-pub(crate) struct Done {
-    pub(crate) examples: usize,
-    pub(crate) weights: usize,
-    pub(crate) outcome: &'static str,
-    pub(crate) epochs: u64,
-    pub(crate) best_epoch: u64,
-    pub(crate) scores: Vec<Scored>,
-    #[serde(skip)]
-    pub(crate) quantisation: Quantisation,
-    #[serde(skip)]
-    pub(crate) sizes: Sizes,
-    #[serde(skip)]
-    pub(crate) seconds: [f64; 2],
-}
-
-/// Scores of all cycles, or of one family's.
-#[derive(Serialize)]
-pub(crate) struct Scored {
-    /// Number of the family, from one; `None` of all.
-    pub(crate) family: Option<usize>,
-    #[serde(flatten)]
-    pub(crate) scores: Scores,
-}
+use crate::results::identifier::{FamilyScores, IdentifierRun};
 
 pub(super) fn run(arguments: &args::Train, recipe: &IdentifierRecipe) -> Result<ExitCode, Failure> {
     recipe
         .validate()
-        .map_err(|error| settings::out_of_range(&arguments.recipe, error))?;
+        .map_err(|error| Failure::unreadable(&arguments.recipe, error))?;
     let out = arguments.out.as_deref().ok_or_else(|| {
         Failure::usage("an identifier is written to a pack: name the file with --out")
     })?;
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
     let dataset = arguments.dataset.clone();
-    let path = dataset.unwrap_or_else(|| beside(out, "dataset"));
+    let path = dataset.unwrap_or_else(|| with_ending(out, "dataset"));
     let experiments = recipe.experiments.clone();
-    let (folder, ..) = filled(&path, experiments, recipe.experiments(), &workers)?;
+    // A dataset of the user's stays; one of an interrupted run goes with its work.
+    let restart = arguments.restart && arguments.dataset.is_none();
+    let wanted = (experiments, recipe.experiments());
+    let (folder, ..) = filled(&path, wanted, restart, &workers)?;
     workers.finish();
     let waiting = Waiting::on("reading the experiments");
     let records = folder.records()?;
@@ -72,12 +48,11 @@ pub(super) fn run(arguments: &args::Train, recipe: &IdentifierRecipe) -> Result<
         let to = records.partition_point(|record| record.number < numbers.end);
         &records[from..to]
     });
-    let kept = serde_json::to_string(recipe).map_err(Failure::usage)?;
-    let part = Part::of(out, 1, kept);
-    let (trainer, outcome) = learn(recipe, [learning, choosing], &part, arguments, &workers)?;
+    let journal = super::journal(out, recipe, arguments.restart)?;
+    let (trainer, outcome) = learn(recipe, [learning, choosing], &journal, &workers)?;
     let waiting = Waiting::on("calibrating");
     let (pack, quantisation) = pack(recipe, trainer.best(), [learning, choosing])?;
-    let mut done = Done {
+    let mut trained = IdentifierRun {
         examples: records.len(),
         weights: trainer.best().weights(),
         outcome: super::described(outcome),
@@ -89,49 +64,41 @@ pub(super) fn run(arguments: &args::Train, recipe: &IdentifierRecipe) -> Result<
         seconds: [simulated_s, 0.0],
     };
     waiting.goes_on("scoring");
-    let bytes = finish(pack, recipe, scoring, &mut done).map_err(Failure::usage)?;
+    let bytes = finish(pack, recipe, scoring, &mut trained).map_err(Failure::usage)?;
     drop(waiting);
     write_file(out, |file| file.write_all(&bytes))?;
-    done.seconds[1] = begin.elapsed().as_secs_f64() - simulated_s;
+    trained.seconds[1] = begin.elapsed().as_secs_f64() - simulated_s;
     if let Some(path) = &arguments.json {
-        let text = report::json(recipe, &done);
+        let text = report::json(recipe, &trained);
         write_text(path, &text)?;
     }
-    print(&report::text(&done, out))?;
-    part.remove()?;
+    print(&report::text(&trained, out))?;
+    journal.remove()?;
     if arguments.dataset.is_none() {
         folder.remove()?;
     }
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The path with another ending behind it.
-fn beside(path: &Path, ending: &str) -> PathBuf {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".");
-    name.push(ending);
-    PathBuf::from(name)
-}
-
 fn learn(
     recipe: &IdentifierRecipe,
     [learning, choosing]: [&[ExampleRecord]; 2],
-    part: &Part,
-    arguments: &args::Train,
+    journal: &Journal,
     workers: &Workers,
 ) -> Result<(Trainer, Outcome), Failure> {
-    let mut trainer = super::begun(Some(part), arguments.resume, || {
+    let kept = Kept { journal, number: 1 };
+    let mut trainer = super::begun(Some(&kept), || {
         recipe
             .network()
             .and_then(|network| Trainer::new(recipe.settings(), network))
     })?;
-    let bar = progress_bar_with_message(recipe.epochs);
+    let bar = progress_bar(recipe.epochs);
     let (training, validation) = (rows(learning), rows(choosing));
     let outcome = super::train(
         &mut trainer,
         [&training, &validation],
         workers,
-        Some(part),
+        Some(&kept),
         |epoch| {
             bar.set_position(epoch.number);
             bar.set_message(format!(
@@ -178,7 +145,7 @@ fn finish(
     mut pack: PackContents,
     recipe: &IdentifierRecipe,
     scoring: &[ExampleRecord],
-    done: &mut Done,
+    trained: &mut IdentifierRun,
 ) -> Result<Vec<u8>, IdentifierError> {
     let bytes = pack.to_bytes()?;
     let read = Pack::read(&bytes).map_err(onecycle_lab::learn::pack::PackContentsError::from)?;
@@ -188,18 +155,18 @@ fn finish(
             .iter()
             .filter(|record| family.is_none_or(|family| record.example.family + 1 == family))
             .collect();
-        Scored {
+        FamilyScores {
             family,
             scores: scores(&read, &cycles),
         }
     };
-    done.scores = std::iter::once(None)
+    trained.scores = std::iter::once(None)
         .chain((1..=families).map(Some).filter(|_| families > 1))
         .map(of)
         .collect();
-    pack.card = report::card(recipe, done);
+    pack.card = report::card(recipe, trained);
     let bytes = pack.to_bytes()?;
     let read = Pack::read(&bytes).map_err(onecycle_lab::learn::pack::PackContentsError::from)?;
-    done.sizes = read.sizes();
+    trained.sizes = read.sizes();
     Ok(bytes)
 }

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value, json};
 
 use super::{Axis, Field, FieldKind, Figure, Hue, Marks, Note, Panel, Places, Series, Shape};
-use crate::pages::page::escaped;
+use crate::pages::escape::escaped;
 
 /// Part of the height between two panels.
 const BETWEEN: f64 = 0.06;
@@ -28,6 +28,8 @@ impl Figure {
                     .map(|note| annotation(note, panel, self, &number)),
             );
             let mut axis = axis(&panel.y, panel.field.as_ref().map(|field| &field.y));
+            let values = panel.series.iter().flat_map(|series| &series.y);
+            space_labels(&mut axis, &panel.y, values);
             axis["domain"] = json!(domain(index, self.panels.len()));
             if self.shape == Shape::ToScale {
                 axis["scaleanchor"] = json!("x");
@@ -37,6 +39,8 @@ impl Figure {
         let field = self.panels.iter().find_map(|panel| panel.field.as_ref());
         let mut x = axis(&self.x, field.map(|field| &field.x));
         x["anchor"] = json!(format!("y{lowest}"));
+        let series = self.panels.iter().flat_map(|panel| &panel.series);
+        space_labels(&mut x, &self.x, series.flat_map(|series| &series.x));
         layout.insert("xaxis".to_owned(), x);
         layout.insert("annotations".to_owned(), json!(annotations));
         if let Some((from, to)) = self.span {
@@ -97,6 +101,10 @@ fn axis(axis: &Axis, places: Option<&Places>) -> Value {
         "automargin": true,
         "zeroline": false,
     });
+    if kind == "category" {
+        // Upright where there is no room: slanted labels touch each other.
+        out["autotickangles"] = json!([0, 90]);
+    }
     if axis.is_bare {
         out["showticklabels"] = json!(false);
         out["showgrid"] = json!(false);
@@ -105,6 +113,29 @@ fn axis(axis: &Axis, places: Option<&Places>) -> Value {
         out["range"] = json!([scaled(axis, low), scaled(axis, high)]);
     }
     out
+}
+
+/// Most decades of an axis whose labels stand at 1, 2 and 5, and most labels of an axis of more decades.
+const FEW_DECADES: f64 = 2.5;
+const MOST_LABELS: f64 = 6.0;
+
+/// Sets the labels of a logarithmic axis: on its own plotly.js labels each of 1 to 9, and they touch.
+fn space_labels<'a>(out: &mut Value, axis: &Axis, values: impl Iterator<Item = &'a f64>) {
+    let (low, high) = axis.range.unwrap_or_else(|| {
+        let positive = values.filter(|value| **value > 0.0);
+        positive.fold((f64::INFINITY, 0.0), |(low, high), value| {
+            (value.min(low), value.max(high))
+        })
+    });
+    let decades = (high / low).log10();
+    // Less than a decade has even steps.
+    if axis.is_logarithmic && decades >= 1.0 {
+        out["dtick"] = if decades < FEW_DECADES {
+            json!("D2")
+        } else {
+            json!((decades / MOST_LABELS).ceil())
+        };
+    }
 }
 
 /// A coordinate as ranges and annotations have it.
@@ -157,10 +188,11 @@ fn trace(series: &Series, number: &str) -> Value {
 fn of_field(field: &Field, number: &str) -> Value {
     let mut trace = json!({
         "x": field.x, "y": field.y,
-        "yaxis": format!("y{number}"), "showlegend": false, "showscale": false, "kind": field.kind,
+        "yaxis": format!("y{number}"), "showlegend": false, "showscale": false,
     });
     match field.kind {
         FieldKind::Regions => {
+            trace["kind"] = json!("regions");
             trace["type"] = json!("contour");
             trace["hoverinfo"] = json!("x+y");
             let rows = field.z.iter();
@@ -173,12 +205,26 @@ fn of_field(field: &Field, number: &str) -> Value {
             trace["contours"] = json!({ "start": 1, "end": REGIONS.len(), "size": 1 });
         }
         FieldKind::Correlations => {
+            trace["kind"] = json!("diverging");
             trace["type"] = json!("heatmap");
             trace["z"] = json!(field.z);
             trace["zmin"] = json!(-1.0);
             trace["zmax"] = json!(1.0);
             trace["texttemplate"] = json!("%{z:.2f}");
             trace["hovertemplate"] = json!("%{x}, %{y}: %{z:.3f}<extra></extra>");
+        }
+        FieldKind::Diverging { middle, reach } => {
+            trace["kind"] = json!("diverging");
+            trace["type"] = json!("heatmap");
+            trace["z"] = json!(field.z);
+            trace["zmin"] = json!(middle - reach);
+            trace["zmax"] = json!(middle + reach);
+            trace["showscale"] = json!(true);
+            trace["colorbar"] = json!({
+                "orientation": "h", "x": 0.5, "xanchor": "center", "y": 1.02, "yanchor": "bottom",
+                "thickness": 12, "outlinewidth": 0,
+            });
+            trace["hovertemplate"] = json!("%{x:.3g}, %{y:.3g}: %{z:.1f}<extra></extra>");
         }
     }
     trace
@@ -264,6 +310,9 @@ mod tests {
         assert_eq!(layout["xaxis"]["anchor"], "y2");
         assert_eq!(layout["xaxis"]["range"], json!([-1.0, 3.0]));
         assert_eq!(layout["yaxis2"]["range"], json!([-1.0, 4.0]));
+        // Four decades: a label each.
+        assert_eq!(layout["xaxis"]["dtick"], 1.0);
+        assert_eq!(layout["yaxis2"]["dtick"], Value::Null);
         assert_eq!(layout["annotations"][0]["y"], 2.0);
         assert_eq!(layout["annotations"][0]["yref"], "y");
         let top = layout["yaxis2"]["domain"][1].as_f64().unwrap();

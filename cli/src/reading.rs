@@ -1,0 +1,73 @@
+//! Files that are read with a bar of bytes on the error output.
+
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+
+use crate::output::Waiting;
+
+/// Opens a file. While it is read, a bar of its bytes is shown on the error output if reading takes longer than half a
+/// second and that is a terminal; the bar goes when the reader is dropped.
+///
+/// # Errors
+/// The error of opening. A folder is refused here, though systems open one.
+pub(crate) fn open_with_bar(path: &Path) -> io::Result<FileWithBar> {
+    let file = File::open(path)?;
+    let about = file.metadata()?;
+    if about.is_dir() {
+        return Err(io::Error::new(ErrorKind::IsADirectory, "Is a directory"));
+    }
+    let work = format!("reading {}", path.display());
+    // Pipes and devices do not tell their length.
+    let waiting = if about.is_file() {
+        Waiting::on_bytes(work, about.len())
+    } else {
+        Waiting::on(work)
+    };
+    Ok(FileWithBar { file, waiting })
+}
+
+/// A file that counts the bytes read from it.
+pub(crate) struct FileWithBar {
+    file: File,
+    waiting: Waiting,
+}
+
+impl Read for FileWithBar {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let count = self.file.read(buffer)?;
+        self.waiting.advance(count as u64);
+        Ok(count)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // 10,000 bytes of 10,000, in pieces of 4096, and they are those of the file.
+    #[test]
+    fn bytes_are_counted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("log.csv");
+        let bytes: Vec<u8> = (0..10_000_u32).map(|k| k as u8).collect();
+        std::fs::write(&path, &bytes).unwrap();
+        let mut reader = open_with_bar(&path).unwrap();
+        assert_eq!(reader.waiting.position(), (0, Some(10_000)));
+        let mut read = vec![0; 4096];
+        reader.read_exact(&mut read).unwrap();
+        assert_eq!(reader.waiting.position(), (4096, Some(10_000)));
+        reader.read_to_end(&mut read).unwrap();
+        assert_eq!(reader.waiting.position(), (10_000, Some(10_000)));
+        assert!(read == bytes);
+    }
+
+    #[test]
+    fn what_cannot_be_read_does_not_open() {
+        let folder = tempfile::tempdir().unwrap();
+        let kind = |path: &Path| open_with_bar(path).err().map(|error| error.kind());
+        assert_eq!(kind(folder.path()), Some(ErrorKind::IsADirectory));
+        let missing = folder.path().join("nosuch.csv");
+        assert_eq!(kind(&missing), Some(ErrorKind::NotFound));
+    }
+}
