@@ -92,7 +92,7 @@ fn from_recipe_to_pack_through_an_interruption() {
         "--threads",
         "3",
     ];
-    let part = folder.path("other.pack.part/network_1.safetensors");
+    let part = folder.path("other.pack.part/network_1.part");
     killed_when(&resumed, || part.exists());
     assert!(!folder.path("other.pack").exists());
     trained(&resumed[1..]);

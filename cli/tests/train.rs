@@ -74,10 +74,10 @@ fn from_recipe_to_table_and_network_through_interruptions() {
         "--threads",
         "3",
     ];
-    let work = folder.path("out.safetensors.part");
-    for network in ["network_1.safetensors", "network_2.safetensors"] {
+    let work = folder.path("out.onnx.part");
+    for network in ["network_1.part", "network_2.part"] {
         killed_when(&resumed, || work.join(network).exists());
-        assert!(!folder.path("out.safetensors").exists());
+        assert!(!folder.path("out.onnx").exists());
     }
     let resumed = run(&resumed);
     assert_eq!(resumed.code, Some(0), "{resumed:?}");
@@ -157,8 +157,8 @@ fn wrong_recipes_are_refused_in_one_sentence() {
 fn a_part_of_something_else() {
     let folder = Scratch::new();
     let recipe = recipe(&folder);
-    let out = folder.name("out.safetensors");
-    let part = folder.path("out.safetensors.part/network_1.safetensors");
+    let out = folder.name("out.onnx");
+    let part = folder.path("out.onnx.part/network_1.part");
     killed_when(&["train", "--recipe", &recipe, "-o", &out], || {
         part.exists()
     });
@@ -174,7 +174,7 @@ fn a_part_of_something_else() {
     ] {
         std::fs::write(&part, &bytes).unwrap();
         let refused = run(&["train", "--recipe", recipe, "-o", &out]);
-        refused.refused(UNREADABLE, &["out.safetensors.part", words]);
+        refused.refused(UNREADABLE, &["out.onnx.part", words]);
         assert!(std::fs::read(&part).unwrap() == bytes);
     }
     let nowhere = folder.name("no/such/folder/out.onnx");

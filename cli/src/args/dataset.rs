@@ -16,7 +16,7 @@ use super::MOST_THREADS;
     "Examples:\n",
     "  onecycle dataset --examples 40000 --into multirotors\n",
     "  onecycle dataset experiments/identifier.toml --examples 1000000 --into examples_to_learn\n",
-    "  python examples/train_pytorch.py multirotors network.safetensors\n\n",
+    "  python examples/train_pytorch.py multirotors network.onnx\n\n",
     "The same command resumes an interrupted run. With a larger --examples it adds what is missing, and\n",
     "damaged files are made again; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or a folder of something else, ",

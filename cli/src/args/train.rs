@@ -16,7 +16,7 @@ use super::MOST_THREADS;
     "Examples:\n",
     "  onecycle train --recipe experiments/identifier.toml -o mine.pack\n",
     "  onecycle train --recipe cli/reproduction/paper_network_small.toml\n",
-    "  onecycle train --recipe cli/reproduction/paper_network.toml -o paper.safetensors --json table.json\n\n",
+    "  onecycle train --recipe cli/reproduction/paper_network.toml -o paper.onnx --json table.json\n\n",
     "With --out, every epoch is kept in the folder OUT.part until the result is written: the same command\n",
     "resumes an interrupted run, to the same bits; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or part, 5 output not written"

@@ -1,0 +1,63 @@
+//! docs/identify-json.md against the program: the same keys, no more and no less.
+
+// Helpers of tests are tests too, which the lint does not see.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::collections::BTreeSet;
+use std::path::Path;
+
+use serde_json::Value;
+
+use crate::common::{Table, identify};
+
+/// Keys in the first column of the tables, without those of an interval.
+fn documented() -> BTreeSet<String> {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/identify-json.md");
+    let text = std::fs::read_to_string(path).unwrap();
+    let key = |line: &str| Some(line.strip_prefix("| `")?.split('`').next()?.to_owned());
+    text.lines().filter_map(key).collect()
+}
+
+/// Dotted paths of all keys of an object; an interval is one key.
+fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
+    let Value::Object(object) = value else { return };
+    if object.contains_key("estimate") {
+        return;
+    }
+    for (key, value) in object {
+        let path = if path.is_empty() {
+            key.clone()
+        } else {
+            format!("{path}.{key}")
+        };
+        keys(value, &path, found);
+        found.insert(path);
+    }
+}
+
+// An identification has every documented key. `columns` and its three columns, and `verdict`, are documented by their
+// parts alone.
+#[test]
+fn the_documented_keys_are_those_of_the_report() {
+    let report = identify(Table::noisy().csv(), &[]).identified();
+    let mut found = BTreeSet::new();
+    keys(&report.0, "", &mut found);
+    for part in ["columns", "columns.time", "columns.input", "columns.output", "verdict"] {
+        assert!(found.remove(part), "{part}");
+    }
+    assert_eq!(found, documented());
+}
+
+// A refusal has the same keys at the top, null where there is no answer.
+#[test]
+fn a_refusal_has_the_same_keys() {
+    let whole = identify(Table::noisy().csv(), &[]).identified();
+    let report = identify("t,u,y\n0,1,0\n1,1,0\n2,1,0\n".to_owned(), &[]).no_process("no_relay");
+    let top = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    assert_eq!(top(&report.0), top(&whole.0));
+    for key in ["excitation", "structure", "process", "controller", "margins"] {
+        assert_eq!(report.0[key], Value::Null, "{key}");
+    }
+}
