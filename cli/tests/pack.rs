@@ -178,16 +178,16 @@ fn damaged_files_are_refused() {
     for (name, bytes, words) in [
         ("flipped", &flipped[..], "is damaged: its content hash"),
         ("newer", &newer, "made by a newer onecycle"),
-        ("longer", &longer, "where it says"),
+        ("longer", &longer, "but its header says"),
         ("cut", &bytes[..length / 2], &cut_at),
         ("header", &bytes[..10], "cut off"),
         ("empty", &[], "no bytes"),
         ("csv", b"time_s,pv,u\n0,1,2\n", "not a pack of onecycle"),
-        ("onnx", &onnx, "no pack of onecycle"),
+        ("onnx", &onnx, "not a pack of onecycle"),
         (
             "tensors",
             &network(4, OUTPUTS, 1).save(),
-            "no pack of onecycle",
+            "not a pack of onecycle",
         ),
     ] {
         let path = folder.write(name, bytes);
@@ -350,7 +350,7 @@ fn networks_that_do_not_fit_are_refused() {
             &onnx_of(&network(9, 13, 1)),
             "14 outputs, but has 13",
         ),
-        ("c.onnx", &onnx_of(&narrow), "5 inputs where 34 come in"),
+        ("c.onnx", &onnx_of(&narrow), "5 inputs, but gets 34"),
         (
             "d.onnx",
             &onnx_of(&network(200, OUTPUTS, 1)),
