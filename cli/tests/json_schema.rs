@@ -44,7 +44,13 @@ fn the_documented_keys_are_those_of_the_report() {
     let report = identify(Table::noisy().csv(), &[]).identified();
     let mut found = BTreeSet::new();
     keys(&report.0, "", &mut found);
-    for part in ["columns", "columns.time", "columns.input", "columns.output", "verdict"] {
+    for part in [
+        "columns",
+        "columns.time",
+        "columns.input",
+        "columns.output",
+        "verdict",
+    ] {
         assert!(found.remove(part), "{part}");
     }
     assert_eq!(found, documented());
@@ -55,9 +61,22 @@ fn the_documented_keys_are_those_of_the_report() {
 fn a_refusal_has_the_same_keys() {
     let whole = identify(Table::noisy().csv(), &[]).identified();
     let report = identify("t,u,y\n0,1,0\n1,1,0\n2,1,0\n".to_owned(), &[]).no_process("no_relay");
-    let top = |value: &Value| value.as_object().unwrap().keys().cloned().collect::<Vec<_>>();
+    let top = |value: &Value| {
+        value
+            .as_object()
+            .unwrap()
+            .keys()
+            .cloned()
+            .collect::<Vec<_>>()
+    };
     assert_eq!(top(&report.0), top(&whole.0));
-    for key in ["excitation", "structure", "process", "controller", "margins"] {
+    for key in [
+        "excitation",
+        "structure",
+        "process",
+        "controller",
+        "margins",
+    ] {
         assert_eq!(report.0[key], Value::Null, "{key}");
     }
 }

@@ -95,8 +95,6 @@ struct Search<'a> {
 impl Search<'_> {
     /// The main loop: steps 1 to 8 of the [module](self).
     fn run(&mut self) -> Result<Identified, Verdict> {
-        let specification = &self.options.specification;
-        specification.check().map_err(Verdict::NoController)?;
         let relay = find_relay(self.signals)?;
         let most = self.options.cycles.clamp(1, MOST_CYCLES);
         for stretch in oscillation::stretches(self.signals, &relay, most)? {
@@ -183,9 +181,11 @@ impl Search<'_> {
 
     /// Misfit of an acceptable fit.
     fn judge(&self, refined: &Refined, window: &FitWindow) -> Result<f64, Verdict> {
+        let specification = &self.options.specification;
+        specification.check().map_err(Verdict::NoController)?;
         let misfit = misfit(refined, window);
         let most_error = match self.refusal {
-            None => largest_response_error(self.options.specification.phase_margin_rad),
+            None => largest_response_error(specification.phase_margin_rad),
             Some(_) => MOST_ERROR_OF_SECOND_CHOICE,
         };
         if misfit > MOST_MISFIT || refined.response_error > most_error {

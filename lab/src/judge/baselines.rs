@@ -17,13 +17,12 @@
 //! use onecycle_lab::judge::baselines::{pem, rules};
 //! use onecycle_lab::experiments::signals_of;
 //! use onecycle_onboard::{Soiptd, Relay, RelaySettings};
-//! use onecycle_plant::Experiment;
-//! use rand::SeedableRng;
+//! use onecycle_plant::{Experiment, Noise};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let process = Soiptd::new(1.0, 0.02, 0.3, 0.01)?;
 //! let mut relay = Relay::new(RelaySettings::bare(1.0, -0.73))?;
-//! let mut noise = rand_pcg::Pcg64Mcg::seed_from_u64(1);
+//! let mut noise = Noise::from_seed(1);
 //! let trace = Experiment::new(process, 1e-3, 6.0).run(&mut relay, &mut noise);
 //! let signals = signals_of(&trace, 1e-3);
 //!

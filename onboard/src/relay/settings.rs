@@ -101,7 +101,7 @@ impl RelaySettings {
     }
 }
 
-/// Setting out of range, with its value.
+/// Setting out of range, with its value. Exhaustive, because the C interface has a code for each.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RelayError {
     /// The amplitude is not positive and finite.
