@@ -9,15 +9,15 @@ use super::pack;
 use crate::args::{Identify, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
+use crate::reading::open_with_bar;
 use crate::report::{json, page, plot, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.report {
         check_page(path, &arguments.file)?;
     }
-    let waiting = Waiting::on(format!("reading {}", arguments.file.display()));
     let recording = read(arguments)?;
-    waiting.goes_on("identifying");
+    let waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::read(&arguments.pack, &bytes)?;
     let found = onecycle::Identify::new()
@@ -50,11 +50,11 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     }))
 }
 
-/// Refuses what is no name for a page: the standard output, and the recording itself, however it is spelt.
+/// Refuses the standard output and the recording itself as names of the page.
 fn check_page(path: &Path, recording: &Path) -> Result<(), Failure> {
     if path == Path::new("-") {
         return Err(Failure::usage(
-            "--report needs the name of a file, and - is none",
+            "--report needs the name of a file; it cannot be -",
         ));
     }
     let there = |path: &Path| path.canonicalize().ok();
@@ -76,9 +76,14 @@ fn read(arguments: &Identify) -> Result<Recording, Failure> {
     options.sample_rate_hz = arguments.sample_rate;
     options.time_unit = arguments.time_unit;
     let result = if arguments.file == Path::new("-") {
+        let _waiting = Waiting::on("reading the standard input");
         onecycle::read_from(std::io::stdin().lock(), &options)
     } else {
-        onecycle::read(&arguments.file, &options)
+        match open_with_bar(&arguments.file) {
+            Ok(file) => onecycle::read_from(file, &options),
+            // The library's error names the file.
+            Err(_) => onecycle::read(&arguments.file, &options),
+        }
     };
     result.map_err(|reason| Failure::Recording {
         path: arguments.file.clone(),
