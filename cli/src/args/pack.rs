@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use clap::{Args, Subcommand};
 
-/// Show, check and exchange packs: files that hold all an identifier knows.
+/// Show, verify, export and import packs: files with everything an identifier needs.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -15,8 +15,8 @@ use clap::{Args, Subcommand};
     "  onecycle pack verify my.pack\n",
     "  onecycle pack export my.pack --onnx my.onnx\n",
     "  onecycle pack import learnt.onnx --like default -o learnt.pack\n\n",
-    "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 4 a pack does not give the outputs it ",
-    "must, 5 output not written"
+    "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 4 a pack fails its self-test, ",
+    "5 output not written"
 ))]
 pub(crate) struct Pack {
     #[command(subcommand)]
@@ -31,10 +31,10 @@ pub(crate) enum PackAction {
     Import(ImportPack),
 }
 
-/// Where a pack is.
+/// The source of a pack.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum PackSource {
-    /// In the program.
+    /// The built-in pack.
     Embedded,
     File(PathBuf),
 }
@@ -59,32 +59,32 @@ impl fmt::Display for PackSource {
     }
 }
 
-/// Show what a pack holds, how many bytes each part takes, and its card.
+/// Show the contents of a pack, the size of each part, and its card.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  onecycle pack show default\n  onecycle pack show my.pack --json\n"
 )]
 pub(crate) struct ShowPack {
-    /// The pack; default is the one built in
+    /// Pack; "default" is the built-in one
     #[arg(value_name = "FILE|default")]
     pub(crate) pack: PackSource,
-    /// Print it as JSON
+    /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
 }
 
-/// Check a pack: its length, its hash, every part of it, and the outputs it must give.
+/// Verify a pack: its length, its hash, its parts, and the outputs of its self-test.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  onecycle pack verify default\n  onecycle pack verify my.pack\n"
 )]
 pub(crate) struct VerifyPack {
-    /// The pack; default is the one built in
+    /// Pack; "default" is the built-in one
     #[arg(value_name = "FILE|default")]
     pub(crate) pack: PackSource,
 }
 
-/// Write the network of a pack, the normalisation of its inputs included, as ONNX.
+/// Export the network of a pack, with the normalisation of its inputs, as ONNX.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -93,22 +93,22 @@ pub(crate) struct VerifyPack {
     "  python3 experiments/onnx_check.py my.onnx samples.safetensors\n"
 ))]
 pub(crate) struct ExportPack {
-    /// The pack; default is the one built in
+    /// Pack; "default" is the built-in one
     #[arg(value_name = "FILE|default")]
     pub(crate) pack: PackSource,
-    /// The model to write
+    /// ONNX file to write
     #[arg(long, value_name = "OUT.onnx")]
     pub(crate) onnx: PathBuf,
-    /// Write random inputs and the outputs for them too, to check the model with
+    /// Also write random inputs and their outputs, to test the model with
     #[arg(long, value_name = "OUT.safetensors")]
     pub(crate) samples: Option<PathBuf>,
 }
 
-/// Make a pack of a network that was learnt elsewhere; everything else is taken from another pack.
+/// Make a pack from a network trained elsewhere; everything else is taken from another pack.
 ///
-/// The network has 34 inputs and 14 outputs, as that of the other pack. An ONNX model brings its
-/// activations, and the normalisation of its inputs if it begins with one; a safetensors file has
-/// those of the other pack. Weights are kept in bytes where that pack keeps them so.
+/// The network must have 34 inputs and 14 outputs. An ONNX model has its own activations, and its own
+/// normalisation of the inputs if it begins with one; a safetensors file uses those of the other pack.
+/// Weights are stored as bytes if the other pack stores them so.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -116,13 +116,13 @@ pub(crate) struct ExportPack {
     "  onecycle pack import learnt.safetensors --like my.pack -o learnt.pack\n"
 ))]
 pub(crate) struct ImportPack {
-    /// The network: .onnx or .safetensors
+    /// Network to import: .onnx or .safetensors
     #[arg(value_name = "MODEL")]
     pub(crate) model: PathBuf,
-    /// The pack that gives everything but the network; default is the one built in
+    /// Pack to take everything but the network from; "default" is the built-in one
     #[arg(long, value_name = "PACK|default")]
     pub(crate) like: PackSource,
-    /// The pack to write
+    /// Pack to write
     #[arg(long, short, value_name = "FILE")]
     pub(crate) out: PathBuf,
 }

@@ -11,14 +11,14 @@ use crate::pages::plot::{Marks, Series};
 use crate::report::number::{degrees, percent};
 use crate::results::reproduction::{Numbers, Row};
 
-/// What is laid and how it is checked.
+/// The grids and their check.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GridCheckSettings {
     deterioration: f64,
-    /// Grids, a column each: the gains at which processes are compared.
+    /// One grid, and one column, for each rule of comparing gains.
     gains: Vec<Gains>,
-    /// Random processes of the check, and their seed.
+    /// Number of random processes of the check, and their seed.
     processes: u64,
     seed: u64,
 }
@@ -67,7 +67,7 @@ pub(super) fn find(settings: &GridCheckSettings, workers: &Workers) -> Result<Nu
     })
 }
 
-/// Members by their body's lag and their dead time (s).
+/// Members over `T_body` and `tau` (s).
 fn members(grid: &Grid) -> Series {
     let times_s = grid.members.iter().map(|member| member.candidate.times_s());
     Series::of_points(
