@@ -129,7 +129,7 @@ fn axis_figures(
     let (first, _) = tuned[0];
     let (found, truth) = (&first.identified.process, &first.truth);
     figures.push((
-        format!("{name}: process (true)"),
+        format!("{name}: identified process (true)"),
         format!(
             "K/T_body {:.4} ({:.4}), T_prop {:.1} ms ({:.1}), T_body {} ({}), tau {:.1} ms ({:.1})",
             found.k_over_t_body(),
@@ -160,7 +160,10 @@ fn axis_figures(
             most(&|tuned| tuned.until_s - tuned.from_s)
         ),
     ));
-    figures.push((format!("{name}: on the vehicle"), on_the_vehicle(tuned)));
+    figures.push((
+        format!("{name}: on the true process"),
+        on_the_vehicle(tuned),
+    ));
 }
 
 /// Cost and phase margin of the controllers on the true processes.

@@ -46,16 +46,19 @@ pub(super) fn find(settings: &GridCheckSettings, workers: &Workers) -> Result<Nu
             row("random processes", &|(_, check)| {
                 check.processes.to_string()
             }),
-            row("beyond J* of their best member", &|(_, check)| {
+            row("farther than J* from every member", &|(_, check)| {
                 check.beyond.to_string()
             }),
-            row("farthest from it", &|(_, check)| or_unstable(check.worst)),
-            row("mean distance from it", &|(_, check)| {
+            row("largest distance to a member", &|(_, check)| {
+                or_unstable(check.worst)
+            }),
+            row("mean distance to a member", &|(_, check)| {
                 or_unstable(check.mean)
             }),
-            row("least phase margin under it", &|(_, check)| {
-                check.least_margin_rad.map_or("-".to_owned(), degrees)
-            }),
+            row(
+                "smallest phase margin under its controller",
+                &|(_, check)| check.least_margin_rad.map_or("-".to_owned(), degrees),
+            ),
         ]],
         figures: vec![
             grids

@@ -1,9 +1,4 @@
-//! The library against the program: the same recording, the same numbers; and what a recording brings along.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! The library and the program give the same numbers for the same recording.
 
 use std::path::PathBuf;
 
@@ -21,7 +16,8 @@ fn example(name: &str) -> PathBuf {
 }
 
 fn of_samples(table: &Table) -> Recording {
-    let column = |of: fn(&common::Sample) -> f64| table.0.iter().map(of).collect::<Vec<f64>>();
+    let column =
+        |of: fn(&crate::common::Sample) -> f64| table.0.iter().map(of).collect::<Vec<f64>>();
     let (time_s, input) = (column(|s| s.time_s), column(|s| s.input));
     Recording::from_samples(&time_s, &input, &column(|s| s.output)).unwrap()
 }
@@ -30,8 +26,7 @@ fn interval(of: &onecycle::Interval) -> Value {
     json!({"estimate": of.estimate, "low": of.low, "high": of.high})
 }
 
-// The report's numbers are the shortest that read back to the same bits, so they are the library's numbers to
-// the bit; and each sentence is the same.
+// Numbers in the report read back to the same bits, so they equal the library's numbers exactly; sentences are equal too.
 #[test]
 fn the_program_says_what_the_library_finds() {
     for name in ["simulated_hover.csv", "jsbsim_f450_roll_clean.csv"] {
@@ -68,7 +63,7 @@ fn the_program_says_what_the_library_finds() {
     }
 }
 
-// ArduPilot's altitude wanders: no steady oscillation, from either.
+// The altitude of ArduPilot is not steady, for the library and for the program.
 #[test]
 fn the_program_refuses_what_the_library_refuses() {
     let path = example("unsteady_ardupilot_alt.csv");
@@ -81,7 +76,7 @@ fn the_program_refuses_what_the_library_refuses() {
     assert_eq!(report.advice(), verdict.advice());
 }
 
-// A verdict is also an error to pass on with `?`, and says the same there.
+// A verdict can be returned as an error with `?`, with the same message.
 #[test]
 fn a_refusal_is_a_value_and_an_error() {
     let time_s: Vec<f64> = (0..1000).map(|tick| 1e-3 * f64::from(tick)).collect();
@@ -97,7 +92,7 @@ fn a_refusal_is_a_value_and_an_error() {
     assert_eq!(error.to_string(), Verdict::ConstantInput.to_string());
 }
 
-// The numbers of a CSV read back to the same bits.
+// Numbers in a CSV file read back to the same bits.
 #[test]
 fn samples_in_memory_are_what_they_are_in_a_file() {
     let table = Table::noisy();
@@ -110,8 +105,8 @@ fn samples_in_memory_are_what_they_are_in_a_file() {
     assert_eq!(found, identify(&read));
 }
 
-// Twenty cycles of 0.44 s; 20 ms without a switch are lost in the fifth last. The eight that are fitted by default
-// must then lie on one side. Taken for one stretch the cycle is as long as the others, and they lie on both.
+// Of twenty cycles of 0.44 s, 20 ms without a switch are missing in the fifth last. The eight cycles fitted by default must
+// then be on one side of the gap. If the gap is ignored, the cycle looks like the others, and the eight are on both sides.
 #[test]
 fn no_cycle_reaches_across_a_gap() {
     let mut table = Table::noisy();
@@ -152,15 +147,14 @@ fn options_and_packs_are_passed_on() {
     };
     let found = identify_with(&recording, &options);
     assert_eq!(found.oscillation.unwrap().cycles_used, 2);
-    // The controller is the optimum of a process that is likely, not of the estimate: its margin there is near the one
-    // asked for, and the interval, some degrees wide, holds that one alone.
+    // The interval of the phase margin, a few degrees wide, holds the requested margin and not the default one.
     let asked_and_usual = [45_f64, 20.0].map(|margin_deg| {
         let margin_rad = found.outcome.as_ref().unwrap().phase_margin_rad;
         margin_rad.holds(margin_deg.to_radians())
     });
     assert_eq!(asked_and_usual, [true, false]);
 
-    // The pack that is built in, given by hand, makes no difference; none leaves nothing to read a cycle by.
+    // The built-in pack as an argument makes no difference; without a pack no cycle is read.
     let pack = Pack::embedded().unwrap();
     assert_eq!(identify_by(&recording, &options, Some(&pack)), found);
     assert!(found.reading.is_some());
