@@ -1,4 +1,4 @@
-//! `onecycle identify` as a whole process, from start to exit, on an 8 s, 1 kHz recording:
+//! Time of `onecycle identify` from start to exit, on a recording of 8 s at 1 kHz:
 //! `cargo bench -p onecycle-cli --bench identify`. Target: 50 ms.
 
 use std::path::Path;
@@ -22,7 +22,7 @@ fn main() {
         );
         1e3 * begin.elapsed().as_secs_f64()
     };
-    // The first run reads the program from the disk.
+    // The first run loads the program from disk.
     run();
     let mut milliseconds: Vec<f64> = (0..RUNS).map(|_| run()).collect();
     milliseconds.sort_unstable_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! Arguments, typed and documented; `--help` is generated from here.
+//! Command line arguments. `--help`, the manual and the completions are generated from these definitions.
 
 mod bench;
 mod campaign;
@@ -49,12 +49,13 @@ onecycle COMMAND --help explains each command and has examples.
 Exit codes:
   0  done (identify: a process was identified)
   2  bad arguments
-  3  the input file cannot be read; the message says where and what to do
-  4  the answer is no: the recording tells no process (the verdict says why and what to do), a space
-     is not certified, a grid leaves holes, a pack does not give the outputs it must
+  3  an input file cannot be read; the message says where and what to do
+  4  finished, with a negative result: no process could be identified (the verdict says why and what
+     to do), a space is not certified, a grid leaves holes, a mission ended early, or a pack fails
+     its self-test
   5  the output cannot be written";
 
-/// From one cycle of a relay test to the process and its optimal controller.
+/// Identify a process from a recorded relay test and design its optimal controller.
 #[derive(Debug, Parser)]
 #[command(name = "onecycle", version, after_help = AFTER_HELP, max_term_width = 100)]
 pub(crate) struct Arguments {
@@ -62,8 +63,8 @@ pub(crate) struct Arguments {
     pub(crate) command: Command,
 }
 
-/// In the order in which a newcomer needs them: a recording, a vehicle, a space of processes, how good it all is,
-/// an identifier of one's own.
+/// Commands in the order in which a new user needs them: recordings, simulated vehicles, spaces of processes, benchmarks,
+/// training.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Identify(Identify),
@@ -98,10 +99,10 @@ pub(crate) struct ProcessArguments {
     /// Acceleration gain K/T_body, instead of K: output unit / (input unit s^2)
     #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
     k_over_t_body: Option<f64>,
-    /// Lag of the actuator, in seconds
+    /// Time constant of the actuator, in seconds
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     t_prop: f64,
-    /// Lag of the body, in seconds; inf for no damping (then give --k-over-t-body)
+    /// Time constant of the body, in seconds; inf for no damping (then use --k-over-t-body)
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     t_body: f64,
     /// Dead time, in seconds
@@ -120,8 +121,7 @@ impl ProcessArguments {
             }
             (Some(_), None) if self.t_body.is_infinite() => {
                 return Err(Failure::usage(
-                    "with --t-body inf the velocity gain is infinite: give --k-over-t-body \
-                     instead of --k",
+                    "--t-body inf makes the velocity gain infinite: use --k-over-t-body instead of --k",
                 ));
             }
             (k, None) => Soiptd::new(k.unwrap_or(0.0), self.t_prop, self.t_body, self.tau),
@@ -130,7 +130,7 @@ impl ProcessArguments {
     }
 }
 
-/// A value, or a percentage of something the help names.
+/// A value, or a percentage of a quantity that the help names.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Share {
     Value(f64),
@@ -138,7 +138,7 @@ pub(crate) enum Share {
 }
 
 impl Share {
-    /// The value, percentages being of `whole`.
+    /// The value; a percentage is taken of `whole`.
     pub(crate) fn of(self, whole: f64) -> f64 {
         match self {
             Self::Value(value) => value,
@@ -164,7 +164,7 @@ impl FromStr for Share {
     }
 }
 
-/// Design the optimal controller of a process: gains, margins and the step to expect.
+/// Design the optimal controller of a known process: gains, margins and the predicted step response.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -174,11 +174,11 @@ impl FromStr for Share {
 pub(crate) struct Tune {
     #[command(flatten)]
     pub(crate) process: ProcessArguments,
-    /// Least phase margin of the controller, in degrees
+    /// Minimum phase margin of the controller, in degrees
     #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true,
           value_parser = phase_margin)]
     pub(crate) phase_margin: f64,
-    /// Write a page with pictures to this file, as HTML that needs no network
+    /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
     /// Print the result as JSON
@@ -186,11 +186,11 @@ pub(crate) struct Tune {
     pub(crate) json: bool,
 }
 
-/// Find the distinguishing phase of a space of processes: that of the relay whose tuning rule costs
-/// them least.
+/// Find the distinguishing phase of a space of processes: the phase of the relay test whose tuning rule
+/// is best for all of them.
 ///
-/// The optimal PD of every shape of process is a tuning rule. Each rule is applied to every other
-/// shape, and the rule whose worst deterioration is least distinguishes the space.
+/// The optimal PD controller of each shape of process is a tuning rule. Each rule is applied to every
+/// other shape. The rule with the smallest worst-case deterioration gives the distinguishing phase.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -198,60 +198,61 @@ pub(crate) struct Tune {
     "  onecycle phase experiments/double_integrators.toml --report phase.html --csv rules.csv\n"
 ))]
 pub(crate) struct Phase {
-    /// The space, in TOML (see experiments/) [default: the paper's multirotors]
+    /// Space of processes, a TOML file (see experiments/) [default: the paper's multirotors]
     pub(crate) file: Option<PathBuf>,
-    /// Shapes by the ratio of the lags (1 to 48)
+    /// Number of ratios of the time constants (1 to 48)
     #[arg(long, value_name = "N", default_value_t = 24, allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=48))]
     pub(crate) rows: u64,
-    /// Shapes by the dead time, for each of these (1 to 48)
+    /// Number of dead times for each ratio (1 to 48)
     #[arg(long, value_name = "N", default_value_t = 24, allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=48))]
     pub(crate) columns: u64,
-    /// Print the result as JSON, all rules included
+    /// Print the result with all rules as JSON
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write all rules to this file, whole or not at all
+    /// Write all rules to this CSV file
     #[arg(long, value_name = "FILE")]
     pub(crate) csv: Option<PathBuf>,
-    /// Write a page with figures to this file, as HTML that needs no network
+    /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
 }
 
-/// Choose processes that stand for a space, so that one of them is near every process of it.
+/// Choose processes that represent a space: every process of the space has one of them nearby.
 ///
-/// Processes are J apart when neither one's optimal controller costs more than J on the other above
-/// that one's own. Neighbours are laid J apart along rows, rays and radii; with --fewest there are
-/// only as many as leave no process farther than J from one of them.
+/// The distance of two processes is the deterioration J: the extra cost of using the optimal controller
+/// of one on the other. Members are placed J apart along rows, rays and radii. With --fewest, the number
+/// of members is the smallest that leaves no process farther than J from a member.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle grid --check 10000\n",
     "  onecycle grid space.toml --deterioration 5% --out grid.json --report grid.html\n",
     "  onecycle grid --from grid.json --check 100000 --seed 2\n\n",
-    "With --out, what is done is kept in GRID.json.part: the same command goes on from there.\n\n",
+    "With --out, finished rows are kept in the folder GRID.json.part until the grid is written: the same\n",
+    "command resumes an interrupted run, --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 4 the check found a process farther ",
     "than J from every member, 5 output not written"
 ))]
 pub(crate) struct Grid {
-    /// The space, in TOML (see experiments/) [default: the paper's multirotors]
+    /// Space of processes, a TOML file (see experiments/) [default: the paper's multirotors]
     #[arg(value_name = "FILE")]
     pub(crate) space: Option<PathBuf>,
-    /// How far apart neighbours are, 0.1 % to 100 %: such as 10% or 0.1
+    /// Distance J of neighbours, 0.1 % to 100 %, such as 10% or 0.1
     #[arg(long, value_name = "J", default_value = "10%", allow_hyphen_values = true,
           value_parser = deterioration)]
     pub(crate) deterioration: f64,
-    /// As few members as possible instead of neighbours J apart
+    /// Use as few members as possible
     #[arg(long)]
     pub(crate) fewest: bool,
-    /// Compare at equal velocity gains instead of the same amplitude, to see what it takes
+    /// Compare processes at equal velocity gains instead of equal oscillation amplitudes
     #[arg(long)]
     pub(crate) equal_gains: bool,
-    /// Write the grid to this file, as JSON
+    /// Write the grid to this JSON file
     #[arg(long, short, value_name = "GRID.json")]
     pub(crate) out: Option<PathBuf>,
-    /// Write the matrix of costs however large it is, not only up to 2000 members
+    /// Write the matrix of costs for any number of members; by default only up to 2000
     #[arg(long, requires = "out")]
     pub(crate) matrix: bool,
     /// Discard the work of an interrupted run and start over
@@ -260,21 +261,21 @@ pub(crate) struct Grid {
     /// Without effect: interrupted runs are always resumed
     #[arg(long = "resume", hide = true)]
     _resume: bool,
-    /// Check that this many random processes have a member near (1 to 10,000,000)
+    /// Check the distance of N random processes to the nearest member (1 to 10,000,000)
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_CHECKED))]
     pub(crate) check: Option<u64>,
-    /// Seed of the random processes
+    /// Seed of the random processes of the check
     #[arg(long, value_name = "S", default_value_t = 1, requires = "check")]
     pub(crate) seed: u64,
-    /// Read the grid from this file instead of making it
+    /// Read the grid from this file instead of computing it
     #[arg(long, value_name = "GRID.json",
           conflicts_with_all = ["space", "deterioration", "fewest", "equal_gains", "out"])]
     pub(crate) from: Option<PathBuf>,
-    /// Write a page with pictures to this file, as HTML that needs no network
+    /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one for each core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
     pub(crate) threads: Option<u64>,
@@ -283,12 +284,12 @@ pub(crate) struct Grid {
     pub(crate) json: bool,
 }
 
-/// Most random processes of a check, all of which are kept.
+/// Largest number of random processes of a check; all of them are kept in memory.
 const MOST_CHECKED: u64 = 10_000_000;
 /// More threads than any machine has cores.
 const MOST_THREADS: u64 = 1024;
 
-/// A deterioration as a fraction, within what a grid can be laid for.
+/// A deterioration as a fraction, in the range of grids.
 fn deterioration(text: &str) -> Result<f64, String> {
     let deterioration = text.trim().parse::<Share>()?.of(1.0);
     if (0.001..=1.0).contains(&deterioration) {
@@ -306,7 +307,7 @@ fn phase_margin(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A sample rate in hertz, within what a recording can have.
+/// A sample rate in hertz, in the range of recordings.
 fn sample_rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(rate_hz) if SAMPLE_RATES_HZ.contains(&rate_hz) => Ok(rate_hz),

@@ -1,4 +1,4 @@
-//! One file a command: arguments in, report out.
+//! One file for each command: takes the arguments, computes the result, prints the report.
 
 pub(crate) mod bench;
 pub(crate) mod campaign;

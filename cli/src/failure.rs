@@ -1,4 +1,4 @@
-//! What can go wrong, as one sentence on the error output and an exit code.
+//! Errors of commands: one sentence on the error output and an exit code.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,22 +9,22 @@ use crate::words;
 
 /// Exit codes, as `--help` lists them.
 pub(crate) mod exit {
-    /// A process was identified.
+    /// Done; `identify`: a process was identified.
     pub(crate) const DONE: u8 = 0;
-    /// Bad arguments; also what the argument parser itself uses.
+    /// Bad arguments; the argument parser uses the same code.
     pub(crate) const USAGE: u8 = 2;
-    /// The input cannot be read as a recording.
+    /// An input file cannot be read.
     pub(crate) const INPUT: u8 = 3;
-    /// The recording was read, but tells no process: see the verdict.
+    /// Finished, with a negative result such as "no process identified".
     pub(crate) const NO_PROCESS: u8 = 4;
     /// The output cannot be written.
     pub(crate) const OUTPUT: u8 = 5;
 }
 
-/// Why a command did not finish.
+/// The reason why a command did not finish.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum Failure {
-    /// Values of arguments that do not go together, or are no process.
+    /// Arguments that contradict each other or describe no process.
     #[error("{0}")]
     Usage(String),
     /// A recording that cannot be read.
@@ -34,7 +34,7 @@ pub(crate) enum Failure {
         #[source]
         reason: Box<ReadError>,
     },
-    /// Any other file that cannot be read or does not hold what it must.
+    /// Any other file that cannot be read or has the wrong content.
     #[error("{file}: {reason}", file = path.display())]
     Unreadable { path: PathBuf, reason: String },
     /// A file or the terminal that cannot be written.
@@ -46,7 +46,7 @@ pub(crate) enum Failure {
     },
 }
 
-/// The file, unless the reason names it itself.
+/// The file name, unless the reason contains it.
 fn located(path: &Path, reason: &ReadError) -> String {
     match reason {
         ReadError::Open { .. } => String::new(),
@@ -81,7 +81,7 @@ impl Failure {
         }
     }
 
-    /// Whether only the reader of the output has gone, as `head` does: no failure.
+    /// Whether the reader of the output has closed the pipe, as `head` does; this is not an error.
     pub(crate) fn is_closed_pipe(&self) -> bool {
         matches!(self, Self::Output { reason, .. } if reason.kind() == io::ErrorKind::BrokenPipe)
     }

@@ -1,7 +1,7 @@
-//! `onecycle`: from one cycle of a relay test to the process and its optimal controller.
+//! The program `onecycle`: identify a process from a relay test and design its optimal controller.
 //!
-//! In stages: arguments are parsed and typed (`args`), a command runs (`commands`), its result is
-//! printed (`report`), and what went wrong becomes one sentence and an exit code (`failure`).
+//! Stages: `args` parses the command line, `commands` computes `results`, `report` shows them as text, JSON or HTML
+//! (`pages`), and `failure` turns an error into one sentence and an exit code. `journal` keeps the work of interrupted runs.
 
 mod args;
 mod commands;
@@ -24,7 +24,7 @@ use crate::args::{Arguments, Command};
 use crate::failure::exit;
 use crate::output::complain;
 
-/// Parses the arguments of the process, runs the command and returns its exit code.
+/// Parses the command line, runs the command and returns its exit code.
 #[must_use]
 pub fn run() -> ExitCode {
     let arguments = Arguments::parse();

@@ -1,4 +1,4 @@
-//! The binary `onecycle`: everything is in the library of this package.
+//! The binary `onecycle`. All code is in the library of this package.
 
 use std::process::ExitCode;
 

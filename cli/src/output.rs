@@ -1,4 +1,4 @@
-//! The only place that writes: the terminal, and files whole or not at all.
+//! Output: the terminal, and files that are written whole or not at all. Nothing else in the program writes.
 
 use std::borrow::Cow;
 use std::fmt::Display;
@@ -17,12 +17,12 @@ use terminal_size::{Width, terminal_size_of};
 use crate::failure::Failure;
 use crate::style::{HEADING, REFUSAL};
 
-/// Prints a report to the standard output, its styles only where they are seen.
+/// Prints a report to the standard output, with styles if that is a terminal.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
     written(AutoStream::auto(io::stdout().lock()), text.as_bytes())
 }
 
-/// Prints these very bytes to the standard output.
+/// Prints bytes to the standard output unchanged.
 pub(crate) fn print_data(bytes: &[u8]) -> Result<(), Failure> {
     written(io::stdout().lock(), bytes)
 }
@@ -41,22 +41,22 @@ pub(crate) fn is_terminal() -> bool {
     io::stdout().is_terminal()
 }
 
-/// Characters in a line of the standard output, where that is a terminal which tells it.
+/// Width of the standard output in characters, if it is a terminal.
 pub(crate) fn columns() -> Option<usize> {
     terminal_size_of(io::stdout()).map(|(Width(columns), _)| usize::from(columns))
 }
 
-/// Says on the error output why nothing came of it.
+/// Prints an error to the error output.
 pub(crate) fn complain(failure: &Failure) {
     say(REFUSAL, failure);
 }
 
-/// Says on the error output how far it is.
+/// Prints a message about progress to the error output.
 pub(crate) fn tell(news: &str) {
     say(HEADING, news);
 }
 
-/// A line on the error output; where that is closed there is no one left to tell.
+/// Prints a line to the error output; a closed one is ignored.
 fn say(style: Style, line: impl Display) {
     let _ = writeln!(
         AutoStream::auto(io::stderr().lock()),
@@ -64,7 +64,7 @@ fn say(style: Style, line: impl Display) {
     );
 }
 
-/// A bar on the error output for this many pieces of work, with a message behind it; hidden where that is no terminal.
+/// A progress bar on the error output for a number of pieces of work, with a message; hidden if that is not a terminal.
 pub(crate) fn progress_bar(pieces: u64) -> ProgressBar {
     let bar = ProgressBar::new(pieces);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}  {msg}") {
@@ -73,13 +73,13 @@ pub(crate) fn progress_bar(pieces: u64) -> ProgressBar {
     bar
 }
 
-/// How long work goes on without a word about it.
+/// Time before a progress indicator appears.
 const QUICK: Duration = Duration::from_millis(500);
-/// Between two turns of what shows that work goes on.
+/// Time between two updates of a progress indicator.
 const TURN: Duration = Duration::from_millis(100);
 
-/// Work in progress, shown on the error output if it takes longer than [`QUICK`] and that is a terminal; gone when this is
-/// dropped.
+/// A progress indicator on the error output. It appears on a terminal only, if the work takes longer than [`QUICK`], and
+/// disappears when it is dropped.
 pub(crate) struct Waiting {
     bar: ProgressBar,
     over: Option<Sender<()>>,
@@ -87,12 +87,12 @@ pub(crate) struct Waiting {
 }
 
 impl Waiting {
-    /// For work of unknown length with this name, such as `identifying`.
+    /// For work of unknown length, named for example `identifying`.
     pub(crate) fn on(work: impl Into<Cow<'static, str>>) -> Self {
         Self::shown_as("{spinner} {msg} {elapsed}", None, work)
     }
 
-    /// For work on this many bytes.
+    /// For work on a known number of bytes.
     pub(crate) fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
         let template = "{wide_bar} {bytes}/{total_bytes} {eta}  {msg}";
         Self::shown_as(template, Some(bytes), work)
@@ -115,22 +115,22 @@ impl Waiting {
         Self {
             bar,
             over: Some(over),
-            // Without a thread the work goes on in silence.
+            // Without a thread there is no indicator.
             patience: patience.ok(),
         }
     }
 
-    /// Other work from now on.
+    /// Names the next step of the work.
     pub(crate) fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
         self.bar.set_message(work);
     }
 
-    /// More bytes are done.
+    /// Counts bytes as done.
     pub(crate) fn advance(&self, bytes: u64) {
         self.bar.inc(bytes);
     }
 
-    /// Bytes that are done, and all of them.
+    /// Bytes done, and bytes in all.
     #[cfg(test)]
     pub(crate) fn position(&self) -> (u64, Option<u64>) {
         (self.bar.position(), self.bar.length())
@@ -141,7 +141,7 @@ impl Drop for Waiting {
     fn drop(&mut self) {
         drop(self.over.take());
         if let Some(patience) = self.patience.take() {
-            // It cannot have panicked, and there would be nothing to do about it.
+            // The thread cannot panic.
             let _ = patience.join();
         }
         self.bar.finish_and_clear();
@@ -156,8 +156,8 @@ pub(crate) fn with_ending(path: &Path, ending: &str) -> PathBuf {
     name.into()
 }
 
-/// Writes a file through a temporary one beside it: whole, or not at all. A link leads to what it names, and a pipe or a
-/// device is written into.
+/// Writes a file whole or not at all, through a temporary file beside it. Links are followed; pipes and devices are written
+/// directly.
 pub(crate) fn write_file(
     path: &Path,
     write: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
@@ -183,12 +183,12 @@ pub(crate) fn write_file(
     Ok(())
 }
 
-/// Writes a text to a file: whole, or not at all.
+/// Writes a text to a file, whole or not at all.
 pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_file(path, |file| file.write_all(text.as_bytes()))
 }
 
-/// Temporary files are private; what a user asked for is readable like any other file.
+/// Temporary files are private; an output file is readable like any other file.
 #[cfg(unix)]
 fn set_usual_permissions(file: &File) -> io::Result<()> {
     use std::os::unix::fs::PermissionsExt;

@@ -1,4 +1,4 @@
-//! Pages for a browser: one file each, which needs no network.
+//! HTML pages: one file each, which works offline.
 
 mod bundle;
 mod escape;

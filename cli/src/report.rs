@@ -1,4 +1,4 @@
-//! Results as text for people and as JSON for programs.
+//! Reports: results as text for people, as JSON for programs, and as HTML pages.
 
 pub(crate) mod bench;
 pub(crate) mod campaign;

@@ -1,4 +1,4 @@
-//! Settings files: TOML, checked field by field.
+//! Settings files in TOML.
 
 use std::path::Path;
 
@@ -7,13 +7,13 @@ use serde::de::DeserializeOwned;
 
 use crate::failure::Failure;
 
-/// What a file holds, as far as its types go; its values are for the caller to check.
+/// Reads a file and checks the types of its fields; the caller checks their values.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> {
     let text = std::fs::read_to_string(path).map_err(|error| Failure::unreadable(path, error))?;
     toml::from_str(&text).map_err(|error| Failure::unreadable(path, located(&text, &error)))
 }
 
-/// The space that a file describes, the paper's multirotors without one.
+/// The space of a file; without a file, that of the paper's multirotors.
 pub(crate) fn space(path: Option<&Path>) -> Result<Space, Failure> {
     let Some(path) = path else {
         return Ok(Space::MULTIROTOR);
@@ -25,14 +25,14 @@ pub(crate) fn space(path: Option<&Path>) -> Result<Space, Failure> {
     Ok(space)
 }
 
-/// The parser's complaint with line and key; its own report is a picture of several lines.
+/// The parser's message in one line, with line number and key; its own report has several lines.
 fn located(text: &str, error: &toml::de::Error) -> String {
     let begin = error.span().map_or(0, |span| span.start).min(text.len());
     let before = &text[..begin];
     let number = before.matches('\n').count() + 1;
     let line = before.rsplit('\n').next().unwrap_or_default();
     let complaint = error.message().replace('\n', ", ");
-    // Where a value is wrong, its key stands before it.
+    // If a value is wrong, its key is before it in the line.
     match line.split_once('=') {
         Some((key, _)) => format!("line {number}, {}: {complaint}", key.trim()),
         None => format!("line {number}: {complaint}"),

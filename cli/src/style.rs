@@ -1,26 +1,25 @@
-//! What looks how in the terminal: the one place that knows of colours.
+//! Styles of the text reports.
 //!
-//! Reports carry the codes of these styles; the output takes them out where nobody sees them, in files and
-//! pipes and where `NO_COLOR` is set, and then leaves the same bytes as if there had been none.
+//! Reports contain the escape codes of these styles. The output removes them in files and pipes and if `NO_COLOR` is set.
 
 use std::fmt::Write;
 
 use anstyle::{AnsiColor, Style};
 
-/// What a part of a report is about.
+/// Headings.
 pub(crate) const HEADING: Style = Style::new().bold();
-/// What holds.
+/// Positive results.
 pub(crate) const HOLDS: Style = AnsiColor::Green.on_default();
-/// What one should know besides.
+/// Remarks.
 pub(crate) const REMARK: Style = AnsiColor::Yellow.on_default();
-/// What does not hold, and why nothing came of it.
+/// Negative results and errors.
 pub(crate) const REFUSAL: Style = AnsiColor::Red.on_default().bold();
-/// A curve of the model.
+/// Curves of the model.
 pub(crate) const FIT: Style = AnsiColor::Cyan.on_default();
-/// What was measured, and the frame of a plot: as the terminal's own text.
+/// Measured points and frames of plots: the default text style of the terminal.
 pub(crate) const PLAIN: Style = Style::new();
 
-/// The text in a style, each line for itself.
+/// The text in a style, applied line by line.
 pub(crate) fn painted(style: Style, text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
@@ -35,12 +34,12 @@ pub(crate) fn painted(style: Style, text: &str) -> String {
     all
 }
 
-/// That of a verdict: what holds, or not.
+/// The text in the style of a positive or a negative result.
 pub(crate) fn verdict(holds: bool, text: &str) -> String {
     painted(if holds { HOLDS } else { REFUSAL }, text)
 }
 
-/// The first word of every line that is not indented as a heading.
+/// The text with the first word of each line that is not indented as a heading.
 pub(crate) fn headed(text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
@@ -55,7 +54,7 @@ pub(crate) fn headed(text: &str) -> String {
 mod tests {
     use super::*;
 
-    // Bold is code 1, green 32, and 0 ends either: each line begins and ends its own, an empty one has none.
+    // Code 1 is bold, 32 green, 0 ends both. Each line has its own codes, an empty line has none.
     #[test]
     fn lines_are_painted_one_by_one() {
         let green = "\x1b[32m";

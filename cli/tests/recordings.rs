@@ -1,5 +1,5 @@
-//! The recordings of `examples/` against the truth beside each. Prints the README's table:
-//! `cargo test -p onecycle --test recordings -- --nocapture`.
+//! The recordings of `examples/`, compared with the true process beside each. Prints a table:
+//! `cargo test -p onecycle-cli --test recordings -- --nocapture`.
 
 // Helpers of tests are tests too, which the lint does not see.
 #![allow(clippy::unwrap_used)]
@@ -9,21 +9,21 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// Largest errors allowed: gain (relative), actuator lag (relative), delay (s).
+/// Largest allowed errors: gain (relative), T_prop (relative), dead time (s).
 struct Tolerance {
     gain: f64,
     t_prop: f64,
     tau_s: f64,
 }
 
-/// The project's target for recordings of simulators that others wrote.
+/// The target for recordings of simulators of other projects.
 const TARGET: Tolerance = Tolerance {
     gain: 0.03,
     t_prop: 0.15,
     tau_s: 0.002,
 };
-/// JSBSim's brushless motor is no first-order lag, and its truth is a 63 % time of it and the delay
-/// that was added on top of the simulator's own frames: up to 4 % and 3 ms beyond the label.
+/// JSBSim's brushless motor is not a first-order lag. Its label is the 63 % rise time and the added delay, without the
+/// simulator's own frames: errors of up to 4 % and 3 ms.
 const JSBSIM: Tolerance = Tolerance {
     gain: 0.045,
     t_prop: 0.15,
@@ -64,7 +64,7 @@ fn truth(name: &str) -> Value {
     serde_json::from_slice(&std::fs::read(example(name, "json")).unwrap()).unwrap()
 }
 
-/// Estimate, and whether its interval holds the truth.
+/// The estimate, and whether its interval holds the truth.
 fn read(report: &Value, parameter: &str, truth: f64) -> (f64, bool) {
     let of = |end: &str| report["process"][parameter][end].as_f64();
     let holds =
@@ -114,14 +114,14 @@ fn recordings_of_other_simulators_give_their_truth() {
         );
         let most_s = tolerance.tau_s.max(0.1 * tau);
         assert!((found_tau - tau).abs() <= most_s, "{name}: tau {found_tau}");
-        // No damping in any of rotorpy's: the truth is infinite.
+        // The recordings of rotorpy have no damping: the true T_body is infinite.
         if name.starts_with("rotorpy") {
             asked += 1;
             held += usize::from(report["process"]["t_body_s"]["high"].is_null());
         }
     }
     println!("90 % intervals hold {held} of {asked}");
-    // Of 30 at 90 % each, 27 are expected; the JSBSim labels are those of another motor.
+    // 27 of 30 are expected at 90 %; the JSBSim labels are for another motor.
     assert!(held >= 22, "{held} of {asked}");
 }
 
@@ -137,7 +137,7 @@ fn the_unsteady_recording_is_refused() {
 fn the_simulated_recording_gives_the_truth_in_its_head() {
     let (code, report) = identify("simulated_hover");
     assert_eq!(code, Some(0));
-    // Truth of the paper's hovering quadrotor, K = 1: see the comments of the file.
+    // The paper's hovering quadrotor, K = 1; see the comments in the file.
     for (parameter, truth) in [
         ("k", 1.0),
         ("k_over_t_body", 1.0 / 1.6886),

@@ -10,7 +10,7 @@ use onecycle_lab::judge::evaluate::Contender;
 use super::MOST_THREADS;
 use crate::results::bench::RecordingFormat;
 
-/// A benchmark for identifiers: relay experiments with their truth, and the score of any answers.
+/// Make a benchmark of relay experiments, and score identification methods on it.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -30,12 +30,12 @@ pub(crate) enum BenchAction {
     Run(RunBench),
 }
 
-/// How recordings are kept.
+/// File format of the recordings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum Format {
-    /// A file an experiment
+    /// One file for each experiment
     Csv,
-    /// One file [needs a build with --features parquet]
+    /// One file for all experiments [needs a build with --features parquet]
     Parquet,
 }
 
@@ -48,12 +48,12 @@ impl From<Format> for RecordingFormat {
     }
 }
 
-/// Most experiments of a benchmark: what four digits number.
+/// Largest number of experiments: file names have four digits.
 const MOST_EXPERIMENTS: u64 = 9999;
 
-/// Make the experiments: recordings, the truth behind them and the rules, in a new folder.
+/// Make a folder of experiments: recordings, the true processes and the rules.
 ///
-/// A thousand experiments are some 200 MB, 60 MB when packed.
+/// 1000 experiments take about 200 MB, 60 MB when compressed.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -61,58 +61,58 @@ const MOST_EXPERIMENTS: u64 = 9999;
     "  onecycle bench make -o small-benchmark --cases 50 --seed 2\n"
 ))]
 pub(crate) struct MakeBench {
-    /// Folder to write, whole or not at all: a new or an empty one
+    /// Folder to write; it must be new or empty
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: PathBuf,
-    /// How many experiments (1 to 9999)
+    /// Number of experiments (1 to 9999)
     #[arg(long, value_name = "N", default_value_t = Benchmark::default().experiments,
           allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_EXPERIMENTS))]
     pub(crate) cases: u64,
-    /// Seed of the experiments (up to 2^32 - 1): the same seed gives the same bytes
+    /// Seed of the experiments (up to 2^32 - 1); the same seed gives the same bytes
     #[arg(long, value_name = "SEED", default_value_t = Benchmark::default().seed,
           allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(0..=u64::from(u32::MAX)))]
     pub(crate) seed: u64,
-    /// How recordings are kept
+    /// File format of the recordings
     #[arg(long, value_enum, default_value = "csv")]
     pub(crate) format: Format,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one for each core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
     pub(crate) threads: Option<u64>,
 }
 
-/// Answer the experiments by every method, score the answers, print the leaderboard.
+/// Run methods on a benchmark, score their answers and print the leaderboard.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle bench run relay-benchmark -o results\n",
     "  onecycle bench run relay-benchmark --methods none --answers mine=answers.csv\n",
     "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair -o results\n\n",
-    "Methods that read the recordings: onecycle-1, onecycle-2, onecycle-4 (cycles), network, pem, \n",
-    "pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc: all by default. Two read \n",
-    "a relay test of their own, which is simulated on the true process with the same bias, noise and seed: \n",
-    "pem-sweep, asymmetric. With 'none' only --answers are scored. Times are those of the processor.\n\n",
-    "With --out, finished experiments are kept in the folder OUT.part until the results are written: the same \n",
-    "command resumes an interrupted run, --restart starts over."
+    "Methods on the recordings, all run by default: onecycle-1, onecycle-2, onecycle-4 (cycles), network,\n",
+    "pem, pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc. The methods\n",
+    "pem-sweep and asymmetric use a relay test of their own, simulated on the true process with the same\n",
+    "bias, noise and seed. With 'none', only --answers are scored. Times are processor times.\n\n",
+    "With --out, finished experiments are kept in the folder OUT.part until the results are written: the\n",
+    "same command resumes an interrupted run, --restart starts over."
 ))]
 pub(crate) struct RunBench {
-    /// The folder that `bench make` has written
+    /// Folder written by `bench make`
     #[arg(value_name = "DIR")]
     pub(crate) folder: PathBuf,
-    /// Methods to run
+    /// Methods to run, separated by commas [default: all that read the recordings]
     #[arg(long, value_name = "NAME,...")]
     pub(crate) methods: Option<Methods>,
-    /// Answers made elsewhere, may be repeated: a CSV with experiment,K,T_prop_s,T_body_s,tau_s or
-    /// experiment,kp,kd, and seconds if you like
+    /// Answers of another program, may be repeated: a CSV file with the columns
+    /// experiment,K,T_prop_s,T_body_s,tau_s or experiment,kp,kd; the column seconds is optional
     #[arg(long, value_name = "NAME=FILE")]
     pub(crate) answers: Vec<Answers>,
-    /// Write OUT.csv (a row a method and experiment), OUT.json (the same and the leaderboard) and OUT.md
+    /// Write OUT.csv (one row for each method and experiment), OUT.json (rows and leaderboard) and OUT.md
     #[arg(long, short, value_name = "OUT")]
     pub(crate) out: Option<PathBuf>,
-    /// Write the recordings that methods make for themselves to a folder, new or empty: a folder a method, a CSV
-    /// an experiment, as `identify` reads them
+    /// Write the relay tests that methods make for themselves to this folder, new or empty: CSV files that
+    /// `identify` can read, in one folder for each method
     #[arg(long, value_name = "DIR")]
     pub(crate) traces: Option<PathBuf>,
     /// Discard the work of an interrupted run and start over
@@ -121,7 +121,7 @@ pub(crate) struct RunBench {
     /// Without effect: interrupted runs are always resumed
     #[arg(long = "resume", hide = true)]
     _resume: bool,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one for each core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
     pub(crate) threads: Option<u64>,
@@ -130,12 +130,12 @@ pub(crate) struct RunBench {
     pub(crate) json: bool,
 }
 
-/// A list of methods, each once.
+/// A list of different methods.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Methods(pub(crate) Vec<Contender>);
 
 impl Default for Methods {
-    /// Those that read the recordings.
+    /// All methods that read the recordings.
     fn default() -> Self {
         let reads = |one: &Contender| one.relay_test() == RelayTest::Recorded;
         Self(Contender::ALL.into_iter().filter(reads).collect())
@@ -153,7 +153,7 @@ impl FromStr for Methods {
                     break;
                 }
                 let names = Contender::ALL.map(Contender::name).join(", ");
-                return Err(format!("there is no method '{name}': name some of {names}"));
+                return Err(format!("there is no method '{name}': choose from {names}"));
             };
             if methods.contains(&method) {
                 return Err(format!("'{name}' is named twice"));
@@ -164,7 +164,7 @@ impl FromStr for Methods {
     }
 }
 
-/// A file of answers and what to call them.
+/// A file of answers and the name of their method.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Answers {
     pub(crate) name: String,

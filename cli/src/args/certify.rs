@@ -8,10 +8,11 @@ use onecycle_onboard::Soiptd;
 
 use super::{Share, sample_rate};
 
-/// Certify that the relay makes every process of a space oscillate, once and stably.
+/// Certify that every process of a space has exactly one stable limit cycle under the relay.
 ///
-/// Limit cycles are exact, and so is the spectral radius of their Poincare map: what is left of a
-/// small deviation after a cycle. Time scales everything, so shapes of processes stand for all.
+/// Limit cycles are computed exactly, and so is the spectral radius of their Poincare map: the fraction
+/// of a small deviation that remains after one cycle. Scaling time changes nothing, so one process of
+/// each shape is enough.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -22,33 +23,33 @@ use super::{Share, sample_rate};
     "written"
 ))]
 pub(crate) struct Certify {
-    /// The space, in TOML (see experiments/) [default: the paper's multirotors]
+    /// Space of processes, a TOML file (see experiments/) [default: the paper's multirotors]
     pub(crate) space: Option<PathBuf>,
-    /// One process instead of the space, may be repeated: T_prop,T_body,tau in seconds
+    /// Certify one process instead of a space, may be repeated: T_prop,T_body,tau in seconds
     #[arg(long, value_name = "T,T,T", conflicts_with_all = ["json", "report", "shapes"])]
     pub(crate) process: Vec<Times>,
-    /// Biases, in amplitudes of the relay or % of it [default: 0 to 0.9, of a process 0]
+    /// Input biases in relay amplitudes or % of it [default: 0, 0.1 .. 0.9; with --process 0]
     #[arg(long, value_name = "BIAS,...", value_delimiter = ',', allow_hyphen_values = true,
           value_parser = bias)]
     bias: Vec<f64>,
-    /// Of single processes: also of a relay sampled at this rate, in hertz
+    /// With --process: also analyse a relay that is sampled at this rate, in hertz
     #[arg(long, value_name = "HZ", requires = "process", allow_negative_numbers = true,
           value_parser = sample_rate)]
     pub(crate) sample_rate: Option<f64>,
-    /// Shapes along either coordinate of their surface (2 to 100)
+    /// Number of shapes along each of the two coordinates (2 to 100)
     #[arg(long, value_name = "N", default_value_t = 16,
           value_parser = clap::value_parser!(u64).range(2..=100))]
     pub(crate) shapes: u64,
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
-    /// Write a page with figures to this file, as HTML that needs no network
+    /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
 }
 
 impl Certify {
-    /// The biases asked for, or the usual ones.
+    /// The biases of the arguments, or the default ones.
     pub(crate) fn biases(&self) -> Vec<f64> {
         if !self.bias.is_empty() {
             self.bias.clone()
@@ -85,7 +86,7 @@ impl FromStr for Times {
     }
 }
 
-/// A bias as a part of the relay's amplitude, below it.
+/// A bias as a fraction of the relay's amplitude, between -1 and 1.
 fn bias(text: &str) -> Result<f64, String> {
     let bias = text.trim().parse::<Share>()?.of(1.0);
     if bias.abs() < 1.0 {

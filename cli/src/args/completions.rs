@@ -3,7 +3,7 @@
 use clap::Args;
 use clap_complete::Shell;
 
-/// Write the script that lets a shell complete commands, options and their values.
+/// Print the completion script of a shell.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -12,8 +12,8 @@ use clap_complete::Shell;
     "  onecycle completions fish > ~/.config/fish/completions/onecycle.fish\n",
     "  onecycle completions powershell >> $PROFILE\n",
     "  onecycle completions elvish >> ~/.config/elvish/rc.elv\n\n",
-    "A shell that is started after that completes. For zsh, ~/.zshrc needs, before its line of compinit:\n",
-    "fpath=(~/.zfunc $fpath)\n\n",
+    "New shells then complete commands, options and values. zsh also needs this line in ~/.zshrc, before\n",
+    "compinit: fpath=(~/.zfunc $fpath)\n\n",
     "Exit codes: 0 done, 2 bad arguments, 5 output not written"
 ))]
 pub(crate) struct Completions {

@@ -7,10 +7,10 @@ use onecycle_lab::learn::dataset::shards::MOST_EXAMPLES;
 
 use super::MOST_THREADS;
 
-/// Make relay experiments to learn from, as files that NumPy, PyTorch and JAX read.
+/// Simulate relay experiments to train on, as files for NumPy, PyTorch and JAX.
 ///
-/// Each example is one steady cycle of a random process of the recipe as a signature of 34 numbers, the
-/// process as the four values that a network is to put out, and what an error of these costs.
+/// Each example is one steady cycle of a random process: the cycle as a signature of 34 numbers, the
+/// process as the four target values of the network, and the cost of errors in these values.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -23,14 +23,14 @@ use super::MOST_THREADS;
     "5 output not written"
 ))]
 pub(crate) struct Dataset {
-    /// The recipe, in TOML (see experiments/identifier.toml) [default: the paper's multirotors]
+    /// Recipe, a TOML file (see experiments/identifier.toml) [default: the paper's multirotors]
     #[arg(value_name = "RECIPE")]
     pub(crate) recipe: Option<PathBuf>,
-    /// How many experiments (1 to 10,000,000)
+    /// Number of experiments (1 to 10,000,000)
     #[arg(long, short = 'n', value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_EXAMPLES))]
     pub(crate) examples: u64,
-    /// Folder to write to: a new one, or one of the same recipe
+    /// Folder to write: a new one, or one of the same recipe
     #[arg(long, value_name = "DIR")]
     pub(crate) into: PathBuf,
     /// Discard the files of an earlier run and start over
@@ -39,10 +39,10 @@ pub(crate) struct Dataset {
     /// Without effect: interrupted runs are always resumed
     #[arg(long = "resume", hide = true)]
     _resume: bool,
-    /// Write all examples to this one Parquet file as well [needs a build with --features parquet]
+    /// Also write all examples to this Parquet file [needs a build with --features parquet]
     #[arg(long, value_name = "FILE")]
     pub(crate) parquet: Option<PathBuf>,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one for each core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
     pub(crate) threads: Option<u64>,

@@ -8,14 +8,13 @@ use onecycle_plant::multirotor::Mission;
 
 use super::MOST_THREADS;
 
-/// Most seeds: as many flights as are worth waiting for.
+/// Largest number of flights of a mission: hours of work.
 const MOST_SEEDS: u64 = 100_000;
 
-/// Fly the paper's missions on a simulated quadrotor: identified in the air by the on-board tuner, then flown by
-/// what was found.
+/// Fly the paper's missions on a simulated quadrotor that the on-board tuner identifies and tunes in flight.
 ///
-/// The vehicle has six degrees of freedom, motors with lag, drag, ground, battery, wind, and sensors that are late
-/// and noisy. With -o writes DIR/flights.html, one page that needs no network, and a CSV of every mission.
+/// The vehicle has six degrees of freedom, motor lag, drag, ground effect, battery, wind, and delayed, noisy
+/// sensors. With -o, DIR/flights.html (one page that works offline) and one CSV file for each mission are written.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -23,31 +22,31 @@ const MOST_SEEDS: u64 = 100_000;
     "  onecycle fly altitude payload -o flights\n",
     "  onecycle fly vehicle --seeds 100\n\n",
     "Missions:\n",
-    "  altitude            from the ground without a controller, identified, tuned, a step\n",
-    "  payload             the same with 30 % more mass\n",
-    "  cycles              five cycles identified one by one, and what each one's controller costs the others\n",
-    "  roll                roll with a bias, the relay about what held it before\n",
-    "  roll-uncompensated  the same with the relay about zero\n",
-    "  disturbed           weight, a blow and wind on the tuned vehicle\n",
-    "  disturbed-untuned   the same on the one that was not tuned\n",
-    "  vehicle             from the ground to all four axes tuned\n\n",
-    "Exit codes: 0 all flown, 2 bad arguments, 4 a mission ended early, 5 output not written"
+    "  altitude            take-off without a controller, identification, tuning, a step\n",
+    "  payload             altitude with 30 % more mass\n",
+    "  cycles              five cycles, each identified alone; cost of each controller on the others\n",
+    "  roll                roll with an input bias; the relay switches about the bias\n",
+    "  roll-uncompensated  roll with an input bias; the relay switches about zero\n",
+    "  disturbed           the tuned vehicle with an added weight, an impact and wind\n",
+    "  disturbed-untuned   the same on a vehicle that is not tuned\n",
+    "  vehicle             take-off and tuning of all four axes\n\n",
+    "Exit codes: 0 all missions flown, 2 bad arguments, 4 a mission ended early, 5 output not written"
 ))]
 pub(crate) struct Fly {
     /// Missions to fly [default: all]
     #[arg(value_name = "MISSION")]
     pub(crate) missions: Vec<Named>,
-    /// Seed of noise and gusts; with --seeds the first of them
+    /// Seed of noise and gusts; with --seeds, the first seed
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub(crate) seed: u64,
-    /// Flights of each mission, a seed each
+    /// Number of flights of each mission, each with its own seed
     #[arg(long, value_name = "N", default_value_t = 1, allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_SEEDS))]
     pub(crate) seeds: u64,
     /// Folder to write the page and the CSV files of the first seed to
     #[arg(long, short, value_name = "DIR")]
     pub(crate) out: Option<PathBuf>,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one for each core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
     pub(crate) threads: Option<u64>,
@@ -64,7 +63,7 @@ impl FromStr for Named {
         let found = Mission::ALL.into_iter().find(|one| one.name() == text);
         found.map(Self).ok_or_else(|| {
             let names = Mission::ALL.map(Mission::name).join(", ");
-            format!("there is no mission '{text}': name some of {names}")
+            format!("there is no mission '{text}': choose from {names}")
         })
     }
 }

@@ -7,9 +7,9 @@ use clap::Args;
 
 use super::MOST_THREADS;
 
-/// Reproduce the paper's simulated results: its tables and figures, each number beside the paper's.
+/// Reproduce the simulated tables and figures of the paper, each number beside the paper's.
 ///
-/// Writes DIR/reproduction.html, one page that needs no network, and DIR/reproduction.md.
+/// Writes DIR/reproduction.html (one page that works offline) and DIR/reproduction.md.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -25,10 +25,10 @@ pub(crate) struct Reproduce {
     /// Parts to reproduce [default: all]
     #[arg(value_name = "NAME")]
     pub(crate) names: Vec<Name>,
-    /// Small sizes, to see that everything runs: at most two minutes
+    /// Use small sizes, to test that everything runs; takes at most two minutes
     #[arg(long)]
     pub(crate) quick: bool,
-    /// Folder to write
+    /// Folder to write to
     #[arg(long, short, value_name = "DIR", default_value = "reproduction")]
     pub(crate) out: PathBuf,
     /// Discard the parts of an earlier run and start over
@@ -37,13 +37,13 @@ pub(crate) struct Reproduce {
     /// Without effect: finished parts are always kept
     #[arg(long = "resume", hide = true)]
     _resume: bool,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one for each core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
     pub(crate) threads: Option<u64>,
 }
 
-/// A part of the reproduction.
+/// A part of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Name {
     Phase,
@@ -71,7 +71,7 @@ impl Name {
         Self::Table7,
     ];
 
-    /// As arguments and files have it.
+    /// The name in arguments and file names.
     pub(crate) fn as_str(self) -> &'static str {
         match self {
             Self::Phase => "phase",
@@ -94,7 +94,7 @@ impl FromStr for Name {
         let found = Self::ALL.into_iter().find(|name| name.as_str() == text);
         found.ok_or_else(|| {
             let names = Self::ALL.map(Self::as_str).join(", ");
-            format!("there is no part '{text}': name some of {names}")
+            format!("there is no part '{text}': choose from {names}")
         })
     }
 }

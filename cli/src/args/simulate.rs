@@ -6,10 +6,10 @@ use clap::Args;
 
 use super::{ProcessArguments, Share};
 
-/// Simulate a relay test and write its recording.
+/// Simulate a relay test and write its recording as CSV.
 ///
-/// The process is propagated exactly and the relay is the one of the on-board library. Comments at
-/// the head of the file tell the truth behind it.
+/// The process is simulated exactly, with the relay of the on-board library. Comments at the head of the
+/// file state the true process, bias and noise.
 #[derive(Clone, Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -20,7 +20,7 @@ use super::{ProcessArguments, Share};
 pub(crate) struct Simulate {
     #[command(flatten)]
     pub(crate) process: ProcessArguments,
-    /// Amplitude h of the relay (input unit)
+    /// Amplitude of the relay (input unit)
     #[arg(
         long,
         value_name = "H",
@@ -28,21 +28,21 @@ pub(crate) struct Simulate {
         allow_negative_numbers = true
     )]
     pub(crate) amplitude: f64,
-    /// Sine of the phase of the oscillation
+    /// Relay parameter beta: the sine of the phase at which the process oscillates
     #[arg(long, value_name = "BETA", default_value_t = -0.73, allow_negative_numbers = true)]
     pub(crate) beta: f64,
-    /// Let the relay keep its centre instead of following the input bias
+    /// Keep the centre of the relay fixed: do not trim the input bias
     #[arg(long)]
     pub(crate) no_trim: bool,
-    /// Part of a cycle by which the trim leaves the output high longer than low, or low longer than
-    /// high (0 to 0.5); 0.2 tells about twice as much of the process as none
-    #[arg(long, value_name = "PART", default_value_t = 0.0, conflicts_with = "no_trim",
+    /// Difference of the high and the low time that the trim leaves, as a fraction of the cycle (0 to 0.5);
+    /// 0.2 gives about twice the information of a symmetric cycle
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.0, conflicts_with = "no_trim",
           allow_negative_numbers = true, value_parser = asymmetry)]
     pub(crate) asymmetry: f64,
-    /// Plain relay: no smoothing of the error and no dwell
+    /// Plain relay, without smoothing of the error and minimum switching time
     #[arg(long)]
     pub(crate) bare: bool,
-    /// Time for which the relay first measures the noise, in seconds
+    /// Duration of the noise measurement before the test, in seconds
     #[arg(
         long,
         value_name = "S",
@@ -50,7 +50,7 @@ pub(crate) struct Simulate {
         allow_negative_numbers = true
     )]
     pub(crate) preroll: f64,
-    /// Constant added to the input and not recorded (input unit, or % of the relay's amplitude)
+    /// Constant input disturbance, not recorded (input unit, or % of the relay's amplitude)
     #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) bias: Share,
     /// Standard deviation of the measurement noise (output unit, or % of the noise-free amplitude)
@@ -62,7 +62,7 @@ pub(crate) struct Simulate {
     /// Standard deviation of the sample period (s, or % of it)
     #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) jitter: Share,
-    /// Output at the start (output unit, or % of the noise-free amplitude)
+    /// Initial output (output unit, or % of the noise-free amplitude)
     #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) offset: Share,
     /// Reference of the output (output unit)
@@ -81,13 +81,13 @@ pub(crate) struct Simulate {
         allow_negative_numbers = true
     )]
     pub(crate) sample_rate: f64,
-    /// Duration, in seconds [default: 20 periods]
+    /// Duration, in seconds [default: 20 periods of the oscillation]
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) duration: Option<f64>,
-    /// Seed of noise and jitter: the same seed gives the same bits
+    /// Seed of noise and jitter; the same seed gives the same recording
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
-    /// File to write, whole or not at all [default: the standard output]
+    /// File to write [default: the standard output]
     #[arg(long, short, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
 }

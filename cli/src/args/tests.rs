@@ -1,4 +1,4 @@
-//! The help texts: every command has examples, they parse, and what they name is there.
+//! Tests of the help texts: every command has examples, the examples parse, and the files they name exist.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use clap::{Command, CommandFactory, Parser};
 
 use super::Arguments;
 
-/// Every command with the words that call it, the program itself first.
+/// Every command with the words that call it; the program itself first.
 fn commands() -> Vec<(String, Command)> {
     fn of(words: &str, command: &Command, all: &mut Vec<(String, Command)>) {
         all.push((words.to_owned(), command.clone()));
@@ -19,14 +19,14 @@ fn commands() -> Vec<(String, Command)> {
     all
 }
 
-/// What stands behind the options.
+/// The text after the options.
 fn after_help(command: &Command) -> String {
     let text = command.get_after_help();
     text.map(ToString::to_string).unwrap_or_default()
 }
 
-/// Calls of the program in a help text: lines that end in a backslash are joined, pipes are cut into what they
-/// connect, and redirections are cut off.
+/// Calls of the program in a help text. Lines that end in a backslash are joined, pipes are split, redirections are cut
+/// off.
 fn calls(help: &str) -> Vec<Vec<String>> {
     let joined = help.replace("\\\n", " ");
     let pieces =
@@ -41,7 +41,7 @@ fn calls(help: &str) -> Vec<Vec<String>> {
     words.filter(is_call).collect()
 }
 
-// Two calls at least of each, by its own name.
+// At least two examples for each command, by its own name.
 #[test]
 fn every_command_has_examples_of_itself() {
     for (words, command) in &commands()[1..] {
@@ -54,7 +54,7 @@ fn every_command_has_examples_of_itself() {
     }
 }
 
-// As a shell would hand them over; none needs quotes, which this splitting does not know.
+// Split at blanks as a shell does; no example may need quotes.
 #[test]
 fn every_example_parses() {
     let mut count = 0;
@@ -67,11 +67,11 @@ fn every_example_parses() {
             count += 1;
         }
     }
-    // Two of each of the 19 commands that do something, and the first steps.
+    // Two for each of the 19 commands, and the first steps.
     assert!(count >= 41, "{count}");
 }
 
-// What an example names of this repository is in it.
+// Files of this repository that an example names exist.
 #[test]
 fn files_of_examples_are_there() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -92,7 +92,7 @@ fn files_of_examples_are_there() {
     assert!(count > 5, "{count}");
 }
 
-// Every name, conflict and default that clap can only check when it runs.
+// Names, conflicts and defaults that clap checks at run time.
 #[test]
 fn clap_finds_nothing_amiss() {
     Arguments::command().debug_assert();

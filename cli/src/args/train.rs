@@ -6,11 +6,11 @@ use clap::Args;
 
 use super::MOST_THREADS;
 
-/// Train a network of a recipe: an identifier of your own processes, or the paper's classifier.
+/// Train an identifier for your own processes, or the paper's classifier, from a recipe.
 ///
-/// An identifier (network = "density") becomes a pack that the board and onecycle identify --pack
-/// read. Of the paper's classifier (network = "classifier") each loss of the recipe trains a network of
-/// its own; the table at the end compares them on processes that none has seen.
+/// An identifier (network = "density") is written as a pack for firmware and for onecycle identify
+/// --pack. For the paper's classifier (network = "classifier"), one network is trained for each loss of
+/// the recipe, and a table compares them on unseen processes.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -22,7 +22,7 @@ use super::MOST_THREADS;
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or part, 5 output not written"
 ))]
 pub(crate) struct Train {
-    /// The recipe, in TOML (see experiments/)
+    /// Recipe, a TOML file (see experiments/)
     #[arg(long, value_name = "FILE")]
     pub(crate) recipe: PathBuf,
     /// Write the result to this file: the pack, or the best network as ONNX
@@ -34,14 +34,14 @@ pub(crate) struct Train {
     /// Without effect: interrupted runs are always resumed
     #[arg(long = "resume", hide = true)]
     _resume: bool,
-    /// Folder for the experiments of an identifier, kept for other runs [default: OUT.dataset, which
-    /// is removed in the end]
+    /// Folder for the simulated experiments of an identifier, kept for other runs [default: OUT.dataset,
+    /// which is removed at the end]
     #[arg(long, value_name = "DIR")]
     pub(crate) dataset: Option<PathBuf>,
-    /// Write the report to this file, as JSON
+    /// Write the report to this JSON file
     #[arg(long, value_name = "FILE")]
     pub(crate) json: Option<PathBuf>,
-    /// Threads to work with [default: one a core]
+    /// Number of threads [default: one for each core]
     #[arg(long, value_name = "N", allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(1..=MOST_THREADS))]
     pub(crate) threads: Option<u64>,

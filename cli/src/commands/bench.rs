@@ -1,4 +1,4 @@
-//! `onecycle bench`: the public benchmark, made and run.
+//! `onecycle bench`: make the public benchmark and run methods on it.
 
 mod folder;
 mod make;

@@ -47,7 +47,7 @@ pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The campaign of the file with the changes of the arguments.
+/// The campaign of the file, changed by the arguments.
 fn campaign(arguments: &args::Campaign) -> Result<Campaign, Failure> {
     let mut campaign: Campaign = settings::read(&arguments.file)?;
     campaign.cases = arguments.cases.unwrap_or(campaign.cases);
@@ -122,7 +122,7 @@ fn of_kinds(
         };
         let (own, others) = rest.split_at(count as usize);
         rest = others;
-        // Without its defect, a process may not oscillate at all: it is no case.
+        // Processes that do not oscillate even without their defect are left out.
         (kind, own.iter().copied().flatten().collect())
     });
     Ok((
@@ -131,7 +131,7 @@ fn of_kinds(
     ))
 }
 
-/// Cases of each thread between two writes to the journal: seconds of work.
+/// Cases of each thread between two writes to the journal: a few seconds of work.
 const LOT: usize = 64;
 
 /// Outcomes of all cases, in order for any number of threads. With an output file, finished cases are kept in its
@@ -182,7 +182,7 @@ fn finished<T: Send + Serialize + DeserializeOwned>(
     Ok((done, journal))
 }
 
-/// What decides the outcomes: the file and the arguments that change it.
+/// Everything that decides the outcomes: the file and the arguments that change it.
 fn settings(arguments: &args::Campaign) -> Result<serde_json::Value, Failure> {
     let file: toml::Table = settings::read(&arguments.file)?;
     let method = arguments.method.map(|method| format!("{method:?}"));

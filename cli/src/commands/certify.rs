@@ -1,4 +1,4 @@
-//! `onecycle certify`: does the relay make every process of a space oscillate, once and stably?
+//! `onecycle certify`: exact limit cycles of the relay on every process of a space, and their stability.
 
 use std::process::ExitCode;
 
@@ -21,7 +21,7 @@ use crate::settings;
 pub(crate) fn run(arguments: &Certify) -> Result<ExitCode, Failure> {
     let space = settings::space(arguments.space.as_deref())?;
     if !arguments.process.is_empty() {
-        let waiting = Waiting::on("looking for limit cycles");
+        let waiting = Waiting::on("computing limit cycles");
         let processes = (arguments.process.iter())
             .map(|times| process(arguments, times.0, space.beta))
             .collect::<Result<Vec<_>, Failure>>()?;
@@ -45,19 +45,19 @@ pub(crate) fn run(arguments: &Certify) -> Result<ExitCode, Failure> {
     }))
 }
 
-/// Points of the climb's first lattice for each shape of the campaign's, along either coordinate.
+/// Ratio of the start points of the search for the least stable process to the shapes, along each coordinate.
 const FINER: usize = 2;
 
 fn certify(arguments: &Certify, space: Space) -> Result<CertifiedSpace, Failure> {
     let side = arguments.shapes as usize;
     let shapes = space.shapes(side, side);
     let biases = arguments.biases();
-    // A certificate of each without bias; under each bias one, and two simulations.
+    // One certificate of each shape without bias; one and two simulations under each bias.
     let workers = Workers::new(None)?;
     workers.expect((1 + 3 * biases.len()) * shapes.len(), 0);
     let least_stable = space
         .least_stable(FINER * side, FINER * side)
-        .ok_or_else(|| Failure::usage("the space has no process"))?;
+        .ok_or_else(|| Failure::usage("there is no process in this space"))?;
     let certified = CertifiedSpace {
         space,
         least_stable,
@@ -125,13 +125,12 @@ fn certificates(
     certificates.into_iter().collect()
 }
 
-/// Period (s) that a simulated oscillation is scaled to: 400 samples at the campaign's 1 kHz.
+/// Period that a simulated oscillation is scaled to (s): 400 samples at the 1 kHz of campaigns.
 const SIMULATED_PERIOD_S: f64 = 0.4;
-/// Noise of the simulation, as a part of the amplitude: that of a good sensor.
+/// Noise of the simulation, as a fraction of the amplitude: that of a good sensor.
 const SIMULATED_SIGMA: f64 = 0.01;
 
-/// Whether the relay of the board, from rest, comes to a steady oscillation within the campaign's 40
-/// periods of the describing function.
+/// Whether the simulated on-board relay, from rest, reaches a steady oscillation within the 40 periods of a campaign.
 fn settles(space: &Space, certificate: &Certificate, trim: bool) -> Result<bool, Failure> {
     let Some((period_s, _)) = certificate.describing_function else {
         return Ok(false);

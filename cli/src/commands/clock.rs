@@ -1,14 +1,13 @@
-//! The time that a method takes: the processor's, for its own thread, so that neither other threads nor other
-//! programs count. Where the system does not tell it, that of the wall.
+//! Processor time of a thread, which other threads and programs do not change; wall time on systems without it.
 
-/// Seconds from some moment on, to be compared on one thread.
+/// Seconds since an arbitrary moment, comparable on the same thread.
 #[cfg(any(target_os = "linux", target_os = "macos"))]
 pub(super) fn thread_seconds() -> f64 {
     let spent = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     spent.tv_sec as f64 + 1e-9 * spent.tv_nsec as f64
 }
 
-/// Seconds from some moment on, to be compared on one thread.
+/// Seconds since an arbitrary moment, comparable on the same thread.
 #[cfg(not(any(target_os = "linux", target_os = "macos")))]
 pub(super) fn thread_seconds() -> f64 {
     use std::sync::LazyLock;
@@ -24,7 +23,7 @@ mod tests {
 
     use super::*;
 
-    // A thread that sleeps spends nothing, one that works spends no more than has gone by.
+    // A sleeping thread uses no processor time; a working one uses at most the wall time.
     #[test]
     fn sleep_is_free_and_work_is_not() {
         let (wall, begin_s) = (Instant::now(), thread_seconds());

@@ -1,4 +1,4 @@
-//! `onecycle completions`: a shell in, its script out.
+//! `onecycle completions`: print the completion script of a shell.
 
 use std::process::ExitCode;
 

@@ -1,4 +1,4 @@
-//! `onecycle dataset`: experiments to learn from, made on all threads and kept file by file.
+//! `onecycle dataset`: simulate experiments to train on, one file at a time on all threads.
 
 pub(super) mod folder;
 
@@ -20,7 +20,7 @@ use crate::{report, settings};
 pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     if arguments.parquet.is_some() && !cfg!(feature = "parquet") {
         return Err(Failure::usage(
-            "this build cannot write Parquet: make one with cargo build --release --features parquet",
+            "this build cannot write Parquet: build with cargo build --release --features parquet",
         ));
     }
     let recipe = recipe(arguments.recipe.as_deref())?;
@@ -52,8 +52,8 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The folder of a recipe with this number of experiments, all made; the number of files that were there before, and of
-/// experiments that were missing.
+/// Completes the folder of a recipe with this number of experiments. Returns it with the number of files that were there
+/// before and the number of experiments made now.
 pub(super) fn filled(
     path: &Path,
     (recipe, examples): (Recipe, u64),
@@ -87,7 +87,7 @@ fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
     let Some(path) = path else {
         return Ok(Recipe::default());
     };
-    // That of an identifier has the recipe of its experiments in a table.
+    // The recipe of an identifier has that of its experiments in a table.
     let table: toml::Table = settings::read(path)?;
     let recipe = if table.contains_key("experiments") {
         settings::read::<IdentifierRecipe>(path)?.experiments
@@ -100,7 +100,7 @@ fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
     Ok(recipe)
 }
 
-/// Makes the files that are missing; returns how many experiments that took.
+/// Makes the missing files; returns the number of experiments simulated.
 fn make(folder: &mut Folder, missing: &[usize], workers: &Workers) -> Result<u64, Failure> {
     let examples = |shard: usize| folder.manifest().numbers(shard).count() as u64;
     let made: u64 = missing.iter().map(|&shard| examples(shard)).sum();

@@ -1,4 +1,4 @@
-//! `onecycle fly`: missions flown, judged, and written down.
+//! `onecycle fly`: fly missions, evaluate them, write page and CSV files.
 
 use std::fs;
 use std::io::{self, Write};
@@ -17,7 +17,7 @@ use crate::output::{print, write_file, write_text};
 use crate::report::fly as report;
 use crate::results::fly::{Flight, MissionFlights};
 
-/// Cycles that are looked at one by one: those of the paper's Table VII.
+/// Number of cycles identified one by one: that of the paper's Table VII.
 const CYCLES: usize = 5;
 
 pub(crate) fn run(arguments: &Fly) -> Result<ExitCode, Failure> {
@@ -91,7 +91,7 @@ fn one(mission: Mission, seed: u64, is_kept: bool) -> Result<Flight, Failure> {
     })
 }
 
-/// The last cycles of the relay, one by one.
+/// The last cycles of the relay, each identified alone.
 fn cycles(flown: &Flown) -> Result<Cycles, CyclesError> {
     let index = Axis::Altitude.index();
     let oscillates = |record: &&FlightRecord| {
@@ -104,7 +104,7 @@ fn cycles(flown: &Flown) -> Result<Cycles, CyclesError> {
     Cycles::of(&trace(&records, Axis::Altitude), TICK_S, CYCLES)
 }
 
-/// Every tick: what was true, what was measured and commanded, what each tuner was doing.
+/// One row for each tick: true state, measurements, commands and the phase of each tuner.
 fn csv(file: &mut dyn Write, records: &[FlightRecord]) -> io::Result<()> {
     let mut out = io::BufWriter::new(file);
     write!(

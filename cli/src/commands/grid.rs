@@ -1,4 +1,4 @@
-//! `onecycle grid`: processes that represent a space; made or read, checked, written.
+//! `onecycle grid`: choose processes that represent a space, or read them; check and write them.
 
 mod kept;
 
@@ -20,7 +20,7 @@ use crate::reading::open_with_bar;
 use crate::results::grid::{CostsAlongRay, GridRun};
 use crate::{report, settings};
 
-/// Most members whose costs are written unasked: four million numbers, 40 MB.
+/// Largest number of members whose matrix is written by default: four million numbers, 40 MB.
 const MOST_IN_MATRIX: usize = 2000;
 
 /// Rows of members, and of the matrix, of each thread between two writes to the journal: about a second of work.
@@ -88,7 +88,7 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<GridRun, Failure> {
             Gains::SameAmplitude
         },
     };
-    // A few members are made again sooner than they are read.
+    // With --fewest there are only a few members, which are computed quickly.
     let mut kept = match (&arguments.out, settings.layout) {
         (Some(out), Layout::Rays) => Some(KeptGrid::open(out, &settings, arguments.restart)?),
         _ => None,
@@ -152,7 +152,7 @@ fn keep_costs(grid: &Grid, kept: &mut KeptGrid, workers: &Workers) -> Result<(),
     Ok(())
 }
 
-/// A row of the matrix, as files have it.
+/// A row of the matrix, rounded as in files.
 fn costs(grid: &Grid, of: usize) -> Vec<Option<f64>> {
     let costs = grid.costs(of).into_iter();
     costs.map(|cost| cost.map(grid::rounded)).collect()
@@ -170,11 +170,11 @@ fn checked(
         .map_err(Failure::usage)
 }
 
-/// Points of a ray on either side of its middle, and how far they reach, in steps of the grid.
+/// Number of points of a ray on each side of its middle, and their range in steps of the grid.
 const POINTS_ALONG: i32 = 200;
 const STEPS_ALONG: f64 = 1.8;
 
-/// Two rays of the space: the longest lags with the shortest dead time, and the other way round.
+/// Two rays of the space: longest time constants with the shortest dead time, and shortest with the longest.
 fn rays(settings: &GridSettings) -> Result<Vec<CostsAlongRay>, CandidateError> {
     let [t_prop_s, t_body_s, tau_s] = settings.space.ranges_s();
     [

@@ -1,4 +1,4 @@
-//! `onecycle man`: the manual, made of what `--help` says.
+//! `onecycle man`: manual pages from the help texts.
 
 use std::fs;
 use std::io;
@@ -12,7 +12,7 @@ use crate::args::{self, Arguments};
 use crate::failure::{Failure, exit};
 use crate::output::{print_data, write_file};
 
-/// Most words of a heading: more before a colon are a sentence.
+/// Largest number of words of a heading; more words before a colon are a sentence.
 const WORDS_OF_A_HEADING: usize = 2;
 
 pub(crate) fn run(arguments: &args::Man) -> Result<ExitCode, Failure> {
@@ -32,13 +32,13 @@ pub(crate) fn run(arguments: &args::Man) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// A command and all those in it.
+/// A command and all its subcommands.
 fn tree(command: &Command) -> Vec<&Command> {
     let inside = command.get_subcommands().flat_map(tree);
     std::iter::once(command).chain(inside).collect()
 }
 
-/// The page of a command.
+/// The manual page of a command.
 fn page(command: &Command) -> io::Result<Vec<u8>> {
     let man = Man::new(command.clone()).source(concat!("onecycle ", env!("CARGO_PKG_VERSION")));
     let mut page = Vec::new();
@@ -56,8 +56,8 @@ fn page(command: &Command) -> io::Result<Vec<u8>> {
     Ok(page)
 }
 
-/// What stands behind the options of `--help`: `Examples:` and the like begin a section each, other
-/// paragraphs are notes. Indented lines stay as they are, as shells want them.
+/// The text after the options of `--help`: `Examples:` and similar headings begin a section, other paragraphs are notes.
+/// Indented lines keep their line breaks.
 fn sections(text: &str) -> Roff {
     let mut roff = Roff::new();
     let mut last = String::new();
@@ -92,7 +92,7 @@ fn sections(text: &str) -> Roff {
 mod tests {
     use super::*;
 
-    // Two headings, a note between them that has a colon late; calls stay in their lines.
+    // Two headings, and between them a note with a late colon; calls keep their lines.
     #[test]
     fn paragraphs_become_sections() {
         let text = "Examples:\n  onecycle fly\n\nWith --out it is kept in a file: go on there.\n\nExit codes: 0 done";

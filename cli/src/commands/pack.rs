@@ -1,4 +1,4 @@
-//! `onecycle pack`: the files that identifiers are; shown, checked, exchanged.
+//! `onecycle pack`: show, verify, export and import the packs of identifiers.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -23,14 +23,14 @@ use crate::output::{print, write_file};
 use crate::report;
 use crate::results::pack::{ImportedPack, VerifiedPack};
 
-/// Most bytes of a pack: a thousand times what one takes. What is larger is something else.
+/// Largest size of a pack file (bytes): a thousand times that of a real one.
 const MOST_OF_A_PACK: u64 = 1 << 24;
-/// Most bytes of a model: what its format can have.
+/// Largest size of a model file (bytes): the limit of its format.
 const MOST_OF_A_MODEL: u64 = 1 << 31;
 
-/// Random signatures that networks are compared on, of seed 1.
+/// Number of random signatures, seed 1, that networks are compared on.
 const SAMPLES: usize = 1000;
-/// How far what the network sees of them lies from zero: two standard deviations of its inputs.
+/// Range of the normalised random inputs: two standard deviations.
 const SPREAD: f32 = 2.0;
 
 pub(crate) fn run(arguments: &args::Pack) -> Result<ExitCode, Failure> {
@@ -109,7 +109,7 @@ fn samples_file(pack: &Pack<'_>) -> Vec<u8> {
     ])
 }
 
-/// Random ones, within [`SPREAD`] once they are normalised.
+/// Random signatures, within [`SPREAD`] after normalisation.
 fn signatures(pack: &Pack<'_>) -> Vec<[f32; LENGTH]> {
     let mut rng = Pcg64Mcg::seed_from_u64(1);
     let scaling: Vec<_> = (pack.input_offsets().iter())
@@ -119,7 +119,7 @@ fn signatures(pack: &Pack<'_>) -> Vec<[f32; LENGTH]> {
         std::array::from_fn(|i| {
             let (offset, scale) = scaling[i];
             let normalised: f32 = rng.random_range(-SPREAD..=SPREAD);
-            // An input that the network does not see may be anything.
+            // The network ignores inputs with scale zero.
             if scale == 0.0 {
                 offset
             } else {
@@ -142,7 +142,10 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
     if let Some(Normalisation { offsets, scales }) = normalisation {
         let row = |values: Vec<f32>| {
             <[f32; LENGTH]>::try_from(values).map_err(|values| {
-                failed(format!("it takes {} numbers, not {LENGTH}", values.len()))
+                failed(format!(
+                    "the network has {} inputs, not {LENGTH}",
+                    values.len()
+                ))
             })
         };
         contents.input_offsets = row(offsets)?;
@@ -170,14 +173,14 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The network of an ONNX file, and the normalisation that it brings.
+/// The network of a file, and its normalisation if the file has one.
 fn learnt(path: &Path) -> Result<(Option<Normalisation>, Network), Failure> {
     let imported = onnx::import(&read_at_most(path, MOST_OF_A_MODEL)?)
         .map_err(|error| Failure::unreadable(path, error.to_string()))?;
     Ok((imported.normalisation, imported.network))
 }
 
-/// How the pack keeps its weights.
+/// The format in which the pack stores its weights.
 fn precision(contents: &PackContents) -> Precision {
     let is_bytes = |weights: &PackedWeights| matches!(weights, PackedWeights::Bytes { .. });
     if contents.layers.iter().any(|layer| is_bytes(&layer.weights)) {
@@ -187,8 +190,8 @@ fn precision(contents: &PackContents) -> Precision {
     }
 }
 
-/// A card that says where the network and everything else come from. What was measured with the
-/// other network is not said of this one.
+/// The card of an imported pack: sources of the network and of everything else. The scores of the other network are left
+/// out.
 fn card(mut other: Value, arguments: &args::ImportPack, hash: u64) -> Value {
     if let Some(card) = other.as_object_mut() {
         card.remove("scores");
@@ -222,7 +225,7 @@ pub(super) fn read<'a>(source: &PackSource, bytes: &'a [u8]) -> Result<Pack<'a>,
     Pack::read(bytes).map_err(|error| Failure::unreadable(&path(source), error.to_string()))
 }
 
-/// The bytes of a file, of which there may be so many.
+/// The bytes of a file of at most this size.
 fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
     let failed = |error: io::Error| Failure::unreadable(path, error.to_string());
     let mut bytes = Vec::new();
@@ -232,7 +235,7 @@ fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
         .read_to_end(&mut bytes)
         .map_err(failed)?;
     if read as u64 > most {
-        let reason = format!("it has more than {most} bytes, too many to be what is asked for");
+        let reason = format!("the file has more than {most} bytes, too many for a pack or a model");
         return Err(Failure::unreadable(path, reason));
     }
     Ok(bytes)

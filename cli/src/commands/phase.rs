@@ -1,4 +1,4 @@
-//! `onecycle phase`: a space of processes in, its distinguishing phase out.
+//! `onecycle phase`: find the distinguishing phase of a space of processes.
 
 use std::io::{self, Write};
 use std::process::ExitCode;
@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Phase) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// Most lines of the table.
+/// Largest number of lines of the table.
 const MOST_LINES: f64 = 16.0;
 
 /// Rules at whole degrees that cover all local rules.
@@ -74,9 +74,9 @@ fn table(space: &Space, optima: &LocalOptima, phase: &DistinguishingPhase) -> Ve
     (first..=last).rev().filter_map(line).collect()
 }
 
-/// Points of the curve.
+/// Number of points of the curve.
 const CURVE_POINTS: usize = 300;
-/// How far the curve goes beyond the local rules: a part of their range, and at least this many degrees.
+/// Range of the curve beyond the local rules: a fraction of their range, and at least this number of degrees.
 const BEYOND: f64 = 0.06;
 const LEAST_BEYOND_DEG: f64 = 0.5;
 
@@ -97,7 +97,7 @@ fn curve(space: &Space, optima: &LocalOptima, phase: &DistinguishingPhase) -> Ve
         .collect()
 }
 
-/// A line for every rule; deteriorations as fractions.
+/// Writes one line for each rule; deteriorations are fractions.
 fn write_rules(file: &mut dyn Write, rules: &[LocalRule]) -> io::Result<()> {
     let mut file = io::BufWriter::new(file);
     writeln!(

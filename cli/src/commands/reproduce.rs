@@ -1,4 +1,4 @@
-//! `onecycle reproduce`: the paper's simulated results, each part worked out, kept and rendered.
+//! `onecycle reproduce`: compute the parts of the paper, keep their numbers, write the page.
 
 mod comparison;
 mod cycles;

@@ -1,4 +1,4 @@
-//! `onecycle simulate`: a process in, the recording of a relay test out.
+//! `onecycle simulate`: simulate a relay test and write its recording.
 
 use std::f64::consts::TAU;
 use std::io::Write;
@@ -12,15 +12,14 @@ use crate::args::Simulate;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print_data, write_file};
 
-/// Periods of the oscillation in a recording: some to settle, eight and more to fit.
+/// Periods of the oscillation in a recording: some to settle, eight or more to fit.
 const PERIODS: f64 = 20.0;
-/// Most samples that a simulation makes, and that fit in its delay: half a day at 1 kHz.
+/// Largest number of samples of a simulation and of its dead time: half a day at 1 kHz.
 const MOST_SAMPLES: f64 = 5e7;
-/// Fewest samples in a period: a relay that is slower than that is none.
+/// Smallest number of samples in a period of the oscillation.
 const FEWEST_SAMPLES_A_PERIOD: f64 = 4.0;
 
-/// Samples in a period where the amplitude is measured: fine enough for the peaks whatever the rate of
-/// the recording.
+/// Samples in a period of the simulation that measures the amplitude, independent of the rate of the recording.
 const SAMPLES_A_PERIOD: usize = 1000;
 
 pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
@@ -45,7 +44,7 @@ pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
         Some(path) => write_file(path, |file| write_csv(file, &recording, &comments))?,
         None => {
             let mut table = Vec::new();
-            // Writing to memory does not fail.
+            // Writing to memory cannot fail.
             let _ = write_csv(&mut table, &recording, &comments);
             drop(waiting);
             print_data(&table)?;
@@ -54,7 +53,7 @@ pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// A relay for a process whose output falls when its input rises.
+/// A relay with reversed output, for a process with negative gain.
 struct Reversed(Relay);
 
 impl Controller for Reversed {
@@ -72,7 +71,7 @@ fn run_relay(experiment: &Experiment, mut relay: Relay, seed: u64) -> Trace {
     }
 }
 
-/// The trace with all its samples, however many.
+/// The trace as a recording with all its samples.
 fn recording(trace: &Trace) -> Result<Recording, Failure> {
     let columns = Columns::new(
         Column::named("time"),
@@ -140,13 +139,13 @@ fn experiment(
     let samples = duration_s / sample_s;
     if !(2.0..=MOST_SAMPLES).contains(&samples) {
         return Err(Failure::usage(format!(
-            "{samples:.0} samples are not between 2 and {MOST_SAMPLES:.0}: change --duration or \
+            "the simulation has {samples:.0} samples, but 2 to {MOST_SAMPLES:.0} are possible: change --duration or \
              --sample-rate"
         )));
     }
     if process.tau_s() / sample_s > MOST_SAMPLES {
         return Err(Failure::usage(format!(
-            "--tau is over {MOST_SAMPLES:.0} samples: lower --sample-rate"
+            "--tau is longer than {MOST_SAMPLES:.0} samples: lower --sample-rate"
         )));
     }
     if !arguments.reference.is_finite() {
@@ -168,7 +167,7 @@ fn experiment(
 fn period_s(arguments: &Simulate, process: &Soiptd) -> Result<f64, Failure> {
     let oscillation = process.describing_function_oscillation(arguments.amplitude, arguments.beta);
     let (omega, _) = oscillation.ok_or_else(|| {
-        Failure::usage("the process has no oscillation at this phase: choose a smaller --beta")
+        Failure::usage("the process does not oscillate at this phase: choose a smaller --beta")
     })?;
     let period_s = TAU / omega;
     if period_s * arguments.sample_rate < FEWEST_SAMPLES_A_PERIOD {
@@ -193,13 +192,13 @@ fn noise_free_amplitude(arguments: &Simulate, process: &Soiptd) -> Result<f64, F
     Ok(trace.amplitude_of_last(2 * SAMPLES_A_PERIOD))
 }
 
-/// The truth behind the recording, as comment lines.
+/// The true process, relay and disturbances, as comment lines.
 fn head(arguments: &Simulate, experiment: &Experiment) -> String {
     let mut text = Vec::new();
     let process = &experiment.process;
     let number =
         |value: Option<f64>| value.map_or("infinite".to_owned(), |value| value.to_string());
-    // Writing to memory does not fail.
+    // Writing to memory cannot fail.
     let _ = writeln!(
         text,
         "simulated relay test: onecycle {}",

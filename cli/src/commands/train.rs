@@ -1,4 +1,4 @@
-//! `onecycle train`: networks from nothing, as a recipe says.
+//! `onecycle train`: train the networks of a recipe.
 
 pub(crate) mod classifier;
 pub(crate) mod identifier;
@@ -17,19 +17,19 @@ use crate::failure::Failure;
 use crate::journal::Journal;
 use crate::{args, settings};
 
-/// What every recipe begins with; the rest is read when it is known what of it is.
+/// The field that every recipe has; the other fields depend on it.
 #[derive(Deserialize)]
 struct Head {
     network: Network,
 }
 
-/// What a recipe is of.
+/// The kind of network of a recipe.
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 enum Network {
     /// The paper's classifier.
     Classifier,
-    /// The shipped identifier, or one of a user's own.
+    /// An identifier.
     Density,
 }
 
@@ -43,12 +43,12 @@ pub(crate) fn run(arguments: &args::Train) -> Result<ExitCode, Failure> {
 
 /// The journal of a training with this recipe beside its output.
 fn journal(out: &Path, recipe: &impl Serialize, restart: bool) -> Result<Journal, Failure> {
-    // All that is kept are pieces.
+    // Trainings are kept as pieces; the journal has no lines.
     let no_line = |_: IgnoredAny| Err("is unknown".to_owned());
     Journal::open(&Journal::folder_of(out), "train", recipe, restart, no_line)
 }
 
-/// A network in training: where it is kept after each epoch.
+/// The place of a network in training, which is kept after each epoch.
 struct Kept<'a> {
     journal: &'a Journal,
     /// Number of the network, from 1.
@@ -89,7 +89,7 @@ fn begun<E: Display>(
     left.map_or_else(|| anew().map_err(Failure::usage), Ok)
 }
 
-/// Trains to the end. After each epoch `told` is called and the training is kept.
+/// Trains to the end. After each epoch it calls `told` and keeps the training.
 fn train(
     trainer: &mut Trainer,
     [training, validation]: [&dyn Dataset; 2],

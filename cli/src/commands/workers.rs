@@ -1,4 +1,4 @@
-//! Threads that work on pieces, and a bar that shows how far they are.
+//! A pool of threads that work on pieces, with a progress bar.
 
 use indicatif::ProgressBar;
 use onecycle_lab::workers;
@@ -14,9 +14,9 @@ pub(crate) struct Workers {
 }
 
 impl Workers {
-    /// So many threads, or as many as there are cores.
+    /// A pool with this number of threads, by default one for each core.
     pub(crate) fn new(threads: Option<u64>) -> Result<Self, Failure> {
-        // Zero is the builder's word for as many as there are cores.
+        // For the builder, zero means one thread for each core.
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads.unwrap_or(0) as usize)
             .build()
@@ -29,14 +29,14 @@ impl Workers {
         self.pool.current_num_threads()
     }
 
-    /// The bar is about so many pieces from now on, some of them done.
+    /// Sets the progress bar to a number of pieces, some of them done.
     pub(crate) fn expect(&self, count: usize, done: usize) {
         self.bar.reset();
         self.bar.set_length(count as u64);
         self.bar.set_position(done as u64);
     }
 
-    /// Runs pieces that the bar counts from zero; their results are in order.
+    /// Runs pieces with a progress bar of their own; the results are in order.
     pub(crate) fn map<T: Send>(
         &self,
         count: usize,
@@ -46,7 +46,7 @@ impl Workers {
         self.run(count, piece)
     }
 
-    /// Runs pieces that the bar expects; their results are in order.
+    /// Runs pieces and advances the bar for each; the results are in order.
     pub(crate) fn run<T: Send>(
         &self,
         count: usize,
@@ -59,7 +59,7 @@ impl Workers {
         })
     }
 
-    /// Runs pieces that the bar does not count; their results are in order.
+    /// Runs pieces without advancing the bar; the results are in order.
     pub(crate) fn quietly<T: Send>(
         &self,
         count: usize,

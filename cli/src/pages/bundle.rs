@@ -1,39 +1,38 @@
-//! plotly.js as pages hold it: only the modules that their plots need.
+//! plotly.js without the modules that the pages do not use.
 //!
-//! The crate brings the whole of plotly.js 3.0.1, 4.7 MB, most of it for maps and volumes that no page has; a browser on
-//! a small machine takes two seconds to read and set it up. The bundle is a chain of modules, each a function that is
-//! called when another one needs it:
+//! The crate has all of plotly.js 3.0.1: 4.7 MB, most of it for maps and 3-D plots, which take a browser on a small machine
+//! two seconds to load. The bundle is a list of modules; each is a function that other modules call when they need it:
 //!
 //! ```text
 //! (function(){ ... ;var A=ye((x,y)=>{ ... B() ... });var B=ye(x=>{ ... });var Z=ye(( ... .register([A(),B(), ...]) ... })();
 //! ```
 //!
-//! The last one sets up every kind of trace. With the kinds that pages draw alone in its list, what it reaches is
-//! 1 MB, and a page is open four times sooner.
+//! The last module registers every kind of trace. With only the kinds that the pages draw in that list, the modules that
+//! can be reached are 1 MB, and a page opens four times faster.
 
 use std::collections::{BTreeSet, HashMap};
 
 use plotly::Plot;
 
-/// Where the list has the kinds beside curves that pages draw: bar, heatmap, contour.
+/// Positions in the list of the kinds that pages draw besides curves: bar, heatmap, contour.
 const KINDS: [usize; 3] = [0, 2, 6];
 
-/// The element that holds plotly.js; what the crate adds for formulas is left out.
+/// The script element with plotly.js; the script for formulas that the crate adds is left out.
 pub(super) fn script() -> String {
     let sources = Plot::offline_js_sources();
     format!("<script>{}</script>", needed(plotly(&sources)))
 }
 
-/// The first of the scripts that the crate writes.
+/// The first script of the crate.
 fn plotly(sources: &str) -> &str {
     let (_, behind) = sources.split_once('>').unwrap_or_default();
     behind.split("</script>").next().unwrap_or_default()
 }
 
-/// The call that sets up the kinds of traces, and its end.
+/// The call that registers the kinds of traces, and its end.
 const LIST: (&str, &str) = (".register([", "])");
 
-/// What is needed of the bundle; all of one that is made in another way.
+/// The needed part of a bundle; the whole bundle if it is built differently.
 fn needed(bundle: &str) -> String {
     let Some((before, rest)) = bundle.rsplit_once(LIST.0) else {
         return bundle.to_owned();
@@ -47,12 +46,12 @@ fn needed(bundle: &str) -> String {
     reached(&[before, LIST.0, &wanted.join(","), LIST.1, after].concat())
 }
 
-/// Between the end of a module and the name of the next.
+/// Text between the end of a module and the name of the next one.
 const BETWEEN: &str = ";var ";
-/// Between the name of a module and its function.
+/// Text between the name of a module and its function.
 const IS_MODULE: &str = "=ye(";
 
-/// What stands before the first module and after the last, and what of the modules between is called from there.
+/// The text before the first module and after the last, and the modules that are called from there.
 fn reached(bundle: &str) -> String {
     let pieces = pieces(bundle);
     let names = pieces.iter().map(|piece| name(piece));
@@ -71,7 +70,7 @@ fn reached(bundle: &str) -> String {
     kept.join(BETWEEN)
 }
 
-/// The bundle cut before the name of each module.
+/// The bundle, split before the name of each module.
 fn pieces(bundle: &str) -> Vec<&str> {
     let mut pieces = vec![];
     let mut start = 0;
@@ -90,7 +89,7 @@ fn is_of_name(character: char) -> bool {
     character.is_ascii_alphanumeric() || matches!(character, '_' | '$')
 }
 
-/// The name of the module that begins here.
+/// The name of the module at the start of this text.
 fn name(piece: &str) -> Option<&str> {
     let end = piece.find(|character| !is_of_name(character))?;
     piece[end..].starts_with(IS_MODULE).then(|| &piece[..end])
@@ -108,7 +107,7 @@ fn calls(piece: &str) -> impl Iterator<Item = &str> {
 mod tests {
     use super::*;
 
-    // Each kind of the list is a module that exports the whole of another one, which says its name.
+    // Each kind in the list is a module that exports another one, which contains its name.
     #[test]
     fn the_places_are_those_of_the_kinds() {
         let script = script();
@@ -134,7 +133,7 @@ mod tests {
         }
     }
 
-    // Nothing that is called is missing, the licences are there, and three quarters of the bundle are not.
+    // Every module that is called is there, so are the licences, and three quarters of the bundle are gone.
     #[test]
     fn what_is_left_is_closed() {
         let sources = Plot::offline_js_sources();
@@ -158,7 +157,7 @@ mod tests {
         assert!(script.len() < 1_200_000, "{}", script.len());
     }
 
-    // Three modules of which the first needs the last, and a bundle of another make.
+    // Three modules of which the first needs the last; and a text that is no bundle.
     #[test]
     fn by_hand() {
         let bundle = "(()=>{var ye=0;f({});var A=ye((x,y)=>{C()});var B=ye(x=>{A()});var C=ye(()=>{});var Z=ye((x)=>{\

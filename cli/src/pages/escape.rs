@@ -1,6 +1,6 @@
-//! Text as HTML has it.
+//! Escaping of text for HTML.
 
-/// The text with every character escaped that HTML would read as markup.
+/// The text with all characters escaped that HTML reads as markup.
 pub(super) fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for character in text.chars() {

@@ -1,6 +1,6 @@
-//! A page in one file: style, script and plots inside, light and dark, for screens and paper.
+//! A page in one HTML file with its style, script and plots; light and dark, for screens and for print.
 //!
-//! All text goes through [`escaped`]; bodies are made of the components here.
+//! The functions here make the components of a page. All text goes through [`escaped`].
 
 use std::fmt::Write;
 
@@ -8,12 +8,12 @@ use super::bundle;
 use super::escape::escaped;
 use super::plot::Figure;
 
-/// A heading and what stands below it.
+/// A section: a heading and the components below it.
 pub(crate) struct Section {
-    /// Its address on the page.
+    /// Identifier, for links.
     pub(crate) id: String,
     pub(crate) title: String,
-    /// Components.
+    /// Components, as HTML.
     pub(crate) body: String,
 }
 
@@ -27,12 +27,12 @@ impl Section {
     }
 }
 
-/// A paragraph of a class.
+/// A paragraph with a CSS class.
 pub(crate) fn paragraph(class: &str, text: &str) -> String {
     format!("<p class=\"{}\">{}</p>\n", escaped(class), escaped(text))
 }
 
-/// What the whole page comes down to, good or bad.
+/// The main result of the page, good or bad.
 pub(crate) fn verdict(is_good: bool, text: &str) -> String {
     let kind = if is_good { "good" } else { "bad" };
     format!("<p class=\"verdict {kind}\">{}</p>\n", escaped(text))
@@ -46,7 +46,7 @@ pub(crate) fn list(items: &[String]) -> String {
     format!("<ul>{}</ul>\n", items.collect::<String>())
 }
 
-/// Names and what is to be said of each.
+/// A list of names with their values.
 pub(crate) fn facts(facts: &[(impl AsRef<str>, String)]) -> String {
     let mut all = String::new();
     for (name, value) in facts {
@@ -56,13 +56,13 @@ pub(crate) fn facts(facts: &[(impl AsRef<str>, String)]) -> String {
     format!("<dl>\n{all}</dl>\n")
 }
 
-/// A value, and a smaller one below it.
+/// A table cell: a value, and a smaller one below it.
 pub(crate) struct Cell<'a> {
     pub(crate) value: &'a str,
     pub(crate) below: Option<String>,
 }
 
-/// Most columns beside each other on a phone; of more, each row becomes a list.
+/// Largest number of columns that a phone shows side by side; with more, each row becomes a list.
 const MOST_COLUMNS: usize = 5;
 
 /// A table; its first column has the names of the rows.
@@ -96,7 +96,7 @@ pub(crate) fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'
     html
 }
 
-/// A table of texts; each row is its name and its cells.
+/// A table of texts: the name of each row and its cells.
 pub(crate) fn plain_table<const N: usize>(
     caption: &str,
     columns: &[&str],
@@ -116,7 +116,7 @@ pub(crate) fn plain_table<const N: usize>(
 
 /// A plot with its caption.
 pub(crate) fn figure(figure: &Figure) -> String {
-    // Within a script nothing but its end is read: no `<`, no end.
+    // A browser looks for the end tag only; without `<` there is none in the JSON.
     let json = figure.to_json().replace('<', "\\u003c");
     let shape = figure.shape.name();
     format!(
@@ -126,7 +126,7 @@ pub(crate) fn figure(figure: &Figure) -> String {
     )
 }
 
-/// Small plots beside each other, as many as there is room for.
+/// Plots side by side, as many as fit.
 pub(crate) fn row(figures: &[Figure]) -> String {
     let figures = figures.iter().map(figure).collect::<String>();
     format!("<div class=\"row\">\n{figures}</div>\n")
@@ -152,7 +152,7 @@ pub(crate) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
          <title>{title}</title>\n<style>\n{STYLE}</style>\n{}\n</head>\n<body>\n\
          <header><h1>{title}</h1><button id=\"theme\" type=\"button\">light / dark</button></header>\n\
          {lead}<nav>{links}</nav>\n\
-         <noscript><p class=\"note\">Plots need JavaScript; the tables do not.</p></noscript>\n\
+         <noscript><p class=\"note\">The plots need JavaScript; the tables work without.</p></noscript>\n\
          <main>\n{body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n",
         bundle::script()
     )
@@ -166,8 +166,7 @@ mod tests {
     use super::super::plot::{Axis, Panel};
     use super::*;
 
-    // Whatever stands in a text, it is text: no tag of it reaches the page, and it can leave no
-    // attribute and no script.
+    // A text with tags and quotes puts no tag on the page and ends no attribute and no script.
     #[test]
     fn text_stays_text() {
         let hostile = "</script><b x='\"'>&";
@@ -179,7 +178,7 @@ mod tests {
         };
         let columns = [hostile.to_owned(), hostile.to_owned()];
         let html = table(hostile, &columns, &[(hostile, vec![cell])]);
-        // Caption, two headings, the row's name, the value, its column and the text below.
+        // Caption, two headings, the row's name, the value, its column and the text below it.
         assert_eq!(html.matches(safe).count(), 7);
         let html = facts(&[(hostile.to_owned(), hostile.to_owned())]);
         assert_eq!(html.matches(safe).count(), 2);
@@ -191,8 +190,7 @@ mod tests {
         assert_eq!(html.matches("</script").count(), 1, "{html}");
     }
 
-    // One file that fetches nothing: what is needed of plotly.js is in it, and two scripts end: that of plotly.js and that
-    // of the page.
+    // One file that loads nothing else, with two scripts: plotly.js and that of the page.
     #[test]
     fn the_page_is_whole() {
         let section = Section {

@@ -1,7 +1,7 @@
-//! Plots of a page: panels of series as plotly.js draws them (plotly.rs, MIT licence).
+//! Plots of a page: figures of panels of series, drawn by plotly.js (MIT licence).
 //!
-//! A series says what it is, not how it looks: colours are the page's, the same for the same thing in every figure,
-//! and they change with its theme.
+//! A series names its meaning, not its colour. The page chooses the colours by theme, the same for the same meaning in
+//! every figure.
 
 mod json;
 
@@ -13,10 +13,10 @@ use serde::{Deserialize, Serialize};
 pub(crate) enum Marks {
     Line,
     Dashes,
-    /// Each value is held until the next.
+    /// Steps: each value is held until the next one.
     Steps,
     Points,
-    /// Few points, which stand for themselves.
+    /// Large open circles, for a few points.
     Rings,
     LineAndPoints,
     /// A closed polygon, filled.
@@ -24,21 +24,21 @@ pub(crate) enum Marks {
     Bars,
 }
 
-/// What a series shows, which is what decides its colour.
+/// Meaning of a series, which decides its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Hue {
-    /// One of several of a kind: the next of the palette.
+    /// One of several similar series: the next colour of the palette.
     #[default]
     Next,
     Measured,
     Model,
     Input,
-    /// What others are held against.
+    /// Reference for other series.
     Reference,
 }
 
-/// Points under one name; those of no name are not in the legend.
+/// A series of points. A series without a name is not in the legend.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Series {
     pub(crate) name: String,
@@ -49,11 +49,11 @@ pub(crate) struct Series {
     pub(crate) y: Vec<f64>,
 }
 
-/// Digits that a screen can show of a coordinate, and of the width of all that there are.
+/// Significant digits of a coordinate, of its value and of the range of all values.
 const DIGITS: usize = 5;
 
 impl Series {
-    /// Of points, as exact as a screen is.
+    /// A series of points, rounded to what a screen can show.
     pub(crate) fn of_points(
         name: &str,
         marks: Marks,
@@ -69,7 +69,7 @@ impl Series {
         }
     }
 
-    /// What lies between two curves over the same abscissas.
+    /// The area between two curves over the same abscissas.
     pub(crate) fn between(name: &str, x: &[f64], low: &[f64], high: &[f64]) -> Self {
         let there = x.iter().zip(low);
         let back = x.iter().zip(high).rev();
@@ -81,7 +81,7 @@ impl Series {
     }
 }
 
-/// The numbers with no more digits than are shown: of each, and of what lies between the least and the greatest.
+/// The numbers rounded to [`DIGITS`] digits of the smaller one: the number or the range of all numbers.
 fn shortened(mut values: Vec<f64>) -> Vec<f64> {
     let ends = values
         .iter()
@@ -107,15 +107,15 @@ fn shortened(mut values: Vec<f64>) -> Vec<f64> {
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Axis {
-    /// What it shows, and in which unit.
+    /// Quantity and unit.
     pub(crate) title: String,
     /// Whether it is logarithmic.
     #[serde(default)]
     pub(crate) is_logarithmic: bool,
-    /// What is shown of it [default: all that there is].
+    /// Range that is shown [default: that of the data].
     #[serde(default)]
     pub(crate) range: Option<(f64, f64)>,
-    /// Whether it has neither numbers nor a grid.
+    /// Whether labels and grid are hidden.
     #[serde(default)]
     pub(crate) is_bare: bool,
 }
@@ -144,18 +144,18 @@ impl Axis {
     }
 }
 
-/// Words at a point of a panel, with an arrow to it.
+/// A note at a point of a panel, with an arrow.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Note {
     pub(crate) text: String,
     pub(crate) x: f64,
     pub(crate) y: f64,
-    /// Where the words stand from there: to the right and down (pixels).
+    /// Offset of the text from the point: right and down (pixels).
     pub(crate) away: (f64, f64),
 }
 
-/// Values over a plane, `z[row][column]` at `y[row]`, `x[column]`, or between `y[row]` and `y[row + 1]` where there is one
-/// more of these than rows, and columns likewise. NaN is left blank.
+/// Values over a plane: `z[row][column]` at `y[row]`, `x[column]`. If `y` has one value more than there are rows, they are
+/// the edges of the rows; the same for `x` and columns. NaN is left blank.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Field {
     pub(crate) kind: FieldKind,
@@ -164,7 +164,7 @@ pub(crate) struct Field {
     pub(crate) z: Vec<Vec<f64>>,
 }
 
-/// Where the values of a field stand.
+/// Coordinates of the values of a field.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum Places {
@@ -172,18 +172,18 @@ pub(crate) enum Places {
     Names(Vec<String>),
 }
 
-/// What the values of a field are.
+/// Meaning of the values of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum FieldKind {
-    /// Contents of the smallest regions, 0 to 1: lines about those of 50, 90 and 99 %.
+    /// Probability content of highest-density regions, 0 to 1; contour lines at 50, 90 and 99 %.
     Regions,
-    /// Correlations, -1 to 1: coloured squares with their numbers.
+    /// Correlations, -1 to 1; coloured squares with numbers.
     Correlations,
-    /// Values on either side of a middle, with a scale beside them.
+    /// Values below and above a middle value, with a colour bar.
     Diverging { middle: f64, reach: f64 },
 }
 
-/// One of the panels that stand above each other over the same abscissas.
+/// One of several panels stacked over a common x axis.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Panel {
     pub(crate) y: Axis,
@@ -202,22 +202,22 @@ impl Panel {
     }
 }
 
-/// How much room a figure has.
+/// Size of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Shape {
     #[default]
     Wide,
     /// For two panels.
     Tall,
-    /// Both axes have one scale.
+    /// With the same scale on both axes.
     ToScale,
     Square,
-    /// One of several in a row.
+    /// One of several side by side.
     Small,
 }
 
 impl Shape {
-    /// As the page's style has it.
+    /// CSS class.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Wide => "wide",
@@ -229,25 +229,25 @@ impl Shape {
     }
 }
 
-/// Panels above each other and what stands under them.
+/// A figure: panels, stacked, and a caption.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Figure {
     pub(crate) caption: String,
     pub(crate) x: Axis,
-    /// The uppermost first.
+    /// From top to bottom.
     pub(crate) panels: Vec<Panel>,
     pub(crate) shape: Shape,
-    /// What is marked of the abscissas.
+    /// Shaded range of the x axis.
     pub(crate) span: Option<(f64, f64)>,
 }
 
 impl Figure {
-    /// Of one panel.
+    /// A figure with one panel.
     pub(crate) fn single(caption: &str, x: Axis, panel: Panel) -> Self {
         Self::stacked(caption, x, vec![panel])
     }
 
-    /// Of panels above each other.
+    /// A figure with several panels, from top to bottom.
     pub(crate) fn stacked(caption: &str, x: Axis, panels: Vec<Panel>) -> Self {
         let shape = if panels.len() > 1 {
             Shape::Tall
@@ -272,7 +272,7 @@ impl Figure {
 mod tests {
     use super::*;
 
-    // Five digits of numbers over decades; of numbers that differ in the sixth the next five.
+    // Five digits of numbers over decades; of numbers that differ in the sixth digit, the next five.
     #[test]
     fn digits_are_those_that_are_seen() {
         assert_eq!(shortened(vec![1.234_567, 1234.567]), [1.2346, 1234.6]);

@@ -24,7 +24,7 @@ fn on_or_off(is_on: bool) -> &'static str {
     if is_on { "on" } else { "off" }
 }
 
-/// Whether the relay reached a steady oscillation.
+/// Table of the relay: how many cases reached a steady oscillation.
 pub(crate) fn relay(campaign: &Campaign, cases: &[RelayCase]) -> String {
     let steady = cases.iter().filter(|case| case.steady_at.is_some()).count();
     let run_away = cases.iter().filter(|case| !case.alive).count();
@@ -61,7 +61,7 @@ pub(crate) fn relay(campaign: &Campaign, cases: &[RelayCase]) -> String {
     )
 }
 
-/// Errors, intervals and cost of the identified processes.
+/// Table of the identification: errors, intervals and cost.
 pub(crate) fn identification(campaign: &Campaign, cases: &[IdentificationCase]) -> String {
     let held: Vec<[bool; 6]> = cases.iter().filter_map(|case| case.held).collect();
     let refused = cases.len() - held.len();
@@ -118,12 +118,12 @@ fn error_over_bound(cases: &[IdentificationCase]) -> String {
     )
 }
 
-/// Processes in the family and of each kind out of it: refused, or accepted with a harmful controller.
+/// Table of processes in the family and of each kind out of it.
 pub(crate) fn unknown(campaign: &Campaign, rows: &[(DefectKind, Vec<OutsiderCase>)]) -> String {
     let mut text = format!(
         "{} random processes with each defect, bias up to {} h, noise up to {} of the amplitude, trim {}\n\
-         refused, and accepted although the controller costs over 10 % more than promised, of {} \
-         cycles; silent: of these last, those whose last cycle is not called unknown either\n",
+         refused: not identified from {} cycles; harmful: identified, but the controller costs over 10 % \
+         more\nthan predicted; silent: harmful with the most cycles, and the last cycle is not judged unknown\n",
         campaign.cases,
         campaign.bias,
         campaign.sigma,

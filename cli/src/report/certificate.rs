@@ -19,7 +19,7 @@ use crate::style::{HEADING, REFUSAL, headed, painted, verdict};
 
 pub(crate) use self::page::html;
 
-/// The report on a space for people.
+/// The certificate of a space as text.
 pub(crate) fn text(certified: &CertifiedSpace) -> String {
     let mut text = String::new();
     let CertifiedSpace { space, rows, .. } = certified;
@@ -81,7 +81,7 @@ fn span_of_ratios(certified: &CertifiedSpace, of: fn((f64, f64)) -> f64) -> Stri
     span(ratios.map(of))
 }
 
-/// `low .. high` of ratios.
+/// `low .. high` of the values.
 fn span(values: impl Iterator<Item = f64> + Clone) -> String {
     let low = values.clone().fold(f64::INFINITY, f64::min);
     let high = values.fold(f64::NEG_INFINITY, f64::max);
@@ -134,7 +134,7 @@ fn corners(text: &mut String, space: &Space, corners: &[Certificate]) {
     }
 }
 
-/// Error of the describing function, from the exact value over its own.
+/// Error of the describing function; `ratio` is the exact value over that of the describing function.
 fn error(ratio: f64) -> String {
     format!("{:+.1} %", 100.0 * (ratio.recip() - 1.0))
 }
@@ -188,7 +188,7 @@ fn stretch(kind: &RelayCounts) -> String {
     })
 }
 
-/// The report on a space for programs.
+/// The certificate of a space as JSON.
 pub(crate) fn json(certified: &CertifiedSpace) -> String {
     let worst = &certified.least_stable;
     let [t_prop_s, t_body_s, tau_s] = worst.times_s;
@@ -210,7 +210,7 @@ pub(crate) fn json(certified: &CertifiedSpace) -> String {
             "t_prop_s": t_prop_s,
             "t_body_s": t_body_s,
             "tau_s": tau_s,
-            // Infinite where there is no cycle.
+            // It is infinite without a cycle.
             "spectral_radius": worst.spectral_radius.is_finite().then_some(worst.spectral_radius),
         },
         "corners": certified.corners.iter().map(corner).collect::<Vec<_>>(),
@@ -233,7 +233,7 @@ fn corner(certificate: &Certificate) -> Value {
     })
 }
 
-/// The report on single processes.
+/// The certificates of single processes as text.
 pub(crate) fn processes(processes: &[CertifiedProcess]) -> String {
     let mut text = String::new();
     for process in processes {

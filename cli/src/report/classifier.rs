@@ -1,4 +1,4 @@
-//! What classifiers have learnt: a table a set of experiments, a row a loss and rule.
+//! Scores of trained classifiers: one table for each set of experiments, one row for each loss and rule.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ use super::json::to_text;
 use super::number::significant;
 use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
 
-/// Changes with every change that a reader of the table could notice.
+/// Version of the JSON; raised with every change that a reader could notice.
 const SCHEMA: &str = "onecycle.train.classifier/1";
 
 #[derive(Serialize)]
@@ -20,7 +20,7 @@ struct Report<'a> {
     run: &'a ClassifierRun<'a>,
 }
 
-/// The table for programs.
+/// The scores as JSON.
 pub(crate) fn json(run: &ClassifierRun<'_>) -> String {
     to_text(&Report {
         schema: SCHEMA,
@@ -28,7 +28,7 @@ pub(crate) fn json(run: &ClassifierRun<'_>) -> String {
     })
 }
 
-/// A loss as the table calls it.
+/// The name of a loss in the table.
 pub(crate) fn name(loss: &Loss) -> &'static str {
     match loss {
         Loss::CrossEntropy => "conventional softmax",
@@ -40,7 +40,7 @@ pub(crate) fn name(loss: &Loss) -> &'static str {
     }
 }
 
-/// The table for people.
+/// The scores as text.
 pub(crate) fn text(run: &ClassifierRun<'_>) -> String {
     let recipe = run.recipe;
     let mut text = String::new();
@@ -54,7 +54,7 @@ pub(crate) fn text(run: &ClassifierRun<'_>) -> String {
         text,
         "Network   {}, {} weights\n\
          Classes   {}, neighbours {} % apart\n\
-         Learnt    from {} experiments, {}, bias up to {} h, noise up to {} of the amplitude\n\
+         Training  {} experiments, {}, bias up to {} h, noise up to {} of the amplitude\n\
          Time      {} s",
         widths.join("-"),
         run.weights,
@@ -93,7 +93,7 @@ fn table(text: &mut String, set: &ScoredSet, number: usize, networks: &[TrainedN
     };
     let _ = writeln!(
         text,
-        "\n{} experiments {of}, {}; {} more were not steady\n\
+        "\n{} experiments {of}, {}; {} more without a steady oscillation\n\
          {:28} {:15} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}",
         set.examples,
         described(set.protocol),
@@ -119,7 +119,7 @@ fn table(text: &mut String, set: &ScoredSet, number: usize, networks: &[TrainedN
         }
     }
     let [harmonics, amplitude] = &set.best;
-    line(text, ("best class there is", ""), harmonics, "");
+    line(text, ("best possible class", ""), harmonics, "");
     line(text, ("the same, gain by amplitude", ""), amplitude, "");
 }
 
@@ -146,6 +146,6 @@ fn described(protocol: Protocol) -> &'static str {
     match protocol {
         Protocol::Trimmed => "trim on",
         Protocol::Untrimmed => "bias left in",
-        Protocol::Both => "trim on and bias left in by turns",
+        Protocol::Both => "trim on and bias left in, alternating",
     }
 }

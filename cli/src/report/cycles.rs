@@ -1,4 +1,4 @@
-//! Cycles of one run, each identified alone: the cost of each one's controller on the process of every other.
+//! Cycles of one run, each identified alone: cost of each controller on the processes of the other cycles.
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::evaluate::Cycles;

@@ -1,4 +1,4 @@
-//! What a dataset holds, and how long it took.
+//! Summary of a dataset: its experiments, its files and the time taken.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use super::json::to_text;
 use super::number::significant;
 use crate::results::dataset::DatasetRun;
 
-/// Changes with every change that a reader of the summary could notice.
+/// Version of the JSON; raised with every change that a reader could notice.
 const SCHEMA: &str = "onecycle.dataset.summary/1";
 
 #[derive(Serialize)]
@@ -18,7 +18,7 @@ struct Summary<'a> {
     recipe: &'a Recipe,
     /// Experiments of the dataset.
     experiments: u64,
-    /// Those that became examples.
+    /// Experiments with a steady oscillation.
     examples: usize,
     without_oscillation: u64,
     files: usize,
@@ -62,16 +62,16 @@ pub(crate) fn text(run: &DatasetRun, folder: &Path) -> String {
     let (experiments, examples) = (summary.experiments, summary.examples);
     let speed = match summary.experiments_per_s {
         Some(speed) => format!(
-            "{} experiments in {} s, {} a second",
+            "{} experiments in {} s, {} per second",
             summary.experiments_made,
             significant(summary.seconds),
             significant(speed)
         ),
-        None => "nothing: all was there".to_owned(),
+        None => "nothing: all files exist".to_owned(),
     };
     text + &format!(
         "Examples   {examples} of {experiments} experiments, {} without a steady oscillation\n\
-         Files      {} in {}, {} of them kept\n\
+         Files      {} in {}, {} of them from earlier runs\n\
          Made now   {speed}\n",
         summary.without_oscillation,
         summary.files,
@@ -85,7 +85,7 @@ fn of_family(family: &Family) -> String {
     let (least, most) = family.samples_per_period;
     format!(
         "weight {}: T_prop {} .. {} s, T_body {} .. {} s, tau {} .. {} s,\n           \
-         {least} .. {most} samples a period",
+         {least} .. {most} samples per period",
         family.weight, prop.0, prop.1, body.0, body.1, tau.0, tau.1
     )
 }

@@ -1,4 +1,4 @@
-//! What flights were worth: as text, and as a page with their pictures.
+//! Evaluation of flights: as text, and as a page with figures.
 
 use std::fmt::Write;
 
@@ -16,27 +16,27 @@ use crate::pages::plot::{self, Figure, Marks, Panel, Series};
 use crate::results::fly::{Flight, MissionFlights};
 use crate::style::{HEADING, painted, verdict};
 
-/// Points of a series: as many as a wide screen has.
+/// Number of points of a series: the width of a wide screen.
 const POINTS: usize = 2000;
 
-/// Names of the figures that say whether all went well.
+/// Names of the lines that say whether all missions were flown.
 const FLOWN: &str = "flown";
 const ENDED_EARLY: &str = "ended early";
 
 fn title(mission: Mission) -> &'static str {
     match mission {
-        Mission::Altitude => "Altitude, from the ground without a controller",
-        Mission::Payload => "The same with a payload of 400 g, 30 % of the mass",
-        Mission::Cycles => "Five cycles of one run, one by one (the paper's Table VII)",
-        Mission::Roll => "Roll with a bias, compensated",
-        Mission::RollUncompensated => "Roll with a bias, not compensated",
-        Mission::Disturbed => "Weight, a blow and wind on the tuned vehicle",
-        Mission::DisturbedUntuned => "The same on the vehicle that was not tuned",
-        Mission::Vehicle => "From the ground to all four axes tuned",
+        Mission::Altitude => "Altitude: take-off without a controller",
+        Mission::Payload => "Altitude with a payload of 400 g, 30 % of the mass",
+        Mission::Cycles => "Five cycles of one run, each identified alone (the paper's Table VII)",
+        Mission::Roll => "Roll with an input bias, compensated",
+        Mission::RollUncompensated => "Roll with an input bias, not compensated",
+        Mission::Disturbed => "Added weight, impact and wind on the tuned vehicle",
+        Mission::DisturbedUntuned => "Added weight, impact and wind on a vehicle that is not tuned",
+        Mission::Vehicle => "Take-off and tuning of all four axes",
     }
 }
 
-/// A mission's figures, each with a name.
+/// The numbers of a mission, each with a name.
 fn figures(campaign: &MissionFlights) -> Vec<(String, String)> {
     let flights = &campaign.flights;
     let done = flights
@@ -63,7 +63,7 @@ fn figures(campaign: &MissionFlights) -> Vec<(String, String)> {
     figures
 }
 
-/// What a mission is flown for.
+/// The numbers that a mission is flown for.
 fn of_mission(campaign: &MissionFlights, figures: &mut Vec<(String, String)>) {
     let flights = &campaign.flights;
     let longest = |value: &dyn Fn(&Flight) -> Option<f64>| {
@@ -78,7 +78,7 @@ fn of_mission(campaign: &MissionFlights, figures: &mut Vec<(String, String)>) {
         && matches!(campaign.mission, Mission::Roll | Mission::RollUncompensated)
     {
         figures.push((
-            "drift to the side, test and 3 s after".to_owned(),
+            "sideways drift, test and 3 s after it".to_owned(),
             format!("{:.0} cm", 100.0 * drift_m),
         ));
     }
@@ -89,7 +89,7 @@ fn of_mission(campaign: &MissionFlights, figures: &mut Vec<(String, String)>) {
             .filter(|flight| flight.cycles.is_some())
             .count();
         figures.push((
-            "runs whose five cycles each tell a process".to_owned(),
+            "runs with five identified cycles".to_owned(),
             format!("{told} of {}", flights.len()),
         ));
         figures.push(("largest J_ij of two cycles".to_owned(), percent(largest)));
@@ -98,7 +98,7 @@ fn of_mission(campaign: &MissionFlights, figures: &mut Vec<(String, String)>) {
         && let Some(until_s) = longest(&|flight| Some(flight.flown.tuned.last()?.until_s))
     {
         figures.push((
-            "all four axes tuned, from the ground".to_owned(),
+            "all four axes tuned after take-off".to_owned(),
             format!("within {until_s:.1} s"),
         ));
     }
@@ -111,7 +111,7 @@ fn of_mission(campaign: &MissionFlights, figures: &mut Vec<(String, String)>) {
             figures.push((
                 format!("after {name}"),
                 format!(
-                    "altitude off by up to {:.1} cm, roll and pitch by {:.1} deg",
+                    "altitude changes by up to {:.1} cm, roll and pitch by {:.1} deg",
                     100.0 * altitude_m,
                     tilt_rad.to_degrees()
                 ),
@@ -129,7 +129,7 @@ fn axis_figures(
     let (first, _) = tuned[0];
     let (found, truth) = (&first.identified.process, &first.truth);
     figures.push((
-        format!("{name}: process (true)"),
+        format!("{name}: identified process (true)"),
         format!(
             "K/T_body {:.4} ({:.4}), T_prop {:.1} ms ({:.1}), T_body {} ({}), tau {:.1} ms ({:.1})",
             found.k_over_t_body(),
@@ -156,14 +156,17 @@ fn axis_figures(
     figures.push((
         format!("{name}: test"),
         format!(
-            "{:.1} s at most",
+            "at most {:.1} s",
             most(&|tuned| tuned.until_s - tuned.from_s)
         ),
     ));
-    figures.push((format!("{name}: on the vehicle"), on_the_vehicle(tuned)));
+    figures.push((
+        format!("{name}: on the true process"),
+        on_the_vehicle(tuned),
+    ));
 }
 
-/// What the controllers cost on the true processes, and the margins that they leave there.
+/// Cost and phase margin of the controllers on the true processes.
 fn on_the_vehicle(tuned: &[&(Tuned, Deterioration)]) -> String {
     let costs: Option<Vec<(f64, f64)>> = (tuned.iter())
         .map(|(_, cost)| match *cost {
@@ -190,8 +193,8 @@ fn on_the_vehicle(tuned: &[&(Tuned, Deterioration)]) -> String {
         .filter(|((tuned, _), (_, margin))| *margin >= PHASE_MARGIN_DEG - width(tuned))
         .count();
     format!(
-        "abs J {} on average, {} at worst; phase margin {least:.1} deg at least, not below 20 deg less half its \
-         90 % interval in {kept} of {}",
+        "|J| mean {}, worst {}; phase margin at least {least:.1} deg, above 20 deg minus half its 90 % interval in \
+         {kept} of {}",
         percent(mean),
         percent(worst),
         tuned.len(),
@@ -202,7 +205,7 @@ fn seconds(time_s: Option<f64>) -> String {
     time_s.map_or("none".to_owned(), |time_s| format!("{time_s:.2} s"))
 }
 
-/// How far the vehicle went to the side from where the test began (m).
+/// Largest sideways distance from the position at the start of the test (m).
 fn drift_m(flown: &Flown) -> Option<f64> {
     let from_s = flown.events.first()?.0;
     let mut after = flown
@@ -215,8 +218,7 @@ fn drift_m(flown: &Flown) -> Option<f64> {
         .max_by(f64::total_cmp)
 }
 
-/// After each disturbance: its name, how far the altitude went from where it was before (m), and the larger of roll
-/// and pitch from theirs (rad).
+/// For each disturbance: its name, the largest change of the altitude after it (m), and that of roll and pitch (rad).
 fn departures(flown: &Flown) -> Vec<(&'static str, f64, f64)> {
     let disturbances: Vec<_> = (flown.events.iter())
         .filter(|(_, name)| !matches!(*name, "test begins" | "tuned"))
@@ -245,7 +247,7 @@ fn departures(flown: &Flown) -> Vec<(&'static str, f64, f64)> {
     departures
 }
 
-/// Gains with the payload over those without.
+/// Ratio of the gains with and without payload.
 fn inflation(campaigns: &[MissionFlights]) -> Option<(f64, f64)> {
     let gains = |wanted: Mission| {
         let campaign = campaigns
@@ -261,7 +263,7 @@ fn inflation(campaigns: &[MissionFlights]) -> Option<(f64, f64)> {
 fn inflated(campaigns: &[MissionFlights]) -> Option<(String, String)> {
     let (kp, kd) = inflation(campaigns)?;
     Some((
-        "gains with the payload over those without".to_owned(),
+        "gains with payload over those without".to_owned(),
         format!("Kp {kp:.2}, Kd {kd:.2} (the paper: 1.19 and 1.22)"),
     ))
 }
@@ -292,12 +294,12 @@ pub(crate) fn text(campaigns: &[MissionFlights]) -> String {
     text
 }
 
-/// All missions on a page.
+/// All missions as a page.
 pub(crate) fn html(campaigns: &[MissionFlights]) -> String {
     let lead = page::paragraph(
         "lead",
-        "A simulated quadrotor of the size of the paper's (section IV-D), each axis held by the on-board tuner: the \
-         same code that firmware links. The pictures are of the first seed.",
+        "A simulated quadrotor of the size of the paper's (section IV-D). Each axis is controlled by the on-board tuner, \
+         the same code that firmware links. The figures show the first seed.",
     ) + &page::paragraph(
         "source",
         &format!(
@@ -332,7 +334,7 @@ fn section(campaign: &MissionFlights, campaigns: &[MissionFlights]) -> Section {
     }
 }
 
-/// The controller of an axis on the process found and on the true one.
+/// Nyquist plot of the controller of an axis, on the identified process and on the true one.
 fn open_loop(tuned: &Tuned) -> Option<Figure> {
     let model = Model::from(tuned.identified.process);
     let controller = Controller::from(tuned.identified.pd);
@@ -343,7 +345,7 @@ fn open_loop(tuned: &Tuned) -> Option<Figure> {
     Some(Figure { caption, ..figure })
 }
 
-/// What the controller of each cycle costs on the process of every other.
+/// Cost of the controller of each cycle on the processes of the other cycles.
 fn cycles_table(cycles: &Cycles) -> String {
     let rows = cross_table(cycles);
     let columns: Vec<String> = std::iter::once("controller of cycle".to_owned())
@@ -384,7 +386,7 @@ fn pictures(mission: Mission, flown: &Flown) -> Vec<Figure> {
         vec![series("altitude", &|record| record.reading.position_m.z)],
     );
     let command = |axis: Axis| {
-        let title = format!("{} command (part of full thrust)", axis.name());
+        let title = format!("{} command (fraction of full thrust)", axis.name());
         figure(
             &title,
             vec![series("command", &move |record| {
@@ -401,7 +403,7 @@ fn pictures(mission: Mission, flown: &Flown) -> Vec<Figure> {
         ],
     );
     let side = figure(
-        "to the left (m)",
+        "distance to the left (m)",
         vec![series("y", &|record| record.reading.position_m.y)],
     );
     match mission {

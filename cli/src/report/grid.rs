@@ -1,4 +1,4 @@
-//! The members of a grid and how near they are to random processes: as text and as JSON; `page` has the figures.
+//! Members of a grid, and their distance to random processes: as text and as JSON; `page` has the figures.
 
 mod page;
 
@@ -16,7 +16,7 @@ use crate::style::{headed, verdict};
 
 pub(crate) use self::page::html;
 
-/// Changes with every change that a reader of the summary could notice.
+/// Version of the JSON; raised with every change that a reader could notice.
 const SCHEMA: &str = "onecycle.grid.summary/1";
 
 #[derive(Serialize)]
@@ -32,7 +32,7 @@ struct Summary<'a> {
     seconds: f64,
 }
 
-/// Ratio of neighbouring radii.
+/// Range of the ratios of neighbouring radii.
 #[derive(Serialize)]
 struct Alpha {
     least: f64,
@@ -63,7 +63,7 @@ fn members_per_row(grid: &Grid) -> Vec<usize> {
     counts
 }
 
-/// The summary for programs.
+/// The summary as JSON.
 pub(crate) fn json(run: &GridRun) -> String {
     to_text(&Summary {
         schema: SCHEMA,
@@ -78,7 +78,7 @@ pub(crate) fn json(run: &GridRun) -> String {
     })
 }
 
-/// The summary for people.
+/// The summary as text.
 pub(crate) fn text(run: &GridRun) -> String {
     let mut text = String::new();
     let space = &run.grid.settings.space;
@@ -110,7 +110,7 @@ pub(crate) fn text(run: &GridRun) -> String {
             ))
         );
         for (name, value) in check_facts(check) {
-            let _ = writeln!(text, "  {name:<28}{value}");
+            let _ = writeln!(text, "  {name:<36}{value}");
         }
         let limit = run.grid.settings.deterioration;
         let _ = writeln!(
@@ -122,7 +122,7 @@ pub(crate) fn text(run: &GridRun) -> String {
     text
 }
 
-/// How members are laid.
+/// How the members are placed.
 fn kind(settings: &GridSettings) -> String {
     let limit = percent(settings.deterioration);
     let layout = match settings.layout {
@@ -136,7 +136,7 @@ fn kind(settings: &GridSettings) -> String {
     format!("{layout}, {gains}")
 }
 
-/// Number of members and how they lie, in sentences of one line each.
+/// Number and arrangement of the members, one line for each fact.
 fn members(grid: &Grid) -> Vec<String> {
     let counts = members_per_row(grid);
     let count = grid.members.len();
@@ -152,11 +152,11 @@ fn members(grid: &Grid) -> Vec<String> {
     let alone = grid.members.iter().filter(|member| member.place.is_none());
     match alone.count() {
         0 => {}
-        alone => lines.push(format!("and {alone} where the rows left holes")),
+        alone => lines.push(format!("{alone} of them where the rows left holes")),
     }
     if let Some(Alpha { least, most }) = Alpha::of(grid) {
         lines.push(format!(
-            "radii of a ray at ratios of {least:.3} to {most:.3}"
+            "ratio of neighbouring radii of a ray {least:.3} to {most:.3}"
         ));
     }
     lines
@@ -168,19 +168,22 @@ fn check_facts(check: &Check) -> [(&'static str, String); 4] {
     let margin = check.least_margin_rad;
     let both = |worst, mean| format!("worst {}, mean {}", cost(worst), cost(mean));
     [
-        ("from the best member", both(check.worst, check.mean)),
         (
-            "its controller on them",
+            "distance to the nearest member",
+            both(check.worst, check.mean),
+        ),
+        (
+            "deterioration under its controller",
             both(check.worst_cost, check.mean_cost),
         ),
         (
-            "least phase margin left",
+            "smallest phase margin under it",
             margin.map_or("unstable".to_owned(), |margin| {
                 format!("{:.1} deg", margin.to_degrees())
             }),
         ),
         (
-            "farthest is",
+            "farthest process",
             format!("T_prop {t_prop} s, T_body {t_body} s, tau {tau} s"),
         ),
     ]
@@ -189,8 +192,10 @@ fn check_facts(check: &Check) -> [(&'static str, String); 4] {
 fn check_verdict(check: &Check, limit: f64) -> String {
     let limit = percent(limit);
     match check.beyond {
-        0 => format!("Every one of them is within {limit} of a member."),
-        beyond => format!("{beyond} of them are farther than {limit} from every member."),
+        0 => format!("Every process of the check is within {limit} of a member."),
+        beyond => {
+            format!("{beyond} processes of the check are farther than {limit} from every member.")
+        }
     }
 }
 

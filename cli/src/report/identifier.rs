@@ -1,4 +1,4 @@
-//! What came of training an identifier.
+//! Result of training an identifier.
 
 use std::path::Path;
 
@@ -8,10 +8,10 @@ use serde_json::{Value, json};
 use super::json::to_text;
 use crate::results::identifier::{FamilyScores, IdentifierRun};
 
-/// Changes with every change that a reader could notice.
+/// Version of the JSON; raised with every change that a reader could notice.
 const SCHEMA: &str = "onecycle.identifier/1";
 
-/// What a pack says of itself.
+/// The card of the pack.
 pub(crate) fn card(recipe: &IdentifierRecipe, run: &IdentifierRun) -> Value {
     json!({
         "program": concat!("onecycle ", env!("CARGO_PKG_VERSION")),
@@ -48,10 +48,10 @@ pub(crate) fn text(run: &IdentifierRun, out: &Path) -> String {
     let sizes = &run.sizes;
     let mut text = format!(
         "Identifier  {}\n  \
-         {} examples in {simulated_s:.0} s, {} epochs in {learnt_s:.0} s ({}), the best {}\n  \
-         {} weights, {} bytes; table {} bytes, card {} bytes, all {} bytes\n  \
-         weights in bytes would put outputs {:.1e} off, of {:.1} (root mean squares)\n\n\
-         One cycle of unseen processes, as the board computes\n",
+         {} examples in {simulated_s:.0} s, {} epochs in {learnt_s:.0} s ({}), best epoch {}\n  \
+         {} weights, {} bytes; table {} bytes, card {} bytes, total {} bytes\n  \
+         8-bit weights change the outputs by {:.1e}, of {:.1} (root mean squares)\n\n\
+         Scores on single cycles of unseen processes, computed as on board\n",
         out.display(),
         run.examples,
         run.epochs,
@@ -85,8 +85,8 @@ fn row(scored: &FamilyScores) -> String {
     format!(
         "{name}\n  \
          {} cycles, {} unknown ({:.1} %), {} unstable\n  \
-         |J| (%)  mean {}, median {}, 99 % {}, worst {}; least phase margin {:.1} deg\n  \
-         posterior holds the truth (stated %: held)  {}; squared distance {:.2}\n",
+         |J| (%)  mean {}, median {}, 99 % {}, worst {}; smallest phase margin {:.1} deg\n  \
+         intervals hold the truth (nominal %: actual %)  {}; squared distance {:.2}\n",
         scores.cycles,
         scores.unknown,
         100.0 * scores.unknown as f64 / scores.cycles.max(1) as f64,

@@ -1,11 +1,11 @@
-//! Numbers as people read them.
+//! Numbers as text.
 
-/// Four significant digits, with a power of ten only where it is needed.
+/// Four significant digits; a power of ten only for very small and very large numbers.
 pub(crate) fn significant(value: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    // The power of ten after rounding: 0.99999 is 1.000.
+    // The power of ten after rounding: 0.99999 becomes 1.000.
     let scientific = format!("{value:.3e}");
     let power = scientific
         .split_once('e')
@@ -16,12 +16,12 @@ pub(crate) fn significant(value: f64) -> String {
     }
 }
 
-/// The same, or `unbounded`.
+/// Four significant digits, or `unbounded`.
 pub(crate) fn bounded(value: Option<f64>) -> String {
     value.map_or("unbounded".to_owned(), significant)
 }
 
-/// A part as a percentage with two decimals, without the sign of a zero.
+/// A fraction as a percentage with two decimals; never "-0.00".
 pub(crate) fn percent(part: f64) -> String {
     let rounded = (1e4 * part).round() / 100.0;
     format!("{:.2} %", rounded + 0.0)
@@ -32,7 +32,7 @@ pub(crate) fn degrees(angle_rad: f64) -> String {
     format!("{:.2} deg", angle_rad.to_degrees())
 }
 
-/// A time (s) with a unit that suits it.
+/// A time (s) in s, ms or us.
 pub(crate) fn seconds(time_s: f64) -> String {
     match time_s {
         0.1.. => format!("{time_s:.2} s"),
@@ -64,7 +64,7 @@ mod tests {
         assert_eq!(bounded(None), "unbounded");
     }
 
-    // Nothing that rounds to zero is below it.
+    // A value that rounds to zero has no sign.
     #[test]
     fn with_units() {
         assert_eq!(percent(0.12346), "12.35 %");

@@ -1,4 +1,4 @@
-//! What a pack holds, whether it is whole, and what became of a network in it.
+//! Contents of a pack, its verification, and the import of a network.
 
 use std::fmt::Write;
 
@@ -11,10 +11,10 @@ use super::number::significant;
 use crate::results::pack::{ImportedPack, VerifiedPack};
 use crate::style::{headed, verdict};
 
-/// Changes with every change that a reader of the report could notice.
+/// Version of the JSON; raised with every change that a reader could notice.
 const SCHEMA: &str = "onecycle.pack/1";
 
-/// A pack for programs.
+/// The contents as JSON.
 pub(crate) fn json(pack: &Pack<'_>) -> String {
     let layers = pack.layers().map(|layer| {
         json!({
@@ -66,7 +66,7 @@ pub(crate) fn json(pack: &Pack<'_>) -> String {
     }))
 }
 
-/// A pack for people.
+/// The contents as text.
 pub(crate) fn text(name: &str, pack: &Pack<'_>) -> String {
     let mut text = String::new();
     let domain = pack.domain();
@@ -88,11 +88,11 @@ pub(crate) fn text(name: &str, pack: &Pack<'_>) -> String {
          values from {lowest} to {highest}\n\
          Domain   ln(T/dt) {ln_samples}, duty {duty}, beta {beta}\n\
          Margin   {margin} deg\n\
-         Unknown  from a score of {threshold}; calibration {calibration}\n\
+         Unknown  above a score of {threshold}; calibration {calibration}\n\
          Table    {n} x {m} points of {fields} numbers, axes {axes}\n\
-         Test     {tests} signatures with the outputs they must give\n\
-         Bytes    weights {weights}, table {table_bytes}, card {card_bytes}, the rest {rest}; \
-         {total} in all\n",
+         Test     {tests} signatures with their outputs\n\
+         Bytes    weights {weights}, table {table_bytes}, card {card_bytes}, other {rest}; \
+         total {total}\n",
         hash = pack.content_hash(),
         network = network(pack),
         scales = row(&scaling.scales),
@@ -116,30 +116,29 @@ pub(crate) fn text(name: &str, pack: &Pack<'_>) -> String {
     headed(&text) + &headed("Card\n") + &to_text(&card(pack))
 }
 
-/// Whether a pack is whole and gives the outputs it must.
+/// The result of the self-test.
 pub(crate) fn verified(verified: &VerifiedPack<'_>) -> String {
     let VerifiedPack { name, pack, worst } = verified;
     let head = format!(
-        "{name}: {} bytes, hash {:016x} as it must be\n",
+        "{name}: {} bytes, hash {:016x} is correct\n",
         pack.sizes().total,
         pack.content_hash()
     );
     let tests = pack.self_tests().count();
     head + &match *worst {
-        None => "It holds no signature to test its outputs with.\n".to_owned(),
+        None => "The pack has no self-test.\n".to_owned(),
         Some(worst) if verified.passes() => verdict(
             true,
             &format!(
-                "{tests} signatures give the outputs they must, the largest difference {}.\n",
+                "Self-test passed: {tests} signatures, largest difference of an output {}.\n",
                 significant(f64::from(worst))
             ),
         ),
         Some(worst) => verdict(
             false,
             &format!(
-                "Its outputs are not those they must be: of {tests} signatures the largest \
-                 difference is {}, where {} is allowed.\n\
-                 Do not use it: make it again, or update onecycle.\n",
+                "Self-test failed: {tests} signatures, largest difference of an output {}, limit {}.\n\
+                 Do not use this pack: make it again, or update onecycle.\n",
                 significant(f64::from(worst)),
                 significant(f64::from(SELF_TEST_TOLERANCE))
             ),
@@ -147,7 +146,7 @@ pub(crate) fn verified(verified: &VerifiedPack<'_>) -> String {
     }
 }
 
-/// What became of a network.
+/// The result of an import.
 pub(crate) fn imported(imported: &ImportedPack<'_>) -> String {
     let ImportedPack {
         model,
@@ -161,13 +160,13 @@ pub(crate) fn imported(imported: &ImportedPack<'_>) -> String {
     let [largest, rms, size] = [changed.largest, changed.rms, changed.size].map(significant);
     format!(
         "Pack     {out}, {total} bytes, hash {hash:016x}\n\
-         Network  {network}, of {model}\n\
-         Inputs   normalised as {normalisation} says\n\
-         Rounding changes an output by {largest} at most, rms {rms}, where outputs are {size} \
+         Network  {network}, from {model}\n\
+         Inputs   normalisation from {normalisation}\n\
+         Rounding changes an output by at most {largest}, RMS {rms}, of outputs of RMS {size} \
          ({samples} random signatures)\n\
-         Scores   cleared: those of {like} were its network's\n\
-         The domain, output scaling, temperatures, threshold of the unknown and table are those of\n\
-         {like}; none of them was fitted to this network.\n",
+         Scores   cleared: those of {like} belong to its network\n\
+         The domain, output scaling, temperatures, threshold and table are those of {like};\n\
+         they are not fitted to this network.\n",
         out = out.display(),
         total = pack.sizes().total,
         hash = pack.content_hash(),
@@ -181,7 +180,7 @@ pub(crate) fn imported(imported: &ImportedPack<'_>) -> String {
     )
 }
 
-/// Such as `34-48-48-14, tanh tanh none, a byte a weight`.
+/// The network in one line, such as `34-48-48-14, tanh tanh none, 8-bit weights`.
 fn network(pack: &Pack<'_>) -> String {
     let mut widths = String::new();
     let (mut activations, mut kinds) = (Vec::new(), Vec::new());
@@ -194,9 +193,9 @@ fn network(pack: &Pack<'_>) -> String {
         kinds.push(weights(layer));
     }
     let kinds = match &kinds[..] {
-        kinds if kinds.iter().all(|&kind| kind == "bytes") => "a byte a weight".to_owned(),
-        kinds if kinds.iter().all(|&kind| kind == "f32") => "weights of f32".to_owned(),
-        kinds => format!("weights of {}", kinds.join(" ")),
+        kinds if kinds.iter().all(|&kind| kind == "bytes") => "8-bit weights".to_owned(),
+        kinds if kinds.iter().all(|&kind| kind == "f32") => "f32 weights".to_owned(),
+        kinds => format!("weights {}", kinds.join(" ")),
     };
     format!("{widths}, {}, {kinds}", activations.join(" "))
 }
@@ -216,13 +215,12 @@ fn weights(layer: &Dense<'_>) -> &'static str {
     }
 }
 
-/// The card, or its text where it is no JSON.
+/// The card as JSON, or as text if it is not JSON.
 fn card(pack: &Pack<'_>) -> Value {
     serde_json::from_str(pack.card()).unwrap_or_else(|_| Value::from(pack.card()))
 }
 
-/// With the digits that tell it from any other f32, not those of its f64: 0.73, not
-/// 0.7300000190734863.
+/// An f32 with its own shortest digits: 0.73, not 0.7300000190734863.
 fn number(value: f32) -> f64 {
     value.to_string().parse().unwrap_or(f64::from(value))
 }

@@ -16,7 +16,7 @@ pub(crate) use self::page::html;
 
 const SCHEMA: &str = "onecycle.phase/1";
 
-/// Plain text, at most 100 columns.
+/// The result as text, at most 100 columns wide.
 pub(crate) fn text(found: &PhaseSearch) -> String {
     let PhaseSearch { space, phase, .. } = found;
     let mut text = String::new();
@@ -48,7 +48,7 @@ pub(crate) fn text(found: &PhaseSearch) -> String {
     rule_line(&mut text, "Best rule of all", &phase.minimax);
     let _ = writeln!(
         text,
-        "\nThe best local rule is that of {},\nand costs most on {}.",
+        "\nThe best local rule is the optimum of {};\nits deterioration is worst on {}.",
         times(phase.best.times_s),
         times(phase.best.applied.worst_on_s)
     );
@@ -79,11 +79,11 @@ fn times([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> String {
     )
 }
 
-/// The deterioration of rules at round phases.
+/// Writes the table of rules at round phases.
 fn table(text: &mut String, found: &PhaseSearch) {
     let _ = writeln!(
         text,
-        "\nPhase of the rule   local rules   deterioration (%)   costs most on (ms)\n\
+        "\nPhase of the rule   local rules   deterioration (%)        worst on (ms)\n\
          {:<20}{:>11}{:>12}{:>9}   {:>8}{:>9}{:>9}",
         "(deg)", "near it", "worst", "mean", "T_prop", "T_body", "tau"
     );
@@ -138,7 +138,7 @@ struct Times {
     tau_s: f64,
 }
 
-/// Deteriorations are fractions, and null where they are infinite.
+/// The result as JSON. Deteriorations are fractions; infinite ones are null.
 pub(crate) fn json(found: &PhaseSearch) -> String {
     to_text(&Report {
         schema: SCHEMA,

@@ -1,6 +1,6 @@
-//! The last cycles in the terminal: what was measured as dots, the fit as a line, the relay underneath.
+//! Plot of the last cycles in the terminal: measurement as dots, fit as a line, relay below.
 //!
-//! A character of braille has two columns of four dots, so a plot of 80 by 12 characters has 160 by 48 dots.
+//! A braille character has two columns of four dots, so a plot of 80 by 12 characters has 160 by 48 dots.
 
 use std::fmt::Write;
 
@@ -9,27 +9,27 @@ use onecycle::{Identification, Oscillation, Recording};
 use super::number::significant;
 use crate::style::{FIT, HEADING, PLAIN, painted};
 
-/// Widest plot, as wide as the rest of the report.
+/// Largest width of the plot: that of the report.
 const WIDTH: usize = 96;
-/// Narrowest, whatever the terminal: narrower shows nothing.
+/// Smallest width of the plot, for any terminal.
 const LEAST_WIDTH: usize = 40;
-/// Characters from the top of the plot to its bottom.
+/// Height of the plot in characters.
 const ROWS: usize = 12;
-/// Characters to the left of the plot: a number, a blank and the frame.
+/// Characters left of the plot: a number, a blank and the frame.
 const MARGIN: usize = 13;
-/// Most cycles that are drawn: with more of them dots would hide the line.
+/// Largest number of cycles drawn; with more cycles the dots would hide the line.
 const MOST_CYCLES: usize = 2;
 
-/// Dots of a character across and down.
+/// Columns and rows of dots of a character.
 const ACROSS: usize = 2;
 const DOWN: usize = 4;
-/// The bit of each dot, by row and column, in the order of Unicode's block of braille.
+/// Bit of each dot by row and column, as in the Unicode braille block.
 const BITS: [[u8; ACROSS]; DOWN] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0x40, 0x80]];
 /// The character without a dot.
 const BRAILLE: u32 = 0x2800;
 
-/// A plot as wide as a terminal of so many characters; of none, as wide as the report may be. The fit is there
-/// where a process was identified. `None` without an oscillation.
+/// The plot for a terminal with this number of columns; without a terminal, in full width. The fit is drawn if a process
+/// was identified. `None` without an oscillation.
 pub(crate) fn cycles(
     recording: &Recording,
     found: &Identification,
@@ -62,7 +62,7 @@ pub(crate) fn cycles(
     Some(text)
 }
 
-/// What is drawn, and in which unit.
+/// The heading: quantity and unit.
 fn title(recording: &Recording, cycles: usize, has_fit: bool) -> String {
     let column = &recording.columns().output;
     let unit = (column.unit.as_ref()).map_or(String::new(), |unit| format!(" ({unit})"));
@@ -85,7 +85,7 @@ fn title(recording: &Recording, cycles: usize, has_fit: bool) -> String {
 /// Time (s) and value.
 type Point = (f64, f64);
 
-/// What the plot reaches over, and its characters across.
+/// Ranges and width of the plot.
 struct Frame {
     times_s: [f64; 2],
     values: [f64; 2],
@@ -93,7 +93,7 @@ struct Frame {
 }
 
 impl Frame {
-    /// Around all points; `None` where they have no extent.
+    /// The frame around all points; `None` if they have no extent.
     fn around(measured: &[Point], fitted: &[Point], width: usize) -> Option<Self> {
         let all = || measured.iter().chain(fitted);
         let range = |values: &mut dyn Iterator<Item = f64>| {
@@ -110,17 +110,17 @@ impl Frame {
         })
     }
 
-    /// Column of dots of a time.
+    /// Dot column of a time.
     fn across(&self, time_s: f64) -> usize {
         place(time_s, self.times_s, self.width * ACROSS)
     }
 
-    /// Row of dots of a value, from the top.
+    /// Dot row of a value, from the top.
     fn down(&self, value: f64) -> usize {
         ROWS * DOWN - 1 - place(value, self.values, ROWS * DOWN)
     }
 
-    /// Time in the middle of a column, of so many.
+    /// Time at the centre of a column.
     fn time_s(&self, column: usize, columns: usize) -> f64 {
         let [from, to] = self.times_s;
         from + (to - from) * (column as f64 + 0.5) / columns as f64
@@ -139,7 +139,7 @@ impl Frame {
                 continue;
             };
             let row = self.down(value);
-            // Down or up to where the column before ended, so that a steep line has no gaps.
+            // Connect to the column before, so that a steep line has no gaps.
             let begin = match last {
                 Some(last) if last < row => last + 1,
                 Some(last) if last > row => last - 1,
@@ -163,7 +163,7 @@ impl Frame {
         }
     }
 
-    /// The relay: high where a stroke is above, low where it is below.
+    /// The relay: an upper stroke is high, a lower stroke is low.
     fn relay(&self, recording: &Recording, found: &Oscillation) -> String {
         let stroke = |column| {
             let time_s = self.time_s(column, self.width);
@@ -175,10 +175,10 @@ impl Frame {
         format!("{:>margin$} │{strokes}\n", "relay", margin = MARGIN - 2)
     }
 
-    /// The axis of time, with where it begins and ends.
+    /// The time axis with its ends.
     fn times(&self) -> String {
         let [from, to] = self.times_s;
-        // Three digits of what the axis reaches over, whatever it begins at; casts saturate.
+        // Three digits of the range of the axis; casts saturate.
         let decimals = (2.0 - (to - from).log10().floor()).clamp(0.0, 9.0) as usize;
         let [from, to] = self.times_s.map(|time_s| format!("{time_s:.decimals$} s"));
         format!(
@@ -191,14 +191,14 @@ impl Frame {
     }
 }
 
-/// Which of `count` equal parts of a range a value lies in.
+/// Index of the one of `count` equal parts of a range that contains a value.
 fn place(value: f64, [low, high]: [f64; 2], count: usize) -> usize {
     let part = (value - low) / (high - low) * count as f64;
     // Casts saturate.
     (part as usize).min(count - 1)
 }
 
-/// The value at a time between points; `None` before and behind them.
+/// Linear interpolation at a time; `None` before the first point and after the last.
 fn interpolated(points: &[Point], time_s: f64) -> Option<f64> {
     let next = points.partition_point(|point| point.0 < time_s);
     let (before, after) = (points.get(next.checked_sub(1)?)?, points.get(next)?);
@@ -206,7 +206,7 @@ fn interpolated(points: &[Point], time_s: f64) -> Option<f64> {
     Some(before.1 + part * (after.1 - before.1))
 }
 
-/// Dots in characters.
+/// A canvas of dots.
 struct Canvas {
     rows: Vec<Vec<u8>>,
 }
@@ -223,7 +223,7 @@ impl Canvas {
     }
 }
 
-/// A row of dots and of the line, one over the other: in the line's colour where it runs.
+/// A row of dots and line combined; characters with a part of the line have its colour.
 fn merged(dots: &[u8], line: &[u8]) -> String {
     let character = |bits: u8| match bits {
         0 => ' ',
@@ -244,7 +244,7 @@ fn merged(dots: &[u8], line: &[u8]) -> String {
 mod tests {
     use super::*;
 
-    /// Two seconds and a value from -1 to 1, on sixteen characters.
+    /// Two seconds, values from -1 to 1, sixteen characters.
     const FRAME: Frame = Frame {
         times_s: [3.0, 5.0],
         values: [-1.0, 1.0],
@@ -257,8 +257,8 @@ mod tests {
         text.lines().map(str::to_owned).collect()
     }
 
-    // The lowest dot at the beginning is the lower left one of the lower left character, and the highest at the
-    // end the upper right one of the upper right character, fifteen blanks behind the frame.
+    // The first and lowest dot is the lower left one of the lower left character; the last and highest dot is the upper
+    // right one of the upper right character, 15 blanks after the frame.
     #[test]
     fn dots_lie_at_the_corners() {
         let rows = rows(&[(3.0, -1.0), (5.0, 1.0)], &[]);
@@ -272,8 +272,8 @@ mod tests {
         );
     }
 
-    // From corner to corner 32 columns of dots rise by 48 rows: more rows than columns, so that every one of
-    // the 12 rows of characters has some of the line, in its colour, and none is missing between two.
+    // From corner to corner, 32 dot columns rise by 48 dot rows. All 12 rows of characters have some of the line, in its
+    // colour, without gaps.
     #[test]
     fn a_steep_line_has_no_gaps() {
         let points = [(3.0, -1.0), (5.0, 1.0)];
@@ -287,11 +287,11 @@ mod tests {
             assert!(row.contains("\x1b[36m"), "{row}");
             dots += in_row;
         }
-        // The middles of the first and the last column are half a column from the corners: a row less at each.
+        // The centres of the first and the last column are half a column from the corners: up to one row less at each.
         assert!((46..=48).contains(&dots), "{dots}");
     }
 
-    // Halfway between two points is the mean of their values; outside there is nothing to draw.
+    // Half way between two points the value is their mean; outside there is none.
     #[test]
     fn only_between_points() {
         let points = [(0.0, 1.0), (2.0, 5.0)];
@@ -300,7 +300,7 @@ mod tests {
         assert_eq!(interpolated(&points, -0.5), None);
     }
 
-    // What has no extent has no frame, and numbers that are none do not make one.
+    // Points without extent and NaN have no frame.
     #[test]
     fn nothing_is_drawn_of_nothing() {
         for points in [
@@ -313,7 +313,7 @@ mod tests {
         }
     }
 
-    // The axis reaches over 2 s, so a hundredth is its third digit; it is as wide as the plot.
+    // The axis spans 2 s, so its third digit is 0.01 s; it is as wide as the plot.
     #[test]
     fn the_axis_names_its_ends() {
         let times = FRAME.times();

@@ -1,4 +1,4 @@
-//! The reproduction of the paper's results, as Markdown and as a page.
+//! The reproduced results of the paper, as Markdown and as a page.
 
 use std::fmt::Write;
 
@@ -8,12 +8,12 @@ use crate::results::reproduction::{ComparedCell, ReproducedPart};
 const TITLE: &str = "The paper's simulated results, reproduced";
 const LEAD: &str = "A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, \"Real-time system identification using deep \
     learning for linear processes with application to unmanned aerial vehicles\", IEEE Access 8 (2020). \
-    J is what a controller costs (integral of the squared error) above the true process's own optimum, as \
-    a part of it. The paper's numbers stand with ours; every number of ours was found by the command.";
-const QUICK: &str = "A quick run: small sizes, to see that everything runs. Its numbers are not those to \
-    compare with the paper's; leave out --quick for them.";
+    J is the relative increase of the cost of a controller (integral of the squared error) over the optimum of the \
+    true process. The paper's numbers are given beside those that the command has computed.";
+const QUICK: &str = "A quick run with small sizes, to test that everything runs. Do not compare its numbers with the \
+    paper's; for that, leave out --quick.";
 
-/// The command that makes it.
+/// The command that makes the report.
 fn command(is_quick: bool) -> &'static str {
     if is_quick {
         "onecycle reproduce --quick"
@@ -22,11 +22,11 @@ fn command(is_quick: bool) -> &'static str {
     }
 }
 
-/// Tables and remarks.
+/// Tables and remarks as Markdown.
 pub(crate) fn markdown(parts: &[ReproducedPart], is_quick: bool) -> String {
     let mut text = format!(
-        "# {TITLE}\n\n{LEAD}\n\nMade by `{}`, onecycle {}: not to be edited. The plots are on the page that \
-         it writes beside this file.\n",
+        "# {TITLE}\n\n{LEAD}\n\nMade by `{}`, onecycle {}; do not edit. The plots are on the page that \
+         the command writes beside this file.\n",
         command(is_quick),
         env!("CARGO_PKG_VERSION")
     );
@@ -71,12 +71,12 @@ fn cell(cell: &ComparedCell) -> String {
     }
 }
 
-/// A cell of Markdown ends at a bar.
+/// Text for a cell of Markdown, with bars escaped.
 fn in_cell(text: &str) -> String {
     text.replace('|', "\\|")
 }
 
-/// Tables, plots and remarks on one page.
+/// Tables, plots and remarks as a page.
 pub(crate) fn html(parts: &[ReproducedPart], is_quick: bool) -> String {
     let mut lead = page::paragraph("lead", LEAD);
     if is_quick {
@@ -106,7 +106,7 @@ fn section(part: &ReproducedPart) -> Section {
     }
 }
 
-/// Ours, the paper's below it.
+/// The computed value, with the paper's below it.
 fn beside(cell: &ComparedCell) -> page::Cell<'_> {
     page::Cell {
         value: &cell.ours,
@@ -141,8 +141,8 @@ mod tests {
         }
     }
 
-    // The paper's number stands beside ours where it has one, bars of a name do not end its cell, and a
-    // quick run says that it is one.
+    // The paper's number is beside the computed one if there is one, bars in names are escaped, and a quick run says that
+    // it is quick.
     #[test]
     fn both_numbers_in_a_row() {
         let text = markdown(&[part()], false);

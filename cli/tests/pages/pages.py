@@ -1,7 +1,7 @@
-"""What a reader of the pages would see, asked of a real browser.
+"""Tests of the HTML pages in a real browser.
 
-python3 pages.py PROGRAM EXAMPLES SCRATCH [--screenshots DIR] [--picture FILE.png]: makes the pages, opens each at two
-widths and in both themes, and prints a line for each. Ends with status 1 at the first thing that is not right.
+python3 pages.py PROGRAM EXAMPLES SCRATCH [--screenshots DIR] [--picture FILE.png]: makes the pages, opens each at
+two widths and in both themes, and prints a line for each. Ends with status 1 at the first fault.
 """
 
 import argparse
@@ -33,12 +33,12 @@ TOUCHING = """() => [...document.querySelectorAll(".plot")].flatMap((plot) =>
         return all.flatMap(([text, box], at) =>
             all.slice(at + 1).filter(([, other]) => meet(box, other)).map(([other]) => `${text} and ${other}`));
     }))"""
-# The largest that a page may be.
+# Largest size of a page.
 MOST_BYTES = 6_000_000
 
 
 class Wrong(Exception):
-    """A page that is not as it should be."""
+    """A fault of a page."""
 
 
 def expect(is_so, what):
@@ -47,8 +47,8 @@ def expect(is_so, what):
 
 
 def made(program, examples, scratch):
-    """Every page by its name, the sections and the least number of plots that it must have, and the call that also tells
-    its margins, where there are some."""
+    """Yields for every page: name, path, sections, least number of plots, and the command for its margins, if it has
+    some."""
     identified = {"recording", "fit", "process", "stability", "step", "controller"}
     recording = lambda name: ["identify", str(examples / name)]
     tune = ["tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1"]
@@ -76,13 +76,13 @@ def made(program, examples, scratch):
 
 def run(program, arguments):
     done = subprocess.run([program, *arguments], capture_output=True, text=True, check=False)
-    # 4: the answer is no, and there is a page of it too.
+    # 4 is a negative result, which has a page too.
     expect(done.returncode in (0, 4), f"{arguments[0]} ended with {done.returncode}: {done.stderr}")
     return done.stdout
 
 
 def opened(browser, path, screen):
-    """The page in a window of its own, with all that went wrong and was fetched."""
+    """Opens the page in a new window; returns it with lists of its errors and requests."""
     window = browser.new_context(**SCREENS[screen], color_scheme="light")
     page = window.new_page()
     faults, fetched = [], []
@@ -95,12 +95,12 @@ def opened(browser, path, screen):
 
 
 def drawn(page):
-    """Waits until all plots are, in the theme of the page."""
+    """Waits until all plots are drawn in the theme of the page."""
     page.wait_for_function("(root => root.dataset.drawn === root.dataset.theme)(document.documentElement)")
 
 
 def look(page, path, sections, least_plots):
-    """Sections, plots and widths."""
+    """Checks sections, plots, widths and labels."""
     ids = set(page.eval_on_selector_all("main section", "all => all.map((one) => one.id)"))
     expect(sections <= ids, f"sections {sorted(sections - ids)} are missing")
     plots = page.locator(".plot")
@@ -131,7 +131,7 @@ def look(page, path, sections, least_plots):
 
 
 def colours(page):
-    """Of the page, and of the words of its first plot."""
+    """Colours of the page and of the labels of its first plot."""
     return page.evaluate(
         """() => [getComputedStyle(document.body).backgroundColor,
                   getComputedStyle(document.querySelector(".plot .xtitle, .plot .xtick text")).fill]"""
@@ -139,13 +139,13 @@ def colours(page):
 
 
 def turn(page):
-    """Light to dark, or back."""
+    """Switches the theme."""
     page.click("#theme")
     drawn(page)
 
 
 def switch(page):
-    """The button turns page and plots dark, and light again."""
+    """Checks that the button switches page and plots to dark and back."""
     light = colours(page)
     turn(page)
     dark = colours(page)
@@ -156,7 +156,7 @@ def switch(page):
 
 
 def print_out(page):
-    """Dark pages are printed light."""
+    """Checks that a dark page is printed light."""
     turn(page)
     paper = page.pdf(format="A4")
     expect(paper.startswith(b"%PDF") and len(paper) > 20_000, f"{len(paper)} bytes on paper")
@@ -173,7 +173,7 @@ def print_out(page):
 
 
 def handle(page):
-    """The first plot answers the mouse: a label under it, a closer look, all of it again, a file."""
+    """Checks the mouse on the first plot: hover label, zoom, reset, download."""
     plot = page.locator(".plot").first
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()
@@ -202,7 +202,7 @@ def annotations(page):
 
 
 def margins(page, report):
-    """The margins that the plots name are those of the report for programs."""
+    """Checks that the margins in the plots equal those of --json."""
     words = annotations(page)
     phase = f"phase margin {report['margins']['phase_margin_deg']:.1f} deg"
     gain = f"gain margin {report['margins']['gain_margin']:.2f}"
@@ -214,12 +214,12 @@ def margins(page, report):
     return phase
 
 
-# Of the identification's page: the fit, the marginals with what is between them, Nyquist's plot, the step.
+# Plots of the identification: fit, posterior, Nyquist plot, step response.
 PICTURED = ["#fit figure", "#process .row:has(.square)", "#stability figure", "#step figure"]
 
 
 def picture(browser, page, path):
-    """Four of a page's plots as one picture."""
+    """Saves four plots of a page as one picture."""
     shots = [page.locator(one).first.locator(".plot").all() for one in PICTURED]
     images = "".join(
         "<div>" + "".join(f'<img src="data:image/png;base64,{base64.b64encode(shot.screenshot()).decode()}">' for shot in row) + "</div>"
@@ -286,4 +286,4 @@ if __name__ == "__main__":
     try:
         main()
     except Wrong as wrong:
-        sys.exit(f"not right: {wrong}")
+        sys.exit(f"fault: {wrong}")

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Opens every page that onecycle writes in a real Chromium, as wide as a desk and as narrow as a phone, and looks at
-# what a reader would: plots, margins, the theme, paper. Status 1 when something is not right.
-#   --screenshots DIR     also saves what was seen
+# Opens every page that onecycle writes in a real Chromium, on a desktop and on a phone of 360 pixels, and checks plots,
+# labels, margins, themes and print. Status 1 at the first fault.
+#   --screenshots DIR     also saves screenshots
 #   --picture FILE.png    also makes the README's picture
-# PYTHON names an interpreter that has the packages of requirements.txt; without it they are installed into a
-# virtual environment that is removed again. CHROMIUM names the browser [default: chromium].
+# PYTHON names an interpreter with the packages of requirements.txt; by default they are installed into a temporary
+# virtual environment. CHROMIUM names the browser [default: chromium].
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)

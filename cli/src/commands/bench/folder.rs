@@ -1,9 +1,9 @@
-//! The folder of a benchmark: what lies where in it, and reading it back.
+//! The folder of a benchmark: its files, and reading them.
 //!
 //! ```text
-//! benchmark.json             format, number of experiments, seed, how recordings are kept
+//! benchmark.json             format version, number of experiments, seed, format of the recordings
 //! recordings/0001.csv ..     or recordings.parquet
-//! truth.csv                  what is behind each: for the score alone
+//! truth.csv                  true process, bias and noise of each, for scoring only
 //! README.md                  the rules
 //! ```
 
@@ -23,17 +23,17 @@ pub(super) const RECORDINGS: &str = "recordings";
 #[cfg(feature = "parquet")]
 pub(super) const PARQUET: &str = "recordings.parquet";
 
-/// The recording of an experiment, in the folder.
+/// The file of an experiment.
 pub(super) fn recording(folder: &Path, number: u64) -> PathBuf {
     folder.join(RECORDINGS).join(numbered(number))
 }
 
-/// The name of an experiment's file.
+/// The file name of an experiment.
 pub(super) fn numbered(number: u64) -> String {
     format!("{number:04}.csv")
 }
 
-/// A folder with anything in it is not written to.
+/// Refuses a folder that is not empty.
 pub(super) fn refuse_filled(out: &Path) -> Result<(), Failure> {
     if !out.exists() {
         return Ok(());
@@ -42,13 +42,13 @@ pub(super) fn refuse_filled(out: &Path) -> Result<(), Failure> {
     match entries.next() {
         None => Ok(()),
         Some(_) => Err(Failure::usage(format!(
-            "{} is not empty: name a new folder",
+            "the folder {} is not empty: name a new folder",
             out.display()
         ))),
     }
 }
 
-/// Fills a new or empty folder, whole or not at all: `fill` writes to a temporary one beside it.
+/// Writes a new or empty folder, whole or not at all: `fill` writes to a temporary folder beside it.
 pub(super) fn write_whole(
     out: &Path,
     fill: impl FnOnce(&Path) -> Result<(), Failure>,
@@ -66,12 +66,12 @@ pub(super) fn write_whole(
         std::fs::remove_dir(out).map_err(failed)?;
     }
     std::fs::rename(staged.path(), out).map_err(failed)?;
-    // Moved, so there is nothing left to remove.
+    // The temporary folder is moved; there is nothing to remove.
     let _ = staged.keep();
     Ok(())
 }
 
-/// Temporary folders are private; a folder that the user asked for is readable like any other.
+/// Temporary folders are private; an output folder is readable like any other.
 #[cfg(unix)]
 fn set_usual_permissions(folder: &Path) -> std::io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
@@ -83,13 +83,13 @@ fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Reads what a folder holds besides the recordings.
+/// Reads the manifest and the true processes of a folder.
 pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure> {
     let path = folder.join(MANIFEST);
     let text = std::fs::read_to_string(&path).map_err(|error| {
         Failure::unreadable(
             &path,
-            format!("{error}: name a folder that onecycle bench make has written"),
+            format!("{error}: name a folder written by onecycle bench make"),
         )
     })?;
     #[derive(Deserialize)]
@@ -102,7 +102,7 @@ pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure
         return Err(Failure::unreadable(
             &path,
             format!(
-                "the folder is of version '{}', but this program scores '{FORMAT}': make it anew",
+                "the folder has format version '{}', but this program scores '{FORMAT}': make the folder again",
                 found.format
             ),
         ));
@@ -115,7 +115,7 @@ pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure
         return Err(Failure::unreadable(
             &path,
             format!(
-                "it has {} experiments, but {MANIFEST} says {}",
+                "the file has {} experiments, but {MANIFEST} says {}",
                 truths.len(),
                 manifest.benchmark.experiments
             ),

@@ -1,4 +1,4 @@
-//! `onecycle bench make`: the folder, whole or not at all.
+//! `onecycle bench make`: simulate the experiments and write the folder.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -18,7 +18,7 @@ use crate::results::bench::{BenchManifest, FORMAT};
 pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
     if arguments.format == Format::Parquet && !cfg!(feature = "parquet") {
         return Err(Failure::usage(
-            "this build cannot write Parquet: make one with cargo build --release --features parquet",
+            "this build cannot write Parquet: build with cargo build --release --features parquet",
         ));
     }
     let out = &arguments.out;
@@ -63,7 +63,7 @@ fn experiment(benchmark: &Benchmark, number: u64) -> Result<(Truth, Recorded), F
     benchmark.experiment(number).map_err(Failure::usage)
 }
 
-/// A file an experiment.
+/// Writes one file for each experiment.
 fn write_recordings(
     folder: &Path,
     benchmark: &Benchmark,
@@ -86,11 +86,11 @@ fn write_recordings(
     written.into_iter().collect()
 }
 
-/// Experiments in memory at a time.
+/// Number of experiments in memory at a time.
 #[cfg(feature = "parquet")]
 const LOT: usize = 64;
 
-/// One file, a row group an experiment.
+/// Writes one file with a row group for each experiment.
 #[cfg(feature = "parquet")]
 fn write_table(
     folder: &Path,

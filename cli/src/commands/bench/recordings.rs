@@ -1,4 +1,4 @@
-//! The recordings of a benchmark, however its folder keeps them.
+//! Reading the recordings of a benchmark folder, in either file format.
 
 use std::path::{Path, PathBuf};
 
@@ -9,17 +9,17 @@ use crate::commands::workers::Workers;
 use crate::failure::Failure;
 use crate::results::bench::{BenchManifest, RecordingFormat};
 
-/// Where recordings are read from.
+/// The source of the recordings.
 pub(super) enum Recordings {
-    /// A file an experiment, in this folder.
+    /// One file for each experiment, in this folder.
     Csv(PathBuf),
-    /// One file.
+    /// One file for all experiments.
     #[cfg(feature = "parquet")]
     Parquet(table::Table),
 }
 
 impl Recordings {
-    /// Of a folder with this manifest.
+    /// Opens a folder with this manifest.
     pub(super) fn open(folder: &Path, manifest: &BenchManifest) -> Result<Self, Failure> {
         match manifest.recordings {
             RecordingFormat::Csv => Ok(Self::Csv(folder.to_owned())),
@@ -28,15 +28,15 @@ impl Recordings {
             #[cfg(not(feature = "parquet"))]
             RecordingFormat::Parquet => Err(Failure::unreadable(
                 &folder.join(super::folder::MANIFEST),
-                "this build cannot read Parquet: make one with cargo build --release --features \
-                 parquet, make the folder with --format csv, for the same seed gives the same \
-                 experiments, or score answers alone with --methods none"
+                "this build cannot read Parquet: build with cargo build --release --features parquet, make \
+                 the folder with --format csv (the same seed gives the same experiments), or score \
+                 answers only with --methods none"
                     .to_owned(),
             )),
         }
     }
 
-    /// Those of these experiments, in their order.
+    /// Reads the recordings of some experiments, in order.
     pub(super) fn read(
         &self,
         numbers: &[u64],
@@ -55,7 +55,7 @@ impl Recordings {
                 };
                 workers.quietly(numbers.len(), read).into_iter().collect()
             }
-            // One after the other: threads would share the position in the file.
+            // One at a time: threads would share the position in the file.
             #[cfg(feature = "parquet")]
             Self::Parquet(table) => numbers.iter().map(|&number| table.read(number)).collect(),
         }
@@ -73,7 +73,7 @@ mod table {
     use crate::commands::bench::folder::PARQUET;
     use crate::failure::Failure;
 
-    /// The file that holds all recordings.
+    /// The file with all recordings.
     pub(in crate::commands::bench) struct Table {
         path: PathBuf,
         reader: Reader,

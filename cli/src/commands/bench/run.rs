@@ -1,4 +1,4 @@
-//! `onecycle bench run`: every method on every recording, scored.
+//! `onecycle bench run`: run every method on every recording and score the answers.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -85,7 +85,7 @@ pub(super) fn run(arguments: &RunBench) -> Result<ExitCode, Failure> {
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// The journal beside the output; the records found in it go to `done`, by experiment.
+/// Opens the journal beside the output; adds the records found in it to `done`, by experiment.
 fn opened(
     out: &Path,
     settings: &Value,
@@ -109,8 +109,8 @@ fn opened(
 /// Experiments of each thread between two writes to the journal: few, because a killed run loses them.
 const LOT: usize = 4;
 
-/// The records of all methods, by experiment, those that are done and those that are made now; `truth` is
-/// the file that the truths are from.
+/// Records of all methods, in the order of the experiments: finished ones and those computed now. `truth` is the file of
+/// the true processes, for errors.
 fn answered(
     recordings: &Recordings,
     methods: &[Contender],
@@ -147,7 +147,7 @@ fn answered(
     Ok(done.into_values().flatten().collect())
 }
 
-/// The records of answers made elsewhere.
+/// Records of the answers of other programs.
 fn foreign(all: &[args::Answers], truths: &[Truth]) -> Result<Vec<Record>, Failure> {
     let experiments: BTreeSet<u64> = truths.iter().map(|truth| truth.number).collect();
     let mut records = Vec::new();
@@ -168,7 +168,7 @@ fn foreign(all: &[args::Answers], truths: &[Truth]) -> Result<Vec<Record>, Failu
             let judge = Judge::new(&truth.process).map_err(Failure::usage)?;
             let (answer, seconds) = match found.remove(&truth.number) {
                 Some(foreign) => (foreign.answer, foreign.seconds),
-                None => (Err("there is no row for it".to_owned()), None),
+                None => (Err("the file has no row for it".to_owned()), None),
             };
             records.push(Record {
                 seconds,

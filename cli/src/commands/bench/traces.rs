@@ -1,4 +1,4 @@
-//! Recordings of the relay tests that methods make for themselves, as CSV like any other.
+//! Recordings of the relay tests that methods make for themselves, as CSV files that `identify` reads.
 //!
 //! ```text
 //! pem-sweep/0001.csv ..     one folder for each method, one file for each experiment
@@ -15,7 +15,7 @@ use crate::commands::workers::Workers;
 use crate::failure::Failure;
 use crate::output::write_file;
 
-/// Refuses a folder that is not empty, and methods of which none makes a relay test of its own.
+/// Refuses a folder that is not empty, and a list of methods none of which makes a relay test of its own.
 pub(super) fn check(folder: &Path, methods: &[Contender]) -> Result<(), Failure> {
     if !methods.iter().any(makes_its_own) {
         return Err(Failure::usage(

@@ -1,7 +1,6 @@
-//! The folder of a dataset: its manifest, and the files that have been made.
+//! The folder of a dataset: its manifest and its files.
 //!
-//! The manifest is written before the first file and after each: a file that it does not list has
-//! not been made, whatever lies there.
+//! The manifest is written before the first file and after each file. A file that it does not list counts as missing.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -20,7 +19,7 @@ pub(crate) struct Folder {
 }
 
 impl Folder {
-    /// Opens the folder of this recipe, or begins one; with `restart` a dataset that is there is removed first.
+    /// Opens the folder of this recipe, or begins one; with `restart`, removes an earlier dataset first.
     pub(crate) fn open(
         path: &Path,
         recipe: Recipe,
@@ -39,7 +38,7 @@ impl Folder {
                     found.go_on(&recipe, examples).map_err(refused)?
                 }
             }
-            // What is no folder cannot be made one, and says so.
+            // If this is a file, making the folder fails with a message.
             Err(error)
                 if [ErrorKind::NotFound, ErrorKind::NotADirectory].contains(&error.kind()) =>
             {
@@ -62,7 +61,7 @@ impl Folder {
         self.manifest
     }
 
-    /// Strikes out of the manifest what is listed but not there as it was made; returns its names.
+    /// Removes missing and damaged files from the manifest; returns their names.
     pub(crate) fn drop_damaged(&mut self) -> Vec<String> {
         let mut names = Vec::new();
         for (shard, slot) in self.manifest.shards.iter_mut().enumerate() {
@@ -78,7 +77,7 @@ impl Folder {
         names
     }
 
-    /// The files to be made.
+    /// Numbers of the files that are not made yet.
     pub(crate) fn missing(&self) -> Vec<usize> {
         let shards = self.manifest.shards.iter().enumerate();
         shards
@@ -86,7 +85,7 @@ impl Folder {
             .collect()
     }
 
-    /// Writes a file, then that it has been made.
+    /// Writes a file, then lists it in the manifest.
     pub(crate) fn keep(&mut self, shard: usize, bytes: &[u8], entry: Entry) -> Result<(), Failure> {
         write_file(&self.path.join(file_name(shard)), |file| {
             file.write_all(bytes)
@@ -111,7 +110,7 @@ impl Folder {
         read.map_err(|error| Failure::unreadable(&path, error))
     }
 
-    /// Removes the files and the folder, where there is nothing else in it.
+    /// Removes the files, and the folder if there is nothing else in it.
     pub(crate) fn remove(self) -> Result<(), Failure> {
         let names = (0..self.manifest.shards.len()).map(file_name);
         for name in names.chain([MANIFEST_NAME.to_owned()]) {
@@ -121,7 +120,7 @@ impl Folder {
         std::fs::remove_dir(&self.path).map_err(|error| Failure::output(&self.path, error))
     }
 
-    /// Writes the experiments of all files to one Parquet file, a file at a time.
+    /// Writes the experiments of all files to one Parquet file, one file at a time.
     #[cfg(feature = "parquet")]
     pub(super) fn write_parquet(&self, to: &Path) -> Result<(), Failure> {
         use onecycle_lab::learn::dataset::parquet::Writer;
@@ -143,7 +142,7 @@ impl Folder {
     }
 }
 
-/// Removes the files of a dataset, those that are there.
+/// Removes the files of a dataset that exist.
 fn remove_files(path: &Path, manifest: &Manifest) -> Result<(), Failure> {
     for name in (0..manifest.shards.len()).map(file_name) {
         let file = path.join(name);
@@ -157,7 +156,7 @@ fn remove_files(path: &Path, manifest: &Manifest) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Makes the folder where there is none, in one that there is; refuses one with anything in it.
+/// Creates the folder, but not its parent; refuses a folder that is not empty.
 fn begin(path: &Path) -> Result<(), Failure> {
     if !path.exists() {
         std::fs::create_dir(path).map_err(|error| Failure::output(path, error))?;
@@ -168,7 +167,7 @@ fn begin(path: &Path) -> Result<(), Failure> {
         Some(_) => Err(Failure::unreadable(
             path,
             format!(
-                "the folder is not empty and has no {MANIFEST_NAME}: name a new one for the dataset"
+                "the folder is not empty and has no {MANIFEST_NAME}: name a new folder for the dataset"
             ),
         )),
     }

@@ -23,7 +23,7 @@ enum Line {
     Costs(Vec<Option<f64>>),
 }
 
-/// The journal and what it holds; the costs stay in the file, for they may be many.
+/// The journal and its contents. The costs are not kept in memory: there may be many.
 pub(super) struct KeptGrid {
     journal: Journal,
     found: Found,
@@ -43,7 +43,7 @@ impl Found {
         thetas_rad.is_some_and(|thetas_rad| thetas_rad.len() == self.rows.len())
     }
 
-    /// Takes a line in; refuses one that is out of order.
+    /// Adds a line; refuses one that is out of order.
     fn take(&mut self, line: Line) -> Result<(), String> {
         let fits = match line {
             Line::ThetasRad(thetas_rad) if self.thetas_rad.is_none() => {
@@ -134,7 +134,7 @@ impl KeptGrid {
         Ok(self.journal.lines()?.filter_map(costs))
     }
 
-    /// Removes the journal: all is written.
+    /// Removes the journal; the output is written.
     pub(super) fn remove(self) -> Result<(), Failure> {
         self.journal.remove()
     }

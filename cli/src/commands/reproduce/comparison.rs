@@ -1,4 +1,4 @@
-//! Table IV and the tuning rules: several methods on the same random processes, under both protocols.
+//! Table IV and the tuning rules: several methods on the same random processes, with both protocols.
 
 use onecycle_lab::experiments::Benchmark;
 use onecycle_lab::judge::evaluate::{Contender, EvaluationError, Record, Summary, records};
@@ -15,14 +15,14 @@ use crate::results::reproduction::{Numbers, Row};
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ComparisonSettings {
-    /// Processes under either protocol.
+    /// Number of processes for each protocol.
     systems: u64,
     seed: u64,
-    /// Names of methods, and what the rows call them.
+    /// Names of methods, and their names in the table.
     methods: Vec<(String, String)>,
 }
 
-/// A method of this name.
+/// The method with this name.
 fn contender(name: &str) -> Result<Contender, Failure> {
     Contender::from_name(name).ok_or_else(|| Failure::usage(format!("there is no method '{name}'")))
 }
@@ -87,10 +87,10 @@ fn row(label: &str, summary: &Summary) -> Row {
     )
 }
 
-/// Least `|J|` that a logarithmic axis shows (%).
+/// Smallest `|J|` on the logarithmic axis (%).
 const LEAST_SHOWN: f64 = 1e-3;
 
-/// `|J|` (%) of the stable loops in rising order, over the part of the systems that are no worse (%).
+/// `|J|` of the stable loops (%) in rising order, over the fraction of systems with at most that `|J|` (%).
 fn sorted(label: &str, records: &[&Record]) -> Series {
     let costs = records.iter().filter_map(|record| record.deterioration);
     let mut costs: Vec<f64> = costs.map(f64::abs).collect();

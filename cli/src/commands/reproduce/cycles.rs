@@ -1,5 +1,4 @@
-//! Table VII: cycles of one run, each identified by itself, and what the controller of each costs on the
-//! process of every other.
+//! Table VII: cycles of one run, each identified alone, and the cost of each controller on the processes of the others.
 
 use onecycle_lab::judge::evaluate::{Cycles, Judge};
 use onecycle_plant::Trace;
@@ -12,14 +11,14 @@ use crate::report::cycles::{cost_cell, cross_table};
 use crate::report::number::percent;
 use crate::results::reproduction::{Numbers, Row};
 
-/// The run.
+/// The relay test.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CyclesSettings {
     setup: Setup,
-    /// Input bias, in parts of the relay's amplitude.
+    /// Input bias, as a fraction of the relay's amplitude.
     input_bias: f64,
-    /// Cycles at its end.
+    /// Number of cycles at the end of the test.
     cycles: usize,
 }
 
@@ -48,7 +47,7 @@ pub(super) fn find(settings: &CyclesSettings) -> Result<Numbers, Failure> {
     })
 }
 
-/// A signal over its largest size, from one time to another (s).
+/// A signal divided by its largest absolute value, in a range of time (s).
 pub(super) fn relative(
     name: &str,
     trace: &Trace,

@@ -1,4 +1,4 @@
-//! The paper's figures of signals: a cycle as its network sees it, and what PEM is given.
+//! The paper's figures of signals: the input of its network, and the data of PEM.
 
 use onecycle_identify::find_oscillation;
 use onecycle_lab::experiments::{RelayTest, signals_of};
@@ -17,12 +17,12 @@ use crate::results::reproduction::Numbers;
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SignalSettings {
-    /// Of the network's cycle: `T_prop`, `T_body`, `tau` (s); largest bias and noise, and their seed.
+    /// Cycle of the network: `T_prop`, `T_body`, `tau` (s); largest bias and noise, and their seed.
     times_s: [f64; 3],
     bias: f64,
     sigma: f64,
     seed: u64,
-    /// Of PEM's data.
+    /// Data of PEM.
     setup: Setup,
     input_bias: f64,
 }
@@ -56,7 +56,7 @@ pub(super) fn find(settings: &SignalSettings) -> Result<Numbers, Failure> {
     })
 }
 
-/// Both halves of the network's inputs, over their numbers.
+/// Both halves of the network's inputs over their index.
 fn prepared(settings: &SignalSettings) -> Result<Vec<Series>, Failure> {
     let trials = Trials {
         space: Space::MULTIROTOR,

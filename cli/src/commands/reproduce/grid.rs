@@ -11,14 +11,14 @@ use crate::pages::plot::{Marks, Series};
 use crate::report::number::{degrees, percent};
 use crate::results::reproduction::{Numbers, Row};
 
-/// What is laid and how it is checked.
+/// The grids and their check.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GridCheckSettings {
     deterioration: f64,
-    /// Grids, a column each: the gains at which processes are compared.
+    /// One grid, and one column, for each rule of comparing gains.
     gains: Vec<Gains>,
-    /// Random processes of the check, and their seed.
+    /// Number of random processes of the check, and their seed.
     processes: u64,
     seed: u64,
 }
@@ -46,16 +46,19 @@ pub(super) fn find(settings: &GridCheckSettings, workers: &Workers) -> Result<Nu
             row("random processes", &|(_, check)| {
                 check.processes.to_string()
             }),
-            row("beyond J* of their best member", &|(_, check)| {
+            row("farther than J* from every member", &|(_, check)| {
                 check.beyond.to_string()
             }),
-            row("farthest from it", &|(_, check)| or_unstable(check.worst)),
-            row("mean distance from it", &|(_, check)| {
+            row("largest distance to a member", &|(_, check)| {
+                or_unstable(check.worst)
+            }),
+            row("mean distance to a member", &|(_, check)| {
                 or_unstable(check.mean)
             }),
-            row("least phase margin under it", &|(_, check)| {
-                check.least_margin_rad.map_or("-".to_owned(), degrees)
-            }),
+            row(
+                "smallest phase margin under its controller",
+                &|(_, check)| check.least_margin_rad.map_or("-".to_owned(), degrees),
+            ),
         ]],
         figures: vec![
             grids
@@ -67,7 +70,7 @@ pub(super) fn find(settings: &GridCheckSettings, workers: &Workers) -> Result<Nu
     })
 }
 
-/// Members by their body's lag and their dead time (s).
+/// Members over `T_body` and `tau` (s).
 fn members(grid: &Grid) -> Series {
     let times_s = grid.members.iter().map(|member| member.candidate.times_s());
     Series::of_points(

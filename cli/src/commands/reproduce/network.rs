@@ -1,4 +1,4 @@
-//! Tables II and III: the paper's network with either softmax.
+//! Tables II and III: the paper's network with both softmax functions.
 
 use onecycle_lab::paper::classifier::{Choice, ClassifierRecipe, PickRule, Score, Test};
 use serde::Deserialize;
@@ -11,15 +11,15 @@ use crate::report::number::{degrees, percent};
 use crate::results::classifier::{SetKind, TrainedNetwork};
 use crate::results::reproduction::{Numbers, Row};
 
-/// The recipe, and what of it is another here.
+/// The recipe, and the fields that replace its own.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct NetworkSettings {
-    /// A file of `experiments`.
+    /// A recipe of `cli/reproduction`.
     recipe: RecipeName,
-    /// Losses, a column each.
+    /// Losses, one for each column.
     losses: Vec<Choice>,
-    /// The systems of Table III.
+    /// Test processes of Table III.
     test: Test,
 }
 

@@ -10,11 +10,11 @@ use crate::pages::plot::{Marks, Series};
 use crate::report::number::{degrees, percent};
 use crate::results::reproduction::{Numbers, Row};
 
-/// How finely the space is looked at.
+/// Resolution of the space.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PhaseSettings {
-    /// Shapes by the ratio of the lags, and by the dead time for each of these.
+    /// Number of ratios of the time constants, and of dead times for each ratio.
     shapes: [usize; 2],
 }
 
@@ -41,7 +41,7 @@ pub(super) fn find(settings: &PhaseSettings) -> Result<Numbers, Failure> {
     })
 }
 
-/// Deterioration (%) over the phase (degrees) of every rule that has one everywhere.
+/// Deterioration (%) over the phase (degrees) of every rule whose relay makes all processes oscillate.
 fn series(name: &str, rules: &[LocalRule], of: fn(&AppliedRule) -> f64) -> Series {
     let rules = rules.iter().map(|rule| &rule.applied);
     let points = rules.map(|rule| (rule.phase_rad.to_degrees(), 100.0 * of(rule)));

@@ -1,12 +1,11 @@
-//! What a part of the reproduction is made of: what was found, which is kept, and the sheet that says what
-//! it is and what the paper has.
+//! The sheet of a part of the paper, a TOML file in the program: settings, captions, the paper's numbers and remarks.
 //!
 //! ```text
-//! Sheet (TOML in the program)  settings -> Found (JSON in a file)
-//!       titles, captions, the paper's numbers, remarks  +  Found  ->  Part, which is rendered
+//! settings of the sheet                           ->  Numbers, kept in the journal
+//! captions, paper's numbers, remarks  +  Numbers  ->  ReproducedPart, which the report shows
 //! ```
 //!
-//! A sheet holds none of our numbers, and what is found none of the paper's.
+//! A sheet has only the paper's numbers, `Numbers` has only computed ones.
 
 use std::collections::BTreeMap;
 
@@ -24,12 +23,12 @@ use crate::results::reproduction::{ComparedCell, ComparedTable, Numbers, Reprodu
 pub(super) struct Sheet {
     title: String,
     source: String,
-    /// What both sizes have in common.
+    /// Settings of both sizes.
     #[serde(default)]
     settings: toml::Table,
-    /// What only the full run has.
+    /// Additional settings of the full run.
     full: toml::Table,
-    /// What only the quick one has.
+    /// Additional settings of the quick run.
     quick: toml::Table,
     #[serde(default)]
     tables: Vec<TableSheet>,
@@ -50,7 +49,7 @@ struct FigureSheet {
 #[serde(deny_unknown_fields)]
 struct TableSheet {
     caption: String,
-    /// The first one is of the names of the rows.
+    /// The first column has the names of the rows.
     columns: Vec<String>,
     /// The paper's cells by the name of the row.
     #[serde(default)]
@@ -58,7 +57,7 @@ struct TableSheet {
 }
 
 impl Sheet {
-    /// The one of this name; those in the program are all well formed.
+    /// The sheet of a part.
     pub(super) fn of(name: Name) -> Result<Self, Failure> {
         let text = match name {
             Name::Phase => include_str!("../../../reproduction/phase.toml"),
@@ -85,7 +84,7 @@ impl Sheet {
         settings
     }
 
-    /// The part, once its numbers are found.
+    /// Joins the sheet with the computed numbers.
     pub(super) fn part(self, name: Name, found: Numbers) -> ReproducedPart {
         let tables = self.tables.into_iter().zip(found.tables);
         let figures = self.figures.into_iter().zip(found.figures);
@@ -125,7 +124,7 @@ fn compared(sheet: TableSheet, rows: Vec<Row>) -> ComparedTable {
     }
 }
 
-/// Settings as a type; a sheet in the program has them all.
+/// Settings as the type of a part.
 pub(super) fn typed<T: DeserializeOwned>(settings: &toml::Table) -> Result<T, Failure> {
     settings.clone().try_into().map_err(Failure::usage)
 }
@@ -134,8 +133,8 @@ pub(super) fn typed<T: DeserializeOwned>(settings: &toml::Table) -> Result<T, Fa
 mod tests {
     use super::*;
 
-    // Every sheet reads; none has more of the paper's cells in a row than columns to put them in; each has
-    // something to show, and a remark that says why ours differ.
+    // Every sheet can be read, has a table or a figure, and a remark on the differences; no row has more cells of the
+    // paper than there are columns.
     #[test]
     fn sheets_are_well_formed() {
         for name in Name::ALL {

@@ -1,4 +1,4 @@
-//! Tables V and VI: one process, with other starts of the fit and with other input biases.
+//! Tables V and VI: one process, for several start values of the fit and several input biases.
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_identify::Signals;
@@ -16,27 +16,27 @@ use crate::pages::plot::{Marks, Series};
 use crate::report::cycles::cost_cell;
 use crate::results::reproduction::{Numbers, Row};
 
-/// Sample period (s): the paper's.
+/// Sample period of the paper (s).
 pub(super) const SAMPLE_S: f64 = 1e-3;
 
-/// A process and the experiment on it.
+/// A process and its relay test.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Setup {
     /// `T_prop`, `T_body`, `tau` (s).
     times_s: [f64; 3],
-    /// Standard deviation of the noise, as a part of the amplitude of the noise-free oscillation.
+    /// Standard deviation of the noise, as a fraction of the amplitude of the noise-free oscillation.
     sigma: f64,
     /// Seed of the noise.
     seed: u64,
-    /// Whether the relay follows the bias.
+    /// Whether the relay trims the bias.
     is_trimmed: bool,
     /// Duration, in periods of the oscillation.
     periods: f64,
 }
 
 impl Setup {
-    /// The experiment under a bias (parts of the relay's amplitude), and the truth behind it.
+    /// Runs the relay test with an input bias (fraction of the relay's amplitude); returns the truth and the trace.
     pub(super) fn run(&self, input_bias: f64) -> Result<(Truth, Trace), Failure> {
         let [t_prop_s, t_body_s, tau_s] = self.times_s;
         let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).map_err(Failure::usage)?;
@@ -64,23 +64,23 @@ impl Setup {
     }
 }
 
-/// What Table V starts from.
+/// Settings of Table V.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Starts {
     setup: Setup,
-    /// Input bias, in parts of the relay's amplitude.
+    /// Input bias, as a fraction of the relay's amplitude.
     input_bias: f64,
-    /// `T_prop`, `T_body`, `tau` (s) of each.
+    /// Start values: `T_prop`, `T_body`, `tau` (s).
     starts_s: Vec<[f64; 3]>,
 }
 
-/// One process under both relay tests, and the judge of what is made of them.
+/// One process with both relay tests, and the judge of the answers.
 struct Bench {
     judge: Judge,
-    /// Set I is its last cycle.
+    /// The test whose last cycle is set I.
     trace: Trace,
-    /// Set II.
+    /// Set II: the swept relay test.
     swept: Recorded,
 }
 
@@ -101,7 +101,7 @@ impl Bench {
         signals_of(&self.trace, SAMPLE_S)
     }
 
-    /// What PEM from a start comes to: on set I, on set II, and on set I with the bias in its model.
+    /// Cost of the answer of PEM from a start value: on set I, on set II, and on set I with the bias in the model.
     fn by_pem(&self, start_s: [f64; 3]) -> [Option<Deterioration>; 3] {
         let cases = [
             (self.one(), pem::PemSettings::paper(Data::LastCycle)),
@@ -124,7 +124,7 @@ impl Bench {
     }
 }
 
-/// Table V: a row a start; set I, set II, set I with the bias in the model, and ours, which needs none.
+/// Table V: one row for each start value; set I, set II, set I with the bias in the model, and onecycle without start.
 pub(super) fn starts(settings: &Starts, workers: &Workers) -> Result<Numbers, Failure> {
     let bench = Bench::new(&settings.setup, settings.input_bias)?;
     let ours = bench.by(Contender::OneCycle(1));
@@ -139,23 +139,23 @@ pub(super) fn starts(settings: &Starts, workers: &Workers) -> Result<Numbers, Fa
     })
 }
 
-/// A start as the paper's sheet has it.
+/// The name of a start value in the sheet.
 fn name([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> String {
     format!("{t_prop_s}, {t_body_s}, {tau_s}")
 }
 
-/// What Table VI varies.
+/// Settings of Table VI.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct Biases {
     setup: Setup,
-    /// Input biases, in parts of the relay's amplitude.
+    /// Input biases, as fractions of the relay's amplitude.
     input_biases: Vec<f64>,
-    /// Where PEM starts: `T_prop`, `T_body`, `tau` (s).
+    /// Start value of PEM: `T_prop`, `T_body`, `tau` (s).
     start_s: [f64; 3],
 }
 
-/// Names of Table VI's columns in its figure.
+/// Names of the columns of Table VI in its figure.
 const METHODS: [&str; 5] = [
     "PEM, set I",
     "PEM, set II",
@@ -164,7 +164,7 @@ const METHODS: [&str; 5] = [
     "PEM, set I, done with care",
 ];
 
-/// Table VI: a row a bias, a column a method.
+/// Table VI: one row for each bias, one column for each method.
 pub(super) fn biases(settings: &Biases, workers: &Workers) -> Result<Numbers, Failure> {
     let judged = workers.map(settings.input_biases.len(), |index| {
         let bench = Bench::new(&settings.setup, settings.input_biases[index])?;

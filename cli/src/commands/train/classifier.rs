@@ -1,4 +1,4 @@
-//! The paper's classifier with every loss of its recipe, each scored on the same experiments.
+//! Training of the paper's classifier with every loss of a recipe, scored on the same experiments.
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -22,10 +22,10 @@ use crate::output::{print, progress_bar, write_file, write_text};
 use crate::report::classifier as report;
 use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
 
-/// Key of what is said beside the weights; changes with every change that a reader could notice.
+/// Key and version of the metadata beside the weights.
 const FORMAT: &str = "onecycle.classifier/1";
 
-/// What is beside the weights of the best network.
+/// Metadata of the best network.
 #[derive(Serialize)]
 struct Card<'a> {
     recipe: &'a ClassifierRecipe,
@@ -35,18 +35,18 @@ struct Card<'a> {
     classes_s: Vec<[f64; 3]>,
 }
 
-/// What all losses have in common.
+/// Data that all losses share.
 struct Lesson<'a> {
     recipe: &'a ClassifierRecipe,
     classes: Classes,
     training: Examples,
     standard: Standard,
-    /// The first one is to verify with.
+    /// The first set is the verification set.
     sets: Vec<Examples>,
     workers: &'a Workers,
 }
 
-/// What a recipe has led to.
+/// Result of a recipe.
 pub(crate) struct Learnt<'a> {
     pub(crate) run: ClassifierRun<'a>,
     /// The best network.
@@ -74,7 +74,7 @@ pub(super) fn run(arguments: &args::Train, recipe: &ClassifierRecipe) -> Result<
     Ok(ExitCode::from(exit::DONE))
 }
 
-/// Trains a network with every loss of a recipe and scores them; `failed` says whose recipe it is.
+/// Trains one network for each loss of a valid recipe and scores them. `failed` makes errors of the recipe.
 pub(crate) fn learn<'a>(
     recipe: &'a ClassifierRecipe,
     journal: Option<&Journal>,
@@ -106,7 +106,7 @@ pub(crate) fn learn<'a>(
     })
 }
 
-/// Removes the networks of a recipe from a journal that outlives them.
+/// Removes the networks of a recipe from a journal that is kept.
 pub(crate) fn forget(journal: &Journal, recipe: &ClassifierRecipe) -> Result<(), Failure> {
     for number in 1..=recipe.losses.len() {
         journal.remove_piece(&Kept { journal, number }.name())?;
@@ -114,7 +114,7 @@ pub(crate) fn forget(journal: &Journal, recipe: &ClassifierRecipe) -> Result<(),
     Ok(())
 }
 
-/// The less the better: unstable picks, then the mean cost, by the better rule.
+/// Rank of a network, smaller is better: unstable picks, then the mean cost, by the better rule.
 fn standing(scores: &[Score; 2]) -> (usize, f64) {
     let score = &scores[better_rule(scores) as usize];
     (score.unstable, score.mean.unwrap_or(f64::INFINITY))
@@ -158,7 +158,7 @@ impl<'a> Lesson<'a> {
         })
     }
 
-    /// Trains with one loss; the scores of its best network, and that.
+    /// Trains with one loss; returns the scores and the best network.
     fn learn(
         &self,
         number: usize,

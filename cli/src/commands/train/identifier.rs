@@ -1,4 +1,4 @@
-//! An identifier from nothing: experiments, training, calibration, scores, a pack.
+//! Training of an identifier: simulate experiments, train, calibrate, score, write the pack.
 
 use std::process::ExitCode;
 use std::time::Instant;
@@ -26,14 +26,14 @@ pub(super) fn run(arguments: &args::Train, recipe: &IdentifierRecipe) -> Result<
         .validate()
         .map_err(|error| Failure::unreadable(&arguments.recipe, error))?;
     let out = arguments.out.as_deref().ok_or_else(|| {
-        Failure::usage("an identifier is written to a pack: name the file with --out")
+        Failure::usage("an identifier is written as a pack: name the file with --out")
     })?;
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
     let dataset = arguments.dataset.clone();
     let path = dataset.unwrap_or_else(|| with_ending(out, "dataset"));
     let experiments = recipe.experiments.clone();
-    // A dataset of the user's stays; one of an interrupted run goes with its work.
+    // --restart keeps a dataset that the user has named.
     let restart = arguments.restart && arguments.dataset.is_none();
     let wanted = (experiments, recipe.experiments());
     let (folder, ..) = filled(&path, wanted, restart, &workers)?;
@@ -118,7 +118,7 @@ fn best_epoch(history: &[Epoch]) -> u64 {
         .map_or(0, |epoch| epoch.number)
 }
 
-/// The calibrated pack, its card still empty, and what weights in bytes change.
+/// The calibrated pack, without its card, and the effect of storing weights as bytes.
 fn pack(
     recipe: &IdentifierRecipe,
     network: &Network,
@@ -140,7 +140,7 @@ fn pack(
     made().map_err(Failure::usage)
 }
 
-/// Scores the pack, writes them on its card, and returns its bytes.
+/// Scores the pack, writes the scores to its card, and returns its bytes.
 fn finish(
     mut pack: PackContents,
     recipe: &IdentifierRecipe,

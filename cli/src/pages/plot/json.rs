@@ -1,17 +1,17 @@
-//! A figure as plotly.js is given it: traces and a layout. Colours are left to the page.
+//! A figure as JSON for plotly.js: traces and a layout. The page adds the colours.
 
 use serde_json::{Map, Value, json};
 
 use super::{Axis, Field, FieldKind, Figure, Hue, Marks, Note, Panel, Places, Series, Shape};
 use crate::pages::escape::escaped;
 
-/// Part of the height between two panels.
+/// Gap between two panels, as a fraction of the height.
 const BETWEEN: f64 = 0.06;
-/// The upper panel's part of what two share.
+/// The upper panel's fraction of the height of two panels.
 const UPPER: f64 = 0.62;
 
 impl Figure {
-    /// Data and layout. plotly.js reads a few tags in names and titles, and there are none in ours.
+    /// Data and layout. plotly.js interprets some tags in names and titles, so these are escaped.
     pub(crate) fn to_json(&self) -> String {
         let mut data: Vec<Value> = vec![];
         let mut layout = Map::new();
@@ -52,7 +52,7 @@ impl Figure {
         }
         let named = data.iter().filter(|trace| trace["showlegend"] == true);
         layout.insert("showlegend".to_owned(), json!(named.count() > 1));
-        // Over time and frequency a label says what is above and below the mouse.
+        // In plots over time or frequency, the hover label shows all curves at the mouse.
         let is_of_abscissa = matches!(self.shape, Shape::Wide | Shape::Tall);
         let hover = if is_of_abscissa { "x" } else { "closest" };
         layout.insert("hovermode".to_owned(), json!(hover));
@@ -68,7 +68,7 @@ impl Figure {
     }
 }
 
-/// What plotly.js appends to the name of an axis: nothing to the first.
+/// The suffix of the name of an axis in plotly.js; the first axis has none.
 fn number(index: usize) -> String {
     match index {
         0 => String::new(),
@@ -76,7 +76,7 @@ fn number(index: usize) -> String {
     }
 }
 
-/// The part of the height that a panel has.
+/// The range of the height that a panel occupies.
 fn domain(index: usize, count: usize) -> [f64; 2] {
     match (index, count) {
         (0, 2) => [1.0 - UPPER + BETWEEN / 2.0, 1.0],
@@ -102,7 +102,7 @@ fn axis(axis: &Axis, places: Option<&Places>) -> Value {
         "zeroline": false,
     });
     if kind == "category" {
-        // Upright where there is no room: slanted labels touch each other.
+        // Upright if there is no room: slanted labels touch each other.
         out["autotickangles"] = json!([0, 90]);
     }
     if axis.is_bare {
@@ -115,11 +115,11 @@ fn axis(axis: &Axis, places: Option<&Places>) -> Value {
     out
 }
 
-/// Most decades of an axis whose labels stand at 1, 2 and 5, and most labels of an axis of more decades.
+/// Up to this number of decades, an axis has labels at 1, 2 and 5; with more decades, at most this number of labels.
 const FEW_DECADES: f64 = 2.5;
 const MOST_LABELS: f64 = 6.0;
 
-/// Sets the labels of a logarithmic axis: on its own plotly.js labels each of 1 to 9, and they touch.
+/// Sets the labels of a logarithmic axis. By default plotly.js labels each of 1 to 9, and these labels touch.
 fn space_labels<'a>(out: &mut Value, axis: &Axis, values: impl Iterator<Item = &'a f64>) {
     let (low, high) = axis.range.unwrap_or_else(|| {
         let positive = values.filter(|value| **value > 0.0);
@@ -128,7 +128,7 @@ fn space_labels<'a>(out: &mut Value, axis: &Axis, values: impl Iterator<Item = &
         })
     });
     let decades = (high / low).log10();
-    // Less than a decade has even steps.
+    // Below one decade plotly.js uses even steps.
     if axis.is_logarithmic && decades >= 1.0 {
         out["dtick"] = if decades < FEW_DECADES {
             json!("D2")
@@ -138,7 +138,7 @@ fn space_labels<'a>(out: &mut Value, axis: &Axis, values: impl Iterator<Item = &
     }
 }
 
-/// A coordinate as ranges and annotations have it.
+/// A coordinate in the units of ranges and annotations.
 fn scaled(axis: &Axis, value: f64) -> f64 {
     if axis.is_logarithmic {
         value.log10()
@@ -230,10 +230,10 @@ fn of_field(field: &Field, number: &str) -> Value {
     trace
 }
 
-/// Contents at which a region ends.
+/// Probability contents of the contour lines.
 const REGIONS: [f64; 3] = [0.5, 0.9, 0.99];
 
-/// plotly.js draws lines at even steps: a content as the number of the region that ends there, straight between.
+/// plotly.js draws contour lines at even steps, so contents are mapped to 1, 2, 3 at [`REGIONS`], linear between.
 fn step(content: f64) -> f64 {
     let ends = [0.0, REGIONS[0], REGIONS[1], REGIONS[2], 1.0];
     let inside = ends[1..].partition_point(|&end| end <= content).min(3);
@@ -266,7 +266,7 @@ mod tests {
         serde_json::from_str(&figure.to_json()).unwrap()
     }
 
-    // What plotly.js is given: a trace a series, types of the axes, five digits, and no tag of a name.
+    // One trace for each series, the types of the axes, five digits, and tags in names escaped.
     #[test]
     fn series_and_axes_reach_the_plot() {
         let series = vec![
@@ -290,8 +290,8 @@ mod tests {
         assert_eq!(json["layout"]["showlegend"], true);
     }
 
-    // Two panels share the abscissas, which stand under the lower one; a note on a logarithmic axis is at its
-    // logarithm, 100 at 2, and so are the ends of a range.
+    // Two panels share the x axis, which is drawn under the lower one. On a logarithmic axis, notes and ranges are given
+    // by their logarithms: 100 is 2.
     #[test]
     fn panels_stand_above_each_other() {
         let mut upper = Panel::new(Axis::titled("a").logarithmic(), vec![]);
@@ -310,7 +310,7 @@ mod tests {
         assert_eq!(layout["xaxis"]["anchor"], "y2");
         assert_eq!(layout["xaxis"]["range"], json!([-1.0, 3.0]));
         assert_eq!(layout["yaxis2"]["range"], json!([-1.0, 4.0]));
-        // Four decades: a label each.
+        // Four decades: one label each.
         assert_eq!(layout["xaxis"]["dtick"], 1.0);
         assert_eq!(layout["yaxis2"]["dtick"], Value::Null);
         assert_eq!(layout["annotations"][0]["y"], 2.0);
@@ -319,7 +319,7 @@ mod tests {
         assert!(layout["yaxis"]["domain"][0].as_f64().unwrap() > top);
     }
 
-    // 50, 90 and 99 % are 1, 2 and 3; half way from 50 to 90 % is one and a half.
+    // 50, 90 and 99 % are mapped to 1, 2 and 3; half way from 50 to 90 % to 1.5.
     #[test]
     fn regions_are_even_steps() {
         for (content, expected) in [

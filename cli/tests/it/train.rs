@@ -1,21 +1,16 @@
-//! `train`: a small recipe from end to end, stopped and gone on with, and what it refuses.
+//! `train` of the classifier: a small recipe, interruptions, refusals.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
-use common::{NOT_WRITTEN, Scratch, UNREADABLE, killed_when, run};
+use crate::common::{NOT_WRITTEN, Scratch, UNREADABLE, killed_when, run};
 use serde_json::Value;
 
-/// Seconds of work: 2 losses, 6 epochs each.
-const RECIPE: &str = include_str!("../reproduction/paper_network_small.toml");
+/// A few seconds of work: 2 losses, 6 epochs each.
+const RECIPE: &str = include_str!("../../reproduction/paper_network_small.toml");
 
 fn recipe(folder: &Scratch) -> String {
     folder.write("recipe.toml", RECIPE.as_bytes())
 }
 
-/// A report without the times that it took.
+/// A report without its times.
 fn timeless(path: &str) -> Value {
     let mut report: Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
     report["seconds"].take();
@@ -25,9 +20,8 @@ fn timeless(path: &str) -> Value {
     report
 }
 
-// The table names both losses, both rules and every set; the file is a network of 4520 inputs. Ended by
-// force in the first loss and in the second, on another number of threads, the rest gives the same bytes
-// and the same table.
+// The table has both losses, both rules and every set; the file has a network with 4520 inputs. Killed in the first and in
+// the second loss and resumed on another number of threads, the run gives the same bytes and the same table.
 #[test]
 fn from_recipe_to_table_and_network_through_interruptions() {
     let folder = Scratch::new();
@@ -42,7 +36,7 @@ fn from_recipe_to_table_and_network_through_interruptions() {
         "conventional softmax         most likely",
         "modified softmax, shifted    least cost",
         "30 experiments of random processes, bias left in",
-        "best class there is",
+        "best possible class",
         "Best on the classes: ",
     ] {
         assert!(made.stdout.contains(words), "{words}: {}", made.stdout);
@@ -57,8 +51,7 @@ fn from_recipe_to_table_and_network_through_interruptions() {
     let floor = report["sets"][1]["best"][0]["mean"].as_f64().unwrap();
     for network in report["networks"].as_array().unwrap() {
         let scores = &network["scores"][1][0];
-        // No pick is better than the best there is, and even these few experiments teach something: picks at
-        // random cost some 40 %.
+        // No pick is better than the best class, and the network has learnt something: random picks cost about 40 %.
         let mean = scores["mean"].as_f64().unwrap();
         assert!((floor..0.15).contains(&mean), "{floor} {mean}");
     }
@@ -152,7 +145,7 @@ fn wrong_recipes_are_refused_in_one_sentence() {
     run(&["train"]).misused(&["required"]);
 }
 
-// Of another recipe, cut off, or nothing of the kind: said so, and kept.
+// Work of another recipe and damaged networks are refused and kept.
 #[test]
 fn a_part_of_something_else() {
     let folder = Scratch::new();

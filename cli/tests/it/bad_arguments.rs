@@ -1,14 +1,11 @@
-//! Arguments, campaigns and outputs that are impossible: an exit code and one sentence.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! Invalid arguments, campaigns and outputs: the exit code, and one sentence.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::Stdio;
 
-use common::{HOVER, NOT_WRITTEN, Outcome, Scratch, Table, UNREADABLE, names_in, onecycle, run};
+use crate::common::{
+    HOVER, NOT_WRITTEN, Outcome, Scratch, Table, UNREADABLE, names_in, onecycle, run,
+};
 
 // ---------------------------------------------------------------- arguments
 
@@ -32,7 +29,7 @@ fn unusable_options_of_identify() {
     run(&["identify"]).misused(&["required"]);
 }
 
-// A bad argument is 2, and the sentence says which.
+// The exit code is 2, and the sentence names the argument.
 #[test]
 fn a_sample_rate_out_of_range() {
     let file = Scratch::new();
@@ -96,7 +93,7 @@ fn impossible_simulations() {
     with(&[("--seed", "-1")]).misused(&["--seed"]);
 }
 
-// The reference is an argument, and neither a recording nor a row.
+// The reference is refused as an argument, not as a row of a recording.
 #[test]
 fn a_reference_that_is_no_number() {
     let reference = [&["simulate"], &HOVER[..], &["--reference", "nan"]].concat();
@@ -111,9 +108,9 @@ fn extreme_simulations_do_not_crash() {
         ];
         run(&[&arguments, more].concat())
     };
-    // A delay of 1e10 samples.
+    // A dead time of 1e10 samples.
     process("0.1", "1e7", &["--duration", "1"]).misused(&[]);
-    // A period too short for a thousandth of it.
+    // A period too short to be divided by 1000.
     process("1e-300", "0", &[]).misused(&[]);
 }
 
@@ -153,7 +150,7 @@ fn impossible_processes_for_tune() {
 }
 
 impl Outcome {
-    /// Without a command the help is the answer, on the error output.
+    /// Asserts that the help is printed on the error output: a call without a command.
     fn misused_without_command(&self) {
         assert_eq!(self.code, Some(2));
         assert_eq!(self.stdout, "");
@@ -168,7 +165,7 @@ fn campaign(text: &str) -> Outcome {
     run(&["campaign", &folder.write("campaign.toml", text.as_bytes())])
 }
 
-/// A campaign of one case of no noise, and more lines.
+/// A campaign of one case, with these lines added.
 fn campaign_with(lines: &str) -> Outcome {
     let head = "measure = \"identification\"\ncases = 1\nseed = 1\ntrim = true\n";
     campaign(&format!("{head}{lines}\n"))
@@ -212,7 +209,7 @@ fn unreadable_campaigns() {
     names(&campaign("\u{0}\u{1}\u{2}"), &["line 1"]);
 }
 
-// Everything that goes wrong is one sentence, as for recordings.
+// The refusal is one sentence, as for recordings.
 #[test]
 fn a_malformed_campaign_is_one_sentence() {
     campaign_with("bias = 0\nsigma = 0\nbogus = 3").refused(UNREADABLE, &["line 7", "`bogus`"]);
@@ -224,7 +221,7 @@ fn a_campaign_without_cases() {
     campaign(text).refused(UNREADABLE, &["cases", "1 to"]);
 }
 
-// Numbers out of their range are refused, whatever TOML allows.
+// Numbers out of their range are refused, also those that TOML allows.
 #[test]
 fn campaigns_of_impossible_numbers() {
     for (line, field) in [

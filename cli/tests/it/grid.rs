@@ -1,20 +1,15 @@
-//! `grid`: its reports and files, stopped and gone on with, and what it refuses.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `grid`: reports, files, interruptions, refusals.
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, figures, onecycle, reported, run};
+use crate::common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, figures, onecycle, reported, run};
 use serde_json::Value;
 
-/// A part of the paper's space.
+/// A small part of the paper's space.
 const SPACE: &str = "t_prop_s = [0.03, 0.1]\nt_body_s = [0.5, 1.0]\ntau_s = [0.005, 0.05]\n";
 
-/// A folder with [`SPACE`] in it, and its path.
+/// A folder with [`SPACE`], and the path of the space.
 fn space() -> (Scratch, String) {
     let folder = Scratch::new();
     let path = folder.write("space.toml", SPACE.as_bytes());
@@ -33,7 +28,7 @@ fn read(path: &str) -> Value {
 
 // ---------------------------------------------------------------- reports and files
 
-// One command from end to end: made, checked, written, drawn; then read and checked again.
+// A grid is made, checked, written and drawn; then read and checked again.
 #[test]
 fn from_space_to_file_and_back() {
     let (folder, space) = space();
@@ -47,7 +42,7 @@ fn from_space_to_file_and_back() {
         "neighbours 10.00 % apart, gains by the amplitude",
         "Members  ",
         "500 random processes, seed 1",
-        "Every one of them is within 10.00 % of a member.",
+        "Every process of the check is within 10.00 % of a member.",
     ] {
         assert!(made.stdout.contains(words), "{words}: {}", made.stdout);
     }
@@ -78,12 +73,12 @@ fn from_space_to_file_and_back() {
     let rows = again.0["members_per_row"].as_array().unwrap();
     let total: u64 = rows.iter().filter_map(Value::as_u64).sum();
     assert_eq!(total, members.len() as u64);
-    // Members made afresh are the same to 1e-9 or so.
+    // Members computed again agree to about 1e-9.
     let worst = file["check"]["worst"].as_f64().unwrap();
     assert!((again.number("/check/worst") - worst).abs() < 1e-9);
     assert!(again.number("/alpha/least") > 1.1);
     assert!(again.number("/alpha/most") >= again.number("/alpha/least"));
-    // Another seed draws others; without --check the file's own check is told.
+    // Another seed gives another check; without --check, that of the file is reported.
     let other = grid(&["--from", &out, "--check", "500", "--seed", "9", "--json"]).report();
     assert_ne!(other.0["check"], again.0["check"]);
     assert_eq!(
@@ -119,7 +114,7 @@ fn the_fewest_and_equal_gains() {
     assert_eq!(figures(&page).len(), 5);
 }
 
-// The same bytes at one thread and at three; either spelling of a deterioration.
+// The same bytes on one and on three threads, and with both spellings of the deterioration.
 #[test]
 fn the_same_bytes_at_any_number_of_threads() {
     let (folder, space) = space();
@@ -161,7 +156,7 @@ fn the_same_bytes_at_any_number_of_threads() {
     );
 }
 
-// A member that covers nothing but itself: the check says so, and so does the exit code.
+// A grid with a single member: the check fails, with its exit code.
 #[test]
 fn a_grid_that_does_not_hold() {
     let (folder, space) = space();
@@ -183,7 +178,7 @@ fn a_grid_that_does_not_hold() {
 
 // ---------------------------------------------------------------- stopped and gone on with
 
-/// Runs and, once its part file has this many lines, ends it by force; what the file then holds.
+/// Kills a run once its journal has this number of lines; returns the journal.
 fn killed(arguments: &[&str], part: &std::path::Path, lines: usize) -> Vec<u8> {
     let mut child = onecycle()
         .args(arguments)
@@ -210,8 +205,8 @@ fn killed(arguments: &[&str], part: &std::path::Path, lines: usize) -> Vec<u8> {
     std::fs::read(part).unwrap()
 }
 
-// Ended by force among the rows and in the check, and then with the part file cut anywhere: the
-// file comes out the same to the last bit, and the part file goes.
+// Killed among the rows and in the check, then with the journal cut at several places: the grid has the same bytes, and
+// the work folder is gone.
 #[test]
 fn an_interrupted_run_is_gone_on_with() {
     let (folder, space) = space();
@@ -243,7 +238,7 @@ fn an_interrupted_run_is_gone_on_with() {
         std::fs::remove_file(&out).unwrap();
         resumed.stderr
     };
-    // Settings, angles, and a row or two.
+    // Head, angles, and one or two rows.
     let said = resumes(&killed(&to(&out), &part, 3));
     assert!(said.starts_with("onecycle: resuming after "), "{said}");
     assert!(
@@ -274,7 +269,7 @@ fn an_interrupted_run_is_gone_on_with() {
         let said = resumes(&left[..length]);
         assert!(said.contains(&words), "{words}: {said}");
     }
-    // Cut in the angles of the rows, in the settings, and down to nothing.
+    // Cut in the angles, in the head, and empty.
     for length in [ends[0] + 9, 17, 0] {
         assert_eq!(resumes(&left[..length]), "");
     }
@@ -287,7 +282,7 @@ fn a_part_of_something_else() {
     let part = folder.path("grid.json.part").join("journal.jsonl");
     let make = |more: &[&str]| run(&[&["grid", &space, "--out", &out], more].concat());
     let quick = ["--deterioration", "30%"];
-    // Of other settings: kept, unless told otherwise.
+    // A journal with other settings is refused and kept.
     let left = killed(
         &["grid", &space, "--out", &out, "--deterioration", "4%"],
         &part,
@@ -303,7 +298,7 @@ fn a_part_of_something_else() {
         ],
     );
     assert_eq!(std::fs::read(&part).unwrap(), left);
-    // Damaged within, or in another order: refused as well.
+    // A damaged journal, or one in another order, is refused too.
     let text = String::from_utf8(left).unwrap();
     let lines: Vec<&str> = text.lines().collect();
     let four = ["--deterioration", "4%"];
@@ -390,13 +385,13 @@ fn bad_files() {
         let path = folder.write("damaged.json", damaged.as_bytes());
         run(&["grid", "--from", &path]).refused(UNREADABLE, &["damaged.json", words]);
     }
-    // Outputs that cannot be written, before and after the work.
+    // Outputs that cannot be written are refused before and after the work.
     let nowhere = folder.name("nosuch/grid.json");
     run(&["grid", &space, "--out", &nowhere]).refused(NOT_WRITTEN, &["cannot write", "nosuch"]);
     let nowhere = folder.name("nosuch/grid.html");
     run(&["grid", "--from", &out, "--report", &nowhere]).refused(NOT_WRITTEN, &["grid.html"]);
     run(&["grid", "--picture", "grid.svg"]).misused(&["--picture"]);
-    // A space that is none.
+    // An invalid space.
     let backwards = SPACE.replace("[0.03, 0.1]", "[0.1, 0.03]");
     let path = folder.write("backwards.toml", backwards.as_bytes());
     run(&["grid", &path]).refused(UNREADABLE, &["t_prop_s", "the lower time first"]);

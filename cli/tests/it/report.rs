@@ -1,12 +1,8 @@
-//! `--report`: pages that are whole, say what the report for programs says, and are written whole or not at all.
-
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `--report`: complete pages with the numbers of `--json`, written whole or not at all.
 
 use std::fs;
 
-use common::{NOT_IDENTIFIED, NOT_WRITTEN, Scratch, figures, notes, reported, run};
+use crate::common::{NOT_IDENTIFIED, NOT_WRITTEN, Scratch, figures, notes, reported, run};
 use serde_json::Value;
 
 const HOVER: &str = concat!(
@@ -18,7 +14,7 @@ const UNSTEADY: &str = concat!(
     "/../examples/unsteady_ardupilot_alt.csv"
 );
 
-// Every section is there, the margins on both plots and the overshoot are those of --json, and every coordinate is a
+// Every section is there, the margins in both plots and the overshoot equal those of --json, and every coordinate is a
 // number.
 #[test]
 fn an_identification_as_a_page() {
@@ -70,8 +66,8 @@ fn an_identification_as_a_page() {
     }
 }
 
-// The relay's point is measured, not modelled: it lies on the curve of the process found, within 1 %, for the
-// recording's noise of 2 % leaves 0.02 % of it over eight cycles.
+// The measured point at the oscillation lies on the curve of the identified process within 1 %: the noise of 2 % leaves
+// 0.02 % over eight cycles.
 #[test]
 fn the_measured_point_lies_on_the_locus() {
     let figures = figures(&reported(&["identify", HOVER]).1);
@@ -101,7 +97,7 @@ fn the_measured_point_lies_on_the_locus() {
     assert!(distance < 0.01 * re[0].hypot(im[0]), "{distance}");
 }
 
-// A refusal has its page too, with the recording and the advice; the exit code stays that of a refusal.
+// A refusal has a page too, with the recording and the advice; the exit code is that of a refusal.
 #[test]
 fn a_refusal_as_a_page() {
     let (ran, page) = reported(&["identify", UNSTEADY]);
@@ -111,7 +107,7 @@ fn a_refusal_as_a_page() {
     assert_eq!(figures(&page).len(), 1);
 }
 
-// Designs and grids have the same plots: the margin asked for stands in both of stability.
+// A design has three figures, with the requested margin in both stability plots; a grid has five.
 #[test]
 fn designs_and_grids_as_pages() {
     let tune = [
@@ -130,8 +126,7 @@ fn designs_and_grids_as_pages() {
     assert!(page.contains("neighbours 50.00 % apart"));
 }
 
-// The same recording gives the same bits; a page that cannot be written is a sentence, and nothing is printed as if it
-// had been.
+// The same recording gives the same bytes. If the page cannot be written, there is one sentence and no report.
 #[test]
 fn whole_or_not_at_all() {
     let again = || reported(&["identify", HOVER]).1;

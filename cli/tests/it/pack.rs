@@ -1,9 +1,4 @@
-//! `pack`: shown, checked, exchanged; and files that are damaged, cut off, newer, or no pack.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `pack`: show, verify, export, import; and files that are damaged, truncated, newer, or not packs.
 
 use onecycle_lab::learn::npz::{self, Column, Numbers};
 use onecycle_lab::learn::onnx;
@@ -21,9 +16,9 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 
-use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, run};
+use crate::common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, run};
 
-/// A pack whose outputs are not those they must be.
+/// The exit code of a pack that fails its self-test.
 const FAILED: i32 = 4;
 
 fn network(hidden: usize, outputs: usize, seed: u64) -> Network {
@@ -67,7 +62,7 @@ fn contents(precision: Precision) -> PackContents {
     }
 }
 
-/// A folder with a pack in it, and its name.
+/// A folder with a pack, the path of the pack, and its bytes.
 fn folder() -> (Scratch, String, Vec<u8>) {
     let folder = Scratch::new();
     let bytes = contents(Precision::Bytes).to_bytes().unwrap();
@@ -84,21 +79,21 @@ fn done(arguments: &[&str]) -> String {
 
 // ---------------------------------------------------------------- show and verify
 
-// Weights: 34 x 10 and 10 x 14 bytes, 24 scales and 24 biases of 4; the table 4 and 12 of 4.
+// Weights: 34 x 10 and 10 x 14 bytes, 24 scales and 24 biases of 4 bytes; table: 4 and 12 numbers of 4 bytes.
 #[test]
 fn a_pack_is_shown() {
     let (_folder, path, bytes) = folder();
     let text = done(&["show", &path]);
     let hash = format!("{:016x}", content_hash(&bytes[HEADER..]));
     let card = contents(Precision::Bytes).card.to_string().len();
-    let sizes = format!("weights 672, table 64, card {card}, the rest");
-    let total = format!("{} in all", bytes.len());
+    let sizes = format!("weights 672, table 64, card {card}, other");
+    let total = format!("total {}", bytes.len());
     for words in [
         &hash[..],
-        "34-10-14, tanh none, a byte a weight",
+        "34-10-14, tanh none, 8-bit weights",
         "ln(T/dt) 3.5 to 8, duty 0.1 to 0.9, beta -0.73 to -0.73",
         "20.00 deg",
-        "from a score of 3.25; calibration 0.5 0.25",
+        "above a score of 3.25; calibration 0.5 0.25",
         "2 x 3 points of 2 numbers, axes 0 1 -1 1",
         "2 signatures",
         &sizes,
@@ -123,18 +118,15 @@ fn a_whole_pack_passes() {
     let (_folder, path, bytes) = folder();
     let text = done(&["verify", &path]);
     assert!(text.contains(&format!("{} bytes", bytes.len())), "{text}");
-    assert!(
-        text.contains("2 signatures give the outputs they must"),
-        "{text}"
-    );
+    assert!(text.contains("Self-test passed: 2 signatures"), "{text}");
     let folder = Scratch::new();
     let mut without = contents(Precision::Bytes);
     without.self_tests.clear();
     let path = folder.write("b.pack", &without.to_bytes().unwrap());
-    assert!(done(&["verify", &path]).contains("no signature to test"));
+    assert!(done(&["verify", &path]).contains("has no self-test"));
 }
 
-// The last output of the last signature stands right before the card; its hash is made to fit.
+// The last output of the last test signature, right before the card, is changed, and the hash is corrected.
 #[test]
 fn a_pack_with_other_outputs_fails() {
     let (folder, _, mut bytes) = folder();
@@ -146,11 +138,11 @@ fn a_pack_with_other_outputs_fails() {
     let path = folder.write("wrong.pack", &bytes);
     let outcome = run(&["pack", "verify", &path]);
     assert_eq!(outcome.code, Some(FAILED), "{outcome:?}");
+    assert!(outcome.stdout.contains("Self-test failed"), "{outcome:?}");
     assert!(
-        outcome.stdout.contains("not those they must be"),
+        outcome.stdout.contains("Do not use this pack"),
         "{outcome:?}"
     );
-    assert!(outcome.stdout.contains("Do not use it"), "{outcome:?}");
 }
 
 #[test]
@@ -249,8 +241,7 @@ fn samples(path: &str) -> (Matrix, Vec<f32>) {
     (Matrix::from_rows(ROWS, LENGTH, inputs).unwrap(), outputs)
 }
 
-// The model, read back, is the pack's network behind its normalisation: the outputs differ by what
-// sums in another order do.
+// The exported model is the network of the pack after its normalisation; outputs differ by rounding only.
 #[test]
 fn what_is_exported_computes_the_same() {
     let (folder, path, bytes) = folder();
@@ -277,7 +268,7 @@ fn what_is_exported_computes_the_same() {
     }
 }
 
-// Bytes of a pack, out and in again, are the same weights: the largest of a row is still 127 steps.
+// 8-bit weights are the same after export and import: the largest of each row is 127 steps.
 #[test]
 fn a_network_comes_back_from_onnx() {
     let (folder, path, bytes) = folder();
@@ -286,7 +277,7 @@ fn a_network_comes_back_from_onnx() {
     let text = done(&["import", &model, "--like", &path, "--out", &out]);
     assert!(text.contains("Scores   cleared"), "{text}");
     assert!(
-        text.contains("normalised as") && text.contains("a.onnx says"),
+        text.contains("Inputs   normalisation from ") && text.contains("a.onnx\n"),
         "{text}"
     );
     let made = std::fs::read(&out).unwrap();
@@ -321,11 +312,11 @@ fn a_network_of_other_widths_is_packed() {
     let out = folder.name("learnt.pack");
     let text = done(&["import", &model, "--like", &path, "-o", &out]);
     assert!(
-        text.contains("34-20-14, tanh none, a byte a weight"),
+        text.contains("34-20-14, tanh none, 8-bit weights"),
         "{text}"
     );
-    assert!(text.contains("a.pack says"), "{text}");
-    // Kept as they are where the other pack keeps them so.
+    assert!(text.contains("a.pack\nRounding"), "{text}");
+    // The weights stay floats if the other pack has floats.
     let floats = contents(Precision::Floats).to_bytes().unwrap();
     let floats = folder.write("floats.pack", &floats);
     done(&["import", &model, "--like", &floats, "-o", &out]);

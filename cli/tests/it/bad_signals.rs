@@ -1,16 +1,11 @@
-//! Recordings of something else than a steady relay test: a verdict with advice, or the truth.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! Recordings that are not steady relay tests: a verdict with advice, or the true process.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use onecycle_onboard::{Relay, RelaySettings};
 
-use common::{
+use crate::common::{
     HOVER, HOVER_K_OVER_T_BODY, Outcome, Sample, Table, UNREADABLE, identify, identify_as_text,
     is_hover, simulate,
 };
@@ -24,7 +19,7 @@ fn a_constant_input() {
     assert!(report.advice().contains("--input"));
 }
 
-// A sensor that is not connected: no cycle is looked for, and nothing is divided by an amplitude of zero.
+// A sensor that is not connected: nothing is divided by an amplitude of zero.
 #[test]
 fn a_constant_output() {
     let table = Table::clean().map(|_, sample| sample.output = 0.0);
@@ -84,14 +79,14 @@ fn swapped_columns() {
             .map(|_, sample| std::mem::swap(&mut sample.output, &mut sample.input))
             .csv_of(header, |sample| sample.time_s)
     };
-    // Named wrongly: the advice, and it works.
+    // With wrong names there is advice, and following it works.
     let report = identify(swapped("time_s,pv,u"), &[]).no_process("no_relay");
     assert!(report.advice().contains("Swap the columns"));
     let fixed = ["--input", "pv", "--output", "u"];
     is_hover(&identify(swapped("time_s,pv,u"), &fixed).identified(), 0.01);
-    // Named rightly.
+    // With the right names.
     is_hover(&identify(swapped("time_s,u,pv"), &[]).identified(), 0.01);
-    // Options that name one column twice.
+    // Options that name the same column twice.
     let twice = ["--input", "u", "--output", "u"];
     identify(Table::clean().csv(), &twice).refused(UNREADABLE, &["\"u\"", "both"]);
 }
@@ -108,7 +103,7 @@ fn columns_without_names() {
         report.noted(&["by how few values the input takes"]);
         is_hover(&report, 0.01);
     }
-    // A trim gives the input more values than its two levels: the columns must be chosen.
+    // With trim, the input takes more than two values: the columns must be given.
     let trimmed = Table::clean().csv_of("", |sample| sample.time_s);
     identify(trimmed.trim_start(), &[]).refused(UNREADABLE, &["column 2 and column 3", "choose"]);
     let report = identify(trimmed.trim_start(), &["--input", "3", "--output", "2"]).identified();
@@ -138,7 +133,7 @@ fn two_cycles_only() {
     let rises = table.rises();
     let cycles = |count: usize| {
         let [from, to] = [rises[8], rises[8 + count] + 80].map(|index| table.0[index].time_s);
-        // From the last of the low level, so that the first rise is in.
+        // From the last sample of the low level, so that the first rise is included.
         table.clone().between(from - 0.05, to)
     };
     let report = identify(cycles(2).csv(), &[]).identified();
@@ -147,9 +142,9 @@ fn two_cycles_only() {
     report.near("k_over_t_body", HOVER_K_OVER_T_BODY, 0.05);
 }
 
-// One complete cycle, edge to edge, tells the process, from a rise or from a fall; that it is one of a steady
-// oscillation nothing in the recording confirms. Without noise the estimator errs by what the repeated past
-// differs from the true one: by less than a hundredth.
+// One complete cycle, from edge to edge, identifies the process, whether it begins with a rise or a fall; the remark says
+// that nothing confirms a steady oscillation. Without noise the only error is that the past is assumed to be the cycle's
+// own: less than 1 %.
 #[test]
 fn one_cycle_only() {
     let table = Table::clean();
@@ -173,15 +168,14 @@ fn one_cycle_only() {
         let text = identify_as_text(one.csv(), &[]);
         assert_eq!(text.code, Some(0), "{text:?}");
         assert!(text.stdout.contains("holds one complete cycle"), "{text:?}");
-        // Without a pack nothing is taken for granted.
+        // Without a pack the cycle cannot be confirmed.
         let report = identify(one.csv(), &["--method", "refine"]).identified();
         report.remarked(&["one complete cycle", "Record two cycles that are alike"]);
         is_hover(&report, 0.02);
     }
 }
 
-// Two edges, or three quarters of a period with the same level at both ends: no cycle, and a sentence that
-// says what one is.
+// Two edges, or three quarters of a period with the same level at both ends: no complete cycle, and the message says so.
 #[test]
 fn half_a_cycle() {
     let table = Table::clean();
@@ -234,7 +228,7 @@ fn an_unsteady_oscillation() {
     assert!(report.advice().contains("settle"));
 }
 
-/// A relay test on any plant: the recorded output is `recorded` of the plant's.
+/// A relay test on any plant. The plant returns the controlled state and the recorded output.
 fn relay_test(
     mut plant: impl FnMut(f64) -> (f64, f64),
     controlled: fn((f64, f64)) -> f64,
@@ -258,8 +252,8 @@ fn relay_test(
     Table((0..12_000).map(sample).collect())
 }
 
-/// Two masses on a spring, behind an actuator and a delay: positions of the driven mass (0) and of
-/// the other (1), as the plant of [`relay_test`], or as the mass that is measured.
+/// Two masses on a spring, driven through an actuator and a dead time. Returns the positions of the driven mass and of the
+/// other one, for [`relay_test`].
 struct TwoMasses {
     /// Force of the actuator, then position and velocity of each mass.
     state: [f64; 5],
@@ -301,7 +295,7 @@ impl TwoMasses {
         ]
     }
 
-    /// One sample of 1 ms by Runge-Kutta; the positions of the two masses.
+    /// Integrates one sample of 1 ms by Runge-Kutta; returns the positions of the two masses.
     fn step(&mut self, input: f64) -> (f64, f64) {
         let h = 1e-3 / Self::STEPS as f64;
         let along = |s: &[f64; 5], k: &[f64; 5], h: f64| std::array::from_fn(|i| s[i] + h * k[i]);
@@ -335,7 +329,7 @@ fn far_mass(mut plant: TwoMasses) -> Table {
     relay_test(move |input| plant.step(input), |state| state.1)
 }
 
-// A spring so stiff that it might as well be none checks the integration itself.
+// A very stiff spring acts like a single mass: a test of the integration itself.
 #[test]
 fn a_stiff_spring_is_a_single_mass() {
     let report = identify(driven_mass(TwoMasses::new(0.1, 200.0, 0.1)).csv(), &[]).identified();
@@ -358,7 +352,7 @@ fn a_resonance_near_the_oscillation() {
     identify(far_mass(TwoMasses::new(0.3, 1.0, 0.02)).csv(), &[]).no_process("not_this_process");
 }
 
-/// A resonance is refused, or the estimate still is that of the whole mass.
+/// Asserts that the recording is refused, or the gain is that of both masses.
 fn is_not_fooled(outcome: &Outcome) {
     let report = outcome.report();
     if report.kind() == "identified" {
@@ -403,7 +397,7 @@ fn a_velocity_instead_of_a_position() {
     );
 }
 
-// What a report says of an angle is an angle, however little is known.
+// The interval of the phase margin has reasonable bounds, however wide it is.
 #[test]
 fn a_phase_margin_is_an_angle() {
     let table = driven_mass(TwoMasses::new(1.0, 10.0, 0.02));
@@ -448,11 +442,11 @@ fn units_of_any_size() {
         );
         let slow = scaled(factor, 1.0, 1.0).identified();
         slow.near("k_over_t_body", HOVER_K_OVER_T_BODY / factor / factor, 0.01);
-        slow.near("tau_s", common::HOVER_TAU_S * factor, 0.02);
+        slow.near("tau_s", crate::common::HOVER_TAU_S * factor, 0.02);
     }
 }
 
-// Squares of these leave the range of numbers: a number, null for unbounded, or a refusal.
+// Squares of these factors overflow. The result is a number, null for an unbounded value, or a refusal.
 #[test]
 fn units_beyond_reason() {
     for factor in [1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e299] {
@@ -462,7 +456,7 @@ fn units_beyond_reason() {
     }
 }
 
-/// A process, a verdict or a refusal: nothing else.
+/// Asserts that the outcome is a process, a verdict or a refusal.
 fn ends_well(outcome: &Outcome) {
     match outcome.code {
         Some(0) => drop(outcome.identified()),

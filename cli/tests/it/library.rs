@@ -1,9 +1,4 @@
-//! The library against the program: the same recording, the same numbers; and what a recording brings along.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! The library and the program give the same numbers for the same recording.
 
 use std::path::PathBuf;
 
@@ -21,7 +16,8 @@ fn example(name: &str) -> PathBuf {
 }
 
 fn of_samples(table: &Table) -> Recording {
-    let column = |of: fn(&common::Sample) -> f64| table.0.iter().map(of).collect::<Vec<f64>>();
+    let column =
+        |of: fn(&crate::common::Sample) -> f64| table.0.iter().map(of).collect::<Vec<f64>>();
     let (time_s, input) = (column(|s| s.time_s), column(|s| s.input));
     Recording::from_samples(&time_s, &input, &column(|s| s.output)).unwrap()
 }

@@ -1,13 +1,8 @@
-//! Good paths of `simulate` and `identify`.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `simulate` and `identify` with valid input.
 
 use serde_json::Value;
 
-use common::{
+use crate::common::{
     DOUBLE_INTEGRATOR, HOVER, HOVER_K, HOVER_K_OVER_T_BODY, HOVER_T_BODY_S, HOVER_T_PROP_S,
     HOVER_TAU_S, Scratch, Table, identify, identify_as_text, is_hover, run, run_with_input,
     simulate, tune,
@@ -30,9 +25,9 @@ fn a_round_trip_without_noise() {
     assert!((report.number("/oscillation/sample_s") - 1e-3).abs() < 1e-12);
 }
 
-// With an asymmetry of 0.2 and a positive bias the relay is high for 0.4 of a cycle, and what made the recording
-// comes back from it: a cycle that the pack knows, of which the controller is certain. Five 90 % intervals hold
-// all at once with less than 0.9 and, even if nothing bound them together, with 0.9^5 = 0.59.
+// With an asymmetry of 0.2 and a positive bias the relay is high for 0.4 of a cycle, and the true process is identified
+// from a known cycle. Five 90 % intervals hold at once with a probability below 0.9, and with 0.9^5 = 0.59 if they were
+// independent.
 #[test]
 fn an_asymmetric_test_is_identified() {
     let arguments = ["--noise", "1%", "--bias", "30%", "--asymmetry", "0.2"];
@@ -47,7 +42,7 @@ fn an_asymmetric_test_is_identified() {
     assert!((0.55..0.9).contains(&report.number("/joint_probability")));
 }
 
-// By the network alone and by least squares alone the same process comes out, as far as each can tell.
+// Every method finds the process, each within its own accuracy.
 #[test]
 fn every_method_finds_the_process() {
     for (method, tolerance) in [("classify", 0.2), ("refine", 0.05), ("map", 0.05)] {
@@ -96,7 +91,7 @@ fn the_same_seed_gives_the_same_bytes() {
     let first = seeded("7");
     assert!(first == seeded("7"), "the same seed gave other bytes");
     assert!(first != seeded("8"), "another seed gave the same bytes");
-    // A file holds the same as the standard output.
+    // A file has the same content as the standard output.
     let folder = Scratch::new();
     let path = folder.name("out.csv");
     let written = [
@@ -134,8 +129,7 @@ fn the_truth_stands_in_the_head() {
     assert_eq!(table.0[1].time_s, 0.002);
 }
 
-// A simulation too long to keep must not quietly become means of samples: read back, their delay
-// of a sample and a half would be taken for the process's.
+// A long simulation must not be written as means of samples: their delay of 1.5 samples would be identified as dead time.
 #[test]
 fn a_long_simulation_reads_back_unbiased() {
     let process = [
@@ -171,7 +165,7 @@ fn a_negative_gain() {
     );
 }
 
-// A relay drives a negative gain away unless its own sign follows: oscillate, or refuse.
+// A process with negative gain oscillates with a reversed relay, or is refused.
 #[test]
 fn a_negative_gain_is_simulated_or_refused() {
     let process = [&["simulate", "--k", "-1"], &HOVER[2..]].concat();
@@ -243,7 +237,7 @@ fn a_fast_process() {
         .near("tau_s", 0.00025, 0.02);
 }
 
-// Noise is a part of the amplitude, however short the period beside the pre-roll.
+// The noise is a fraction of the amplitude, also for a period much shorter than the pre-roll.
 #[test]
 fn a_fast_process_with_noise() {
     let arguments = ["--sample-rate", "100000", "--noise", "1%", "--seed", "3"];
@@ -264,7 +258,7 @@ fn keys(value: &Value) -> Vec<&str> {
     keys
 }
 
-/// The parts of the report and their keys, both in order.
+/// The parts of the report and their keys, in order.
 const PARTS: [(&str, &str); 9] = [
     (
         "",
@@ -300,7 +294,7 @@ fn the_json_report_has_every_key() {
     assert_eq!(report["schema"], "onecycle.identify/2");
     for (part, expected) in PARTS {
         let found = report.pointer(part).map(keys).unwrap_or_default();
-        // Keys may be added; none may go.
+        // Keys may be added, but not removed.
         for key in expected.split(' ') {
             assert!(found.contains(&key), "{key} is not in {part}: {found:?}");
         }
@@ -333,7 +327,7 @@ fn the_controller_is_consistent() {
     assert!((angle_p - kp / kd).abs() < 1e-9 * angle_p);
     assert!((rate_p - kd).abs() < 1e-9 * kd);
     assert!((report.number("/margins/phase_margin_deg") - 20.0).abs() < 0.1);
-    // The same as tune gives for the true process.
+    // As `tune` for the true process.
     let tuned = tune(&HOVER, &[]);
     assert!((kp / tuned.number("/controller/kp") - 1.0).abs() < 0.01);
     let calm = identify(Table::clean().csv(), &["--phase-margin", "45"]).identified();
@@ -364,7 +358,7 @@ fn columns_by_name_and_by_number() {
     let table = Table::clean();
     let text: String = std::iter::once("stamp,altitude,roll,battery,servo\n".to_owned())
         .chain(table.0.iter().map(|sample| {
-            let common::Sample {
+            let crate::common::Sample {
                 time_s,
                 output,
                 input,
@@ -382,7 +376,7 @@ fn columns_by_name_and_by_number() {
         assert_eq!(report.0["columns"]["output"]["name"], "roll");
         is_hover(&report, 0.01);
     }
-    // What is left to guess is refused with the names to choose from.
+    // Without options, the columns cannot be guessed; the refusal lists their names.
     identify(&text, &[]).refused(3, &["altitude", "roll", "battery", "servo"]);
 }
 
@@ -419,7 +413,7 @@ fn the_report_for_people() {
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    // The first line is the name of the file, as long as it is.
+    // The first line is the file name, of any length.
     let widest = text.lines().skip(1).map(|line| line.chars().count()).max();
     assert!(widest <= Some(130), "{text}");
     let refused = identify_as_text(
@@ -435,7 +429,7 @@ fn the_report_for_people() {
     assert!(refused.stdout.contains("--input"), "{}", refused.stdout);
 }
 
-// A number just below a power of ten is rounded like its neighbours above.
+// A number just below a power of ten is rounded to 1.000, not to 1.0000.
 #[test]
 fn four_digits_are_four_digits() {
     let text = identify_as_text(Table::clean().csv(), &[]).stdout;

@@ -1,17 +1,12 @@
-//! `certify`: its reports, its page, its verdicts, and what it refuses.
+//! `certify`: reports, page, verdicts, refusals.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod common;
-
-use common::{NOT_WRITTEN, Scratch, UNREADABLE, figures, reported, run};
+use crate::common::{NOT_WRITTEN, Scratch, UNREADABLE, figures, reported, run};
 
 /// The exit code of a space that is not certified.
 const NOT_CERTIFIED: i32 = 4;
 
-// Fewer shapes and biases than by default, and the same verdicts: stable without bias and with the
-// trim; the bare relay has lost its cycle at 0.5; simulations settle there.
+// Fewer shapes and biases than by default, with the same verdicts: stable without bias and with the trim. At a bias of 0.5
+// the bare relay has no cycle, but simulations settle.
 #[test]
 fn multirotors_are_certified() {
     let outcome = run(&["certify", "--shapes", "4", "--bias", "0,0.3,50%", "--json"]);
@@ -62,7 +57,7 @@ fn the_report_for_people_fits_a_terminal() {
     assert!(page.contains("class=\"verdict good\">Certified: stable without bias"));
 }
 
-// A relay that lags by 50 degrees needs damping, of which there is none here.
+// A relay that lags by 50 degrees needs damping; these processes have none.
 #[test]
 fn a_relay_without_oscillation_is_not_certified() {
     let folder = Scratch::new();
@@ -77,8 +72,8 @@ fn a_relay_without_oscillation_is_not_certified() {
     assert!(text.contains("no limit cycle"), "{text}");
 }
 
-// The values of the library's tests: one exact cycle at 2.306 s, three sampled ones from 2.308 s; a
-// pattern of one cycle at a bias of 0.25; no cycle at 0.5 and a relay that stops switching.
+// As in the tests of the library: one exact cycle of 2.306 s, three sampled ones from 2.308 s; a pattern of one cycle at a
+// bias of 0.25; no cycle at 0.5, where the relay stops switching.
 #[test]
 fn single_processes() {
     let arguments = ["certify", "--process", "0.3,2,0.1", "--bias", "0,25%,0.5"];

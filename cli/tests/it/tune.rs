@@ -1,13 +1,8 @@
-//! Good paths of `tune` and `campaign`, and what `--help` says.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `tune` and `campaign` with valid input, and `--help`.
 
 use serde_json::Value;
 
-use common::{DOUBLE_INTEGRATOR, Outcome, Scratch, killed_when, run, tune};
+use crate::common::{DOUBLE_INTEGRATOR, Outcome, Scratch, killed_when, run, tune};
 
 // ---------------------------------------------------------------- tune
 
@@ -24,7 +19,7 @@ fn tune_gives_the_published_gains() {
     assert!((angle_p - kp / kd).abs() < 1e-12);
     assert_eq!(report.0["schema"], "onecycle.tune/2");
     assert!((report.number("/margins/phase_margin_deg") - 20.0).abs() < 1e-6);
-    // Twice the gain takes half the controller.
+    // Twice the gain needs half the controller gains.
     let double = [
         "--k", "2", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
     ];
@@ -123,8 +118,8 @@ fn a_small_campaign() {
     );
 }
 
-// Killed once the journal has a lot of cases, on any number of threads: the same table to the byte, on the standard
-// output and in its file, and the work folder goes. Another campaign is refused while it is there.
+// Killed once the journal has some cases, the campaign is resumed and gives the same table to the byte, printed and in its
+// file; the work folder is gone. Other settings are refused.
 #[test]
 fn a_campaign_is_resumed() {
     let folder = Scratch::new();

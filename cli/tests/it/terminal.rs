@@ -1,18 +1,13 @@
-//! What a terminal shows: colours, the plot, completions and the manual.
-
-// Helpers of tests are tests too, which the lint does not see; a test that cannot run says so.
-#![allow(clippy::unwrap_used, clippy::print_stderr)]
-
-mod common;
+//! Output on a terminal: colours, plot, completions, manual.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use common::{Scratch, Table, names_in, onecycle, run};
+use crate::common::{Scratch, Table, names_in, onecycle, run};
 
 const ESCAPE: char = '\u{1b}';
 
-/// A recording that tells its process, and one whose output is clipped and tells none.
+/// A recording with an identifiable process, and one with a clipped output.
 fn recordings(folder: &Scratch) -> [String; 2] {
     let clipped = Table::noisy().map(|_, sample| sample.output = sample.output.clamp(-2e-3, 2e-3));
     [
@@ -21,7 +16,7 @@ fn recordings(folder: &Scratch) -> [String; 2] {
     ]
 }
 
-/// Standard output and error output with colours as this variable has them, none of the others being set.
+/// Standard output and error output of a run with only this colour variable set.
 fn coloured(arguments: &[&str], variable: Option<&str>) -> [String; 2] {
     let mut command = onecycle();
     for other in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
@@ -36,8 +31,7 @@ fn coloured(arguments: &[&str], variable: Option<&str>) -> [String; 2] {
     [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap())
 }
 
-/// The text without its codes for colours, which are the only ones there may be: an escape, a bracket, numbers
-/// and an m.
+/// The text without colour codes: an escape, a bracket, numbers and an m. Asserts that there are no other codes.
 fn stripped(text: &str) -> String {
     let mut parts = text.split(ESCAPE);
     let mut plain = parts.next().unwrap().to_owned();
@@ -55,7 +49,7 @@ fn stripped(text: &str) -> String {
     plain
 }
 
-/// Characters of braille that have a dot.
+/// Whether a character is braille with a dot.
 fn is_braille(character: char) -> bool {
     ('\u{2801}'..='\u{28ff}').contains(&character)
 }
@@ -66,21 +60,22 @@ fn rows_of_braille(text: &str) -> usize {
         .count()
 }
 
-/// Lines but the one that says how long it took.
+/// All lines but that of the time.
 fn timeless(text: &str) -> Vec<&str> {
     text.lines()
         .filter(|line| !line.starts_with("Time"))
         .collect()
 }
 
-/// A program of this name, where the machine has one.
+/// The path of a program, if it is installed.
+#[expect(clippy::print_stderr, reason = "a test that cannot run says so")]
 fn program(name: &str) -> Option<PathBuf> {
     let path = std::env::var_os("PATH")?;
     let found = std::env::split_paths(&path)
         .map(|folder| folder.join(name))
         .find(|file| file.is_file());
     if found.is_none() {
-        eprintln!("skipped: there is no {name} here");
+        eprintln!("skipped: {name} is not installed");
     }
     found
 }
@@ -114,7 +109,7 @@ fn colours_change_nothing_but_the_colours() {
     }
 }
 
-// Green is 32, yellow 33, bold red 1 and 31: what is known, the remark on the noise, and the refusal.
+// A known cycle is green (32), a note yellow (33), a refusal bold red (1 and 31).
 #[test]
 fn verdicts_have_their_colours() {
     let folder = Scratch::new();
@@ -148,7 +143,7 @@ fn only_the_word_before_a_complaint_is_coloured() {
     assert_eq!(stripped(&forced), plain);
 }
 
-// Data are not reports: JSON and tables have no colours however they are asked for.
+// JSON, completion scripts and manual pages never have colours.
 #[test]
 fn data_have_no_colours() {
     let folder = Scratch::new();
@@ -165,7 +160,7 @@ fn data_have_no_colours() {
 
 // ---------------------------------------------------------------- the plot
 
-// Twelve rows, no line wider than the report's 96 characters, the axis from 2 periods of 0.44 s before the end.
+// Twelve rows, lines of at most 96 characters, a time axis of two periods of 0.44 s.
 #[test]
 fn a_pipe_has_the_plot_when_it_is_asked_for() {
     let folder = Scratch::new();
@@ -192,36 +187,35 @@ fn a_pipe_has_the_plot_when_it_is_asked_for() {
         .filter_map(|time| time.trim().parse().ok())
         .collect();
     assert!((times[1] - times[0] - 0.88).abs() < 0.05, "{axis}");
-    // The relay switches twice a cycle: four changes in two cycles, three if the window begins with one.
+    // The relay switches twice in a cycle: four times in two cycles, or three times if the window begins with a switch.
     let relay = text.lines().find(|line| line.contains("relay │")).unwrap();
     let strokes: Vec<char> = relay.chars().filter(|c| ['▔', '▁'].contains(c)).collect();
     let switches = strokes.windows(2).filter(|pair| pair[0] != pair[1]).count();
     assert!((3..=4).contains(&switches), "{relay}");
 
-    // A refusal shows what was refused, without a fit.
+    // A refusal shows the recording without a fit.
     let text = run(&["identify", &clipped, "--plot", "always"]).stdout;
     assert!(text.contains("No process identified"), "{text}");
     assert!(rows_of_braille(&text) >= 10, "{text}");
     assert!(!text.contains("the fit"), "{text}");
 }
 
-// Without an oscillation there is nothing to draw; JSON has its own figures.
+// Without an oscillation there is no plot; --json has none either.
 #[test]
 fn there_is_no_plot_of_nothing() {
     let folder = Scratch::new();
     let still = Table::noisy().map(|_, sample| sample.output = 0.0);
     let path = folder.write("still.csv", still.csv().as_bytes());
     let outcome = run(&["identify", &path, "--plot", "always"]);
-    assert_eq!(outcome.code, Some(common::NOT_IDENTIFIED));
+    assert_eq!(outcome.code, Some(crate::common::NOT_IDENTIFIED));
     assert_eq!(rows_of_braille(&outcome.stdout), 0);
     run(&["identify", &path, "--json", "--plot", "always"]).misused(&["--plot", "--json"]);
 }
 
-/// What a terminal of this width gets from `onecycle identify FILE`; `None` where there is no `script` to make
-/// one.
+/// Output of `onecycle identify FILE` on a terminal of this width; `None` if the program `script` is not installed.
 fn on_a_terminal(file: &str, columns: usize, variable: Option<&str>) -> Option<String> {
     let script = program("script")?;
-    // Progress stays out of the picture.
+    // Without the progress indicator.
     let program = env!("CARGO_BIN_EXE_onecycle");
     let call = format!("stty rows 40 cols {columns}; '{program}' identify '{file}' 2>/dev/null");
     let mut command = Command::new(script);
@@ -238,7 +232,7 @@ fn on_a_terminal(file: &str, columns: usize, variable: Option<&str>) -> Option<S
     Some(String::from_utf8(output.stdout).unwrap())
 }
 
-// A plot is there unasked, as wide as the terminal: 70 characters, of which 13 stand before it.
+// On a terminal the plot is drawn by default, as wide as the terminal: 70 characters, 13 of them left of the plot.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_terminal_has_plot_and_colours_where_script_makes_one() {
@@ -284,7 +278,7 @@ fn bash_completes_a_command_an_option_and_a_value() {
     );
     let checked = Command::new(&bash).args(["-n", &path]).output().unwrap();
     assert!(checked.status.success(), "{checked:?}");
-    // What bash does when Tab is pressed behind these words.
+    // The completion of bash after these words.
     for (words, expected) in [
         ("onecycle ide", "identify"),
         ("onecycle identify --plo", "--plot"),
@@ -304,7 +298,7 @@ fn bash_completes_a_command_an_option_and_a_value() {
     }
 }
 
-/// Commands that a help text lists.
+/// The commands in a help text.
 fn listed(help: &str) -> Vec<String> {
     let lines = help.lines().skip_while(|line| *line != "Commands:").skip(1);
     let lines = lines.take_while(|line| !line.is_empty());
@@ -316,7 +310,7 @@ fn listed(help: &str) -> Vec<String> {
         .collect()
 }
 
-// A page for the program, one for each command that its help lists, and one for each of theirs.
+// One page for the program, for each command and for each of their subcommands.
 #[test]
 fn every_command_has_a_page() {
     let folder = Scratch::new();
@@ -362,15 +356,15 @@ fn every_command_has_a_page() {
         );
         assert!(text.contains(".SH OPTIONS"), "{page}");
     }
-    // The program's own page is the one that goes to the standard output.
+    // Without -o, the page of the program is printed.
     let main = std::fs::read_to_string(Path::new(&out).join("onecycle.1")).unwrap();
     assert_eq!(run(&["man"]).stdout, main);
 }
 
-// A file where the folder should be: a sentence and the code of outputs that cannot be written.
+// A file in place of the folder: one sentence, and the exit code for outputs.
 #[test]
 fn pages_that_cannot_be_written_are_refused() {
     let folder = Scratch::new();
     let path = folder.write("file", b"");
-    run(&["man", "-o", &path]).refused(common::NOT_WRITTEN, &["file"]);
+    run(&["man", "-o", &path]).refused(crate::common::NOT_WRITTEN, &["file"]);
 }

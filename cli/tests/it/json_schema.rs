@@ -1,10 +1,5 @@
 //! docs/identify-json.md against the program: the same keys, no more and no less.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
-
 use std::collections::BTreeSet;
 use std::path::Path;
 

@@ -1,17 +1,12 @@
-//! `bench`: the folder it makes, the leaderboard it writes, answers from elsewhere, and what it refuses.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `bench`: the folder, the leaderboard, answers of other programs, interruptions, refusals.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{NOT_IDENTIFIED, NOT_WRITTEN, Outcome, Scratch, UNREADABLE, names_in, run};
+use crate::common::{NOT_IDENTIFIED, NOT_WRITTEN, Outcome, Scratch, UNREADABLE, names_in, run};
 use serde_json::Value;
 
-/// A folder of four experiments.
+/// Makes a benchmark of four experiments.
 fn made(folder: &Scratch, name: &str) -> String {
     let path = folder.name(name);
     let arguments = [
@@ -26,7 +21,7 @@ fn made(folder: &Scratch, name: &str) -> String {
     path
 }
 
-/// Every file below a folder.
+/// All files below a folder.
 fn bytes_below(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let mut files = BTreeMap::new();
     for name in names_in(folder) {
@@ -45,7 +40,7 @@ fn bench_run(folder: &str, arguments: &[&str]) -> Outcome {
     run(&[&["bench", "run", folder], arguments].concat())
 }
 
-/// The leaderboard of a run that succeeds, by method, from its JSON.
+/// The leaderboard of a successful run, by method.
 fn leaderboard(folder: &str, arguments: &[&str]) -> BTreeMap<String, Value> {
     let outcome = bench_run(folder, &[arguments, &["--json"]].concat());
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
@@ -56,7 +51,7 @@ fn leaderboard(folder: &str, arguments: &[&str]) -> BTreeMap<String, Value> {
         .collect()
 }
 
-/// `truth.csv` with other columns, as answers.
+/// Some rows of `truth.csv` as answers.
 fn answers_from_truth(folder: &Scratch, bench: &str, keep: impl Fn(usize) -> bool) -> String {
     let text = std::fs::read_to_string(Path::new(bench).join("truth.csv")).unwrap();
     let lines: Vec<&str> = text.lines().collect();
@@ -69,8 +64,7 @@ fn answers_from_truth(folder: &Scratch, bench: &str, keep: impl Fn(usize) -> boo
 
 // ---------------------------------------------------------------- the folder
 
-// Twice the same command gives the same bytes, on any threads; another seed gives others. The rules tell
-// what lies there.
+// The same seed gives the same bytes on any number of threads; another seed gives others. The rules describe the folder.
 #[test]
 fn the_same_seed_makes_the_same_bytes() {
     let folder = Scratch::new();
@@ -111,7 +105,7 @@ fn the_same_seed_makes_the_same_bytes() {
     assert_eq!(folder.files().len(), 3, "no temporary folder is left");
 }
 
-// A recording is one that `identify` reads like any other.
+// `identify` reads the recordings.
 #[test]
 fn a_recording_is_like_any_other() {
     let folder = Scratch::new();
@@ -137,8 +131,8 @@ fn a_folder_that_cannot_be_made() {
 
 // ---------------------------------------------------------------- runs
 
-// The truth handed in as answers scores zero to rounding and comes first; with one of four rows left out
-// it scores exactly that quarter. Four cycles of ours cost less than 1 % here.
+// The truth as answers scores zero, up to rounding, and is first; without one of four rows it scores exactly 25 %.
+// onecycle-4 scores less than 1 % here.
 #[test]
 fn answers_are_scored_beside_the_methods() {
     let folder = Scratch::new();
@@ -173,7 +167,7 @@ fn answers_are_scored_beside_the_methods() {
     assert_eq!(board["bad"]["score"], 1.0);
 }
 
-/// `results.csv` without its last column, the time.
+/// `results.csv` without its last column, the times.
 fn without_time(path: &Path) -> String {
     let text = std::fs::read_to_string(path).unwrap();
     assert!(text.lines().next().unwrap().ends_with(",reason,seconds"));
@@ -181,8 +175,8 @@ fn without_time(path: &Path) -> String {
     text.lines().map(cut).collect::<Vec<_>>().join("\n")
 }
 
-// The files are there and the part is not; but for the time they are the same bits on one thread and
-// after an interruption, which leaves the first two experiments and half a line.
+// The files are there, the work folder is not. Without the times, the files are the same on one thread and after an
+// interruption that leaves the first two experiments and half a line.
 #[test]
 fn results_are_the_same_bits_after_an_interruption() {
     let folder = Scratch::new();
@@ -209,7 +203,7 @@ fn results_are_the_same_bits_after_an_interruption() {
     assert_eq!(whole.lines().count(), 1 + 3 * 4);
     let report = std::fs::read_to_string(folder.path("results.json")).unwrap();
     let report: Value = serde_json::from_str(&report).unwrap();
-    // What an interrupted run leaves: what it is of, and a line an experiment.
+    // The journal of an interrupted run: the head, and one line for each experiment.
     let head = serde_json::json!({
         "program": env!("CARGO_PKG_VERSION"),
         "command": "bench run",
@@ -239,7 +233,7 @@ fn results_are_the_same_bits_after_an_interruption() {
     assert_eq!(outcome.stderr.lines().count(), 1);
     assert_eq!(without_time(&folder.path("results.csv")), whole);
     assert!(!folder.path("results.part").exists());
-    // Another list of methods is another run.
+    // A journal with other methods is refused.
     leave(&part);
     let other = bench_run(&path, &["--methods", "rules", "-o", &out]);
     other.refused(
@@ -249,7 +243,7 @@ fn results_are_the_same_bits_after_an_interruption() {
     let damaged = part.replacen("\"experiment\":1", "\"experiment\":x", 1);
     leave(&damaged);
     bench_run(&path, &resumed).refused(UNREADABLE, &["line 2 is damaged"]);
-    // Discarded; the flag of earlier versions changes nothing.
+    // --restart discards it; the flag --resume of earlier versions has no effect.
     let anew = [&resumed[..], &["--restart", "--resume"]].concat();
     let outcome = bench_run(&path, &anew);
     assert_eq!(
@@ -260,9 +254,8 @@ fn results_are_the_same_bits_after_an_interruption() {
     assert_eq!(without_time(&folder.path("results.csv")), whole);
 }
 
-// A folder a method that makes an experiment of its own, a file an experiment, twice the same bytes, and
-// `identify` reads each, whether or not it finds a process there. A method that reads the recordings of all
-// writes none.
+// One folder for each method that makes its own relay test, one file for each experiment, the same bytes when repeated,
+// and `identify` reads every file. Methods that use the recordings write none.
 #[test]
 fn traces_are_recordings() {
     let folder = Scratch::new();
@@ -292,7 +285,7 @@ fn traces_are_recordings() {
             "{outcome:?}"
         );
     }
-    // 20 s of sweep at 1 kHz behind the tenth of a second in which the relay measures its noise.
+    // 0.1 s of noise measurement and 20 s of sweep at 1 kHz.
     let swept = String::from_utf8_lossy(&files["pem-sweep/0001.csv"]).into_owned();
     let rows = swept.lines().filter(|line| !line.starts_with('#')).count() - 1;
     assert!((20_050..=20_500).contains(&rows), "{rows}");
@@ -303,8 +296,8 @@ fn traces_are_recordings() {
     bench_run(&path, &none).refused(2, &["no method makes a relay test of its own"]);
 }
 
-// The same experiments in one Parquet file: the methods read the same numbers, so that results are the same
-// bits but for the time. A file that is none, or lacks an experiment, is refused.
+// The same experiments in one Parquet file give the same results except for the times. A file that is not Parquet, or
+// lacks an experiment, is refused.
 #[cfg(feature = "parquet")]
 #[test]
 fn a_parquet_folder_gives_the_same_results() {

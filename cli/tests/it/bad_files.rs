@@ -1,14 +1,9 @@
-//! Files that are no recording, damaged ones, and the dialects that work.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! Files that are not recordings, damaged files, and CSV dialects that work.
 
 use std::io::Write;
 use std::process::Stdio;
 
-use common::{
+use crate::common::{
     HOVER, HOVER_K_OVER_T_BODY, Report, Sample, Scratch, Table, UNREADABLE, identify,
     identify_as_text, is_hover, onecycle, run, run_with_input, simulate,
 };
@@ -97,7 +92,7 @@ fn damage_in_the_middle() {
 
 // ---------------------------------------------------------------- cells and rows
 
-/// The lines of a table, some of its outputs replaced by another cell.
+/// The lines of a table with some outputs replaced by another cell.
 fn with_cells(table: &Table, replace: impl Fn(usize) -> Option<&'static str>) -> String {
     let mut text = "time_s,pv,u\n".to_owned();
     for (index, sample) in table.0.iter().enumerate() {
@@ -130,7 +125,7 @@ fn many_cells_without_a_number() {
     outcome.refused(UNREADABLE, &wanted);
 }
 
-// The reader calls it "the output" where every other sentence says "pv" (column 2).
+// The message contains the name of the column.
 #[test]
 fn many_cells_without_a_number_name_the_column() {
     let text = with_cells(&Table::clean(), |index| (index % 20 == 7).then_some("NaN"));
@@ -203,13 +198,13 @@ fn many_duplicate_stamps() {
         "sample rate",
     ];
     outcome.refused(UNREADABLE, &wanted);
-    // The advice works.
+    // Following the advice works.
     let report = identify(&text, &["--sample-rate", "1000"]).identified();
     report.noted(&["did not read", "time_s", "1000 Hz"]);
     is_hover(&report, 0.01);
 }
 
-// Options are to be named as the program calls them.
+// Messages name options as the program spells them.
 #[test]
 fn advice_names_options_of_the_program() {
     let coarse = Table::clean().csv_of("time_s,pv,u", |sample| sample.time_s.floor());
@@ -283,7 +278,7 @@ fn sample_jitter() {
 
 // ---------------------------------------------------------------- dialects that work
 
-/// Asserts the same process, to the last digit that the stamps allow.
+/// Asserts the same process, to the precision of the time stamps.
 fn same_process(report: &Report) {
     let plain = identify(Table::noisy().csv(), &[]).identified();
     for name in ["k_over_t_body", "t_prop_s", "tau_s"] {
@@ -307,7 +302,7 @@ fn time_in_other_units() {
         same_process(&report);
     }
     for (factor, unit) in [(1e3, "ms"), (1e6, "us")] {
-        // Guessed, and said so; and given.
+        // The unit is guessed, with a note; and given as an argument.
         let text = table.csv_of("time,pv,u", whole(factor));
         let report = identify(&text, &[]).identified();
         report.noted(&["gives no unit", unit]);
@@ -340,8 +335,8 @@ fn marks_and_line_ends_of_windows() {
 
 // ---------------------------------------------------------------- ten million samples
 
-// SLOW, some 5 to 30 s: ten million rows, 300 MB, through the standard input; steady cycles with
-// stamps that go on. Were the recording kept whole, it alone would take 240 MB and each copy 80.
+// Slow, 5 to 30 s: ten million rows, 300 MB, through the standard input; steady cycles with increasing stamps. The whole
+// recording in memory would take 240 MB, and each copy 80 MB.
 #[test]
 fn ten_million_samples_in_bounded_memory() {
     const ROWS: usize = 10_000_000;
@@ -383,6 +378,6 @@ fn ten_million_samples_in_bounded_memory() {
     let report = Report(serde_json::from_slice(&output.stdout).unwrap());
     report.noted(&["averaged", "4 samples"]);
     report.near("k_over_t_body", HOVER_K_OVER_T_BODY, 0.02);
-    report.near("tau_s", common::HOVER_TAU_S, 0.05);
-    report.near("t_prop_s", common::HOVER_T_PROP_S, 0.05);
+    report.near("tau_s", crate::common::HOVER_TAU_S, 0.05);
+    report.near("t_prop_s", crate::common::HOVER_T_PROP_S, 0.05);
 }

@@ -4,18 +4,10 @@
 //! on-board code; nothing that ships depends on the research crate `lab`.
 //! Files: read from the sources. No file takes names from a file that, directly or not, takes names from it.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::panic,
-    reason = "helpers of tests are tests too, which the lint does not see"
-)]
-
-mod imports;
-
 use std::path::Path;
 use std::process::Command;
 
-use imports::{Files, circles};
+use crate::imports::{Files, circles};
 use serde::Deserialize;
 use serde_json::{Value, json};
 

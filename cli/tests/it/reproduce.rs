@@ -1,22 +1,17 @@
-//! `reproduce`: the quick run of the parts that take seconds, gone on with, and what it refuses.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `reproduce`: the quick run of the fast parts, interruptions, refusals.
 
 use std::fs;
 
-use common::{Scratch, UNREADABLE, run};
+use crate::common::{Scratch, UNREADABLE, run};
 
-/// Parts that take seconds, and their sheets.
+/// Parts that take seconds, with their sheets.
 const PARTS: [(&str, &str); 3] = [
-    ("phase", include_str!("../reproduction/phase.toml")),
-    ("figures", include_str!("../reproduction/figures.toml")),
-    ("table_7", include_str!("../reproduction/table_7.toml")),
+    ("phase", include_str!("../../reproduction/phase.toml")),
+    ("figures", include_str!("../../reproduction/figures.toml")),
+    ("table_7", include_str!("../../reproduction/table_7.toml")),
 ];
 
-/// The paper's cells of a sheet.
+/// Number of cells of the paper in a sheet.
 fn papers(sheet: &str) -> usize {
     let sheet: toml::Table = sheet.parse().unwrap();
     let tables = sheet.get("tables").and_then(|tables| tables.as_array());
@@ -32,9 +27,8 @@ fn papers(sheet: &str) -> usize {
         .count()
 }
 
-// Every number of the paper stands beside one that was found, so every row is there: 2 of the phase, 20 and
-// 1 of Table VII. Both files are there and nothing is left beside them but the parts. The same command
-// again computes nothing anew and all is the same to the byte; a part made with other settings is refused.
+// Every number of the paper is beside a computed one: 2 of the phase, 20 and 1 of Table VII. The same command again computes
+// nothing and gives the same bytes; a part with other settings is refused.
 #[test]
 fn quick_run_of_the_fast_parts() {
     let folder = Scratch::new();
@@ -79,12 +73,12 @@ fn quick_run_of_the_fast_parts() {
     assert_eq!(read("parts/phase_quick/journal.jsonl"), part);
 }
 
-// One sentence names the parts; a part that is no JSON is named with what to do.
+// An unknown part is refused with the names of all parts; a damaged journal with advice.
 #[test]
 fn what_it_refuses() {
     let refused = run(&["reproduce", "table_8"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
-    let words = "there is no part 'table_8': name some of phase, grid, figures, table_2_and_3, table_4, \
+    let words = "there is no part 'table_8': choose from phase, grid, figures, table_2_and_3, table_4, \
                  tuning_rules, table_5, table_6, table_7";
     assert!(refused.stderr.contains(words), "{refused:?}");
 

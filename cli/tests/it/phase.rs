@@ -1,14 +1,11 @@
-//! `phase`: its reports, its files, and what it refuses.
+//! `phase`: reports, files, refusals.
 
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used, clippy::panic)]
-
-mod common;
-
-use common::{NOT_WRITTEN, Outcome, Report, Scratch, UNREADABLE, figures, notes, reported, run};
+use crate::common::{
+    NOT_WRITTEN, Outcome, Report, Scratch, UNREADABLE, figures, notes, reported, run,
+};
 use serde_json::Value;
 
-/// The files of this repository.
+/// Spaces of this repository.
 const MULTIROTOR: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../experiments/multirotor.toml"
@@ -55,7 +52,7 @@ fn the_paper_s_space_is_the_default() {
     assert_eq!(report(&[MULTIROTOR]).0, found.0);
 }
 
-// Hardly any damping and no racing delay: a rule for all costs half a percent, at -49.9 deg.
+// Little damping and little dead time: one rule costs at most 0.5 % everywhere, at -49.9 deg.
 #[test]
 fn a_space_of_one_s_own() {
     let found = report(&[DOUBLE_INTEGRATORS, "--rows", "12", "--columns", "10"]);
@@ -131,8 +128,8 @@ fn the_table_has_a_row_for_every_rule() {
     assert_eq!(folder.files(), ["rules.csv"]);
 }
 
-// The best phase stands in the curve and in the text; the paper's stands there where the curve reaches it. The map has
-// six rows, and shows some and only phases of the local rules.
+// The best phase is marked in the curve; the paper's phase too, if it is in the range. The map has six rows with phases of
+// the local rules only.
 #[test]
 fn the_page_has_the_curve_and_the_map() {
     for (space, has_paper) in [(MULTIROTOR, true), (DOUBLE_INTEGRATORS, false)] {

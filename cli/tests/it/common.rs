@@ -1,8 +1,6 @@
-//! The program as a user meets it: arguments and files in; an exit code, reports and sentences out.
+//! Helpers to run the program: arguments and files in; exit code, reports and messages out.
 //!
-//! Every run is checked for what must never be seen: a panic, and numbers that are none.
-
-#![allow(dead_code, reason = "each file of tests uses its own part")]
+//! Every run is checked for panics.
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -14,7 +12,7 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Exit codes: an input that cannot be read or tells no process, an output that cannot be written.
+/// Exit codes: unreadable input, no process identified, unwritable output.
 pub(crate) const UNREADABLE: i32 = 3;
 pub(crate) const NOT_IDENTIFIED: i32 = 4;
 pub(crate) const NOT_WRITTEN: i32 = 5;
@@ -42,10 +40,10 @@ pub(crate) const DOUBLE_INTEGRATOR: [&str; 8] = [
     "0.015",
 ];
 
-/// What a run left behind.
+/// The outcome of a run.
 #[derive(Debug)]
 pub(crate) struct Outcome {
-    /// The exit code; none if a signal ended it.
+    /// The exit code; `None` after a signal.
     pub(crate) code: Option<i32>,
     pub(crate) stdout: String,
     pub(crate) stderr: String,
@@ -53,7 +51,7 @@ pub(crate) struct Outcome {
 
 pub(crate) fn onecycle() -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_onecycle"));
-    // A developer's backtraces and colours must not come in by the environment of the tests.
+    // The developer's settings of backtraces and colours must not change the output.
     command.env("RUST_BACKTRACE", "0");
     command.env_remove("CLICOLOR_FORCE");
     command
@@ -77,12 +75,12 @@ pub(crate) fn run_with_input(arguments: &[&str], bytes: &[u8]) -> Outcome {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program starts");
-    // Only a program that has refused already stops reading; its sentence is then what counts.
+    // A program that has refused its input stops reading; this is no error.
     let _ = child.stdin.take().expect("stdin is piped").write_all(bytes);
     Outcome::of(&child.wait_with_output().expect("the program ends"))
 }
 
-/// Ends a run by force as soon as `is_time`.
+/// Kills a run as soon as `is_time`.
 pub(crate) fn killed_when(arguments: &[&str], is_time: impl Fn() -> bool) {
     let mut child = onecycle()
         .args(arguments)
@@ -101,7 +99,7 @@ pub(crate) fn killed_when(arguments: &[&str], is_time: impl Fn() -> bool) {
     child.wait().expect("it ends");
 }
 
-/// `identify FILE --json ARGUMENTS`, the file holding `bytes`.
+/// Runs `identify FILE --json ARGUMENTS` on a file with these bytes.
 pub(crate) fn identify(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> Outcome {
     let file = Scratch::new();
     let path = file.write("recording.csv", bytes.as_ref());
@@ -110,7 +108,7 @@ pub(crate) fn identify(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> Outcome {
     run(&all)
 }
 
-/// `identify FILE ARGUMENTS`: the report for people.
+/// Runs `identify FILE ARGUMENTS` on a file with these bytes.
 pub(crate) fn identify_as_text(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> Outcome {
     let file = Scratch::new();
     let path = file.write("recording.csv", bytes.as_ref());
@@ -119,7 +117,7 @@ pub(crate) fn identify_as_text(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> O
     run(&all)
 }
 
-/// `simulate ARGUMENTS` to the standard output.
+/// Runs `simulate ARGUMENTS`; returns the standard output.
 pub(crate) fn simulate(process: &[&str], arguments: &[&str]) -> String {
     let mut all = vec!["simulate"];
     all.extend(process);
@@ -151,7 +149,7 @@ impl Outcome {
         outcome
     }
 
-    /// Asserts that no word of the output is a number that is none.
+    /// Asserts that the output has no NaN and no infinity.
     pub(crate) fn without_nan(&self) -> &Self {
         for text in [&self.stdout, &self.stderr] {
             let words = text.split(|letter: char| !letter.is_ascii_alphanumeric());
@@ -161,8 +159,7 @@ impl Outcome {
         self
     }
 
-    /// Asserts a refusal: this code, nothing on the standard output, and on the error output one
-    /// sentence that holds each of `words`.
+    /// Asserts a refusal: this exit code, no standard output, and one sentence with each of `words` on the error output.
     pub(crate) fn refused(&self, code: i32, words: &[&str]) {
         let sentence = self.stderr.strip_suffix('\n').unwrap_or_default();
         assert_eq!(self.code, Some(code), "{self:?}");
@@ -176,7 +173,7 @@ impl Outcome {
         }
     }
 
-    /// Asserts that the arguments are refused; the first line of the error output holds `words`.
+    /// Asserts that the arguments are refused; the first line of the error output has each of `words`.
     pub(crate) fn misused(&self, words: &[&str]) {
         assert_eq!(self.code, Some(2), "{self:?}");
         assert_eq!(self.stdout, "");
@@ -188,7 +185,7 @@ impl Outcome {
         }
     }
 
-    /// The JSON report, whatever its verdict.
+    /// The JSON report, with any verdict.
     pub(crate) fn report(&self) -> Report {
         self.without_nan();
         assert_eq!(self.stderr, "");
@@ -196,12 +193,12 @@ impl Outcome {
         Report(report)
     }
 
-    /// The report of a process that was identified.
+    /// The report of an identified process.
     pub(crate) fn identified(&self) -> Report {
         assert_eq!(self.code, Some(0), "{}{}", self.stdout, self.stderr);
         let report = self.report();
         assert_eq!(report.kind(), "identified");
-        // What is not a number is null in JSON, and null is only for what is unbounded.
+        // NaN would be null in JSON; these values must be numbers.
         for pointer in [
             "/oscillation/period_s",
             "/oscillation/amplitude",
@@ -224,8 +221,8 @@ impl Outcome {
         report
     }
 
-    /// The report of a recording that tells no process, for this reason; it carries no numbers of
-    /// one, and both the reason and the advice are a sentence.
+    /// The report of a recording without an identified process, for this reason. It has no numbers of a process; message
+    /// and advice are one sentence each.
     pub(crate) fn no_process(&self, kind: &str) -> Report {
         assert_eq!(self.code, Some(4), "{}{}", self.stdout, self.stderr);
         let report = self.report();
@@ -257,7 +254,7 @@ impl Report {
         self.0["verdict"]["advice"].as_str().unwrap_or_default()
     }
 
-    /// A number, by its path.
+    /// The number at a path.
     pub(crate) fn number(&self, pointer: &str) -> f64 {
         let found = self.0.pointer(pointer).and_then(Value::as_f64);
         assert!(found.is_some(), "{pointer} is no number: {}", self.0);
@@ -268,7 +265,7 @@ impl Report {
         self.number(&format!("/process/{name}/estimate"))
     }
 
-    /// Asserts an estimate within a part of the truth.
+    /// Asserts that an estimate is within a fraction of the truth.
     pub(crate) fn near(&self, name: &str, truth: f64, part: f64) -> &Self {
         let found = self.estimate(name);
         let error = (found - truth).abs();
@@ -276,7 +273,7 @@ impl Report {
         self
     }
 
-    /// Whether the 90 % interval holds a value; null bounds nothing.
+    /// Whether the 90 % interval holds a value; null is unbounded.
     pub(crate) fn holds(&self, name: &str, truth: f64) -> bool {
         let bound = |side: &str| self.0["process"][name][side].as_f64();
         bound("low").is_none_or(|low| low <= truth)
@@ -288,7 +285,7 @@ impl Report {
         list.iter().filter_map(Value::as_str).collect()
     }
 
-    /// Asserts a note of the reader that holds each of `words`.
+    /// Asserts a note of the reader with each of `words`.
     pub(crate) fn noted(&self, words: &[&str]) -> &Self {
         let notes = self.sentences("notes");
         let has_all = |note: &&str| words.iter().all(|word| note.contains(word));
@@ -296,7 +293,7 @@ impl Report {
         self
     }
 
-    /// Asserts a remark on the result that holds each of `words`.
+    /// Asserts a remark on the result with each of `words`.
     pub(crate) fn remarked(&self, words: &[&str]) -> &Self {
         let remarks = self.sentences("remarks");
         let has_all = |remark: &&str| words.iter().all(|word| remark.contains(word));
@@ -305,7 +302,7 @@ impl Report {
     }
 }
 
-/// A folder that goes away with the test.
+/// A temporary folder.
 pub(crate) struct Scratch(TempDir);
 
 impl Scratch {
@@ -317,7 +314,7 @@ impl Scratch {
         self.0.path().join(name)
     }
 
-    /// The same as text, for arguments.
+    /// A path in the folder as text, for arguments.
     pub(crate) fn name(&self, name: &str) -> String {
         self.path(name).display().to_string()
     }
@@ -349,12 +346,12 @@ pub(crate) struct Sample {
     pub(crate) input: f64,
 }
 
-/// A recording to spoil.
+/// A recording that tests can change.
 #[derive(Clone, Debug)]
 pub(crate) struct Table(pub(crate) Vec<Sample>);
 
 impl Table {
-    /// What `simulate` wrote.
+    /// Reads the output of `simulate`.
     pub(crate) fn parse(csv: &str) -> Self {
         let number = |cell: Option<&str>| cell.and_then(|cell| cell.parse().ok());
         let row = |line: &str| {
@@ -376,7 +373,7 @@ impl Table {
             .clone()
     }
 
-    /// The same with 1 % noise and a bias of 20 %.
+    /// Twenty cycles with 1 % noise and a bias of 20 %.
     pub(crate) fn noisy() -> Self {
         static NOISY: OnceLock<Table> = OnceLock::new();
         let arguments = ["--noise", "1%", "--bias", "20%", "--seed", "5"];
@@ -411,7 +408,7 @@ impl Table {
         self.csv_of("time_s,pv,u", |sample| sample.time_s)
     }
 
-    /// The same under another header and with another stamp.
+    /// As lines with another header and other stamps.
     pub(crate) fn csv_of<T: std::fmt::Debug>(
         &self,
         header: &str,
@@ -426,7 +423,7 @@ impl Table {
     }
 }
 
-/// Asserts that a report has found the hovering multirotor.
+/// Asserts that the report is of the hovering multirotor.
 pub(crate) fn is_hover(report: &Report, part: f64) {
     report
         .near("k_over_t_body", HOVER_K_OVER_T_BODY, part)
@@ -434,14 +431,14 @@ pub(crate) fn is_hover(report: &Report, part: f64) {
         .near("tau_s", HOVER_TAU_S, 5.0 * part);
 }
 
-/// What `tune` makes of a process.
+/// The report of `tune` for a process.
 pub(crate) fn tune(process: &[&str], arguments: &[&str]) -> Report {
     let outcome = run(&[&["tune", "--json"], process, arguments].concat());
     assert_eq!(outcome.code, Some(0), "{outcome:?}");
     outcome.report()
 }
 
-/// What a run with `--report` printed, and the page that it wrote.
+/// The outcome of a run with `--report`, and its page.
 pub(crate) fn reported(arguments: &[&str]) -> (Outcome, String) {
     let folder = Scratch::new();
     let path = folder.name("out.html");
@@ -450,7 +447,7 @@ pub(crate) fn reported(arguments: &[&str]) -> (Outcome, String) {
     (ran, page)
 }
 
-/// The figures of a page, as plotly.js is given them.
+/// The figures of a page as JSON.
 pub(crate) fn figures(page: &str) -> Vec<Value> {
     let parts = page.split("<script type=\"application/json\">").skip(1);
     let texts = parts.map(|part| part.split("</script>").next().unwrap_or_default());
@@ -459,7 +456,7 @@ pub(crate) fn figures(page: &str) -> Vec<Value> {
         .collect()
 }
 
-/// All notes at points of the figures.
+/// The texts of all notes in figures.
 pub(crate) fn notes(figures: &[Value]) -> Vec<String> {
     let annotations = figures
         .iter()

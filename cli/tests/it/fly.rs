@@ -1,16 +1,11 @@
-//! `fly`: missions from the command line, their page and their CSV, and what is refused.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `fly`: missions, page, CSV files, refusals.
 
 use std::fs;
 
-use common::{Scratch, run};
+use crate::common::{Scratch, run};
 
-// A mission that takes seconds of flight: the page holds its pictures, the CSV a row for each millisecond, and
-// the same seed gives the same bytes; another seed gives others.
+// A short mission: the page has its figures, the CSV file one row for each millisecond. The same seed gives the same
+// bytes, another seed gives others.
 #[test]
 fn a_mission_with_its_page_and_its_ticks() {
     let folder = Scratch::new();
@@ -27,8 +22,8 @@ fn a_mission_with_its_page_and_its_ticks() {
         text.contains("flown                                    1 of 1"),
         "{text}"
     );
-    assert!(text.contains("roll: on the vehicle"), "{text}");
-    // 4 s under the poor controller, a test, 3 s of what came of it.
+    assert!(text.contains("roll: on the true process"), "{text}");
+    // 4 s with a poor controller, the test, 3 s with the new controller.
     let rows = csv.lines().count() - 1;
     assert!((8000..14_000).contains(&rows), "{rows}");
     let columns = csv.lines().next().unwrap().split(',').count();
@@ -38,7 +33,7 @@ fn a_mission_with_its_page_and_its_ticks() {
         assert!(csv.contains(&format!(",{phase},")), "{phase}");
     }
     assert!(!csv.contains("NaN") && !csv.contains("inf"));
-    // Roll, its command, where it drifted, and the loop that was tuned.
+    // Roll angle, command, sideways drift, Nyquist plot.
     assert_eq!(page.matches("<figure ").count(), 4);
     let main = page
         .split("<main>")
@@ -52,8 +47,7 @@ fn a_mission_with_its_page_and_its_ticks() {
     assert_ne!(fly("other", "8").1, csv);
 }
 
-// An identification made in flight can be read again from its CSV by `identify`: the command is the relay's
-// input, the measured angle its output.
+// `identify` reads the CSV file of a flight: the command is the input, the measurement the output.
 #[test]
 fn a_flight_is_a_recording() {
     let folder = Scratch::new();
@@ -82,7 +76,7 @@ fn a_flight_is_a_recording() {
     let gain = json["process"]["k_over_t_body"]["estimate"]
         .as_f64()
         .unwrap();
-    // 20.7 m/s^2 for the whole thrust; what one test of four cycles leaves is some 2 %.
+    // 20.7 m/s^2 at full thrust; one test of four cycles has an error of about 2 %.
     assert!((gain / 20.7 - 1.0).abs() < 0.08, "{gain}");
 }
 

@@ -1,29 +1,24 @@
-//! `dataset`: its files, stopped and gone on with, damaged and grown, and what it refuses.
-
-// Helpers of tests are tests too, which the lint does not see.
-#![allow(clippy::unwrap_used)]
-
-mod common;
+//! `dataset`: files, interruptions, damage, growth, refusals.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, killed_when, names_in, run};
+use crate::common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, killed_when, names_in, run};
 use serde_json::Value;
 
-/// The file of this repository.
+/// A recipe of this repository.
 const IDENTIFIER: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../experiments/identifier.toml"
 );
 
-/// Few samples a period, for time's sake.
+/// Few samples per period, so that the tests are fast.
 const RECIPE: &str = "seed = 3\n[[families]]\nsamples_per_period = [40, 45]\n";
 
-/// More than one file of 4096.
+/// More experiments than one file holds (4096).
 const TWO_FILES: &str = "4200";
 
-/// A folder with [`RECIPE`] in it, and its path.
+/// A folder with [`RECIPE`], and the path of the recipe.
 fn recipe() -> (Scratch, String) {
     let folder = Scratch::new();
     let path = folder.write("recipe.toml", RECIPE.as_bytes());
@@ -36,7 +31,7 @@ fn dataset(arguments: &[&str]) -> Outcome {
     outcome
 }
 
-/// Every file of a folder.
+/// All files of a folder.
 fn bytes_in(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let names = names_in(folder).into_iter();
     names
@@ -49,7 +44,7 @@ fn bytes_in(folder: &Path) -> BTreeMap<String, Vec<u8>> {
 
 // ---------------------------------------------------------------- reports and files
 
-// One command from a recipe to files; the same command again finds all there.
+// A recipe gives files; the same command again finds them complete.
 #[test]
 fn from_recipe_to_files() {
     let folder = Scratch::new();
@@ -74,7 +69,7 @@ fn from_recipe_to_files() {
     assert_eq!(manifest["format"], "onecycle.dataset/1");
     assert_eq!(manifest["examples"], 30);
     assert_eq!(manifest["recipe"]["families"][1]["draw"], "logarithmic");
-    // At most one in a hundred does not oscillate.
+    // At most 1 % of the experiments do not oscillate.
     let rows = manifest["shards"][0]["rows"].as_u64().unwrap();
     assert!((29..=30).contains(&rows), "{rows}");
 
@@ -90,10 +85,10 @@ fn from_recipe_to_files() {
     assert_eq!(again.0["experiments_per_s"], Value::Null);
     assert_eq!(bytes_in(&folder.path("identifier")), files);
     let said = dataset(&arguments).stdout;
-    assert!(said.contains("nothing: all was there"), "{said}");
+    assert!(said.contains("nothing: all files exist"), "{said}");
 }
 
-// Without a recipe they are the paper's multirotors.
+// The default recipe is the paper's multirotors.
 #[test]
 fn the_paper_s_space_is_the_default() {
     let folder = Scratch::new();
@@ -109,8 +104,8 @@ fn the_paper_s_space_is_the_default() {
 
 // ---------------------------------------------------------------- the same bytes
 
-// At one thread, grown from a smaller one; at three, stopped by force after the first file and gone on
-// with; damaged and made again: the same bytes in every file.
+// Grown from a smaller dataset on one thread; killed after the first file and resumed on three; damaged and made again:
+// every file has the same bytes.
 #[test]
 fn the_same_bytes_however_they_come_about() {
     let (folder, recipe) = recipe();
@@ -135,7 +130,7 @@ fn the_same_bytes_however_they_come_about() {
         "not grown"
     );
     let same = |found: &BTreeMap<String, Vec<u8>>| {
-        // Not assert_eq: megabytes say nothing.
+        // Not assert_eq, which would print megabytes.
         assert!(*found == expected, "other bytes");
     };
 
@@ -165,7 +160,7 @@ fn the_same_bytes_however_they_come_about() {
         );
         assert!(is_resumed(lines[1]) && lines.len() == 2, "{said}");
     }
-    // Nothing is used again, of another recipe neither.
+    // --restart uses no file of an earlier run, also not one of another recipe.
     let (found, said) = run_into(TWO_FILES, "three", &["--restart"]);
     same(&found);
     assert_eq!(said, "");
@@ -177,12 +172,12 @@ fn the_same_bytes_however_they_come_about() {
     assert_eq!(bytes_in(&three).len(), 2);
 }
 
-/// Whether a line says that one of two files is used again.
+/// Whether a line says that the run is resumed after one of two files.
 fn is_resumed(line: &str) -> bool {
     line.starts_with("onecycle: resuming after 1 of 2 files of ")
 }
 
-/// Runs and ends it by force once the manifest lists a file.
+/// Kills a run once the manifest lists a file.
 fn stopped(arguments: &[&str], folder: &Path) {
     let lists_a_file = || {
         let text = std::fs::read_to_string(folder.join("manifest.json")).unwrap_or_default();
@@ -193,7 +188,7 @@ fn stopped(arguments: &[&str], folder: &Path) {
 
 // ---------------------------------------------------------------- Parquet
 
-// Of two files 4200 rows or a few less: the table of the records of the one, then of the other.
+// Two files with about 4200 rows: the records of the first, then of the second.
 #[cfg(feature = "parquet")]
 #[test]
 fn one_parquet_file_of_all() {
@@ -217,9 +212,9 @@ fn one_parquet_file_of_all() {
         writer.add(&records.unwrap()).unwrap();
     }
     writer.finish().unwrap();
-    // Not assert_eq: megabytes say nothing.
+    // Not assert_eq, which would print megabytes.
     assert!(found == expected, "other bytes");
-    // Of what has been made already as well, and what cannot be written is said.
+    // The same from an existing dataset; a file that cannot be written is refused.
     std::fs::remove_file(&table).unwrap();
     dataset(&[&arguments[..], &[&table]].concat());
     assert!(std::fs::read(&table).unwrap() == expected, "other bytes");
@@ -228,7 +223,7 @@ fn one_parquet_file_of_all() {
     outcome.refused(NOT_WRITTEN, &["nowhere/all.parquet"]);
 }
 
-// Without the feature the option says how to have it, before anything is made.
+// Without the feature the message says how to build with it, before any simulation.
 #[cfg(not(feature = "parquet"))]
 #[test]
 fn no_parquet_without_its_feature() {
@@ -270,7 +265,7 @@ fn bad_arguments() {
     assert!(!folder.path("into").exists());
 }
 
-/// What the argument parser says on several lines.
+/// Checks of the messages of the argument parser, which have several lines.
 trait Misused {
     fn misused_about(&self, words: &str);
 }

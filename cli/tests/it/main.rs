@@ -1,0 +1,32 @@
+//! Tests of the program as users run it, and of the structure of the workspace. All are modules of one test program, which
+//! is linked once: `cargo test -p onecycle-cli --test it bench` runs those of `bench`.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "helpers of tests are tests too, which the lint does not see"
+)]
+
+mod architecture;
+mod bad_arguments;
+mod bad_files;
+mod bad_signals;
+mod bench;
+mod certify;
+mod commands;
+mod common;
+mod dataset;
+mod fly;
+mod grid;
+mod identifier;
+mod imports;
+mod json_schema;
+mod library;
+mod pack;
+mod phase;
+mod report;
+mod reproduce;
+mod terminal;
+mod train;
+mod tune;
+mod unknown;
