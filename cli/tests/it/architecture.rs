@@ -216,15 +216,6 @@ fn dependencies_for_tests_are_not_shipped() {
 }
 
 // ---------------------------------------------------------------- files
-
-/// Circles that somebody else's change will break: the crate and a file of the circle. To be emptied when it is merged.
-const TO_BE_MERGED: [(&str, &str); 4] = [
-    ("onecycle-link", "csv/records.rs"),
-    ("onecycle-identify", "outcome.rs"),
-    ("onecycle-lab", "judge/campaign.rs"),
-    ("onecycle-lab", "learn/train/layer.rs"),
-];
-
 /// Adds the source files of a folder; programs beside the library are crates of their own.
 fn add_sources(folder: &Path, below: &str, files: &mut Files) {
     for entry in std::fs::read_dir(folder).unwrap() {
@@ -248,12 +239,7 @@ fn no_file_imports_in_a_circle() {
         add_sources(&folder.join("src"), "", &mut files);
         assert!(files.contains_key("lib.rs"), "{}", package.name);
         for circle in circles(&files) {
-            let is_allowed = TO_BE_MERGED.iter().any(|&(name, file)| {
-                name == package.name && circle.files.iter().any(|one| one == file)
-            });
-            if !is_allowed {
-                found.push(format!("{}: {}", package.name, circle.ties.join("\n  ")));
-            }
+            found.push(format!("{}: {}", package.name, circle.ties.join("\n  ")));
         }
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
