@@ -1,4 +1,4 @@
-//! What the nodes of a model do one after another, and the network that this is.
+//! The steps of a model's nodes, and the network that they make.
 //!
 //! ```text
 //! y = scale x + shift     folded into a dense layer before it:   W := diag(scale) W, b := scale b + shift
@@ -9,14 +9,14 @@
 use super::{Normalisation, OnnxError};
 use crate::learn::train::{Layer, Network};
 
-/// What a node does to a row of numbers.
+/// Step of a node on a row of numbers.
 pub(super) enum Step {
     Affine(Affine),
     Dense(Dense),
     Activation(Layer),
 }
 
-/// `scale x + shift`, a number each for every column or one for all.
+/// `scale x + shift`, with one number for each column or one for all.
 #[derive(Clone)]
 pub(super) struct Affine {
     pub(super) scale: Vec<f64>,
@@ -26,13 +26,13 @@ pub(super) struct Affine {
 /// `W x + b`.
 pub(super) struct Dense {
     pub(super) inputs: usize,
-    /// A row for each output.
+    /// One row for each output.
     pub(super) weight: Vec<f32>,
     pub(super) bias: Vec<f32>,
 }
 
 impl Affine {
-    /// This for every of so many columns; `None` where it is for another number.
+    /// Scale and shift of every column; `None` for another number of columns.
     fn of_columns(&self, columns: usize) -> Option<Vec<(f64, f64)>> {
         let fits = |values: &[f64]| values.len() == 1 || values.len() == columns;
         let at = |values: &[f64], i: usize| values[if values.len() == 1 { 0 } else { i }];
@@ -43,7 +43,7 @@ impl Affine {
         })
     }
 
-    /// This, and then another; `None` where they are for different numbers of columns.
+    /// This step followed by another; `None` if their numbers of columns differ.
     fn then(&self, next: &Self) -> Option<Self> {
         let lengths = [&self.scale, &self.shift, &next.scale, &next.shift].map(Vec::len);
         let columns = lengths.into_iter().max()?;
@@ -89,12 +89,12 @@ pub(super) struct Chain {
     layers: Vec<Layer>,
     dense: Vec<Dense>,
     normalisation: Option<Normalisation>,
-    /// What scales and shifts before a layer to come.
+    /// Scale and shift that wait for the next layer.
     waiting: Option<Affine>,
 }
 
 impl Chain {
-    /// Takes a step; a sentence where it does not fit.
+    /// Adds a step. The error says why it does not fit.
     pub(super) fn take(&mut self, step: Step) -> Result<(), String> {
         match step {
             Step::Affine(affine) => self.take_affine(affine),
@@ -145,7 +145,7 @@ impl Chain {
         Ok(())
     }
 
-    /// The network, once all steps are taken.
+    /// The network of all steps.
     pub(super) fn network(self) -> Result<(Option<Normalisation>, Network), OnnxError> {
         if self.waiting.is_some() {
             let reason = "what scales or shifts at its end has no dense layer before it";

@@ -1,4 +1,4 @@
-//! From a model's nodes to what they do, one after another.
+//! Reads the nodes of a model into steps.
 
 use std::collections::BTreeMap;
 
@@ -9,22 +9,22 @@ use super::message::{EXTERNAL, FLOAT, Graph, Model, Node, Tensor};
 use super::{Normalisation, OnnxError};
 use crate::learn::train::{Layer, Network};
 
-/// Since then constants are broadcast without being told to.
+/// From this opset on, constants are broadcast without an attribute.
 const OLDEST_OPSET: i64 = 7;
 
-/// A network that was learnt elsewhere.
+/// A network that was trained by another program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imported {
-    /// What the model itself does to its inputs before its first dense layer.
+    /// Normalisation before the first dense layer, if there is one.
     pub normalisation: Option<Normalisation>,
-    /// All behind that.
+    /// The network after the normalisation.
     pub network: Network,
 }
 
-/// The network of the bytes of a model.
+/// Reads the bytes of a model.
 ///
 /// # Errors
-/// Names the node that cannot be read, or says what else is wrong.
+/// [`OnnxError`]: names the node that cannot be read, or says what else is wrong.
 pub fn import(bytes: &[u8]) -> Result<Imported, OnnxError> {
     let model = Model::decode(bytes).map_err(|error| OnnxError::File(error.to_string()))?;
     let Some(graph) = model.graph else {
@@ -66,7 +66,7 @@ pub fn import(bytes: &[u8]) -> Result<Imported, OnnxError> {
     })
 }
 
-/// The one name there is.
+/// The only name.
 fn only<'a>(what: &str, mut names: impl Iterator<Item = &'a str>) -> Result<&'a str, OnnxError> {
     match (names.next(), names.next()) {
         (Some(name), None) => Ok(name),
@@ -75,10 +75,10 @@ fn only<'a>(what: &str, mut names: impl Iterator<Item = &'a str>) -> Result<&'a 
     }
 }
 
-/// A model read so far.
+/// State of the reader.
 struct Reader<'a> {
     constants: BTreeMap<&'a str, &'a Tensor>,
-    /// The name of what the last node put out.
+    /// Name of the last node's output.
     current: &'a str,
     chain: Chain,
 }
@@ -88,7 +88,7 @@ impl<'a> Reader<'a> {
         let constants: BTreeMap<_, _> = (graph.initializer.iter())
             .map(|tensor| (&tensor.name[..], tensor))
             .collect();
-        // Older models list constants among the inputs too.
+        // Older models list constants among the inputs.
         let inputs = (graph.input.iter().map(|input| &input.name[..]))
             .filter(|name| !constants.contains_key(name));
         let current = only("input", inputs)?;
@@ -99,7 +99,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Takes a node; a sentence where that cannot be.
+    /// Adds a node. The error says why it cannot be read.
     fn take(&mut self, node: &'a Node) -> Result<(), String> {
         let [output] = &node.output[..] else {
             return Err(format!("it has {} outputs, not one", node.output.len()));
@@ -151,7 +151,7 @@ impl<'a> Reader<'a> {
         self.constants.contains_key(name)
     }
 
-    /// The constant that is input `index`: its extents and numbers.
+    /// Shape and numbers of the constant at input `index`.
     fn constant(&self, node: &Node, index: usize) -> Result<(Vec<usize>, Vec<f32>), String> {
         let name = node.input.get(index).map_or("", String::as_str);
         match self.constants.get(name) {
@@ -182,7 +182,7 @@ impl<'a> Reader<'a> {
         let mut dense = self.weight(node, is_set("transB"))?;
         let (alpha, beta) = (number("alpha", 1.0), number("beta", 1.0));
         (dense.weight.iter_mut()).for_each(|weight| *weight *= alpha);
-        // The third input may be left out, or be empty.
+        // The third input is optional.
         if node.input.get(2).is_some_and(|name| !name.is_empty()) {
             let bias = self.row(node, 2)?;
             let outputs = dense.bias.len();
@@ -200,7 +200,7 @@ impl<'a> Reader<'a> {
         self.weight(node, false)
     }
 
-    /// What multiplies from the right: `in x out`, or `out x in` if transposed.
+    /// A dense layer of the constant at input 1: `in x out`, or `out x in` if transposed.
     fn weight(&self, node: &Node, is_transposed: bool) -> Result<Dense, String> {
         let (shape, values) = self.constant(node, 1)?;
         let &[rows, columns] = &shape[..] else {
@@ -230,7 +230,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// What comes in with a constant.
+    /// Sum, difference, product or quotient with a constant.
     fn elementwise(&self, node: &Node) -> Result<Affine, String> {
         let [left, right] = &node.input[..] else {
             return Err(format!("it has {} inputs, not two", node.input.len()));
@@ -262,7 +262,7 @@ impl<'a> Reader<'a> {
         if attribute(node, "training_mode").is_some_and(|value| value.i != 0) {
             return Err("it is still learning: export the model after eval()".to_owned());
         }
-        // The operator's own default.
+        // The operator's default.
         let epsilon = attribute(node, "epsilon").map_or(1e-5, |value| value.f);
         let mut rows = Vec::new();
         for index in 1..5 {
@@ -292,7 +292,7 @@ fn attribute<'a>(node: &'a Node, name: &str) -> Option<&'a super::message::Attri
         .find(|attribute| attribute.name == name)
 }
 
-/// The extents and numbers of a constant.
+/// Shape and numbers of a constant.
 fn numbers(tensor: &Tensor) -> Result<(Vec<usize>, Vec<f32>), String> {
     let name = &tensor.name;
     if tensor.data_location == EXTERNAL {
