@@ -5,8 +5,8 @@
 //! t_prop_s = [0.015, 0.3]
 //! t_body_s = [0.2, 2.0]
 //! tau_s = [0.0005, 0.1]
-//! phase_margin_deg = 20.0   # the least one, 20 where it is left out
-//! beta = -0.73              # of the relay, -0.73 where it is left out
+//! phase_margin_deg = 20.0   # least phase margin; default 20
+//! beta = -0.73              # parameter of the relay; default -0.73
 //! ```
 
 pub mod candidate;

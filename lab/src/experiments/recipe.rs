@@ -1,17 +1,17 @@
 //! Recipes: which processes are drawn, how often, and under which bias and noise.
 //!
 //! ```toml
-//! seed = 1        # of the first example, 1 where it is left out
-//! bias = 0.5      # up to this part of the relay's amplitude
-//! sigma = 0.03    # noise, up to this part of the amplitude of the oscillation
+//! seed = 1        # seed of the first example; default 1
+//! bias = 0.5      # largest bias, over the relay's amplitude
+//! sigma = 0.03    # largest noise, over the amplitude of the oscillation
 //! trim = true     # whether the relay follows the bias
 //!
 //! [[families]]
 //! samples_per_period = [89, 2306]
 //! space = { t_prop_s = [0.015, 0.3], t_body_s = [0.2, 2.0], tau_s = [0.0005, 0.1] }
 //!
-//! [[families]]    # as many as there are kinds of processes
-//! weight = 0.5    # half as often as one of weight 1
+//! [[families]]    # one table for each kind of process
+//! weight = 0.5    # drawn half as often as a family of weight 1
 //! draw = "logarithmic"
 //! samples_per_period = [40, 2500]
 //! space = { t_prop_s = [0.005, 0.12], t_body_s = [20, 2000], tau_s = [0.008, 0.05] }
@@ -96,7 +96,7 @@ impl Family {
             ),
             (
                 "tau_s",
-                "positive, for there is no logarithm of zero",
+                "positive if the draw is logarithmic (the logarithm of zero is not finite)",
                 least_tau_s,
                 self.draw == Draw::Uniform || least_tau_s > 0.0,
             ),

@@ -1,17 +1,17 @@
-//! Baselines: the methods of others on the same experiments, each tuned as well as possible.
+//! Baselines: published methods run on the same experiments, each tuned as well as possible.
 //!
 //! | module         | method                                        | what it needs                    |
 //! |----------------|-----------------------------------------------|----------------------------------|
-//! | [`pem`]        | prediction error, output error by SQP         | any recording from rest or steady |
+//! | [`pem`]        | prediction error, output error by SQP         | any recording that starts at rest or in a steady state |
 //! | [`rules`]      | homogeneous tuning rules                      | a cycle at the rule's `beta`     |
-//! | [`arx`]        | recursive least squares on ARX(2,2), as PX4's | any lively recording             |
-//! | [`gmvc`]       | PX4's gains for that model                    | the same                         |
-//! | [`asymmetric`] | asymmetric relay, integrator with dead time   | that relay's recording           |
+//! | [`arx`]        | recursive least squares on ARX(2,2), as in PX4 | any recording with enough excitation |
+//! | [`gmvc`]       | PX4's gains for that model                    | the same recording as [`arx`]    |
+//! | [`asymmetric`] | asymmetric relay, integrator with dead time   | a recording of that relay        |
 //!
-//! All read a recording as [`Signals`], one sample a point and at an even period, and return a
+//! All read a recording as [`Signals`], one sample per point at an even period, and return a
 //! [`BaselineAnswer`]: a controller and the process behind it, or a [`BaselineError`]. From a process
 //! the controller is always the PD of least exact ISE at the requested phase margin, so that only the
-//! identification is compared. [`gmvc`] alone returns the gains that its method flies.
+//! identification is compared. Only [`gmvc`] returns the gains of its own method.
 //!
 //! ```
 //! use onecycle_lab::judge::baselines::{pem, rules};
@@ -74,7 +74,7 @@ pub enum BaselineError {
     #[error("{0} is out of range: {1}")]
     Setting(&'static str, f64),
     /// The model found is not such a process: the reason.
-    #[error("the model found is no integrating process with lags: {0}")]
+    #[error("the model found is not an integrating process with lags: {0}")]
     NotThisProcess(&'static str),
     /// The parameters found are outside their physical range.
     #[error("{0}")]

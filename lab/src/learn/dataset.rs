@@ -1,5 +1,5 @@
-//! Examples to learn from: the signature of one steady cycle of a relay experiment on a random process,
-//! and the values that a network should put out for it.
+//! Training examples: the signature of one steady cycle of a relay experiment on a random process,
+//! and the target values of a network.
 //!
 //! The experiment uses the relay of the board with noise protection and trim, the exact process, noise
 //! and bias. Example `n` of a [`Recipe`] does not depend on what else is made. The values have no unit
@@ -17,11 +17,11 @@
 //!
 //! | question                                  | answer                                        |
 //! |-------------------------------------------|-----------------------------------------------|
-//! | which experiments?                        | [`Recipe`], of one [`Family`](crate::experiments::Family) or several      |
-//! | what is seen, and of what is it?          | [`Example`]                                   |
-//! | what does an error of the values cost?    | [`Example::cost_gradient`]                    |
-//! | how do many of them lie on a disk?        | [`shards`]: files that NumPy reads            |
-//! | and in one table, for other programs?     | `parquet`, with the feature of that name      |
+//! | which experiments?                        | [`Recipe`], with one or more [`Family`](crate::experiments::Family)       |
+//! | what does a network see, and what is true?| [`Example`]                                   |
+//! | what does an error in the values cost?    | [`Example::cost_gradient`]                    |
+//! | how are many examples stored?             | [`shards`]: files that NumPy reads            |
+//! | how do other programs read them?          | `parquet`, one table (feature `parquet`)      |
 //! | how does a network learn from them?       | [`learning`]: rows of a [`Batch`]             |
 //!
 //! [`Batch`]: crate::learn::train::Batch
@@ -90,7 +90,7 @@ impl Example {
         }
     }
 
-    /// Values that a network should put out, see the [module](self).
+    /// Target values of a network, see the [module](self).
     #[must_use]
     pub fn values(&self) -> [f64; VALUES] {
         let period_s = self.period_s;

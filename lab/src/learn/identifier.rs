@@ -6,20 +6,20 @@
 //!                                                  Scores  <---+   as the board computes
 //! ```
 //!
-//! The network puts out a Gaussian over the four values of `dataset`: the estimator's own coordinates,
+//! The output of the network is a Gaussian over the four values of `dataset`: the estimator's own coordinates,
 //! in which the posterior of a cycle is nearly Gaussian. Experiments are numbered from zero: first
-//! those to learn from, then those that choose the best epoch and calibrate, then those that are only
-//! scored.
+//! those for training, then those for the choice of the best epoch and the calibration, then those for
+//! the score.
 //!
 //! ```toml
 //! network = "density"
-//! hidden = [64, 64]      # widths of the hidden layers, tanh behind each
-//! learning = 220000      # experiments to learn from
-//! choosing = 8000        # that choose the epoch and calibrate
-//! scoring = 8000         # that are scored
-//! # and what is left out of it: IdentifierRecipe::default()
+//! hidden = [64, 64]      # widths of the hidden layers, each followed by tanh
+//! learning = 220000      # experiments for training
+//! choosing = 8000        # experiments for the choice of the epoch and the calibration
+//! scoring = 8000         # experiments for the score
+//! # defaults of other fields: IdentifierRecipe::default()
 //!
-//! [experiments]          # a recipe of `dataset`
+//! [experiments]          # a recipe as for `onecycle dataset`
 //! ```
 
 mod calibration;
@@ -54,11 +54,11 @@ pub struct IdentifierRecipe {
     pub network: IdentifierKind,
     /// Widths of the hidden layers.
     pub hidden: Vec<usize>,
-    /// Experiments to learn from.
+    /// Number of experiments for training.
     pub learning: u64,
-    /// Experiments that choose the best epoch and calibrate.
+    /// Number of experiments for the choice of the best epoch and the calibration.
     pub choosing: u64,
-    /// Experiments that are scored.
+    /// Number of experiments for the score.
     pub scoring: u64,
     /// Largest number of epochs.
     pub epochs: u64,
@@ -141,7 +141,7 @@ pub enum IdentifierError {
     #[error("{0}")]
     Experiment(#[from] ExperimentError),
     /// The shapes of the family have no spread.
-    #[error("the processes of the family are all alike: widen its space")]
+    #[error("all processes of the family have the same shape: widen its space")]
     OneShape,
 }
 

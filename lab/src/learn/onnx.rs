@@ -56,7 +56,7 @@ pub struct Normalisation {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OnnxError {
     /// The bytes are not ONNX.
-    #[error("the file is no ONNX model: {0}")]
+    #[error("the file is not an ONNX model: {0}")]
     File(String),
     /// The model as a whole cannot be read.
     #[error("the model cannot be read: {0}")]
@@ -80,7 +80,7 @@ pub enum OnnxError {
         reason: &'static str,
     },
     /// The number of offsets or scales differs from the number of inputs.
-    #[error("the normalisation is of {found} inputs, the network of {expected}")]
+    #[error("the normalisation has {found} inputs, but the network has {expected}")]
     Normalisation {
         /// Number of inputs of the network.
         expected: usize,

@@ -88,8 +88,8 @@ pub enum PackContentsError {
     Pack(#[from] PackError),
     /// A pack cannot hold a layer.
     #[error(
-        "layer {index} of the network, {layer}, has no place in a pack: it holds dense layers, \
-         each with one relu or tanh behind it or none"
+        "layer {index} of the network, {layer}, does not fit into a pack: a pack holds dense \
+         layers, each with at most one relu or tanh after it"
     )]
     Layer {
         /// Number of the layer, from 0.

@@ -8,12 +8,12 @@
 //!
 //! | question                                          | answer                                 |
 //! |---------------------------------------------------|----------------------------------------|
-//! | which network?                                    | [`Network`], a row of [`Layer`]s       |
+//! | which network?                                    | [`Network`], a sequence of [`Layer`]s  |
 //! | what does it learn: a class, a cost, a density?   | [`Loss`]                               |
 //! | how?                                              | [`OptimizerMethod`], [`Schedule`], [`TrainingSettings`] |
 //! | from what?                                        | [`Dataset`], which fills a [`Batch`]   |
-//! | how do networks come from PyTorch and go there?   | [`onnx`](crate::learn::onnx)           |
-//! | on how many threads?                              | [`Workers`](crate::workers::Workers), the caller's |
+//! | how are networks exchanged with PyTorch?          | [`onnx`](crate::learn::onnx)           |
+//! | on how many threads?                              | [`Workers`](crate::workers::Workers) of the caller |
 //!
 //! Rows are samples: inputs `batch x in`, weights of a dense layer `out x in`, outputs `batch x out`.
 //! Conventions and names are those of PyTorch, so that numbers can be compared. The same seed gives the
@@ -88,13 +88,15 @@ pub enum TrainError {
         classes: usize,
     },
     /// The weights of the samples have no mean.
-    #[error("the weights of samples must be finite and not negative, and their sum positive")]
+    #[error(
+        "the weights of the samples must be finite and not negative, and their sum must be positive"
+    )]
     SampleWeights,
     /// Batch normalisation of a single sample.
-    #[error("batch normalisation needs batches of at least two samples to learn from")]
+    #[error("training with batch normalisation needs batches of at least two samples")]
     OneSample,
     /// A number that no network can hold.
-    #[error("{layer}.{array} of the network holds {value:?}")]
+    #[error("layer {layer} of the network: {array} must not hold {value:?}")]
     Value {
         /// Number of the layer, from 0.
         layer: usize,
@@ -104,7 +106,7 @@ pub enum TrainError {
         value: f32,
     },
     /// There are no samples.
-    #[error("there is no sample to {0}")]
+    #[error("there are no samples to {0}")]
     NoSample(&'static str),
 }
 

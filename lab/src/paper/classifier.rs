@@ -4,22 +4,22 @@
 //! ```text
 //! ClassifierRecipe -> Classes, the members of a grid
 //!        -> Examples: Trials under the relay -> SampledCycle -> Prepared, the network's 4520 inputs
-//!                                                            -> Measured, what tells the gain
+//!                                                            -> Measured, which gives the gain
 //!        -> Network 4520-3000-1000-N, a Loss each -> picks by either PickRule -> Score
 //! ```
 //!
-//! Differences to the paper, where it leaves something open or something else is better:
+//! Choices that the paper leaves open, or that differ from it because they are better:
 //!
 //! | question              | the paper                          | here                               |
 //! |-----------------------|------------------------------------|------------------------------------|
-//! | learnt from           | 30 experiments of each class       | random processes, some of classes  |
-//! | the true class        | the simulated one                  | the one that costs least           |
-//! | cost of another one   | between classes                    | on the true process                |
+//! | training examples     | 30 experiments of each class       | random processes and some classes  |
+//! | the true class        | the simulated class                | the class of least cost            |
+//! | cost of another class | between classes                    | on the true process                |
 //! | gain of a class       | from the amplitude                 | from the harmonics                 |
-//! | the output, `pv`      | zero-padded                        | that, or stretched: [`Fit`]        |
-//! | inputs                | amplitude of one                   | that, learnt from in standard coordinates: [`Standard`] |
-//! | a hidden layer        | ReLU, batch normalisation, dropout | in this order                      |
-//! | rate, momentum, batch, epochs, part dropped, noise | not said | in the recipe                  |
+//! | the output, `pv`      | zero-padded                        | zero-padded or stretched: [`Fit`]  |
+//! | inputs                | amplitude 1                        | amplitude 1, then standardised for training: [`Standard`] |
+//! | a hidden layer        | ReLU, batch normalisation, dropout | the same, in this order            |
+//! | rate, momentum, batch, epochs, dropout, noise | not given | in the recipe                       |
 //!
 //! A controller has two numbers and a process, apart from its gain, three. So many classes have nearly
 //! the same controller, a wrong class is often as good as the right one, and accuracy says little.
@@ -81,9 +81,7 @@ pub enum ClassifierError {
     #[error("{0}")]
     Train(#[from] TrainError),
     /// The loss reads something other than classes and their costs.
-    #[error(
-        "losses: a classifier learns classes; take a loss that reads them, such as cross_entropy"
-    )]
+    #[error("losses: a classifier needs a loss over classes, such as cross_entropy")]
     Loss,
 }
 

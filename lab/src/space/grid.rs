@@ -8,8 +8,8 @@
 //!
 //! | layout             | members                                                             |
 //! |--------------------|---------------------------------------------------------------------|
-//! | [`Layout::Rays`]   | the paper's: along each of three coordinates `J*` apart, and what that leaves out; they tell processes apart, as a classifier needs them |
-//! | [`Layout::Fewest`] | as few as leave no process without one: a bank of controllers; how far apart they are is not said |
+//! | [`Layout::Rays`]   | the paper's: `J*` apart along each of three coordinates, with the gaps filled; members are far enough apart for a classifier |
+//! | [`Layout::Fewest`] | as few as cover the space, for a bank of controllers; no least distance between members |
 //!
 //! Work is cut into independent parts that run on the caller's [`Workers`].
 //!

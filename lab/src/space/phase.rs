@@ -76,7 +76,7 @@ pub struct DistinguishingPhase {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PhaseError {
     /// There is no process.
-    #[error("there is no process to make a rule for")]
+    #[error("the rule needs at least one process")]
     Empty,
     /// The times are out of range.
     #[error("{0}")]

@@ -266,7 +266,7 @@ impl Model {
         let (input_size, rate_size) = (size(&inputs), size(&rates));
         if !(input_size > 0.0 && rate_size > 0.0) {
             return Err(BaselineError::NotThisProcess(
-                "its input or its output stands still",
+                "its input or its output is zero",
             ));
         }
         let model_s = every as f64 * sample_s;
@@ -308,7 +308,7 @@ impl Model {
         let acceleration = sum / (gain_part * self.sample_s);
         if !(delay_s.is_finite() && acceleration.is_finite()) {
             return Err(BaselineError::NotThisProcess(
-                "it has no finite gain or dead time",
+                "its gain or dead time is not finite",
             ));
         }
         Ok(Soiptd::from_acceleration_gain(

@@ -92,7 +92,9 @@ impl HalfPeriods {
         let gain = self.output_span / rise;
         let delay_s = (rise - 2.0 * self.hysteresis / gain) / (self.above + self.below);
         if !(gain > 0.0 && delay_s > 0.0) {
-            return Err(BaselineError::NotThisProcess("no dead time is left"));
+            return Err(BaselineError::NotThisProcess(
+                "its dead time is not positive",
+            ));
         }
         let lag_s = NO_LAG * delay_s;
         Ok(Soiptd::new(gain, lag_s, lag_s, delay_s)?)

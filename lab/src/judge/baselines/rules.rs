@@ -83,7 +83,9 @@ pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRu
         count += 1.0;
     }
     if count == 0.0 {
-        return Err(BaselineError::NotThisProcess("no shape has a limit cycle"));
+        return Err(BaselineError::NotThisProcess(
+            "no ratio of its time constants has a limit cycle",
+        ));
     }
     Ok(TuningRule {
         beta: space.beta,
@@ -122,7 +124,7 @@ pub fn identify(
             let lead_rad = phase_margin_rad - (-response).arg() - hold_rad;
             if !(lead_rad > 0.0 && lead_rad < 0.5 * PI) {
                 return Err(BaselineError::NotThisProcess(
-                    "the phase measured leaves no lead from 0 to pi/2",
+                    "the measured phase gives a lead outside 0 to pi/2",
                 ));
             }
             let rule = TuningRule::from_lead(lead_rad, phase_margin_rad);
@@ -133,7 +135,7 @@ pub fn identify(
         return Err(BaselineError::Setting("c1 or c3 of the rule", rule.c1));
     }
     if !(ratio.is_finite() && ratio > 0.0) {
-        return Err(BaselineError::NotThisProcess("its output stands still"));
+        return Err(BaselineError::NotThisProcess("its output is constant"));
     }
     Ok(BaselineAnswer {
         process: None,

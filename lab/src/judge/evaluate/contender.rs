@@ -144,7 +144,7 @@ impl Contender {
         let (signals, margin_rad) = (&seen.signals, PHASE_MARGIN_DEG.to_radians());
         let by_pem = |settings: &pem::PemSettings| pem::identify(signals, settings, margin_rad);
         let by_rule = |rule: &Rule| rules::identify(signals, rule, 1);
-        let rival = match self {
+        let found = match self {
             Self::OneCycle(cycles) => return ours(signals, cycles, Method::Map),
             Self::Network => return ours(signals, 1, Method::Classify),
             Self::Pem => by_pem(&pem::PemSettings::paper(pem::Data::LastCycle)),
@@ -165,7 +165,7 @@ impl Contender {
                 asymmetric::identify(signals, seen.hysteresis, ASYMMETRIC_CYCLES, margin_rad)
             }
         };
-        of_rival(rival)
+        of_baseline(found)
     }
 }
 
@@ -193,10 +193,10 @@ fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, BaselineError> {
 }
 
 /// The answer of a baseline: a process gets the same controller as those of all methods.
-fn of_rival(rival: Result<BaselineAnswer, BaselineError>) -> Result<Answer, String> {
-    let rival = rival.map_err(|error| error.to_string())?;
-    match rival.process {
+fn of_baseline(found: Result<BaselineAnswer, BaselineError>) -> Result<Answer, String> {
+    let found = found.map_err(|error| error.to_string())?;
+    match found.process {
         Some(process) => Answer::of_process(process).map_err(|error| error.to_string()),
-        None => Ok(Answer::of_gains(rival.pd)),
+        None => Ok(Answer::of_gains(found.pd)),
     }
 }

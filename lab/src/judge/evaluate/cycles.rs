@@ -16,7 +16,7 @@ pub enum CyclesError {
     #[error("{0}")]
     Oscillation(Verdict),
     /// No process could be identified from one of the cycles.
-    #[error("a cycle tells no process: {0}")]
+    #[error("a cycle cannot be identified: {0}")]
     Cycle(String),
     /// A process has no controller.
     #[error(transparent)]

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! truth     experiment,K,T_prop_s,T_body_s,tau_s,input_bias,noise_sigma,protocol,seed
-//! answers   experiment,K,T_prop_s,T_body_s,tau_s   or   experiment,kp,kd      and seconds, if you like
-//! results   experiment,method,outcome,deterioration,...   as Record has them; what is not, is empty
+//! answers   experiment,K,T_prop_s,T_body_s,tau_s   or   experiment,kp,kd      (optional: seconds)
+//! results   experiment,method,outcome,deterioration,...   the fields of Record; missing values are empty
 //! ```
 //!
 //! Columns may be in any order, other columns are ignored, and lines that begin with `#` are comments.
@@ -48,7 +48,7 @@ pub enum Problem {
     NotAnswers,
     /// A cell is not a finite number.
     #[error(
-        "{column} is '{text}', which is no finite number; leave the row out where there is none"
+        "{column} is '{text}', which is not a finite number; omit the row of an experiment without an answer"
     )]
     NoNumber {
         /// The column.
@@ -57,7 +57,7 @@ pub enum Problem {
         text: String,
     },
     /// A cell is not a whole number.
-    #[error("{column} is '{text}', which is no whole number")]
+    #[error("{column} is '{text}', which is not a whole number")]
     NotWhole {
         /// The column.
         column: &'static str,
@@ -65,13 +65,13 @@ pub enum Problem {
         text: String,
     },
     /// An unknown protocol.
-    #[error("protocol is '{0}', neither 'trimmed' nor 'biased'")]
+    #[error("protocol is '{0}', but must be 'trimmed' or 'biased'")]
     NoProtocol(String),
     /// The benchmark has no such experiment.
     #[error("the benchmark has no experiment {0}")]
     UnknownExperiment(u64),
     /// An experiment has two rows.
-    #[error("experiment {experiment} has a row already, line {first}")]
+    #[error("experiment {experiment} already has a row, line {first}")]
     Twice {
         /// Number of the experiment.
         experiment: u64,
@@ -79,10 +79,10 @@ pub enum Problem {
         first: u64,
     },
     /// The parameters are out of range.
-    #[error("no process: {0}; leave the row out where there is none")]
+    #[error("not a process: {0}; omit the row of an experiment without an answer")]
     NoProcess(#[from] SoiptdError),
     /// The table has no row.
-    #[error("the table has no row")]
+    #[error("the table has no rows")]
     Empty,
 }
 

@@ -109,7 +109,9 @@ impl Reader {
             .map(|column| (column.name(), column.physical_type()))
             .eq(COLUMNS);
         if !is_right {
-            return Err(malformed("its columns are no recordings".to_owned()));
+            return Err(malformed(
+                "its columns are not those of recordings".to_owned(),
+            ));
         }
         Ok(Self(reader))
     }
@@ -119,7 +121,7 @@ impl Reader {
     /// # Errors
     /// Errors of the file; it has no such experiment, or another one in its place.
     pub fn recording(&self, experiment: u64) -> io::Result<Recorded> {
-        let missing = || malformed(format!("it has no experiment {experiment}"));
+        let missing = || malformed(format!("the file has no experiment {experiment}"));
         let index = usize::try_from(experiment).unwrap_or(0);
         if !(1..=self.0.num_row_groups()).contains(&index) {
             return Err(missing());

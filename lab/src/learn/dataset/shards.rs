@@ -2,24 +2,24 @@
 //!
 //! ```text
 //! manifest.json       format, program, recipe, number of examples, rows and hash of every file
-//! shard-00000.npz     examples 0 .. 4095, less those without a steady oscillation
+//! shard-00000.npz     examples 0 .. 4095, without those that have no steady oscillation
 //! shard-00001.npz     examples 4096 .. 8191, ..
 //! ```
 //!
 //! | column               | numbers          | meaning                                            |
 //! |----------------------|------------------|----------------------------------------------------|
-//! | `number`             | u64              | of the example in its recipe                       |
-//! | `family`             | u64              | of the recipe, counted from zero                   |
+//! | `number`             | u64              | number of the example in its recipe                |
+//! | `family`             | u64              | number of the family in the recipe, from zero      |
 //! | `inputs`             | f32, 34 a row    | [`Signature::values`]                              |
 //! | `values`             | f64, 4 a row     | [`Example::values`]                                |
 //! | `gradient`           | f64, 4 a row     | [`Example::cost_gradient`], at the family's margin |
-//! | `period_s`           | f64              | of the cycle (s)                                   |
-//! | `amplitude`          | f64              | of the signature, times the sign it found the gain to have |
-//! | `centre`             | f64              | of the signature                                   |
+//! | `period_s`           | f64              | period of the cycle (s)                            |
+//! | `amplitude`          | f64              | amplitude of the signature, with the sign of the gain |
+//! | `centre`             | f64              | centre of the signature                            |
 //! | `process`            | f64, 4 a row     | `K`, `T_prop`, `T_body`, `tau` (s)                 |
-//! | `bias`               | f64              | by the relay's amplitude                           |
-//! | `sigma`              | f64              | noise by the amplitude without noise               |
-//! | `samples_per_period` | f64              | of the oscillation without noise                   |
+//! | `bias`               | f64              | bias over the relay's amplitude                    |
+//! | `sigma`              | f64              | noise over the noise-free amplitude                |
+//! | `samples_per_period` | f64              | samples in a period of the noise-free oscillation  |
 //!
 //! A recipe and a number of examples give the same bytes on any number of threads. A file that is
 //! missing or damaged is made again; a folder of another recipe or program is refused.
@@ -43,7 +43,7 @@ pub const FORMAT: &str = "onecycle.dataset/1";
 /// Experiments per file: 1.2 MB and some seconds of work, which is what an interruption loses.
 pub const EXAMPLES_PER_SHARD: u64 = 4096;
 
-/// Most examples of a dataset: 3 GB or so.
+/// Most examples of a dataset: about 3 GB.
 pub const MOST_EXAMPLES: u64 = 10_000_000;
 
 /// One example with its targets, as files store it.
@@ -63,7 +63,7 @@ pub struct ExampleRecord {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DatasetError {
     /// The manifest is not JSON, or has other fields.
-    #[error("the manifest is not one of a dataset: {0}")]
+    #[error("the file is not the manifest of a dataset: {0}")]
     Json(String),
     /// The manifest has another format.
     #[error("the format of the manifest must be \"{FORMAT}\", but is {0}")]
@@ -90,7 +90,7 @@ pub enum DatasetError {
     OtherRecipe,
     /// The folder belongs to another version of the program, whose last bits may differ.
     #[error(
-        "the folder holds a dataset made by {0}, this is {PROGRAM}: name another folder, or remove this one"
+        "the folder holds a dataset made by {0}, but this program is {PROGRAM}: name another folder, or remove this one"
     )]
     OtherProgram(String),
     /// The folder has more examples than requested.
@@ -105,11 +105,11 @@ pub enum DatasetError {
     },
     /// A file has not been made yet.
     #[error(
-        "{0} has not been made: the command that makes the dataset goes on where it was stopped"
+        "{0} is missing: run the command that makes the dataset again; it continues where it stopped"
     )]
     Unfinished(String),
     /// A file has other bytes than the manifest says.
-    #[error("{0} is not the file that the manifest speaks of: make the dataset again")]
+    #[error("{0} differs from the file in the manifest: make the dataset again")]
     Damaged(String),
 }
 

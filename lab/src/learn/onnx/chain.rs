@@ -99,9 +99,10 @@ impl Chain {
         match step {
             Step::Affine(affine) => self.take_affine(affine),
             Step::Dense(dense) => self.take_dense(dense),
-            Step::Activation(_) if self.waiting.is_some() => {
-                Err("between it and what scales or shifts before it no dense layer stands".into())
-            }
+            Step::Activation(_) if self.waiting.is_some() => Err(
+                "no dense layer stands between this activation and the scaling or shift before it"
+                    .into(),
+            ),
             Step::Activation(layer) => {
                 self.layers.push(layer);
                 Ok(())
@@ -110,7 +111,7 @@ impl Chain {
     }
 
     fn take_affine(&mut self, affine: Affine) -> Result<(), String> {
-        let widths = || "its constant has another width than what comes in".to_owned();
+        let widths = || "the width of its constant differs from the width of its input".to_owned();
         let is_dense = matches!(self.layers.last(), Some(Layer::Dense { .. }));
         match (self.waiting.take(), self.dense.last_mut()) {
             (Some(first), _) => {
@@ -128,10 +129,15 @@ impl Chain {
             && before.bias.len() != inputs
         {
             let outputs = before.bias.len();
-            return Err(format!("it takes {inputs} numbers where {outputs} come in"));
+            return Err(format!(
+                "it takes {inputs} inputs, but the layer before it has {outputs} outputs"
+            ));
         }
         if let Some(affine) = self.waiting.take() {
-            let widths = || "what is scaled and shifted before it has another width".to_owned();
+            let widths = || {
+                "the width of the scaling or shift before it differs from its number of inputs"
+                    .to_owned()
+            };
             if self.layers.is_empty() {
                 let columns = affine.of_columns(inputs).ok_or_else(widths)?;
                 self.normalisation = Some(normalisation(&columns)?);
@@ -148,7 +154,7 @@ impl Chain {
     /// The network of all steps.
     pub(super) fn network(self) -> Result<(Option<Normalisation>, Network), OnnxError> {
         if self.waiting.is_some() {
-            let reason = "what scales or shifts at its end has no dense layer before it";
+            let reason = "the scaling or shift at its end follows no dense layer";
             return Err(OnnxError::Model(reason.to_owned()));
         }
         let Some(first) = self.dense.first() else {
@@ -175,6 +181,6 @@ fn normalisation(columns: &[(f64, f64)]) -> Result<Normalisation, String> {
     if offsets.iter().chain(scales).all(|value| value.is_finite()) {
         Ok(normalisation)
     } else {
-        Err("before it an input is scaled by zero or by no finite number".to_owned())
+        Err("the scaling or shift of an input before it is zero or not finite".to_owned())
     }
 }

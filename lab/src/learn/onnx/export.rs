@@ -46,7 +46,7 @@ pub fn export(
         match layer {
             Layer::Dense { outputs } => {
                 let (Some(weight), Some(bias)) = (parameters.next(), parameters.next()) else {
-                    return Err(refused("it has no weights"));
+                    return Err(refused("the dense layer has no weights"));
                 };
                 let name = format!("dense_{index}");
                 let shape = [outputs, weight.columns()];
@@ -66,14 +66,14 @@ pub fn export(
             Layer::Tanh => chain.add(format!("tanh_{index}"), "Tanh", Vec::new(), Vec::new()),
             Layer::BatchNorm => {
                 return Err(refused(
-                    "batch normalisation with no dense layer before or behind it",
+                    "batch normalisation needs a dense layer before or after it",
                 ));
             }
-            Layer::Dropout { .. } => return Err(refused("dropout that is not left out")),
+            Layer::Dropout { .. } => return Err(refused("dropout is for training only")),
         }
     }
     let Some(last) = chain.nodes.last_mut() else {
-        let reason = "there is none";
+        let reason = "the network has no layers";
         return Err(OnnxError::Layer { index: 0, reason });
     };
     last.output = vec![OUTPUT.to_owned()];

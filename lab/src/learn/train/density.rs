@@ -9,7 +9,7 @@
 //! d/dmu = -L w,   d/dl_i = w_i (y - mu)_i L_ii - 1,   d/dL_ij = w_j (y - mu)_i
 //! ```
 //!
-//! The network puts out the factor of the precision, not of the covariance, so that nothing is divided.
+//! The outputs hold the factor of the precision, not of the covariance, which avoids divisions.
 //! Reference: P. M. Williams, "Using neural networks to model conditional multivariate densities", Neural
 //! Computation 8 (1996).
 

@@ -11,13 +11,13 @@
 //! | shifted softmax      | `-ln p_T`, `p_i ~ exp(gamma_iT (a_i - min_j a_j))`                    |
 //! | cost-augmented       | `-ln p_T`, `p_i ~ exp(a_i + m J_iT)`                                  |
 //! | expected cost        | `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`             |
-//! | Gaussian             | `-ln N(y)` of the mean and the precision that the network puts out    |
+//! | Gaussian             | `-ln N(y)`, the outputs of the network give mean and precision        |
 //! | cost-aware Gaussian  | `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)`                   |
 //!
-//! **The paper's loss has only a degenerate optimum.** `gamma_TT = 1` is the smallest gamma, so adding
-//! a constant `-s` to all outputs, whatever the inputs, divides every `p_i / p_T` by `exp((gamma_iT -
-//! 1) s)`: the loss falls to zero and nothing is learnt. The shifted softmax cannot fall like that, and
-//! equals the paper's if the least output is zero.
+//! **The paper's loss has only a degenerate optimum.** `gamma_TT = 1` is the smallest gamma. A constant
+//! `-s` added to all outputs therefore divides every `p_i / p_T` by `exp((gamma_iT - 1) s)`: the loss
+//! falls to zero without learning anything from the inputs. The shifted softmax does not change with
+//! `s`, and equals the paper's softmax if the least output is zero.
 //!
 //! The cost-aware Gaussian adds the cost of the controller made for its mean `mu`: `g . (mu - y)` to
 //! first order, with `g` the derivatives of the cost by errors of `y`. A cost above `c` counts

@@ -135,7 +135,7 @@ impl TrueProcess {
         deterioration(controller, &self.process, &self.best)
     }
 
-    /// The minimised cost, see the [module](self); infinite if unstable.
+    /// The cost that the choice of a class minimises; infinite if unstable.
     #[must_use]
     pub fn cost(&self, controller: Pd) -> f64 {
         let Some(cost) = ise(&self.process, controller) else {

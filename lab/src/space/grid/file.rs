@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! { "format", "program",           what wrote it
-//!   "settings": { .. },            what it was laid for
-//!   "check": { .. } or null,       what random processes cost, if any were drawn
-//!   "members": [ { .. }, .. ],     one a line
-//!   "matrix": [ [ .. ], .. ] }     row i, column j: J_ij, or null in place of them all
+//!   "settings": { .. },            settings that the grid was made for
+//!   "check": { .. } or null,       costs on random processes
+//!   "members": [ { .. }, .. ],     one member per line
+//!   "matrix": [ [ .. ], .. ] }     row i, column j: J_ij; or null without matrix
 //! ```
 //!
 //! The reader trusts nothing: it checks sizes, ranges, the box and the angles, and computes a sample of
@@ -197,7 +197,7 @@ impl MemberRecord {
         ] {
             if !agree(found, expected) {
                 return Err(format!(
-                    "{name} is {found}, but of these times it is {expected}: make the grid again"
+                    "{name} is {found}, but these times give {expected}: make the grid again"
                 ));
             }
         }
@@ -219,15 +219,18 @@ impl MemberRecord {
             || !agree(self.theta_rad, direction.theta_rad)
             || !agree(self.phi_rad, direction.phi_rad)
         {
-            return Some("its angles and radius are not those of its times".to_owned());
+            return Some("its angles and radius do not match its times".to_owned());
         }
         let has_place = self.place().is_some_and(|place| place.alpha > 1.0);
         let has_none = [self.row, self.ray, self.rung] == [None; 3] && self.alpha.is_none();
         match settings.layout {
-            Layout::Rays if !has_place && !has_none => {
-                Some("row, ray, rung and an alpha above one belong together".to_owned())
+            Layout::Rays if !has_place && !has_none => Some(
+                "row, ray, rung and an alpha above 1 must be given together or not at all"
+                    .to_owned(),
+            ),
+            Layout::Fewest if !has_none => {
+                Some("a grid of this layout must not name row, ray, rung or alpha".to_owned())
             }
-            Layout::Fewest if !has_none => Some("this layout has no rows".to_owned()),
             _ => None,
         }
     }
@@ -327,7 +330,7 @@ impl GridFile {
                     .is_none_or(|order| order.is_gt())
             {
                 return Err(FileError::Matrix(format!(
-                    "row {i}, column {j} is {found}, but of these members it is {expected}"
+                    "row {i}, column {j} is {found}, but these members give {expected}"
                 )));
             }
         }
