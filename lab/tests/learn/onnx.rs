@@ -380,24 +380,27 @@ fn what_cannot_be_read_is_named() {
         ),
         (with(unnamed), "node number 1, Softmax: "),
         (with(foreign), "com.example"),
-        (with(node("Relu", &["x"], "y")), "takes x and not a"),
-        (with(node("Relu", &["a"], "z")), "output y is not"),
+        (with(node("Relu", &["x"], "y")), "its input is x, not a"),
+        (
+            with(node("Relu", &["a"], "z")),
+            "output y is not the output of its last node",
+        ),
         (with(node("Add", &["a", "x"], "y")), "must be a constant"),
-        (with(node("Add", &["a", "w"], "y")), "not that of a row"),
-        (with(node("Div", &["s", "a"], "y")), "divides a constant"),
+        (with(node("Add", &["a", "w"], "y")), "must be a row"),
+        (
+            with(node("Div", &["s", "a"], "y")),
+            "division of a constant",
+        ),
         (
             with(node("MatMul", &["a", "r"], "y")),
             "takes 1 inputs, but the layer before it has 3 outputs",
         ),
-        (
-            with(node("MatMul", &["a", "n"], "y")),
-            "not that of a matrix",
-        ),
+        (with(node("MatMul", &["a", "n"], "y")), "must be a matrix"),
         (with(node("MatMul", &["w", "a"], "y")), "must be a constant"),
         (with(learning), "eval()"),
-        (refused(&[transposed]), "transposes"),
+        (refused(&[transposed]), "transA is not supported"),
         (refused(&[node("Relu", &["x"], "y")]), "no dense layer"),
-        (refused(&[]), "output y is not"),
+        (refused(&[]), "output y is not the output of its last node"),
     ] {
         assert!(sentence.contains(words), "{words}: {sentence}");
         assert!(!sentence.contains('\n'), "{sentence}");
@@ -405,7 +408,7 @@ fn what_cannot_be_read_is_named() {
 }
 
 #[test]
-fn tensors_that_are_none_are_named() {
+fn malformed_tensors_are_named() {
     let spoilt = |spoil: fn(&mut Tensor)| {
         let mut model = model(&[node("MatMul", &["x", "w"], "y")]);
         spoil(&mut model.graph.as_mut().unwrap().initializer[0]);
@@ -413,19 +416,19 @@ fn tensors_that_are_none_are_named() {
     };
     for (sentence, words) in [
         (spoilt(|w| w.data_location = 1), "external_data=False"),
-        (spoilt(|w| w.data_type = 11), "not of f32"),
+        (spoilt(|w| w.data_type = 11), "must hold f32"),
         (spoilt(|w| w.dims = vec![2, 4]), "6 numbers"),
         (spoilt(|w| w.dims = vec![-2, 3]), "6 numbers"),
         (spoilt(|w| w.dims = vec![i64::MAX, i64::MAX]), "6 numbers"),
         (spoilt(|w| w.dims = vec![0, 3]), "6 numbers"),
-        (spoilt(|w| w.float_data[2] = f32::NAN), "holds NaN"),
+        (spoilt(|w| w.float_data[2] = f32::NAN), "must not hold NaN"),
     ] {
         assert!(sentence.contains(words), "{words}: {sentence}");
     }
 }
 
 #[test]
-fn files_that_are_none_are_refused() {
+fn malformed_files_are_refused() {
     let bytes = model(&[node("MatMul", &["x", "w"], "y")]).encode_to_vec();
     assert!(import(&bytes).is_ok());
     for bytes in [

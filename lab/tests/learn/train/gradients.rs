@@ -357,7 +357,7 @@ fn what_does_not_fit_is_named() {
         ),
         (
             error(Loss::CrossEntropy, |b| b.weights = vec![1.0]),
-            "the number of weights of the samples must be 5, but is 1",
+            "the number of weights of samples must be 5, but is 1",
         ),
         (
             error(softmax, |b| b.costs = Matrix::default()),
