@@ -36,9 +36,7 @@ pub(crate) fn name(loss: &Loss) -> &'static str {
         Loss::ShiftedSoftmax { .. } => "modified softmax, shifted",
         Loss::CostAugmented { .. } => "cost-augmented softmax",
         Loss::ExpectedCost { .. } => "expected cost",
-        Loss::Gaussian { .. } | Loss::CostAwareGaussian { .. } | Loss::GaussianMixture { .. } => {
-            "density"
-        }
+        Loss::Gaussian { .. } | Loss::CostAwareGaussian { .. } => "density",
     }
 }
 
