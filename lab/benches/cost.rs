@@ -1,4 +1,4 @@
-//! One cost, one set of margins, one optimum, searched and from a table, one step response.
+//! One cost, one set of margins, one optimum (by search and from a table), one step response.
 
 use divan::{Bencher, black_box};
 use onecycle_design::soiptd_pd::cost::ise;
@@ -9,7 +9,8 @@ use onecycle_lab::learn::lead_table::{POINTS, build};
 use onecycle_onboard::gains::LeadTable;
 use onecycle_onboard::{Pd, Soiptd};
 
-/// The paper's hover process and, with its floor inactive, a process that is mostly dead time.
+/// The paper's hover process, and a process dominated by its dead time, whose optimum lies above the
+/// least margin.
 const HOVER: (f64, f64, f64) = (0.0321, 1.6886, 0.0237);
 const DELAYED: (f64, f64, f64) = (0.015, 0.2, 0.1);
 
@@ -55,7 +56,7 @@ fn optimum_above_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
     bencher.bench(|| pd(black_box(&process), PHASE_MARGIN_RAD));
 }
 
-/// From a table, as on board.
+/// From a table, as on the board.
 #[divan::bench(args = [HOVER, DELAYED])]
 fn tabled_at_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
     let numbers = build(PHASE_MARGIN_RAD, POINTS).expect("20 deg is a margin");
@@ -64,7 +65,7 @@ fn tabled_at_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
     bencher.bench(|| table.pd_at_phase_margin(black_box(&process)));
 }
 
-/// From a table, as on board.
+/// From a table, as on the board.
 #[divan::bench(args = [HOVER, DELAYED])]
 fn tabled_above_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
     let numbers = build(PHASE_MARGIN_RAD, POINTS).expect("20 deg is a margin");

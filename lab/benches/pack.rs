@@ -1,4 +1,4 @@
-//! What a board does with one cycle, by the pack that is built in: outputs of the network, the whole
+//! Work of a board on one cycle with the built-in pack: outputs of the network, the whole
 //! classification, gains from the table; and reading the pack.
 
 use divan::{Bencher, black_box};
@@ -14,7 +14,7 @@ fn pack() -> Pack<'static> {
     Pack::embedded().expect("a pack is built in")
 }
 
-/// A cycle that the pack tests itself with, its period 1 s.
+/// A cycle of the pack's self-test, with a period of 1 s.
 fn signature() -> Signature {
     let (values, _) = pack()
         .self_tests()

@@ -1,4 +1,5 @@
-//! Samples a second in training: the paper's classifier and a small density, on one and two threads.
+//! Samples per second in training: the paper's classifier and a small density network, on one and two
+//! threads.
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -43,7 +44,7 @@ fn paper() -> (Network, Loss) {
     (network(4520, &layers), Loss::ShiftedSoftmax { cap: 0.2 })
 }
 
-/// 66-32-32-9: features of a cycle to a Gaussian of three times.
+/// 66-32-32-9: from features of a cycle to a Gaussian over three times.
 fn small() -> (Network, Loss) {
     let mut layers = Vec::new();
     for outputs in [32, 32] {
@@ -119,7 +120,7 @@ fn small_network_adam(bencher: Bencher, threads: usize) {
     steps(bencher, small(), OptimizerMethod::ADAM, threads);
 }
 
-/// The paper's classifier at work on one sample.
+/// The paper's classifier evaluates one sample.
 #[divan::bench(args = [1, BATCH], sample_count = 20)]
 fn paper_network_evaluates(bencher: Bencher, samples: usize) {
     let (network, _) = paper();

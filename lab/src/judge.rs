@@ -1,4 +1,4 @@
-//! Evaluation: methods on the same experiments, scored.
+//! Evaluation: every method runs on the same experiments and gets a score.
 
 pub mod baselines;
 pub mod calibrate;

@@ -1,4 +1,16 @@
-//! Research behind onecycle: how the identifier is made and judged. Nothing that ships depends on it.
+//! Research behind onecycle: training and evaluation of the identifier. Nothing that ships depends on
+//! this crate.
+//!
+//! A room may use the rooms above it in this table, never those below.
+//!
+//! | room            | what it holds                                                          |
+//! |-----------------|------------------------------------------------------------------------|
+//! | [`workers`]     | threads of the caller                                                  |
+//! | [`space`]       | spaces of processes: phase of the relay, grid, certificate             |
+//! | [`experiments`] | random relay experiments: draw, run, cut                               |
+//! | [`judge`]       | evaluation: baselines, benchmark scores, out-of-family processes       |
+//! | [`learn`]       | training: datasets, networks, the shipped pack                         |
+//! | [`paper`]       | the classifier of the paper; no other room uses it                     |
 
 pub mod experiments;
 pub mod judge;

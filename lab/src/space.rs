@@ -1,12 +1,12 @@
-//! A space of processes, and what is asked of their controllers: what phase, grid and certificate
-//! are about (the paper's equations 3 and 11; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//! A space of processes with the requirements on their controllers; phase, grid and certificate are
+//! computed for a space (the paper's equations 3 and 11; Ayyad, Chehadeh, Awad, Zweiri 2020).
 //!
 //! ```toml
 //! t_prop_s = [0.015, 0.3]
 //! t_body_s = [0.2, 2.0]
 //! tau_s = [0.0005, 0.1]
-//! phase_margin_deg = 20.0   # the least one, 20 where it is left out
-//! beta = -0.73              # of the relay, -0.73 where it is left out
+//! phase_margin_deg = 20.0   # least phase margin; default 20
+//! beta = -0.73              # parameter of the relay; default -0.73
 //! ```
 
 pub mod candidate;
@@ -43,7 +43,7 @@ pub struct Space {
     pub beta: f64,
 }
 
-/// A third value is one too many, which a tuple would let pass.
+/// Exactly two values; a tuple would accept a third.
 pub(crate) fn two_times<'de, D: serde::Deserializer<'de>>(file: D) -> Result<Range, D::Error> {
     let values: Vec<f64> = serde::Deserialize::deserialize(file)?;
     match values[..] {
@@ -67,15 +67,15 @@ fn paper_beta() -> f64 {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("{field} must be {range}, but is {value:?}")]
 pub struct FieldError {
-    /// Its name in the file.
+    /// Name of the field in the file.
     pub field: &'static str,
-    /// What it may be.
+    /// Allowed values.
     pub range: &'static str,
-    /// What it is.
+    /// Value of the field.
     pub value: f64,
 }
 
-/// The first of these checks that fails: a field, what it may be, what it is, whether that is right.
+/// Returns the first check that fails: a field, its allowed values, its value, and whether it is right.
 pub(crate) fn first_out_of_range(
     checks: impl IntoIterator<Item = (&'static str, &'static str, f64, bool)>,
 ) -> Result<(), FieldError> {
@@ -91,8 +91,8 @@ pub(crate) fn first_out_of_range(
     Ok(())
 }
 
-/// Shortest and longest time of a process (s): from electronics to the climate, and far enough
-/// from the limits of `f64` for any power that a formula takes.
+/// Shortest and longest time of a process (s): from electronics to the climate, and far from the limits
+/// of `f64` for any power in a formula.
 const TIMES_S: Range = (1e-9, 1e9);
 
 impl Space {
@@ -165,7 +165,7 @@ impl Space {
         [self.t_prop_s, self.t_body_s, self.tau_s]
     }
 
-    /// `T_prop`, `T_body` and `tau` (s) uniform in the box.
+    /// Random `T_prop`, `T_body` and `tau` (s), uniform in the box.
     pub fn random(&self, rng: &mut impl Rng) -> [f64; 3] {
         self.ranges_s()
             .map(|(low, high)| rng.random_range(low..=high))
@@ -201,7 +201,7 @@ mod tests {
         }
     }
 
-    // A box without extent in one direction is a box, and its random processes lie in it.
+    // A box may have no extent in one direction; its random processes lie in it.
     #[test]
     fn random_processes_lie_in_the_box() {
         let space = Space {

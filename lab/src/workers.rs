@@ -1,7 +1,7 @@
-//! Threads, as the caller has them: this crate starts none.
+//! Threads of the caller; this crate starts none.
 //!
-//! Work is cut into parts that do not depend on each other. A caller runs them on as many threads as it
-//! likes; results do not depend on their number.
+//! Work is cut into parts that do not depend on each other. The caller runs them on any number
+//! of threads; results do not depend on that number.
 
 use std::sync::{Mutex, PoisonError};
 

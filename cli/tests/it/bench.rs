@@ -423,7 +423,7 @@ fn wrong_answers_are_refused() {
         ("experiment,kp,kd\n1,2,NaN\n", ["line 2", "kd is 'NaN'"]),
         (
             "experiment,kp,kd\n1,2,3\n1,2,3\n",
-            ["line 3", "a row already"],
+            ["line 3", "already has a row"],
         ),
         (
             "experiment,kp,kd\n1,2,3\n5,2,3\n",

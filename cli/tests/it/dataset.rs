@@ -336,9 +336,9 @@ fn folders_of_something_else() {
 
     let manifest = folder.path("into").join("manifest.json");
     for (text, words) in [
-        ("{", "not one of a dataset"),
+        ("{", "not the manifest of a dataset"),
         ("{\"format\": \"onecycle.dataset/9\"}", "onecycle.dataset/9"),
-        ("[1, 2]", "not one of a dataset"),
+        ("[1, 2]", "not the manifest of a dataset"),
     ] {
         std::fs::write(&manifest, text).unwrap();
         of(&["--into", &into]).refused(UNREADABLE, &["manifest.json", words]);

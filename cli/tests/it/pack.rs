@@ -332,8 +332,8 @@ fn networks_that_do_not_fit_are_refused() {
     let onnx_of = |network: &Network| onnx::export(network, None, &[]).unwrap();
     let narrow = Network::zeros(5, &[Layer::Dense { outputs: OUTPUTS }]).unwrap();
     for (name, bytes, words) in [
-        ("a.txt", &b"text"[..], "no ONNX model"),
-        ("a.onnx", &bytes, "no ONNX model"),
+        ("a.txt", &b"text"[..], "not an ONNX model"),
+        ("a.onnx", &bytes, "not an ONNX model"),
         (
             "b.onnx",
             &onnx_of(&network(9, 13, 1)),

@@ -34,10 +34,10 @@ pub enum ExperimentError {
     #[error("{0} is out of range: {1}")]
     Setting(&'static str, f64),
     /// The describing function has no oscillation at the phase of this relay.
-    #[error("the process has no oscillation at this phase")]
+    #[error("the process does not oscillate at this phase")]
     NoOscillation,
     /// The relay made fewer cycles than a recording keeps.
-    #[error("the relay has made only {0} cycles")]
+    #[error("the relay made only {0} cycles")]
     TooFewCycles(usize),
 }
 

@@ -1,23 +1,23 @@
-//! Recipes: which processes, how often each kind, under which disturbances.
+//! Recipes: which processes are drawn, how often, and under which bias and noise.
 //!
 //! ```toml
-//! seed = 1        # of the first example, 1 where it is left out
-//! bias = 0.5      # up to this part of the relay's amplitude
-//! sigma = 0.03    # noise, up to this part of the amplitude of the oscillation
+//! seed = 1        # seed of the first example; default 1
+//! bias = 0.5      # largest bias, over the relay's amplitude
+//! sigma = 0.03    # largest noise, over the amplitude of the oscillation
 //! trim = true     # whether the relay follows the bias
 //!
 //! [[families]]
 //! samples_per_period = [89, 2306]
 //! space = { t_prop_s = [0.015, 0.3], t_body_s = [0.2, 2.0], tau_s = [0.0005, 0.1] }
 //!
-//! [[families]]    # as many as there are kinds of processes
-//! weight = 0.5    # half as often as one of weight 1
+//! [[families]]    # one table for each kind of process
+//! weight = 0.5    # drawn half as often as a family of weight 1
 //! draw = "logarithmic"
 //! samples_per_period = [40, 2500]
 //! space = { t_prop_s = [0.005, 0.12], t_body_s = [20, 2000], tau_s = [0.008, 0.05] }
 //! ```
 //!
-//! What is left out is the paper's; an empty file is a recipe.
+//! Fields that are left out have the paper's values; an empty file is a valid recipe.
 
 use onecycle_onboard::{Soiptd, SoiptdError};
 use rand::{Rng, RngExt};
@@ -31,19 +31,19 @@ pub enum Draw {
     /// Uniform.
     #[default]
     Uniform,
-    /// Uniform in their logarithms: for times of several powers of ten.
+    /// Uniform in their logarithms, for times that span several powers of ten.
     Logarithmic,
 }
 
-/// One kind of processes.
+/// A family of processes.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Family {
-    /// Where they are drawn from, the relay, and the margin of their controllers.
+    /// Space that the processes are drawn from, with the relay and the phase margin of the controllers.
     pub space: Space,
-    /// How they are drawn.
+    /// Distribution of the times.
     pub draw: Draw,
-    /// How often, beside the other families.
+    /// Relative frequency among the families.
     pub weight: f64,
     /// Samples in a period of the noise-free oscillation, uniform in logarithms.
     #[serde(deserialize_with = "two_times")]
@@ -63,8 +63,8 @@ impl Default for Family {
 }
 
 impl Family {
-    /// Multirotors of other people's simulators: nearly double integrators behind a fast motor, down to
-    /// 40 samples a period. A body that takes 2000 s is as good as one without damping.
+    /// Multirotors as published simulators have them: nearly double integrators behind a fast motor,
+    /// with 40 samples a period and more. A body time constant of 2000 s is practically no damping.
     pub const NEAR_DOUBLE_INTEGRATORS: Self = Self {
         space: Space {
             t_prop_s: (0.005, 0.12),
@@ -96,14 +96,14 @@ impl Family {
             ),
             (
                 "tau_s",
-                "positive, for there is no logarithm of zero",
+                "positive if the draw is logarithmic (the logarithm of zero is not finite)",
                 least_tau_s,
                 self.draw == Draw::Uniform || least_tau_s > 0.0,
             ),
         ])
     }
 
-    /// A random process, its velocity gain one.
+    /// A random process with a velocity gain of one.
     pub(crate) fn process(&self, rng: &mut impl Rng) -> Result<Soiptd, SoiptdError> {
         let [t_prop_s, t_body_s, tau_s] = match self.draw {
             Draw::Uniform => self.space.random(rng),
@@ -112,7 +112,7 @@ impl Family {
         Soiptd::new(1.0, t_prop_s, t_body_s, tau_s)
     }
 
-    /// Samples in a period of a random experiment.
+    /// Samples per period of a random experiment.
     pub(crate) fn samples(&self, rng: &mut impl Rng) -> f64 {
         between(self.samples_per_period, rng)
     }
@@ -123,19 +123,20 @@ fn between((low, high): Range, rng: &mut impl Rng) -> f64 {
     low * (high / low).powf(rng.random_range(0.0..=1.0))
 }
 
-/// How examples are made. See the [module](self).
+/// How experiments are drawn. See the [module](self).
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct Recipe {
-    /// Seed of the first example; the others follow.
+    /// Seed of the first experiment; experiment `n` has seed `seed + n`.
     pub seed: u64,
     /// Input bias, uniform between plus and minus this part of the relay's amplitude.
     pub bias: f64,
     /// Noise of a sample, uniform up to this part of the amplitude of the noise-free oscillation.
     pub sigma: f64,
-    /// Whether the relay follows the bias.
+    /// Whether the relay trims the bias away.
     pub trim: bool,
-    /// Kinds of processes; one is usual. Last, for a file has its tables at its end.
+    /// Families of processes, usually one. The last field, because a TOML file has its tables at the
+    /// end.
     pub families: Vec<Family>,
 }
 
@@ -155,15 +156,15 @@ impl Default for Recipe {
 /// What is wrong with a recipe.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RecipeError {
-    /// A field of all experiments.
+    /// A field of the recipe itself.
     #[error("{0}")]
     Field(#[from] FieldError),
     /// A field of a family.
     #[error("family {number}: {reason}")]
     Family {
-        /// Its number, from one.
+        /// Number of the family, from one.
         number: usize,
-        /// The field.
+        /// The field and its value.
         reason: FieldError,
     },
 }
@@ -215,7 +216,7 @@ impl Recipe {
             left -= family.weight;
             left < 0.0
         };
-        // Rounding may leave nothing for the last one.
+        // Rounding may leave a remainder after the last family.
         (self.families.iter().position(is_it)).unwrap_or(self.families.len().saturating_sub(1))
     }
 }

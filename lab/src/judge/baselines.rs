@@ -1,17 +1,17 @@
-//! The rivals: what others would do with the same experiment, each as good as it can be made.
+//! Baselines: published methods run on the same experiments, each tuned as well as possible.
 //!
 //! | module         | method                                        | what it needs                    |
 //! |----------------|-----------------------------------------------|----------------------------------|
-//! | [`pem`]        | prediction error, output error by SQP         | any recording from rest or steady |
+//! | [`pem`]        | prediction error, output error by SQP         | any recording that starts at rest or in a steady state |
 //! | [`rules`]      | homogeneous tuning rules                      | a cycle at the rule's `beta`     |
-//! | [`arx`]        | recursive least squares on ARX(2,2), as PX4's | any lively recording             |
-//! | [`gmvc`]       | PX4's gains for that model                    | the same                         |
-//! | [`asymmetric`] | asymmetric relay, integrator with dead time   | that relay's recording           |
+//! | [`arx`]        | recursive least squares on ARX(2,2), as in PX4 | any recording with enough excitation |
+//! | [`gmvc`]       | PX4's gains for that model                    | the same recording as [`arx`]    |
+//! | [`asymmetric`] | asymmetric relay, integrator with dead time   | a recording of that relay        |
 //!
-//! All read a recording as [`Signals`], one sample a point and at an even period, and return a
-//! [`BaselineAnswer`]: the controller they lead to and the process behind it, or the reason why there is none.
-//! Where there is a process the controller is its PD of least exact ISE at the phase margin asked for,
-//! so that identifiers are compared and nothing else. Only [`gmvc`] makes the controller that flies.
+//! All read a recording as [`Signals`], one sample per point at an even period, and return a
+//! [`BaselineAnswer`]: a controller and the process behind it, or a [`BaselineError`]. From a process
+//! the controller is always the PD of least exact ISE at the requested phase margin, so that only the
+//! identification is compared. Only [`gmvc`] returns the gains of its own method.
 //!
 //! ```
 //! use onecycle_lab::judge::baselines::{pem, rules};
@@ -45,37 +45,37 @@ use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 use onecycle_design::soiptd_pd::optimum::{OptimumError, pd_at_phase_margin};
 use onecycle_identify::{Oscillation, Signals, Verdict, find_oscillation};
 
-/// What a rival makes of a recording.
+/// Result of a baseline on a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BaselineAnswer {
-    /// The process it identifies; `None` for a rule that goes straight to the controller.
+    /// The identified process; `None` for a rule that leads directly to a controller.
     pub process: Option<Soiptd>,
-    /// The controller it leads to.
+    /// The resulting controller.
     pub pd: Pd,
 }
 
-/// Why a rival has no answer.
+/// Why a baseline has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BaselineError {
-    /// There is no steady oscillation where one is needed.
+    /// The method needs a steady oscillation and there is none.
     #[error("{0}")]
     NoOscillation(Verdict),
-    /// The columns differ in length, points are averages, or they do not lie at an even period.
+    /// The columns differ in length, points are averages, or the samples are not at an even period.
     #[error("the recording must hold single samples at an even period, without gaps")]
     Uneven,
     /// There are too few samples for the method.
     #[error("{samples} samples are too few for this method")]
     TooShort {
-        /// Samples that there are.
+        /// Number of samples.
         samples: usize,
     },
     /// A setting is out of its range: its name and value.
     #[error("{0} is out of range: {1}")]
     Setting(&'static str, f64),
-    /// What was found is no process of this kind: why.
-    #[error("the model found is no integrating process with lags: {0}")]
+    /// The model found is not such a process: the reason.
+    #[error("the model found is not an integrating process with lags: {0}")]
     NotThisProcess(&'static str),
-    /// The parameters found are out of their physical range.
+    /// The parameters found are outside their physical range.
     #[error("{0}")]
     Process(#[from] SoiptdError),
     /// The process found has no optimal controller.
@@ -93,11 +93,11 @@ impl BaselineAnswer {
     }
 }
 
-/// Stamps may stray from the even grid by this part of the sample period: what rounding in a file
-/// leaves, far below what moves a fit.
+/// Largest deviation of a time stamp from the even grid, in sample periods: what rounding in a file
+/// causes, and far below what changes a fit.
 const EVEN: f64 = 0.01;
 
-/// Checks that the recording is what every rival reads.
+/// Checks that the recording is what every baseline reads.
 fn check_even(signals: &Signals<'_>) -> Result<(), BaselineError> {
     let samples = signals.time_s.len();
     let is_single = signals.samples_per_point == 1 && signals.breaks.is_empty();

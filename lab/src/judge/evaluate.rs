@@ -1,4 +1,4 @@
-//! The judge: every method on the same experiments, scored by what its controller costs.
+//! Evaluation: every method on the same experiments, scored by the cost of its controller.
 //!
 //! ```text
 //! J      = (ISE of the controller on the true process - J*) / J*           exact, see deterioration
@@ -7,12 +7,13 @@
 //!          a J below zero at a margin of 20 degrees or more being 0
 //! ```
 //!
-//! An answer is a process, which gets its PD of least ISE at the same margin, or gains: of a PD, or of a
-//! cascade with a PID of the rate ([`Cascade`]), which may cost less than the best PD. Unstable loops
-//! and missing answers have no `J`: they are counted apart, and mean, median, percentiles, worst and the
-//! least phase margin are over the stable loops. Alone these could be bettered by refusing the hard
-//! experiments; the score cannot: a refusal costs as much as anything can. `|J|`, for less margin than
-//! asked for may buy a cost below `J*`, which is no merit. No PD has one at the full margin; a cascade may.
+//! An answer is a process, for which the PD of least ISE at the same margin is designed, or gains: of a
+//! PD, or of a cascade with a PID of the rate ([`Cascade`]), which may cost less than the best PD.
+//! Unstable loops and missing answers have no `J` and are counted separately; mean, median,
+//! percentiles, worst and least phase margin are over the stable loops. A method could improve those by
+//! refusing hard experiments, but not its score: a refusal counts as the highest cost. The score uses
+//! `|J|`, because a cost below `J*` can be bought with less margin than required, which is no merit. At
+//! the full margin no PD costs less than `J*`; a cascade may.
 //!
 //! | module         | what it holds                                                            |
 //! |----------------|--------------------------------------------------------------------------|
@@ -20,8 +21,8 @@
 //! | [`summary`]    | many verdicts in a row of numbers                                        |
 //! | [`files`]      | truth, answers and results as CSV                                        |
 //!
-//! Times are taken from a clock that the caller hands in, the program's is the processor time of the thread;
-//! nothing else depends on it.
+//! Times are read from a clock that the caller passes in (the program passes the processor time of the
+//! thread). Nothing else depends on it.
 //!
 //! ```
 //! use onecycle_lab::judge::evaluate::{Answer, Judge};
@@ -58,12 +59,12 @@ use crate::experiments::{ExperimentError, Truth};
 /// Least phase margin of all controllers (degrees): the paper's.
 pub const PHASE_MARGIN_DEG: f64 = 20.0;
 
-/// What a method makes of an experiment.
+/// Answer of a method to an experiment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Answer {
-    /// The process it identifies; `None` where it goes straight to gains.
+    /// The identified process; `None` for a method that leads directly to gains.
     pub process: Option<Soiptd>,
-    /// The controller it leads to.
+    /// The resulting controller.
     pub feedback: Feedback,
 }
 
@@ -101,7 +102,7 @@ impl Answer {
         })
     }
 
-    /// Gains and nothing else.
+    /// An answer of gains alone.
     #[must_use]
     pub fn of_gains(gains: impl Into<Feedback>) -> Self {
         Self {
@@ -111,18 +112,19 @@ impl Answer {
     }
 }
 
-/// The process with its lags in order, the shorter one first: they may be swapped without any change
-/// of the response.
+/// The process with its lags in order, the shorter one first. Swapping the lags does not change the
+/// response.
 ///
 /// # Errors
-/// [`SoiptdError`] where rounding makes it none: not for a process within reach of a relay.
+/// [`SoiptdError`] if rounding takes the parameters out of range; never for a process that a relay can
+/// excite.
 pub fn in_order(process: &Soiptd) -> Result<Soiptd, SoiptdError> {
     let (sum, ratio) = process.pole_sum();
     let unit = Soiptd::from_pole_sum(1.0, sum, ratio, process.tau_s())?;
     unit.with_gain_scaled(process.jerk_gain() * unit.t_prop_s())
 }
 
-/// What answers are held against: a true process and its optimum.
+/// Reference for answers: a true process and its optimum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judge {
     truth: Soiptd,
@@ -130,7 +132,7 @@ pub struct Judge {
 }
 
 impl Judge {
-    /// The judge of answers to this process.
+    /// The reference for answers to this process.
     ///
     /// # Errors
     /// [`OptimumError`] for a process too extreme to have an optimum.
@@ -141,7 +143,7 @@ impl Judge {
         })
     }
 
-    /// What a controller costs on the true process.
+    /// Cost of a controller on the true process.
     #[must_use]
     pub fn deterioration(&self, controller: impl Into<Feedback>) -> Deterioration {
         let cascade = match controller.into() {
@@ -154,7 +156,7 @@ impl Judge {
         })
     }
 
-    /// The verdict on an answer to an experiment, or on why there is none.
+    /// Record of an answer to an experiment, or of the reason why there is none.
     #[must_use]
     pub fn record(&self, experiment: u64, method: &str, answer: Result<Answer, String>) -> Record {
         let mut record = Record {
@@ -208,32 +210,32 @@ fn errors(found: &Soiptd, truth: &Soiptd) -> Option<[f64; 3]> {
     ])
 }
 
-/// How an answer fares.
+/// Outcome of an answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LoopOutcome {
-    /// Its loop is stable.
+    /// The loop is stable.
     Stable,
-    /// Its loop is unstable.
+    /// The loop is unstable.
     Unstable,
-    /// There is none.
+    /// There is no answer.
     NoAnswer,
 }
 
-/// The verdict on a method in an experiment: a row of the results.
+/// Record of a method in an experiment: a row of the results.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Record {
     /// Number of the experiment.
     pub experiment: u64,
     /// Name of the method.
     pub method: String,
-    /// How its answer fares.
+    /// Outcome of the answer.
     pub outcome: LoopOutcome,
-    /// `J`, where the loop is stable.
+    /// `J`, if the loop is stable.
     pub deterioration: Option<f64>,
-    /// Phase margin on the true process (degrees), where the loop is stable.
+    /// Phase margin on the true process (degrees), if the loop is stable.
     pub phase_margin_deg: Option<f64>,
-    /// Error of `K/T_body` over its true value, where there is a process.
+    /// Error of `K/T_body` over its true value, if there is a process.
     pub k_over_t_body_error: Option<f64>,
     /// Error of `T_prop` over its true value.
     pub t_prop_error: Option<f64>,
@@ -241,12 +243,13 @@ pub struct Record {
     pub tau_error_s: Option<f64>,
     /// Why there is no answer.
     pub reason: Option<String>,
-    /// Time of the clock that the method took (s), where it was taken; the one number that no seed fixes.
+    /// Time that the method took (s), if it was measured; the only number that depends on more than the
+    /// seed.
     pub seconds: Option<f64>,
 }
 
 impl Record {
-    /// What the controller costs; `None` without an answer.
+    /// Cost of the controller; `None` without an answer.
     #[must_use]
     pub fn judged(&self) -> Option<Deterioration> {
         match (self.outcome, self.deterioration, self.phase_margin_deg) {

@@ -1,27 +1,27 @@
-//! Relay experiments to learn from: random processes of a space, the signature of one steady cycle
-//! of each, and what a network is to read off it.
+//! Training examples: the signature of one steady cycle of a relay experiment on a random process,
+//! and the target values of a network.
 //!
-//! The experiment is that of the board: its relay with noise protection and trim, the exact process,
-//! noise and bias. Example `n` of a [`Recipe`] is the same whatever else is made. What is learnt has no
-//! unit and no time scale (section III-C of the paper learns classes; Ayyad, Chehadeh, Awad, Zweiri
-//! 2020): with `T` the period, `a` the amplitude of the signature and `p1`, `p2` the poles,
+//! The experiment uses the relay of the board with noise protection and trim, the exact process, noise
+//! and bias. Example `n` of a [`Recipe`] does not depend on what else is made. The values have no unit
+//! and no time scale (section III-C of the paper learns classes; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//! With `T` the period, `a` the amplitude of the signature and `p1`, `p2` the poles,
 //!
 //! ```text
 //! values = ln((p1 + p2) T),   p1 p2 / (p1 + p2)^2,   tau / T,   ln(a / (K p1 p2 T^3))
 //! ```
 //!
-//! These are the estimator's own coordinates, regular for equal lags and for double integrators: none
-//! says which pole is the actuator's. The fourth gives the gain, `K p1 p2` being the jerk that a unit
-//! of input comes to: the amplitude of a sampled, smoothed relay is not that of the continuous one, and
-//! a gain taken from that costs several per cent.
+//! These are the estimator's own coordinates. They are regular for equal lags and for double
+//! integrators, because none says which pole is the actuator's. The fourth gives the gain: `K p1 p2` is
+//! the jerk for a unit of input. The amplitude of a sampled, smoothed relay is not that of the
+//! continuous one, and a gain from that would be off by several per cent.
 //!
 //! | question                                  | answer                                        |
 //! |-------------------------------------------|-----------------------------------------------|
-//! | which experiments?                        | [`Recipe`], of one [`Family`](crate::experiments::Family) or several      |
-//! | what is seen, and of what is it?          | [`Example`]                                   |
-//! | what does an error of the values cost?    | [`Example::cost_gradient`]                    |
-//! | how do many of them lie on a disk?        | [`shards`]: files that NumPy reads            |
-//! | and in one table, for other programs?     | `parquet`, with the feature of that name      |
+//! | which experiments?                        | [`Recipe`], with one or more [`Family`](crate::experiments::Family)       |
+//! | what does a network see, and what is true?| [`Example`]                                   |
+//! | what does an error in the values cost?    | [`Example::cost_gradient`]                    |
+//! | how are many examples stored?             | [`shards`]: files that NumPy reads            |
+//! | how do other programs read them?          | `parquet`, one table (feature `parquet`)      |
 //! | how does a network learn from them?       | [`learning`]: rows of a [`Batch`]             |
 //!
 //! [`Batch`]: crate::learn::train::Batch
@@ -38,20 +38,20 @@ use onecycle_onboard::signature::Signature;
 
 use crate::experiments::{Drawn, ExperimentError, Recipe, SteadyCycle};
 
-/// One experiment: what is seen, and what it is of.
+/// One example: what a network sees of an experiment, and the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Example {
-    /// What a network sees.
+    /// Inputs of a network.
     pub signature: Signature,
-    /// Period of the cycle it was taken from (s).
+    /// Period of the cycle (s).
     pub period_s: f64,
     /// The process.
     pub process: Soiptd,
-    /// Which family of the recipe it is from, counted from zero.
+    /// Number of the family in the recipe, from zero.
     pub family: usize,
-    /// Input bias by the relay's amplitude.
+    /// Input bias over the relay's amplitude.
     pub bias: f64,
-    /// Noise by the amplitude of the noise-free oscillation.
+    /// Noise of a sample over the amplitude of the noise-free oscillation.
     pub sigma: f64,
     /// Samples in a period of the noise-free oscillation.
     pub samples_per_period: f64,
@@ -90,7 +90,7 @@ impl Example {
         }
     }
 
-    /// What a network is to put out, see the [module](self).
+    /// Target values of a network, see the [module](self).
     #[must_use]
     pub fn values(&self) -> [f64; VALUES] {
         let period_s = self.period_s;

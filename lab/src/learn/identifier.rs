@@ -1,4 +1,4 @@
-//! The shipped identifier: from a recipe to a pack, and what it is worth on cycles it has not seen.
+//! The shipped identifier: from a recipe to a pack, and its scores on cycles that it has not seen.
 //!
 //! ```text
 //! IdentifierRecipe -> Manifest -> records -> Trainer -> calibrate -> PackContents -> bytes
@@ -6,20 +6,20 @@
 //!                                                  Scores  <---+   as the board computes
 //! ```
 //!
-//! The network puts out a Gaussian over the four values of `dataset`: the estimator's own coordinates,
+//! The output of the network is a Gaussian over the four values of `dataset`: the estimator's own coordinates,
 //! in which the posterior of a cycle is nearly Gaussian. Experiments are numbered from zero: first
-//! those to learn from, then those that choose the best epoch and calibrate, then those that are
-//! only scored.
+//! those for training, then those for the choice of the best epoch and the calibration, then those for
+//! the score.
 //!
 //! ```toml
 //! network = "density"
-//! hidden = [64, 64]      # widths of the hidden layers, tanh behind each
-//! learning = 220000      # experiments to learn from
-//! choosing = 8000        # that choose the epoch and calibrate
-//! scoring = 8000         # that are scored
-//! # and what is left out of it: IdentifierRecipe::default()
+//! hidden = [64, 64]      # widths of the hidden layers, each followed by tanh
+//! learning = 220000      # experiments for training
+//! choosing = 8000        # experiments for the choice of the epoch and the calibration
+//! scoring = 8000         # experiments for the score
+//! # defaults of other fields: IdentifierRecipe::default()
 //!
-//! [experiments]          # a recipe of `dataset`
+//! [experiments]          # a recipe as for `onecycle dataset`
 //! ```
 
 mod calibration;
@@ -46,41 +46,41 @@ use crate::learn::train::{
 };
 use crate::space::{FieldError, first_out_of_range};
 
-/// How an identifier is made.
+/// Recipe of an identifier. See the [module](self).
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct IdentifierRecipe {
-    /// What of; always `density` here.
+    /// Kind of network; always `density` here.
     pub network: IdentifierKind,
     /// Widths of the hidden layers.
     pub hidden: Vec<usize>,
-    /// Experiments to learn from.
+    /// Number of experiments for training.
     pub learning: u64,
-    /// Experiments that choose the best epoch and calibrate.
+    /// Number of experiments for the choice of the best epoch and the calibration.
     pub choosing: u64,
-    /// Experiments that are scored.
+    /// Number of experiments for the score.
     pub scoring: u64,
-    /// Epochs at most.
+    /// Largest number of epochs.
     pub epochs: u64,
-    /// Epochs without a better one after which it is enough.
+    /// Number of epochs without improvement after which training stops.
     pub patience: u64,
-    /// Examples a step.
+    /// Examples per step.
     pub batch: usize,
-    /// Learning rate at its highest.
+    /// Highest learning rate.
     pub rate: f64,
-    /// How much the cost counts beside the likelihood, see [`Loss::CostAwareGaussian`].
+    /// Weight of the cost beside the likelihood, see [`Loss::CostAwareGaussian`].
     pub cost_weight: f64,
-    /// Cost from which it no longer counts by its square.
+    /// Cost above which it counts linearly instead of by its square.
     pub cost_scale: f64,
-    /// Whether a weight is a byte on board, or four.
+    /// Whether a weight takes one byte on board instead of four.
     pub bytes: bool,
     /// Seed of the first weights and of the order of the examples.
     pub seed: u64,
-    /// Where the experiments come from.
+    /// Recipe of the experiments.
     pub experiments: experiments::Recipe,
 }
 
-/// The kind of network, which tells recipes apart.
+/// The kind of network, which distinguishes recipes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IdentifierKind {
@@ -125,13 +125,13 @@ pub enum IdentifierError {
     /// A field of its experiments.
     #[error("experiments: {0}")]
     Experiments(#[from] RecipeError),
-    /// The families do not agree in what one pack can have.
+    /// The families differ in a value that a pack has once.
     #[error("all families of one identifier must have the same {0}")]
     Families(&'static str),
-    /// Nothing can be learnt.
+    /// Training is not possible.
     #[error("{0}")]
     Train(#[from] TrainError),
-    /// The network is too large for a pack, or the like.
+    /// A pack cannot hold the network.
     #[error("{0}")]
     Pack(#[from] PackContentsError),
     /// There is no table for the phase margin.
@@ -141,7 +141,7 @@ pub enum IdentifierError {
     #[error("{0}")]
     Experiment(#[from] ExperimentError),
     /// The shapes of the family have no spread.
-    #[error("the processes of the family are all alike: widen its space")]
+    #[error("all processes of the family have the same shape: widen its space")]
     OneShape,
 }
 
@@ -196,13 +196,13 @@ impl IdentifierRecipe {
         Ok(())
     }
 
-    /// Experiments of all kinds.
+    /// Number of all experiments.
     #[must_use]
     pub fn experiments(&self) -> u64 {
         self.learning + self.choosing + self.scoring
     }
 
-    /// Numbers of the experiments to learn from, to choose by, to score.
+    /// Numbers of the experiments to learn from, to choose with, and to score.
     #[must_use]
     pub fn numbers(&self) -> [Range<u64>; 3] {
         let chosen = self.learning + self.choosing;
@@ -213,10 +213,10 @@ impl IdentifierRecipe {
         ]
     }
 
-    /// The network before it has learnt anything.
+    /// The network before training.
     ///
     /// # Errors
-    /// Where the widths are none of a network.
+    /// [`TrainError`]: a width is out of its range.
     pub fn network(&self) -> Result<Network, TrainError> {
         let hidden = self.hidden.iter();
         let mut layers: Vec<Layer> = hidden
@@ -228,7 +228,7 @@ impl IdentifierRecipe {
         Network::new(LENGTH, &layers, &mut Pcg64Mcg::seed_from_u64(self.seed))
     }
 
-    /// How it learns.
+    /// Settings of the training.
     #[must_use]
     pub fn settings(&self) -> TrainingSettings {
         TrainingSettings {
@@ -256,7 +256,7 @@ impl IdentifierRecipe {
     /// The pack of a trained network, calibrated, without scores yet.
     ///
     /// # Errors
-    /// See [`IdentifierError`].
+    /// [`IdentifierError`]: a pack cannot hold the network, or has no table for the phase margin.
     pub fn pack(
         &self,
         network: &Network,
@@ -289,16 +289,16 @@ impl IdentifierRecipe {
     }
 }
 
-/// Cycles that a pack carries to test itself with.
+/// Number of cycles that a pack contains for its self-test.
 const SELF_TESTS: usize = 2;
 
-/// Rows to learn from.
+/// The batch of these records.
 #[must_use]
 pub fn rows(records: &[ExampleRecord]) -> Batch {
     batch(records, Wanted::ValuesAndSlopes)
 }
 
-/// Scales of the outputs, as a pack keeps them.
+/// Scales of the outputs, as a pack stores them.
 fn output_scales() -> [f32; VALUES] {
     SCALE.map(|scale| scale as f32)
 }

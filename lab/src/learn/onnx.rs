@@ -1,4 +1,4 @@
-//! Networks in ONNX, for whatever else runs networks, and from wherever else they learn.
+//! ONNX export and import of networks.
 //!
 //! | written               | as                                                                 |
 //! |-----------------------|--------------------------------------------------------------------|
@@ -8,16 +8,16 @@
 //! | batch normalisation   | folded into the dense layer before or behind it                    |
 //! | dropout               | left out                                                           |
 //!
-//! in f32, IR version 8, opset 17, which every runtime since 2022 reads; the input is
-//! `inputs: [batch, in]`, the output `outputs: [batch, out]`.
+//! Numbers are f32, IR version 8, opset 17, which every runtime since 2022 reads. The input is `inputs:
+//! [batch, in]`, the output `outputs: [batch, out]`.
 //!
-//! Read are chains of `Gemm`, `MatMul`, `Relu`, `Tanh`, `Identity`, `BatchNormalization`, and `Sub`,
-//! `Mul`, `Add`, `Div` with constants, as PyTorch's exporters write them. Whatever only scales and
-//! shifts is folded into the dense layer next to it; before the first one it is the normalisation.
-//! Any other node is refused by its name.
+//! The import reads chains of `Gemm`, `MatMul`, `Relu`, `Tanh`, `Identity`, `BatchNormalization`, and
+//! `Sub`, `Mul`, `Add`, `Div` with constants, as PyTorch's exporters write them. Nodes that only scale
+//! and shift are folded into the dense layer next to them; before the first layer they are the
+//! normalisation. Any other node is refused by its name.
 //!
 //! Reference: ONNX, "Open Neural Network Exchange intermediate representation specification", IR
-//! version 8, and its operators; the messages (field numbers) are those of `onnx.proto`.
+//! version 8, and its operators; the messages (field numbers) follow `onnx.proto`.
 //!
 //! ```
 //! use onecycle_lab::learn::onnx;
@@ -43,48 +43,48 @@ use crate::learn::train::TrainError;
 pub use export::export;
 pub use import::{Imported, import};
 
-/// What a network sees of its inputs: `(x - offset) scale`.
+/// Normalisation of the inputs: the network sees `(x - offset) scale`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Normalisation {
-    /// What is subtracted.
+    /// Offsets, one for each input.
     pub offsets: Vec<f32>,
-    /// What is then multiplied with.
+    /// Scales, one for each input.
     pub scales: Vec<f32>,
 }
 
-/// Why there is no network, or no file.
+/// Why a model cannot be read or written.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OnnxError {
-    /// The bytes are no ONNX.
-    #[error("the file is no ONNX model: {0}")]
+    /// The bytes are not ONNX.
+    #[error("the file is not an ONNX model: {0}")]
     File(String),
-    /// Something of the model as a whole.
+    /// The model as a whole cannot be read.
     #[error("the model cannot be read: {0}")]
     Model(String),
-    /// A node that is none of those that can be read, or not so.
+    /// A node cannot be read.
     #[error("node {node}, {op}: {reason}")]
     Node {
-        /// Its name, or its number where it has none.
+        /// Name of the node, or its number if it has no name.
         node: String,
-        /// Its operator.
+        /// Operator of the node.
         op: String,
-        /// What is wrong with it.
+        /// What is wrong with the node.
         reason: String,
     },
-    /// A layer that cannot be written.
+    /// A layer cannot be written.
     #[error("layer {index} of the network cannot be written to ONNX: {reason}")]
     Layer {
-        /// Which, from 0; those of dropout are left out before.
+        /// Number of the layer, from 0, without dropout layers.
         index: usize,
-        /// Why.
+        /// The reason.
         reason: &'static str,
     },
-    /// Offsets or scales that are not as many as the inputs.
-    #[error("the normalisation is of {found} inputs, the network of {expected}")]
+    /// The number of offsets or scales differs from the number of inputs.
+    #[error("the normalisation has {found} inputs, but the network has {expected}")]
     Normalisation {
-        /// Inputs of the network.
+        /// Number of inputs of the network.
         expected: usize,
-        /// Offsets or scales.
+        /// Number of offsets or scales.
         found: usize,
     },
     /// Sizes or numbers that no network has.

@@ -1,13 +1,13 @@
-//! Packs: from a trained network, its scaling and its tables to the one file that an identifier is.
+//! Packs: a trained network, its scaling and its tables in one file, which is the identifier on board.
 //!
 //! ```text
 //! Network -> layers() -> PackContents -> to_bytes()    ->  a file, or the board's flash
 //!                                        read()        <-
 //! ```
 //!
-//! The format stands in [`onecycle_onboard::pack`], whose reader checks whatever is written here
-//! before it is handed out. The outputs of the self-test are those of the code that flies, on the
-//! machine that makes the pack; [`quantisation`] says how far they are from the network's own.
+//! The format is documented in [`onecycle_onboard::pack`], whose reader checks every pack before it is
+//! returned. The outputs of the self-test are those of the board's code on the machine that makes the
+//! pack; [`quantisation`] measures how far they are from the network's own.
 
 mod layers;
 
@@ -22,24 +22,24 @@ use crate::learn::train::{Network, TrainError};
 
 pub use layers::{PackedLayer, PackedWeights, Precision, Quantisation, layers, quantisation};
 
-/// What a pack holds.
+/// Contents of a pack.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PackContents {
     /// Layers of the network, first to last.
     pub layers: Vec<PackedLayer>,
-    /// The network sees `(x - offset) scale`: offsets.
+    /// Offsets of the inputs: the network sees `(x - offset) scale`.
     pub input_offsets: [f32; LENGTH],
-    /// The network sees `(x - offset) scale`: scales.
+    /// Scales of the inputs.
     pub input_scales: [f32; LENGTH],
-    /// From the network's outputs to values.
+    /// Scaling from the network's outputs to values.
     pub output_scaling: OutputScaling,
-    /// What the pack is made for.
+    /// Domain that the pack is made for.
     pub domain: Domain,
-    /// The score from which a cycle is unknown.
+    /// Score above which a cycle is unknown.
     pub unknown_threshold: f32,
     /// Calibration of the score.
     pub calibration: Vec<f32>,
-    /// How the shapes of the family are distributed.
+    /// Distribution of the shapes of the family.
     pub prior: Prior,
     /// Table of leads.
     pub lead_table: LeadTableContents,
@@ -49,24 +49,24 @@ pub struct PackContents {
     pub card: serde_json::Value,
 }
 
-/// A table of leads, as [`onecycle_onboard::pack::LeadTableBytes`] hands it out.
+/// A table of leads, as in [`onecycle_onboard::pack::LeadTableBytes`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LeadTableContents {
     /// Points along the first axis.
     pub n: usize,
     /// Points along the second axis.
     pub m: usize,
-    /// Numbers of each point.
+    /// Number of numbers at each point.
     pub fields: usize,
-    /// Four that say where the points lie.
+    /// Four numbers that determine where the points lie.
     pub axes: [f32; AXES],
-    /// `n m` times as many as there are fields.
+    /// The numbers of all points, `n m` times the number of fields.
     pub values: Vec<f32>,
 }
 
 impl LeadTableContents {
-    /// Of so many points and fields, its axes and values one behind the other; `None` where they are
-    /// not that many.
+    /// A table of these numbers of points and fields, from its axes followed by its values; `None` if
+    /// the count does not match.
     #[must_use]
     pub fn of_numbers([n, m]: [usize; 2], fields: usize, numbers: &[f32]) -> Option<Self> {
         let (axes, values) = numbers.split_first_chunk()?;
@@ -80,24 +80,24 @@ impl LeadTableContents {
     }
 }
 
-/// Why there is no pack, or none of this network.
+/// Why a pack cannot be made or read.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PackContentsError {
-    /// What the board's reader says of it.
+    /// The board's reader refuses the pack.
     #[error("{0}")]
     Pack(#[from] PackError),
-    /// A layer that a pack cannot hold.
+    /// A pack cannot hold a layer.
     #[error(
-        "layer {index} of the network, {layer}, has no place in a pack: it holds dense layers, \
-         each with one relu or tanh behind it or none"
+        "layer {index} of the network, {layer}, does not fit into a pack: a pack holds dense \
+         layers, each with at most one relu or tanh after it"
     )]
     Layer {
-        /// Which, from 0.
+        /// Number of the layer, from 0.
         index: usize,
-        /// Of which kind.
+        /// Kind of the layer.
         layer: &'static str,
     },
-    /// The card is no JSON.
+    /// The card is not JSON.
     #[error("the card of the pack is not JSON: {0}")]
     Card(String),
     /// Sizes or numbers that no network has.
@@ -106,10 +106,10 @@ pub enum PackContentsError {
 }
 
 impl PackContents {
-    /// What a pack holds, copied.
+    /// Copies the contents of a pack.
     ///
     /// # Errors
-    /// Where the card is no JSON.
+    /// [`PackContentsError::Card`]: the card is not JSON.
     pub fn read(pack: &Pack<'_>) -> Result<Self, PackContentsError> {
         let card = serde_json::from_str(pack.card());
         let table = pack.lead_table();
@@ -135,12 +135,12 @@ impl PackContents {
         })
     }
 
-    /// The bytes of the pack, which the board's reader has read.
+    /// The bytes of the pack; the board's reader has checked them.
     ///
     /// # Errors
-    /// What that reader says.
+    /// [`PackContentsError::Pack`]: the reader refuses the pack.
     pub fn to_bytes(&self) -> Result<Vec<u8>, PackContentsError> {
-        // Once without the outputs, once with what that pack puts out.
+        // First without the outputs of the self-test, then with the outputs of that pack.
         let without = self.file(&[]);
         let pack = Pack::read(&without)?;
         let self_tests: Vec<_> = (self.self_tests.iter())
@@ -151,10 +151,10 @@ impl PackContents {
         Ok(bytes)
     }
 
-    /// The network in full precision: what its bytes stand for.
+    /// The network with the weights that the bytes stand for.
     ///
     /// # Errors
-    /// Where the layers are none of a network.
+    /// [`PackContentsError::Train`]: the layers have sizes or numbers that no network has.
     pub fn network(&self) -> Result<Network, PackContentsError> {
         layers::network(&self.layers)
     }
@@ -207,8 +207,7 @@ impl PackContents {
     }
 }
 
-/// What is too large for the format is, as the largest number, too large for what follows: the
-/// reader says so.
+/// Numbers too large for the format are limited to the largest one; the reader then refuses the pack.
 fn saturated(count: usize) -> u32 {
     u32::try_from(count).unwrap_or(u32::MAX)
 }

@@ -1,4 +1,4 @@
-//! Training of small networks: layers, losses that know what a mistake costs, optimisers.
+//! Training of small networks: layers, losses that know the cost of a mistake, optimisers.
 //!
 //! ```text
 //! Dataset -> Batch -> Network -> Loss -> backward -> Optimizer       steps of an epoch
@@ -8,16 +8,16 @@
 //!
 //! | question                                          | answer                                 |
 //! |---------------------------------------------------|----------------------------------------|
-//! | which network?                                    | [`Network`], a row of [`Layer`]s       |
+//! | which network?                                    | [`Network`], a sequence of [`Layer`]s  |
 //! | what does it learn: a class, a cost, a density?   | [`Loss`]                               |
 //! | how?                                              | [`OptimizerMethod`], [`Schedule`], [`TrainingSettings`] |
 //! | from what?                                        | [`Dataset`], which fills a [`Batch`]   |
-//! | how do networks come from PyTorch and go there?   | [`onnx`](crate::learn::onnx)           |
-//! | on how many threads?                              | [`Workers`](crate::workers::Workers), the caller's |
+//! | how are networks exchanged with PyTorch?          | [`onnx`](crate::learn::onnx)           |
+//! | on how many threads?                              | [`Workers`](crate::workers::Workers) of the caller |
 //!
-//! Rows are samples throughout: inputs `batch x in`, weights of a dense layer `out x in`, outputs
-//! `batch x out`. Conventions and names are those of PyTorch, so that numbers can be compared.
-//! The same seed gives the same bits, on any number of threads and through any interruption.
+//! Rows are samples: inputs `batch x in`, weights of a dense layer `out x in`, outputs `batch x out`.
+//! Conventions and names are those of PyTorch, so that numbers can be compared. The same seed gives the
+//! same bits on any number of threads and through any interruption.
 //!
 //! ```
 //! use onecycle_lab::learn::train::{Layer, Matrix, Network};
@@ -63,23 +63,23 @@ pub use trainer::{Epoch, Outcome, Trainer, TrainingSettings};
 
 use crate::space::FieldError;
 
-/// Why nothing can be learnt from this.
+/// Why training is not possible.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum TrainError {
     /// A setting is out of its range.
     #[error("{0}")]
     Field(#[from] FieldError),
-    /// Two things that belong together have different sizes.
+    /// Two sizes that must be equal differ.
     #[error("{what} must be {expected}, but is {found}")]
     Size {
-        /// Of what.
+        /// Name of the size.
         what: &'static str,
-        /// What it must be.
+        /// The size that it must have.
         expected: usize,
-        /// What it is.
+        /// The size that it has.
         found: usize,
     },
-    /// A class beyond the network's outputs.
+    /// A class that the network has no output for.
     #[error("there is no class {class}: the network has {classes} outputs")]
     Class {
         /// The class.
@@ -87,14 +87,16 @@ pub enum TrainError {
         /// Number of outputs.
         classes: usize,
     },
-    /// Weights of samples that have no mean.
-    #[error("the weights of samples must be finite and not negative, and their sum positive")]
+    /// The weights of the samples have no mean.
+    #[error(
+        "the weights of the samples must be finite and not negative, and their sum must be positive"
+    )]
     SampleWeights,
-    /// The variance of one sample.
-    #[error("batch normalisation needs batches of at least two samples to learn from")]
+    /// Batch normalisation of a single sample.
+    #[error("training with batch normalisation needs batches of at least two samples")]
     OneSample,
     /// A number that no network can hold.
-    #[error("{layer}.{array} of the network holds {value:?}")]
+    #[error("layer {layer} of the network: {array} must not hold {value:?}")]
     Value {
         /// Number of the layer, from 0.
         layer: usize,
@@ -103,8 +105,8 @@ pub enum TrainError {
         /// The number.
         value: f32,
     },
-    /// No data.
-    #[error("there is no sample to {0}")]
+    /// There are no samples.
+    #[error("there are no samples to {0}")]
     NoSample(&'static str),
 }
 
@@ -120,7 +122,7 @@ fn expect_size(what: &'static str, expected: usize, found: usize) -> Result<(), 
     })
 }
 
-/// What a stream of random numbers is for; the streams of one seed do not depend on each other.
+/// Purpose of a stream of random numbers; the streams of one seed are independent.
 #[derive(Clone, Copy)]
 enum Purpose {
     Shuffling,

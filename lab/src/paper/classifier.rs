@@ -1,28 +1,28 @@
-//! The paper's classifier: one cycle of a relay test in, the member of a grid behind it out
-//! (section III-C; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//! The paper's classifier: from one cycle of a relay test to a member of a grid of processes (section
+//! III-C; Ayyad, Chehadeh, Awad, Zweiri 2020).
 //!
 //! ```text
 //! ClassifierRecipe -> Classes, the members of a grid
 //!        -> Examples: Trials under the relay -> SampledCycle -> Prepared, the network's 4520 inputs
-//!                                                            -> Measured, what tells the gain
+//!                                                            -> Measured, which gives the gain
 //!        -> Network 4520-3000-1000-N, a Loss each -> picks by either PickRule -> Score
 //! ```
 //!
-//! Where the paper leaves something open, or something else is better, this is what is done:
+//! Choices that the paper leaves open, or that differ from it because they are better:
 //!
 //! | question              | the paper                          | here                               |
 //! |-----------------------|------------------------------------|------------------------------------|
-//! | learnt from           | 30 experiments of each class       | random processes, some of classes  |
-//! | the true class        | the simulated one                  | the one that costs least           |
-//! | cost of another one   | between classes                    | on the true process                |
+//! | training examples     | 30 experiments of each class       | random processes and some classes  |
+//! | the true class        | the simulated class                | the class of least cost            |
+//! | cost of another class | between classes                    | on the true process                |
 //! | gain of a class       | from the amplitude                 | from the harmonics                 |
-//! | the output, `pv`      | zero-padded                        | that, or stretched: [`Fit`]        |
-//! | inputs                | amplitude of one                   | that, learnt from in standard coordinates: [`Standard`] |
-//! | a hidden layer        | ReLU, batch normalisation, dropout | in this order                      |
-//! | rate, momentum, batch, epochs, part dropped, noise | not said | in the recipe                  |
+//! | the output, `pv`      | zero-padded                        | zero-padded or stretched: [`Fit`]  |
+//! | inputs                | amplitude 1                        | amplitude 1, then standardised for training: [`Standard`] |
+//! | a hidden layer        | ReLU, batch normalisation, dropout | the same, in this order            |
+//! | rate, momentum, batch, epochs, dropout, noise | not given | in the recipe                       |
 //!
-//! Controllers are two numbers and processes, but for their gain, three: many classes have nearly the same
-//! controller, so a wrong class is often as good as the right one, and accuracy says little.
+//! A controller has two numbers and a process, apart from its gain, three. So many classes have nearly
+//! the same controller, a wrong class is often as good as the right one, and accuracy says little.
 
 mod classes;
 mod examples;
@@ -60,10 +60,10 @@ pub enum ClassifierError {
     /// A field is out of its range.
     #[error("{0}")]
     Field(#[from] FieldError),
-    /// The grid of classes cannot be laid.
+    /// The grid of classes cannot be computed.
     #[error("{0}")]
     Grid(#[from] GridError),
-    /// The times are no process.
+    /// The times are out of range.
     #[error("{0}")]
     Process(#[from] SoiptdError),
     /// A process has no controller.
@@ -80,66 +80,64 @@ pub enum ClassifierError {
     /// Network and examples do not fit each other.
     #[error("{0}")]
     Train(#[from] TrainError),
-    /// A loss that reads something else than classes and their costs.
-    #[error(
-        "losses: a classifier learns classes; take a loss that reads them, such as cross_entropy"
-    )]
+    /// The loss reads something other than classes and their costs.
+    #[error("losses: a classifier needs a loss over classes, such as cross_entropy")]
     Loss,
 }
 
-/// All that makes a classifier, its examples included.
+/// Recipe of a classifier, with its examples.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassifierRecipe {
-    /// What it is a recipe of.
+    /// Kind of network; always `classifier` here.
     pub network: ClassifierKind,
     /// Seed of experiments, first weights, shuffling and dropout; below 2^32.
     pub seed: u64,
-    /// The processes; the paper's multirotors where it is left out.
+    /// Space of the processes; the paper's multirotors if left out.
     #[serde(default = "multirotor")]
     pub space: Space,
     /// `J*` of the grid of classes.
     pub deterioration: f64,
-    /// How a class comes to its gain.
+    /// How the gain of a class is found.
     #[serde(default)]
     pub gain: Gain,
-    /// How the output comes to its 2260 numbers.
+    /// How the output is fitted into 2260 numbers.
     #[serde(default)]
     pub fit: Fit,
     /// Neurons of the hidden layers.
     pub hidden: Vec<usize>,
-    /// Part that dropout leaves out.
+    /// Probability of dropout.
     pub dropout: f64,
     /// Experiments to learn from.
     pub examples: u64,
-    /// Every how many of them is of a class itself instead of a random process; 0 is none.
+    /// Every n-th example is of a class instead of a random process; 0 for none.
     pub class_every: u64,
-    /// Experiments of every class to verify with, as the paper does.
+    /// Experiments of every class for verification, as in the paper.
     pub verification: u64,
-    /// Input bias, uniform between plus and minus this part of the relay's amplitude.
+    /// Largest input bias over the relay's amplitude.
     pub bias: f64,
-    /// Noise, uniform up to this part of the amplitude.
+    /// Largest noise over the amplitude of the oscillation.
     pub sigma: f64,
-    /// Whether the relay follows the bias while it is learnt.
+    /// Whether the relay trims the bias away in the examples to learn from.
     pub protocol: Protocol,
-    /// What the networks are tested on: random processes.
+    /// Tests on random processes.
     pub tests: Vec<Test>,
-    /// How a gradient becomes a step.
+    /// Method of the optimiser.
     pub method: OptimizerMethod,
     /// The learning rate.
     pub schedule: Schedule,
-    /// Samples a step.
+    /// Samples per step.
     pub batch: usize,
-    /// Epochs at most.
+    /// Largest number of epochs.
     pub epochs: u64,
-    /// Epochs without a lower loss on the verification set after which it is enough.
+    /// Number of epochs without a lower loss on the verification set after which training stops.
     #[serde(default)]
     pub patience: Option<u64>,
     /// The losses to compare, one network each.
     pub losses: Vec<Choice>,
 }
 
-/// The word by which a file says that it is of a classifier.
+/// The kind of network, which distinguishes recipes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ClassifierKind {
@@ -153,7 +151,7 @@ pub enum ClassifierKind {
 pub struct Choice {
     /// The loss.
     pub loss: Loss,
-    /// Its own highest learning rate: some losses are steeper than others.
+    /// Highest learning rate for this loss, because some losses are steeper than others.
     #[serde(default)]
     pub rate: Option<f64>,
 }
@@ -162,11 +160,11 @@ pub struct Choice {
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Test {
-    /// How many.
+    /// Number of processes.
     pub systems: u64,
-    /// Their seed; below 2^32.
+    /// Seed of the processes; below 2^32.
     pub seed: u64,
-    /// Whether the relay follows the bias.
+    /// Whether the relay trims the bias away.
     pub protocol: Protocol,
 }
 
@@ -174,17 +172,17 @@ fn multirotor() -> Space {
     Space::MULTIROTOR
 }
 
-/// Seeds, and numbers of experiments, lie below this: what is learnt from, verified with and tested on
-/// draws from seeds that cannot meet.
+/// Limit of seeds and of numbers of experiments: training, verification and tests then never draw from
+/// the same seed.
 const SEEDS: u64 = 1 << 32;
 
-/// Most experiments in memory: some 10 GB.
+/// Largest number of experiments in memory: some 10 GB.
 const MOST_EXAMPLES: u64 = 1_000_000;
 
-/// Most neurons of a layer, with which the first one weighs 2 GB.
+/// Largest number of neurons in a layer, for which the first one takes 2 GB.
 const MOST_NEURONS: u64 = 100_000;
 
-/// What experiments are for.
+/// Purpose of experiments.
 #[derive(Clone, Copy)]
 enum Purpose {
     Training,
@@ -269,15 +267,15 @@ impl ClassifierRecipe {
     /// The classes: a grid of the space.
     ///
     /// # Errors
-    /// Where the grid cannot be laid.
+    /// [`ClassifierError`]: the grid cannot be computed.
     pub fn classes(&self, workers: &dyn Workers) -> Result<Classes, ClassifierError> {
         Classes::of(&Grid::build(&self.grid(), workers)?)
     }
 
-    /// What is learnt from.
+    /// Examples to learn from.
     ///
     /// # Errors
-    /// Where a process has no controller.
+    /// [`ClassifierError`]: a process has no controller.
     pub fn training(
         &self,
         classes: &Classes,
@@ -296,10 +294,10 @@ impl ClassifierRecipe {
         )
     }
 
-    /// What the best epoch is chosen by: as many experiments of every class.
+    /// Examples to choose the best epoch with: the same number of every class.
     ///
     /// # Errors
-    /// Where a process has no controller.
+    /// [`ClassifierError`]: a process has no controller.
     pub fn verification(
         &self,
         classes: &Classes,
@@ -315,10 +313,10 @@ impl ClassifierRecipe {
         )
     }
 
-    /// The random processes of a test.
+    /// Examples of a test.
     ///
     /// # Errors
-    /// Where a process has no controller.
+    /// [`ClassifierError`]: a process has no controller.
     pub fn test(
         &self,
         test: &Test,
@@ -347,7 +345,7 @@ impl ClassifierRecipe {
         hidden.chain([Layer::Dense { outputs: classes }]).collect()
     }
 
-    /// The network before it learns: the same for every loss.
+    /// The network before training, the same for every loss.
     ///
     /// # Errors
     /// Names the first size or probability that is out of its range.
@@ -356,7 +354,7 @@ impl ClassifierRecipe {
         Ok(Network::new(INPUTS, &self.layers(classes), &mut rng)?)
     }
 
-    /// How the network of loss `number`, of those there are, is trained.
+    /// Settings of the training with loss `number`; panics if there is none.
     #[must_use]
     pub fn settings(&self, number: usize) -> TrainingSettings {
         let choice = &self.losses[number];

@@ -1,15 +1,14 @@
-//! A process as a candidate for another: what its controller would cost there (the `J_ij` of the
+//! A process as a candidate for another one: the cost of its controller there (the `J_ij` of the
 //! paper's equation 8, gains matched; Ayyad, Chehadeh, Awad, Zweiri 2020).
 //!
-//! In an identification the amplitude of the oscillation tells the gain: whatever the candidate,
-//! its gain is the one that makes its amplitude the measured one. So candidates are compared at
-//! gains that give them the same amplitude under the same relay, here one. [`Gains::Equal`]
-//! compares at equal velocity gains instead, to show the difference.
+//! In an identification the amplitude of the oscillation determines the gain: the gain of any candidate
+//! makes its amplitude the measured one. So candidates are compared at gains that give them the same
+//! amplitude under the same relay, here one. [`Gains::Equal`] compares at equal velocity gains instead,
+//! to show the difference.
 //!
-//! Time scales everything: of a candidate whose times are `alpha` times as long, the amplitude is
-//! the same with `1/alpha^2` of the acceleration gain, `Kp` is the same, `Kd` and the cost are `alpha`
-//! times as large, and the margins do not change. Costs between two candidates stay what they are
-//! when both are scaled alike (the paper's property 1).
+//! Scaling: a candidate with times `alpha` times as long has the same amplitude with `1/alpha^2` of the
+//! acceleration gain, the same `Kp`, `alpha` times the `Kd` and the cost, and the same margins. Costs
+//! between two candidates do not change when both are scaled alike (the paper's property 1).
 
 use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 
@@ -19,23 +18,23 @@ use onecycle_design::soiptd_pd::cost::ise;
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd};
 
-/// At which gains candidates are compared.
+/// Gains at which candidates are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Gains {
-    /// Those that give the same amplitude under the same relay.
+    /// Gains that give the same amplitude under the same relay.
     #[default]
     SameAmplitude,
     /// Equal velocity gains.
     Equal,
 }
 
-/// A process with its gain as [`Gains`] has it, and its optimal controller.
+/// A process with a gain according to [`Gains`], and its optimal controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
     /// The process.
     pub process: Soiptd,
-    /// Its optimum at or above the margin of its space.
+    /// The optimum with at least the margin of the space.
     pub optimum: Optimum,
     gains: Gains,
 }
@@ -43,13 +42,13 @@ pub struct Candidate {
 /// Why a process is no candidate.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum CandidateError {
-    /// The times are no process.
+    /// The times are out of range.
     #[error("{0}")]
     Process(#[from] SoiptdError),
-    /// It has no optimal controller.
+    /// The process has no optimal controller.
     #[error("{0}")]
     Optimum(#[from] OptimumError),
-    /// The relay does not make it oscillate, so no amplitude tells its gain.
+    /// The relay does not make the process oscillate, so no amplitude determines its gain.
     #[error(
         "T_prop {t_prop_s} s, T_body {t_body_s} s, tau {tau_s} s does not oscillate under a relay \
          with beta {beta}: choose a smaller beta"
@@ -96,12 +95,13 @@ impl Candidate {
         })
     }
 
-    /// The candidate whose times are `alpha > 0` times as long, exactly.
+    /// The candidate with times `alpha > 0` times as long; exact.
     ///
     /// # Errors
-    /// [`CandidateError::Process`] where a time or the gain leaves the range of `f64`.
+    /// [`CandidateError::Process`] if a time or the gain leaves the range of `f64`.
     pub fn scaled(&self, alpha: f64) -> Result<Self, CandidateError> {
-        // Of the acceleration gain; what it changes beyond 1/alpha^2 divides the controller's.
+        // Factor on the acceleration gain; a change other than 1/alpha^2 divides the controller's
+        // gains.
         let gain = match self.gains {
             Gains::SameAmplitude => alpha.powi(-2),
             Gains::Equal => alpha.recip(),
@@ -130,24 +130,24 @@ impl Candidate {
         })
     }
 
-    /// `J_ij`: what the controller of this candidate costs on `other`, with the margin it leaves.
+    /// `J_ij`: cost of this candidate's controller on `other`, with the margin there.
     #[must_use]
     pub fn on(&self, other: &Self) -> Deterioration {
         deterioration(self.optimum.pd, &other.process, &other.optimum)
     }
 
-    /// `J_(ij) = max(J_ij, J_ji)`: how far apart two candidates are; infinite where either
-    /// controller is unstable on the other process.
+    /// `J_(ij) = max(J_ij, J_ji)`: distance of two candidates; infinite if either controller is
+    /// unstable on the other process.
     ///
-    /// At a margin `J_ij` alone can be negative, a faster step bought with margin, and then `J_ji`
-    /// is positive as a rule. Where both are negative (by some thousandths, seen between shapes
-    /// far apart) the candidates are as good as the same: zero.
+    /// At a fixed margin `J_ij` alone can be negative, a faster step bought with margin; then `J_ji` is
+    /// usually positive. If both are negative (by some thousandths, seen between shapes far apart) the
+    /// distance is zero.
     #[must_use]
     pub fn distance(&self, other: &Self) -> f64 {
         self.cost_on(other).max(other.cost_on(self)).max(0.0)
     }
 
-    /// The distance where it is below `bound`, at half the work where it is not.
+    /// The distance if it is below `bound`; half the work if it is not.
     #[must_use]
     pub fn distance_below(&self, other: &Self, bound: f64) -> Option<f64> {
         let there = self.cost_on(other);
@@ -158,7 +158,7 @@ impl Candidate {
         (distance < bound).then_some(distance)
     }
 
-    /// `J_ij` alone, infinite where it is unstable.
+    /// `J_ij` alone; infinite if unstable.
     #[must_use]
     pub fn cost_on(&self, other: &Self) -> f64 {
         ise(&other.process, self.optimum.pd).map_or(f64::INFINITY, |cost| {

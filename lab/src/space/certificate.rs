@@ -1,14 +1,15 @@
-//! Whether the relay makes every process of a space oscillate, once and stably: a proof by
-//! computation where the paper appeals to a criterion for its describing function (Ayyad, Chehadeh,
-//! Awad, Zweiri 2020, section II; the "Loeb criterion").
+//! Certificates: does the relay make every process of a space oscillate in exactly one stable limit
+//! cycle? This is a proof by computation; the paper uses a criterion for the describing function
+//! (Ayyad, Chehadeh, Awad, Zweiri 2020, section II; the "Loeb criterion").
 //!
-//! Time scales everything, so a process stands for its whole ray, and a patch of the surface of
-//! shapes ([`Space::shapes`]) for the space. Each shape's limit cycles are exact, and so is the
-//! spectral radius of their Poincare map; the largest one on a lattice is then climbed from.
+//! Time can be scaled, so one process represents its whole ray, and a patch of the surface of shapes
+//! ([`Space::shapes`]) represents the space. The limit cycles of each shape and the spectral radius of
+//! their Poincare map are exact; the largest radius on a lattice is the start of a climb to the worst
+//! process.
 //!
-//! Under a bias the relay of the board differs from the bare one in two ways, and both are
-//! certified: its trim cancels the bias, and without trim the side whose signal turns back before
-//! it has reached zero switches later from then on, with half the lead each time.
+//! Under a bias the relay of the board differs from the bare one in two ways, and both are certified:
+//! its trim cancels the bias; and without trim the side whose signal turns back before zero switches
+//! later from then on, with half the lead each time.
 
 mod summary;
 
@@ -20,42 +21,43 @@ use crate::space::surface::Direction;
 
 pub use self::summary::{CertificateSummary, RelayCounts};
 
-/// What holds of one process under one bias.
+/// Limit cycles of one process under one bias.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Certificate {
     /// `T_prop`, `T_body`, `tau` (s).
     pub times_s: [f64; 3],
     /// Constant added to the relay's output, whose amplitude is one.
     pub bias: f64,
-    /// Period (s) and amplitude (output unit, velocity gain one) that the describing function
-    /// gives, without bias; it knows none. `None` where it has none.
+    /// Period (s) and amplitude (output unit, velocity gain one) by the describing function, which is
+    /// without bias; `None` if it predicts no oscillation.
     pub describing_function: Option<(f64, f64)>,
     /// The exact cycle without bias.
     pub unbiased: Option<LimitCycle>,
     /// All cycles of the bare relay under the bias, the shortest first.
     pub bare: Vec<LimitCycle>,
-    /// All cycles where the side that the bias turns back leads by `2^-n` of `beta`, and `n` from one.
+    /// All cycles in which the side that the bias turns back leads by `2^-n` of `beta`, with `n` from
+    /// one.
     pub turned_back: Vec<(u32, LimitCycle)>,
-    /// Spectral radius of the cycle where the trim follows the bias; `None` beyond the trim's limit.
+    /// Spectral radius of the cycle with the trim cancelling the bias; `None` beyond the trim's limit.
     pub trimmed: Option<f64>,
 }
 
-/// What a list of limit cycles says.
+/// Stability of a list of limit cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CycleStability {
     /// One stable cycle.
     Stable,
-    /// Two stable cycles or more: the start decides.
+    /// Two stable cycles or more: the start decides which one is reached.
     Coexisting,
-    /// A cycle or more, none of them stable.
+    /// One cycle or more, none of them stable.
     Unstable,
     /// No cycle of two switches.
     NoCycle,
 }
 
 impl CycleStability {
-    /// Of these cycles.
+    /// Stability of these cycles.
     #[must_use]
     pub fn of<'a>(cycles: impl IntoIterator<Item = &'a LimitCycle>) -> Self {
         let (mut stable, mut unstable) = (0, 0);
@@ -75,11 +77,11 @@ impl CycleStability {
     }
 }
 
-/// Halvings of the lead that are looked at; the last leaves 1/64 of it, next to a plain relay.
+/// Largest number of halvings of the lead; the last leaves 1/64 of it, nearly a plain relay.
 const HALVINGS: u32 = 6;
 
 impl Certificate {
-    /// For `T_prop`, `T_body`, `tau` (s), a relay and a bias between -1 and 1.
+    /// Computes the certificate for `T_prop`, `T_body`, `tau` (s), a relay and a bias between -1 and 1.
     ///
     /// # Errors
     /// Names the time that is out of its physical range.
@@ -94,7 +96,7 @@ impl Certificate {
                 [beta, less]
             }
         };
-        // Turning back is a matter of leading relays.
+        // Only leading relays turn back.
         let halvings = if beta < 0.0 && bias != 0.0 {
             HALVINGS
         } else {
@@ -123,7 +125,7 @@ impl Certificate {
         })
     }
 
-    /// The period over that of the describing function, and the amplitude likewise, without bias.
+    /// Period and amplitude over those of the describing function, without bias.
     #[must_use]
     pub fn describing_function_ratios(&self) -> Option<(f64, f64)> {
         let (period_s, amplitude) = self.describing_function?;
@@ -135,27 +137,27 @@ impl Certificate {
 /// The process of a space whose cycle without bias is the least stable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LeastStable {
-    /// Its shape.
+    /// Shape of the process.
     pub shape: Direction,
     /// `T_prop`, `T_body`, `tau` (s) in the middle of its ray.
     pub times_s: [f64; 3],
-    /// Spectral radius of its Poincare map; infinite where there is no cycle.
+    /// Spectral radius of its Poincare map; infinite without a cycle.
     pub spectral_radius: f64,
 }
 
-/// Steps of the climb in parts of the patch: from that of a lattice to one that changes nothing.
+/// First and last step of the climb, in parts of the patch: from that of a lattice to a negligible one.
 const CLIMB_STEPS: (f64, f64) = (1.0 / 32.0, 1e-6);
 
 impl Space {
-    /// Times (s) of a shape in the middle of its ray; `None` where the ray misses the space.
+    /// Times (s) of a shape in the middle of its ray; `None` if the ray misses the space.
     #[must_use]
     pub fn middle_of_ray(&self, shape: Direction) -> Option<[f64; 3]> {
         let (low, high) = self.radius_range_s(shape)?;
         Some(shape.at((low * high).sqrt()))
     }
 
-    /// The least stable process without bias, climbed to from the worst point of a lattice of
-    /// `rows` by `columns` shapes by ever smaller steps. `None` of an empty lattice.
+    /// The least stable process without bias, found by a climb from the worst point of a lattice of
+    /// `rows` by `columns` shapes with decreasing steps. `None` for an empty lattice.
     #[must_use]
     pub fn least_stable(&self, rows: usize, columns: usize) -> Option<LeastStable> {
         let radius_at = |across: f64, along: f64| {

@@ -1,15 +1,15 @@
-//! Grids: the processes that stand for a space, so that one of them is near every process of it
-//! (section III-B of the paper; Ayyad, Chehadeh, Awad, Zweiri 2020).
+//! Grids: sets of processes such that every process of a space is near one of them (section III-B of
+//! the paper; Ayyad, Chehadeh, Awad, Zweiri 2020).
 //!
-//! `J_(ij) = max(J_ij, J_ji)`, [`Candidate::distance`], says how far apart two processes are: what
-//! either one's optimal controller costs on the other, as a fraction above that one's own optimum.
-//! A grid is laid for a deterioration `J*`. What a user needs of it is the same for both layouts:
-//! every process of the space has a member within `J*`; [`check`] measures it.
+//! The distance of two processes is `J_(ij) = max(J_ij, J_ji)`, [`Candidate::distance`]: the cost of
+//! either one's optimal controller on the other, as a fraction above that one's own optimum. A grid is
+//! computed for a deterioration `J*`. Both layouts guarantee the same: every process of the space has a
+//! member within `J*`; [`check`] measures it.
 //!
 //! | layout             | members                                                             |
 //! |--------------------|---------------------------------------------------------------------|
-//! | [`Layout::Rays`]   | the paper's: along each of three coordinates `J*` apart, and what that leaves out; they tell processes apart, as a classifier needs them |
-//! | [`Layout::Fewest`] | as few as leave no process without one: a bank of controllers; how far apart they are is not said |
+//! | [`Layout::Rays`]   | the paper's: `J*` apart along each of three coordinates, with the gaps filled; members are far enough apart for a classifier |
+//! | [`Layout::Fewest`] | as few as cover the space, for a bank of controllers; no least distance between members |
 //!
 //! Work is cut into independent parts that run on the caller's [`Workers`].
 //!
@@ -51,29 +51,29 @@ pub use rays::{Ray, row, rows, step};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Layout {
-    /// Rows, rays and rungs, `J*` apart.
+    /// Rows, rays and radii, `J*` apart.
     #[default]
     Rays,
-    /// A greedy cover.
+    /// A small cover.
     Fewest,
 }
 
-/// What a grid is laid for.
+/// Settings of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GridSettings {
-    /// The processes that it stands for.
+    /// Space of the processes.
     pub space: Space,
     /// `J*`, as a fraction.
     pub deterioration: f64,
-    /// How its members are chosen.
+    /// Choice of the members.
     pub layout: Layout,
-    /// At which gains processes are compared.
+    /// Gains at which processes are compared.
     pub gains: Gains,
 }
 
 impl Default for GridSettings {
-    /// The paper's: its space, its 10 %.
+    /// The paper's space and its 10 %.
     fn default() -> Self {
         Self {
             space: Space::MULTIROTOR,
@@ -106,14 +106,14 @@ impl GridSettings {
     }
 }
 
-/// Where a member of [`Layout::Rays`] stands, all counted from zero.
+/// Place of a member in [`Layout::Rays`], all numbers from zero.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Number of its row, by rising `theta`.
+    /// Number of the row, by rising `theta`.
     pub row: usize,
-    /// Number of its ray in the row, by rising `phi`.
+    /// Number of the ray in the row, by rising `phi`.
     pub ray: usize,
-    /// Number of its radius on the ray, by rising radius.
+    /// Number of the radius on the ray, by rising radius.
     pub rung: usize,
     /// Ratio of neighbouring radii on the ray.
     pub alpha: f64,
@@ -124,16 +124,16 @@ pub struct Place {
 pub struct Member {
     /// The process and its controller.
     pub candidate: Candidate,
-    /// Its shape.
+    /// The shape of the process.
     pub direction: Direction,
-    /// Its radius (s).
+    /// The radius of the process (s).
     pub radius_s: f64,
-    /// Where it stands; `None` in [`Layout::Fewest`] and of a member that closes a hole.
+    /// Place in the layout; `None` in [`Layout::Fewest`] and for a member that closes a hole.
     pub place: Option<Place>,
 }
 
 impl Member {
-    /// One that stands on no ray.
+    /// A member without a place on a ray.
     fn alone(candidate: Candidate) -> Self {
         let (direction, radius_s) = Direction::of(candidate.times_s());
         Self {
@@ -145,7 +145,7 @@ impl Member {
     }
 }
 
-/// Why a grid cannot be laid.
+/// Why a grid cannot be computed.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum GridError {
     /// A setting is out of its range.
@@ -159,17 +159,17 @@ pub enum GridError {
 /// A grid. See the [module](self).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
-    /// What it was laid for.
+    /// Settings that the grid was computed for.
     pub settings: GridSettings,
-    /// Its members, at least one: by row, ray and rung, or by rising `Kd`.
+    /// Members, at least one: by row, ray and radius, or by rising `Kd`.
     pub members: Vec<Member>,
 }
 
 impl Grid {
-    /// Lays a grid.
+    /// Computes a grid.
     ///
     /// # Errors
-    /// See [`GridError`].
+    /// [`GridError`]: a setting is out of its range, or a process has no controller or no oscillation.
     pub fn build(settings: &GridSettings, workers: &dyn Workers) -> Result<Self, GridError> {
         settings.validate()?;
         let members = match settings.layout {
@@ -187,10 +187,10 @@ impl Grid {
         })
     }
 
-    /// The grid of these rays, row by row, and of members in the holes that they leave.
+    /// The grid of these rays, row by row, and of the members that close its holes.
     ///
     /// # Errors
-    /// See [`GridError`].
+    /// [`GridError`]: a setting is out of its range, or a process has no controller or no oscillation.
     pub fn of_rays(
         settings: &GridSettings,
         rows: &[Vec<Ray>],
@@ -213,7 +213,7 @@ impl Grid {
         })
     }
 
-    /// `J_ij` of one member's controller `i` on every process `j`; `None` where it is unstable.
+    /// `J_ij` of the controller of member `i` on every process `j`; `None` if unstable.
     #[must_use]
     pub fn costs(&self, i: usize) -> Vec<Option<f64>> {
         let made = &self.members[i].candidate;

@@ -1,24 +1,24 @@
 //! Exact limit cycles of a process and a relay, and their stability.
 //!
-//! The relay is the modified one with amplitude one (the paper's equation 4 as meant; Ayyad,
-//! Chehadeh, Awad, Zweiri 2020): while its output is high it follows the minimum of `y` since the last
-//! switch, and switches once that is negative and `y` has come back to `-beta` times it; mirrored
-//! while it is low. A constant `bias` adds to its output.
+//! The relay is the modified one with amplitude one (the paper's equation 4 as meant; Ayyad, Chehadeh,
+//! Awad, Zweiri 2020): while its output is high it follows the minimum of `y` since the last switch,
+//! and switches once that is negative and `y` has returned to `-beta` times it; mirrored while it is
+//! low. A constant `bias` adds to its output.
 //!
-//! The process integrates, so in a cycle the mean input is zero: `high (1 + bias) = low (1 - bias)`. The
-//! period fixes both durations, they fix the periodic response but for a constant (`waveform`), and
-//! both switches ask for that constant:
+//! The process integrates, so the mean input of a cycle is zero: `high (1 + bias) = low (1 - bias)`.
+//! The period determines both durations, they determine the periodic response up to a constant
+//! (`waveform`), and both switches determine that constant:
 //!
 //! ```text
 //! y(high) + c = b (min + c),    y(period) + c = b (max + c),    b = -beta
 //! F(period) = (b min - y(high)) / (1 - b) - (b max - y(period)) / (1 - b) = 0
 //! ```
 //!
-//! One equation in one unknown; no describing function, no time simulation. Its roots are cycles
-//! where the relay would not have switched before. They are followed over [`PERIODS`] around the
-//! describing function's; a dead time longer than the period is left out. Reference for exact
-//! methods: K. J. Astrom, "Oscillations in systems with relay feedback", IMA Vol. Math. Appl. 74 (1995);
-//! I. Boiko, "Discontinuous Control Systems", Birkhauser (2009).
+//! This is one equation in one unknown, without describing function or simulation in time. Its roots
+//! are limit cycles if the relay would not have switched earlier. They are searched for over
+//! [`PERIODS`] around the describing function's; a dead time longer than the period is left out.
+//! References for exact methods: K. J. Astrom, "Oscillations in systems with relay feedback", IMA Vol.
+//! Math. Appl. 74 (1995); I. Boiko, "Discontinuous Control Systems", Birkhauser (2009).
 
 mod poincare;
 pub mod sampled;
@@ -44,36 +44,36 @@ pub struct LimitCycle {
     pub amplitude: f64,
     /// Mean of the output's extremes (output unit).
     pub centre: f64,
-    /// Spectral radius of the Poincare map: what is left of a small deviation after a cycle.
+    /// Spectral radius of the Poincare map: what remains of a small deviation after a cycle.
     pub spectral_radius: f64,
 }
 
 impl LimitCycle {
-    /// Its period (s).
+    /// Period (s).
     #[must_use]
     pub fn period_s(&self) -> f64 {
         self.high_s + self.low_s
     }
 
-    /// Whether small deviations die out.
+    /// Whether small deviations decay.
     #[must_use]
     pub fn is_stable(&self) -> bool {
         self.spectral_radius < 1.0
     }
 }
 
-/// Where cycles are looked for, in periods of the describing function: a bias of 0.9 stretches those
-/// of multirotors five times.
+/// Range of the search, in periods of the describing function: a bias of 0.9 stretches the cycles of
+/// multirotors five times.
 pub const PERIODS: Range = (0.25, 32.0);
 
 /// Ratio of successive trial periods.
 const SCAN_RATIO: f64 = 1.06;
 
-/// The farthest that the cycle without bias is looked for from the describing function's.
+/// Range of the search for the cycle without bias, in periods of the describing function.
 const SYMMETRIC_PERIODS: Range = (0.5, 4.0);
 
-/// The limit cycle without bias that is nearest to the describing function's; `None` where the
-/// describing function or the exact condition has none.
+/// The limit cycle without bias that is nearest to the describing function's; `None` if the describing
+/// function or the exact condition has none.
 #[must_use]
 pub fn symmetric(process: &Soiptd, beta: f64) -> Option<LimitCycle> {
     let search = Search {
@@ -104,11 +104,11 @@ pub fn symmetric(process: &Soiptd, beta: f64) -> Option<LimitCycle> {
     None
 }
 
-/// Spectral radius of the [`symmetric`] cycle of a relay that follows its bias: at each rise its trim
-/// moves by `trim_gain` times the mean of its output about the trim over the cycle. Whatever the
-/// bias, the trim cancels it, so that this is the cycle and its stability under every bias.
+/// Spectral radius of the [`symmetric`] cycle of a relay with trim: at each rise the trim moves by
+/// `trim_gain` times the mean of the relay's output about the trim over the cycle. The trim cancels any
+/// bias, so this is the cycle and its stability under every bias.
 ///
-/// `None` where there is no cycle, or the dead time is longer than half of it.
+/// `None` without a cycle, or if the dead time is longer than half of it.
 #[must_use]
 pub fn trimmed_spectral_radius(process: &Soiptd, beta: f64, trim_gain: f64) -> Option<f64> {
     let cycle = symmetric(process, beta)?;
@@ -123,8 +123,9 @@ pub fn trimmed_spectral_radius(process: &Soiptd, beta: f64, trim_gain: f64) -> O
     (process.tau_s() < cycle.high_s).then(|| orbit.trimmed_spectral_radius(trim_gain))
 }
 
-/// All limit cycles with two switches a period under a constant `bias` between -1 and 1, the
-/// shortest first. `beta`: of the switch that ends the high output, and of that which ends the low one.
+/// All limit cycles with two switches a period under a constant `bias` between -1 and 1, the shortest
+/// first. `beta` holds the values for the switch that ends the high output and for the one that ends
+/// the low output.
 #[must_use]
 pub fn limit_cycles(process: &Soiptd, beta: [f64; 2], bias: f64) -> Vec<LimitCycle> {
     let search = Search {
@@ -150,7 +151,7 @@ pub fn limit_cycles(process: &Soiptd, beta: [f64; 2], bias: f64) -> Vec<LimitCyc
     cycles
 }
 
-/// What the cycles are of.
+/// Process, relay and bias of a search.
 #[derive(Clone, Copy, Debug)]
 struct Search<'a> {
     process: &'a Soiptd,
@@ -166,7 +167,7 @@ impl Search<'_> {
         (self.bias.abs() < 1.0).then_some(TAU / omega)
     }
 
-    /// `None` where the dead time is longer than the period.
+    /// `None` if the dead time is longer than the period.
     fn waveform(&self, period_s: f64) -> Option<Waveform> {
         let high_s = 0.5 * period_s * (1.0 - self.bias);
         (self.process.tau_s() < period_s)
@@ -179,7 +180,7 @@ impl Search<'_> {
         let high = Window::of(&waveform, true);
         let constant = high.constant(self.b(true));
         let opposite = if self.is_symmetric() {
-            // The low half is the high one upside down about the mean.
+            // The low half is the high half mirrored at the mean.
             -constant - (high.course[0].y + high.end.y)
         } else {
             Window::of(&waveform, false).constant(self.b(false))
@@ -195,8 +196,7 @@ impl Search<'_> {
         -self.beta[usize::from(!high)]
     }
 
-    /// The cycle whose period lies between these; `None` where the relay would have switched
-    /// before.
+    /// The cycle with a period between these; `None` if the relay would have switched earlier.
     fn cycle_between(&self, from_s: f64, to_s: f64) -> Option<LimitCycle> {
         let imbalance = |period_s| self.imbalance(period_s).unwrap_or(f64::NAN);
         let period_s = root(imbalance, from_s, to_s, 0.0);
@@ -226,7 +226,7 @@ impl Search<'_> {
     }
 }
 
-/// The output while the relay's output stays: its course, and the extremum that the relay follows.
+/// The output between two switches: its course, and the extremum that the relay follows.
 struct Window {
     course: Vec<Moment>,
     extreme: Moment,
@@ -251,12 +251,12 @@ impl Window {
         }
     }
 
-    /// What to add to the output for the relay to switch at the end.
+    /// Constant to add to the output so that the relay switches at the end.
     fn constant(&self, b: f64) -> f64 {
         (b * self.extreme.y - self.end.y) / (1.0 - b)
     }
 
-    /// Whether the relay, in the sign that makes the window high, waits for its end.
+    /// Whether the relay does not switch before the end; `sign` makes the window a high one.
     fn lasts(&self, constant: f64, b: f64, sign: f64) -> bool {
         let y = |moment: &Moment| sign * (moment.y + constant);
         let mut lowest = y(&self.course[0]);

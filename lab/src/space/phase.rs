@@ -1,6 +1,6 @@
-//! The distinguishing phase: the tuning rule that costs the processes of a space least, and so the
-//! phase at which a relay should make them oscillate (section III-A of the paper; Ayyad, Chehadeh,
-//! Awad, Zweiri 2020; I. Boiko, "Non-parametric Tuning of PID Controllers", 2013).
+//! The distinguishing phase: the tuning rule that costs the processes of a space least, and the phase
+//! at which a relay should make them oscillate (section III-A of the paper; Ayyad, Chehadeh, Awad,
+//! Zweiri 2020; I. Boiko, "Non-parametric Tuning of PID Controllers", 2013).
 //!
 //! The paper's six steps:
 //!
@@ -11,15 +11,15 @@
 //!    its lead and its margin are the rule's, so nothing is left to search for but the crossover;
 //! 6. the rule whose worst deterioration is least, [`distinguishing_phase`].
 //!
-//! A rule is homogeneous: it takes its gains from the amplitude of the oscillation and counts time
-//! in the oscillation's own period. So neither the gain nor the time scale of a process changes its
-//! deterioration, and one process of every shape stands for its whole ray: here the slowest.
+//! A rule is homogeneous: it takes its gains from the amplitude of the oscillation and measures time in
+//! its period. So neither the gain nor the time scale of a process changes its deterioration, and one
+//! process of every shape, here the slowest, represents its whole ray.
 //!
-//! At a given margin the rules are a family of one parameter, the lead `psi`, with
-//! `asin(beta) = PM - psi`. A process's deterioration over the lead falls to zero at its own
-//! optimum and rises beyond it. Of the processes whose own lead is larger the worst therefore falls
-//! with the lead, of the others it rises, and where the two are equal is the best rule of all,
-//! whether or not it is any process's own: [`LocalOptima::minimax`].
+//! At a given margin the rules have one parameter, the lead `psi`, with `asin(beta) = PM - psi`. As a
+//! function of the lead, a process's deterioration falls to zero at its own optimum and rises beyond
+//! it. So the worst deterioration of the processes with larger leads falls with the lead, that of the
+//! others rises, and the best rule of all is where both are equal, whether or not it is any process's
+//! own: [`LocalOptima::minimax`].
 
 use onecycle_onboard::{Soiptd, SoiptdError};
 
@@ -30,25 +30,25 @@ use onecycle_design::soiptd_pd::cost::ise_at_crossover;
 use onecycle_design::soiptd_pd::open_loop::{OpenLoop, lead_for_margin};
 use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd_at_phase_margin};
 
-/// Of the best lead (rad): ten times what rounding leaves of a deterioration, whose slope over the
-/// lead is of the order of one.
+/// Precision of the best lead (rad): ten times the rounding error of a deterioration, whose slope over
+/// the lead is of the order of one.
 const LEAD_TOLERANCE_RAD: f64 = 1e-12;
 
-/// A tuning rule and what it costs the processes it is applied to.
+/// A tuning rule and its costs on the processes it is applied to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AppliedRule {
     /// The rule.
     pub rule: TuningRule,
-    /// Lead of its controllers at the gain crossover (rad).
+    /// Lead of the controllers at the gain crossover (rad).
     pub lead_rad: f64,
-    /// Phase of its relay's oscillation, `asin(beta)` (rad).
+    /// Phase of the relay's oscillation, `asin(beta)` (rad).
     pub phase_rad: f64,
-    /// Largest deterioration, as a fraction of the optimal cost; infinite where the relay does not
-    /// make a process oscillate.
+    /// Largest deterioration, as a fraction of the optimal cost; infinite if the relay does not make a
+    /// process oscillate.
     pub worst: f64,
     /// Mean deterioration over all processes.
     pub mean: f64,
-    /// `T_prop`, `T_body`, `tau` (s) of the process that suffers most.
+    /// `T_prop`, `T_body`, `tau` (s) of the process with the largest deterioration.
     pub worst_on_s: [f64; 3],
 }
 
@@ -61,24 +61,24 @@ pub struct LocalRule {
     pub applied: AppliedRule,
 }
 
-/// What the six steps find.
+/// Result of the six steps.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DistinguishingPhase {
     /// The rule of every process, in the order of [`Space::shapes`].
     pub rules: Vec<LocalRule>,
-    /// The one with the least worst deterioration: the paper's distinguishing rule.
+    /// The rule with the least worst deterioration: the paper's distinguishing rule.
     pub best: LocalRule,
-    /// The best rule of all, local or not.
+    /// The best rule of all, whether local or not.
     pub minimax: AppliedRule,
 }
 
 /// Why there is no distinguishing phase.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PhaseError {
-    /// There is no process to make a rule for.
-    #[error("there is no process to make a rule for")]
+    /// There is no process.
+    #[error("the rule needs at least one process")]
     Empty,
-    /// The times are no process.
+    /// The times are out of range.
     #[error("{0}")]
     Process(#[from] SoiptdError),
     /// A process has no optimal controller.
@@ -89,7 +89,7 @@ pub enum PhaseError {
 /// The paper's six steps for `rows` times `columns` shapes of a space, see [`Space::shapes`].
 ///
 /// # Errors
-/// See [`PhaseError`].
+/// [`PhaseError`]: a process is out of range or has no optimal controller.
 pub fn distinguishing_phase(
     space: &Space,
     rows: usize,
@@ -98,7 +98,7 @@ pub fn distinguishing_phase(
     LocalOptima::of_shapes(space, rows, columns)?.distinguishing_phase()
 }
 
-/// Processes and the optimum of each at one phase margin.
+/// Processes and their optima at one phase margin.
 #[derive(Clone, Debug)]
 pub struct LocalOptima {
     phase_margin_rad: f64,
@@ -113,10 +113,10 @@ struct Member {
 }
 
 impl LocalOptima {
-    /// Of processes with these times, `T_prop`, `T_body`, `tau` (s).
+    /// The optima of processes with these times, `T_prop`, `T_body`, `tau` (s).
     ///
     /// # Errors
-    /// See [`PhaseError`].
+    /// [`PhaseError`]: a process is out of range or has no optimal controller.
     pub fn new(
         times_s: impl IntoIterator<Item = [f64; 3]>,
         phase_margin_rad: f64,
@@ -131,10 +131,10 @@ impl LocalOptima {
         })
     }
 
-    /// Of the slowest process of every shape of a space, see [`Space::shapes`].
+    /// The optima of the slowest process of every shape of a space, see [`Space::shapes`].
     ///
     /// # Errors
-    /// See [`PhaseError`].
+    /// [`PhaseError`]: a process is out of range or has no optimal controller.
     pub fn of_shapes(space: &Space, rows: usize, columns: usize) -> Result<Self, PhaseError> {
         let shapes = space.shapes(rows, columns);
         let slowest = shapes.into_iter().filter_map(|shape| {
@@ -153,7 +153,7 @@ impl LocalOptima {
         })
     }
 
-    /// Deterioration of every process, in their order, under the rule with this lead (rad).
+    /// Deterioration of every process, in order, under the rule with this lead (rad).
     pub fn deteriorations(&self, lead_rad: f64) -> impl Iterator<Item = f64> {
         self.members.iter().map(move |member| {
             member
@@ -162,10 +162,10 @@ impl LocalOptima {
         })
     }
 
-    /// The rule with this lead (rad) on every process.
+    /// Applies the rule with this lead (rad) to every process.
     ///
     /// # Errors
-    /// [`PhaseError::Empty`].
+    /// [`PhaseError::Empty`]: there is no process.
     pub fn apply(&self, lead_rad: f64) -> Result<AppliedRule, PhaseError> {
         let mut sum = 0.0;
         let mut worst = None;
@@ -186,7 +186,8 @@ impl LocalOptima {
         })
     }
 
-    /// The rule of the process at `index`, on every process; `None` where there is no such process.
+    /// The rule of the process at `index`, applied to every process; `None` if there is no such
+    /// process.
     #[must_use]
     pub fn local_rule(&self, index: usize) -> Option<LocalRule> {
         let member = self.members.get(index)?;
@@ -199,7 +200,7 @@ impl LocalOptima {
     /// The rule with the least worst deterioration, whatever its lead.
     ///
     /// # Errors
-    /// [`PhaseError::Empty`].
+    /// [`PhaseError::Empty`]: there is no process.
     pub fn minimax(&self) -> Result<AppliedRule, PhaseError> {
         let (low, high) = self.lead_range_rad();
         self.apply(root(
@@ -210,8 +211,8 @@ impl LocalOptima {
         ))
     }
 
-    /// How much more the worst of the processes that want a larger lead loses than the worst of the
-    /// others; falls with the lead. Lost is `1 - J*/J`, which is one where `J` is infinite.
+    /// Largest loss of the processes that want a larger lead minus that of the others; falls with the
+    /// lead. The loss is `1 - J*/J`, which is one for an infinite `J`.
     fn balance(&self, lead_rad: f64) -> f64 {
         let (mut want_more, mut want_less) = (0.0_f64, 0.0_f64);
         for (member, deterioration) in self.members.iter().zip(self.deteriorations(lead_rad)) {
@@ -228,7 +229,7 @@ impl LocalOptima {
     /// Steps 5 and 6, and the best rule of all.
     ///
     /// # Errors
-    /// [`PhaseError::Empty`].
+    /// [`PhaseError::Empty`]: there is no process.
     pub fn distinguishing_phase(&self) -> Result<DistinguishingPhase, PhaseError> {
         let rules: Vec<_> = (0..self.members.len())
             .filter_map(|index| self.local_rule(index))
@@ -257,8 +258,8 @@ impl Member {
         })
     }
 
-    /// ISE under the rule with this lead and margin; `None` where the rule's relay has nowhere to
-    /// oscillate: a process without damping under a relay that does not lead.
+    /// ISE under the rule with this lead and margin; `None` if the rule's relay causes no oscillation:
+    /// a process without damping under a relay that does not lead.
     fn cost(&self, lead_rad: f64, phase_margin_rad: f64) -> Option<f64> {
         let omega = falling_root(
             |omega| lead_rad - lead_for_margin(&self.process, omega, phase_margin_rad),

@@ -16,7 +16,7 @@ use onecycle_onboard::Pd;
 /// A homogeneous tuning rule. See the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TuningRule {
-    /// Parameter of the relay, -1 to 1; negative where it leads.
+    /// Parameter of the relay, -1 to 1; negative for a leading relay.
     pub beta: f64,
     /// Proportional gain times the amplitude ratio of the oscillation.
     pub c1: f64,
@@ -25,7 +25,7 @@ pub struct TuningRule {
 }
 
 impl TuningRule {
-    /// The rule whose PD has this lead and leaves this phase margin (rad), both from 0 to `pi/2`.
+    /// The rule whose PD has this lead and this phase margin (rad), both from 0 to `pi/2`.
     #[must_use]
     pub fn from_lead(lead_rad: f64, phase_margin_rad: f64) -> Self {
         Self {
@@ -35,7 +35,7 @@ impl TuningRule {
         }
     }
 
-    /// Gains from the oscillation: `|G|` there (output unit / input unit) and its period (s).
+    /// Gains from an oscillation: its `|G|` (output unit / input unit) and its period (s).
     #[must_use]
     pub fn pd(&self, amplitude_ratio: f64, period_s: f64) -> Pd {
         let kp = self.c1 / amplitude_ratio;

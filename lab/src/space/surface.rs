@@ -5,9 +5,9 @@
 //! T_prop = r sin(phi) cos(theta),   T_body = r sin(phi) sin(theta),   tau = r cos(phi)
 //! ```
 //!
-//! Scaling all three times scales time itself, so whatever has no unit depends on the direction
-//! `(theta, phi)` alone: a point of a surface. A box of processes is a patch of it and, on every
-//! ray through the patch, an interval of radii.
+//! Scaling all three times scales time itself, so every dimensionless property depends on the direction
+//! `(theta, phi)` alone: a point of a surface. A box of processes is a patch of that surface and, on
+//! every ray through the patch, an interval of radii.
 
 use crate::space::{Range, Space};
 
@@ -44,11 +44,11 @@ impl Direction {
     }
 }
 
-/// Rounding is forgiven where a ray only touches a box.
+/// Tolerance for a ray that only touches a box.
 const TOUCH: f64 = 1e-12;
 
 impl Space {
-    /// The angles `theta` (rad) of its processes.
+    /// The angles `theta` (rad) of the processes.
     #[must_use]
     pub fn theta_range_rad(&self) -> Range {
         (
@@ -57,14 +57,14 @@ impl Space {
         )
     }
 
-    /// The angles `phi` (rad) of its processes with this `theta`; `None` where there are none.
+    /// The angles `phi` (rad) of the processes with this `theta`; `None` if there are none.
     #[must_use]
     pub fn phi_range_rad(&self, theta_rad: f64) -> Option<Range> {
         let (low, high) = self.lags_range_s(theta_rad)?;
         Some((low.atan2(self.tau_s.1), high.atan2(self.tau_s.0)))
     }
 
-    /// The radii (s) of its processes in this direction; `None` where there are none.
+    /// The radii (s) of the processes in this direction; `None` if there are none.
     #[must_use]
     pub fn radius_range_s(&self, direction: Direction) -> Option<Range> {
         let (sin, cos) = direction.phi_rad.sin_cos();
@@ -79,7 +79,7 @@ impl Space {
         intersection(lags, delay)
     }
 
-    /// `hypot(T_prop, T_body)` (s) of its processes with this `theta`.
+    /// `hypot(T_prop, T_body)` (s) of the processes with this `theta`.
     fn lags_range_s(&self, theta_rad: f64) -> Option<Range> {
         let (sin, cos) = theta_rad.sin_cos();
         intersection(
@@ -88,9 +88,9 @@ impl Space {
         )
     }
 
-    /// The shape at a point of the unit square, which the square's corners and edges map onto those
-    /// of the patch: `theta` uniform in `ln(T_body/T_prop)`, then `phi` uniform in
-    /// `ln(1 + tau/T_prop)`, the longest dead time first.
+    /// The shape at a point of the unit square; corners and edges of the square map onto those of the
+    /// patch. `theta` is uniform in `ln(T_body/T_prop)`, then `phi` uniform in `ln(1 + tau/T_prop)`,
+    /// the longest dead time first.
     #[must_use]
     pub fn shape(&self, across: f64, along: f64) -> Option<Direction> {
         let (low, high) = self.theta_range_rad();
@@ -106,8 +106,8 @@ impl Space {
         })
     }
 
-    /// Shapes all over the patch, its edges included: [`Space::shape`] at `rows` by `columns` points,
-    /// fewer where the patch has no extent.
+    /// Shapes all over the patch, with its edges: [`Space::shape`] at `rows` by `columns` points, fewer
+    /// if the patch has no extent.
     #[must_use]
     pub fn shapes(&self, rows: usize, columns: usize) -> Vec<Direction> {
         let (low, high) = self.theta_range_rad();

@@ -2,7 +2,7 @@
 
 use onecycle_lab::workers::Workers;
 
-/// This many threads, started for every piece of work; each takes every so many parts.
+/// Runs every piece of work on this many new threads, which share its parts.
 pub(crate) struct Threads(pub(crate) usize);
 
 impl Workers for Threads {

@@ -1,4 +1,4 @@
-//! The rivals: right where theory says so, wrong where the paper says so, and never crippled.
+//! Baselines: exact where theory says so, and wrong where the paper says so.
 
 mod arx;
 mod asymmetric;
@@ -40,7 +40,7 @@ fn run(process: Soiptd, bias: f64, duration_s: f64, controller: &mut impl Contro
     experiment.run(controller, &mut Noise::from_seed(1))
 }
 
-/// The paper's relay, without protection, on a process without noise, for so many of its periods.
+/// The paper's relay, without noise protection, on a noise-free process, for `periods` of its periods.
 fn relay_test(process: Soiptd, bias: f64, periods: f64) -> Trace {
     let (omega, _) = process.describing_function_oscillation(1.0, -0.73).unwrap();
     let mut relay = Relay::new(RelaySettings::bare(1.0, -0.73)).unwrap();
@@ -52,7 +52,7 @@ fn relay_test(process: Soiptd, bias: f64, periods: f64) -> Trace {
     )
 }
 
-/// Cost of what a rival found above the optimum; `None` where unstable.
+/// Cost above the optimum of a baseline's answer; `None` if unstable.
 fn cost(found: Result<BaselineAnswer, BaselineError>, truth: &Soiptd) -> Option<f64> {
     let best = pd_at_phase_margin(truth, margin()).unwrap();
     deterioration(found.unwrap().pd, truth, &best).relative()

@@ -1,4 +1,4 @@
-//! Smaller versions of the campaigns under `experiments/`, which the README quotes.
+//! Smaller versions of the campaigns under `experiments/`.
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_design::{Model, Parameter};
@@ -24,8 +24,8 @@ fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
     }
 }
 
-// Of 1,000 cases all become steady (experiments/relay.toml): so do these, with and without trim,
-// from rest and from an offset, at the most noise.
+// All 1,000 cases of experiments/relay.toml become steady. So do these, with and without trim, from
+// rest and from an offset, at the highest noise.
 #[test]
 fn the_relay_becomes_steady_and_never_runs_away() {
     for (trim, offset) in [(true, 0.0), (false, 0.0), (true, 30.0)] {
@@ -41,8 +41,8 @@ fn the_relay_becomes_steady_and_never_runs_away() {
                 "{case:?}: {outcome:?}"
             );
             assert!(outcome.alive, "{case:?}: {outcome:?}");
-            // Without noise the period is up to 1.18 of the describing function's where the trim makes
-            // up for the bias; noise shortens it by a tenth or so.
+            // Without noise the period is up to 1.18 times that of the describing function while the
+            // trim cancels the bias; noise shortens it by about a tenth.
             if trim {
                 assert!(
                     (0.8..1.3).contains(&outcome.period_ratio),
@@ -59,7 +59,7 @@ fn outcomes(campaign: &Campaign) -> Vec<IdentificationOutcome> {
         .collect()
 }
 
-/// Absolute deteriorations, in ascending order; none unstable, none refused.
+/// Absolute deteriorations, ascending; asserts that none is unstable or refused.
 fn deteriorations(outcomes: &[IdentificationOutcome]) -> Vec<f64> {
     let mut costs: Vec<f64> = outcomes
         .iter()
@@ -72,8 +72,8 @@ fn deteriorations(outcomes: &[IdentificationOutcome]) -> Vec<f64> {
     costs
 }
 
-// Medians of 1,000 cases: 0.047 % at 1 % noise and 0.146 % at 3 %, bias left in. The median of 100 of
-// such skewed values scatters by some 12 %: two of that above the claims of 0.05 % and 0.15 %.
+// Medians of 1,000 cases, bias left in: 0.047 % at 1 % noise and 0.146 % at 3 %. The median of 100 such
+// skewed values varies by about 12 %; the limits are two of that above 0.05 % and 0.15 %.
 #[test]
 fn two_cycles_give_the_optimal_controller() {
     for (sigma, most) in [(0.01, 6e-4), (0.03, 1.8e-3)] {
@@ -84,8 +84,8 @@ fn two_cycles_give_the_optimal_controller() {
     }
 }
 
-// Of 1,000 cases 90 to 92 % hold (experiments/intervals.toml). Of 200, an honest 90 % scatters by
-// 2.1 %: three of that either way.
+// Of 1,000 cases 90 to 92 % hold the truth (experiments/intervals.toml). A true share of 90 % varies by
+// 2.1 % among 200 cases; the limits are three of that on either side.
 #[test]
 fn intervals_hold_the_truth_nine_times_in_ten() {
     let campaign = campaign(Measure::Identification, 200, 0.02, true);
@@ -109,7 +109,7 @@ fn intervals_hold_the_truth_nine_times_in_ten() {
     }
 }
 
-// The same case, bit for bit, whatever ran before it.
+// A case is the same to the bit, whatever ran before it.
 #[test]
 fn a_case_is_reproducible() {
     let campaign = campaign(Measure::Identification, 10, 0.03, true);

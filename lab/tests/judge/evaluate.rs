@@ -1,4 +1,4 @@
-//! The judge: its scoring rule on cases made by hand, its experiments, its tables.
+//! Evaluation: the scoring rule on cases made by hand, the experiments, the tables.
 
 use std::collections::BTreeSet;
 
@@ -28,8 +28,8 @@ fn stable(relative: f64, margin_deg: f64) -> Option<Deterioration> {
 
 // ---------------------------------------------------------------- the scoring rule
 
-// A J of -0.3 bought with margin counts 0.3; at the full margin it is won and counts nothing, and so do 20
-// degrees but for rounding. A cost above the optimum counts whatever the margin.
+// A J of -0.3 that loses margin counts 0.3. At the full margin (20 degrees to rounding) it is a gain
+// and counts nothing. A cost above the optimum counts at any margin.
 #[test]
 fn what_is_won_at_the_full_margin_counts_nothing() {
     for (relative, margin_deg, score) in [
@@ -43,8 +43,8 @@ fn what_is_won_at_the_full_margin_counts_nothing() {
     }
 }
 
-// The best PD as a cascade is judged as the PD is: J 0 and 20 degrees, but for what a walk through
-// frequencies errs by. Four times the gain is unstable, for the gain margin is 2.26.
+// The best PD written as a cascade scores the same as the PD: J 0 and 20 degrees, to the error of the
+// frequency search. Four times the gain is unstable, because the gain margin is 2.26.
 #[test]
 fn a_cascade_is_judged_as_a_pd_is() {
     let truth = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
@@ -85,8 +85,8 @@ fn the_score_of_a_case_made_by_hand() {
     assert!((costs.least_phase_margin_deg.unwrap() - 12.0).abs() < 1e-12);
 }
 
-// Refusing the hard one of two makes the mean better, 0.05 instead of 0.225, and the score worse,
-// 0.525 instead of 0.225; whoever refuses all scores 1 and has no mean.
+// Refusing the harder of two experiments improves the mean from 0.225 to 0.05, but worsens the score
+// from 0.225 to 0.525. A method that refuses all scores 1 and has no mean.
 #[test]
 fn refusing_never_pays() {
     let honest = Costs::of([stable(0.05, 20.0), stable(0.4, 9.0)]);
@@ -98,7 +98,7 @@ fn refusing_never_pays() {
     assert_eq!((mute.score, mute.mean, mute.worst), (1.0, None, None));
 }
 
-// Nearest ranks of 101 values 0..=100: the rank is the value. Of none there is none.
+// Nearest ranks of 101 values 0..=100: the rank is the value. An empty sample has no quantile.
 #[test]
 fn quantiles_are_values_of_the_sample() {
     let mut values: Vec<f64> = (0..=100).rev().map(f64::from).collect();
@@ -114,8 +114,8 @@ fn quantiles_are_values_of_the_sample() {
     assert_eq!(quantile(&mut [], 0.5), None);
 }
 
-// The truth as the answer costs what the optimum costs, J = 0 to rounding, at 20 degrees at least; with
-// its lags swapped it is the same process.
+// The truth as an answer has J = 0 to rounding and at least 20 degrees. With its lags exchanged it is
+// the same process.
 #[test]
 fn a_perfect_answer_scores_zero() {
     for [t_prop_s, t_body_s, tau_s] in [[0.02, 0.3, 0.001], [0.3, 0.2, 0.1], [0.1, 1.0, 0.03]] {
@@ -145,8 +145,8 @@ fn a_perfect_answer_scores_zero() {
     }
 }
 
-// Five times the gain passes the gain margin of 2.26 of (0.3, 2, 0.1): unstable, score 1. The wrong sign
-// is unstable too. Neither has a J, nor does a refusal, which has its reason.
+// Five times the gain exceeds the gain margin of 2.26 of (0.3, 2, 0.1): unstable, score 1. The wrong
+// sign is unstable, too. Neither has a J; nor has a refusal, which has a reason.
 #[test]
 fn unstable_and_missing_answers_count_one() {
     let truth = Soiptd::new(1.0, 0.3, 2.0, 0.1).unwrap();
@@ -170,15 +170,16 @@ fn unstable_and_missing_answers_count_one() {
 
 // ---------------------------------------------------------------- experiments and methods
 
-/// Few experiments of a seed of their own.
+/// A few experiments with their own seed.
 const FEW: Benchmark = Benchmark {
     experiments: 6,
     seed: 123,
 };
 
-// As the rules say: odd ones trimmed, their mean input the bias turned round to some hundredths; even
-// ones with two levels exactly and a bias left in. Four complete cycles and 1.5 periods before them are
-// five complete cycles from rise to rise. K, bias and noise are within their ranges.
+// The rules of the benchmark: odd experiments are trimmed, and their mean input is minus the bias to
+// some hundredths; even ones have exactly two levels and keep the bias. Four complete cycles and the
+// 1.5 periods before them make five complete cycles from rise to rise. K, bias and noise are within
+// their ranges.
 #[test]
 fn experiments_are_as_the_rules_say() {
     for number in 1..=FEW.experiments {
@@ -204,7 +205,7 @@ fn experiments_are_as_the_rules_say() {
         } else {
             assert!(recorded.input.iter().all(|&u| u.abs() == 1.0));
         }
-        // Rounded to a power of ten well above a hundred millionth of the amplitude.
+        // Rounded to a power of ten far above 1e-8 of the amplitude.
         let unit = 10_f64.powf(found.amplitude.log10().floor() - 8.0);
         let units = recorded.output.iter().map(|output| output / unit);
         assert!(
@@ -217,8 +218,8 @@ fn experiments_are_as_the_rules_say() {
     assert_eq!(first, again);
 }
 
-// The rivals' own tests are on the same process: the sweep lasts its 20 s behind 0.1 s of pre-roll, the
-// asymmetric relay has the levels 4/3 and -2/3 and goes on switching whatever the bias.
+// The tests of other methods run on the same process: the sweep lasts its 20 s after 0.1 s of pre-roll;
+// the asymmetric relay has the levels 4/3 and -2/3 and keeps switching at any bias.
 #[test]
 fn other_relay_tests_are_of_the_same_process() {
     for number in 1..=FEW.experiments {
@@ -244,7 +245,7 @@ fn all_records(contenders: &[Contender], workers: &dyn Workers) -> Vec<Record> {
     workers.map(FEW.experiments as usize, of_one).concat()
 }
 
-/// The methods that are quick.
+/// The fast methods.
 const QUICK: [Contender; 8] = [
     Contender::OneCycle(1),
     Contender::OneCycle(4),
@@ -256,8 +257,8 @@ const QUICK: [Contender; 8] = [
     Contender::Asymmetric,
 ];
 
-// But for the clock, which stands still here, nothing depends on the threads: to the last bit. Four
-// cycles give J below 1 % and |K/T_body| within 5 % in each of these (0.3 % and 2 % are usual).
+// Results have the same bits on any number of threads; the clock is constant here. Four cycles give J
+// below 1 % and |K/T_body| within 5 % in each of these (0.3 % and 2 % are usual).
 #[test]
 fn the_same_bits_on_any_number_of_threads() {
     let one = all_records(&QUICK, &OneThread);
@@ -288,8 +289,8 @@ fn the_same_bits_on_any_number_of_threads() {
     );
 }
 
-// Every method answers a plain experiment; PEM that knows of the bias is within 10 % of the optimum from one
-// noisy cycle (3.4 % here, a median of 0.2 % over many).
+// Every method answers a simple experiment. PEM with an estimated bias is within 10 % of the optimum
+// from one noisy cycle (3.4 % here, median 0.2 % over many).
 #[test]
 fn every_method_answers_a_plain_experiment() {
     let (truth, recorded) = FEW.experiment(1).unwrap();
@@ -306,8 +307,8 @@ fn every_method_answers_a_plain_experiment() {
     }
 }
 
-// The shapes that the exact rule is made for are enough: of twice as many rows and columns its numbers
-// are within 2 %.
+// The exact rule has enough shapes: with twice as many rows and columns its numbers change by less than
+// 2 %.
 #[test]
 fn the_exact_rule_has_shapes_enough() {
     let [some, more] =
@@ -332,8 +333,8 @@ fn truths() -> Vec<Truth> {
     (1..=3).map(truth).collect()
 }
 
-// What is written is read: all to the last bit, but for the process to rounding, for it holds T_body by
-// its inverse.
+// Truths read back to the last bit, except for the process, which holds the inverse of T_body and reads
+// back to rounding.
 #[test]
 fn the_truth_comes_back() {
     let truths = truths();
@@ -369,7 +370,7 @@ fn answers_are_processes_or_gains() {
     assert_eq!(answers[&2].seconds, None);
 }
 
-// Each wrong table is refused with the line where it goes wrong.
+// Each wrong table is refused, and the error names the line.
 #[test]
 fn wrong_answers_name_their_line() {
     let experiments = BTreeSet::from([1, 2, 3]);
@@ -382,7 +383,7 @@ fn wrong_answers_name_their_line() {
         (
             format!("{gains}1,2,3\n2,2,3\n1,2,3\n"),
             4,
-            "experiment 1 has a row already, line 2",
+            "experiment 1 already has a row, line 2",
         ),
         (format!("{gains}9,2,3\n"), 2, "no experiment 9"),
         (format!("{gains}1.5,2,3\n"), 2, "experiment is '1.5'"),
@@ -394,7 +395,7 @@ fn wrong_answers_name_their_line() {
         (
             "experiment,K,T_prop_s,T_body_s,tau_s\n1,1,-0.1,1,0\n".to_owned(),
             2,
-            "no process",
+            "not a process",
         ),
     ] {
         let error = read_answers(&text, &experiments).unwrap_err();
@@ -409,7 +410,7 @@ fn wrong_truths_name_their_line() {
     for (from, to, words) in [
         ("trimmed", "trusted", "protocol is 'trusted'"),
         ("input_bias", "bias", "no column 'input_bias'"),
-        ("\n2,", "\n1,", "line 3: experiment 1 has a row already"),
+        ("\n2,", "\n1,", "line 3: experiment 1 already has a row"),
     ] {
         let error = read_truth(&text.replacen(from, to, 1)).unwrap_err();
         assert!(error.to_string().contains(words), "{words} not in: {error}");
@@ -423,7 +424,7 @@ fn wrong_truths_name_their_line() {
     );
 }
 
-// Two recordings, read by the crate that wrote them: a row group each, every number to the last bit.
+// Two recordings, one row group each, read by the crate that wrote them: every number to the last bit.
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_has_the_recordings() {

@@ -1,5 +1,5 @@
-//! The missions of the paper, each flown with a hundred seeds: all succeed, and the controllers have their
-//! margin on the true vehicle.
+//! The missions of the paper, each flown with a hundred seeds: all succeed, and the controllers keep
+//! their margin on the true vehicle.
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::flights::judged;
@@ -7,8 +7,9 @@ use onecycle_plant::multirotor::{Axis, Mission, fly};
 
 const SEEDS: u64 = 100;
 
-/// Flies a mission with every seed; the number of axes tuned in each, the largest deterioration of one, its
-/// least margin (deg), the longest flight until all were tuned (s).
+/// Flies a mission with a hundred seeds. Returns the number of axes tuned in each flight, the largest
+/// deterioration of an axis, the least margin (deg), and the longest time until all axes were tuned
+/// (s).
 fn hundred(mission: Mission) -> (usize, f64, f64, f64) {
     let (mut axes, mut worst, mut least_deg, mut longest_s) = (0, 0.0_f64, 180.0_f64, 0.0_f64);
     for seed in 0..SEEDS {
@@ -31,8 +32,8 @@ fn hundred(mission: Mission) -> (usize, f64, f64, f64) {
     (axes, worst, least_deg, longest_s)
 }
 
-// From two cycles with noise of 3 to 4 % of the oscillation the campaigns' controllers cost 0.7 % at the 95th
-// percentile and 3 % at worst, and lose up to 1.5 degrees.
+// With two cycles and noise of 3 to 4 % of the oscillation, the controllers of the campaigns cost 0.7 %
+// (95th percentile) and 3 % (worst) and lose up to 1.5 degrees.
 #[test]
 fn altitude_from_the_ground_with_and_without_payload() {
     for mission in [Mission::Altitude, Mission::Payload, Mission::Cycles] {
@@ -51,7 +52,7 @@ fn roll_with_a_bias() {
     }
 }
 
-// All axes at once disturb each other: up to a tenth of the cost, and a degree and a half.
+// Axes tuned at the same time disturb each other: up to a tenth of the cost, and 1.5 degrees.
 #[test]
 fn whole_vehicle() {
     let (axes, worst, least_deg, longest_s) = hundred(Mission::Vehicle);
@@ -67,8 +68,9 @@ fn disturbed() {
     assert!(worst < 0.03 && least_deg > 18.5, "{worst} {least_deg}");
 }
 
-// The weight of the blow is 200 g of 1.33 kg: under the poor controller, 1.5 m/s^2 over 2.3 1/s^2, half a metre and
-// more; under the new one, whose Kp is forty times as large, two centimetres.
+// The disturbance is the weight of 200 g on 1.33 kg. With the poor controller the deviation is 1.5
+// m/s^2 over 2.3 1/s^2, more than half a metre; with the new one, whose Kp is forty times as large, two
+// centimetres.
 #[test]
 fn tuning_pays() {
     let sags = [Mission::Disturbed, Mission::DisturbedUntuned].map(|mission| {

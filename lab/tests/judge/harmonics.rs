@@ -1,4 +1,5 @@
-//! The measured response at the harmonics of an oscillation against that of the process, known exactly.
+//! The measured response at the harmonics of an oscillation, compared with the exact response of the
+//! process.
 
 use num_complex::Complex64;
 use onecycle_identify::{Harmonic, harmonics};
@@ -9,7 +10,7 @@ use onecycle_onboard::relay::Relay;
 use onecycle_plant::{Experiment, Noise, Sensor, Trace};
 
 const SAMPLE_S: f64 = 1e-3;
-/// T_prop, T_body, tau (s): slow and quick multirotors of the paper's space and its hexacopter.
+/// T_prop, T_body, tau (s): slow and fast multirotors of the paper's space and its hexacopter.
 const PROCESSES: [[f64; 3]; 5] = [
     [0.3, 2.0, 0.1],
     [0.3, 2.0, 0.0005],
@@ -17,15 +18,15 @@ const PROCESSES: [[f64; 3]; 5] = [
     [0.015, 0.2, 0.0005],
     [0.0321, 1.6886, 0.0237],
 ];
-/// One whose biased relay switches after 219 and 365 samples, cycle by cycle, and the relay without bias
-/// after 296: 592 samples, a multiple of four.
+/// A process whose relay switches after 219 and 365 samples in every cycle with bias, and after 296
+/// without: 592 samples, a multiple of four.
 const EVEN: [f64; 3] = PROCESSES[2];
 
 fn process([t_prop, t_body, tau]: [f64; 3]) -> Soiptd {
     Soiptd::new(1.0, t_prop, t_body, tau).unwrap()
 }
 
-/// So long a test without noise that nothing is left of its beginning.
+/// A noise-free test, long enough for the transient to vanish.
 fn settled(process: Soiptd, bias: f64) -> Trace {
     let mut experiment = Campaign::QUIET.quiet_experiment(process, 1).unwrap();
     experiment.input_bias = bias;
@@ -55,12 +56,12 @@ fn orders(harmonics: &[Harmonic]) -> Vec<usize> {
     harmonics.iter().map(|harmonic| harmonic.order).collect()
 }
 
-// The relay's square wave has coefficients as 1/n at odd n, and samples add those at n + m N to that at n:
-// G(j n w) + sum_m n/(n + m N) G(j (n + m N) w) is measured. It falls as m^-4, so that beyond 300 it has
-// 1e-8 of the sum, which is at most 2e-4 of G: to 1e-11, with what the simulation rounds off. No half sample
-// of a hold is in it, which would be pi n/N, 0.03 at N = 96.
-// Against G alone 25 (n/N)^4: the actuator's lag is a fortieth of the period at the least, and before
-// it acts the response falls as n^-2 only.
+// The relay's square wave has coefficients proportional to 1/n at odd n, and sampling adds those at n +
+// m N to that at n, so the measured response is G(j n w) + sum_m n/(n + m N) G(j (n + m N) w). The
+// terms fall as m^-4: those beyond 300 are 1e-8 of the sum, which is at most 2e-4 of G. That leaves
+// 1e-11 and the rounding of the simulation. A hold of half a sample would add pi n/N, 0.03 at N = 96.
+// Compared with G alone the error is 25 (n/N)^4: the lag of the actuator is at least a fortieth of the
+// period, and below it the response falls as n^-2 only.
 #[test]
 fn a_settled_oscillation_has_the_response_of_the_process() {
     for times in PROCESSES {
@@ -87,8 +88,8 @@ fn a_settled_oscillation_has_the_response_of_the_process() {
     }
 }
 
-// High for 3/8 of the cycle: even orders are excited too, the eighth (sin(8 pi 3/8) = 0) is not. With the
-// input upside down the gain is negative, the rest the same.
+// High for 3/8 of the cycle: even orders are excited too, except for the eighth, sin(8 pi 3/8) = 0.
+// With the input negated the gain is negative and the rest is the same.
 #[test]
 fn a_bias_brings_even_orders_and_a_negative_gain_its_sign() {
     let process = process(EVEN);
@@ -111,9 +112,9 @@ fn a_bias_brings_even_orders_and_a_negative_gain_its_sign() {
     }
 }
 
-// Four samples a point, from a rise on: 148 points a cycle, and still exact to their aliases. The middle of a
-// point, 1.5 samples late, would be 0.016 rad at the first order, and at the ninth the mean takes 0.6 % off
-// a sine.
+// Four samples per point from a rise on: 148 points per cycle, still exact to the aliases. Half a point
+// too late, 1.5 samples, would be 0.016 rad at the first order; the average over a point takes 0.6 %
+// off a sine of the ninth order.
 #[test]
 fn points_of_several_samples_are_as_exact() {
     let process = process(EVEN);
@@ -148,8 +149,9 @@ fn points_of_several_samples_are_as_exact() {
     }
 }
 
-// Sample periods that vary by a fifth: half a sample of a hold would still be 0.7 %. The lines about both
-// ends see parts of the wave that differ by a sample or two, and the cycles differ a little; 0.02 % in all.
+// Sample periods that vary by a fifth: half a sample of hold would still be 0.7 %. The lines fitted at
+// both ends see parts of the wave that differ by a sample or two, and the cycles differ slightly; 0.02
+// % in all.
 #[test]
 fn uneven_stamps_will_do() {
     let process = process(PROCESSES[4]);
@@ -163,7 +165,7 @@ fn uneven_stamps_will_do() {
     assert!(error(&process, &first) < 1e-3, "{first:?}");
 }
 
-/// Mean of |error|^2 over twice the variance, which is 1 where the deviation is right.
+/// Mean of |error|^2 over twice the variance; 1 if the stated deviation is right.
 fn squared_errors(errors: &[(Harmonic, Complex64)]) -> f64 {
     let square = |(harmonic, truth): &(Harmonic, Complex64)| {
         (harmonic.response - truth).norm_sqr() / (2.0 * harmonic.deviation.powi(2))
@@ -171,9 +173,9 @@ fn squared_errors(errors: &[(Harmonic, Complex64)]) -> f64 {
     errors.iter().map(square).sum::<f64>() / errors.len() as f64
 }
 
-// Noise of 1 % on a settled oscillation, 200 seeds: half a chi-square of two degrees each, with mean 1 and
-// variance 1, so that the mean of 200 is 1 with a deviation of 0.07: within 0.25. The drift's own noise is an
-// eighth of the variance of 8 cycles and a third of that of two.
+// Noise of 1 % on a settled oscillation, 200 seeds. Each value is half a chi-square with two degrees of
+// freedom, with mean 1 and variance 1, so the mean of 200 is 1 with a deviation of 0.07; the limit is
+// 0.25. The noise of the drift is an eighth of the variance for 8 cycles and a third for two.
 #[test]
 fn the_scatter_under_noise_is_the_deviation() {
     let process = process(PROCESSES[4]);
@@ -210,9 +212,8 @@ fn the_scatter_under_noise_is_the_deviation() {
     }
 }
 
-// With noise of 1 % and a bias in the relay's own loop no cycle is like another. Of 200 cases
-// the mean square is 1.1, its median 0.76; 5.2 with the drift left in. The mean of 50 has a deviation of
-// 0.16.
+// With 1 % noise and a bias in the loop of the relay the cycles differ. Over 200 cases the mean square
+// is 1.1 and its median 0.76; with the drift left in it is 5.2. The mean of 50 has a deviation of 0.16.
 #[test]
 fn cycles_that_differ_are_worth_as_much() {
     let campaign = Campaign {
@@ -237,7 +238,8 @@ fn cycles_that_differ_are_worth_as_much() {
     );
 }
 
-// The recording cut at the cycles' own ends has nothing beyond them to tell a drift by; there is none.
+// A recording cut at the ends of the cycles has no samples beyond them to measure a drift; here there
+// is no drift.
 #[test]
 fn a_recording_of_the_cycles_alone_will_do() {
     let process = process(EVEN);
@@ -294,7 +296,7 @@ fn what_has_no_fundamental_has_no_harmonics() {
             "{start_s} {end_s} {cycles_used}"
         );
     }
-    // More orders than samples resolve: those that stand out of the differences that pass for noise.
+    // More orders than the samples resolve: only those above the noise level are returned.
     let many = harmonics(&signals, &found, 10_000);
     assert!(
         many.iter()

@@ -1,6 +1,6 @@
 //! Experiments and evaluation: campaigns, baselines, the benchmark, out-of-family processes.
 
-// The lint excepts tests, but not their helpers.
+// The lint exempts test functions, but not their helpers.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 #[path = "../common/mod.rs"]

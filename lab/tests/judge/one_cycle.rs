@@ -1,4 +1,4 @@
-//! Recordings that hold one complete cycle and no more: the paper's promise.
+//! Recordings of only one complete cycle: the paper's promise.
 
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::pd;
@@ -19,11 +19,11 @@ const CAMPAIGN: Campaign = Campaign {
     cycles: 8,
     ..Campaign::QUIET
 };
-/// Periods that every relay has settled in.
+/// Number of periods after which every relay has settled.
 const PERIODS: f64 = 25.0;
 const SAMPLE_S: f64 = 1e-3;
 
-/// An experiment to cut recordings out of.
+/// An experiment from which recordings are cut.
 struct Experiment {
     case: RelayExperiment,
     trace: Trace,
@@ -49,14 +49,14 @@ impl Experiment {
         .collect()
     }
 
-    /// The one before the last of [`Experiment::cycles`].
+    /// The last but one of [`Experiment::cycles`].
     fn steady_cycle(&self, from_rises: bool) -> Cycle {
         let cycles = self.cycles(from_rises);
         cycles[cycles.len() - 2]
     }
 
-    /// What is identified from the rows from `from_s`, and the one before, up to that of `to_s`: an edge at
-    /// either is in.
+    /// Identifies from the rows between `from_s` and `to_s` and the row before, so that an edge at
+    /// either end is included.
     fn identify(&self, from_s: f64, to_s: f64, method: Method) -> Identification {
         let row = |time_s: f64| {
             (self.trace.time_s).partition_point(|&before| before < time_s - 0.5 * SAMPLE_S)
@@ -73,7 +73,8 @@ impl Experiment {
         identify(&signals, &Options::default().method(method))
     }
 
-    /// What the controller, which must be stable, costs above or below the optimum, as a fraction of it.
+    /// Cost of the controller above or below the optimum, as a fraction of it; asserts that it is
+    /// stable.
     fn deterioration(&self, identified: &Identified) -> f64 {
         let process = &self.case.process;
         let best = pd(process, Options::default().specification.phase_margin_rad).unwrap();
@@ -83,7 +84,7 @@ impl Experiment {
         }
     }
 
-    /// Which of the intervals of gain, lags, delay and bias hold the truth.
+    /// Whether the intervals of gain, both lags, delay and bias contain the truth.
     fn held(&self, identified: &Identified) -> [bool; 5] {
         let process = &self.case.process;
         // With the lags in order.
@@ -117,7 +118,7 @@ fn mean_and_worst(costs: &[f64]) -> (f64, f64) {
     (100.0 * mean, 100.0 * worst)
 }
 
-/// What becomes of one kind of recording.
+/// Results for one kind of recording.
 #[derive(Default)]
 struct Tally {
     costs: Vec<f64>,
@@ -125,7 +126,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// Of one cycle, and `past` periods before it.
+    /// Adds a recording of one cycle and `past` periods before it.
     fn add(&mut self, experiment: &Experiment, from_rises: bool, past: f64) {
         let cycle = experiment.steady_cycle(from_rises);
         let to_s = cycle.start_s + cycle.period_s;
@@ -158,11 +159,11 @@ fn is_one_cycle(found: &Identification, is_known: bool) -> bool {
     found.remarks.contains(&Remark::OneCycle { is_known })
 }
 
-// One cycle of a steady oscillation, edge to edge, and what comes 0 or 0.5 periods before it; none is refused
-// or unstable. The same cycles with all of their past cost 0.098 % on average and 1.2 % at worst; the past
-// that they repeat is not quite theirs, as the relay's jitter makes it: 0.17 % and 2.0 % (1.1 % from fall to
-// fall). The mean scatters by 8 % from seed to seed: three of that above. Of 200 intervals an honest 90 %
-// hold 180, give or take 4.2: three of that either way.
+// One cycle of a steady oscillation, edge to edge, with 0 or 0.5 periods before it; none is refused or
+// unstable. With all of the past, the same cycles cost 0.098 % on average and 1.2 % at worst. Without
+// it the cost is 0.17 % and 2.0 % (1.1 % from fall to fall), because the jitter of the relay makes the
+// assumed repetition inexact. The mean varies by 8 % from seed to seed; the limit is three of that. A
+// true share of 90 % of 200 intervals is 180 +- 4.2; the limits are three of that.
 #[test]
 fn one_steady_cycle_is_enough() {
     const KINDS: [(bool, f64); 4] = [(true, 0.0), (true, 0.5), (false, 0.0), (false, 0.5)];
@@ -180,8 +181,8 @@ fn one_steady_cycle_is_enough() {
     }
 }
 
-// Without a pack nothing tells that the cycle is a steady one, and the state at its beginning stays unknown.
-// Of 200 the mean is 0.40 %, the worst 4.9 %, one is too uncertain.
+// Without a pack the cycle is not known to be steady, and its initial state stays unknown. Of 200 the
+// mean is 0.40 %, the worst 4.9 %, and one is too uncertain.
 #[test]
 fn without_a_pack_nothing_is_taken_for_steady() {
     let mut costs = Vec::new();
@@ -201,9 +202,9 @@ fn without_a_pack_nothing_is_taken_for_steady() {
     assert!(costs.len() >= 98 && mean < 0.6 && worst < 8.0);
 }
 
-// The first complete cycle of a test, from rest: the pack knows 8 of 200 for steady ones, wrongly, and 29 are
-// refused. Where it does not, the fit needs no steady oscillation. None is unstable, though the least of these
-// amplitudes drown in noise: 27 % at worst of 200.
+// The first complete cycle of a test from rest: the pack wrongly takes 8 of 200 for steady, and 29 are
+// refused. For the others the fit does not assume a steady oscillation. None is unstable, although the
+// smallest amplitudes are below the noise: worst 27 % of 200.
 #[test]
 fn a_transient_is_hardly_taken_for_steady() {
     let (mut known, mut worst) = (0, 0.0_f64);
@@ -220,8 +221,8 @@ fn a_transient_is_hardly_taken_for_steady() {
     assert!(known <= 10 && worst < 0.5, "{known} {worst}");
 }
 
-// With 1.5 periods before it there are two complete cycles. They are fitted both: 0.09 % of 200 on average,
-// where one of 200 refuses because its cycles are not alike.
+// With 1.5 periods before it there are two complete cycles, and both are fitted: 0.09 % on average of
+// 200; one of 200 is refused because its cycles differ.
 #[test]
 fn a_period_and_a_half_more_is_a_second_cycle() {
     let mut costs = Vec::new();
@@ -245,9 +246,9 @@ fn a_period_and_a_half_more_is_a_second_cycle() {
     assert!(costs.len() >= 98 && mean < 0.13 && worst < 3.0);
 }
 
-// Whatever part of a period is recorded: no two switches the same way, no cycle.
+// Any recording of less than a period has no two switches in the same direction, so no cycle.
 #[test]
-fn half_a_cycle_is_none() {
+fn less_than_a_cycle_is_refused() {
     let experiment = Experiment::first(1).next().unwrap();
     let cycle = experiment.steady_cycle(true);
     for (from, to) in [(0.0, 0.95), (0.1, 1.0), (0.2, 1.2), (-0.3, 0.3)] {

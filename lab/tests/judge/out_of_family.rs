@@ -1,5 +1,4 @@
-//! Processes out of the family: simulated as they say, harmful where they are, and told from those of
-//! the family.
+//! Out-of-family processes: correct simulations, correct harm, and recognised as unknown.
 
 use std::ops::ControlFlow;
 
@@ -35,7 +34,7 @@ fn hover() -> (Soiptd, Oscillation) {
     (process, scale)
 }
 
-/// Outputs and rates of ten periods under a square wave of 140 samples a period, over the amplitude.
+/// Outputs and rates of ten periods under a square wave of 140 samples per period, over the amplitude.
 fn course(process: &Soiptd, defect: &Defect, scale: Oscillation) -> Vec<[f64; 2]> {
     let mut plant = DefectPlant::new(process, defect, scale, 0.003);
     (0..1400)
@@ -46,7 +45,7 @@ fn course(process: &Soiptd, defect: &Defect, scale: Oscillation) -> Vec<[f64; 2]
         .collect()
 }
 
-/// From a quarter of a period high on, so that the mean rate is zero.
+/// High from a quarter of a period on, so that the mean rate is zero.
 fn square(sample: usize) -> f64 {
     if (sample + 35) % 140 < 70 { 1.0 } else { -1.0 }
 }
@@ -58,7 +57,7 @@ fn apart(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// The exact simulation of a process, as [`course`] has it.
+/// The exact simulation of a process, in the form of [`course`].
 fn exact(process: &Soiptd) -> Vec<[f64; 2]> {
     let mut exact = FixedStepProcess::new(process, 0.003);
     (0..1400)
@@ -69,8 +68,9 @@ fn exact(process: &Soiptd) -> Vec<[f64; 2]> {
         .collect()
 }
 
-// Steps of 0.42/600 s against a lag of 0.0321 s: (0.0218)^5 / 120 = 4e-11 a step, some 50 steps of memory
-// of the force, whose integral over 10 periods multiplies by less than ten.
+// Steps of 0.42/600 s against a lag of 0.0321 s: an error of (0.0218)^5 / 120 = 4e-11 per step. The
+// force remembers about 50 steps, and its integral over 10 periods multiplies the error by less than
+// ten.
 #[test]
 fn without_a_defect_the_plant_is_exact() {
     let (process, scale) = hover();
@@ -78,7 +78,8 @@ fn without_a_defect_the_plant_is_exact() {
     assert!(error < 1e-8, "{error}");
 }
 
-// All of the input 37 ms later is a dead time 37 ms longer; half of it on either way the mean of both.
+// The whole input 37 ms later is a dead time 37 ms longer; half of the input on either path gives the
+// mean of both outputs.
 #[test]
 fn a_second_way_is_a_delay() {
     let (process, scale) = hover();
@@ -99,8 +100,8 @@ fn a_second_way_is_a_delay() {
     assert!(apart(&way(0.5), &mean) < 1e-8);
 }
 
-// A lag in the actuator and the same lag in the sensor are one transfer function; a second mass at so
-// high a frequency that it follows is none; a rate is the rate.
+// A lag in the actuator and the same lag in the sensor have the same transfer function. A second mass
+// with a very high natural frequency has no effect. The rate is the derivative of the output.
 #[test]
 fn linear_defects_are_what_they_say() {
     let (process, scale) = hover();
@@ -109,8 +110,8 @@ fn linear_defects_are_what_they_say() {
     let in_sensor = course(&process, &Defect::SlowSensor { lag_s }, scale);
     assert!(apart(&in_actuator, &in_sensor) < 1e-8);
 
-    // The mass lags by 2 damping / w, 0.01 ms of 420, which turns the fundamental by 1.5e-4; and it
-    // rings with (w_0/w)^2 = 1e-6 of the acceleration.
+    // The mass lags by 2 damping / w, 0.01 ms of 420, a phase of 1.5e-4 at the fundamental. It rings
+    // with (w_0/w)^2 = 1e-6 of the acceleration.
     let stiff = Defect::Resonance {
         rad_per_s: 1000.0 * std::f64::consts::TAU / 0.42,
         damping: 0.05,
@@ -133,7 +134,7 @@ fn linear_defects_are_what_they_say() {
     }
 }
 
-// The error that the plant's file states for kinks, at steps half as long.
+// The error of kinks at half the step, as stated in the plant's file.
 #[test]
 fn kinks_are_resolved() {
     let (process, scale) = hover();
@@ -145,7 +146,7 @@ fn kinks_are_resolved() {
         },
         Defect::RateLimit { per_s: 12.0 },
     ] {
-        // Half the period and half the amplitude: half the step, and the same creep.
+        // Half the period and half the amplitude give half the step and the same creep.
         let half = Oscillation {
             period_s: 0.5 * scale.period_s,
             amplitude: 0.5 * scale.amplitude,
@@ -184,10 +185,11 @@ fn a_case_is_always_the_same() {
     assert!(spoilt.experiment_with_defect(DefectKind::Play, 0).is_err());
 }
 
-// The process's own controller keeps its promise, to what the hold and the derivative at samples take:
-// half a step of 1/1000 turn, 0.2 degrees of 20, 1 % of the cost. Made for half the gain it is twice
-// as strong, near the gain margin of a process with dead time: it settles late and costs far more. For a third of the gain it
-// never settles. And nothing holds what the input does not drive.
+// The process's own controller keeps its promise, to the effect of hold and sampled derivative: half a
+// step of 1/1000 turn, 0.2 degrees of 20, 1 % of the cost. A controller made for half the gain is twice
+// as strong, near the gain margin of a process with dead time: it settles late and costs far more. One
+// made for a third of the gain never settles. An output that the input does not drive cannot be
+// controlled.
 #[test]
 fn harm_is_a_promise_broken() {
     let plain = (0..20)
@@ -213,8 +215,8 @@ fn harm_is_a_promise_broken() {
     assert!(foreign.defect().is_undriven() && of(&foreign, 1.0).is_harmful());
 }
 
-// The board and the trainer read the same Gaussian off the same outputs: mean, and with L the
-// trainer's factor L^T root = 1 (after scaling), to rounding of f32's exp in neither.
+// The board and the trainer read the same Gaussian from the same outputs: the mean, and L^T root = 1
+// (after scaling) with the trainer's factor L, to rounding; neither uses the exp of f32.
 #[test]
 fn the_board_reads_the_trainers_gaussian() {
     let outputs: [f32; OUTPUTS] = std::array::from_fn(|k| (k as f32 * 1.7).sin());
@@ -279,9 +281,9 @@ fn sure(values: [f64; VALUES]) -> [f32; OUTPUTS] {
     outputs
 }
 
-// Parts and values are f32: some 1e-7 of the amplitude is left over a floor of 3e-4, a statistic of
-// 30 (1e-7/3e-4)^2 = 3e-6, over the limit of 48 1e-7. A delay 4 % of the period too long turns the
-// fundamental by 0.25 and is not to be explained by 0.1 %.
+// Parts and values are f32: a residual of about 1e-7 of the amplitude over a floor of 3e-4 gives a
+// statistic of 30 (1e-7/3e-4)^2 = 3e-6, and 1e-7 over the limit of 48. A delay too long by 4 % of the
+// period turns the fundamental by 0.25, which an uncertainty of 0.1 % does not explain.
 #[test]
 fn a_perfect_cycle_scores_nothing() {
     let example = perfect_example();
@@ -326,7 +328,7 @@ fn inputs(signature: &Signature) -> [f32; LENGTH] {
     inputs
 }
 
-/// A network of 2,638 weights that has seen 2,500 cycles.
+/// A network of 2,638 weights, trained on 2,500 cycles.
 fn trained() -> Network {
     let recipe = Recipe::default();
     let examples: Vec<Example> = (0..2500)
@@ -373,8 +375,8 @@ fn trained() -> Network {
     trainer.best().clone()
 }
 
-// Calibrated to call 2 % of 250 cycles of the family unknown (five, known to plus or minus 2.2), it calls
-// at most 5 % of 100 others so; and nearly all with play, of which half the sensor's travel is lost.
+// Calibrated to report 2 % of 250 cycles of the family as unknown (5 +- 2.2), it reports at most 5 % of
+// 100 others as unknown. It reports nearly all cycles with backlash of half the sensor's travel.
 #[test]
 fn a_small_network_knows_what_it_does_not_know() {
     let network = trained();
@@ -411,8 +413,8 @@ fn a_small_network_knows_what_it_does_not_know() {
     assert!(with_play >= 18, "{with_play}");
 }
 
-// Without a network there is no score, and the identification is asked all the same: of one, two and
-// eight cycles of a process of the family it finds the process, and refuses a clipped recording.
+// Without a network there is no score, but the identification runs: from one, two and eight cycles of a
+// process of the family it finds the process, and it refuses a clipped recording.
 #[test]
 fn the_identification_is_judged_without_a_network() {
     let recipe = Recipe::default();

@@ -1,4 +1,4 @@
-//! Examples to learn from: always the same ones, of the processes they say, and learnable.
+//! Training examples: reproducible, with the stated processes, and learnable.
 
 use std::ops::{ControlFlow, Range};
 
@@ -36,7 +36,7 @@ fn of(family: Family) -> Recipe {
     }
 }
 
-/// The paper's multirotors and other people's, half and half.
+/// The paper's multirotors and another family, with equal weights.
 fn two_families() -> Recipe {
     Recipe {
         families: vec![Family::default(), Family::NEAR_DOUBLE_INTEGRATORS],
@@ -44,8 +44,8 @@ fn two_families() -> Recipe {
     }
 }
 
-// Of 45,300 of the paper's multirotors 3 are not steady after 14 periods: of 400 one is missing at most,
-// and the rest have duties near one half, for the trim has followed the bias.
+// Of 45,300 of the paper's multirotors 3 are not steady after 14 periods, so of 400 at most one example
+// is missing. The others have a duty near one half, because the trim follows the bias.
 #[test]
 fn nearly_every_experiment_is_an_example() {
     let recipe = Recipe::default();
@@ -80,8 +80,8 @@ fn same(a: &Soiptd, b: &Soiptd) {
     }
 }
 
-// The values are the process: back from them its parameters agree to rounding, also where the actuator
-// is slower than the body, as half of the third family's are.
+// The process computed from the values agrees with the original to rounding, also if the actuator is
+// slower than the body, as in half of the third family.
 #[test]
 fn values_are_the_process() {
     let mut slow_actuators = 0;
@@ -99,8 +99,8 @@ fn values_are_the_process() {
     assert!((5..40).contains(&slow_actuators), "{slow_actuators}");
 }
 
-// Where the lags meet nothing happens to the values: of T_prop = T_body -+ e they are the same with the
-// lags exchanged, to rounding, and between them they move by e^2.
+// The values are regular at equal lags: at T_prop = T_body -+ e they are the same to rounding with the
+// lags exchanged, and from one side to the other they move by e^2.
 #[test]
 fn values_are_regular_where_the_lags_meet() {
     let template = examples(&Recipe::default(), 0..1)[0];
@@ -129,14 +129,14 @@ fn values_are_regular_where_the_lags_meet() {
     );
 }
 
-// Both kinds are there as often as they weigh: of 2000, 500 of weight 1 against 3, give or take five
-// times sqrt(2000 * 3/16) = 19. Each in its box and with its samples; nearly double integrators are
-// drawn in logarithms: half of 20 .. 2000 s are below 200.
+// Families occur in proportion to their weights: of 2000 draws at weights 1 and 3, 500 (tolerance: five
+// times sqrt(2000 * 3/16) = 19). Each process lies in its box and has its number of samples. Nearly
+// double integrators are drawn in logarithms: half of 20 .. 2000 s are below 200 s.
 #[test]
 fn families_by_their_weights() {
     let [mut rare, mut frequent] = [Family::default(), Family::NEAR_DOUBLE_INTEGRATORS];
     (rare.weight, frequent.weight) = (0.5, 1.5);
-    // As few samples as the relay is sure to oscillate with, for time's sake.
+    // Few samples per period, for speed, but enough for a sure oscillation.
     rare.samples_per_period = (100.0, 120.0);
     frequent.samples_per_period = (60.0, 80.0);
     let recipe = Recipe {
@@ -168,14 +168,15 @@ fn families_by_their_weights() {
     assert!(below.abs_diff(half) < 100, "{below} of {counts:?}");
 }
 
-// Of a body without damping even at few samples, and a bias of half the relay: hardly any is missing.
+// With a body nearly without damping, few samples and a bias of half the relay's amplitude, hardly any
+// example is missing.
 #[test]
 fn nearly_double_integrators_oscillate() {
     let made = examples(&of(Family::NEAR_DOUBLE_INTEGRATORS), 0..400);
     assert!(made.len() >= 388, "{}", made.len());
 }
 
-/// What the controller of the process at values + d costs on the true one, above its optimum.
+/// Cost of the controller for the values + d on the true process, above its optimum.
 fn cost_at(example: &Example, d: [f64; VALUES]) -> f64 {
     let margin = 20_f64.to_radians();
     let values = example.values();
@@ -188,8 +189,8 @@ fn cost_at(example: &Example, d: [f64; VALUES]) -> f64 {
         .unwrap()
 }
 
-// For random errors of a hundredth of each value's extent, the gradient says what they cost: up to 1 %
-// or so, and what is left is of the square of that.
+// For random errors of a hundredth of each value's range, the gradient gives their cost, up to 1 %. The
+// remainder is of second order.
 #[test]
 fn the_gradient_is_what_an_error_costs() {
     const EXTENT: [f64; VALUES] = [1e-2, 1e-3, 1e-3, 1e-2];
@@ -200,7 +201,7 @@ fn the_gradient_is_what_an_error_costs() {
         let values = example.values();
         let d: [f64; VALUES] = std::array::from_fn(|k| {
             let d = EXTENT[k] * rng.random_range(-1.0..1.0);
-            // A ratio of poles beyond its ends is the end.
+            // The ratio of the poles is limited to its range.
             if k == 1 {
                 d.clamp(-values[1], 0.25 - values[1])
             } else {
@@ -216,8 +217,8 @@ fn the_gradient_is_what_an_error_costs() {
     assert!(off.sqrt() < 0.05 * squares.sqrt(), "{off} {squares}");
 }
 
-// The gain is the fourth value alone: a controller made for e times the gain has 1/e of the right gains,
-// so its slope is minus that of the cost by ln of the gains, and gains alone have that by differences.
+// The gain depends on the fourth value alone. A controller for e times the gain has 1/e of the right
+// gains, so the slope is minus that of the cost over ln of the gains, which follows from differences.
 #[test]
 fn the_slope_of_the_gain_is_that_of_the_gains() {
     let margin = 20_f64.to_radians();
@@ -230,7 +231,7 @@ fn the_slope_of_the_gain_is_that_of_the_gains() {
             };
             ise(&example.process, scaled).unwrap() / best.ise
         };
-        // ln(a / jerk) more by d: a gain less by d, gains more by d.
+        // ln(a / jerk) larger by d means a gain smaller and controller gains larger by the factor e^d.
         let slope = (8.0 * (cost(1e-2) - cost(-1e-2)) - (cost(2e-2) - cost(-2e-2))) / 0.12;
         let gradient = example.cost_gradient(margin).unwrap();
         assert!(
@@ -241,7 +242,7 @@ fn the_slope_of_the_gain_is_that_of_the_gains() {
     }
 }
 
-// A file says as little as it likes, and a family as little as its space.
+// All fields of a recipe are optional; a family needs only its space.
 #[test]
 fn recipes_are_short() {
     let read = |text: &str| serde_json::from_str::<Recipe>(text);
@@ -260,8 +261,8 @@ fn recipes_are_short() {
     }
 }
 
-// A space a thousand times as slow gives the same examples, but for a switch that rounding moves to the
-// next sample: two switches a period, and three times as much of the amplitude by T^3.
+// A space a thousand times as slow gives the same examples, except that rounding may move a switch to
+// the next sample: two switches per period, and three times the effect on the amplitude through T^3.
 #[test]
 fn time_scale_plays_no_part() {
     let scaled = |(low, high): (f64, f64)| (1000.0 * low, 1000.0 * high);
@@ -321,8 +322,8 @@ fn errors_name_the_field() {
     }
 }
 
-// From 4,000 experiments 2,638 weights learn enough in seconds that the controller of the mean of their
-// density costs 0.7 % more than the optimum (median of 100 other processes, one cycle each), at worst 5 %.
+// Trained for seconds on 4,000 experiments, a network of 2,638 weights gives controllers that cost 0.7
+// % more than the optimum (median of 100 other processes, one cycle each) and 5 % at worst.
 #[test]
 fn a_small_network_learns_controllers() {
     let recipe = Recipe::default();

@@ -1,4 +1,4 @@
-//! Tabled controllers beside the exact optima.
+//! Controllers from tables compared with the exact optima.
 
 use std::f64::consts::PI;
 
@@ -14,7 +14,7 @@ use rand_pcg::Pcg64Mcg;
 
 const PHASE_MARGIN_RAD: f64 = PI / 9.0;
 
-/// What a table may cost above the exact optimum.
+/// Largest cost of a tabled controller above the exact optimum, as a fraction.
 const EXCESS: f64 = 1e-3;
 
 fn numbers(phase_margin_rad: f64) -> Vec<f32> {
@@ -25,8 +25,9 @@ fn close(a: f64, b: f64, tolerance: f64) -> bool {
     (a - b).abs() <= tolerance * b.abs()
 }
 
-/// A process of any shape that a table reaches, of either sign; of eight, one is without damping, one has
-/// equal lags, one has the shorter lag in the body, one has no dead time, one the largest.
+/// A process of any shape inside the table, with a gain of either sign. Of every eight, one is without
+/// damping, one has equal lags, one has the shorter lag in the body, one has no dead time and one the
+/// largest.
 fn random_process(rng: &mut impl Rng) -> Soiptd {
     let mut decades = |from: f64, to: f64| 10_f64.powf(rng.random_range(from..=to));
     let mut lag_s = decades(-3.0, 1.0);
@@ -45,7 +46,7 @@ fn random_process(rng: &mut impl Rng) -> Soiptd {
     Soiptd::from_acceleration_gain(sign * gain, lag_s, inv_other_per_s, tau_s).unwrap()
 }
 
-/// Processes of every shape that a table reaches.
+/// Processes of every shape inside the table.
 fn processes(seed: u64, count: usize) -> Vec<Soiptd> {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     (0..count).map(|_| random_process(&mut rng)).collect()
@@ -60,7 +61,8 @@ enum Constraint {
     Exactly,
 }
 
-/// Cost of a tabled controller above the exact optimum, over it; infinite if the controller is unstable.
+/// Cost of a tabled controller above the exact optimum, as a fraction of it; infinite if the controller
+/// is unstable.
 fn excess(table: &LeadTable, constraint: Constraint, process: &Soiptd) -> f64 {
     let margin_rad = f64::from(table.nodes().phase_margin_rad);
     let (best, tabled) = match constraint {
@@ -87,8 +89,8 @@ fn worst_and_mean(table: &LeadTable, constraint: Constraint, processes: &[Soiptd
     (worst, sum / processes.len() as f64)
 }
 
-// K = 1 and exactly 20 deg, the gains of an independent prototype. Within one per cent: 0.01 % of
-// cost leaves the lead some tenths of a degree.
+// K = 1 and exactly 20 deg, with the gains of an independent prototype. The gains agree to one per
+// cent, because an excess cost of 0.01 % allows a change of the lead by some tenths of a degree.
 #[test]
 fn tabled_controllers_match_the_prototype() {
     let numbers = numbers(PHASE_MARGIN_RAD);
@@ -109,10 +111,10 @@ fn tabled_controllers_match_the_prototype() {
     }
 }
 
-// Every shape: without damping, with equal lags, without dead time and with the largest. At worst
-// 0.045 % where exactly 20 deg are asked, with a dead time above seven times two similar lags, and
-// 0.014 % where at least 20 deg are, with 0.03 of equal lags as dead time. No tabled controller is
-// cheaper than the exact optimum.
+// Every shape, including no damping, equal lags, no dead time and the largest dead time. Worst excess
+// at exactly 20 deg: 0.045 %, with a dead time above seven times two similar lags. Worst excess at 20
+// deg or more: 0.014 %, with equal lags and a dead time of 0.03 of them. No tabled controller costs
+// less than the exact optimum.
 #[test]
 fn no_cost_is_a_thousandth_above_the_optimum() {
     let numbers = numbers(PHASE_MARGIN_RAD);
@@ -132,7 +134,7 @@ fn no_cost_is_a_thousandth_above_the_optimum() {
     }
 }
 
-// The paper's space, its corners, and its lags and dead times on double integrators.
+// The paper's space with its corners, and double integrators with its lags and dead times.
 #[test]
 fn multirotors_and_double_integrators_are_closer() {
     let numbers = numbers(PHASE_MARGIN_RAD);
@@ -158,8 +160,8 @@ fn multirotors_and_double_integrators_are_closer() {
     }
 }
 
-// From 10 deg for at least the margin, from 20 deg for exactly it; 80 deg is the most that a space
-// may ask for. Below, 13 points do: 0.09 % at 5 deg.
+// Margins from 10 deg ("at least") and from 20 deg ("exactly") up to 80 deg, the largest of a space.
+// Below that 13 points are enough: 0.09 % at 5 deg.
 #[test]
 fn other_margins_have_tables_as_good() {
     for (margin_deg, points) in [
@@ -182,8 +184,8 @@ fn other_margins_have_tables_as_good() {
     }
 }
 
-// The margin of the table is a number of f32, half an ulp of which is 1.5e-8 rad here; beside the
-// rounded one it is exact. The other form leaves more where the exact optimum does.
+// The table stores the margin as f32; half an ulp is 1.5e-8 rad here, and the controller has the
+// rounded margin exactly. With "at least" the margin is larger where that of the exact optimum is.
 #[test]
 fn margins_are_exact() {
     let numbers = numbers(PHASE_MARGIN_RAD);
@@ -212,8 +214,9 @@ fn margins_are_exact() {
     assert!(above > 100 && at > 100, "{above} {at}");
 }
 
-// Time in units of alpha: Kp / alpha^2 and Kd / alpha for the acceleration gain; output mirrored and
-// scaled: both gains over that factor. Which lag is the actuator's is no difference to G.
+// With time in units of alpha the gains become Kp / alpha^2 and Kd / alpha at the same acceleration
+// gain. A mirrored and scaled output divides both gains by the factor. G does not depend on which lag
+// belongs to the actuator.
 #[test]
 fn gains_scale_as_the_process_does() {
     let numbers = numbers(PHASE_MARGIN_RAD);
@@ -241,7 +244,7 @@ fn gains_scale_as_the_process_does() {
             assert!(close(-mirrored.kd * alpha, pd.kd, 1e-15));
         }
         if damping > 0.0 {
-            // K/T_body is K over the other lag now.
+            // K/T_body now has the other lag as divisor.
             let swapped_gain = gain / (damping * lag_s);
             let swapped = Soiptd::from_acceleration_gain(
                 swapped_gain,

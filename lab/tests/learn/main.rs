@@ -1,6 +1,6 @@
-//! Learning: examples, networks, packs, exchange with other programs.
+//! Training: examples, networks, packs, exchange with other programs.
 
-// The lint excepts tests, but not their helpers.
+// The lint exempts test functions, but not their helpers.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 #[path = "../common/mod.rs"]

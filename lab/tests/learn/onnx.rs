@@ -1,4 +1,4 @@
-//! Networks out to ONNX and back, and in from PyTorch.
+//! Networks exported to ONNX and imported again, and models of PyTorch.
 
 use onecycle_lab::learn::onnx::{Normalisation, OnnxError, export, import};
 use onecycle_lab::learn::train::{Layer, Matrix, Network};
@@ -17,7 +17,7 @@ fn dense(outputs: usize) -> Layer {
     Layer::Dense { outputs }
 }
 
-/// Every tensor drawn, variances included.
+/// A network with random tensors, variances included.
 fn drawn(layers: &[Layer], seed: u64) -> Network {
     let mut rng = Pcg64Mcg::seed_from_u64(seed);
     let network = Network::new(INPUTS, layers, &mut rng).unwrap();
@@ -59,7 +59,7 @@ fn difference(found: &Matrix, expected: &[f32]) -> f32 {
     }) / largest
 }
 
-// Nothing is folded, so every bit comes back; -offset scale / scale, in f64, rounds to the offset.
+// Nothing is folded, so every bit reads back: -offset scale / scale, in f64, rounds to the offset.
 #[test]
 fn networks_come_back() {
     let normalisation = Normalisation {
@@ -113,7 +113,7 @@ struct Golden {
     outputs: Vec<f32>,
 }
 
-// Seven inputs of order one through three layers of sums: a few units of 2^-24 = 6e-8 each.
+// Seven inputs of the order of 1 through three layers of sums: errors of a few units of 2^-24 = 6e-8.
 #[test]
 fn pytorch_models_give_pytorchs_numbers() {
     let golden: Golden = serde_json::from_str(include_str!("../golden/torch_onnx.json")).unwrap();
@@ -135,7 +135,7 @@ fn pytorch_models_give_pytorchs_numbers() {
 
 // ---------------------------------------------------------------- models by hand
 
-/// A node of a model in as few fields as matter here, by the numbers of `onnx.proto`.
+/// The fields of a model that these tests need, with the field numbers of `onnx.proto`.
 #[derive(Clone, PartialEq, Message)]
 struct Model {
     #[prost(message, optional, tag = "7")]
@@ -251,7 +251,7 @@ fn model(nodes: &[Node]) -> Model {
     }
 }
 
-/// What the model makes of 1 and 10.
+/// Outputs of the model for the inputs 1 and 10.
 fn outputs(nodes: &[Node]) -> Vec<f32> {
     let imported = import(&model(nodes).encode_to_vec()).unwrap();
     let mut inputs = Matrix::from_rows(1, 2, vec![1.0, 10.0]).unwrap();
@@ -289,7 +289,7 @@ fn nodes_do_what_the_operators_say() {
     assert_eq!(outputs(&nodes), [5.25, 6.0, 6.75]);
 }
 
-// Of x wT with wT as a constant of its own: 41 = 1 + 4 * 10 and so on; 2 x w + 0.5 r.
+// x w^T with w^T as the output of a Constant node: 41 = 1 + 4 * 10 and so on; then 2 x w + 0.5 r.
 #[test]
 fn gemm_and_constants_in_nodes() {
     let number = |name: &str, f: f32, i: i64| Attribute {
@@ -328,8 +328,8 @@ fn gemm_and_constants_in_nodes() {
     assert_eq!(outputs(&nodes), [41.0, 52.0, 63.0]);
 }
 
-// (a - mean) / sqrt(var) weight + bias with mean = bias = r, weight = var = (1, 1, 3): of a = (41,
-// 52, 63) the third is 61 / sqrt(3) 3 + 2.
+// (a - mean) / sqrt(var) weight + bias with mean = bias = r and weight = var = (1, 1, 3): for a = (41,
+// 52, 63) the third value is 61 / sqrt(3) 3 + 2.
 #[test]
 fn batch_normalisation_is_evaluated() {
     let epsilon = Attribute {
@@ -376,28 +376,31 @@ fn what_cannot_be_read_is_named() {
     for (sentence, words) in [
         (
             with(node("Conv", &["a"], "y")),
-            "node the Conv, Conv: it is none of Gemm",
+            "node the Conv, Conv: this operator is not supported",
         ),
         (with(unnamed), "node number 1, Softmax: "),
         (with(foreign), "com.example"),
-        (with(node("Relu", &["x"], "y")), "takes x and not a"),
-        (with(node("Relu", &["a"], "z")), "output y is not"),
+        (with(node("Relu", &["x"], "y")), "its input is x, not a"),
+        (
+            with(node("Relu", &["a"], "z")),
+            "output y is not the output of its last node",
+        ),
         (with(node("Add", &["a", "x"], "y")), "must be a constant"),
-        (with(node("Add", &["a", "w"], "y")), "not that of a row"),
-        (with(node("Div", &["s", "a"], "y")), "divides a constant"),
+        (with(node("Add", &["a", "w"], "y")), "must be a row"),
+        (
+            with(node("Div", &["s", "a"], "y")),
+            "division of a constant",
+        ),
         (
             with(node("MatMul", &["a", "r"], "y")),
-            "takes 1 numbers where 3 come in",
+            "takes 1 inputs, but the layer before it has 3 outputs",
         ),
-        (
-            with(node("MatMul", &["a", "n"], "y")),
-            "not that of a matrix",
-        ),
+        (with(node("MatMul", &["a", "n"], "y")), "must be a matrix"),
         (with(node("MatMul", &["w", "a"], "y")), "must be a constant"),
         (with(learning), "eval()"),
-        (refused(&[transposed]), "transposes"),
+        (refused(&[transposed]), "transA is not supported"),
         (refused(&[node("Relu", &["x"], "y")]), "no dense layer"),
-        (refused(&[]), "output y is not"),
+        (refused(&[]), "output y is not the output of its last node"),
     ] {
         assert!(sentence.contains(words), "{words}: {sentence}");
         assert!(!sentence.contains('\n'), "{sentence}");
@@ -405,7 +408,7 @@ fn what_cannot_be_read_is_named() {
 }
 
 #[test]
-fn tensors_that_are_none_are_named() {
+fn malformed_tensors_are_named() {
     let spoilt = |spoil: fn(&mut Tensor)| {
         let mut model = model(&[node("MatMul", &["x", "w"], "y")]);
         spoil(&mut model.graph.as_mut().unwrap().initializer[0]);
@@ -413,19 +416,19 @@ fn tensors_that_are_none_are_named() {
     };
     for (sentence, words) in [
         (spoilt(|w| w.data_location = 1), "external_data=False"),
-        (spoilt(|w| w.data_type = 11), "not of f32"),
+        (spoilt(|w| w.data_type = 11), "must hold f32"),
         (spoilt(|w| w.dims = vec![2, 4]), "6 numbers"),
         (spoilt(|w| w.dims = vec![-2, 3]), "6 numbers"),
         (spoilt(|w| w.dims = vec![i64::MAX, i64::MAX]), "6 numbers"),
         (spoilt(|w| w.dims = vec![0, 3]), "6 numbers"),
-        (spoilt(|w| w.float_data[2] = f32::NAN), "holds NaN"),
+        (spoilt(|w| w.float_data[2] = f32::NAN), "must not hold NaN"),
     ] {
         assert!(sentence.contains(words), "{words}: {sentence}");
     }
 }
 
 #[test]
-fn files_that_are_none_are_refused() {
+fn malformed_files_are_refused() {
     let bytes = model(&[node("MatMul", &["x", "w"], "y")]).encode_to_vec();
     assert!(import(&bytes).is_ok());
     for bytes in [
@@ -451,7 +454,7 @@ fn files_that_are_none_are_refused() {
 }
 
 proptest! {
-    // Lengths, names, shapes, operators: whatever is hit.
+    // Changes any byte: lengths, names, shapes, operators.
     #[test]
     fn no_change_of_a_model_makes_it_panic(
         changes in proptest::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..4),

@@ -1,4 +1,4 @@
-//! Packs of networks: the same outputs on board as where they learnt, and everything comes back.
+//! Packs of networks: the board computes the outputs of the trainer, and all contents read back.
 
 use onecycle_lab::learn::pack::{
     LeadTableContents, PackContents, PackContentsError, PackedWeights, Precision, layers,
@@ -17,7 +17,7 @@ const HIDDEN: usize = 32;
 /// Samples that networks are compared on.
 const SAMPLES: usize = 1000;
 
-/// 34-32-32-14 with drawn weights and biases.
+/// A 34-32-32-14 network with random weights and biases.
 fn drawn(activation: Layer, rng: &mut Pcg64Mcg) -> Network {
     let layers = [
         Layer::Dense { outputs: HIDDEN },
@@ -34,7 +34,7 @@ fn drawn(activation: Layer, rng: &mut Pcg64Mcg) -> Network {
     })
 }
 
-/// A pack of the network, what the network sees of a signature being between -1 and 1.
+/// A pack of the network, for inputs between -1 and 1.
 fn contents(network: &Network, precision: Precision) -> PackContents {
     PackContents {
         layers: layers(network, precision).unwrap(),
@@ -73,8 +73,8 @@ fn signatures(rng: &mut Pcg64Mcg) -> Vec<[f32; LENGTH]> {
         .collect()
 }
 
-// Sums of 34 and 32 terms near one in another order: a few units of 2^-24 = 6e-8 a layer, and the
-// outputs are of the order of one.
+// Sums of 34 and 32 terms of the order of 1, in another order: a few units of 2^-24 = 6e-8 per layer;
+// outputs are of the order of 1.
 #[test]
 fn outputs_are_the_trainers() {
     let mut rng = Pcg64Mcg::seed_from_u64(20);
@@ -88,10 +88,10 @@ fn outputs_are_the_trainers() {
     }
 }
 
-// A weight is off by up to half a step, evenly: s / sqrt(12) for steps s of a 127th of the row's
-// largest, some 2.2 standard deviations sqrt(2 / 34) of the weights: 0.5 % of it, thus 0.5 % of the
-// size of the sums a layer, in three layers 0.9 % of the outputs; the largest of 14,000 some four
-// or five times that, 4 %.
+// The error of a weight is uniform, up to half a step s: s / sqrt(12). A step is 1/127 of the largest
+// weight of its row, about 2.2 standard deviations sqrt(2 / 34) of the weights. That is an error of 0.5
+// % per weight, 0.5 % of the sums of a layer, and 0.9 % of the outputs after three layers; the largest
+// of 14,000 errors is four to five times that, 4 %.
 #[test]
 fn bytes_are_a_few_per_cent_off() {
     let mut rng = Pcg64Mcg::seed_from_u64(21);
@@ -104,7 +104,7 @@ fn bytes_are_a_few_per_cent_off() {
     assert!(rms > 0.004 && rms < 0.014, "{found:?}");
 }
 
-// Half a step of each row, and the largest weight exactly 127 steps.
+// Every weight is within half a step of its row, and the largest weight is exactly 127 steps.
 #[test]
 fn every_weight_is_within_half_a_step() {
     let network = drawn(Layer::Tanh, &mut Pcg64Mcg::seed_from_u64(22));
@@ -128,7 +128,8 @@ fn every_weight_is_within_half_a_step() {
     }
 }
 
-// 0 0 has no scale; of -2 1 a step is 2 / 127 and 1 is 63.5 of them, away from zero.
+// A row of zeros has no scale. In the row -2 1 a step is 2 / 127, and 1 is 63.5 steps, rounded away
+// from zero.
 #[test]
 fn rows_of_zeros_stay_zeros() {
     let network = Network::zeros(2, &[Layer::Dense { outputs: 2 }]).unwrap();
@@ -151,7 +152,7 @@ fn contents_come_back() {
         assert_eq!(pack.self_test(), Some(0.0));
         assert_eq!(pack.self_tests().count(), 2);
         assert_eq!(pack.card(), r#"{"made":"for a test","seed":7}"#);
-        // The same contents, the same bytes.
+        // The same contents give the same bytes.
         assert_eq!(contents.to_bytes().unwrap(), bytes);
     }
     let floats = contents(&network, Precision::Floats);
@@ -172,7 +173,7 @@ fn lead_tables_come_from_their_numbers() {
     assert_eq!(of([usize::MAX, 2], &numbers), None);
 }
 
-// Batch normalisation is folded and dropout dropped.
+// Batch normalisation is folded into dense layers and dropout is omitted.
 #[test]
 fn a_trained_network_is_packed_as_it_evaluates() {
     let mut rng = Pcg64Mcg::seed_from_u64(24);
@@ -218,7 +219,7 @@ fn what_a_pack_cannot_hold_is_named() {
     ] {
         assert!(of(kinds).starts_with(sentence), "{}", of(kinds));
     }
-    // What the board's reader refuses is not written.
+    // Contents that the board's reader refuses are not written.
     let wide = [
         Layer::Dense { outputs: 200 },
         Layer::Dense { outputs: OUTPUTS },

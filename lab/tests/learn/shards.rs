@@ -1,5 +1,4 @@
-//! Datasets on a disk: the same bytes however they come about, read back as they were, and nothing
-//! else taken for them.
+//! Datasets on disk: the same bytes in any order of work, exact reading, and damaged files refused.
 
 use onecycle_lab::experiments::{Family, Recipe};
 use onecycle_lab::learn::dataset::shards::{
@@ -7,7 +6,7 @@ use onecycle_lab::learn::dataset::shards::{
 };
 use onecycle_lab::workers::{OneThread, Workers};
 
-/// Few samples a period, for time's sake.
+/// Few samples per period, for speed.
 fn recipe() -> Recipe {
     let mut families = vec![Family::default(), Family::NEAR_DOUBLE_INTEGRATORS];
     for family in &mut families {
@@ -40,8 +39,8 @@ fn made(examples: u64) -> (Manifest, Vec<u8>) {
     (manifest, bytes)
 }
 
-// Written and read, a record is what the recipe makes of its number: its process to rounding, for the
-// file has T_body and the process its inverse; the rest to the last bit.
+// A record reads back as the recipe makes it: the process to rounding, because the file holds T_body
+// and the process its inverse; all else to the last bit.
 #[test]
 fn records_come_back() {
     let (manifest, bytes) = made(60);
@@ -73,7 +72,7 @@ fn the_same_bytes_in_any_order() {
     let (backwards, entry) = manifest.make(0, &Backwards).unwrap();
     assert!(bytes == backwards, "other bytes");
     assert_eq!(manifest.shards[0].as_ref(), Some(&entry));
-    // Of 60 the first 40 are these.
+    // The first 40 of 60 examples are the same.
     let more = made(60);
     let more = more.0.records(0, &more.1).unwrap();
     let few = manifest.records(0, &bytes).unwrap();
@@ -95,14 +94,14 @@ fn only_its_own_bytes_are_read() {
         manifest.records(1, &bytes),
         Err(DatasetError::Unfinished(file_name(1)))
     );
-    // A hash that fits does not make three rows four, nor a text a file.
+    // A correct hash does not excuse a wrong number of rows or a text.
     let entry = manifest.shards[0].clone().unwrap();
     manifest.shards[0] = Some(Entry {
         rows: entry.rows + 1,
         ..entry
     });
     assert_eq!(manifest.records(0, &bytes), damaged);
-    // SHA-256 of no bytes at all.
+    // SHA-256 of an empty file.
     let sha256 = "e3b0c44298fc1c149afbf4c8996fb92427ae41e4649b934ca495991b7852b855".to_owned();
     let entry = Entry { rows: 0, sha256 };
     assert!(entry.is_of(&[]) && !entry.is_of(&[0]));
@@ -135,15 +134,15 @@ fn a_manifest_is_its_text() {
             "\"examples\": 4097",
             "must list 2 files for its 4097 examples, but lists 1",
         ),
-        ("{", "", "not one of a dataset"),
+        ("{", "", "not the manifest of a dataset"),
     ] {
         let error = spoilt(from, to);
         assert!(error.contains(sentence), "{error}");
     }
 }
 
-// Full files stay where more is asked for, the last one does not; another recipe, another program and
-// fewer examples are refused.
+// If more examples are asked for, full files stay and the last file is made again. Another recipe,
+// another program and fewer examples are refused.
 #[test]
 fn a_dataset_grows() {
     let entry = |rows| {
@@ -182,8 +181,9 @@ fn a_dataset_grows() {
     assert!(refused.to_string().contains("made by onecycle 999"));
 }
 
-// Three lots of 3, 0 and the other rows; 2 whole numbers, 34 inputs, 3 times 4 and 6 single ones make 54
-// columns. Read by the crate that wrote them, not by the code under test: every number to the last bit.
+// Written in three lots of 3, 0 and the remaining rows. 2 whole numbers, 34 inputs, 3 times 4 and 6
+// single columns make 54 columns. Read by the crate that wrote them, not by the code under test: every
+// number to the last bit.
 #[cfg(feature = "parquet")]
 #[test]
 fn parquet_has_the_records() {
@@ -193,7 +193,7 @@ fn parquet_has_the_records() {
 
     let (manifest, bytes) = made(8);
     let mut records = manifest.records(0, &bytes).unwrap();
-    // One that would come back negative, were its column one of signed numbers.
+    // A number that a signed column would return as negative.
     records[4].number = u64::MAX;
     let path = concat!(env!("CARGO_TARGET_TMPDIR"), "/records.parquet");
     let mut writer = Writer::new(std::fs::File::create(path).unwrap()).unwrap();

@@ -1,4 +1,4 @@
-//! The trainer against finite differences, against PyTorch, and against what a net must learn.
+//! The trainer compared with finite differences and with PyTorch, and on problems with a known answer.
 
 mod files;
 mod gradients;
@@ -14,7 +14,7 @@ fn rng(seed: u64) -> Pcg64Mcg {
     Pcg64Mcg::seed_from_u64(seed)
 }
 
-/// Multiples of `2^-10` in -1..1, so that steps of such a size are exact.
+/// Random multiples of `2^-10` in -1..1, so that steps of that size are exact.
 fn random(rows: usize, columns: usize, seed: u64) -> Matrix {
     let mut rng = rng(seed);
     let values = (0..rows * columns).map(|_| rng.random_range(-1024..1024) as f32 / 1024.0);

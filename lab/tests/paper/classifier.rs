@@ -1,4 +1,4 @@
-//! The paper's classifier: what its network sees, how classes come to their gains, which class is right.
+//! The paper's classifier: inputs of its network, gains of the classes, labels and picks.
 
 use std::f64::consts::TAU;
 
@@ -49,10 +49,10 @@ fn cycle(input: Vec<f32>, output: Vec<f32>) -> SampledCycle {
     }
 }
 
-// ---------------------------------------------------------------- what the network sees
+// ---------------------------------------------------------------- inputs of the network
 
-// A square of levels 0.25 and 2.25 and an output of amplitude 3 about 7: levels become -1 and 1, a sine
-// an amplitude of one about zero; all else is padding.
+// A square wave with levels 0.25 and 2.25 becomes -1 and 1; a sine of amplitude 3 about 7 becomes
+// amplitude 1 about zero; the rest is padding.
 #[test]
 fn a_cycle_is_centred_scaled_and_padded() {
     let samples = 400;
@@ -71,7 +71,7 @@ fn a_cycle_is_centred_scaled_and_padded() {
     assert!(seen_input[samples..].iter().all(|&value| value == 0.0));
 }
 
-// Longer than 2260 samples: centred and scaled as a whole, then cut.
+// A cycle of more than 2260 samples is centred and scaled as a whole, then cut.
 #[test]
 fn a_long_cycle_is_cut() {
     let samples = 3000;
@@ -88,8 +88,8 @@ fn a_long_cycle_is_cut() {
     assert!(row[SAMPLES..].iter().all(|&value| value == 1.0));
 }
 
-// Stretched, a sine of 565 samples is one of 2260 with every sample in its place at every fourth number and
-// the mean of two between them: at most 1 - cos(pi / 565) = 1.6e-5 off the sine.
+// A sine of 565 samples is stretched to 2260: every fourth number is a sample, the numbers between are
+// interpolated. The error of the interpolation is at most 1 - cos(pi / 565) = 1.6e-5.
 #[test]
 fn a_cycle_is_stretched() {
     let samples = SAMPLES / 4;
@@ -112,9 +112,9 @@ fn a_cycle_is_stretched() {
 
 // ---------------------------------------------------------------- gains
 
-// Harmonics of a cycle that is no experiment at all, to rounding: the output of a pure delay by half the
-// samples, times 3, is the input negated in its odd harmonics. u is sampled as is held: w/o the hold
-// the response of the samples would be 3 exactly, so what is found is 3 / (sin(x) / x), x = pi / N.
+// A made-up cycle with exact harmonics: the output of a pure delay by half the samples, times 3, is the
+// input with its odd harmonics negated. The response includes the hold of the input, so its magnitude
+// is 3 / (sin(x) / x) with x = pi / N.
 #[test]
 fn harmonics_by_hand() {
     let samples = 64;
@@ -143,9 +143,9 @@ fn harmonics_by_hand() {
     );
 }
 
-// Without noise the harmonics are the response of the process, and the gain of a class that is the process is
-// one: but for what is left of a transient, the harmonics above that samples fold back, and f32. Middle and
-// worst of 30 processes.
+// Without noise the harmonics give the response of the process, and the gain of a class with this very
+// process is 1. The error comes from the rest of a transient, from aliases of higher harmonics, and
+// from f32. Median and worst of 30 processes.
 #[test]
 fn gains_of_steady_cycles() {
     let found = [Protocol::Trimmed, Protocol::Untrimmed].map(|protocol| {
@@ -173,11 +173,11 @@ fn gains_of_steady_cycles() {
     );
 }
 
-// A bias of 0.43 h on a short lag: on its way to the oscillation, of 0.136 s, the relay makes three cycles of
-// 0.55, 0.54 and 0.45 s that are alike, and the first experiment ends there. Such a cycle tells a gain of 19
-// instead of one; the settled one, with 1.9 % of noise, one to within 15 %.
+// A bias of 0.43 h on a process with a short lag: before the steady oscillation of 0.136 s the relay
+// makes three similar cycles of 0.55, 0.54 and 0.45 s, and the first experiment ends there. Such a
+// cycle gives a gain of 19 instead of 1; the settled cycle, with 1.9 % noise, gives 1 within 15 %.
 #[test]
-fn a_cycle_on_the_way_is_none() {
+fn cycles_before_the_steady_ones_are_not_used() {
     let trials = Trials {
         seed: (2 << 32) + 1,
         bias: 0.5,
@@ -192,7 +192,7 @@ fn a_cycle_on_the_way_is_none() {
     assert!((gain - 1.0).abs() < 0.15, "{gain}");
 }
 
-// Three times the output is three times the gain and a third of the controller, whichever way it is found.
+// Three times the output gives three times the gain and a third of the controller, by either method.
 #[test]
 fn controllers_follow_the_gain() {
     let classes = classes();
@@ -226,8 +226,9 @@ fn controllers_follow_the_gain() {
 
 // ---------------------------------------------------------------- classes and labels
 
-// Of a class's own process its own controller costs nothing, every other one more; from another class's the
-// cost is that of `deterioration`, positive, with what margin it costs.
+// On the process of a class its own controller costs nothing and every other controller costs more. The
+// cost of another class's controller is that of `deterioration`: positive, also if it is bought with
+// margin.
 #[test]
 fn a_class_is_its_own_label() {
     let classes = classes();
@@ -246,7 +247,7 @@ fn a_class_is_its_own_label() {
         truth.judge(made),
         deterioration(made, &truth.process, &best)
     );
-    // Half of both gains: slower, and with more margin.
+    // Half of both gains: a slower loop with more margin.
     let slow = onecycle_onboard::Pd {
         kp: 0.5 * best.pd.kp,
         kd: 0.5 * best.pd.kd,
@@ -259,8 +260,8 @@ fn a_class_is_its_own_label() {
     assert_eq!(truth.cost(hot), f64::INFINITY);
 }
 
-// The same experiments whatever else is made; of classes every fourth, in turn; labels are where costs are
-// least; a batch holds what was asked for.
+// Examples do not depend on other examples; examples of classes take every fourth class in turn; the
+// label has the least cost; a batch holds the fields that the loss asks for.
 #[test]
 fn examples_are_what_they_say() {
     let classes = classes();
@@ -281,7 +282,7 @@ fn examples_are_what_they_say() {
         assert_eq!(random.labels()[i], label(random.costs(i)));
         assert_eq!(random.costs(i) == mixed.costs(i), i % 4 != 0, "{i}");
     }
-    // Noise moves the label of a class's own process to a neighbour now and then, never far.
+    // Noise sometimes moves the label from the process's own class to a neighbour, but never far.
     let own = make(classes.len() as u64, Processes::Classes);
     for k in 0..classes.len() {
         assert!(
@@ -300,8 +301,9 @@ fn examples_are_what_they_say() {
 
 // ---------------------------------------------------------------- picks
 
-// By hand: of probabilities 0.5, 0.3, 0.2 the first is most likely; it costs 0.3 * 1 (unstable counts as one)
-// + 0.2 * 0.5 = 0.4 on average, the second 0.5 * 0.1 = 0.05, the third more.
+// By hand, for the probabilities 0.5, 0.3, 0.2: the first class is most likely. Its mean cost is 0.3 *
+// 1 (unstable counts as 1) + 0.2 * 0.5 = 0.4; that of the second is 0.5 * 0.1 = 0.05; that of the third
+// is higher.
 #[test]
 fn both_rules_by_hand() {
     let outputs = [0.5_f32.ln(), 0.3_f32.ln(), 0.2_f32.ln()];
@@ -309,12 +311,12 @@ fn both_rules_by_hand() {
     let costs = Matrix::from_rows(3, 3, rows).unwrap();
     assert_eq!(most_likely(&outputs), 0);
     assert_eq!(least_expected_cost(&outputs, &costs), 1);
-    // Certain enough, both say the same.
+    // If one class is nearly certain, both rules pick it.
     let certain = [0.0, -20.0, -20.0];
     assert_eq!(least_expected_cost(&certain, &costs), 0);
 }
 
-// The best picks are right by definition, cost least, and score as the same picks made one by one.
+// The best picks are right by definition, have the least cost, and score the same one by one.
 #[test]
 fn scores_of_the_best_picks() {
     let classes = classes();
@@ -338,6 +340,6 @@ fn scores_of_the_best_picks() {
     let wrong = Score::of_picks(&wrong, &examples, &classes);
     assert_eq!(wrong.accuracy, 0.0);
     assert!(wrong.mean > best.mean && wrong.worst > best.worst);
-    // Within the 20 % that the grid was laid for.
+    // Within the 20 % of the grid.
     assert!(best.worst.unwrap() < 0.2, "{best:?}");
 }

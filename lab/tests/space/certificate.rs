@@ -1,4 +1,4 @@
-//! What is certified of the paper's multirotors, and of spaces that cannot be.
+//! Certificates of the paper's multirotors, and of spaces that have none.
 
 use onecycle_lab::space::Space;
 use onecycle_lab::space::certificate::{Certificate, CertificateSummary, CycleStability};
@@ -34,8 +34,8 @@ fn every_multirotor_is_stable_without_bias() {
     }
 }
 
-// Between two edges of the patch, at no delay to speak of: 21.19 % of a deviation is left, and a finer
-// lattice climbs to the same.
+// The least stable process lies between two edges of the patch, at nearly no delay: 21.19 % of a
+// deviation remains after a cycle. A finer lattice finds the same process.
 #[test]
 fn least_stable_multirotor() {
     let [coarse, fine] = [6, 20].map(|n| Space::MULTIROTOR.least_stable(n, n).unwrap());
@@ -47,9 +47,9 @@ fn least_stable_multirotor() {
     }
 }
 
-// At 0.3 of the relay's amplitude the bare relay is stable, at 0.5 it has no cycle of two switches;
-// turning back brings stable ones back, several of them; the trim is stable under both, and at its
-// limit of 0.9, but not beyond.
+// At a bias of 0.3 of the relay's amplitude the bare relay is stable; at 0.5 it has no cycle of two
+// switches. With a reduced lead there are stable cycles again, several of them. With the trim the cycle
+// is stable at both, and up to its limit of 0.9.
 #[test]
 fn multirotors_under_a_bias() {
     let summary = |bias| CertificateSummary::of(bias, &certificates(&Space::MULTIROTOR, bias));
@@ -86,8 +86,8 @@ fn verdicts() {
     }
 }
 
-// Lags of milliseconds behind a body of hours: next to a double integrator, which a lagging relay
-// cannot turn round within any reasonable period.
+// Lags of milliseconds with a body of hours are close to a double integrator. A lagging relay does not
+// reverse it within a reasonable period.
 #[test]
 fn a_lagging_relay_is_not_certified_on_double_integrators() {
     let space = Space {

@@ -1,4 +1,4 @@
-//! Grids: the laws they rest on, the spacing they promise, what they cover; and their files.
+//! Grids: properties of the cost, spacing and coverage of both layouts, and files.
 
 mod files;
 
@@ -29,7 +29,7 @@ fn paper(gains: Gains, [t_prop_s, t_body_s, tau_s]: [f64; 3]) -> Candidate {
     Candidate::new(&Space::MULTIROTOR, gains, [t_prop_s, t_body_s, tau_s]).unwrap()
 }
 
-/// Times (s) of a process of any shape, the dead time often none.
+/// Times (s) of a process of any shape, often without dead time.
 fn times() -> impl Strategy<Value = [f64; 3]> {
     (
         -2.0..0.0_f64,
@@ -43,7 +43,7 @@ fn scaled(times_s: [f64; 3], alpha: f64) -> [f64; 3] {
     times_s.map(|time_s| alpha * time_s)
 }
 
-/// Whether two costs above the optimum are the same to 1e-9 of what is paid, or both infinite.
+/// Whether two costs above the optimum agree to 1e-9 of the whole cost, or are both infinite.
 fn same(a: f64, b: f64) -> bool {
     a == b || (a - b).abs() <= 1e-9 * (1.0 + b.abs())
 }
@@ -53,8 +53,8 @@ fn same(a: f64, b: f64) -> bool {
 proptest! {
     #![proptest_config(config())]
 
-    // Property 1: of successive processes of a geometric ladder J_ij = J_jk and J_ji = J_kj,
-    // each computed afresh.
+    // Property 1: for successive processes of a geometric ladder J_ij = J_jk and J_ji = J_kj, each
+    // computed anew.
     #[test]
     fn property_1(times_s in times(), alpha in 0.5..2.0_f64) {
         for gains in BOTH_GAINS {
@@ -64,9 +64,9 @@ proptest! {
         }
     }
 
-    // Property 2 as it is true: of two shapes i, k and the same two scaled by a common alpha, j, l,
-    // J_(ik) = J_(jl), and J_ik = J_jl, J_ki = J_lj. Of two scaled by different factors it is
-    // J_(jl) = J_(im), where m is k scaled by their ratio.
+    // Property 2 in its correct form: if j and l are i and k scaled by the same alpha, then J_(ik) =
+    // J_(jl), J_ik = J_jl and J_ki = J_lj. If they are scaled by different factors, then J_(jl) =
+    // J_(im), where m is k scaled by the ratio of the factors.
     #[test]
     fn property_2(i in times(), k in times(), scale in 0.5..2.0_f64, alphas in (0.2..5.0_f64, 0.2..5.0_f64)) {
         for gains in BOTH_GAINS {
@@ -80,7 +80,7 @@ proptest! {
         }
     }
 
-    // A scaled candidate is the candidate of the scaled times.
+    // A scaled candidate equals the candidate computed from the scaled times.
     #[test]
     fn scaled_is_new(times_s in times(), ln_alpha in -7.0..7.0_f64) {
         let alpha = ln_alpha.exp();
@@ -111,16 +111,16 @@ proptest! {
     }
 }
 
-// The paper's property 2 has two factors: with J_ij = J_kl = 10 % along two rays it wants
-// J_(ik) = J_(jl) = 10 %. The rays of the long lags (0.3, 2, 0.0005) s and of the longer dead time
-// (0.1, 1, 0.03) s have steps of 1.24 and 1.39. With k on its ray 10 % from i, j and l are i and k
-// moved by different factors, and 10 % apart no more.
+// The paper states property 2 with two factors: if J_ij = J_kl = 10 % along two rays, then J_(ik) =
+// J_(jl) = 10 %. This is false. The rays of the long lags (0.3, 2, 0.0005) s and of the longer dead
+// time (0.1, 1, 0.03) s have steps of 1.24 and 1.39. If k is 10 % from i, then j and l, which are i and
+// k moved by different factors, are no longer 10 % apart.
 #[test]
 fn property_2_does_not_hold_for_two_factors() {
     let i = paper(Gains::SameAmplitude, [0.3, 2.0, 0.0005]);
     let on_k = paper(Gains::SameAmplitude, [0.1, 1.0, 0.03]);
     let away = |scale: f64| i.distance(&on_k.scaled(scale).unwrap()) - 0.1;
-    // The scale at which it falls through 10 %, from a k that is much too fast.
+    // The scale at which the distance falls to 10 %, from a k that is much too fast.
     let (mut fast, mut slow) = (0.5, 0.5);
     while away(slow) > 0.0 {
         (fast, slow) = (slow, 1.02 * slow);
@@ -146,7 +146,7 @@ fn property_2_does_not_hold_for_two_factors() {
     let apart = j.distance(&l);
     println!("J_(jl) = {apart}, J_(ik) = 0.1, k = {:?}", k.times_s());
     assert!((apart - 0.1).abs() > 0.02, "{apart}");
-    // With one factor for both it is.
+    // With one factor for both, the distance stays 10 %.
     let l = k.scaled(alpha_1).unwrap();
     assert!((j.distance(&l) - 0.1).abs() < 1e-9);
 }
@@ -158,8 +158,8 @@ fn ten_percent() -> &'static Grid {
     GRID.get_or_init(|| Grid::build(&GridSettings::default(), &Threads(2)).unwrap())
 }
 
-// A ladder, a row and, in the mean square over nine places, the rows: 10 % from each neighbour to the
-// next, each member computed afresh.
+// Neighbours on a ladder, in a row, and from row to row (mean square over nine places) are 10 % apart,
+// each member computed anew.
 #[test]
 fn neighbours_are_ten_percent_apart() {
     let grid = ten_percent();
@@ -172,7 +172,7 @@ fn neighbours_are_ten_percent_apart() {
             (true, false) => 1,
             (false, _) => continue,
         };
-        // Rays are 10 % apart at the same radius.
+        // Rays are 10 % apart at equal radius.
         let radius_s = if kind == 0 {
             two[1].radius_s
         } else {
@@ -201,7 +201,8 @@ fn neighbours_are_ten_percent_apart() {
     }
 }
 
-// The paper has 208. The layout separates, so it covers with half of its 10 % and to spare.
+// The paper has 208 members. This layout keeps members apart, so it covers the space with less than
+// half of its 10 %.
 #[test]
 fn ten_percent_cover_the_multirotors() {
     let grid = ten_percent();
@@ -228,15 +229,15 @@ fn ten_percent_cover_the_multirotors() {
         found.least_margin_rad.unwrap().to_degrees() > 15.0,
         "{found:?}"
     );
-    // The same at any number of threads.
+    // The result does not depend on the number of threads.
     assert_eq!(
         check(grid, 300, 3, &Threads(2)),
         check(grid, 300, 3, &OneThread)
     );
 }
 
-// A known dead time leaves one radius to a ray: seven members miss a corner by 300 %, an eighth stands
-// there, farther than 30 % from all of them. Its file reads back, with it at the end only.
+// A known dead time leaves one radius on each ray: seven members miss a corner by 300 %. An eighth
+// member fills it, more than 30 % away from the others. The file keeps it, as the last member.
 #[test]
 fn holes_are_closed() {
     let settings = GridSettings {
@@ -273,7 +274,7 @@ fn holes_are_closed() {
     assert!(error.contains("out of the order of rows"), "{error}");
 }
 
-// What the index finds is what asking every member finds.
+// The index finds the same member as a search through all members.
 #[test]
 fn the_index_misses_nothing() {
     let grid = ten_percent();
@@ -304,8 +305,8 @@ fn the_index_misses_nothing() {
     }
 }
 
-// Boxes without extent in one, two or three directions, and without dead time at one end: laid,
-// covered, and a single process is one member.
+// Boxes without extent in one, two or three directions, and with a dead time of zero at one end, are
+// covered; a single process gives one member.
 #[test]
 fn narrow_spaces() {
     let paper = Space::MULTIROTOR;
@@ -359,7 +360,7 @@ fn narrow_spaces() {
     }
 }
 
-// With equal gains a process's own gain has to be met as well: many more members.
+// With equal gains, members must also match the gain of a process: many more members.
 #[test]
 fn equal_gains_take_many_more() {
     let settings = GridSettings {
@@ -392,7 +393,7 @@ fn settings_out_of_range() {
 
 // ---------------------------------------------------------------- the fewest
 
-// Without distance to keep between them, a fraction of the members will do.
+// Without a least distance between members, a fraction of the members is enough.
 #[test]
 fn the_fewest_cover_as_well() {
     let rays = GridSettings {

@@ -11,8 +11,8 @@ use onecycle_plant::VariableStepProcess;
 
 const BETA: f64 = -0.73;
 
-/// The slowest and the quickest processes of the paper's space and one within, velocity gain one:
-/// T_prop, T_body, tau (s).
+/// T_prop, T_body, tau (s) of the slowest and the fastest processes of the paper's space and of one
+/// inside, all with a velocity gain of one.
 const PROCESSES: [[f64; 3]; 5] = [
     [0.3, 2.0, 0.1],
     [0.3, 2.0, 0.0005],
@@ -25,8 +25,8 @@ fn process([t_prop, t_body, tau]: [f64; 3]) -> Soiptd {
     Soiptd::new(1.0, t_prop, t_body, tau).unwrap()
 }
 
-/// Output at a phase of the oscillation by the Fourier series of the square wave, high from phase 0
-/// to pi: terms fall as the fourth power, so that 4,000 leave 1e-12.
+/// Output at a phase of the oscillation by the Fourier series of the square wave, high from phase 0 to
+/// pi. Terms fall with the fourth power of the order, so 4,000 of them leave an error of 1e-12.
 fn fourier(process: &Soiptd, omega: f64, phase: f64) -> f64 {
     let term = |n: i32| {
         let n = f64::from(n);
@@ -37,9 +37,9 @@ fn fourier(process: &Soiptd, omega: f64, phase: f64) -> f64 {
     (0..4000).rev().map(|k| term(2 * k + 1)).sum()
 }
 
-// The output at the fall is -beta times its minimum since the rise, and that is the amplitude; by a
-// series that shares nothing with the exact solution. With damping and without, without dead time,
-// lags equal, a plain relay and a lagging one.
+// The output at the fall is -beta times its minimum since the rise, which is the amplitude. The series
+// shares nothing with the exact solution. With and without damping, without dead time, with equal lags,
+// with a plain and a lagging relay.
 #[test]
 fn fourier_series_meets_the_switching_condition() {
     let double = |t_prop, tau| Soiptd::from_acceleration_gain(2.0, t_prop, 0.0, tau).unwrap();
@@ -64,7 +64,7 @@ fn fourier_series_meets_the_switching_condition() {
                 minimum = (phase, y);
             }
         }
-        // A parabola through three points near the minimum leaves the cube of their distance.
+        // The error of a parabola through three points near the minimum is the cube of their distance.
         let mut width = PI / 200.0;
         for _ in 0..6 {
             let [left, centre, right] =
@@ -85,8 +85,8 @@ fn fourier_series_meets_the_switching_condition() {
     }
 }
 
-/// A continuous relay around the process: steps of `dt`, switches and turns of the output located in
-/// them by bisection.
+/// A continuous relay in a loop with the process: steps of `dt`; switches and turning points within a
+/// step are located by bisection.
 struct Loop {
     plant: VariableStepProcess,
     b: [f64; 2],
@@ -98,7 +98,7 @@ struct Loop {
 }
 
 impl Loop {
-    /// Off rest, or the relay has nothing to switch on.
+    /// Starts away from rest, because the relay does not switch at rest.
     fn new(process: &Soiptd, beta: [f64; 2], cycle: &LimitCycle) -> Self {
         let mut plant = VariableStepProcess::new(process);
         plant.displace(-0.5 * cycle.amplitude, 0.0);
@@ -113,7 +113,8 @@ impl Loop {
         }
     }
 
-    /// Settled without bias, then led to `bias` in small steps: from rest the bare relay may be lost.
+    /// Settles without bias, then raises the bias in small steps up to `bias`; from rest the bare relay
+    /// may stop switching.
     fn under(process: &Soiptd, beta: [f64; 2], bias: f64, cycle: &LimitCycle) -> Self {
         let mut simulation = Self::new(process, beta, cycle);
         simulation.cycles(5);
@@ -130,7 +131,7 @@ impl Loop {
         plant
     }
 
-    /// Where `holds` becomes true within a step at whose end it is.
+    /// Time within the step at which `holds` becomes true; it is true at the end of the step.
     fn moment(&self, holds: impl Fn(&VariableStepProcess) -> bool) -> f64 {
         let (mut low, mut high) = (0.0, self.dt);
         for _ in 0..60 {
@@ -144,7 +145,7 @@ impl Loop {
         high
     }
 
-    /// Time until the next switch (s); infinite where it has not come after a hundred periods.
+    /// Time until the next switch (s); infinite if there is none within a hundred periods.
     fn half(&mut self) -> f64 {
         let sign = self.sign;
         let mut extreme = sign * self.plant.output();
@@ -170,7 +171,7 @@ impl Loop {
         f64::INFINITY
     }
 
-    /// Times high and low (s) of so many cycles.
+    /// Times high and low (s) of `count` cycles.
     fn cycles(&mut self, count: usize) -> Vec<(f64, f64)> {
         let mut cycles = Vec::new();
         for _ in 0..count {
@@ -208,8 +209,8 @@ fn period_is_that_of_the_simulation() {
     }
 }
 
-// Up to 0.3 of the relay's amplitude the bare relay has one cycle, the simulation's; at 0.3 it is
-// shorter than without bias though the low output lasts longer.
+// Up to a bias of 0.3 of the relay's amplitude the bare relay has one cycle, which equals the simulated
+// one. At 0.3 its period is shorter than without bias, although the low output lasts longer.
 #[test]
 fn biased_period_is_that_of_the_simulation() {
     for times in PROCESSES {
@@ -227,8 +228,8 @@ fn biased_period_is_that_of_the_simulation() {
     }
 }
 
-// Under half the relay's amplitude of bias the bare relay has no cycle of two switches; with the lead
-// of one side halved it has one, which the simulation of that relay comes to.
+// At a bias of half the relay's amplitude the bare relay has no cycle of two switches. With the lead of
+// one side halved it has one, and the simulation of that relay converges to it.
 #[test]
 fn halved_lead_brings_the_cycle_back() {
     for times in PROCESSES {
@@ -244,15 +245,15 @@ fn halved_lead_brings_the_cycle_back() {
     }
 }
 
-/// What is left of a deviation of the period after a cycle, in the mean over so many cycles from
-/// the `from`-th.
+/// Ratio of the period's deviations in successive cycles: the mean over `count` cycles from cycle
+/// `from`.
 fn decay(cycles: &[(f64, f64)], cycle: &LimitCycle, from: usize, count: usize) -> f64 {
     let deviation = |k: usize| (cycles[k].0 - cycle.high_s).hypot(cycles[k].1 - cycle.low_s);
     (deviation(from + count) / deviation(from)).powf(1.0 / count as f64)
 }
 
-// Just before the bare relay loses its cycle, deviations die out slowly, which a simulation sees: the
-// exact radii at a bias of 0.32 are 0.843, 0.291, 0.422 and 0.824.
+// Just before the bare relay loses its cycle, deviations decay slowly, as the simulation shows. The
+// exact spectral radii at a bias of 0.32 are 0.843, 0.291, 0.422 and 0.824.
 #[test]
 fn spectral_radius_is_that_of_the_simulation() {
     for (times, radius) in [
@@ -275,7 +276,7 @@ fn spectral_radius_is_that_of_the_simulation() {
     }
 }
 
-// A little more bias, and deviations grow: 1.196 a cycle at 0.34.
+// With slightly more bias deviations grow: by a factor of 1.196 per cycle at 0.34.
 #[test]
 fn unstable_cycle_is_left() {
     let process = process([0.3, 2.0, 0.1]);
@@ -288,9 +289,8 @@ fn unstable_cycle_is_left() {
     assert!((high_s / cycle.high_s - 1.0).abs() > 0.01);
 }
 
-// The trim cancels any bias, and the cycle is the one without: from a bias that
-// appears at once the simulation comes to it at the exact rate. A trim that does not move leaves what
-// bias there is: one.
+// The trim cancels any bias, so the cycle is the one without bias. After a step of the bias the
+// simulation converges to it at the exact rate. With a trim gain of zero the bias stays: a rate of one.
 #[test]
 fn trimmed_cycle_is_that_of_the_simulation() {
     for times in PROCESSES {
@@ -309,7 +309,8 @@ fn trimmed_cycle_is_that_of_the_simulation() {
             assert!((simulation.trim + bias).abs() < 1e-6);
             let radius = trimmed_spectral_radius(&process, BETA, trim_gain).unwrap();
             assert!(radius < 1.0);
-            // Complex and nearly equal multipliers make the rate waver; at 1.7 one dominates.
+            // Complex and nearly equal multipliers make the rate vary; at a gain of 1.7 one multiplier
+            // dominates.
             let tolerance = match trim_gain {
                 1.7 => 0.05,
                 0.5 => 0.2,
@@ -325,8 +326,8 @@ fn trimmed_cycle_is_that_of_the_simulation() {
     }
 }
 
-// The same loop in milliseconds and in hours: scaling by 1000 scales the period and the square of it
-// the amplitude at the same acceleration gain, and nothing else.
+// The same loop in milliseconds and in hours: at equal acceleration gain, a time scale of 1000
+// multiplies the period by 1000 and the amplitude by 1000^2, and changes nothing else.
 #[test]
 fn time_scales_everything() {
     for bias in [0.0, 0.3] {
@@ -348,8 +349,8 @@ fn time_scales_everything() {
     }
 }
 
-// h = 1, K = 1, beta = -0.73 at 1 ms: steady period (s), and amplitude with half a unit of its last
-// digit, as a prototype in another language simulated them.
+// Steady period (s), amplitude and half a unit of the amplitude's last digit, from a prototype in
+// another language: h = 1, K = 1, beta = -0.73, samples of 1 ms.
 #[test]
 fn sampled_cycles_hold_the_prototype_s() {
     for (times, period_s, (amplitude, digit)) in [
@@ -368,8 +369,8 @@ fn sampled_cycles_hold_the_prototype_s() {
     }
 }
 
-// Without bias the relay ends in one of the exact cycles, if it ends in one; sampled ten times as
-// often, only one is left, and it is the continuous relay's to a sample.
+// Without bias a sampled relay that settles ends in one of the exact cycles. At ten times the sample
+// rate only one cycle is left, which is that of the continuous relay to one sample.
 #[test]
 fn sampled_relay_ends_in_one_of_its_cycles() {
     for times in PROCESSES {
@@ -399,8 +400,8 @@ fn sampled_relay_ends_in_one_of_its_cycles() {
     }
 }
 
-// 0.25 = 1/4 high 3 to low 5: (0.3, 2, 0.1) repeats 831 and 1385 samples, whose ratio is 3 to 5. At half
-// the relay's amplitude the bare relay stops switching.
+// A bias of 0.25 means 3 parts high to 5 parts low: (0.3, 2, 0.1) repeats 831 and 1385 samples, a ratio
+// of 3 to 5. At a bias of half the relay's amplitude the bare relay stops switching.
 #[test]
 fn biased_sampled_relay() {
     let process = process([0.3, 2.0, 0.1]);
@@ -425,7 +426,7 @@ fn biased_sampled_relay() {
 
 #[test]
 fn relays_without_oscillation() {
-    // No lead, no damping: nothing turns a double integrator round.
+    // Without lead and damping nothing reverses a double integrator.
     let double = Soiptd::from_acceleration_gain(1.0, 0.05, 0.0, 0.02).unwrap();
     assert_eq!(symmetric(&double, 0.2), None);
     assert_eq!(limit_cycles(&double, [0.2; 2], 0.0), []);

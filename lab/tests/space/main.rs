@@ -1,6 +1,6 @@
 //! Spaces of processes: limit cycles, certificates, phases, grids.
 
-// The lint excepts tests, but not their helpers.
+// The lint exempts test functions, but not their helpers.
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 #[path = "../common/mod.rs"]

@@ -12,13 +12,13 @@ fn optimum(t_prop_s: f64, t_body_s: f64, tau_s: f64) -> Optimum {
     pd_at_phase_margin(&process, PHASE_MARGIN_RAD).expect("20 deg is a margin")
 }
 
-/// Half a unit of the last printed digit, and one percent for the prototype's own rounding.
+/// Half a unit of the last printed digit, plus one per cent of it for the rounding of the prototype.
 fn prints_as(value: f64, printed: f64, last_digit: f64) -> bool {
     (value - printed).abs() <= 0.505 * last_digit
 }
 
-// K = 1 and exactly 20 deg. The prototype searched on a grid; its minimum is flat, so its gains
-// deserve a few units of their fifth digit, its cost and its lead all the digits they have.
+// K = 1 and exactly 20 deg. The prototype searched on a grid near a flat minimum, so its gains may
+// differ by a few units of the fifth digit. Its cost and its lead agree to all digits.
 #[test]
 fn optimal_controllers_match_the_prototype() {
     for (t_prop, t_body, tau, kp, kd, cost, lead_deg) in [
@@ -40,8 +40,8 @@ fn optimal_controllers_match_the_prototype() {
     }
 }
 
-// The paper's gains of its hover and roll processes: Kd/Kp = 9.0356/59.0220 and 0.0985/1.1000, the
-// latter with three digits. The prototype's are 0.15304 and 0.08974, from its flat minimum.
+// The paper's gains for hover and roll give Kd/Kp = 9.0356/59.0220 and 0.0985/1.1000, the latter with
+// three digits. The prototype has 0.15304 and 0.08974, from its flat minimum.
 #[test]
 fn derivative_times_match_the_paper() {
     for (times, prototype, paper, digits) in [
@@ -58,8 +58,8 @@ fn derivative_times_match_the_paper() {
     }
 }
 
-// The rule of the slowest process of the paper's space has the phase of the paper's relay, beta =
-// -0.73: asin(beta) = -46.88 deg.
+// The rule for the slowest process of the paper's space has the phase of the paper's relay: asin(-0.73)
+// = -46.88 deg.
 #[test]
 fn slowest_process_has_the_paper_s_phase() {
     let rule = TuningRule::from_lead(optimum(0.3, 2.0, 0.1).lead_rad, PHASE_MARGIN_RAD);
@@ -67,8 +67,8 @@ fn slowest_process_has_the_paper_s_phase() {
     assert!(prints_as(rule.beta, -0.73, 0.01));
 }
 
-// Where the dead time dominates, more margin than 20 deg is cheaper: 21.2 deg for this process.
-// Elsewhere the floor is where the optimum lies.
+// If the dead time dominates, a margin above 20 deg costs less: 21.2 deg for this process. Otherwise
+// the optimum lies at the least margin.
 #[test]
 fn free_optimum_lies_above_the_floor_only_where_the_delay_dominates() {
     let process = Soiptd::new(1.0, 0.015, 0.2, 0.1).unwrap();
@@ -76,7 +76,7 @@ fn free_optimum_lies_above_the_floor_only_where_the_delay_dominates() {
     let margin_deg = free.margins.phase_margin_rad.to_degrees();
     assert!(prints_as(margin_deg, 21.2, 0.1), "{margin_deg}");
     assert!(free.ise < pd_at_phase_margin(&process, PHASE_MARGIN_RAD).unwrap().ise);
-    // Stationary in both directions: a change of 1e-4 in either gain costs 1e-8 or so, not 1e-4.
+    // The optimum is stationary: a change of 1e-4 in either gain costs about 1e-8, not 1e-4.
     for (kp, kd) in [(1.0001, 1.0), (0.9999, 1.0), (1.0, 1.0001), (1.0, 0.9999)] {
         let near = onecycle_onboard::Pd {
             kp: kp * free.pd.kp,

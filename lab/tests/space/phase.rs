@@ -1,4 +1,5 @@
-//! The distinguishing phase: against the paper, a search without its formulas, and its own laws.
+//! The distinguishing phase: compared with the paper and with a search that shares no formulas, and its
+//! invariances.
 
 use std::f64::consts::{PI, TAU};
 
@@ -28,7 +29,7 @@ fn process([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> Soiptd {
     Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).expect("times are positive")
 }
 
-/// Hardly damped at all, and a space whose margin puts its rules on either side of `beta = 0`.
+/// A space with hardly any damping, and a space whose rules have `beta` on both sides of zero.
 fn other_spaces() -> [Space; 2] {
     [
         Space {
@@ -45,7 +46,7 @@ fn other_spaces() -> [Space; 2] {
     ]
 }
 
-/// Greatest relative difference.
+/// Largest relative difference.
 fn differ(a: &[f64], b: &[f64]) -> f64 {
     assert_eq!(a.len(), b.len());
     a.iter()
@@ -56,8 +57,8 @@ fn differ(a: &[f64], b: &[f64]) -> f64 {
 
 // ---------------------------------------------------------------- the paper's space
 
-// -47.66 deg, beta -0.739, worst 3.81 %, mean 1.10 %, on 12, 24 and 48 rows alike to 0.04 deg and
-// 0.05 %. The paper: -46.89 deg, which is 0.77 deg away.
+// Phase -47.66 deg, beta -0.739, worst 3.81 %, mean 1.10 %. With 12, 24 and 48 rows the phase agrees to
+// 0.04 deg and the deterioration to 0.05 %. The paper has -46.89 deg, 0.77 deg away.
 #[test]
 fn distinguishing_phase_of_the_paper_s_space() {
     for count in [12, 24] {
@@ -78,8 +79,8 @@ fn distinguishing_phase_of_the_paper_s_space() {
     }
 }
 
-// The paper's rule: 5.0 % where the best has 3.8 %, but a mean of 0.92 % where that has 1.10 %.
-// The worst deterioration is not flat: it rises by 1.6 points a degree above, 1.3 below the best.
+// The paper's rule has a worst deterioration of 5.0 % instead of 3.8 %, but a mean of 0.92 % instead of
+// 1.10 %. The worst deterioration rises by 1.6 points per degree above the best phase and by 1.3 below.
 #[test]
 fn the_paper_s_phase_trades_the_worst_for_the_mean() {
     let optima = LocalOptima::of_shapes(&Space::MULTIROTOR, 24, 24).unwrap();
@@ -96,7 +97,7 @@ fn the_paper_s_phase_trades_the_worst_for_the_mean() {
     }
 }
 
-/// A lattice in the box: `count` values along each axis, with or without its ends.
+/// A lattice in the box: `count` values along each axis, with or without the ends of the ranges.
 fn lattice(count: usize, logarithmic: bool, with_ends: bool) -> Vec<[f64; 3]> {
     let axis = |(low, high): (f64, f64)| -> Vec<f64> {
         let part = |k: usize| {
@@ -131,11 +132,11 @@ fn steps_on(times_s: Vec<[f64; 3]>) -> DistinguishingPhase {
         .expect("a lattice of processes")
 }
 
-// Why the paper has -46.89 deg. That is asin(-0.73), so it has the two digits of beta = -0.73, which
-// are those of any phase from -47.31 to -46.47 deg. With the corners of the box in the lattice, however
-// coarse, the six steps give -47.4 to -47.8 deg, beta -0.736 to -0.740, never the two digits. Without
-// them, in the middles of equal cells, they give -47.0 to -47.2 deg on linear axes: beta -0.7317 to
-// -0.7332, which is -0.73; on logarithmic ones -0.743 to -0.750, which is not.
+// Where the paper's -46.89 deg comes from. It is asin(-0.73), and beta = -0.73 with its two digits
+// holds for any phase from -47.31 to -46.47 deg. If the lattice of processes contains the corners of
+// the box, the six steps give -47.4 to -47.8 deg, beta -0.736 to -0.740, at any spacing: never -0.73.
+// With points in the middles of equal cells they give -47.0 to -47.2 deg on linear axes, beta -0.7317
+// to -0.7332, which rounds to -0.73; on logarithmic axes -0.743 to -0.750, which does not.
 #[test]
 fn the_paper_s_beta_is_that_of_a_lattice_without_the_corners() {
     assert!((PAPER_BETA.asin().to_degrees() - PAPER_DEG).abs() < 0.005);
@@ -156,8 +157,8 @@ fn the_paper_s_beta_is_that_of_a_lattice_without_the_corners() {
     }
 }
 
-// It is not the rule of the slowest process, which has -46.877 deg, beta -0.72994: where that is in
-// the lattice it costs 4.3 to 5.1 %, and is never the best.
+// The paper's rule is not that of the slowest process, which has -46.877 deg, beta -0.72994: in
+// lattices that contain this process its rule costs 4.3 to 5.1 % and is never the best.
 #[test]
 fn the_slowest_process_s_rule_is_never_the_best() {
     for count in 2..=8 {
@@ -175,10 +176,10 @@ fn the_slowest_process_s_rule_is_never_the_best() {
     }
 }
 
-// ---------------------------------------------------------------- the same by search
+// ---------------------------------------------------------------- comparison with a search
 
-/// The PD with this lead that leaves 20 deg of margin: the first frequency where it does, from the
-/// frequency response alone.
+/// The PD with this lead and 20 deg of margin: the first such crossover frequency, from the frequency
+/// response alone.
 fn search_pd(times_s: [f64; 3], lead_rad: f64) -> Pd {
     let [t_prop_s, t_body_s, tau_s] = times_s;
     let response = |omega: f64| {
@@ -205,7 +206,7 @@ fn search_pd(times_s: [f64; 3], lead_rad: f64) -> Pd {
     Pd { kp, kd }
 }
 
-/// Lead and cost of the best, by golden section.
+/// Lead and cost of the optimum, by golden section.
 fn search_optimum(times_s: [f64; 3]) -> (f64, f64) {
     let cost = |lead_rad: f64| {
         ise(&process(times_s), search_pd(times_s, lead_rad)).expect("a margin is stable")
@@ -223,7 +224,7 @@ fn search_optimum(times_s: [f64; 3]) -> (f64, f64) {
     (low, cost(low))
 }
 
-// The golden section finds leads to 1e-7, deteriorations change by less than 1 per radian.
+// The golden section finds leads to 1e-7, and deteriorations change by less than 1 per radian.
 #[test]
 fn search_finds_the_same_rules() {
     let phase = distinguishing_phase(&Space::MULTIROTOR, 4, 4).unwrap();
@@ -248,10 +249,11 @@ fn search_finds_the_same_rules() {
     assert!((phase.best.applied.worst - least).abs() < 1e-6);
 }
 
-// ---------------------------------------------------------------- laws
+// ---------------------------------------------------------------- invariances
 
-// As the paper defines it: gains from the amplitude ratio and the period of the oscillation. Every
-// controller has the rule's lead, so the space's margin, and costs what the table says.
+// The paper's definition: gains follow from the amplitude ratio and the period of the oscillation.
+// Every controller has the lead of the rule, so it has the margin of the space, and its cost is that of
+// the table.
 #[test]
 fn every_applied_controller_has_the_margin() {
     for space in [Space::MULTIROTOR].into_iter().chain(other_spaces()) {
@@ -291,7 +293,7 @@ fn a_rule_costs_its_own_process_nothing() {
     assert_eq!(optima.local_rule(36), None);
 }
 
-// A thousand times as slow, and the times of the processes with it; nothing else changes.
+// A space a thousand times as slow has the same rules, and its processes are a thousand times as slow.
 #[test]
 fn time_scale_changes_nothing() {
     let fast = Space::MULTIROTOR;
@@ -315,7 +317,8 @@ fn time_scale_changes_nothing() {
     assert!((fast.minimax.worst - slow.minimax.worst).abs() < 1e-9);
 }
 
-// No local rule and no lead between or beyond them is better; 1e-11 is what the lead's 1e-12 leaves.
+// No local rule and no lead between or beyond the local rules is better. The tolerance of 1e-11 follows
+// from the lead's precision of 1e-12.
 #[test]
 fn no_lead_is_better_than_the_minimax() {
     for space in [Space::MULTIROTOR].into_iter().chain(other_spaces()) {
@@ -331,7 +334,7 @@ fn no_lead_is_better_than_the_minimax() {
     }
 }
 
-// Nothing to choose between: the rule of the only process costs nothing.
+// For a space of one process the rule costs nothing.
 #[test]
 fn a_single_process_and_none() {
     let space = Space {
@@ -350,7 +353,7 @@ fn a_single_process_and_none() {
     assert_eq!(none, Err(PhaseError::Empty));
 }
 
-// At the ends of what a space may be, deteriorations are numbers or infinite.
+// At the limits of a space, deteriorations are numbers or infinite, never NaN.
 #[test]
 fn extreme_spaces_give_numbers() {
     for phase_margin_deg in [1.0, 80.0] {

@@ -6,10 +6,11 @@
 //! v(k) = -a1 v(k-1) - a2 v(k-2) + b0 u(k-1) + b1 u(k-2) + b2 u(k-3) + e(k)
 //! ```
 //!
-//! Before the estimator stand, as there: a Butterworth low pass of second order and a high pass of first
-//! order on both signals, and only every so many samples go on. The rate is the difference of the
-//! recorded output. Both signals are scaled to a root mean square of one, so that the initial covariance is weak whatever their units, and the
-//! estimator waits until the high pass has forgotten what was before the recording.
+//! Both signals pass the filters of PX4 first: a Butterworth low pass of second order and a high pass
+//! of first order; then every n-th sample is kept. The rate is the difference of the recorded output.
+//! Both signals are scaled to a root mean square of one, so that the initial covariance is weak
+//! whatever their units, and the estimator waits until the high pass has forgotten the signal before
+//! the recording.
 //!
 //! The model becomes a process by its poles and its first moments:
 //!
@@ -18,10 +19,10 @@
 //! tau = dt (1 + (b1 + 2 b2)/sum b + sum p/(1 - p)) - sum of the lags - one sample of the recording
 //! ```
 //!
-//! the last for the hold of the input and the difference of the output, half a sample each. From there
-//! on it gets the same controller as everybody.
+//! The last sample accounts for the hold of the input and the difference of the output, half a sample
+//! each. The process then gets the same controller as those of all methods.
 //!
-//! PX4 itself goes on by a law of its own: [`gmvc`](super::gmvc).
+//! PX4 itself designs its gains by another law: [`gmvc`](super::gmvc).
 
 use std::f64::consts::{PI, SQRT_2, TAU};
 
@@ -36,18 +37,18 @@ pub const COEFFICIENTS: usize = 5;
 /// PX4's variance of every coefficient at the start.
 const FIRST_VARIANCE: f64 = 1e4;
 
-/// Poles faster than this are taken for it: a lag of a tenth of the model's sample period.
+/// Fastest pole, to which faster ones are limited: a lag of a tenth of the model's sample period.
 const FASTEST_POLE: f64 = 4.5e-5;
 
-/// Samples of the model in a period of the oscillation: few enough for two of them to hold the dead
+/// Samples of the model in a period of the oscillation: few enough for two samples to hold the dead
 /// times of the paper's processes, which are up to a sixth of the period.
 const SAMPLES_A_PERIOD: f64 = 16.0;
 
-/// Periods after which a scaled estimator forgets, at the least.
+/// Shortest time constant of forgetting of a scaled estimator, in periods.
 const FORGETTING_PERIODS: f64 = 60.0;
 
-/// Time constants of the high pass after which the estimator begins: what was before the recording is
-/// forgotten to a twentieth by then.
+/// Time constants of the high pass after which the estimator starts: the signal before the recording is
+/// then forgotten to a twentieth.
 const WARM_UP: f64 = 3.0;
 
 /// The recursive estimator.
@@ -64,8 +65,8 @@ pub struct Estimator {
 }
 
 impl Estimator {
-    /// Knows nothing. The forgetting factor is the weight of a sample over that of the next, above zero
-    /// and at most one.
+    /// An estimator without data. The forgetting factor is the weight of a sample over the weight of
+    /// the next one, above zero and at most one.
     ///
     /// # Errors
     /// [`BaselineError::Setting`] for a factor out of its range.
@@ -87,7 +88,7 @@ impl Estimator {
         })
     }
 
-    /// A sample: the rate measured, and the input held from it on.
+    /// Adds a sample: the measured rate, and the input held after it.
     pub fn push(&mut self, input: f64, rate: f64) {
         if self.seen >= self.inputs.len() {
             self.update(rate);
@@ -122,22 +123,23 @@ impl Estimator {
     }
 }
 
-/// The filters before the estimator.
+/// Filters before the estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArxSettings {
     /// Cut-off of the low pass (Hz).
     pub low_pass_hz: f64,
     /// Cut-off of the high pass (Hz).
     pub high_pass_hz: f64,
-    /// Sample period of the model (s); the nearest multiple of the recording's below it, one at least.
+    /// Sample period of the model (s), rounded down to a multiple of the recording's, at least one
+    /// sample.
     pub model_s: f64,
     /// Time constant of forgetting (s).
     pub forgetting_s: f64,
 }
 
 impl ArxSettings {
-    /// PX4's own: 30 Hz (the cut-off of its gyroscope, a parameter), 0.5 Hz, 10 ms (half the inverse of
-    /// the first, 2 ms to 10 ms) and 60 s.
+    /// PX4's own settings: 30 Hz (the cut-off of its gyroscope, a parameter), 0.5 Hz, 10 ms (half the
+    /// inverse of the first, 2 ms to 10 ms) and 60 s.
     pub const PX4: Self = Self {
         low_pass_hz: 30.0,
         high_pass_hz: 0.5,
@@ -145,13 +147,13 @@ impl ArxSettings {
         forgetting_s: 60.0,
     };
 
-    /// The same filters in proportion to the oscillation, as a careful user would set them: so many
-    /// samples of the model a period, the low pass at half their rate, the high pass at a tenth of the
+    /// The same filters scaled with the oscillation, as a careful user would set them: a fixed number
+    /// of model samples a period, the low pass at half their rate, the high pass at a tenth of the
     /// frequency of the oscillation.
     ///
-    /// PX4's own hold dead times of 10 to 20 ms and the noise of a gyroscope: of 50 random experiments
-    /// with the paper's bias and noise, 48 controllers are unstable with them and none with these, whose
-    /// mean cost is 3.5 %.
+    /// PX4's own settings suit dead times of 10 to 20 ms and the noise of a gyroscope. Of 50 random
+    /// experiments with the paper's bias and noise, 48 controllers are unstable with them; with these
+    /// none is, and the mean cost is 3.5 %.
     ///
     /// # Errors
     /// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`].
@@ -188,7 +190,7 @@ impl ArxSettings {
     }
 }
 
-/// A process from a recording of input and output, its rate by differences.
+/// Identifies a process from a recording of input and output; the rate is the difference of the output.
 ///
 /// # Errors
 /// [`BaselineError::Uneven`], [`BaselineError::TooShort`], [`BaselineError::Setting`]; those of
@@ -202,17 +204,17 @@ pub fn identify(
     BaselineAnswer::of_process(model.process(signals.sample_period_s)?, phase_margin_rad)
 }
 
-/// What the estimator ends with, in the units of the recording.
+/// The estimated model, in the units of the recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Model {
     /// `a1`, `a2`, `b0`, `b1`, `b2`; `b` in rate unit / input unit.
     pub coefficients: [f64; COEFFICIENTS],
-    /// Its sample period (s).
+    /// Sample period of the model (s).
     pub sample_s: f64,
 }
 
 impl Model {
-    /// Of input and output, the rate by differences.
+    /// A model from input and output; the rate is the difference of the output.
     ///
     /// # Errors
     /// Those of [`Model::of`].
@@ -232,8 +234,8 @@ impl Model {
     /// Filters the signals and runs the estimator over them.
     ///
     /// # Errors
-    /// [`BaselineError::Uneven`], also where the rate has another length, [`BaselineError::TooShort`],
-    /// [`BaselineError::Setting`], [`BaselineError::NotThisProcess`] where a signal stands still.
+    /// [`BaselineError::Uneven`], also if the rate has another length, [`BaselineError::TooShort`],
+    /// [`BaselineError::Setting`], [`BaselineError::NotThisProcess`] if a signal is constant.
     pub fn of(
         signals: &Signals<'_>,
         rate: &[f64],
@@ -264,7 +266,7 @@ impl Model {
         let (input_size, rate_size) = (size(&inputs), size(&rates));
         if !(input_size > 0.0 && rate_size > 0.0) {
             return Err(BaselineError::NotThisProcess(
-                "its input or its output stands still",
+                "its input or its output is zero",
             ));
         }
         let model_s = every as f64 * sample_s;
@@ -280,18 +282,18 @@ impl Model {
         })
     }
 
-    /// The process, `late_s` being what of the delay is due to hold and differences (s).
+    /// The process; `late_s` is the part of the delay due to hold and differences (s).
     ///
-    /// A pole that turns out slower than an integrator is taken for one, a pair that turns out to
-    /// oscillate for two equal lags, a dead time below zero for none.
+    /// A pole slower than an integrator becomes an integrator, a complex pair becomes two equal lags, a
+    /// negative dead time becomes zero.
     ///
     /// # Errors
-    /// [`BaselineError::NotThisProcess`] where the numbers are not finite; [`BaselineError::Process`].
+    /// [`BaselineError::NotThisProcess`] if the numbers are not finite; [`BaselineError::Process`].
     pub fn process(&self, late_s: f64) -> Result<Soiptd, BaselineError> {
         let [a1, a2, b0, b1, b2] = self.coefficients;
         let sum = b0 + b1 + b2;
         let discriminant = 0.25 * a1 * a1 - a2;
-        // What is clamped away below, the gain of the force per sample keeps.
+        // Clamped poles keep their gain of the force per sample.
         let (fast, slow, gain_part) = if discriminant >= 0.0 {
             let root = discriminant.sqrt();
             let pole = |p: f64| p.clamp(FASTEST_POLE, 1.0);
@@ -306,7 +308,7 @@ impl Model {
         let acceleration = sum / (gain_part * self.sample_s);
         if !(delay_s.is_finite() && acceleration.is_finite()) {
             return Err(BaselineError::NotThisProcess(
-                "it has no finite gain or dead time",
+                "its gain or dead time is not finite",
             ));
         }
         Ok(Soiptd::from_acceleration_gain(
@@ -324,10 +326,10 @@ fn rest(pole: f64) -> f64 {
     if rate > 0.0 { (1.0 - pole) / rate } else { 1.0 }
 }
 
-/// `p/(1 - p) + 1/ln p`: mean delay of a discrete pole less its lag, in samples; -1/2 at `p = 1`.
+/// `p/(1 - p) + 1/ln p`: mean delay of a discrete pole minus its lag, in samples; -1/2 at `p = 1`.
 fn hold(pole: f64) -> f64 {
     let rate = -pole.ln();
-    // The series where the difference cancels: -1/2 + r/12.
+    // Series for small rates, where the difference cancels: -1/2 + r/12.
     if rate < 1e-4 {
         rate / 12.0 - 0.5
     } else {
@@ -364,7 +366,7 @@ impl Filter {
         }
     }
 
-    /// The first value is taken to have been there for ever.
+    /// The first value counts as the value for all time before.
     fn step(&mut self, value: f64) -> f64 {
         let [back1, back2] = self.back;
         let first = self.inner.is_none();

@@ -28,8 +28,8 @@ use onecycle_onboard::Soiptd;
 use super::{BaselineAnswer, BaselineError, steady_cycles};
 use onecycle_identify::Signals;
 
-/// The lags of the process that stands for an integrator with dead time, over the dead time: far below
-/// all that a controller sees of it.
+/// Lags of the process that represents an integrator with dead time, over the dead time: too short to
+/// matter to a controller.
 const NO_LAG: f64 = 1e-6;
 
 /// Half periods and levels of the oscillation.
@@ -50,8 +50,8 @@ pub struct HalfPeriods {
 }
 
 impl HalfPeriods {
-    /// Means of the last steady cycles, `cycles` at most, of a relay that began at an equilibrium at the
-    /// reference zero with the input zero.
+    /// Measures the means of the last steady cycles, `cycles` at most, of a relay that began at an
+    /// equilibrium with reference and input zero.
     ///
     /// # Errors
     /// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`].
@@ -83,25 +83,28 @@ impl HalfPeriods {
         }
     }
 
-    /// The integrator with dead time, as a process with lags of a millionth of it.
+    /// The integrator with dead time, as a process with lags of a millionth of the dead time.
     ///
     /// # Errors
-    /// [`BaselineError::NotThisProcess`] where no dead time is left, or no gain.
+    /// [`BaselineError::NotThisProcess`] if the dead time or the gain is not positive.
     pub fn integrator(&self) -> Result<Soiptd, BaselineError> {
         let rise = self.above * self.on_s;
         let gain = self.output_span / rise;
         let delay_s = (rise - 2.0 * self.hysteresis / gain) / (self.above + self.below);
         if !(gain > 0.0 && delay_s > 0.0) {
-            return Err(BaselineError::NotThisProcess("no dead time is left"));
+            return Err(BaselineError::NotThisProcess(
+                "its dead time is not positive",
+            ));
         }
         let lag_s = NO_LAG * delay_s;
         Ok(Soiptd::new(gain, lag_s, lag_s, delay_s)?)
     }
 }
 
-/// The integrator with dead time behind the recording of an [`AsymmetricRelay`](crate::experiments::relays::AsymmetricRelay) with this hysteresis
-/// (output unit), means of the last steady cycles, `cycles` at most, and its PD of least ISE at a phase
-/// margin (rad).
+/// Identifies an integrator with dead time from the recording of an
+/// [`AsymmetricRelay`](crate::experiments::relays::AsymmetricRelay) with this hysteresis (output unit),
+/// from the means of the last steady cycles, `cycles` at most, and designs its PD of least ISE at a
+/// phase margin (rad).
 ///
 /// # Errors
 /// Those of [`HalfPeriods::measure`] and [`HalfPeriods::integrator`].

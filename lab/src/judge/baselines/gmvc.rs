@@ -1,12 +1,13 @@
-//! PX4's gains: a PID of the rate by generalised minimum variance on the model of [`arx`](super::arx), and a
-//! gain of the angle around it.
+//! PX4's gains: a PID of the rate by generalised minimum variance on the model of [`arx`](super::arx),
+//! and a proportional gain of the angle around it.
 //!
 //! T. Yamamoto, K. Fujii, M. Kaneda, "Design and implementation of a self-tuning PID controller" (1998), in
 //! the form and with the numbers that PX4 flies (`mc_autotune_attitude_control`, library `pid_design`).
 //!
-//! **The law.** With `A = 1 + a1 q + a2 q^2`, `B = b0 + b1 q + b2 q^2`, `q` a delay of one sample, `D = 1 - q`:
-//! minimise the variance of `P v + lambda D u - F(1) w` two samples ahead, `w` the rate asked for. Two, for
-//! PX4 counts one sample more than the model's own. What lies ahead splits off by
+//! **The law.** With `A = 1 + a1 q + a2 q^2`, `B = b0 + b1 q + b2 q^2`, `q` a delay of one sample and
+//! `D = 1 - q`, the law minimises the variance of `P v + lambda D u - F(1) w` two samples ahead, where
+//! `w` is the commanded rate. It is two samples because PX4 counts one more than the model has. The
+//! prediction splits off by
 //!
 //! ```text
 //! P = D A (1 + e1 q) + q^2 (f0 + f1 q + f2 q^2),      P = 1 + p1 q + p2 q^2
@@ -16,31 +17,31 @@
 //! f2 = a2 e1                            from q^4
 //! ```
 //!
-//! and `D u = (F(1) w - F v)/(E B + lambda)`. With its value at rest for the denominator,
-//! `nu = (1 + e1)(b0 + b1 + b2) + lambda`, this is a PID whose proportional and derivative parts act on the
-//! measurement: the powers of `q` in `F/nu = k (D + dt/Ti + Td/dt D^2)` give
+//! and `D u = (F(1) w - F v)/(E B + lambda)`. With the static value of the denominator, `nu = (1 +
+//! e1)(b0 + b1 + b2) + lambda`, this is a PID whose proportional and derivative parts act on the
+//! measurement. The powers of `q` in `F/nu = k (D + dt/Ti + Td/dt D^2)` give
 //!
 //! ```text
 //! k = -(f1 + 2 f2)/nu,   1/Ti = -(f0 + f1 + f2)/(dt (f1 + 2 f2)),   Td = -dt f2/(f1 + 2 f2)
 //! ```
 //!
-//! of which PX4 takes a fifth of the integral, and the proportional part on the error.
+//! PX4 takes a fifth of this integral part, and the proportional part acts on the error.
 //!
-//! **Where it is to go.** `P` is `1 + sigma s + mu sigma^2 s^2` in discrete time, `sigma` the rise time:
-//! with `rho = dt/sigma`
+//! **Reference model.** `P` is `1 + sigma s + mu sigma^2 s^2` in discrete time, `sigma` the rise time.
+//! With `rho = dt/sigma`
 //!
 //! ```text
 //! p1 = -2 exp(-rho/(2 mu)) cos(sqrt(4 mu - 1) rho/(2 mu)),   p2 = exp(-rho/mu)
 //! ```
 //!
-//! PX4 takes the critical damping, `mu` = 1/4.
+//! PX4 uses critical damping, `mu` = 1/4.
 //!
-//! **The angle.** An error of 60 degrees is to command all of the torque: `angle_p = 1/(pi/3 k)`, between 2
-//! and 6.5 1/s.
+//! **The angle.** An error of 60 degrees commands the full torque: `angle_p = 1/(pi/3 k)`, limited to 2
+//! to 6.5 1/s.
 //!
-//! **Units.** Rise time, detuning `lambda` and the rule for the angle are numbers for vehicles: seconds,
-//! radians, all of the torque. A law that they belong to compares on other processes only when they are
-//! scaled with them ([`Design::scaled_to_oscillation`]).
+//! **Units.** Rise time, detuning `lambda` and the rule for the angle are numbers for vehicles:
+//! seconds, radians, full torque. On other processes they must be scaled with the process for a fair
+//! comparison ([`Design::scaled_to_oscillation`]).
 
 use std::f64::consts::PI;
 
@@ -49,30 +50,31 @@ use super::{BaselineError, steady_cycles};
 use onecycle_design::cascade::Cascade;
 use onecycle_identify::{MOST_CYCLES, Signals};
 
-/// Part of the law's integral that PX4 takes.
+/// Part of the law's integral that PX4 uses.
 const INTEGRAL_PART: f64 = 0.2;
 
-/// What the law is to achieve.
+/// Design parameters of the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Design {
     /// Rise time (s).
     pub rise_time_s: f64,
-    /// `mu`: 1/4 is critically damped, 0.51 nearly Butterworth.
+    /// `mu`: 1/4 is critical damping, 0.51 nearly Butterworth.
     pub damping: f64,
-    /// Detuning `lambda` (rate unit / input unit): the larger, the lower the gain.
+    /// Detuning `lambda` (rate unit / input unit): a larger value gives a lower gain.
     pub detuning: f64,
-    /// Gain from angle to input that the angle's gain aims for (input unit / output unit).
+    /// Target of the gain from angle to input (input unit / output unit).
     pub stiffness: f64,
     /// Least and greatest gain of the angle (1/s).
     pub angle_p_range: (f64, f64),
 }
 
-/// A vehicle of the kind that PX4's numbers are for: the relay test of JSBSim's F450 in roll
-/// (`examples/jsbsim_f450_roll_clean.csv`): period (s), amplitude (rad) and the relay's (part of the torque).
+/// A vehicle for which PX4's numbers are right: the relay test of JSBSim's F450 in roll
+/// (`examples/jsbsim_f450_roll_clean.csv`): period (s), amplitude (rad), amplitude of the relay (part
+/// of the torque).
 const VEHICLE: (f64, f64, f64) = (0.503, 0.172, 0.05);
 
 impl Design {
-    /// PX4's own, for a recording in radians and parts of the torque.
+    /// PX4's own numbers, for a recording in radians and parts of the torque.
     pub const PX4: Self = Self {
         rise_time_s: 0.14,
         damping: 0.25,
@@ -81,7 +83,7 @@ impl Design {
         angle_p_range: (2.0, 6.5),
     };
 
-    /// The same in proportion to the oscillation: were it the vehicle's, it would be PX4's.
+    /// PX4's numbers scaled with the oscillation; equal to them for the vehicle that they are made for.
     ///
     /// # Errors
     /// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`].
@@ -103,8 +105,8 @@ impl Design {
     /// The gains for a model.
     ///
     /// # Errors
-    /// [`BaselineError::NotThisProcess`] where proportional, integral or derivative are below zero: gains that
-    /// PX4 does not fly either.
+    /// [`BaselineError::NotThisProcess`] if proportional, integral or derivative gain is negative; PX4
+    /// does not fly such gains either.
     pub fn cascade(&self, model: &Model) -> Result<Cascade, BaselineError> {
         let [a1, a2, b0, b1, b2] = model.coefficients;
         let (mu, rho) = (self.damping, model.sample_s / self.rise_time_s);

@@ -1,5 +1,5 @@
-//! The prediction error method: a continuous-time output-error fit by sequential quadratic
-//! programming, the rival of the paper's section IV-B.
+//! The prediction error method: a continuous-time output-error fit by sequential quadratic programming.
+//! It is the baseline of the paper's section IV-B.
 //!
 //! ```text
 //!                          K e^(-tau s)
@@ -13,14 +13,14 @@
 //! Identification: Theory for the User", 1999, chapter 7). `K`, the initial state and a bias `b` enter
 //! linearly and are solved for at every step (G. Golub, V. Pereyra, "The differentiation of
 //! pseudo-inverses and nonlinear least squares problems whose variables separate", SIAM J. Numer. Anal.
-//! 10, 1973): their start is never wrong, which the toolbox behind the paper, with `K` as one more
-//! parameter to search for, cannot say. The three times are searched for by their logarithms, which
-//! keeps them positive and scales them alike.
+//! 10, 1973), so they need no start value. The toolbox behind the paper searches for `K` too and
+//! depends on its start. The search runs over the logarithms of the three times, which keeps them
+//! positive and scales them alike.
 //!
 //! The optimiser is Kraft's SLSQP (D. Kraft, "Algorithm 733: TOMP-Fortran modules for optimal control
 //! calculations", ACM Trans. Math. Softw. 20, 1994). The model is simulated exactly, the delay too.
 //!
-//! [`PemSettings::paper`] is what the paper describes: one start, the initial state estimated, no bias.
+//! [`PemSettings::paper`] follows the paper: one start, the initial state estimated, no bias.
 //! [`PemSettings::fair`] is what a careful user would do today: a bias, and starts all over the domain.
 
 mod output_error;
@@ -43,70 +43,71 @@ pub enum Data {
     Whole,
 }
 
-/// What is known of the process at the first sample that is fitted.
+/// What is known of the process at the first sample of the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InitialState {
-    /// It was at rest at zero output, and its input before was zero.
+    /// The process was at rest at zero output, with zero input before.
     Rest,
-    /// Nothing: output, rate and force are estimated. The recorded input before counts.
+    /// Nothing: output, rate and force are estimated. The recorded input before the first sample
+    /// counts.
     Estimated,
 }
 
-/// What is made of a constant input that was not recorded.
+/// Treatment of a constant input that was not recorded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum InputBias {
-    /// There is none.
+    /// The input has no bias.
     Ignored,
-    /// The mean of the input over the samples fitted is taken out: right as far as they are whole
-    /// cycles, for an integrator oscillates only where its input is zero on average.
+    /// The mean of the input over the fitted samples is removed. This is right if they are whole
+    /// cycles, because an integrator oscillates only if its mean input is zero.
     MeanRemoved,
-    /// It is estimated.
+    /// The bias is estimated.
     Estimated,
 }
 
-/// How the fit is done.
+/// Settings of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PemSettings {
-    /// Which samples.
+    /// Samples to fit.
     pub data: Data,
-    /// The process at the first of them.
+    /// State of the process at the first of these samples.
     pub initial_state: InitialState,
-    /// A constant input.
+    /// Treatment of a constant input.
     pub input_bias: InputBias,
-    /// Longest dead time, as a part of the duration of the samples fitted; infinite for no limit but
-    /// the 2 s of all fits.
+    /// Longest dead time over the duration of the fitted samples; infinite for the general limit of 2
+    /// s.
     pub longest_delay: f64,
     /// Starts, `T_prop`, `T_body`, `tau` (s); the fit of least cost counts.
     pub starts_s: Vec<[f64; 3]>,
 }
 
-/// The times of a start, `T_prop`, `T_body`, `tau` (s), from which the paper's fits begin unless it says
-/// otherwise: the process of its domain that is most sensitive to its parameters.
+/// The paper's start, `T_prop`, `T_body`, `tau` (s), unless it says otherwise: the process of its
+/// domain that is most sensitive to its parameters.
 pub const PAPER_START_S: [f64; 3] = [0.015, 0.2, 0.1];
 
-/// Times of the fair starts: thirds of the paper's domain in logarithms, their middles.
+/// Times of the fair starts (s): the middles of thirds of the paper's domain, in logarithms.
 const FAIR_TIMES_S: [[f64; 3]; 3] = [
     [0.025, 0.067, 0.18],
     [0.29, 0.63, 1.4],
     [0.0012, 0.007, 0.041],
 ];
 
-/// Limits of the lags and of the dead time (s): some fifteen and more times beyond the paper's domain on
+/// Limits of the lags and of the dead time (s): at least fifteen times beyond the paper's domain on
 /// either side.
 const LIMITS_S: [(f64, f64); 3] = [(1e-3, 100.0), (1e-3, 100.0), (1e-5, 2.0)];
 
-/// Evaluations of the cost that a start is allowed: of 540 on random experiments half needed 60, none more
-/// than 159.
+/// Most evaluations of the cost for a start. Of 540 starts on random experiments half needed 60, none
+/// more than 159.
 const MOST_EVALUATIONS: usize = 400;
 /// Relative change of the logarithms of the times, and of the cost, at which the search ends.
 const TOLERANCE: f64 = 1e-12;
 
 impl PemSettings {
-    /// As the paper describes it: one start, the initial state estimated, the bias not modelled.
+    /// Settings of the paper: one start, the initial state estimated, the bias not modelled.
     ///
-    /// The mean of the input is removed, which is the toolbox's habit and all that keeps the method on
-    /// its feet: of 50 random processes under the paper's bias and noise, 3 controllers are unstable from
-    /// one cycle and 1 from the sweep; with the bias ignored altogether 17 and 42 (the paper: 5 and 1).
+    /// The mean of the input is removed, as the paper's toolbox does. Without that the method hardly
+    /// works: of 50 random processes under the paper's bias and noise, 3 controllers are unstable from
+    /// one cycle and 1 from the sweep; with the bias ignored 17 and 42 are (the paper: 5 and 1).
     #[must_use]
     pub fn paper(data: Data) -> Self {
         Self {
@@ -118,16 +119,16 @@ impl PemSettings {
         }
     }
 
-    /// The best that can be made of it: one cycle, the initial state and a bias estimated, 27 starts all
+    /// Settings of a careful user: one cycle, the initial state and a bias estimated, 27 starts all
     /// over the paper's domain, the dead time at most half the period.
     ///
-    /// On 50 random experiments with the paper's bias and noise it costs 0.31 % on average, 1.4 % at worst;
-    /// with [`InputBias::MeanRemoved`] instead 0.20 and 1.5 %, which however is never exact: the samples of
-    /// a cycle are no whole period.
+    /// On 50 random experiments with the paper's bias and noise the cost is 0.31 % on average, 1.4 % at
+    /// worst. With [`InputBias::MeanRemoved`] it is 0.20 and 1.5 %, but never exact, because the
+    /// samples of a cycle are not exactly a whole period.
     ///
-    /// A dead time longer by a period explains a periodic recording as well. It is none: where a relay
-    /// with `beta > -1` makes it oscillate, an integrator's lag beyond its own quarter period is less than
-    /// half of one.
+    /// A dead time longer by one period explains a periodic recording equally well. It is excluded: if
+    /// a relay with `beta > -1` makes an integrator with lags oscillate, the dead time is less than
+    /// half a period.
     #[must_use]
     pub fn fair() -> Self {
         let [props, bodies, delays] = FAIR_TIMES_S;
@@ -152,19 +153,19 @@ impl PemSettings {
 pub struct OutputErrorFit {
     /// The process.
     pub process: Soiptd,
-    /// The constant input (input unit), where it was estimated.
+    /// The constant input (input unit), if it was estimated.
     pub input_bias: Option<f64>,
-    /// What is left of the output's sum of squares about its mean.
+    /// Residual sum of squares over the output's sum of squares about its mean.
     pub cost: f64,
-    /// Index of the start that led here.
+    /// Index of the start that led to this fit.
     pub start: usize,
 }
 
 /// Fits the samples that the settings name and designs the PD of least ISE at a phase margin (rad).
 ///
 /// # Errors
-/// [`BaselineError::NoOscillation`] where a cycle is asked for and none is steady; those of [`fit`]; the
-/// process found may have no controller.
+/// [`BaselineError::NoOscillation`] if a cycle is asked for and none is steady; the errors of [`fit`];
+/// the process found may have no controller.
 pub fn identify(
     signals: &Signals<'_>,
     settings: &PemSettings,
@@ -181,8 +182,8 @@ pub fn identify(
 /// Fits the samples of a window of the recording.
 ///
 /// # Errors
-/// [`BaselineError::Uneven`], [`BaselineError::TooShort`], [`BaselineError::Setting`] for a start that is no
-/// positive time, [`BaselineError::NotThisProcess`] where no start leads to a fit.
+/// [`BaselineError::Uneven`], [`BaselineError::TooShort`], [`BaselineError::Setting`] for a start that
+/// is not a positive time, [`BaselineError::NotThisProcess`] if no start leads to a fit.
 pub fn fit(
     signals: &Signals<'_>,
     window: Range<usize>,
@@ -214,7 +215,7 @@ pub fn fit(
     best.ok_or(BaselineError::NotThisProcess("no start leads to a fit"))
 }
 
-/// The times (s) at which SLSQP ends; `None` where the cost is not defined there.
+/// The times (s) at which SLSQP ends; `None` if the cost is not defined there.
 fn search(
     model: &OutputError<'_>,
     start_s: [f64; 3],
@@ -240,7 +241,8 @@ fn search(
         ..StopTols::default()
     };
     let constraints: [&dyn Func<()>; 0] = [];
-    // However the search ends, where it ended is its answer: rounding stops most that are at the optimum.
+    // The end of the search is the answer whatever the reason it stopped: rounding stops most searches
+    // that are at the optimum.
     let (x, cost) = match minimize(
         objective,
         &start,

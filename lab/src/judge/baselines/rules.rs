@@ -6,19 +6,19 @@
 //! |G(j Omega0)| = pi a0 / (4 h),   lead = PM - asin(beta),   (Kp, Kd) by the rule with that lead
 //! ```
 //!
-//! `a0` is half the peak-to-peak output, mean of the cycles used, noise and all. At the paper's `beta`
-//! of -0.73 the rule costs the whole of its domain at most 3.7 %, as far as the describing function
-//! goes: it takes output and input for sines, the relay for one without delay and the bias for zero.
+//! `a0` is half the peak-to-peak output with its noise, averaged over the cycles used. At the paper's
+//! `beta` of -0.73 the rule costs at most 3.7 % over the whole domain by the describing function, which
+//! takes output and input for sines, the relay for one without delay and the bias for zero.
 //!
-//! Two rules ask for less of that. [`calibrated`] has its two numbers from the exact limit cycles of the
-//! domain, so that it is right about the waveform. [`Rule::FirstHarmonic`] takes magnitude and phase of
-//! `G` from the ratio of the first harmonics of output and input, and for the lead what the phase that
-//! was measured lacks to the margin: its PD leaves that margin, at a crossover where the oscillation was,
+//! Two rules make weaker assumptions. [`calibrated`] takes its two numbers from the exact limit cycles
+//! of the domain, so it is right about the waveform. [`Rule::FirstHarmonic`] takes magnitude and phase
+//! of `G` from the first harmonics of output and input, and as lead the difference between the measured
+//! phase and the phase of the margin. Its PD has that margin at the frequency of the oscillation,
 //! whatever the relay did.
 //!
-//! All presuppose a symmetric oscillation, so the relay that is flown for them should trim. Of 50 random
-//! processes of the paper's domain at up to half the relay's amplitude of bias and 3 % noise they cost,
-//! mean and worst:
+//! All rules assume a symmetric oscillation, so their relay should trim the bias. Costs (mean, worst)
+//! on 50 random processes of the paper's domain at up to half the relay's amplitude of bias and 3 %
+//! noise:
 //!
 //! | relay     | paper's rule | calibrated | first harmonic |
 //! |-----------|--------------|------------|----------------|
@@ -37,12 +37,12 @@ use crate::space::rule::TuningRule;
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 use onecycle_identify::Signals;
 
-/// How an oscillation becomes a controller.
+/// How a controller follows from an oscillation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rule {
-    /// By a rule for the relay that was flown, from half the peak-to-peak output.
+    /// A rule for the relay of the recording, from half the peak-to-peak output.
     Amplitude(TuningRule),
-    /// By the rule for the phase that was measured, from the first harmonics of output and input.
+    /// The rule for the measured phase, from the first harmonics of output and input.
     FirstHarmonic {
         /// Phase margin of the controller (rad).
         phase_margin_rad: f64,
@@ -50,7 +50,7 @@ pub enum Rule {
 }
 
 impl Rule {
-    /// The paper's, with the lead that the describing function gives a relay with this `beta`.
+    /// The paper's rule, with the lead that the describing function gives for a relay with this `beta`.
     #[must_use]
     pub fn of_relay(beta: f64, phase_margin_rad: f64) -> Self {
         Self::Amplitude(TuningRule::from_lead(
@@ -60,12 +60,12 @@ impl Rule {
     }
 }
 
-/// The rule with the numbers that suit the exact limit cycles of a space best: the geometric means of
-/// `c1` and `c3` that the optimum of each of `rows` by `columns` shapes asks for. The rule is homogeneous,
-/// so that one process stands for every shape.
+/// The rule that fits the exact limit cycles of a space best: the geometric means of `c1` and `c3` of
+/// the optima of `rows` by `columns` shapes. The rule is homogeneous, so one process represents its
+/// shape.
 ///
 /// # Errors
-/// [`BaselineError::NotThisProcess`] where no shape has a limit cycle; its processes may have no controller.
+/// [`BaselineError::NotThisProcess`] if no shape has a limit cycle; a process may have no controller.
 pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRule, BaselineError> {
     let (mut ln_c1, mut ln_c3, mut count) = (0.0, 0.0, 0.0);
     for shape in space.shapes(rows, columns) {
@@ -83,7 +83,9 @@ pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRu
         count += 1.0;
     }
     if count == 0.0 {
-        return Err(BaselineError::NotThisProcess("no shape has a limit cycle"));
+        return Err(BaselineError::NotThisProcess(
+            "no ratio of its time constants has a limit cycle",
+        ));
     }
     Ok(TuningRule {
         beta: space.beta,
@@ -92,7 +94,7 @@ pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRu
     })
 }
 
-/// `|G|` of the describing function from the amplitudes of the output and of the relay.
+/// `|G|` by the describing function, from the amplitudes of the output and of the relay.
 fn describing_function_ratio(amplitude: f64, relay_amplitude: f64) -> f64 {
     PI * amplitude / (4.0 * relay_amplitude)
 }
@@ -100,9 +102,9 @@ fn describing_function_ratio(amplitude: f64, relay_amplitude: f64) -> f64 {
 /// The PD of the rule, from the last steady cycles, `cycles` at most; the paper uses one.
 ///
 /// # Errors
-/// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`]; [`BaselineError::Setting`] for a rule whose gains
-/// are not positive; [`BaselineError::NotThisProcess`] where the output stands still or the phase that was
-/// measured leaves no lead between 0 and `pi/2`.
+/// [`BaselineError::NoOscillation`], [`BaselineError::Uneven`]; [`BaselineError::Setting`] for a rule
+/// with gains that are not positive; [`BaselineError::NotThisProcess`] if the output is constant or the
+/// measured phase leaves no lead between 0 and `pi/2`.
 pub fn identify(
     signals: &Signals<'_>,
     rule: &Rule,
@@ -117,12 +119,12 @@ pub fn identify(
         Rule::FirstHarmonic { phase_margin_rad } => {
             let harmonic = |signal: &[f64]| harmonic(&signal[window.clone()], found.cycles_used);
             let response = harmonic(signals.output) / harmonic(signals.input);
-            // The input is held from its sample on: half a sample late, and a little weaker.
+            // The input is held after its sample: half a sample of delay and a little less amplitude.
             let hold_rad = PI * signals.sample_period_s / found.period_s;
             let lead_rad = phase_margin_rad - (-response).arg() - hold_rad;
             if !(lead_rad > 0.0 && lead_rad < 0.5 * PI) {
                 return Err(BaselineError::NotThisProcess(
-                    "the phase measured leaves no lead from 0 to pi/2",
+                    "the measured phase gives a lead outside 0 to pi/2",
                 ));
             }
             let rule = TuningRule::from_lead(lead_rad, phase_margin_rad);
@@ -133,7 +135,7 @@ pub fn identify(
         return Err(BaselineError::Setting("c1 or c3 of the rule", rule.c1));
     }
     if !(ratio.is_finite() && ratio > 0.0) {
-        return Err(BaselineError::NotThisProcess("its output stands still"));
+        return Err(BaselineError::NotThisProcess("its output is constant"));
     }
     Ok(BaselineAnswer {
         process: None,
@@ -141,7 +143,7 @@ pub fn identify(
     })
 }
 
-/// Fourier sum of a signal over so many whole cycles at their frequency.
+/// Fourier sum of a signal over a number of whole cycles, at the frequency of the cycles.
 fn harmonic(signal: &[f64], cycles: usize) -> Complex64 {
     let step_rad = TAU * cycles as f64 / signal.len() as f64;
     let turned = |(k, &value): (usize, &f64)| Complex64::from_polar(value, -step_rad * k as f64);

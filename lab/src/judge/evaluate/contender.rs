@@ -1,4 +1,4 @@
-//! The methods, ours and the [rivals](crate::judge::baselines).
+//! The methods: ours and the [baselines](crate::judge::baselines).
 
 use std::sync::LazyLock;
 
@@ -10,42 +10,42 @@ use crate::space::Space;
 use crate::space::rule::TuningRule;
 use onecycle_identify::{Method, Options, Signals, identify};
 
-/// A method as it enters.
+/// A method of the benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contender {
-    /// Ours, from so many cycles.
+    /// Our method, from this number of cycles.
     OneCycle(usize),
     /// The network of the pack alone, from the last cycle.
     Network,
     /// The prediction error method of the paper on its estimation set I, one steady cycle.
     Pem,
-    /// The same on its estimation set II, 20 s of a relay with a swept phase.
+    /// The same method on the paper's estimation set II: 20 s of a relay with a swept phase.
     PemSweep,
-    /// The same on one cycle with a bias, an initial state and 27 starts.
+    /// The same method on one cycle with a bias, an initial state and 27 starts.
     PemFair,
     /// The paper's tuning rule, from half the peak-to-peak output of a cycle.
     Rules,
-    /// The same with its numbers from the exact limit cycles of the paper's domain.
+    /// The same rule with its numbers from the exact limit cycles of the paper's domain.
     RulesExact,
-    /// The rule for the phase that the first harmonics of a cycle tell.
+    /// The tuning rule for the phase of the first harmonics of a cycle.
     RulesHarmonic,
     /// PX4's ARX(2,2) by recursive least squares, with its own filters.
     Arx,
-    /// The same with filters in proportion to the oscillation.
+    /// The same estimator with filters scaled with the oscillation.
     ArxScaled,
-    /// The same with the gains that PX4 makes of it, in proportion to the oscillation: a PID of the rate
-    /// in a cascade.
+    /// The same model with PX4's own gains, scaled with the oscillation: a PID of the rate in a
+    /// cascade.
     ArxGmvc,
     /// The asymmetric relay with the model of an integrator with dead time.
     Asymmetric,
 }
 
-/// A recording and what its reader knows of the relay.
+/// A recording, and what a method is told of the relay.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen<'a> {
     /// The recording.
     pub signals: Signals<'a>,
-    /// Hysteresis of the relay (output unit); zero where it has none.
+    /// Hysteresis of the relay (output unit); zero for a relay without one.
     pub hysteresis: f64,
 }
 
@@ -69,20 +69,20 @@ impl<'a> Seen<'a> {
     }
 }
 
-/// Most cycles that the asymmetric relay's half periods are the means of: as many as the recordings of
-/// the others hold.
+/// Most cycles over which the half periods of the asymmetric relay are averaged: as many as the other
+/// recordings hold.
 const ASYMMETRIC_CYCLES: usize = CYCLES_KEPT;
 
-/// Rows and columns of the shapes that the exact rule is made for: twice as many change its two numbers by
-/// less than 2 %.
+/// Rows and columns of shapes for the exact rule: twice as many change its two numbers by less than 2
+/// %.
 const RULE_SHAPES: usize = 8;
 
-/// The exact rule, made once: by the first experiment that asks for it.
+/// The exact rule, computed once by the first experiment that needs it.
 static EXACT_RULE: LazyLock<Result<TuningRule, BaselineError>> =
     LazyLock::new(|| rules::calibrated(&Space::MULTIROTOR, RULE_SHAPES, RULE_SHAPES));
 
 impl Contender {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Self; 14] = [
         Self::OneCycle(1),
         Self::OneCycle(2),
@@ -100,7 +100,7 @@ impl Contender {
         Self::Asymmetric,
     ];
 
-    /// Its name in tables and arguments.
+    /// Name in tables and arguments.
     #[must_use]
     pub fn name(self) -> String {
         let name = match self {
@@ -120,13 +120,13 @@ impl Contender {
         name.to_owned()
     }
 
-    /// The one of this name.
+    /// The method with this name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|one| one.name() == name)
     }
 
-    /// The experiment it reads.
+    /// The relay test that the method reads.
     #[must_use]
     pub fn relay_test(self) -> RelayTest {
         match self {
@@ -136,15 +136,15 @@ impl Contender {
         }
     }
 
-    /// What it makes of a recording, or in a sentence why it has no answer.
+    /// Answer of the method to a recording.
     ///
     /// # Errors
-    /// That sentence.
+    /// A sentence that says why there is no answer.
     pub fn answer(self, seen: &Seen<'_>) -> Result<Answer, String> {
         let (signals, margin_rad) = (&seen.signals, PHASE_MARGIN_DEG.to_radians());
         let by_pem = |settings: &pem::PemSettings| pem::identify(signals, settings, margin_rad);
         let by_rule = |rule: &Rule| rules::identify(signals, rule, 1);
-        let rival = match self {
+        let found = match self {
             Self::OneCycle(cycles) => return ours(signals, cycles, Method::Map),
             Self::Network => return ours(signals, 1, Method::Classify),
             Self::Pem => by_pem(&pem::PemSettings::paper(pem::Data::LastCycle)),
@@ -165,11 +165,11 @@ impl Contender {
                 asymmetric::identify(signals, seen.hysteresis, ASYMMETRIC_CYCLES, margin_rad)
             }
         };
-        of_rival(rival)
+        of_baseline(found)
     }
 }
 
-/// Our road from a recording to a controller.
+/// Our method, from a recording to a controller.
 fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, String> {
     let options = Options::default()
         .cycles(cycles)
@@ -184,7 +184,7 @@ fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, 
     })
 }
 
-/// PX4's whole road from a recording to gains.
+/// PX4's method, from a recording to gains.
 fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, BaselineError> {
     let settings = arx::ArxSettings::scaled_to_oscillation(signals)?;
     let model = arx::Model::of_differences(signals, &settings)?;
@@ -192,11 +192,11 @@ fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, BaselineError> {
     Ok(Answer::of_gains(design.cascade(&model)?))
 }
 
-/// A process gets the same controller whoever found it.
-fn of_rival(rival: Result<BaselineAnswer, BaselineError>) -> Result<Answer, String> {
-    let rival = rival.map_err(|error| error.to_string())?;
-    match rival.process {
+/// The answer of a baseline: a process gets the same controller as those of all methods.
+fn of_baseline(found: Result<BaselineAnswer, BaselineError>) -> Result<Answer, String> {
+    let found = found.map_err(|error| error.to_string())?;
+    match found.process {
         Some(process) => Answer::of_process(process).map_err(|error| error.to_string()),
-        None => Ok(Answer::of_gains(rival.pd)),
+        None => Ok(Answer::of_gains(found.pd)),
     }
 }

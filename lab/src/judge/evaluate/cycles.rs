@@ -1,5 +1,5 @@
-//! Cycles of one run, each identified by itself, and what the controller of each costs on the process of
-//! every other: the paper's Table VII.
+//! Cycles of one run, each identified separately, and the cost of each one's controller on the
+//! processes of all others: the paper's Table VII.
 
 use onecycle_plant::Trace;
 
@@ -9,37 +9,38 @@ use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_design::soiptd_pd::optimum::OptimumError;
 use onecycle_identify::{Signals, Verdict, find_oscillation};
 
-/// Why cycles cannot be looked at one by one.
+/// Why cycles cannot be identified one by one.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum CyclesError {
-    /// There are not so many of them.
+    /// The recording has too few steady cycles.
     #[error("{0}")]
     Oscillation(Verdict),
-    /// One of them tells no process.
-    #[error("a cycle tells no process: {0}")]
+    /// No process could be identified from one of the cycles.
+    #[error("a cycle cannot be identified: {0}")]
     Cycle(String),
     /// A process has no controller.
     #[error(transparent)]
     Optimum(#[from] OptimumError),
 }
 
-/// The last cycles of a recording, each identified by itself.
+/// The last cycles of a recording, each identified separately.
 #[derive(Clone, Debug)]
 pub struct Cycles {
-    /// Beginning of the first and end of the last (s).
+    /// Start of the first cycle and end of the last one (s).
     pub range_s: (f64, f64),
-    /// Of each the answer, and the judge of others on its process.
+    /// For each cycle the answer, and the reference for others on its process.
     pub answers: Vec<(Answer, Judge)>,
 }
 
-/// Where a recording is cut, in periods behind the end of a cycle: far from that end and from the next.
+/// Where the recording is cut, in periods after the end of a cycle: far from that end and from the next
+/// one.
 const BEHIND: f64 = 0.25;
 
 impl Cycles {
-    /// Looks at the last `count` cycles of a recording one by one, each as though the recording ended there.
+    /// Identifies each of the last `count` cycles as if the recording ended there.
     ///
     /// # Errors
-    /// Where they are not steady or one of them tells no process.
+    /// [`CyclesError`]: the cycles are not steady, or no process could be identified from one of them.
     pub fn of(trace: &Trace, sample_s: f64, count: usize) -> Result<Self, CyclesError> {
         let signals = signals_of(trace, sample_s);
         let found = find_oscillation(&signals, count).map_err(CyclesError::Oscillation)?;
@@ -67,7 +68,7 @@ impl Cycles {
         })
     }
 
-    /// `J_ij`: what the controller of cycle `i` costs on the process of cycle `j`.
+    /// `J_ij`: cost of the controller of cycle `i` on the process of cycle `j`.
     #[must_use]
     pub fn cross(&self) -> Vec<Vec<Deterioration>> {
         let row = |(answer, _): &(Answer, Judge)| {
@@ -77,7 +78,7 @@ impl Cycles {
         self.answers.iter().map(row).collect()
     }
 
-    /// The largest of them off the diagonal, a fraction; infinite where one is unstable.
+    /// The largest `J_ij` off the diagonal, as a fraction; infinite if one loop is unstable.
     #[must_use]
     pub fn largest(&self) -> f64 {
         let mut largest = 0.0_f64;

@@ -1,13 +1,13 @@
-//! Truth, answers and results as text: CSV with a header, a row an experiment.
+//! Truth, answers and results as CSV with a header and one row for each experiment.
 //!
 //! ```text
 //! truth     experiment,K,T_prop_s,T_body_s,tau_s,input_bias,noise_sigma,protocol,seed
-//! answers   experiment,K,T_prop_s,T_body_s,tau_s   or   experiment,kp,kd      and seconds, if you like
-//! results   experiment,method,outcome,deterioration,...   as Record has them; what is not, is empty
+//! answers   experiment,K,T_prop_s,T_body_s,tau_s   or   experiment,kp,kd      (optional: seconds)
+//! results   experiment,method,outcome,deterioration,...   the fields of Record; missing values are empty
 //! ```
 //!
-//! Columns may come in any order, others beside them are not read; lines that begin with `#` are
-//! comments. An experiment without a row has no answer. Every error names its line.
+//! Columns may be in any order, other columns are ignored, and lines that begin with `#` are comments.
+//! An experiment without a row has no answer. Every error names its line.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -21,7 +21,7 @@ use crate::experiments::Truth;
 const PROCESS: [&str; 4] = ["K", "T_prop_s", "T_body_s", "tau_s"];
 /// Columns of gains.
 const GAINS: [&str; 2] = ["kp", "kd"];
-/// What the column `protocol` says of a relay that trims the bias away, and of one that does not.
+/// Values of the column `protocol`: the relay trims the bias away, or it does not.
 const PROTOCOLS: [&str; 2] = ["trimmed", "biased"];
 
 /// Why a table cannot be read.
@@ -30,14 +30,14 @@ const PROTOCOLS: [&str; 2] = ["trimmed", "biased"];
 pub struct TableError {
     /// Line of the file, from one.
     pub line: u64,
-    /// What is wrong there.
+    /// What is wrong.
     pub problem: Problem,
 }
 
 /// What is wrong with a line of a table.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Problem {
-    /// It is no row of the table: why.
+    /// The line is not a row of the table: the reason.
     #[error("{0}")]
     Row(String),
     /// The header lacks a column.
@@ -46,43 +46,43 @@ pub enum Problem {
     /// The header of answers names neither processes nor gains, or both.
     #[error("the header must name experiment and either K, T_prop_s, T_body_s, tau_s or kp, kd")]
     NotAnswers,
-    /// A cell is no finite number.
+    /// A cell is not a finite number.
     #[error(
-        "{column} is '{text}', which is no finite number; leave the row out where there is none"
+        "{column} is '{text}', which is not a finite number; omit the row of an experiment without an answer"
     )]
     NoNumber {
         /// The column.
         column: &'static str,
-        /// What it says.
+        /// Text of the cell.
         text: String,
     },
-    /// A cell is no whole number.
-    #[error("{column} is '{text}', which is no whole number")]
+    /// A cell is not a whole number.
+    #[error("{column} is '{text}', which is not a whole number")]
     NotWhole {
         /// The column.
         column: &'static str,
-        /// What it says.
+        /// Text of the cell.
         text: String,
     },
-    /// A protocol that there is not.
-    #[error("protocol is '{0}', neither 'trimmed' nor 'biased'")]
+    /// An unknown protocol.
+    #[error("protocol is '{0}', but must be 'trimmed' or 'biased'")]
     NoProtocol(String),
     /// The benchmark has no such experiment.
     #[error("the benchmark has no experiment {0}")]
     UnknownExperiment(u64),
-    /// An experiment has a row already.
-    #[error("experiment {experiment} has a row already, line {first}")]
+    /// An experiment has two rows.
+    #[error("experiment {experiment} already has a row, line {first}")]
     Twice {
-        /// Its number.
+        /// Number of the experiment.
         experiment: u64,
         /// Line of its first row.
         first: u64,
     },
-    /// The parameters are no process.
-    #[error("no process: {0}; leave the row out where there is none")]
+    /// The parameters are out of range.
+    #[error("not a process: {0}; omit the row of an experiment without an answer")]
     NoProcess(#[from] SoiptdError),
-    /// There is no row.
-    #[error("the table has no row")]
+    /// The table has no row.
+    #[error("the table has no rows")]
     Empty,
 }
 
@@ -95,10 +95,10 @@ impl Problem {
     }
 }
 
-/// A table as text, its rows by the number of the experiment.
+/// A table as text.
 struct Table {
     header: Vec<String>,
-    /// Line and cells.
+    /// Line number and cells of each row.
     rows: Vec<(u64, Vec<String>)>,
 }
 
@@ -138,7 +138,7 @@ impl Table {
         at.ok_or(Problem::NoColumn(name).at(1))
     }
 
-    /// A whole number for every row.
+    /// The whole numbers of a column.
     fn whole(&self, column: &'static str) -> Result<Vec<u64>, TableError> {
         self.each(column, |text| {
             text.parse().map_err(|_| Problem::NotWhole {
@@ -148,7 +148,7 @@ impl Table {
         })
     }
 
-    /// A finite number for every row.
+    /// The finite numbers of a column.
     fn finite(&self, column: &'static str) -> Result<Vec<f64>, TableError> {
         self.each(column, |text| {
             let number = text.parse().ok().filter(|number: &f64| number.is_finite());
@@ -170,7 +170,7 @@ impl Table {
             .collect()
     }
 
-    /// The numbers of the experiments, each once.
+    /// Numbers of the experiments; each may occur once.
     fn experiments(&self) -> Result<Vec<u64>, TableError> {
         let experiments = self.whole("experiment")?;
         let mut lines = BTreeMap::new();
@@ -182,7 +182,7 @@ impl Table {
         Ok(experiments)
     }
 
-    /// The process of every row.
+    /// The processes of all rows.
     fn processes(&self) -> Result<Vec<Soiptd>, TableError> {
         let [k, t_prop_s, t_body_s, tau_s] = PROCESS;
         let (k, t_prop_s) = (self.finite(k)?, self.finite(t_prop_s)?);
@@ -195,7 +195,8 @@ impl Table {
     }
 }
 
-/// The truth behind a benchmark, as `truth.csv` has it: the shortest numbers that read back to the same bits.
+/// The truth behind a benchmark, as in `truth.csv`: the shortest numbers that read back to the same
+/// bits.
 #[must_use]
 pub fn truth_csv(truths: &[Truth]) -> String {
     let mut text =
@@ -221,7 +222,7 @@ pub fn truth_csv(truths: &[Truth]) -> String {
 /// Reads the truth, in the order of the file.
 ///
 /// # Errors
-/// [`TableError`] with the line.
+/// [`TableError`], with the line.
 pub fn read_truth(text: &str) -> Result<Vec<Truth>, TableError> {
     let table = Table::read(text)?;
     let numbers = table.experiments()?;
@@ -247,19 +248,20 @@ pub fn read_truth(text: &str) -> Result<Vec<Truth>, TableError> {
     Ok((0..numbers.len()).map(truth).collect())
 }
 
-/// An answer made elsewhere.
+/// An answer of another program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Foreign {
-    /// What it is, or why its process has no controller.
+    /// The answer, or the reason why its process has no controller.
     pub answer: Result<Answer, String>,
-    /// The time that its maker says it took (s).
+    /// Time that it took (s), as its author states.
     pub seconds: Option<f64>,
 }
 
-/// Reads answers by the number of their experiment, to a benchmark of these experiments.
+/// Reads answers to a benchmark with these experiments, by the number of the experiment.
 ///
 /// # Errors
-/// [`TableError`] with the line: not a number, no process, an experiment twice or one that there is not.
+/// [`TableError`], with the line: not a number, parameters out of range, an experiment twice or an
+/// unknown one.
 pub fn read_answers(
     text: &str,
     experiments: &BTreeSet<u64>,
@@ -296,10 +298,10 @@ pub fn read_answers(
     Ok(numbers.into_iter().zip(foreign).collect())
 }
 
-/// Results, in order; numbers read back to the same bits.
+/// Results in order, as CSV; numbers read back to the same bits.
 ///
 /// # Errors
-/// [`csv::Error`]; none, for it is written to memory.
+/// [`csv::Error`]; never, because the text is written to memory.
 pub fn results_csv(records: &[Record]) -> Result<Vec<u8>, csv::Error> {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for record in records {

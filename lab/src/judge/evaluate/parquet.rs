@@ -38,7 +38,7 @@ impl<W: Write + Send> Writer<W> {
     /// A file without recordings.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Errors of `out`.
     pub fn new(out: W) -> io::Result<Self> {
         let fields: Result<Vec<_>, ParquetError> = (COLUMNS.iter())
             .map(|&(name, stored)| {
@@ -61,7 +61,7 @@ impl<W: Write + Send> Writer<W> {
     /// Adds the recording of an experiment.
     ///
     /// # Errors
-    /// Those of what it writes to.
+    /// Errors of the output.
     pub fn add(&mut self, experiment: u64, recorded: &Recorded) -> io::Result<()> {
         let mut group = self.0.next_row_group()?;
         if let Some(mut column) = group.next_column()? {
@@ -83,24 +83,24 @@ impl<W: Write + Send> Writer<W> {
         Ok(())
     }
 
-    /// Writes what tells a reader where all is.
+    /// Writes the footer.
     ///
     /// # Errors
-    /// Those of what it writes to.
+    /// Errors of the output.
     pub fn finish(self) -> io::Result<()> {
         self.0.close()?;
         Ok(())
     }
 }
 
-/// Reads recordings, one at a time and by one thread, for the position in the file is one.
+/// Reads recordings, one at a time and on one thread, because the file has one position.
 pub struct Reader(SerializedFileReader<File>);
 
 impl Reader {
-    /// Of a file that a [`Writer`] has written.
+    /// Opens a file that a [`Writer`] has written.
     ///
     /// # Errors
-    /// Those of the file; where it is no Parquet, or its columns are others.
+    /// Errors of the file; it is not Parquet, or has other columns.
     pub fn new(file: File) -> io::Result<Self> {
         let reader = SerializedFileReader::new(file)?;
         let schema = reader.metadata().file_metadata().schema_descr();
@@ -109,17 +109,19 @@ impl Reader {
             .map(|column| (column.name(), column.physical_type()))
             .eq(COLUMNS);
         if !is_right {
-            return Err(malformed("its columns are no recordings".to_owned()));
+            return Err(malformed(
+                "its columns are not those of recordings".to_owned(),
+            ));
         }
         Ok(Self(reader))
     }
 
-    /// The recording of an experiment; they are numbered from one.
+    /// The recording of an experiment; experiments are numbered from one.
     ///
     /// # Errors
-    /// Those of the file; where it lacks the experiment or holds another in its place.
+    /// Errors of the file; it has no such experiment, or another one in its place.
     pub fn recording(&self, experiment: u64) -> io::Result<Recorded> {
-        let missing = || malformed(format!("it has no experiment {experiment}"));
+        let missing = || malformed(format!("the file has no experiment {experiment}"));
         let index = usize::try_from(experiment).unwrap_or(0);
         if !(1..=self.0.num_row_groups()).contains(&index) {
             return Err(missing());

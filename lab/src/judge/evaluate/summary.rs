@@ -1,38 +1,39 @@
-//! Many verdicts in a row of numbers.
+//! Summaries: many records of a method in a row of numbers.
 
 use serde::Serialize;
 
 use super::{PHASE_MARGIN_DEG, Record};
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 
-/// What controllers cost, over many experiments. See the [module](super) for how unstable loops, missing
-/// answers and `J` below zero enter.
+/// Costs of controllers over many experiments. See the [module](super) for unstable loops, missing
+/// answers and negative `J`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Costs {
-    /// Experiments, answered or not.
+    /// Number of experiments, answered or not.
     pub experiments: usize,
-    /// Mean over all of them of `min(|J|, 1)`, unstable and missing being 1; zero of none.
+    /// Mean of `min(|J|, 1)` over all experiments, with 1 for unstable loops and missing answers; zero
+    /// without experiments.
     pub score: f64,
-    /// Mean of `|J|` over the stable loops, zero for what is won at the full margin.
+    /// Mean of `|J|` over the stable loops; a negative `J` at the full margin counts as zero.
     pub mean: Option<f64>,
-    /// Its median.
+    /// Median of `|J|`.
     pub median: Option<f64>,
-    /// Its 95th percentile.
+    /// 95th percentile of `|J|`.
     pub percentile_95: Option<f64>,
-    /// Its 99th percentile.
+    /// 99th percentile of `|J|`.
     pub percentile_99: Option<f64>,
-    /// The largest.
+    /// Largest `|J|`.
     pub worst: Option<f64>,
-    /// Unstable loops.
+    /// Number of unstable loops.
     pub unstable: usize,
-    /// Experiments without an answer.
+    /// Number of experiments without an answer.
     pub no_answer: usize,
     /// Least phase margin of the stable loops (degrees).
     pub least_phase_margin_deg: Option<f64>,
 }
 
 impl Costs {
-    /// Of experiments, `None` for one without an answer.
+    /// Summarises experiments; `None` stands for a missing answer.
     #[must_use]
     pub fn of(judged: impl IntoIterator<Item = Option<Deterioration>>) -> Self {
         let (mut costs, mut least_rad) = (Vec::new(), None);
@@ -73,10 +74,11 @@ impl Costs {
     }
 }
 
-/// A margin that is short of the full one by this much is rounded (degrees).
+/// A margin that is smaller than the full one by at most this counts as the full one (degrees):
+/// rounding.
 const MARGIN_ROUNDING_DEG: f64 = 1e-6;
 
-/// `|J|`, but zero for a `J` below zero with the full margin: that is bought with nothing.
+/// `|J|`, but zero for a negative `J` at the full margin, which costs no margin.
 fn priced(relative: f64, phase_margin_rad: f64) -> f64 {
     let is_full = phase_margin_rad.to_degrees() >= PHASE_MARGIN_DEG - MARGIN_ROUNDING_DEG;
     if is_full {
@@ -86,26 +88,26 @@ fn priced(relative: f64, phase_margin_rad: f64) -> f64 {
     }
 }
 
-/// A method over all its experiments: a row of the leaderboard.
+/// Summary of a method: a row of the leaderboard.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Name of the method.
     pub method: String,
-    /// What its controllers cost.
+    /// Costs of the controllers.
     #[serde(flatten)]
     pub costs: Costs,
-    /// Median size of the error of `K/T_body`, over the true value, of those that gave a process.
+    /// Median size of the error of `K/T_body` over the true value, over the answers with a process.
     pub median_k_over_t_body_error: Option<f64>,
-    /// The same of `T_prop`.
+    /// Median size of the error of `T_prop` over the true value.
     pub median_t_prop_error: Option<f64>,
     /// Median size of the error of `tau` (s).
     pub median_tau_error_s: Option<f64>,
-    /// Median time (s) of those that were timed.
+    /// Median time (s) of the records that have one.
     pub median_seconds: Option<f64>,
 }
 
 impl Summary {
-    /// Of the records of one method.
+    /// Summary of the records of one method.
     #[must_use]
     pub fn of(method: &str, records: &[&Record]) -> Self {
         let median = |value: fn(&Record) -> Option<f64>| {
@@ -123,7 +125,7 @@ impl Summary {
         }
     }
 
-    /// Of every method in these records, the least score first, then by name.
+    /// Summaries of all methods in these records, the best score first, then by name.
     #[must_use]
     pub fn of_all(records: &[Record]) -> Vec<Self> {
         let mut by_method = std::collections::BTreeMap::<&str, Vec<&Record>>::new();
@@ -138,7 +140,7 @@ impl Summary {
     }
 }
 
-/// The value below which a part `q` of the values lie, the nearest one; they are sorted. `None` of none.
+/// The quantile `q` of the values (nearest rank), which are sorted in place. `None` without values.
 pub fn quantile(values: &mut [f64], q: f64) -> Option<f64> {
     values.sort_unstable_by(f64::total_cmp);
     let index = (values.len().saturating_sub(1) as f64 * q).round() as usize;

@@ -1,4 +1,4 @@
-//! Rows for a network to learn from: inputs and values of the order of one.
+//! Rows that a network learns from, scaled to the order of one.
 //!
 //! ```text
 //! inputs    the signature, but for its last: (ln(samples in a period) - 6) / 2
@@ -12,13 +12,13 @@ use super::VALUES;
 use super::shards::ExampleRecord;
 use crate::learn::train::{Batch, Matrix};
 
-/// Of each value: a ratio of poles and a delay are at most 1/4 and about 1/8.
+/// Scale of each value: a ratio of poles is at most 1/4, a delay about 1/8.
 pub const SCALE: [f64; VALUES] = [1.0, 8.0, 8.0, 1.0];
 
-/// Middle and half extent of the logarithm of the samples in a period: 40 to 2500 are 3.7 to 7.8.
+/// Middle and half range of the logarithm of samples per period: 40 to 2500 samples are 3.7 to 7.8.
 pub(crate) const LN_SAMPLES: (f32, f32) = (6.0, 2.0);
 
-/// What a network sees of a signature.
+/// Inputs of a network for a signature.
 #[must_use]
 pub fn inputs(signature: &Signature) -> [f32; LENGTH] {
     let mut inputs = signature.values;
@@ -27,23 +27,23 @@ pub fn inputs(signature: &Signature) -> [f32; LENGTH] {
     inputs
 }
 
-/// What a network put out, as values.
+/// Values from the outputs of a network.
 #[must_use]
 pub fn values(scaled: [f64; VALUES]) -> [f64; VALUES] {
     std::array::from_fn(|k| scaled[k] / SCALE[k])
 }
 
-/// What a batch says of each value.
+/// Targets of a batch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
-    /// What it is: for [`Loss::Gaussian`](crate::learn::train::Loss::Gaussian).
+    /// The values: for [`Loss::Gaussian`](crate::learn::train::Loss::Gaussian).
     Values,
-    /// That, and then what its errors cost: for
+    /// The values, then the costs of their errors: for
     /// [`Loss::CostAwareGaussian`](crate::learn::train::Loss::CostAwareGaussian).
     ValuesAndSlopes,
 }
 
-/// A row for every record.
+/// A batch with one row for each record.
 #[must_use]
 pub fn batch(records: &[ExampleRecord], wanted: Wanted) -> Batch {
     let columns = match wanted {

@@ -24,14 +24,14 @@ use super::shards::{ExampleRecord, columns};
 use crate::PROGRAM;
 use crate::learn::npz::{Column, Numbers};
 
-/// Writes a table, some rows at a time: 4096, as a file of a dataset has them, are a good number.
+/// Writes a table, some rows at a time; 4096 rows, as in a file of a dataset, are a good size.
 pub struct Writer<W: Write + Send>(SerializedFileWriter<W>);
 
 impl<W: Write + Send> Writer<W> {
     /// A table without rows.
     ///
     /// # Errors
-    /// Those of `out`.
+    /// Errors of `out`.
     pub fn new(out: W) -> io::Result<Self> {
         let fields: Result<Vec<_>, ParquetError> = (columns(&[]).iter())
             .flat_map(|column| names(column).into_iter().map(move |name| (name, column)))
@@ -46,7 +46,7 @@ impl<W: Write + Send> Writer<W> {
         let schema = Schema::group_type_builder("examples").with_fields(fields?);
         let properties = WriterProperties::builder()
             .set_created_by(PROGRAM.to_owned())
-            // Hardly a number comes twice: a dictionary would only be longer.
+            // Hardly any number occurs twice, so a dictionary would make the file longer.
             .set_dictionary_enabled(false)
             .build();
         let writer =
@@ -57,7 +57,7 @@ impl<W: Write + Send> Writer<W> {
     /// Adds rows.
     ///
     /// # Errors
-    /// Those of what it writes to.
+    /// Errors of the output.
     pub fn add(&mut self, records: &[ExampleRecord]) -> io::Result<()> {
         let mut group = self.0.next_row_group()?;
         for column in columns(records) {
@@ -78,17 +78,17 @@ impl<W: Write + Send> Writer<W> {
         Ok(())
     }
 
-    /// Writes what tells a reader where all is.
+    /// Writes the footer.
     ///
     /// # Errors
-    /// Those of what it writes to.
+    /// Errors of the output.
     pub fn finish(self) -> io::Result<()> {
         self.0.close()?;
         Ok(())
     }
 }
 
-/// How numbers are stored, and what they mean where that says too little.
+/// Physical type of the numbers, and their logical type if that differs.
 fn types(numbers: &Numbers) -> (Type, Option<LogicalType>) {
     match numbers {
         Numbers::U64(_) => (Type::INT64, Some(LogicalType::integer(64, false))),
@@ -97,7 +97,7 @@ fn types(numbers: &Numbers) -> (Type, Option<LogicalType>) {
     }
 }
 
-/// Names of the columns that one of a shard becomes, numbered with as many digits as it takes.
+/// Names of the columns for one array, numbered with as many digits as needed.
 fn names(column: &Column) -> Vec<String> {
     let name = column.name;
     match column.width {

@@ -1,4 +1,4 @@
-//! What a small error of the values costs: the derivative of the deterioration.
+//! Cost of a small error of the values: the derivative of the deterioration.
 //!
 //! ```text
 //! J(d) = cost of the controller made for the process at values + d, on the true process,
@@ -6,10 +6,11 @@
 //! g_k  = dJ/dd_k  at d = 0
 //! ```
 //!
-//! An optimum has no slope, but this one is least at a phase margin that is an equality: a controller
-//! of a little less margin is a little cheaper, and of a little more a little dearer. So `J` is nearly
-//! linear near zero, and `|g . d|` is what an estimate that is off by `d` costs, to first order: within
-//! 5 % of costs up to 1 %. Of far errors it says too much, above all of a ratio of poles off by 0.05.
+//! An unconstrained optimum has no slope, but this one is at an exact phase margin: a controller with a
+//! little less margin is a little cheaper, one with a little more a little dearer. So `J` is nearly
+//! linear near zero, and `|g . d|` is the cost of an estimate with the error `d` to first order: within
+//! 5 % for costs up to 1 %. For large errors it is too high, above all for a ratio of poles off by
+//! 0.05.
 
 use onecycle_onboard::classify::process_of;
 
@@ -17,11 +18,11 @@ use super::{Example, VALUES};
 use onecycle_design::soiptd_pd::cost::ise;
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 
-/// Steps of the central differences: a thousandth of each value's extent or less, so that of the third
-/// derivative 1e-5 of the slope is left at most, and of rounding less.
+/// Steps of the central differences: at most a thousandth of the range of each value, so that the third
+/// derivative contributes at most 1e-5 of the slope and rounding less.
 const STEPS: [f64; VALUES] = [1e-3, 1e-4, 1e-4, 1e-3];
 
-/// What a ratio of poles and a delay by the period can be.
+/// Possible range of each value.
 const RANGES: [(f64, f64); VALUES] = [
     (f64::NEG_INFINITY, f64::INFINITY),
     (0.0, 0.25),
@@ -30,12 +31,11 @@ const RANGES: [(f64, f64); VALUES] = [
 ];
 
 impl Example {
-    /// Derivatives of what a controller made at this phase margin costs, by the errors of the values
-    /// that it was made for. At an end of what a value can be errors have one side only, and so does
-    /// the difference.
+    /// Derivatives of the cost of a controller with this phase margin (rad), by errors of the values
+    /// that the controller is designed for. At a limit of a value's range the difference is one-sided.
     ///
-    /// `None` where a controller's gains or cost overflow, or it is unstable a step beside its optimum:
-    /// no process of ordinary times is so.
+    /// `None` if the controller's gains or cost overflow, or a controller one step from the optimum is
+    /// unstable; this does not happen for processes with ordinary times.
     #[must_use]
     pub fn cost_gradient(&self, phase_margin_rad: f64) -> Option<[f64; VALUES]> {
         let best = pd_at_phase_margin(&self.process, phase_margin_rad).ok()?;

@@ -1,28 +1,28 @@
-//! Many examples on a disk: a manifest, and files of up to 4096 of them that NumPy reads.
+//! Datasets on disk: a manifest, and files of up to 4096 examples that NumPy reads.
 //!
 //! ```text
 //! manifest.json       format, program, recipe, number of examples, rows and hash of every file
-//! shard-00000.npz     examples 0 .. 4095, less those without a steady oscillation
+//! shard-00000.npz     examples 0 .. 4095, without those that have no steady oscillation
 //! shard-00001.npz     examples 4096 .. 8191, ..
 //! ```
 //!
 //! | column               | numbers          | meaning                                            |
 //! |----------------------|------------------|----------------------------------------------------|
-//! | `number`             | u64              | of the example in its recipe                       |
-//! | `family`             | u64              | of the recipe, counted from zero                   |
+//! | `number`             | u64              | number of the example in its recipe                |
+//! | `family`             | u64              | number of the family in the recipe, from zero      |
 //! | `inputs`             | f32, 34 a row    | [`Signature::values`]                              |
 //! | `values`             | f64, 4 a row     | [`Example::values`]                                |
 //! | `gradient`           | f64, 4 a row     | [`Example::cost_gradient`], at the family's margin |
-//! | `period_s`           | f64              | of the cycle (s)                                   |
-//! | `amplitude`          | f64              | of the signature, times the sign it found the gain to have |
-//! | `centre`             | f64              | of the signature                                   |
+//! | `period_s`           | f64              | period of the cycle (s)                            |
+//! | `amplitude`          | f64              | amplitude of the signature, with the sign of the gain |
+//! | `centre`             | f64              | centre of the signature                            |
 //! | `process`            | f64, 4 a row     | `K`, `T_prop`, `T_body`, `tau` (s)                 |
-//! | `bias`               | f64              | by the relay's amplitude                           |
-//! | `sigma`              | f64              | noise by the amplitude without noise               |
-//! | `samples_per_period` | f64              | of the oscillation without noise                   |
+//! | `bias`               | f64              | bias over the relay's amplitude                    |
+//! | `sigma`              | f64              | noise over the noise-free amplitude                |
+//! | `samples_per_period` | f64              | samples in a period of the noise-free oscillation  |
 //!
-//! A recipe and a number give the same bytes on any number of threads, so a file that is missing or
-//! damaged is made again rather than refused; what belongs to another recipe or program is refused.
+//! A recipe and a number of examples give the same bytes on any number of threads. A file that is
+//! missing or damaged is made again; a folder of another recipe or program is refused.
 
 use std::ops::Range;
 
@@ -40,16 +40,16 @@ use crate::workers::Workers;
 /// Changes with every change that a reader could notice.
 pub const FORMAT: &str = "onecycle.dataset/1";
 
-/// Numbers of examples in a file: 1.2 MB, and some seconds of work, which is what an interruption loses.
+/// Experiments per file: 1.2 MB and some seconds of work, which is what an interruption loses.
 pub const EXAMPLES_PER_SHARD: u64 = 4096;
 
-/// Most examples of a dataset: 3 GB or so.
+/// Most examples of a dataset: about 3 GB.
 pub const MOST_EXAMPLES: u64 = 10_000_000;
 
-/// One example as a file has it.
+/// One example with its targets, as files store it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExampleRecord {
-    /// Of the example in its recipe.
+    /// Number of the example in its recipe.
     pub number: u64,
     /// The example.
     pub example: Example,
@@ -62,69 +62,69 @@ pub struct ExampleRecord {
 /// What is wrong with a dataset.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DatasetError {
-    /// The manifest is no JSON, or its fields are others.
-    #[error("the manifest is not one of a dataset: {0}")]
+    /// The manifest is not JSON, or has other fields.
+    #[error("the file is not the manifest of a dataset: {0}")]
     Json(String),
-    /// A manifest of another program, or a later one.
+    /// The manifest has another format.
     #[error("the format of the manifest must be \"{FORMAT}\", but is {0}")]
     Format(String),
-    /// Its recipe.
+    /// The recipe is out of range.
     #[error("the recipe of the manifest is out of range: {0}")]
     Recipe(#[from] RecipeError),
-    /// Its lists do not fit each other.
+    /// The list of files does not match the number of examples.
     #[error(
         "the manifest must list {expected} files for its {examples} examples, but lists {found}"
     )]
     List {
-        /// How many examples it has.
+        /// Number of examples.
         examples: u64,
-        /// How many files these take.
+        /// Number of files for these examples.
         expected: usize,
-        /// How many it lists.
+        /// Number of files in the list.
         found: usize,
     },
-    /// Examples of another recipe.
+    /// The folder belongs to another recipe.
     #[error(
         "the folder holds a dataset of another recipe: name another folder, or remove this one"
     )]
     OtherRecipe,
-    /// Examples of another version, whose last bits may differ.
+    /// The folder belongs to another version of the program, whose last bits may differ.
     #[error(
-        "the folder holds a dataset made by {0}, this is {PROGRAM}: name another folder, or remove this one"
+        "the folder holds a dataset made by {0}, but this program is {PROGRAM}: name another folder, or remove this one"
     )]
     OtherProgram(String),
-    /// More examples than are asked for.
+    /// The folder has more examples than requested.
     #[error(
         "the folder already holds {found} examples of this recipe, more than {asked}: name another folder"
     )]
     Fewer {
-        /// How many it holds.
+        /// Number of examples in the folder.
         found: u64,
-        /// How many are asked for.
+        /// Number of examples requested.
         asked: u64,
     },
-    /// A file that is not there yet.
+    /// A file has not been made yet.
     #[error(
-        "{0} has not been made: the command that makes the dataset goes on where it was stopped"
+        "{0} is missing: run the command that makes the dataset again; it continues where it stopped"
     )]
     Unfinished(String),
-    /// A file whose bytes have changed.
-    #[error("{0} is not the file that the manifest speaks of: make the dataset again")]
+    /// A file has other bytes than the manifest says.
+    #[error("{0} differs from the file in the manifest: make the dataset again")]
     Damaged(String),
 }
 
-/// A file of the dataset, once it has been made.
+/// A finished file of a dataset.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
-    /// How many examples it holds.
+    /// Number of examples in the file.
     pub rows: usize,
     /// SHA-256 of its bytes, in hexadecimal.
     pub sha256: String,
 }
 
 impl Entry {
-    /// Whether these are its bytes.
+    /// Whether these are the bytes of the file.
     #[must_use]
     pub fn is_of(&self, bytes: &[u8]) -> bool {
         self.sha256 == sha256(bytes)
@@ -136,22 +136,22 @@ fn sha256(bytes: &[u8]) -> String {
     digest.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// What a dataset is of, and what of it has been made.
+/// Contents of a dataset and its finished files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
     format: String,
     program: String,
-    /// How its examples are made.
+    /// Recipe of the experiments.
     pub recipe: Recipe,
-    /// Numbers of examples, with and without an oscillation.
+    /// Number of experiments, with and without a steady oscillation.
     pub examples: u64,
-    /// Its files in order; `None` of those still to be made.
+    /// Files in order; `None` for files still to be made.
     pub shards: Vec<Option<Entry>>,
 }
 
 impl Manifest {
-    /// Of a dataset of which nothing has been made.
+    /// The manifest of an empty dataset.
     #[must_use]
     pub fn new(recipe: Recipe, examples: u64) -> Self {
         Self {
@@ -163,10 +163,10 @@ impl Manifest {
         }
     }
 
-    /// From the text of its file.
+    /// Reads the text of a manifest.
     ///
     /// # Errors
-    /// Says what is wrong with it.
+    /// [`DatasetError`]: what is wrong with the text.
     pub fn read(text: &str) -> Result<Self, DatasetError> {
         #[derive(Deserialize)]
         struct Head {
@@ -191,17 +191,17 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// The text of its file.
+    /// The text of the manifest.
     #[must_use]
     pub fn text(&self) -> String {
-        // Strings for keys and no number that is none: there is a text.
+        // Serialisation cannot fail: keys are strings.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
     }
 
-    /// Makes room for as many examples as are asked for; what has been made stays.
+    /// Extends the dataset to this number of examples; finished files stay.
     ///
     /// # Errors
-    /// Where the recipe or the program is another, or fewer are asked for.
+    /// [`DatasetError`]: the recipe or the program is another, or fewer examples are requested.
     pub fn go_on(mut self, recipe: &Recipe, examples: u64) -> Result<Self, DatasetError> {
         if self.recipe != *recipe {
             return Err(DatasetError::OtherRecipe);
@@ -213,7 +213,7 @@ impl Manifest {
             let (found, asked) = (self.examples, examples);
             return Err(DatasetError::Fewer { found, asked });
         }
-        // The last file is longer now.
+        // The last file gets longer, so it is made again.
         let full = (self.examples / EXAMPLES_PER_SHARD) as usize;
         if self.examples < examples {
             self.shards.truncate(full);
@@ -223,23 +223,23 @@ impl Manifest {
         Ok(self)
     }
 
-    /// Numbers of the examples of a file.
+    /// Numbers of the experiments of a file.
     #[must_use]
     pub fn numbers(&self, shard: usize) -> Range<u64> {
         let first = shard as u64 * EXAMPLES_PER_SHARD;
         first..(first + EXAMPLES_PER_SHARD).min(self.examples)
     }
 
-    /// How many examples there are with an oscillation.
+    /// Number of examples with a steady oscillation.
     #[must_use]
     pub fn rows(&self) -> usize {
         self.shards.iter().flatten().map(|entry| entry.rows).sum()
     }
 
-    /// Makes a file: its bytes, and what the manifest will say of it.
+    /// Makes a file: its bytes and its entry in the manifest.
     ///
     /// # Errors
-    /// See [`ExperimentError`]; none of a valid recipe.
+    /// [`ExperimentError`]; never for a valid recipe.
     pub fn make(
         &self,
         shard: usize,
@@ -274,7 +274,7 @@ impl Manifest {
     }
 }
 
-/// How many files so many examples take.
+/// Number of files for this number of examples.
 fn count(examples: u64) -> usize {
     examples.div_ceil(EXAMPLES_PER_SHARD) as usize
 }
@@ -289,10 +289,10 @@ pub fn file_name(shard: usize) -> String {
 }
 
 impl Recipe {
-    /// Example number `n` with what an error costs; `None` as of [`Self::example`].
+    /// Example number `n` with its targets; `None` as for [`Self::example`].
     ///
     /// # Errors
-    /// See [`ExperimentError`].
+    /// [`ExperimentError`]: a field of the recipe is out of its range.
     pub fn record(&self, n: u64) -> Result<Option<ExampleRecord>, ExperimentError> {
         let made = self.example(n)?;
         Ok(made.and_then(|example| {
@@ -307,7 +307,7 @@ impl Recipe {
     }
 }
 
-/// The columns of these records; of none, what columns there are.
+/// The columns of these records; without records, the names, widths and types of the columns.
 pub(super) fn columns(records: &[ExampleRecord]) -> Vec<Column> {
     let whole = |name, of: fn(&ExampleRecord) -> u64| Column {
         name,
@@ -361,7 +361,7 @@ fn parameters(process: &Soiptd) -> [f64; 4] {
     ]
 }
 
-/// The records of these columns; `None` where a process is none.
+/// The records of these columns; `None` if a process is out of range.
 fn records(columns: &[Column], rows: usize) -> Option<Vec<ExampleRecord>> {
     let wholes = |name: &str| match &named(columns, name)?.numbers {
         Numbers::U64(numbers) => Some(numbers),

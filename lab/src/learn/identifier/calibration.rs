@@ -1,4 +1,5 @@
-//! What a trained network is told beside its weights: how much to trust itself, where its family ends.
+//! Calibration of a trained network: temperatures of its posterior, limit of its score, and the domain
+//! of its family.
 
 use onecycle_onboard::classify::{Calibration, CyclePosterior};
 use onecycle_onboard::pack::{Domain, OutputScaling, Pack, Prior};
@@ -12,21 +13,21 @@ use crate::learn::dataset::shards::ExampleRecord;
 use crate::learn::pack::{LeadTableContents, PackContents};
 use onecycle_identify::cholesky::cholesky;
 
-/// Part of the family's own cycles that are called unknown: 2 % are the most that is allowed, less twice
-/// what so many experiments as the limit is taken from err by.
+/// Part of the family's cycles that are called unknown: the allowed 2 % minus twice the standard error
+/// of this number of experiments.
 pub const MOST_UNKNOWN: f64 = 0.017;
 
-/// Experiments that the limit of the score is taken from: 2 % of them are known to 0.16 %.
+/// Number of experiments for the limit of the score: it determines 2 % to 0.16 %.
 const LIMIT_EXPERIMENTS: u64 = 8000;
 
-/// What belongs to a network.
+/// Calibration of a network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibrated(Calibration);
 
-/// Calibrates the network of a pack that is not calibrated yet, by records that it has not learnt from.
+/// Calibrates the network of a pack with records that it has not learnt from.
 ///
 /// # Errors
-/// Where an experiment cannot be made.
+/// [`IdentifierError`]: an experiment cannot be made.
 pub fn calibrated(
     recipe: &IdentifierRecipe,
     pack: &Pack<'_>,
@@ -40,7 +41,7 @@ pub fn calibrated(
         for (k, square) in squares.iter_mut().enumerate() {
             let variance: f64 = posterior.root[k].iter().map(|root| root * root).sum();
             let error = record.values[k] - posterior.mean[k];
-            // A few wild errors are for the score to find, not for all others to make up for.
+            // A few very large errors are the score's task; they must not widen all other posteriors.
             *square += (error * error / variance).min(MOST_SQUARE);
         }
     }
@@ -60,17 +61,18 @@ pub fn calibrated(
     Ok(Calibrated(calibration))
 }
 
-/// Five standard deviations: of Gaussian errors one in 1.7 million is beyond.
+/// Largest squared error that counts: five standard deviations, which one in 1.7 million Gaussian
+/// errors exceeds.
 const MOST_SQUARE: f64 = 25.0;
 
 impl Calibrated {
-    /// Of a network that has not been calibrated.
+    /// The calibration before any calibration.
     #[must_use]
     pub fn not_yet() -> Self {
         Self(Calibration::UNTRAINED)
     }
 
-    /// The pack but for network, table and self-test.
+    /// The contents of a pack without network, table and self-test.
     pub(super) fn contents(
         &self,
         recipe: &IdentifierRecipe,
@@ -113,12 +115,13 @@ impl Calibrated {
     }
 }
 
-/// What is infinite before calibration, or of a network that has hardly learnt, has no place in a file.
+/// Limits a value to the range of `f32`: before calibration, or with a network that has hardly learnt,
+/// it may be infinite, which a file cannot hold.
 fn finite(value: f64) -> f32 {
     value.clamp(f64::from(f32::MIN), f64::from(f32::MAX)) as f32
 }
 
-/// The lowest and the highest of each number.
+/// Lowest and highest value of each number.
 fn extremes<T: PartialOrd + Copy + From<f32>, const N: usize>(
     rows: impl Iterator<Item = [T; N]>,
 ) -> [[T; N]; 2] {
@@ -136,7 +139,7 @@ fn extremes<T: PartialOrd + Copy + From<f32>, const N: usize>(
     extremes
 }
 
-/// Mean and root of the covariance of the shapes; `None` where they have no spread.
+/// Mean and root of the covariance of the shapes; `None` if they have no spread.
 fn prior(records: &[ExampleRecord]) -> Option<Prior> {
     const SHAPE: usize = 3;
     let count = records.len() as f64;

@@ -1,5 +1,5 @@
-//! What a pack is worth on experiments that it has not learnt from, computed as the board does: its
-//! network, its score, its table.
+//! Scores of a pack on experiments that it has not learnt from, computed as on board: with its network,
+//! its score and its table.
 
 use onecycle_onboard::classify::{Classification, Familiarity, classify_by};
 use onecycle_onboard::gains::LeadTable;
@@ -11,38 +11,37 @@ use crate::learn::dataset::shards::ExampleRecord;
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 
-/// Of one cycle each, those called unknown left out.
+/// Scores over cycles; costs are without the cycles that were called unknown.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Scores {
-    /// Cycles that were scored.
+    /// Number of cycles.
     pub cycles: usize,
-    /// Of these, called unknown.
+    /// Number of cycles that were called unknown.
     pub unknown: usize,
-    /// Controllers that are unstable on the true process.
+    /// Number of controllers that are unstable on the true process.
     pub unstable: usize,
-    /// Mean of the size of the deterioration (fraction).
+    /// Mean of `|J|` (fraction).
     pub mean: f64,
-    /// Its median.
+    /// Median of `|J|`.
     pub median: f64,
-    /// What 99 % stay below.
+    /// 99th percentile of `|J|`.
     pub percentile_99: f64,
-    /// The worst.
+    /// Largest `|J|`.
     pub worst: f64,
     /// Least phase margin on the true process (degrees).
     pub least_margin_deg: f64,
-    /// Mean square of the Mahalanobis distance of the truth, over the four values: one where the
-    /// posterior is right.
+    /// Mean square of the Mahalanobis distance of the truth, over four; one if the posterior is right.
     pub mahalanobis: f64,
-    /// How often the posterior's regions hold the truth.
+    /// How often regions of the posterior contain the truth.
     pub reliability: [Reliability; LEVELS.len()],
 }
 
-/// Of a region of the posterior.
+/// A region of the posterior.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Reliability {
-    /// How often it should hold the truth.
+    /// Stated probability of the region.
     pub stated: f64,
-    /// How often it does.
+    /// Fraction of cycles whose truth lies in the region.
     pub held: f64,
 }
 
@@ -56,7 +55,7 @@ const LEVELS: [(f64, f64); 5] = [
     (0.99, 13.27670),
 ];
 
-/// What became of a cycle.
+/// Result for a cycle.
 struct Outcome {
     deterioration: Deterioration,
     mahalanobis: f64,
@@ -93,7 +92,7 @@ pub fn scores(pack: &Pack<'_>, records: &[&ExampleRecord]) -> Scores {
     scores
 }
 
-/// `None` where the cycle is unknown.
+/// Result for a cycle; `None` if it is called unknown.
 fn outcome(pack: &Pack<'_>, record: &ExampleRecord) -> Option<Outcome> {
     let found = classified(pack, record).filter(|found| found.familiarity == Familiarity::Known)?;
     let truth = &record.example.process;

@@ -1,4 +1,4 @@
-//! What the nodes of a model do one after another, and the network that this is.
+//! The steps of a model's nodes, and the network that they make.
 //!
 //! ```text
 //! y = scale x + shift     folded into a dense layer before it:   W := diag(scale) W, b := scale b + shift
@@ -9,14 +9,14 @@
 use super::{Normalisation, OnnxError};
 use crate::learn::train::{Layer, Network};
 
-/// What a node does to a row of numbers.
+/// Step of a node on a row of numbers.
 pub(super) enum Step {
     Affine(Affine),
     Dense(Dense),
     Activation(Layer),
 }
 
-/// `scale x + shift`, a number each for every column or one for all.
+/// `scale x + shift`, with one number for each column or one for all.
 #[derive(Clone)]
 pub(super) struct Affine {
     pub(super) scale: Vec<f64>,
@@ -26,13 +26,13 @@ pub(super) struct Affine {
 /// `W x + b`.
 pub(super) struct Dense {
     pub(super) inputs: usize,
-    /// A row for each output.
+    /// One row for each output.
     pub(super) weight: Vec<f32>,
     pub(super) bias: Vec<f32>,
 }
 
 impl Affine {
-    /// This for every of so many columns; `None` where it is for another number.
+    /// Scale and shift of every column; `None` for another number of columns.
     fn of_columns(&self, columns: usize) -> Option<Vec<(f64, f64)>> {
         let fits = |values: &[f64]| values.len() == 1 || values.len() == columns;
         let at = |values: &[f64], i: usize| values[if values.len() == 1 { 0 } else { i }];
@@ -43,7 +43,7 @@ impl Affine {
         })
     }
 
-    /// This, and then another; `None` where they are for different numbers of columns.
+    /// This step followed by another; `None` if their numbers of columns differ.
     fn then(&self, next: &Self) -> Option<Self> {
         let lengths = [&self.scale, &self.shift, &next.scale, &next.shift].map(Vec::len);
         let columns = lengths.into_iter().max()?;
@@ -89,19 +89,20 @@ pub(super) struct Chain {
     layers: Vec<Layer>,
     dense: Vec<Dense>,
     normalisation: Option<Normalisation>,
-    /// What scales and shifts before a layer to come.
+    /// Scale and shift that wait for the next layer.
     waiting: Option<Affine>,
 }
 
 impl Chain {
-    /// Takes a step; a sentence where it does not fit.
+    /// Adds a step. The error says why it does not fit.
     pub(super) fn take(&mut self, step: Step) -> Result<(), String> {
         match step {
             Step::Affine(affine) => self.take_affine(affine),
             Step::Dense(dense) => self.take_dense(dense),
-            Step::Activation(_) if self.waiting.is_some() => {
-                Err("between it and what scales or shifts before it no dense layer stands".into())
-            }
+            Step::Activation(_) if self.waiting.is_some() => Err(
+                "no dense layer stands between this activation and the scaling or shift before it"
+                    .into(),
+            ),
             Step::Activation(layer) => {
                 self.layers.push(layer);
                 Ok(())
@@ -110,7 +111,7 @@ impl Chain {
     }
 
     fn take_affine(&mut self, affine: Affine) -> Result<(), String> {
-        let widths = || "its constant has another width than what comes in".to_owned();
+        let widths = || "the width of its constant differs from the width of its input".to_owned();
         let is_dense = matches!(self.layers.last(), Some(Layer::Dense { .. }));
         match (self.waiting.take(), self.dense.last_mut()) {
             (Some(first), _) => {
@@ -128,10 +129,15 @@ impl Chain {
             && before.bias.len() != inputs
         {
             let outputs = before.bias.len();
-            return Err(format!("it takes {inputs} numbers where {outputs} come in"));
+            return Err(format!(
+                "it takes {inputs} inputs, but the layer before it has {outputs} outputs"
+            ));
         }
         if let Some(affine) = self.waiting.take() {
-            let widths = || "what is scaled and shifted before it has another width".to_owned();
+            let widths = || {
+                "the width of the scaling or shift before it differs from its number of inputs"
+                    .to_owned()
+            };
             if self.layers.is_empty() {
                 let columns = affine.of_columns(inputs).ok_or_else(widths)?;
                 self.normalisation = Some(normalisation(&columns)?);
@@ -145,10 +151,10 @@ impl Chain {
         Ok(())
     }
 
-    /// The network, once all steps are taken.
+    /// The network of all steps.
     pub(super) fn network(self) -> Result<(Option<Normalisation>, Network), OnnxError> {
         if self.waiting.is_some() {
-            let reason = "what scales or shifts at its end has no dense layer before it";
+            let reason = "the scaling or shift at its end follows no dense layer";
             return Err(OnnxError::Model(reason.to_owned()));
         }
         let Some(first) = self.dense.first() else {
@@ -175,6 +181,6 @@ fn normalisation(columns: &[(f64, f64)]) -> Result<Normalisation, String> {
     if offsets.iter().chain(scales).all(|value| value.is_finite()) {
         Ok(normalisation)
     } else {
-        Err("before it an input is scaled by zero or by no finite number".to_owned())
+        Err("the scaling or shift of an input before it is zero or not finite".to_owned())
     }
 }

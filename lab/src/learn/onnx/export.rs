@@ -9,19 +9,19 @@ use super::message::{
 use super::{Normalisation, OnnxError};
 use crate::learn::train::{Layer, Network};
 
-/// Of 2022, with opset 17: what is written needs nothing newer.
+/// Of 2022, with opset 17; nothing newer is needed.
 const IR_VERSION: i64 = 8;
 const OPSET: i64 = 17;
 
 const INPUT: &str = "inputs";
 const OUTPUT: &str = "outputs";
 
-/// The bytes of a model that computes what the network does, its inputs normalised first; `metadata` are
-/// keys and values that the model carries along.
+/// The bytes of a model that normalises its inputs and then computes the network; `metadata` are keys
+/// and values that the model carries along.
 ///
 /// # Errors
-/// Where batch normalisation has no dense layer to be folded into, the network has no layer, or the
-/// normalisation is of another number of inputs.
+/// [`OnnxError`]: batch normalisation has no dense layer to be folded into, the network has no layer,
+/// or the normalisation has another number of inputs.
 pub fn export(
     network: &Network,
     normalisation: Option<&Normalisation>,
@@ -46,7 +46,7 @@ pub fn export(
         match layer {
             Layer::Dense { outputs } => {
                 let (Some(weight), Some(bias)) = (parameters.next(), parameters.next()) else {
-                    return Err(refused("it has no weights"));
+                    return Err(refused("the dense layer has no weights"));
                 };
                 let name = format!("dense_{index}");
                 let shape = [outputs, weight.columns()];
@@ -66,14 +66,14 @@ pub fn export(
             Layer::Tanh => chain.add(format!("tanh_{index}"), "Tanh", Vec::new(), Vec::new()),
             Layer::BatchNorm => {
                 return Err(refused(
-                    "batch normalisation with no dense layer before or behind it",
+                    "batch normalisation needs a dense layer before or after it",
                 ));
             }
-            Layer::Dropout { .. } => return Err(refused("dropout that is not left out")),
+            Layer::Dropout { .. } => return Err(refused("dropout is for training only")),
         }
     }
     let Some(last) = chain.nodes.last_mut() else {
-        let reason = "there is none";
+        let reason = "the network has no layers";
         return Err(OnnxError::Layer { index: 0, reason });
     };
     last.output = vec![OUTPUT.to_owned()];
@@ -82,7 +82,7 @@ pub fn export(
         .encode_to_vec())
 }
 
-/// Nodes one behind the other.
+/// Nodes in a chain.
 #[derive(Default)]
 struct Chain {
     nodes: Vec<Node>,
@@ -106,7 +106,7 @@ impl Chain {
         name
     }
 
-    /// Adds a node that takes what the last one puts out, and constants.
+    /// Adds a node whose inputs are the output of the last node and constants.
     fn add(&mut self, name: String, op: &str, constants: Vec<String>, attribute: Vec<Attribute>) {
         let before = match self.nodes.last() {
             Some(last) => last.output.clone(),
@@ -148,7 +148,7 @@ impl Chain {
     }
 }
 
-/// Any number of rows of so many numbers.
+/// An input or output of any number of rows with this number of columns.
 fn rows(name: &str, columns: usize) -> ValueInfo {
     let batch = Dimension {
         dim_param: Some("batch".to_owned()),

@@ -1,4 +1,4 @@
-//! From a model's nodes to what they do, one after another.
+//! Reads the nodes of a model into steps.
 
 use std::collections::BTreeMap;
 
@@ -9,22 +9,22 @@ use super::message::{EXTERNAL, FLOAT, Graph, Model, Node, Tensor};
 use super::{Normalisation, OnnxError};
 use crate::learn::train::{Layer, Network};
 
-/// Since then constants are broadcast without being told to.
+/// From this opset on, constants are broadcast without an attribute.
 const OLDEST_OPSET: i64 = 7;
 
-/// A network that was learnt elsewhere.
+/// A network that was trained by another program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imported {
-    /// What the model itself does to its inputs before its first dense layer.
+    /// Normalisation before the first dense layer, if there is one.
     pub normalisation: Option<Normalisation>,
-    /// All behind that.
+    /// The network after the normalisation.
     pub network: Network,
 }
 
-/// The network of the bytes of a model.
+/// Reads the bytes of a model.
 ///
 /// # Errors
-/// Names the node that cannot be read, or says what else is wrong.
+/// [`OnnxError`]: names the node that cannot be read, or says what else is wrong.
 pub fn import(bytes: &[u8]) -> Result<Imported, OnnxError> {
     let model = Model::decode(bytes).map_err(|error| OnnxError::File(error.to_string()))?;
     let Some(graph) = model.graph else {
@@ -49,14 +49,17 @@ pub fn import(bytes: &[u8]) -> Result<Imported, OnnxError> {
             reason,
         };
         if !is_default(&node.domain) {
-            return Err(refused(format!("its domain {} is not read", node.domain)));
+            return Err(refused(format!(
+                "operators of the domain {} are not supported",
+                node.domain
+            )));
         }
         reader.take(node).map_err(refused)?;
     }
     let output = only("output", graph.output.iter().map(|output| &output.name[..]))?;
     if reader.current != output {
         return Err(OnnxError::Model(format!(
-            "its output {output} is not what its last node puts out"
+            "its output {output} is not the output of its last node"
         )));
     }
     let (normalisation, network) = reader.chain.network()?;
@@ -66,7 +69,7 @@ pub fn import(bytes: &[u8]) -> Result<Imported, OnnxError> {
     })
 }
 
-/// The one name there is.
+/// The only name.
 fn only<'a>(what: &str, mut names: impl Iterator<Item = &'a str>) -> Result<&'a str, OnnxError> {
     match (names.next(), names.next()) {
         (Some(name), None) => Ok(name),
@@ -75,10 +78,10 @@ fn only<'a>(what: &str, mut names: impl Iterator<Item = &'a str>) -> Result<&'a 
     }
 }
 
-/// A model read so far.
+/// State of the reader.
 struct Reader<'a> {
     constants: BTreeMap<&'a str, &'a Tensor>,
-    /// The name of what the last node put out.
+    /// Name of the last node's output.
     current: &'a str,
     chain: Chain,
 }
@@ -88,7 +91,7 @@ impl<'a> Reader<'a> {
         let constants: BTreeMap<_, _> = (graph.initializer.iter())
             .map(|tensor| (&tensor.name[..], tensor))
             .collect();
-        // Older models list constants among the inputs too.
+        // Older models list constants among the inputs.
         let inputs = (graph.input.iter().map(|input| &input.name[..]))
             .filter(|name| !constants.contains_key(name));
         let current = only("input", inputs)?;
@@ -99,7 +102,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Takes a node; a sentence where that cannot be.
+    /// Adds a node. The error says why it cannot be read.
     fn take(&mut self, node: &'a Node) -> Result<(), String> {
         let [output] = &node.output[..] else {
             return Err(format!("it has {} outputs, not one", node.output.len()));
@@ -107,7 +110,7 @@ impl<'a> Reader<'a> {
         match &node.op_type[..] {
             "Constant" => {
                 let value = node.attribute.iter().find_map(|value| value.t.as_ref());
-                let value = value.ok_or("its value is no tensor")?;
+                let value = value.ok_or("its value is not a tensor")?;
                 self.constants.insert(output, value);
                 return Ok(());
             }
@@ -127,16 +130,18 @@ impl<'a> Reader<'a> {
             "Sub" | "Mul" | "Add" | "Div" => Some(Step::Affine(self.elementwise(node)?)),
             "BatchNormalization" => Some(Step::Affine(self.batch_normalisation(node)?)),
             _ => {
-                return Err("it is none of Gemm, MatMul, Relu, Tanh, Identity, \
-                            BatchNormalization, Sub, Mul, Add and Div with a constant"
-                    .to_owned());
+                return Err(
+                    "this operator is not supported; supported are Gemm, MatMul, Relu, Tanh, \
+                            Identity, BatchNormalization, and Sub, Mul, Add or Div with a constant"
+                        .to_owned(),
+                );
             }
         };
         if !node.input.iter().any(|name| name == self.current) {
             let found = node.input.first().map_or("nothing", String::as_str);
             return Err(format!(
-                "it takes {found} and not {}, which the node before it puts out; only chains are \
-                 read",
+                "its input is {found}, not {}, the output of the node before it; only a chain of nodes \
+                 can be read",
                 self.current
             ));
         }
@@ -151,7 +156,7 @@ impl<'a> Reader<'a> {
         self.constants.contains_key(name)
     }
 
-    /// The constant that is input `index`: its extents and numbers.
+    /// Shape and numbers of the constant at input `index`.
     fn constant(&self, node: &Node, index: usize) -> Result<(Vec<usize>, Vec<f32>), String> {
         let name = node.input.get(index).map_or("", String::as_str);
         match self.constants.get(name) {
@@ -165,7 +170,7 @@ impl<'a> Reader<'a> {
         let (shape, values) = self.constant(node, index)?;
         match shape.split_last() {
             Some((_, rows)) if rows.iter().any(|&size| size != 1) => Err(format!(
-                "its input {index} has shape {shape:?}, not that of a row"
+                "its input {index} must be a row, but has the shape {shape:?}"
             )),
             _ if values.is_empty() => Err(format!("its input {index} is empty")),
             _ => Ok(values),
@@ -177,12 +182,12 @@ impl<'a> Reader<'a> {
         let number = |name, default: f32| attribute(node, name).map_or(default, |value| value.f);
         let is_set = |name| attribute(node, name).is_some_and(|value| value.i != 0);
         if is_set("transA") {
-            return Err("it transposes what comes in".to_owned());
+            return Err("transA is not supported".to_owned());
         }
         let mut dense = self.weight(node, is_set("transB"))?;
         let (alpha, beta) = (number("alpha", 1.0), number("beta", 1.0));
         (dense.weight.iter_mut()).for_each(|weight| *weight *= alpha);
-        // The third input may be left out, or be empty.
+        // The third input is optional.
         if node.input.get(2).is_some_and(|name| !name.is_empty()) {
             let bias = self.row(node, 2)?;
             let outputs = dense.bias.len();
@@ -200,16 +205,16 @@ impl<'a> Reader<'a> {
         self.weight(node, false)
     }
 
-    /// What multiplies from the right: `in x out`, or `out x in` if transposed.
+    /// A dense layer of the constant at input 1: `in x out`, or `out x in` if transposed.
     fn weight(&self, node: &Node, is_transposed: bool) -> Result<Dense, String> {
         let (shape, values) = self.constant(node, 1)?;
         let &[rows, columns] = &shape[..] else {
             return Err(format!(
-                "its weights have shape {shape:?}, not that of a matrix"
+                "its weights must be a matrix, but have the shape {shape:?}"
             ));
         };
         if rows == 0 || columns == 0 {
-            return Err(format!("its weights have shape {shape:?}"));
+            return Err(format!("its weights are empty: their shape is {shape:?}"));
         }
         let (inputs, outputs) = if is_transposed {
             (columns, rows)
@@ -230,7 +235,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// What comes in with a constant.
+    /// Sum, difference, product or quotient with a constant.
     fn elementwise(&self, node: &Node) -> Result<Affine, String> {
         let [left, right] = &node.input[..] else {
             return Err(format!("it has {} inputs, not two", node.input.len()));
@@ -238,7 +243,7 @@ impl<'a> Reader<'a> {
         let (is_left, index) = match (self.is_constant(left), self.is_constant(right)) {
             (true, false) => (true, 0),
             (false, true) => (false, 1),
-            _ => return Err("one of its inputs must be a constant, the other not".to_owned()),
+            _ => return Err("exactly one of its two inputs must be a constant".to_owned()),
         };
         let values: Vec<f64> = (self.row(node, index)?.into_iter())
             .map(f64::from)
@@ -253,16 +258,16 @@ impl<'a> Reader<'a> {
                 values.iter().map(|value| value.recip()).collect(),
                 vec![0.0],
             ),
-            _ => return Err("it divides a constant by what comes in".to_owned()),
+            _ => return Err("division of a constant by the input is not supported".to_owned()),
         };
         Ok(Affine { scale, shift })
     }
 
     fn batch_normalisation(&self, node: &Node) -> Result<Affine, String> {
         if attribute(node, "training_mode").is_some_and(|value| value.i != 0) {
-            return Err("it is still learning: export the model after eval()".to_owned());
+            return Err("it is in training mode: call eval() before the export".to_owned());
         }
-        // The operator's own default.
+        // The operator's default.
         let epsilon = attribute(node, "epsilon").map_or(1e-5, |value| value.f);
         let mut rows = Vec::new();
         for index in 1..5 {
@@ -270,10 +275,10 @@ impl<'a> Reader<'a> {
             rows.push(row.into_iter().map(f64::from).collect::<Vec<_>>());
         }
         let [weight, bias, mean, variance] = &rows[..] else {
-            return Err("it has not the four constants that it takes".to_owned());
+            return Err("it needs four constants: scale, shift, mean and variance".to_owned());
         };
         if rows.iter().any(|row| row.len() != weight.len()) {
-            return Err("its constants are of different widths".to_owned());
+            return Err("its constants differ in width".to_owned());
         }
         let scale: Vec<f64> = (weight.iter().zip(variance))
             .map(|(weight, variance)| weight / (variance + f64::from(epsilon)).sqrt())
@@ -292,18 +297,18 @@ fn attribute<'a>(node: &'a Node, name: &str) -> Option<&'a super::message::Attri
         .find(|attribute| attribute.name == name)
 }
 
-/// The extents and numbers of a constant.
+/// Shape and numbers of a constant.
 fn numbers(tensor: &Tensor) -> Result<(Vec<usize>, Vec<f32>), String> {
     let name = &tensor.name;
     if tensor.data_location == EXTERNAL {
         return Err(format!(
-            "the numbers of {name} lie in another file: export the model with \
+            "the numbers of {name} are in another file: export the model with \
              external_data=False"
         ));
     }
     if tensor.data_type != FLOAT {
         return Err(format!(
-            "{name} is not of f32 (type {FLOAT}), but of type {}",
+            "{name} must hold f32 (type {FLOAT}), but has type {}",
             tensor.data_type
         ));
     }
@@ -316,12 +321,12 @@ fn numbers(tensor: &Tensor) -> Result<(Vec<usize>, Vec<f32>), String> {
     let values = match tensor.raw_data.as_chunks() {
         ([], []) => tensor.float_data.clone(),
         (values, []) => values.iter().copied().map(f32::from_le_bytes).collect(),
-        _ => return Err(format!("{name} has a number that is cut off")),
+        _ => return Err(format!("{name} ends within a number")),
     };
     match shape {
         Some(shape) if count == Some(values.len()) => Ok((shape, values)),
         _ => Err(format!(
-            "{name} has {} numbers, which are not those of its shape {:?}",
+            "{name} has {} numbers, which does not match its shape {:?}",
             values.len(),
             tensor.dims
         )),

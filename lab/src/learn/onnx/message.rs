@@ -1,4 +1,4 @@
-//! The messages of a model, as far as they are read or written; unknown fields are passed over.
+//! The messages of a model that are read or written; unknown fields are skipped.
 
 use prost::Message;
 
@@ -129,7 +129,7 @@ pub(super) struct Shape {
     pub(super) dim: Vec<Dimension>,
 }
 
-/// One of the two.
+/// One of the two fields is set.
 #[derive(Clone, PartialEq, Message)]
 pub(super) struct Dimension {
     #[prost(int64, optional, tag = "1")]

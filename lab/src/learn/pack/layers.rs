@@ -1,10 +1,10 @@
-//! Layers as a pack holds them: weights in bytes, a scale for each row.
+//! Layers of a pack: weights in bytes, with a scale for each row.
 //!
 //! ```text
 //! s_o = max_i |w_oi| / 127,   q_oi = w_oi / s_o to the nearest whole number
 //! ```
 //!
-//! A weight is off by `s_o / 2` at most, 0.4 % of the row's largest.
+//! The error of a weight is at most `s_o / 2`, 0.4 % of the largest weight in its row.
 
 use onecycle_onboard::network::{Activation, Dense, Weights};
 use onecycle_onboard::pack::Pack;
@@ -14,7 +14,7 @@ use super::PackContentsError;
 use crate::learn::train::{Layer, Matrix, Network, TrainError};
 use crate::workers::OneThread;
 
-/// Largest whole number of a byte that has a negative.
+/// Largest magnitude in a signed byte with both signs.
 const LARGEST: f32 = 127.0;
 
 /// A dense layer of a pack.
@@ -22,39 +22,39 @@ const LARGEST: f32 = 127.0;
 pub struct PackedLayer {
     /// Number of inputs.
     pub inputs: usize,
-    /// Weights, a row for each output.
+    /// Weights, one row for each output.
     pub weights: PackedWeights,
     /// Biases, one for each output.
     pub biases: Vec<f32>,
-    /// What becomes of the sums.
+    /// Activation of the sums.
     pub activation: Activation,
 }
 
 /// Weights of a layer, row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub enum PackedWeights {
-    /// As they are.
+    /// Single precision.
     Floats(Vec<f32>),
     /// Whole numbers, -127 to 127.
     Bytes {
         /// The numbers.
         rows: Vec<i8>,
-        /// What a one stands for in each row.
+        /// Value of a step in each row.
         scales: Vec<f32>,
     },
 }
 
-/// How weights are kept.
+/// Storage of the weights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Precision {
-    /// Four bytes a weight: as they are.
+    /// Four bytes for each weight.
     Floats,
-    /// A byte a weight, and a scale for each row.
+    /// One byte for each weight, and a scale for each row.
     #[default]
     Bytes,
 }
 
-/// What weights in bytes change in the outputs of a network.
+/// Effect of weights in bytes on the outputs of a network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Quantisation {
     /// The largest difference of any output.
@@ -94,10 +94,10 @@ impl PackedLayer {
     }
 }
 
-/// The layers of a network: batch normalisation folded into them, dropout left out.
+/// The layers of a network, with batch normalisation folded into them and without dropout.
 ///
 /// # Errors
-/// Names a layer that a pack cannot hold.
+/// [`PackContentsError::Layer`]: names a layer that a pack cannot hold.
 pub fn layers(
     network: &Network,
     precision: Precision,
@@ -147,7 +147,7 @@ fn quantised(weight: &Matrix) -> PackedWeights {
             .iter()
             .fold(0.0_f32, |most, weight| most.max(weight.abs()));
         let scale = largest / LARGEST;
-        // A row of zeros has no scale, and needs none.
+        // A row of zeros has the scale zero.
         let steps = if scale > 0.0 { scale.recip() } else { 0.0 };
         rows.extend(row.iter().map(|weight| (weight * steps).round() as i8));
         scales.push(scale);
@@ -176,10 +176,10 @@ pub(super) fn network(layers: &[PackedLayer]) -> Result<Network, PackContentsErr
     Ok(Network::zeros(inputs, &kinds)?.with_numbers(&numbers)?)
 }
 
-/// What the pack puts out for these signatures against what the network it is made of does.
+/// Compares the outputs of a pack with those of its network for these signatures.
 ///
 /// # Errors
-/// Where the network is of other sizes, or there is no signature.
+/// [`TrainError`]: the network has other sizes, or there is no signature.
 pub fn quantisation(
     pack: &Pack<'_>,
     network: &Network,

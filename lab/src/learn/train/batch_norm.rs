@@ -1,4 +1,5 @@
-//! Batch normalisation: every column of a batch to mean zero and variance one, then scaled.
+//! Batch normalisation: scales every column of a batch to mean zero and variance one, then scales and
+//! shifts it.
 //!
 //! ```text
 //! x^ = (x - mean) / sqrt(var + eps),   y = weight x^ + bias
@@ -23,7 +24,7 @@ const EPSILON: f64 = 1e-5;
 /// Share of a batch in the running statistics: PyTorch's.
 const MOMENTUM: f64 = 0.1;
 
-/// Four rows of as many numbers as there are columns to normalise.
+/// Four rows with one number for each column.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct BatchNorm {
     pub(super) weight: Matrix,
@@ -33,7 +34,7 @@ pub(super) struct BatchNorm {
 }
 
 impl BatchNorm {
-    /// Scales by one, shifts by nothing; running statistics of a standard normal variable.
+    /// Scale one, shift zero, running statistics of a standard normal variable.
     pub(super) fn new(columns: usize) -> Self {
         let mut ones = Matrix::zeros(1, columns);
         ones.values_mut().fill(1.0);
@@ -46,7 +47,7 @@ impl BatchNorm {
         }
     }
 
-    /// `(scale, shift)` of every column: what evaluating comes to.
+    /// `(scale, shift)` of every column for evaluation.
     pub(super) fn scale_and_shift(&self) -> impl Iterator<Item = (f64, f64)> {
         let [weight, bias, mean, var] = [
             &self.weight,
@@ -111,8 +112,8 @@ impl BatchNorm {
         Ok(())
     }
 
-    /// The gradient of the outputs becomes that of the inputs; those of weight and bias go to
-    /// `into`.
+    /// Turns the gradient of the outputs into that of the inputs; the gradients of weight and bias go
+    /// to `into`.
     pub(super) fn backward(
         &self,
         (normal, scale): (&Matrix, &[f64]),
@@ -147,7 +148,7 @@ impl BatchNorm {
     }
 }
 
-/// Running statistics after one more batch, whose own are `times` the given ones.
+/// Updates running statistics with a batch, whose statistics count `times` their value.
 fn blend(running: &mut [f32], batch: &[f64], times: f64) {
     for (running, batch) in running.iter_mut().zip(batch) {
         *running = ((1.0 - MOMENTUM) * f64::from(*running) + MOMENTUM * times * batch) as f32;

@@ -24,7 +24,7 @@ pub enum CheckpointError {
     #[error("{0}")]
     Train(#[from] TrainError),
     /// The file is cut off, or is something else.
-    #[error("the file is not one of a training: {0}")]
+    #[error("the file is not a saved training: {0}")]
     Malformed(String),
 }
 
@@ -72,7 +72,7 @@ impl Trainer {
     pub fn resume(bytes: &[u8]) -> Result<Self, CheckpointError> {
         let malformed = |reason: &str| CheckpointError::Malformed(reason.to_owned());
         let end = bytes.iter().position(|&byte| byte == b'\n');
-        let end = end.ok_or_else(|| malformed("its first line has no end"))?;
+        let end = end.ok_or_else(|| malformed("its first line does not end"))?;
         let head: Head = serde_json::from_slice(&bytes[..end])
             .map_err(|error| CheckpointError::Malformed(error.to_string()))?;
         if head.format != FORMAT {
@@ -108,13 +108,14 @@ impl Trainer {
         for (moments, is_square) in moments.into_iter().zip([false, true]) {
             for matrix in moments {
                 let values = next(matrix.values().len())?;
-                check_values(values, is_square)
-                    .map_err(|value| malformed(&format!("a moment is {value:?}")))?;
+                check_values(values, is_square).map_err(|value| {
+                    malformed(&format!("a moment of the optimizer is {value:?}"))
+                })?;
                 matrix.values_mut().copy_from_slice(values);
             }
         }
         if !rest.is_empty() {
-            return Err(malformed("it goes on after its last number"));
+            return Err(malformed("bytes follow its last number"));
         }
         let mut trainer = Self::new(head.settings, network)?;
         trainer.best = best;

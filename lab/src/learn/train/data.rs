@@ -1,30 +1,30 @@
-//! What a network learns from.
+//! Batches and datasets.
 
 use super::matrix::Matrix;
 use super::{TrainError, expect_size};
 
-/// Samples and what is wanted of them. A [`Loss`](super::Loss) reads what it says; the rest may
-/// stay empty.
+/// Samples and their targets. A [`Loss`](super::Loss) says which targets it reads; the others may be
+/// empty.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Batch {
-    /// A row a sample, a column an input.
+    /// Inputs: one row for each sample, one column for each input.
     pub inputs: Matrix,
     /// The true class of every sample.
     pub classes: Vec<usize>,
-    /// A row a sample, a column a class: `J_iT`, what it costs to take class `i` for the true one,
-    /// as a fraction (0.1 is ten percent); infinite where the loop would be unstable.
+    /// Costs: one row for each sample, one column for each class: `J_iT`, the cost of taking class `i`
+    /// for the true class, as a fraction; infinite if the loop would be unstable.
     pub costs: Matrix,
-    /// A row a sample, a column a dimension: where the density is evaluated.
+    /// Values: one row for each sample, one column for each dimension of the density.
     pub values: Matrix,
-    /// How much every sample counts; where it is empty, all count alike.
+    /// Weight of every sample; if empty, all weights are one.
     pub weights: Vec<f32>,
 }
 
 impl Batch {
-    /// How much all samples count together.
+    /// Sum of the weights.
     ///
     /// # Errors
-    /// Where the weights have no mean, or are not as many as the samples.
+    /// [`TrainError`]: the weights have no mean, or are not as many as the samples.
     pub fn total_weight(&self) -> Result<f64, TrainError> {
         if self.weights.is_empty() {
             return Ok(self.inputs.rows() as f64);
@@ -39,28 +39,28 @@ impl Batch {
         Ok(total)
     }
 
-    /// How much sample `i` counts.
+    /// Weight of sample `i`.
     pub(super) fn weight(&self, i: usize) -> f64 {
         self.weights.get(i).copied().map_or(1.0, f64::from)
     }
 }
 
-/// Samples, known by their numbers: kept in memory, read, or made when asked for.
+/// Samples with numbers: kept in memory, read, or made on demand.
 pub trait Dataset {
-    /// How many there are.
+    /// Number of samples.
     fn len(&self) -> usize;
 
-    /// Whether there are none.
+    /// Whether there are no samples.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Fills a batch, whatever it holds, with these samples in this order. A sample must be the
-    /// same each time.
+    /// Replaces the contents of a batch by these samples, in this order. A sample must be the same each
+    /// time.
     fn fill(&self, samples: &[usize], batch: &mut Batch);
 }
 
-/// A batch is a dataset: its rows.
+/// The rows of a batch as a dataset.
 impl Dataset for Batch {
     fn len(&self) -> usize {
         self.inputs.rows()

@@ -9,14 +9,14 @@
 //! d/dmu = -L w,   d/dl_i = w_i (y - mu)_i L_ii - 1,   d/dL_ij = w_j (y - mu)_i
 //! ```
 //!
-//! The network puts out the factor of the precision, not of the covariance, so that nothing is divided.
+//! The outputs hold the factor of the precision, not of the covariance, which avoids divisions.
 //! Reference: P. M. Williams, "Using neural networks to model conditional multivariate densities", Neural
 //! Computation 8 (1996).
 
 use std::f64::consts::TAU;
 
-/// A Gaussian that a network put out: of dimension `D` its mean, the logarithms of the diagonal of
-/// `L`, then what is below it, row by row.
+/// A Gaussian from the outputs of a network: for dimension `D` the mean, the logarithms of the diagonal
+/// of `L`, then the elements below the diagonal row by row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gaussian {
     /// Mean, `D` numbers.
@@ -26,13 +26,13 @@ pub struct Gaussian {
 }
 
 impl Gaussian {
-    /// How many outputs describe one of this dimension.
+    /// Number of outputs for this dimension.
     #[must_use]
     pub fn outputs(dimension: usize) -> usize {
         2 * dimension + dimension * dimension.saturating_sub(1) / 2
     }
 
-    /// From the outputs; `None` where they are not as many as this dimension takes.
+    /// A Gaussian from outputs; `None` if the number of outputs is not that of this dimension.
     #[must_use]
     pub fn from_outputs(dimension: usize, outputs: &[f32]) -> Option<Self> {
         (outputs.len() == Self::outputs(dimension)).then(|| Self {
@@ -71,7 +71,7 @@ fn factor(dimension: usize, outputs: &[f32], i: usize, j: usize) -> f64 {
     }
 }
 
-/// Where `L_ij` below the diagonal stands among the outputs.
+/// Index of `L_ij` below the diagonal among the outputs.
 fn below(dimension: usize, i: usize, j: usize) -> usize {
     2 * dimension + i * (i - 1) / 2 + j
 }

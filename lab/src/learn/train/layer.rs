@@ -1,4 +1,4 @@
-//! Layers: what they are called, what they hold, their forward and backward pass.
+//! Layers: names, numbers, forward and backward pass.
 //!
 //! | layer       | output                                             | tensors                |
 //! |-------------|----------------------------------------------------|------------------------|
@@ -22,29 +22,29 @@ use super::matrix::Matrix;
 use super::{Purpose, TrainError, expect_size, stream};
 use crate::workers::Workers;
 
-/// A layer, as a user names it.
+/// A layer as a recipe names it.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Layer {
-    /// Every output a weighted sum of every input, and a bias.
+    /// Every output is a weighted sum of all inputs plus a bias.
     Dense {
         /// Number of outputs.
         outputs: usize,
     },
-    /// Cuts off what is negative.
+    /// Replaces negative numbers by zero.
     Relu,
     /// Hyperbolic tangent.
     Tanh,
-    /// Brings every column to mean zero and variance one, then scales and shifts it.
+    /// Scales every column to mean zero and variance one, then scales and shifts it.
     BatchNorm,
-    /// Leaves out random numbers while learning.
+    /// Replaces random numbers by zero while learning.
     Dropout {
-        /// How likely a number is left out, 0 to 0.99.
+        /// Probability that a number is replaced, 0 to 0.99.
         probability: f64,
     },
 }
 
-/// Arrays of a layer that are learnt, the first of them: weight and bias.
+/// Number of arrays of a layer that are learnt, which come first: weight and bias.
 pub(super) const PARAMETERS: usize = 2;
 
 /// Name of the array that holds variances.
@@ -60,7 +60,7 @@ pub(super) enum Stage {
     Dropout { probability: f64 },
 }
 
-/// What a layer keeps of a forward pass for the backward one.
+/// Memory of a layer between forward and backward pass.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Memory {
     /// `x^` of batch normalisation, factors of dropout.
@@ -69,14 +69,14 @@ pub(super) struct Memory {
     pub(super) row: Vec<f64>,
 }
 
-/// A layer's own part of a forward pass.
+/// A layer's part of a forward pass.
 pub(super) struct Passed<'a> {
     pub(super) input: &'a Matrix,
     pub(super) output: &'a Matrix,
     pub(super) memory: &'a Memory,
 }
 
-/// Which random numbers are left out: the same of the same seed, step and layer.
+/// Draw of a dropout layer: the same for the same seed, step and layer.
 #[derive(Clone, Copy)]
 pub(super) struct Draw {
     pub(super) seed: u64,
@@ -84,7 +84,7 @@ pub(super) struct Draw {
 }
 
 impl Stage {
-    /// A layer of so many inputs, its weights and biases zero.
+    /// A layer with this number of inputs, weights and biases zero.
     pub(super) fn zeros(layer: Layer, inputs: usize) -> Self {
         match layer {
             Layer::Dense { outputs } => Self::Dense {
@@ -137,7 +137,7 @@ impl Stage {
         }
     }
 
-    /// What is learnt.
+    /// The arrays that are learnt.
     pub(super) fn parameters(&self) -> Vec<&Matrix> {
         let arrays = self.arrays().into_iter().take(PARAMETERS);
         arrays.map(|(_, matrix)| matrix).collect()
@@ -157,7 +157,7 @@ impl Stage {
         }
     }
 
-    /// The outputs of a network that has learnt.
+    /// Outputs for evaluation.
     pub(super) fn evaluate(
         &self,
         mut values: Matrix,
@@ -175,7 +175,7 @@ impl Stage {
         Ok(values)
     }
 
-    /// The outputs of a network that learns, and what the backward pass needs of them.
+    /// Outputs while learning, and the memory for the backward pass.
     pub(super) fn learn(
         &mut self,
         input: &Matrix,
@@ -205,8 +205,9 @@ impl Stage {
         Ok(())
     }
 
-    /// From the gradient of the outputs that of the parameters, into `into`, and of the inputs,
-    /// which nobody asks of the `first` layer. Expects the gradient in the shape of the outputs.
+    /// Computes from the gradient of the outputs those of the parameters, into `into`, and returns that
+    /// of the inputs (not computed for the `first` layer). The gradient must have the shape of the
+    /// outputs.
     pub(super) fn backward(
         &self,
         passed: &Passed<'_>,
@@ -261,7 +262,7 @@ fn dense(
     with_bias(product, weight, bias, input)
 }
 
-/// The product of inputs and weights, where their shapes fit, and the bias.
+/// Adds the bias to the product of inputs and weights, if their shapes fit.
 fn with_bias(
     product: Option<Matrix>,
     weight: &Matrix,
@@ -279,7 +280,7 @@ fn with_bias(
 }
 
 fn relu(x: f32) -> f32 {
-    // Not `max`, which would make a zero of what is no number.
+    // Not `max`, which would turn NaN into zero.
     if x < 0.0 { 0.0 } else { x }
 }
 
@@ -300,7 +301,7 @@ fn multiply(values: &mut Matrix, factors: &Matrix) {
     }
 }
 
-/// Multiplies by the derivative, which is known from the output.
+/// Multiplies by the derivative, as a function of the output.
 fn by_output(gradient: &mut Matrix, passed: &Passed<'_>, derivative: impl Fn(f32) -> f32) {
     for (value, y) in (gradient.values_mut().iter_mut()).zip(passed.output.values()) {
         *value *= derivative(*y);

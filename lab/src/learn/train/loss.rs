@@ -1,8 +1,8 @@
-//! What a network is to make small: classes, costs of a mistake, densities.
+//! Losses: classes, costs of a mistake, densities.
 //!
-//! `J_iT` is what the controller of class `i` costs on the true process, as a fraction, `T` the
-//! true class. `gamma_iT = 1 + min(J_iT, cap)`: uncapped, the cost of an unstable pick would be
-//! infinite, and one class would be all that is learnt.
+//! `J_iT` is the cost of the controller of class `i` on the true process, as a fraction, `T` the true
+//! class. `gamma_iT = 1 + min(J_iT, cap)`. Without the cap an unstable pick would cost infinitely much,
+//! and only that class would be learnt.
 //!
 //! | loss                 | formula                                                               |
 //! |----------------------|-----------------------------------------------------------------------|
@@ -11,20 +11,21 @@
 //! | shifted softmax      | `-ln p_T`, `p_i ~ exp(gamma_iT (a_i - min_j a_j))`                    |
 //! | cost-augmented       | `-ln p_T`, `p_i ~ exp(a_i + m J_iT)`                                  |
 //! | expected cost        | `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`             |
-//! | Gaussian             | `-ln N(y)` of the mean and the precision that the network puts out    |
+//! | Gaussian             | `-ln N(y)`, the outputs of the network give mean and precision        |
 //! | cost-aware Gaussian  | `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)`                   |
 //!
-//! **The paper's loss has no optimum but a degenerate one.** `gamma_TT = 1` is the least of the
-//! gammas, so adding a constant `-s` to all outputs, whatever the inputs, divides every
-//! `p_i / p_T` by `exp((gamma_iT - 1) s)`: the loss falls to zero and nothing is learnt. The shifted
-//! softmax cannot fall so, and is the same for outputs whose least is zero.
+//! **The paper's loss has only a degenerate optimum.** `gamma_TT = 1` is the smallest gamma. A constant
+//! `-s` added to all outputs therefore divides every `p_i / p_T` by `exp((gamma_iT - 1) s)`: the loss
+//! falls to zero without learning anything from the inputs. The shifted softmax does not change with
+//! `s`, and equals the paper's softmax if the least output is zero.
 //!
-//! The cost-aware Gaussian adds what the controller made for its mean `mu` costs: `g . (mu - y)` to first
-//! order, `g` the derivatives of the cost by the errors of `y`. Where that is beyond `c` it counts as it
-//! is, below as its square, which has a slope where the sign of the cost changes. A network that cannot
-//! have all values right has the costly combination of them right. The first order knows nothing of
-//! errors along which the cost has no slope, and likelihood alone keeps these small: of multirotors
-//! (see [`dataset`](crate::learn::dataset)) `w = 1`, `c = 0.01` makes controllers cheaper, `w = 10` dearer.
+//! The cost-aware Gaussian adds the cost of the controller made for its mean `mu`: `g . (mu - y)` to
+//! first order, with `g` the derivatives of the cost by errors of `y`. A cost above `c` counts
+//! linearly; a smaller one counts by its square, which is smooth where the cost changes its sign. A
+//! network that cannot get all values right thus gets their costly combination right. The first order
+//! does not see errors along which the cost has no slope; the likelihood alone keeps those small. For
+//! multirotors (see [`dataset`](crate::learn::dataset)) `w = 1`, `c = 0.01` makes controllers cheaper,
+//! `w = 10` dearer.
 //!
 //! References: A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, IEEE Access 8 (2020), equations 15
 //! and 16; K. Gimpel, N. A. Smith, "Softmax-margin CRFs: training log-linear models with cost
@@ -37,13 +38,13 @@ use super::softmax::{Logits, Shares, Softmax};
 use super::{TrainError, expect_size};
 use crate::space::{FieldError, first_out_of_range};
 
-/// What is to become small, of outputs `a`, the true class `T` and costs `J_iT` up to a cap.
+/// A loss of outputs `a`, the true class `T` and costs `J_iT` up to a cap.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Loss {
     /// `-ln p_T`, `p_i ~ exp(a_i)`. Reads classes.
     CrossEntropy,
-    /// `-ln p_T`, `p_i ~ exp((1 + J_iT) a_i)`: the paper's to the letter, whose optimum is to shift
+    /// `-ln p_T`, `p_i ~ exp((1 + J_iT) a_i)`: the paper's loss as printed, whose optimum is to shift
     /// all outputs to minus infinity. Reads classes and costs.
     ModifiedSoftmax {
         /// Highest cost that counts.
@@ -54,23 +55,23 @@ pub enum Loss {
         /// Highest cost that counts.
         cap: f64,
     },
-    /// `-ln p_T`, `p_i ~ exp(a_i + m J_iT)`: costly classes must be the further below the true one.
-    /// Reads classes and costs.
+    /// `-ln p_T`, `p_i ~ exp(a_i + m J_iT)`: the output of a costly class must be further below the
+    /// true one. Reads classes and costs.
     CostAugmented {
-        /// `m`, how far: a distance of outputs per unit of cost.
+        /// `m`, distance of outputs per unit of cost.
         scale: f64,
         /// Highest cost that counts.
         cap: f64,
     },
-    /// `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`: what a pick at random costs.
-    /// Reads classes and costs.
+    /// `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`: the cost of a random pick. Reads
+    /// classes and costs.
     ExpectedCost {
         /// Highest cost that counts.
         cap: f64,
         /// `c`, share of the plain cross-entropy.
         cross_entropy: f64,
-        /// `h`, share of the entropy `H`, which keeps picks from being certain: alone with the cost
-        /// it makes `p_i ~ exp(-J_iT / h)` the optimum.
+        /// `h`, share of the entropy `H`, which keeps picks from being certain. With the cost alone the
+        /// optimum is then `p_i ~ exp(-J_iT / h)`.
         entropy: f64,
     },
     /// `-ln N(y)` of a [`Gaussian`]. Reads values.
@@ -79,13 +80,13 @@ pub enum Loss {
         dimension: usize,
     },
     /// `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)` of a [`Gaussian`] with mean `mu`. Reads
-    /// values: `y`, then `g`, what an error of each number of `y` costs.
+    /// values: `y`, then `g`, the cost of an error of each number of `y`.
     CostAwareGaussian {
         /// Length of `y`.
         dimension: usize,
-        /// `w`, how much the cost counts beside the likelihood.
+        /// `w`, weight of the cost beside the likelihood.
         weight: f64,
-        /// `c`, the cost up to which its square counts, and from which it counts itself.
+        /// `c`, cost below which the square counts, and above which the cost itself counts.
         scale: f64,
     },
 }
@@ -93,7 +94,7 @@ pub enum Loss {
 /// Largest dimension of a Gaussian: outputs grow with its square.
 const MOST_DIMENSIONS: usize = 1000;
 
-/// What is used again from sample to sample.
+/// Memory that is reused from sample to sample.
 #[derive(Default)]
 struct Scratch {
     softmax: Softmax,
@@ -149,7 +150,7 @@ impl Loss {
         first_out_of_range(checks)
     }
 
-    /// How many outputs it takes; `None` where any number does, one a class.
+    /// Number of outputs that the loss needs; `None` if any number will do, one for each class.
     #[must_use]
     pub fn outputs(&self) -> Option<usize> {
         match *self {
@@ -160,11 +161,11 @@ impl Loss {
         }
     }
 
-    /// The mean over a batch, by the weights of its samples, and in `gradient` its derivatives with
-    /// respect to the outputs, `batch x out`.
+    /// The mean over a batch, weighted by sample, and in `gradient` its derivatives with respect to the
+    /// outputs, `batch x out`.
     ///
     /// # Errors
-    /// Where outputs and batch do not fit each other, or a field is out of its range.
+    /// [`TrainError`]: outputs and batch do not fit each other, or a field is out of its range.
     pub fn evaluate(
         &self,
         outputs: &Matrix,
@@ -182,7 +183,7 @@ impl Loss {
         let mut loss = 0.0;
         for (i, outputs) in outputs.iter_rows().enumerate() {
             let share = batch.weight(i) / total;
-            // No weight, no share, not even of what is infinite.
+            // A weight of zero excludes even an infinite loss.
             if share == 0.0 {
                 gradient.row_mut(i).fill(0.0);
                 continue;
@@ -195,7 +196,7 @@ impl Loss {
         Ok(loss)
     }
 
-    /// The loss of sample `i`, its derivatives in the scratch.
+    /// The loss of sample `i`; its derivatives are in the scratch.
     fn sample(&self, outputs: &[f32], batch: &Batch, i: usize, scratch: &mut Scratch) -> f64 {
         let Scratch { softmax, gradient } = scratch;
         let capped = |cap: f64| move |k: usize| f64::from(batch.costs.row(i)[k]).min(cap);

@@ -68,13 +68,13 @@ impl Matrix {
         &mut self.values
     }
 
-    /// Row `i` of those there are.
+    /// Row `i`; panics if there is none.
     #[must_use]
     pub fn row(&self, i: usize) -> &[f32] {
         &self.values[i * self.columns..(i + 1) * self.columns]
     }
 
-    /// Row `i` of those there are.
+    /// Row `i`; panics if there is none.
     pub fn row_mut(&mut self, i: usize) -> &mut [f32] {
         &mut self.values[i * self.columns..(i + 1) * self.columns]
     }

@@ -1,15 +1,15 @@
 //! A network: layers one after another.
 //!
-//! Learning goes forward and backward through a [`Tape`], which keeps what each layer put out;
-//! evaluating keeps nothing. [`Network::folded`] multiplies batch normalisation into the dense
-//! layers next to it: of `y = W x + b` and `z = scale y + shift`
+//! Learning goes forward and backward through a [`Tape`], which keeps the output of each layer;
+//! evaluation keeps nothing. [`Network::folded`] multiplies batch normalisation into the dense layers
+//! next to it: for `y = W x + b` and `z = scale y + shift`
 //!
 //! ```text
 //! after a dense layer      W := diag(scale) W,   b := scale b + shift
 //! before a dense layer     b := b + W shift,     W := W diag(scale)
 //! ```
 //!
-//! Networks go to other programs and come from them as ONNX ([`onnx`](crate::learn::onnx)).
+//! Networks are exchanged with other programs as ONNX ([`onnx`](crate::learn::onnx)).
 
 use rand::Rng;
 
@@ -19,10 +19,10 @@ use super::{TrainError, expect_size};
 use crate::space::FieldError;
 use crate::workers::Workers;
 
-/// Most weights of a network, 4 GB: beyond, a size is a mistake.
+/// Largest number of weights: 4 GB.
 const MOST_WEIGHTS: usize = 1 << 30;
 
-/// Most of what dropout may leave out; beyond, hardly a number is left.
+/// Largest probability of dropout; beyond, hardly any number is left.
 const MOST_DROPPED: f64 = 0.99;
 
 /// Layers one after another. See the [module](super).
@@ -32,13 +32,13 @@ pub struct Network {
     stages: Vec<Stage>,
 }
 
-/// What a forward pass leaves for the backward one. One tape serves all steps.
+/// Memory of a forward pass for the backward pass. One tape serves all steps.
 #[derive(Clone, Debug, Default)]
 pub struct Tape {
-    /// The inputs, then what each layer put out.
+    /// The inputs, then the output of each layer.
     values: Vec<Matrix>,
     memories: Vec<Memory>,
-    /// Of every parameter, in their order.
+    /// Gradient of every parameter, in their order.
     gradients: Vec<Matrix>,
 }
 
@@ -56,7 +56,7 @@ impl Tape {
     }
 }
 
-/// What dropout leaves out: the same in the same step of the same seed.
+/// Draw of dropout: the same for the same step and seed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Dropped {
     /// Seed of the training.
@@ -66,8 +66,8 @@ pub struct Dropped {
 }
 
 impl Network {
-    /// A network of so many inputs, its weights drawn (He et al.: normal, variance `2 / inputs`),
-    /// its biases zero.
+    /// A network with this number of inputs, random weights (He et al.: normal, variance `2 / inputs`)
+    /// and biases zero.
     ///
     /// # Errors
     /// Names the first size or probability that is out of its range.
@@ -110,19 +110,20 @@ impl Network {
         })
     }
 
-    /// Its layers.
+    /// The layers.
     #[must_use]
     pub fn layers(&self) -> Vec<Layer> {
         self.stages.iter().map(Stage::layer).collect()
     }
 
-    /// How many numbers are learnt.
+    /// Number of numbers that are learnt.
     #[must_use]
     pub fn weights(&self) -> usize {
         self.parameters().map(|matrix| matrix.values().len()).sum()
     }
 
-    /// What is learnt: of every layer in turn its weight, `out x in` or a row, and its bias, a row.
+    /// The arrays that are learnt: of each layer in turn its weight, `out x in` or a row, and its bias,
+    /// a row.
     pub fn parameters(&self) -> impl Iterator<Item = &Matrix> {
         self.stages.iter().flat_map(Stage::parameters)
     }
@@ -134,11 +135,11 @@ impl Network {
             .map(|(_, matrix)| matrix)
     }
 
-    /// The outputs, `batch x out`, of inputs `batch x in`: no dropout, running statistics. A sample has the
-    /// same bits in any batch of two or more; alone it agrees to rounding.
+    /// The outputs, `batch x out`, for inputs `batch x in`, without dropout and with running
+    /// statistics. A sample has the same bits in any batch of two or more; alone it agrees to rounding.
     ///
     /// # Errors
-    /// Where the inputs are not as many as the network's.
+    /// [`TrainError::Size`]: the number of inputs is not the network's.
     pub fn evaluate(&self, inputs: &Matrix, workers: &dyn Workers) -> Result<Matrix, TrainError> {
         expect_size("the number of inputs", self.inputs, inputs.columns())?;
         let mut values = None;
@@ -154,11 +155,12 @@ impl Network {
         Ok(values.unwrap_or_else(|| inputs.clone()))
     }
 
-    /// The forward pass of a step: dropout, the statistics of the batch, and a share of them into
-    /// the running ones. The outputs, `batch x out`, are the tape's.
+    /// The forward pass of a step: with dropout and the statistics of the batch, which also update the
+    /// running statistics. The outputs, `batch x out`, are on the tape.
     ///
     /// # Errors
-    /// Where the inputs are not as many as the network's, or one sample is to be normalised.
+    /// [`TrainError`]: the number of inputs is not the network's, or a single sample is to be
+    /// normalised.
     pub fn forward(
         &mut self,
         tape: &mut Tape,
@@ -187,7 +189,7 @@ impl Network {
     /// `batch x out`, to [`Tape::gradients`].
     ///
     /// # Errors
-    /// Where the gradient has not the shape of the tape's outputs.
+    /// [`TrainError::Size`]: the gradient does not have the shape of the tape's outputs.
     pub fn backward(
         &self,
         tape: &mut Tape,
@@ -225,12 +227,12 @@ impl Network {
         Ok(())
     }
 
-    /// The same function for evaluating, without dropout, and without batch normalisation wherever
-    /// a dense layer stands before or after it.
+    /// The same function for evaluation, without dropout, and without batch normalisation wherever a
+    /// dense layer is before or after it.
     #[must_use]
     pub fn folded(&self) -> Self {
         let mut stages: Vec<Stage> = Vec::new();
-        // The batch normalisation that stands before the layer to come.
+        // The batch normalisation that waits for the next dense layer.
         let mut waiting: Option<Stage> = None;
         let kept = (self.stages.iter()).filter(|stage| !matches!(stage, Stage::Dropout { .. }));
         for stage in kept.cloned() {
@@ -325,8 +327,8 @@ fn width_after(layer: Layer, width: usize) -> usize {
     }
 }
 
-/// How many numbers such a network would hold, running statistics included; names the first size or
-/// probability that is out of its range.
+/// Number of numbers of such a network, with running statistics; names the first size or probability
+/// that is out of its range.
 pub(super) fn count_weights(inputs: usize, layers: &[Layer]) -> Result<usize, FieldError> {
     let size = |field, value: usize| FieldError {
         field,
@@ -367,7 +369,7 @@ pub(super) fn count_weights(inputs: usize, layers: &[Layer]) -> Result<usize, Fi
     Ok(weights)
 }
 
-/// A dense layer of what a batch normalisation puts out.
+/// A dense layer with the batch normalisation before it folded into it.
 fn folded_before(mut weight: Matrix, mut bias: Matrix, columns: &[(f64, f64)]) -> Stage {
     for (i, bias) in bias.values_mut().iter_mut().enumerate() {
         let mut sum = f64::from(*bias);

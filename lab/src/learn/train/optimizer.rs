@@ -1,4 +1,4 @@
-//! Steps down a gradient.
+//! Optimisers: SGD with momentum, and Adam.
 //!
 //! ```text
 //! SGD     v := momentum v + g + decay w                                   w := w - rate v
@@ -20,22 +20,22 @@ use super::network::{Network, Tape};
 use crate::space::{FieldError, first_out_of_range};
 use crate::workers::Workers;
 
-/// How a gradient becomes a step.
+/// Method of an optimiser.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum OptimizerMethod {
     /// Stochastic gradient descent.
     Sgd {
-        /// What is left of the velocity after a step, 0 to below 1.
+        /// Decay factor of the velocity per step, 0 to below 1.
         momentum: f64,
         /// Decay of the weights, 0 to 1.
         decay: f64,
     },
     /// Adam with decoupled decay.
     Adam {
-        /// What is left of the mean gradient after a step, 0 to below 1: 0.9 as a rule.
+        /// Decay factor of the mean gradient per step, 0 to below 1; usually 0.9.
         b1: f64,
-        /// The same of its square: 0.999 as a rule.
+        /// Decay factor of the mean square per step; usually 0.999.
         b2: f64,
         /// Decay of the weights, 0 to 1.
         decay: f64,
@@ -45,22 +45,22 @@ pub enum OptimizerMethod {
 /// Keeps Adam from dividing by zero: Kingma and Ba's value.
 const EPSILON: f64 = 1e-8;
 
-/// Numbers of a parameter that one part of the work takes: some 0.1 ms.
+/// Numbers of a parameter in one part of the work: some 0.1 ms.
 const PART: usize = 1 << 17;
 
-/// A method with its memory of past gradients.
+/// An optimiser: a method with its memory of past gradients.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Optimizer {
     method: OptimizerMethod,
     steps: u64,
-    /// Of every parameter the velocity or the mean gradient.
+    /// Velocity or mean gradient of every parameter.
     first: Vec<Matrix>,
-    /// Of every parameter the mean square of the gradient; empty without Adam.
+    /// Mean square of the gradient of every parameter; empty without Adam.
     second: Vec<Matrix>,
 }
 
 impl OptimizerMethod {
-    /// Adam as its authors have it, without decay.
+    /// Adam with its authors' values, without decay.
     pub const ADAM: Self = Self::Adam {
         b1: 0.9,
         b2: 0.999,
@@ -93,7 +93,7 @@ enum Factors {
         rate: f32,
     },
     Adam {
-        /// `b1` and `1 - b1`, which loses no digits in `f64`.
+        /// `b1` and `1 - b1`; the difference is taken in `f64`.
         b1: [f32; 2],
         b2: [f32; 2],
         kept: f32,
@@ -102,7 +102,7 @@ enum Factors {
     },
 }
 
-/// A stretch of one parameter with all that belongs to it.
+/// A stretch of one parameter with its gradient and moments.
 struct Stretch<'a> {
     weights: &'a mut [f32],
     gradient: &'a [f32],
@@ -111,7 +111,7 @@ struct Stretch<'a> {
 }
 
 impl Optimizer {
-    /// Without any past.
+    /// An optimiser without memory.
     ///
     /// # Errors
     /// Names the first field of the method that is out of its range.
@@ -139,7 +139,7 @@ impl Optimizer {
         self.steps
     }
 
-    /// What is remembered of past gradients: velocities or means, and mean squares.
+    /// Memory of past gradients: velocities or means, and mean squares.
     pub(super) fn moments(&self) -> [&[Matrix]; 2] {
         [&self.first, &self.second]
     }
@@ -152,7 +152,7 @@ impl Optimizer {
     /// One step of a network down the gradients of a tape.
     ///
     /// # Errors
-    /// Where network or tape are not those of this optimiser.
+    /// [`TrainError::Size`]: network or tape are not those of this optimiser.
     pub fn step(
         &mut self,
         network: &mut Network,
@@ -222,7 +222,8 @@ impl Optimizer {
     }
 }
 
-/// Fewer stretches than fill the threads are not worth handing over: a parameter has one or more.
+/// Whether there are too few stretches to be worth handing to threads; every parameter has at least
+/// one.
 fn network_is_small(stretches: usize, workers: &dyn Workers) -> bool {
     stretches < 8 * workers.count()
 }

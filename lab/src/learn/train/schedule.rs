@@ -19,33 +19,33 @@ use crate::space::{FieldError, first_out_of_range};
 pub struct Schedule {
     /// Highest rate.
     pub rate: f64,
-    /// Epochs over which the rate rises from zero; none where it is left out.
+    /// Epochs in which the rate rises from zero; zero if left out.
     #[serde(default)]
     pub warm_up: f64,
-    /// What follows; constant where it is left out.
+    /// Shape of the rate after that; constant if left out.
     #[serde(default)]
     pub shape: Shape,
 }
 
-/// How the rate falls.
+/// Shape of the learning rate.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape {
-    /// Not at all.
+    /// Constant.
     #[default]
     Constant,
-    /// By a factor every so many epochs.
+    /// Falls by a factor at regular intervals.
     Step {
         /// Epochs from one fall to the next.
         every: f64,
-        /// What is left of the rate after one.
+        /// Factor of each fall.
         factor: f64,
     },
-    /// As half a period of a cosine.
+    /// Falls as half a period of a cosine.
     Cosine {
         /// Epochs from the highest to the least rate.
         epochs: f64,
-        /// Least rate, as a part of the highest.
+        /// Least rate over the highest.
         least: f64,
     },
 }
@@ -92,7 +92,7 @@ impl Schedule {
         first_out_of_range(checks)
     }
 
-    /// The rate after so many epochs, whole and parts.
+    /// The rate after this number of epochs, which may be fractional.
     #[must_use]
     pub fn rate_after(&self, epochs: f64) -> f64 {
         let shape = match self.shape {

@@ -1,6 +1,6 @@
 //! The losses of a classifier, one sample at a time.
 //!
-//! All are cross-entropies of a softmax of `z_i = gamma_i (a_i - s) + b_i`, where `a` are the
+//! Each is the cross-entropy of a softmax of `z_i = gamma_i (a_i - s) + b_i`, where `a` are the
 //! network's outputs, or an expectation over the plain softmax:
 //!
 //! ```text
@@ -13,10 +13,10 @@
 //! dL/da_k = p_k (J_k - sum_i p_i J_i) + c (p_k - y_k) + h p_k (ln p_k + H)
 //! ```
 //!
-//! The paper's equation 16 has `J` where `gamma` stands here, and its appendix has the sign
-//! of the last line turned: `p_k - y_k` is what finite differences confirm.
+//! The paper's equation 16 has `J` in place of `gamma`, and its appendix has the opposite sign in the
+//! last line; finite differences confirm `p_k - y_k`.
 
-/// A softmax at work: two rows as long as the outputs, kept from sample to sample.
+/// Memory of a softmax: two rows of the length of the outputs, reused from sample to sample.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Softmax {
     gamma: Vec<f64>,
@@ -36,7 +36,7 @@ pub(super) enum Logits {
     Raised(f64),
 }
 
-/// Shares of the loss that goes by expected cost.
+/// Shares of the expected-cost loss.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Shares {
     pub(super) cross_entropy: f64,
@@ -107,7 +107,7 @@ impl Softmax {
     }
 }
 
-/// Makes probabilities of `z`; returns `ln sum exp(z)`.
+/// Replaces `z` by probabilities; returns `ln sum exp(z)`.
 fn normalise(z: &mut [f64]) -> f64 {
     let highest = z.iter().copied().fold(f64::NEG_INFINITY, f64::max);
     let mut sum = 0.0;

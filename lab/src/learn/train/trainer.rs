@@ -1,11 +1,11 @@
 //! Epochs: shuffle, step, validate, keep the best, stop early.
 //!
-//! An epoch visits every sample once, in an order that its number and the seed give, in batches of
-//! equal size; what is left over, less than a batch, has its turn in another epoch. After it the
-//! validation set is evaluated; the network of the least validation loss is kept.
+//! An epoch visits every sample once, in batches of equal size and in an order that its number and the
+//! seed determine; a remainder smaller than a batch waits for another epoch. After each epoch the
+//! validation set is evaluated, and the network with the least validation loss is kept.
 //!
-//! Between epochs all there is fits into [`Trainer::save`], and a training that was stopped there
-//! and resumed gives the same bits as one that was not.
+//! Between epochs [`Trainer::save`] saves the whole state; a training that was stopped there and
+//! resumed gives the same bits as one that was not.
 
 use std::ops::ControlFlow;
 
@@ -21,21 +21,21 @@ use super::{Purpose, TrainError, expect_size, stream};
 use crate::space::FieldError;
 use crate::workers::Workers;
 
-/// How a network is trained.
+/// Settings of a training.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrainingSettings {
-    /// What is to become small.
+    /// The loss.
     pub loss: Loss,
-    /// How a gradient becomes a step.
+    /// Method of the optimiser.
     pub method: OptimizerMethod,
     /// The learning rate.
     pub schedule: Schedule,
-    /// Samples a step; all of them where there are fewer.
+    /// Samples per step; all of them if there are fewer.
     pub batch: usize,
-    /// Epochs at most.
+    /// Largest number of epochs.
     pub epochs: u64,
-    /// Epochs without a lower validation loss after which it is enough; never where it is left out.
+    /// Number of epochs without a lower validation loss after which training stops; never if left out.
     #[serde(default)]
     pub patience: Option<u64>,
     /// Seed of the shuffling and of dropout.
@@ -68,17 +68,17 @@ impl TrainingSettings {
     }
 }
 
-/// What came of an epoch.
+/// Result of an epoch.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Epoch {
-    /// Its number, from one.
+    /// Number of the epoch, from one.
     pub number: u64,
-    /// Mean loss of its steps, each before the step was made.
+    /// Mean loss of the steps, each evaluated before the step.
     pub training_loss: f64,
-    /// Loss over the validation set after it.
+    /// Loss over the validation set after the epoch.
     pub validation_loss: f64,
-    /// Learning rate of its last step.
+    /// Learning rate of the last step.
     pub rate: f64,
     /// Whether no epoch before had a lower validation loss.
     pub is_best: bool,
@@ -87,13 +87,13 @@ pub struct Epoch {
 /// Why training ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// All epochs are through.
+    /// All epochs are done.
     Finished,
-    /// The validation loss has not fallen for as many epochs as patience lasts.
+    /// The validation loss has not fallen for the number of epochs in `patience`.
     StoppedEarly,
-    /// The caller wanted a pause.
+    /// The caller paused the training.
     Paused,
-    /// A loss was no longer finite; the best network before that is kept.
+    /// A loss was not finite; the best network before that is kept.
     Diverged,
 }
 
@@ -107,7 +107,7 @@ pub struct Trainer {
     pub(super) history: Vec<Epoch>,
 }
 
-/// Buffers that live through a run.
+/// Buffers of a run.
 #[derive(Default)]
 struct Workshop {
     tape: Tape,
@@ -116,11 +116,11 @@ struct Workshop {
 }
 
 impl Trainer {
-    /// Training that is to begin.
+    /// A training before its first epoch.
     ///
     /// # Errors
-    /// Names the first setting that is out of its range, or says that the network has another
-    /// number of outputs than the loss takes.
+    /// [`TrainError`]: names the first setting that is out of its range; or the network has another
+    /// number of outputs than the loss needs.
     pub fn new(settings: TrainingSettings, network: Network) -> Result<Self, TrainError> {
         settings.validate()?;
         if let Some(outputs) = settings.loss.outputs() {
@@ -135,35 +135,35 @@ impl Trainer {
         })
     }
 
-    /// The network as it is now.
+    /// The current network.
     #[must_use]
     pub fn network(&self) -> &Network {
         &self.network
     }
 
-    /// The network of the least validation loss; before the first epoch, the initial one.
+    /// The network with the least validation loss; before the first epoch, the initial one.
     #[must_use]
     pub fn best(&self) -> &Network {
         &self.best
     }
 
-    /// All epochs so far.
+    /// The epochs so far.
     #[must_use]
     pub fn history(&self) -> &[Epoch] {
         &self.history
     }
 
-    /// Its settings.
+    /// The settings.
     #[must_use]
     pub fn settings(&self) -> &TrainingSettings {
         &self.settings
     }
 
-    /// Trains until the epochs or the patience are at an end, or `progress`, which sees every epoch,
-    /// breaks off.
+    /// Trains until the last epoch, until patience ends, or until `progress`, which is called after
+    /// every epoch, breaks.
     ///
     /// # Errors
-    /// Where data, loss and network do not fit each other.
+    /// [`TrainError`]: data, loss and network do not fit each other.
     pub fn run(
         &mut self,
         training: &dyn Dataset,
@@ -209,7 +209,7 @@ impl Trainer {
         }
     }
 
-    /// Whether there is nothing left to do.
+    /// The outcome, if training has ended.
     fn end(&self) -> Option<Outcome> {
         let epochs = self.history.len() as u64;
         if epochs >= self.settings.epochs {
@@ -220,7 +220,7 @@ impl Trainer {
         (epochs - best >= patience).then_some(Outcome::StoppedEarly)
     }
 
-    /// Mean loss and last rate of the steps of an epoch; `None` where a loss is not finite.
+    /// Mean loss and last rate of the steps of an epoch; `None` if a loss is not finite.
     fn epoch(
         &mut self,
         training: &dyn Dataset,

@@ -1,10 +1,11 @@
-//! The classes: members of a grid, each with its controller, at a gain that the cycle tells.
+//! Classes: the members of a grid, each with its controller, at a gain that follows from the cycle.
 //!
-//! A class knows its shape; its gain `K` follows from what is measured ([`Measured`]). Costs are those of the
-//! paper's equation 8: `J_k = (J(C_k, G) - J(C, G)) / J(C, G)` of the class's controller on the true process
-//! `G`, whose own `C` is best at exactly 20 degrees of margin, as the class's own was on its process.
+//! A class is a shape; its gain `K` follows from what is measured ([`Measured`]). Costs follow the
+//! paper's equation 8: `J_k = (J(C_k, G) - J(C, G)) / J(C, G)` of the class's controller on the true
+//! process `G`, whose own controller `C` is the best one at exactly 20 degrees of margin, as the
+//! class's is for its own process.
 //!
-//! At a margin `J` alone can be negative, bought with margin. What is minimised is
+//! At a fixed margin `J` alone can be negative, bought with margin. The minimised cost is
 //!
 //! ```text
 //! cost = max(J, 0) + 0.012 per degree of margin below 20
@@ -22,43 +23,43 @@ use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::margins::margins;
 use onecycle_design::soiptd_pd::optimum::{Optimum, pd_at_phase_margin};
 
-/// What a degree of lost margin costs: on (0.3, 2, 0.1) s the best PD at 15 degrees is cheaper than
-/// that at 20 by 6.0 %, five times this.
+/// Cost of a degree of lost margin: on (0.3, 2, 0.1) s the best PD at 15 degrees is 6.0 % cheaper than
+/// at 20 degrees, a fifth of that for each degree.
 const COST_OF_A_DEGREE: f64 = 0.012;
 
-/// Costs from which margins play no part any more: ten times those of neighbours.
+/// Cost above which the margin is not computed: ten times that of neighbouring classes.
 const HIGH_COST: f64 = 1.0;
 
-/// How a class comes to its gain.
+/// How the gain of a class is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Gain {
     /// From the harmonics of both signals.
     #[default]
     Harmonics,
-    /// From the amplitude, against that of the class's own limit cycle: the paper's.
+    /// From the amplitude, relative to the amplitude of the class's own limit cycle: the paper's way.
     Amplitude,
 }
 
-/// What a cycle tells of the gain, whatever the class.
+/// What a cycle says about the gain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Measured {
     /// The harmonics of both signals.
     Harmonics(Harmonics),
-    /// Half the difference of highest and lowest output (output unit), the relay's amplitude one.
+    /// Half the peak-to-peak output (output unit) for a relay amplitude of one.
     Amplitude(f64),
 }
 
-/// A class, its velocity gain one.
+/// A class, with a velocity gain of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Class {
     /// The process.
     pub process: Soiptd,
     /// The best PD at the margin of the space.
     pub pd: Pd,
-    /// Amplitude of its limit cycle without bias under a relay of amplitude one (output unit).
+    /// Amplitude of the limit cycle without bias under a relay of amplitude one (output unit).
     pub amplitude: f64,
-    /// Period of that cycle (s).
+    /// Period of the limit cycle (s).
     pub period_s: f64,
 }
 
@@ -67,16 +68,16 @@ pub struct Class {
 pub struct Classes {
     classes: Vec<Class>,
     phase_margin_rad: f64,
-    /// Row `i`, column `k`: what the controller of `i` costs on `k`.
+    /// Row `i`, column `k`: cost of the controller of `i` on `k`.
     matrix: Matrix,
 }
 
-/// A process with the controller that others are compared with.
+/// A true process with its optimal controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrueProcess {
     /// The process.
     pub process: Soiptd,
-    /// Its best PD at the margin of the space.
+    /// The best PD at the margin of the space.
     pub best: Optimum,
 }
 
@@ -93,7 +94,7 @@ impl Class {
         })
     }
 
-    /// Its velocity gain.
+    /// Velocity gain of the class for a measured cycle.
     #[must_use]
     pub fn gain(&self, measured: &Measured) -> f64 {
         match measured {
@@ -105,7 +106,7 @@ impl Class {
         }
     }
 
-    /// Its controller at that gain.
+    /// Controller of the class at that gain.
     #[must_use]
     pub fn controller(&self, measured: &Measured) -> Pd {
         let gain = self.gain(measured);
@@ -117,10 +118,10 @@ impl Class {
 }
 
 impl TrueProcess {
-    /// Of a process at a margin.
+    /// A true process and its best PD at a margin.
     ///
     /// # Errors
-    /// Where it has no such controller.
+    /// [`ClassifierError`]: the process has no such controller.
     pub fn new(process: Soiptd, phase_margin_rad: f64) -> Result<Self, ClassifierError> {
         Ok(Self {
             best: pd_at_phase_margin(&process, phase_margin_rad)?,
@@ -128,13 +129,13 @@ impl TrueProcess {
         })
     }
 
-    /// What a controller costs here.
+    /// Cost of a controller on this process.
     #[must_use]
     pub fn judge(&self, controller: Pd) -> Deterioration {
         deterioration(controller, &self.process, &self.best)
     }
 
-    /// What is minimised, infinite where unstable.
+    /// The cost that the choice of a class minimises; infinite if unstable.
     #[must_use]
     pub fn cost(&self, controller: Pd) -> f64 {
         let Some(cost) = ise(&self.process, controller) else {
@@ -153,10 +154,10 @@ impl TrueProcess {
 }
 
 impl Classes {
-    /// The members of a grid.
+    /// The classes of a grid.
     ///
     /// # Errors
-    /// Where one has no controller or does not oscillate.
+    /// [`ClassifierError`]: a member has no controller or does not oscillate.
     pub fn of(grid: &Grid) -> Result<Self, ClassifierError> {
         let space = &grid.settings.space;
         let phase_margin_rad = space.phase_margin_rad();
@@ -171,7 +172,7 @@ impl Classes {
         for k in 0..this.len() {
             let on = this.classes[k];
             let truth = this.truth(on.process)?;
-            // Without noise and bias the class's own cycle says this, exactly.
+            // Exact for the class's own cycle without noise and bias.
             let omega_rad_per_s = std::f64::consts::TAU / on.period_s;
             let measured = Measured::Harmonics(Harmonics {
                 first: Response::of(&on.process, omega_rad_per_s),
@@ -184,26 +185,25 @@ impl Classes {
         Ok(this)
     }
 
-    /// How many there are.
+    /// Number of classes.
     #[must_use]
     pub fn len(&self) -> usize {
         self.classes.len()
     }
 
-    /// Whether there are none.
+    /// Whether there are no classes.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.classes.is_empty()
     }
 
-    /// Class `k` of those there are.
+    /// Class `k`; panics if there is none.
     #[must_use]
     pub fn class(&self, k: usize) -> &Class {
         &self.classes[k]
     }
 
-    /// Row `i`, column `k`: what the controller of class `i` costs on class `k`, infinite where it
-    /// is unstable.
+    /// Row `i`, column `k`: cost of the controller of class `i` on class `k`; infinite if unstable.
     #[must_use]
     pub fn matrix(&self) -> &Matrix {
         &self.matrix
@@ -220,15 +220,15 @@ impl Classes {
         ]
     }
 
-    /// A process beside its best controller at the margin of the classes.
+    /// A true process with its best controller at the margin of the classes.
     ///
     /// # Errors
-    /// Where it has none.
+    /// [`ClassifierError`]: the process has no controller.
     pub fn truth(&self, process: Soiptd) -> Result<TrueProcess, ClassifierError> {
         TrueProcess::new(process, self.phase_margin_rad)
     }
 
-    /// What the controller of every class costs on a process, at the gains that a cycle tells.
+    /// Cost of the controller of every class on a process, at the gains that follow from a cycle.
     #[must_use]
     pub fn costs(&self, truth: &TrueProcess, measured: &Measured) -> Vec<f32> {
         let costs = (self.classes.iter()).map(|class| truth.cost(class.controller(measured)));
@@ -236,7 +236,7 @@ impl Classes {
     }
 }
 
-/// The class of least cost, the first where several cost as little.
+/// The class of least cost, the first of equals.
 #[must_use]
 pub fn label(costs: &[f32]) -> usize {
     let mut least = 0;

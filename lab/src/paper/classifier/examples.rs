@@ -1,4 +1,5 @@
-//! Trials as examples: what the network sees, the class that fits best, what all others would cost.
+//! Examples: trials with the inputs of the network, the class that fits best, and the costs of all
+//! others.
 
 use onecycle_onboard::Pd;
 
@@ -12,14 +13,14 @@ use crate::learn::train::{Batch, Dataset, Matrix};
 use crate::workers::Workers;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 
-/// Which processes examples are of.
+/// Processes of the examples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Processes {
-    /// Random ones of the space.
+    /// Random processes of the space.
     Random,
-    /// The same, but every so many a class, one after the other.
+    /// Random processes, but every n-th example is of a class, one after the other.
     RandomAndClasses {
-        /// Every how many.
+        /// The interval `n`.
         every: u64,
     },
     /// The classes themselves, one after the other.
@@ -31,7 +32,7 @@ pub enum Processes {
 struct Example {
     prepared: Prepared,
     truth: TrueProcess,
-    /// From the harmonics, and from the amplitude.
+    /// Measured by harmonics, and by amplitude.
     measured: [Measured; 2],
     costs: Vec<f32>,
 }
@@ -58,7 +59,7 @@ impl Processes {
 }
 
 impl Examples {
-    /// Those of so many trials.
+    /// The examples of this number of trials.
     ///
     /// # Errors
     /// Where a process has no controller.
@@ -105,31 +106,31 @@ impl Examples {
         &self.labels
     }
 
-    /// Trials whose oscillation did not become steady, of which there is no example.
+    /// Number of trials whose oscillation did not become steady; they give no example.
     #[must_use]
     pub fn unsteady(&self) -> u64 {
         self.unsteady
     }
 
-    /// What every class would cost example `i` of those there are.
+    /// Cost of every class for example `i`; panics if there is none.
     #[must_use]
     pub fn costs(&self, i: usize) -> &[f32] {
         &self.examples[i].costs
     }
 
-    /// The inputs of example `i` of those there are.
+    /// Writes the inputs of example `i`.
     pub(super) fn fill_inputs(&self, i: usize, row: &mut [f32]) {
         self.examples[i].prepared.fill(row);
     }
 
-    /// What the controller of a class costs example `i` of those there are.
+    /// Cost of the controller of a class on example `i`; panics if there is none.
     #[must_use]
     pub fn judge(&self, i: usize, classes: &Classes, class: usize) -> Deterioration {
         let truth = &self.examples[i].truth;
         truth.judge(self.controller(i, classes, class, self.gain))
     }
 
-    /// The best class of each example, were its gain found in this way, and what it costs.
+    /// The best class of each example and its cost, with gains found in this way.
     #[must_use]
     pub fn best(&self, classes: &Classes, gain: Gain) -> Vec<(usize, Deterioration)> {
         let best = |example: &Example| {

@@ -13,27 +13,27 @@ use crate::experiments::{
 };
 use crate::space::{FieldError, Space, first_out_of_range};
 
-/// Periods of the noise-free oscillation that an experiment lasts, and that it lasts where it was not
-/// steady by then.
+/// Durations of an experiment in periods of the noise-free oscillation: the second one is used if the
+/// first was too short to become steady.
 const PERIODS: [f64; 2] = [14.0, 60.0];
-/// The same under a bias that is not trimmed: cycles are up to three times as long, and what is left of
-/// a deviation after one is more.
+/// The same durations for a bias that is not trimmed: cycles are up to three times as long and
+/// deviations decay more slowly.
 const UNTRIMMED_PERIODS: [f64; 2] = [50.0, 150.0];
 
-/// A cycle of a relay that follows the bias is steady only up to this many periods of the noise-free
-/// oscillation: on the way there, while the trim still moves, three cycles of five periods can be alike. Of 32,000
-/// random experiments none that had settled was longer than 1.13.
+/// Longest period of a steady cycle with trim, in periods of the noise-free oscillation. While the trim
+/// still moves, three cycles of five periods can be alike. Of 32,000 random experiments no settled one
+/// was longer than 1.13.
 const LONGEST_TRIMMED: f64 = 1.5;
 
-/// Whether the relay follows the bias.
+/// Whether the relay trims the bias away.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Protocol {
-    /// It does: cycles are symmetric.
+    /// The bias is trimmed away: cycles are symmetric.
     Trimmed,
-    /// It does not, as in the paper: the bias is in the cycle.
+    /// The bias is left in, as in the paper.
     Untrimmed,
-    /// The one and the other in turn.
+    /// Trimmed and untrimmed in turn.
     Both,
 }
 
@@ -48,27 +48,28 @@ impl Protocol {
     }
 }
 
-/// How trials are drawn.
+/// Settings of the trials.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trials {
-    /// Where processes come from, and the relay.
+    /// Space of the processes, and the relay.
     pub space: Space,
-    /// Seed of the first; the others follow.
+    /// Seed of the first trial; trial `n` has seed `seed + n`.
     pub seed: u64,
-    /// Input bias, uniform between plus and minus this part of the relay's amplitude.
+    /// Largest input bias over the relay's amplitude; drawn uniformly from plus to minus this value.
     pub bias: f64,
-    /// Noise of a sample, uniform up to this part of the amplitude of the noise-free oscillation.
+    /// Largest noise of a sample over the amplitude of the noise-free oscillation; drawn uniformly from
+    /// zero.
     pub sigma: f64,
-    /// Whether the relay follows the bias.
+    /// Whether the relay trims the bias away.
     pub protocol: Protocol,
 }
 
 /// A trial that came to a steady oscillation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trial {
-    /// The process, its velocity gain one.
+    /// The process, with a velocity gain of one.
     pub process: Soiptd,
-    /// Its last steady cycle.
+    /// The last steady cycle.
     pub cycle: SampledCycle,
 }
 

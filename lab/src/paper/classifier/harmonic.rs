@@ -1,32 +1,32 @@
-//! The response of a process at the harmonics of a cycle, and the gain that it says a class has.
+//! The response of a process at the harmonics of a cycle, and the gain of a class that follows from it.
 //!
-//! In a periodic steady state every harmonic of the output is that of the input times the response
-//! of the process at its frequency, whatever the bias, the smoothing of the relay, its sampling:
+//! In a periodic steady state every harmonic of the output is that of the input times the response of
+//! the process at its frequency, whatever the bias, the smoothing of the relay and the sampling:
 //!
 //! ```text
 //! G(j n w) = Y_n / (U_n H_n),   w = 2 pi / T,   Y_n = sum_k y_k exp(-2 pi i n k / N)
 //! H_n = sin(pi n / N) / (pi n / N) exp(-i pi n / N)
 //! ```
 //!
-//! with the `N` samples of a whole cycle; `H` is that of an input held between samples. Taking `Y_n`
-//! from samples instead of an integral adds the harmonics `N - n, N + n, ..`, some `N^-3` of it.
+//! Here `N` is the number of samples of a whole cycle and `H` belongs to the hold of the input. Taking
+//! `Y_n` from samples instead of an integral adds the harmonics `N - n, N + n, ..`, some `N^-3` of it.
 //!
-//! A class is a process but for its gain. **Its gain is the one that makes its magnitude the measured
-//! one where its phase is the measured one**, at `w_k` with `arg G_k(j w_k) = arg G(j w)`:
+//! A class is a process without its gain. **Its gain makes its magnitude the measured one at the
+//! frequency where its phase is the measured one**, `w_k` with `arg G_k(j w_k) = arg G(j w)`:
 //!
 //! ```text
 //! K_k = |G(j w)| / |G_k(j w_k)|
 //! ```
 //!
-//! Exact for the class that is the process, for then `w_k = w`. Of others it keeps what a tuning rule
-//! keeps, the amplitude at a phase. With magnitudes compared at the same frequency instead,
-//! the best of 182 classes costs 1,000 processes at worst 8.8 % (mean 1.4 %), with amplitudes 6.9 % (0.93 %),
-//! with this 4.1 % (0.53 %).
+//! This is exact for the class that is the process, because then `w_k = w`. For other classes it keeps
+//! what a tuning rule keeps, the amplitude at a phase. Costs of the best of 182 classes on 1,000
+//! processes: at worst 4.1 % (mean 0.53 %); with magnitudes compared at the same frequency 8.8 % (1.4
+//! %), with amplitudes 6.9 % (0.93 %).
 //!
-//! Under a bias that is not trimmed the cycle is up to three times as long and its first harmonic tells
-//! little of where a controller works, but the second is strong then. Both say the same of
-//! the class that is the process; of others their mean is taken, in logarithms, the weight
-//! of the second `(f_1 - f) / (f_1 - f_2)`: where the phase `f` of the relay lies between theirs.
+//! Under a bias that is not trimmed the cycle is up to three times as long. Its first harmonic is then
+//! far from the crossover of a controller, but its second harmonic is strong. Both agree for the class
+//! that is the process; for other classes the gain is their mean in logarithms, where the second has
+//! the weight `(f_1 - f) / (f_1 - f_2)`: the position of the relay's phase `f` between theirs.
 
 use std::f64::consts::{PI, TAU};
 
@@ -46,20 +46,20 @@ pub struct Response {
     pub phase_rad: f64,
 }
 
-/// What a cycle says of the gain.
+/// The harmonics of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Harmonics {
-    /// At the frequency of the cycle.
+    /// Response at the frequency of the cycle.
     pub first: Response,
-    /// At twice that, and how much it counts, below one.
+    /// Response at twice that frequency and its weight, 0 to 1.
     pub second: Option<(Response, f64)>,
 }
 
-/// The second harmonic of the input counts from this part of the first on: less is noise.
+/// Least second harmonic of the input over the first for it to count; below, it is noise.
 const STRONG: f64 = 0.2;
 
 impl Response {
-    /// Of a process at a frequency.
+    /// Response of a process at a frequency.
     #[must_use]
     pub fn of(process: &Soiptd, omega_rad_per_s: f64) -> Self {
         Self {
@@ -69,8 +69,8 @@ impl Response {
         }
     }
 
-    /// The factor on the gain of a process that gives it this magnitude at this phase, sought from a
-    /// frequency on.
+    /// Factor on the gain of a process that gives it this magnitude at this phase; the search starts at
+    /// a frequency.
     fn gain(&self, process: &Soiptd, near_rad_per_s: f64) -> f64 {
         let omega_rad_per_s = frequency_at_phase(process, self.phase_rad, near_rad_per_s)
             .or_else(|| process.frequency_at_phase(self.phase_rad))
@@ -80,7 +80,7 @@ impl Response {
 }
 
 impl Harmonics {
-    /// Those of a whole cycle of a relay with this `beta`; `None` of one that has no first harmonic.
+    /// Harmonics of a whole cycle of a relay with this `beta`; `None` without a first harmonic.
     #[must_use]
     pub fn of(cycle: &SampledCycle, beta: f64) -> Option<Self> {
         let samples = cycle.output.len();
@@ -90,7 +90,7 @@ impl Harmonics {
         let inputs = [1, 2].map(|n| harmonic(&cycle.input, 0.0, n));
         let [first, second] = [1, 2].map(|n| {
             let half_turn = PI * n as f64 / samples as f64;
-            // An input is held from its sample on, so on average half a sample later.
+            // The input is held after its sample, so it acts half a sample later on average.
             let held = Complex64::from_polar(half_turn.sin() / half_turn, -half_turn);
             let response = harmonic(&cycle.output, cycle.drift, n) / (inputs[n - 1] * held);
             Response {
@@ -110,8 +110,8 @@ impl Harmonics {
         Some(Self { first, second })
     }
 
-    /// The factor on the gain of a process that fits best; `near_rad_per_s` is a frequency near the first
-    /// one's.
+    /// Factor on the gain of a process that fits best; `near_rad_per_s` is a frequency near that of the
+    /// first harmonic.
     #[must_use]
     pub fn gain(&self, process: &Soiptd, near_rad_per_s: f64) -> f64 {
         let first = self.first.gain(process, near_rad_per_s);
@@ -125,7 +125,7 @@ impl Harmonics {
     }
 }
 
-/// Sum of a harmonic, of the signal without its drift and about its mean: so less is rounded off.
+/// Fourier sum of a harmonic of the signal without drift and mean, which reduces rounding.
 fn harmonic(signal: &[f32], drift: f64, number: usize) -> Complex64 {
     let samples = signal.len();
     let mean = signal.iter().copied().map(f64::from).sum::<f64>() / samples as f64;
@@ -138,13 +138,13 @@ fn harmonic(signal: &[f32], drift: f64, number: usize) -> Complex64 {
         .sum()
 }
 
-/// Steps of the search: from a frequency within a factor of three, five are enough.
+/// Largest number of steps of the search; from a frequency within a factor of three, five suffice.
 const STEPS: usize = 12;
 
-/// Where the search ends (rad): what rounding leaves of a phase.
+/// Error of the phase at which the search ends (rad): rounding.
 const PHASE_TOLERANCE_RAD: f64 = 1e-13;
 
-/// Frequency of a phase by Newton's method in its logarithm; `None` where that does not converge.
+/// Frequency of a phase by Newton's method in its logarithm; `None` if that does not converge.
 fn frequency_at_phase(process: &Soiptd, phase_rad: f64, near_rad_per_s: f64) -> Option<f64> {
     let (t_prop_s, body_per_s) = (process.t_prop_s(), process.inv_t_body_per_s());
     let mut w = near_rad_per_s;
@@ -156,7 +156,7 @@ fn frequency_at_phase(process: &Soiptd, phase_rad: f64, near_rad_per_s: f64) -> 
         let slope = w * body_per_s / (body_per_s * body_per_s + w * w)
             + w * t_prop_s / (1.0 + (w * t_prop_s).powi(2))
             + w * process.tau_s();
-        // At most a factor of e at a time: beyond, the phase is no straight line.
+        // At most a factor of e per step: beyond, the phase is not linear.
         w *= (off / slope).clamp(-1.0, 1.0).exp();
     }
     None

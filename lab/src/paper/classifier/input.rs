@@ -1,6 +1,6 @@
-//! What the network sees: one cycle as the paper prepares it (its figure 5), or nearly so.
+//! Inputs of the network: one cycle, prepared nearly as in the paper (its figure 5).
 //!
-//! Sampled at 1 ms, output and input of one steady cycle stand one after the other, each of 2260 numbers,
+//! Output and input of one steady cycle, sampled at 1 ms, follow each other with 2260 numbers each,
 //! centred and scaled to an amplitude of one:
 //!
 //! ```text
@@ -8,15 +8,15 @@
 //! stretched  (pv_0 - mean) / a,  ..........,    (u_0 - centre) / h, .., 0, .., 0
 //! ```
 //!
-//! Padded is the paper's. Stretched, the output fills all 2260 numbers whatever the period, which the
-//! padding of the input goes on to tell: the same shape looks the same at every time scale, and is
-//! learnt from far fewer examples.
+//! Padding is the paper's way. Stretched, the output fills all 2260 numbers whatever the period, which
+//! remains visible in the padding of the input. The same shape then looks the same at every time scale
+//! and is learnt from far fewer examples.
 //!
-//! A cycle begins where the relay rises. `a` is the amplitude of the sine that has the output's variance:
-//! half the span, which 3 % of noise raises by a tenth, is no steady measure. The input becomes its
-//! levels, -1 and 1. The paper has 2260 samples for its slowest member; the slowest here have 2310, and up
-//! to three times as many under a bias that is not trimmed: what is padded and beyond is cut off, after
-//! all has been centred and scaled.
+//! A cycle begins at a rise of the relay. `a` is the amplitude of the sine with the output's variance;
+//! half the span would be raised by a tenth by 3 % of noise. The input becomes its levels, -1 and 1.
+//! The paper has 2260 samples for its slowest member; the slowest here have 2310, and up to three times
+//! as many under a bias that is not trimmed. Padded signals are cut off there, after centring and
+//! scaling.
 
 use crate::experiments::SampledCycle;
 
@@ -26,14 +26,14 @@ pub const SAMPLES: usize = 2260;
 /// Numbers that the network sees.
 pub const INPUTS: usize = 2 * SAMPLES;
 
-/// How the output comes to [`SAMPLES`] numbers.
+/// How the output is fitted into [`SAMPLES`] numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fit {
-    /// With zeros behind it: the paper's.
+    /// Padded with zeros: the paper's way.
     #[default]
     Padded,
-    /// Interpolated between its samples.
+    /// Stretched by interpolation.
     Stretched,
 }
 
@@ -46,7 +46,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Of a cycle.
+    /// Prepares a cycle.
     #[must_use]
     pub fn of(cycle: &SampledCycle, fit: Fit) -> Self {
         let mut input = scaled(&cycle.input, span(&cycle.input));
@@ -70,7 +70,7 @@ impl Prepared {
     }
 }
 
-/// About a centre, over an amplitude; zeros of a signal that stands still.
+/// The signal less a centre, over an amplitude; zeros for a constant signal.
 fn scaled(signal: &[f32], (centre, amplitude): (f64, f64)) -> Vec<f32> {
     let scale = if amplitude > 0.0 {
         amplitude.recip()
@@ -81,7 +81,7 @@ fn scaled(signal: &[f32], (centre, amplitude): (f64, f64)) -> Vec<f32> {
     signal.iter().map(scaled).collect()
 }
 
-/// A whole cycle of a periodic signal in as many samples as there is room for, linear between its own.
+/// Stretches a whole cycle of a periodic signal to the length of `to`, linear between samples.
 fn stretch(signal: &[f32], to: &mut [f32]) {
     if signal.is_empty() {
         return;
@@ -95,7 +95,7 @@ fn stretch(signal: &[f32], to: &mut [f32]) {
     }
 }
 
-/// Mean, and amplitude of the sine that has the same variance.
+/// Mean, and amplitude of the sine with the same variance.
 fn level_and_amplitude(signal: &[f32]) -> (f64, f64) {
     let samples = signal.len().max(1) as f64;
     let mean = signal.iter().copied().map(f64::from).sum::<f64>() / samples;

@@ -1,4 +1,4 @@
-//! From the outputs of a network to a class, and what that class's controllers cost.
+//! From the outputs of a network to a class, and the costs of its controllers.
 //!
 //! | rule                | the class picked                                           |
 //! |---------------------|------------------------------------------------------------|
@@ -16,18 +16,18 @@ use onecycle_design::soiptd_pd::deterioration::Deterioration;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PickRule {
-    /// The one with the largest output.
+    /// The class with the largest output.
     MostLikely,
-    /// The one that costs least on average.
+    /// The class with the least expected cost.
     LeastExpectedCost,
 }
 
 impl PickRule {
-    /// Both.
+    /// Both rules.
     pub const ALL: [Self; 2] = [Self::MostLikely, Self::LeastExpectedCost];
 }
 
-/// Cost of an unstable loop in an expectation: as if it were twice as bad as the optimum.
+/// Cost of an unstable loop in an expectation: twice the optimum.
 const UNSTABLE: f64 = 1.0;
 
 /// Probabilities below this part of the highest do not count in an expectation.
@@ -36,29 +36,29 @@ const UNLIKELY: f64 = 1e-6;
 /// Examples evaluated at a time: some tens of MB.
 const BATCH: usize = 512;
 
-/// How the picked classes fare; costs are fractions.
+/// Scores of picked classes; costs are fractions.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Score {
-    /// Examples.
+    /// Number of examples.
     pub examples: usize,
-    /// Part of them whose pick is the best class.
+    /// Fraction of examples whose pick is the best class.
     pub accuracy: f64,
-    /// Mean of `|J|` where stable.
+    /// Mean of `|J|` over the stable loops.
     pub mean: Option<f64>,
-    /// 99 of 100 `|J|` are at most this; null where that one is unstable.
+    /// 99th percentile of `|J|`; null if that loop is unstable.
     pub percentile_99: Option<f64>,
-    /// The largest `|J|` where stable.
+    /// Largest `|J|` of the stable loops.
     pub worst: Option<f64>,
-    /// Mean of `J` with its sign where stable: below zero is bought with margin.
+    /// Mean of `J` with its sign over the stable loops; a negative `J` is bought with margin.
     pub mean_signed: Option<f64>,
-    /// Unstable loops.
+    /// Number of unstable loops.
     pub unstable: usize,
-    /// The least phase margin where stable (rad).
+    /// Least phase margin of the stable loops (rad).
     pub least_margin_rad: Option<f64>,
 }
 
 impl Score {
-    /// Of picks on examples.
+    /// Score of picks on examples.
     #[must_use]
     pub fn of_picks(picks: &[usize], examples: &Examples, classes: &Classes) -> Self {
         let judged = (picks.iter().enumerate())
@@ -67,7 +67,7 @@ impl Score {
         Self::of(judged, examples.labels())
     }
 
-    /// Of the best picks there are, were gains found in this way.
+    /// Score of the best possible picks, with gains found in this way.
     #[must_use]
     pub fn of_best(examples: &Examples, classes: &Classes, gain: Gain) -> Self {
         Self::of(examples.best(classes, gain), examples.labels())
@@ -97,7 +97,7 @@ impl Score {
             *cost = cost.abs();
         }
         costs.sort_unstable_by(f64::total_cmp);
-        // Unstable ones come last.
+        // Unstable loops rank last.
         let rank = (0.99 * examples.saturating_sub(1) as f64).round() as usize;
         Self {
             examples,
@@ -115,7 +115,7 @@ impl Score {
 /// The classes that a network picks for every example, by each of [`PickRule::ALL`].
 ///
 /// # Errors
-/// Where the network has other inputs or outputs than the examples.
+/// [`ClassifierError`]: the network has other inputs or outputs than the examples.
 pub fn picks(
     network: &Network,
     examples: &Examples,
@@ -136,7 +136,7 @@ pub fn picks(
     Ok(picks)
 }
 
-/// The class with the largest output, the first of several.
+/// The class with the largest output, the first of equals.
 #[must_use]
 pub fn most_likely(outputs: &[f32]) -> usize {
     let mut best = 0;
@@ -148,8 +148,8 @@ pub fn most_likely(outputs: &[f32]) -> usize {
     best
 }
 
-/// The class that costs least on average over the softmax of the outputs; row `i`, column `k` of
-/// `costs`: what class `i` costs on `k`.
+/// The class with the least expected cost under the softmax of the outputs; row `i`, column `k` of
+/// `costs` is the cost of class `i` on `k`.
 #[must_use]
 pub fn least_expected_cost(outputs: &[f32], costs: &Matrix) -> usize {
     let highest = outputs.iter().copied().fold(f32::NEG_INFINITY, f32::max);

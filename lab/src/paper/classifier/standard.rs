@@ -1,27 +1,27 @@
-//! Inputs about their mean, over their deviation: the coordinates in which a network learns.
+//! Standard coordinates of the inputs: less their mean, over their deviation.
 //!
-//! Numbers of a cycle have large means and unlike variances, and what tells shapes apart is a per cent of
-//! them. Steps down a gradient hardly move along it, whatever the loss: with inputs as they are a network
-//! learns the period and no more. So the first layer learns from
+//! The numbers of a cycle have large means and different variances, and only a per cent of them
+//! distinguishes shapes. Gradient steps hardly move along that part, whatever the loss: with raw inputs
+//! a network learns the period and no more. So the first layer learns from
 //!
 //! ```text
 //! x^ = (x - mean) / (deviation + 0.02)
 //! ```
 //!
-//! over what is learnt from. It is a batch normalisation whose statistics are known beforehand, and stands
-//! as one before the layers of the network that comes out; [`Network::folded`] multiplies it into the
-//! first of them.
+//! with mean and deviation over the training set. This is a batch normalisation with known statistics,
+//! and the finished network has it as its first layer; [`Network::folded`] multiplies it into the next
+//! one.
 
 use super::ClassifierError;
 use super::examples::Examples;
 use super::input::INPUTS;
 use crate::learn::train::{Batch, Dataset, Layer, Network};
 
-/// Keeps numbers that are nearly always the same from counting more than others: a fiftieth of the
-/// amplitude, which is what noise moves them by.
+/// Keeps nearly constant numbers from counting more than others: a fiftieth of the amplitude, which is
+/// the effect of noise.
 const LEAST_DEVIATION: f64 = 0.02;
 
-/// Added to the variance by batch normalisation, here to be taken off before.
+/// Added to the variance by batch normalisation, so it is subtracted here.
 const EPSILON: f64 = 1e-5;
 
 /// Mean and deviation of every input.
@@ -41,7 +41,7 @@ pub struct Standardised<'a> {
 }
 
 impl Standard {
-    /// Of these examples.
+    /// Standard coordinates of these examples.
     #[must_use]
     pub fn of(examples: &Examples) -> Self {
         let mut row = vec![0.0_f32; INPUTS];
@@ -62,10 +62,10 @@ impl Standard {
         Self { mean, deviation }
     }
 
-    /// The same network for inputs as they are: with a batch normalisation before its layers.
+    /// The same network for raw inputs: with a batch normalisation before its layers.
     ///
     /// # Errors
-    /// Where the network has another number of inputs.
+    /// [`ClassifierError`]: the network has another number of inputs.
     pub fn before(&self, network: &Network) -> Result<Network, ClassifierError> {
         let mut layers = vec![Layer::BatchNorm];
         layers.extend(network.layers());

@@ -1,29 +1,29 @@
-//! Many certificates under one bias in one row.
+//! Summary of many certificates under one bias.
 
 use super::{Certificate, CycleStability};
 use crate::space::Range;
 use crate::space::limit_cycle::LimitCycle;
 
-/// What holds of a set of processes under one bias.
+/// Summary for a set of processes under one bias.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct CertificateSummary {
     /// Constant added to the relay's output, whose amplitude is one.
     pub bias: f64,
     /// Number of processes.
     pub processes: usize,
-    /// How many of them have no cycle without bias, or an unstable one.
+    /// Number of processes without a stable cycle at zero bias.
     pub unbiased_failures: usize,
     /// The bare relay.
     pub bare: RelayCounts,
-    /// The relay that turns back.
+    /// The relay with turning back.
     pub turned_back: RelayCounts,
-    /// How many keep a stable cycle where the trim follows the bias.
+    /// Number of processes with a stable cycle while the trim cancels the bias.
     pub trimmed: usize,
     /// The largest spectral radius of those cycles.
     pub trimmed_radius: Option<f64>,
 }
 
-/// What holds of a kind of relay.
+/// Counts for a kind of relay.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct RelayCounts {
     /// Processes with one stable cycle.
@@ -36,16 +36,16 @@ pub struct RelayCounts {
     pub no_cycle: usize,
     /// The least and the largest number of stable cycles of a process.
     pub stable_cycles: (usize, usize),
-    /// The shortest and the longest stable period, in those of the same process without bias.
+    /// Shortest and longest stable period, over the period of the same process without bias.
     pub stretch: Option<Range>,
     /// The largest spectral radius of a cycle, stable or not.
     pub radius: Option<f64>,
-    /// The largest of the smallest spectral radius of each process.
+    /// Over all processes, the largest of the smallest spectral radius of each.
     pub best_radius: Option<f64>,
 }
 
 impl CertificateSummary {
-    /// Of certificates under one bias.
+    /// Summarises certificates under one bias.
     #[must_use]
     pub fn of(bias: f64, certificates: &[Certificate]) -> Self {
         let trimmed = certificates.iter().filter_map(|c| c.trimmed);

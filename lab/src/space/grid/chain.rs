@@ -1,4 +1,5 @@
-//! Chains: as few places of a line as cover an interval, each a given deterioration from the next.
+//! Chains: the fewest places on a line that cover an interval, each a given deterioration from the
+//! next.
 
 use std::cell::Cell;
 
@@ -6,27 +7,27 @@ use crate::space::Range;
 use crate::space::candidate::CandidateError;
 use onecycle_design::roots::root;
 
-/// A line of processes: one coordinate of a layout, the others held.
+/// A line of processes: one coordinate of a layout varies.
 pub(super) trait Line {
-    /// What stands at a coordinate.
+    /// What a coordinate of the line stands for.
     type Place;
 
     fn place(&self, at: f64) -> Result<Self::Place, CandidateError>;
 
-    /// `J_(ij)` between a place and what stands at another coordinate, growing with how far that
-    /// is; infinite where a controller is unstable.
+    /// `J_(ij)` between a place and another coordinate. It grows with the distance of the coordinates
+    /// and is infinite if a controller is unstable.
     fn distance(&self, from: &Self::Place, to: f64) -> Result<f64, CandidateError>;
 }
 
-/// How finely the slack is balanced between the ends of a chain, as a part of its first step:
-/// nothing that a neighbour's coverage would show.
+/// Precision of the balance of slack between the ends of a chain, over its first step: too small to
+/// affect the coverage.
 const BALANCE: f64 = 1e-3;
 
-/// A step is first looked for this far, as a part of what is left of the interval.
+/// First distance of the search for a step, over the remaining interval.
 const FIRST_LOOK: f64 = 1.0 / 32.0;
 
-/// Where a distance stands beside a step: from -1/2 through zero at a step up to 1/2, so that a
-/// search for the root can take infinite distances.
+/// A monotone measure of a distance relative to a step, from -1/2 through zero at the step to 1/2, so
+/// that a root search can handle infinite distances.
 pub(super) fn beyond(distance: f64, step: f64) -> f64 {
     if distance.is_finite() {
         distance / (distance + step) - 0.5
@@ -35,9 +36,9 @@ pub(super) fn beyond(distance: f64, step: f64) -> f64 {
     }
 }
 
-/// Coordinates from low to high whose neighbours are `step` apart, each of them owning the interval
-/// for half a step to either side: one where there is nothing to cover, and never two where one
-/// does. The first and the last are equally far from the ends.
+/// Coordinates from low to high whose neighbours are `step` apart; each one covers half a step to
+/// either side. One coordinate if there is nothing to cover, and never two if one is enough. The first
+/// and the last have the same distance to the ends.
 pub(super) fn cover<L: Line>(
     line: &L,
     (low, high): Range,
@@ -54,7 +55,7 @@ pub(super) fn cover<L: Line>(
     let imbalance = |first: f64| {
         walk.imbalance(low, first, count).unwrap_or_else(|reason| {
             error.set(Some(reason));
-            // A root ends the search.
+            // Zero ends the search.
             0.0
         })
     };
@@ -63,7 +64,7 @@ pub(super) fn cover<L: Line>(
         return Err(reason);
     }
     let balanced = walk.from(first)?;
-    // Without any slack rounding may push the last one out.
+    // Without slack, rounding may push the last one out.
     Ok(if balanced.len() == count {
         balanced
     } else {
@@ -78,7 +79,7 @@ struct Walk<'a, L> {
 }
 
 impl<L: Line> Walk<'_, L> {
-    /// Coordinates from `first` on, a step apart.
+    /// Coordinates from `first` on, one step apart.
     fn from(&self, first: f64) -> Result<Vec<f64>, CandidateError> {
         let mut places = vec![first];
         let mut at = first;
@@ -89,7 +90,7 @@ impl<L: Line> Walk<'_, L> {
         Ok(places)
     }
 
-    /// The coordinate a step further; `None` beyond the end.
+    /// The coordinate one step further; `None` beyond the end.
     fn next(&self, at: f64) -> Result<Option<f64>, CandidateError> {
         let from = self.line.place(at)?;
         let error = Cell::new(None);
@@ -97,7 +98,7 @@ impl<L: Line> Walk<'_, L> {
             Ok(distance) => beyond(distance, self.step),
             Err(reason) => {
                 error.set(Some(reason));
-                // A root ends the search.
+                // Zero ends the search.
                 0.0
             }
         };
@@ -116,8 +117,8 @@ impl<L: Line> Walk<'_, L> {
         error.get().map_or(Ok(found), Err)
     }
 
-    /// How much further the first of `count` places is from the low end than the last from the
-    /// high one.
+    /// Distance of the first of `count` places from the low end minus that of the last from the high
+    /// end.
     fn imbalance(&self, low: f64, first: f64, count: usize) -> Result<f64, CandidateError> {
         let before = self.line.distance(&self.line.place(low)?, first)?;
         let places = self.from(first)?;

@@ -1,34 +1,34 @@
-//! What a grid is for, measured: how far the processes of its space are from their best members.
+//! Check of a grid: distances of random processes of its space from their best members.
 
 use super::index::Index;
 use super::{Grid, GridError, draws};
 use crate::workers::Workers;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 
-/// What random processes of a space cost on the best member each has. Infinite costs are `None`.
+/// Distances and costs of random processes on their best members. Infinite values are `None`.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Check {
-    /// Number of processes: the corners of the space first, then a quarter of them uniform, a
-    /// quarter uniform in logarithms, and half of either kind put on faces, edges and corners.
+    /// Number of processes: the corners of the space first, then a quarter of them uniform, a quarter
+    /// uniform in logarithms, and half of either kind moved to faces, edges and corners.
     pub processes: u64,
     /// Seed of the draws.
     pub seed: u64,
     /// Largest `J_(ij)` between a process and its best member, as a fraction.
     pub worst: Option<f64>,
-    /// Mean of the same.
+    /// Mean `J_(ij)`.
     pub mean: Option<f64>,
-    /// How many are farther than the grid's `J*`.
+    /// Number of processes farther away than the grid's `J*`.
     pub beyond: u64,
-    /// `T_prop`, `T_body`, `tau` (s) of the process that is farthest.
+    /// `T_prop`, `T_body`, `tau` (s) of the farthest process.
     pub worst_at_s: [f64; 3],
     /// Number of its best member.
     pub worst_member: usize,
-    /// Largest `J_ij`: what the best member's controller costs on a process.
+    /// Largest `J_ij`: cost of the best member's controller on a process.
     pub worst_cost: Option<f64>,
-    /// Mean of the same; it may be negative, bought with margin.
+    /// Mean `J_ij`; it may be negative, bought with margin.
     pub mean_cost: Option<f64>,
-    /// Least phase margin that the best member's controller leaves (rad).
+    /// Least phase margin of the best member's controller (rad).
     pub least_margin_rad: Option<f64>,
 }
 
@@ -44,7 +44,7 @@ struct Found {
 /// Draws this many processes and finds the best member of each.
 ///
 /// # Errors
-/// See [`GridError`].
+/// [`GridError`]: a process has no controller or no oscillation.
 pub fn check(
     grid: &Grid,
     processes: u64,

@@ -1,24 +1,24 @@
-//! Random processes that look for holes in a grid: in a space's middle, in its corners, between.
+//! Random processes that search a grid for holes: inside the space, on its faces, in its corners.
 
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use crate::space::Space;
 
-/// Draws of logarithms begin at this part of the highest time, where the lowest is zero.
+/// If the lowest time is zero, logarithmic draws start at this part of the highest time.
 const LEAST_PART: f64 = 1e-3;
 
 /// Number of corners of a box.
 const CORNERS: u64 = 8;
 
-/// Keeps the streams of neighbouring seeds apart: 2^64 over the golden ratio.
+/// Distance of the streams of neighbouring seeds: 2^64 over the golden ratio.
 const STRIDE: u64 = 0x9E37_79B9_7F4A_7C15;
 
 /// `T_prop`, `T_body`, `tau` (s) of draw number `n`.
 ///
-/// The first eight are the corners. Of the others a quarter is uniform in the times, a quarter in
-/// their logarithms, and half is one of these with each time put on its lowest or highest value
-/// with a chance of one half: of these 3/8 lie on a face, 3/8 on an edge, 1/8 in a corner.
+/// The first eight draws are the corners. Of the others a quarter is uniform in the times, a quarter in
+/// their logarithms, and half is one of these with each time moved to its lowest or highest value with
+/// a probability of one half: of these 3/8 lie on a face, 3/8 on an edge, 1/8 in a corner.
 pub(super) fn times_s(space: &Space, seed: u64, n: u64) -> [f64; 3] {
     let mut rng = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(STRIDE).wrapping_add(n));
     let (in_logarithms, on_faces) = (n % 2 == 1, n % 4 >= 2);
@@ -33,7 +33,7 @@ pub(super) fn times_s(space: &Space, seed: u64, n: u64) -> [f64; 3] {
         }
         let inside = if in_logarithms {
             let least = low.max(LEAST_PART * high);
-            // Between zero and nothing there is nothing to draw.
+            // A range of zero to zero has one value.
             if least > 0.0 {
                 least * (high / least).powf(part)
             } else {
@@ -54,8 +54,8 @@ pub(super) fn times_s(space: &Space, seed: u64, n: u64) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    // Eight corners, each once; then all in the box, half of the even ones with a time on a face:
-    // of every four draws two may, each with a chance of 1 - 1/8 = 7/8.
+    // The first eight draws are the eight corners, each once. All later draws lie in the box. Two of
+    // every four draws may have a time on a face, each with a probability of 1 - 1/8 = 7/8:
     #[test]
     fn corners_faces_and_the_inside() {
         let space = Space::MULTIROTOR;

@@ -1,12 +1,12 @@
-//! The fewest members that leave no process of a space farther than `J*` from one of them.
+//! The fewest members such that no process of a space is farther than `J*` from one of them.
 //!
-//! A sample of the space is covered with members of the same sample: greedily first (the process
-//! near the most others, then the one near the most of those left, ..), then by exchange: a member
-//! goes, and others move until all is covered again, or until there is no more patience. Random
-//! processes then look for holes: those without a member join the sample, which is covered anew,
-//! until ten thousand fresh ones find none, not even uphill from where they are.
+//! A sample of the space is covered with members of the same sample: first greedily (the process near
+//! the most others, then the one near the most of the rest, ..), then by exchange: one member is
+//! removed, and others are exchanged until everything is covered again or patience ends. Then random
+//! processes search for holes. Those without a member join the sample, which is covered again, until
+//! ten thousand new ones find no hole, even after walks away from the members.
 //!
-//! Least covers are hard to find; these are covers, and small. References: V. Chvatal, "A greedy
+//! The smallest cover is hard to find; these covers are small. References: V. Chvatal, "A greedy
 //! heuristic for the set-covering problem", Math. Oper. Res. 4 (1979); C. Gao et al., "An efficient
 //! local search heuristic with row weighting for the unicost set covering problem", Eur. J. Oper. Res.
 //! 246 (2015), for the weights.
@@ -29,24 +29,24 @@ const RADII_PER_STEP: f64 = 2.0;
 /// Exchanges without a smaller cover after which the search ends.
 const PATIENCE: u32 = 1000;
 
-/// Random processes among which no hole may be left, and how many are drawn before those among
-/// them without a member are attended to.
+/// Number of random processes without a hole that ends the search, and number of draws before holes
+/// among them are closed.
 const PROOFS: usize = 10_000;
 const BATCH: usize = 2_500;
 
-/// The farthest of them start walks uphill, this many and long: as much work again.
+/// Number and length of walks from the farthest of them away from the members: as much work again.
 const CLIMBERS: usize = 200;
 const STRIDES: usize = 40;
 
-/// Longest stride of a walk (natural logarithms of the times), and what a failure makes of it: the
-/// last of a walk without success is a hundredth of the first.
+/// First stride of a walk (natural logarithms of the times), and its factor after a failure: the last
+/// stride of a walk without success is a hundredth of the first.
 const FIRST_STRIDE: f64 = 0.1;
 const SHORTER: f64 = 0.9;
 
-/// Their seed: not one that people choose.
+/// Seed of these processes, which nobody chooses by chance.
 const SEED: u64 = u64::MAX;
 
-/// The sample is covered within this part of `J*`, and what lies between within that part.
+/// The sample is covered within this part of `J*`, all else within the second part.
 const SHRINK: f64 = 0.95;
 const PROVEN: f64 = 0.97;
 
@@ -76,7 +76,7 @@ pub(super) fn members(
     }
 }
 
-/// Processes all over the space, its faces, edges and corners included.
+/// Processes all over the space, with its faces, edges and corners.
 fn sample(
     settings: &GridSettings,
     workers: &dyn Workers,
@@ -103,7 +103,7 @@ fn ray(settings: &GridSettings, direction: Direction) -> Result<Vec<Candidate>, 
         .collect()
 }
 
-/// Of each of `sample` the numbers of the `others` near it.
+/// For each process of `sample`, the numbers of the `others` near it.
 fn neighbours(
     settings: &GridSettings,
     sample: &[Candidate],
@@ -116,7 +116,7 @@ fn neighbours(
     })
 }
 
-/// Numbers of a greedy cover.
+/// Numbers of the members of a greedy cover.
 fn greedy(near: &[Vec<usize>]) -> Vec<usize> {
     let mut is_left = vec![true; near.len()];
     let mut chosen = Vec::new();
@@ -124,7 +124,7 @@ fn greedy(near: &[Vec<usize>]) -> Vec<usize> {
         let gains = near
             .iter()
             .map(|near| near.iter().filter(|&&point| is_left[point]).count());
-        // The first of the best.
+        // The first of equals.
         let best = gains
             .enumerate()
             .max_by_key(|&(number, gain)| (gain, usize::MAX - number));
@@ -144,9 +144,9 @@ fn greedy(near: &[Vec<usize>]) -> Vec<usize> {
 struct Exchange<'a> {
     near: &'a [Vec<usize>],
     members: Vec<usize>,
-    /// How many members each point is near.
+    /// Number of members near each point.
     owners: Vec<u32>,
-    /// How often each point was left over: what is hard to cover counts more and more.
+    /// How often each point was uncovered: points that are hard to cover gain weight.
     weights: Vec<u64>,
 }
 
@@ -184,7 +184,8 @@ impl<'a> Exchange<'a> {
         best
     }
 
-    /// Removes the member, though not `kept`, whose own points weigh least; the earliest of them.
+    /// Removes the member, other than `kept`, whose own points have the least weight; the earliest of
+    /// equals.
     fn remove_cheapest(&mut self, kept: Option<usize>) {
         let own = |member: &usize| -> u64 {
             let points = self.near[*member].iter();
@@ -203,7 +204,7 @@ impl<'a> Exchange<'a> {
         }
     }
 
-    /// Adds the candidate, of those near the heaviest point left over, whose gain weighs most.
+    /// Adds the candidate near the heaviest uncovered point that gains the most weight.
     fn add_dearest(&mut self) -> Option<usize> {
         let left = (0..self.near.len()).filter(|&point| self.owners[point] == 0);
         let heaviest = left.max_by_key(|&point| (self.weights[point], usize::MAX - point))?;
@@ -212,7 +213,7 @@ impl<'a> Exchange<'a> {
             let gained = points.filter(|&&point| self.owners[point] == 0);
             gained.map(|&point| self.weights[point]).sum()
         };
-        // Nearness is mutual.
+        // Nearness is symmetric.
         let candidates = self.near[heaviest].iter().copied();
         let added =
             candidates.max_by_key(|&candidate| (gain(candidate), usize::MAX - candidate))?;
@@ -227,8 +228,8 @@ impl<'a> Exchange<'a> {
     }
 }
 
-/// Processes that are farther than proven from every member: the first batch of random ones that
-/// has some or, where none has, those uphill from the farthest of all.
+/// Processes that are farther than `PROVEN` from every member: from the first batch of random ones that
+/// has some or, if none has, from walks that start at the farthest of all.
 fn missed(
     settings: &GridSettings,
     chosen: &[Candidate],
@@ -264,7 +265,7 @@ fn missed(
     Ok(beyond(&climbed))
 }
 
-/// A process and how far its nearest member is.
+/// A process and the distance of its nearest member.
 #[derive(Clone, Copy, Debug)]
 struct Far {
     candidate: Candidate,
@@ -288,7 +289,7 @@ impl Far {
     }
 }
 
-/// A random walk in the space that keeps the steps that lead farther away.
+/// A random walk in the space that keeps steps away from the members.
 fn climb(
     settings: &GridSettings,
     index: &Index<'_>,
@@ -331,9 +332,9 @@ mod tests {
         (0..count).map(|k| near(k).collect()).collect()
     }
 
-    // Processes in a line, each near its neighbours. Of six greedy takes number 1 (of those near
-    // the most the first), then 4: what was near 3 and 5. Two is the least for six, each being near
-    // three; of four members of seven the exchange leaves ceil(7/3) = 3.
+    // Processes in a line, each near its neighbours. Of six, greedy takes number 1 (the first of those
+    // near the most), then 4, which is near 3 and 5. Two is the least for six, because each is near
+    // three. From four members of seven, the exchange leaves ceil(7/3) = 3.
     #[test]
     fn covers_by_hand() {
         let six = in_a_line(6);

@@ -1,16 +1,16 @@
-//! The file of a grid: JSON, `"format": "onecycle.grid/1"`; what is unstable or infinite is null.
+//! The file of a grid: JSON, `"format": "onecycle.grid/1"`; unstable or infinite values are null.
 //!
 //! ```text
 //! { "format", "program",           what wrote it
-//!   "settings": { .. },            what it was laid for
-//!   "check": { .. } or null,       what random processes cost, if any were drawn
-//!   "members": [ { .. }, .. ],     one a line
-//!   "matrix": [ [ .. ], .. ] }     row i, column j: J_ij, or null in place of them all
+//!   "settings": { .. },            settings that the grid was made for
+//!   "check": { .. } or null,       costs on random processes
+//!   "members": [ { .. }, .. ],     one member per line
+//!   "matrix": [ [ .. ], .. ] }     row i, column j: J_ij; or null without matrix
 //! ```
 //!
-//! A reader trusts nothing: sizes, ranges, the box, the angles, and of members and matrix a sample
-//! computed afresh; [`GridFile::grid`] computes every member afresh. Where a program is
-//! newer than a file, gains agree to [`AGREEMENT`] or the file is refused.
+//! The reader trusts nothing: it checks sizes, ranges, the box and the angles, and computes a sample of
+//! members and matrix again; [`GridFile::grid`] computes every member again. If the program is newer
+//! than the file, gains must agree to [`AGREEMENT`] or the file is refused.
 
 use std::io::{self, Write};
 
@@ -25,37 +25,37 @@ use crate::workers::Workers;
 /// Changes with every change that a reader could notice.
 pub const FORMAT: &str = "onecycle.grid/1";
 
-/// Relative difference between what a file says and what is computed that is rounding, in either
-/// program: a gain of a grid matters to some 1e-3.
+/// Relative difference between file and computation that counts as rounding, in either program; a gain
+/// of a grid matters to some 1e-3.
 const AGREEMENT: f64 = 1e-6;
 
-/// Elements of the matrix are written to this absolute precision: a ten-thousandth of a percent,
-/// in a third of the digits.
+/// Absolute precision of the elements of the matrix in the file: a ten-thousandth of a per cent, in a
+/// third of the digits.
 const MATRIX_PRECISION: f64 = 1e-6;
 
-/// Members, and elements of the matrix, that [`GridFile::read`] computes afresh.
+/// Number of members, and of elements of the matrix, that [`GridFile::read`] computes again.
 const SAMPLE: usize = 16;
 
-/// A file of a grid, read and found consistent.
+/// A file of a grid that has been read and checked.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GridFile {
     /// [`FORMAT`].
     pub format: String,
-    /// What wrote it.
+    /// Program that wrote the file.
     pub program: String,
-    /// What the grid was laid for.
+    /// Settings of the grid.
     pub settings: GridSettings,
-    /// What random processes cost; `None` if none were drawn.
+    /// Check of the grid; `None` if there was none.
     pub check: Option<Check>,
     /// The members.
     pub members: Vec<MemberRecord>,
-    /// `J_ij`, the controller of `i` on process `j`; `None` where it is unstable. `None` as a whole
-    /// where it was left out.
+    /// `J_ij`, the cost of controller `i` on process `j`; `None` if unstable. `None` as a whole if it
+    /// was left out.
     pub matrix: Option<Vec<Vec<Option<f64>>>>,
 }
 
-/// A member as the file has it.
+/// A member as stored in the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MemberRecord {
@@ -65,18 +65,18 @@ pub struct MemberRecord {
     pub t_body_s: f64,
     /// Dead time (s).
     pub tau_s: f64,
-    /// Angle `theta` of its shape (rad).
+    /// Angle `theta` of the shape (rad).
     pub theta_rad: f64,
-    /// Angle `phi` of its shape (rad).
+    /// Angle `phi` of the shape (rad).
     pub phi_rad: f64,
     /// Radius (s).
     pub r_s: f64,
-    /// `K/T_body`: with this gain a relay of amplitude one makes the amplitude one, or with equal
-    /// gains that of `K = 1`; output unit / (input unit s^2).
+    /// `K/T_body` (output unit / (input unit s^2)): with this gain a relay of amplitude one gives an
+    /// oscillation of amplitude one; with equal gains the one for `K = 1`.
     pub k_over_t_body: f64,
-    /// Proportional gain for that (input unit / output unit).
+    /// Proportional gain for that process (input unit / output unit).
     pub kp: f64,
-    /// Derivative gain for that (input unit s / output unit).
+    /// Derivative gain for that process (input unit s / output unit).
     pub kd: f64,
     /// Squared error of a unit step (output unit^2 s).
     pub ise: f64,
@@ -84,37 +84,37 @@ pub struct MemberRecord {
     pub lead_rad: f64,
     /// Phase margin (rad).
     pub phase_margin_rad: f64,
-    /// Gain margin as a factor; null where no gain is too high.
+    /// Gain margin as a factor; null if no gain is too high.
     pub gain_margin: Option<f64>,
-    /// Row, null without rows.
+    /// Number of the row; null without rows.
     pub row: Option<usize>,
-    /// Ray of the row.
+    /// Number of the ray in the row.
     pub ray: Option<usize>,
-    /// Radius of the ray.
+    /// Number of the radius on the ray.
     pub rung: Option<usize>,
     /// Ratio of neighbouring radii of the ray.
     pub alpha: Option<f64>,
 }
 
-/// Why a file is not taken for a grid.
+/// Why a file is refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FileError {
-    /// It is not JSON, or not with these fields.
+    /// The file is not JSON, or has other fields.
     #[error("not a grid: {0}")]
     Json(String),
-    /// It is of another format.
+    /// The file has another format.
     #[error("the format is {0}, but this program reads {FORMAT:?}: make the grid again")]
     Format(String),
     /// A setting is out of its range.
     #[error("settings: {0}")]
     GridSettings(#[from] FieldError),
-    /// A grid has members.
+    /// The grid has no members.
     #[error("the grid has no members")]
     Empty,
     /// A member contradicts itself, the settings or the program.
     #[error("member {number}: {reason}")]
     Member {
-        /// Counted from zero.
+        /// Number of the member, from zero.
         number: usize,
         /// What is wrong.
         reason: String,
@@ -168,7 +168,7 @@ impl MemberRecord {
         })
     }
 
-    /// The member computed afresh, or what it contradicts.
+    /// The member computed again, or the contradiction.
     fn member(&self, settings: &GridSettings) -> Result<Member, String> {
         let candidate = settings
             .candidate(self.times_s())
@@ -197,14 +197,14 @@ impl MemberRecord {
         ] {
             if !agree(found, expected) {
                 return Err(format!(
-                    "{name} is {found}, but of these times it is {expected}: make the grid again"
+                    "{name} is {found}, but these times give {expected}: make the grid again"
                 ));
             }
         }
         Ok(member)
     }
 
-    /// What is wrong with it that takes no computing.
+    /// Faults that are found without computing the member.
     fn fault(&self, settings: &GridSettings) -> Option<String> {
         for (time_s, (low, high)) in self.times_s().into_iter().zip(settings.space.ranges_s()) {
             let slack = AGREEMENT * high;
@@ -219,15 +219,18 @@ impl MemberRecord {
             || !agree(self.theta_rad, direction.theta_rad)
             || !agree(self.phi_rad, direction.phi_rad)
         {
-            return Some("its angles and radius are not those of its times".to_owned());
+            return Some("its angles and radius do not match its times".to_owned());
         }
         let has_place = self.place().is_some_and(|place| place.alpha > 1.0);
         let has_none = [self.row, self.ray, self.rung] == [None; 3] && self.alpha.is_none();
         match settings.layout {
-            Layout::Rays if !has_place && !has_none => {
-                Some("row, ray, rung and an alpha above one belong together".to_owned())
+            Layout::Rays if !has_place && !has_none => Some(
+                "row, ray, rung and an alpha above 1 must be given together or not at all"
+                    .to_owned(),
+            ),
+            Layout::Fewest if !has_none => {
+                Some("a grid of this layout must not name row, ray, rung or alpha".to_owned())
             }
-            Layout::Fewest if !has_none => Some("this layout has no rows".to_owned()),
             _ => None,
         }
     }
@@ -241,7 +244,7 @@ impl GridFile {
     /// Reads and checks a file.
     ///
     /// # Errors
-    /// One sentence on the first fault: see [`FileError`].
+    /// [`FileError`]: the first fault.
     pub fn read(text: &str) -> Result<Self, FileError> {
         #[derive(Deserialize)]
         struct Head {
@@ -259,10 +262,10 @@ impl GridFile {
         Ok(file)
     }
 
-    /// The grid, every member of it computed afresh.
+    /// The grid, with every member computed again.
     ///
     /// # Errors
-    /// [`FileError::Member`] of one that comes out differently.
+    /// [`FileError::Member`]: a member that differs.
     pub fn grid(&self, workers: &dyn Workers) -> Result<Grid, FileError> {
         let members = workers.map(self.members.len(), |number| self.member(number));
         Ok(Grid {
@@ -284,7 +287,7 @@ impl GridFile {
             if let Some(reason) = record.fault(&self.settings) {
                 return Err(FileError::Member { number, reason });
             }
-            // Members that stand on no ray come last.
+            // Members without a place on a ray come last.
             let place = record.place().map_or((usize::MAX, 0, 0), |place| {
                 (place.row, place.ray, place.rung)
             });
@@ -314,7 +317,7 @@ impl GridFile {
             )));
         }
         for k in 0..SAMPLE {
-            // Two different strides, so that the sample is not a line.
+            // Two different strides, so that the sample is not on a line.
             let (i, j) = (k * count / SAMPLE, (5 * k + 3) % SAMPLE * count / SAMPLE);
             let (made, on) = (self.member(i)?.candidate, self.member(j)?.candidate);
             let expected = made.cost_on(&on);
@@ -327,7 +330,7 @@ impl GridFile {
                     .is_none_or(|order| order.is_gt())
             {
                 return Err(FileError::Matrix(format!(
-                    "row {i}, column {j} is {found}, but of these members it is {expected}"
+                    "row {i}, column {j} is {found}, but these members give {expected}"
                 )));
             }
         }
@@ -335,17 +338,17 @@ impl GridFile {
     }
 }
 
-/// An element of the matrix as files have it.
+/// An element of the matrix as it is stored.
 #[must_use]
 pub fn rounded(cost: f64) -> f64 {
-    // A quotient by a power of ten is the double nearest to few digits; the sum makes -0 a 0.
+    // A quotient by a power of ten is the double nearest to few digits; adding zero turns -0 into 0.
     (cost / MATRIX_PRECISION).round() / MATRIX_PRECISION.recip() + 0.0
 }
 
-/// Writes the file of a grid, with these rows of the matrix if any, as they come.
+/// Writes the file of a grid, with these rows of the matrix if there are any, as they arrive.
 ///
 /// # Errors
-/// Those of `out` and of `matrix`.
+/// Errors of `out` and of `matrix`.
 pub fn write(
     out: &mut dyn Write,
     grid: &Grid,
@@ -375,7 +378,7 @@ pub fn write(
     }
 }
 
-/// The elements of a list, one a line.
+/// Writes the elements of a list, one per line.
 fn write_lines<T: Serialize>(
     out: &mut dyn Write,
     values: impl Iterator<Item = io::Result<T>>,

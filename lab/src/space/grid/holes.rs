@@ -1,19 +1,20 @@
-//! Members for the processes that rays leave without one.
+//! Members that close the holes between rays.
 //!
-//! Where a space is thin (a dead time that is known, a single actuator), a ray has one radius, and
-//! between rays no other is there to help. Random processes look for such holes, and the farthest of
-//! them becomes a member, until none is left: more than `J*` from all others, as members are.
+//! If a space is thin (a known dead time, a single actuator), a ray has one radius, and processes
+//! between rays may be far from all members. Random processes search for such holes, and the farthest
+//! of them becomes a member, until none is left. Such members are more than `J*` from all others, as
+//! all members are.
 
 use super::index::Index;
 use super::{GridSettings, Member, draws};
 use crate::space::candidate::{Candidate, CandidateError};
 use crate::workers::Workers;
 
-/// Random processes that look for holes at once, and their seed: not one that people choose.
+/// Number of random processes in a search, and their seed, which nobody chooses by chance.
 const SEARCHERS: usize = 4000;
 const SEED: u64 = u64::MAX;
 
-/// Adds to `members` until no searcher finds a hole.
+/// Adds to `members` until no search finds a hole.
 pub(super) fn close(
     settings: &GridSettings,
     members: &mut Vec<Member>,
@@ -37,7 +38,7 @@ pub(super) fn close(
     }
 }
 
-/// The next searchers that are farther than `J*` from every member, and how far.
+/// The processes of the next search that are farther than `J*` from every member, with their distances.
 fn search(
     settings: &GridSettings,
     members: &[Member],

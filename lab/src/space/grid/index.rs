@@ -1,17 +1,17 @@
-//! Finds the candidates near a process without asking all of them.
+//! Finds the candidates near a process without comparing it with all of them.
 //!
-//! Of candidates near each other the derivative gains `Kd` are alike, whatever their times: at the
-//! same amplitude under the same relay it is the gain of the loop where it crosses one. Measured
-//! on 3000 random processes of the paper's space, and of one with all times from 1 ms to 10 s and
-//! to 1000 s for the body (every pair; either choice of gains):
+//! Candidates near each other have similar derivative gains `Kd`, whatever their times: at the same
+//! amplitude under the same relay `Kd` is the gain of the loop at its crossover. Measured on 3000
+//! random processes of the paper's space, and of one with all times from 1 ms to 10 s and to 1000 s for
+//! the body (every pair; either choice of gains):
 //!
 //! | `J_(ij)` up to                 | 0.02 | 0.05 | 0.1  | 0.3  | 1    |
 //! |--------------------------------|------|------|------|------|------|
 //! | largest difference of `ln Kd`  | 0.37 | 0.45 | 0.55 | 0.95 | 1.73 |
 //! | `reach`                        | 0.61 | 0.74 | 0.87 | 1.22 | 1.90 |
 //!
-//! Candidates beyond reach are not asked. Should one of them be nearer after all, the distance
-//! found is too large, never too small: a grid that holds by it does hold.
+//! Candidates beyond reach are not compared. If one of them is nearer after all, the distance found is
+//! too large, never too small: a grid that passes its check does hold.
 
 use crate::space::candidate::Candidate;
 
@@ -19,11 +19,11 @@ use crate::space::candidate::Candidate;
 #[derive(Clone, Debug)]
 pub struct Index<'a> {
     candidates: Vec<&'a Candidate>,
-    /// `ln Kd` and number of each, rising.
+    /// `ln Kd` and number of each candidate, rising.
     order: Vec<(f64, usize)>,
 }
 
-/// Difference of `ln Kd` beyond which no candidate is as near as this.
+/// Difference of `ln Kd` beyond which no candidate is within this distance.
 fn reach(distance: f64) -> f64 {
     0.4 + 1.5 * distance.sqrt()
 }
@@ -33,7 +33,7 @@ fn ln_kd(candidate: &Candidate) -> f64 {
 }
 
 impl<'a> Index<'a> {
-    /// Puts candidates in order.
+    /// An index of candidates.
     #[must_use]
     pub fn new(candidates: impl IntoIterator<Item = &'a Candidate>) -> Self {
         let candidates: Vec<&Candidate> = candidates.into_iter().collect();
@@ -46,8 +46,8 @@ impl<'a> Index<'a> {
         Self { candidates, order }
     }
 
-    /// The candidate with the least `J_(ij)`, as its number, and that `J_(ij)`; the one with the
-    /// nearest `Kd` where several are as near. `None` of no candidates.
+    /// Number of the candidate with the least `J_(ij)`, and that `J_(ij)`; of equals the one with the
+    /// nearest `Kd`. `None` without candidates.
     #[must_use]
     pub fn nearest(&self, process: &Candidate) -> Option<(usize, f64)> {
         let key = ln_kd(process);
@@ -56,7 +56,7 @@ impl<'a> Index<'a> {
         let mut above = self.order[middle..].iter().peekable();
         let mut best: Option<(usize, f64)> = None;
         loop {
-            // Outwards, the nearer `Kd` first.
+            // Outwards from the process, the nearer `Kd` first.
             let is_below = match (below.peek(), above.peek()) {
                 (Some(low), Some(high)) => key - low.0 < high.0 - key,
                 (low, _) => low.is_some(),
@@ -76,7 +76,7 @@ impl<'a> Index<'a> {
         best
     }
 
-    /// The numbers of all candidates within `distance`, in the order of `Kd`.
+    /// Numbers of all candidates within `distance`, in the order of `Kd`.
     #[must_use]
     pub fn within(&self, process: &Candidate, distance: f64) -> Vec<usize> {
         let key = ln_kd(process);

@@ -1,18 +1,19 @@
-//! The paper's layout: rows of constant `theta`, on each row rays, on each ray a ladder of radii.
+//! The paper's layout: rows of constant `theta`, rays in each row, a ladder of radii on each ray.
 //!
-//! Processes on two rays are as far apart at every radius (the paper's property 1), so rows and
-//! rays are laid on the sphere of radius one, and a ladder is geometric:
+//! The distance of two rays is the same at every radius (the paper's property 1), so rows and rays are
+//! placed on the sphere of radius one, and a ladder is geometric:
 //!
 //! - rows: `J*` apart in the root mean square over the row, at the same `phi` and radius;
 //! - rays of a row: `J*` apart at the same radius, over the angles `phi` that the row has in the space;
 //! - rungs of a ray: radii `alpha^k` with `alpha` the step of that ray, over its radii in the space.
 //!
-//! Rows are farthest apart at their end with the shortest dead time, where the lags alone make the
-//! time scale, and near each other everywhere else. Kept `J*` apart there, they would be more than
-//! twice as many members for no process's good: one in that corner has members of the next rays near.
+//! Rows are farthest apart at their end with the shortest dead time, where the lags alone determine the
+//! time scale, and near each other everywhere else. Rows `J*` apart at that end would need more than
+//! twice as many members without any benefit, because a process in that corner is near members of the
+//! next rays.
 //!
-//! Rows are of constant `theta`, rays of constant `phi`, and not the other way round, because it
-//! takes fewer: 182 against 280 for the paper's space at 10 %.
+//! Rows have constant `theta` and rays constant `phi`, because the other way round takes more members:
+//! 280 instead of 182 for the paper's space at 10 %.
 
 use super::chain::{Line, beyond, cover};
 use super::{GridSettings, Member, Place};
@@ -22,14 +23,14 @@ use crate::space::surface::Direction;
 use crate::workers::Workers;
 use onecycle_design::roots::root;
 
-/// Places at which two rows are compared, from end to end of the first: the distance changes little
-/// from one to the next.
+/// Number of places at which two rows are compared, from end to end of the first: the distance changes
+/// little from one to the next.
 const PLACES_PER_ROW: usize = 9;
 
 /// The angles `theta` (rad) of the rows.
 ///
 /// # Errors
-/// See [`CandidateError`].
+/// [`CandidateError`]: a process has no controller or no oscillation.
 pub fn rows(settings: &GridSettings, workers: &dyn Workers) -> Result<Vec<f64>, CandidateError> {
     cover(
         &Rows { settings, workers },
@@ -38,7 +39,7 @@ pub fn rows(settings: &GridSettings, workers: &dyn Workers) -> Result<Vec<f64>, 
     )
 }
 
-/// A ray and its ladder: all that its members are made of.
+/// A ray with its ladder, from which its members follow.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ray {
@@ -46,7 +47,7 @@ pub struct Ray {
     pub theta_rad: f64,
     /// Angle `phi` (rad).
     pub phi_rad: f64,
-    /// Geometric mean of its radii (s).
+    /// Geometric mean of the radii (s).
     pub middle_s: f64,
     /// Ratio of neighbouring radii.
     pub alpha: f64,
@@ -57,7 +58,7 @@ pub struct Ray {
 /// The rays of the row at this `theta`, by rising `phi`.
 ///
 /// # Errors
-/// See [`CandidateError`].
+/// [`CandidateError`]: a process has no controller or no oscillation.
 pub fn row(settings: &GridSettings, theta_rad: f64) -> Result<Vec<Ray>, CandidateError> {
     let Some(range_rad) = settings.space.phi_range_rad(theta_rad) else {
         return Ok(Vec::new());
@@ -76,7 +77,7 @@ pub fn row(settings: &GridSettings, theta_rad: f64) -> Result<Vec<Ray>, Candidat
         .collect()
 }
 
-/// A ladder is first looked along by this much, in natural logarithms: no step is shorter.
+/// First step of the search along a ladder, in natural logarithms; no step is shorter.
 const LEAST_STEP: f64 = 1e-4;
 
 /// The factor `alpha > 1` for which a candidate scaled by it is `deterioration` away.
@@ -90,14 +91,14 @@ pub fn step(candidate: &Candidate, deterioration: f64) -> f64 {
         )
     };
     let (mut near, mut far) = (0.0, LEAST_STEP);
-    // Ends at the latest where times overflow.
+    // Ends at the latest when the times overflow.
     while beyond(far) <= 0.0 {
         (near, far) = (far, 2.0 * far);
     }
     root(beyond, near, far, 0.0).exp()
 }
 
-/// As few rungs as own all radii, each half a step to either side, centred.
+/// The fewest radii that cover the ray, each half a step to either side, centred.
 fn ladder(
     settings: &GridSettings,
     direction: Direction,
@@ -116,10 +117,10 @@ fn ladder(
 }
 
 impl Ray {
-    /// Its members by rising radius; it is the ray number `ray` of the row number `row`.
+    /// Members of the ray by rising radius; `ray` and `row` are its numbers.
     ///
     /// # Errors
-    /// See [`CandidateError`].
+    /// [`CandidateError`]: a process has no controller or no oscillation.
     pub fn members(
         &self,
         settings: &GridSettings,
@@ -173,7 +174,7 @@ impl Line for Row<'_> {
     }
 }
 
-/// The space as a line of `theta`; what stands at one is its row.
+/// The space as a line of `theta`; a place on it is a row.
 struct Rows<'a> {
     settings: &'a GridSettings,
     workers: &'a dyn Workers,

@@ -1,9 +1,9 @@
-//! The Poincare map of a limit cycle, linearised: what a deviation at one rise of the relay's
-//! output has become at the next.
+//! The linearised Poincare map of a limit cycle: the deviation at one rise of the relay's output as a
+//! function of the deviation at the previous rise.
 //!
-//! At a switch the future depends on the state `x = (y, v, f)` and, where the dead time is longer
-//! than the time since the switch before, on how early that one was, `d`: its edge is still under
-//! way. Over a window with `Phi` the transition and `B` the input column,
+//! At a switch the future depends on the state `x = (y, v, f)` and, if the dead time is longer than the
+//! time since the previous switch, on how early that switch was, `d`: its edge is still in the delay.
+//! Over a window with the transition `Phi` and the input column `B`,
 //!
 //! ```text
 //! dx(t) = Phi(t) dx + Phi(t - arrival) B jump d        once the edge that is `d` early has arrived
@@ -11,11 +11,11 @@
 //! dx'   = dx(end) + dx/dt(end) ds,   d' = ds           the deviation as seen from that switch
 //! ```
 //!
-//! Two windows make a cycle. Time shifts are divided out, so that no multiplier is one by itself.
-//! Reference: Astrom (1995), whose formula this is for `beta = 0` without dead time.
+//! Two windows make a cycle. Time shifts are eliminated, so no multiplier is one by itself. Reference:
+//! Astrom (1995), whose formula this is for `beta = 0` without dead time.
 //!
-//! With a trim there are two states more: its deviation in the process, `p`, and at the relay, `q`,
-//! whose edges are the rises.
+//! With a trim there are two more states: its deviation in the process, `p`, and at the relay, `q`. Its
+//! edges are the rises.
 
 use onecycle_onboard::transition::{State, Transition};
 
@@ -25,14 +25,15 @@ use super::waveform::Waveform;
 type Deviation = [f64; ORDER];
 const ORDER: usize = 6;
 
-/// The cycle that is deviated from.
+/// The limit cycle.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Orbit<'a> {
     pub(super) waveform: &'a Waveform,
     pub(super) tau_s: f64,
     /// `-beta` of the switch that ends the high output, and of the other.
     pub(super) b: [f64; 2],
-    /// When the output is lowest while the relay's output is high, and highest while it is low (s).
+    /// Times of the lowest output while the relay's output is high, and of the highest while it is low
+    /// (s).
     pub(super) extremes_s: [f64; 2],
 }
 
@@ -46,8 +47,9 @@ impl Orbit<'_> {
         }))
     }
 
-    /// The same where each rise moves the trim by `trim_gain` times the mean of the relay's output
-    /// about it over the cycle. The dead time must be shorter than the time for which it is high.
+    /// The same with a trim that each rise moves by `trim_gain` times the mean of the relay's output
+    /// about it over the cycle. The dead time must be shorter than the time for which the output is
+    /// high.
     pub(super) fn trimmed_spectral_radius(&self, trim_gain: f64) -> f64 {
         let period_s = self.waveform.period_s;
         let high_share = self.waveform.high_s / period_s;
@@ -56,7 +58,7 @@ impl Orbit<'_> {
             let [.., p, q] = &mut at_fall;
             *p = *q;
             let (mut at_rise, low_later_s) = self.low(&at_fall);
-            // (high - low) / (high + low), differentiated.
+            // Derivative of (high - low) / (high + low).
             let mean = 2.0 * ((1.0 - high_share) * high_later_s - high_share * low_later_s);
             at_rise[5] += trim_gain * mean / period_s;
             at_rise
@@ -92,7 +94,7 @@ impl Orbit<'_> {
         )
     }
 
-    /// The deviation at the end of a window, and how much later that end is (s).
+    /// The deviation at the end of a window, and the delay of that end (s).
     fn cross(&self, deviation: &Deviation, window: Window) -> (Deviation, f64) {
         let length_s = window.end_s - window.start_s;
         let at_extreme = self.after(deviation, &window, window.extreme_s - window.start_s);
@@ -130,17 +132,17 @@ impl Orbit<'_> {
     }
 }
 
-/// A stretch from switch to switch.
+/// An interval from switch to switch.
 #[derive(Clone, Copy, Debug)]
 struct Window {
     start_s: f64,
     end_s: f64,
     b: f64,
     extreme_s: f64,
-    /// When, after the start, the edge of the switch before this window's arrives; negative where it
-    /// did so earlier.
+    /// Time after the start at which the edge of the previous switch arrives; negative if it arrived
+    /// earlier.
     edge_s: f64,
-    /// The jump of the input there.
+    /// Jump of the input at that edge.
     jump: f64,
 }
 
@@ -165,7 +167,7 @@ fn matrix(map: impl Fn(Deviation) -> Deviation) -> Matrix {
     rows
 }
 
-/// Squarings after which the constant of Gelfand's formula has shrunk below rounding.
+/// Number of squarings after which the constant of Gelfand's formula is below rounding.
 const SQUARINGS: i32 = 60;
 
 /// `lim |M^n|^(1/n)`, Gelfand's formula, `n` a power of two.

@@ -1,13 +1,13 @@
-//! Limit cycles of a relay that looks at the output, and switches, at samples only.
+//! Limit cycles of a relay that reads the output, and switches, at samples only.
 //!
-//! Without bias: high for `n` samples, low for `n`. The output is then known, odd about its mean, and
-//! the relay either switches at sample `n` first or it does not; often several `n` will do, and the
-//! start decides. They are stable: a small deviation does not move a switch, so that what is left of
-//! it after a cycle is what the process leaves, but for a shift of the mean output within the bounds
-//! that keep the switches where they are.
+//! Without bias the output is high for `n` samples and low for `n`. The response is then known and odd
+//! about its mean, and the relay either switches first at sample `n` or it does not. Often several `n`
+//! are possible, and the start decides. The cycles are stable: a small deviation does not move a
+//! switch, so it decays as the process does, except for a shift of the mean output within the bounds
+//! that keep the switches in place.
 //!
-//! With a bias `high (1 + bias) = low (1 - bias)` has seldom a solution in whole samples, and the
-//! durations form a pattern over many cycles, or none.
+//! With a bias, `high (1 + bias) = low (1 - bias)` seldom has a solution in whole samples, and the
+//! durations form a pattern over many cycles, or no pattern.
 
 use onecycle_onboard::Soiptd;
 use onecycle_plant::FixedStepProcess;
@@ -18,13 +18,14 @@ use super::{LimitCycle, symmetric};
 /// A limit cycle of the sampled relay without bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledLimitCycle {
-    /// Samples for which the output is high, and low.
+    /// Samples for which the output is high, and equally low.
     pub half_period: u32,
     /// Half the peak-to-peak output, also between samples (output unit).
     pub amplitude: f64,
 }
 
-/// Half periods that are tried, in those of the relay that is not sampled, and samples beyond them.
+/// Range of half periods that are tried, over that of the relay without sampling, and additional
+/// samples.
 const HALF_PERIODS: (f64, f64) = (0.5, 2.0);
 const SAMPLES_BEYOND: f64 = 4.0;
 
@@ -57,7 +58,7 @@ fn cycle_of(
     let waveform = Waveform::new(process, high_s, 2.0 * high_s, 0.0);
     let course = waveform.course(true);
     let [first, last] = [course[0], course[course.len() - 1]];
-    // Odd about its mean: the output at the rise is minus that at the fall.
+    // The response is odd about its mean: the output at the rise is minus that at the fall.
     let mean = 0.5 * (first.y + last.y);
     let level = |sample: u32| waveform.at(f64::from(sample) * sample_s).0.y - mean;
     if first_switch(&course, sample_s, half_period, -beta, level) != Some(half_period) {
@@ -75,8 +76,8 @@ fn cycle_of(
     })
 }
 
-/// The sample at which the relay, high from sample zero on, switches: between turns the output is
-/// monotone, so that it is enough to look at the samples on either side of each.
+/// The sample at which the relay, high from sample zero on, switches. Between turning points the output
+/// is monotone, so it is enough to check the samples on either side of each.
 fn first_switch(
     course: &[Moment],
     sample_s: f64,
@@ -101,34 +102,35 @@ fn first_switch(
         })
 }
 
-/// What the sampled relay has come to after many cycles.
+/// Motion of the sampled relay after many cycles.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Motion {
-    /// It goes through these cycles again and again: samples high, samples low.
+    /// These cycles repeat: samples high, samples low.
     Pattern(Vec<(u32, u32)>),
-    /// It goes on without a repetition that is short enough to be seen.
+    /// No repetition short enough to be seen.
     Wandering {
         /// Samples of the shortest cycle seen, and of the longest.
         period: (u32, u32),
         /// Mean samples of a cycle.
         mean: f64,
     },
-    /// It has stopped switching.
+    /// The relay has stopped switching.
     Stopped,
 }
 
-/// Cycles before the motion is looked at, and cycles that are looked at.
+/// Number of cycles before the motion is observed, and number of cycles observed.
 const SETTLING_CYCLES: usize = 200;
 const OBSERVED_CYCLES: usize = 120;
-/// The longest pattern that is looked for, so that any is seen twice.
+/// Longest pattern that is searched for, so that each is seen twice.
 const LONGEST_PATTERN: usize = OBSERVED_CYCLES / 2;
-/// A relay that has not switched for so many half periods has stopped.
+/// Number of half periods without a switch after which the relay counts as stopped.
 const STOPPED_AFTER: f64 = 100.0;
-/// Two states of a pattern are the same within this part of the amplitude.
+/// Tolerance of equal states in a pattern, over the amplitude.
 const SAME_STATE: f64 = 1e-9;
 
-/// What the relay sampled every `sample_s` comes to under a constant `bias` between -1 and 1, from
-/// half its amplitude below rest. `beta`: of the switch that ends the high output, and of the other.
+/// Motion of the relay sampled every `sample_s` under a constant `bias` between -1 and 1, starting half
+/// its amplitude below rest. `beta` holds the values for the switch that ends the high output and for
+/// the other one.
 #[must_use]
 pub fn motion(process: &Soiptd, beta: [f64; 2], bias: f64, sample_s: f64) -> Option<Motion> {
     let cycle = symmetric(process, 0.5 * (beta[0] + beta[1]))?;
@@ -175,7 +177,7 @@ struct SampledLoop {
 }
 
 impl SampledLoop {
-    /// Samples high and low of the next cycle; `None` where it does not end.
+    /// Samples high and low of the next cycle; `None` if it does not end.
     fn cycle(&mut self) -> Option<(u32, u32)> {
         Some((self.half(1.0, self.b[0])?, self.half(-1.0, self.b[1])?))
     }

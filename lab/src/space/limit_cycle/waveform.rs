@@ -1,26 +1,28 @@
-//! The periodic response of the process to a rectangular wave, exact.
+//! The exact periodic response of a process to a rectangular wave.
 //!
-//! The relay's output is high from `0` to `high_s` and low from there to the period; its edges
-//! reach the process `tau` later. Between edges and window ends the input is constant: at most four
-//! pieces, each a start state and a [`Transition`] away. With the acceleration gain one,
+//! The relay's output is high from `0` to `high_s` and low from there to the period; its edges reach
+//! the process `tau` later. Between edges and window ends the input is constant, so there are at most
+//! four pieces, each with a start state and a [`Transition`]. With the acceleration gain one,
 //!
 //! ```text
 //! f(t) = w + (f0 - w) e^(-p t)                       w the input, p = 1/T_prop, a = 1/T_body
 //! v(t) = v0 e^(-a t) + w E(a, 0) + (f0 - w) E(a, p),   E(x, y) = (e^(-y t) - e^(-x t)) / (x - y)
 //! ```
 //!
-//! The force is periodic by one division; the rate is what brings the output back to where it was,
-//! which holds for a double integrator too; the output itself is free by a constant, here zero at the start.
+//! One division makes the force periodic. The rate follows from the output returning to its value,
+//! which works for a double integrator too. The output itself is free by a constant, here zero at the
+//! start.
 
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::transition::{State, Transition};
 
 use onecycle_design::roots::root;
 
-/// Of a turn, as a part of its piece: the output there is flat, so that its error is the square.
+/// Precision of a turning point, over the length of its piece: the output is flat there, so its error
+/// is the square of this.
 const TURN_TOLERANCE: f64 = 1e-9;
 
-/// Of the bend of the rate, which only has to lie between two turns.
+/// Precision of the extremum of the rate, which only has to lie between two turning points.
 const BEND_TOLERANCE: f64 = 1e-3;
 
 /// A rectangular wave and the process's periodic response to it.
@@ -43,7 +45,7 @@ struct Piece {
     start: State,
 }
 
-/// A moment of the output.
+/// A point of the output.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
     pub(super) time_s: f64,
@@ -51,8 +53,8 @@ pub(super) struct Moment {
 }
 
 impl Waveform {
-    /// For a wave of plus and minus one on top of `bias`, whose mean must be zero, and a dead time
-    /// shorter than the period.
+    /// The response to a wave of plus and minus one on top of `bias`. Its mean must be zero and the
+    /// dead time shorter than the period.
     pub(super) fn new(process: &Soiptd, high_s: f64, period_s: f64, bias: f64) -> Self {
         let (body, prop) = (process.inv_t_body_per_s(), 1.0 / process.t_prop_s());
         let rise_s = process.tau_s();
@@ -64,7 +66,7 @@ impl Waveform {
         for (k, piece) in pieces.iter_mut().enumerate() {
             let end_s = cuts.get(k + 1).copied().unwrap_or(period_s);
             let since_rise_s = (cuts[k] - rise_s).rem_euclid(period_s);
-            // At the fall itself rounding must not tell.
+            // At the fall itself rounding must not decide.
             let is_high = cuts[k] != fall_s && since_rise_s < high_s;
             *piece = Piece {
                 start_s: cuts[k],
@@ -97,8 +99,7 @@ impl Waveform {
         }
     }
 
-    /// State at a time from zero to the period, and the input that is acting there, the old one
-    /// where it just changes.
+    /// State at a time from zero to the period, and the input there; at an edge the input before it.
     pub(super) fn at(&self, time_s: f64) -> (State, f64) {
         let piece = self
             .pieces
@@ -113,8 +114,8 @@ impl Waveform {
         Transition::of_poles(self.body, self.prop, elapsed_s).apply(&piece.start, piece.input)
     }
 
-    /// The output where the relay's output is high or low: its first value, every value at which
-    /// it turns, its last value. Between two of them it is monotone.
+    /// The output while the relay's output is high or low: its first value, its turning points, its
+    /// last value. Between two of them it is monotone.
     pub(super) fn course(&self, high: bool) -> Vec<Moment> {
         let inside = |piece: &&Piece| (piece.start_s < self.high_s) == high && piece.length_s > 0.0;
         let mut course = Vec::with_capacity(6);
@@ -144,7 +145,8 @@ impl Waveform {
         course
     }
 
-    /// Where the rate changes sign within a piece: at most twice, for its derivative does once.
+    /// Times of sign changes of the rate within a piece: at most two, because its derivative changes
+    /// sign once.
     fn turns(&self, piece: &Piece) -> impl Iterator<Item = f64> {
         let rate = |t: f64| self.rate(piece, t);
         let end_s = piece.length_s;
@@ -166,7 +168,7 @@ impl Waveform {
         turns.into_iter().flatten()
     }
 
-    /// Rate after `t` of a piece.
+    /// Rate at time `t` of a piece.
     fn rate(&self, piece: &Piece, t: f64) -> f64 {
         let Piece { input, start, .. } = *piece;
         start.v * (-self.body * t).exp()
@@ -175,7 +177,7 @@ impl Waveform {
     }
 }
 
-/// `(e^(-y t) - e^(-x t)) / (x - y)`, regular where `x` and `y` meet.
+/// `(e^(-y t) - e^(-x t)) / (x - y)`, regular for `x` equal to `y`.
 fn chained(x: f64, y: f64, t: f64) -> f64 {
     let apart = (x - y).abs() * t;
     let ratio = if apart > 0.0 {
@@ -208,7 +210,7 @@ mod tests {
         }
     }
 
-    // The same wave 0.5 s late turns 0.5 s later, in whatever window that falls.
+    // The same wave 0.5 s late turns 0.5 s later, whatever the window.
     #[test]
     fn dead_time_shifts_the_response() {
         let at = |tau_s| {
@@ -223,8 +225,8 @@ mod tests {
         }
     }
 
-    // After a period the state is what it was, with and without damping, at equal lags, and with
-    // a bias whose duty balances it: 0.2 high of (1 - 0.2)/2.
+    // After a period the state returns, with and without damping, at equal lags, and with a bias
+    // balanced by the duty: 0.2 high of (1 - 0.2)/2.
     #[test]
     fn response_is_periodic() {
         for (t_prop, damping, tau) in [(0.3, 0.5, 0.1), (0.05, 0.0, 0.7), (0.25, 4.0, 0.01)] {

@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::{SAMPLE_S, cost, margin, process, processes, relay_test};
 
-/// Plus and minus one at random.
+/// A random sequence of 1 and -1.
 fn coins(samples: usize) -> Vec<f64> {
     let mut rng = Pcg64Mcg::seed_from_u64(3);
     (0..samples)
@@ -25,8 +25,8 @@ fn coins(samples: usize) -> Vec<f64> {
         .collect()
 }
 
-// Of its start the estimator remembers 0.999^20000 = 2e-9, and there is no noise: the coefficients are the
-// model's.
+// The start has a weight of 0.999^20000 = 2e-9 and there is no noise: the coefficients are those of the
+// model.
 #[test]
 fn a_known_model_is_reproduced() {
     let model = [-1.7, 0.72, 0.03, 0.05, -0.02];
@@ -49,8 +49,8 @@ fn a_known_model_is_reproduced() {
     }
 }
 
-// A dead time of up to a sample, two lags and a held input are exactly an ARX(2,2) with one sample of delay,
-// so that the way back is exact, equal lags (to half the digits) and no dead time included.
+// A dead time of up to one sample, two lags and a held input are exactly an ARX(2,2) with one sample of
+// delay. The conversion back is exact, also for equal lags (to half the digits) and without dead time.
 #[test]
 fn a_model_is_its_process() {
     for (k, t_prop_s, t_body_s, tau_s, tolerance) in [
@@ -80,10 +80,11 @@ fn a_model_is_its_process() {
     }
 }
 
-// Poles at 1.01 and 0.5 with a dead time of one sample: an integrator and a lag of 1/ln 2 samples. A pair
-// 0.9 e^(+-0.1j): two lags of -1/ln 0.9 samples. A gain of 2 rates an input a sample: sum b / (1 - 0.5).
+// Poles at 1.01 and 0.5 with a dead time of one sample become an integrator and a lag of 1/ln 2
+// samples. A pair 0.9 e^(+-0.1j) becomes two lags of -1/ln 0.9 samples. The gain is 2 units of rate per
+// unit of input and sample: sum b / (1 - 0.5).
 #[test]
-fn what_is_no_lag_becomes_the_nearest() {
+fn other_poles_become_the_nearest_lags() {
     let of = |a1: f64, a2: f64| {
         let model = Model {
             coefficients: [a1, a2, 1.0, 0.0, 0.0],
@@ -101,9 +102,9 @@ fn what_is_no_lag_becomes_the_nearest() {
     assert!((pair.t_body_s().unwrap() - lag_s).abs() < 1e-12);
 }
 
-// Without noise, filters in proportion to the oscillation leave a few per cent at most (4.3 % on 50 random
-// processes). PX4's own leave ten samples of dead time to a model that holds two: on (0.3, 2, 0.1) its
-// controller is unstable. A rate from a sensor of its own serves as well as differences.
+// Without noise, filters scaled to the oscillation leave an error of a few per cent (at most 4.3 % on
+// 50 random processes). PX4's own filters leave a dead time of ten samples to a model that holds two:
+// on (0.3, 2, 0.1) its controller is unstable.
 #[test]
 fn the_filters_decide() {
     for truth in processes() {

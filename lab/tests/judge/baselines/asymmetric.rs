@@ -32,7 +32,7 @@ fn first_order(delay_s: f64, hysteresis: f64) -> HalfPeriods {
     }
 }
 
-/// The relay on `2 e^(-s)/(3 s + 1)`, exact at the samples, 1 ms apart.
+/// The relay with `2 e^(-s)/(3 s + 1)`, exact at samples of 1 ms.
 fn simulated_first_order(relay: &mut AsymmetricRelay) -> Trace {
     let sample_s = 1e-3;
     let keep = f64::exp(-sample_s / 3.0);
@@ -49,8 +49,8 @@ fn simulated_first_order(relay: &mut AsymmetricRelay) -> Trace {
     trace
 }
 
-// From a simulation the half periods are those above but for the sample that the relay waits at either end:
-// some ms in 2 s and more.
+// Simulated half periods equal those above, except for the sample that the relay waits at each switch:
+// some ms in 2 s or more.
 #[test]
 fn a_recording_is_measured_right() {
     let mut relay = AsymmetricRelay::new(LEVELS.0, LEVELS.1, 0.01).unwrap();
@@ -69,9 +69,9 @@ fn a_recording_is_measured_right() {
     );
 }
 
-// Integrator with dead time by hand, Kv = 0.5, L = 0.2, h = 0.03, levels 2 and -1: from -h the output goes on
-// down by Kv L, then up at Kv 2 to h and on by 2 Kv L: peak to peak 2 h + 3 Kv L = 0.36, t_on = 0.36, t_off
-// = 0.72.
+// Integrator with dead time by hand, Kv = 0.5, L = 0.2, h = 0.03, levels 2 and -1. After -h the output
+// falls on by Kv L, then rises by 2 Kv to h and on by 2 Kv L: peak to peak 2 h + 3 Kv L = 0.36, t_on =
+// 0.36, t_off = 0.72.
 #[test]
 fn an_integrator_by_hand() {
     let half_periods = HalfPeriods {
@@ -87,8 +87,8 @@ fn an_integrator_by_hand() {
     assert!((found.tau_s() - 0.2).abs() < 1e-12, "{found:?}");
 }
 
-// The same simulated, with and without a bias that nobody was told of: exact to the sampling. A cycle may be a
-// sample, 1 ms of 0.3 s and more, longer than the next, and the relay waits for one at either switch.
+// The same in a simulation, with and without an unknown bias: exact to the sampling. A cycle may be one
+// sample (1 ms of 0.3 s or more) longer than the next, and the relay waits one sample at either switch.
 #[test]
 fn an_integrator_from_a_recording_whatever_the_bias() {
     let truth = process(0.5, 1e-9, 1e-9, 0.2);
@@ -108,8 +108,8 @@ fn an_integrator_from_a_recording_whatever_the_bias() {
     }
 }
 
-// The lags of a millionth of the dead time are none to a controller: a thousand times as long they move the
-// gains by less than a per cent.
+// Lags of a millionth of the dead time do not affect the controller: lags a thousand times as long
+// change the gains by less than one per cent.
 #[test]
 fn the_missing_lags_do_not_matter() {
     let [fast, slow] = [1e-6, 1e-3].map(|part| {
@@ -120,8 +120,8 @@ fn the_missing_lags_do_not_matter() {
     assert!((fast.kd / slow.kd - 1.0).abs() < 0.01, "{fast:?} {slow:?}");
 }
 
-// Two lags are not a dead time: on the paper's processes the controller is stable, and costs some 20 to 170 %
-// above the optimum.
+// A model of a dead time instead of two lags: on the paper's processes the controller is stable and
+// costs about 20 to 170 % above the optimum.
 #[test]
 fn lags_taken_for_a_dead_time_cost() {
     for process in processes() {

@@ -15,7 +15,7 @@ fn close(a: f64, b: f64, tolerance: f64) -> bool {
     (a - b).abs() <= tolerance * b.abs()
 }
 
-/// All within a part of what is expected.
+/// Asserts that all gains are within a relative tolerance.
 fn assert_gains(found: Cascade, expected: Cascade, tolerance: f64) {
     for (a, b) in [
         (found.angle_p, expected.angle_p),
@@ -27,9 +27,9 @@ fn assert_gains(found: Cascade, expected: Cascade, tolerance: f64) {
     }
 }
 
-// Poles 0.9 and 0.9, and a rise time that makes exp(-2 rho) = 0.8: p = -1.6, 0.64, so e1 = 1.2, f0 = 1.39,
-// f1 = -2.322, f2 = 0.972; f0 + f1 + f2 = P(1) = 0.04. With sum b 0.15 and lambda 0.17 nu is 0.5:
-// k = 0.378/0.5, 1/Ti = 0.04/(0.01 0.378)/5, Td = 0.01 0.972/0.378; the angle 3/0.756.
+// Poles 0.9 and 0.9, and a rise time with exp(-2 rho) = 0.8: p = -1.6, 0.64, so e1 = 1.2, f0 = 1.39, f1
+// = -2.322, f2 = 0.972; f0 + f1 + f2 = P(1) = 0.04. With sum b = 0.15 and lambda = 0.17, nu is 0.5: k =
+// 0.378/0.5, 1/Ti = 0.04/(0.01 0.378)/5, Td = 0.01 0.972/0.378; the angle gain is 3/0.756.
 #[test]
 fn the_law_by_hand() {
     let model = Model {
@@ -49,7 +49,7 @@ fn the_law_by_hand() {
         rate_d: 0.00972 / 0.378,
     };
     assert_gains(design.cascade(&model).unwrap(), expected, 1e-12);
-    // Below 2 1/s the angle's gain does not go, above 6.5 neither.
+    // The angle gain is limited to 2 .. 6.5 1/s.
     for (stiffness, angle_p) in [(0.1, 2.0), (90.0, 6.5)] {
         let design = Design {
             stiffness,
@@ -59,8 +59,8 @@ fn the_law_by_hand() {
     }
 }
 
-// What PX4's own test of its law expects, to the digits that it states: k 0.129, 1/Ti 11.911/5 1/s,
-// Td 0.0463 s, at a rise time of 0.1 s, nearly Butterworth, detuning 0.5.
+// Expected values of PX4's own test of its law, to the stated digits: k 0.129, 1/Ti 11.911/5 1/s, Td
+// 0.0463 s, at a rise time of 0.1 s, nearly Butterworth, detuning 0.5.
 #[test]
 fn the_law_is_px4s() {
     let model = Model {
@@ -79,7 +79,7 @@ fn the_law_is_px4s() {
     assert!((found.rate_d - 0.0463).abs() < 1e-4, "{found:?}");
 }
 
-/// The gains for a recording, everything in proportion to its oscillation.
+/// The gains for a recording, with all settings scaled to its oscillation.
 fn scaled(signals: &Signals<'_>) -> Cascade {
     let settings = ArxSettings::scaled_to_oscillation(signals).unwrap();
     let model = Model::of_differences(signals, &settings).unwrap();
@@ -87,8 +87,8 @@ fn scaled(signals: &Signals<'_>) -> Cascade {
     design.cascade(&model).unwrap()
 }
 
-// The output in another unit, ten times as large, and the input in one a fourth: gains from angle to
-// input change by 1/40, gains in seconds not at all.
+// With the output in a unit ten times as small and the input in a unit four times as large, the gains
+// from angle to input change by 1/40; gains in seconds do not change.
 #[test]
 fn units_do_not_matter() {
     let trace = relay_test(process(1.0, 0.15, 1.0, 0.05), 0.1, 20.0);
@@ -108,11 +108,11 @@ fn units_do_not_matter() {
     assert_gains(other, expected, 1e-6);
 }
 
-// A process like the vehicle that the numbers are for, under a relay of 5 % of the torque, identified with
-// PX4's own filters: PX4's own gains leave 48.9 degrees and cost 18.9 % less than the best PD, which has no
-// derivative of the rate. In proportion to the oscillation the design is PX4's to within a quarter, for the relay
-// is another one; and on the corners and the middle of the paper's domain it costs 10 to 14 % less than the
-// best PD, at 21 degrees and more.
+// A process like the vehicle of PX4's settings, under a relay of 5 % of the torque, identified with
+// PX4's own filters: PX4's gains leave 48.9 degrees and cost 18.9 % less than the best PD, which has no
+// derivative of the rate. Scaled to the oscillation the design equals PX4's to a quarter, because the
+// relay differs. On the corners and the middle of the paper's domain it costs 10 to 14 % less than the
+// best PD, at 21 degrees or more.
 #[test]
 fn it_flies_its_own_vehicle_and_others() {
     let below = |cascade: Cascade, truth: &Soiptd, margin_deg: f64| {
@@ -147,7 +147,7 @@ fn it_flies_its_own_vehicle_and_others() {
     }
 }
 
-// Without poles and with a gain of the wrong sign nothing flies.
+// Models without poles or with a gain of the wrong sign are refused.
 #[test]
 fn wrong_models_are_refused() {
     for coefficients in [[0.0, 0.0, -5.0, 0.0, 0.0], [-1.8, 0.81, f64::NAN, 0.0, 0.0]] {

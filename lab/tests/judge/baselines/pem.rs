@@ -28,9 +28,9 @@ fn from(start_s: [f64; 3], data: Data) -> PemSettings {
     }
 }
 
-// The model is the process and there is no noise: the fit is the truth, to where rounding stops the
-// optimiser. From rest over the whole recording; in one steady cycle, whose state is not known; and with a
-// bias of 0.3 that is found, too.
+// The model equals the process and there is no noise: the fit is the truth, to the rounding that stops
+// the optimiser. From rest over the whole recording, from one steady cycle with an unknown state, and
+// with a bias of 0.3, which is estimated.
 #[test]
 fn the_truth_is_found_without_noise() {
     let truth = process(2.5, 0.05, 0.5, 0.0207);
@@ -74,9 +74,9 @@ fn the_truth_is_found_without_noise() {
     }
 }
 
-// Table V of the paper, without noise or bias: its first guess arrives (J 0.0 %), its second, fourth and
-// fifth, whose dead time is that of a period or half of one, do not: unstable there, unstable or hundreds
-// of per cent here. The starts of the fair variant arrive without any guess.
+// Table V of the paper, without noise or bias. Its first guess converges (J 0.0 %). Its second, fourth
+// and fifth, whose dead time is a period or half a period, do not: unstable in the paper, unstable or
+// hundreds of per cent here. The starts of `PemSettings::fair` converge without any guess.
 #[test]
 fn the_guess_decides() {
     let truth = process(1.0, 0.02, 0.3, 0.001);
@@ -97,10 +97,10 @@ fn the_guess_decides() {
     assert!(fair.is_some_and(|cost| cost.abs() < 1e-6), "{fair:?}");
 }
 
-// Table VI of the paper at -0.3 h, from the guess that arrives without a bias: unstable from the sweep and
-// off by more than a tenth from a cycle where the bias is ignored; within 5 % from a cycle, as in the paper,
-// where the mean is removed, and by more than 5 % off from the sweep, which is not of whole cycles; no
-// matter where the bias is estimated.
+// Table VI of the paper at -0.3 h, from the guess that converges without bias. If the bias is ignored:
+// unstable from the sweep, and off by more than a tenth from a cycle. If the mean is removed: within 5
+// % from a cycle, as in the paper, but more than 5 % from the sweep, which does not consist of whole
+// cycles. If the bias is estimated: no error.
 #[test]
 fn a_bias_spoils_it_unless_it_is_estimated() {
     let truth = process(1.0, 0.02, 0.3, 0.001);
@@ -134,8 +134,9 @@ fn a_bias_spoils_it_unless_it_is_estimated() {
     }
 }
 
-// The describing function has the period at beta = -0.1 and -0.9, and is off by up to 30 %; a symmetric
-// triangle of phases between leaves the ends within a third of theirs.
+// The describing function gives the periods at beta = -0.1 and -0.9 with an error of up to 30 %. The
+// sweep follows a symmetric triangle of phases between them; its end periods are within a third of
+// those.
 #[test]
 fn the_sweep_goes_from_slow_to_fast() {
     let truth = process(1.0, 0.15, 1.0, 0.05);
@@ -159,9 +160,9 @@ fn the_sweep_goes_from_slow_to_fast() {
     assert_eq!(of((1.5, -0.9)), Some(RelayError::Beta(1.5)));
 }
 
-// Processes of the paper's domain at 3 % noise and up to half the relay's amplitude of bias: every one still
-// switches in the last four seconds of the sweep (periods are 4 s at the longest), and none runs away: the
-// output stays within thirty of the oscillation's amplitudes.
+// Processes of the paper's domain with 3 % noise and a bias of up to half the relay's amplitude. Every
+// one still switches in the last four seconds of the sweep (periods are at most 4 s), and none runs
+// away: outputs stay within thirty amplitudes of the oscillation.
 #[test]
 fn the_sweep_survives_noise_and_bias() {
     let campaign = Campaign {

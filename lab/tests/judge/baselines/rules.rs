@@ -10,7 +10,7 @@ use onecycle_plant::{Controller, Experiment, Noise, Sensed};
 
 use super::{SAMPLE_S, cost, margin, process, processes, relay_test};
 
-/// A square wave: so many samples high, as many low.
+/// A square wave with the given numbers of samples high and low.
 struct SquareWave {
     half: usize,
     sample: usize,
@@ -24,9 +24,9 @@ impl Controller for SquareWave {
     }
 }
 
-// Driven at the gain crossover of its optimum, a process shows there the phase and the magnitude that the
-// optimum answers: the rule for the phase measured gives the optimum back, for any gain. What the samples
-// leave is the alias of the 199th harmonic, of which the output has 199^-4 or less: 1e-9.
+// At the gain crossover of its optimum a process shows the phase and the magnitude that the optimum
+// compensates, so the rule for the measured phase gives the optimum, at any gain. The error of the
+// sampling is the alias of the 199th harmonic, 199^-4 of the output or less: 1e-9.
 #[test]
 fn the_rule_is_the_optimum_at_the_optimum_s_crossover() {
     let half = 100;
@@ -40,7 +40,7 @@ fn the_rule_is_the_optimum_at_the_optimum_s_crossover() {
         let best = pd_at_phase_margin(&process, margin()).unwrap();
         let period_s = std::f64::consts::TAU / best.margins.gain_crossover_rad_per_s;
         let sample_s = period_s / (2 * half) as f64;
-        // Forty times the slowest lag: what is left of the start is e^-40.
+        // Forty times the slowest lag: the transient falls to e^-40.
         let periods = (40.0 * t_body_s / period_s).ceil() + 8.0;
         let experiment = Experiment::new(process, sample_s, periods * period_s);
         let mut wave = SquareWave { half, sample: 0 };
@@ -60,8 +60,8 @@ fn the_rule_is_the_optimum_at_the_optimum_s_crossover() {
     }
 }
 
-// A space of one process has a rule that is exact there. The recording differs from the exact limit cycle
-// by its samples, 1 ms in 2.3 s of the slowest process and at most one per cent of the others' periods.
+// For a space of one process the rule is exact. The recording differs from the exact limit cycle by its
+// sampling: 1 ms in 2.3 s for the slowest process, at most one per cent of the period for the others.
 #[test]
 fn a_rule_for_one_process_gives_back_its_optimum() {
     for process in processes() {
@@ -87,9 +87,10 @@ fn a_rule_for_one_process_gives_back_its_optimum() {
     }
 }
 
-// The paper's rule on cycles without noise or bias: the describing function is off by 5 to 30 % in period and
-// amplitude, which costs up to 12.4 % on 50 random processes of the domain; calibrated to its exact cycles
-// up to 7.9 %; by what was measured 7.1 %. The paper: mean 1.67 %, worst 13.29 %.
+// The paper's rule on cycles without noise or bias: the describing function has errors of 5 to 30 % in
+// period and amplitude, which cost up to 12.4 % on 50 random processes of the domain. Calibrated to
+// exact cycles the rule costs up to 7.9 %; with the measured harmonic 7.1 %. The paper has a mean of
+// 1.67 % and a worst of 13.29 %.
 #[test]
 fn the_paper_s_rule_costs_a_few_per_cent() {
     let exact = calibrated(&Space::MULTIROTOR, 8, 8).unwrap();
@@ -126,7 +127,7 @@ fn no_oscillation_no_rule() {
         matches!(found, Err(BaselineError::NoOscillation(_))),
         "{found:?}"
     );
-    // A margin of 60 deg below the phase of -46.89 deg asks for a lead above 90 deg.
+    // A margin of 60 deg at a phase of -46.89 deg needs a lead above 90 deg.
     let rule = Rule::FirstHarmonic {
         phase_margin_rad: 1.2,
     };
@@ -135,7 +136,7 @@ fn no_oscillation_no_rule() {
         matches!(found, Err(BaselineError::NotThisProcess(_))),
         "{found:?}"
     );
-    // A relay at -80 deg asks for a lead of 100 deg, whose cosine is negative.
+    // A relay at -80 deg needs a lead of 100 deg, whose cosine is negative.
     let rule = Rule::of_relay(f64::sin(-80_f64.to_radians()), margin());
     let found = identify(&signals_of(&trace, SAMPLE_S), &rule, 1);
     assert!(

@@ -10,8 +10,8 @@ use onecycle_lab::workers::OneThread;
 
 use super::{dense, network, random};
 
-/// A network whose normalisation has seen batches, in three places: after a dense layer, before
-/// one, and with none on either side.
+/// A network with trained batch normalisation in three places: after a dense layer, before a dense
+/// layer, and next to none.
 fn seasoned() -> Network {
     let layers = [
         dense(6),
@@ -57,7 +57,7 @@ fn folded_network_is_the_same_function() {
     }
 }
 
-// Numbers go out and in again in the order of the arrays, whose names are PyTorch's.
+// Numbers are written and read in the order of the arrays, whose names are those of PyTorch.
 #[test]
 fn numbers_come_back() {
     let network = seasoned();
@@ -71,7 +71,7 @@ fn numbers_come_back() {
     assert_eq!(arrays[5], ("1.running_var".to_owned(), 1, 6));
 }
 
-// 6 x 4 weights, 6 biases and three rows of six stand before the first variance.
+// 6 x 4 weights, 6 biases and three rows of six come before the first variance.
 #[test]
 fn numbers_of_other_networks_are_refused() {
     let network = seasoned();
@@ -89,11 +89,14 @@ fn numbers_of_other_networks_are_refused() {
     negative[24 + 6 + 3 * 6] = -1.0;
     assert_eq!(
         refused(&negative),
-        "1.running_var of the network holds -1.0"
+        "layer 1 of the network: running_var must not hold -1.0"
     );
     let mut infinite = numbers;
     infinite[24] = f32::INFINITY;
-    assert_eq!(refused(&infinite), "0.bias of the network holds inf");
+    assert_eq!(
+        refused(&infinite),
+        "layer 0 of the network: bias must not hold inf"
+    );
 }
 
 #[test]
@@ -124,19 +127,19 @@ fn checkpoints_are_checked() {
         assert!(head.contains(from), "{head}");
         [head.replace(from, to).as_bytes(), &bytes[end..]].concat()
     };
-    // Two networks and two moments of 3 x 2 weights and 3 biases.
+    // The file holds two networks and two moments, each of 3 x 2 weights and 3 biases.
     let mut negative = bytes.clone();
     let last = negative.len() - 1;
     negative[last] |= 0x80;
     for (bytes, sentence) in [
-        (b"no training".to_vec(), "the file is not one of a training"),
+        (b"no training".to_vec(), "the file is not a saved training"),
         (b"{}\n".to_vec(), "missing field"),
         (replaced("training/2", "training/3"), "another format"),
         (bytes[..bytes.len() - 4].to_vec(), "it is cut off"),
         (bytes[..bytes.len() - 1].to_vec(), "but it holds 35"),
         (
             [&bytes[..], &[0; 4]].concat(),
-            "it goes on after its last number",
+            "bytes follow its last number",
         ),
         (
             replaced("\"outputs\":3", "\"outputs\":300000000"),
@@ -144,7 +147,7 @@ fn checkpoints_are_checked() {
         ),
         (replaced("\"number\":1", "\"number\":2"), "not numbered"),
         (replaced("\"batch\":4", "\"batch\":0"), "batch must be"),
-        (negative, "a moment is -"),
+        (negative, "a moment of the optimizer is -"),
     ] {
         let error = Trainer::resume(&bytes).unwrap_err().to_string();
         assert!(error.contains(sentence), "{error}");

@@ -1,4 +1,4 @@
-//! Every layer and every loss by central differences.
+//! Gradients of every layer and every loss compared with central differences.
 
 use onecycle_lab::learn::train::{
     Batch, Dropped, Gaussian, Layer, Loss, Matrix, Network, Tape, TrainError,
@@ -9,7 +9,7 @@ use super::{dense, network, random, rng};
 
 const DROPPED: Dropped = Dropped { seed: 5, step: 7 };
 
-/// `sum c_ij y_ij` of what the network puts out while learning.
+/// `sum c_ij y_ij` of the outputs in training mode.
 fn weighted_sum(network: &Network, inputs: &Matrix, c: &Matrix) -> f64 {
     let mut tape = Tape::default();
     let mut network = network.clone();
@@ -22,10 +22,10 @@ fn weighted_sum(network: &Network, inputs: &Matrix, c: &Matrix) -> f64 {
         .sum()
 }
 
-/// Largest error of a gradient by the largest gradient, over all parameters.
+/// Largest error of a gradient over the largest gradient, for all parameters.
 ///
-/// Outputs of size one are rounded by 6e-8; steps of 2^-7 to both sides divide that by 0.016, and
-/// the five-point formula leaves `h^4/30 = 1e-10` of the fifth derivative.
+/// Outputs of size 1 are rounded to 6e-8, which steps of 2^-7 to both sides divide by 0.016. The
+/// five-point formula has an error of `h^4/30 = 1e-10` of the fifth derivative.
 fn worst_error(network: &Network, inputs: &Matrix) -> f64 {
     const H: f32 = 1.0 / 128.0;
     let c = random(inputs.rows(), network.outputs(), 99);
@@ -64,7 +64,7 @@ fn worst_error(network: &Network, inputs: &Matrix) -> f64 {
     worst / largest
 }
 
-// What is rounded is some 6e-8/0.016 = 4e-6 an output; a dozen of them are summed.
+// The rounding error is about 6e-8/0.016 = 4e-6 per output; a dozen of them are summed.
 const TOLERANCE: f64 = 5e-5;
 
 #[test]
@@ -74,7 +74,8 @@ fn dense_and_tanh() {
     assert!(error < TOLERANCE, "{error}");
 }
 
-// Two steps of a weight move what goes into a ReLU by 1/64 at most: none is as near to its kink.
+// Two steps of a weight change the input of a ReLU by at most 1/64; every input is farther than that
+// from the kink.
 #[test]
 fn relu() {
     let inputs = random(4, 4, 4);
@@ -87,7 +88,7 @@ fn relu() {
     assert!(error < TOLERANCE, "{error}");
 }
 
-// The first bias has no effect: normalisation takes it out again, and its gradient is zero.
+// The first bias has no effect, because the normalisation removes it; its gradient is zero.
 #[test]
 fn batch_normalisation() {
     let layers = [dense(5), Layer::BatchNorm, Layer::Tanh, dense(3)];
@@ -109,7 +110,7 @@ fn dropout() {
     assert!(error < TOLERANCE, "{error}");
 }
 
-/// Four classes, one pick of them unstable.
+/// Costs of four classes; one pick is unstable.
 fn classified() -> (Matrix, Batch) {
     let mut costs = random(5, 4, 11);
     let classes = vec![2, 0, 1, 1, 3];
@@ -130,8 +131,8 @@ fn classified() -> (Matrix, Batch) {
     (random(5, 4, 13), batch)
 }
 
-/// Largest error of a loss's gradient. Outputs are multiples of the step 2^-10, so nothing is
-/// rounded but the gradient itself, to 6e-8 of its size; `h^4/30` is 3e-14.
+/// Largest error of a loss's gradient. Outputs are multiples of the step 2^-10, so only the gradient is
+/// rounded, to 6e-8 of its size; `h^4/30` is 3e-14.
 fn worst_error_of_loss(loss: Loss, outputs: &Matrix, batch: &Batch) -> f64 {
     const H: f32 = 1.0 / 1024.0;
     let mut gradient = Matrix::default();
@@ -182,13 +183,13 @@ fn losses_of_classes() {
 fn losses_of_densities() {
     let (_, batch) = classified();
     let loss = Loss::Gaussian { dimension: 3 };
-    // Gradients are up to ten, and so is 6e-8 of them.
+    // Gradients are up to 10, so their rounding is up to 10 times 6e-8.
     let error = worst_error_of_loss(loss, &random(5, 9, 14), &batch);
     assert!(error < 1e-6, "{error}");
 }
 
-// The cost of the mean is beyond its scale for some samples and below it for others; where all slopes
-// are zero, or nothing is asked of them, what is left is the Gaussian.
+// The cost of the mean is above its scale for some samples and below it for others. With slopes of
+// zero, or a weight of zero, the Gaussian loss is left.
 #[test]
 fn loss_of_a_density_that_knows_costs() {
     let (_, mut batch) = classified();
@@ -229,8 +230,9 @@ fn loss_of_a_density_that_knows_costs() {
     assert_ne!(gradient.row(1), gaussian.1.row(1));
 }
 
-// One number, mean 3 above y, slope 2, so a cost of 6; scale 8: 5/4 of length. The density is a standard
-// normal one. 4 (5/4 - 1) = 1 comes to its loss, and 4 * 6/64 / (5/4) * 2 = 0.6 to its slope of 3.
+// One value with a mean 3 above y and a slope of 2, so a cost of 6, at a scale of 8: sqrt(1 + (6/8)^2)
+// = 5/4. The density is a standard normal. The loss gains 4 (5/4 - 1) = 1, and its slope of 3 gains 4 *
+// 6/64 / (5/4) * 2 = 0.6.
 #[test]
 fn cost_of_a_mean_by_hand() {
     let batch = Batch {
@@ -251,8 +253,8 @@ fn cost_of_a_mean_by_hand() {
     assert!((gradient.row(0)[0] - 3.6).abs() < 1e-6);
 }
 
-// gamma_k (p_k - y_k), by hand: of outputs 0 and ln 2, T = 1, J_0 = 1, p_0 = 1/(1 + 2), and of
-// outputs ln 2 and 0, p_0 = 4/(4 + 1). J for gamma, as the paper has it, would be 0 for k = T.
+// gamma_k (p_k - y_k) by hand: for outputs 0 and ln 2, T = 1, J_0 = 1, p_0 = 1/(1 + 2); for outputs ln
+// 2 and 0, p_0 = 4/(4 + 1). With J instead of gamma, as printed in the paper, it would be 0 for k = T.
 #[test]
 fn gradient_of_the_modified_softmax() {
     let outputs = Matrix::from_rows(2, 2, vec![0.0, 2_f32.ln(), 2_f32.ln(), 0.0]).unwrap();
@@ -270,14 +272,15 @@ fn gradient_of_the_modified_softmax() {
         (loss - 0.5 * (1.5_f64.ln() + 5_f64.ln())).abs() < 1e-7,
         "{loss}"
     );
-    // Halves: the mean of two samples.
+    // Divided by two: the mean of two samples.
     for (slope, by_hand) in (gradient.values().iter()).zip([2.0 / 3.0, -1.0 / 3.0, 8.0 / 5.0, -0.8])
     {
         assert!((slope - 0.5 * by_hand).abs() < 1e-7, "{slope}");
     }
 }
 
-// The same for outputs shifted alike; the paper's is not, and that is its degenerate optimum.
+// A common shift of all outputs does not change the shifted softmax. It changes the paper's loss, which
+// is the cause of its degenerate optimum.
 #[test]
 fn only_the_shifted_softmax_ignores_a_shift() {
     let (outputs, batch) = classified();
@@ -293,7 +296,7 @@ fn only_the_shifted_softmax_ignores_a_shift() {
     assert!(value(loss, &shifted) < 0.8 * value(loss, &outputs));
 }
 
-// The type that users read agrees with the loss.
+// `Gaussian`, the public type, agrees with the loss.
 #[test]
 fn the_loss_is_that_of_the_gaussian() {
     let (_, batch) = classified();
@@ -312,7 +315,7 @@ fn the_loss_is_that_of_the_gaussian() {
     assert_eq!(Gaussian::from_outputs(3, &[0.0; 8]), None);
 }
 
-// Two samples of which the second counts three times are four, of which three are the same.
+// Two samples, the second with a weight of three, equal four samples of which three are the same.
 #[test]
 fn weights_count_samples() {
     let (outputs, batch) = classified();
@@ -350,7 +353,7 @@ fn what_does_not_fit_is_named() {
         ),
         (
             error(Loss::CrossEntropy, |b| b.weights[0] = -1.0),
-            "the weights of samples must be finite and not negative, and their sum positive",
+            "the weights of the samples must be finite and not negative, and their sum must be positive",
         ),
         (
             error(Loss::CrossEntropy, |b| b.weights = vec![1.0]),
@@ -400,8 +403,9 @@ fn networks_refuse_what_they_cannot_take() {
     }
 }
 
-// Of 100,000 numbers 0.3 are left out, give or take five standard deviations of 0.0014, and the
-// others divided by 0.7; the same in the same step, others in the next, none when evaluating.
+// Of 100,000 numbers a share of 0.3 is dropped (tolerance: five standard deviations of 0.0014) and the
+// others are divided by 0.7. The same step drops the same numbers, the next step others; an evaluation
+// drops none.
 #[test]
 fn dropout_leaves_out_its_share() {
     let mut network = network(1000, &[Layer::Dropout { probability: 0.3 }], 1);
@@ -423,7 +427,7 @@ fn dropout_leaves_out_its_share() {
     assert_eq!(network.evaluate(&ones, &OneThread), Ok(ones));
 }
 
-// Variance 2/50 of 50,000 weights, give or take five standard deviations of 2/50 sqrt(2/50,000).
+// 50,000 weights have a variance of 2/50 (tolerance: five standard deviations of 2/50 sqrt(2/50,000)).
 #[test]
 fn initial_weights_are_those_of_he() {
     let network = network(50, &[dense(1000)], 1);

@@ -1,4 +1,4 @@
-//! What a network must learn, what it must not, and that a training can be stopped and resumed.
+//! Problems that a network must learn, one that it cannot learn, and interrupted trainings.
 
 use std::ops::ControlFlow;
 
@@ -41,7 +41,7 @@ fn xor() -> Batch {
     }
 }
 
-// A line cannot separate it: without a hidden layer the loss falls to ln 2 and no further.
+// A line cannot separate the classes: without a hidden layer the loss does not fall below ln 2.
 #[test]
 fn exclusive_or() {
     let net = network(2, &[dense(8), Layer::Tanh, dense(2)], 1);
@@ -58,9 +58,9 @@ fn exclusive_or() {
     assert!(excess.abs() < 1e-6, "{excess}");
 }
 
-// y = sin 3x + sigma(x) e: a density knows the noise as well. On the data it was trained on it must
-// be as likely as the truth is, and may be more likely only by what its 130 weights can fit of
-// 2000 samples' noise, about 130/2/2000 = 0.03.
+// y = sin 3x + sigma(x) e: the density learns the noise as well. On the training data it must be as
+// likely as the truth. It may be more likely only by the overfit of its 130 weights to the noise of
+// 2000 samples, about 130/2/2000 = 0.03.
 #[test]
 fn regression_learns_mean_and_noise() {
     let mut rng = rng(3);
@@ -97,8 +97,9 @@ fn regression_learns_mean_and_noise() {
     assert!((-0.03..0.01).contains(&excess), "{excess}");
 }
 
-// Three classes alike, a mistake costs 0.2, and the inputs say nothing: no loss below ln 3 has any
-// meaning. The paper's has ln(1 + 2 exp(-0.2 s)) when all outputs are -s, which goes to zero.
+// Three equally likely classes, a mistake costs 0.2, and the inputs carry no information: no meaningful
+// loss is below ln 3. The paper's loss is ln(1 + 2 exp(-0.2 s)) if all outputs are -s, which falls to
+// zero.
 #[test]
 fn the_papers_loss_is_driven_to_zero_by_shifting_all_outputs() {
     let mut costs = Matrix::from_rows(3, 3, vec![0.2; 9]).unwrap();
@@ -125,13 +126,13 @@ fn the_papers_loss_is_driven_to_zero_by_shifting_all_outputs() {
     assert!(loss < 0.03, "{loss}");
     assert!((loss / predicted - 1.0).abs() < 0.01, "{loss} {predicted}");
     let (loss, outputs) = train(Loss::ShiftedSoftmax { cap: 0.2 });
-    // Steps of a tenth circle round the optimum.
+    // Steps of a tenth move around the optimum.
     let excess = loss - 3_f64.ln();
     assert!((-1e-6..0.02).contains(&excess), "{excess}");
     assert!(outputs.iter().all(|a| a.abs() < 20.0), "{outputs:?}");
 }
 
-/// Everything that has a state: normalisation, dropout, moments, a rate that changes.
+/// Everything that has a state: normalisation, dropout, moments, a changing rate.
 fn eventful() -> (TrainingSettings, Network, Batch) {
     let layers = [
         dense(16),
@@ -195,7 +196,7 @@ fn resumed_training_has_the_same_bits() {
     }
 }
 
-// Large enough that products and steps are divided.
+// Large enough that products and steps are split among threads.
 #[test]
 fn two_threads_have_the_same_bits() {
     let layers = [dense(3000), Layer::Tanh, dense(500), Layer::Tanh, dense(5)];
@@ -213,8 +214,8 @@ fn two_threads_have_the_same_bits() {
     assert!(together == alone);
 }
 
-// Validated by the opposite of what it learns, the loss rises once more is learnt than that the
-// classes are equally frequent.
+// The validation samples have the opposite labels, so their loss rises as soon as the network learns
+// more than that the classes are equally frequent.
 #[test]
 fn training_stops_early_and_keeps_the_best() {
     let mut opposite = xor();
@@ -292,6 +293,6 @@ fn settings_are_checked() {
     let error = trainer.run(&Batch::default(), &xor(), &OneThread, go_on);
     assert_eq!(
         error.unwrap_err().to_string(),
-        "there is no sample to learn from"
+        "there are no samples to learn from"
     );
 }

@@ -62,8 +62,8 @@ fn products_of_whole_numbers_are_exact() {
     }
 }
 
-// Both are more than 2^22 multiply-adds; the first is divided by rows, the second by columns, into parts of
-// unequal size.
+// Both products have more than 2^22 multiply-adds; the first is split by rows, the second by columns,
+// into parts of unequal size.
 #[test]
 fn threads_do_not_change_a_bit() {
     for (rows, columns) in [(300, 128), (128, 300)] {
@@ -77,8 +77,8 @@ fn threads_do_not_change_a_bit() {
     }
 }
 
-// One sample takes a path of its own through a layer, several the general one: two layers of sums of 70 and
-// 40 terms near one, rounded by some 6e-8 each.
+// One sample takes its own path through a layer, several samples the general one. Two layers of sums of
+// 70 and 40 terms of the order of 1, each rounded to about 6e-8.
 #[test]
 fn one_sample_evaluates_as_several_do() {
     let kinds = [dense(40), Layer::Tanh, dense(3)];

@@ -1,5 +1,5 @@
-//! Numbers of PyTorch, from `golden/torch_steps.py`, in f64 from the same f32 weights: what differs
-//! is our rounding.
+//! Numbers of PyTorch, from `golden/torch_steps.py`, computed in f64 from the same f32 weights; the
+//! difference is our rounding.
 
 use std::collections::BTreeMap;
 
@@ -65,7 +65,7 @@ fn batch(golden: &Golden) -> Batch {
     }
 }
 
-/// Largest difference, by the largest number.
+/// Largest difference over the largest number.
 fn deviation(ours: &[f32], torch: &[f64]) -> f64 {
     assert_eq!(ours.len(), torch.len());
     let largest = torch.iter().fold(0.0_f64, |max, x| max.max(x.abs()));
@@ -88,7 +88,7 @@ fn pass(network: &mut Network, tape: &mut Tape, batch: &Batch) -> (f64, Matrix) 
     (loss, gradient)
 }
 
-// A dozen roundings of 6e-8 in a row.
+// About a dozen successive roundings of 6e-8.
 const TOLERANCE: f64 = 1e-6;
 
 #[test]
@@ -112,7 +112,7 @@ fn forward_loss_and_gradients() {
     for (gradient, (name, _)) in tape.gradients().iter().zip(names) {
         let torch = &golden.gradients[&name];
         if name == "0.bias" {
-            // Zero but for rounding: normalisation takes the bias out again.
+            // Zero to rounding, because the normalisation removes the bias.
             assert!(torch.iter().all(|x| x.abs() < 1e-15));
             assert!(gradient.values().iter().all(|x| x.abs() < 1e-7));
         } else {
@@ -152,8 +152,8 @@ fn three_steps_of_sgd() {
     }
 }
 
-// Adam divides a gradient by its own size, so that of the first bias, which is zero, becomes steps
-// of 0.01 in a direction that rounding chooses; the running mean follows that bias.
+// Adam divides a gradient by its own size. The gradient of the first bias is zero to rounding, so this
+// bias moves by steps of 0.01 in a direction set by rounding, and the running mean follows it.
 #[test]
 fn three_steps_of_adam() {
     let method = OptimizerMethod::Adam {
@@ -170,7 +170,7 @@ fn three_steps_of_adam() {
             continue;
         }
         let error = deviation(matrix.values(), torch);
-        // A gradient near zero, too, is divided by its size.
+        // Adam divides a gradient near zero by its size, too.
         assert!(error < 1e-5, "{name} {error}");
     }
 }
@@ -189,7 +189,7 @@ fn densities() {
     };
     let mut gradient = Matrix::default();
     let value = loss.evaluate(&outputs, &batch, &mut gradient).unwrap();
-    // In f64 throughout, except for the gradient that is put out.
+    // All in f64, except for the gradient that is returned.
     assert!((value / density.loss - 1.0).abs() < 1e-13, "{value}");
     let error = deviation(gradient.values(), &density.gradient);
     assert!(error < 1e-7, "{error}");

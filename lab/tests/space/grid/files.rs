@@ -1,4 +1,4 @@
-//! Files of grids: they read back, and every kind of damage is refused with a sentence.
+//! Files of grids: they read back, and every kind of damage is refused with an error that names it.
 
 use std::io;
 use std::sync::OnceLock;
@@ -37,7 +37,7 @@ fn file(grid: &Grid, checked: bool) -> String {
     String::from_utf8(bytes).unwrap()
 }
 
-// The same settings, angles and gains come back; the matrix to its precision of 1e-6.
+// Settings, angles and gains read back exactly, the matrix to its precision of 1e-6.
 #[test]
 fn a_file_reads_back() {
     let grid = small();
@@ -63,9 +63,9 @@ fn a_file_reads_back() {
             }
         }
     }
-    // Unstable pairs are null: the slowest member's controller on the fastest.
+    // Unstable pairs are null, such as the slowest member's controller on the fastest process.
     assert!(matrix.iter().flatten().any(Option::is_none));
-    // Written again from what was read it is the same grid, and without a matrix it reads as well.
+    // A grid that is written again after reading is the same, also without a matrix.
     let mut bytes = Vec::new();
     write(&mut bytes, grid, None, None).unwrap();
     let text = String::from_utf8(bytes).unwrap();
@@ -73,7 +73,7 @@ fn a_file_reads_back() {
     assert_eq!(GridFile::read(&text).unwrap().members, read.members);
 }
 
-/// A file with the value of the first `key` after `after` replaced.
+/// The file with the value of the first `key` after `after` replaced.
 fn with(text: &str, after: &str, key: &str, value: &str) -> String {
     let from = text.find(after).unwrap();
     let key = format!("\"{key}\":");
@@ -82,7 +82,7 @@ fn with(text: &str, after: &str, key: &str, value: &str) -> String {
     format!("{}{value}{}", &text[..begin], &text[begin + length..])
 }
 
-/// Asserts that every damage is refused in one sentence that holds its words.
+/// Asserts that every damaged file is refused with an error that contains the given words.
 fn refused(text: &str, damages: &[(String, &str)]) {
     for (number, (damaged, words)) in damages.iter().enumerate() {
         assert_ne!(damaged, text, "damage {number} is none");
@@ -119,7 +119,7 @@ fn damaged_settings_are_refused() {
             (head("beta", "-0.5"), "member 0: k_over_t_body"),
             (
                 head("layout", "\"fewest\""),
-                "member 0: this layout has no rows",
+                "member 0: a grid of this layout must not name row",
             ),
         ],
     );
@@ -185,7 +185,7 @@ fn damaged_matrices_are_refused() {
     );
 }
 
-// A member that no sample meets is found when the grid is made of the file.
+// Reading checks a sample of the members; making the grid of a file checks every member.
 #[test]
 fn every_member_is_computed_afresh() {
     let grid = ten_percent();
@@ -201,7 +201,7 @@ fn every_member_is_computed_afresh() {
     assert!(error.contains("kd is 0.7"), "{error}");
 }
 
-// The pieces are what the whole is made of.
+// The pieces together are the whole grid.
 #[test]
 fn pieces_make_the_grid() {
     let grid = small();

@@ -1,4 +1,4 @@
-//! The output-error model on a window of samples: its best linear parameters, its cost, its slopes.
+//! The output-error model on a window of samples: best linear parameters, cost, slopes.
 
 use std::ops::Range;
 
@@ -10,11 +10,11 @@ use super::{InitialState, InputBias, OutputErrorFit, PemSettings};
 use crate::judge::baselines::BaselineError;
 use onecycle_identify::Signals;
 
-/// Half the step of the central differences of the response over the logarithm of a time: its square,
-/// and rounding over it, are both some 1e-10.
+/// Half the step of the central differences of the response over the logarithm of a time: its square
+/// and the rounding error over it are both some 1e-10.
 const HALF_STEP: f64 = 1e-5;
 
-/// What enters the response linearly.
+/// A linear term of the response.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Term {
     /// The recorded input; its factor is the gain `K`.
@@ -23,16 +23,17 @@ enum Term {
     Bias,
     /// The output at the first sample.
     Output,
-    /// The rate there.
+    /// The rate at the first sample.
     Rate,
-    /// The force there (output unit / s^2).
+    /// The force at the first sample (output unit / s^2).
     Force,
 }
 
-/// The samples, and what of the response is linear.
+/// The samples and the linear terms of the model.
 pub(super) struct OutputError<'a> {
     sample_s: f64,
-    /// The recorded input, mean taken out where that was asked for, as far as the window's end.
+    /// The recorded input up to the end of the window, with its mean removed if the settings ask for
+    /// that.
     input: Vec<f64>,
     /// First sample of the window.
     begin: usize,
@@ -57,7 +58,7 @@ impl<'a> OutputError<'a> {
             terms.extend([Term::Output, Term::Rate, Term::Force]);
         }
         let samples = window.len();
-        // As many samples as parameters leave nothing to fit.
+        // A fit needs more samples than parameters.
         let output = signals.output.get(window.clone());
         let Some(output) = output.filter(|_| samples > terms.len() + 3) else {
             return Err(BaselineError::TooShort { samples });
@@ -82,7 +83,8 @@ impl<'a> OutputError<'a> {
         })
     }
 
-    /// The fit at these times (s); `None` where they are no process or the output does not follow.
+    /// The fit at these times (s); `None` if they are out of range or the output does not follow the
+    /// input.
     pub(super) fn fit(&self, times_s: [f64; 3], start: usize) -> Option<OutputErrorFit> {
         let unit = unit_process(times_s)?;
         let (factors, residual) = self.solve(&unit);
@@ -96,8 +98,8 @@ impl<'a> OutputError<'a> {
         })
     }
 
-    /// The cost at these times (s) and, where asked for, its slopes over their logarithms. Infinite
-    /// where they are no process.
+    /// The cost at these times (s) and, if asked for, its slopes over their logarithms. Infinite if the
+    /// times are out of range.
     pub(super) fn cost_and_slopes(&self, times_s: [f64; 3], with_slopes: bool) -> (f64, [f64; 3]) {
         let Some(unit) = unit_process(times_s) else {
             return (f64::INFINITY, [0.0; 3]);
@@ -105,7 +107,7 @@ impl<'a> OutputError<'a> {
         let (factors, residual) = self.solve(&unit);
         let mut slopes = [0.0; 3];
         if with_slopes {
-            // The best factors are stationary: only the response at these factors changes.
+            // The best factors are a stationary point, so only the response at these factors changes.
             for (index, slope) in slopes.iter_mut().enumerate() {
                 let along = |step: f64| {
                     let mut times_s = times_s;
@@ -125,7 +127,7 @@ impl<'a> OutputError<'a> {
         residual.iter().map(|r| r * r).sum::<f64>() / self.total
     }
 
-    /// The best factors of the terms and what they leave of the output.
+    /// The best factors of the terms, and the residual of the output.
     fn solve(&self, unit: &Soiptd) -> (Vec<f64>, Vec<f64>) {
         let columns = (0..self.terms.len()).map(|index| {
             let mut factors = vec![0.0; self.terms.len()];
@@ -147,10 +149,10 @@ impl<'a> OutputError<'a> {
             v: factor(Term::Rate),
             f: factor(Term::Force),
         };
-        // What the input adds behind the state, and what drives the state itself.
+        // `offset` is added to the input, `constant` drives the state.
         let (past, offset, constant) = match self.initial_state {
             InitialState::Rest => (0, bias, 0.0),
-            // What arrives in the window has left before it; the bias has always been there.
+            // The input that arrives in the window left before it; the bias has always been there.
             InitialState::Estimated => {
                 let under_way = (unit.tau_s() / self.sample_s).ceil() as usize + 1;
                 (self.begin.min(under_way), 0.0, bias * unit.k_over_t_body())
@@ -175,11 +177,12 @@ fn unit_process([t_prop_s, t_body_s, tau_s]: [f64; 3]) -> Option<Soiptd> {
     Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).ok()
 }
 
-/// A column whose part outside those before it is less than this is their combination.
+/// A column counts as a combination of the columns before it if its remainder is less than this part of
+/// it.
 const DEPENDENT: f64 = 1e-12;
 
-/// Factors of the columns that leave least of `right`, and what is left, by modified Gram-Schmidt
-/// (A. Bjorck 1967); columns that depend on those before them get a factor of zero.
+/// Least-squares factors of the columns and the residual of `right`, by modified Gram-Schmidt (A.
+/// Bjorck 1967); columns that depend on those before them get a factor of zero.
 fn least_squares(mut columns: Vec<Vec<f64>>, right: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
     let count = columns.len();
@@ -212,7 +215,7 @@ fn least_squares(mut columns: Vec<Vec<f64>>, right: &[f64]) -> (Vec<f64>, Vec<f6
     (factors, residual)
 }
 
-/// Takes the part along the unit vector `q` out of `vector` and returns its length.
+/// Removes the part along the unit vector `q` from `vector` and returns its length.
 fn take_out(q: &[f64], vector: &mut [f64]) -> f64 {
     let part = q.iter().zip(&*vector).map(|(x, y)| x * y).sum::<f64>();
     for (value, q) in vector.iter_mut().zip(q) {
@@ -226,7 +229,8 @@ mod tests {
     use super::*;
     use crate::judge::baselines::pem::Data;
 
-    // 3 - 2 t through 1, t and 4 + 2 t, which the first two make up: 3, -2 and nothing.
+    // Fit of 3 - 2 t by the columns 1, t and 4 + 2 t, where the third depends on the first two: factors
+    // 3, -2 and 0.
     #[test]
     fn dependent_columns_get_nothing() {
         let times = [0.0, 1.0, 2.0, 5.0];
@@ -242,8 +246,8 @@ mod tests {
         assert!(residual.iter().all(|r| r.abs() < 1e-14), "{residual:?}");
     }
 
-    // Slopes of the cost against its own central differences, away from the optimum: the differences'
-    // error is of the order of 1e-8 of the cost, and so is the bound.
+    // Slopes of the cost against central differences of the cost, away from the optimum. The error of
+    // the differences is of the order of 1e-8 of the cost, and so is the bound.
     #[test]
     fn slopes_are_those_of_the_cost() {
         let samples = 400;
