@@ -66,6 +66,13 @@ pub use self::sections::{Domain, LeadTableBytes, OutputScaling, Prior, Sizes};
 pub const MAGIC: [u8; 8] = *b"ONECYC\x1a\n";
 /// Version of the format that this reader knows.
 pub const VERSION: u32 = 1;
+/// Structure of the processes that a pack of this version is for, by its name off board: an integrator with two lags
+/// and a delay.
+pub const STRUCTURE: &str = "soiptd";
+/// Excitation that a pack of this version is for, by its name off board: a two-level relay.
+pub const EXCITATION: &str = "relay";
+/// Form of the controllers in the table of a pack of this version, by its name off board.
+pub const CONTROLLER_FORM: &str = "pd";
 /// Number of bytes before the first section.
 pub const HEADER: usize = 24;
 

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use onecycle_lab::learn::identifier::IdentifierRecipe;
+use onecycle_onboard::pack::{CONTROLLER_FORM, EXCITATION, STRUCTURE};
 use serde_json::{Value, json};
 
 use super::json::to_text;
@@ -15,6 +16,9 @@ const SCHEMA: &str = "onecycle.identifier/1";
 pub(crate) fn card(recipe: &IdentifierRecipe, run: &IdentifierRun) -> Value {
     json!({
         "program": concat!("onecycle ", env!("CARGO_PKG_VERSION")),
+        "structure": STRUCTURE,
+        "excitation": EXCITATION,
+        "controller": { "form": CONTROLLER_FORM },
         "recipe": recipe,
         "training": {
             "examples": run.examples,

@@ -3,7 +3,9 @@
 use std::fmt::Write;
 
 use onecycle_onboard::network::{Activation, Dense, Weights};
-use onecycle_onboard::pack::{Pack, SELF_TEST_TOLERANCE, Sizes, VERSION};
+use onecycle_onboard::pack::{
+    CONTROLLER_FORM, EXCITATION, Pack, SELF_TEST_TOLERANCE, STRUCTURE, Sizes, VERSION,
+};
 use serde_json::{Value, json};
 
 use super::json::to_text;
@@ -29,6 +31,9 @@ pub(crate) fn json(pack: &Pack<'_>) -> String {
     to_text(&json!({
         "schema": SCHEMA,
         "version": VERSION,
+        "structure": STRUCTURE,
+        "excitation": EXCITATION,
+        "controller": { "form": CONTROLLER_FORM },
         "hash": format!("{:016x}", pack.content_hash()),
         "layers": layers.collect::<Vec<_>>(),
         "input_offsets": numbers(pack.input_offsets().iter()),
@@ -83,6 +88,7 @@ pub(crate) fn text(name: &str, pack: &Pack<'_>) -> String {
     let _ = writeln!(
         text,
         "Pack     {name}, version {VERSION} of the format, hash {hash:016x}\n\
+         For      structure {STRUCTURE}, excitation {EXCITATION}, controller {CONTROLLER_FORM}\n\
          Network  {network}\n\
          Outputs  means over {scales}; deviations times {temperatures}\n         \
          values from {lowest} to {highest}\n\

@@ -146,3 +146,15 @@ fn without_a_pack_least_squares_is_left() {
     let fitted = outcome(Method::Map).unwrap();
     assert_eq!(Ok(fitted), outcome(Method::Refine));
 }
+
+// A pack names what it is for as the values off board do.
+#[test]
+fn packs_name_structure_excitation_and_form() {
+    use onecycle_design::{Form, Structure};
+    use onecycle_onboard::pack::{CONTROLLER_FORM, EXCITATION, STRUCTURE};
+    let found = identified_with(&Options::default());
+    let excitation = found.excitation.unwrap();
+    assert_eq!(STRUCTURE, Structure::Soiptd.name());
+    assert_eq!(EXCITATION, excitation.name());
+    assert_eq!(CONTROLLER_FORM, Form::Pd.name());
+}
