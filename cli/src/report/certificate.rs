@@ -43,7 +43,7 @@ pub(crate) fn text(certified: &CertifiedSpace) -> String {
 /// The verdict in one sentence.
 fn holds_text(holds: bool) -> &'static str {
     if holds {
-        "Certified: stable without bias, and with the trim under every bias."
+        "Certified: stable without bias, and with the trim under every bias above."
     } else {
         "Not certified: some processes have no stable cycle."
     }
