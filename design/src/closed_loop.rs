@@ -1,7 +1,7 @@
 //! Margins, cost, open loop and step response of a model under a controller.
 //!
-//! Each function chooses its method by the structure of the model and the form of the controller. The only pair today,
-//! an integrator with two lags and dead time under a PD, has exact solutions: [`soiptd_pd`].
+//! Each function chooses its method by the structure of the model and the form of the controller. An integrator with two
+//! lags and dead time under a PD has exact solutions: [`soiptd_pd`]. Other pairs have none yet.
 
 use onecycle_onboard::{Pd, Soiptd};
 
@@ -12,27 +12,29 @@ use crate::soiptd_pd::loop_response::LoopResponse;
 use crate::soiptd_pd::margins::Margins;
 use crate::soiptd_pd::step_response::{StepResponse, StepResponseError};
 
-/// Parameters and gains of the pair that has exact solutions.
-fn process_and_pd(model: &Model, controller: &Controller) -> (Soiptd, Pd) {
-    let (Model::Soiptd(process), Controller::Pd(pd)) = (model, controller);
-    (*process, *pd)
+/// Parameters and gains of the pair that has exact solutions. `None` for another pair.
+fn process_and_pd(model: &Model, controller: &Controller) -> Option<(Soiptd, Pd)> {
+    match (model, controller) {
+        (Model::Soiptd(process), Controller::Pd(pd)) => Some((*process, *pd)),
+        (Model::Linear(_), _) => None,
+    }
 }
 
 /// Stability margins of the loop. An unstable loop has margins too: its phase margin is not positive.
 ///
-/// `None` if the proportional gain is zero or has the wrong sign. Such a loop is unstable, and its magnitude may never
+/// `None` if the structure of the model has no method, or if the proportional gain is zero or has the wrong sign. Such a loop is unstable, and its magnitude may never
 /// cross 1.
 #[must_use]
 pub fn margins(model: &Model, controller: &Controller) -> Option<Margins> {
-    let (process, pd) = process_and_pd(model, controller);
+    let (process, pd) = process_and_pd(model, controller)?;
     soiptd_pd::margins(&process, pd)
 }
 
 /// Integral of the squared error (ISE) of a unit step of the reference (output unit^2 s). `None` if the loop is
-/// unstable.
+/// unstable, or if the structure of the model has no method.
 #[must_use]
 pub fn ise(model: &Model, controller: &Controller) -> Option<f64> {
-    let (process, pd) = process_and_pd(model, controller);
+    let (process, pd) = process_and_pd(model, controller)?;
     soiptd_pd::ise(&process, pd)
 }
 
@@ -44,7 +46,7 @@ pub fn loop_response(
     controller: &Controller,
     omega_rad_per_s: f64,
 ) -> Option<LoopResponse> {
-    let (process, pd) = process_and_pd(model, controller);
+    let (process, pd) = process_and_pd(model, controller)?;
     soiptd_pd::loop_response(&process, pd, omega_rad_per_s)
 }
 
@@ -52,12 +54,13 @@ pub fn loop_response(
 ///
 /// # Errors
 /// - [`StepResponseError::Unstable`]: the response grows without bound.
+/// - [`StepResponseError::NoMethod`]: the structure of the model has no method.
 /// - [`StepResponseError::TooSlow`]: the response takes more than 2^20 simulation steps to settle.
 pub fn step_response(
     model: &Model,
     controller: &Controller,
 ) -> Result<StepResponse, StepResponseError> {
-    let (process, pd) = process_and_pd(model, controller);
+    let (process, pd) = process_and_pd(model, controller).ok_or(StepResponseError::NoMethod)?;
     soiptd_pd::step_response(&process, pd)
 }
 

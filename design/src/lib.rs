@@ -46,7 +46,7 @@ pub mod tuning;
 pub use cascade::{Cascade, CascadeCost};
 pub use closed_loop::{ise, loop_response, margins, step_response};
 pub use controller::{Controller, Form};
-pub use model::{Model, Parameter, Structure, Unit};
+pub use model::{Linear, LinearError, Model, Parameter, Stages, Structure, Unit, state_space};
 pub use soiptd_pd::loop_response::LoopResponse;
 pub use soiptd_pd::margins::Margins;
 pub use soiptd_pd::step_metrics::StepMetrics;

@@ -23,7 +23,7 @@ use std::f64::consts::FRAC_PI_2;
 
 use crate::closed_loop::{ise, margins};
 use crate::controller::{Controller, Form};
-use crate::model::Model;
+use crate::model::{Model, Structure};
 use crate::soiptd_pd;
 use crate::soiptd_pd::margins::Margins;
 use crate::soiptd_pd::optimum::OptimumError;
@@ -98,6 +98,9 @@ pub enum DesignError {
     /// overflow.
     #[error("the process is too extreme: its optimal gains or their cost cannot be represented")]
     Overflow,
+    /// No method designs a controller for this structure.
+    #[error("no controller is designed for the structure {}", .0.name())]
+    Structure(Structure),
 }
 
 impl From<OptimumError> for DesignError {
@@ -113,9 +116,12 @@ impl From<OptimumError> for DesignError {
 ///
 /// # Errors
 /// - [`DesignError::PhaseMargin`]: the specified phase margin is not between 0 and `pi/2`.
+/// - [`DesignError::Structure`]: no method for this structure.
 /// - [`DesignError::Overflow`]: the parameters of the model are near the limits of `f64`.
 pub fn design(model: &Model, specification: &Specification) -> Result<Design, DesignError> {
-    let (Model::Soiptd(process), Form::Pd) = (model, specification.form);
+    let (Model::Soiptd(process), Form::Pd) = (model, specification.form) else {
+        return Err(DesignError::Structure(model.structure()));
+    };
     let best = soiptd_pd::pd(process, specification.phase_margin_rad)?;
     Ok(Design {
         controller: best.pd.into(),

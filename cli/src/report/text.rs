@@ -69,7 +69,7 @@ pub(crate) fn design(model: &Model, design: &Design, step: Option<&StepMetrics>)
     for &parameter in structure.parameters() {
         let value = model.parameter(parameter).filter(|value| value.is_finite());
         let value = value.map_or("infinite".to_owned(), significant);
-        let (name, unit) = (parameter.symbol(), units.parameter(parameter));
+        let (name, unit) = (parameter.symbol(), units.parameter(structure, parameter));
         let _ = writeln!(
             text,
             "{}",
@@ -148,7 +148,10 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
     let _ = writeln!(text, "\n{}", headed(&format!("Process  {formula}")));
     let _ = writeln!(text, "  {:<10}{:>12}   90 % interval", "", "estimate");
     for (parameter, interval) in identified.estimate.iter() {
-        let (name, unit) = (parameter.symbol(), units.parameter(parameter));
+        let (name, unit) = (
+            parameter.symbol(),
+            units.parameter(identified.model.structure(), parameter),
+        );
         let Interval {
             estimate,
             low,

@@ -1,6 +1,6 @@
 //! Units of results, made of those of the recording's columns.
 
-use onecycle::{Parameter, Recording};
+use onecycle::{Parameter, Recording, Structure};
 use onecycle_design::Unit;
 
 /// Units of input and output; empty where the recording gives none.
@@ -20,8 +20,10 @@ impl Units {
     }
 
     /// Unit of a parameter; empty where it needs units that the recording does not give.
-    pub(super) fn parameter(&self, parameter: Parameter) -> String {
-        match parameter.unit() {
+    pub(super) fn parameter(&self, structure: Structure, parameter: Parameter) -> String {
+        match structure.unit(parameter) {
+            Unit::OutputPerInput => self.gain(""),
+            Unit::RadianPerSecond => "rad/s".to_owned(),
             Unit::OutputPerInputSecond => self.gain("s"),
             Unit::OutputPerInputSecondSquared => self.gain("s^2"),
             Unit::Second => "s".to_owned(),
@@ -31,10 +33,13 @@ impl Units {
         }
     }
 
-    /// `output/(input per)`.
+    /// `output/(input per)`, or `output/input` without `per`.
     fn gain(&self, per: &str) -> String {
         if self.input.is_empty() || self.output.is_empty() {
             return String::new();
+        }
+        if per.is_empty() {
+            return format!("{}/{}", self.output, self.input);
         }
         format!("{}/({} {per})", self.output, self.input)
     }

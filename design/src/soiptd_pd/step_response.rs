@@ -105,6 +105,9 @@ pub enum StepResponseError {
     /// gain of the stability limit, or has a mode a thousand times slower than its gain crossover.
     #[error("the closed loop takes too long to settle to be simulated")]
     TooSlow,
+    /// No method computes the response of this structure.
+    #[error("no method computes the step response of this structure")]
+    NoMethod,
 }
 
 /// Response of the continuous loop to a unit step of the reference, from rest.

@@ -48,7 +48,10 @@ fn models() -> [Model; 4] {
 // JSON and command lines of users hold these names, so a name must not change and must not mean two things.
 #[test]
 fn names_are_stable_and_unique() {
-    assert_eq!(Structure::ALL.map(Structure::name), ["soiptd"]);
+    for structure in Structure::ALL {
+        assert_eq!(Structure::from_name(structure.name()), Some(structure));
+    }
+    assert_eq!(Structure::Soiptd.name(), "soiptd");
     assert_eq!(
         Structure::Soiptd.transfer_function(),
         "K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))"
@@ -58,7 +61,7 @@ fn names_are_stable_and_unique() {
     for (parameter, key, symbol, unit) in PARAMETERS {
         assert_eq!(parameter.key(), key);
         assert_eq!(parameter.symbol(), symbol);
-        assert_eq!(parameter.unit(), unit, "{key}");
+        assert_eq!(Structure::Soiptd.unit(parameter), unit, "{key}");
     }
     let keys: HashSet<&str> = PARAMETERS.map(|(_, key, ..)| key).into();
     let symbols: HashSet<&str> = PARAMETERS.map(|(_, _, symbol, _)| symbol).into();

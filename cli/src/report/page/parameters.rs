@@ -25,7 +25,7 @@ pub(super) fn of_model(model: &Model) -> Vec<(&'static str, String)> {
     let shown = |&parameter: &Parameter| {
         let value = model.parameter(parameter).filter(|value| value.is_finite());
         let value = value.map_or("infinite".to_owned(), significant);
-        let unit = units.parameter(parameter);
+        let unit = units.parameter(structure, parameter);
         (
             parameter.symbol(),
             format!("{value} {unit}").trim_end().to_owned(),
@@ -68,7 +68,7 @@ fn table(identified: &Identified, units: &Units) -> String {
         .map(|(parameter, interval)| {
             let estimate = interval.estimate.map_or("infinite".to_owned(), significant);
             let (low, high) = (bounded(interval.low), bounded(interval.high));
-            let unit = units.parameter(parameter);
+            let unit = units.parameter(identified.model.structure(), parameter);
             (parameter.symbol(), [estimate, low, high, unit])
         })
         .collect();
@@ -137,7 +137,10 @@ fn distribution(
         Parameter::TBody => (Units::titled(symbol, "s"), values(parameter), *interval),
         Parameter::TProp | Parameter::Tau => time(symbol, values(parameter), interval),
         _ => (
-            Units::titled(symbol, &units.parameter(parameter)),
+            Units::titled(
+                symbol,
+                &units.parameter(identified.model.structure(), parameter),
+            ),
             values(parameter),
             *interval,
         ),
