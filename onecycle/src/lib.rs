@@ -167,7 +167,7 @@
 //! let model = Model::from(Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?);
 //! assert_eq!(model.structure().name(), "soiptd");
 //! assert_eq!(model.parameter(Parameter::Tau), Some(0.0237));
-//! assert_eq!(Structure::Soiptd.unit(Parameter::Tau), Unit::Second);
+//! assert_eq!(model.structure().unit(Parameter::Tau), Unit::Second);
 //!
 //! let asked = Specification::default().with_phase_margin_rad(45_f64.to_radians());
 //! let best = design(&model, &asked)?;
