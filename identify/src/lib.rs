@@ -18,6 +18,8 @@
 pub mod cholesky;
 pub mod diagnose;
 mod excitation;
+#[allow(dead_code)]
+mod innovations;
 mod outcome;
 mod posterior;
 mod reading;

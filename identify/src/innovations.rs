@@ -1,0 +1,9 @@
+//! Identification from any recording, by an exact likelihood with disturbances.
+mod lifted;
+mod likelihood;
+mod orthogonal;
+mod record;
+mod response;
+mod theta;
+#[cfg(test)]
+mod vectors;

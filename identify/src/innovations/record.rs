@@ -1,0 +1,218 @@
+//! Record: the samples that a likelihood is made of, in blocks.
+//!
+//! A block is `M` consecutive samples of an even grid. Its datum is the **sum of the samples present**: the sum is an
+//! anti-alias filter, and the model of the sum is exact, so decimation costs information but causes no bias. A sample
+//! that was lost, stuck or is an outlier is absent: it is not summed. Samples with uneven time stamps form blocks of one.
+
+use std::collections::HashMap;
+
+/// What the input does between two samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Hold {
+    /// It keeps the value of the last sample: the recording has the rate of the loop that makes the input.
+    Held,
+    /// It runs straight to the next sample: the recording is thinned from a faster loop.
+    Interpolated,
+}
+
+impl Hold {
+    /// Name in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Held => "held",
+            Self::Interpolated => "interpolated",
+        }
+    }
+}
+
+/// Samples of a record.
+#[derive(Clone, Debug)]
+pub(crate) struct Record {
+    /// Time of each sample from the first (s), if they are uneven. Empty on an even grid.
+    pub(crate) uneven_s: Vec<f64>,
+    /// Sample period (s); the median increment of uneven samples.
+    pub(crate) dt_s: f64,
+    /// Input at each sample (input unit).
+    pub(crate) input: Vec<f64>,
+    /// Output at each sample (output unit). Any finite value where the sample is absent.
+    pub(crate) output: Vec<f64>,
+    /// Whether the output of a sample is used.
+    pub(crate) present: Vec<bool>,
+    /// Input between the samples.
+    pub(crate) hold: Hold,
+}
+
+impl Record {
+    /// Record of all samples on an even grid.
+    #[cfg(test)]
+    pub(crate) fn even(dt_s: f64, input: Vec<f64>, output: Vec<f64>) -> Self {
+        Self {
+            uneven_s: vec![],
+            dt_s,
+            present: vec![true; output.len()],
+            input,
+            output,
+            hold: Hold::Held,
+        }
+    }
+
+    /// Number of samples, absent ones included.
+    pub(crate) fn len(&self) -> usize {
+        self.output.len()
+    }
+
+    /// Time of a sample from the first (s).
+    pub(crate) fn time_s(&self, index: usize) -> f64 {
+        (self.uneven_s.get(index).copied()).unwrap_or(index as f64 * self.dt_s)
+    }
+
+    /// Index of the first sample at or after a time (s).
+    pub(crate) fn index_at(&self, time_s: f64) -> usize {
+        if self.uneven_s.is_empty() {
+            ((time_s / self.dt_s - 1e-9).ceil().max(0.0) as usize).min(self.len())
+        } else {
+            self.uneven_s.partition_point(|&at| at < time_s - 1e-12)
+        }
+    }
+
+    /// The same record without the samples outside `range`.
+    pub(crate) fn part(&self, range: std::ops::Range<usize>) -> Self {
+        let start_s = self.time_s(range.start);
+        let times = self.uneven_s.get(range.clone()).unwrap_or(&[]);
+        Self {
+            uneven_s: times.iter().map(|time_s| time_s - start_s).collect(),
+            dt_s: self.dt_s,
+            input: self.input[range.clone()].to_vec(),
+            output: self.output[range.clone()].to_vec(),
+            present: self.present[range].to_vec(),
+            hold: self.hold,
+        }
+    }
+}
+
+/// Length of a block and the samples present in it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct BlockKind {
+    /// Sample period within the block (s); for uneven samples the time to the next sample.
+    pub(crate) step_s: f64,
+    /// Samples present. All others of the block are absent.
+    pub(crate) mask: Vec<bool>,
+}
+
+/// A record in blocks.
+#[derive(Clone, Debug)]
+pub(crate) struct Blocks<'a> {
+    pub(crate) record: &'a Record,
+    /// Samples a block.
+    pub(crate) samples: usize,
+    /// First sample of the first block. The input before is used, the output is not: it may depend on input from before
+    /// the record.
+    pub(crate) first: usize,
+    /// Different kinds of blocks.
+    pub(crate) kinds: Vec<BlockKind>,
+    /// Index in `kinds` of each block.
+    pub(crate) kind_of: Vec<u32>,
+    /// Sum of the outputs present in each block, over [`Self::scale`].
+    pub(crate) sums: Vec<f64>,
+    /// Standard deviation of the outputs (output unit).
+    pub(crate) scale: f64,
+}
+
+impl<'a> Blocks<'a> {
+    /// Blocks of `samples` samples (one for uneven samples), from `skip_s` after the first sample on.
+    pub(crate) fn new(record: &'a Record, samples: usize, skip_s: f64) -> Self {
+        let even = record.uneven_s.is_empty();
+        let samples = if even { samples.max(1) } else { 1 };
+        let first = record.index_at(skip_s);
+        let count = record.len().saturating_sub(first) / samples;
+        let scale = deviation(record);
+        let mut blocks = Self {
+            record,
+            samples,
+            first,
+            kinds: vec![],
+            kind_of: Vec::with_capacity(count),
+            sums: Vec::with_capacity(count),
+            scale,
+        };
+        let mut known: HashMap<(u64, Vec<bool>), u32> = HashMap::new();
+        for block in 0..count {
+            let range = first + block * samples..first + (block + 1) * samples;
+            let step_s = blocks.step_s(range.start);
+            let mask = &record.present[range.clone()];
+            let outputs = record.output[range].iter().zip(mask);
+            let sum: f64 = outputs.filter(|(_, present)| **present).map(|(y, _)| y).sum();
+            let next = blocks.kinds.len() as u32;
+            // To the nanosecond: clocks are no better, and jitter would make every block a kind of its own.
+            let key = ((step_s * 1e9).round() as u64, mask.to_vec());
+            let kind = *known.entry(key).or_insert(next);
+            if kind == next {
+                let mask = mask.to_vec();
+                blocks.kinds.push(BlockKind { step_s, mask });
+            }
+            blocks.kind_of.push(kind);
+            blocks.sums.push(sum / scale);
+        }
+        blocks
+    }
+
+    fn step_s(&self, sample: usize) -> f64 {
+        match &self.record.uneven_s[..] {
+            [] => self.record.dt_s,
+            times => times.get(sample + 1).map_or(self.record.dt_s, |next| {
+                ((next - times[sample]) * 1e9).round() * 1e-9
+            }),
+        }
+    }
+
+    /// Number of blocks.
+    pub(crate) fn len(&self) -> usize {
+        self.sums.len()
+    }
+
+    /// Length of a block (s).
+    pub(crate) fn block_s(&self) -> f64 {
+        self.samples as f64 * self.record.dt_s
+    }
+
+    /// Time from the first block to the end of the record (s).
+    pub(crate) fn length_s(&self) -> f64 {
+        self.record.time_s(self.record.len() - 1) - self.record.time_s(self.first)
+    }
+
+    /// Samples of a block.
+    pub(crate) fn range(&self, block: usize) -> std::ops::Range<usize> {
+        let start = self.first + block * self.samples;
+        start..start + self.samples
+    }
+
+    /// Number of samples present in a block.
+    pub(crate) fn present(&self, block: usize) -> usize {
+        let mask = &self.kinds[self.kind_of[block] as usize].mask;
+        mask.iter().filter(|present| **present).count()
+    }
+
+    /// Sums over the samples present in each block of a value of each sample.
+    pub(crate) fn sums_of(&self, values: &[f64]) -> Vec<f64> {
+        let sum = |block: usize| {
+            let range = self.range(block);
+            let values = values[range.clone()].iter().zip(&self.record.present[range]);
+            values.filter(|(_, present)| **present).map(|(v, _)| v).sum()
+        };
+        (0..self.len()).map(sum).collect()
+    }
+}
+
+/// Standard deviation of the outputs present; 1 if they are constant.
+fn deviation(record: &Record) -> f64 {
+    let present = || {
+        let values = record.output.iter().zip(&record.present);
+        values.filter(|(_, present)| **present).map(|(y, _)| *y)
+    };
+    let count = present().count().max(1) as f64;
+    let mean = present().sum::<f64>() / count;
+    let variance = present().map(|y| (y - mean) * (y - mean)).sum::<f64>() / count;
+    if variance > 0.0 { variance.sqrt() } else { 1.0 }
+}

@@ -1,0 +1,228 @@
+//! Unknowns of a fit that enter the model nonlinearly: lags, pole, second-order stage, dead time, noise.
+//!
+//! | unknown | coordinate | why |
+//! |---------|------------|-----|
+//! | actuator lag `T` (s) | `ln T` | positive |
+//! | pole `a = 1/T_body` (1/s) | `a` | no damping, `a = 0`, is an ordinary point |
+//! | `c1` (1/s), `c0` (1/s^2) of the second-order stage | as they are | `c0 = 0` is an integrator with a lag |
+//! | dead time `tau` (s) | `tau` | no dead time is an ordinary point |
+//! | noise `w1`, `w0`, `wy` (rad/s) | `ln w` | positive; minus infinity without this noise |
+//!
+//! The frequencies of the noises are those below which the disturbance outweighs the white noise of a sample:
+//!
+//! | noise | intensity over the variance of the white noise, with `n` states behind the actuator lags |
+//! |-------|-----------|
+//! | `w1`: random walk of the disturbance, which enters behind the actuator lags | `dt w1^(2 n + 2)` |
+//! | `w0`: white disturbance at the same place | `dt w0^(2 n)` |
+//! | `wy`: random walk of the measured output, as of an angle integrated from a gyro | `dt wy^2` |
+
+use onecycle_design::{Linear, Stages, Structure};
+
+use super::record::Blocks;
+
+/// Most unknowns of a structure.
+pub(super) const MOST: usize = 8;
+
+/// Values of the unknowns in their coordinates. Unused entries are zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Theta {
+    pub(super) structure: Structure,
+    pub(super) values: [f64; MOST],
+}
+
+/// A noise beside the white noise of a sample.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[non_exhaustive]
+pub enum NoiseKind {
+    /// `w1`: random walk of the disturbance behind the actuator lags, as wind.
+    RandomWalk,
+    /// `w0`: white disturbance behind the actuator lags, as gusts and the errors of an accelerometer.
+    WhiteForce,
+    /// `wy`: random walk of the measured output, as an angle integrated from a gyro.
+    OutputWalk,
+}
+
+impl NoiseKind {
+    /// Every kind.
+    pub const ALL: [Self; 3] = [Self::RandomWalk, Self::WhiteForce, Self::OutputWalk];
+
+    /// Name in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::RandomWalk => "w1",
+            Self::WhiteForce => "w0",
+            Self::OutputWalk => "wy",
+        }
+    }
+}
+
+/// Where the unknowns of a structure are in [`Theta::values`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Layout {
+    pub(super) stages: Stages,
+}
+
+impl Layout {
+    pub(super) fn pole(self) -> Option<usize> {
+        (self.stages.poles > 0).then_some(self.stages.lags)
+    }
+
+    /// Index of `c1`; `c0` follows.
+    pub(super) fn pair(self) -> Option<usize> {
+        (self.stages.pairs > 0).then_some(self.stages.lags + self.stages.poles)
+    }
+
+    pub(super) fn tau(self) -> usize {
+        self.stages.lags + self.stages.poles + 2 * self.stages.pairs
+    }
+
+    pub(super) fn noise(self, kind: NoiseKind) -> usize {
+        self.tau() + 1 + kind as usize
+    }
+
+    pub(super) fn len(self) -> usize {
+        self.tau() + 4
+    }
+}
+
+impl Theta {
+    /// Without dead time and noise.
+    pub(super) fn new(structure: Structure) -> Self {
+        let mut theta = Self {
+            structure,
+            values: [0.0; MOST],
+        };
+        for kind in NoiseKind::ALL {
+            theta.set_noise(kind, 0.0);
+        }
+        theta
+    }
+
+    pub(super) fn layout(&self) -> Layout {
+        Layout {
+            stages: self.structure.stages(),
+        }
+    }
+
+    /// Dead time (s).
+    pub(super) fn tau_s(&self) -> f64 {
+        self.values[self.layout().tau()]
+    }
+
+    /// Frequency of a noise (rad/s), zero without it.
+    pub(super) fn noise(&self, kind: NoiseKind) -> f64 {
+        self.values[self.layout().noise(kind)].exp()
+    }
+
+    /// Sets the frequency of a noise (rad/s), zero for none.
+    pub(super) fn set_noise(&mut self, kind: NoiseKind, rad_per_s: f64) {
+        self.values[self.layout().noise(kind)] = rad_per_s.ln();
+    }
+
+    /// Noises that the fit has.
+    pub(super) fn noises(&self) -> impl Iterator<Item = NoiseKind> + use<> {
+        let theta = *self;
+        (NoiseKind::ALL.into_iter()).filter(move |kind| theta.noise(*kind) > 0.0)
+    }
+
+    /// Indices of the unknowns to fit: all but the noises that are off.
+    pub(super) fn free(&self) -> Vec<usize> {
+        let is_on = |index: &usize| self.values[*index] > f64::NEG_INFINITY;
+        (0..self.layout().len()).filter(is_on).collect()
+    }
+
+    /// The process, with this gain in front of its stages.
+    pub(super) fn process(&self, gain: f64) -> Linear {
+        let layout = self.layout();
+        let mut lags_s = [1.0; 2];
+        for lag in 0..layout.stages.lags {
+            lags_s[lag] = self.values[lag].exp();
+        }
+        let mut process = Linear::new(self.structure)
+            .with_gain(gain)
+            .with_lags_s(lags_s)
+            .with_tau_s(self.tau_s());
+        if let Some(pole) = layout.pole() {
+            process = process.with_pole_per_s(self.values[pole]);
+        }
+        if let Some(pair) = layout.pair() {
+            process = process.with_pair(self.values[pair], self.values[pair + 1]);
+        }
+        process
+    }
+
+    /// Longest and shortest time of the process (s) but for the dead time: its lags and the inverse of its poles.
+    pub(super) fn shortest_lag_s(&self) -> f64 {
+        let layout = self.layout();
+        let lags = (0..layout.stages.lags).map(|lag| self.values[lag].exp());
+        let pole = layout.pole().map(|pole| 1.0 / self.values[pole].abs());
+        let pair = (layout.pair()).map(|pair| 1.0 / self.values[pair + 1].abs().sqrt());
+        lags.chain(pole).chain(pair).fold(f64::INFINITY, f64::min)
+    }
+}
+
+/// Box that holds the unknowns, and steps for differences.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounds {
+    pub(super) low: [f64; MOST],
+    pub(super) high: [f64; MOST],
+    /// Steps of forward differences.
+    pub(super) step: [f64; MOST],
+}
+
+impl Bounds {
+    /// Bounds for a record: lags from a twentieth of a sample to its length, a pole that may be a little unstable (so
+    /// that no damping is not on the boundary), a dead time that may be a little negative, noise frequencies from
+    /// 0.03 over its length to ten over the sample period.
+    pub(super) fn new(structure: Structure, blocks: &Blocks<'_>, longest_tau_s: f64) -> Self {
+        let (dt, length) = (blocks.record.dt_s, blocks.length_s());
+        let block = blocks.block_s();
+        let layout = Layout {
+            stages: structure.stages(),
+        };
+        let mut bounds = Self {
+            low: [f64::NEG_INFINITY; MOST],
+            high: [f64::INFINITY; MOST],
+            step: [1e-5; MOST],
+        };
+        let mut set = |index: usize, low: f64, high: f64, step: f64| {
+            bounds.low[index] = low;
+            bounds.high[index] = high;
+            bounds.step[index] = step;
+        };
+        for lag in 0..layout.stages.lags {
+            set(lag, (dt / 20.0).ln(), length.ln(), 1e-5);
+        }
+        if let Some(pole) = layout.pole() {
+            set(pole, -3.0 / length, 2.0 / dt, 1e-4 / length);
+        }
+        if let Some(pair) = layout.pair() {
+            set(pair, -3.0 / length, 4.0 / dt, 1e-4 / length);
+            let (low, high) = (-9.0 / (length * length), 4.0 / (dt * dt));
+            set(pair + 1, low, high, 1e-4 / (length * length));
+        }
+        set(layout.tau(), -2.0 * dt, longest_tau_s, 1e-4 * block);
+        for kind in NoiseKind::ALL {
+            let (low, high) = ((0.03 / length).ln(), (10.0 / dt).ln());
+            set(layout.noise(kind), low, high, 1e-5);
+        }
+        bounds
+    }
+
+    /// The nearest values inside the box. A noise that is off stays off.
+    pub(super) fn clamp(&self, theta: &Theta) -> Theta {
+        let mut inside = *theta;
+        for index in theta.free() {
+            inside.values[index] =
+                theta.values[index].clamp(self.low[index], self.high[index]);
+        }
+        inside
+    }
+
+    /// Whether an unknown is on the boundary.
+    pub(super) fn is_at_edge(&self, theta: &Theta, index: usize) -> bool {
+        let value = theta.values[index];
+        value <= self.low[index] + 1e-9 || value >= self.high[index] - 1e-9
+    }
+}
