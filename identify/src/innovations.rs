@@ -1,4 +1,6 @@
 //! Identification from any recording, by an exact likelihood with disturbances.
+mod descent;
+mod laplace;
 mod lifted;
 mod likelihood;
 mod orthogonal;

@@ -207,3 +207,43 @@ fn check(record: &Record, samples: usize, theta: &Theta, expected: [f64; 5]) -> 
     assert!((found.log_likelihood - likelihood).abs() < 2e-7, "{name} {}", found.log_likelihood);
     found.determinants
 }
+
+#[test]
+fn best_points_with_their_covariance() {
+    use super::descent::{Patience, descend};
+    use super::laplace::Laplace;
+    use super::theta::Bounds;
+
+    // Samples a block, kind of noise; T, a, tau, w, gain, ln L, variance; deviations of ln T, a, tau, ln w, gain.
+    let cases = [
+        (1, NoiseKind::RandomWalk, [0.0724315, 0.5482979, 0.06000601, 12.962674, 1.05198827, 3814.6517046, 9.1047220248e-08], [3.1056e-01, 3.3379e-01, 8.6855e-03, 4.2885e-02, 2.0159e-01]),
+        (3, NoiseKind::RandomWalk, [0.0998265, 0.4627307, 0.05120661, 13.445180, 1.30678187, 1069.2040133, 7.4568419651e-08], [3.6083e-01, 3.4310e-01, 8.9777e-03, 4.8379e-02, 3.5626e-01]),
+        (1, NoiseKind::WhiteForce, [0.0808300, 0.5193686, 0.05702680, 25.855543, 1.13044775, 3762.9033080, 8.7666572320e-08], [3.5755e-01, 1.0676e-01, 9.7275e-03, 4.7161e-02, 2.6980e-01]),
+    ];
+    for (samples, kind, best, deviations) in cases {
+        let record = data(600);
+        let blocks = Blocks::new(&record, samples, 0.1);
+        let mut start = theta(Structure::Soiptd, &[0.05_f64.ln(), 0.5, 0.05], 0.0, 0.0);
+        start.set_noise(kind, 2.0);
+        let bounds = Bounds::new(Structure::Soiptd, &blocks, 0.3);
+        let patience = Patience {
+            steps: 100,
+            decrease: 1e-13,
+        };
+        let free = start.free();
+        let found = descend(&blocks, &start, &free, &bounds, patience).unwrap();
+        let [t, a, tau, w, gain, likelihood, variance] = best;
+        close(found.theta.values[0].exp(), t, 1e-5, "T");
+        close(found.theta.values[1], a, 1e-5, "a");
+        close(found.theta.tau_s(), tau, 1e-5, "tau");
+        close(found.theta.noise(kind), w, 1e-5, "w");
+        close(found.at.gain, gain, 1e-5, "gain");
+        close(found.at.variance, variance, 1e-5, "variance");
+        assert!((found.at.log_likelihood - likelihood).abs() < 1e-6);
+        let laplace = Laplace::new(&blocks, &found, &free, &bounds).unwrap();
+        for (index, deviation) in free.iter().zip(deviations) {
+            close(laplace.deviation(*index).unwrap(), deviation, 1e-3, "deviation");
+        }
+        close(laplace.gain_deviation(&found.at), deviations[4], 1e-3, "deviation of the gain");
+    }
+}

@@ -1,0 +1,199 @@
+//! Levenberg-Marquardt within bounds on the residual of the likelihood.
+//!
+//! The Jacobian is made of forward differences of the residual, in which the linear unknowns are at their best: one
+//! evaluation an unknown. An unknown that a bound holds against the gradient takes no part in a step. References: J. J.
+//! More, "The Levenberg-Marquardt algorithm: implementation and theory", Lecture Notes in Mathematics 630 (1978); C.
+//! Kanzow, N. Yamashita, M. Fukushima, J. Comput. Appl. Math. 172 (2004), bounds.
+
+use super::likelihood::{Evaluation, Memory, evaluate};
+use super::record::Blocks;
+use super::theta::{Bounds, MOST, Theta};
+
+/// Damping at the start, and the factors by which it follows success and failure.
+const DAMPING: f64 = 1e-2;
+const EASIER: f64 = 0.2;
+const HARDER: f64 = 6.0;
+const MOST_DAMPING: f64 = 1e10;
+
+/// End of a search.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Patience {
+    /// Most steps.
+    pub(super) steps: usize,
+    /// Relative decrease of the cost below which a step is the last.
+    pub(super) decrease: f64,
+}
+
+/// Point with its likelihood.
+#[derive(Clone, Debug)]
+pub(super) struct Found {
+    pub(super) theta: Theta,
+    pub(super) at: Evaluation,
+}
+
+/// Normal equations of the unknowns `free`.
+struct Normal {
+    matrix: [[f64; MOST]; MOST],
+    gradient: [f64; MOST],
+}
+
+/// Best point from `start` over the unknowns `free`. `None` if the start has no likelihood.
+pub(super) fn descend(
+    blocks: &Blocks<'_>,
+    start: &Theta,
+    free: &[usize],
+    bounds: &Bounds,
+    patience: Patience,
+) -> Option<Found> {
+    let mut memory = Memory::default();
+    let theta = bounds.clamp(start);
+    let at = evaluate(blocks, &theta, &mut memory)?;
+    let mut here = Found { theta, at };
+    let mut cost = here.at.cost();
+    let mut damping = DAMPING;
+    let mut normal: Option<Normal> = None;
+    for _ in 0..patience.steps {
+        if normal.is_none() {
+            normal = Some(linearise(blocks, &here, free, bounds, &mut memory)?);
+        }
+        let equations = normal.as_ref()?;
+        let Some(theta) = step(equations, &here.theta, free, bounds, damping) else {
+            break;
+        };
+        let new = evaluate(blocks, &theta, &mut memory);
+        match new.map(|at| (at.cost(), at)) {
+            Some((new_cost, at)) if new_cost < cost => {
+                let decrease = (cost - new_cost) / cost;
+                here = Found { theta, at };
+                cost = new_cost;
+                damping = (damping * EASIER).max(1e-12);
+                normal = None;
+                if decrease < patience.decrease && damping < DAMPING {
+                    break;
+                }
+            }
+            _ => {
+                damping *= HARDER;
+                if damping > MOST_DAMPING {
+                    break;
+                }
+            }
+        }
+    }
+    Some(here)
+}
+
+/// Normal equations at a point.
+fn linearise(
+    blocks: &Blocks<'_>,
+    here: &Found,
+    free: &[usize],
+    bounds: &Bounds,
+    memory: &mut Memory,
+) -> Option<Normal> {
+    let mut columns = Vec::with_capacity(free.len());
+    for &index in free {
+        let room = bounds.high[index] - here.theta.values[index];
+        let step = if bounds.step[index] <= room {
+            bounds.step[index]
+        } else {
+            -bounds.step[index]
+        };
+        let mut theta = here.theta;
+        theta.values[index] += step;
+        let moved = evaluate(blocks, &theta, memory)?.residual;
+        let difference = moved.iter().zip(&here.at.residual);
+        columns.push(difference.map(|(a, b)| (a - b) / step).collect::<Vec<f64>>());
+    }
+    let mut normal = Normal {
+        matrix: [[0.0; MOST]; MOST],
+        gradient: [0.0; MOST],
+    };
+    for i in 0..free.len() {
+        normal.gradient[i] = dot(&columns[i], &here.at.residual);
+        for j in 0..=i {
+            normal.matrix[i][j] = dot(&columns[i], &columns[j]);
+            normal.matrix[j][i] = normal.matrix[i][j];
+        }
+    }
+    Some(normal)
+}
+
+/// Next point, or `None` if no unknown can move.
+fn step(
+    normal: &Normal,
+    here: &Theta,
+    free: &[usize],
+    bounds: &Bounds,
+    damping: f64,
+) -> Option<Theta> {
+    let can_move = |slot: &usize| {
+        let (index, gradient) = (free[*slot], normal.gradient[*slot]);
+        let held_below = here.values[index] <= bounds.low[index] && gradient > 0.0;
+        let held_above = here.values[index] >= bounds.high[index] && gradient < 0.0;
+        !(held_below || held_above) && normal.matrix[*slot][*slot] > 0.0
+    };
+    let moving: Vec<usize> = (0..free.len()).filter(can_move).collect();
+    if moving.is_empty() {
+        return None;
+    }
+    let mut matrix = vec![vec![0.0; moving.len()]; moving.len()];
+    let mut right = vec![0.0; moving.len()];
+    for (i, &a) in moving.iter().enumerate() {
+        for (j, &b) in moving.iter().enumerate() {
+            matrix[i][j] = normal.matrix[a][b];
+        }
+        matrix[i][i] += damping * normal.matrix[a][a];
+        right[i] = -normal.gradient[a];
+    }
+    let change = solve(matrix, right)?;
+    let mut next = *here;
+    for (&slot, change) in moving.iter().zip(change) {
+        next.values[free[slot]] += change;
+    }
+    Some(bounds.clamp(&next))
+}
+
+/// Solution of a small symmetric positive definite system by Cholesky's decomposition, scaled to a unit diagonal.
+/// `None` if the matrix is not positive definite.
+pub(super) fn solve(matrix: Vec<Vec<f64>>, right: Vec<f64>) -> Option<Vec<f64>> {
+    let inverse = inverse(&matrix)?;
+    let row = |row: &Vec<f64>| dot(row, &right);
+    Some(inverse.iter().map(row).collect())
+}
+
+/// Inverse of a small symmetric positive definite matrix. `None` if it is not positive definite.
+pub(super) fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+    let n = matrix.len();
+    let scale: Vec<f64> = (0..n).map(|i| 1.0 / matrix[i][i].sqrt()).collect();
+    // L of the scaled matrix, then its inverse, row by row.
+    let mut l = vec![vec![0.0; n]; n];
+    let mut inverse_l = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
+            let rest = matrix[i][j] * scale[i] * scale[j] - sum;
+            if i > j {
+                l[i][j] = rest / l[j][j];
+            } else if rest > 1e-14 {
+                l[i][i] = rest.sqrt();
+            } else {
+                return None;
+            }
+        }
+        inverse_l[i][i] = 1.0 / l[i][i];
+        for j in 0..i {
+            let sum: f64 = (j..i).map(|k| l[i][k] * inverse_l[k][j]).sum();
+            inverse_l[i][j] = -sum / l[i][i];
+        }
+    }
+    let entry = |i: usize, j: usize| {
+        let sum: f64 = (i.max(j)..n).map(|k| inverse_l[k][i] * inverse_l[k][j]).sum();
+        sum * scale[i] * scale[j]
+    };
+    Some((0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect())
+}
+
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}

@@ -1,0 +1,132 @@
+//! Gaussian approximation of the posterior about a best point.
+//!
+//! ```text
+//! cov theta = (J'J)^-1 |rho|^2 / m,      var kappa = var(kappa | theta) + k' cov(theta) k,   k = d kappa / d theta
+//! ```
+//!
+//! with the residual `rho` and its Jacobian `J` by central differences. Unknowns at a bound are taken as known.
+
+use super::descent::{Found, dot, inverse};
+use super::likelihood::{Evaluation, Memory, evaluate};
+use super::record::Blocks;
+use super::theta::{Bounds, MOST};
+
+/// Covariance of the unknowns.
+#[derive(Clone, Debug)]
+pub(super) struct Laplace {
+    /// Indices of the unknowns, in the order of rows and columns.
+    pub(super) free: Vec<usize>,
+    pub(super) covariance: Vec<Vec<f64>>,
+    /// Derivatives of the gain and of the disturbance at the first block (both as [`Evaluation`] has them).
+    pub(super) slopes: Vec<[f64; 2]>,
+    /// Factor on the standard deviation of each unknown if the residual is not white: square root of the ratio of the
+    /// sandwich estimator's variance (Newey and West's weights) to the plain one.
+    pub(super) coloured: Vec<f64>,
+}
+
+impl Laplace {
+    /// At `found`. Unknowns of which `free` has no entry are fixed. `None` if the unknowns have no joint maximum.
+    pub(super) fn new(
+        blocks: &Blocks<'_>,
+        found: &Found,
+        free: &[usize],
+        bounds: &Bounds,
+    ) -> Option<Self> {
+        let inside = |index: &usize| !bounds.is_at_edge(&found.theta, *index);
+        let free: Vec<usize> = free.iter().copied().filter(inside).collect();
+        let mut memory = Memory::default();
+        let mut columns = Vec::with_capacity(free.len());
+        let mut slopes = Vec::with_capacity(free.len());
+        for &index in &free {
+            // Forward differences use a tenth of this step.
+            let step = 10.0 * bounds.step[index];
+            let mut at = |sign: f64| {
+                let mut theta = found.theta;
+                theta.values[index] += sign * step;
+                evaluate(blocks, &theta, &mut memory)
+            };
+            let (above, below) = (at(1.0)?, at(-1.0)?);
+            let residuals = above.residual.iter().zip(&below.residual);
+            columns.push(residuals.map(|(a, b)| (a - b) / (2.0 * step)).collect::<Vec<f64>>());
+            let slope = |value: fn(&Evaluation) -> f64| (value(&above) - value(&below)) / (2.0 * step);
+            slopes.push([slope(|e| e.gain), slope(|e| e.state[e.state.len() - 1])]);
+        }
+        let information: Vec<Vec<f64>> = (columns.iter())
+            .map(|a| columns.iter().map(|b| dot(a, b)).collect())
+            .collect();
+        let inverse = inverse(&information)?;
+        let factor = found.at.cost() / found.at.freedom;
+        let covariance = (inverse.iter())
+            .map(|row| row.iter().map(|v| v * factor).collect())
+            .collect();
+        let coloured = coloured(&columns, &found.at.residual, &inverse, factor);
+        Some(Self {
+            free,
+            covariance,
+            slopes,
+            coloured,
+        })
+    }
+
+    /// Standard deviation of an unknown of [`Theta::values`](super::theta::Theta). `None` if it is not free.
+    pub(super) fn deviation(&self, index: usize) -> Option<f64> {
+        let slot = self.free.iter().position(|free| *free == index)?;
+        Some(self.covariance[slot][slot].sqrt())
+    }
+
+    /// Standard deviation of the gain.
+    pub(super) fn gain_deviation(&self, at: &Evaluation) -> f64 {
+        let n = self.free.len();
+        let slope = |i: usize| self.slopes[i][0];
+        let through: f64 = (0..n * n)
+            .map(|k| slope(k / n) * self.covariance[k / n][k % n] * slope(k % n))
+            .sum();
+        (at.gain_variance + through).sqrt()
+    }
+
+    /// `ln det(covariance) / 2`.
+    pub(super) fn half_log_determinant(&self) -> f64 {
+        // Of the inverse's Cholesky factor: by elimination without pivots on a scaled copy.
+        let n = self.free.len();
+        let mut a = self.covariance.clone();
+        let mut sum = 0.0;
+        for i in 0..n {
+            sum += 0.5 * a[i][i].max(f64::MIN_POSITIVE).ln();
+            for j in i + 1..n {
+                let factor = a[j][i] / a[i][i];
+                for k in i..n {
+                    a[j][k] -= factor * a[i][k];
+                }
+            }
+        }
+        sum
+    }
+}
+
+/// Ratios of the standard deviations of the sandwich estimator to the plain ones.
+fn coloured(columns: &[Vec<f64>], residual: &[f64], inverse: &[Vec<f64>], factor: f64) -> Vec<f64> {
+    let n = columns.len();
+    let rows = residual.len();
+    let lags = (rows / 20).min((4.0 * (rows as f64).cbrt()) as usize);
+    let scores: Vec<Vec<f64>> = (columns.iter())
+        .map(|column| column.iter().zip(residual).map(|(j, r)| j * r).collect())
+        .collect();
+    let mut meat = vec![[0.0; MOST]; n];
+    for i in 0..n {
+        for j in 0..n {
+            let at = |lag: usize| dot(&scores[i][lag..], &scores[j][..rows - lag]);
+            let weighted = (1..=lags).map(|lag| {
+                let weight = 1.0 - lag as f64 / (lags + 1) as f64;
+                weight * (at(lag) + dot(&scores[j][lag..], &scores[i][..rows - lag]))
+            });
+            meat[i][j] = at(0) + weighted.sum::<f64>();
+        }
+    }
+    let variance = |i: usize| -> f64 {
+        let pair = |k: usize| inverse[i][k / n] * meat[k / n][k % n] * inverse[k % n][i];
+        (0..n * n).map(pair).sum()
+    };
+    (0..n)
+        .map(|i| (variance(i).max(0.0) / (inverse[i][i] * factor)).sqrt())
+        .collect()
+}
