@@ -1,5 +1,6 @@
 //! Excitation of the process during a recording.
 
+use crate::innovations::Hold;
 use crate::reading::Reading;
 
 /// Excitation found in a recording, and its measured properties.
@@ -14,6 +15,37 @@ pub enum Excitation {
         /// returns no estimate.
         last_cycle: Option<Reading>,
     },
+    /// Any other input: chirp, steps, normal operation, an oscillation that is not steady.
+    Recorded(Recorded),
+}
+
+/// What a record of any input holds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Recorded {
+    /// Start of the part used (s).
+    pub start_s: f64,
+    /// End of the part used (s).
+    pub end_s: f64,
+    /// Sample period of the grid, or median increment of uneven time stamps (s).
+    pub sample_s: f64,
+    /// Number of samples used.
+    pub samples: usize,
+    /// Number of samples of the grid without a usable output: lost or stuck.
+    pub absent: usize,
+    /// Number of outputs left out as outliers.
+    pub outliers: usize,
+    /// Number of samples summed into one row of the fit.
+    pub samples_per_row: usize,
+    /// Input between two samples.
+    pub hold: Hold,
+    /// Standard deviation of the input (input unit).
+    pub input_deviation: f64,
+    /// Standard deviation of the output (output unit).
+    pub output_deviation: f64,
+    /// Band of frequencies (rad/s) that holds the central 90 % of the information on the gain. `None` if nothing was
+    /// fitted.
+    pub informative_rad_per_s: Option<(f64, f64)>,
 }
 
 impl Excitation {
@@ -22,6 +54,7 @@ impl Excitation {
     pub fn name(&self) -> &'static str {
         match self {
             Self::Relay { .. } => "relay",
+            Self::Recorded(_) => "recorded",
         }
     }
 }

@@ -19,12 +19,13 @@ pub mod cholesky;
 pub mod diagnose;
 mod excitation;
 #[allow(dead_code)]
-mod innovations;
+pub mod innovations;
 mod outcome;
 mod posterior;
 mod reading;
 mod relay;
 mod remark;
+mod remarks;
 mod settings;
 mod signals;
 mod verdict;
@@ -34,13 +35,17 @@ use onecycle_onboard::pack::Pack;
 pub use diagnose::density::{Density, density};
 pub use diagnose::harmonics::{Harmonic, harmonics};
 pub use diagnose::whiteness::{Whiteness, whiteness};
-pub use excitation::{Excitation, Oscillation};
-pub use outcome::{Fit, FitPoint, Identification, Identified};
+pub use excitation::{Excitation, Oscillation, Recorded};
+pub use innovations::Hold;
+pub use outcome::{
+    Alternative, Evidence, Fit, FitPoint, Identification, Identified, InnovationRow,
+    InnovationTests, Innovations, Noise, Prediction,
+};
 pub use posterior::{Draw, Estimate, Interval, Posterior};
 pub use reading::Reading;
 pub use relay::find_oscillation;
 pub use remark::Remark;
-pub use settings::{MOST_CYCLES, Method, Options};
+pub use settings::{MOST_CYCLES, Method, Options, Road};
 pub use signals::Signals;
 pub use verdict::Verdict;
 

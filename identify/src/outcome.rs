@@ -22,23 +22,23 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// Relay oscillation. `None` if the recording has none.
+    /// Relay oscillation. `None` if the recording has none, or if the general road was taken.
     #[must_use]
     pub fn oscillation(&self) -> Option<&Oscillation> {
-        self.excitation.as_ref().map(|excitation| {
-            let Excitation::Relay { oscillation, .. } = excitation;
-            oscillation
-        })
+        match &self.excitation {
+            Some(Excitation::Relay { oscillation, .. }) => Some(oscillation),
+            _ => None,
+        }
     }
 
     /// Estimate from the last cycle by the network of the pack. `None` without an oscillation, without a pack, or if
     /// the pack returns no estimate.
     #[must_use]
     pub fn last_cycle(&self) -> Option<&Reading> {
-        self.excitation.as_ref().and_then(|excitation| {
-            let Excitation::Relay { last_cycle, .. } = excitation;
-            last_cycle.as_ref()
-        })
+        match &self.excitation {
+            Some(Excitation::Relay { last_cycle, .. }) => last_cycle.as_ref(),
+            _ => None,
+        }
     }
 }
 
@@ -55,11 +55,13 @@ pub struct Identified {
     /// Probability that all parameters of the model lie within their intervals at once. `None` if there are no
     /// intervals.
     pub joint_probability: Option<f64>,
-    /// Controller of least expected cost over the posterior, with its cost and margins on [`Identified::model`].
-    pub design: Design,
-    /// Phase margin of the controller (rad), with its 90 % interval over the posterior.
-    pub phase_margin_rad: Interval,
-    /// Predicted response to a unit step of the reference. `None` if it is too slow to simulate.
+    /// Controller of least expected cost over the posterior, with its cost and margins on [`Identified::model`]. `None`
+    /// if none can be designed; a remark says why.
+    pub design: Option<Design>,
+    /// Phase margin of the controller (rad), with its 90 % interval over the posterior. `None` without a controller.
+    pub phase_margin_rad: Option<Interval>,
+    /// Predicted response to a unit step of the reference. `None` without a controller, or if it is too slow to
+    /// simulate.
     pub step: Option<StepMetrics>,
     /// Quality of the fit.
     pub fit: Fit,
@@ -69,12 +71,151 @@ pub struct Identified {
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Fit {
-    /// Root mean square of the residual in excess of the noise, divided by that of the oscillation.
+    /// Part of the output that the model leaves unexplained. Of a steady oscillation: root mean square of the residual
+    /// in excess of the noise, divided by that of the oscillation. Of any other record: root of the unexplained share of
+    /// the variance, in a prediction of the last third from the model of the first two thirds.
     pub misfit: f64,
-    /// Result of the estimator: covariance, residual, noise, model error.
-    pub refined: Refined,
-    /// Measured and fitted output over the cycles used.
+    /// Measured and fitted output over the cycles, or over the record, used.
     pub points: Vec<FitPoint>,
+    /// How the model was estimated.
+    pub evidence: Evidence,
+}
+
+/// Estimator of a model, with its results.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Evidence {
+    /// Least squares over whole cycles of a steady oscillation, as on board.
+    Relay(Refined),
+    /// Likelihood of the whole record with disturbances.
+    Innovations(Innovations),
+}
+
+impl Fit {
+    /// Result of the relay's estimator: covariance, residual, noise, model error. `None` on the general road.
+    #[must_use]
+    pub fn refined(&self) -> Option<&Refined> {
+        match &self.evidence {
+            Evidence::Relay(refined) => Some(refined),
+            Evidence::Innovations(_) => None,
+        }
+    }
+
+    /// Result of the general estimator. `None` for a steady relay oscillation.
+    #[must_use]
+    pub fn innovations(&self) -> Option<&Innovations> {
+        match &self.evidence {
+            Evidence::Relay(_) => None,
+            Evidence::Innovations(innovations) => Some(innovations),
+        }
+    }
+}
+
+/// Result of the general estimator: the innovations, which are what a Kalman filter of the model could not predict.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Innovations {
+    /// Noise and disturbances beside the response to the input.
+    pub noise: Noise,
+    /// Logarithm of the likelihood of the rows of the fit.
+    pub log_likelihood: f64,
+    /// Bayesian information criterion; lower is better.
+    pub bic: f64,
+    /// Best fit of every structure tried, in ascending order of BIC, the chosen one included.
+    pub alternatives: Vec<Alternative>,
+    /// Whether the innovations are white and free of the input.
+    pub whiteness: InnovationTests,
+    /// Prediction of the last third of the record from the model of the first two thirds. `None` if that is too short
+    /// to fit.
+    pub prediction: Option<Prediction>,
+    /// Factor by which the deviations were widened because the innovations are not white; 1 if they are.
+    pub widened: f64,
+    /// Rows of the fit in order of time.
+    pub rows: Vec<InnovationRow>,
+}
+
+/// Noise and disturbances of a record. A frequency is the one below which the disturbance outweighs the white noise of
+/// the samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Noise {
+    /// Standard deviation of the white noise of one sample (output unit).
+    pub sigma: f64,
+    /// Random walk of a disturbance that acts behind the actuator lags, as wind (rad/s).
+    pub w1_rad_per_s: Option<f64>,
+    /// White disturbance at the same place, as gusts (rad/s).
+    pub w0_rad_per_s: Option<f64>,
+    /// Random walk of the measured output, as an angle integrated from a gyro (rad/s).
+    pub wy_rad_per_s: Option<f64>,
+}
+
+impl Noise {
+    /// Kinds of noise beside the white one, as in JSON: `white`, or the names joined by `+`.
+    #[must_use]
+    pub fn kind(&self) -> String {
+        let names = [
+            ("w1", self.w1_rad_per_s),
+            ("w0", self.w0_rad_per_s),
+            ("wy", self.wy_rad_per_s),
+        ];
+        let present = names.iter().filter(|(_, value)| value.is_some());
+        let joined = present.map(|(name, _)| *name).collect::<Vec<_>>().join("+");
+        if joined.is_empty() {
+            "white".to_owned()
+        } else {
+            joined
+        }
+    }
+}
+
+/// Best fit of a structure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Alternative {
+    /// The model.
+    pub model: Model,
+    /// Its noise.
+    pub noise: Noise,
+    /// Its Bayesian information criterion.
+    pub bic: f64,
+}
+
+/// Tests of the innovations at lags of 1 to 20 rows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct InnovationTests {
+    /// Largest magnitude of the autocorrelation.
+    pub autocorrelation: f64,
+    /// Statistic of Ljung and Box over its degrees of freedom: 1 for white innovations.
+    pub ljung_box: f64,
+    /// Share of the innovations' variance that the past input explains.
+    pub input_share: f64,
+    /// F statistic of that share: 1 if the input explains nothing.
+    pub input_f: f64,
+}
+
+/// Prediction of data that the model was not fitted to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Prediction {
+    /// Time ahead of the last measurement used (s).
+    pub horizon_s: f64,
+    /// Share of the variance of the output that the prediction explains; below zero if the mean is a better guess.
+    pub explained: f64,
+}
+
+/// Row of the fit: the mean over the samples of a block.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct InnovationRow {
+    /// Mean time of the samples (s).
+    pub time_s: f64,
+    /// Innovation over its standard deviation. `None` if no sample is present.
+    pub innovation: Option<f64>,
+    /// Output predicted from the rows before (output unit).
+    pub predicted: f64,
+    /// Disturbance at the process input, estimated from the rows before (input unit).
+    pub disturbance: f64,
 }
 
 /// Measured and fitted output in one bin: the mean over a few consecutive samples.

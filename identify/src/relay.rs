@@ -18,7 +18,6 @@
 mod input;
 mod last_cycle;
 mod oscillation;
-mod remarks;
 mod saturation;
 
 use onecycle_design::{Model, Specification, design_over, step_response, tuning};
@@ -29,10 +28,11 @@ use onecycle_onboard::refine::{PriorKnowledge, RefineError, Refined, ShapePrior,
 use self::input::{RelayInput, find_relay};
 use self::oscillation::{FitWindow, Past, Stretch};
 use crate::excitation::{Excitation, Oscillation};
-use crate::outcome::{Fit, Identification, Identified};
+use crate::outcome::{Evidence, Fit, Identification, Identified};
 use crate::posterior::Posterior;
 use crate::reading::Reading;
 use crate::remark::Remark;
+use crate::remarks;
 use crate::settings::{MOST_CYCLES, Method, Options};
 use crate::signals::Signals;
 use crate::verdict::Verdict;
@@ -151,10 +151,15 @@ impl Search<'_> {
         };
         let fit = Fit {
             misfit: self.judge(&refined, window)?,
-            refined,
+            evidence: Evidence::Relay(refined),
             points: oscillation::fit_points(window, stretch.period_s, &refined),
         };
-        design(fit, window.sample_s(), &self.options.specification)
+        design(
+            fit,
+            &refined,
+            window.sample_s(),
+            &self.options.specification,
+        )
     }
 
     /// Least squares from the starts that the reading suggests. With the prior of the pack this is the most probable
@@ -198,11 +203,15 @@ impl Search<'_> {
 
     /// Keeps the first excitation, and the first reading of a last cycle.
     fn keep_first(&mut self, excitation: Excitation) {
-        let Excitation::Relay { last_cycle, .. } = excitation;
-        let Excitation::Relay {
+        let Excitation::Relay { last_cycle, .. } = excitation else {
+            return;
+        };
+        if let Excitation::Relay {
             last_cycle: kept, ..
-        } = self.excitation.get_or_insert(excitation);
-        *kept = kept.or(last_cycle);
+        } = self.excitation.get_or_insert(excitation)
+        {
+            *kept = kept.or(last_cycle);
+        }
     }
 }
 
@@ -220,10 +229,15 @@ fn classified(window: &FitWindow, reading: Option<&Reading>) -> Result<Refined, 
 ///
 /// # Errors
 /// The specification is out of range, or the controller may be unstable on a process within the intervals.
-fn design(fit: Fit, sample_s: f64, specification: &Specification) -> Result<Identified, Verdict> {
-    let model = Model::from(fit.refined.process);
-    let posterior = Posterior::new(&fit.refined, sample_s);
-    let has_model_error = fit.refined.response_error > 0.0;
+fn design(
+    fit: Fit,
+    refined: &Refined,
+    sample_s: f64,
+    specification: &Specification,
+) -> Result<Identified, Verdict> {
+    let model = Model::from(refined.process);
+    let posterior = Posterior::new(refined, sample_s);
+    let has_model_error = refined.response_error > 0.0;
     // A model error widens the intervals, but its distribution is not known. So the controller is not optimised over
     // draws.
     let draws = if has_model_error {
@@ -249,8 +263,8 @@ fn design(fit: Fit, sample_s: f64, specification: &Specification) -> Result<Iden
         model,
         estimate,
         posterior,
-        design,
-        phase_margin_rad,
+        design: Some(design),
+        phase_margin_rad: Some(phase_margin_rad),
         fit,
     })
 }

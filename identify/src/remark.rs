@@ -1,6 +1,8 @@
 //! Remarks on a result: what limits it or deserves attention.
 
-use onecycle_design::Parameter;
+use onecycle_design::{DesignError, Parameter, Structure};
+
+use crate::verdict::Verdict;
 
 /// Something that limits a result or deserves attention, as facts. The program that shows it writes the sentence.
 #[derive(Clone, Debug, PartialEq)]
@@ -55,6 +57,37 @@ pub enum Remark {
     MarginMayBeLess(f64),
     /// The predicted step response overshoots by much. The value is the overshoot as a fraction of the step.
     Overshoot(f64),
+    /// No controller can be designed for the model.
+    NoController(DesignError),
+    /// The estimator of steady oscillations refused the recording, and the general one did not. The value is the
+    /// refusal.
+    NotASteadyOscillation(Box<Verdict>),
+    /// The general estimator disagrees with that of steady oscillations and explains the recording better, so its
+    /// result is given. The value is the difference of the BIC.
+    RelayReplaced(f64),
+    /// Other structures explain the recording nearly as well.
+    OtherStructures(Vec<Structure>),
+    /// The innovations are not white. The value is their largest autocorrelation; the intervals are widened.
+    Coloured(f64),
+    /// The past input explains a share of the innovations: the model lacks something.
+    InputLeft(f64),
+    /// The model predicts less than nine tenths of the variance of data that it was not fitted to.
+    WeakPrediction {
+        /// Share of the variance explained.
+        explained: f64,
+        /// Time ahead (s).
+        horizon_s: f64,
+    },
+    /// Outputs were left out: lost, stuck or outliers. The value is their share.
+    Absent(f64),
+    /// Only the longest part without a gap was used. The value is its share of the recording.
+    PartUsed(f64),
+    /// The input between the samples is taken as straight lines and not as held, because that explains the recording
+    /// better. The value is the difference of the log-likelihood.
+    Interpolated(f64),
+    /// The recording disagrees with the prior of the pack, so the prior was not used. The value is the misfit of the
+    /// prior: squared distance in standard deviations.
+    PriorDropped(f64),
 }
 
 impl Remark {
@@ -77,6 +110,17 @@ impl Remark {
             Self::Misfit(_) => "misfit",
             Self::MarginMayBeLess(_) => "margin_may_be_less",
             Self::Overshoot(_) => "overshoot",
+            Self::NoController(_) => "no_controller",
+            Self::NotASteadyOscillation(_) => "not_a_steady_oscillation",
+            Self::RelayReplaced(_) => "relay_replaced",
+            Self::OtherStructures(_) => "other_structures",
+            Self::Coloured(_) => "coloured",
+            Self::InputLeft(_) => "input_left",
+            Self::WeakPrediction { .. } => "weak_prediction",
+            Self::Absent(_) => "absent",
+            Self::PartUsed(_) => "part_used",
+            Self::Interpolated(_) => "interpolated",
+            Self::PriorDropped(_) => "prior_dropped",
         }
     }
 }

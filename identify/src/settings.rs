@@ -1,6 +1,8 @@
 //! Settings of an identification.
 
-use onecycle_design::Specification;
+use onecycle_design::{Specification, Structure};
+
+use crate::innovations::Hold;
 
 /// Maximum number of cycles that a fit can use: the window of the estimator has room for the switches of 50 cycles.
 pub const MOST_CYCLES: usize = 50;
@@ -14,8 +16,16 @@ pub struct Options {
     pub cycles: usize,
     /// Requirements on the controller.
     pub specification: Specification,
-    /// Method of estimation.
+    /// Method of estimation of a steady oscillation.
     pub method: Method,
+    /// Which recordings take the general road.
+    pub road: Road,
+    /// Structure to fit. `None`: the simplest one that explains the recording.
+    pub structure: Option<Structure>,
+    /// First and last time to use (s). `None`: from the start, to the end.
+    pub span_s: (Option<f64>, Option<f64>),
+    /// Input between two samples. `None`: the likelihood decides.
+    pub hold: Option<Hold>,
 }
 
 impl Default for Options {
@@ -24,6 +34,10 @@ impl Default for Options {
             cycles: 8,
             specification: Specification::default(),
             method: Method::default(),
+            road: Road::default(),
+            structure: None,
+            span_s: (None, None),
+            hold: None,
         }
     }
 }
@@ -53,6 +67,47 @@ impl Options {
     pub fn method(self, method: Method) -> Self {
         Self { method, ..self }
     }
+
+    /// Takes this road.
+    #[must_use]
+    pub fn road(self, road: Road) -> Self {
+        Self { road, ..self }
+    }
+
+    /// Fits this structure, or the simplest one that explains the recording if `None`.
+    #[must_use]
+    pub fn structure(self, structure: Option<Structure>) -> Self {
+        Self { structure, ..self }
+    }
+
+    /// Uses the recording from the first to the second time (s) only.
+    #[must_use]
+    pub fn span_s(self, from_s: Option<f64>, to_s: Option<f64>) -> Self {
+        Self {
+            span_s: (from_s, to_s),
+            ..self
+        }
+    }
+
+    /// Takes the input between two samples as `hold` says, or lets the likelihood decide if `None`.
+    #[must_use]
+    pub fn hold(self, hold: Option<Hold>) -> Self {
+        Self { hold, ..self }
+    }
+}
+
+/// Which estimator a recording takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Road {
+    /// A steady relay oscillation takes that of the board, which the general one checks and replaces where the data
+    /// say so. Any other recording takes the general one.
+    #[default]
+    Automatic,
+    /// That of the board: steady relay oscillations only.
+    Relay,
+    /// The general one, for any recording.
+    General,
 }
 
 /// Method of estimation.

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use onecycle_design::DesignError;
+use onecycle_design::{DesignError, Parameter};
 use onecycle_onboard::refine::DomainEdge;
 
 /// Reason why no process was identified.
@@ -68,6 +68,38 @@ pub enum Verdict {
     EdgeOfDomain(DomainEdge),
     /// The output does not follow the input.
     NoFit,
+    /// The record has too few rows for the unknowns of the structure.
+    TooFewRows {
+        /// Number of rows: samples, or sums of samples.
+        rows: usize,
+        /// Number needed.
+        needed: usize,
+    },
+    /// The input did not excite the process enough to tell a parameter.
+    NoInformation {
+        /// The parameter that the record does not tell.
+        parameter: Parameter,
+        /// Its relative standard deviation. `None` if it is not finite.
+        deviation: Option<f64>,
+        /// Band of frequencies (rad/s) with the central 90 % of the information on the gain.
+        informative_rad_per_s: Option<(f64, f64)>,
+        /// Frequency (rad/s) up to which an excitation would tell the lags and the dead time.
+        needed_rad_per_s: f64,
+    },
+    /// The best fit lies on a bound of this parameter.
+    AtBound(Parameter),
+    /// The model does not predict data that it was not fitted to.
+    NoPrediction {
+        /// Share of the variance explained.
+        explained: f64,
+        /// Time ahead (s).
+        horizon_s: f64,
+    },
+    /// The past input explains much of what the model did not predict: the process is of another kind.
+    InputLeft {
+        /// Share of the innovations' variance.
+        share: f64,
+    },
     /// A process was identified, but no controller meets the specification.
     NoController(DesignError),
 }
@@ -80,13 +112,17 @@ impl Verdict {
             Self::ConstantInput | Self::NoRelay { .. } | Self::FewSwitches { .. } => "no_relay",
             Self::ConstantOutput => "no_response",
             Self::Units => "unusable_units",
-            Self::TooShort { .. } | Self::TooCoarse { .. } => "too_short",
+            Self::TooShort { .. } | Self::TooCoarse { .. } | Self::TooFewRows { .. } => "too_short",
+            Self::NoInformation { .. } => "no_information",
             Self::NotSteady { .. } => "not_steady",
             Self::Saturated { .. } => "saturated",
-            Self::NotThisProcess { .. } | Self::NoFit => "not_this_process",
+            Self::NotThisProcess { .. }
+            | Self::NoFit
+            | Self::NoPrediction { .. }
+            | Self::InputLeft { .. } => "not_this_process",
             Self::Unknown { .. } => "unknown",
             Self::TooUncertain => "too_uncertain",
-            Self::EdgeOfDomain(_) => "edge_of_domain",
+            Self::EdgeOfDomain(_) | Self::AtBound(_) => "edge_of_domain",
             Self::NoController(_) => "no_controller",
         }
     }
@@ -113,6 +149,11 @@ impl fmt::Display for Verdict {
             | Self::EdgeOfDomain(_)
             | Self::NoFit
             | Self::NoController(_) => self.write_model(f),
+            Self::TooFewRows { .. }
+            | Self::NoInformation { .. }
+            | Self::AtBound(_)
+            | Self::NoPrediction { .. }
+            | Self::InputLeft { .. } => self.write_record(f),
         }
     }
 }
@@ -168,6 +209,51 @@ impl Verdict {
                 f,
                 "saturated: the output stays at one exact limit for {:.0} % of the time",
                 100.0 * part
+            ),
+            _ => f.write_str(self.kind()),
+        }
+    }
+
+    /// Clause of a verdict of the general estimator.
+    fn write_record(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::TooFewRows { rows, needed } => write!(
+                f,
+                "too short: {rows} samples can be used, and at least {needed} are needed"
+            ),
+            Self::NoInformation {
+                parameter,
+                deviation: Some(deviation),
+                ..
+            } => write!(
+                f,
+                "no information: the standard deviation of {} is {:.0} % of its value",
+                parameter.symbol(),
+                100.0 * deviation
+            ),
+            Self::NoInformation { parameter, .. } => write!(
+                f,
+                "no information: the recording does not tell {}",
+                parameter.symbol()
+            ),
+            Self::AtBound(parameter) => write!(
+                f,
+                "at the edge of the domain: the best fit has {} at a bound of the search",
+                parameter.symbol()
+            ),
+            Self::NoPrediction {
+                explained,
+                horizon_s,
+            } => write!(
+                f,
+                "not this kind of process: a model of the first two thirds predicts {:.0} % of the variance of the \
+                 last third, {horizon_s:.3} s ahead",
+                100.0 * explained
+            ),
+            Self::InputLeft { share } => write!(
+                f,
+                "not this kind of process: the past input explains {:.0} % of what the model did not predict",
+                100.0 * share
             ),
             _ => f.write_str(self.kind()),
         }

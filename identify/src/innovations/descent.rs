@@ -103,7 +103,11 @@ fn linearise(
         theta.values[index] += step;
         let moved = evaluate(blocks, &theta, memory)?.residual;
         let difference = moved.iter().zip(&here.at.residual);
-        columns.push(difference.map(|(a, b)| (a - b) / step).collect::<Vec<f64>>());
+        columns.push(
+            difference
+                .map(|(a, b)| (a - b) / step)
+                .collect::<Vec<f64>>(),
+        );
     }
     let mut normal = Normal {
         matrix: [[0.0; MOST]; MOST],
@@ -188,10 +192,16 @@ pub(super) fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         }
     }
     let entry = |i: usize, j: usize| {
-        let sum: f64 = (i.max(j)..n).map(|k| inverse_l[k][i] * inverse_l[k][j]).sum();
+        let sum: f64 = (i.max(j)..n)
+            .map(|k| inverse_l[k][i] * inverse_l[k][j])
+            .sum();
         sum * scale[i] * scale[j]
     };
-    Some((0..n).map(|i| (0..n).map(|j| entry(i, j)).collect()).collect())
+    Some(
+        (0..n)
+            .map(|i| (0..n).map(|j| entry(i, j)).collect())
+            .collect(),
+    )
 }
 
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {

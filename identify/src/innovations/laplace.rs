@@ -47,8 +47,13 @@ impl Laplace {
             };
             let (above, below) = (at(1.0)?, at(-1.0)?);
             let residuals = above.residual.iter().zip(&below.residual);
-            columns.push(residuals.map(|(a, b)| (a - b) / (2.0 * step)).collect::<Vec<f64>>());
-            let slope = |value: fn(&Evaluation) -> f64| (value(&above) - value(&below)) / (2.0 * step);
+            columns.push(
+                residuals
+                    .map(|(a, b)| (a - b) / (2.0 * step))
+                    .collect::<Vec<f64>>(),
+            );
+            let slope =
+                |value: fn(&Evaluation) -> f64| (value(&above) - value(&below)) / (2.0 * step);
             slopes.push([slope(|e| e.gain), slope(|e| e.state[e.state.len() - 1])]);
         }
         let information: Vec<Vec<f64>> = (columns.iter())

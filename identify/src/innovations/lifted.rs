@@ -190,7 +190,8 @@ fn largest<const N: usize>(a: &Matrix<N>) -> f64 {
 fn inverse<const N: usize>(mut a: Matrix<N>) -> Option<Matrix<N>> {
     let mut out = identity();
     for column in 0..N {
-        let pivot = (column..N).max_by(|&i, &j| a[i][column].abs().total_cmp(&a[j][column].abs()))?;
+        let pivot =
+            (column..N).max_by(|&i, &j| a[i][column].abs().total_cmp(&a[j][column].abs()))?;
         a.swap(column, pivot);
         out.swap(column, pivot);
         let scale = 1.0 / a[column][column];

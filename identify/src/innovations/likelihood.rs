@@ -74,7 +74,11 @@ impl Evaluation {
 }
 
 /// Evaluates the likelihood at `theta`. `None` if the filter does not converge or the columns are degenerate.
-pub(super) fn evaluate(blocks: &Blocks<'_>, theta: &Theta, memory: &mut Memory) -> Option<Evaluation> {
+pub(super) fn evaluate(
+    blocks: &Blocks<'_>,
+    theta: &Theta,
+    memory: &mut Memory,
+) -> Option<Evaluation> {
     match theta.structure.stages().states() + 1 {
         2 => evaluate_sized::<2>(blocks, theta, memory),
         3 => evaluate_sized::<3>(blocks, theta, memory),
@@ -257,7 +261,11 @@ fn remember<const N: usize>(
     memory.response = blocks.sums_of(&samples);
     let has_samples = |block: &usize| lifted[blocks.kind_of[*block] as usize].r > 0.0;
     let mut columns = vec![Vec::with_capacity(blocks.len()); N + 1];
-    columns[0].extend((0..blocks.len()).filter(has_samples).map(|block| memory.response[block]));
+    columns[0].extend(
+        (0..blocks.len())
+            .filter(has_samples)
+            .map(|block| memory.response[block]),
+    );
     let mut state = identity::<N>();
     for &kind in &blocks.kind_of {
         let block = &lifted[kind as usize];
@@ -438,7 +446,9 @@ fn paths_sized<const N: usize>(
         let forced = evaluation.gain * response[block];
         let count = blocks.present(block).max(1) as f64;
         let prediction = forced + dot(&model.c, &filtered);
-        paths.simulated.push((forced + dot(&model.c, &free)) / count);
+        paths
+            .simulated
+            .push((forced + dot(&model.c, &free)) / count);
         paths.predicted.push(prediction / count);
         let disturbance = if walks { 0.0 } else { filtered[N - 1] };
         paths.disturbance.push(disturbance / evaluation.gain);

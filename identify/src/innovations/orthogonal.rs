@@ -65,7 +65,10 @@ impl Orthogonal {
                 x[i] -= self.r[j][i] * x[j];
             }
         }
-        (residual, x.iter().zip(&self.scale).map(|(x, s)| x / s).collect())
+        (
+            residual,
+            x.iter().zip(&self.scale).map(|(x, s)| x / s).collect(),
+        )
     }
 
     /// `ln|X'X| / 2`.

@@ -143,7 +143,10 @@ impl<'a> Blocks<'a> {
             let step_s = blocks.step_s(range.start);
             let mask = &record.present[range.clone()];
             let outputs = record.output[range].iter().zip(mask);
-            let sum: f64 = outputs.filter(|(_, present)| **present).map(|(y, _)| y).sum();
+            let sum: f64 = outputs
+                .filter(|(_, present)| **present)
+                .map(|(y, _)| y)
+                .sum();
             let next = blocks.kinds.len() as u32;
             // To the nanosecond: clocks are no better, and jitter would make every block a kind of its own.
             let key = ((step_s * 1e9).round() as u64, mask.to_vec());
@@ -198,8 +201,13 @@ impl<'a> Blocks<'a> {
     pub(crate) fn sums_of(&self, values: &[f64]) -> Vec<f64> {
         let sum = |block: usize| {
             let range = self.range(block);
-            let values = values[range.clone()].iter().zip(&self.record.present[range]);
-            values.filter(|(_, present)| **present).map(|(v, _)| v).sum()
+            let values = values[range.clone()]
+                .iter()
+                .zip(&self.record.present[range]);
+            values
+                .filter(|(_, present)| **present)
+                .map(|(v, _)| v)
+                .sum()
         };
         (0..self.len()).map(sum).collect()
     }

@@ -214,8 +214,7 @@ impl Bounds {
     pub(super) fn clamp(&self, theta: &Theta) -> Theta {
         let mut inside = *theta;
         for index in theta.free() {
-            inside.values[index] =
-                theta.values[index].clamp(self.low[index], self.high[index]);
+            inside.values[index] = theta.values[index].clamp(self.low[index], self.high[index]);
         }
         inside
     }

@@ -19,7 +19,9 @@ fn noise(count: usize) -> Vec<f64> {
         s = (1_103_515_245 * s + 12345) % (1 << 31);
         s as f64 / f64::from(1_u32 << 31) - 0.5
     };
-    (0..count).map(|_| (0..4).map(|_| uniform()).sum()).collect()
+    (0..count)
+        .map(|_| (0..4).map(|_| uniform()).sum())
+        .collect()
 }
 
 /// A relay-like input that halves its amplitude, on an integrator with two lags and a slow disturbance (Euler steps).
@@ -44,7 +46,10 @@ pub(super) fn data(count: usize) -> Record {
 
 fn close(found: f64, expected: f64, relative: f64, what: &str) {
     let error = (found - expected).abs();
-    assert!(error <= relative * expected.abs(), "{what}: {found} is not {expected}");
+    assert!(
+        error <= relative * expected.abs(),
+        "{what}: {found} is not {expected}"
+    );
 }
 
 /// Structure, its unknowns but the noise, and the noise frequencies w1, w0.
@@ -83,7 +88,15 @@ fn blocks_with_their_steady_filter() {
     let one = [0.0, 0.0, 1.0, 0.0];
     let cases = [
         (1, one, [0.0; 4], 1.0, p_of_one, 1.1190167648, gain_of_one),
-        (4, four, s_of_four, 4.0000655760, p_of_four, 6.2705563858, gain_of_four),
+        (
+            4,
+            four,
+            s_of_four,
+            4.0000655760,
+            p_of_four,
+            6.2705563858,
+            gain_of_four,
+        ),
     ];
     for (count, c, s, r, p, variance, gain) in cases {
         let block = Lifted::of_full(&sample(), count);
@@ -143,11 +156,36 @@ fn responses_with_fractional_long_and_negative_dead_time() {
     interpolated.hold = Hold::Interpolated;
     let short = 2.1326767126e-03;
     let cases = [
-        (&held, 0.033, [short, 3.8296365608e-02, 1.0414076712e-01, 1.7894486470e-01]),
-        (&interpolated, 0.033, [short, 3.5551719163e-02, 9.5794175673e-02, 1.6590710790e-01]),
-        (&held, -0.01, [short, 2.5828903180e-02, 6.8374495167e-02, 1.2272128044e-01]),
-        (&held, 0.25, [short, 5.8894537082e-02, 2.7123150542e-01, 4.6123348996e-01]),
-        (&uneven(120), 0.033, [1.8259772035e-03, 3.9284953060e-02, 1.2626394512e-01, 2.3113775130e-01]),
+        (
+            &held,
+            0.033,
+            [short, 3.8296365608e-02, 1.0414076712e-01, 1.7894486470e-01],
+        ),
+        (
+            &interpolated,
+            0.033,
+            [short, 3.5551719163e-02, 9.5794175673e-02, 1.6590710790e-01],
+        ),
+        (
+            &held,
+            -0.01,
+            [short, 2.5828903180e-02, 6.8374495167e-02, 1.2272128044e-01],
+        ),
+        (
+            &held,
+            0.25,
+            [short, 5.8894537082e-02, 2.7123150542e-01, 4.6123348996e-01],
+        ),
+        (
+            &uneven(120),
+            0.033,
+            [
+                1.8259772035e-03,
+                3.9284953060e-02,
+                1.2626394512e-01,
+                2.3113775130e-01,
+            ],
+        ),
     ];
     let process = Linear::new(Structure::Soiptd)
         .with_lags_s([0.05, 1.0])
@@ -169,28 +207,187 @@ fn likelihoods() {
     // Structure, unknowns, w1, w0, samples a block, absent samples; ln L, gain, variance, sum ln S, ln|X'X| - ln|X0'X0|.
     type Case<'a> = (Structure, Vec<f64>, f64, f64, usize, &'a [usize], [f64; 5]);
     let cases: [Case<'_>; 11] = [
-        (Soiptd, vec![ln(0.05), 0.5, 0.033], 3.0, 0.0, 1, &[], [470.54124399, 5.9936430860e-01, 1.1174279452e-05, 12.71366864, -11.75408513]),
-        (Soiptd, vec![ln(0.05), 0.5, 0.033], 0.0, 2.0, 1, &[], [432.69631770, 4.7430727901e-01, 2.2402826851e-05, 5.45624704, -5.31978482]),
-        (Soiptd, vec![ln(0.05), 0.5, 0.033], 3.0, 2.0, 4, &[], [66.02343932, 5.6834083822e-01, 4.5232379605e-05, 51.40422248, -18.63723426]),
-        (Soiptd, vec![ln(0.05), 0.5, 0.033], 3.0, 2.0, 4, &absent, [66.42349083, 5.8128170084e-01, 4.5205361314e-05, 50.47560974, -18.49498204]),
-        (Soiptd, vec![ln(0.05), 0.0, 0.0], 0.0, 0.0, 1, &[], [402.09428240, 3.1015036889e-01, 3.9127610045e-05, 0.0, 0.0]),
-        (Soptd, vec![ln(0.05), 2.0, 0.033], 3.0, 0.0, 1, &[], [156.81339323, 9.3185486638e-02, 3.4151916591e-03, 6.18795621, -4.39219225]),
-        (Foptd, vec![3.0, 0.033], 3.0, 0.0, 1, &absent, [114.05358003, 7.5701790724e-02, 7.1147496754e-03, 4.99820143, -3.36517159]),
-        (Iptd, vec![0.033], 2.0, 0.0, 1, &[], [315.33450887, 9.0068433016e-03, 2.0842002095e-04, 6.50538238, -5.70965108]),
-        (ResonantLag, vec![ln(0.05), 1.0, 30.0, 0.033], 3.0, 0.0, 2, &[], [-15.51908152, -1.5882625217, 5.2565974723e-02, 42.24118662, -5.59694672]),
-        (DoubleIntegratorLag, vec![ln(0.05), 0.033], 3.0, 1.0, 1, &[], [446.39486685, 5.0172768765e-01, 1.7331284226e-05, 13.81416842, -12.84067062]),
-        (Toiptd, vec![ln(0.05), ln(0.02), 0.4, 0.033], 3.0, 0.0, 1, &[], [463.64863449, 7.3962509304e-01, 1.1730245886e-05, 12.92079844, -12.03261491]),
+        (
+            Soiptd,
+            vec![ln(0.05), 0.5, 0.033],
+            3.0,
+            0.0,
+            1,
+            &[],
+            [
+                470.54124399,
+                5.9936430860e-01,
+                1.1174279452e-05,
+                12.71366864,
+                -11.75408513,
+            ],
+        ),
+        (
+            Soiptd,
+            vec![ln(0.05), 0.5, 0.033],
+            0.0,
+            2.0,
+            1,
+            &[],
+            [
+                432.69631770,
+                4.7430727901e-01,
+                2.2402826851e-05,
+                5.45624704,
+                -5.31978482,
+            ],
+        ),
+        (
+            Soiptd,
+            vec![ln(0.05), 0.5, 0.033],
+            3.0,
+            2.0,
+            4,
+            &[],
+            [
+                66.02343932,
+                5.6834083822e-01,
+                4.5232379605e-05,
+                51.40422248,
+                -18.63723426,
+            ],
+        ),
+        (
+            Soiptd,
+            vec![ln(0.05), 0.5, 0.033],
+            3.0,
+            2.0,
+            4,
+            &absent,
+            [
+                66.42349083,
+                5.8128170084e-01,
+                4.5205361314e-05,
+                50.47560974,
+                -18.49498204,
+            ],
+        ),
+        (
+            Soiptd,
+            vec![ln(0.05), 0.0, 0.0],
+            0.0,
+            0.0,
+            1,
+            &[],
+            [402.09428240, 3.1015036889e-01, 3.9127610045e-05, 0.0, 0.0],
+        ),
+        (
+            Soptd,
+            vec![ln(0.05), 2.0, 0.033],
+            3.0,
+            0.0,
+            1,
+            &[],
+            [
+                156.81339323,
+                9.3185486638e-02,
+                3.4151916591e-03,
+                6.18795621,
+                -4.39219225,
+            ],
+        ),
+        (
+            Foptd,
+            vec![3.0, 0.033],
+            3.0,
+            0.0,
+            1,
+            &absent,
+            [
+                114.05358003,
+                7.5701790724e-02,
+                7.1147496754e-03,
+                4.99820143,
+                -3.36517159,
+            ],
+        ),
+        (
+            Iptd,
+            vec![0.033],
+            2.0,
+            0.0,
+            1,
+            &[],
+            [
+                315.33450887,
+                9.0068433016e-03,
+                2.0842002095e-04,
+                6.50538238,
+                -5.70965108,
+            ],
+        ),
+        (
+            ResonantLag,
+            vec![ln(0.05), 1.0, 30.0, 0.033],
+            3.0,
+            0.0,
+            2,
+            &[],
+            [
+                -15.51908152,
+                -1.5882625217,
+                5.2565974723e-02,
+                42.24118662,
+                -5.59694672,
+            ],
+        ),
+        (
+            DoubleIntegratorLag,
+            vec![ln(0.05), 0.033],
+            3.0,
+            1.0,
+            1,
+            &[],
+            [
+                446.39486685,
+                5.0172768765e-01,
+                1.7331284226e-05,
+                13.81416842,
+                -12.84067062,
+            ],
+        ),
+        (
+            Toiptd,
+            vec![ln(0.05), ln(0.02), 0.4, 0.033],
+            3.0,
+            0.0,
+            1,
+            &[],
+            [
+                463.64863449,
+                7.3962509304e-01,
+                1.1730245886e-05,
+                12.92079844,
+                -12.03261491,
+            ],
+        ),
     ];
     for (structure, process, w1, w0, samples, absent, expected) in cases {
         let mut record = data(120);
         absent.iter().for_each(|&k| record.present[k] = false);
-        let (log_s, log_x) = check(&record, samples, &theta(structure, &process, w1, w0), expected);
+        let (log_s, log_x) = check(
+            &record,
+            samples,
+            &theta(structure, &process, w1, w0),
+            expected,
+        );
         let name = structure.name();
         assert!((log_s - expected[3]).abs() < 2e-8, "{name}: {log_s}");
         assert!((log_x - expected[4]).abs() < 2e-7, "{name}: {log_x}");
     }
     // Uneven stamps: the two determinants depend on the covariance that the filter starts from, their sum does not.
-    let expected = [512.28284582, 1.2149279719, 4.8225240989e-06, 12.78217922, -12.27524376];
+    let expected = [
+        512.28284582,
+        1.2149279719,
+        4.8225240989e-06,
+        12.78217922,
+        -12.27524376,
+    ];
     let soiptd = theta(Soiptd, &[ln(0.05), 0.5, 0.033], 3.0, 0.0);
     let (log_s, log_x) = check(&uneven(120), 1, &soiptd, expected);
     assert!((log_s + log_x - expected[3] - expected[4]).abs() < 2e-7);
@@ -204,7 +401,11 @@ fn check(record: &Record, samples: usize, theta: &Theta, expected: [f64; 5]) -> 
     let name = theta.structure.name();
     close(found.gain, gain, 1e-9, name);
     close(found.variance, variance, 1e-9, name);
-    assert!((found.log_likelihood - likelihood).abs() < 2e-7, "{name} {}", found.log_likelihood);
+    assert!(
+        (found.log_likelihood - likelihood).abs() < 2e-7,
+        "{name} {}",
+        found.log_likelihood
+    );
     found.determinants
 }
 
@@ -216,9 +417,48 @@ fn best_points_with_their_covariance() {
 
     // Samples a block, kind of noise; T, a, tau, w, gain, ln L, variance; deviations of ln T, a, tau, ln w, gain.
     let cases = [
-        (1, NoiseKind::RandomWalk, [0.0724315, 0.5482979, 0.06000601, 12.962674, 1.05198827, 3814.6517046, 9.1047220248e-08], [3.1056e-01, 3.3379e-01, 8.6855e-03, 4.2885e-02, 2.0159e-01]),
-        (3, NoiseKind::RandomWalk, [0.0998265, 0.4627307, 0.05120661, 13.445180, 1.30678187, 1069.2040133, 7.4568419651e-08], [3.6083e-01, 3.4310e-01, 8.9777e-03, 4.8379e-02, 3.5626e-01]),
-        (1, NoiseKind::WhiteForce, [0.0808300, 0.5193686, 0.05702680, 25.855543, 1.13044775, 3762.9033080, 8.7666572320e-08], [3.5755e-01, 1.0676e-01, 9.7275e-03, 4.7161e-02, 2.6980e-01]),
+        (
+            1,
+            NoiseKind::RandomWalk,
+            [
+                0.0724315,
+                0.5482979,
+                0.06000601,
+                12.962674,
+                1.05198827,
+                3814.6517046,
+                9.1047220248e-08,
+            ],
+            [3.1056e-01, 3.3379e-01, 8.6855e-03, 4.2885e-02, 2.0159e-01],
+        ),
+        (
+            3,
+            NoiseKind::RandomWalk,
+            [
+                0.0998265,
+                0.4627307,
+                0.05120661,
+                13.445180,
+                1.30678187,
+                1069.2040133,
+                7.4568419651e-08,
+            ],
+            [3.6083e-01, 3.4310e-01, 8.9777e-03, 4.8379e-02, 3.5626e-01],
+        ),
+        (
+            1,
+            NoiseKind::WhiteForce,
+            [
+                0.0808300,
+                0.5193686,
+                0.05702680,
+                25.855543,
+                1.13044775,
+                3762.9033080,
+                8.7666572320e-08,
+            ],
+            [3.5755e-01, 1.0676e-01, 9.7275e-03, 4.7161e-02, 2.6980e-01],
+        ),
     ];
     for (samples, kind, best, deviations) in cases {
         let record = data(600);
@@ -242,8 +482,18 @@ fn best_points_with_their_covariance() {
         assert!((found.at.log_likelihood - likelihood).abs() < 1e-6);
         let laplace = Laplace::new(&blocks, &found, &free, &bounds).unwrap();
         for (index, deviation) in free.iter().zip(deviations) {
-            close(laplace.deviation(*index).unwrap(), deviation, 1e-3, "deviation");
+            close(
+                laplace.deviation(*index).unwrap(),
+                deviation,
+                1e-3,
+                "deviation",
+            );
         }
-        close(laplace.gain_deviation(&found.at), deviations[4], 1e-3, "deviation of the gain");
+        close(
+            laplace.gain_deviation(&found.at),
+            deviations[4],
+            1e-3,
+            "deviation of the gain",
+        );
     }
 }

@@ -33,7 +33,7 @@ const LITTLE_MARGIN: f64 = 0.75;
 const MUCH_OVERSHOOT: f64 = 0.4;
 
 /// Remarks on `found`.
-pub(super) fn remarks(found: &Identification, options: &Options, has_pack: bool) -> Vec<Remark> {
+pub(crate) fn remarks(found: &Identification, options: &Options, has_pack: bool) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if let Some(oscillation) = found.oscillation() {
         let is_known = found.last_cycle().is_some_and(Reading::is_known);
@@ -47,7 +47,8 @@ pub(super) fn remarks(found: &Identification, options: &Options, has_pack: bool)
             }
         }
         if let Ok(identified) = &found.outcome {
-            of_process(identified, oscillation, &mut remarks);
+            of_model(identified, oscillation.period_s, &mut remarks);
+            of_fit(identified, oscillation, &mut remarks);
             of_controller(identified, options, &mut remarks);
         }
     }
@@ -76,7 +77,9 @@ fn of_oscillation(
     }
 }
 
-fn of_process(identified: &Identified, oscillation: &Oscillation, remarks: &mut Vec<Remark>) {
+/// Remarks on the parameters. `period_s` is the period of the oscillation, or that of the highest informative
+/// frequency.
+pub(crate) fn of_model(identified: &Identified, period_s: f64, remarks: &mut Vec<Remark>) {
     let estimate = &identified.estimate;
     let gain = identified.model.parameter(Parameter::KOverTBody);
     if gain.is_some_and(|gain| gain < 0.0) {
@@ -100,11 +103,14 @@ fn of_process(identified: &Identified, oscillation: &Oscillation, remarks: &mut 
     }
     let tau = estimate.get(Parameter::Tau);
     if let Some((low_s, high_s)) = tau.and_then(|tau| tau.low.zip(tau.high))
-        && high_s - low_s > WIDE_DELAY * oscillation.period_s
+        && high_s - low_s > WIDE_DELAY * period_s
     {
         remarks.push(Remark::WeakDelay { low_s, high_s });
     }
-    let bias = identified.fit.refined.input_bias;
+}
+
+fn of_fit(identified: &Identified, oscillation: &Oscillation, remarks: &mut Vec<Remark>) {
+    let bias = (identified.fit.refined()).map_or(0.0, |refined| refined.input_bias);
     let untrimmed = bias + oscillation.relay_centre;
     let bias = untrimmed.abs() / oscillation.relay_amplitude;
     if bias > MUCH_BIAS {
@@ -115,10 +121,11 @@ fn of_process(identified: &Identified, oscillation: &Oscillation, remarks: &mut 
     }
 }
 
-fn of_controller(identified: &Identified, options: &Options, remarks: &mut Vec<Remark>) {
+/// Remarks on the controller.
+pub(crate) fn of_controller(identified: &Identified, options: &Options, remarks: &mut Vec<Remark>) {
     let margin = identified.phase_margin_rad;
     if let Some(low) = margin
-        .low
+        .and_then(|margin| margin.low)
         .filter(|&low| low < LITTLE_MARGIN * options.specification.phase_margin_rad)
     {
         remarks.push(Remark::MarginMayBeLess(low));

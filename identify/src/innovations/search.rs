@@ -1,0 +1,346 @@
+//! Search for the best process of a structure and the noise that goes with it.
+//!
+//! ```text
+//! 1. screen a grid of processes and noises on a coarse copy of the record       screen
+//! 2. descend from the best starts of each kind of noise, on the coarse copy      screen
+//! 3. descend from the best of these on the record, for each set of noises        heads
+//! 4. fit the other structures from the best of a structure that contains them    derive
+//! ```
+
+use onecycle_design::Structure;
+
+use super::descent::{Found, Patience, descend};
+use super::likelihood::{Memory, evaluate};
+use super::record::{Blocks, Record};
+use super::theta::{Bounds, NoiseKind, Theta};
+
+/// Structures that are screened. Every other structure is a limit of one of them, or adds one lag.
+pub(super) const HEADS: [Structure; 3] =
+    [Structure::Soiptd, Structure::Soptd, Structure::ResonantLag];
+
+const COARSE: Patience = Patience {
+    steps: 12,
+    decrease: 1e-4,
+};
+pub(super) const FINE: Patience = Patience {
+    steps: 40,
+    decrease: 1e-7,
+};
+/// Rows of the coarse copy.
+const COARSE_BLOCKS: usize = 500;
+/// Number of different starts for each kind of noise.
+const STARTS: usize = 2;
+
+/// Best point of a structure with a set of noises.
+#[derive(Clone, Debug)]
+pub(super) struct Candidate {
+    pub(super) found: Found,
+    /// Bayesian information criterion: `-2 ln L + (number of unknowns + 1) ln N`.
+    pub(super) bic: f64,
+}
+
+impl Candidate {
+    pub(super) fn new(found: Found) -> Self {
+        let unknowns = found.theta.free().len() + 1;
+        let rows = found.at.residual.len() as f64;
+        let bic = -2.0 * found.at.log_likelihood + unknowns as f64 * rows.ln();
+        Self { found, bic }
+    }
+
+    pub(super) fn structure(&self) -> Structure {
+        self.found.theta.structure
+    }
+}
+
+/// The candidate of least BIC.
+pub(super) fn best(candidates: impl IntoIterator<Item = Candidate>) -> Option<Candidate> {
+    candidates
+        .into_iter()
+        .min_by(|a, b| a.bic.total_cmp(&b.bic))
+}
+
+/// Copy of an even record in steps of `samples` samples: means of input and output. The output of a step stands at its
+/// middle, half a step after its stamp, so the dead time appears shorter by the second value (s).
+fn coarse(record: &Record, samples: usize) -> (Record, f64) {
+    if samples <= 1 || !record.uneven_s.is_empty() {
+        return (record.clone(), 0.0);
+    }
+    let mut copy = Record {
+        uneven_s: vec![],
+        dt_s: record.dt_s * samples as f64,
+        input: vec![],
+        output: vec![],
+        present: vec![],
+        hold: record.hold,
+    };
+    for start in (0..=record.len().saturating_sub(samples)).step_by(samples) {
+        let range = start..start + samples;
+        copy.input
+            .push(record.input[range.clone()].iter().sum::<f64>() / samples as f64);
+        let outputs = record.output[range.clone()]
+            .iter()
+            .zip(&record.present[range]);
+        let present: Vec<f64> = outputs
+            .filter(|(_, present)| **present)
+            .map(|(y, _)| *y)
+            .collect();
+        copy.present.push(!present.is_empty());
+        copy.output
+            .push(present.iter().sum::<f64>() / present.len().max(1) as f64);
+    }
+    (copy, 0.5 * (samples - 1) as f64 * record.dt_s)
+}
+
+/// Starts for a structure: the best points of a coarse grid, after a few steps of descent on a coarse copy of the record.
+pub(super) fn screen(
+    record: &Record,
+    structure: Structure,
+    skip_s: f64,
+    longest_tau_s: f64,
+) -> Vec<Theta> {
+    let used = record.len() - record.index_at(skip_s);
+    let (copy, early_s) = coarse(record, (used / COARSE_BLOCKS).max(1));
+    let blocks = Blocks::new(&copy, 1, skip_s);
+    if blocks.len() < 30 {
+        return vec![];
+    }
+    let bounds = Bounds::new(structure, &blocks, longest_tau_s);
+    let mut screened: Vec<(f64, Theta)> = Vec::new();
+    let mut memory = Memory::default();
+    for theta in grid(structure, &blocks, early_s, longest_tau_s) {
+        let theta = bounds.clamp(&theta);
+        if let Some(at) = evaluate(&blocks, &theta, &mut memory) {
+            screened.push((at.log_likelihood, theta));
+        }
+    }
+    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut starts = Vec::new();
+    for kind in NoiseKind::ALL {
+        let of_kind = screened.iter().filter(|(_, theta)| theta.noise(kind) > 0.0);
+        let mut chosen: Vec<Theta> = Vec::new();
+        for (_, theta) in of_kind {
+            if chosen
+                .iter()
+                .all(|other| differ(theta, other, longest_tau_s))
+            {
+                chosen.push(*theta);
+            }
+            if chosen.len() == STARTS {
+                break;
+            }
+        }
+        let descended = chosen.iter().filter_map(|theta| {
+            let free = theta.free();
+            descend(&blocks, theta, &free, &bounds, COARSE)
+        });
+        starts.extend(descended);
+    }
+    starts.sort_by(|a, b| b.at.log_likelihood.total_cmp(&a.at.log_likelihood));
+    starts
+        .into_iter()
+        .map(|found| {
+            let mut theta = found.theta;
+            theta.values[theta.layout().tau()] += early_s;
+            theta
+        })
+        .collect()
+}
+
+/// Whether two starts are far enough apart to lead to different basins.
+fn differ(a: &Theta, b: &Theta, longest_tau_s: f64) -> bool {
+    let lags = 0..a.layout().stages.lags;
+    let lag = lags
+        .map(|i| (a.values[i] - b.values[i]).abs())
+        .fold(0.0, f64::max);
+    lag + 5.0 * (a.tau_s() - b.tau_s()).abs() / longest_tau_s > 0.9
+}
+
+/// Grid of starts: lags and poles from two steps to a twelfth of the record, dead times to 0.4 of the longest, noises
+/// below 8, 60 and 300 over the length of the record.
+fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: f64) -> Vec<Theta> {
+    let (dt, length) = (blocks.record.dt_s, blocks.length_s());
+    let (shortest, longest) = (2.0 * dt, length / 12.0);
+    let times: Vec<f64> = (0..5)
+        .map(|i| shortest * (longest / shortest).powf(f64::from(i) / 4.0))
+        .collect();
+    let mut processes = Vec::new();
+    let base = Theta::new(structure);
+    let layout = base.layout();
+    for &t_s in &times {
+        let mut theta = base;
+        if let Some(pair) = layout.pair() {
+            theta.values[0] = dt.ln();
+            for zeta in [0.1, 0.7] {
+                theta.values[pair] = 2.0 * zeta / t_s;
+                theta.values[pair + 1] = 1.0 / (t_s * t_s);
+                processes.push(theta);
+            }
+            continue;
+        }
+        theta.values[0] = t_s.ln();
+        let Some(pole) = layout.pole() else {
+            processes.push(theta);
+            continue;
+        };
+        let slow = times
+            .iter()
+            .filter(|slow| **slow > 1.5 * t_s)
+            .map(|slow| 1.0 / slow);
+        for a in slow.chain([0.3 / length]) {
+            theta.values[pole] = a;
+            processes.push(theta);
+        }
+    }
+    let mut starts = Vec::new();
+    // Noise last: neighbours in the list share the response, which is the larger part of the work.
+    for process in processes {
+        for part in [0.0, 0.05, 0.15, 0.4] {
+            for kind in NoiseKind::ALL {
+                for over_length in [8.0, 60.0, 300.0] {
+                    let mut theta = process;
+                    theta.values[layout.tau()] = part * longest_tau_s - early_s;
+                    theta.set_noise(kind, over_length / length);
+                    starts.push(theta);
+                }
+            }
+        }
+    }
+    starts
+}
+
+/// Descends on the record, and puts the lags in order.
+pub(super) fn fit(blocks: &Blocks<'_>, start: &Theta, longest_tau_s: f64) -> Option<Candidate> {
+    let bounds = Bounds::new(start.structure, blocks, longest_tau_s);
+    let free = start.free();
+    let found = descend(blocks, start, &free, &bounds, FINE)?;
+    let found = match ordered(&found.theta) {
+        Some(theta) => descend(blocks, &theta, &free, &bounds, FINE)?,
+        None => found,
+    };
+    Some(Candidate::new(found))
+}
+
+/// The same process with the actuator lag shorter than the body's. `None` if it is in order.
+fn ordered(theta: &Theta) -> Option<Theta> {
+    let layout = theta.layout();
+    let mut swapped = *theta;
+    if layout.stages.lags == 2 && theta.values[1] > theta.values[0] {
+        swapped.values.swap(0, 1);
+    }
+    if let (Some(pole), 1..) = (layout.pole(), layout.stages.lags) {
+        let a = swapped.values[pole];
+        if a > 0.0 && swapped.values[0] > -a.ln() {
+            swapped.values[pole] = (-swapped.values[0]).exp();
+            swapped.values[0] = -a.ln();
+        }
+    }
+    (swapped != *theta).then_some(swapped)
+}
+
+/// Candidates of a screened structure, one for each set of noises: one noise, two, none.
+pub(super) fn head(blocks: &Blocks<'_>, starts: &[Theta], longest_tau_s: f64) -> Vec<Candidate> {
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for kind in NoiseKind::ALL {
+        let own = starts
+            .iter()
+            .filter(|theta| theta.noise(kind) > 0.0)
+            .copied();
+        let mut tried: Vec<Theta> = own.take(1).collect();
+        // The best start of all with its noise turned into this kind.
+        if let Some(best) = starts.first() {
+            let frequency = (best.noises().next()).map_or(0.0, |other| best.noise(other));
+            let mut theta = *best;
+            NoiseKind::ALL
+                .iter()
+                .for_each(|&other| theta.set_noise(other, 0.0));
+            theta.set_noise(kind, frequency);
+            tried.push(theta);
+        }
+        tried.dedup();
+        candidates.extend(best(
+            tried
+                .iter()
+                .filter_map(|theta| fit(blocks, theta, longest_tau_s)),
+        ));
+    }
+    let Some(lead) = best(candidates.clone()) else {
+        return candidates;
+    };
+    candidates.extend(noise_sets(blocks, &lead, longest_tau_s));
+    candidates
+}
+
+/// The candidate `lead`, which has one noise, with a second noise, and without any.
+fn noise_sets(blocks: &Blocks<'_>, lead: &Candidate, longest_tau_s: f64) -> Vec<Candidate> {
+    let theta = lead.found.theta;
+    let Some(own) = theta.noises().next() else {
+        return vec![];
+    };
+    let others = NoiseKind::ALL.into_iter().filter(|kind| *kind != own);
+    let mut starts: Vec<Theta> = others
+        .map(|kind| {
+            let mut with = theta;
+            with.set_noise(kind, 0.1 * theta.noise(own));
+            with
+        })
+        .collect();
+    let mut without = theta;
+    without.set_noise(own, 0.0);
+    starts.push(without);
+    starts
+        .iter()
+        .filter_map(|theta| fit(blocks, theta, longest_tau_s))
+        .collect()
+}
+
+/// Starts for `structure` from the best point of a structure that contains it or lacks one lag.
+pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta> {
+    let old = from.layout();
+    let mut theta = Theta::new(structure);
+    let layout = theta.layout();
+    for kind in NoiseKind::ALL {
+        theta.set_noise(kind, from.noise(kind));
+    }
+    let lag_s = |i: usize| from.values[i].exp();
+    let lag = if old.stages.lags > 0 { lag_s(0) } else { dt_s };
+    let body_s = match (old.pole(), old.pair()) {
+        (Some(pole), _) => 1.0 / from.values[pole].max(1e-9 / dt_s),
+        (_, Some(pair)) => from.values[pair].max(0.0) / from.values[pair + 1].abs().max(1e-18),
+        _ => f64::INFINITY,
+    };
+    // Lags that the structure lacks lengthen its dead time.
+    let mut starts = Vec::new();
+    let mut with = |lags: &[f64], body: f64, lost_s: f64| {
+        let mut start = theta;
+        for (i, lag) in lags.iter().enumerate() {
+            start.values[i] = lag.max(dt_s / 10.0).ln();
+        }
+        if let Some(pole) = layout.pole() {
+            start.values[pole] = 1.0 / body;
+        }
+        start.values[layout.tau()] = from.tau_s() + lost_s;
+        starts.push(start);
+    };
+    match structure {
+        Structure::Iptd => with(&[], 0.0, lag),
+        Structure::Foptd => with(&[], body_s, lag),
+        Structure::IntegratorLag => {
+            with(&[lag], 0.0, 0.0);
+            if body_s.is_finite() {
+                with(&[body_s], 0.0, lag);
+            }
+        }
+        Structure::DoubleIntegratorLag => with(&[lag], 0.0, 0.0),
+        Structure::Toiptd => with(&[lag, 0.3 * lag], body_s, -0.3 * lag),
+        Structure::Resonant => {
+            if let (Some(pair), Some(own)) = (layout.pair(), old.pair()) {
+                with(&[], 0.0, lag);
+                starts[0].values[pair] = from.values[own];
+                starts[0].values[pair + 1] = from.values[own + 1];
+            }
+        }
+        Structure::Soiptd | Structure::Soptd => with(&[lag], body_s, 0.0),
+        _ => {}
+    }
+    starts
+}
