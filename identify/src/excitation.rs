@@ -31,7 +31,7 @@ pub struct Recorded {
     pub sample_s: f64,
     /// Number of samples used.
     pub samples: usize,
-    /// Number of samples of the grid without a usable output: lost or stuck.
+    /// Number of samples of the grid without a usable output: lost or stale.
     pub absent: usize,
     /// Number of outputs left out as outliers.
     pub outliers: usize,

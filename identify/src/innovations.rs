@@ -1,89 +1,444 @@
 //! Identification from any recording, by an exact likelihood with disturbances.
+//!
+//! The process is one of several structures; the output carries white noise, and disturbances act on the process or on
+//! the measurement. All of the recording is used, transients included; the initial state is unknown.
+//!
+//! ```text
+//! 1. put the samples on their grid; mark lost, stale and far samples      prepare, outliers
+//! 2. find the simplest structure that explains the record                 choose, search
+//! 3. fit it to finer rows; mark samples it cannot predict, fit again      refine
+//! 4. average the posterior over the intensity of the noise                mixture, laplace
+//! 5. test the innovations, predict the last third from the first two      validate
+//! 6. refuse what the record does not tell                                 judge
+//! 7. draw from the posterior, design the controller                       design
+//! ```
+//!
+//! The likelihood itself is in `likelihood`, on the matrices of `lifted` and the response of `response`. Method: L. Ljung,
+//! "System Identification" (1999), section 7.4, with unknown initial state (P. de Jong, Biometrika 75 (1988)).
+
+mod choose;
 mod descent;
 mod laplace;
 mod lifted;
 mod likelihood;
+mod mixture;
 mod orthogonal;
+mod outliers;
+mod prepare;
 mod record;
 mod response;
+mod result;
 mod search;
 mod theta;
+mod validate;
 #[cfg(test)]
 mod vectors;
 
-use onecycle_design::Structure;
-pub use record::Hold;
-use record::*;
-pub use theta::NoiseKind;
-pub fn try_it(dt_s: f64, u: &[f64], y: &[f64]) {
-    let record = Record {
-        uneven_s: vec![],
-        dt_s,
-        input: u.to_vec(),
-        output: y.to_vec(),
-        present: vec![true; y.len()],
-        hold: Hold::Held,
+use onecycle_design::{Structure, design_over, step_response, tuning};
+
+use self::choose::{Choice, Limits, NEARLY, choose};
+use self::mixture::{Component, mixture};
+use self::prepare::{FEWEST, Prepared, prepare};
+pub use self::record::Hold;
+use self::record::{Blocks, Record};
+use self::search::Candidate;
+use self::theta::{Bounds, Theta};
+use crate::excitation::{Excitation, Recorded};
+use crate::outcome::{Evidence, Fit, Identification, Identified, InnovationTests, Prediction};
+use crate::remark::Remark;
+use crate::remarks;
+use crate::settings::Options;
+use crate::signals::Signals;
+use crate::verdict::Verdict;
+
+/// Longest dead time, and time left out at the start while it is not known, as a share of the record.
+const LONGEST_TAU: f64 = 1.0 / 8.0;
+/// Rows of the final fit, unless a row would be longer than lag and dead time together.
+const ROWS: usize = 1500;
+/// Rounds of outliers.
+const ROUNDS: usize = 3;
+/// Difference of the log-likelihood above which the input is taken as straight lines between the samples.
+const STRAIGHT: f64 = 3.0;
+/// Relative standard deviation of the gain above which the record tells nothing.
+const MOST_DEVIATION: f64 = 0.3;
+/// Autocorrelation and share of the input above which the innovations are coloured.
+const COLOURED: (f64, f64) = (0.1, 0.02);
+/// Share of the input and its F statistic above which the model is of another kind, if it also predicts little.
+const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
+/// Explained share of the last third below which a fit gets a remark, and below which it is refused.
+const WELL_PREDICTED: f64 = 0.9;
+const LEAST_PREDICTED: f64 = 0.7;
+/// Mean square of the prediction's error over what the disturbances explain, above which the model is at fault.
+const MOST_ERROR_RATIO: f64 = 4.0;
+
+/// Identifies the process from a record of any input.
+pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
+    let mut search = Search {
+        options,
+        excitation: None,
+        remarks: vec![],
     };
-    let length = dt_s * y.len() as f64;
-    let longest = length / 8.0;
-    let skip = longest;
-    let t0 = std::time::Instant::now();
-    let mut all: Vec<search::Candidate> = vec![];
-    let m = (record.len() / 1500).max(1);
-    let blocks = Blocks::new(&record, m, skip);
-    println!("{} blocks of {m}", blocks.len());
-    for h in search::HEADS {
-        let t = std::time::Instant::now();
-        let starts = search::screen(&record, h, skip, longest);
-        let a = t.elapsed();
-        let t = std::time::Instant::now();
-        let c = search::head(&blocks, &starts, longest);
-        println!(
-            "{} screen {:?} {} head {:?}",
-            h.name(),
-            a,
-            starts.len(),
-            t.elapsed()
-        );
-        all.extend(c);
+    let outcome = search.run(signals);
+    if let Ok(identified) = &outcome {
+        let period_s = (search
+            .excitation
+            .and_then(|found| found.informative_rad_per_s))
+        .map_or(f64::INFINITY, |(_, high)| std::f64::consts::TAU / high);
+        remarks::of_model(identified, period_s, &mut search.remarks);
+        remarks::of_controller(identified, options, &mut search.remarks);
     }
-    all.sort_by(|a, b| a.bic.total_cmp(&b.bic));
-    for s in Structure::ALL {
-        if search::HEADS.contains(&s) {
-            continue;
+    Identification {
+        excitation: search.excitation.map(Excitation::Recorded),
+        outcome,
+        remarks: search.remarks,
+    }
+}
+
+/// A fit and all that the result needs of it.
+struct Fitted {
+    choice: Choice,
+    record: Record,
+    limits: Limits,
+    /// Samples a row.
+    samples: usize,
+    best: Candidate,
+    /// Fit of the structure that contains the best one and has its damping as a further unknown. The posterior is that
+    /// of this structure: damping that a record does not show may be there.
+    wider: Candidate,
+    outliers: usize,
+}
+
+struct Search<'a> {
+    options: &'a Options,
+    excitation: Option<Recorded>,
+    remarks: Vec<Remark>,
+}
+
+impl Search<'_> {
+    /// The main loop: steps 1 to 7 of the [module](self).
+    fn run(&mut self, signals: &Signals<'_>) -> Result<Identified, Verdict> {
+        self.options
+            .specification
+            .check()
+            .map_err(Verdict::NoController)?;
+        let mut prepared = prepare(signals, self.options)?;
+        let outliers = outliers::mark_far(&mut prepared.record);
+        self.excitation = Some(describe(&prepared, outliers));
+        if prepared.part_used < 0.999 {
+            self.remarks.push(Remark::PartUsed(prepared.part_used));
         }
-        let t = std::time::Instant::now();
-        let from: Vec<_> = all
-            .iter()
-            .filter(|c| search::HEADS.contains(&c.structure()))
-            .take(3)
-            .flat_map(|c| search::derive(&c.found.theta, s, dt_s))
-            .collect();
-        let c = search::best(from.iter().filter_map(|t| search::fit(&blocks, t, longest)));
-        println!("{} {:?} {}", s.name(), t.elapsed(), from.len());
-        all.extend(c);
-    }
-    all.sort_by(|a, b| a.bic.total_cmp(&b.bic));
-    println!("{:?}", t0.elapsed());
-    let b = all[0].bic;
-    for c in all.iter().take(14) {
-        let n: Vec<_> = c
-            .found
-            .theta
-            .noises()
-            .map(|k| format!("{}={:.3}", k.name(), c.found.theta.noise(k)))
-            .collect();
-        let p = c.found.theta.process(c.found.at.gain);
-        println!(
-            "{:22} bic {:+9.1} {:?} gain {:.5} lags {:?} a {:.4} pair {:?} tau {:.5}",
-            c.structure().name(),
-            c.bic - b,
-            n,
-            p.gain(),
-            p.lags_s(),
-            p.pole_per_s(),
-            p.pair(),
-            p.tau_s()
+        let fitted = self.fit(&prepared, outliers)?;
+        let blocks = fitted.blocks();
+        let components = fitted.posterior(&blocks);
+        let tests = validate::tests(&blocks, &fitted.best.found.at);
+        let informative = validate::informative(&blocks, &fitted.best.found.at);
+        let median = informative.map(|(_, median)| median);
+        let horizon_s = median.map_or(blocks.length_s() / 10.0, |omega| {
+            std::f64::consts::TAU / omega
+        });
+        let theta = &fitted.best.found.theta;
+        let prediction = validate::prediction(
+            &fitted.record,
+            theta,
+            &fitted.limits,
+            fitted.samples,
+            horizon_s,
         );
+        if let Some(excitation) = &mut self.excitation {
+            excitation.outliers = fitted.outliers;
+            excitation.samples_per_row = fitted.samples;
+            excitation.hold = fitted.record.hold;
+            excitation.informative_rad_per_s = informative.map(|(band, _)| band);
+        }
+        self.judge(&fitted, &components, &tests, prediction.as_ref())?;
+        self.remark(&fitted, &tests, prediction.as_ref());
+        self.design(&prepared, &fitted, &components, tests, prediction)
+    }
+
+    /// Steps 2 and 3: the structure, and its fit to finer rows.
+    fn fit(&mut self, prepared: &Prepared, outliers: usize) -> Result<Fitted, Verdict> {
+        let mut record = prepared.record.clone();
+        let length_s = record.time_s(record.len() - 1);
+        let longest = LONGEST_TAU * length_s;
+        let mut limits = Limits {
+            skip_s: longest,
+            longest_tau_s: longest,
+            structure: self.options.structure,
+        };
+        let mut choice = choose(&record, &limits);
+        if let Some(gain) = straight(&record, &choice, &limits, self.options) {
+            record.hold = Hold::Interpolated;
+            self.remarks.push(Remark::Interpolated(gain));
+            choice = choose(&record, &limits);
+        }
+        let chosen = choice.chosen().ok_or(Verdict::NoFit)?.clone();
+        let theta = chosen.found.theta;
+        let tau_s = theta.tau_s().max(0.0);
+        limits.skip_s = (1.5 * tau_s + 2.0 * record.dt_s).min(longest);
+        let rows = record.len() - record.index_at(limits.skip_s);
+        let fast_s = theta.shortest_lag_s().min(length_s) + tau_s;
+        let samples = (rows / ROWS).min((fast_s / record.dt_s) as usize).max(1);
+        let (best, found) = refine(&mut record, &theta, &limits, samples).ok_or(Verdict::NoFit)?;
+        let blocks = Blocks::new(&record, samples, limits.skip_s);
+        let damped = choice
+            .damped(best.structure())
+            .map(|damped| damped.found.theta);
+        let wider = damped.and_then(|theta| search::fit(&blocks, &theta, longest));
+        Ok(Fitted {
+            choice,
+            limits,
+            samples,
+            wider: wider.unwrap_or_else(|| best.clone()),
+            best,
+            outliers: outliers + found,
+            record,
+        })
+    }
+
+    /// Step 6: reasons to refuse.
+    fn judge(
+        &self,
+        fitted: &Fitted,
+        components: &[Component],
+        tests: &InnovationTests,
+        prediction: Option<&Prediction>,
+    ) -> Result<(), Verdict> {
+        let rows = fitted.best.found.at.residual.len();
+        if rows < FEWEST / 2 {
+            return Err(Verdict::TooFewRows {
+                rows,
+                needed: FEWEST / 2,
+            });
+        }
+        if let Some(verdict) = self.too_little(fitted, components) {
+            return Err(verdict);
+        }
+        let explained = prediction.map_or(1.0, |prediction| prediction.explained);
+        let is_another = tests.input_share > ANOTHER_KIND.0 && tests.input_f > ANOTHER_KIND.1;
+        if is_another && explained < WELL_PREDICTED {
+            return Err(Verdict::InputLeft {
+                share: tests.input_share,
+            });
+        }
+        match prediction {
+            Some(prediction)
+                if explained < LEAST_PREDICTED && prediction.error_ratio > MOST_ERROR_RATIO =>
+            {
+                Err(Verdict::NoPrediction {
+                    explained,
+                    horizon_s: prediction.horizon_s,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Verdict if the record does not tell the gain, or if a bound of the search holds the fit.
+    fn too_little(&self, fitted: &Fitted, components: &[Component]) -> Option<Verdict> {
+        let theta = &fitted.best.found.theta;
+        let gain = |component: &Component| {
+            let deviation = component.laplace.gain_deviation(&component.found.at);
+            deviation / component.found.at.gain.abs()
+        };
+        let deviation = components.first().map(gain).filter(|v| v.is_finite());
+        let lag_s = theta.shortest_lag_s().min(fitted.limits.longest_tau_s);
+        if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
+            return Some(Verdict::NoInformation {
+                parameter: result::gain_of(theta.structure),
+                deviation,
+                informative_rad_per_s: self
+                    .excitation
+                    .and_then(|found| found.informative_rad_per_s),
+                needed_rad_per_s: 1.0 / (lag_s + theta.tau_s().max(0.0)),
+            });
+        }
+        let blocks = fitted.blocks();
+        let bounds = Bounds::new(theta.structure, &blocks, fitted.limits.longest_tau_s);
+        result::at_bound(theta, &bounds).map(Verdict::AtBound)
+    }
+
+    fn remark(
+        &mut self,
+        fitted: &Fitted,
+        tests: &InnovationTests,
+        prediction: Option<&Prediction>,
+    ) {
+        let present = fitted
+            .record
+            .present
+            .iter()
+            .filter(|present| **present)
+            .count();
+        let absent = 1.0 - present as f64 / fitted.record.len() as f64;
+        if absent > 0.0 {
+            self.remarks.push(Remark::Absent(absent));
+        }
+        if tests.autocorrelation > COLOURED.0 {
+            self.remarks.push(Remark::Coloured(tests.autocorrelation));
+        }
+        if tests.input_share > COLOURED.1 && tests.input_f > ANOTHER_KIND.1 {
+            self.remarks.push(Remark::InputLeft(tests.input_share));
+        }
+        if let Some(prediction) = prediction.filter(|p| p.explained < WELL_PREDICTED) {
+            self.remarks.push(Remark::WeakPrediction {
+                explained: prediction.explained,
+                horizon_s: prediction.horizon_s,
+            });
+        }
+        let chosen = fitted.best.structure();
+        let best = fitted
+            .choice
+            .candidates
+            .first()
+            .map_or(0.0, |best| best.bic);
+        let others: Vec<Structure> = (fitted.choice.candidates.iter())
+            .filter(|other| other.bic < best + NEARLY && other.structure() != chosen)
+            .map(Candidate::structure)
+            .collect();
+        if !others.is_empty() && self.options.structure.is_none() {
+            self.remarks.push(Remark::OtherStructures(others));
+        }
+    }
+
+    /// Step 7: posterior, controller, and the result.
+    fn design(
+        &mut self,
+        prepared: &Prepared,
+        fitted: &Fitted,
+        components: &[Component],
+        tests: InnovationTests,
+        prediction: Option<Prediction>,
+    ) -> Result<Identified, Verdict> {
+        let is_coloured = tests.autocorrelation > COLOURED.0 || tests.input_share > COLOURED.1;
+        let blocks = fitted.blocks();
+        let (posterior, widened) =
+            result::posterior(fitted, components, prepared.early_s, is_coloured);
+        let model = result::model(&fitted.best.found, prepared.early_s);
+        let draws = posterior.models(tuning::DRAWS);
+        let design = match design_over(&model, &draws, &self.options.specification) {
+            Ok(design) => Some(design),
+            Err(error) => {
+                self.remarks.push(Remark::NoController(error));
+                None
+            }
+        };
+        let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
+        if phase_margin_rad.is_some_and(|margin| margin.low.is_none_or(|low| low <= 0.0)) {
+            return Err(Verdict::TooUncertain);
+        }
+        let estimate = posterior.estimate();
+        let explained = prediction.map_or(1.0, |prediction| prediction.explained);
+        let (innovations, points) = result::innovations(
+            fitted,
+            &blocks,
+            prepared.start_s,
+            (tests, prediction, widened),
+        )
+        .ok_or(Verdict::NoFit)?;
+        Ok(Identified {
+            joint_probability: posterior.joint_probability(&estimate),
+            step: design
+                .and_then(|design| step_response(&model, &design.controller).ok())
+                .map(|step| step.metrics),
+            model,
+            estimate,
+            posterior,
+            design,
+            phase_margin_rad,
+            fit: Fit {
+                misfit: (1.0 - explained).max(0.0).sqrt(),
+                points,
+                evidence: Evidence::Innovations(innovations),
+            },
+        })
+    }
+}
+
+impl Fitted {
+    fn blocks(&self) -> Blocks<'_> {
+        Blocks::new(&self.record, self.samples, self.limits.skip_s)
+    }
+
+    /// Step 4: components of the posterior.
+    fn posterior(&self, blocks: &Blocks<'_>) -> Vec<Component> {
+        let structure = self.wider.structure();
+        let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
+        mixture(blocks, &self.wider.found, &bounds)
+    }
+}
+
+/// Fits to rows of `samples` samples, marks outliers and fits again. Returns the number of outliers too.
+fn refine(
+    record: &mut Record,
+    theta: &Theta,
+    limits: &Limits,
+    samples: usize,
+) -> Option<(Candidate, usize)> {
+    let fit = |record: &Record, theta: &Theta| {
+        let blocks = Blocks::new(record, samples, limits.skip_s);
+        search::fit(&blocks, theta, limits.longest_tau_s)
+    };
+    let mut best = fit(record, theta)?;
+    let mut outliers = 0;
+    for _ in 0..ROUNDS {
+        let found = outliers::mark_unlikely(record, &best.found.theta, limits.skip_s);
+        if found == 0 {
+            break;
+        }
+        outliers += found;
+        best = fit(record, &best.found.theta)?;
+    }
+    Some((best, outliers))
+}
+
+/// Gain of the log-likelihood if the input runs straight from sample to sample, where that explains the record better.
+/// `None` otherwise, and if the input is piecewise constant or the user has said what it does.
+fn straight(record: &Record, choice: &Choice, limits: &Limits, options: &Options) -> Option<f64> {
+    let held = record
+        .input
+        .windows(2)
+        .filter(|pair| pair[0] == pair[1])
+        .count();
+    if options.hold.is_some() || 2 * held > record.len() {
+        return None;
+    }
+    let lead = choice.candidates.first()?;
+    let mut other = record.clone();
+    other.hold = Hold::Interpolated;
+    let blocks = Blocks::new(&other, choice.samples, limits.skip_s);
+    // Half a sample lies between the two readings of the input.
+    let mut theta = lead.found.theta;
+    theta.values[theta.layout().tau()] += 0.5 * record.dt_s;
+    let fitted = search::warm(&blocks, &theta, limits.longest_tau_s, search::FINE)?;
+    let gain = fitted.at.log_likelihood - lead.found.at.log_likelihood;
+    (gain > STRAIGHT).then_some(gain)
+}
+
+/// What is known of a record before any fit.
+fn describe(prepared: &Prepared, outliers: usize) -> Recorded {
+    let record = &prepared.record;
+    let deviation = |values: &[f64]| {
+        let mean = values.iter().sum::<f64>() / values.len() as f64;
+        let squares = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>();
+        (squares / values.len() as f64).sqrt()
+    };
+    let present = record.present.iter().filter(|present| **present).count();
+    let outputs = record.output.iter().zip(&record.present);
+    let outputs: Vec<f64> = outputs
+        .filter(|(_, present)| **present)
+        .map(|(y, _)| *y)
+        .collect();
+    Recorded {
+        start_s: prepared.start_s,
+        end_s: prepared.start_s + record.time_s(record.len() - 1),
+        sample_s: record.dt_s,
+        samples: present,
+        absent: record.len() - present - outliers,
+        outliers,
+        samples_per_row: 1,
+        hold: record.hold,
+        input_deviation: deviation(&record.input),
+        output_deviation: deviation(&outputs),
+        informative_rad_per_s: None,
     }
 }

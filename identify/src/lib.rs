@@ -18,8 +18,7 @@
 pub mod cholesky;
 pub mod diagnose;
 mod excitation;
-#[allow(dead_code)]
-pub mod innovations;
+mod innovations;
 mod outcome;
 mod posterior;
 mod reading;
@@ -74,7 +73,10 @@ pub fn identify_by(
     options: &Options,
     pack: Option<&Pack<'_>>,
 ) -> Identification {
-    relay::identify(signals, options, pack)
+    match options.road {
+        Road::General => innovations::identify(signals, options),
+        Road::Relay | Road::Automatic => relay::identify(signals, options, pack),
+    }
 }
 
 // Compiles and runs the code of the README.

@@ -202,6 +202,9 @@ pub struct Prediction {
     pub horizon_s: f64,
     /// Share of the variance of the output that the prediction explains; below zero if the mean is a better guess.
     pub explained: f64,
+    /// Mean square of the error over the variance that the disturbances and the noise of the model cause: 1 if the
+    /// model is right.
+    pub error_ratio: f64,
 }
 
 /// Row of the fit: the mean over the samples of a block.

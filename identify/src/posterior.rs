@@ -6,8 +6,7 @@
 //! inverse may be zero is unbounded above.
 
 use onecycle_design::bands::quantiles;
-use onecycle_design::{Controller, Model, Parameter, Structure, margins};
-use onecycle_onboard::Soiptd;
+use onecycle_design::{Controller, Linear, Model, Parameter, Structure, margins};
 use onecycle_onboard::refine::{Refined, coordinate};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -96,16 +95,12 @@ impl Estimate {
 /// Draw from the posterior, in physical parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw {
-    /// Velocity gain `K` (output unit / (input unit s)). Infinite without damping.
-    k: f64,
-    /// Acceleration gain `K/T_body` (output unit / (input unit s^2)).
-    k_over_t_body: f64,
-    /// Actuator lag (s).
-    t_prop_s: f64,
-    /// Body lag (s). Infinite without damping.
-    t_body_s: f64,
-    /// Dead time (s).
-    tau_s: f64,
+    process: Linear,
+    /// Structure of the reported parameters. It may lack the damping of `process`, which a recording did not show but
+    /// which may be there.
+    reported: Structure,
+    /// `K` and `T_body` of the relay's estimator, to the last bit.
+    own: Option<(f64, f64)>,
     /// Constant disturbance at the process input (input unit).
     input_bias: f64,
     /// Whether the drawn coordinates belong to a process. If not (complex poles, negative damping or negative dead
@@ -114,7 +109,7 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// Draw at these coordinates of the estimator. `sign` is the sign of the gain.
+    /// Draw at these coordinates of the relay's estimator. `sign` is the sign of the gain.
     fn of(at: &[f64; 5], sign: f64) -> Self {
         let sum_per_s = at[coordinate::LN_POLE_SUM].exp();
         let ratio = at[coordinate::POLE_RATIO];
@@ -122,14 +117,34 @@ impl Draw {
         // Zero or negative damping: the body lag is infinite.
         let slow_per_s = (ratio * sum_per_s * sum_per_s / fast_per_s).clamp(0.0, fast_per_s);
         let k_over_t_body = sign * at[coordinate::LN_JERK_GAIN].exp() / fast_per_s;
+        let t_body_s = 1.0 / slow_per_s;
         Self {
-            k: k_over_t_body / slow_per_s,
-            k_over_t_body,
-            t_prop_s: 1.0 / fast_per_s,
-            t_body_s: 1.0 / slow_per_s,
-            tau_s: at[coordinate::TAU_S].max(0.0),
+            process: Linear::new(Structure::Soiptd)
+                .with_gain(k_over_t_body)
+                .with_lags_s([1.0 / fast_per_s, 1.0])
+                .with_pole_per_s(1.0 / t_body_s)
+                .with_tau_s(at[coordinate::TAU_S].max(0.0)),
+            reported: Structure::Soiptd,
+            own: Some((k_over_t_body / slow_per_s, t_body_s)),
             input_bias: at[coordinate::INPUT_BIAS],
             is_process: (0.0..=0.25).contains(&ratio) && at[coordinate::TAU_S] >= 0.0,
+        }
+    }
+
+    /// Draw of the general estimator.
+    fn of_linear(process: &Linear, reported: Structure, input_bias: f64) -> Self {
+        let [c1, c0] = process.pair();
+        let is_process =
+            process.tau_s() >= 0.0 && process.pole_per_s() >= 0.0 && c0 >= 0.0 && c1 >= 0.0;
+        Self {
+            process: process
+                .with_pole_per_s(process.pole_per_s().max(0.0))
+                .with_pair(c1.max(0.0), c0.max(0.0))
+                .with_tau_s(process.tau_s().max(0.0)),
+            reported,
+            own: None,
+            input_bias,
+            is_process,
         }
     }
 
@@ -138,40 +153,39 @@ impl Draw {
         margins(&self.model()?, controller).map(|margins| margins.phase_margin_rad)
     }
 
-    /// Value of a parameter in its [unit](Parameter::unit). `K` and `T_body` are infinite without damping. NaN if the
+    /// Value of a parameter in its [unit](Structure::unit). `K` and `T_body` are infinite without damping. `None` if the
     /// model does not have the parameter.
     #[must_use]
-    pub fn value(&self, parameter: Parameter) -> f64 {
-        match parameter {
-            Parameter::K => self.k,
-            Parameter::KOverTBody => self.k_over_t_body,
-            Parameter::TProp => self.t_prop_s,
-            Parameter::TBody => self.t_body_s,
-            Parameter::InverseTBody => 1.0 / self.t_body_s,
-            Parameter::Tau => self.tau_s,
-            Parameter::InputBias => self.input_bias,
-            _ => f64::NAN,
+    pub fn value(&self, parameter: Parameter) -> Option<f64> {
+        match (parameter, self.own) {
+            (Parameter::K, Some((k, _))) => Some(k),
+            (Parameter::TBody, Some((_, t_body_s))) => Some(t_body_s),
+            (Parameter::InputBias, _) => Some(self.input_bias),
+            _ => self
+                .process
+                .with_structure(self.reported)
+                .parameter(parameter),
         }
     }
 
     /// Model with these parameters. `None` if they are out of range.
     #[must_use]
     pub fn model(&self) -> Option<Model> {
-        let damping_per_s = 1.0 / self.t_body_s;
-        let process = Soiptd::from_acceleration_gain(
-            self.k_over_t_body,
-            self.t_prop_s,
-            damping_per_s,
-            self.tau_s,
-        );
-        process.ok().map(Model::Soiptd)
+        match self.process.structure() {
+            Structure::Soiptd => self.process.soiptd().map(Model::Soiptd),
+            _ => (self.process.gain() != 0.0).then(|| self.process.into()),
+        }
     }
 }
 
 /// Probability distribution of the process: the most probable model, and 4,000 draws.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Posterior {
+    /// Structure of the most probable model.
+    structure: Structure,
     best: Draw,
+    /// Whether the input bias is estimated.
+    has_bias: bool,
     /// Empty if the estimator returned no covariance.
     draws: Vec<Draw>,
 }
@@ -216,7 +230,50 @@ impl Posterior {
             (0..DRAWS / 2).flat_map(|_| pair(&root)).collect()
         });
         Self {
+            structure: Structure::Soiptd,
             best: Draw::of(&centre, sign),
+            has_bias: true,
+            draws,
+        }
+    }
+
+    /// Posterior of the general estimator about `best`: draws from a mixture. `draw` turns a component, by its index, and
+    /// standard normal numbers into a process and its input bias.
+    pub(crate) fn of_mixture(
+        best: &Linear,
+        input_bias: Option<f64>,
+        weights: &[f64],
+        draw: impl Fn(usize, &[f64]) -> (Linear, f64),
+    ) -> Self {
+        let structure = best.structure();
+        let mut rng = Pcg64Mcg::seed_from_u64(SEED);
+        let mut draws = Vec::with_capacity(DRAWS);
+        let mut sum = 0.0;
+        for (component, weight) in weights.iter().enumerate() {
+            // Rounding the cumulated weights keeps the total.
+            let until = |sum: f64| ((sum * (DRAWS / 2) as f64).round() as usize).min(DRAWS / 2);
+            let count = until(sum + weight) - until(sum);
+            sum += weight;
+            for _ in 0..count {
+                let normal: [f64; 10] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
+                for side in [1.0, -1.0] {
+                    let (process, bias) = draw(component, &normal.map(|z| side * z));
+                    draws.push(Draw::of_linear(&process, structure, bias));
+                }
+            }
+        }
+        // Consecutive pairs come from different components, so that the first few represent all: 617 is a prime that does
+        // not divide the number of pairs.
+        let pairs = draws.len() / 2;
+        let shuffled = (0..pairs).flat_map(|k| {
+            let at = 2 * (617 * k % pairs);
+            [draws[at], draws[at + 1]]
+        });
+        let draws = shuffled.collect();
+        Self {
+            structure,
+            best: Draw::of_linear(best, structure, input_bias.unwrap_or(0.0)),
+            has_bias: input_bias.is_some(),
             draws,
         }
     }
@@ -224,19 +281,24 @@ impl Posterior {
     /// Parameters of the model and the input bias, with their 90 % intervals.
     #[must_use]
     pub fn estimate(&self) -> Estimate {
-        let structure = Structure::Soiptd;
         let interval = |parameter: Parameter| {
-            let values = self.draws.iter().map(|draw| draw.value(parameter));
-            let interval = Interval::new(self.best.value(parameter), quantiles(values.collect()));
-            (parameter, interval)
+            let best = self.best.value(parameter)?;
+            let interval = Interval::new(best, quantiles(self.values(parameter)));
+            Some((parameter, interval))
         };
-        let reported = structure.parameters().iter().copied();
+        let bias = self.has_bias.then_some(Parameter::InputBias);
+        let reported = self.structure.parameters().iter().copied();
         Estimate {
-            structure,
-            intervals: (reported.chain([Parameter::InputBias]))
-                .map(interval)
-                .collect(),
+            structure: self.structure,
+            intervals: reported.chain(bias).filter_map(interval).collect(),
         }
+    }
+
+    /// Values of a parameter in all draws. Empty if the model does not have the parameter.
+    #[must_use]
+    pub fn values(&self, parameter: Parameter) -> Vec<f64> {
+        let values = self.draws.iter().filter_map(|draw| draw.value(parameter));
+        values.collect()
     }
 
     /// All draws. Empty if the estimator returned no covariance.
@@ -266,7 +328,8 @@ impl Posterior {
             .collect();
         let inside = |draw: &&Draw| {
             let holds = |(parameter, interval): &(Parameter, Interval)| {
-                interval.holds(draw.value(*parameter))
+                draw.value(*parameter)
+                    .is_none_or(|value| interval.holds(value))
             };
             of_model.iter().all(holds)
         };
@@ -274,48 +337,50 @@ impl Posterior {
         (!self.draws.is_empty()).then(|| count as f64 / self.draws.len() as f64)
     }
 
-    /// Parameters of [`Posterior::correlations`], in the order of its rows and columns.
-    pub const CORRELATED: [Parameter; 5] = [
-        Parameter::KOverTBody,
-        Parameter::TProp,
-        Parameter::InverseTBody,
-        Parameter::Tau,
-        Parameter::InputBias,
-    ];
-
-    /// Correlation coefficients of the parameters [`Posterior::CORRELATED`], 5 x 5. `None` if the estimator returned no
-    /// covariance.
+    /// Parameters of [`Posterior::correlations`], in the order of its rows and columns: those that are finite for every
+    /// process, then the input bias.
     #[must_use]
-    pub fn correlations(&self) -> Option<[[f64; 5]; 5]> {
-        let of = |draw: &Draw| Self::CORRELATED.map(|parameter| draw.value(parameter));
-        let count = self.draws.len() as f64;
-        let mut mean = [0.0; 5];
-        for draw in &self.draws {
-            let values = of(draw);
-            (0..5).for_each(|i| mean[i] += values[i] / count);
-        }
-        let mut covariance = [[0.0; 5]; 5];
-        for draw in &self.draws {
-            let values = of(draw);
-            for i in 0..5 {
-                for j in 0..5 {
-                    covariance[i][j] += (values[i] - mean[i]) * (values[j] - mean[j]);
-                }
-            }
-        }
+    pub fn correlated(&self) -> Vec<Parameter> {
+        let reported = self.structure.parameters();
+        let finite = |parameter: &Parameter| match parameter {
+            // Infinite without damping, where K/T_body is not.
+            Parameter::K if reported.contains(&Parameter::KOverTBody) => None,
+            Parameter::TBody => Some(Parameter::InverseTBody),
+            other => Some(*other),
+        };
+        let bias = self.has_bias.then_some(Parameter::InputBias);
+        reported.iter().filter_map(finite).chain(bias).collect()
+    }
+
+    /// Correlation coefficients of the parameters [`Posterior::correlated`], one row and one column each. `None` if the
+    /// estimator returned no covariance.
+    #[must_use]
+    pub fn correlations(&self) -> Option<Vec<Vec<f64>>> {
+        let columns: Vec<Vec<f64>> = (self.correlated().into_iter())
+            .map(|parameter| {
+                let values = self.values(parameter);
+                let mean = values.iter().map(|v| v / values.len() as f64).sum::<f64>();
+                values.iter().map(|v| v - mean).collect()
+            })
+            .collect();
+        let product = |i: usize, j: usize| -> f64 {
+            let pairs = columns[i].iter().zip(&columns[j]);
+            pairs.map(|(a, b)| a * b).sum()
+        };
         // A parameter of zero variance has no correlation with the others.
         let entry = |i: usize, j: usize| {
-            let size = (covariance[i][i] * covariance[j][j]).sqrt();
+            let size = (product(i, i) * product(j, j)).sqrt();
             if i == j {
                 1.0
             } else if size > 0.0 {
-                covariance[i][j] / size
+                product(i, j) / size
             } else {
                 0.0
             }
         };
-        let rows = std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)));
-        (!self.draws.is_empty()).then_some(rows)
+        let count = columns.len();
+        let row = |i: usize| (0..count).map(|j| entry(i, j)).collect();
+        (!self.draws.is_empty()).then(|| (0..count).map(row).collect())
     }
 
     /// Phase margin (rad) that a controller leaves on the most probable model, with its 90 % interval over the draws.

@@ -78,7 +78,7 @@ pub enum Remark {
         /// Time ahead (s).
         horizon_s: f64,
     },
-    /// Outputs were left out: lost, stuck or outliers. The value is their share.
+    /// Outputs were left out: lost, stale or outliers. The value is their share.
     Absent(f64),
     /// Only the longest part without a gap was used. The value is its share of the recording.
     PartUsed(f64),

@@ -64,6 +64,12 @@ impl Linear {
         Self { gain, ..self }
     }
 
+    /// The same stages, as far as `structure` has them.
+    #[must_use]
+    pub fn with_structure(self, structure: Structure) -> Self {
+        Self { structure, ..self }
+    }
+
     /// Sets the actuator lags (s). Lags that the structure does not have are not used.
     #[must_use]
     pub fn with_lags_s(self, lags_s: [f64; 2]) -> Self {

@@ -2,7 +2,7 @@
 //!
 //! A block is `M` consecutive samples of an even grid. Its datum is the **sum of the samples present**: the sum is an
 //! anti-alias filter, and the model of the sum is exact, so decimation costs information but causes no bias. A sample
-//! that was lost, stuck or is an outlier is absent: it is not summed. Samples with uneven time stamps form blocks of one.
+//! that was lost, is stale or is an outlier is absent: it is not summed. Samples with uneven time stamps form blocks of one.
 
 use std::collections::HashMap;
 

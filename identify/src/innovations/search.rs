@@ -234,59 +234,50 @@ fn ordered(theta: &Theta) -> Option<Theta> {
             swapped.values[0] = -a.ln();
         }
     }
+    if let (Some(pair), 1) = (layout.pair(), layout.stages.lags) {
+        let (c1, c0) = (swapped.values[pair], swapped.values[pair + 1]);
+        let root = (0.25 * c1 * c1 - c0).sqrt();
+        let (fast, slow) = (0.5 * c1 + root, 0.5 * c1 - root);
+        let lag_per_s = (-swapped.values[0]).exp();
+        // The disturbance enters behind the lag, so the fastest of three real lags is the actuator's.
+        if fast > lag_per_s {
+            swapped.values[0] = -fast.ln();
+            swapped.values[pair] = lag_per_s + slow;
+            swapped.values[pair + 1] = lag_per_s * slow;
+        }
+    }
     (swapped != *theta).then_some(swapped)
 }
 
-/// Candidates of a screened structure, one for each set of noises: one noise, two, none.
-pub(super) fn head(blocks: &Blocks<'_>, starts: &[Theta], longest_tau_s: f64) -> Vec<Candidate> {
+/// Candidates of a screened structure with one noise each, from the best starts.
+pub(super) fn singles(blocks: &Blocks<'_>, starts: &[Theta], longest_tau_s: f64) -> Vec<Candidate> {
     let mut candidates: Vec<Candidate> = Vec::new();
     for kind in NoiseKind::ALL {
-        let own = starts
-            .iter()
-            .filter(|theta| theta.noise(kind) > 0.0)
-            .copied();
-        let mut tried: Vec<Theta> = own.take(1).collect();
-        // The best start of all with its noise turned into this kind.
-        if let Some(best) = starts.first() {
-            let frequency = (best.noises().next()).map_or(0.0, |other| best.noise(other));
-            let mut theta = *best;
-            NoiseKind::ALL
-                .iter()
-                .for_each(|&other| theta.set_noise(other, 0.0));
-            theta.set_noise(kind, frequency);
-            tried.push(theta);
-        }
-        tried.dedup();
-        candidates.extend(best(
-            tried
-                .iter()
-                .filter_map(|theta| fit(blocks, theta, longest_tau_s)),
-        ));
+        let own = starts.iter().find(|theta| theta.noise(kind) > 0.0);
+        candidates.extend(own.and_then(|theta| fit(blocks, theta, longest_tau_s)));
     }
-    let Some(lead) = best(candidates.clone()) else {
-        return candidates;
-    };
-    candidates.extend(noise_sets(blocks, &lead, longest_tau_s));
     candidates
 }
 
-/// The candidate `lead`, which has one noise, with a second noise, and without any.
-fn noise_sets(blocks: &Blocks<'_>, lead: &Candidate, longest_tau_s: f64) -> Vec<Candidate> {
+/// The candidate `lead`, which has one noise, with another in its place, with a second one, and without any.
+pub(super) fn noise_sets(
+    blocks: &Blocks<'_>,
+    lead: &Candidate,
+    longest_tau_s: f64,
+) -> Vec<Candidate> {
     let theta = lead.found.theta;
     let Some(own) = theta.noises().next() else {
         return vec![];
     };
-    let others = NoiseKind::ALL.into_iter().filter(|kind| *kind != own);
-    let mut starts: Vec<Theta> = others
-        .map(|kind| {
-            let mut with = theta;
-            with.set_noise(kind, 0.1 * theta.noise(own));
-            with
-        })
-        .collect();
     let mut without = theta;
     without.set_noise(own, 0.0);
-    starts.push(without);
+    let mut starts = vec![without];
+    for kind in NoiseKind::ALL.into_iter().filter(|kind| *kind != own) {
+        let (mut beside, mut instead) = (theta, without);
+        beside.set_noise(kind, 0.1 * theta.noise(own));
+        instead.set_noise(kind, theta.noise(own));
+        starts.extend([beside, instead]);
+    }
     starts
         .iter()
         .filter_map(|theta| fit(blocks, theta, longest_tau_s))
@@ -343,4 +334,15 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
         _ => {}
     }
     starts
+}
+
+/// Fit from a point that is nearly right, without putting the lags in order.
+pub(super) fn warm(
+    blocks: &Blocks<'_>,
+    theta: &Theta,
+    longest_tau_s: f64,
+    patience: Patience,
+) -> Option<Found> {
+    let bounds = Bounds::new(theta.structure, blocks, longest_tau_s);
+    descend(blocks, theta, &theta.free(), &bounds, patience)
 }

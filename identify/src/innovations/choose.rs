@@ -1,0 +1,165 @@
+//! Choice of the structure: the simplest whose BIC is nearly the best.
+//!
+//! BIC = -2 ln L + (number of unknowns, the gain included) ln(number of rows), always on the same rows. Reference: G.
+//! Schwarz, "Estimating the dimension of a model", Ann. Stat. 6 (1978).
+
+use onecycle_design::Structure;
+
+use super::record::{Blocks, Record};
+use super::search::{self, Candidate, HEADS};
+use super::theta::{NoiseKind, Theta};
+
+/// A simpler structure is taken if its BIC exceeds the best by no more than this: a likelihood ratio of `e^3`.
+pub(super) const NEARLY: f64 = 6.0;
+/// Twice the gain of the log-likelihood from which damping shows: 5 % of undamped processes seem damped by as much.
+/// The BIC alone would hide damping of two standard deviations, and with it bias the gain.
+const SHOWN: f64 = 2.7;
+/// Structures whose best fit is worse than this are given up: no further noise makes up for it.
+const HOPELESS: f64 = 80.0;
+/// Rows of the fit that chooses, and fewest samples of a row.
+const ROWS: usize = 1200;
+
+/// Candidates of all structures in ascending order of BIC, the best of each structure, on one set of rows.
+pub(super) struct Choice {
+    pub(super) candidates: Vec<Candidate>,
+    /// Samples a row.
+    pub(super) samples: usize,
+}
+
+impl Choice {
+    /// The simplest structure within [`NEARLY`] of the best; with damping, where damping shows.
+    pub(super) fn chosen(&self) -> Option<&Candidate> {
+        let best = self.candidates.first()?.bic;
+        let simplest = (self.candidates.iter())
+            .filter(|candidate| candidate.bic <= best + NEARLY)
+            .min_by_key(|candidate| unknowns(candidate.structure()))?;
+        let damped = self.damped(simplest.structure()).filter(|damped| {
+            let gain = damped.found.at.log_likelihood - simplest.found.at.log_likelihood;
+            2.0 * gain > SHOWN && damped.found.theta.process(1.0).pole_per_s() > 0.0
+        });
+        Some(damped.unwrap_or(simplest))
+    }
+
+    /// Fit of the structure that has the damping which `structure` lacks.
+    pub(super) fn damped(&self, structure: Structure) -> Option<&Candidate> {
+        let damped = match structure {
+            Structure::DoubleIntegratorLag => Structure::Soiptd,
+            Structure::IntegratorLag => Structure::Soptd,
+            Structure::Iptd => Structure::Foptd,
+            _ => return None,
+        };
+        let mut of_damped = self.candidates.iter();
+        of_damped.find(|candidate| candidate.structure() == damped)
+    }
+}
+
+/// Number of unknowns of a structure: its rank in simplicity.
+fn unknowns(structure: Structure) -> usize {
+    let stages = structure.stages();
+    stages.lags + stages.poles + 2 * stages.pairs
+}
+
+/// Where the search starts and ends.
+#[derive(Clone, Copy)]
+pub(super) struct Limits {
+    /// Time at the start whose output is not used (s).
+    pub(super) skip_s: f64,
+    /// Longest dead time (s).
+    pub(super) longest_tau_s: f64,
+    /// The only structure to fit.
+    pub(super) structure: Option<Structure>,
+}
+
+/// Fits the structures to a record.
+pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
+    let rows = record.len() - record.index_at(limits.skip_s);
+    let samples = (rows / ROWS).max(1);
+    let blocks = Blocks::new(record, samples, limits.skip_s);
+    let tau_s = limits.longest_tau_s;
+    let heads = heads(limits.structure);
+    let screened: Vec<Vec<Theta>> = (heads.iter())
+        .map(|head| search::screen(record, *head, limits.skip_s, tau_s))
+        .collect();
+    let mut all: Vec<Candidate> = Vec::new();
+    for starts in &screened {
+        all.extend(search::singles(&blocks, starts, tau_s));
+    }
+    if let Some(lead) = search::best(all.clone()) {
+        all.extend(search::noise_sets(&blocks, &lead, tau_s));
+    }
+    derive(&blocks, &mut all, limits);
+    keep_best_of_each(&mut all, limits.structure);
+    Choice {
+        candidates: all,
+        samples,
+    }
+}
+
+/// Structures to screen: all heads, or those that lead to the one asked for.
+fn heads(structure: Option<Structure>) -> Vec<Structure> {
+    let Some(structure) = structure else {
+        return HEADS.to_vec();
+    };
+    match structure {
+        Structure::Resonant | Structure::ResonantLag => vec![Structure::ResonantLag],
+        Structure::Foptd | Structure::Soptd => vec![Structure::Soptd],
+        Structure::IntegratorLag | Structure::Iptd => vec![Structure::Soptd, Structure::Soiptd],
+        _ => vec![Structure::Soiptd],
+    }
+}
+
+/// Adds the structures that are not screened, from the best of those that contain them; and the screened ones with the
+/// noises that proved best in another.
+fn derive(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
+    let screened = all.clone();
+    let Some(lead) = search::best(screened.clone()) else {
+        return;
+    };
+    for structure in Structure::ALL {
+        if limits.structure.is_some_and(|asked| asked != structure) {
+            continue;
+        }
+        let mut sources: Vec<&Candidate> = (screened.iter())
+            .filter(|from| from.structure() != structure && contains(from.structure(), structure))
+            .filter(|from| from.bic < lead.bic + HOPELESS)
+            .collect();
+        sources.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+        sources.truncate(2);
+        for from in sources {
+            for mut start in search::derive(&from.found.theta, structure, blocks.record.dt_s) {
+                // A head keeps its own fits and is tried with the noises of the lead.
+                if HEADS.contains(&structure) {
+                    for kind in NoiseKind::ALL {
+                        start.set_noise(kind, lead.found.theta.noise(kind));
+                    }
+                }
+                all.extend(search::fit(blocks, &start, limits.longest_tau_s));
+            }
+        }
+    }
+}
+
+/// Whether starts for `inner` can be derived from a fit of `outer`.
+fn contains(outer: Structure, inner: Structure) -> bool {
+    use Structure::{
+        DoubleIntegratorLag, Foptd, IntegratorLag, Iptd, Resonant, ResonantLag, Soiptd, Soptd,
+        Toiptd,
+    };
+    matches!(
+        (outer, inner),
+        (Soiptd, Iptd | IntegratorLag | DoubleIntegratorLag | Toiptd)
+            | (Soptd, Iptd | Foptd | IntegratorLag)
+            | (ResonantLag, Resonant | Soptd | Soiptd)
+    )
+}
+
+fn keep_best_of_each(all: &mut Vec<Candidate>, structure: Option<Structure>) {
+    all.retain(|candidate| structure.is_none_or(|asked| asked == candidate.structure()));
+    all.sort_by(|a, b| a.bic.total_cmp(&b.bic));
+    let mut seen: Vec<Structure> = Vec::new();
+    all.retain(|candidate| {
+        let is_new = !seen.contains(&candidate.structure());
+        seen.push(candidate.structure());
+        is_new
+    });
+}

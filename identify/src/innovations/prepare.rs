@@ -1,0 +1,285 @@
+//! From the columns of a recording to a record: the part to use, its grid, lost and stale samples.
+
+use std::ops::Range;
+
+use super::record::{Hold, Record};
+use crate::settings::Options;
+use crate::signals::Signals;
+use crate::verdict::Verdict;
+
+/// Fewest samples to fit.
+pub(super) const FEWEST: usize = 60;
+/// Increments that differ by less than this share of the sample period are even.
+const EVEN: f64 = 1e-4;
+/// Mean and largest distance of time stamps from their grid, in steps, for samples on a grid with some absent.
+const OFF_GRID: (f64, f64) = (0.05, 0.45);
+/// Most steps of a grid for each sample.
+const SPARSE: usize = 6;
+/// Uneven time stamps are rounded to this part of the sample period, so that few lengths of step occur.
+const STAMP: f64 = 1.0 / 256.0;
+/// An output that repeats the one before is stale if at least this share of all other outputs is distinct, or if this
+/// share of the runs of equal outputs has one length: the sensor is slower than the recording. A coarse sensor has few
+/// distinct values and runs of all lengths, and its repetitions are measurements.
+const ALIKE: f64 = 0.9;
+
+/// Record with what was left out of the recording.
+pub(super) struct Prepared {
+    pub(super) record: Record,
+    /// Time of the first sample (s).
+    pub(super) start_s: f64,
+    /// Share of the samples asked for that the longest part without a gap holds.
+    pub(super) part_used: f64,
+    /// Delay from the stamp of a point to the mean time of its samples (s): the dead time appears shorter by it.
+    pub(super) early_s: f64,
+}
+
+/// Record of the longest part of the recording without a gap, within the span of `options`.
+///
+/// # Errors
+/// [`Verdict::TooFewRows`], [`Verdict::ConstantInput`], [`Verdict::ConstantOutput`] or [`Verdict::Units`].
+pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepared, Verdict> {
+    let (from_s, to_s) = options.span_s;
+    let first = from_s.map_or(0, |at| signals.time_s.partition_point(|t| *t < at));
+    let end = to_s.map_or(signals.time_s.len(), |at| {
+        signals.time_s.partition_point(|t| *t <= at)
+    });
+    let asked = first..end.max(first);
+    let range = longest_part(&asked, signals.breaks);
+    if range.len() < FEWEST {
+        return Err(Verdict::TooFewRows {
+            rows: range.len(),
+            needed: FEWEST,
+        });
+    }
+    let (input, output) = (
+        &signals.input[range.clone()],
+        &signals.output[range.clone()],
+    );
+    check(input, output)?;
+    let part_used = range.len() as f64 / asked.len() as f64;
+    let times_s = &signals.time_s[range];
+    let mut record = gridded(times_s, input, output);
+    mark_stale(&mut record);
+    record.hold = options.hold.unwrap_or(Hold::Held);
+    let points = f64::from(signals.samples_per_point.saturating_sub(1));
+    Ok(Prepared {
+        record,
+        start_s: times_s[0],
+        part_used,
+        early_s: 0.5 * points * signals.sample_period_s,
+    })
+}
+
+/// The longest run of indices of `asked` between gaps.
+fn longest_part(asked: &Range<usize>, breaks: &[usize]) -> Range<usize> {
+    let inside = breaks.iter().copied().filter(|at| asked.contains(at));
+    let mut start = asked.start;
+    let mut longest = start..start;
+    for end in inside.chain([asked.end]) {
+        if end - start > longest.len() {
+            longest = start..end;
+        }
+        start = end;
+    }
+    longest
+}
+
+fn check(input: &[f64], output: &[f64]) -> Result<(), Verdict> {
+    let constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
+    if constant(input) {
+        return Err(Verdict::ConstantInput);
+    }
+    if constant(output) {
+        return Err(Verdict::ConstantOutput);
+    }
+    let size = |values: &[f64]| values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let usable = |values: &[f64]| (1e-100..=1e100).contains(&size(values));
+    if usable(input) && usable(output) {
+        Ok(())
+    } else {
+        Err(Verdict::Units)
+    }
+}
+
+/// Samples on an even grid, with absent samples if time stamps are missing from it; or with their uneven time stamps.
+fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
+    let mut steps: Vec<f64> = times_s.windows(2).map(|t| t[1] - t[0]).collect();
+    let mean = (times_s[times_s.len() - 1] - times_s[0]) / steps.len() as f64;
+    let is_even = steps
+        .iter()
+        .all(|step| (step - mean).abs() < EVEN * mean + 2e-9);
+    steps.sort_by(f64::total_cmp);
+    let mut record = Record {
+        uneven_s: vec![],
+        dt_s: mean,
+        input: input.to_vec(),
+        output: output.to_vec(),
+        present: vec![true; output.len()],
+        hold: Hold::Held,
+    };
+    if is_even {
+        return record;
+    }
+    let short = steps[steps.len() / 10];
+    let on_grid = (1..=4).find_map(|part| indices(times_s, short / f64::from(part)));
+    if let Some((indices, step_s)) = on_grid {
+        return spread(&indices, step_s, input, output);
+    }
+    let median = steps[steps.len() / 2];
+    record.dt_s = median;
+    let unit = median * STAMP;
+    let rounded = times_s
+        .iter()
+        .map(|t| ((t - times_s[0]) / unit).round() * unit);
+    record.uneven_s = rounded.collect();
+    // Two stamps in one unit would be one sample.
+    let distinct = |pair: &[f64]| pair[1] > pair[0];
+    if !record.uneven_s.windows(2).all(distinct) {
+        record.uneven_s = times_s.iter().map(|t| t - times_s[0]).collect();
+    }
+    record
+}
+
+/// Index of each time stamp on a grid of steps near `step_s`, and the step (s). `None` if the stamps do not fit one.
+fn indices(times_s: &[f64], step_s: f64) -> Option<(Vec<usize>, f64)> {
+    let from_start: Vec<f64> = times_s.iter().map(|t| t - times_s[0]).collect();
+    let mut step_s = step_s;
+    for _ in 0..4 {
+        let k = |t: &f64| (t / step_s).round();
+        let (products, squares) =
+            (from_start.iter()).fold((0.0, 0.0), |(p, s), t| (p + k(t) * t, s + k(t) * k(t)));
+        step_s = products / squares;
+    }
+    let off = |t: &f64| (t / step_s - (t / step_s).round()).abs();
+    let mean = from_start.iter().map(off).sum::<f64>() / from_start.len() as f64;
+    let most = from_start.iter().map(off).fold(0.0, f64::max);
+    let indices: Vec<usize> = from_start
+        .iter()
+        .map(|t| (t / step_s).round() as usize)
+        .collect();
+    let rises = indices.windows(2).all(|pair| pair[1] > pair[0]);
+    let is_dense = indices
+        .last()
+        .is_some_and(|last| *last < SPARSE * indices.len());
+    (rises && is_dense && mean < OFF_GRID.0 && most < OFF_GRID.1).then_some((indices, step_s))
+}
+
+/// Samples at their indices on a grid; the others are absent, and the input keeps its value there.
+fn spread(indices: &[usize], step_s: f64, input: &[f64], output: &[f64]) -> Record {
+    let count = indices[indices.len() - 1] + 1;
+    let mut record = Record {
+        uneven_s: vec![],
+        dt_s: step_s,
+        input: Vec::with_capacity(count),
+        output: Vec::with_capacity(count),
+        present: Vec::with_capacity(count),
+        hold: Hold::Held,
+    };
+    let mut sample = 0;
+    for index in 0..count {
+        let is_next = indices.get(sample + 1).is_some_and(|next| *next <= index);
+        sample += usize::from(is_next);
+        record.input.push(input[sample]);
+        record.output.push(output[sample]);
+        record.present.push(indices[sample] == index);
+    }
+    record
+}
+
+/// Marks stale outputs as absent: the sensor is slower than the recording, or an update was lost.
+fn mark_stale(record: &mut Record) {
+    let present: Vec<usize> = (0..record.len()).filter(|i| record.present[*i]).collect();
+    let repeats = present
+        .windows(2)
+        .filter(|pair| record.output[pair[0]] == record.output[pair[1]]);
+    let stale: Vec<usize> = repeats.map(|pair| pair[1]).collect();
+    let mut values: Vec<u64> = present
+        .iter()
+        .map(|i| record.output[*i].to_bits())
+        .collect();
+    values.sort_unstable();
+    values.dedup();
+    let others = (present.len() - stale.len()) as f64;
+    let is_distinct = values.len() as f64 >= ALIKE * others;
+    if !(is_distinct || is_regular(record, &present)) {
+        return;
+    }
+    for index in stale {
+        record.present[index] = false;
+    }
+}
+
+/// Whether most runs of equal outputs have one length, or a multiple of it, above one sample.
+fn is_regular(record: &Record, present: &[usize]) -> bool {
+    let runs = present.chunk_by(|a, b| record.output[*a] == record.output[*b]);
+    let mut lengths: Vec<usize> = runs.map(<[usize]>::len).collect();
+    let count = lengths.len();
+    let (_, &mut median, _) = lengths.select_nth_unstable(count / 2);
+    let alike = lengths
+        .iter()
+        .filter(|length| **length % median == 0)
+        .count();
+    median > 1 && alike as f64 >= ALIKE * count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ramp(count: usize) -> Vec<f64> {
+        (0..count).map(|k| (k as f64 * 0.37).sin()).collect()
+    }
+
+    fn prepared(times_s: &[f64], output: &[f64], breaks: &[usize]) -> Prepared {
+        let signals = Signals {
+            time_s: times_s,
+            input: &ramp(times_s.len()),
+            output,
+            samples_per_point: 1,
+            sample_period_s: 0.01,
+            breaks,
+        };
+        prepare(&signals, &Options::default()).unwrap()
+    }
+
+    // Stamps 10 ms apart with jitter of 0.2 ms, and every seventh sample missing: 350 steps, 300 present.
+    #[test]
+    fn missing_samples_leave_holes_in_the_grid() {
+        let kept = (0..350).filter(|k| k % 7 != 3);
+        let times_s: Vec<f64> = kept
+            .map(|k| 0.01 * f64::from(k) + 2e-4 * f64::from(k).sin())
+            .collect();
+        let found = prepared(&times_s, &ramp(times_s.len()), &[]).record;
+        assert!(found.uneven_s.is_empty() && (found.dt_s - 0.01).abs() < 1e-6);
+        assert_eq!(found.len(), 350);
+        assert_eq!(found.present.iter().filter(|p| **p).count(), 300);
+        assert!(!found.present[3] && found.input[3] == found.input[2]);
+    }
+
+    #[test]
+    fn stale_outputs_are_absent_but_those_of_a_coarse_sensor_are_not() {
+        let times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
+        let mut output = ramp(300);
+        output[100..110].fill(0.5);
+        let stale = prepared(&times_s, &output, &[]).record;
+        assert_eq!(stale.present.iter().filter(|p| !**p).count(), 9);
+        let coarse: Vec<f64> = output.iter().map(|y| (2.0 * y).round()).collect();
+        assert!(
+            prepared(&times_s, &coarse, &[])
+                .record
+                .present
+                .iter()
+                .all(|p| *p)
+        );
+    }
+
+    #[test]
+    fn the_longest_part_without_a_gap_is_used() {
+        let mut times_s: Vec<f64> = (0..300).map(|k| 0.01 * f64::from(k)).collect();
+        times_s[100..].iter_mut().for_each(|t| *t += 1.0);
+        let found = prepared(&times_s, &ramp(300), &[100]);
+        assert_eq!(found.record.len(), 200);
+        assert_eq!(found.start_s, 2.0);
+        assert!((found.part_used - 2.0 / 3.0).abs() < 1e-12);
+    }
+}

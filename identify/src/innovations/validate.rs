@@ -1,0 +1,180 @@
+//! Tests of a fit: innovations, prediction of data that it was not fitted to, information.
+
+use std::f64::consts::TAU;
+
+use super::choose::Limits;
+use super::descent::Patience;
+use super::likelihood::{Evaluation, Filtering, predict};
+use super::orthogonal::Orthogonal;
+use super::record::{Blocks, Record};
+use super::search;
+use super::theta::Theta;
+use crate::outcome::{InnovationTests, Prediction};
+
+/// Lags of the tests.
+const LAGS: usize = 20;
+/// Most rows between which a correlation is computed exactly; frequencies of the information's spectrum.
+const FREQUENCIES: usize = 120;
+
+/// Tests of the innovations against whiteness and against the input.
+pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
+    let innovations = at.innovations();
+    let count = innovations.len();
+    let square: f64 = innovations.iter().map(|e| e * e).sum();
+    let correlation = |lag: usize| {
+        let pairs = innovations[lag..].iter().zip(&innovations);
+        pairs.map(|(a, b)| a * b).sum::<f64>() / square
+    };
+    let lags = LAGS.min(count / 4);
+    let correlations: Vec<f64> = (1..=lags).map(correlation).collect();
+    let n = count as f64;
+    let sum: f64 = (correlations.iter().zip(1..))
+        .map(|(r, lag)| r * r / (n - f64::from(lag)))
+        .sum();
+    let (input_share, input_f) = of_input(blocks, &innovations);
+    InnovationTests {
+        autocorrelation: correlations
+            .iter()
+            .fold(0.0, |most: f64, r| most.max(r.abs())),
+        ljung_box: n * (n + 2.0) * sum / lags.max(1) as f64,
+        input_share,
+        input_f,
+    }
+}
+
+/// Share of the innovations that the input of the blocks before explains, and its F statistic. The input of the same
+/// block is left out: under feedback it contains the innovation.
+fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
+    let input = |block: usize| {
+        let range = blocks.range(block);
+        let count = range.len() as f64;
+        blocks.record.input[range].iter().sum::<f64>() / count
+    };
+    let inputs: Vec<f64> = (0..blocks.len()).map(input).collect();
+    let rows: Vec<usize> = (0..blocks.len())
+        .filter(|block| blocks.present(*block) > 0)
+        .collect();
+    let used: Vec<(usize, f64)> = (rows.into_iter().zip(innovations.iter().copied()))
+        .filter(|(row, _)| *row >= LAGS)
+        .collect();
+    let count = used.len() as f64;
+    if count < 4.0 * LAGS as f64 {
+        return (0.0, 0.0);
+    }
+    let centred = |mut column: Vec<f64>| {
+        let mean = column.iter().sum::<f64>() / count;
+        column.iter_mut().for_each(|v| *v -= mean);
+        column
+    };
+    let target = centred(used.iter().map(|(_, e)| *e).collect());
+    let mut columns: Vec<Vec<f64>> = Vec::new();
+    for lag in 1..=LAGS {
+        columns.push(centred(
+            used.iter().map(|(row, _)| inputs[row - lag]).collect(),
+        ));
+        // A lag that repeats those before it (a slow input) tells nothing new.
+        if Orthogonal::new(&columns).is_none() {
+            columns.pop();
+        }
+    }
+    let Some(orthogonal) = Orthogonal::new(&columns) else {
+        return (0.0, 0.0);
+    };
+    let size = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+    let (rest, _) = orthogonal.solve(&target);
+    let share = 1.0 - size(&rest) / size(&target);
+    let number = columns.len() as f64;
+    let f = (share / number) / ((1.0 - share) / (count - number - 1.0));
+    (share, f)
+}
+
+/// Prediction of the last third of the record from a fit to the first two thirds. `None` if a third is too short.
+pub(super) fn prediction(
+    record: &Record,
+    theta: &Theta,
+    limits: &Limits,
+    samples: usize,
+    horizon_s: f64,
+) -> Option<Prediction> {
+    const WARM: Patience = Patience {
+        steps: 12,
+        decrease: 1e-5,
+    };
+    let skip_s = limits.skip_s;
+    let split = record.len() - (record.len() - record.index_at(skip_s)) / 3;
+    let early = record.part(0..split);
+    let blocks = Blocks::new(&early, samples, skip_s);
+    if blocks.len() < 40 {
+        return None;
+    }
+    let fitted = search::warm(&blocks, theta, limits.longest_tau_s, WARM)?;
+    let whole = Blocks::new(record, samples, skip_s);
+    let ahead = ((horizon_s / whole.block_s()).round() as usize).clamp(1, whole.len() / 6);
+    let filtering = Filtering {
+        ahead,
+        ..Filtering::default()
+    };
+    let found = predict(&whole, &fitted.theta, &fitted.at, filtering)?;
+    let measured = |row: usize| {
+        let count = whole.present(row);
+        (count > 0).then(|| whole.sums[row] * whole.scale / count as f64)
+    };
+    let later = blocks.len()..whole.len().saturating_sub(ahead);
+    let pairs: Vec<(f64, f64)> = later
+        .filter_map(|row| {
+            let predicted = found.ahead[row] + found.forced[row + ahead];
+            measured(row + ahead).map(|value| (value, predicted))
+        })
+        .collect();
+    let count = pairs.len() as f64;
+    if count < 10.0 {
+        return None;
+    }
+    let mean = pairs.iter().map(|(value, _)| value).sum::<f64>() / count;
+    let variance: f64 = pairs.iter().map(|(value, _)| (value - mean).powi(2)).sum();
+    let error: f64 = pairs
+        .iter()
+        .map(|(value, predicted)| (value - predicted).powi(2))
+        .sum();
+    Some(Prediction {
+        horizon_s: ahead as f64 * whole.block_s(),
+        explained: 1.0 - error / variance,
+        error_ratio: error / (count * found.ahead_variance),
+    })
+}
+
+/// Band of frequencies (rad/s) with the central 90 % of the information on the gain, and the frequency of its median:
+/// the spectrum of the filtered response to the input. `None` if the input has no effect.
+pub(super) fn informative(blocks: &Blocks<'_>, at: &Evaluation) -> Option<((f64, f64), f64)> {
+    let rows = &at.input_innovations;
+    let length_s = blocks.block_s() * rows.len() as f64;
+    let (lowest, highest) = (TAU / length_s, std::f64::consts::PI / blocks.block_s());
+    let frequency =
+        |i: usize| lowest * (highest / lowest).powf(i as f64 / (FREQUENCIES - 1) as f64);
+    let mean = rows.iter().sum::<f64>() / rows.len() as f64;
+    let power = |omega: f64| {
+        let (mut re, mut im) = (0.0, 0.0);
+        let (sin, cos) = (omega * blocks.block_s()).sin_cos();
+        let (mut c, mut s) = (1.0, 0.0);
+        for value in rows {
+            re += (value - mean) * c;
+            im += (value - mean) * s;
+            (c, s) = (c * cos - s * sin, s * cos + c * sin);
+        }
+        re * re + im * im
+    };
+    // On a logarithmic grid a frequency stands for a band as wide as itself.
+    let powers: Vec<f64> = (0..FREQUENCIES)
+        .map(|i| power(frequency(i)) * frequency(i))
+        .collect();
+    let total: f64 = powers.iter().sum();
+    let quantile = |part: f64| {
+        let mut sum = 0.0;
+        let index = powers.iter().position(|power| {
+            sum += power;
+            sum >= part * total
+        });
+        frequency(index.unwrap_or(FREQUENCIES - 1))
+    };
+    (total > 0.0 && total.is_finite()).then(|| ((quantile(0.05), quantile(0.95)), quantile(0.5)))
+}
