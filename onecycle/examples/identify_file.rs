@@ -7,7 +7,7 @@
 
 use std::error::Error;
 
-use onecycle::{CsvOptions, Identified, Identify, Interval};
+use onecycle::{CsvOptions, Design, Identified, Identify, Interval};
 
 const HOVER: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
@@ -45,7 +45,15 @@ fn report(identified: &Identified) {
     for (parameter, interval) in identified.estimate.iter() {
         println!("{:<11} {}", parameter.symbol(), with_ends(&interval));
     }
-    let (controller, margins) = (identified.design.controller, identified.design.margins);
+    let Some(Design {
+        controller,
+        margins,
+        ..
+    }) = identified.design
+    else {
+        println!("no controller: see the remarks");
+        return;
+    };
     println!(
         "u = {:.4} (r - y) - {:.4} dy/dt",
         controller.kp(),

@@ -37,7 +37,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let is_within = if interval.holds(truth) { "yes" } else { "no" };
         println!("{name:<13} {truth:>9.5}  {estimate:>9.5}   {is_within}");
     }
-    let controller = identified.design.controller;
+    let controller = identified.design.ok_or("no controller")?.controller;
     println!("Kp {:.3}, Kd {:.3}", controller.kp(), controller.kd());
     for remark in &found.remarks {
         println!("- {remark:?}");

@@ -1,6 +1,7 @@
 //! Builder of an identification.
 
-use onecycle_identify::{Identification, Method, Options, Signals, identify_by};
+use onecycle_design::Structure;
+use onecycle_identify::{Hold, Identification, Method, Options, Road, Signals, identify_by};
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
 
@@ -66,6 +67,39 @@ impl<'a> Identify<'a> {
     pub fn method(self, method: Method) -> Self {
         Self {
             options: self.options.method(method),
+            ..self
+        }
+    }
+
+    /// Takes this road: the estimator of steady relay oscillations, the general one, or the one that suits the
+    /// recording (default).
+    pub fn road(self, road: Road) -> Self {
+        Self {
+            options: self.options.road(road),
+            ..self
+        }
+    }
+
+    /// Fits this structure. `None` (default): the simplest one that explains the recording.
+    pub fn structure(self, structure: impl Into<Option<Structure>>) -> Self {
+        Self {
+            options: self.options.structure(structure.into()),
+            ..self
+        }
+    }
+
+    /// Uses the recording from `from_s` to `to_s` (s) only. `None`: from its start, to its end.
+    pub fn span_s(self, from_s: impl Into<Option<f64>>, to_s: impl Into<Option<f64>>) -> Self {
+        Self {
+            options: self.options.span_s(from_s.into(), to_s.into()),
+            ..self
+        }
+    }
+
+    /// Takes the input between two samples as held or as interpolated. `None` (default): the likelihood decides.
+    pub fn hold(self, hold: impl Into<Option<Hold>>) -> Self {
+        Self {
+            options: self.options.hold(hold.into()),
             ..self
         }
     }
@@ -144,6 +178,15 @@ mod tests {
         assert_eq!(larger.options, default.phase_margin_rad(1.0));
         let refined = Identify::new().method(Method::Refine);
         assert_eq!(refined.options, default.method(Method::Refine));
+        let general = Identify::new().road(Road::General);
+        assert_eq!(general.options, default.road(Road::General));
+        let named = Identify::new().structure(Structure::Soptd);
+        assert_eq!(named.options, default.structure(Some(Structure::Soptd)));
+        assert_eq!(named.structure(None).options, default);
+        let cut = Identify::new().span_s(1.0, None);
+        assert_eq!(cut.options, default.span_s(Some(1.0), None));
+        let held = Identify::new().hold(Hold::Held);
+        assert_eq!(held.options, default.hold(Some(Hold::Held)));
         assert!(larger.pack.is_some() && refined.without_pack().pack.is_none());
     }
 

@@ -18,7 +18,7 @@
 //! for (parameter, interval) in found.estimate.iter() {
 //!     println!("{} {:?}", parameter.symbol(), interval);
 //! }
-//! let controller = found.design.controller;
+//! let controller = found.design.ok_or("no controller")?.controller;
 //! println!("Kp {:.3}, Kd {:.3}", controller.kp(), controller.kd());
 //! # // The file names the true process; the 90 % intervals hold K/T_body = 0.5922 and tau = 23.7 ms.
 //! # let holds = |parameter, truth| found.estimate.get(parameter).is_some_and(|of| of.holds(truth));
@@ -33,14 +33,15 @@
 //! | task | names |
 //! |------|-------|
 //! | read and write recordings | [`read`], [`read_from`], [`CsvOptions`], [`ColumnRef`], [`TimeUnit`], [`Recording`], [`Gap`], [`Note`], [`write_csv`] |
-//! | identify | [`Identify`], [`Method`], [`Pack`] |
-//! | use the result | [`Identification`], [`Identified`], [`Estimate`], [`Interval`], [`Posterior`], [`Excitation`], [`Oscillation`] |
+//! | identify | [`Identify`], [`Structure`], [`Road`], [`Hold`], [`Method`], [`Pack`] |
+//! | use the result | [`Identification`], [`Identified`], [`Estimate`], [`Interval`], [`Posterior`] |
+//! | see what the estimate rests on | [`Excitation`], [`Oscillation`], [`Recorded`], [`Evidence`], [`Innovations`] |
 //! | find out why there is no result, or what limits it | [`Verdict`], [`Remark`] |
-//! | describe a process | [`Model`], [`Structure`], [`Parameter`], [`Unit`], [`Soiptd`] |
+//! | describe a process | [`Model`], [`Structure`], [`Parameter`], [`Unit`], [`Soiptd`], [`Linear`] |
 //! | design a controller | [`design()`], [`Specification`], [`Design`], [`Controller`], [`Form`], [`Pd`] |
 //! | analyse a loop | [`margins()`], [`Margins`], [`ise()`], [`step_response()`], [`StepResponse`], [`StepMetrics`] |
 //! | simulate a relay test | [`Experiment`], [`Sensor`], [`Trace`], [`FixedStepProcess`], [`Relay`], [`RelaySettings`] |
-//! | handle errors | [`ReadError`], [`RecordingError`], [`PackError`], [`DesignError`], [`StepResponseError`], [`SoiptdError`], [`RelayError`] |
+//! | handle errors | [`ReadError`], [`RecordingError`], [`PackError`], [`DesignError`], [`StepResponseError`], [`SoiptdError`], [`LinearError`], [`RelayError`] |
 //!
 //! # Read a recording
 //!
@@ -144,7 +145,7 @@
 //! let recording = Recording::from_samples(&time_s, &[0.2; 1000], &[0.0; 1000])?;
 //! let found = Identify::new().run(&recording);
 //! match &found.outcome {
-//!     Ok(identified) => println!("{:?}", identified.design.controller),
+//!     Ok(identified) => println!("{:?}", identified.design),
 //!     Err(verdict) => println!("{}: {verdict}", verdict.kind()),
 //! }
 //! for remark in &found.remarks {
@@ -224,8 +225,8 @@ pub use onecycle_link::{
 // Identification.
 #[doc(inline)]
 pub use onecycle_identify::{
-    Estimate, Excitation, Identification, Identified, Interval, Method, Oscillation, Posterior,
-    Remark, Verdict,
+    Estimate, Evidence, Excitation, Hold, Identification, Identified, Innovations, Interval,
+    Method, Oscillation, Posterior, Recorded, Remark, Road, Verdict,
 };
 #[doc(inline)]
 pub use onecycle_onboard::pack::{Pack, PackError};
@@ -233,8 +234,9 @@ pub use onecycle_onboard::pack::{Pack, PackError};
 // Models, controllers, design.
 #[doc(inline)]
 pub use onecycle_design::{
-    Controller, Design, DesignError, Form, Margins, Model, Parameter, Specification, StepMetrics,
-    StepResponse, StepResponseError, Structure, Unit, design, ise, margins, step_response,
+    Controller, Design, DesignError, Form, Linear, LinearError, Margins, Model, Parameter,
+    Specification, StepMetrics, StepResponse, StepResponseError, Structure, Unit, design, ise,
+    margins, step_response,
 };
 #[doc(inline)]
 pub use onecycle_onboard::{Pd, Soiptd, SoiptdError};

@@ -106,9 +106,9 @@ impl<T: Serialize> Serialize for Parameters<T> {
 #[derive(Serialize)]
 struct Fit {
     misfit: f64,
-    response_error: f64,
-    residual_sigma: f64,
-    noise_sigma: f64,
+    response_error: Option<f64>,
+    residual_sigma: Option<f64>,
+    noise_sigma: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -145,6 +145,7 @@ struct Step {
 /// The report of an identification, one line at the end.
 pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
     let identified = found.outcome.as_ref().ok();
+    let design = identified.and_then(|i| i.design.as_ref());
     let columns = recording.columns();
     to_text(&IdentifyReport {
         schema: IDENTIFY_SCHEMA,
@@ -177,8 +178,10 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         process: identified.map(process),
         joint_probability: identified.and_then(|i| i.joint_probability),
         fit: identified.map(fit),
-        controller: identified.map(|i| controller(&i.design)),
-        margins: identified.map(|i| margins(&i.design.margins, Some(&i.phase_margin_rad))),
+        controller: design.map(controller),
+        margins: design
+            .zip(identified)
+            .map(|(design, i)| margins(&design.margins, i.phase_margin_rad.as_ref())),
         step: identified.and_then(|i| i.step.as_ref()).map(step),
         remarks: found.remarks.iter().map(sentence).collect(),
         remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
@@ -252,11 +255,14 @@ fn process(identified: &Identified) -> Parameters<Range> {
 }
 
 fn fit(identified: &Identified) -> Fit {
+    let refined = identified.fit.refined();
+    let innovations = identified.fit.innovations();
     Fit {
         misfit: identified.fit.misfit,
-        response_error: identified.fit.refined.response_error,
-        residual_sigma: identified.fit.refined.residual_sigma,
-        noise_sigma: identified.fit.refined.noise_sigma,
+        response_error: refined.map(|refined| refined.response_error),
+        residual_sigma: refined.map(|refined| refined.residual_sigma),
+        noise_sigma: (refined.map(|refined| refined.noise_sigma))
+            .or(innovations.map(|innovations| innovations.noise.sigma)),
     }
 }
 

@@ -34,24 +34,23 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     let units = Units::of(recording);
     let mut sections = vec![recorded::section(recording, found.oscillation())];
     let mut lead = made_by("identify");
-    match (&found.outcome, found.oscillation()) {
-        (Ok(identified), Some(oscillation)) => {
+    match &found.outcome {
+        Ok(identified) => {
             lead += &identified_lead(identified, found.remarks.len());
             let view = View {
                 units: &units,
                 identified,
             };
             // One cycle may be one of no steady oscillation, which has no harmonics.
-            let measured = if oscillation.cycles_used > 1 {
+            let steady = (found.oscillation()).filter(|oscillation| oscillation.cycles_used > 1);
+            let measured = steady.map_or(vec![], |oscillation| {
                 with_signals(recording, |signals| {
                     harmonics(signals, oscillation, HARMONICS)
                 })
-            } else {
-                vec![]
-            };
+            });
             sections.extend(view.sections(&measured));
         }
-        (Err(verdict), _) => {
+        Err(verdict) => {
             let words = format!(
                 "No process identified. {}",
                 words::sentence(&verdict.to_string())
@@ -59,7 +58,6 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             lead += &page::verdict(false, &words);
             lead += &page::paragraph("lead", words::verdict::advice(verdict));
         }
-        (Ok(_), None) => {}
     }
     sections.extend(remarks(found));
     page(&format!("Relay test: {file}"), &lead, &sections)
@@ -87,32 +85,34 @@ struct View<'a> {
 
 impl View<'_> {
     fn sections(&self, measured: &[Harmonic]) -> Vec<Section> {
-        let Identified {
-            model,
-            estimate,
-            posterior,
-            design,
-            phase_margin_rad,
-            fit,
-            ..
-        } = self.identified;
-        let draws = posterior.models(DRAWS);
+        let mut sections = vec![
+            fit::section(self.identified, self.units),
+            parameters::section(self.identified, self.units),
+        ];
+        if let Some(design) = &self.identified.design {
+            sections.extend(self.of_controller(design, measured));
+        }
+        sections
+    }
+
+    /// Stability, step and forms of the controller.
+    fn of_controller(&self, design: &Design, measured: &[Harmonic]) -> Vec<Section> {
+        let identified = self.identified;
+        let draws = identified.posterior.models(DRAWS);
         // Where the interval holds zero there is nothing to subtract.
-        let bias = (estimate.get(Parameter::InputBias))
+        let bias = (identified.estimate.get(Parameter::InputBias))
             .filter(|bias| !bias.holds(0.0))
-            .map(|_| fit.refined.input_bias);
-        let own = Loop::new(*model, design.controller, design.margins)
-            .within(&draws, *phase_margin_rad)
+            .and_then(|bias| bias.estimate);
+        let own = Loop::new(identified.model, design.controller, design.margins)
+            .within(&draws, identified.phase_margin_rad)
             .measured(measured);
-        let response = step_response(model, &design.controller).ok();
+        let response = step_response(&identified.model, &design.controller).ok();
         let step = response.map(|response| {
             let times_s = times_s(&response);
             let bands = step_bands(&draws, &design.controller, &times_s);
             step::section(&response, bands.as_ref(), &times_s)
         });
         [
-            Some(fit::section(self.identified, self.units)),
-            Some(parameters::section(self.identified, self.units)),
             Some(own.section()),
             step,
             Some(controller::section(design, self.units, bias)),
@@ -141,13 +141,20 @@ fn made_by(command: &str) -> String {
 
 /// What the page comes down to.
 fn identified_lead(identified: &Identified, remarks: usize) -> String {
-    let design = &identified.design;
-    let margin = stability::phase_margin(&design.margins, Some(&identified.phase_margin_rad));
-    let mut text = format!(
-        "Identified. Kp {}, Kd {}: phase margin {margin}",
-        significant(design.controller.kp()),
-        significant(design.controller.kd()),
-    );
+    let mut text = "Identified. ".to_owned();
+    match &identified.design {
+        Some(design) => {
+            let margin_rad = identified.phase_margin_rad.as_ref();
+            let _ = write!(
+                text,
+                "Kp {}, Kd {}: phase margin {}",
+                significant(design.controller.kp()),
+                significant(design.controller.kd()),
+                stability::phase_margin(&design.margins, margin_rad)
+            );
+        }
+        None => text += "No controller was designed",
+    }
     if let Some(step) = &identified.step {
         let (overshoot, settled) = (100.0 * step.overshoot, significant(step.settling_time_s));
         let _ = write!(

@@ -36,13 +36,9 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     match &found.outcome {
         Ok(identified) => {
             describe_process(&mut text, identified, &units);
-            let margin = Some(&identified.phase_margin_rad);
-            describe_controller(&mut text, &identified.design, margin, &units);
-            let bias = identified.estimate.get(Parameter::InputBias);
-            if bias.is_some_and(|bias| !bias.holds(0.0)) {
-                text.push_str("  subtract the input bias from u: there is no integral action\n");
+            if let Some(design) = &identified.design {
+                describe_own_controller(&mut text, identified, design, &units);
             }
-            describe_step(&mut text, identified.step.as_ref(), &units);
         }
         Err(verdict) => {
             let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
@@ -170,6 +166,22 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
             100.0 * probability
         );
     }
+}
+
+/// The controller of an identified process, with its margins and step.
+fn describe_own_controller(
+    text: &mut String,
+    identified: &Identified,
+    design: &Design,
+    units: &Units,
+) {
+    let margin = identified.phase_margin_rad.as_ref();
+    describe_controller(text, design, margin, units);
+    let bias = identified.estimate.get(Parameter::InputBias);
+    if bias.is_some_and(|bias| !bias.holds(0.0)) {
+        text.push_str("  subtract the input bias from u: there is no integral action\n");
+    }
+    describe_step(text, identified.step.as_ref(), units);
 }
 
 fn describe_controller(

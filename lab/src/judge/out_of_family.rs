@@ -120,5 +120,5 @@ fn identified(experiment: &RelayExperiment, trace: &Trace, cycles: usize) -> Opt
     let signals = signals_of(trace, experiment.sample_s);
     let options = Options::default().cycles(cycles);
     let found = identify(&signals, &options).outcome.ok()?;
-    Some(Harm::of(experiment, &found.fit.refined.process))
+    Some(Harm::of(experiment, &found.model.soiptd()?))
 }

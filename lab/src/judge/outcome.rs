@@ -122,10 +122,10 @@ pub fn identification_outcome(
     let truth = in_order(&experiment.process)?;
     let judge = Judge::new(&truth).ok();
     let deterioration = (found.outcome.as_ref().ok().zip(judge)).and_then(|(identified, judge)| {
-        Some(judge.deterioration(identified.design.controller.pd()?))
+        Some(judge.deterioration(identified.design?.controller.pd()?))
     });
     let errors = (found.outcome.as_ref().ok())
-        .and_then(|identified| errors(&identified.fit.refined, &truth));
+        .and_then(|identified| errors(identified.fit.refined()?, &truth));
     Ok(IdentificationOutcome {
         errors,
         found,

@@ -78,7 +78,11 @@ impl Experiment {
     fn deterioration(&self, identified: &Identified) -> f64 {
         let process = &self.case.process;
         let best = pd(process, Options::default().specification.phase_margin_rad).unwrap();
-        match deterioration(identified.design.controller.pd().unwrap(), process, &best) {
+        match deterioration(
+            identified.design.unwrap().controller.pd().unwrap(),
+            process,
+            &best,
+        ) {
             Deterioration::Stable { relative, .. } => relative.abs(),
             Deterioration::Unstable => panic!("unstable: {:?}", self.case),
         }

@@ -1,7 +1,8 @@
 //! The model over the data, and the residuals.
 
 use onecycle::Identified;
-use onecycle_identify::{FitPoint, Whiteness, whiteness};
+use onecycle_identify::{Evidence, FitPoint, Whiteness, whiteness};
+use onecycle_onboard::refine::Refined;
 
 use super::significant;
 use crate::pages::page::{self, Section};
@@ -86,20 +87,11 @@ fn facts(identified: &Identified, white: &Whiteness) -> Vec<(&'static str, Strin
     } else {
         "not white: the model misses a part of the process, or the noise is so small that any error shows"
     };
-    let refined = &identified.fit.refined;
-    [
-        (
-            "unexplained",
-            format!("{} of the oscillation, beyond the noise", percent(identified.fit.misfit)),
-        ),
-        (
-            "residual, noise",
-            format!(
-                "{}, {} (standard deviations of a sample)",
-                significant(refined.residual_sigma),
-                significant(refined.noise_sigma)
-            ),
-        ),
+    let mut facts = match &identified.fit.evidence {
+        Evidence::Relay(refined) => of_relay(identified.fit.misfit, refined),
+        _ => vec![],
+    };
+    facts.push(
         (
             "whiteness",
             format!(
@@ -107,6 +99,24 @@ fn facts(identified: &Identified, white: &Whiteness) -> Vec<(&'static str, Strin
                 white.outside,
                 white.portmanteau,
                 percent(white.probability),
+            ),
+        ),
+    );
+    facts
+}
+
+fn of_relay(misfit: f64, refined: &Refined) -> Vec<(&'static str, String)> {
+    [
+        (
+            "unexplained",
+            format!("{} of the oscillation, beyond the noise", percent(misfit)),
+        ),
+        (
+            "residual, noise",
+            format!(
+                "{}, {} (standard deviations of a sample)",
+                significant(refined.residual_sigma),
+                significant(refined.noise_sigma)
             ),
         ),
     ]

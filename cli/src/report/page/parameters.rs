@@ -100,15 +100,19 @@ fn table(identified: &Identified, units: &Units) -> String {
 /// One marginal for each finite parameter, and one for the phase margin.
 fn marginals(identified: &Identified, units: &Units) -> Vec<Figure> {
     let degrees = 1_f64.to_degrees();
-    let margins = (identified.posterior).phase_margins_rad(&identified.design.controller);
-    let margin = (
-        "phase margin (deg)".to_owned(),
-        margins.iter().map(|margin| degrees * margin).collect(),
-        scaled(&identified.phase_margin_rad, degrees),
-    );
+    let margin = (identified.design.as_ref())
+        .zip(identified.phase_margin_rad)
+        .map(|(design, interval)| {
+            let margins = (identified.posterior).phase_margins_rad(&design.controller);
+            (
+                "phase margin (deg)".to_owned(),
+                margins.iter().map(|margin| degrees * margin).collect(),
+                scaled(&interval, degrees),
+            )
+        });
     (identified.estimate.iter())
         .map(|(parameter, interval)| distribution(parameter, &interval, identified, units))
-        .chain([margin])
+        .chain(margin)
         // Without damping the velocity gain is infinite.
         .filter(|(_, _, interval)| interval.high.is_some())
         .filter_map(|(title, values, interval)| marginal(&title, values, &interval))

@@ -55,11 +55,11 @@ impl Loop {
     }
 
     /// With the interval of the phase margin, and a band over draws from the posterior.
-    pub(super) fn within(self, draws: &[Model], phase_margin_rad: Interval) -> Self {
+    pub(super) fn within(self, draws: &[Model], phase_margin_rad: Option<Interval>) -> Self {
         let bands = loop_bands(&self.model, draws, &self.controller, &self.omegas_rad_per_s);
         Self {
             bands,
-            phase_margin_rad: Some(phase_margin_rad),
+            phase_margin_rad,
             ..self
         }
     }

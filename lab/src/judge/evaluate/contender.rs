@@ -177,10 +177,10 @@ fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, 
         .method(method);
     let identified = identify(signals, &options).outcome;
     let identified = identified.map_err(|verdict| verdict.to_string())?;
-    let pd = identified.design.controller.pd();
+    let pd = identified.design.and_then(|design| design.controller.pd());
     Ok(Answer {
         process: identified.model.soiptd(),
-        feedback: pd.ok_or("the controller is not a PD")?.into(),
+        feedback: pd.ok_or("there is no PD controller")?.into(),
     })
 }
 
