@@ -25,6 +25,7 @@ mod reading;
 mod relay;
 mod remark;
 mod remarks;
+mod road;
 mod settings;
 mod signals;
 mod verdict;
@@ -50,7 +51,7 @@ pub use verdict::Verdict;
 
 /// Identifies the process from a recording, with the built-in pack.
 ///
-/// The recording must hold a relay test. The method:
+/// A steady relay oscillation takes the estimator of the board:
 ///
 /// 1. Find the relay in the input, and the runs of steady cycles.
 /// 2. Average the last cycles of the longest run into bins.
@@ -59,6 +60,11 @@ pub use verdict::Verdict;
 /// 5. Refuse the fit if the output is clipped, or if residual or model error are too large. Then repeat from step 2
 ///    with fewer cycles, or with the last run.
 /// 6. Draw from the posterior; choose the controller of least expected cost.
+///
+/// Any other recording takes the general estimator: the likelihood of all samples under each [`Structure`] with
+/// disturbances, of which the simplest is chosen. [`Options::road`] fixes the choice.
+///
+/// [`Structure`]: onecycle_design::Structure
 #[must_use]
 pub fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
     identify_by(signals, options, Pack::embedded().ok().as_ref())
@@ -73,10 +79,7 @@ pub fn identify_by(
     options: &Options,
     pack: Option<&Pack<'_>>,
 ) -> Identification {
-    match options.road {
-        Road::General => innovations::identify(signals, options),
-        Road::Relay | Road::Automatic => relay::identify(signals, options, pack),
-    }
+    road::identify(signals, options, pack)
 }
 
 // Compiles and runs the code of the README.

@@ -62,8 +62,8 @@ pub enum Remark {
     /// The estimator of steady oscillations refused the recording, and the general one did not. The value is the
     /// refusal.
     NotASteadyOscillation(Box<Verdict>),
-    /// The general estimator disagrees with that of steady oscillations and explains the recording better, so its
-    /// result is given. The value is the difference of the BIC.
+    /// The estimator of steady oscillations leaves a part of the oscillation unexplained and the general one does not, so
+    /// the general result is given. The value is that part.
     RelayReplaced(f64),
     /// Other structures explain the recording nearly as well.
     OtherStructures(Vec<Structure>),

@@ -126,10 +126,7 @@ fn distribution(
     identified: &Identified,
     units: &Units,
 ) -> (String, Vec<f64>, Interval) {
-    let values = |parameter| -> Vec<f64> {
-        let draws = identified.posterior.draws().iter();
-        draws.map(|draw| draw.value(parameter)).collect()
-    };
+    let values = |parameter| identified.posterior.values(parameter);
     let symbol = parameter.symbol();
     match parameter {
         // Unbounded above: its inverse, the damping, is bounded.
@@ -250,13 +247,15 @@ fn surface(identified: &Identified, posterior: &Posterior) -> Option<Figure> {
 }
 
 fn correlations(posterior: &Posterior) -> Option<Figure> {
-    let names = Posterior::CORRELATED.map(|parameter| parameter.symbol().to_owned());
-    let z = posterior.correlations()?.map(Vec::from).into();
+    let names: Vec<String> = (posterior.correlated().iter())
+        .map(|parameter| parameter.symbol().to_owned())
+        .collect();
+    let z = posterior.correlations()?;
     let mut panel = Panel::new(Axis::titled(""), vec![]);
     panel.field = Some(Field {
         kind: FieldKind::Correlations,
-        x: Places::Names(names.clone().into()),
-        y: Places::Names(names.into()),
+        x: Places::Names(names.clone()),
+        y: Places::Names(names),
         z,
     });
     let figure = Figure::single(
