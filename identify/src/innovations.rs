@@ -54,7 +54,7 @@ use crate::verdict::Verdict;
 /// Longest dead time, and time left out at the start while it is not known, as a share of the record.
 const LONGEST_TAU: f64 = 1.0 / 8.0;
 /// Rows of the final fit, unless a row would be longer than lag and dead time together.
-const ROWS: usize = 1500;
+const ROWS: usize = 1200;
 /// Rounds of outliers.
 const ROUNDS: usize = 3;
 /// Difference of the log-likelihood above which the input is taken as straight lines between the samples.

@@ -16,8 +16,8 @@ pub(super) const NEARLY: f64 = 6.0;
 const SHOWN: f64 = 2.7;
 /// Structures whose best fit is worse than this are given up: no further noise makes up for it.
 const HOPELESS: f64 = 80.0;
-/// Rows of the fit that chooses, and fewest samples of a row.
-const ROWS: usize = 1200;
+/// Rows of the fit that chooses.
+const ROWS: usize = 900;
 
 /// Candidates of all structures in ascending order of BIC, the best of each structure, on one set of rows.
 pub(super) struct Choice {

@@ -6,6 +6,7 @@
 //! Kanzow, N. Yamashita, M. Fukushima, J. Comput. Appl. Math. 172 (2004), bounds.
 
 use super::likelihood::{Evaluation, Memory, evaluate};
+use super::orthogonal::dot;
 use super::record::Blocks;
 use super::theta::{Bounds, MOST, Theta};
 
@@ -202,8 +203,4 @@ pub(super) fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
             .map(|i| (0..n).map(|j| entry(i, j)).collect())
             .collect(),
     )
-}
-
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

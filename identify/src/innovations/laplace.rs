@@ -6,8 +6,9 @@
 //!
 //! with the residual `rho` and its Jacobian `J` by central differences. Unknowns at a bound are taken as known.
 
-use super::descent::{Found, dot, inverse};
+use super::descent::{Found, inverse};
 use super::likelihood::{Evaluation, Memory, evaluate};
+use super::orthogonal::dot;
 use super::record::Blocks;
 use super::theta::{Bounds, MOST};
 
@@ -71,12 +72,6 @@ impl Laplace {
             slopes,
             coloured,
         })
-    }
-
-    /// Standard deviation of an unknown of [`Theta::values`](super::theta::Theta). `None` if it is not free.
-    pub(super) fn deviation(&self, index: usize) -> Option<f64> {
-        let slot = self.free.iter().position(|free| *free == index)?;
-        Some(self.covariance[slot][slot].sqrt())
     }
 
     /// Standard deviation of the gain.

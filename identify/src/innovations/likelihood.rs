@@ -26,7 +26,7 @@ use onecycle_design::state_space::{Matrix, StateSpace, identity, product, times}
 use super::lifted::{Lifted, Sample, dot, row_times};
 use super::orthogonal::Orthogonal;
 use super::record::Blocks;
-use super::response::response;
+use super::response;
 use super::theta::{NoiseKind, Theta};
 
 /// Columns of a row of the filter: room for `y`, `g` and six states, and a multiple of the width of a vector register.
@@ -58,6 +58,7 @@ pub(super) struct Evaluation {
     /// Innovations of the response to the input, over the standard deviation of an innovation.
     pub(super) input_innovations: Vec<f64>,
     /// `sum ln S_k` and `ln|X'X| - ln|X0'X0|`.
+    #[cfg(test)]
     pub(super) determinants: (f64, f64),
 }
 
@@ -247,6 +248,7 @@ fn evaluate_sized<const N: usize>(
         disturbance: (inverse[1][1] * squared, inverse[0][1] * squared),
         variance: squared,
         input_innovations,
+        #[cfg(test)]
         determinants: (filtered.log_variances, log_x),
     })
 }
@@ -265,8 +267,7 @@ fn remember<const N: usize>(
         return Some(());
     }
     memory.key = None;
-    let samples = response(&system.model, blocks.record, theta.tau_s());
-    memory.response = blocks.sums_of(&samples);
+    memory.response = response::sums(&system.model, blocks, theta.tau_s());
     let has_samples = |block: &usize| lifted[blocks.kind_of[*block] as usize].r > 0.0;
     let mut columns = vec![Vec::with_capacity(blocks.len()); N + 1];
     columns[0].extend(
@@ -466,8 +467,7 @@ fn predict_sized<const N: usize>(
 ) -> Option<Predictions> {
     let system = System::<N>::new(theta, blocks.record.dt_s);
     let lifted = system.lifted(blocks);
-    let samples = response(&system.model, blocks.record, theta.tau_s());
-    let response = blocks.sums_of(&samples);
+    let response = response::sums(&system.model, blocks, theta.tau_s());
     let mut gains = Gains::new(system.start(blocks, &lifted)?);
     let start: [f64; N] = std::array::from_fn(|i| evaluation.state[i]);
     let (mut free, mut filtered) = (start, start);

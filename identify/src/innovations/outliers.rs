@@ -14,6 +14,8 @@ const WEIGHT_SUM: f64 = 20.0;
 /// record without noise is no outlier.
 const FAR: f64 = 6.0;
 const VISIBLE: f64 = 0.03;
+/// Increments to both neighbours in robust deviations of all increments.
+const SPIKE: f64 = 2.0;
 const ROUNDS: usize = 5;
 /// Largest share of outliers; more are no outliers but a coarse or discontinuous signal.
 const MOST: f64 = 0.1;
@@ -35,12 +37,14 @@ pub(super) fn mark_far(record: &mut Record) -> usize {
     for _ in 0..ROUNDS {
         let distances = distances(record);
         let limit = (FAR * robust(&distances)).max(visible);
+        let steps = record.output.windows(2).map(|pair| Some(pair[1] - pair[0]));
+        let least = (0.5 * limit).max(SPIKE * robust(&steps.collect::<Vec<_>>()));
         let mut marked = 0;
         for k in 3..record.len().saturating_sub(3) {
             let size = |i: usize| distances[i].map_or(0.0, f64::abs);
             // The neighbours of an outlier are far from it too: only the farthest of them is one.
             let is_peak = (k - 3..=k + 3).all(|i| size(i) <= size(k));
-            if size(k) > limit && is_peak && is_spike(record, k, 0.5 * limit) {
+            if size(k) > limit && is_peak && is_spike(record, k, least) {
                 record.present[k] = false;
                 marked += 1;
             }
@@ -57,8 +61,8 @@ pub(super) fn mark_far(record: &mut Record) -> usize {
     found
 }
 
-/// Whether a sample stands out from both neighbours to the same side by more than `least`. A step or a lost update does
-/// not.
+/// Whether a sample stands out from both neighbours to the same side by more than `least`. A step, a lost update and the
+/// corner of a triangle wave do not.
 fn is_spike(record: &Record, k: usize, least: f64) -> bool {
     let before = record.output[k] - record.output[k - 1];
     let after = record.output[k] - record.output[k + 1];

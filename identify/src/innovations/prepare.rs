@@ -120,12 +120,11 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
     if is_even {
         return record;
     }
-    let short = steps[steps.len() / 10];
-    let on_grid = (1..=4).find_map(|part| indices(times_s, short / f64::from(part)));
+    let median = steps[steps.len() / 2];
+    let on_grid = (1..=4).find_map(|part| indices(times_s, median / f64::from(part)));
     if let Some((indices, step_s)) = on_grid {
         return spread(&indices, step_s, input, output);
     }
-    let median = steps[steps.len() / 2];
     record.dt_s = median;
     let unit = median * STAMP;
     let rounded = times_s
@@ -142,21 +141,23 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
 
 /// Index of each time stamp on a grid of steps near `step_s`, and the step (s). `None` if the stamps do not fit one.
 fn indices(times_s: &[f64], step_s: f64) -> Option<(Vec<usize>, f64)> {
-    let from_start: Vec<f64> = times_s.iter().map(|t| t - times_s[0]).collect();
-    let mut step_s = step_s;
-    for _ in 0..4 {
-        let k = |t: &f64| (t / step_s).round();
-        let (products, squares) =
-            (from_start.iter()).fold((0.0, 0.0), |(p, s), t| (p + k(t) * t, s + k(t) * k(t)));
-        step_s = products / squares;
+    // Increment by increment, so that an error of the step does not add up; then the step that fits all stamps best.
+    let mut indices = vec![0_usize];
+    for pair in times_s.windows(2) {
+        let steps = ((pair[1] - pair[0]) / step_s).round() as usize;
+        indices.push(indices[indices.len() - 1] + steps);
     }
-    let off = |t: &f64| (t / step_s - (t / step_s).round()).abs();
-    let mean = from_start.iter().map(off).sum::<f64>() / from_start.len() as f64;
-    let most = from_start.iter().map(off).fold(0.0, f64::max);
-    let indices: Vec<usize> = from_start
-        .iter()
-        .map(|t| (t / step_s).round() as usize)
-        .collect();
+    let stamps = || {
+        indices
+            .iter()
+            .zip(times_s)
+            .map(|(k, t)| (*k as f64, t - times_s[0]))
+    };
+    let (products, squares) = stamps().fold((0.0, 0.0), |(p, s), (k, t)| (p + k * t, s + k * k));
+    let step_s = products / squares;
+    let off = |(k, t): (f64, f64)| (t / step_s - k).abs();
+    let mean = stamps().map(off).sum::<f64>() / indices.len() as f64;
+    let most = stamps().map(off).fold(0.0, f64::max);
     let rises = indices.windows(2).all(|pair| pair[1] > pair[0]);
     let is_dense = indices
         .last()

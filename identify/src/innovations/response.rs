@@ -4,63 +4,145 @@
 //! two samples: a part `f` of the older one, then the newer one. Before the record the input is that of the first
 //! sample. A negative dead time uses later input.
 
-use onecycle_design::state_space::{StateSpace, Step, product, times};
+use onecycle_design::state_space::{Matrix, StateSpace, Step, identity, product, times};
 
-use super::record::{Hold, Record};
+use super::lifted::{dot, row_times};
+use super::orthogonal::dot as inner;
+use super::record::{BlockKind, Blocks, Hold, Record};
 
-/// Output of the response at each sample (output unit / input unit for unit gain), and the state at each sample if
-/// `output` wants it.
-pub(crate) fn response<const N: usize>(
+/// Response summed over the samples present in each block (output unit / input unit for unit gain).
+pub(super) fn sums<const N: usize>(
     model: &StateSpace<N>,
-    record: &Record,
+    blocks: &Blocks<'_>,
     tau_s: f64,
 ) -> Vec<f64> {
-    if record.uneven_s.is_empty() {
-        even(model, record, tau_s)
+    if blocks.record.uneven_s.is_empty() {
+        even(model, blocks, tau_s)
     } else {
-        uneven(model, record, tau_s)
+        blocks.sums_of(&uneven(model, blocks.record, tau_s))
     }
 }
 
-/// Samples on an even grid.
-fn even<const N: usize>(model: &StateSpace<N>, record: &Record, tau_s: f64) -> Vec<f64> {
-    let dt = record.dt_s;
-    let whole = (tau_s / dt).floor();
-    let fraction = tau_s / dt - whole;
-    let (older, newer) = (model.step(fraction * dt), model.step((1.0 - fraction) * dt));
-    let phi = product(&newer.phi, &older.phi);
-    let older_held = times(&newer.phi, &older.held);
-    let older_ramp = times(&newer.phi, &older.ramp);
-    let last = record.len() as i64 - 1;
-    let at = |index: i64| record.input[index.clamp(0, last) as usize];
-    let delay = whole as i64;
+/// State at the end of a sample per unit of the delayed input: of the sample before, of this one, and of the next one.
+struct Injection<const N: usize> {
+    phi: Matrix<N>,
+    inputs: [[f64; N]; 3],
+    /// Whole samples of the dead time.
+    delay: i64,
+}
+
+impl<const N: usize> Injection<N> {
+    fn new(model: &StateSpace<N>, dt_s: f64, tau_s: f64, hold: Hold) -> Self {
+        let whole = (tau_s / dt_s).floor();
+        let f = tau_s / dt_s - whole;
+        let (older, newer) = (model.step(f * dt_s), model.step((1.0 - f) * dt_s));
+        let held = times(&newer.phi, &older.held);
+        let ramp = times(&newer.phi, &older.ramp);
+        let column = |value: &dyn Fn(usize) -> f64| std::array::from_fn(value);
+        let inputs = match hold {
+            Hold::Held => [held, newer.held, [0.0; N]],
+            Hold::Interpolated => [
+                column(&|i| held[i] * f - ramp[i] / dt_s),
+                column(&|i| held[i] * (1.0 - f) + (ramp[i] - newer.ramp[i]) / dt_s + newer.held[i]),
+                column(&|i| newer.ramp[i] / dt_s),
+            ],
+        };
+        Self {
+            phi: product(&newer.phi, &older.phi),
+            inputs,
+            delay: whole as i64,
+        }
+    }
+
+    /// Moves the state over one sample. `window` holds the three inputs.
+    fn advance(&self, state: &[f64; N], window: &[f64]) -> [f64; N] {
+        let mut next = times(&self.phi, state);
+        for (column, input) in self.inputs.iter().zip(window) {
+            for i in 0..N {
+                next[i] += column[i] * input;
+            }
+        }
+        next
+    }
+}
+
+/// Sum and final state of a block as linear functions of the state at its start and of the delayed inputs: `M + 2` of
+/// them, from that of the sample before the block on.
+struct Weights<const N: usize> {
+    phi: Matrix<N>,
+    output: [f64; N],
+    sum: Vec<f64>,
+    state: [Vec<f64>; N],
+}
+
+impl<const N: usize> Weights<N> {
+    fn new(injection: &Injection<N>, output: usize, mask: &[bool]) -> Self {
+        let count = mask.len();
+        let mut weights = Self {
+            phi: identity(),
+            output: [0.0; N],
+            sum: vec![0.0; count + 2],
+            state: std::array::from_fn(|_| vec![0.0; count + 2]),
+        };
+        // Backwards: `phi` is the power that takes a state after sample k to the end, `output` the row that takes it to
+        // the sum of the later samples.
+        for k in (0..count).rev() {
+            for (ahead, column) in injection.inputs.iter().enumerate() {
+                weights.sum[k + ahead] += dot(&weights.output, column);
+                let moved = times(&weights.phi, column);
+                for i in 0..N {
+                    weights.state[i][k + ahead] += moved[i];
+                }
+            }
+            weights.output = row_times(&weights.output, &injection.phi);
+            if mask[k] {
+                weights.output[output] += 1.0;
+            }
+            weights.phi = product(&weights.phi, &injection.phi);
+        }
+        weights
+    }
+}
+
+/// Samples on an even grid, block by block.
+fn even<const N: usize>(model: &StateSpace<N>, blocks: &Blocks<'_>, tau_s: f64) -> Vec<f64> {
+    let record = blocks.record;
+    let injection = Injection::new(model, record.dt_s, tau_s, record.hold);
+    let inputs = |start: usize, count: usize, copy: &mut Vec<f64>| {
+        let first = start as i64 - injection.delay - 1;
+        let last = record.len() as i64 - 1;
+        let window = first..first + count as i64 + 2;
+        copy.clear();
+        if window.start >= 0 && window.end <= record.len() as i64 {
+            copy.extend_from_slice(&record.input[window.start as usize..window.end as usize]);
+        } else {
+            copy.extend(window.map(|k| record.input[k.clamp(0, last) as usize]));
+        }
+    };
+    let mut window = Vec::new();
     let mut state = [0.0; N];
-    let mut outputs = Vec::with_capacity(record.len());
-    for sample in 0..record.len() as i64 {
-        outputs.push(state[model.output]);
-        let (before, now) = (at(sample - delay - 1), at(sample - delay));
-        let mut next = times(&phi, &state);
-        match record.hold {
-            Hold::Held => {
-                for i in 0..N {
-                    next[i] += older_held[i] * before + newer.held[i] * now;
-                }
-            }
-            Hold::Interpolated => {
-                let slope = (now - before) / dt;
-                let later = (at(sample - delay + 1) - now) / dt;
-                let start = before + slope * (1.0 - fraction) * dt;
-                for i in 0..N {
-                    next[i] += older_held[i] * start
-                        + older_ramp[i] * slope
-                        + newer.held[i] * now
-                        + newer.ramp[i] * later;
-                }
-            }
+    for sample in 0..blocks.first {
+        inputs(sample, 1, &mut window);
+        state = injection.advance(&state, &window);
+    }
+    let of_kind = |kind: &BlockKind| Weights::new(&injection, model.output, &kind.mask);
+    let weights: Vec<Weights<N>> = blocks.kinds.iter().map(of_kind).collect();
+    let mut sums = Vec::with_capacity(blocks.len());
+    for (block, &kind) in blocks.kind_of.iter().enumerate() {
+        let weights = &weights[kind as usize];
+        inputs(
+            blocks.first + block * blocks.samples,
+            blocks.samples,
+            &mut window,
+        );
+        sums.push(dot(&weights.output, &state) + inner(&weights.sum, &window));
+        let mut next = times(&weights.phi, &state);
+        for i in 0..N {
+            next[i] += inner(&weights.state[i], &window);
         }
         state = next;
     }
-    outputs
+    sums
 }
 
 /// Samples at any times: from edge to edge of the delayed input and from sample to sample.

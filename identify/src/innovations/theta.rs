@@ -31,9 +31,8 @@ pub(super) struct Theta {
 }
 
 /// A noise beside the white noise of a sample.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[non_exhaustive]
-pub enum NoiseKind {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum NoiseKind {
     /// `w1`: random walk of the disturbance behind the actuator lags, as wind.
     RandomWalk,
     /// `w0`: white disturbance behind the actuator lags, as gusts and the errors of an accelerometer.
@@ -44,17 +43,7 @@ pub enum NoiseKind {
 
 impl NoiseKind {
     /// Every kind.
-    pub const ALL: [Self; 3] = [Self::RandomWalk, Self::WhiteForce, Self::OutputWalk];
-
-    /// Name in JSON.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::RandomWalk => "w1",
-            Self::WhiteForce => "w0",
-            Self::OutputWalk => "wy",
-        }
-    }
+    pub(super) const ALL: [Self; 3] = [Self::RandomWalk, Self::WhiteForce, Self::OutputWalk];
 }
 
 /// Where the unknowns of a structure are in [`Theta::values`].
