@@ -70,7 +70,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Identify(Identify),
-    Simulate(Simulate),
+    Simulate(Box<Simulate>),
     Tune(Tune),
     Fly(Fly),
     Certify(Certify),

@@ -41,6 +41,9 @@ impl Plan {
         positive("--amplitude", arguments.amplitude)?;
         not_negative("the pre-roll", arguments.preroll)?;
         check_combination(arguments)?;
+        if arguments.excitation == Excitation::Relay {
+            relay(arguments, arguments.preroll, 0.0)?;
+        }
         let mut plan = Self {
             model,
             experiment: Experiment::new(model, 1.0 / arguments.sample_rate, 0.0),
@@ -89,8 +92,7 @@ impl Plan {
         experiment.jitter = not_negative("--jitter", jitter_s / experiment.sample_s)?;
         experiment.initial_output = arguments.reference + arguments.offset.of(amplitude);
         self.experiment.disturbances = self.disturbances(arguments, amplitude)?;
-        // The relay checks its settings.
-        self.controller(arguments).map(drop)
+        Ok(())
     }
 
     fn disturbances(&self, arguments: &Simulate, amplitude: f64) -> Result<Disturbances, Failure> {
