@@ -30,7 +30,7 @@ pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Identify, Method, When};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
-pub(crate) use self::simulate::{Excitation, Inject, NamedDisturbance, Simulate};
+pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};
 pub(crate) use self::structure::StructureArguments;
 pub(crate) use self::train::Train;
 use crate::failure::Failure;

@@ -11,6 +11,9 @@ use super::{Share, StructureArguments};
 pub(crate) use values::NamedDisturbance;
 use values::{Band, Gust, LoopGains, Outliers};
 
+/// Default of `--beta`: the distinguishing phase of the paper.
+pub(crate) const BETA: f64 = -0.73;
+
 /// Simulate a test of a process and write its recording as CSV.
 ///
 /// The process and its disturbances are simulated exactly, whatever the sample period and the dead time; the relay is that
@@ -81,7 +84,7 @@ pub(crate) struct Simulate {
     #[arg(long, value_name = "PLACE", value_enum, requires = "closed")]
     pub(crate) inject: Option<Inject>,
     /// Relay parameter beta: the sine of the phase at which the process oscillates
-    #[arg(long, value_name = "BETA", default_value_t = -0.73, allow_negative_numbers = true)]
+    #[arg(long, value_name = "BETA", default_value_t = BETA, allow_negative_numbers = true)]
     pub(crate) beta: f64,
     /// Keep the centre of the relay fixed: do not trim the input bias
     #[arg(long)]
@@ -184,7 +187,7 @@ pub(crate) enum Excitation {
     Prbs,
     /// Sine with a frequency that rises exponentially over the test
     Chirp,
-    /// Sum of sines
+    /// Sum of sines with the power of one sine of the amplitude; its peak is higher
     Multisine,
 }
 

@@ -471,6 +471,9 @@ fn options_that_do_not_go_together() {
         .misused(&["walk", "zero or positive"]);
     with("--excitation step --duration 3 --drop-outs 100%").misused(&["--drop-outs", "below 100%"]);
     with("--excitation step --duration 3 --outliers 200%").misused(&["--outliers", "below 100%"]);
+    with("--excitation step --duration 3 --loop 1,1 --inject setpoint --bias 10%")
+        .misused(&["--inject setpoint", "percentages"]);
+    with("--excitation step --duration 3 --inject setpoint").misused(&["required"]);
     with("--excitation step --duration 1e6").misused(&["--duration", "samples"]);
 }
 

@@ -11,7 +11,7 @@ use onecycle_plant::{
     Sensed, Sensor, Stimulus, TestSignal,
 };
 
-use crate::args::{Excitation, Inject, NamedDisturbance, Share, Simulate};
+use crate::args::{BETA, Excitation, Inject, NamedDisturbance, Share, Simulate};
 use crate::failure::Failure;
 
 /// Periods of the oscillation in a recording: some to settle, eight or more to fit.
@@ -313,7 +313,7 @@ fn check_combination(arguments: &Simulate) -> Result<(), Failure> {
         }
     }
     let is_relay = excitation == Relay;
-    let defaults = (-0.73, 0.0);
+    let defaults = (BETA, 0.0);
     let unused = [
         (has_pulses, arguments.pulse.is_some(), "--pulse"),
         (has_band, arguments.band.is_some(), "--band"),
@@ -348,7 +348,27 @@ fn check_combination(arguments: &Simulate) -> Result<(), Failure> {
             arguments.reference
         )));
     }
+    if arguments.inject == Some(Inject::Setpoint) && has_input_percentage(arguments) {
+        return Err(Failure::usage(
+            "with --inject setpoint --amplitude is in output units: give --bias, --gust, walk and white as values \
+             and not as percentages of it",
+        ));
+    }
     Ok(())
+}
+
+/// Whether a disturbance at the input is a percentage of the amplitude of the test signal.
+fn has_input_percentage(arguments: &Simulate) -> bool {
+    let mut shares = vec![arguments.bias];
+    shares.extend(arguments.gust.map(|gust| gust.sigma));
+    for disturbance in &arguments.disturbance {
+        if let NamedDisturbance::Walk(share) | NamedDisturbance::White(share) = disturbance {
+            shares.push(*share);
+        }
+    }
+    shares
+        .iter()
+        .any(|share| matches!(share, Share::Percent(_)))
 }
 
 fn check_size(arguments: &Simulate, plan: &Plan) -> Result<(), Failure> {
