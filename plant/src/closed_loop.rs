@@ -124,24 +124,29 @@ impl Experiment {
         observer: impl FnMut(&Row) -> ControlFlow<()>,
     ) {
         let jittered = self.jitter > 0.0;
-        if let (Model::Soiptd(process), true) = (&self.process, self.disturbances.is_none()) {
-            if jittered {
-                let process = VariableStepProcess::new(process);
-                self.observe_process(process, controller, noise, observer);
-            } else {
+        let is_disturbed = !self.disturbances.is_none();
+        let process = match (&self.process, jittered) {
+            // On its own: the simulation that campaigns run a million times.
+            (Model::Soiptd(process), false) if !is_disturbed => {
                 let process = FixedStepProcess::new(process, self.sample_s);
-                self.observe_process(process, controller, noise, observer);
+                return self.observe_process(process, controller, noise, observer);
             }
-            return;
-        }
-        let (process, disturbances) = (self.process.linear(), &self.disturbances);
-        if jittered {
-            let process = VariableStepLinear::new(&process, disturbances, noise);
-            self.observe_process(process, controller, noise, observer);
-        } else {
-            let process = FixedStepLinear::new(&process, disturbances, self.sample_s, noise);
-            self.observe_process(process, controller, noise, observer);
-        }
+            (Model::Soiptd(process), true) if !is_disturbed => {
+                General::VariableStep(VariableStepProcess::new(process))
+            }
+            (model, false) => General::FixedLinear(Box::new(FixedStepLinear::new(
+                &model.linear(),
+                &self.disturbances,
+                self.sample_s,
+                noise,
+            ))),
+            (model, true) => General::VariableLinear(Box::new(VariableStepLinear::new(
+                &model.linear(),
+                &self.disturbances,
+                noise,
+            ))),
+        };
+        self.observe_process(process, controller, noise, observer);
     }
 
     fn observe_process(
@@ -218,59 +223,43 @@ impl Process for FixedStepProcess {
     }
 }
 
-impl Process for VariableStepProcess {
-    fn advance(&mut self, u: f64, duration_s: f64, _noise: &mut impl NoiseSource) {
-        self.advance(u, duration_s);
-    }
-
-    fn output(&self) -> f64 {
-        self.output()
-    }
-
-    fn rate(&self) -> f64 {
-        self.rate()
-    }
-
-    fn displace_output(&mut self, output: f64) {
-        self.displace(output, 0.0);
-    }
+/// Any simulation but the fastest one.
+enum General {
+    VariableStep(VariableStepProcess),
+    FixedLinear(Box<FixedStepLinear>),
+    VariableLinear(Box<VariableStepLinear>),
 }
 
-impl Process for FixedStepLinear {
-    #[inline]
-    fn advance(&mut self, u: f64, _duration_s: f64, noise: &mut impl NoiseSource) {
-        self.step(u, noise);
-    }
-
-    #[inline]
-    fn output(&self) -> f64 {
-        self.output()
-    }
-
-    #[inline]
-    fn rate(&self) -> f64 {
-        self.rate()
-    }
-
-    fn displace_output(&mut self, output: f64) {
-        self.displace(output);
-    }
-}
-
-impl Process for VariableStepLinear {
+impl Process for General {
     fn advance(&mut self, u: f64, duration_s: f64, noise: &mut impl NoiseSource) {
-        self.advance(u, duration_s, noise);
+        match self {
+            Self::VariableStep(process) => process.advance(u, duration_s),
+            Self::FixedLinear(process) => process.step(u, noise),
+            Self::VariableLinear(process) => process.advance(u, duration_s, noise),
+        }
     }
 
     fn output(&self) -> f64 {
-        self.output()
+        match self {
+            Self::VariableStep(process) => process.output(),
+            Self::FixedLinear(process) => process.output(),
+            Self::VariableLinear(process) => process.output(),
+        }
     }
 
     fn rate(&self) -> f64 {
-        self.rate()
+        match self {
+            Self::VariableStep(process) => process.rate(),
+            Self::FixedLinear(process) => process.rate(),
+            Self::VariableLinear(process) => process.rate(),
+        }
     }
 
     fn displace_output(&mut self, output: f64) {
-        self.displace(output);
+        match self {
+            Self::VariableStep(process) => process.displace(output, 0.0),
+            Self::FixedLinear(process) => process.displace(output),
+            Self::VariableLinear(process) => process.displace(output),
+        }
     }
 }

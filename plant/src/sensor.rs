@@ -56,7 +56,7 @@ impl Sensor {
     /// Sample of `output`: [`Self::read`], or `None` if it is dropped.
     #[inline]
     pub fn sample(&self, output: f64, noise: &mut impl NoiseSource) -> Option<f64> {
-        if self.drop_out_share > 0.0 && noise.uniform() < self.drop_out_share {
+        if self.drop_out_share > 0.0 && happens(self.drop_out_share, noise) {
             return None;
         }
         Some(self.read(output, noise))
@@ -69,12 +69,24 @@ impl Sensor {
         if self.noise_sigma > 0.0 {
             reading += self.noise_sigma * noise.standard_normal();
         }
-        if self.outlier_share > 0.0 && noise.uniform() < self.outlier_share {
-            reading += self.outlier_size.copysign(noise.standard_normal());
+        if self.outlier_share > 0.0 && happens(self.outlier_share, noise) {
+            reading += outlier(self.outlier_size, noise);
         }
         if self.quantum > 0.0 {
             reading = (reading / self.quantum).round() * self.quantum;
         }
         reading
     }
+}
+
+/// Draws whether something of this probability happens. Apart, so that the loop of a good sensor stays small.
+#[cold]
+fn happens(probability: f64, noise: &mut impl NoiseSource) -> bool {
+    noise.uniform() < probability
+}
+
+/// Error of this size with a random sign.
+#[cold]
+fn outlier(size: f64, noise: &mut impl NoiseSource) -> f64 {
+    size.copysign(noise.standard_normal())
 }
