@@ -11,6 +11,7 @@ mod man;
 mod pack;
 mod reproduce;
 mod simulate;
+mod structure;
 mod train;
 
 use std::path::PathBuf;
@@ -29,7 +30,8 @@ pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Identify, Method, When};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
-pub(crate) use self::simulate::Simulate;
+pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};
+pub(crate) use self::structure::StructureArguments;
 pub(crate) use self::train::Train;
 use crate::failure::Failure;
 
@@ -68,7 +70,7 @@ pub(crate) struct Arguments {
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Identify(Identify),
-    Simulate(Simulate),
+    Simulate(Box<Simulate>),
     Tune(Tune),
     Fly(Fly),
     Certify(Certify),

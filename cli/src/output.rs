@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::fs::File;
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
@@ -30,6 +30,29 @@ pub(crate) fn print_data(bytes: &[u8]) -> Result<(), Failure> {
 fn written(mut out: impl Write, bytes: &[u8]) -> Result<(), Failure> {
     out.write_all(bytes)
         .and_then(|()| out.flush())
+        .map_err(|reason| Failure::Output {
+            target: "to the standard output".to_owned(),
+            reason,
+        })
+}
+
+/// Bytes that wait for the standard output in memory; more wait in a temporary file.
+const WAITING_BYTES: usize = 1 << 24;
+
+/// Prints what `write` writes to the standard output unchanged, once it is complete: whole or not at all, in bounded
+/// memory.
+pub(crate) fn print_whole(
+    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
+) -> Result<(), Failure> {
+    let mut waiting = tempfile::spooled_tempfile(WAITING_BYTES);
+    let kept = write(&mut waiting).and_then(|()| waiting.rewind());
+    kept.map_err(|reason| Failure::Output {
+        target: "to a temporary file".to_owned(),
+        reason,
+    })?;
+    let mut out = io::stdout().lock();
+    io::copy(&mut waiting, &mut out)
+        .and_then(|_| out.flush())
         .map_err(|reason| Failure::Output {
             target: "to the standard output".to_owned(),
             reason,

@@ -43,7 +43,7 @@ use crate::time_unit::TimeUnit;
 
 pub use error::ReadError;
 pub use options::{ColumnRef, CsvOptions};
-pub use write::write_csv;
+pub use write::{CsvWriter, write_csv};
 
 /// Range of sample rates that a caller may give, in hertz.
 pub const SAMPLE_RATES_HZ: std::ops::RangeInclusive<f64> = 1e-6..=1e9;

@@ -4,7 +4,9 @@ mod csv;
 mod recording;
 mod time_unit;
 
-pub use csv::{ColumnRef, CsvOptions, ReadError, SAMPLE_RATES_HZ, read, read_from, write_csv};
+pub use csv::{
+    ColumnRef, CsvOptions, CsvWriter, ReadError, SAMPLE_RATES_HZ, read, read_from, write_csv,
+};
 pub use recording::{
     ChosenBy, Column, ColumnLabel, Columns, GAP_PERIODS, Gap, MAX_POINTS, Note, Position,
     Recording, RecordingBuilder, RecordingError, Role,

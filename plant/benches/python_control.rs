@@ -6,6 +6,7 @@
 
 use std::error::Error;
 use std::hint::black_box;
+use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
@@ -110,16 +111,13 @@ fn onecycle() -> Result<Measured, Box<dyn Error>> {
     let mut relay = Relay::new(RelaySettings::bare(1.0, RelaySettings::DISTINGUISHING_BETA))?;
     let (mut lowest, mut highest) = (f64::INFINITY, f64::NEG_INFINITY);
     let begin = Instant::now();
-    experiment.observe(
-        &mut relay,
-        &mut Noise::from_seed(0),
-        |time_s, _, output, _| {
-            if (8.0..9.0).contains(&time_s) {
-                lowest = lowest.min(output);
-                highest = highest.max(output);
-            }
-        },
-    );
+    experiment.observe(&mut relay, &mut Noise::from_seed(0), |row| {
+        if (8.0..9.0).contains(&row.time_s) {
+            lowest = lowest.min(row.true_output);
+            highest = highest.max(row.true_output);
+        }
+        ControlFlow::Continue(())
+    });
     let relay_steps_per_s = STEPS as f64 / begin.elapsed().as_secs_f64();
 
     let experiment = experiment.with_reference(1.0);
@@ -130,17 +128,14 @@ fn onecycle() -> Result<Measured, Box<dyn Error>> {
     let mut sample = 0_usize;
     let (mut pd_output, mut sum) = (0.0, 0.0);
     let begin = Instant::now();
-    experiment.observe(
-        &mut controller,
-        &mut Noise::from_seed(0),
-        |_, _, output, _| {
-            if sample == 300 {
-                pd_output = output;
-            }
-            sample += 1;
-            sum += output;
-        },
-    );
+    experiment.observe(&mut controller, &mut Noise::from_seed(0), |row| {
+        if sample == 300 {
+            pd_output = row.true_output;
+        }
+        sample += 1;
+        sum += row.true_output;
+        ControlFlow::Continue(())
+    });
     black_box(sum);
     Ok(Measured {
         relay_steps_per_s,

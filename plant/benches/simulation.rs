@@ -1,5 +1,7 @@
 //! Steps per second of the process alone and of the whole relay experiment.
 
+use std::ops::ControlFlow;
+
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
@@ -61,13 +63,10 @@ fn relay_experiment(bencher: Bencher, noise_sigma: f64) {
         .with_sensor(Sensor::noisy(noise_sigma));
     bencher.counter(ItemsCount::new(STEPS)).bench_local(|| {
         let mut sum = 0.0;
-        experiment.observe(
-            &mut relay(),
-            &mut Noise::from_seed(1),
-            |_, input, output, _| {
-                sum += input * output;
-            },
-        );
+        experiment.observe(&mut relay(), &mut Noise::from_seed(1), |row| {
+            sum += row.input * row.true_output;
+            ControlFlow::Continue(())
+        });
         black_box(sum)
     });
 }

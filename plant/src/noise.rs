@@ -21,6 +21,13 @@ use rand_pcg::Pcg64Mcg;
 pub trait NoiseSource {
     /// The next independent number with mean zero and variance one.
     fn standard_normal(&mut self) -> f64;
+
+    /// A number between 0 and 1, uniform: `exp(-(a^2 + b^2) / 2)` of the next two normal numbers, because `a^2 + b^2` has
+    /// an exponential distribution.
+    fn uniform(&mut self) -> f64 {
+        let (a, b) = (self.standard_normal(), self.standard_normal());
+        (-0.5 * (a * a + b * b)).exp()
+    }
 }
 
 /// Noise from a seed. See the [module](self).

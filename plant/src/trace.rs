@@ -1,7 +1,23 @@
-//! Trace of an experiment: one row per sample.
+//! Rows of an experiment, one per sample, and a trace of them in memory.
+
+/// One sample of an experiment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Row {
+    /// Time of the sample (s).
+    pub time_s: f64,
+    /// Set-point that the controller follows (output unit).
+    pub setpoint: f64,
+    /// Commanded input from this sample to the next, without the bias (input unit).
+    pub input: f64,
+    /// Measured output (output unit). `None` if the sensor dropped the sample.
+    pub output: Option<f64>,
+    /// True output (output unit).
+    pub true_output: f64,
+}
 
 /// Columns of equal length. In row `i` the output is measured at `time_s[i]`, and the input is held from
-/// `time_s[i]` to `time_s[i + 1]`.
+/// `time_s[i]` to the next sample, which is `time_s[i + 1]` unless the sensor dropped it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Trace {
     /// Time of the sample (s), increasing.

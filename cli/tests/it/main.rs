@@ -26,6 +26,7 @@ mod pack;
 mod phase;
 mod report;
 mod reproduce;
+mod simulate;
 mod terminal;
 mod train;
 mod tune;

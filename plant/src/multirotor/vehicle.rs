@@ -93,10 +93,7 @@ impl Parts {
     /// Motion capture for the position, an inertial unit for the attitude.
     fn quadrotor_sensors() -> Sensors {
         let channel = |noise_sigma, delay_s| Channel {
-            sensor: Sensor {
-                noise_sigma,
-                quantum: 0.0,
-            },
+            sensor: Sensor::noisy(noise_sigma),
             delay_s,
         };
         // T_prop + tau of altitude as in the paper, 0.0558 s; the motors contribute 0.0179 s at hover. A motor

@@ -1,5 +1,7 @@
 //! Limit cycles of the bare relay against an independent prototype of the same loop.
 
+use std::ops::ControlFlow;
+
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{Experiment, Noise};
@@ -11,13 +13,10 @@ fn steady_cycles(process: &Soiptd, amplitude: f32, periods_s: f64) -> Vec<Cycle>
     let mut detector = CycleDetector::new();
     let mut cycles = Vec::new();
     let experiment = Experiment::new(*process, 1e-3, 60.0 * periods_s);
-    experiment.observe(
-        &mut relay,
-        &mut Noise::from_seed(0),
-        |time_s, input, output, _| {
-            cycles.extend(detector.push(time_s, input > 0.0, output));
-        },
-    );
+    experiment.observe(&mut relay, &mut Noise::from_seed(0), |row| {
+        cycles.extend(detector.push(row.time_s, row.input > 0.0, row.true_output));
+        ControlFlow::Continue(())
+    });
     cycles.split_off(cycles.len() - 20)
 }
 

@@ -6,6 +6,7 @@
 mod calibration;
 mod closed_loop;
 mod limit_cycle;
+mod linear;
 mod multirotor_flight;
 mod multirotor_ground;
 mod multirotor_linearised;
@@ -13,3 +14,4 @@ mod multirotor_relay;
 mod propagation;
 mod sensor;
 mod signature;
+mod test_signal;

@@ -77,3 +77,14 @@ fn a_perfect_sensor_draws_nothing() {
     assert_eq!(Sensor::default().read(0.123, &mut used), 0.123);
     assert_eq!(used, Noise::from_seed(3));
 }
+
+// 5 % of 100,000: 5,000 with a standard deviation of 69. Each is off by exactly 3, half of them upwards (35).
+#[test]
+fn outliers_have_their_share_and_size() {
+    let errors = errors(&Sensor::default().with_outliers(0.05, 3.0), 0.0);
+    let [up, down] = [3.0, -3.0].map(|size| errors.iter().filter(|e| **e == size).count() as f64);
+    assert!((up + down - 5000.0).abs() < 210.0, "{up} {down}");
+    assert!((up - down).abs() < 3.0 * 71.0, "{up} {down}");
+    let clean = errors.iter().filter(|error| **error == 0.0).count() as f64;
+    assert_eq!(clean + up + down, READINGS as f64);
+}
