@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle::{ColumnRef, CsvOptions, Recording};
+use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Structure};
 
 use super::pack;
-use crate::args::{Identify, When};
+use crate::args::{Estimator, Identify, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::reading::open_with_bar;
@@ -16,7 +16,9 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.report {
         check_page(path, &arguments.file)?;
     }
+    check_structure(arguments)?;
     let recording = read(arguments)?;
+    check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::read(&arguments.pack, &bytes)?;
@@ -24,6 +26,10 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .cycles(arguments.cycles as usize)
         .phase_margin_rad(arguments.phase_margin)
         .method(arguments.method.into())
+        .road(arguments.estimator.into())
+        .structure(arguments.structure)
+        .span_s(arguments.from, arguments.to)
+        .hold(arguments.hold.map(Hold::from))
         .pack(pack)
         .run(&recording);
     let name = arguments.file.display().to_string();
@@ -62,6 +68,35 @@ fn check_page(path: &Path, recording: &Path) -> Result<(), Failure> {
         return Err(Failure::usage(format!(
             "--report {} would overwrite the recording: name another file for the page",
             path.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Refuses structures that the estimator for relay oscillations does not have.
+fn check_structure(arguments: &Identify) -> Result<(), Failure> {
+    let is_other = arguments
+        .structure
+        .is_some_and(|structure| structure != Structure::Soiptd);
+    if is_other && arguments.estimator == Estimator::Relay {
+        return Err(Failure::usage(
+            "--estimator relay fits the structure soiptd only: leave out --structure or --estimator",
+        ));
+    }
+    Ok(())
+}
+
+/// Refuses a part of the recording that is empty.
+fn check_span(arguments: &Identify, recording: &Recording) -> Result<(), Failure> {
+    let times_s = recording.time_s();
+    let (Some(&start_s), Some(&end_s)) = (times_s.first(), times_s.last()) else {
+        return Ok(());
+    };
+    let from_s = arguments.from.unwrap_or(start_s);
+    let to_s = arguments.to.unwrap_or(end_s);
+    if from_s >= to_s || from_s >= end_s || to_s <= start_s {
+        return Err(Failure::usage(format!(
+            "--from {from_s} --to {to_s} leaves nothing: the recording runs from {start_s:.3} to {end_s:.3} s"
         )));
     }
     Ok(())

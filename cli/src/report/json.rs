@@ -1,5 +1,7 @@
 //! The JSON reports; docs/identify-json.md is their description. Infinite values are null.
 
+use std::borrow::Cow;
+
 use onecycle::{
     Design, Identification, Identified, Interval, Margins, Model, Recording, StepMetrics,
 };
@@ -7,7 +9,7 @@ use onecycle_link::Column;
 use serde::{Serialize, Serializer};
 
 use crate::words::recording::note;
-use crate::words::remark::sentence;
+use crate::words::remark::sentences;
 use crate::words::verdict::advice;
 
 /// Changes with every change that a reader of the report could notice, added keys excepted.
@@ -69,7 +71,7 @@ struct ColumnReport<'a> {
 struct Verdict {
     kind: &'static str,
     message: String,
-    advice: Option<&'static str>,
+    advice: Option<Cow<'static, str>>,
 }
 
 #[derive(Serialize)]
@@ -183,7 +185,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             .zip(identified)
             .map(|(design, i)| margins(&design.margins, i.phase_margin_rad.as_ref())),
         step: identified.and_then(|i| i.step.as_ref()).map(step),
-        remarks: found.remarks.iter().map(sentence).collect(),
+        remarks: sentences(found),
         remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
         notes: recording.notes().iter().map(note).collect(),
     })

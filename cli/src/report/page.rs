@@ -56,7 +56,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
                 words::sentence(&verdict.to_string())
             );
             lead += &page::verdict(false, &words);
-            lead += &page::paragraph("lead", words::verdict::advice(verdict));
+            lead += &page::paragraph("lead", &words::verdict::advice(verdict));
         }
     }
     sections.extend(remarks(found));
@@ -171,7 +171,7 @@ fn identified_lead(identified: &Identified, remarks: usize) -> String {
 }
 
 fn remarks(found: &Identification) -> Option<Section> {
-    let remarks: Vec<String> = found.remarks.iter().map(words::remark::sentence).collect();
+    let remarks = words::remark::sentences(found);
     (!remarks.is_empty()).then(|| Section {
         id: "remarks".to_owned(),
         title: "Remarks".to_owned(),

@@ -12,7 +12,7 @@ use super::number::{bounded, seconds, significant};
 use super::units::Units;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
 use crate::words::recording;
-use crate::words::remark::sentence as remark_sentence;
+use crate::words::remark::sentences;
 use crate::words::sentence;
 use crate::words::verdict::advice;
 
@@ -43,13 +43,13 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         Err(verdict) => {
             let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
             wrapped(&mut text, "  ", &sentence(&verdict.to_string()));
-            wrapped(&mut text, "  ", advice(verdict));
+            wrapped(&mut text, "  ", &advice(verdict));
         }
     }
     if !found.remarks.is_empty() {
         text.push_str(&headed("\nRemarks\n"));
-        for one in &found.remarks {
-            remark(&mut text, "  - ", &remark_sentence(one));
+        for sentence in sentences(found) {
+            remark(&mut text, "  - ", &sentence);
         }
     }
     text
