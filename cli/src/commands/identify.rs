@@ -46,7 +46,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     print(&if arguments.json {
         json::identification(&name, &recording, &found)
     } else {
-        let plotted = is_plotted.then(|| plot::cycles(&recording, &found, columns()));
+        let plotted = is_plotted.then(|| plot::end(&recording, &found, columns()));
         text::identification(&name, &recording, &found) + &plotted.flatten().unwrap_or_default()
     })?;
     Ok(ExitCode::from(if found.outcome.is_ok() {

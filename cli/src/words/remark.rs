@@ -2,6 +2,8 @@
 
 use onecycle::{DesignError, Identification, Parameter, Remark};
 
+use crate::report::number::percent;
+
 /// One or two sentences for each remark on a result, with the options of this program.
 pub(crate) fn sentences(found: &Identification) -> Vec<String> {
     let is_relay = found.oscillation().is_some();
@@ -70,8 +72,8 @@ fn of_recording(remark: &Remark) -> Option<String> {
 fn of_record(remark: &Remark) -> Option<String> {
     Some(match *remark {
         Remark::Absent(part) => format!(
-            "{:.1} % of the outputs were left out: lost, stuck at one value, or outliers.",
-            100.0 * part
+            "{} of the outputs were left out: lost, stale or outliers.",
+            percent(part)
         ),
         Remark::PartUsed(part) => format!(
             "Only the longest part without a gap was used, {:.0} % of the recording. Choose another part with --from \
@@ -134,10 +136,7 @@ fn of_estimator(remark: &Remark) -> Option<String> {
              without it. Use a pack for processes of this kind with --pack.",
             distance.max(0.0).sqrt()
         ),
-        Remark::NoController(error) => format!(
-            "No controller was designed: {error}. {}",
-            other_design(error)
-        ),
+        Remark::NoController(error) => without_controller(error),
         _ => return None,
     })
 }
@@ -151,13 +150,18 @@ fn listed(names: &[&str]) -> String {
     }
 }
 
-fn other_design(error: &DesignError) -> &'static str {
+fn without_controller(error: &DesignError) -> String {
     match error {
-        DesignError::Structure(_) => {
-            "The model and its intervals are valid: use them to design a controller elsewhere."
+        DesignError::Structure(structure) => format!(
+            "This version designs no controller for the structure {}. The model and its intervals are valid.",
+            structure.name()
+        ),
+        DesignError::PhaseMargin(_) => {
+            format!(
+                "No controller was designed: {error}. Choose another margin with --phase-margin."
+            )
         }
-        DesignError::PhaseMargin(_) => "Choose another margin with --phase-margin.",
-        _ => "Write the recording in other units.",
+        _ => format!("No controller was designed: {error}. The model and its intervals are valid."),
     }
 }
 
