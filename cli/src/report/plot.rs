@@ -61,7 +61,7 @@ pub(crate) fn end(
         }
     };
     let frame = Frame::around(&measured, &fitted, width)?;
-    let mut text = title(recording, &heading, !fitted.is_empty());
+    let mut text = title(recording, &heading, fit_name(found, &fitted));
     frame.write(&mut text, &measured, &fitted);
     text += &match found.oscillation() {
         Some(oscillation) => frame.relay(recording, oscillation),
@@ -95,18 +95,26 @@ fn last_points(found: &Identification, record: &Recorded, most: usize) -> (f64, 
     (from_s, record.end_s, heading)
 }
 
+/// What the line is: disturbances move the output of a recording away from that of the model alone.
+fn fit_name(found: &Identification, fitted: &[Point]) -> Option<&'static str> {
+    let name = match found.oscillation() {
+        Some(_) => "fit",
+        None => "model without disturbances",
+    };
+    (!fitted.is_empty()).then_some(name)
+}
+
 /// The heading: quantity and unit.
-fn title(recording: &Recording, heading: &str, has_fit: bool) -> String {
+fn title(recording: &Recording, heading: &str, fit: Option<&str>) -> String {
     let column = &recording.columns().output;
     let unit = (column.unit.as_ref()).map_or(String::new(), |unit| format!(" ({unit})"));
-    let what = if has_fit {
-        format!(
+    let what = match fit {
+        Some(fit) => format!(
             "{}{unit} in dots, the {} as a line",
             column.name,
-            painted(FIT, "fit")
-        )
-    } else {
-        format!("{}{unit}", column.name)
+            painted(FIT, fit)
+        ),
+        None => format!("{}{unit}", column.name),
     };
     format!("\n{}  {what}\n", painted(HEADING, heading))
 }
