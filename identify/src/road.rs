@@ -46,11 +46,7 @@ fn road(options: &Options) -> Road {
     }
 }
 
-fn automatic(
-    signals: &Signals<'_>,
-    options: &Options,
-    pack: Option<&Pack<'_>>,
-) -> Identification {
+fn automatic(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) -> Identification {
     let steady = relay::identify(signals, options, pack);
     match &steady.outcome {
         Ok(_) if !is_doubtful(&steady) => steady,
@@ -86,13 +82,20 @@ fn is_doubtful(found: &Identification) -> bool {
 
 /// Whether the general estimator explains the recording up to white innovations.
 fn is_white(found: &Identification) -> bool {
-    let innovations = found.outcome.as_ref().ok().and_then(|found| found.fit.innovations());
+    let innovations = found
+        .outcome
+        .as_ref()
+        .ok()
+        .and_then(|found| found.fit.innovations());
     innovations.is_some_and(|innovations| innovations.whiteness.autocorrelation < WHITE)
 }
 
 /// The general result in place of that of the steady oscillation.
 fn replaced(mut general: Identification, steady: &Identification) -> Identification {
-    let misfit = steady.outcome.as_ref().map_or(0.0, |found| found.fit.misfit);
+    let misfit = steady
+        .outcome
+        .as_ref()
+        .map_or(0.0, |found| found.fit.misfit);
     general.remarks.push(Remark::RelayReplaced(misfit));
     general
 }

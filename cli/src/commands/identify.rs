@@ -16,7 +16,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.report {
         check_page(path, &arguments.file)?;
     }
-    check_structure(arguments)?;
+    check_estimator(arguments)?;
     let recording = read(arguments)?;
     check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
@@ -73,17 +73,24 @@ fn check_page(path: &Path, recording: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Refuses structures that the estimator for relay oscillations does not have.
-fn check_structure(arguments: &Identify) -> Result<(), Failure> {
-    let is_other = arguments
-        .structure
-        .is_some_and(|structure| structure != Structure::Soiptd);
-    if is_other && arguments.estimator == Estimator::Relay {
-        return Err(Failure::usage(
-            "--estimator relay fits the structure soiptd only: leave out --structure or --estimator",
-        ));
+/// Refuses options that the estimator for steady relay oscillations does not have.
+fn check_estimator(arguments: &Identify) -> Result<(), Failure> {
+    if arguments.estimator != Estimator::Relay {
+        return Ok(());
     }
-    Ok(())
+    let is_other = |structure| structure != Structure::Soiptd;
+    let refused = [
+        ("--structure", arguments.structure.is_some_and(is_other)),
+        ("--from", arguments.from.is_some()),
+        ("--to", arguments.to.is_some()),
+        ("--hold", arguments.hold.is_some()),
+    ];
+    match refused.iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => Err(Failure::usage(format!(
+            "{option} needs the general estimator: leave out {option} or --estimator relay"
+        ))),
+        None => Ok(()),
+    }
 }
 
 /// Refuses a part of the recording that is empty.

@@ -52,7 +52,7 @@ fn estimator(remarks: &[Remark]) -> String {
     let why = remarks.iter().find_map(|remark| match remark {
         Remark::NotASteadyOscillation(verdict) => Some(verdict.to_string()),
         Remark::RelayReplaced(_) => {
-            Some("it explains the recording better than that of steady oscillations".to_owned())
+            Some("it explains more than the one for steady oscillations".to_owned())
         }
         _ => None,
     });

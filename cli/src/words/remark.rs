@@ -112,9 +112,10 @@ fn of_estimator(remark: &Remark) -> Option<String> {
         Remark::NotASteadyOscillation(verdict) => format!(
             "The general estimator was used. The one for steady relay oscillations refuses this recording ({verdict})."
         ),
-        Remark::RelayReplaced(difference) => format!(
-            "The result is that of the general estimator. It disagrees with the one for steady relay oscillations and \
-             explains the recording better (BIC lower by {difference:.0}). Compare with --estimator relay."
+        Remark::RelayReplaced(part) => format!(
+            "The general estimator was used. The one for steady relay oscillations leaves {:.1} % of the oscillation \
+             unexplained, the general one nothing but white noise. Compare with --estimator relay.",
+            100.0 * part
         ),
         Remark::OtherStructures(structures) => {
             let names: Vec<&str> = structures
@@ -249,7 +250,7 @@ mod tests {
             Remark::NotASteadyOscillation(Box::new(Verdict::NoRelay {
                 output_is_relay: false,
             })),
-            Remark::RelayReplaced(41.3),
+            Remark::RelayReplaced(0.041),
             Remark::OtherStructures(vec![Structure::Soptd, Structure::ResonantLag]),
             Remark::Coloured(0.31),
             Remark::InputLeft(0.024),

@@ -16,19 +16,24 @@ pub(super) fn section(chosen: Structure, found: &Innovations, units: &Units) -> 
             format!("{}{mark}", structure.name()),
             [
                 format!("{:+.1}", alternative.bic - least),
-                structure.transfer_function().to_owned(),
-                parameters(alternative, units),
                 alternative.noise.kind(),
+                structure.transfer_function().to_owned(),
             ],
         )
     });
     let table = page::plain_table(
         "Best fit of each structure. BIC: above the least; the simplest structure within 6 of it is chosen, with \
          damping where the recording shows damping.",
-        &["structure", "BIC", "process", "parameters", "noise"],
+        &["structure", "BIC", "noise", "process"],
         rows,
     );
-    Section::new("structures", "Structures", table)
+    let values: Vec<(&str, String)> = (found.alternatives.iter())
+        .map(|alternative| {
+            let name = alternative.model.structure().name();
+            (name, parameters(alternative, units))
+        })
+        .collect();
+    Section::new("structures", "Structures", table + &page::facts(&values))
 }
 
 /// Symbols with their values and units.
