@@ -32,22 +32,19 @@ const PERIODS: f64 = 20.0;
 
 /// What was excited, what is missing, and the test that excites it.
 fn excite(informative_rad_per_s: Option<(f64, f64)>, needed_rad_per_s: f64) -> String {
-    let excited = informative_rad_per_s.map_or(
-        "The input excites the process too little".to_owned(),
-        |(low, high)| {
-            format!(
-                "The recording is informative from {} to {} only",
-                frequency(low),
-                frequency(high)
-            )
-        },
-    );
-    let is_covered = informative_rad_per_s.is_some_and(|(_, high)| high >= needed_rad_per_s);
-    if is_covered {
-        return format!(
-            "{excited}, which would be enough with less noise: raise the amplitude of the input, or record longer."
-        );
-    }
+    let excited = match informative_rad_per_s {
+        None => "The input excites the process too little".to_owned(),
+        Some((low, high)) => {
+            let band = format!("{} to {}", frequency(low), frequency(high));
+            if high >= needed_rad_per_s {
+                return format!(
+                    "The recording is informative from {band}, but too short or too noisy: raise the amplitude of the \
+                     input, or record longer."
+                );
+            }
+            format!("The recording is informative from {band} only")
+        }
+    };
     if !(needed_rad_per_s > 0.0 && needed_rad_per_s.is_finite()) {
         return format!("{excited}: raise the amplitude of the input, or fly a chirp.");
     }
