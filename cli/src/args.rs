@@ -27,7 +27,7 @@ pub(crate) use self::certify::Certify;
 pub(crate) use self::completions::Completions;
 pub(crate) use self::dataset::Dataset;
 pub(crate) use self::fly::Fly;
-pub(crate) use self::identify::{Identify, Method, When};
+pub(crate) use self::identify::{Estimator, Identify, Method, When};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};
@@ -57,7 +57,7 @@ Exit codes:
      its self-test
   5  the output cannot be written";
 
-/// Identify a process from a recorded relay test and design its optimal controller.
+/// Identify a process from a recording and design its optimal controller.
 #[derive(Debug, Parser)]
 #[command(name = "onecycle", version, after_help = AFTER_HELP, max_term_width = 100)]
 pub(crate) struct Arguments {

@@ -15,6 +15,7 @@ pub(crate) mod pack;
 pub(crate) mod page;
 pub(crate) mod phase;
 pub(crate) mod plot;
+mod record;
 pub(crate) mod reproduction;
 pub(crate) mod text;
 mod units;

@@ -248,7 +248,7 @@ impl Verdict {
                 f,
                 "not this kind of process: a model of the first two thirds predicts {:.0} % of the variance of the \
                  last third, {horizon_s:.3} s ahead",
-                100.0 * explained
+                100.0 * explained.max(0.0)
             ),
             Self::InputLeft { share } => write!(
                 f,

@@ -2,22 +2,26 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
+use onecycle::{Hold, Road, Structure};
 use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
 use super::{PackSource, phase_margin, sample_rate, time_unit};
 
-/// Identify the process of a recorded relay test and design its controller.
+/// Identify the process from a recording and design its controller.
 ///
-/// The recording is a table with the columns time, input (the relay's output) and output (the
-/// measurement), separated by commas, semicolons, tabs or blanks, with or without a header.
+/// The recording may hold a relay test, a chirp, steps or any other input that excites the process. It is
+/// a table with the columns time, input (what acts on the process) and output (the measurement),
+/// separated by commas, semicolons, tabs or blanks, with or without a header.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle identify examples/simulated_hover.csv\n",
     "  onecycle identify examples/simulated_hover.csv --report report.html\n",
     "  onecycle identify log.csv --time t_ms --input 4 --output roll --cycles 4\n",
+    "  onecycle identify chirp.csv --structure soptd --from 12 --to 40\n",
     "  onecycle identify log.csv --plot always > report.txt\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
     "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process identified (see the ",
@@ -32,11 +36,12 @@ pub(crate) struct Identify {
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
-    /// Draw the last cycles and the fit: always, never, or only on a terminal (auto)
+    /// Draw the end of the recording and the fit: always, never, or only on a terminal (auto)
     #[arg(long, value_name = "WHEN", value_enum, default_value_t = When::Auto, conflicts_with = "json",
           hide_possible_values = true)]
     pub(crate) plot: When,
-    /// Fit the last N steady cycles (1 to 50). More cycles narrow the intervals; fewer follow a process that drifts
+    /// Fit the last N steady cycles of a relay test (1 to 50). More cycles narrow the intervals; fewer follow a
+    /// process that drifts
     #[arg(long, value_name = "N", default_value_t = 8,
           value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
     pub(crate) cycles: u64,
@@ -44,8 +49,25 @@ pub(crate) struct Identify {
     #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true,
           value_parser = phase_margin)]
     pub(crate) phase_margin: f64,
-    /// Method: the network of the pack alone (classify), least squares alone (refine), or least squares with
-    /// the network's prior (map)
+    /// Estimator: whole cycles of a steady relay oscillation (relay), the whole recording with its disturbances
+    /// (general), or relay where the recording is one and the general estimator agrees (auto)
+    #[arg(long, value_enum, default_value_t = Estimator::Auto)]
+    pub(crate) estimator: Estimator,
+    /// Structure of the process [default: the simplest that explains the recording]
+    #[arg(long, value_name = "NAME", value_parser = structure())]
+    pub(crate) structure: Option<Structure>,
+    /// Use the recording from this time, in seconds of its time column [default: its start]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
+    pub(crate) from: Option<f64>,
+    /// Use the recording up to this time, in seconds of its time column [default: its end]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
+    pub(crate) to: Option<f64>,
+    /// Input between two samples: constant (held), if the recording has every sample of the loop, or a straight line
+    /// (interpolated), if it has fewer [default: what explains the recording better]
+    #[arg(long, value_name = "KIND", value_enum)]
+    pub(crate) hold: Option<Between>,
+    /// Method for a steady relay oscillation: the network of the pack alone (classify), least squares alone (refine),
+    /// or least squares with the network's prior (map)
     #[arg(long, value_enum, default_value_t = Method::Map)]
     pub(crate) method: Method,
     /// Identifier pack; "default" is the built-in one
@@ -54,7 +76,7 @@ pub(crate) struct Identify {
     /// Time column, by name or by number from 1
     #[arg(long, value_name = "COLUMN")]
     pub(crate) time: Option<String>,
-    /// Input column, the relay's output, by name or number
+    /// Input column, what acts on the process, by name or number
     #[arg(long, value_name = "COLUMN")]
     pub(crate) input: Option<String>,
     /// Output column, the measurement, by name or number
@@ -69,12 +91,57 @@ pub(crate) struct Identify {
     pub(crate) time_unit: Option<TimeUnit>,
 }
 
+/// Names of structures.
+fn structure() -> impl TypedValueParser<Value = Structure> {
+    PossibleValuesParser::new(Structure::ALL.map(Structure::name))
+        .try_map(|name| Structure::from_name(&name).ok_or("there is no such structure"))
+}
+
+fn time_s(text: &str) -> Result<f64, String> {
+    let time_s = text.parse().ok().filter(|time_s: &f64| time_s.is_finite());
+    time_s.ok_or_else(|| "a time is a number of seconds".to_owned())
+}
+
 /// When a plot is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum When {
     Auto,
     Always,
     Never,
+}
+
+/// Estimator of the process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Estimator {
+    Auto,
+    Relay,
+    General,
+}
+
+impl From<Estimator> for Road {
+    fn from(estimator: Estimator) -> Self {
+        match estimator {
+            Estimator::Auto => Self::Automatic,
+            Estimator::Relay => Self::Relay,
+            Estimator::General => Self::General,
+        }
+    }
+}
+
+/// Input between two samples.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Between {
+    Held,
+    Interpolated,
+}
+
+impl From<Between> for Hold {
+    fn from(between: Between) -> Self {
+        match between {
+            Between::Held => Self::Held,
+            Between::Interpolated => Self::Interpolated,
+        }
+    }
 }
 
 /// Identification method.

@@ -3,10 +3,10 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle::{ColumnRef, CsvOptions, Recording};
+use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Structure};
 
 use super::pack;
-use crate::args::{Identify, When};
+use crate::args::{Estimator, Identify, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::reading::open_with_bar;
@@ -16,7 +16,9 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.report {
         check_page(path, &arguments.file)?;
     }
+    check_estimator(arguments)?;
     let recording = read(arguments)?;
+    check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::read(&arguments.pack, &bytes)?;
@@ -24,6 +26,10 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .cycles(arguments.cycles as usize)
         .phase_margin_rad(arguments.phase_margin)
         .method(arguments.method.into())
+        .road(arguments.estimator.into())
+        .structure(arguments.structure)
+        .span_s(arguments.from, arguments.to)
+        .hold(arguments.hold.map(Hold::from))
         .pack(pack)
         .run(&recording);
     let name = arguments.file.display().to_string();
@@ -40,7 +46,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     print(&if arguments.json {
         json::identification(&name, &recording, &found)
     } else {
-        let plotted = is_plotted.then(|| plot::cycles(&recording, &found, columns()));
+        let plotted = is_plotted.then(|| plot::end(&recording, &found, columns()));
         text::identification(&name, &recording, &found) + &plotted.flatten().unwrap_or_default()
     })?;
     Ok(ExitCode::from(if found.outcome.is_ok() {
@@ -62,6 +68,42 @@ fn check_page(path: &Path, recording: &Path) -> Result<(), Failure> {
         return Err(Failure::usage(format!(
             "--report {} would overwrite the recording: name another file for the page",
             path.display()
+        )));
+    }
+    Ok(())
+}
+
+/// Refuses options that the estimator for steady relay oscillations does not have.
+fn check_estimator(arguments: &Identify) -> Result<(), Failure> {
+    if arguments.estimator != Estimator::Relay {
+        return Ok(());
+    }
+    let is_other = |structure| structure != Structure::Soiptd;
+    let refused = [
+        ("--structure", arguments.structure.is_some_and(is_other)),
+        ("--from", arguments.from.is_some()),
+        ("--to", arguments.to.is_some()),
+        ("--hold", arguments.hold.is_some()),
+    ];
+    match refused.iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => Err(Failure::usage(format!(
+            "{option} needs the general estimator: leave out {option} or --estimator relay"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Refuses a part of the recording that is empty.
+fn check_span(arguments: &Identify, recording: &Recording) -> Result<(), Failure> {
+    let times_s = recording.time_s();
+    let (Some(&start_s), Some(&end_s)) = (times_s.first(), times_s.last()) else {
+        return Ok(());
+    };
+    let from_s = arguments.from.unwrap_or(start_s);
+    let to_s = arguments.to.unwrap_or(end_s);
+    if from_s >= to_s || from_s >= end_s || to_s <= start_s {
+        return Err(Failure::usage(format!(
+            "--from {from_s} --to {to_s} leaves nothing: the recording runs from {start_s:.3} to {end_s:.3} s"
         )));
     }
     Ok(())

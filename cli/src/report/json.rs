@@ -1,13 +1,19 @@
 //! The JSON reports; docs/identify-json.md is their description. Infinite values are null.
 
+mod record;
+
+use std::borrow::Cow;
+
 use onecycle::{
-    Design, Identification, Identified, Interval, Margins, Model, Recording, StepMetrics,
+    Design, Excitation, Identification, Identified, Interval, Margins, Model, Recording,
+    StepMetrics,
 };
 use onecycle_link::Column;
 use serde::{Serialize, Serializer};
 
+use self::record::Record;
 use crate::words::recording::note;
-use crate::words::remark::sentence;
+use crate::words::remark::sentences;
 use crate::words::verdict::advice;
 
 /// Changes with every change that a reader of the report could notice, added keys excepted.
@@ -22,11 +28,16 @@ struct IdentifyReport<'a> {
     verdict: Verdict,
     excitation: Option<&'static str>,
     oscillation: Option<Oscillation>,
+    record: Option<Record>,
     last_cycle: Option<LastCycle>,
     structure: Option<&'static str>,
-    process: Option<Parameters<Range>>,
+    process: Option<Process>,
     joint_probability: Option<f64>,
     fit: Option<Fit>,
+    noise: Option<record::Noise>,
+    alternatives: Option<Vec<record::Alternative>>,
+    innovations: Option<record::Tests>,
+    prediction: Option<record::Prediction>,
     controller: Option<Controller>,
     margins: Option<MarginsReport>,
     step: Option<Step>,
@@ -69,7 +80,7 @@ struct ColumnReport<'a> {
 struct Verdict {
     kind: &'static str,
     message: String,
-    advice: Option<&'static str>,
+    advice: Option<Cow<'static, str>>,
 }
 
 #[derive(Serialize)]
@@ -94,12 +105,33 @@ struct Range {
     high: Option<f64>,
 }
 
+/// The structure beside its parameters.
+#[derive(Serialize)]
+struct Process {
+    structure: &'static str,
+    #[serde(flatten)]
+    parameters: Parameters<Range>,
+}
+
 /// Values by the keys of their parameters, in the order of the structure.
 struct Parameters<T>(Vec<(&'static str, T)>);
 
 impl<T: Serialize> Serialize for Parameters<T> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
+    }
+}
+
+impl Parameters<Option<f64>> {
+    /// Of a model without intervals.
+    fn of_model(model: &Model) -> Self {
+        let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
+        let parameters = model.structure().parameters().iter();
+        Self(
+            parameters
+                .map(|&parameter| (parameter.key(), finite(model.parameter(parameter))))
+                .collect(),
+        )
     }
 }
 
@@ -146,6 +178,7 @@ struct Step {
 pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
     let identified = found.outcome.as_ref().ok();
     let design = identified.and_then(|i| i.design.as_ref());
+    let innovations = identified.and_then(|i| i.fit.innovations());
     let columns = recording.columns();
     to_text(&IdentifyReport {
         schema: IDENTIFY_SCHEMA,
@@ -157,19 +190,11 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         },
         verdict: verdict(found),
         excitation: found.excitation.as_ref().map(onecycle::Excitation::name),
-        oscillation: found.oscillation().map(|o| Oscillation {
-            period_s: o.period_s,
-            amplitude: o.amplitude,
-            cycles_used: o.cycles_used,
-            cycles_steady: o.cycles_steady,
-            start_s: o.start_s,
-            end_s: o.end_s,
-            duty: o.duty,
-            relay_amplitude: o.relay_amplitude,
-            relay_centre: o.relay_centre,
-            noise_sigma: o.noise_sigma,
-            sample_s: o.sample_s,
-        }),
+        oscillation: found.oscillation().map(oscillation),
+        record: match &found.excitation {
+            Some(Excitation::Recorded(recorded)) => Some(recorded.into()),
+            _ => None,
+        },
         last_cycle: found.last_cycle().map(|reading| LastCycle {
             is_known: reading.is_known(),
             score: reading.classification.score,
@@ -178,12 +203,16 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         process: identified.map(process),
         joint_probability: identified.and_then(|i| i.joint_probability),
         fit: identified.map(fit),
+        noise: innovations.map(|i| (&i.noise).into()),
+        alternatives: innovations.map(|i| i.alternatives.iter().map(Into::into).collect()),
+        innovations: innovations.map(Into::into),
+        prediction: (innovations.and_then(|i| i.prediction.as_ref())).map(Into::into),
         controller: design.map(controller),
         margins: design
             .zip(identified)
             .map(|(design, i)| margins(&design.margins, i.phase_margin_rad.as_ref())),
         step: identified.and_then(|i| i.step.as_ref()).map(step),
-        remarks: found.remarks.iter().map(sentence).collect(),
+        remarks: sentences(found),
         remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
         notes: recording.notes().iter().map(note).collect(),
     })
@@ -191,16 +220,10 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
 
 /// The report of a design.
 pub(crate) fn design(model: &Model, design: &Design, metrics: Option<&StepMetrics>) -> String {
-    let structure = model.structure();
-    let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
     to_text(&TuneReport {
         schema: TUNE_SCHEMA,
-        structure: structure.name(),
-        process: Parameters(
-            (structure.parameters().iter())
-                .map(|&parameter| (parameter.key(), finite(model.parameter(parameter))))
-                .collect(),
-        ),
+        structure: model.structure().name(),
+        process: Parameters::of_model(model),
         controller: controller(design),
         ise: design.ise,
         margins: margins(&design.margins, None),
@@ -245,13 +268,32 @@ fn range(interval: &Interval) -> Range {
     }
 }
 
-fn process(identified: &Identified) -> Parameters<Range> {
+fn oscillation(of: &onecycle::Oscillation) -> Oscillation {
+    Oscillation {
+        period_s: of.period_s,
+        amplitude: of.amplitude,
+        cycles_used: of.cycles_used,
+        cycles_steady: of.cycles_steady,
+        start_s: of.start_s,
+        end_s: of.end_s,
+        duty: of.duty,
+        relay_amplitude: of.relay_amplitude,
+        relay_centre: of.relay_centre,
+        noise_sigma: of.noise_sigma,
+        sample_s: of.sample_s,
+    }
+}
+
+fn process(identified: &Identified) -> Process {
     let intervals = identified.estimate.iter();
-    Parameters(
-        intervals
-            .map(|(parameter, interval)| (parameter.key(), range(&interval)))
-            .collect(),
-    )
+    Process {
+        structure: identified.model.structure().name(),
+        parameters: Parameters(
+            intervals
+                .map(|(parameter, interval)| (parameter.key(), range(&interval)))
+                .collect(),
+        ),
+    }
 }
 
 fn fit(identified: &Identified) -> Fit {

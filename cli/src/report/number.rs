@@ -1,17 +1,33 @@
 //! Numbers as text.
 
+use std::f64::consts::TAU;
+
 /// Four significant digits; a power of ten only for very small and very large numbers.
 pub(crate) fn significant(value: f64) -> String {
+    digits(value, 4)
+}
+
+/// A frequency (rad/s) in Hz with two significant digits.
+pub(crate) fn frequency(omega_rad_per_s: f64) -> String {
+    format!("{} Hz", digits(omega_rad_per_s / TAU, 2))
+}
+
+/// `count` significant digits, with trailing zeros.
+fn digits(value: f64, count: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
+    if value.is_nan() {
+        return "unknown".to_owned();
+    }
     // The power of ten after rounding: 0.99999 becomes 1.000.
-    let scientific = format!("{value:.3e}");
+    let last = count as i32 - 1;
+    let scientific = format!("{value:.*e}", count - 1);
     let power = scientific
         .split_once('e')
         .and_then(|(_, power)| power.parse::<i32>().ok());
     match power {
-        Some(power @ -4..=5) => format!("{value:.*}", (3 - power).max(0) as usize),
+        Some(power @ -4..=5) => format!("{value:.*}", (last - power).max(0) as usize),
         _ => scientific,
     }
 }
@@ -62,6 +78,19 @@ mod tests {
             assert_eq!(significant(value), text);
         }
         assert_eq!(bounded(None), "unbounded");
+    }
+
+    #[test]
+    fn frequencies_are_in_hertz() {
+        for (hertz, text) in [
+            (0.999, "1.0 Hz"),
+            (0.0123, "0.012 Hz"),
+            (19.96, "20 Hz"),
+            (123.0, "123 Hz"),
+        ] {
+            assert_eq!(frequency(TAU * hertz), text);
+        }
+        assert_eq!(frequency(f64::NAN), "unknown Hz");
     }
 
     // A value that rounds to zero has no sign.

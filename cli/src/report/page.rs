@@ -6,12 +6,14 @@ mod parameters;
 mod recorded;
 pub(crate) mod stability;
 mod step;
+mod structures;
+mod thin;
 
 use std::fmt::Write;
 
 use onecycle::{
-    Design, Identification, Identified, Model, Parameter, Recording, StepResponse, step_response,
-    with_signals,
+    Design, Excitation, Identification, Identified, Model, Parameter, Recording, StepResponse,
+    step_response, with_signals,
 };
 use onecycle_design::bands::step_bands;
 use onecycle_identify::{Harmonic, harmonics};
@@ -32,7 +34,7 @@ const STEP_POINTS: usize = 400;
 /// The page of an identification.
 pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
     let units = Units::of(recording);
-    let mut sections = vec![recorded::section(recording, found.oscillation())];
+    let mut sections = vec![recorded::section(recording, found, &units)];
     let mut lead = made_by("identify");
     match &found.outcome {
         Ok(identified) => {
@@ -56,11 +58,15 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
                 words::sentence(&verdict.to_string())
             );
             lead += &page::verdict(false, &words);
-            lead += &page::paragraph("lead", words::verdict::advice(verdict));
+            lead += &page::paragraph("lead", &words::verdict::advice(verdict));
         }
     }
     sections.extend(remarks(found));
-    page(&format!("Relay test: {file}"), &lead, &sections)
+    let kind = match found.excitation {
+        Some(Excitation::Recorded(_)) => "Recording",
+        _ => "Relay test",
+    };
+    page(&format!("{kind}: {file}"), &lead, &sections)
 }
 
 /// The page of a design.
@@ -89,6 +95,10 @@ impl View<'_> {
             fit::section(self.identified, self.units),
             parameters::section(self.identified, self.units),
         ];
+        if let Some(innovations) = self.identified.fit.innovations() {
+            let chosen = self.identified.model.structure();
+            sections.push(structures::section(chosen, innovations, self.units));
+        }
         if let Some(design) = &self.identified.design {
             sections.extend(self.of_controller(design, measured));
         }
@@ -171,7 +181,7 @@ fn identified_lead(identified: &Identified, remarks: usize) -> String {
 }
 
 fn remarks(found: &Identification) -> Option<Section> {
-    let remarks: Vec<String> = found.remarks.iter().map(words::remark::sentence).collect();
+    let remarks = words::remark::sentences(found);
     (!remarks.is_empty()).then(|| Section {
         id: "remarks".to_owned(),
         title: "Remarks".to_owned(),

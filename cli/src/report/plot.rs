@@ -1,12 +1,12 @@
-//! Plot of the last cycles in the terminal: measurement as dots, fit as a line, relay below.
+//! Plot of the end of a recording in the terminal: measurement as dots, fit as a line, input below.
 //!
 //! A braille character has two columns of four dots, so a plot of 80 by 12 characters has 160 by 48 dots.
 
 use std::fmt::Write;
 
-use onecycle::{Identification, Oscillation, Recording};
+use onecycle::{Excitation, Identification, Oscillation, Recorded, Recording};
 
-use super::number::significant;
+use super::number::{seconds, significant};
 use crate::style::{FIT, HEADING, PLAIN, painted};
 
 /// Largest width of the plot: that of the report.
@@ -28,17 +28,24 @@ const BITS: [[u8; ACROSS]; DOWN] = [[0x01, 0x08], [0x02, 0x10], [0x04, 0x20], [0
 /// The character without a dot.
 const BRAILLE: u32 = 0x2800;
 
-/// The plot for a terminal with this number of columns; without a terminal, in full width. The fit is drawn if a process
-/// was identified. `None` without an oscillation.
-pub(crate) fn cycles(
+/// Characters of the input, from its least value to its largest.
+const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+/// The plot for a terminal with this number of columns; without a terminal, in full width. Drawn are the last cycles of
+/// an oscillation; of another recording, as many of the last points of the fit as there are columns of dots. The fit is
+/// drawn if a process was identified. `None` if nothing was found that excites the process.
+pub(crate) fn end(
     recording: &Recording,
     found: &Identification,
     columns: Option<usize>,
 ) -> Option<String> {
-    let oscillation = found.oscillation()?;
-    let cycles = oscillation.cycles_used.clamp(1, MOST_CYCLES);
-    let from_s = oscillation.end_s - cycles as f64 * oscillation.period_s;
-    let shown = |time_s: f64| (from_s..=oscillation.end_s).contains(&time_s);
+    let width = columns.unwrap_or(WIDTH).clamp(LEAST_WIDTH, WIDTH) - MARGIN;
+    let (from_s, end_s, heading) = match found.excitation.as_ref()? {
+        Excitation::Relay { oscillation, .. } => last_cycles(oscillation),
+        Excitation::Recorded(recorded) => last_points(found, recorded, width * ACROSS),
+        _ => return None,
+    };
+    let shown = |time_s: f64| (from_s..=end_s).contains(&time_s);
     let (measured, fitted): (Vec<Point>, Vec<Point>) = match &found.outcome {
         Ok(identified) => (identified.fit.points.iter())
             .filter(|point| shown(point.time_s))
@@ -53,31 +60,61 @@ pub(crate) fn cycles(
             (points.filter(|point| shown(point.0)).collect(), vec![])
         }
     };
-    let width = columns.unwrap_or(WIDTH).clamp(LEAST_WIDTH, WIDTH) - MARGIN;
     let frame = Frame::around(&measured, &fitted, width)?;
-    let mut text = title(recording, cycles, !fitted.is_empty());
+    let mut text = title(recording, &heading, fit_name(found, &fitted));
     frame.write(&mut text, &measured, &fitted);
-    text += &frame.relay(recording, oscillation);
+    text += &match found.oscillation() {
+        Some(oscillation) => frame.relay(recording, oscillation),
+        None => frame.input(recording),
+    };
     text += &frame.times();
     Some(text)
 }
 
-/// The heading: quantity and unit.
-fn title(recording: &Recording, cycles: usize, has_fit: bool) -> String {
-    let column = &recording.columns().output;
-    let unit = (column.unit.as_ref()).map_or(String::new(), |unit| format!(" ({unit})"));
+/// Start and end (s) of the last cycles, and the heading.
+fn last_cycles(found: &Oscillation) -> (f64, f64, String) {
+    let cycles = found.cycles_used.clamp(1, MOST_CYCLES);
     let heading = match cycles {
         1 => "Last cycle",
         _ => "Last two cycles",
     };
-    let what = if has_fit {
-        format!(
+    let from_s = found.end_s - cycles as f64 * found.period_s;
+    (from_s, found.end_s, heading.to_owned())
+}
+
+/// Start and end (s) of the last `most` points of the fit, or of the part that was used, and the heading.
+fn last_points(found: &Identification, record: &Recorded, most: usize) -> (f64, f64, String) {
+    let points = (found.outcome.as_ref()).map_or(&[][..], |identified| &identified.fit.points);
+    let first = points.len().saturating_sub(most);
+    let from_s = (points.get(first).filter(|_| first > 0)).map_or(record.start_s, |at| at.time_s);
+    let heading = if from_s > record.start_s {
+        format!("Last {}", seconds(record.end_s - from_s))
+    } else {
+        "Recording".to_owned()
+    };
+    (from_s, record.end_s, heading)
+}
+
+/// What the line is: disturbances move the output of a recording away from that of the model alone.
+fn fit_name(found: &Identification, fitted: &[Point]) -> Option<&'static str> {
+    let name = match found.oscillation() {
+        Some(_) => "fit",
+        None => "model without disturbances",
+    };
+    (!fitted.is_empty()).then_some(name)
+}
+
+/// The heading: quantity and unit.
+fn title(recording: &Recording, heading: &str, fit: Option<&str>) -> String {
+    let column = &recording.columns().output;
+    let unit = (column.unit.as_ref()).map_or(String::new(), |unit| format!(" ({unit})"));
+    let what = match fit {
+        Some(fit) => format!(
             "{}{unit} in dots, the {} as a line",
             column.name,
-            painted(FIT, "fit")
-        )
-    } else {
-        format!("{}{unit}", column.name)
+            painted(FIT, fit)
+        ),
+        None => format!("{}{unit}", column.name),
     };
     format!("\n{}  {what}\n", painted(HEADING, heading))
 }
@@ -175,6 +212,18 @@ impl Frame {
         format!("{:>margin$} │{strokes}\n", "relay", margin = MARGIN - 2)
     }
 
+    /// The input, each column at the value it begins with, from the least value that is shown to the largest.
+    fn input(&self, recording: &Recording) -> String {
+        let value = |column| {
+            let time_s = self.time_s(column, self.width);
+            let next = recording.time_s().partition_point(|&at_s| at_s <= time_s);
+            recording.input()[next.saturating_sub(1)]
+        };
+        let values: Vec<f64> = (0..self.width).map(value).collect();
+        let bars = levels(&values);
+        format!("{:>margin$} │{bars}\n", "input", margin = MARGIN - 2)
+    }
+
     /// The time axis with its ends.
     fn times(&self) -> String {
         let [from, to] = self.times_s;
@@ -196,6 +245,15 @@ fn place(value: f64, [low, high]: [f64; 2], count: usize) -> usize {
     let part = (value - low) / (high - low) * count as f64;
     // Casts saturate.
     (part as usize).min(count - 1)
+}
+
+/// A character for each value. A constant is at the lowest level.
+fn levels(values: &[f64]) -> String {
+    let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+    let high = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let range = [low, if low < high { high } else { low + 1.0 }];
+    let level = |&value: &f64| LEVELS[place(value, range, LEVELS.len())];
+    values.iter().map(level).collect()
 }
 
 /// Linear interpolation at a time; `None` before the first point and after the last.
@@ -289,6 +347,15 @@ mod tests {
         }
         // The centres of the first and the last column are half a column from the corners: up to one row less at each.
         assert!((46..=48).contains(&dots), "{dots}");
+    }
+
+    // From -1 to 1 each eighth of the range has its character; a constant has the lowest.
+    #[test]
+    fn the_input_is_drawn_by_its_level() {
+        let values: Vec<f64> = (0..8).map(|k| f64::from(k) / 3.5 - 1.0).collect();
+        assert_eq!(levels(&values), LEVELS.iter().collect::<String>());
+        assert_eq!(levels(&[1e300, 1e300]), "▁▁");
+        assert_eq!(levels(&[]), "");
     }
 
     // Half way between two points the value is their mean; outside there is none.

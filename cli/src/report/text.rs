@@ -3,16 +3,17 @@
 use std::fmt::Write;
 
 use onecycle::{
-    Controller, Design, Identification, Identified, Interval, Model, Oscillation, Parameter,
-    Recording, StepMetrics,
+    Controller, Design, Excitation, Identification, Identified, Interval, Model, Oscillation,
+    Parameter, Recording, StepMetrics,
 };
 use onecycle_identify::Reading;
 
 use super::number::{bounded, seconds, significant};
+use super::record::{self, Fact};
 use super::units::Units;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
 use crate::words::recording;
-use crate::words::remark::sentence as remark_sentence;
+use crate::words::remark::sentences;
 use crate::words::sentence;
 use crate::words::verdict::advice;
 
@@ -27,15 +28,32 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
     for note in recording.notes() {
         remark(&mut text, "  note: ", &recording::note(note));
     }
-    if let Some(oscillation) = found.oscillation() {
-        describe_oscillation(&mut text, oscillation, &units);
-        if let Some(reading) = found.last_cycle() {
-            describe_last_cycle(&mut text, reading);
+    match &found.excitation {
+        Some(Excitation::Relay {
+            oscillation,
+            last_cycle,
+        }) => {
+            describe_oscillation(&mut text, oscillation, &units);
+            if let Some(reading) = last_cycle {
+                describe_last_cycle(&mut text, reading);
+            }
         }
+        Some(Excitation::Recorded(recorded)) => {
+            text.push_str(&headed("\nRecording\n"));
+            facts(&mut text, &record::of_recording(found, recorded, &units));
+        }
+        _ => {}
     }
     match &found.outcome {
         Ok(identified) => {
             describe_process(&mut text, identified, &units);
+            if let Some(innovations) = identified.fit.innovations() {
+                text.push_str(&headed("\nModel\n"));
+                facts(
+                    &mut text,
+                    &record::of_model(identified, innovations, &units),
+                );
+            }
             if let Some(design) = &identified.design {
                 describe_own_controller(&mut text, identified, design, &units);
             }
@@ -43,13 +61,13 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         Err(verdict) => {
             let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
             wrapped(&mut text, "  ", &sentence(&verdict.to_string()));
-            wrapped(&mut text, "  ", advice(verdict));
+            wrapped(&mut text, "  ", &advice(verdict));
         }
     }
     if !found.remarks.is_empty() {
         text.push_str(&headed("\nRemarks\n"));
-        for one in &found.remarks {
-            remark(&mut text, "  - ", &remark_sentence(one));
+        for sentence in sentences(found) {
+            remark(&mut text, "  - ", &sentence);
         }
     }
     text
@@ -259,6 +277,13 @@ fn describe_step(text: &mut String, step: Option<&StepMetrics>, units: &Units) {
         ),
         None => writeln!(text, "  too slow to simulate"),
     };
+}
+
+/// Writes names and values, wrapped.
+fn facts(text: &mut String, facts: &[Fact]) {
+    for (name, value) in facts {
+        wrapped(text, &format!("  {name:<12}"), value);
+    }
 }
 
 /// Writes a remark in its colour, wrapped.

@@ -1,10 +1,23 @@
 //! What a remark means.
 
-use onecycle::{Parameter, Remark};
+use onecycle::{DesignError, Identification, Parameter, Remark};
 
-/// One or two sentences, with the options of this program.
-pub(crate) fn sentence(remark: &Remark) -> String {
+use crate::report::number::percent;
+
+/// One or two sentences for each remark on a result, with the options of this program.
+pub(crate) fn sentences(found: &Identification) -> Vec<String> {
+    let is_relay = found.oscillation().is_some();
+    (found.remarks.iter())
+        .map(|remark| sentence(remark, is_relay))
+        .collect()
+}
+
+/// One or two sentences. `is_relay`: whether the cycles of a relay oscillation were fitted.
+fn sentence(remark: &Remark, is_relay: bool) -> String {
     of_recording(remark)
+        .or_else(|| of_record(remark))
+        .or_else(|| of_estimator(remark))
+        .or_else(|| of_interval(remark, is_relay))
         .or_else(|| of_result(remark))
         .unwrap_or_else(|| format!("{}.", remark.kind()))
 }
@@ -55,6 +68,140 @@ fn of_recording(remark: &Remark) -> Option<String> {
     })
 }
 
+/// Remarks of the general estimator on the data.
+fn of_record(remark: &Remark) -> Option<String> {
+    Some(match *remark {
+        Remark::Absent(part) => format!(
+            "{} of the outputs were left out: lost, stale or outliers.",
+            percent(part)
+        ),
+        Remark::PartUsed(part) => format!(
+            "Only the longest part without a gap was used, {:.0} % of the recording. Choose another part with --from \
+             and --to.",
+            100.0 * part
+        ),
+        Remark::Interpolated(difference) => format!(
+            "The input runs in straight lines between the samples, which explains the recording better than a held \
+             input (log-likelihood higher by {difference:.1}). If the recording has every sample of the loop, use --hold \
+             held: the dead time changes by up to half a sample period."
+        ),
+        Remark::WeakPrediction {
+            explained,
+            horizon_s,
+        } => format!(
+            "A model of the first two thirds predicts {:.0} % of the variance of the last third, {horizon_s:.3} s ahead. \
+             Possible causes: strong disturbances, a process that changes, a saturated actuator.",
+            100.0 * explained.max(0.0)
+        ),
+        Remark::Coloured(autocorrelation) => format!(
+            "What the model did not predict is not white noise (largest autocorrelation {autocorrelation:.2}): the \
+             intervals are widened for it."
+        ),
+        Remark::InputLeft(share) => format!(
+            "The past input explains {:.1} % of what the model did not predict: the process has more than the model, \
+             such as a resonance, friction or a saturation. Try another structure with --structure.",
+            100.0 * share
+        ),
+        _ => return None,
+    })
+}
+
+/// Remarks on the choice of the estimator and of the structure.
+fn of_estimator(remark: &Remark) -> Option<String> {
+    Some(match remark {
+        Remark::NotASteadyOscillation(verdict) => format!(
+            "The general estimator was used. The one for steady relay oscillations refuses this recording ({verdict})."
+        ),
+        Remark::RelayReplaced(part) => format!(
+            "The general estimator was used. The one for steady relay oscillations leaves {:.1} % of the oscillation \
+             unexplained, the general one nothing but white noise. Compare with --estimator relay.",
+            100.0 * part
+        ),
+        Remark::OtherStructures(structures) => {
+            let names: Vec<&str> = structures
+                .iter()
+                .map(|structure| structure.name())
+                .collect();
+            let (noun, verb) = match names.len() {
+                1 => ("structure", "explains"),
+                _ => ("structures", "explain"),
+            };
+            format!(
+                "The {noun} {} {verb} the recording nearly as well. An input with more frequencies would tell; \
+                 --structure fixes the choice.",
+                listed(&names)
+            )
+        }
+        Remark::PriorDropped(distance) => format!(
+            "The recording disagrees with the prior of the pack by {:.1} standard deviations, so the fit was made \
+             without it. Use a pack for processes of this kind with --pack.",
+            distance.max(0.0).sqrt()
+        ),
+        Remark::NoController(error) => without_controller(error),
+        _ => return None,
+    })
+}
+
+/// `a`, `a and b`, `a, b and c`.
+fn listed(names: &[&str]) -> String {
+    match names {
+        [] => String::new(),
+        [one] => (*one).to_owned(),
+        [first @ .., last] => format!("{} and {last}", first.join(", ")),
+    }
+}
+
+fn without_controller(error: &DesignError) -> String {
+    match error {
+        DesignError::Structure(structure) => format!(
+            "This version designs no controller for the structure {}. The model and its intervals are valid.",
+            structure.name()
+        ),
+        DesignError::PhaseMargin(_) => {
+            format!(
+                "No controller was designed: {error}. Choose another margin with --phase-margin."
+            )
+        }
+        _ => format!("No controller was designed: {error}. The model and its intervals are valid."),
+    }
+}
+
+/// Remarks on intervals, with the way to narrower ones.
+fn of_interval(remark: &Remark, is_relay: bool) -> Option<String> {
+    let (longer, more) = if is_relay {
+        (
+            "use more cycles",
+            "use more cycles or a larger relay amplitude",
+        )
+    } else {
+        ("record longer", "record longer or excite the process more")
+    };
+    Some(match *remark {
+        Remark::Weak {
+            parameter: Parameter::TBody,
+            relative_half_width,
+        } => format!(
+            "T_body is known to about {:.0} % only. The controller depends on K/T_body, which is known better.",
+            100.0 * relative_half_width
+        ),
+        Remark::Weak {
+            parameter,
+            relative_half_width,
+        } => format!(
+            "{} is known to about {:.0} % only; {more}.",
+            parameter.symbol(),
+            100.0 * relative_half_width
+        ),
+        Remark::MarginMayBeLess(margin_rad) => format!(
+            "Within the intervals the phase margin may be as low as {:.1} deg; {}, or ask for a larger margin with \
+             --phase-margin.",
+            margin_rad.to_degrees(),
+            longer
+        ),
+        _ => return None,
+    })
+}
+
 fn of_result(remark: &Remark) -> Option<String> {
     Some(match *remark {
         Remark::NegativeGain => {
@@ -71,21 +218,6 @@ fn of_result(remark: &Remark) -> Option<String> {
                  K/T_body, which is known."
             )
         }
-        Remark::Weak {
-            parameter: Parameter::TBody,
-            relative_half_width,
-        } => format!(
-            "T_body is known to about {:.0} % only. The controller depends on K/T_body, which is known better.",
-            100.0 * relative_half_width
-        ),
-        Remark::Weak {
-            parameter,
-            relative_half_width,
-        } => format!(
-            "{} is known to about {:.0} % only; use more cycles or a larger relay amplitude.",
-            parameter.symbol(),
-            100.0 * relative_half_width
-        ),
         Remark::WeakDelay { low_s, high_s } => format!(
             "The delay is only known to lie between {:.2} and {:.2} ms.",
             1e3 * low_s,
@@ -96,11 +228,6 @@ fn of_result(remark: &Remark) -> Option<String> {
              it.",
             100.0 * part
         ),
-        Remark::MarginMayBeLess(margin_rad) => format!(
-            "Within the intervals the phase margin may be as low as {:.1} deg; use more cycles, or ask for a larger \
-             margin with --phase-margin.",
-            margin_rad.to_degrees()
-        ),
         Remark::Overshoot(part) => format!(
             "The step overshoots by {:.0} %, which is usual for the least squared error at this phase margin. Less \
              overshoot: --phase-margin 45, or a filter on the reference.",
@@ -108,4 +235,70 @@ fn of_result(remark: &Remark) -> Option<String> {
         ),
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use onecycle::{Structure, Verdict};
+
+    use super::*;
+
+    // The text of the reports is checked as a whole for relay tests; here what the general estimator adds.
+    #[test]
+    fn every_remark_on_a_record_has_a_sentence() {
+        let remarks = [
+            Remark::NotASteadyOscillation(Box::new(Verdict::NoRelay {
+                output_is_relay: false,
+            })),
+            Remark::RelayReplaced(0.041),
+            Remark::OtherStructures(vec![Structure::Soptd, Structure::ResonantLag]),
+            Remark::Coloured(0.31),
+            Remark::InputLeft(0.024),
+            Remark::WeakPrediction {
+                explained: -0.2,
+                horizon_s: 0.5,
+            },
+            Remark::Absent(0.013),
+            Remark::PartUsed(0.61),
+            Remark::Interpolated(12.0),
+            Remark::PriorDropped(25.0),
+            Remark::NoController(DesignError::Structure(Structure::Foptd)),
+        ];
+        let all = remarks.map(|remark| (sentence(&remark, false), remark.kind()));
+        for (sentence, kind) in &all {
+            assert!(sentence.ends_with('.') && sentence.len() > 40, "{sentence}");
+            assert!(!sentence.starts_with(kind), "{sentence}");
+        }
+        let with = |words: &str| all.iter().any(|(sentence, _)| sentence.contains(words));
+        assert!(with(
+            "(no relay in the input: it does not switch between two levels)"
+        ));
+        assert!(with("structures soptd and resonant_lag explain"));
+        // Squared distance 25: 5 standard deviations.
+        assert!(with("by 5.0 standard deviations"));
+        // Worse than the mean predicts nothing.
+        assert!(with(
+            "predicts 0 % of the variance of the last third, 0.500 s ahead"
+        ));
+    }
+
+    // A chirp has no cycles to add.
+    #[test]
+    fn the_way_to_narrower_intervals_is_that_of_the_recording() {
+        let weak = Remark::Weak {
+            parameter: Parameter::TProp,
+            relative_half_width: 0.5,
+        };
+        assert!(sentence(&weak, true).ends_with("use more cycles or a larger relay amplitude."));
+        assert!(sentence(&weak, false).ends_with("record longer or excite the process more."));
+        let margin = Remark::MarginMayBeLess(0.1);
+        assert!(sentence(&margin, true).contains("; use more cycles, or ask"));
+        assert!(sentence(&margin, false).contains("; record longer, or ask"));
+    }
+
+    #[test]
+    fn names_are_listed_with_and() {
+        assert_eq!(listed(&["a"]), "a");
+        assert_eq!(listed(&["a", "b", "c"]), "a, b and c");
+    }
 }

@@ -1,13 +1,15 @@
 //! The model over the data, and the residuals.
 
-use onecycle::Identified;
-use onecycle_identify::{Evidence, FitPoint, Whiteness, whiteness};
+use onecycle::{Identified, Innovations};
+use onecycle_identify::{FitPoint, Whiteness, whiteness};
 use onecycle_onboard::refine::Refined;
 
 use super::significant;
+use super::thin::thinned;
 use crate::pages::page::{self, Section};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series};
 use crate::report::number::percent;
+use crate::report::record::{self, Fact};
 use crate::report::units::Units;
 
 /// Lags that residuals are compared at, and the least number of residuals for each.
@@ -15,16 +17,33 @@ const LAGS: usize = 25;
 const RESIDUALS_PER_LAG: usize = 4;
 
 pub(super) fn section(identified: &Identified, units: &Units) -> Section {
-    let mut body = page::figure(&over_data(&identified.fit.points, units));
-    let residuals: Vec<f64> = (identified.fit.points.iter())
-        .map(|point| point.measured - point.fitted)
-        .collect();
+    let fit = &identified.fit;
+    let (figure, what, residuals) = match fit.innovations() {
+        None => (
+            over_cycles(&fit.points, units),
+            "residuals",
+            fit.points.iter().map(residual).collect::<Vec<f64>>(),
+        ),
+        Some(found) => (
+            over_record(&fit.points, found, units),
+            "innovations",
+            found.rows.iter().filter_map(|row| row.innovation).collect(),
+        ),
+    };
+    let mut body = page::figure(&figure);
+    let mut facts = match fit.innovations() {
+        None => fit
+            .refined()
+            .map_or(vec![], |refined| of_relay(fit.misfit, refined)),
+        Some(found) => record::of_model(identified, found, units),
+    };
     let lags = LAGS.min(residuals.len() / RESIDUALS_PER_LAG);
     // No parameter was fitted to these bins alone: zero degrees of freedom are subtracted.
     if let Some(white) = whiteness(&residuals, lags, 0) {
-        body += &page::figure(&correlogram(&white));
-        body += &page::facts(&facts(identified, &white));
+        body += &page::figure(&correlogram(&white, what));
+        facts.push(("whiteness", judgement(&white)));
     }
+    body += &page::facts(&facts);
     Section {
         id: "fit".to_owned(),
         title: "Fit".to_owned(),
@@ -32,44 +51,89 @@ pub(super) fn section(identified: &Identified, units: &Units) -> Section {
     }
 }
 
-fn over_data(fit: &[FitPoint], units: &Units) -> Figure {
+fn residual(point: &FitPoint) -> f64 {
+    point.measured - point.fitted
+}
+
+fn output(fit: &[FitPoint], fitted: &str, units: &Units) -> Panel {
     let series = |name, marks, value: fn(&FitPoint) -> f64| {
         let points = fit.iter().map(|point| (point.time_s, value(point)));
-        Series::of_points(name, marks, points)
+        Series::of_points(name, marks, thinned(points))
     };
-    let upper = vec![
-        series("fitted", Marks::Line, |point| point.fitted).hue(Hue::Model),
+    let series = vec![
+        series(fitted, Marks::Line, |point| point.fitted).hue(Hue::Model),
         series("measured", Marks::Points, |point| point.measured).hue(Hue::Measured),
     ];
-    let residual = series("", Marks::Points, |point| point.measured - point.fitted);
+    Panel::new(Axis::titled(Units::titled("output", &units.output)), series)
+}
+
+fn over_cycles(fit: &[FitPoint], units: &Units) -> Figure {
+    let points = fit.iter().map(|point| (point.time_s, residual(point)));
+    let residuals = Series::of_points("", Marks::Points, points).hue(Hue::Measured);
     Figure::stacked(
         "Measured output, and output of the identified model for the recorded input; below, the residuals. Each point is \
          the mean of the samples in a short interval, as used in the fit.",
         Axis::titled("time (s)"),
         vec![
-            Panel::new(Axis::titled(Units::titled("output", &units.output)), upper),
-            Panel::new(Axis::titled("residual"), vec![residual.hue(Hue::Measured)]),
+            output(fit, "fitted", units),
+            Panel::new(Axis::titled("residual"), vec![residuals]),
         ],
     )
 }
 
-fn correlogram(white: &Whiteness) -> Figure {
+fn over_record(fit: &[FitPoint], found: &Innovations, units: &Units) -> Figure {
+    let innovations = (found.rows.iter()).filter_map(|row| Some((row.time_s, row.innovation?)));
+    let disturbance = (found.rows.iter()).map(|row| (row.time_s, row.disturbance));
+    let panel = |title: String, marks, hue, points| {
+        let series = Series::of_points("", marks, points).hue(hue);
+        Panel::new(Axis::titled(title), vec![series])
+    };
+    let mut panels = vec![
+        output(fit, "model without disturbances", units),
+        panel(
+            "innovation / deviation".to_owned(),
+            Marks::Points,
+            Hue::Measured,
+            thinned(innovations),
+        ),
+    ];
+    // A constant is the input bias alone.
+    if found.noise.w1_rad_per_s.is_some() {
+        panels.push(panel(
+            Units::titled("disturbance", &units.input),
+            Marks::Line,
+            Hue::Input,
+            thinned(disturbance),
+        ));
+    }
+    Figure::stacked(
+        "Measured output, and output of the identified model for the recorded input alone, without disturbances; below, \
+         the innovations: what the model could not predict from the samples before. The disturbance, where there is \
+         one, acts at the process input. Each point is the mean of consecutive samples, as used in the fit.",
+        Axis::titled("time (s)"),
+        panels,
+    )
+}
+
+fn correlogram(white: &Whiteness, what: &str) -> Figure {
     let lags = || (1..=white.autocorrelation.len()).map(|lag| lag as f64);
     let bars = lags().zip(white.autocorrelation.iter().copied());
     let ends = [0.0, white.autocorrelation.len() as f64 + 1.0];
-    let edge = |name, value: f64| {
+    let edge = |name: &str, value: f64| {
         let points = ends.map(|lag| (lag, value));
         Series::of_points(name, Marks::Dashes, points).hue(Hue::Reference)
     };
     Figure::single(
-        "Autocorrelation of the residuals. Of white residuals 19 in 20 bars stay between the dashed lines; a slow wave \
-         means that the model misses a part of the process.",
+        &format!(
+            "Autocorrelation of the {what}. Of white {what} 19 in 20 bars stay between the dashed lines; a slow wave \
+             means that the model misses a part of the process."
+        ),
         Axis::titled("lag (points)"),
         Panel::new(
             Axis::titled("autocorrelation").spanning(-1.0, 1.0),
             vec![
-                Series::of_points("residuals", Marks::Bars, bars).hue(Hue::Model),
-                edge("95 % of white residuals", white.band),
+                Series::of_points(what, Marks::Bars, bars).hue(Hue::Model),
+                edge(&format!("95 % of white {what}"), white.band),
                 edge("", -white.band),
             ],
         ),
@@ -79,33 +143,23 @@ fn correlogram(white: &Whiteness) -> Figure {
 /// Probability below which residuals are called not white.
 const LEAST_PROBABILITY: f64 = 0.01;
 
-fn facts(identified: &Identified, white: &Whiteness) -> Vec<(&'static str, String)> {
+/// How many lags are outside the band, and what that means.
+fn judgement(white: &Whiteness) -> String {
     let lags = white.autocorrelation.len();
-    let is_white = white.probability >= LEAST_PROBABILITY;
-    let judgement = if is_white {
+    let judgement = if white.probability >= LEAST_PROBABILITY {
         "white: nothing is left to explain"
     } else {
         "not white: the model misses a part of the process, or the noise is so small that any error shows"
     };
-    let mut facts = match &identified.fit.evidence {
-        Evidence::Relay(refined) => of_relay(identified.fit.misfit, refined),
-        _ => vec![],
-    };
-    facts.push(
-        (
-            "whiteness",
-            format!(
-                "{} of {lags} lags outside; Ljung-Box {:.1}, which white residuals exceed in {} of cases: {judgement}",
-                white.outside,
-                white.portmanteau,
-                percent(white.probability),
-            ),
-        ),
-    );
-    facts
+    format!(
+        "{} of {lags} lags outside; Ljung-Box {:.1}, which white residuals exceed in {} of cases: {judgement}",
+        white.outside,
+        white.portmanteau,
+        percent(white.probability),
+    )
 }
 
-fn of_relay(misfit: f64, refined: &Refined) -> Vec<(&'static str, String)> {
+fn of_relay(misfit: f64, refined: &Refined) -> Vec<Fact> {
     [
         (
             "unexplained",

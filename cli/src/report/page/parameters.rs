@@ -136,7 +136,9 @@ fn distribution(
             inverse(interval),
         ),
         Parameter::TBody => (Units::titled(symbol, "s"), values(parameter), *interval),
-        Parameter::TProp | Parameter::Tau => time(symbol, values(parameter), interval),
+        Parameter::TProp | Parameter::TProp2 | Parameter::Tau => {
+            time(symbol, values(parameter), interval)
+        }
         _ => (
             Units::titled(
                 symbol,

@@ -1,29 +1,43 @@
-//! The recording, with the cycles that were used.
+//! The recording, with the part that was used.
 
-use onecycle::{Oscillation, Recording};
+use onecycle::{Excitation, Identification, Oscillation, Recording};
 use onecycle_link::Column;
 
 use super::significant;
+use super::thin::thinned;
 use crate::pages::page::{self, Section};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Panel, Series};
+use crate::report::record::{self, Fact};
+use crate::report::units::Units;
 use crate::words;
 
-/// Pieces that a long recording is cut into, each drawn by its extremes: more than a screen is wide.
-const PIECES: usize = 1500;
-
-pub(super) fn section(recording: &Recording, found: Option<&Oscillation>) -> Section {
+pub(super) fn section(recording: &Recording, found: &Identification, units: &Units) -> Section {
     let columns = recording.columns();
+    let (used, facts) = match &found.excitation {
+        Some(Excitation::Relay { oscillation, .. }) => (
+            Some((
+                "cycles are those that were",
+                (oscillation.start_s, oscillation.end_s),
+            )),
+            facts(oscillation),
+        ),
+        Some(Excitation::Recorded(recorded)) => (
+            Some(("part was", (recorded.start_s, recorded.end_s))),
+            record::of_recording(found, recorded, units),
+        ),
+        _ => (None, vec![]),
+    };
     let panel = |column: &Column, values: &[f64], marks, hue| {
-        let points = thinned(recording.time_s(), values);
+        let points = recording.time_s().iter().zip(values);
+        let points = thinned(points.map(|(&time_s, &value)| (time_s, value)));
         let series = Series::of_points("", marks, points).hue(hue);
         Panel::new(Axis::titled(titled(column)), vec![series])
     };
+    let caption = used.map_or("Output and input as recorded.".to_owned(), |(what, _)| {
+        format!("Output and input as recorded; the shaded {what} used.")
+    });
     let mut figure = Figure::stacked(
-        if found.is_some() {
-            "Output and input as recorded; the shaded cycles are those that were used."
-        } else {
-            "Output and input as recorded."
-        },
+        &caption,
         Axis::titled("time (s)"),
         vec![
             panel(
@@ -35,10 +49,10 @@ pub(super) fn section(recording: &Recording, found: Option<&Oscillation>) -> Sec
             panel(&columns.input, recording.input(), Marks::Steps, Hue::Input),
         ],
     );
-    figure.span = found.map(|found| (found.start_s, found.end_s));
+    figure.span = used.map(|(_, span)| span);
     let mut body = page::figure(&figure);
-    if let Some(found) = found {
-        body += &page::facts(&facts(found));
+    if !facts.is_empty() {
+        body += &page::facts(&facts);
     }
     let notes: Vec<String> = recording
         .notes()
@@ -53,7 +67,7 @@ pub(super) fn section(recording: &Recording, found: Option<&Oscillation>) -> Sec
     }
 }
 
-fn facts(found: &Oscillation) -> Vec<(&'static str, String)> {
+fn facts(found: &Oscillation) -> Vec<Fact> {
     let noise = 100.0 * found.noise_sigma / found.amplitude;
     [
         (
@@ -89,58 +103,5 @@ fn titled(column: &Column) -> String {
     match &column.unit {
         Some(unit) => format!("{} ({unit})", column.name),
         None => column.name.clone(),
-    }
-}
-
-/// All points, or of each piece the first, the least, the greatest and the last, in their order.
-fn thinned(time_s: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
-    let points = time_s.iter().copied().zip(values.iter().copied());
-    if time_s.len() <= 4 * PIECES {
-        return points.collect();
-    }
-    let points: Vec<(f64, f64)> = points.collect();
-    let of_piece = |piece: &[(f64, f64)]| {
-        let place = |of: fn(f64, f64) -> bool| {
-            (0..piece.len()).reduce(|best, at| {
-                if of(piece[at].1, piece[best].1) {
-                    at
-                } else {
-                    best
-                }
-            })
-        };
-        let (least, most) = (place(|a, b| a < b), place(|a, b| a > b));
-        let mut kept: Vec<usize> = [Some(0), least, most, piece.len().checked_sub(1)]
-            .into_iter()
-            .flatten()
-            .collect();
-        kept.sort_unstable();
-        kept.dedup();
-        kept.into_iter().map(|at| piece[at]).collect::<Vec<_>>()
-    };
-    points
-        .chunks(points.len().div_ceil(PIECES))
-        .flat_map(of_piece)
-        .collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    // A million points with one spike each way: at most four of a piece are left, both spikes among them, and time
-    // never goes back.
-    #[test]
-    fn spikes_are_drawn() {
-        let time_s: Vec<f64> = (0..1_000_000).map(f64::from).collect();
-        let mut values = vec![0.0; time_s.len()];
-        values[123_457] = 5.0;
-        values[654_321] = -7.0;
-        let points = thinned(&time_s, &values);
-        assert!(points.len() <= 4 * PIECES);
-        assert!(points.contains(&(123_457.0, 5.0)) && points.contains(&(654_321.0, -7.0)));
-        assert!(points.windows(2).all(|pair| pair[0].0 < pair[1].0));
-        assert_eq!(points.last(), Some(&(999_999.0, 0.0)));
-        assert_eq!(thinned(&time_s[..100], &values[..100]).len(), 100);
     }
 }

@@ -1,0 +1,127 @@
+//! What the general estimator adds to the report of an identification.
+
+use onecycle::{Hold, Innovations, Recorded};
+use onecycle_identify as identify;
+use serde::Serialize;
+
+use super::Parameters;
+
+/// The part of a recording that was used.
+#[derive(Serialize)]
+pub(super) struct Record {
+    start_s: f64,
+    end_s: f64,
+    sample_s: f64,
+    samples: usize,
+    absent: usize,
+    outliers: usize,
+    samples_per_row: usize,
+    hold: &'static str,
+    input_deviation: f64,
+    output_deviation: f64,
+    informative_from_rad_per_s: Option<f64>,
+    informative_to_rad_per_s: Option<f64>,
+}
+
+impl From<&Recorded> for Record {
+    fn from(of: &Recorded) -> Self {
+        Self {
+            start_s: of.start_s,
+            end_s: of.end_s,
+            sample_s: of.sample_s,
+            samples: of.samples,
+            absent: of.absent,
+            outliers: of.outliers,
+            samples_per_row: of.samples_per_row,
+            hold: Hold::name(of.hold),
+            input_deviation: of.input_deviation,
+            output_deviation: of.output_deviation,
+            informative_from_rad_per_s: of.informative_rad_per_s.map(|(low, _)| low),
+            informative_to_rad_per_s: of.informative_rad_per_s.map(|(_, high)| high),
+        }
+    }
+}
+
+/// Intensities in rad/s, null where there is no such noise.
+#[derive(Serialize)]
+pub(super) struct Noise {
+    kind: String,
+    sigma: f64,
+    w1: Option<f64>,
+    w0: Option<f64>,
+    wy: Option<f64>,
+}
+
+impl From<&identify::Noise> for Noise {
+    fn from(of: &identify::Noise) -> Self {
+        Self {
+            kind: of.kind(),
+            sigma: of.sigma,
+            w1: of.w1_rad_per_s,
+            w0: of.w0_rad_per_s,
+            wy: of.wy_rad_per_s,
+        }
+    }
+}
+
+/// Best fit of a structure.
+#[derive(Serialize)]
+pub(super) struct Alternative {
+    structure: &'static str,
+    bic: f64,
+    process: Parameters<Option<f64>>,
+    noise: Noise,
+}
+
+impl From<&identify::Alternative> for Alternative {
+    fn from(of: &identify::Alternative) -> Self {
+        Self {
+            structure: of.model.structure().name(),
+            bic: of.bic,
+            process: Parameters::of_model(&of.model),
+            noise: Noise::from(&of.noise),
+        }
+    }
+}
+
+/// Tests of the innovations.
+#[derive(Serialize)]
+pub(super) struct Tests {
+    log_likelihood: f64,
+    autocorrelation: f64,
+    ljung_box: f64,
+    input_share: f64,
+    input_f: f64,
+    widened: f64,
+}
+
+impl From<&Innovations> for Tests {
+    fn from(of: &Innovations) -> Self {
+        Self {
+            log_likelihood: of.log_likelihood,
+            autocorrelation: of.whiteness.autocorrelation,
+            ljung_box: of.whiteness.ljung_box,
+            input_share: of.whiteness.input_share,
+            input_f: of.whiteness.input_f,
+            widened: of.widened,
+        }
+    }
+}
+
+/// Prediction of the last third of the record.
+#[derive(Serialize)]
+pub(super) struct Prediction {
+    horizon_s: f64,
+    explained: f64,
+    error_ratio: f64,
+}
+
+impl From<&identify::Prediction> for Prediction {
+    fn from(of: &identify::Prediction) -> Self {
+        Self {
+            horizon_s: of.horizon_s,
+            explained: of.explained,
+            error_ratio: of.error_ratio,
+        }
+    }
+}
