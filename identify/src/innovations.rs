@@ -17,6 +17,8 @@
 //! "System Identification" (1999), section 7.4, with unknown initial state (P. de Jong, Biometrika 75 (1988)).
 
 mod choose;
+#[cfg(test)]
+mod dense;
 mod descent;
 mod laplace;
 mod lifted;
@@ -24,6 +26,7 @@ mod likelihood;
 mod mixture;
 mod orthogonal;
 mod outliers;
+mod plan;
 mod prepare;
 mod record;
 mod response;
@@ -38,6 +41,7 @@ use onecycle_design::{Structure, design_over, step_response, tuning};
 
 use self::choose::{Choice, Limits, NEARLY, choose};
 use self::mixture::{Component, mixture};
+pub use self::plan::expected;
 use self::prepare::{FEWEST, Prepared, prepare};
 pub use self::record::Hold;
 use self::record::{Blocks, Record};
@@ -311,8 +315,12 @@ impl Search<'_> {
     ) -> Result<Identified, Verdict> {
         let is_coloured = tests.autocorrelation > COLOURED.0 || tests.input_share > COLOURED.1;
         let blocks = fitted.blocks();
-        let (posterior, widened) =
-            result::posterior(fitted, components, prepared.early_s, is_coloured);
+        let (posterior, widened) = result::posterior_of(
+            &fitted.best.found,
+            components,
+            prepared.early_s,
+            is_coloured,
+        );
         let model = result::model(&fitted.best.found, prepared.early_s);
         let draws = posterior.models(tuning::DRAWS);
         let design = match design_over(&model, &draws, &self.options.specification) {

@@ -13,6 +13,7 @@
 //! | the phase margin of a controller over all likely processes | [`Posterior::phase_margin_rad`] |
 //! | the frequency response at the harmonics of the oscillation, without a model | [`harmonics`](fn@harmonics) |
 //! | a test of the residuals for whiteness | [`whiteness`](fn@whiteness) |
+//! | the intervals to expect from a planned test | [`expected`] |
 //! | contours of the posterior | [`density`](fn@density) |
 
 pub mod cholesky;
@@ -36,7 +37,7 @@ pub use diagnose::density::{Density, density};
 pub use diagnose::harmonics::{Harmonic, harmonics};
 pub use diagnose::whiteness::{Whiteness, whiteness};
 pub use excitation::{Excitation, Oscillation, Recorded};
-pub use innovations::Hold;
+pub use innovations::{Hold, expected};
 pub use outcome::{
     Alternative, Evidence, Fit, FitPoint, Identification, Identified, InnovationRow,
     InnovationTests, Innovations, Noise, Prediction,

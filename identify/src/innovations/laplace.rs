@@ -61,7 +61,8 @@ impl Laplace {
             .map(|a| columns.iter().map(|b| dot(a, b)).collect())
             .collect();
         let inverse = inverse(&information)?;
-        let factor = found.at.cost() / found.at.freedom;
+        // Of the innovations, at the scale of the residual.
+        let factor = found.at.variance * found.at.stretch * found.at.stretch;
         let covariance = (inverse.iter())
             .map(|row| row.iter().map(|v| v * factor).collect())
             .collect();
@@ -81,7 +82,7 @@ impl Laplace {
         let through: f64 = (0..n * n)
             .map(|k| slope(k / n) * self.covariance[k / n][k % n] * slope(k % n))
             .sum();
-        (at.gain_variance + through).sqrt()
+        (at.gain_factor * at.variance + through).sqrt()
     }
 
     /// `ln det(covariance) / 2`.

@@ -41,18 +41,17 @@ pub(super) struct Evaluation {
     /// Residual of each block that has samples, scaled so that least squares of it is maximum likelihood, the noise
     /// included.
     pub(super) residual: Vec<f64>,
-    /// Normalised innovation of each block that has samples: `r_k / sqrt(s2)` before the scale of the likelihood.
-    pub(super) innovation_scale: f64,
-    /// Number of rows less number of linear unknowns, `m`.
-    pub(super) freedom: f64,
+    /// Scale of the residual: `exp((sum ln S_k + ln|X'X| - ln|X0'X0|) / (2 m))` over the deviation of the outputs.
+    pub(super) stretch: f64,
     /// Gain in front of the stages (output unit / input unit, per second for each integration).
     pub(super) gain: f64,
-    /// Variance of the gain for fixed nonlinear unknowns.
-    pub(super) gain_variance: f64,
+    /// Variance of the gain for fixed nonlinear unknowns, over [`Self::variance`].
+    pub(super) gain_factor: f64,
     /// State at the first block; the disturbance is the last (output unit, times the gain).
     pub(super) state: Vec<f64>,
-    /// Variance of the disturbance at the first block and its covariance with the gain, for fixed nonlinear unknowns.
-    pub(super) disturbance: (f64, f64),
+    /// Variance of the disturbance at the first block and its covariance with the gain, for fixed nonlinear unknowns, over
+    /// [`Self::variance`].
+    pub(super) disturbance_factors: (f64, f64),
     /// Variance `s2` of the white noise of a sample (output unit^2).
     pub(super) variance: f64,
     /// Innovations of the response to the input, over the standard deviation of an innovation.
@@ -70,9 +69,8 @@ impl Evaluation {
 
     /// Innovations over their standard deviation.
     pub(super) fn innovations(&self) -> Vec<f64> {
-        (self.residual.iter())
-            .map(|r| r * self.innovation_scale)
-            .collect()
+        let scale = 1.0 / (self.stretch * self.variance.sqrt());
+        self.residual.iter().map(|r| r * scale).collect()
     }
 }
 
@@ -240,12 +238,11 @@ fn evaluate_sized<const N: usize>(
     Some(Evaluation {
         log_likelihood,
         residual: residual.iter().map(|r| r * stretch).collect(),
-        innovation_scale: 1.0 / (stretch * variance.sqrt()),
-        freedom,
+        stretch: stretch / scale,
         gain: coefficients[0] * scale,
-        gain_variance: inverse[0][0] * squared,
+        gain_factor: inverse[0][0],
         state: coefficients[1..].iter().map(|x| x * scale).collect(),
-        disturbance: (inverse[1][1] * squared, inverse[0][1] * squared),
+        disturbance_factors: (inverse[1][1], inverse[0][1]),
         variance: squared,
         input_innovations,
         #[cfg(test)]

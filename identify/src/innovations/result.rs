@@ -58,8 +58,8 @@ fn clamped(process: &Linear) -> Linear {
 }
 
 /// Posterior over all components, and the factor by which its deviations were widened.
-pub(super) fn posterior(
-    fitted: &Fitted,
+pub(super) fn posterior_of(
+    best: &Found,
     components: &[Component],
     early_s: f64,
     is_coloured: bool,
@@ -91,7 +91,6 @@ pub(super) fn posterior(
     let draw = |index: usize, normal: &[f64]| {
         roots[index].draw(&components[index], &factors[index], normal, early_s)
     };
-    let best = &fitted.best.found;
     let bias = has_bias(&best.theta).then(|| disturbance(best) / best.at.gain);
     let weights = if total > 0.0 { weights } else { vec![] };
     let process = clamped(&process(&best.theta, best.at.gain, early_s));
@@ -131,8 +130,9 @@ impl Root {
             }
         }
         let at = &component.found.at;
-        let (variance, covariance) = at.disturbance;
-        let linear = cholesky(&[[at.gain_variance, covariance], [covariance, variance]]);
+        let (d, gd) = at.disturbance_factors;
+        let linear = [[at.gain_factor, gd], [gd, d]].map(|row| row.map(|v| v * at.variance));
+        let linear = cholesky(&linear);
         let process = cholesky(&padded);
         Self {
             is_usable: process.is_some() && linear.is_some(),
