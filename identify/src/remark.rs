@@ -85,8 +85,8 @@ pub enum Remark {
     /// The input between the samples is taken as straight lines and not as held, because that explains the recording
     /// better. The value is the difference of the log-likelihood.
     Interpolated(f64),
-    /// The recording disagrees with the prior of the pack, so the prior was not used. The value is the misfit of the
-    /// prior: squared distance in standard deviations.
+    /// The recording disagrees with the prior of the pack, so the prior was not used. The value is the squared
+    /// distance, in standard deviations of the residual, by which the prior would have moved the fit.
     PriorDropped(f64),
 }
 
