@@ -107,6 +107,9 @@ fn is_final(verdict: &Verdict) -> bool {
         Verdict::ConstantInput
             | Verdict::ConstantOutput
             | Verdict::Units
+            | Verdict::NoRelay {
+                output_is_relay: true
+            }
             | Verdict::NoController(_)
             | Verdict::Saturated { .. }
     )
