@@ -33,8 +33,10 @@ fn a_constant_output() {
 #[test]
 fn a_continuous_input() {
     let table = Table::clean().map(|_, sample| sample.input = (14.2 * sample.time_s).sin());
-    let report = identify(table.csv(), &[]).no_process("no_relay");
+    let report = identify(table.csv(), RELAY).no_process("no_relay");
     assert!(report.advice().contains("relay"));
+    // One frequency tells two numbers, a gain and a phase: not a process.
+    identify(table.csv(), &[]).no_process("no_information");
 }
 
 #[test]
