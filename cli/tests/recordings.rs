@@ -47,11 +47,12 @@ fn example(name: &str, ending: &str) -> PathBuf {
         .join(format!("{name}.{ending}"))
 }
 
-fn identify(name: &str) -> (Option<i32>, Value) {
+fn identify(name: &str, options: &[&str]) -> (Option<i32>, Value) {
     let output = Command::new(env!("CARGO_BIN_EXE_onecycle"))
         .arg("identify")
         .arg(example(name, "csv"))
         .arg("--json")
+        .args(options)
         .output()
         .unwrap();
     (
@@ -80,7 +81,7 @@ fn recordings_of_other_simulators_give_their_truth() {
     println!("| --- | --- | --- | --- |");
     let (mut held, mut asked) = (0, 0);
     for (name, tolerance) in RECORDINGS {
-        let (code, report) = identify(name);
+        let (code, report) = identify(name, &[]);
         assert_eq!(code, Some(0), "{name}: {}", report["verdict"]["message"]);
         let truth = &truth(name)["soiptd_truth"];
         let of = |key: &str| truth[key].as_f64().unwrap();
@@ -125,17 +126,25 @@ fn recordings_of_other_simulators_give_their_truth() {
     assert!(held >= 22, "{held} of {asked}");
 }
 
+// The estimator of steady oscillations refuses it. The general one finds the acceleration of the vehicle, 9.81 m/s^2 at
+// the trim thrust beside the file, within 5 %: the link adds a dead time that changes.
 #[test]
-fn the_unsteady_recording_is_refused() {
-    let (code, report) = identify("unsteady_ardupilot_alt");
+fn the_unsteady_recording_needs_the_general_estimator() {
+    let (code, report) = identify("unsteady_ardupilot_alt", &["--estimator", "relay"]);
     assert_eq!(code, Some(4));
     assert_eq!(report["verdict"]["kind"], "not_steady");
     assert!(report["process"].is_null() && report["controller"].is_null());
+    let (code, report) = identify("unsteady_ardupilot_alt", &[]);
+    assert_eq!((code, &report["excitation"]), (Some(0), &"recorded".into()));
+    let gain = report["process"]["k_over_t_body"]["estimate"]
+        .as_f64()
+        .unwrap();
+    assert!((gain * 0.364_190 / 9.81 - 1.0).abs() < 0.05, "{gain}");
 }
 
 #[test]
 fn the_simulated_recording_gives_the_truth_in_its_head() {
-    let (code, report) = identify("simulated_hover");
+    let (code, report) = identify("simulated_hover", &[]);
     assert_eq!(code, Some(0));
     // The paper's hovering quadrotor, K = 1; see the comments in the file.
     for (parameter, truth) in [

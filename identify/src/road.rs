@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! a steady relay oscillation                     that of the board (relay)
-//! the same, but with an error of the model, or   both; the general one replaces it if its innovations are white
-//! with a stretch refused
+//! the same, but with an error of the model, or   both; the general one replaces it if its innovations are white and no
+//! with a stretch refused                         controller is lost
 //! anything else                                  the general one (innovations)
 //! ```
 
@@ -52,7 +52,7 @@ fn automatic(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) 
         Ok(_) if !is_doubtful(&steady) => steady,
         Ok(_) => {
             let general = innovations::identify(signals, options);
-            if is_white(&general) {
+            if is_white(&general) && has_controller(&general) >= has_controller(&steady) {
                 replaced(general, &steady)
             } else {
                 steady
@@ -90,6 +90,10 @@ fn is_white(found: &Identification) -> bool {
     innovations.is_some_and(|innovations| innovations.whiteness.autocorrelation < WHITE)
 }
 
+fn has_controller(found: &Identification) -> bool {
+    (found.outcome.as_ref()).is_ok_and(|identified| identified.design.is_some())
+}
+
 /// The general result in place of that of the steady oscillation.
 fn replaced(mut general: Identification, steady: &Identification) -> Identification {
     let misfit = steady
@@ -107,6 +111,9 @@ fn is_final(verdict: &Verdict) -> bool {
         Verdict::ConstantInput
             | Verdict::ConstantOutput
             | Verdict::Units
+            | Verdict::NoRelay {
+                output_is_relay: true
+            }
             | Verdict::NoController(_)
             | Verdict::Saturated { .. }
     )

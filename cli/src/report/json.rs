@@ -189,7 +189,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             output: column(&columns.output),
         },
         verdict: verdict(found),
-        excitation: found.excitation.as_ref().map(onecycle::Excitation::name),
+        excitation: found.excitation.as_ref().map(Excitation::name),
         oscillation: found.oscillation().map(oscillation),
         record: match &found.excitation {
             Some(Excitation::Recorded(recorded)) => Some(recorded.into()),

@@ -25,6 +25,24 @@ fn unusable_options_of_identify() {
     with(&["--time-unit", "parsec"]).misused(&["--time-unit", "parsec", "ms, us or ns"]);
     with(&["--sample-rate", "fast"]).misused(&["--sample-rate", "fast"]);
     with(&["--sample-rate", "1000", "--time", "1"]).misused(&["--sample-rate", "--time"]);
+    with(&["--structure", "pt1"]).misused(&["--structure", "pt1"]);
+    with(&["--estimator", "best"]).misused(&["--estimator", "best"]);
+    with(&["--hold", "cubic"]).misused(&["--hold", "cubic"]);
+    with(&["--from", "noon"]).misused(&["--from", "noon", "number of seconds"]);
+    with(&["--to", "nan"]).misused(&["--to", "number of seconds"]);
+    // The recording has 8 s, from zero.
+    with(&["--from", "8.5"]).misused(&["--from 8.5", "runs from 0.000 to 7.9"]);
+    with(&["--to", "-1"]).misused(&["--to -1", "runs from 0.000 to 7.9"]);
+    with(&["--from", "3", "--to", "3"]).misused(&["--from 3 --to 3", "leaves nothing"]);
+    for general in [
+        ["--structure", "foptd"],
+        ["--from", "1"],
+        ["--to", "5"],
+        ["--hold", "held"],
+    ] {
+        let both = [&general[..], &["--estimator", "relay"]].concat();
+        with(&both).misused(&[general[0], "--estimator relay", "leave out"]);
+    }
     with(&["--nosuch"]).misused(&["--nosuch"]);
     run(&["identify"]).misused(&["required"]);
 }

@@ -12,6 +12,9 @@ use crate::common::{
 
 // ---------------------------------------------------------------- inputs that are no relay
 
+/// Options for the estimator of steady relay oscillations alone.
+const RELAY: &[&str] = &["--estimator", "relay"];
+
 #[test]
 fn a_constant_input() {
     let table = Table::clean().map(|_, sample| sample.input = 0.5);
@@ -30,8 +33,10 @@ fn a_constant_output() {
 #[test]
 fn a_continuous_input() {
     let table = Table::clean().map(|_, sample| sample.input = (14.2 * sample.time_s).sin());
-    let report = identify(table.csv(), &[]).no_process("no_relay");
+    let report = identify(table.csv(), RELAY).no_process("no_relay");
     assert!(report.advice().contains("relay"));
+    // One frequency tells two numbers, a gain and a phase: not a process.
+    identify(table.csv(), &[]).no_process("no_information");
 }
 
 #[test]
@@ -39,8 +44,10 @@ fn one_switch() {
     let table = Table::clean().map(|index, sample| {
         sample.input = if index < 3000 { 1.0 } else { -1.0 };
     });
-    let report = identify(table.csv(), &[]).no_process("too_short");
+    let report = identify(table.csv(), RELAY).no_process("too_short");
     assert!(report.advice().contains("four cycles"));
+    // One change of the input tells little of a process that moves by itself.
+    identify(table.csv(), &[]).no_process("no_information");
 }
 
 // A relay test that failed: the input moves from 1 to 2, then to 0, where it stays for 99.7 % of the recording.
@@ -53,9 +60,10 @@ fn a_relay_that_gave_up() {
             _ => 0.0,
         };
     });
-    let report = identify(table.csv(), &[]).no_process("no_relay");
+    let report = identify(table.csv(), RELAY).no_process("no_relay");
     let message = report.0["verdict"]["message"].as_str().unwrap();
     assert!(message.contains("switches 2 times"), "{message}");
+    identify(table.csv(), &[]).no_process("not_this_process");
 }
 
 #[test]
@@ -187,10 +195,13 @@ fn half_a_cycle() {
         from + 1..to + quarter,
         from - 1..from + 3 * quarter,
     ] {
-        let report = identify(Table(table.0[rows].to_vec()).csv(), &[]).no_process("too_short");
+        let table = Table(table.0[rows].to_vec());
+        let report = identify(table.csv(), RELAY).no_process("too_short");
         let message = report.0["verdict"]["message"].as_str().unwrap();
         assert!(message.contains("no complete cycle"), "{message}");
         assert!(report.advice().contains("four cycles"));
+        // Without noise less than a cycle is enough for the general estimator.
+        is_hover(&identify(table.csv(), &[]).identified(), 0.01);
     }
 }
 
@@ -224,8 +235,11 @@ fn an_unsteady_oscillation() {
         period_s = (period_s * (1.0 + 0.5 * chance())).clamp(0.1, 2.0);
         amplitude = (amplitude * (1.0 + 0.5 * chance())).clamp(0.1, 10.0);
     }
-    let report = identify(Table(samples).csv(), &[]).no_process("not_steady");
+    let table = Table(samples);
+    let report = identify(table.csv(), RELAY).no_process("not_steady");
     assert!(report.advice().contains("settle"));
+    // No process made these samples.
+    identify(table.csv(), &[]).no_process("edge_of_domain");
 }
 
 /// A relay test on any plant. The plant returns the controlled state and the recorded output.

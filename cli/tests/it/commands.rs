@@ -300,6 +300,9 @@ fn the_json_report_has_every_key() {
         }
     }
     for name in keys(&report["process"]) {
+        if name == "structure" {
+            continue;
+        }
         let range = &report["process"][name];
         assert_eq!(keys(range), ["estimate", "high", "low"], "{name}");
         let [low, estimate, high] = ["low", "estimate", "high"].map(|side| range[side].as_f64());

@@ -199,23 +199,34 @@ impl Outcome {
         let report = self.report();
         assert_eq!(report.kind(), "identified");
         // NaN would be null in JSON; these values must be numbers.
-        for pointer in [
-            "/oscillation/period_s",
-            "/oscillation/amplitude",
-            "/oscillation/noise_sigma",
+        let own: &[&str] = match report.0["excitation"].as_str() {
+            Some("relay") => &[
+                "/oscillation/period_s",
+                "/oscillation/amplitude",
+                "/oscillation/noise_sigma",
+                "/fit/residual_sigma",
+            ],
+            _ => &[
+                "/record/end_s",
+                "/record/informative_to_rad_per_s",
+                "/noise/sigma",
+                "/innovations/autocorrelation",
+            ],
+        };
+        let common = [
             "/process/k_over_t_body/estimate",
             "/process/t_prop_s/estimate",
             "/process/tau_s/estimate",
             "/process/input_bias/estimate",
             "/fit/misfit",
-            "/fit/residual_sigma",
             "/controller/kp",
             "/controller/kd",
             "/controller/angle_p",
             "/controller/rate_p",
             "/margins/phase_margin_deg",
             "/margins/delay_margin_s",
-        ] {
+        ];
+        for pointer in own.iter().chain(&common) {
             report.number(pointer);
         }
         report

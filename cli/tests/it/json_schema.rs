@@ -3,14 +3,19 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
+use onecycle::Structure;
 use serde_json::Value;
 
 use crate::common::{Table, identify};
 
+fn document() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/identify-json.md");
+    std::fs::read_to_string(path).unwrap()
+}
+
 /// Keys in the first column of the tables, without those of an interval.
 fn documented() -> BTreeSet<String> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/identify-json.md");
-    let text = std::fs::read_to_string(path).unwrap();
+    let text = document();
     let key = |line: &str| Some(line.strip_prefix("| `")?.split('`').next()?.to_owned());
     text.lines().filter_map(key).collect()
 }
@@ -32,13 +37,15 @@ fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     }
 }
 
-// An identification has every documented key. `columns` and its three columns, and `verdict`, are documented by their
-// parts alone.
+// The identifications of both estimators together have every documented key. `columns` and its three columns, and
+// `verdict`, are documented by their parts alone.
 #[test]
 fn the_documented_keys_are_those_of_the_report() {
-    let report = identify(Table::noisy().csv(), &[]).identified();
     let mut found = BTreeSet::new();
-    keys(&report.0, "", &mut found);
+    for estimator in ["relay", "general"] {
+        let report = identify(Table::noisy().csv(), &["--estimator", estimator]).identified();
+        keys(&report.0, "", &mut found);
+    }
     for part in [
         "columns",
         "columns.time",
@@ -73,5 +80,23 @@ fn a_refusal_has_the_same_keys() {
         "margins",
     ] {
         assert_eq!(report.0[key], Value::Null, "{key}");
+    }
+}
+
+// Each structure has a row with its formula and the keys of its parameters.
+#[test]
+fn every_structure_is_documented() {
+    let text = document();
+    for structure in Structure::ALL {
+        let keys: Vec<String> = (structure.parameters().iter())
+            .map(|parameter| format!("`{}`", parameter.key()))
+            .collect();
+        let row = format!(
+            "| {} | `{}` | {} |\n",
+            structure.name(),
+            structure.transfer_function(),
+            keys.join(", ")
+        );
+        assert!(text.contains(&row), "{row}");
     }
 }

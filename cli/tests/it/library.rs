@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use onecycle::{
-    CsvOptions, Identification, Identify, Method, Pack, Recording, Remark, Verdict, with_signals,
+    CsvOptions, Excitation, Identification, Identify, Method, Pack, Recording, Remark, Road,
+    Verdict, with_signals,
 };
 use onecycle_identify::{Options, Signals};
 use serde_json::{Value, json};
@@ -75,17 +76,30 @@ fn the_program_says_what_the_library_finds() {
     }
 }
 
-// ArduPilot's altitude wanders: no steady oscillation, from either.
+// ArduPilot's altitude wanders: no steady oscillation, from either. The general estimator identifies it, in either.
 #[test]
 fn the_program_refuses_what_the_library_refuses() {
     let path = example("unsteady_ardupilot_alt.csv");
     let recording = onecycle::read(&path, &CsvOptions::default()).unwrap();
-    let verdict = identify(&recording).outcome.unwrap_err();
+    let steady = Identify::new().road(Road::Relay);
+    let verdict = steady.run(&recording).outcome.unwrap_err();
     assert!(matches!(verdict, Verdict::NotSteady { .. }), "{verdict}");
 
-    let report = run(&["identify", path.to_str().unwrap(), "--json"]).no_process(verdict.kind());
+    let identify_json = ["identify", path.to_str().unwrap(), "--json"];
+    let relay = [&identify_json[..], &["--estimator", "relay"]].concat();
+    let report = run(&relay).no_process(verdict.kind());
     assert_eq!(report.0["verdict"]["message"], verdict.to_string());
     assert!(report.advice().ends_with('.'), "{}", report.advice());
+
+    let found = identify(&recording);
+    let recorded = matches!(found.excitation, Some(Excitation::Recorded(_)));
+    let identified = found.outcome.unwrap();
+    assert!(recorded && identified.fit.innovations().is_some());
+    let report = run(&identify_json).identified();
+    for (parameter, ours) in identified.estimate.iter() {
+        let key = parameter.key();
+        assert_eq!(report.0["process"][key], interval(&ours), "{key}");
+    }
 }
 
 // A verdict is also an error to pass on with `?`, and says the same there.

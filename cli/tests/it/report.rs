@@ -100,11 +100,55 @@ fn the_measured_point_lies_on_the_locus() {
 // A refusal has a page too, with the recording and the advice; the exit code is that of a refusal.
 #[test]
 fn a_refusal_as_a_page() {
-    let (ran, page) = reported(&["identify", UNSTEADY]);
+    let (ran, page) = reported(&["identify", UNSTEADY, "--estimator", "relay"]);
     assert_eq!(ran.code, Some(NOT_IDENTIFIED));
     assert!(page.contains("class=\"verdict bad\">No process identified."));
     assert!(page.contains("Let the oscillation settle"));
     assert_eq!(figures(&page).len(), 1);
+}
+
+// A recording of any kind: the same sections and one for the structures; no figure holds a null, although samples are
+// absent, and the page is below 2 MB.
+#[test]
+fn a_recording_of_any_kind_as_a_page() {
+    let (ran, page) = reported(&["identify", UNSTEADY, "--json"]);
+    assert_eq!(ran.code, Some(0));
+    for section in [
+        "recording",
+        "fit",
+        "process",
+        "structures",
+        "stability",
+        "step",
+    ] {
+        assert!(
+            page.contains(&format!("<section id=\"{section}\">")),
+            "{section}"
+        );
+    }
+    let report: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let structures = report["alternatives"].as_array().unwrap();
+    assert!(structures.len() > 1);
+    for structure in structures {
+        let name = structure["structure"].as_str().unwrap();
+        assert!(
+            page.contains(&format!("<th scope=\"row\">{name}")),
+            "{name}"
+        );
+    }
+    let figures = figures(&page);
+    // Recording, fit, correlogram, seven marginals, contours, correlations, Nyquist, Bode, step.
+    assert_eq!(figures.len(), 15);
+    for trace in figures
+        .iter()
+        .flat_map(|figure| figure["data"].as_array().unwrap())
+    {
+        for axis in ["x", "y"] {
+            let values = trace[axis].as_array().unwrap();
+            assert!(!values.is_empty() && values.iter().all(|value| !value.is_null()));
+        }
+    }
+    assert!(page.len() < 2_000_000, "{}", page.len());
 }
 
 // A design has three figures, with the requested margin in both stability plots; a grid has five.

@@ -368,3 +368,58 @@ fn pages_that_cannot_be_written_are_refused() {
     let path = folder.write("file", b"");
     run(&["man", "-o", &path]).refused(crate::common::NOT_WRITTEN, &["file"]);
 }
+
+// Any recording has a plot of its end: twelve rows of dots, the input in blocks below, and the heading says what the
+// line is.
+#[test]
+fn a_recording_of_any_kind_is_plotted() {
+    let folder = Scratch::new();
+    let [noisy, _] = recordings(&folder);
+    let general = [
+        "identify",
+        &noisy,
+        "--estimator",
+        "general",
+        "--plot",
+        "always",
+    ];
+    let [text, _] = coloured(&general, None);
+    let text = stripped(&text);
+    assert!(
+        text.contains("in dots, the model without disturbances as a line"),
+        "{text}"
+    );
+    assert_eq!(rows_of_braille(&text), 12, "{text}");
+    let input = text
+        .lines()
+        .find(|line| line.trim_start().starts_with("input │"))
+        .unwrap();
+    assert!(input.contains('▁') && input.contains('█'), "{input}");
+}
+
+// Structure, part and hold that were asked for are those of the report.
+#[test]
+fn the_options_of_the_general_estimator_are_passed_on() {
+    let folder = Scratch::new();
+    let [noisy, _] = recordings(&folder);
+    let asked = [
+        "identify",
+        &noisy,
+        "--json",
+        "--structure",
+        "toiptd",
+        "--from",
+        "1",
+        "--to",
+        "5.5",
+        "--hold",
+        "interpolated",
+    ];
+    let report: serde_json::Value = serde_json::from_str(&run(&asked).stdout).unwrap();
+    let structures = report["alternatives"].as_array().unwrap();
+    assert_eq!(structures.len(), 1);
+    assert_eq!(report["process"]["structure"], "toiptd");
+    assert_eq!(report["record"]["hold"], "interpolated");
+    assert_eq!(report["record"]["start_s"], 1.0);
+    assert_eq!(report["record"]["end_s"], 5.5);
+}
