@@ -150,6 +150,22 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// White noise of this standard deviation (output unit), with the disturbances whose frequency (rad/s) is given.
+    #[must_use]
+    pub fn new(
+        sigma: f64,
+        w1_rad_per_s: Option<f64>,
+        w0_rad_per_s: Option<f64>,
+        wy_rad_per_s: Option<f64>,
+    ) -> Self {
+        Self {
+            sigma,
+            w1_rad_per_s,
+            w0_rad_per_s,
+            wy_rad_per_s,
+        }
+    }
+
     /// Kinds of noise beside the white one, as in JSON: `white`, or the names joined by `+`.
     #[must_use]
     pub fn kind(&self) -> String {

@@ -28,7 +28,9 @@ pub(crate) const BETA: f64 = -0.73;
     "      --sample-rate 2 --noise 1% --out tank.csv\n",
     "  onecycle simulate --k-over-t-body 40 --t-prop 0.05 --t-body 1 --tau 0.015 \\\n",
     "      --excitation chirp --band 0.5,10 --amplitude 0.2 --duration 20 --loop 0.5,0.1 \\\n",
-    "      --noise 1% --gust 5%,0.5 --sample-rate 250 --out roll.csv\n\n",
+    "      --noise 1% --gust 5%,0.5 --sample-rate 250 --out roll.csv\n",
+    "  onecycle simulate --process foptd --k 2 --t-body 30 --tau 5 --excitation prbs --pulse 15 \\\n",
+    "      --duration 600 --sample-rate 1 --noise 0.05 --expect\n\n",
     "Processes (K/T_body may replace K where there is a T_body; w0 is --natural-frequency):\n",
     "  soiptd                 K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))\n",
     "  toiptd                 K e^(-tau s) / (s (T_prop s + 1)(T_prop2 s + 1)(T_body s + 1))\n",
@@ -166,6 +168,12 @@ pub(crate) struct Simulate {
     /// Seed of noise, disturbances and jitter; the same seed gives the same recording
     #[arg(long, default_value_t = 0)]
     pub(crate) seed: u64,
+    /// Print the 90 % intervals to expect from this test, and write no recording
+    ///
+    /// The intervals are the Cramer-Rao bound of the test: those that an efficient estimator reaches on average. An error
+    /// of the model is not in them.
+    #[arg(long, conflicts_with = "out")]
+    pub(crate) expect: bool,
     /// File to write [default: the standard output]
     #[arg(long, short, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,

@@ -1,5 +1,6 @@
 //! `onecycle simulate`: simulate a test and write its recording.
 
+mod expect;
 mod head;
 mod plan;
 
@@ -12,12 +13,18 @@ use onecycle_plant::Noise;
 
 use crate::args::Simulate;
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print_whole, write_file};
+use crate::output::{Waiting, print, print_whole, write_file};
 use plan::{LARGEST, Plan};
 
 pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
     let waiting = Waiting::on("simulating");
     let plan = Plan::new(arguments)?;
+    if arguments.expect {
+        let text = expect::text(arguments, &plan)?;
+        drop(waiting);
+        print(&text)?;
+        return Ok(ExitCode::from(exit::DONE));
+    }
     let head = head::head(arguments, &plan);
     let comments: Vec<&str> = head.lines().collect();
     let mut end = Ok(());

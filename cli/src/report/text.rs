@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use onecycle::{
-    Controller, Design, Excitation, Identification, Identified, Interval, Model, Oscillation,
-    Parameter, Recording, StepMetrics,
+    Controller, Design, Estimate, Excitation, Identification, Identified, Interval, Model,
+    Oscillation, Parameter, Recording, StepMetrics,
 };
 use onecycle_identify::Reading;
 
@@ -157,15 +157,30 @@ fn describe_oscillation(text: &mut String, found: &Oscillation, units: &Units) {
     }
 }
 
-fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
-    let formula = identified.model.structure().transfer_function();
-    let _ = writeln!(text, "\n{}", headed(&format!("Process  {formula}")));
-    let _ = writeln!(text, "  {:<10}{:>12}   90 % interval", "", "estimate");
-    for (parameter, interval) in identified.estimate.iter() {
-        let (name, unit) = (
-            parameter.symbol(),
-            units.parameter(identified.model.structure(), parameter),
-        );
+/// Table of the parameters with the intervals to expect from a planned test.
+pub(crate) fn expected(model: &Model, estimate: &Estimate) -> String {
+    let mut text = String::new();
+    let formula = model.structure().transfer_function();
+    let _ = writeln!(text, "{}", headed(&format!("Process  {formula}")));
+    let columns = ("true", "expected 90 % interval");
+    describe_estimate(&mut text, estimate, columns, &Units::default());
+    text.push_str(
+        "\nThe intervals are those of an efficient estimator. An error of the model is not in them.\n",
+    );
+    text
+}
+
+/// A line for each parameter, under the titles of the two columns.
+fn describe_estimate(
+    text: &mut String,
+    estimate: &Estimate,
+    (value, range): (&str, &str),
+    units: &Units,
+) {
+    let _ = writeln!(text, "  {:<10}{value:>12}   {range}", "");
+    let structure = estimate.structure();
+    for (parameter, interval) in estimate.iter() {
+        let (name, unit) = (parameter.symbol(), units.parameter(structure, parameter));
         let Interval {
             estimate,
             low,
@@ -176,6 +191,13 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
         let line = format!("  {name:<10}{estimate:>12}   {range:<26} {unit}");
         let _ = writeln!(text, "{}", line.trim_end());
     }
+}
+
+fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
+    let formula = identified.model.structure().transfer_function();
+    let _ = writeln!(text, "\n{}", headed(&format!("Process  {formula}")));
+    let columns = ("estimate", "90 % interval");
+    describe_estimate(text, &identified.estimate, columns, units);
     if let Some(probability) = identified.joint_probability {
         let _ = writeln!(
             text,

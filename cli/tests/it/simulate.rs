@@ -501,3 +501,27 @@ fn an_unstable_loop_is_refused() {
     assert_eq!(std::fs::read(&path).unwrap(), b"kept");
     assert_eq!(folder.files(), ["out.csv"]);
 }
+
+// The Cramer-Rao bound holds the true values, and is half as wide in a test four times as long; without noise there is
+// no answer.
+#[test]
+fn the_intervals_of_a_planned_test() {
+    const TANK: &str = "simulate --process foptd --k 2 --t-body 30 --tau 5 --excitation prbs --pulse 15 \
+                        --sample-rate 1 --expect";
+    let plan = |more: &str| run(&[TANK, more].join(" ").split_whitespace().collect::<Vec<_>>());
+    let width = |duration: &str| {
+        let text = plan(&format!("--noise 0.05 --duration {duration}")).stdout;
+        let line = text.lines().find(|line| line.trim_start().starts_with("tau"));
+        let words = line.unwrap().split_whitespace();
+        let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
+        let [tau, low, high] = numbers[..] else {
+            panic!("{text}")
+        };
+        assert!(tau == 5.0 && low < 5.0 && high > 5.0, "{text}");
+        high - low
+    };
+    let ratio = width("300") / width("1200");
+    assert!((ratio - 2.0).abs() < 0.5, "{ratio}");
+    plan("--duration 300").misused(&["--expect", "--noise"]);
+    plan("--duration 300 --noise 0.05 --out x.csv").misused(&["--out"]);
+}
