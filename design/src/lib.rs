@@ -34,6 +34,7 @@
 //! Reference: A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, "Real-time system identification using deep learning for
 //! linear processes with application to unmanned aerial vehicles", IEEE Access 8 (2020): "the paper" throughout.
 
+mod analysis;
 pub mod bands;
 pub mod cascade;
 mod closed_loop;
@@ -44,8 +45,12 @@ pub mod soiptd_pd;
 pub mod tuning;
 
 pub use cascade::{Cascade, CascadeCost};
-pub use closed_loop::{ise, loop_response, margins, step_response};
-pub use controller::{Controller, Form};
+pub use closed_loop::{
+    LoadResponse, ise, load_iae, load_response, loop_response, margins, noise_amplification,
+    reference_iae, sensitivity, step_response,
+};
+pub use analysis::sensitivity::Sensitivity;
+pub use controller::{Autopilot, Controller, Execution, Form, Ideal, LowPass, Pid, Series};
 pub use model::{Linear, LinearError, Model, Parameter, Stages, Structure, Unit, state_space};
 pub use soiptd_pd::loop_response::LoopResponse;
 pub use soiptd_pd::margins::Margins;

@@ -1,0 +1,168 @@
+//! Shapes of each form: the controller up to its gain, from the variables of the search.
+//!
+//! | form | variables: logarithms of, in units of the process |
+//! |------|-----------|
+//! | P | - |
+//! | PI | `Ti` |
+//! | PD | `Td` |
+//! | PID | `Ti`, `Td` |
+//! | cascade with PI | integral time of the rate loop, `1/angle_p` |
+//! | cascade with PID | the same, and the derivative time of the rate loop |
+//!
+//! A filter time that is searched is the last variable.
+
+use crate::analysis::{Law, Process};
+use crate::cascade::Cascade;
+use crate::controller::{Autopilot, Controller, Execution, Form};
+
+/// How the filter time is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Filter {
+    /// This time, in the unit of the process.
+    Fixed(f64),
+    /// A variable of the search.
+    Searched,
+}
+
+/// Form and filter: what turns variables into laws.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Family {
+    pub form: Form,
+    pub filter: Filter,
+}
+
+/// Largest magnitude of a variable: factors of 10^6.
+pub(crate) const LARGEST_VARIABLE: f64 = 14.0;
+
+impl Family {
+    /// Number of variables that are times of the form.
+    pub(crate) fn times(&self) -> usize {
+        match self.form {
+            Form::P => 0,
+            Form::Pi | Form::Pd => 1,
+            Form::Pid | Form::CascadePi => 2,
+            Form::CascadePid => 3,
+        }
+    }
+
+    /// Number of variables.
+    pub(crate) fn variables(&self) -> usize {
+        self.times() + usize::from(self.filter == Filter::Searched)
+    }
+
+    fn tf(&self, z: &[f64]) -> f64 {
+        match self.filter {
+            Filter::Fixed(time) => time,
+            Filter::Searched => z.last().map_or(0.0, |ln| ln.exp()),
+        }
+    }
+
+    /// The law of a shape with gain 1: `kp = 1`, for a cascade `rate_p = 1`.
+    pub(crate) fn law(&self, process: &Process, z: &[f64]) -> Law {
+        let time = |i: usize| z[i].exp();
+        let tf = self.tf(z);
+        match self.form {
+            Form::P => Law::pid(process, [1.0, 0.0, 0.0], tf),
+            Form::Pi => Law::pid(process, [1.0, 1.0 / time(0), 0.0], tf),
+            Form::Pd => Law::pid(process, [1.0, 0.0, time(0)], tf),
+            Form::Pid => Law::pid(process, [1.0, 1.0 / time(0), time(1)], tf),
+            Form::CascadePi | Form::CascadePid => {
+                let (rate_i, angle_p) = (1.0 / time(0), 1.0 / time(1));
+                Law {
+                    kd: 1.0,
+                    kf: 0.0,
+                    k2: self.rate_d(z),
+                    b: angle_p / (angle_p + rate_i),
+                    ..Law::pid(process, [angle_p + rate_i, rate_i * angle_p, 0.0], tf)
+                }
+            }
+        }
+    }
+
+    /// Derivative time of the rate loop.
+    fn rate_d(&self, z: &[f64]) -> f64 {
+        if self.form == Form::CascadePid {
+            z[2].exp()
+        } else {
+            0.0
+        }
+    }
+
+    /// The rate loop of a cascade alone, with gain 1, as in acro mode: on the rate of the process. `None` for another form.
+    pub(crate) fn rate_law(&self, process: &Process, z: &[f64]) -> Option<Law> {
+        matches!(self.form, Form::CascadePi | Form::CascadePid).then(|| {
+            Law::pid(process, [1.0, 1.0 / z[0].exp(), self.rate_d(z)], self.tf(z))
+        })
+    }
+
+    /// The controller with gain `k` in the units of the user.
+    pub(crate) fn controller(
+        &self,
+        process: &Process,
+        (k, z): (f64, &[f64]),
+        b: f64,
+        execution: Execution,
+    ) -> Controller {
+        let law = Law {
+            b,
+            ..self.law(process, z).scaled(k)
+        };
+        let pid = law.controller(process).with_execution(execution);
+        if self.rate_law(process, z).is_none() {
+            return pid.into();
+        }
+        let t = process.unit_s;
+        let gains = Cascade {
+            angle_p: 1.0 / (z[1].exp() * t),
+            rate_p: pid.kd,
+            rate_i: 1.0 / (z[0].exp() * t),
+            rate_d: self.rate_d(z) * t,
+        };
+        (Autopilot::from(gains).with_filter_s(pid.filter_s))
+            .with_execution(execution)
+            .into()
+    }
+
+    /// Variables to start a search from.
+    pub(crate) fn starts(&self, process: &Process) -> Vec<Vec<f64>> {
+        let is_integrating = process.integrators() > 0;
+        // Dead time and the lags behind the two longest ones: the time scale of a fast loop.
+        let fast = process.half_rule_dead_time(2);
+        let mut integral_times = vec![0.25, 0.6, 1.2, 3.0];
+        if is_integrating {
+            integral_times.extend([6.0, 12.0]);
+        }
+        if fast > 0.0 && fast < 0.1 {
+            integral_times.extend([3.0 * fast, 8.0 * fast, 20.0 * fast, 60.0 * fast]);
+        }
+        let derivative_times = if fast > 0.0 && fast < 0.1 {
+            vec![0.1, 0.4, 1.0, 2.0 * fast, 8.0 * fast]
+        } else {
+            vec![0.1, 0.4, 1.0]
+        };
+        let mut starts: Vec<Vec<f64>> = match self.form {
+            Form::P => vec![vec![]],
+            Form::Pd => derivative_times.iter().map(|td: &f64| vec![td.ln()]).collect(),
+            Form::Pi => integral_times.iter().map(|ti| vec![ti.ln()]).collect(),
+            Form::Pid => (integral_times.iter())
+                .flat_map(|ti| [0.12, 0.3, 0.6].map(|share| vec![ti.ln(), (ti * share).ln()]))
+                .collect(),
+            Form::CascadePi => (integral_times.iter())
+                .map(|ti| vec![(0.5 * ti).ln(), (0.5 * ti).ln()])
+                .collect(),
+            Form::CascadePid => (integral_times.iter())
+                .map(|ti| vec![(0.5 * ti).ln(), (0.5 * ti).ln(), (0.06 * ti).ln()])
+                .collect(),
+        };
+        if self.filter == Filter::Searched {
+            for start in &mut starts {
+                let shortest = match self.form {
+                    Form::P => process.tau.max(0.1).ln(),
+                    _ => *start.last().unwrap_or(&0.0),
+                };
+                start.push(shortest - 2.0);
+            }
+        }
+        starts
+    }
+}
