@@ -30,10 +30,10 @@ pub(crate) mod noise;
 pub(crate) mod open_loop;
 mod polynomial;
 pub(crate) mod process;
-mod propagator;
-mod realisation;
+pub(crate) mod propagator;
+pub(crate) mod realisation;
 pub(crate) mod response;
-pub mod sensitivity;
+pub(crate) mod sensitivity;
 mod simulation;
 pub(crate) mod stability;
 

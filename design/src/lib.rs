@@ -42,6 +42,7 @@ mod controller;
 mod model;
 pub mod roots;
 pub mod soiptd_pd;
+mod synthesis;
 pub mod tuning;
 
 pub use cascade::{Cascade, CascadeCost};
@@ -56,7 +57,9 @@ pub use soiptd_pd::loop_response::LoopResponse;
 pub use soiptd_pd::margins::Margins;
 pub use soiptd_pd::step_metrics::StepMetrics;
 pub use soiptd_pd::step_response::{Sample, StepResponse, StepResponseError};
-pub use tuning::{Design, DesignError, Specification, design, design_over};
+pub use tuning::{
+    Design, DesignError, MeasurementNoise, Specification, Style, design, design_over,
+};
 
 // Compiles and runs the code of the README.
 #[cfg(doctest)]

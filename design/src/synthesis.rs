@@ -13,7 +13,16 @@
 //! | `simplex` | Nelder-Mead search |
 //! | `optimum` | starts, search, check of the result |
 //! | `polish` | optimum to six digits |
+//! | `setpoint` | set-point weight |
 //! | `robust` | optimum over draws |
 
 pub(crate) mod bands;
 pub(crate) mod limits;
+pub(crate) mod objective;
+pub(crate) mod optimum;
+pub(crate) mod setpoint;
+pub(crate) mod shape;
+pub(crate) mod simplex;
+
+#[cfg(test)]
+mod tests;

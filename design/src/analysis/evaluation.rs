@@ -87,11 +87,6 @@ impl Loop {
         }
     }
 
-    /// Whether the loop is asymptotically stable.
-    pub(crate) fn is_stable(&self) -> bool {
-        self.is_stable
-    }
-
     /// `None` if the loop is unstable.
     pub(crate) fn margins(&self) -> Option<Margins> {
         Some(self.curve()?.margins(self.process.unit_s))
@@ -114,6 +109,14 @@ impl Loop {
     pub(crate) fn reference_integrals(&self) -> Option<(f64, f64)> {
         let (iae, ise) = self.integrals(Excitation::Reference)?;
         Some((iae * self.process.unit_s, ise * self.process.unit_s))
+    }
+
+    /// ISE of a unit step of the reference (output unit^2 s), to a relative 1e-4.
+    pub(crate) fn reference_ise(&self) -> Option<f64> {
+        let omega = self.fastest(&self.curve()?);
+        let step = (STEP_RAD / omega, Ending::COARSE);
+        let found = integrals(&self.process, &self.law, Excitation::Reference, omega, step)?;
+        Some(found.ise * self.process.unit_s)
     }
 
     fn integrals(&self, excitation: Excitation) -> Option<(f64, f64)> {

@@ -160,11 +160,16 @@ impl Process {
         })
     }
 
+    /// Denominator of the process alone.
+    pub(crate) fn stage_denominator(&self) -> Polynomial {
+        (self.stages().iter()).fold(Polynomial::new(&[1.0]), |product, stage| {
+            product.times(&stage.denominator())
+        })
+    }
+
     /// Denominator of the process and of the filter of the measurement.
     pub(crate) fn denominator(&self) -> Polynomial {
-        let stages = (self.stages().iter()).fold(Polynomial::new(&[1.0]), |product, stage| {
-            product.times(&stage.denominator())
-        });
+        let stages = self.stage_denominator();
         match self.sensor {
             Some(filter) => stages.times(&Polynomial::new(&filter.denominator())),
             None => stages,

@@ -3,10 +3,17 @@
 //! | symbol | meaning |
 //! |--------|---------|
 //! | IAE | integral of the absolute error; zero crossings of the interpolating polynomial split it |
-//! | IE | integral of the error; after a step of the load it is `1/ki` |
+//! | IE | integral of the error, known in advance |
 //! | ISE | integral of the squared error |
 //!
-//! A response ends when the error has stayed small, or when it has one sign and the rest of a known IE is small.
+//! With an integral term `u` settles at `1/P(0)` after a step of the reference and the error of a step of the load has the
+//! IE `1/ki`. So the reference has `ki (IE + T) = 1/P(0) + kp (1 - b)`, where `T` is the sum of the filter times, which
+//! delay the measurement. Without integral term, on an integrating process, `kp (IE + T) = kd + lim 1/(s P)`.
+//!
+//! A response ends when the error has stayed small, or when the rest of the IE is that of an exponential with the present
+//! slope: then only the slowest mode is left, and the rest is known.
+
+use crate::controller::LowPass;
 
 use super::law::Law;
 use super::process::Process;
@@ -23,10 +30,8 @@ pub(crate) const STEP_RAD: f64 = 0.7;
 pub(crate) struct Ending {
     /// The error has stayed below this share of its peak for six radians of the frequency of interest.
     pub small: f64,
-    /// The rest of a known IE is below this share of the IAE, and the error has had one sign for twelve radians, ...
+    /// The error has had one sign for twelve radians, and the rest of the IE is that of an exponential within this share.
     pub rest: f64,
-    /// ... and is below this share of its peak.
-    pub low: f64,
     /// Most steps.
     pub steps: usize,
 }
@@ -35,15 +40,13 @@ impl Ending {
     /// For a search: relative error about 1e-5.
     pub(crate) const COARSE: Self = Self {
         small: 1e-8,
-        rest: 2e-3,
-        low: 1e-3,
-        steps: 30_000,
+        rest: 3e-3,
+        steps: 20_000,
     };
     /// Relative error about 1e-9.
     pub(crate) const FINE: Self = Self {
         small: 1e-11,
-        rest: 1e-9,
-        low: 1e-8,
+        rest: 1e-7,
         steps: 2_000_000,
     };
 }
@@ -67,14 +70,14 @@ pub(crate) fn integrals(
     omega: f64,
     (longest, ending): (f64, Ending),
 ) -> Option<Integrals> {
-    let mut found = Accumulator::new(law, excitation, ending);
+    let mut found = Accumulator::new(excitation, known_integral(process, law, excitation), ending);
     run(process, law, excitation, longest, |simulation_h, start, out| {
         found.add(simulation_h, start, omega, process.tau, out)
     })?;
     let iae = found.iae + found.added;
     (iae.is_finite() && found.ended).then_some(Integrals {
         iae,
-        ise: found.ise,
+        ise: found.ise + found.added_square,
         peak_output: found.peak_output,
         peak_input: found.peak_input,
     })
@@ -107,6 +110,23 @@ pub(crate) fn run(
     }
 }
 
+/// IE of a response that settles. `None` if the error stays.
+fn known_integral(process: &Process, law: &Law, excitation: Excitation) -> Option<f64> {
+    let denominator = process.stage_denominator();
+    let of_power = |i: usize| denominator.coefficients().get(i).copied().unwrap_or(0.0);
+    let lags = law.tf + process.sensor.map_or(0.0, LowPass::time_s);
+    match excitation {
+        Excitation::Load => (law.ki != 0.0).then(|| 1.0 / law.ki),
+        Excitation::Reference if law.ki != 0.0 => {
+            Some((of_power(0) + law.kp * (1.0 - law.b)) / law.ki - lags)
+        }
+        Excitation::Reference if of_power(0) == 0.0 && law.b == 1.0 => {
+            Some((of_power(1) + law.kd + law.kf) / law.kp - lags)
+        }
+        Excitation::Reference => None,
+    }
+}
+
 struct Accumulator {
     excitation: Excitation,
     ending: Ending,
@@ -115,8 +135,9 @@ struct Accumulator {
     iae: f64,
     ie: f64,
     ise: f64,
-    /// The rest of the IE at the end.
+    /// The rest of the IAE and of the ISE at the end.
     added: f64,
+    added_square: f64,
     peak: f64,
     peak_output: f64,
     peak_input: f64,
@@ -127,16 +148,16 @@ struct Accumulator {
 }
 
 impl Accumulator {
-    fn new(law: &Law, excitation: Excitation, ending: Ending) -> Self {
-        let is_known = excitation == Excitation::Load && law.ki != 0.0;
+    fn new(excitation: Excitation, total: Option<f64>, ending: Ending) -> Self {
         Self {
             excitation,
             ending,
-            total: is_known.then(|| 1.0 / law.ki),
+            total,
             iae: 0.0,
             ie: 0.0,
             ise: 0.0,
             added: 0.0,
+            added_square: 0.0,
             peak: 0.0,
             peak_output: 0.0,
             peak_input: 0.0,
@@ -152,7 +173,7 @@ impl Accumulator {
     fn add(&mut self, h: f64, start: f64, omega: f64, tau: f64, out: &[f64; 2 * NODES]) -> bool {
         if self.steps == 0 {
             // Until the first node the error of the reference is 1.
-            (self.iae, self.ise) = (start, start);
+            (self.iae, self.ie, self.ise) = (start, start, start);
         }
         self.steps += 1;
         let mut error = [0.0; NODES];
@@ -176,11 +197,15 @@ impl Accumulator {
         self.quiet = if top <= self.ending.small * self.peak { self.quiet + 1 } else { 0 };
         if let Some(total) = self.total
             && self.one_sign as f64 > steps_of(12.0)
-            && top < self.ending.low * self.peak
-            && (total - self.ie).abs() < self.ending.rest * self.iae
         {
-            self.added = (total - self.ie).abs();
-            self.ended = true;
+            let (first, last) = (error[0], error[NODES - 1]);
+            let time = -h / (last / first).ln();
+            let rest = total - self.ie;
+            if time > 0.0 && (last * time - rest).abs() <= self.ending.rest * rest.abs() {
+                self.added = rest.abs();
+                self.added_square = 0.5 * last * rest;
+                self.ended = true;
+            }
         }
         self.ended |= self.quiet as f64 >= steps_of(6.0);
         !self.ended && self.steps < self.ending.steps && top.is_finite() && top < 1e12

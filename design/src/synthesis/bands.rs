@@ -1,17 +1,12 @@
 //! The gains that the limits allow over all frequencies.
 //!
-//! A *band* is a run of frequencies with forbidden gains. How the Nyquist plot enters and leaves it says on which side of
-//! the forbidden gains the loop is stable:
+//! A *band* is a run of frequencies with forbidden gains, from `low` to `high`. Gains below `low` keep the part of the Nyquist
+//! plot in the band inside -1, gains above `high` outside of it. A band turns the plot about -1 if it enters above the
+//! negative real axis (`Im l < 0`, phase above -180 deg) and leaves below it (-1), or the other way round (+1).
 //!
-//! | band | allowed |
-//! |------|---------|
-//! | left downwards (`Im l > 0`) | gains below |
-//! | contains the first frequency, while `|L|` grows without limit there (two integrators) | gains above |
-//! | left upwards, entered from below | gains above |
-//! | left upwards, entered from above: a dip | gains below, or above |
-//!
-//! Small gains are stable for a stable process and one integrator, and no allowed gain meets -1. So no count of
-//! encirclements is needed.
+//! So a gain is allowed if it lies in no band, and if the turns of the bands that it exceeds sum to zero. With two
+//! integrators the first band begins at infinite gain: it turns if it leaves below the axis. Three integrators start with
+//! a turn of -1. Nothing else needs to be counted for a stable process.
 
 use num_complex::Complex64;
 
@@ -83,20 +78,7 @@ impl Grid {
     }
 }
 
-/// A band in progress.
-#[derive(Default)]
-struct Band {
-    from_first: bool,
-    from_above: bool,
-    /// Local minima of the lower end of the forbidden gains, and local maxima of the upper end: frequency, gain, and
-    /// distance to the neighbours.
-    lows: Vec<Extremum>,
-    highs: Vec<Extremum>,
-    /// The last two intervals.
-    recent: [Option<(f64, Interval)>; 2],
-    last_imaginary: f64,
-}
-
+/// Local extremum of an end of the forbidden gains.
 #[derive(Clone, Copy, Debug)]
 struct Extremum {
     omega: f64,
@@ -105,7 +87,33 @@ struct Extremum {
     between: [f64; 2],
 }
 
+struct Band {
+    enters_above: bool,
+    from_first: bool,
+    /// Local minima of the lower end and local maxima of the upper end.
+    lows: Vec<Extremum>,
+    highs: Vec<Extremum>,
+    low: f64,
+    high: f64,
+    /// The last two frequencies with their intervals.
+    recent: [Option<(f64, Interval)>; 2],
+    last_imaginary: f64,
+}
+
 impl Band {
+    fn new(l: Complex64, from_first: bool) -> Self {
+        Self {
+            enters_above: l.im < 0.0,
+            from_first,
+            lows: Vec::new(),
+            highs: Vec::new(),
+            low: f64::INFINITY,
+            high: 0.0,
+            recent: [None; 2],
+            last_imaginary: l.im,
+        }
+    }
+
     fn push(&mut self, omega: f64, interval: Interval) {
         let [before, here] = self.recent;
         if let Some((middle, (low, high))) = here {
@@ -120,6 +128,8 @@ impl Band {
             if high >= highs_before && high >= interval.1 {
                 self.highs.push(Extremum { omega: middle, gain: high, between });
             }
+            self.low = self.low.min(low);
+            self.high = self.high.max(high);
         }
         self.recent = [here, Some((omega, interval))];
     }
@@ -127,6 +137,16 @@ impl Band {
     /// Ends the band before `omega`.
     fn finish(&mut self, omega: f64) {
         self.push(omega, (f64::INFINITY, 0.0));
+        if self.from_first {
+            // It extends to frequency zero, where every gain exceeds it.
+            self.low = 0.0;
+        }
+    }
+
+    /// Turns about -1 of a plot that exceeds the band.
+    fn turns(&self) -> i32 {
+        let leaves_above = self.last_imaginary < 0.0;
+        i32::from(leaves_above) - i32::from(self.enters_above || self.from_first)
     }
 }
 
@@ -135,9 +155,8 @@ struct Scan<'a> {
     limits: &'a Limits,
     open_loop: &'a OpenLoop,
     band: Option<Band>,
-    upper: Vec<Extremum>,
-    lower: Vec<Extremum>,
-    dips: Vec<[Extremum; 2]>,
+    bands: Vec<Band>,
+    /// Least gain below a band that turns downwards.
     least: f64,
     is_first: bool,
 }
@@ -145,17 +164,11 @@ struct Scan<'a> {
 impl Scan<'_> {
     #[inline]
     fn add(&mut self, before: f64, omega: f64, l: Complex64) {
-        let interval = self.limits.forbidden(omega, l);
-        match (interval, &mut self.band) {
+        match (self.limits.forbidden(omega, l), &mut self.band) {
             (None, None) => {}
             (Some(interval), band) => {
                 let from_first = self.is_first;
-                let band = band.get_or_insert_with(|| Band {
-                    from_first,
-                    from_above: l.im < 0.0 && !from_first,
-                    last_imaginary: l.im,
-                    ..Band::default()
-                });
+                let band = band.get_or_insert_with(|| Band::new(l, from_first));
                 if self.limits.gain_margin > 1.0 && (band.last_imaginary < 0.0) != (l.im < 0.0) {
                     let crossing = root(|omega| self.open_loop.at(omega).im, before, omega, 0.0);
                     let margin = self.limits.at_phase_crossing(self.open_loop.at(crossing));
@@ -164,30 +177,62 @@ impl Scan<'_> {
                 band.push(omega, interval);
                 band.last_imaginary = l.im;
             }
-            (None, Some(_)) => self.leave(omega),
+            (None, Some(_)) => {
+                if let Some(mut band) = self.band.take() {
+                    band.finish(omega);
+                    if band.turns() < 0 && !band.from_first {
+                        self.least = self.least.min(band.low);
+                    }
+                    self.bands.push(band);
+                }
+            }
         }
         self.is_first = false;
     }
 
-    fn leave(&mut self, omega: f64) {
-        let Some(mut band) = self.band.take() else {
-            return;
-        };
-        band.finish(omega);
-        if band.from_first {
-            self.lower.append(&mut band.highs);
-        } else if band.last_imaginary > 0.0 {
-            for extremum in band.lows {
-                self.least = self.least.min(extremum.gain);
-                self.upper.push(extremum);
+    /// Turns at frequency zero, by the integrators of the loop.
+    fn first_turns(&self) -> i32 {
+        let zeros = |c: &[f64]| c.iter().take_while(|c| **c == 0.0).count();
+        let integrators = zeros(self.open_loop.denominator.coefficients());
+        -i32::from(integrators > 2 + zeros(self.open_loop.numerator.coefficients()))
+    }
+
+    /// Whether a gain just below the band `at` is allowed.
+    fn is_allowed(&self, at: &Band) -> bool {
+        let mut turns = self.first_turns();
+        for band in &self.bands {
+            if at.low > band.low && at.low < band.high {
+                return false;
             }
-        } else if band.from_above {
-            let low = band.lows.iter().copied().min_by(|a, b| a.gain.total_cmp(&b.gain));
-            let high = band.highs.iter().copied().max_by(|a, b| a.gain.total_cmp(&b.gain));
-            self.dips.extend(low.zip(high).map(|(low, high)| [low, high]));
-        } else {
-            self.lower.append(&mut band.highs);
+            if at.low >= band.high {
+                turns += band.turns();
+            }
         }
+        turns == 0
+    }
+
+    /// The ends of the allowed gains on the grid: the highest stable ones, or by how much they miss each other.
+    fn ends(&self) -> Option<[f64; 2]> {
+        let tops = self.bands.iter().filter(|band| band.low > 0.0);
+        let high = (tops.clone().filter(|band| self.is_allowed(band)))
+            .map(|band| band.low)
+            .fold(0.0, f64::max);
+        if high > 0.0 {
+            return Some([self.highest_below(high), high]);
+        }
+        // The bands that turn upwards ask for more gain than those that turn downwards allow.
+        let high = (tops.clone().filter(|band| band.turns() < 0))
+            .map(|band| band.low)
+            .fold(f64::INFINITY, f64::min);
+        let is_lower = |band: &&Band| band.turns() > 0 || band.from_first;
+        let low = (self.bands.iter().filter(is_lower)).map(|band| band.high).fold(0.0, f64::max);
+        (low > high).then_some([low, high])
+    }
+
+    /// Highest end of the bands below a gain.
+    fn highest_below(&self, gain: f64) -> f64 {
+        let ends = self.bands.iter().map(|band| band.high);
+        ends.filter(|high| *high <= gain).fold(0.0, f64::max)
     }
 
     /// Refines an extremum of the lower (`true`) or upper end of the forbidden gains.
@@ -206,46 +251,25 @@ impl Scan<'_> {
         if is_better { (ln.exp(), gain) } else { (extremum.omega, extremum.gain) }
     }
 
-    fn refined(&self, extrema: &[Extremum], is_low: bool) -> Vec<(f64, f64)> {
-        let gains = extrema.iter().map(|extremum| extremum.gain);
-        let best = if is_low {
-            gains.fold(f64::INFINITY, f64::min)
-        } else {
-            gains.fold(0.0, f64::max)
-        };
-        let is_near = |extremum: &&Extremum| {
-            if is_low {
-                extremum.gain <= WORTH_REFINING * best
-            } else {
-                extremum.gain * WORTH_REFINING >= best
-            }
-        };
-        (extrema.iter().filter(is_near)).map(|extremum| self.refine(extremum, is_low)).collect()
-    }
-
-    /// `None` if no frequency limits the gain from above.
+    /// `None` if no frequency limits the gain from above, or no gain is stable.
     fn allowed(&self) -> Option<Allowed> {
-        let mut upper = self.refined(&self.upper, true);
-        let mut lower = self.refined(&self.lower, false);
-        let (mut omega, mut high) = *upper.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-        // From the highest dip down: a gain inside a dip goes below it, a gain above a dip stays above it.
-        let mut dips = self.dips.clone();
-        dips.sort_by(|a, b| b[1].gain.total_cmp(&a[1].gain));
-        for [low_end, high_end] in &dips {
-            let below = self.refine(low_end, true);
-            let above = self.refine(high_end, false);
-            if above.1 <= high {
-                lower.push(above);
-            } else if below.1 < high {
-                (omega, high) = below;
-                upper = vec![below];
-            }
-        }
-        let low = lower.iter().map(|(_, gain)| *gain).fold(0.0, f64::max);
+        let [low, high] = self.ends()?;
+        let rounding = 1e-12;
+        let upper: Vec<(f64, f64)> = (self.bands.iter())
+            .flat_map(|band| &band.lows)
+            .filter(|e| e.gain >= high * (1.0 - rounding) && e.gain <= WORTH_REFINING * high)
+            .map(|extremum| self.refine(extremum, true))
+            .collect();
+        let lower: Vec<(f64, f64)> = (self.bands.iter())
+            .flat_map(|band| &band.highs)
+            .filter(|e| e.gain <= low * (1.0 + rounding) && e.gain * WORTH_REFINING >= low)
+            .map(|extremum| self.refine(extremum, false))
+            .collect();
+        let (omega, high) = *upper.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
         Some(Allowed {
             high,
             omega,
-            low,
+            low: lower.iter().map(|(_, gain)| *gain).fold(low, f64::max),
             upper,
             lower,
         })
@@ -253,7 +277,7 @@ impl Scan<'_> {
 }
 
 /// Gains of the shape in `open_loop` (its gain is 1) that `limits` allow. `path` is the feedback path of the shape, `grid`
-/// the process. `None` if the gain has no upper limit, or the grid none.
+/// the process. `None` if the gain has no upper limit, or no gain is stable, or the grid has no end.
 pub(crate) fn allowed(
     grid: &mut Grid,
     open_loop: &OpenLoop,
@@ -265,9 +289,7 @@ pub(crate) fn allowed(
         limits,
         open_loop,
         band: None,
-        upper: Vec::new(),
-        lower: Vec::new(),
-        dips: Vec::new(),
+        bands: Vec::new(),
         least: f64::INFINITY,
         is_first: true,
     };

@@ -20,8 +20,8 @@ use crate::controller::{Autopilot, Controller, Execution, Form};
 pub(crate) enum Filter {
     /// This time, in the unit of the process.
     Fixed(f64),
-    /// A variable of the search.
-    Searched,
+    /// This time, in the unit of the process, plus a variable of the search.
+    Searched(f64),
 }
 
 /// Form and filter: what turns variables into laws.
@@ -31,29 +31,20 @@ pub(crate) struct Family {
     pub filter: Filter,
 }
 
-/// Largest magnitude of a variable: factors of 10^6.
-pub(crate) const LARGEST_VARIABLE: f64 = 14.0;
+/// Range of the variables: times from 1e-6 to 5000 units. Longer ones would act below the grid of frequencies.
+const LEAST_VARIABLE: f64 = -14.0;
+const LARGEST_VARIABLE: f64 = 8.5;
+
+/// Whether a shape is in the range of the search.
+pub(crate) fn is_in_range(z: &[f64]) -> bool {
+    z.iter().all(|variable| (LEAST_VARIABLE..=LARGEST_VARIABLE).contains(variable))
+}
 
 impl Family {
-    /// Number of variables that are times of the form.
-    pub(crate) fn times(&self) -> usize {
-        match self.form {
-            Form::P => 0,
-            Form::Pi | Form::Pd => 1,
-            Form::Pid | Form::CascadePi => 2,
-            Form::CascadePid => 3,
-        }
-    }
-
-    /// Number of variables.
-    pub(crate) fn variables(&self) -> usize {
-        self.times() + usize::from(self.filter == Filter::Searched)
-    }
-
     fn tf(&self, z: &[f64]) -> f64 {
         match self.filter {
             Filter::Fixed(time) => time,
-            Filter::Searched => z.last().map_or(0.0, |ln| ln.exp()),
+            Filter::Searched(least) => least + z.last().map_or(0.0, |ln| ln.exp()),
         }
     }
 
@@ -132,14 +123,23 @@ impl Family {
         if is_integrating {
             integral_times.extend([6.0, 12.0]);
         }
+        let is_double = process.integrators() > 1;
+        if is_double {
+            integral_times.extend([30.0, 100.0, 300.0]);
+        }
         if fast > 0.0 && fast < 0.1 {
             integral_times.extend([3.0 * fast, 8.0 * fast, 20.0 * fast, 60.0 * fast]);
         }
-        let derivative_times = if fast > 0.0 && fast < 0.1 {
-            vec![0.1, 0.4, 1.0, 2.0 * fast, 8.0 * fast]
-        } else {
-            vec![0.1, 0.4, 1.0]
-        };
+        let mut derivative_times = vec![0.1, 0.4, 1.0];
+        if is_integrating {
+            derivative_times.push(3.0);
+        }
+        if is_double {
+            derivative_times.extend([10.0, 30.0]);
+        }
+        if fast > 0.0 && fast < 0.1 {
+            derivative_times.extend([2.0 * fast, 8.0 * fast]);
+        }
         let mut starts: Vec<Vec<f64>> = match self.form {
             Form::P => vec![vec![]],
             Form::Pd => derivative_times.iter().map(|td: &f64| vec![td.ln()]).collect(),
@@ -154,7 +154,7 @@ impl Family {
                 .map(|ti| vec![(0.5 * ti).ln(), (0.5 * ti).ln(), (0.06 * ti).ln()])
                 .collect(),
         };
-        if self.filter == Filter::Searched {
+        if let Filter::Searched(_) = self.filter {
             for start in &mut starts {
                 let shortest = match self.form {
                     Form::P => process.tau.max(0.1).ln(),

@@ -6,6 +6,7 @@
 )]
 
 mod cost;
+mod designs;
 mod properties;
 mod step_response;
 mod values;
