@@ -58,7 +58,7 @@ pub use soiptd_pd::margins::Margins;
 pub use soiptd_pd::step_metrics::StepMetrics;
 pub use soiptd_pd::step_response::{Sample, StepResponse, StepResponseError};
 pub use tuning::{
-    Design, DesignError, MeasurementNoise, Specification, Style, design, design_over,
+    Design, DesignError, MeasurementNoise, Robustness, Specification, Style, design, design_over,
 };
 
 // Compiles and runs the code of the README.

@@ -146,6 +146,21 @@ impl Process {
         in_range.then_some(built)
     }
 
+    /// The same process in another unit of time.
+    pub(crate) fn in_unit(&self, unit_s: f64) -> Self {
+        let ratio = unit_s / self.unit_s;
+        let powers: i32 = self.stages().iter().map(|stage| stage.powers_of_time()).sum();
+        Self {
+            stages: self.stages.map(|stage| stage.in_unit(ratio)),
+            tau: self.tau / ratio,
+            sensor: self.sensor.map(|filter| filter.in_unit(ratio)),
+            derivative_filter: self.derivative_filter.map(|filter| filter.in_unit(ratio)),
+            unit_s,
+            gain: self.gain * ratio.powi(powers),
+            ..*self
+        }
+    }
+
     /// The stages in the order that the input passes them.
     pub(crate) fn stages(&self) -> &[Stage] {
         &self.stages[..self.count]

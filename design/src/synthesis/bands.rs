@@ -23,7 +23,10 @@ const WORTH_REFINING: f64 = 1.5;
 const TOLERANCE: f64 = 1e-8;
 
 /// Lowest frequency, per unit of time of the process.
-const FIRST: f64 = 1e-5;
+const FIRST: f64 = 1e-6;
+
+/// A loop whose phase has not fallen below -pi at this frequency, per unit of time and corner, has no limit.
+const LAST: f64 = 1e6;
 
 /// Most frequencies of a grid. A loop that needs more has a dead time of thousands of its other times.
 const MOST_FREQUENCIES: usize = 100_000;
@@ -41,6 +44,15 @@ pub(crate) struct Allowed {
     pub upper: Vec<(f64, f64)>,
     /// The same of the lower limits.
     pub lower: Vec<(f64, f64)>,
+}
+
+/// Why a shape has no largest gain.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum NoGain {
+    /// Every large gain is allowed.
+    Unbounded,
+    /// No gain is stable.
+    Unstable,
 }
 
 /// Frequencies of a process, and the process at each. Grows as needed.
@@ -64,6 +76,14 @@ impl Grid {
             resonance: process.resonance(),
             plant,
         }
+    }
+
+    /// Index of the last point at or below a frequency.
+    fn first_from(&mut self, omega: f64) -> usize {
+        while self.points.last().is_none_or(|point| point.0 <= omega) {
+            self.point(self.points.len());
+        }
+        self.points.partition_point(|point| point.0 <= omega).saturating_sub(1)
     }
 
     #[inline]
@@ -212,13 +232,13 @@ impl Scan<'_> {
     }
 
     /// The ends of the allowed gains on the grid: the highest stable ones, or by how much they miss each other.
-    fn ends(&self) -> Option<[f64; 2]> {
+    fn ends(&self) -> Result<[f64; 2], NoGain> {
         let tops = self.bands.iter().filter(|band| band.low > 0.0);
         let high = (tops.clone().filter(|band| self.is_allowed(band)))
             .map(|band| band.low)
             .fold(0.0, f64::max);
         if high > 0.0 {
-            return Some([self.highest_below(high), high]);
+            return Ok([self.highest_below(high), high]);
         }
         // The bands that turn upwards ask for more gain than those that turn downwards allow.
         let high = (tops.clone().filter(|band| band.turns() < 0))
@@ -226,7 +246,7 @@ impl Scan<'_> {
             .fold(f64::INFINITY, f64::min);
         let is_lower = |band: &&Band| band.turns() > 0 || band.from_first;
         let low = (self.bands.iter().filter(is_lower)).map(|band| band.high).fold(0.0, f64::max);
-        (low > high).then_some([low, high])
+        if low > high { Ok([low, high]) } else { Err(NoGain::Unstable) }
     }
 
     /// Highest end of the bands below a gain.
@@ -251,8 +271,7 @@ impl Scan<'_> {
         if is_better { (ln.exp(), gain) } else { (extremum.omega, extremum.gain) }
     }
 
-    /// `None` if no frequency limits the gain from above, or no gain is stable.
-    fn allowed(&self) -> Option<Allowed> {
+    fn allowed(&self) -> Result<Allowed, NoGain> {
         let [low, high] = self.ends()?;
         let rounding = 1e-12;
         let upper: Vec<(f64, f64)> = (self.bands.iter())
@@ -265,8 +284,9 @@ impl Scan<'_> {
             .filter(|e| e.gain <= low * (1.0 + rounding) && e.gain * WORTH_REFINING >= low)
             .map(|extremum| self.refine(extremum, false))
             .collect();
-        let (omega, high) = *upper.iter().min_by(|a, b| a.1.total_cmp(&b.1))?;
-        Some(Allowed {
+        let least = upper.iter().min_by(|a, b| a.1.total_cmp(&b.1));
+        let (omega, high) = *least.ok_or(NoGain::Unstable)?;
+        Ok(Allowed {
             high,
             omega,
             low: lower.iter().map(|(_, gain)| *gain).fold(low, f64::max),
@@ -277,14 +297,14 @@ impl Scan<'_> {
 }
 
 /// Gains of the shape in `open_loop` (its gain is 1) that `limits` allow. `path` is the feedback path of the shape, `grid`
-/// the process. `None` if the gain has no upper limit, or no gain is stable, or the grid has no end.
+/// the process. The scan starts at the first of `ends`, and `|L|` never rises above the second.
 pub(crate) fn allowed(
     grid: &mut Grid,
     open_loop: &OpenLoop,
     path: impl Fn(f64) -> Complex64,
     limits: &Limits,
-    corner: f64,
-) -> Option<Allowed> {
+    [first, corner]: [f64; 2],
+) -> Result<Allowed, NoGain> {
     let mut scan = Scan {
         limits,
         open_loop,
@@ -294,8 +314,9 @@ pub(crate) fn allowed(
         is_first: true,
     };
     let share = (1.0 - 1.0 / limits.ms.min(limits.mt)).min(1.0 / limits.gain_margin);
-    let mut before = FIRST;
-    for i in 0..MOST_FREQUENCIES {
+    let start = grid.first_from(first);
+    let mut before = first;
+    for i in start..start + MOST_FREQUENCIES {
         let (omega, process) = grid.point(i);
         let l = process * path(omega);
         scan.add(before, omega, l);
@@ -308,9 +329,9 @@ pub(crate) fn allowed(
             break;
         }
         // A loop whose phase stays above -pi has no limit.
-        if scan.least == f64::INFINITY && omega > 1e4 * corner && scan.band.is_none() {
+        if scan.least == f64::INFINITY && omega > LAST * (1.0 + corner) && scan.band.is_none() {
             break;
         }
     }
-    None
+    Err(NoGain::Unbounded)
 }

@@ -8,7 +8,7 @@ use crate::analysis::process::Process;
 use crate::analysis::response::{Ending, Integrals, STEP_RAD, integrals};
 use crate::analysis::{Law, OpenLoop};
 
-use super::bands::{Allowed, Grid, allowed};
+use super::bands::{Allowed, Grid, NoGain, allowed};
 use super::limits::Limits;
 use super::shape::{Family, is_in_range};
 
@@ -25,6 +25,9 @@ const GAIN_TOLERANCE: f64 = 1e-9;
 
 /// Most evaluations of noise or peak for one gain.
 const MOST_EVALUATIONS: usize = 12;
+
+/// Below this share of the inverse of its longest time, a loop is its integrators.
+const ASYMPTOTIC: f64 = 0.01;
 
 /// Limit of the noise at the actuator, in the units of the process.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,6 +62,8 @@ pub(crate) struct Gain {
 /// A problem with the grids of its process.
 pub(crate) struct Objective {
     pub problem: Problem,
+    /// Whether an infeasible shape has no cost instead of a penalty.
+    pub is_strict: bool,
     grid: Grid,
     /// Rate of the output, for the rate loop of a cascade.
     rate: Option<(Process, Grid)>,
@@ -80,20 +85,57 @@ impl Problem {
         integrals(&self.process, law, self.excitation(), omega, step)
     }
 
+    /// The gain `k` of a shape, or a smaller one that keeps the limits of noise and input. `None` if no simulation ends.
+    pub(crate) fn limited(&self, z: &[f64], k: f64, omega: f64) -> Option<f64> {
+        let process = &self.process;
+        let law = self.family.law(process, z);
+        let mut k = k;
+        if let Some(limit) = self.noise {
+            let excess = |ln: f64| {
+                let found = noise::amplification(process, &law.scaled(ln.exp()), limit.period);
+                Some((found / limit.amplification).ln())
+            };
+            k = limited(k, excess)?;
+        }
+        if let Some(limit) = self.input_peak {
+            let b = if self.family.form.has_integral() { 0.0 } else { 1.0 };
+            let step = (STEP_RAD / omega, Ending::COARSE);
+            let excess = |ln: f64| {
+                let law = Law { b: b * law.b, ..law.scaled(ln.exp()) };
+                let found = integrals(process, &law, Excitation::Reference, omega, step)?;
+                Some((found.peak_input / limit).ln())
+            };
+            k = limited(k, excess)?;
+        }
+        Some(k)
+    }
+
     /// Lower bound of the logarithm of the cost of a shape with gain `k`: the IAE is at least `1/ki`.
     pub(crate) fn least_cost(&self, z: &[f64], k: f64) -> f64 {
         let ki = self.family.law(&self.process, z).ki * k;
         if ki > 0.0 { -ki.ln() } else { -NO_COST }
     }
 
-    /// Frequency above which the magnitude of a loop with this law falls.
-    pub(crate) fn corner(&self, law: &Law) -> f64 {
-        let filter = if law.tf > 0.0 { 2.0 / law.tf } else { 0.0 };
-        let derivative = match law.derivative_filter {
-            Some(low_pass) if law.uses_derivative_filter() => 2.0 / low_pass.time_s(),
-            _ => 0.0,
+    /// Frequencies between which a loop with this law is scanned. Below the first one the loop is its integrators; above the
+    /// second one its magnitude never rises: the process falls at least as fast there as the controller can rise, and a
+    /// resonance is passed.
+    pub(crate) fn ends(&self, law: &Law) -> [f64; 2] {
+        let rise = if law.k2 != 0.0 {
+            2
+        } else {
+            usize::from(law.kd != 0.0 || law.kf != 0.0)
         };
-        2.0 * self.process.highest_corner().max(filter).max(derivative)
+        let times = self.process.times();
+        let corner = match rise.checked_sub(1) {
+            Some(index) => times.get(index).map_or(0.0, |time| 1.0 / time),
+            None => 0.0,
+        };
+        let resonance = self.process.resonance().map_or(0.0, |(peak, _)| peak);
+        // The longest time of the controller: of the integral, or between derivative and proportional term.
+        let slope = law.kd + law.kf;
+        let longest = [law.kp / law.ki, slope / law.kp, (law.k2 / law.kp).sqrt(), law.tf, 1.0];
+        let longest = longest.into_iter().filter(|time| time.is_finite()).fold(1.0, f64::max);
+        [ASYMPTOTIC / longest, 2.0 * corner.max(resonance)]
     }
 }
 
@@ -108,45 +150,48 @@ impl Objective {
         let grid = |process: &Process| Grid::new(process, plant(process), fraction);
         Self {
             problem,
+            is_strict: false,
             grid: grid(&problem.process),
             rate: problem.process.rate().map(|rate| (rate, grid(&rate))),
         }
     }
 
-    /// Gains that the sensitivity and the margins allow a shape, of the loop and of the rate loop of a cascade. `None` if
-    /// there is no upper limit.
-    pub(crate) fn allowed(&mut self, z: &[f64]) -> Option<(Allowed, Option<Allowed>)> {
+    /// Gains that the sensitivity and the margins allow a shape, of the loop and of the rate loop of a cascade.
+    pub(crate) fn allowed(&mut self, z: &[f64]) -> Result<(Allowed, Option<Allowed>), NoGain> {
         let problem = self.problem;
         let Problem { process, family, limits, .. } = &problem;
         let law = family.law(process, z);
         let whole = self.on(&law)?;
         let Some((rate, rate_grid)) = &mut self.rate else {
-            return Some((whole, None));
+            return Ok((whole, None));
         };
         let Some(law) = family.rate_law(rate, z) else {
-            return Some((whole, None));
+            return Ok((whole, None));
         };
         let open_loop = OpenLoop::new(rate, &law);
         let (numerator, denominator) = law.transfer();
         let path = |omega: f64| numerator.at(omega) / denominator.at(omega);
-        let corner = problem.corner(&law);
-        let inner = allowed(rate_grid, &open_loop, path, limits, corner);
-        Some((whole, inner))
+        let ends = Problem { process: *rate, ..problem }.ends(&law);
+        match allowed(rate_grid, &open_loop, path, limits, ends) {
+            Ok(inner) => Ok((whole, Some(inner))),
+            Err(NoGain::Unbounded) => Ok((whole, None)),
+            Err(unstable) => Err(unstable),
+        }
     }
 
-    fn on(&mut self, law: &Law) -> Option<Allowed> {
+    fn on(&mut self, law: &Law) -> Result<Allowed, NoGain> {
         let open_loop = OpenLoop::new(&self.problem.process, law);
         if !open_loop.is_proper() {
-            return None;
+            return Err(NoGain::Unstable);
         }
         let (numerator, denominator) = law.transfer();
         let path = |omega: f64| numerator.at(omega) / denominator.at(omega);
-        let corner = self.problem.corner(law);
-        allowed(&mut self.grid, &open_loop, path, &self.problem.limits, corner)
+        let ends = self.problem.ends(law);
+        allowed(&mut self.grid, &open_loop, path, &self.problem.limits, ends)
     }
 
     /// Largest gain within all limits.
-    pub(crate) fn gain(&mut self, z: &[f64]) -> Option<Gain> {
+    pub(crate) fn gain(&mut self, z: &[f64]) -> Result<Gain, NoGain> {
         let (whole, inner) = self.allowed(z)?;
         let mut gain = Gain {
             k: whole.high,
@@ -159,39 +204,21 @@ impl Objective {
                 (gain.k, gain.omega) = (inner.high, inner.omega);
             }
         }
-        let problem = self.problem;
-        let law = problem.family.law(&problem.process, z);
-        if let Some(limit) = problem.noise {
-            let excess = |ln: f64| {
-                let law = law.scaled(ln.exp());
-                let found = noise::amplification(&problem.process, &law, limit.period);
-                Some((found / limit.amplification).ln())
-            };
-            gain.k = limited(gain.k, excess)?;
-        }
-        if let Some(limit) = problem.input_peak {
-            let b = if problem.family.form.has_integral() { 0.0 } else { 1.0 };
-            let omega = gain.omega;
-            let excess = |ln: f64| {
-                let law = Law { b: b * law.b, ..law.scaled(ln.exp()) };
-                let step = (STEP_RAD / omega, Ending::COARSE);
-                let found =
-                    integrals(&problem.process, &law, Excitation::Reference, omega, step)?;
-                Some((found.peak_input / limit).ln())
-            };
-            gain.k = limited(gain.k, excess)?;
-        }
-        Some(gain)
+        gain.k = self.problem.limited(z, gain.k, gain.omega).ok_or(NoGain::Unstable)?;
+        Ok(gain)
     }
 
     /// Logarithm of the cost of a shape, with the penalty of an infeasible gain.
     pub(crate) fn cost(&mut self, z: &[f64]) -> f64 {
-        if !is_in_range(z) {
+        if !is_in_range(&self.problem.process, z) {
             return NO_COST;
         }
-        let Some(gain) = self.gain(z) else {
+        let Ok(gain) = self.gain(z) else {
             return NO_COST;
         };
+        if self.is_strict && gain.low > gain.k {
+            return NO_COST;
+        }
         let law = self.problem.family.law(&self.problem.process, z).scaled(gain.k);
         match self.problem.integrals(&law, gain.omega, 1.0) {
             Some(found) if found.iae > 0.0 => found.iae.ln() + penalty(gain.low, gain.k),

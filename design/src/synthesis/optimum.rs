@@ -3,13 +3,14 @@
 //! The search continues from the start of least cost. With an integral term the IAE is at least `1/ki`, so most starts need
 //! no simulation. If no start is feasible, a first search looks for a feasible shape.
 
+use super::bands::NoGain;
 use super::objective::{Gain, NO_COST, Objective, Problem};
 use super::shape::is_in_range;
 use super::simplex::{Best, Extent, minimise};
 
 /// Step of the grid in the search, and in the check of its result.
 const COARSE_GRID: f64 = 0.08;
-pub(crate) const FINE_GRID: f64 = 0.04;
+const FINE_GRID: f64 = 0.04;
 
 /// First and second simplex of a search.
 const FIRST: Extent = Extent { size: 0.35, tolerance: 3e-2, evaluations: 120 };
@@ -45,24 +46,42 @@ pub(crate) enum NoOptimum {
 /// Shape of least cost.
 pub(crate) fn optimum(problem: Problem) -> Result<Optimum, NoOptimum> {
     let mut coarse = Objective::new(problem, COARSE_GRID);
-    let starts = problem.family.starts(&problem.process);
+    let mut starts = problem.family.starts(&problem.process);
+    if let Some(family) = problem.family.without_rate_derivative() {
+        // The derivative of the rate starts from the cascade without it.
+        let simpler = Problem { family, ..problem };
+        let best = search(&mut Objective::new(simpler, COARSE_GRID), &family.starts(&problem.process))?;
+        starts = problem.family.with_rate_derivative(&problem.process, &best.point);
+    }
     let best = search(&mut coarse, &starts)?;
-    // The kinks of the cost, where another limit becomes active, stop a simplex: one restart, on the fine grid.
     let mut fine = Objective::new(problem, FINE_GRID);
-    finish(&mut fine, best.point)
+    if let Ok(found) = finish(&mut fine, &best.point) {
+        return Ok(found);
+    }
+    // The coarse grid took an infeasible shape for a feasible one: back inside, and again with shapes that are feasible.
+    let excess = fine.gain(&best.point).map_or(NO_COST, |gain| (gain.low / gain.k).ln());
+    let inside = feasible(&mut fine, &best.point, excess).ok_or(NoOptimum::Infeasible)?;
+    fine.is_strict = true;
+    let best = minimise(&mut |z: &[f64]| fine.cost(z), &inside, SECOND);
+    finish(&mut fine, &best.point)
 }
 
 /// Search from the best of the starts, from the least infeasible one if none is feasible.
 fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOptimum> {
     let mut ranked = Vec::with_capacity(starts.len());
+    let mut reason = NoOptimum::Infeasible;
     for start in starts {
-        if let Some(gain) = objective.gain(start) {
-            let excess = (gain.low / gain.k).ln();
-            ranked.push((start.clone(), excess, objective.problem.least_cost(start, gain.k)));
+        match objective.gain(start) {
+            Ok(gain) => {
+                let excess = (gain.low / gain.k).ln();
+                ranked.push((start.clone(), excess, objective.problem.least_cost(start, gain.k)));
+            }
+            Err(NoGain::Unbounded) => reason = NoOptimum::Unbounded,
+            Err(NoGain::Unstable) => {}
         }
     }
     if ranked.is_empty() {
-        return Err(NoOptimum::Unbounded);
+        return Err(reason);
     }
     let mut best: Option<Best> = None;
     ranked.sort_by(|a, b| a.2.total_cmp(&b.2));
@@ -92,10 +111,11 @@ fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOpti
 /// A feasible shape with a cost, from an infeasible start: the search minimises the excess of the least gain.
 fn feasible(objective: &mut Objective, start: &[f64], excess: f64) -> Option<Best> {
     let mut of = |z: &[f64]| {
-        if !is_in_range(z) {
+        if !is_in_range(&objective.problem.process, z) {
             return NO_COST;
         }
-        objective.gain(z).map_or(NO_COST, |gain| (gain.low / gain.k).ln().max(WELL_INSIDE))
+        let gain = objective.gain(z);
+        gain.map_or(NO_COST, |gain| (gain.low / gain.k).ln().max(WELL_INSIDE))
     };
     let start = Best { value: excess, point: start.to_vec() };
     let found = minimise(&mut of, &start, FEASIBILITY);
@@ -104,14 +124,14 @@ fn feasible(objective: &mut Objective, start: &[f64], excess: f64) -> Option<Bes
 }
 
 /// Gain of the shape on the fine grid.
-pub(crate) fn finish(fine: &mut Objective, z: Vec<f64>) -> Result<Optimum, NoOptimum> {
-    let gain = fine.gain(&z).ok_or(NoOptimum::Unbounded)?;
+fn finish(fine: &mut Objective, z: &[f64]) -> Result<Optimum, NoOptimum> {
+    let gain = fine.gain(z).map_err(|_| NoOptimum::Infeasible)?;
     if gain.low > gain.k * (1.0 + FEASIBLE) {
         return Err(NoOptimum::Infeasible);
     }
-    let ln_cost = fine.cost(&z);
+    let ln_cost = fine.cost(z);
     if ln_cost >= NO_COST {
         return Err(NoOptimum::Infeasible);
     }
-    Ok(Optimum { z, gain, ln_cost })
+    Ok(Optimum { z: z.to_vec(), gain, ln_cost })
 }

@@ -31,13 +31,18 @@ pub(crate) struct Family {
     pub filter: Filter,
 }
 
-/// Range of the variables: times from 1e-6 to 5000 units. Longer ones would act below the grid of frequencies.
-const LEAST_VARIABLE: f64 = -14.0;
+/// Longest time of a shape: 5000 units. A longer one would act below the grid of frequencies.
 const LARGEST_VARIABLE: f64 = 8.5;
 
+/// Shortest time of a shape, as a share of the dead time and lags behind the longest one: a shorter one acts above all
+/// frequencies of the loop.
+const SHORTEST: f64 = 1e-3;
+
 /// Whether a shape is in the range of the search.
-pub(crate) fn is_in_range(z: &[f64]) -> bool {
-    z.iter().all(|variable| (LEAST_VARIABLE..=LARGEST_VARIABLE).contains(variable))
+pub(crate) fn is_in_range(process: &Process, z: &[f64]) -> bool {
+    let order = process.integrators().max(1);
+    let least = (SHORTEST * process.half_rule_dead_time(order)).max(1e-8).ln();
+    z.iter().all(|variable| (least..=LARGEST_VARIABLE).contains(variable))
 }
 
 impl Family {
@@ -114,7 +119,26 @@ impl Family {
             .into()
     }
 
-    /// Variables to start a search from.
+    /// The family of cascades with PI, for a family of cascades with PID.
+    pub(crate) fn without_rate_derivative(&self) -> Option<Self> {
+        (self.form == Form::CascadePid).then_some(Self {
+            form: Form::CascadePi,
+            ..*self
+        })
+    }
+
+    /// Starts of a cascade with PID from the variables of one with PI.
+    pub(crate) fn with_rate_derivative(&self, process: &Process, simpler: &[f64]) -> Vec<Vec<f64>> {
+        let fast = process.half_rule_dead_time(2);
+        let start = |share: f64| {
+            let mut start = simpler.to_vec();
+            start.insert(2, (share * fast).ln());
+            start
+        };
+        [0.03, 0.1, 0.3, 1.0].map(start).to_vec()
+    }
+
+    /// Variables to start a search from. A cascade with PID starts [from one with PI](Self::with_rate_derivative).
     pub(crate) fn starts(&self, process: &Process) -> Vec<Vec<f64>> {
         let is_integrating = process.integrators() > 0;
         // Dead time and the lags behind the two longest ones: the time scale of a fast loop.
@@ -125,7 +149,7 @@ impl Family {
         }
         let is_double = process.integrators() > 1;
         if is_double {
-            integral_times.extend([30.0, 100.0, 300.0]);
+            integral_times.extend([30.0, 100.0, 300.0, 1000.0]);
         }
         if fast > 0.0 && fast < 0.1 {
             integral_times.extend([3.0 * fast, 8.0 * fast, 20.0 * fast, 60.0 * fast]);
@@ -145,13 +169,17 @@ impl Family {
             Form::Pd => derivative_times.iter().map(|td: &f64| vec![td.ln()]).collect(),
             Form::Pi => integral_times.iter().map(|ti| vec![ti.ln()]).collect(),
             Form::Pid => (integral_times.iter())
-                .flat_map(|ti| [0.12, 0.3, 0.6].map(|share| vec![ti.ln(), (ti * share).ln()]))
+                .flat_map(|ti| {
+                    let shares: &[f64] = if is_double { &[0.03, 0.12, 0.3, 0.6] } else { &[0.12, 0.3, 0.6] };
+                    shares.iter().map(move |share| vec![ti.ln(), (ti * share).ln()])
+                })
+                // The zeros of the controller on a resonance.
+                .chain(process.resonance().map(|(peak, damping)| {
+                    vec![(2.0 * damping / peak).ln(), -(2.0 * damping * peak).ln()]
+                }))
                 .collect(),
-            Form::CascadePi => (integral_times.iter())
+            Form::CascadePi | Form::CascadePid => (integral_times.iter())
                 .map(|ti| vec![(0.5 * ti).ln(), (0.5 * ti).ln()])
-                .collect(),
-            Form::CascadePid => (integral_times.iter())
-                .map(|ti| vec![(0.5 * ti).ln(), (0.5 * ti).ln(), (0.06 * ti).ln()])
                 .collect(),
         };
         if let Filter::Searched(_) = self.filter {

@@ -7,10 +7,11 @@ use crate::model::Model;
 use crate::synthesis::limits::Limits;
 use crate::synthesis::objective::{NoiseLimit, Problem};
 use crate::synthesis::optimum::{NoOptimum, Optimum, optimum};
+use crate::synthesis::robust::Draws;
 use crate::synthesis::setpoint;
 use crate::synthesis::shape::{Family, Filter};
 
-use super::outcome::{Design, DesignError};
+use super::outcome::{Design, DesignError, Robustness};
 use super::specification::Specification;
 
 /// Without noise figure the filter time is this share of the dead time that the half rule leaves: the filter then costs
@@ -31,13 +32,57 @@ pub(super) fn design(model: &Model, specification: &Specification) -> Result<Des
     let problem = problem(model, specification)?;
     match optimum(problem) {
         Ok(best) => checked(model, specification, &problem, &best),
-        Err(NoOptimum::Unbounded) => Err(DesignError::Unbounded),
-        Err(NoOptimum::Infeasible) => Err(DesignError::Infeasible {
+        Err(reason) => Err(refusal(problem, specification, reason)),
+    }
+}
+
+/// See [`super::design_over`].
+pub(super) fn design_over(
+    model: &Model,
+    draws: &[Model],
+    specification: &Specification,
+) -> Result<Design, DesignError> {
+    if draws.is_empty() {
+        return design(model, specification);
+    }
+    let problem = problem(model, specification)?;
+    let nominal =
+        optimum(problem).map_err(|reason| refusal(problem, specification, reason))?;
+    let processes: Vec<Process> = (draws.iter())
+        .filter_map(|draw| Process::new(&draw.linear(), &specification.execution))
+        .collect();
+    let of = |problem: Problem| Draws::new(problem, &processes, specification.coverage);
+    let mut set = of(problem);
+    let best = set.optimum(&nominal).map_err(|_| DesignError::Infeasible {
+        form: specification.form,
+        least_peak: least_peak(problem.limits.ms.max(problem.limits.mt), |peak| {
+            of(with_peak(problem, peak)).feasible(&nominal).is_some()
+        }),
+    })?;
+    let (found, alone) =
+        (set.performance(&best, draws.len()), set.performance(&nominal, draws.len()));
+    let mut designed = loop_of(model, specification, &problem, &best)?;
+    // A cost after a step of the load is in the unit of the gain.
+    let gain = if specification.form.has_integral() { problem.process.gain.abs() } else { 1.0 };
+    let unit = gain * problem.process.unit_s;
+    designed.robustness = Some(Robustness {
+        coverage: found.coverage,
+        mean_iae: found.mean_cost * unit,
+        nominal_coverage: alone.coverage,
+        nominal_mean_iae: alone.mean_cost * unit,
+    });
+    Ok(designed)
+}
+
+fn refusal(problem: Problem, specification: &Specification, reason: NoOptimum) -> DesignError {
+    match reason {
+        NoOptimum::Unbounded => DesignError::Unbounded,
+        NoOptimum::Infeasible => DesignError::Infeasible {
             form: specification.form,
             least_peak: least_peak(problem.limits.ms.max(problem.limits.mt), |peak| {
                 optimum(with_peak(problem, peak)).is_ok()
             }),
-        }),
+        },
     }
 }
 
@@ -125,54 +170,43 @@ pub(super) fn controller(
     family.controller(process, (best.gain.k, &best.z), b, specification.execution)
 }
 
-/// Design of an optimum, after a check of stability and limits by another method than the search.
+/// Design of an optimum, after a check of the limits by another method than the search.
 fn checked(
     model: &Model,
     specification: &Specification,
     problem: &Problem,
     best: &Optimum,
 ) -> Result<Design, DesignError> {
+    let designed = loop_of(model, specification, problem, best)?;
+    let found = Loop::new(model, &designed.controller).and_then(|found| found.sensitivity());
+    let is_kept = found.is_some_and(|peaks| {
+        peaks.ms <= specification.ms * (1.0 + ROUNDING)
+            && peaks.mt <= specification.mt * (1.0 + ROUNDING)
+    });
+    if is_kept { Ok(designed) } else { Err(unexplained(specification)) }
+}
+
+/// Controller, cost and margins of an optimum on the model. An error if the loop is unstable.
+fn loop_of(
+    model: &Model,
+    specification: &Specification,
+    problem: &Problem,
+    best: &Optimum,
+) -> Result<Design, DesignError> {
     let controller = controller(specification, problem, best);
-    let infeasible = DesignError::Infeasible {
-        form: specification.form,
-        least_peak: None,
-    };
     let found = Loop::new(model, &controller).ok_or(DesignError::Overflow)?;
-    let peaks = found.sensitivity().ok_or(infeasible)?;
-    let is_kept = peaks.ms <= specification.ms * (1.0 + ROUNDING)
-        && peaks.mt <= specification.mt * (1.0 + ROUNDING);
-    if !is_kept {
-        return Err(infeasible);
-    }
     Ok(Design {
         controller,
-        ise: found.reference_ise().ok_or(infeasible)?,
-        margins: found.margins().ok_or(infeasible)?,
+        ise: found.reference_ise().ok_or(unexplained(specification))?,
+        margins: found.margins().ok_or(unexplained(specification))?,
+        robustness: None,
     })
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::controller::Execution;
-    use crate::model::{Linear, Structure};
-    use crate::synthesis::objective::Objective;
-    use crate::tuning::{MeasurementNoise, Style};
-
-    #[test]
-    fn dbg() {
-        for (form, st) in [(Form::Pd, Structure::DoubleIntegratorLag), (Form::CascadePi, Structure::DoubleIntegratorLag)] {
-        let model: Model = Linear::new(st).with_lags_s([0.1, 1.0]).with_tau_s(1.0).into();
-        let spec = Specification::new(form, Style::Balanced);
-        let p = problem(&model, &spec).unwrap();
-        let mut o = Objective::new(p, 0.08);
-        for s in [1.0f64, 3.0, 10.0, 20.0, 30.0, 60.0, 100.0, 300.0] {
-            for r in [1.0, 0.5, 0.25, 0.1] {
-            let z = if form == Form::Pd { vec![s.ln()] } else {vec![s.ln(), (s*r).ln()]};
-            println!("{form:?} {s} {r} {:?} {:?} {}", o.allowed(&z).map(|(a,b)| ((a.low,a.high), b.map(|b| (b.low,b.high)))), 0, o.cost(&z));
-            if form == Form::Pd {break;}
-            }
-        }
-        }
+/// The refusal of a result that the check does not confirm.
+fn unexplained(specification: &Specification) -> DesignError {
+    DesignError::Infeasible {
+        form: specification.form,
+        least_peak: None,
     }
 }

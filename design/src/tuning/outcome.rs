@@ -16,6 +16,22 @@ pub struct Design {
     pub ise: f64,
     /// Stability margins of the loop.
     pub margins: Margins,
+    /// How the controller does on the draws. `None` without draws, and in the paper's style.
+    pub robustness: Option<Robustness>,
+}
+
+/// A design over draws, beside the one for the most probable model alone: the price of not knowing the process.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Robustness {
+    /// Share of the draws on which the limits hold.
+    pub coverage: f64,
+    /// Mean IAE over the first 12 draws: of a unit step of the load, or of the reference without an integral term.
+    pub mean_iae: f64,
+    /// Share of the draws on which the controller of the most probable model alone keeps the limits.
+    pub nominal_coverage: f64,
+    /// Mean IAE of that controller over the same draws. Infinite if one of the loops is unstable.
+    pub nominal_mean_iae: f64,
 }
 
 /// Why no controller was designed.

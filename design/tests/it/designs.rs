@@ -95,3 +95,42 @@ fn every_design_is_stable_and_keeps_its_limits() {
     c.sort_by(|a, b| a.0.cmp(&b.0));
     for (k, (n, s)) in c { println!("{k}: {n}, mean {:.2} ms", 1e3 * s / n as f64); }
 }
+
+fn posterior(n: usize, seed: u64, spread: [f64; 4]) -> Vec<Model> {
+    let mut random = Random(seed);
+    (0..n).map(|_| {
+        let mut normal = |scale: f64| {
+            let u: f64 = random.uniform(1e-12, 1.0);
+            let v = random.uniform(0.0, std::f64::consts::TAU);
+            (scale * (-2.0 * u.ln()).sqrt() * v.cos() / 1.645).exp()
+        };
+        let [ratio, lag, body, tau] = spread;
+        let body = normal(body);
+        Linear::new(Structure::Soiptd)
+            .with_gain(normal(ratio) / 1.6886)
+            .with_lags_s([0.0321 * normal(lag), 1.0])
+            .with_pole_per_s(1.0 / (1.6886 * body))
+            .with_tau_s(0.0237 * normal(tau))
+            .into()
+    }).collect()
+}
+
+#[test]
+fn robust_dbg() {
+    let model = posterior(1, 1, [0.0; 4])[0];
+    for spread in [[0.0075, 0.044, 0.2, 0.046], [0.1, 0.3, 0.3, 0.3]] {
+        let draws = posterior(200, 3, spread);
+        let fresh = posterior(400, 4, spread);
+        for form in [Form::Pid, Form::CascadePi, Form::Pd, Form::CascadePid] {
+            let asked = Specification::new(form, Style::Balanced);
+            let asked = if form == Form::Pid { asked.with_filter_s(0.002) } else { asked };
+            let t = std::time::Instant::now();
+            let found = onecycle_design::design_over(&model, &draws, &asked);
+            println!("{form:?} {:?}", t.elapsed());
+            match found { Ok(found) => {
+                let kept = fresh.iter().filter(|m| sensitivity(m, &found.controller).is_some_and(|s| s.ms < 1.6 && s.mt < 1.6)).count();
+                println!("   {:?} fresh {}", found.robustness, kept as f64 / 400.0); }
+                Err(e) => println!("   {e:?}") }
+        }
+    }
+}
