@@ -220,8 +220,6 @@ impl Controller {
         };
         let measurement = LowPass::SecondOrder(pid.filter_s).frequency_response(omega)
             * filtered(pid.execution.sensor_filter);
-        (terms + integral)
-            * measurement
-            * Complex64::cis(-omega * pid.execution.dead_time_s())
+        (terms + integral) * measurement * Complex64::cis(-omega * pid.execution.dead_time_s())
     }
 }

@@ -41,16 +41,17 @@ mod closed_loop;
 mod controller;
 mod model;
 pub mod roots;
+pub mod rules;
 pub mod soiptd_pd;
 mod synthesis;
 pub mod tuning;
 
+pub use analysis::sensitivity::Sensitivity;
 pub use cascade::{Cascade, CascadeCost};
 pub use closed_loop::{
     LoadResponse, ise, load_iae, load_response, loop_response, margins, noise_amplification,
     reference_iae, sensitivity, step_response,
 };
-pub use analysis::sensitivity::Sensitivity;
 pub use controller::{Autopilot, Controller, Execution, Form, Ideal, LowPass, Pid, Series};
 pub use model::{Linear, LinearError, Model, Parameter, Stages, Structure, Unit, state_space};
 pub use soiptd_pd::loop_response::LoopResponse;

@@ -20,6 +20,7 @@ pub(crate) mod bands;
 pub(crate) mod limits;
 pub(crate) mod objective;
 pub(crate) mod optimum;
+pub(crate) mod polish;
 pub(crate) mod robust;
 pub(crate) mod setpoint;
 pub(crate) mod shape;

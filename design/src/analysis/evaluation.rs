@@ -131,7 +131,13 @@ impl Loop {
         let omega = self.fastest(&curve);
         let mut longest = self.longest_step(omega);
         let of = |longest: f64| {
-            integrals(&self.process, &self.law, excitation, omega, (longest, Ending::FINE))
+            integrals(
+                &self.process,
+                &self.law,
+                excitation,
+                omega,
+                (longest, Ending::FINE),
+            )
         };
         let mut before = of(longest)?;
         for _ in 0..MOST_HALVINGS {
@@ -169,7 +175,13 @@ impl Loop {
         if self.law.ki != 0.0 {
             return 1.0;
         }
-        let zero = self.open_loop.denominator.coefficients().first().copied().unwrap_or(0.0);
+        let zero = self
+            .open_loop
+            .denominator
+            .coefficients()
+            .first()
+            .copied()
+            .unwrap_or(0.0);
         self.law.b * self.law.kp / (zero + self.law.kp)
     }
 
@@ -223,15 +235,23 @@ impl Loop {
         let take = |h: f64, start: f64, out: &[f64; 2 * NODES]| {
             (record.h, record.start) = (h, start);
             record.steps.push(*out);
-            let off = out[NODES..].iter().fold(0.0, |off: f64, y| off.max((y - goal).abs()));
+            let off = out[NODES..]
+                .iter()
+                .fold(0.0, |off: f64, y| off.max((y - goal).abs()));
             peak = peak.max(off);
             quiet = if off <= RESIDUE * peak { quiet + 1 } else { 0 };
             let quiet_s = 2.0 * PI / omega + 2.0 * self.process.tau;
             settled = f64::from(quiet) * h >= quiet_s;
             !settled && record.steps.len() < MOST_STEPS && off.is_finite()
         };
-        run(&self.process, &self.law, excitation, self.longest_step(omega), take)
-            .ok_or(StepResponseError::NoMethod)?;
+        run(
+            &self.process,
+            &self.law,
+            excitation,
+            self.longest_step(omega),
+            take,
+        )
+        .ok_or(StepResponseError::NoMethod)?;
         if settled {
             Ok(record)
         } else {
@@ -240,7 +260,13 @@ impl Loop {
     }
 
     /// Samples in the units of the user.
-    fn samples(&self, record: &Record, output_unit: f64, input_unit: f64, start_s: f64) -> Vec<Sample> {
+    fn samples(
+        &self,
+        record: &Record,
+        output_unit: f64,
+        input_unit: f64,
+        start_s: f64,
+    ) -> Vec<Sample> {
         let spacing_s = record.h * self.process.unit_s / (NODES - 1) as f64;
         let sample = |(n, [u, y]): (usize, [f64; 2])| Sample {
             t_s: start_s + n as f64 * spacing_s,
@@ -273,13 +299,21 @@ impl Loop {
                 settling_time_s: metrics.settling_time_s * unit_s,
                 peak_input: metrics.peak_input * input_unit.abs(),
             },
-            ise: self.reference_integrals().map_or(f64::INFINITY, |found| found.1),
+            ise: self
+                .reference_integrals()
+                .map_or(f64::INFINITY, |found| found.1),
         })
     }
 
     /// See [`crate::load_response`].
     pub(crate) fn load_response(&self) -> Result<LoadResponse, StepResponseError> {
-        let zero = self.open_loop.denominator.coefficients().first().copied().unwrap_or(0.0);
+        let zero = self
+            .open_loop
+            .denominator
+            .coefficients()
+            .first()
+            .copied()
+            .unwrap_or(0.0);
         let goal = if self.law.ki != 0.0 {
             0.0
         } else {
@@ -293,7 +327,9 @@ impl Loop {
             u: 0.0,
         };
         let after = self.samples(&record, k, 1.0, self.model_tau_s);
-        let peak = after.iter().fold(0.0, |peak: f64, sample| peak.max(sample.y.abs()));
+        let peak = after
+            .iter()
+            .fold(0.0, |peak: f64, sample| peak.max(sample.y.abs()));
         let dead_time = (self.model_tau_s > 0.0).then_some(first);
         Ok(LoadResponse {
             samples: dead_time.into_iter().chain(after).collect(),
@@ -302,7 +338,6 @@ impl Loop {
         })
     }
 }
-
 
 #[cfg(test)]
 mod tests {
@@ -339,7 +374,10 @@ mod tests {
             ];
             for (figure, (found, expected)) in figures.iter().enumerate() {
                 let off = (found / expected - 1.0).abs();
-                assert!(off < 1e-8, "vector {i}, figure {figure}: {found} {expected} {off:e}");
+                assert!(
+                    off < 1e-8,
+                    "vector {i}, figure {figure}: {found} {expected} {off:e}"
+                );
             }
         }
     }

@@ -70,13 +70,9 @@ impl Law {
     /// The controller of this law in the units of the user, as a PID.
     pub(crate) fn controller(&self, process: &Process) -> Pid {
         let (k, t) = (process.gain, process.unit_s);
-        Pid::new(
-            self.kp / k,
-            self.ki / (k * t),
-            (self.kd + self.kf) * t / k,
-        )
-        .with_filter_s(self.tf * t)
-        .with_setpoint_weight(self.b)
+        Pid::new(self.kp / k, self.ki / (k * t), (self.kd + self.kf) * t / k)
+            .with_filter_s(self.tf * t)
+            .with_setpoint_weight(self.b)
     }
 
     /// The law with all gains times `factor`.
@@ -107,9 +103,7 @@ impl Law {
     pub(crate) fn transfer(&self) -> (Polynomial, Polynomial) {
         let one = Polynomial::new(&[1.0]);
         let h = match self.derivative_filter {
-            Some(filter) if self.uses_derivative_filter() => {
-                Polynomial::new(&filter.denominator())
-            }
+            Some(filter) if self.uses_derivative_filter() => Polynomial::new(&filter.denominator()),
             _ => one,
         };
         let integral = usize::from(self.ki != 0.0);
@@ -118,9 +112,10 @@ impl Law {
         } else {
             Polynomial::new(&[self.kp, self.kd])
         };
-        let numerator = (direct.times(&h))
-            .plus(self.kf, 1 + integral, &one)
-            .plus(self.k2, 2 + integral, &one);
+        let numerator =
+            (direct.times(&h))
+                .plus(self.kf, 1 + integral, &one)
+                .plus(self.k2, 2 + integral, &one);
         let filter = Polynomial::new(&LowPass::SecondOrder(self.tf).denominator());
         let denominator = Polynomial::new(&[]).plus(1.0, integral, &h).times(&filter);
         (numerator, denominator)

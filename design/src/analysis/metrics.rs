@@ -29,7 +29,10 @@ impl Record {
     /// `[u, y]` at all nodes. The first node of a step is the last one of the step before, and is not repeated.
     pub(crate) fn nodes(&self) -> impl Iterator<Item = [f64; 2]> + '_ {
         let first = self.steps.first().map(|step| [step[0], step[NODES]]);
-        let rest = self.steps.iter().flat_map(|step| (1..NODES).map(|i| [step[i], step[NODES + i]]));
+        let rest = self
+            .steps
+            .iter()
+            .flat_map(|step| (1..NODES).map(|i| [step[i], step[NODES + i]]));
         first.into_iter().chain(rest)
     }
 }
@@ -37,7 +40,9 @@ impl Record {
 /// Polynomial through the nodes of a step at `s` in 0..1.
 fn at(values: &[f64], s: f64) -> f64 {
     let coefficient = |p: usize| (0..NODES).map(|i| MONOMIALS[p][i] * values[i]).sum::<f64>();
-    (0..NODES).rev().fold(0.0, |sum, p| sum * s + coefficient(p))
+    (0..NODES)
+        .rev()
+        .fold(0.0, |sum, p| sum * s + coefficient(p))
 }
 
 /// Metrics in the unit of time of the loop, of a response that settles at `goal`.
@@ -59,14 +64,14 @@ pub(crate) fn reference_metrics(record: &Record, goal: f64) -> StepMetrics {
         })
     };
     let beyond = |value: f64| (1.0 - value / goal).abs() - SETTLING_BAND;
-    let unsettled = cells()
-        .filter(|&(step, i)| beyond(y(step)[i]) > 0.0)
-        .last();
+    let unsettled = cells().filter(|&(step, i)| beyond(y(step)[i]) > 0.0).last();
     let (mut peak, mut peak_time) = (0.0, record.start);
     let mut peak_input = 0.0_f64;
     for (step, i) in cells() {
         let here = y(step)[i + 1] / goal;
-        peak_input = peak_input.max(record.steps[step][i].abs()).max(record.steps[step][i + 1].abs());
+        peak_input = peak_input
+            .max(record.steps[step][i].abs())
+            .max(record.steps[step][i + 1].abs());
         if here > peak {
             let low = node(i);
             let high = node((i + 2).min(NODES - 1));
@@ -82,8 +87,7 @@ pub(crate) fn reference_metrics(record: &Record, goal: f64) -> StepMetrics {
         overshoot: (peak - 1.0).max(0.0),
         peak_time_s: (peak > 1.0).then_some(peak_time),
         rise_time_s: rise(RISE[1]) - rise(RISE[0]),
-        settling_time_s: unsettled
-            .map_or(record.start, |(step, i)| crossing(step, i, &beyond)),
+        settling_time_s: unsettled.map_or(record.start, |(step, i)| crossing(step, i, &beyond)),
         peak_input,
     }
 }

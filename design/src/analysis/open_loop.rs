@@ -58,7 +58,10 @@ impl OpenLoop {
     /// numerator and denominator are their highest powers within a part of ten. `None` for a loop with a pole in the
     /// origin, or without numbers.
     pub(crate) fn range(&self) -> Option<(f64, f64)> {
-        let (n, d) = (self.numerator.coefficients(), self.denominator.coefficients());
+        let (n, d) = (
+            self.numerator.coefficients(),
+            self.denominator.coefficients(),
+        );
         let size = |i: usize| {
             let delayed = (0..=i).map(|j| {
                 let power = self.tau.powi((i - j) as i32);
@@ -101,12 +104,7 @@ impl OpenLoop {
 }
 
 /// Step of a frequency grid: a fraction of the frequency, a turn of the dead time, and fine enough for a resonance.
-pub(crate) fn grid_step(
-    omega: f64,
-    tau: f64,
-    resonance: Option<(f64, f64)>,
-    fraction: f64,
-) -> f64 {
+pub(crate) fn grid_step(omega: f64, tau: f64, resonance: Option<(f64, f64)>, fraction: f64) -> f64 {
     let step = (fraction * omega).min(GRID_TURN_RAD * fraction / GRID_STEP / tau);
     match resonance {
         // The pole lies at the distance `hypot` from jw. Above the resonance the step may reach beyond, below not past it.

@@ -86,7 +86,10 @@ mod tests {
     fn products_and_values_by_hand() {
         let product = Polynomial::new(&[1.0, 2.0]).times(&Polynomial::new(&[3.0, 0.0, 1.0, 0.0]));
         assert_eq!(product.coefficients(), [3.0, 6.0, 1.0, 2.0]);
-        assert_eq!((product.degree(), product.at(2.0)), (3, Complex64::new(-1.0, -4.0)));
+        assert_eq!(
+            (product.degree(), product.at(2.0)),
+            (3, Complex64::new(-1.0, -4.0))
+        );
         let sum = product.plus(-2.0, 3, &Polynomial::new(&[1.0]));
         assert_eq!(sum.coefficients(), [3.0, 6.0, 1.0]);
     }

@@ -149,7 +149,11 @@ impl Process {
     /// The same process in another unit of time.
     pub(crate) fn in_unit(&self, unit_s: f64) -> Self {
         let ratio = unit_s / self.unit_s;
-        let powers: i32 = self.stages().iter().map(|stage| stage.powers_of_time()).sum();
+        let powers: i32 = self
+            .stages()
+            .iter()
+            .map(|stage| stage.powers_of_time())
+            .sum();
         Self {
             stages: self.stages.map(|stage| stage.in_unit(ratio)),
             tau: self.tau / ratio,

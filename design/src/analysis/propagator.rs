@@ -138,7 +138,10 @@ impl<const N: usize> Step<N> {
     }
 
     /// Rows `row Phi` and `row Gamma` at all nodes, from the step between nodes.
-    pub(crate) fn rows_at_nodes(&self, row: &[f64; N]) -> ([[f64; N]; NODES], [[f64; NODES]; NODES]) {
+    pub(crate) fn rows_at_nodes(
+        &self,
+        row: &[f64; N],
+    ) -> ([[f64; N]; NODES], [[f64; NODES]; NODES]) {
         let dot = |column: &[f64; N], row: &[f64; N]| -> f64 {
             column.iter().zip(row).map(|(a, b)| a * b).sum()
         };
@@ -230,7 +233,9 @@ mod tests {
             let s = i as f64 / n as f64;
             (-20.0 * (1.0 - s)).exp() * s.powi(7)
         };
-        let sum: f64 = (0..n / 2).map(|i| at(2 * i) + 4.0 * at(2 * i + 1) + at(2 * i + 2)).sum();
+        let sum: f64 = (0..n / 2)
+            .map(|i| at(2 * i) + 4.0 * at(2 * i + 1) + at(2 * i + 2))
+            .sum();
         let expected = sum / (3 * n) as f64 * h;
         let found = step.gamma[7][0] * 5040.0;
         assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
@@ -241,7 +246,9 @@ mod tests {
     fn interpolation_is_exact_for_a_quintic() {
         let value = |i: usize| (i as f64 / 7.0).powi(5);
         let polynomial = |p: usize| (0..NODES).map(|i| MONOMIALS[p][i] * value(i)).sum::<f64>();
-        let at: f64 = (0..NODES).map(|p| polynomial(p) * 0.3_f64.powi(p as i32)).sum();
+        let at: f64 = (0..NODES)
+            .map(|p| polynomial(p) * 0.3_f64.powi(p as i32))
+            .sum();
         assert!((at - 0.002_43).abs() < 1e-14, "{at}");
     }
 }

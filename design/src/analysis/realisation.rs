@@ -45,7 +45,9 @@ pub(crate) fn states(process: &Process, law: &Law) -> usize {
         Stage::Pair(..) => 2,
         _ => 1,
     });
-    let derivative = law.derivative_filter.filter(|_| law.uses_derivative_filter());
+    let derivative = law
+        .derivative_filter
+        .filter(|_| law.uses_derivative_filter());
     stages.sum::<usize>()
         + order(process.sensor)
         + order(filter(law))
@@ -86,7 +88,11 @@ impl<const N: usize> Realisation<N> {
         }
         let measured = built.filter(built.cy, process.sensor);
         let measured = built.filter(measured, filter(law));
-        let reference = if excitation == Excitation::Reference { 1.0 } else { 0.0 };
+        let reference = if excitation == Excitation::Reference {
+            1.0
+        } else {
+            0.0
+        };
         let mut cu = [0.0; N];
         if law.ki != 0.0 {
             let state = built.next();
@@ -105,7 +111,9 @@ impl<const N: usize> Realisation<N> {
             subtract(law.kd, &built.derivative(&measured)?);
         }
         if law.kf != 0.0 || law.k2 != 0.0 {
-            let used = law.derivative_filter.filter(|_| law.uses_derivative_filter());
+            let used = law
+                .derivative_filter
+                .filter(|_| law.uses_derivative_filter());
             let h = built.filter(measured, used);
             let slope = built.derivative(&h)?;
             subtract(law.kf, &slope);

@@ -21,7 +21,6 @@ use super::propagator::{MONOMIALS, NODES};
 use super::realisation::{Excitation, states};
 use super::simulation::{Nodes, Simulation};
 
-
 /// Longest step, as the angle of the fastest frequency of interest (rad): the search's relative error is about 1e-5.
 pub(crate) const STEP_RAD: f64 = 0.7;
 
@@ -71,9 +70,13 @@ pub(crate) fn integrals(
     (longest, ending): (f64, Ending),
 ) -> Option<Integrals> {
     let mut found = Accumulator::new(excitation, known_integral(process, law, excitation), ending);
-    run(process, law, excitation, longest, |simulation_h, start, out| {
-        found.add(simulation_h, start, omega, process.tau, out)
-    })?;
+    run(
+        process,
+        law,
+        excitation,
+        longest,
+        |simulation_h, start, out| found.add(simulation_h, start, omega, process.tau, out),
+    )?;
     let iae = found.iae + found.added;
     (iae.is_finite() && found.ended).then_some(Integrals {
         iae,
@@ -193,8 +196,16 @@ impl Accumulator {
         self.ie += h * signed;
         self.ise += h * squared_integral(&error);
         let steps_of = |radians: f64| (radians / (omega * h)).ceil() + (tau / h).ceil();
-        self.one_sign = if part == signed.abs() { self.one_sign + 1 } else { 0 };
-        self.quiet = if top <= self.ending.small * self.peak { self.quiet + 1 } else { 0 };
+        self.one_sign = if part == signed.abs() {
+            self.one_sign + 1
+        } else {
+            0
+        };
+        self.quiet = if top <= self.ending.small * self.peak {
+            self.quiet + 1
+        } else {
+            0
+        };
         if let Some(total) = self.total
             && self.one_sign as f64 > steps_of(12.0)
         {
@@ -284,7 +295,9 @@ fn absolute_integral(error: &Nodes) -> (f64, f64) {
     }
     let value = |s: f64| monomials.iter().rev().fold(0.0, |sum, c| sum * s + c);
     let antiderivative = |s: f64| {
-        (0..NODES).rev().fold(0.0, |sum, p| (sum + monomials[p] / (p + 1) as f64) * s)
+        (0..NODES)
+            .rev()
+            .fold(0.0, |sum, p| (sum + monomials[p] / (p + 1) as f64) * s)
     };
     let (mut sum, mut before) = (0.0, 0.0);
     for i in 1..NODES {
@@ -298,5 +311,11 @@ fn absolute_integral(error: &Nodes) -> (f64, f64) {
     }
     let last = antiderivative(1.0);
     // A step with a crossing is never of one sign, also if the crossing is at its end.
-    (f64::max(sum + (last - before).abs(), signed.abs() * (1.0 + f64::EPSILON)), signed)
+    (
+        f64::max(
+            sum + (last - before).abs(),
+            signed.abs() * (1.0 + f64::EPSILON),
+        ),
+        signed,
+    )
 }

@@ -52,7 +52,11 @@ impl<const N: usize> Simulation<N> {
         let loop_ = Realisation::<N>::new(process, law, excitation)?;
         let tau = process.tau;
         let is_short = tau <= SHORT_DELAY * longest;
-        let per_delay = if is_short { 1.0 } else { (tau / longest).ceil() };
+        let per_delay = if is_short {
+            1.0
+        } else {
+            (tau / longest).ceil()
+        };
         if !(per_delay <= MOST_STEPS_PER_DELAY && longest > 0.0 && longest.is_finite()) {
             return None;
         }
@@ -159,9 +163,15 @@ fn implicit<const N: usize>(
     let (mut present, mut last) = ([[0.0; NODES]; NODES], [[0.0; NODES]; NODES]);
     for node in 0..NODES {
         let s = node as f64 / (NODES - 1) as f64 - delay;
-        let (rows, s) = if s >= 0.0 { (&mut present, s) } else { (&mut last, s + 1.0) };
+        let (rows, s) = if s >= 0.0 {
+            (&mut present, s)
+        } else {
+            (&mut last, s + 1.0)
+        };
         for i in 0..NODES {
-            rows[node][i] = (0..NODES).rev().fold(0.0, |sum, p| sum * s + MONOMIALS[p][i]);
+            rows[node][i] = (0..NODES)
+                .rev()
+                .fold(0.0, |sum, p| sum * s + MONOMIALS[p][i]);
         }
     }
     let mut matrix = [[0.0; NODES]; NODES];

@@ -83,7 +83,9 @@ impl Grid {
         while self.points.last().is_none_or(|point| point.0 <= omega) {
             self.point(self.points.len());
         }
-        self.points.partition_point(|point| point.0 <= omega).saturating_sub(1)
+        self.points
+            .partition_point(|point| point.0 <= omega)
+            .saturating_sub(1)
     }
 
     #[inline]
@@ -143,10 +145,18 @@ impl Band {
             };
             let between = [start, omega];
             if low <= lows_before && low <= interval.0 {
-                self.lows.push(Extremum { omega: middle, gain: low, between });
+                self.lows.push(Extremum {
+                    omega: middle,
+                    gain: low,
+                    between,
+                });
             }
             if high >= highs_before && high >= interval.1 {
-                self.highs.push(Extremum { omega: middle, gain: high, between });
+                self.highs.push(Extremum {
+                    omega: middle,
+                    gain: high,
+                    between,
+                });
             }
             self.low = self.low.min(low);
             self.high = self.high.max(high);
@@ -245,8 +255,14 @@ impl Scan<'_> {
             .map(|band| band.low)
             .fold(f64::INFINITY, f64::min);
         let is_lower = |band: &&Band| band.turns() > 0 || band.from_first;
-        let low = (self.bands.iter().filter(is_lower)).map(|band| band.high).fold(0.0, f64::max);
-        if low > high { Ok([low, high]) } else { Err(NoGain::Unstable) }
+        let low = (self.bands.iter().filter(is_lower))
+            .map(|band| band.high)
+            .fold(0.0, f64::max);
+        if low > high {
+            Ok([low, high])
+        } else {
+            Err(NoGain::Unstable)
+        }
     }
 
     /// Highest end of the bands below a gain.
@@ -257,18 +273,17 @@ impl Scan<'_> {
 
     /// Refines an extremum of the lower (`true`) or upper end of the forbidden gains.
     fn refine(&self, extremum: &Extremum, is_low: bool) -> (f64, f64) {
-        let end = |ln: f64| {
-            let omega = ln.exp();
-            match self.limits.forbidden(omega, self.open_loop.at(omega)) {
-                Some((low, high)) => if is_low { low } else { -high },
-                None => if is_low { f64::INFINITY } else { 0.0 },
-            }
+        let (omega, gain) = between(self.open_loop, self.limits, extremum.between, is_low);
+        let is_better = if is_low {
+            gain < extremum.gain
+        } else {
+            gain > extremum.gain
         };
-        let [low, high] = extremum.between.map(f64::ln);
-        let (ln, value) = minimum(end, low, high, TOLERANCE);
-        let gain = value.abs();
-        let is_better = if is_low { gain < extremum.gain } else { gain > extremum.gain };
-        if is_better { (ln.exp(), gain) } else { (extremum.omega, extremum.gain) }
+        if is_better {
+            (omega, gain)
+        } else {
+            (extremum.omega, extremum.gain)
+        }
     }
 
     fn allowed(&self) -> Result<Allowed, NoGain> {
@@ -294,6 +309,27 @@ impl Scan<'_> {
             lower,
         })
     }
+}
+
+/// Frequency and value of the least lower (`true`) or largest upper end of the forbidden gains between two frequencies.
+fn between(open_loop: &OpenLoop, limits: &Limits, ends: [f64; 2], is_low: bool) -> (f64, f64) {
+    let end = |ln: f64| {
+        let omega = ln.exp();
+        match limits.forbidden(omega, open_loop.at(omega)) {
+            Some((low, _)) if is_low => low,
+            Some((_, high)) => -high,
+            None if is_low => f64::INFINITY,
+            None => 0.0,
+        }
+    };
+    let [low, high] = ends.map(f64::ln);
+    let (ln, value) = minimum(end, low, high, TOLERANCE);
+    (ln.exp(), value.abs())
+}
+
+/// Value of the extremum of the forbidden gains near a frequency: of the lower end (`true`) or of the upper one.
+pub(crate) fn extremum(open_loop: &OpenLoop, limits: &Limits, omega: f64, is_low: bool) -> f64 {
+    between(open_loop, limits, [omega * 0.94, omega * 1.06], is_low).1
 }
 
 /// Gains of the shape in `open_loop` (its gain is 1) that `limits` allow. `path` is the feedback path of the shape, `grid`

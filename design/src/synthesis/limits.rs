@@ -113,19 +113,31 @@ mod tests {
     fn the_ends_touch_the_limits() {
         for (re, im) in [(-1.0, 0.1), (-3.0, -0.8), (-0.02, 0.0)] {
             let l = Complex64::new(re, im);
-            let sensitivity = Limits { mt: 1e6, ..Limits::of(1.6) };
+            let sensitivity = Limits {
+                mt: 1e6,
+                ..Limits::of(1.6)
+            };
             let (low, high) = sensitivity.forbidden(1.0, l).unwrap();
             // Mt = 1e6 forbids |1 + k l| < 1e-6 |k l| only, inside the interval of Ms.
             for k in [low, high] {
                 assert!(((1.0 + k * l).norm() * 1.6 - 1.0).abs() < 1e-14);
             }
-            let complementary = Limits { ms: 1e6, ..Limits::of(1.6) };
+            let complementary = Limits {
+                ms: 1e6,
+                ..Limits::of(1.6)
+            };
             let (low, high) = complementary.forbidden(1.0, l).unwrap();
             for k in [low, high] {
                 assert!(((k * l).norm() / (1.0 + k * l).norm() / 1.6 - 1.0).abs() < 1e-14);
             }
         }
-        assert_eq!(Limits::of(1.6).forbidden(1.0, Complex64::new(1.0, 0.0)), None);
-        assert_eq!(Limits::of(1.6).forbidden(1.0, Complex64::new(-1.0, 2.0)), None);
+        assert_eq!(
+            Limits::of(1.6).forbidden(1.0, Complex64::new(1.0, 0.0)),
+            None
+        );
+        assert_eq!(
+            Limits::of(1.6).forbidden(1.0, Complex64::new(-1.0, 2.0)),
+            None
+        );
     }
 }

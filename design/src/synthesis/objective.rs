@@ -8,8 +8,9 @@ use crate::analysis::process::Process;
 use crate::analysis::response::{Ending, Integrals, STEP_RAD, integrals};
 use crate::analysis::{Law, OpenLoop};
 
-use super::bands::{Allowed, Grid, NoGain, allowed};
+use super::bands::{Allowed, Grid, NoGain, allowed, extremum};
 use super::limits::Limits;
+use super::polish::Constraint;
 use super::shape::{Family, is_in_range};
 
 pub(crate) use crate::analysis::realisation::Excitation;
@@ -80,7 +81,11 @@ impl Problem {
     }
 
     pub(crate) fn integrals(&self, law: &Law, omega: f64, refinement: f64) -> Option<Integrals> {
-        let ending = if refinement > 1.0 { Ending::FINE } else { Ending::COARSE };
+        let ending = if refinement > 1.0 {
+            Ending::FINE
+        } else {
+            Ending::COARSE
+        };
         let step = (STEP_RAD / (omega * refinement), ending);
         integrals(&self.process, law, self.excitation(), omega, step)
     }
@@ -98,10 +103,17 @@ impl Problem {
             k = limited(k, excess)?;
         }
         if let Some(limit) = self.input_peak {
-            let b = if self.family.form.has_integral() { 0.0 } else { 1.0 };
+            let b = if self.family.form.has_integral() {
+                0.0
+            } else {
+                1.0
+            };
             let step = (STEP_RAD / omega, Ending::COARSE);
             let excess = |ln: f64| {
-                let law = Law { b: b * law.b, ..law.scaled(ln.exp()) };
+                let law = Law {
+                    b: b * law.b,
+                    ..law.scaled(ln.exp())
+                };
                 let found = integrals(process, &law, Excitation::Reference, omega, step)?;
                 Some((found.peak_input / limit).ln())
             };
@@ -133,8 +145,17 @@ impl Problem {
         let resonance = self.process.resonance().map_or(0.0, |(peak, _)| peak);
         // The longest time of the controller: of the integral, or between derivative and proportional term.
         let slope = law.kd + law.kf;
-        let longest = [law.kp / law.ki, slope / law.kp, (law.k2 / law.kp).sqrt(), law.tf, 1.0];
-        let longest = longest.into_iter().filter(|time| time.is_finite()).fold(1.0, f64::max);
+        let longest = [
+            law.kp / law.ki,
+            slope / law.kp,
+            (law.k2 / law.kp).sqrt(),
+            law.tf,
+            1.0,
+        ];
+        let longest = longest
+            .into_iter()
+            .filter(|time| time.is_finite())
+            .fold(1.0, f64::max);
         [ASYMPTOTIC / longest, 2.0 * corner.max(resonance)]
     }
 }
@@ -159,7 +180,12 @@ impl Objective {
     /// Gains that the sensitivity and the margins allow a shape, of the loop and of the rate loop of a cascade.
     pub(crate) fn allowed(&mut self, z: &[f64]) -> Result<(Allowed, Option<Allowed>), NoGain> {
         let problem = self.problem;
-        let Problem { process, family, limits, .. } = &problem;
+        let Problem {
+            process,
+            family,
+            limits,
+            ..
+        } = &problem;
         let law = family.law(process, z);
         let whole = self.on(&law)?;
         let Some((rate, rate_grid)) = &mut self.rate else {
@@ -171,11 +197,84 @@ impl Objective {
         let open_loop = OpenLoop::new(rate, &law);
         let (numerator, denominator) = law.transfer();
         let path = |omega: f64| numerator.at(omega) / denominator.at(omega);
-        let ends = Problem { process: *rate, ..problem }.ends(&law);
+        let ends = Problem {
+            process: *rate,
+            ..problem
+        }
+        .ends(&law);
         match allowed(rate_grid, &open_loop, path, limits, ends) {
             Ok(inner) => Ok((whole, Some(inner))),
             Err(NoGain::Unbounded) => Ok((whole, None)),
             Err(unstable) => Err(unstable),
+        }
+    }
+
+    /// Extrema of the forbidden gains within a share `near` of the gain `k`, as constraints.
+    pub(crate) fn constraints(&mut self, z: &[f64], k: f64, near: f64) -> Vec<Constraint> {
+        let Ok((whole, inner)) = self.allowed(z) else {
+            return Vec::new();
+        };
+        let mut found = Vec::new();
+        for (allowed, is_rate_loop) in [(Some(whole), false), (inner, true)] {
+            let Some(allowed) = allowed else {
+                continue;
+            };
+            let ends = [(allowed.upper, true), (allowed.lower, false)];
+            for (extrema, is_upper) in ends {
+                let is_near = |gain: f64| (gain / k).ln().abs() < near;
+                for (omega, _) in extrema.into_iter().filter(|(_, gain)| is_near(*gain)) {
+                    for is_sensitivity in [true, false] {
+                        let constraint = Constraint {
+                            is_rate_loop,
+                            is_upper,
+                            is_sensitivity,
+                            omega,
+                        };
+                        let mut x = vec![k.ln()];
+                        x.extend(z);
+                        if self.distance(&constraint, &x).abs() < near {
+                            found.push(constraint);
+                        }
+                    }
+                }
+            }
+        }
+        found
+    }
+
+    /// Logarithm by which the gain `exp(x[0])` of the shape `x[1..]` keeps a constraint.
+    pub(crate) fn distance(&self, constraint: &Constraint, x: &[f64]) -> f64 {
+        let problem = &self.problem;
+        let law = if constraint.is_rate_loop {
+            let rate = problem.process.rate();
+            rate.and_then(|rate| Some((rate, problem.family.rate_law(&rate, &x[1..])?)))
+        } else {
+            Some((
+                problem.process,
+                problem.family.law(&problem.process, &x[1..]),
+            ))
+        };
+        let Some((process, law)) = law else {
+            return f64::INFINITY;
+        };
+        let none = 1e9;
+        let limits = if constraint.is_sensitivity {
+            Limits {
+                mt: none,
+                ..problem.limits
+            }
+        } else {
+            Limits {
+                ms: none,
+                ..problem.limits
+            }
+        };
+        let open_loop = OpenLoop::new(&process, &law);
+        let gain = extremum(&open_loop, &limits, constraint.omega, constraint.is_upper);
+        if constraint.is_upper {
+            gain.ln() - x[0]
+        } else {
+            x[0] - gain.ln()
         }
     }
 
@@ -204,7 +303,10 @@ impl Objective {
                 (gain.k, gain.omega) = (inner.high, inner.omega);
             }
         }
-        gain.k = self.problem.limited(z, gain.k, gain.omega).ok_or(NoGain::Unstable)?;
+        gain.k = self
+            .problem
+            .limited(z, gain.k, gain.omega)
+            .ok_or(NoGain::Unstable)?;
         Ok(gain)
     }
 
@@ -219,7 +321,11 @@ impl Objective {
         if self.is_strict && gain.low > gain.k {
             return NO_COST;
         }
-        let law = self.problem.family.law(&self.problem.process, z).scaled(gain.k);
+        let law = self
+            .problem
+            .family
+            .law(&self.problem.process, z)
+            .scaled(gain.k);
         match self.problem.integrals(&law, gain.omega, 1.0) {
             Some(found) if found.iae > 0.0 => found.iae.ln() + penalty(gain.low, gain.k),
             _ => NO_COST,
@@ -229,7 +335,11 @@ impl Objective {
 
 /// Penalty of a gain below the least one.
 pub(crate) fn penalty(low: f64, k: f64) -> f64 {
-    if low > k { PENALTY * (low / k).ln() } else { 0.0 }
+    if low > k {
+        PENALTY * (low / k).ln()
+    } else {
+        0.0
+    }
 }
 
 /// The gain `k`, or a smaller one at which `excess(ln k)` is zero: secant in logarithms, as noise and peaks grow about in

@@ -10,14 +10,26 @@ use super::simplex::{Best, Extent, minimise};
 
 /// Step of the grid in the search, and in the check of its result.
 const COARSE_GRID: f64 = 0.08;
-const FINE_GRID: f64 = 0.04;
+pub(crate) const FINE_GRID: f64 = 0.04;
 
 /// First and second simplex of a search.
-const FIRST: Extent = Extent { size: 0.35, tolerance: 3e-2, evaluations: 120 };
-const SECOND: Extent = Extent { size: 0.06, tolerance: 1e-2, evaluations: 80 };
+const FIRST: Extent = Extent {
+    size: 0.35,
+    tolerance: 3e-2,
+    evaluations: 120,
+};
+const SECOND: Extent = Extent {
+    size: 0.06,
+    tolerance: 1e-2,
+    evaluations: 80,
+};
 
 /// Simplex of the search for a feasible shape, and the logarithm of the ratio of gains at which it is feasible enough.
-const FEASIBILITY: Extent = Extent { size: 1.0, tolerance: 3e-2, evaluations: 150 };
+const FEASIBILITY: Extent = Extent {
+    size: 1.0,
+    tolerance: 3e-2,
+    evaluations: 150,
+};
 const WELL_INSIDE: f64 = -0.1;
 
 /// A result whose least gain exceeds its largest one by more than this is infeasible.
@@ -50,8 +62,13 @@ pub(crate) fn optimum(problem: Problem) -> Result<Optimum, NoOptimum> {
     if let Some(family) = problem.family.without_rate_derivative() {
         // The derivative of the rate starts from the cascade without it.
         let simpler = Problem { family, ..problem };
-        let best = search(&mut Objective::new(simpler, COARSE_GRID), &family.starts(&problem.process))?;
-        starts = problem.family.with_rate_derivative(&problem.process, &best.point);
+        let best = search(
+            &mut Objective::new(simpler, COARSE_GRID),
+            &family.starts(&problem.process),
+        )?;
+        starts = problem
+            .family
+            .with_rate_derivative(&problem.process, &best.point);
     }
     let best = search(&mut coarse, &starts)?;
     let mut fine = Objective::new(problem, FINE_GRID);
@@ -59,7 +76,9 @@ pub(crate) fn optimum(problem: Problem) -> Result<Optimum, NoOptimum> {
         return Ok(found);
     }
     // The coarse grid took an infeasible shape for a feasible one: back inside, and again with shapes that are feasible.
-    let excess = fine.gain(&best.point).map_or(NO_COST, |gain| (gain.low / gain.k).ln());
+    let excess = fine
+        .gain(&best.point)
+        .map_or(NO_COST, |gain| (gain.low / gain.k).ln());
     let inside = feasible(&mut fine, &best.point, excess).ok_or(NoOptimum::Infeasible)?;
     fine.is_strict = true;
     let best = minimise(&mut |z: &[f64]| fine.cost(z), &inside, SECOND);
@@ -74,7 +93,11 @@ fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOpti
         match objective.gain(start) {
             Ok(gain) => {
                 let excess = (gain.low / gain.k).ln();
-                ranked.push((start.clone(), excess, objective.problem.least_cost(start, gain.k)));
+                ranked.push((
+                    start.clone(),
+                    excess,
+                    objective.problem.least_cost(start, gain.k),
+                ));
             }
             Err(NoGain::Unbounded) => reason = NoOptimum::Unbounded,
             Err(NoGain::Unstable) => {}
@@ -92,14 +115,18 @@ fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOpti
         }
         let value = objective.cost(start);
         if value < least {
-            best = Some(Best { value, point: start.clone() });
+            best = Some(Best {
+                value,
+                point: start.clone(),
+            });
         }
     }
     let best = match best {
         Some(best) => best,
         None => {
             let nearest = ranked.iter().min_by(|a, b| a.1.total_cmp(&b.1));
-            nearest.and_then(|(start, excess, _)| feasible(objective, start, *excess))
+            nearest
+                .and_then(|(start, excess, _)| feasible(objective, start, *excess))
                 .ok_or(NoOptimum::Infeasible)?
         }
     };
@@ -117,10 +144,16 @@ fn feasible(objective: &mut Objective, start: &[f64], excess: f64) -> Option<Bes
         let gain = objective.gain(z);
         gain.map_or(NO_COST, |gain| (gain.low / gain.k).ln().max(WELL_INSIDE))
     };
-    let start = Best { value: excess, point: start.to_vec() };
+    let start = Best {
+        value: excess,
+        point: start.to_vec(),
+    };
     let found = minimise(&mut of, &start, FEASIBILITY);
     let value = objective.cost(&found.point);
-    (found.value <= 0.0 && value < NO_COST).then_some(Best { value, point: found.point })
+    (found.value <= 0.0 && value < NO_COST).then_some(Best {
+        value,
+        point: found.point,
+    })
 }
 
 /// Gain of the shape on the fine grid.
@@ -133,5 +166,9 @@ fn finish(fine: &mut Objective, z: &[f64]) -> Result<Optimum, NoOptimum> {
     if ln_cost >= NO_COST {
         return Err(NoOptimum::Infeasible);
     }
-    Ok(Optimum { z: z.to_vec(), gain, ln_cost })
+    Ok(Optimum {
+        z: z.to_vec(),
+        gain,
+        ln_cost,
+    })
 }

@@ -23,12 +23,24 @@ const GRID: f64 = 0.15;
 /// Probability that fewer draws miss the limits than the share of the posterior that does.
 const DOUBT: f64 = 0.07;
 
-const FIRST: Extent = Extent { size: 0.3, tolerance: 3e-2, evaluations: 30 };
-const SECOND: Extent = Extent { size: 0.1, tolerance: 2e-2, evaluations: 15 };
-const FEASIBILITY: Extent = Extent { size: 0.3, tolerance: 3e-2, evaluations: 40 };
+const FIRST: Extent = Extent {
+    size: 0.3,
+    tolerance: 3e-2,
+    evaluations: 30,
+};
+const SECOND: Extent = Extent {
+    size: 0.1,
+    tolerance: 2e-2,
+    evaluations: 15,
+};
+const FEASIBILITY: Extent = Extent {
+    size: 0.3,
+    tolerance: 3e-2,
+    evaluations: 40,
+};
 const WELL_INSIDE: f64 = -0.05;
 
-/// Logarithms of the factors of the integral time that are tried first.
+/// Logarithms of the factors of the times of integral and angle loop that are tried first.
 const LONGER: [f64; 6] = [0.0, 0.15, 0.4, 0.8, 1.4, 2.2];
 
 /// Draws of a posterior in the units of the nominal process.
@@ -65,7 +77,12 @@ impl Draws {
         }
         let lost = draws.len() - ratios.len();
         let given_up = most_given_up(draws.len(), 1.0 - coverage).saturating_sub(lost);
-        Self { objectives, ratios, nominal, given_up }
+        Self {
+            objectives,
+            ratios,
+            nominal,
+            given_up,
+        }
     }
 
     /// Intervals of the gain of a shape, per gain of the nominal process: ends, and whether there is one.
@@ -74,7 +91,8 @@ impl Draws {
         draws
             .map(|(objective, ratio)| match objective.allowed(z) {
                 Ok((whole, inner)) => {
-                    let (low, high) = inner.map_or((0.0, f64::INFINITY), |inner| (inner.low, inner.high));
+                    let (low, high) =
+                        inner.map_or((0.0, f64::INFINITY), |inner| (inner.low, inner.high));
                     (whole.low.max(low) / ratio, whole.high.min(high) / ratio)
                 }
                 Err(_) => (f64::INFINITY, 0.0),
@@ -96,19 +114,31 @@ impl Draws {
         let splits: Vec<(f64, f64)> = (0..=self.given_up).filter_map(split).collect();
         let feasible = splits.iter().rev().find(|(_, excess)| *excess <= 0.0);
         let nearest = || splits.iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        feasible.or_else(nearest).copied().unwrap_or((0.0, f64::INFINITY))
+        feasible
+            .or_else(nearest)
+            .copied()
+            .unwrap_or((0.0, f64::INFINITY))
     }
 
     fn mean_cost(&self, z: &[f64], k: f64, omega: f64) -> f64 {
         let count = self.objectives.len().min(COST_DRAWS);
-        let costs = self.objectives.iter().zip(&self.ratios).take(count).map(|(objective, ratio)| {
-            let problem = &objective.problem;
-            let law = problem.family.law(&problem.process, z).scaled(k * ratio);
-            // The output after a step of the load is in units of the gain of the draw.
-            let unit = if problem.family.form.has_integral() { *ratio } else { 1.0 };
-            let found = problem.integrals(&law, omega, 1.0);
-            found.map_or(f64::INFINITY, |found| found.iae * unit)
-        });
+        let costs =
+            self.objectives
+                .iter()
+                .zip(&self.ratios)
+                .take(count)
+                .map(|(objective, ratio)| {
+                    let problem = &objective.problem;
+                    let law = problem.family.law(&problem.process, z).scaled(k * ratio);
+                    // The output after a step of the load is in units of the gain of the draw.
+                    let unit = if problem.family.form.has_integral() {
+                        *ratio
+                    } else {
+                        1.0
+                    };
+                    let found = problem.integrals(&law, omega, 1.0);
+                    found.map_or(f64::INFINITY, |found| found.iae * unit)
+                });
         costs.sum::<f64>() / count.max(1) as f64
     }
 
@@ -117,7 +147,9 @@ impl Draws {
         let k = best.gain.k;
         let intervals = self.intervals(&best.z);
         let rounding = 1e-6;
-        let is_kept = |(low, high): &&(f64, f64)| *low <= k * (1.0 + rounding) && k <= *high * (1.0 + rounding);
+        let is_kept = |(low, high): &&(f64, f64)| {
+            *low <= k * (1.0 + rounding) && k <= *high * (1.0 + rounding)
+        };
         let kept = intervals.iter().filter(is_kept).count();
         Performance {
             coverage: kept as f64 / count.max(1) as f64,
@@ -147,30 +179,44 @@ impl Draws {
                 return NO_COST;
             };
             let mean = self.mean_cost(z, k, omega);
-            if mean.is_finite() { mean.ln() + PENALTY * excess.max(0.0) } else { NO_COST }
+            if mean.is_finite() {
+                mean.ln() + PENALTY * excess.max(0.0)
+            } else {
+                NO_COST
+            }
         };
-        let start = Best { value: cost(&start), point: start };
+        let start = Best {
+            value: cost(&start),
+            point: start,
+        };
         let first = minimise(&mut cost, &start, FIRST);
         let best = minimise(&mut cost, &first, SECOND);
-        let (k, excess) = self.limited(&best.point, omega).ok_or(NoOptimum::Infeasible)?;
+        let (k, excess) = self
+            .limited(&best.point, omega)
+            .ok_or(NoOptimum::Infeasible)?;
         let mut found = nominal.clone();
         (found.z, found.gain.k, found.ln_cost) = (best.point, k, best.value);
-        if excess <= 0.0 && best.value < NO_COST { Ok(found) } else { Err(NoOptimum::Infeasible) }
+        if excess <= 0.0 && best.value < NO_COST {
+            Ok(found)
+        } else {
+            Err(NoOptimum::Infeasible)
+        }
     }
 
     /// A shape that keeps the limits on enough draws.
     pub(crate) fn feasible(&mut self, nominal: &Optimum) -> Option<Vec<f64>> {
         let omega = nominal.gain.omega;
-        let has_integral = self.nominal.family.form.has_integral();
+        let slow = self.nominal.family.slow_variables();
         let mut excess = |z: &[f64]| {
-            self.limited(z, omega).map_or(NO_COST, |(_, excess)| excess.max(WELL_INSIDE))
+            self.limited(z, omega)
+                .map_or(NO_COST, |(_, excess)| excess.max(WELL_INSIDE))
         };
-        // A longer integral time separates the ends of the gain.
+        // Longer times of integral and angle loop separate the ends of the gain.
         let mut start: Option<Best> = None;
         for longer in LONGER {
             let mut point = nominal.z.clone();
-            if let (Some(first), true) = (point.first_mut(), has_integral) {
-                *first += longer;
+            for variable in point.iter_mut().take(slow) {
+                *variable += longer;
             }
             let value = excess(&point);
             if value < start.as_ref().map_or(f64::INFINITY, |best| best.value) {

@@ -28,7 +28,9 @@ pub(crate) fn weight(process: &Process, law: &Law, omega: f64, input_peak: Optio
         let mut nodes = Vec::new();
         let mut quiet = 0;
         let take = |h: f64, _: f64, out: &[f64; 2 * NODES]| {
-            let off = out[NODES..].iter().fold(0.0, |off: f64, y| off.max((y - 1.0).abs()));
+            let off = out[NODES..]
+                .iter()
+                .fold(0.0, |off: f64, y| off.max((y - 1.0).abs()));
             quiet = if off < SETTLED { quiet + 1 } else { 0 };
             nodes.push(*out);
             f64::from(quiet) * h * omega < 6.0 && nodes.len() < LONGEST

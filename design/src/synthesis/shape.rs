@@ -41,8 +41,11 @@ const SHORTEST: f64 = 1e-3;
 /// Whether a shape is in the range of the search.
 pub(crate) fn is_in_range(process: &Process, z: &[f64]) -> bool {
     let order = process.integrators().max(1);
-    let least = (SHORTEST * process.half_rule_dead_time(order)).max(1e-8).ln();
-    z.iter().all(|variable| (least..=LARGEST_VARIABLE).contains(variable))
+    let least = (SHORTEST * process.half_rule_dead_time(order))
+        .max(1e-8)
+        .ln();
+    z.iter()
+        .all(|variable| (least..=LARGEST_VARIABLE).contains(variable))
 }
 
 impl Family {
@@ -50,6 +53,15 @@ impl Family {
         match self.filter {
             Filter::Fixed(time) => time,
             Filter::Searched(least) => least + z.last().map_or(0.0, |ln| ln.exp()),
+        }
+    }
+
+    /// Number of variables, from the first one on, whose larger values make the loop slower and more robust.
+    pub(crate) fn slow_variables(&self) -> usize {
+        match self.form {
+            Form::P | Form::Pd => 0,
+            Form::Pi | Form::Pid => 1,
+            Form::CascadePi | Form::CascadePid => 2,
         }
     }
 
@@ -86,9 +98,8 @@ impl Family {
 
     /// The rate loop of a cascade alone, with gain 1, as in acro mode: on the rate of the process. `None` for another form.
     pub(crate) fn rate_law(&self, process: &Process, z: &[f64]) -> Option<Law> {
-        matches!(self.form, Form::CascadePi | Form::CascadePid).then(|| {
-            Law::pid(process, [1.0, 1.0 / z[0].exp(), self.rate_d(z)], self.tf(z))
-        })
+        matches!(self.form, Form::CascadePi | Form::CascadePid)
+            .then(|| Law::pid(process, [1.0, 1.0 / z[0].exp(), self.rate_d(z)], self.tf(z)))
     }
 
     /// The controller with gain `k` in the units of the user.
@@ -166,12 +177,21 @@ impl Family {
         }
         let mut starts: Vec<Vec<f64>> = match self.form {
             Form::P => vec![vec![]],
-            Form::Pd => derivative_times.iter().map(|td: &f64| vec![td.ln()]).collect(),
+            Form::Pd => derivative_times
+                .iter()
+                .map(|td: &f64| vec![td.ln()])
+                .collect(),
             Form::Pi => integral_times.iter().map(|ti| vec![ti.ln()]).collect(),
             Form::Pid => (integral_times.iter())
                 .flat_map(|ti| {
-                    let shares: &[f64] = if is_double { &[0.03, 0.12, 0.3, 0.6] } else { &[0.12, 0.3, 0.6] };
-                    shares.iter().map(move |share| vec![ti.ln(), (ti * share).ln()])
+                    let shares: &[f64] = if is_double {
+                        &[0.03, 0.12, 0.3, 0.6]
+                    } else {
+                        &[0.12, 0.3, 0.6]
+                    };
+                    shares
+                        .iter()
+                        .map(move |share| vec![ti.ln(), (ti * share).ln()])
                 })
                 // The zeros of the controller on a resonance.
                 .chain(process.resonance().map(|(peak, damping)| {

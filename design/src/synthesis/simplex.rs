@@ -46,12 +46,20 @@ pub(crate) fn minimise(f: &mut impl FnMut(&[f64]) -> f64, start: &Best, extent: 
             .map(|i| corners[..n].iter().map(|corner| corner.1[i]).sum::<f64>() / n as f64)
             .collect();
         let along = |factor: f64, worst: &[f64]| -> Vec<f64> {
-            centre.iter().zip(worst).map(|(c, w)| c + factor * (c - w)).collect()
+            centre
+                .iter()
+                .zip(worst)
+                .map(|(c, w)| c + factor * (c - w))
+                .collect()
         };
         let (reflected, point, _) = of(along(1.0, &corners[n].1));
         if reflected < corners[0].0 {
             let (expanded, further, used) = of(along(2.0, &corners[n].1));
-            corners[n] = if expanded < reflected { (expanded, further) } else { (reflected, point) };
+            corners[n] = if expanded < reflected {
+                (expanded, further)
+            } else {
+                (reflected, point)
+            };
             count = used;
             continue;
         }
@@ -69,7 +77,12 @@ pub(crate) fn minimise(f: &mut impl FnMut(&[f64]) -> f64, start: &Best, extent: 
         }
         let best = corners[0].1.clone();
         for corner in &mut corners[1..] {
-            let point = corner.1.iter().zip(&best).map(|(a, b)| b + 0.5 * (a - b)).collect();
+            let point = corner
+                .1
+                .iter()
+                .zip(&best)
+                .map(|(a, b)| b + 0.5 * (a - b))
+                .collect();
             let (value, point, used) = of(point);
             *corner = (value, point);
             count = used;
@@ -89,8 +102,15 @@ mod tests {
     fn a_curved_valley() {
         let mut f = |p: &[f64]| (p[0] - 1.0).powi(2) + 10.0 * (p[1] - p[0] * p[0]).powi(2);
         let point = vec![-1.0, 2.0];
-        let start = Best { value: f(&point), point };
-        let extent = Extent { size: 0.5, tolerance: 1e-7, evaluations: 1000 };
+        let start = Best {
+            value: f(&point),
+            point,
+        };
+        let extent = Extent {
+            size: 0.5,
+            tolerance: 1e-7,
+            evaluations: 1000,
+        };
         let found = minimise(&mut f, &start, extent);
         assert!((found.point[0] - 1.0).abs() < 1e-6 && (found.point[1] - 1.0).abs() < 1e-6);
         assert_eq!(found.value, f(&found.point));

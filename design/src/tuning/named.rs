@@ -5,8 +5,9 @@ use crate::analysis::process::Process;
 use crate::controller::{Controller, Form};
 use crate::model::Model;
 use crate::synthesis::limits::Limits;
-use crate::synthesis::objective::{NoiseLimit, Problem};
-use crate::synthesis::optimum::{NoOptimum, Optimum, optimum};
+use crate::synthesis::objective::{NoiseLimit, Objective, Problem};
+use crate::synthesis::optimum::{FINE_GRID, NoOptimum, Optimum, optimum};
+use crate::synthesis::polish::polish;
 use crate::synthesis::robust::Draws;
 use crate::synthesis::setpoint;
 use crate::synthesis::shape::{Family, Filter};
@@ -31,6 +32,10 @@ const ROUNDING: f64 = 1e-6;
 pub(super) fn design(model: &Model, specification: &Specification) -> Result<Design, DesignError> {
     let problem = problem(model, specification)?;
     match optimum(problem) {
+        Ok(best) if specification.refined && problem.noise.is_none() => {
+            let best = polish(&mut Objective::new(problem, FINE_GRID), &best);
+            checked(model, specification, &problem, &best)
+        }
         Ok(best) => checked(model, specification, &problem, &best),
         Err(reason) => Err(refusal(problem, specification, reason)),
     }
@@ -46,8 +51,7 @@ pub(super) fn design_over(
         return design(model, specification);
     }
     let problem = problem(model, specification)?;
-    let nominal =
-        optimum(problem).map_err(|reason| refusal(problem, specification, reason))?;
+    let nominal = optimum(problem).map_err(|reason| refusal(problem, specification, reason))?;
     let processes: Vec<Process> = (draws.iter())
         .filter_map(|draw| Process::new(&draw.linear(), &specification.execution))
         .collect();
@@ -59,11 +63,17 @@ pub(super) fn design_over(
             of(with_peak(problem, peak)).feasible(&nominal).is_some()
         }),
     })?;
-    let (found, alone) =
-        (set.performance(&best, draws.len()), set.performance(&nominal, draws.len()));
+    let (found, alone) = (
+        set.performance(&best, draws.len()),
+        set.performance(&nominal, draws.len()),
+    );
     let mut designed = loop_of(model, specification, &problem, &best)?;
     // A cost after a step of the load is in the unit of the gain.
-    let gain = if specification.form.has_integral() { problem.process.gain.abs() } else { 1.0 };
+    let gain = if specification.form.has_integral() {
+        problem.process.gain.abs()
+    } else {
+        1.0
+    };
     let unit = gain * problem.process.unit_s;
     designed.robustness = Some(Robustness {
         coverage: found.coverage,
@@ -88,7 +98,11 @@ fn refusal(problem: Problem, specification: &Specification, reason: NoOptimum) -
 
 /// The problem with other limits of `Ms` and `Mt`.
 pub(super) fn with_peak(problem: Problem, peak: f64) -> Problem {
-    let limits = Limits { ms: peak, mt: peak, ..problem.limits };
+    let limits = Limits {
+        ms: peak,
+        mt: peak,
+        ..problem.limits
+    };
     Problem { limits, ..problem }
 }
 
@@ -110,7 +124,10 @@ pub(super) fn least_peak(from: f64, is_kept: impl Fn(f64) -> bool) -> Option<f64
 }
 
 /// The problem in the units of the process.
-pub(super) fn problem(model: &Model, specification: &Specification) -> Result<Problem, DesignError> {
+pub(super) fn problem(
+    model: &Model,
+    specification: &Specification,
+) -> Result<Problem, DesignError> {
     specification.check()?;
     let form = specification.form;
     let execution = &specification.execution;
@@ -159,7 +176,9 @@ pub(super) fn controller(
     problem: &Problem,
     best: &Optimum,
 ) -> Controller {
-    let Problem { process, family, .. } = problem;
+    let Problem {
+        process, family, ..
+    } = problem;
     let law = family.law(process, &best.z).scaled(best.gain.k);
     let b = match specification.form {
         Form::Pi | Form::Pid => {
@@ -183,7 +202,11 @@ fn checked(
         peaks.ms <= specification.ms * (1.0 + ROUNDING)
             && peaks.mt <= specification.mt * (1.0 + ROUNDING)
     });
-    if is_kept { Ok(designed) } else { Err(unexplained(specification)) }
+    if is_kept {
+        Ok(designed)
+    } else {
+        Err(unexplained(specification))
+    }
 }
 
 /// Controller, cost and margins of an optimum on the model. An error if the loop is unstable.

@@ -59,7 +59,9 @@ pub enum DesignError {
         requirement: &'static str,
     },
     /// The process is unstable without a controller.
-    #[error("the process has a pole in the right half-plane; controllers are designed for stable and integrating processes")]
+    #[error(
+        "the process has a pole in the right half-plane; controllers are designed for stable and integrating processes"
+    )]
     UnstableProcess,
     /// The form has no integral term, so that a stable process would not reach the reference.
     #[error("a process without integrator needs a controller with an integral term, but {} has none", .0.name())]
@@ -68,7 +70,9 @@ pub enum DesignError {
     #[error("the form {} needs a process whose last stage is an integrator", .0.name())]
     NoRate(Form),
     /// Nothing limits the gain: the process has no dead time, or too few lags.
-    #[error("the best gain is infinite, because nothing delays the loop: give the sample period of the controller")]
+    #[error(
+        "the best gain is infinite, because nothing delays the loop: give the sample period of the controller"
+    )]
     Unbounded,
     /// No controller of this form keeps the limits.
     #[error("no controller of the form {} keeps the limits{}", .form.name(), at_least(.least_peak))]
@@ -81,7 +85,9 @@ pub enum DesignError {
 }
 
 fn at_least(peak: &Option<f64>) -> String {
-    peak.map_or(String::new(), |peak| format!("; the least Ms and Mt is {peak:.2}"))
+    peak.map_or(String::new(), |peak| {
+        format!("; the least Ms and Mt is {peak:.2}")
+    })
 }
 
 impl From<OptimumError> for DesignError {

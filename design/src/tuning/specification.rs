@@ -240,7 +240,12 @@ impl Specification {
         [
             ("ms", self.ms, at_least(self.ms, 1.01), "1.01 or more"),
             ("mt", self.mt, at_least(self.mt, 1.01), "1.01 or more"),
-            ("gain_margin", self.gain_margin, at_least(self.gain_margin, 1.0), "1 or more"),
+            (
+                "gain_margin",
+                self.gain_margin,
+                at_least(self.gain_margin, 1.0),
+                "1 or more",
+            ),
             (
                 "delay_margin_s",
                 self.delay_margin_s,
@@ -260,7 +265,12 @@ impl Specification {
                 positive(noise.input_amplitude),
                 "positive",
             ),
-            ("noise_share", self.noise_share, positive(self.noise_share), "positive"),
+            (
+                "noise_share",
+                self.noise_share,
+                positive(self.noise_share),
+                "positive",
+            ),
             (
                 "input_peak",
                 self.input_peak.unwrap_or(1.0),
@@ -289,7 +299,11 @@ impl Specification {
         .into_iter()
         .find(|(_, _, holds, _)| !holds)
         .map_or(Ok(()), |(name, value, _, requirement)| {
-            Err(DesignError::Setting { name, value, requirement })
+            Err(DesignError::Setting {
+                name,
+                value,
+                requirement,
+            })
         })
     }
 }

@@ -37,7 +37,10 @@ impl Random {
         let damping = self.decades(-2.5, 0.7);
         Linear::new(structure)
             .with_gain(sign * self.decades(-3.0, 3.0))
-            .with_lags_s([scale_s * self.decades(-3.0, 0.0), scale_s * self.decades(-3.0, 0.0)])
+            .with_lags_s([
+                scale_s * self.decades(-3.0, 0.0),
+                scale_s * self.decades(-3.0, 0.0),
+            ])
             .with_pole_per_s(self.one_of(&[0.0, 1.0, 1.0, 1.0]) * self.decades(-2.0, 1.5) / scale_s)
             .with_pair(2.0 * damping * natural, natural * natural)
             .with_tau_s(scale_s * self.decades(-3.0, 1.0))
@@ -55,7 +58,11 @@ impl Random {
         };
         if self.uniform(0.0, 1.0) < 0.15 {
             let std = self.decades(-4.0, -1.0);
-            asked.with_noise(MeasurementNoise::new(std, tau_s * self.decades(-2.0, 0.0), 1.0))
+            asked.with_noise(MeasurementNoise::new(
+                std,
+                tau_s * self.decades(-2.0, 0.0),
+                1.0,
+            ))
         } else {
             asked
         }
@@ -77,13 +84,46 @@ fn every_design_is_stable_and_keeps_its_limits() {
             Ok(_) => "ok".to_string(),
             Err(e) => format!("{e:?}").split('{').next().unwrap().to_string(),
         };
-        *count.entry(format!("{} {:?} {name}", if asked.noise.is_some() {"noise"} else {""}, asked.form)).or_insert((0, 0.0)) = {
-            let c = count.get(&format!("{} {:?} {name}", if asked.noise.is_some() {"noise"} else {""}, asked.form)).copied().unwrap_or((0, 0.0f64));
+        *count
+            .entry(format!(
+                "{} {:?} {name}",
+                if asked.noise.is_some() { "noise" } else { "" },
+                asked.form
+            ))
+            .or_insert((0, 0.0)) = {
+            let c = count
+                .get(&format!(
+                    "{} {:?} {name}",
+                    if asked.noise.is_some() { "noise" } else { "" },
+                    asked.form
+                ))
+                .copied()
+                .unwrap_or((0, 0.0f64));
             (c.0 + 1, c.1 + el)
         };
-        if el > 0.1 || matches!(found, Err(DesignError::Infeasible { .. } | DesignError::Unbounded)) {
-            let boring = model.linear().structure().stages().integrators + usize::from(model.linear().structure().stages().poles > 0 && model.linear().pole_per_s() == 0.0) > 1 && matches!(asked.form, Form::P | Form::Pi);
-            if !boring { println!("{i} {el:.3} s {:?} {:?} noise {} h {:.2e} -> {:?}", model.linear(), asked.form, asked.noise.is_some(), asked.execution.sample_period_s, found.as_ref().map(|_| ())); }
+        if el > 0.1
+            || matches!(
+                found,
+                Err(DesignError::Infeasible { .. } | DesignError::Unbounded)
+            )
+        {
+            let boring = model.linear().structure().stages().integrators
+                + usize::from(
+                    model.linear().structure().stages().poles > 0
+                        && model.linear().pole_per_s() == 0.0,
+                )
+                > 1
+                && matches!(asked.form, Form::P | Form::Pi);
+            if !boring {
+                println!(
+                    "{i} {el:.3} s {:?} {:?} noise {} h {:.2e} -> {:?}",
+                    model.linear(),
+                    asked.form,
+                    asked.noise.is_some(),
+                    asked.execution.sample_period_s,
+                    found.as_ref().map(|_| ())
+                );
+            }
         }
         if let Ok(found) = found {
             let peaks = sensitivity(&model, &found.controller).unwrap();
@@ -93,26 +133,30 @@ fn every_design_is_stable_and_keeps_its_limits() {
     }
     let mut c: Vec<_> = count.into_iter().collect();
     c.sort_by(|a, b| a.0.cmp(&b.0));
-    for (k, (n, s)) in c { println!("{k}: {n}, mean {:.2} ms", 1e3 * s / n as f64); }
+    for (k, (n, s)) in c {
+        println!("{k}: {n}, mean {:.2} ms", 1e3 * s / n as f64);
+    }
 }
 
 fn posterior(n: usize, seed: u64, spread: [f64; 4]) -> Vec<Model> {
     let mut random = Random(seed);
-    (0..n).map(|_| {
-        let mut normal = |scale: f64| {
-            let u: f64 = random.uniform(1e-12, 1.0);
-            let v = random.uniform(0.0, std::f64::consts::TAU);
-            (scale * (-2.0 * u.ln()).sqrt() * v.cos() / 1.645).exp()
-        };
-        let [ratio, lag, body, tau] = spread;
-        let body = normal(body);
-        Linear::new(Structure::Soiptd)
-            .with_gain(normal(ratio) / 1.6886)
-            .with_lags_s([0.0321 * normal(lag), 1.0])
-            .with_pole_per_s(1.0 / (1.6886 * body))
-            .with_tau_s(0.0237 * normal(tau))
-            .into()
-    }).collect()
+    (0..n)
+        .map(|_| {
+            let mut normal = |scale: f64| {
+                let u: f64 = random.uniform(1e-12, 1.0);
+                let v = random.uniform(0.0, std::f64::consts::TAU);
+                (scale * (-2.0 * u.ln()).sqrt() * v.cos() / 1.645).exp()
+            };
+            let [ratio, lag, body, tau] = spread;
+            let body = normal(body);
+            Linear::new(Structure::Soiptd)
+                .with_gain(normal(ratio) / 1.6886)
+                .with_lags_s([0.0321 * normal(lag), 1.0])
+                .with_pole_per_s(1.0 / (1.6886 * body))
+                .with_tau_s(0.0237 * normal(tau))
+                .into()
+        })
+        .collect()
 }
 
 #[test]
@@ -123,14 +167,27 @@ fn robust_dbg() {
         let fresh = posterior(400, 4, spread);
         for form in [Form::Pid, Form::CascadePi, Form::Pd, Form::CascadePid] {
             let asked = Specification::new(form, Style::Balanced);
-            let asked = if form == Form::Pid { asked.with_filter_s(0.002) } else { asked };
+            let asked = if form == Form::Pid {
+                asked.with_filter_s(0.002)
+            } else {
+                asked
+            };
             let t = std::time::Instant::now();
             let found = onecycle_design::design_over(&model, &draws, &asked);
             println!("{form:?} {:?}", t.elapsed());
-            match found { Ok(found) => {
-                let kept = fresh.iter().filter(|m| sensitivity(m, &found.controller).is_some_and(|s| s.ms < 1.6 && s.mt < 1.6)).count();
-                println!("   {:?} fresh {}", found.robustness, kept as f64 / 400.0); }
-                Err(e) => println!("   {e:?}") }
+            match found {
+                Ok(found) => {
+                    let kept = fresh
+                        .iter()
+                        .filter(|m| {
+                            sensitivity(m, &found.controller)
+                                .is_some_and(|s| s.ms < 1.6 && s.mt < 1.6)
+                        })
+                        .count();
+                    println!("   {:?} fresh {}", found.robustness, kept as f64 / 400.0);
+                }
+                Err(e) => println!("   {e:?}"),
+            }
         }
     }
 }
