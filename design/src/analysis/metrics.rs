@@ -64,7 +64,7 @@ pub(crate) fn reference_metrics(record: &Record, goal: f64) -> StepMetrics {
         })
     };
     let beyond = |value: f64| (1.0 - value / goal).abs() - SETTLING_BAND;
-    let unsettled = cells().filter(|&(step, i)| beyond(y(step)[i]) > 0.0).last();
+    let unsettled = cells().rfind(|&(step, i)| beyond(y(step)[i]) > 0.0);
     let (mut peak, mut peak_time) = (0.0, record.start);
     let mut peak_input = 0.0_f64;
     for (step, i) in cells() {

@@ -229,16 +229,6 @@ impl Process {
         self.tau + half + left_out.iter().skip(1).sum::<f64>()
     }
 
-    /// Highest corner frequency of stages and filter.
-    pub(crate) fn highest_corner(&self) -> f64 {
-        let shortest = self.times().last().copied().unwrap_or(0.0);
-        if shortest > 0.0 && shortest.is_finite() {
-            1.0 / shortest
-        } else {
-            1.0
-        }
-    }
-
     /// Frequency and damping ratio of a resonance with damping ratio below 1.
     pub(crate) fn resonance(&self) -> Option<(f64, f64)> {
         self.stages().iter().find_map(|stage| match *stage {

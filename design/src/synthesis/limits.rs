@@ -34,6 +34,7 @@ pub(crate) type Interval = (f64, f64);
 
 impl Limits {
     /// `Ms` and `Mt` at most `m`.
+    #[cfg(test)]
     pub(crate) fn of(m: f64) -> Self {
         Self {
             ms: m,

@@ -10,7 +10,6 @@ use crate::analysis::{Law, OpenLoop};
 
 use super::bands::{Allowed, Grid, NoGain, allowed, extremum};
 use super::limits::Limits;
-use super::polish::Constraint;
 use super::shape::{Family, is_in_range};
 
 pub(crate) use crate::analysis::realisation::Excitation;
@@ -48,6 +47,17 @@ pub(crate) struct Problem {
     pub noise: Option<NoiseLimit>,
     /// Largest output of the controller after a unit step of the reference with `b = 0`, or `b = 1` without integral.
     pub input_peak: Option<f64>,
+}
+
+/// Which loop and which end of the forbidden gains an extremum belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Constraint {
+    pub is_rate_loop: bool,
+    /// Upper limit of the gain; a lower one otherwise.
+    pub is_upper: bool,
+    /// Limit of `Ms`; of `Mt` otherwise.
+    pub is_sensitivity: bool,
+    pub omega: f64,
 }
 
 /// Gain of a shape.

@@ -31,17 +31,6 @@ const REFINEMENT: f64 = 4.0;
 /// Tolerance of a linearised constraint that is not in the active set, and of the sign of its multiplier.
 const TOLERANCE: f64 = 1e-7;
 
-/// Which loop and which end of the forbidden gains an extremum belongs to.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Constraint {
-    pub is_rate_loop: bool,
-    /// Upper limit of the gain; a lower one otherwise.
-    pub is_upper: bool,
-    /// Limit of `Ms`; of `Mt` otherwise.
-    pub is_sensitivity: bool,
-    pub omega: f64,
-}
-
 type Matrix = Vec<Vec<f64>>;
 
 /// Value, gradient and second derivatives.

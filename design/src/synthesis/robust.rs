@@ -247,7 +247,7 @@ fn most_given_up(draws: usize, missing: f64) -> usize {
     for r in 1..=draws {
         term *= (n - r as f64 + 1.0) / r as f64 * missing / (1.0 - missing);
         sum += term;
-        if !(sum <= DOUBT) {
+        if sum > DOUBT || sum.is_nan() {
             break;
         }
         given_up = r;

@@ -15,81 +15,98 @@ pub(crate) struct Extent {
     pub evaluations: usize,
 }
 
+/// Simplex in progress: values and corners.
+struct Simplex<'a, F> {
+    f: &'a mut F,
+    corners: Vec<(f64, Vec<f64>)>,
+    evaluations: usize,
+}
+
+impl<F: FnMut(&[f64]) -> f64> Simplex<'_, F> {
+    fn corner(&mut self, point: Vec<f64>) -> (f64, Vec<f64>) {
+        self.evaluations += 1;
+        ((self.f)(&point), point)
+    }
+
+    fn sort(&mut self) {
+        self.corners.sort_by(|a, b| a.0.total_cmp(&b.0));
+    }
+
+    /// Largest distance of a corner from the best one, in any variable.
+    fn spread(&self) -> f64 {
+        let best = self.corners[0].1.iter().cycle();
+        let others = self.corners[1..].iter().flat_map(|corner| &corner.1);
+        others
+            .zip(best)
+            .fold(0.0, |spread: f64, (a, b)| spread.max((a - b).abs()))
+    }
+
+    /// Corner on the line from the worst one through the centre of the others, `factor` times as far on the other side.
+    fn along(&mut self, factor: f64) -> (f64, Vec<f64>) {
+        let n = self.corners.len() - 1;
+        let point = (0..n)
+            .map(|i| {
+                let sum: f64 = self.corners[..n].iter().map(|corner| corner.1[i]).sum();
+                let centre = sum / n as f64;
+                centre + factor * (centre - self.corners[n].1[i])
+            })
+            .collect();
+        self.corner(point)
+    }
+
+    /// Replaces the worst of the sorted corners, or moves all to the best one.
+    fn step(&mut self) {
+        let n = self.corners.len() - 1;
+        let reflected = self.along(1.0);
+        if reflected.0 < self.corners[0].0 {
+            let expanded = self.along(2.0);
+            self.corners[n] = if expanded.0 < reflected.0 {
+                expanded
+            } else {
+                reflected
+            };
+            return;
+        }
+        if reflected.0 < self.corners[n - 1].0 {
+            self.corners[n] = reflected;
+            return;
+        }
+        let outside = reflected.0 < self.corners[n].0;
+        let contracted = self.along(if outside { 0.5 } else { -0.5 });
+        if contracted.0 < reflected.0.min(self.corners[n].0) {
+            self.corners[n] = contracted;
+            return;
+        }
+        let best = self.corners[0].1.clone();
+        for i in 1..=n {
+            let halfway = |(a, b): (&f64, &f64)| b + 0.5 * (a - b);
+            let point = self.corners[i].1.iter().zip(&best).map(halfway).collect();
+            self.corners[i] = self.corner(point);
+        }
+    }
+}
+
 /// Local minimum of `f` from `start`, whose value is known.
 pub(crate) fn minimise(f: &mut impl FnMut(&[f64]) -> f64, start: &Best, extent: Extent) -> Best {
     let n = start.point.len();
-    if n == 0 {
-        return start.clone();
-    }
-    let mut evaluations = 0;
-    let mut of = |point: Vec<f64>| {
-        evaluations += 1;
-        (f(&point), point, evaluations)
+    let mut simplex = Simplex {
+        f,
+        corners: vec![(start.value, start.point.clone())],
+        evaluations: 0,
     };
-    let mut corners = vec![(start.value, start.point.clone())];
     for i in 0..n {
         let mut point = start.point.clone();
         point[i] += extent.size;
-        let (value, point, _) = of(point);
-        corners.push((value, point));
+        let corner = simplex.corner(point);
+        simplex.corners.push(corner);
     }
-    let mut count = n;
-    while count < extent.evaluations {
-        corners.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let spread = (corners[1..].iter().flat_map(|corner| &corner.1))
-            .zip(corners[0].1.iter().cycle())
-            .fold(0.0, |spread: f64, (a, b)| spread.max((a - b).abs()));
-        if spread < extent.tolerance {
-            break;
-        }
-        let centre: Vec<f64> = (0..n)
-            .map(|i| corners[..n].iter().map(|corner| corner.1[i]).sum::<f64>() / n as f64)
-            .collect();
-        let along = |factor: f64, worst: &[f64]| -> Vec<f64> {
-            centre
-                .iter()
-                .zip(worst)
-                .map(|(c, w)| c + factor * (c - w))
-                .collect()
-        };
-        let (reflected, point, _) = of(along(1.0, &corners[n].1));
-        if reflected < corners[0].0 {
-            let (expanded, further, used) = of(along(2.0, &corners[n].1));
-            corners[n] = if expanded < reflected {
-                (expanded, further)
-            } else {
-                (reflected, point)
-            };
-            count = used;
-            continue;
-        }
-        if reflected < corners[n - 1].0 {
-            corners[n] = (reflected, point);
-            count += 1;
-            continue;
-        }
-        let factor = if reflected < corners[n].0 { 0.5 } else { -0.5 };
-        let (contracted, inner, used) = of(along(factor, &corners[n].1));
-        count = used;
-        if contracted < reflected.min(corners[n].0) {
-            corners[n] = (contracted, inner);
-            continue;
-        }
-        let best = corners[0].1.clone();
-        for corner in &mut corners[1..] {
-            let point = corner
-                .1
-                .iter()
-                .zip(&best)
-                .map(|(a, b)| b + 0.5 * (a - b))
-                .collect();
-            let (value, point, used) = of(point);
-            *corner = (value, point);
-            count = used;
-        }
+    simplex.sort();
+    while n > 0 && simplex.evaluations < extent.evaluations && simplex.spread() >= extent.tolerance
+    {
+        simplex.step();
+        simplex.sort();
     }
-    corners.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let (value, point) = corners.swap_remove(0);
+    let (value, point) = simplex.corners.swap_remove(0);
     Best { value, point }
 }
 

@@ -233,77 +233,92 @@ impl Specification {
         if is_paper {
             return Ok(());
         }
-        let positive = |value: f64| value > 0.0 && value.is_finite();
-        let at_least = |value: f64, least: f64| value >= least && value.is_finite();
-        let noise = self.noise.unwrap_or(MeasurementNoise::new(1.0, 1.0, 1.0));
-        let sampling = self.execution.sample_period_s;
-        [
-            ("ms", self.ms, at_least(self.ms, 1.01), "1.01 or more"),
-            ("mt", self.mt, at_least(self.mt, 1.01), "1.01 or more"),
-            (
-                "gain_margin",
-                self.gain_margin,
-                at_least(self.gain_margin, 1.0),
-                "1 or more",
-            ),
-            (
-                "delay_margin_s",
-                self.delay_margin_s,
-                at_least(self.delay_margin_s, 0.0),
-                "zero or a positive time",
-            ),
-            ("noise.std", noise.std, positive(noise.std), "positive"),
-            (
-                "noise.sample_period_s",
-                noise.sample_period_s,
-                positive(noise.sample_period_s),
-                "a positive time",
-            ),
-            (
-                "noise.input_amplitude",
-                noise.input_amplitude,
-                positive(noise.input_amplitude),
-                "positive",
-            ),
-            (
-                "noise_share",
-                self.noise_share,
-                positive(self.noise_share),
-                "positive",
-            ),
-            (
-                "input_peak",
-                self.input_peak.unwrap_or(1.0),
-                positive(self.input_peak.unwrap_or(1.0)),
-                "positive",
-            ),
-            (
-                "filter_s",
-                self.filter_s.unwrap_or(0.0),
-                at_least(self.filter_s.unwrap_or(0.0), 0.0),
-                "zero or a positive time",
-            ),
-            (
-                "execution.sample_period_s",
-                sampling,
-                self.execution.is_valid(),
-                "zero or a positive time, as are the times of its delay and filters",
-            ),
-            (
-                "coverage",
-                self.coverage,
-                self.coverage > 0.0 && self.coverage <= 1.0,
-                "between 0 and 1",
-            ),
-        ]
-        .into_iter()
-        .find(|(_, _, holds, _)| !holds)
-        .map_or(Ok(()), |(name, value, _, requirement)| {
+        if !self.execution.is_valid() {
+            return Err(DesignError::Setting {
+                name: "execution.sample_period_s",
+                value: self.execution.sample_period_s,
+                requirement: "zero or a positive time, as are the times of its delay and filters",
+            });
+        }
+        let failed = self
+            .values()
+            .into_iter()
+            .find(|(_, value, range)| !range.holds(*value));
+        failed.map_or(Ok(()), |(name, value, range)| {
             Err(DesignError::Setting {
                 name,
                 value,
-                requirement,
+                requirement: range.name(),
             })
         })
+    }
+
+    /// Each value with its name and range. An optional value that is not set is left out.
+    fn values(&self) -> Vec<(&'static str, f64, Range)> {
+        let mut values = vec![
+            ("ms", self.ms, Range::Peak),
+            ("mt", self.mt, Range::Peak),
+            ("gain_margin", self.gain_margin, Range::OneOrMore),
+            ("delay_margin_s", self.delay_margin_s, Range::ZeroOrMore),
+            ("noise_share", self.noise_share, Range::Positive),
+            ("coverage", self.coverage, Range::Share),
+        ];
+        if let Some(noise) = self.noise {
+            values.extend([
+                ("noise.std", noise.std, Range::Positive),
+                (
+                    "noise.sample_period_s",
+                    noise.sample_period_s,
+                    Range::Positive,
+                ),
+                (
+                    "noise.input_amplitude",
+                    noise.input_amplitude,
+                    Range::Positive,
+                ),
+            ]);
+        }
+        values.extend(
+            self.input_peak
+                .map(|peak| ("input_peak", peak, Range::Positive)),
+        );
+        values.extend(
+            self.filter_s
+                .map(|time_s| ("filter_s", time_s, Range::ZeroOrMore)),
+        );
+        values
+    }
+}
+
+/// Range of a value of a specification.
+#[derive(Clone, Copy)]
+enum Range {
+    Peak,
+    OneOrMore,
+    ZeroOrMore,
+    Positive,
+    Share,
+}
+
+impl Range {
+    fn holds(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Self::Peak => value >= 1.01,
+                Self::OneOrMore => value >= 1.0,
+                Self::ZeroOrMore => value >= 0.0,
+                Self::Positive => value > 0.0,
+                Self::Share => value > 0.0 && value <= 1.0,
+            }
+    }
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Peak => "1.01 or more",
+            Self::OneOrMore => "1 or more",
+            Self::ZeroOrMore => "zero or positive",
+            Self::Positive => "positive",
+            Self::Share => "above zero and at most 1",
+        }
     }
 }
