@@ -17,10 +17,14 @@ use crate::roots::{minimum, root};
 use super::limits::{Interval, Limits, union};
 
 /// Local extrema within this factor of the best one are refined.
-const WORTH_REFINING: f64 = 1.5;
+const WORTH_REFINING: f64 = 1.1;
 
-/// Tolerance of the logarithm of the frequency of an extremum. The gain is then exact to rounding.
+/// Tolerance of the logarithm of the frequency of an extremum. The gain is then exact to rounding, as it is flat there.
 const TOLERANCE: f64 = 1e-8;
+
+/// The same on a grid with steps above this fraction: the gain is then exact to 1e-6.
+const ROUGH_TOLERANCE: f64 = 1e-3;
+const ROUGH: f64 = 0.1;
 
 /// Lowest frequency, per unit of time of the process.
 const FIRST: f64 = 1e-6;
@@ -184,6 +188,7 @@ impl Band {
 struct Scan<'a> {
     limits: &'a Limits,
     open_loop: &'a OpenLoop,
+    tolerance: f64,
     band: Option<Band>,
     bands: Vec<Band>,
     /// Least gain below a band that turns downwards.
@@ -273,7 +278,12 @@ impl Scan<'_> {
 
     /// Refines an extremum of the lower (`true`) or upper end of the forbidden gains.
     fn refine(&self, extremum: &Extremum, is_low: bool) -> (f64, f64) {
-        let (omega, gain) = between(self.open_loop, self.limits, extremum.between, is_low);
+        let (omega, gain) = between(
+            self.open_loop,
+            self.limits,
+            (extremum.between, self.tolerance),
+            is_low,
+        );
         let is_better = if is_low {
             gain < extremum.gain
         } else {
@@ -312,7 +322,12 @@ impl Scan<'_> {
 }
 
 /// Frequency and value of the least lower (`true`) or largest upper end of the forbidden gains between two frequencies.
-fn between(open_loop: &OpenLoop, limits: &Limits, ends: [f64; 2], is_low: bool) -> (f64, f64) {
+fn between(
+    open_loop: &OpenLoop,
+    limits: &Limits,
+    (ends, tolerance): ([f64; 2], f64),
+    is_low: bool,
+) -> (f64, f64) {
     let end = |ln: f64| {
         let omega = ln.exp();
         match limits.forbidden(omega, open_loop.at(omega)) {
@@ -323,13 +338,14 @@ fn between(open_loop: &OpenLoop, limits: &Limits, ends: [f64; 2], is_low: bool) 
         }
     };
     let [low, high] = ends.map(f64::ln);
-    let (ln, value) = minimum(end, low, high, TOLERANCE);
+    let (ln, value) = minimum(end, low, high, tolerance);
     (ln.exp(), value.abs())
 }
 
 /// Value of the extremum of the forbidden gains near a frequency: of the lower end (`true`) or of the upper one.
 pub(crate) fn extremum(open_loop: &OpenLoop, limits: &Limits, omega: f64, is_low: bool) -> f64 {
-    between(open_loop, limits, [omega * 0.94, omega * 1.06], is_low).1
+    let ends = [omega * 0.94, omega * 1.06];
+    between(open_loop, limits, (ends, TOLERANCE), is_low).1
 }
 
 /// Gains of the shape in `open_loop` (its gain is 1) that `limits` allow. `path` is the feedback path of the shape, `grid`
@@ -344,6 +360,11 @@ pub(crate) fn allowed(
     let mut scan = Scan {
         limits,
         open_loop,
+        tolerance: if grid.fraction > ROUGH {
+            ROUGH_TOLERANCE
+        } else {
+            TOLERANCE
+        },
         band: None,
         bands: Vec::new(),
         least: f64::INFINITY,
