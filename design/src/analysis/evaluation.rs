@@ -32,7 +32,8 @@ const RESIDUE: f64 = 1e-5;
 /// Most steps of a recorded response, of 7 samples each.
 const MOST_STEPS: usize = (1 << 20) / (NODES - 1);
 
-/// The filter is resolved by at most this many times more steps than the frequency of interest needs.
+/// Lags and filter make layers after each dead time. They are resolved by at most this many times more steps than the
+/// frequency of interest needs.
 const MOST_REFINEMENT: f64 = 16.0;
 
 /// Response to a unit step of the load at the input of the process, until it has settled.
@@ -163,11 +164,12 @@ impl Loop {
 
     fn longest_step(&self, omega: f64) -> f64 {
         let step = 0.5 * STEP_RAD / omega;
-        if self.law.tf > 0.0 {
-            step.min(self.law.tf).max(step / MOST_REFINEMENT)
-        } else {
-            step
-        }
+        let times = self.process.times();
+        let lag = times.last().filter(|time| time.is_finite());
+        let filter = Some(&self.law.tf).filter(|time| **time > 0.0);
+        let layers = lag.into_iter().chain(filter);
+        let shortest = layers.copied().fold(f64::INFINITY, f64::min);
+        step.min(shortest).max(step / MOST_REFINEMENT)
     }
 
     /// Value at which the output settles after a unit step of the reference.

@@ -6,7 +6,7 @@
 //! |1 + k l| < 1/Ms:           k rho in cos -+ sqrt(1/Ms^2 - sin^2)                      if |sin| < 1/Ms and Re l < 0
 //! |k l| > Mt |1 + k l|:       the same with Mt, both ends times Mt^2/(Mt^2 - 1)
 //! phase margin phi:           k rho = 1                                                where |arg l + pi| < phi
-//! delay margin d:             k rho = 1                                                where 0 < arg l + pi < w d
+//! delay margin d:             k rho = 1                                                where 0 < arg l + pi < min(w d, pi)
 //! gain margin g:              k rho in 1/g .. g                                         where arg l = -pi
 //! ```
 
@@ -53,7 +53,7 @@ impl Limits {
         if self.phase_margin_rad > 0.0 || self.delay_margin > 0.0 {
             let above_rad = (l.arg() + PI).rem_euclid(TAU);
             let is_near = above_rad.min(TAU - above_rad) < self.phase_margin_rad
-                || above_rad < omega * self.delay_margin;
+                || above_rad < (omega * self.delay_margin).min(PI);
             if is_near {
                 let one = 1.0 / l.norm();
                 found = union(found, (one, one));

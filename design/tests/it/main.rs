@@ -7,6 +7,7 @@
 
 mod cost;
 mod designs;
+mod loops;
 mod properties;
 mod step_response;
 mod values;
