@@ -1,5 +1,9 @@
 //! Controller design for one model, or for draws from a posterior.
 //!
+//! In the styles sharp, balanced and calm a design has the least IAE within limits of `Ms`, `Mt`, margins and noise; over
+//! draws it keeps the limits on most of them and has the least mean IAE. The rest of this page is about
+//! [`Style::Paper`].
+//!
 //! [`design()`] takes one model and returns the controller of least cost that keeps the specified phase margin.
 //! [`design_over()`] takes draws from a posterior and returns the controller of least expected loss:
 //!

@@ -10,7 +10,7 @@ use crate::analysis::{Law, OpenLoop};
 
 use super::bands::{Allowed, Grid, NoGain, allowed, extremum};
 use super::limits::Limits;
-use super::shape::{Family, is_in_range};
+use super::shape::Family;
 
 pub(crate) use crate::analysis::realisation::Excitation;
 
@@ -313,16 +313,17 @@ impl Objective {
                 (gain.k, gain.omega) = (inner.high, inner.omega);
             }
         }
-        gain.k = self
-            .problem
-            .limited(z, gain.k, gain.omega)
-            .ok_or(NoGain::Unstable)?;
+        let limited = self.problem.limited(z, gain.k, gain.omega);
+        let k = limited.ok_or(NoGain::Unstable)?;
+        // With less gain the loop is slower: between in proportion (one integrator) and not at all.
+        gain.omega *= (k / gain.k).sqrt();
+        gain.k = k;
         Ok(gain)
     }
 
     /// Logarithm of the cost of a shape, with the penalty of an infeasible gain.
     pub(crate) fn cost(&mut self, z: &[f64]) -> f64 {
-        if !is_in_range(&self.problem.process, z) {
+        if !self.problem.family.is_in_range(&self.problem.process, z) {
             return NO_COST;
         }
         let Ok(gain) = self.gain(z) else {

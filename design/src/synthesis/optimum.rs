@@ -5,7 +5,6 @@
 
 use super::bands::NoGain;
 use super::objective::{Gain, NO_COST, Objective, Problem};
-use super::shape::is_in_range;
 use super::simplex::{Best, Extent, minimise};
 
 /// Step of the grid in the search, and in the check of its result.
@@ -138,7 +137,11 @@ fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOpti
 /// A feasible shape with a cost, from an infeasible start: the search minimises the excess of the least gain.
 fn feasible(objective: &mut Objective, start: &[f64], excess: f64) -> Option<Best> {
     let mut of = |z: &[f64]| {
-        if !is_in_range(&objective.problem.process, z) {
+        if !objective
+            .problem
+            .family
+            .is_in_range(&objective.problem.process, z)
+        {
             return NO_COST;
         }
         let gain = objective.gain(z);

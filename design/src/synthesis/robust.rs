@@ -11,7 +11,6 @@ use crate::analysis::process::Process;
 
 use super::objective::{NO_COST, Objective, PENALTY, Problem};
 use super::optimum::{NoOptimum, Optimum};
-use super::shape::is_in_range;
 use super::simplex::{Best, Extent, minimise};
 
 /// Draws over which the cost is averaged.
@@ -159,7 +158,7 @@ impl Draws {
 
     /// Gain of a shape with the limits of noise and input, and its infeasibility.
     fn limited(&mut self, z: &[f64], omega: f64) -> Option<(f64, f64)> {
-        if !is_in_range(&self.nominal.process, z) {
+        if !self.nominal.family.is_in_range(&self.nominal.process, z) {
             return None;
         }
         let (high, excess) = self.gain(z);

@@ -15,6 +15,9 @@ use crate::analysis::{Law, Process};
 use crate::cascade::Cascade;
 use crate::controller::{Autopilot, Controller, Execution, Form};
 
+/// Filter times of the starts, in least ones.
+const FILTERS: [f64; 2] = [0.5, 5.0];
+
 /// How the filter time is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Filter {
@@ -34,19 +37,9 @@ pub(crate) struct Family {
 /// Longest time of a shape: 5000 units. A longer one would act below the grid of frequencies.
 const LARGEST_VARIABLE: f64 = 8.5;
 
-/// Shortest time of a shape, as a share of the dead time and lags behind the longest one: a shorter one acts above all
-/// frequencies of the loop.
-const SHORTEST: f64 = 1e-3;
-
-/// Whether a shape is in the range of the search.
-pub(crate) fn is_in_range(process: &Process, z: &[f64]) -> bool {
-    let order = process.integrators().max(1);
-    let least = (SHORTEST * process.half_rule_dead_time(order))
-        .max(1e-8)
-        .ln();
-    z.iter()
-        .all(|variable| (least..=LARGEST_VARIABLE).contains(variable))
-}
+/// Shortest time of a shape, as a share of the dead time and lags behind the two longest ones: a shorter one acts above
+/// all frequencies of the loop.
+const SHORTEST: f64 = 1e-2;
 
 impl Family {
     fn tf(&self, z: &[f64]) -> f64 {
@@ -54,6 +47,24 @@ impl Family {
             Filter::Fixed(time) => time,
             Filter::Searched(least) => least + z.last().map_or(0.0, |ln| ln.exp()),
         }
+    }
+
+    /// Whether a shape is in the range of the search.
+    pub(crate) fn is_in_range(&self, process: &Process, z: &[f64]) -> bool {
+        let order = process.integrators().max(1);
+        let behind = [2, order].map(|order| process.half_rule_dead_time(order));
+        let fast = if behind[0] > 0.0 {
+            behind[0]
+        } else {
+            behind[1]
+        };
+        let least = (SHORTEST * fast).max(1e-8).ln();
+        let times = match self.filter {
+            Filter::Searched(_) => z.len().saturating_sub(1),
+            Filter::Fixed(_) => z.len(),
+        };
+        z.iter().all(|variable| *variable <= LARGEST_VARIABLE)
+            && z[..times].iter().all(|variable| *variable >= least)
     }
 
     /// Number of variables, from the first one on, whose larger values make the loop slower and more robust.
@@ -202,14 +213,12 @@ impl Family {
                 .map(|ti| vec![(0.5 * ti).ln(), (0.5 * ti).ln()])
                 .collect(),
         };
-        if let Filter::Searched(_) = self.filter {
-            for start in &mut starts {
-                let shortest = match self.form {
-                    Form::P => process.tau.max(0.1).ln(),
-                    _ => *start.last().unwrap_or(&0.0),
-                };
-                start.push(shortest - 2.0);
-            }
+        if let Filter::Searched(least) = self.filter {
+            let first = if least > 0.0 { least } else { 0.05 };
+            let with_filter = |start: &Vec<f64>| {
+                FILTERS.map(|factor| [start.as_slice(), &[(factor * first).ln()]].concat())
+            };
+            starts = starts.iter().flat_map(with_filter).collect();
         }
         starts
     }

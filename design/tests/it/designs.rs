@@ -82,7 +82,7 @@ fn has_two_integrators(model: &Model) -> bool {
 #[test]
 fn every_design_is_stable_and_keeps_its_limits() {
     let mut random = Random(1);
-    let mut designed = 0;
+    let (mut designed, mut searches_given_up) = (0, 0);
     for case in 0..1200 {
         let model = random.process();
         let asked = random.specification(&model);
@@ -112,9 +112,9 @@ fn every_design_is_stable_and_keeps_its_limits() {
                 );
             }
             Err(DesignError::Infeasible { .. }) => {
-                let is_hopeless = has_two_integrators(&model) && matches!(form, Form::P | Form::Pi);
+                let is_hopeless = matches!(form, Form::P | Form::Pi);
                 assert!(
-                    is_hopeless || asked.noise.is_some(),
+                    is_hopeless && has_two_integrators(&model),
                     "{case} {form:?} {model:?}"
                 );
             }
@@ -122,6 +122,8 @@ fn every_design_is_stable_and_keeps_its_limits() {
         }
     }
     assert!(designed > 700, "{designed}");
+    // Noise of many times the usual share of the input asks for filters far from the starts of the search.
+    assert!(searches_given_up <= 3, "{searches_given_up}");
 }
 
 /// Draws about the paper's hexacopter: 90 % of them within these factors of gain / body lag, actuator lag, body lag, delay.
