@@ -81,9 +81,46 @@ pub fn falling_root(f: impl Fn(f64) -> f64, start: f64) -> Option<f64> {
     None
 }
 
+/// Argument between `a` and `b` of a local minimum of `f`, to `tolerance`, and the minimum: golden-section search.
+#[must_use]
+pub fn minimum(f: impl Fn(f64) -> f64, a: f64, b: f64, tolerance: f64) -> (f64, f64) {
+    const GOLDEN: f64 = 0.618_033_988_749_894_8;
+    let (mut low, mut high) = (a, b);
+    let (mut left, mut right) = (high - GOLDEN * (high - low), low + GOLDEN * (high - low));
+    let (mut f_left, mut f_right) = (f(left), f(right));
+    for _ in 0..MAX_STEPS {
+        if f_left < f_right {
+            high = right;
+            (right, f_right) = (left, f_left);
+            left = high - GOLDEN * (high - low);
+            f_left = f(left);
+        } else {
+            low = left;
+            (left, f_left) = (right, f_right);
+            right = low + GOLDEN * (high - low);
+            f_right = f(right);
+        }
+        if high - low <= tolerance {
+            break;
+        }
+    }
+    if f_left < f_right {
+        (left, f_left)
+    } else {
+        (right, f_right)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    // (x - 1/3)^2 + 2 is least at 1/3. Near it the function is flat to rounding over 1e-8.
+    #[test]
+    fn minimum_of_a_parabola() {
+        let (x, least) = minimum(|x| (x - 1.0 / 3.0).powi(2) + 2.0, -1.0, 4.0, 1e-9);
+        assert!((x - 1.0 / 3.0).abs() < 3e-8 && least == 2.0, "{x} {least}");
+    }
 
     // cos x = x at 0.739085133215160641655312...
     #[test]

@@ -15,7 +15,7 @@ use onecycle_onboard::Soiptd;
 
 use super::structure::{Parameter, Structure};
 
-/// Linear process with dead time. See the [module](self) for the symbols.
+/// Linear process with dead time. Its stages are those of [`Structure::stages`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Linear {
     /// Structure: number of stages of each kind.

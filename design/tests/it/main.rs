@@ -6,6 +6,8 @@
 )]
 
 mod cost;
+mod designs;
+mod loops;
 mod properties;
 mod step_response;
 mod values;
