@@ -133,8 +133,8 @@ fn of_estimator(remark: &Remark) -> Option<String> {
             )
         }
         Remark::PriorDropped(distance) => format!(
-            "The recording disagrees with the prior of the pack by {:.1} standard deviations, so the fit was made \
-             without it. Use a pack for processes of this kind with --pack.",
+            "The recording contradicts the prior of the pack, which would move the fit by {:.1} standard deviations of \
+             the residual: the fit was made without it. Choose a pack for processes of this kind with --pack.",
             distance.max(0.0).sqrt()
         ),
         Remark::NoController(error) => without_controller(error),

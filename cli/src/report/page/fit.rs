@@ -88,8 +88,11 @@ fn over_record(fit: &[FitPoint], found: &Innovations, units: &Units) -> Figure {
         let series = Series::of_points("", marks, points).hue(hue);
         Panel::new(Axis::titled(title), vec![series])
     };
+    let mut upper = output(fit, "model without disturbances", units);
+    // A long record has so many points that they would hide the line.
+    upper.series.reverse();
     let mut panels = vec![
-        output(fit, "model without disturbances", units),
+        upper,
         panel(
             "innovation / deviation".to_owned(),
             Marks::Points,
