@@ -37,7 +37,7 @@ mod validate;
 #[cfg(test)]
 mod vectors;
 
-use onecycle_design::{Structure, design_over, step_response, tuning};
+use onecycle_design::{Model, Structure, design_over, step_response, tuning};
 
 use self::choose::{Choice, Limits, NEARLY, choose};
 use self::mixture::{Component, mixture};
@@ -65,8 +65,12 @@ const ROUNDS: usize = 3;
 const STRAIGHT: f64 = 3.0;
 /// Relative standard deviation of the gain above which the record tells nothing.
 const MOST_DEVIATION: f64 = 0.3;
+/// Half width of the interval of the gain over the estimate above which the record tells nothing.
+const MOST_WIDTH: f64 = 0.5;
 /// Autocorrelation and share of the input above which the innovations are coloured.
 const COLOURED: (f64, f64) = (0.1, 0.02);
+/// Autocorrelation of the innovations above which an error of the prediction is the model's fault.
+const STRONGLY_COLOURED: f64 = 0.3;
 /// Share of the input and its F statistic above which the model is of another kind, if it also predicts little.
 const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
 /// Explained share of the last third below which a fit gets a remark, and below which it is refused.
@@ -217,17 +221,18 @@ impl Search<'_> {
         if let Some(verdict) = self.too_little(fitted, components) {
             return Err(verdict);
         }
-        let explained = prediction.map_or(1.0, |prediction| prediction.explained);
+        let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
+            (prediction.explained, prediction.error_ratio)
+        });
         let is_another = tests.input_share > ANOTHER_KIND.0 && tests.input_f > ANOTHER_KIND.1;
         if is_another && explained < WELL_PREDICTED {
             return Err(Verdict::InputLeft {
                 share: tests.input_share,
             });
         }
+        let is_wrong = explained < LEAST_PREDICTED || tests.autocorrelation > STRONGLY_COLOURED;
         match prediction {
-            Some(prediction)
-                if explained < LEAST_PREDICTED && prediction.error_ratio > MOST_ERROR_RATIO =>
-            {
+            Some(prediction) if is_wrong && ratio > MOST_ERROR_RATIO => {
                 Err(Verdict::NoPrediction {
                     explained,
                     horizon_s: prediction.horizon_s,
@@ -245,20 +250,25 @@ impl Search<'_> {
             deviation / component.found.at.gain.abs()
         };
         let deviation = components.first().map(gain).filter(|v| v.is_finite());
-        let lag_s = theta.shortest_lag_s().min(fitted.limits.longest_tau_s);
         if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
-            return Some(Verdict::NoInformation {
-                parameter: result::gain_of(theta.structure),
-                deviation,
-                informative_rad_per_s: self
-                    .excitation
-                    .and_then(|found| found.informative_rad_per_s),
-                needed_rad_per_s: 1.0 / (lag_s + theta.tau_s().max(0.0)),
-            });
+            return Some(self.no_information(theta, deviation));
         }
         let blocks = fitted.blocks();
         let bounds = Bounds::new(theta.structure, &blocks, fitted.limits.longest_tau_s);
         result::at_bound(theta, &bounds).map(Verdict::AtBound)
+    }
+
+    /// The gain is not known; `deviation` is its relative uncertainty.
+    fn no_information(&self, theta: &Theta, deviation: Option<f64>) -> Verdict {
+        let found = self.excitation;
+        let length_s = found.map_or(f64::INFINITY, |found| found.end_s - found.start_s);
+        let lag_s = theta.shortest_lag_s().min(LONGEST_TAU * length_s);
+        Verdict::NoInformation {
+            parameter: result::gain_of(theta.structure),
+            deviation,
+            informative_rad_per_s: found.and_then(|found| found.informative_rad_per_s),
+            needed_rad_per_s: 1.0 / (lag_s + theta.tau_s().max(0.0)),
+        }
     }
 
     fn remark(
@@ -283,7 +293,10 @@ impl Search<'_> {
         if tests.input_share > COLOURED.1 && tests.input_f > ANOTHER_KIND.1 {
             self.remarks.push(Remark::InputLeft(tests.input_share));
         }
-        if let Some(prediction) = prediction.filter(|p| p.explained < WELL_PREDICTED) {
+        let is_weak = |p: &&Prediction| {
+            p.explained < WELL_PREDICTED && p.error_ratio > MOST_ERROR_RATIO / 2.0
+        };
+        if let Some(prediction) = prediction.filter(is_weak) {
             self.remarks.push(Remark::WeakPrediction {
                 explained: prediction.explained,
                 horizon_s: prediction.horizon_s,
@@ -323,7 +336,8 @@ impl Search<'_> {
         );
         let model = result::model(&fitted.best.found, prepared.early_s);
         let draws = posterior.models(tuning::DRAWS);
-        let design = match design_over(&model, &draws, &self.options.specification) {
+        let undamped = model.soiptd().map_or(model, Model::Soiptd);
+        let design = match design_over(&undamped, &draws, &self.options.specification) {
             Ok(design) => Some(design),
             Err(error) => {
                 self.remarks.push(Remark::NoController(error));
@@ -335,6 +349,11 @@ impl Search<'_> {
             return Err(Verdict::TooUncertain);
         }
         let estimate = posterior.estimate();
+        let gain = result::gain_of(model.structure());
+        let width = (estimate.get(gain)).and_then(|interval| interval.relative_half_width());
+        if width.is_none_or(|width| width > MOST_WIDTH) {
+            return Err(self.no_information(&fitted.best.found.theta, width));
+        }
         let explained = prediction.map_or(1.0, |prediction| prediction.explained);
         let (innovations, points) = result::innovations(
             fitted,
@@ -346,7 +365,7 @@ impl Search<'_> {
         Ok(Identified {
             joint_probability: posterior.joint_probability(&estimate),
             step: design
-                .and_then(|design| step_response(&model, &design.controller).ok())
+                .and_then(|design| step_response(&undamped, &design.controller).ok())
                 .map(|step| step.metrics),
             model,
             estimate,

@@ -32,7 +32,7 @@ impl Choice {
         let best = self.candidates.first()?.bic;
         let simplest = (self.candidates.iter())
             .filter(|candidate| candidate.bic <= best + NEARLY)
-            .min_by_key(|candidate| unknowns(candidate.structure()))?;
+            .min_by_key(|candidate| simplicity(candidate.structure()))?;
         let damped = self.damped(simplest.structure()).filter(|damped| {
             let gain = damped.found.at.log_likelihood - simplest.found.at.log_likelihood;
             2.0 * gain > SHOWN && damped.found.theta.process(1.0).pole_per_s() > 0.0
@@ -53,10 +53,10 @@ impl Choice {
     }
 }
 
-/// Number of unknowns of a structure: its rank in simplicity.
-fn unknowns(structure: Structure) -> usize {
+/// Rank of a structure: number of unknowns; of two with equal numbers the one with real lags is simpler.
+fn simplicity(structure: Structure) -> (usize, usize) {
     let stages = structure.stages();
-    stages.lags + stages.poles + 2 * stages.pairs
+    (stages.lags + stages.poles + 2 * stages.pairs, stages.pairs)
 }
 
 /// Where the search starts and ends.
