@@ -1,4 +1,4 @@
-//! Random relay experiments: draw a process, run the relay, cut the cycles.
+//! Random experiments: draw a process, run the relay or another test, cut the cycles.
 //!
 //! ```text
 //! Recipe, Campaign, Benchmark   draw     -> RelayExperiment   run   -> Trace   cut   -> cycles, signature
@@ -10,6 +10,7 @@
 //! | [`draw`]        | random draws of a recipe's experiments                                    |
 //! | [`defect`]      | defects that take a process out of the family                             |
 //! | [`campaign`]    | experiments on the paper's multirotors, described by a TOML file          |
+//! | [`recording`]   | campaigns of recordings of any process and test signal                    |
 //! | [`benchmark`]   | the public benchmark: truths and recordings                               |
 //! | [`experiment`]  | one experiment: relay, pre-roll, noise, plant                             |
 //! | [`relays`]      | relays of other relay tests                                               |
@@ -24,6 +25,7 @@ pub mod draw;
 pub mod experiment;
 pub mod oscillation;
 pub mod recipe;
+pub mod recording;
 pub mod relays;
 
 pub use benchmark::{Benchmark, CYCLES_KEPT, IDENTIFICATION_PERIODS, Recorded, RelayTest, Truth};
@@ -34,3 +36,4 @@ pub use draw::Drawn;
 pub use experiment::{ExperimentError, RelayExperiment, RelaySetup, Simulation};
 pub use oscillation::Oscillation;
 pub use recipe::{Family, Recipe, RecipeError};
+pub use recording::{RecordingCampaign, RecordingError};

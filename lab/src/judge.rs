@@ -7,3 +7,4 @@ pub mod flights;
 pub mod harm;
 pub mod out_of_family;
 pub mod outcome;
+pub mod recording;

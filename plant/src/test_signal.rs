@@ -25,6 +25,15 @@ const ROUNDING: f64 = 1e-12;
 /// Orders of a PRBS: periods of 7 to 1,048,575 bits.
 pub const PRBS_ORDERS: std::ops::RangeInclusive<u32> = 3..=20;
 
+/// Smallest order of a PRBS that does not repeat within `bits` bits; the largest order if there is none.
+#[must_use]
+pub fn prbs_order(bits: f64) -> u32 {
+    let mut orders = PRBS_ORDERS;
+    orders
+        .find(|order| f64::from((1_u32 << order) - 1) >= bits)
+        .unwrap_or(*PRBS_ORDERS.end())
+}
+
 /// Feedback taps of a register of `PRBS_ORDERS.start() + index` bits with the longest period; 0 is no tap.
 const TAPS: [[u32; 4]; 18] = [
     [3, 2, 0, 0],

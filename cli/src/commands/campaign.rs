@@ -2,14 +2,17 @@
 
 use std::process::ExitCode;
 
-use onecycle_lab::experiments::{Campaign, DefectKind, ExperimentError, Measure, RelayExperiment};
+use onecycle_lab::experiments::{
+    Campaign, DefectKind, ExperimentError, Measure, RecordingCampaign, RelayExperiment,
+};
 use onecycle_lab::judge::out_of_family::{CycleClassifier, evaluate};
 use onecycle_lab::judge::outcome::{identification_outcome, relay_outcome};
+use onecycle_lab::judge::recording::recording_outcome;
 use onecycle_onboard::classify::{Calibration, ClassifyError};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::Signature;
-use serde::Serialize;
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 use serde_json::json;
 
 use super::workers::Workers;
@@ -21,23 +24,9 @@ use crate::results::campaign::{IdentificationCase, OutsiderCase, RelayCase};
 use crate::{args, settings};
 
 pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
-    let campaign = campaign(arguments)?;
-    let (table, journal) = match campaign.measure {
-        Measure::Relay => {
-            let case =
-                |experiment: &RelayExperiment| relay_outcome(experiment).map(RelayCase::from);
-            let (cases, journal) = of_family(arguments, &campaign, case)?;
-            (report::relay(&campaign, &cases), journal)
-        }
-        Measure::Identification => {
-            let case = |experiment: &RelayExperiment| {
-                identification_outcome(&campaign, experiment)
-                    .map(|outcome| IdentificationCase::of(&outcome))
-            };
-            let (cases, journal) = of_family(arguments, &campaign, case)?;
-            (report::identification(&campaign, &cases), journal)
-        }
-        Measure::Unknown => of_kinds(arguments, &campaign)?,
+    let (table, journal) = match settings::read::<Head>(&arguments.file)?.measure {
+        Measure::Recording => of_recordings(arguments)?,
+        measure => of_relay_tests(arguments, measure)?,
     };
     if let Some(out) = &arguments.out {
         write_text(out, &table)?;
@@ -45,6 +34,64 @@ pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
     print(&table)?;
     journal.map_or(Ok(()), Journal::remove)?;
     Ok(ExitCode::from(exit::DONE))
+}
+
+/// What decides which other fields a file has.
+#[derive(Deserialize)]
+struct Head {
+    measure: Measure,
+}
+
+/// The table of a campaign, and the journal to remove once it is written.
+type Table = (String, Option<Journal>);
+
+/// The table of relay tests on the paper's multirotors.
+fn of_relay_tests(arguments: &args::Campaign, measure: Measure) -> Result<Table, Failure> {
+    let campaign = campaign(arguments)?;
+    Ok(match measure {
+        Measure::Relay => {
+            let case =
+                |experiment: &RelayExperiment| relay_outcome(experiment).map(RelayCase::from);
+            let (cases, journal) = of_family(arguments, &campaign, case)?;
+            (report::relay(&campaign, &cases), journal)
+        }
+        Measure::Unknown => of_kinds(arguments, &campaign)?,
+        _ => {
+            let case = |experiment: &RelayExperiment| {
+                identification_outcome(&campaign, experiment)
+                    .map(|outcome| IdentificationCase::of(&outcome))
+            };
+            let (cases, journal) = of_family(arguments, &campaign, case)?;
+            (report::identification(&campaign, &cases), journal)
+        }
+    })
+}
+
+/// The table of recordings of any kind.
+fn of_recordings(arguments: &args::Campaign) -> Result<Table, Failure> {
+    let of_relays = [
+        ("--cycles", arguments.cycles.is_some()),
+        ("--method", arguments.method.is_some()),
+        ("--sigma", arguments.sigma.is_some()),
+        ("--time-scale", arguments.time_scale.is_some()),
+    ];
+    if let Some((option, _)) = of_relays.iter().find(|(_, given)| *given) {
+        return Err(Failure::usage(format!(
+            "{option} has no effect on a campaign of recordings: leave it out and change the file"
+        )));
+    }
+    let mut campaign: RecordingCampaign = settings::read(&arguments.file)?;
+    campaign.cases = arguments.cases.unwrap_or(campaign.cases);
+    campaign
+        .validate()
+        .map_err(|error| Failure::unreadable(&arguments.file, error))?;
+    let (cases, journal) = finished(arguments, campaign.cases, |n| {
+        let recording = campaign
+            .record(n)
+            .map_err(|error| Failure::unreadable(&arguments.file, error))?;
+        Ok(recording_outcome(&recording, campaign.structure))
+    })?;
+    Ok((report::recording::table(&campaign, &cases), journal))
 }
 
 /// The campaign of the file, changed by the arguments.
@@ -83,10 +130,7 @@ fn of_family<T: Send + Serialize + DeserializeOwned>(
 const IN_FAMILY: u64 = 5;
 
 /// The table of processes in and out of the family.
-fn of_kinds(
-    arguments: &args::Campaign,
-    campaign: &Campaign,
-) -> Result<(String, Option<Journal>), Failure> {
+fn of_kinds(arguments: &args::Campaign, campaign: &Campaign) -> Result<Table, Failure> {
     let recipe = campaign.recipe();
     recipe
         .validate()

@@ -1,5 +1,7 @@
 //! The tables of a campaign.
 
+pub(crate) mod recording;
+
 use std::fmt::Write;
 
 use onecycle_lab::experiments::Campaign;

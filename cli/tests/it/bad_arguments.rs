@@ -4,7 +4,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::process::Stdio;
 
 use crate::common::{
-    HOVER, NOT_WRITTEN, Outcome, Scratch, Table, UNREADABLE, names_in, onecycle, run,
+    HOVER, NOT_WRITTEN, Outcome, RECORDINGS, Scratch, Table, UNREADABLE, names_in, onecycle, run,
 };
 
 // ---------------------------------------------------------------- arguments
@@ -258,6 +258,72 @@ fn campaigns_of_impossible_numbers() {
             "{line}: {outcome:?}"
         );
     }
+}
+
+// A field of a campaign of recordings that is wrong, missing or one too many is named.
+#[test]
+fn a_malformed_campaign_of_recordings_is_one_sentence() {
+    for (good, bad, words) in [
+        ("noise = 0.01", "noise = -1", &["noise must be", "-1"][..]),
+        ("noise = 0.01", "nois = 1", &["unknown field `nois`"]),
+        ("durations_s = [6]", "durations_s = []", &["durations_s"]),
+        (
+            "durations_s = [6]",
+            "durations_s = [1e9]",
+            &["durations_s", "samples"],
+        ),
+        (
+            "\"prbs\"",
+            "\"noise\"",
+            &["unknown variant `noise`", "chirp"],
+        ),
+        (
+            "band_hz = [0.2, 5]",
+            "beta = 0",
+            &["signal chirp", "band_hz must be given"],
+        ),
+        (
+            "band_hz = [0.2, 5]",
+            "band_hz = [0.2, 80]",
+            &["band_hz", "half the sample rate"],
+        ),
+        (
+            "band_hz = [0.2, 5]",
+            "band_hz = [5, 5]",
+            &["signal chirp", "frequency"],
+        ),
+        ("tau_s = 0.02", "tau_s = -1", &["process soiptd", "tau"]),
+        (
+            "tau_s = 0.02",
+            "tau_s = [0.3, 0.2]",
+            &["tau_s", "lower value first"],
+        ),
+        ("tau_s = 0.02", "tau_s = [1, 2, 3]", &["expected a number"]),
+        ("tau_s = 0.02", "zeta = 0.02", &["process soiptd: zeta"]),
+        (
+            "tau_s = 0.02,",
+            "",
+            &["process soiptd: tau_s must be given"],
+        ),
+        (
+            "structure = \"soiptd\", k",
+            "structure = \"pid\", k",
+            &["no structure `pid`", "foptd"],
+        ),
+        (
+            "wy_rad_per_s = 2",
+            "gust_sigma = 1",
+            &["gust_correlation_s must be positive"],
+        ),
+        ("kp = 4", "kp = -4", &["case 0", "unstable"]),
+    ] {
+        let text = RECORDINGS.replace(good, bad);
+        assert_ne!(text, RECORDINGS, "{good}");
+        campaign(&text).refused(UNREADABLE, words);
+    }
+    let folder = Scratch::new();
+    let path = folder.write("campaign.toml", RECORDINGS.as_bytes());
+    run(&["campaign", &path, "--sigma", "0.1"]).refused(2, &["--sigma has no effect"]);
 }
 
 #[test]

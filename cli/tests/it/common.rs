@@ -57,6 +57,21 @@ pub(crate) fn onecycle() -> Command {
     command
 }
 
+/// A small campaign of recordings.
+pub(crate) const RECORDINGS: &str = "\
+measure = \"recording\"
+cases = 4
+seed = 1
+sample_rate_hz = 100
+durations_s = [6]
+noise = 0.01
+structure = \"soiptd\"
+disturbances = [{ wy_rad_per_s = 2 }]
+processes = [{ structure = \"soiptd\", k_over_t_body = [0.5, 2], tau_s = 0.02, t_prop_s = 0.05, t_body_s = 0.5 }]
+excitations = [{ signal = \"chirp\", amplitude = 1, band_hz = [0.2, 5] }, { signal = \"prbs\", amplitude = 1, pulse_s = 0.1 }]
+loops = [{ kp = 4, kd = 2.5, filter_s = 0.02, entry = \"setpoint\" }]
+";
+
 pub(crate) fn run(arguments: &[&str]) -> Outcome {
     let output = onecycle()
         .args(arguments)

@@ -2,7 +2,9 @@
 
 use serde_json::Value;
 
-use crate::common::{DOUBLE_INTEGRATOR, Outcome, Scratch, killed_when, run, tune};
+use crate::common::{
+    DOUBLE_INTEGRATOR, Outcome, RECORDINGS, Scratch, killed_when, onecycle, run, tune,
+};
 
 // ---------------------------------------------------------------- tune
 
@@ -116,6 +118,32 @@ fn a_small_campaign() {
         "{}",
         table.stdout
     );
+}
+
+// Two cases of each of two signals in a loop with a disturbance; the table is the same with one thread as with three.
+#[test]
+fn a_campaign_of_recordings() {
+    let folder = Scratch::new();
+    let path = folder.write("recordings.toml", RECORDINGS.as_bytes());
+    let [table, other] = ["1", "3"].map(|threads| {
+        let mut program = onecycle();
+        program
+            .args(["campaign", &path])
+            .env("RAYON_NUM_THREADS", threads);
+        Outcome::of(&program.output().unwrap())
+    });
+    assert_eq!(table.code, Some(0), "{table:?}");
+    table.without_nan();
+    for words in [
+        "4 recordings",
+        "chirp ",
+        "prbs ",
+        "90 % intervals hold",
+        "T_body",
+    ] {
+        assert!(table.stdout.contains(words), "{words}: {}", table.stdout);
+    }
+    assert_eq!(table.stdout, other.stdout);
 }
 
 // Killed once the journal has some cases, the campaign is resumed and gives the same table to the byte, printed and in its

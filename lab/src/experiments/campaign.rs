@@ -81,6 +81,9 @@ pub enum Measure {
     /// [kind](crate::experiments::defect::DefectKind), and five times as many of the family. The noise is
     /// uniform from zero.
     Unknown,
+    /// Errors, intervals and structures of the general estimator on any recording; the file describes a
+    /// [`RecordingCampaign`](super::RecordingCampaign).
+    Recording,
 }
 
 /// Sample period of an unscaled experiment (s): the paper's.

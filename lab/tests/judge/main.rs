@@ -13,3 +13,4 @@ mod flights;
 mod harmonics;
 mod one_cycle;
 mod out_of_family;
+mod recordings;

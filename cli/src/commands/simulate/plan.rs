@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use onecycle_design::Model;
 use onecycle_onboard::{Pd, Relay, RelaySettings, Soiptd};
-use onecycle_plant::test_signal::PRBS_ORDERS;
+use onecycle_plant::test_signal::prbs_order;
 use onecycle_plant::{
     Bandwidths, Controller, Disturbances, Entry, ExcitedLoop, Experiment, FilteredPd, Noise,
     Sensed, Sensor, Stimulus, TestSignal,
@@ -257,14 +257,6 @@ fn relay(arguments: &Simulate, preroll_s: f64, noise_sigma: f64) -> Result<Relay
         }
     };
     Relay::new(settings).map_err(Failure::usage)
-}
-
-/// Smallest order whose period is not shorter than `bits`, or the largest order.
-fn prbs_order(bits: f64) -> u32 {
-    let mut orders = PRBS_ORDERS;
-    orders
-        .find(|order| f64::from((1_u32 << order) - 1) >= bits)
-        .unwrap_or(*PRBS_ORDERS.end())
 }
 
 /// The sentence for a simulation whose output grows without limit.
