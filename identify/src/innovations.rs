@@ -55,8 +55,11 @@ use crate::settings::Options;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
 
-/// Longest dead time, and time left out at the start while it is not known, as a share of the record.
+/// Longest dead time as a share of the record.
 const LONGEST_TAU: f64 = 1.0 / 8.0;
+/// Time at the start whose outputs are left out while the dead time is not known, as a share of the record. Most records
+/// begin with the input at rest, and some with all their excitation.
+const SKIPPED: f64 = 1.0 / 40.0;
 /// Rows of the final fit, unless a row would be longer than lag and dead time together.
 const ROWS: usize = 1200;
 /// Rounds of outliers.
@@ -169,7 +172,7 @@ impl Search<'_> {
         let length_s = record.time_s(record.len() - 1);
         let longest = LONGEST_TAU * length_s;
         let mut limits = Limits {
-            skip_s: longest,
+            skip_s: SKIPPED * length_s,
             longest_tau_s: longest,
             structure: self.options.structure,
         };

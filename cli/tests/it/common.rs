@@ -144,7 +144,7 @@ pub(crate) fn simulate(process: &[&str], arguments: &[&str]) -> String {
 }
 
 impl Outcome {
-    fn of(output: &Output) -> Self {
+    pub(crate) fn of(output: &Output) -> Self {
         let outcome = Self {
             code: output.status.code(),
             stdout: String::from_utf8_lossy(&output.stdout).into_owned(),

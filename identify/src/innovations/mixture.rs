@@ -3,7 +3,8 @@
 //! A short record tells the intensity of a slow disturbance badly, and intervals at the best intensity alone are too
 //! narrow. So the other unknowns are fitted at a grid of intensities, and the posterior is the mixture of the Gaussian
 //! approximations there, each with the weight of its likelihood times the volume of its Gaussian. The prior is flat in
-//! the logarithm of the intensity.
+//! the logarithm of the intensity. Noises that the best fit does not have are part of the mixture: one that is too weak to
+//! show still widens the intervals.
 
 use super::descent::{Found, Patience, descend};
 use super::laplace::Laplace;
@@ -16,6 +17,13 @@ const SPACING: f64 = 0.45;
 const POINTS: usize = 6;
 /// Logarithm of the weight relative to the best below which the grid ends.
 const NEGLIGIBLE: f64 = -6.0;
+/// Grid of a noise that the best fit does not have: too weak to show, but perhaps there.
+const HIDDEN_SPACING: f64 = 0.8;
+const HIDDEN_POINTS: usize = 8;
+const HIDDEN: Patience = Patience {
+    steps: 3,
+    decrease: 1e-4,
+};
 const WARM: Patience = Patience {
     steps: 6,
     decrease: 1e-5,
@@ -70,6 +78,32 @@ pub(super) fn mixture(blocks: &Blocks<'_>, best: &Found, bounds: &Bounds) -> Vec
                 if weight < points[0].0 + NEGLIGIBLE {
                     break;
                 }
+            }
+        }
+    }
+    for kind in NoiseKind::ALL {
+        // Without an integrator the walk of the output replaces the disturbance: another model.
+        let is_other =
+            kind == NoiseKind::OutputWalk && best.theta.structure.stages().integrators == 0;
+        if best.theta.noise(kind) > 0.0 || is_other {
+            continue;
+        }
+        let mut theta = best.theta;
+        let index = theta.layout().noise(kind);
+        theta.set_noise(kind, 3.0 / blocks.length_s());
+        for _ in 0..HIDDEN_POINTS {
+            let fitted = descend(blocks, &theta, &others(&theta, kind), bounds, HIDDEN);
+            let Some(point) = fitted.and_then(of) else {
+                break;
+            };
+            let weight = point.0;
+            theta = point.1.theta;
+            theta.values[index] += HIDDEN_SPACING;
+            if point.2.free.len() == unknowns {
+                points.push(point);
+            }
+            if weight < points[0].0 + NEGLIGIBLE || theta.values[index] > bounds.high[index] {
+                break;
             }
         }
     }
