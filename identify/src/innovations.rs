@@ -79,6 +79,8 @@ const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
 /// Explained share of the last third below which a fit gets a remark, and below which it is refused.
 const WELL_PREDICTED: f64 = 0.9;
 const LEAST_PREDICTED: f64 = 0.7;
+/// Explained share below which a fit is refused even if its disturbances account for that: they account for everything.
+const NOTHING_PREDICTED: f64 = 0.3;
 /// Mean square of the prediction's error over what the disturbances explain, above which the model is at fault.
 const MOST_ERROR_RATIO: f64 = 4.0;
 
@@ -143,10 +145,7 @@ impl Search<'_> {
         let components = fitted.posterior(&blocks);
         let tests = validate::tests(&blocks, &fitted.best.found.at);
         let informative = validate::informative(&blocks, &fitted.best.found.at);
-        let median = informative.map(|(_, median)| median);
-        let horizon_s = median.map_or(blocks.length_s() / 10.0, |omega| {
-            std::f64::consts::TAU / omega
-        });
+        let horizon_s = validate::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
         let theta = &fitted.best.found.theta;
         let prediction = validate::prediction(
             &fitted.record,
@@ -159,7 +158,7 @@ impl Search<'_> {
             excitation.outliers = fitted.outliers;
             excitation.samples_per_row = fitted.samples;
             excitation.hold = fitted.record.hold;
-            excitation.informative_rad_per_s = informative.map(|(band, _)| band);
+            excitation.informative_rad_per_s = informative;
         }
         self.judge(&fitted, &components, &tests, prediction.as_ref())?;
         self.remark(&fitted, &tests, prediction.as_ref());
@@ -235,7 +234,9 @@ impl Search<'_> {
         }
         let is_wrong = explained < LEAST_PREDICTED || tests.autocorrelation > STRONGLY_COLOURED;
         match prediction {
-            Some(prediction) if is_wrong && ratio > MOST_ERROR_RATIO => {
+            Some(prediction)
+                if is_wrong && ratio > MOST_ERROR_RATIO || explained < NOTHING_PREDICTED =>
+            {
                 Err(Verdict::NoPrediction {
                     explained,
                     horizon_s: prediction.horizon_s,
@@ -296,10 +297,7 @@ impl Search<'_> {
         if tests.input_share > COLOURED.1 && tests.input_f > ANOTHER_KIND.1 {
             self.remarks.push(Remark::InputLeft(tests.input_share));
         }
-        let is_weak = |p: &&Prediction| {
-            p.explained < WELL_PREDICTED && p.error_ratio > MOST_ERROR_RATIO / 2.0
-        };
-        if let Some(prediction) = prediction.filter(is_weak) {
+        if let Some(prediction) = prediction.filter(|p| p.explained < WELL_PREDICTED) {
             self.remarks.push(Remark::WeakPrediction {
                 explained: prediction.explained,
                 horizon_s: prediction.horizon_s,

@@ -508,10 +508,17 @@ fn an_unstable_loop_is_refused() {
 fn the_intervals_of_a_planned_test() {
     const TANK: &str = "simulate --process foptd --k 2 --t-body 30 --tau 5 --excitation prbs --pulse 15 \
                         --sample-rate 1 --expect";
-    let plan = |more: &str| run(&[TANK, more].join(" ").split_whitespace().collect::<Vec<_>>());
+    let plan = |more: &str| {
+        run(&[TANK, more]
+            .join(" ")
+            .split_whitespace()
+            .collect::<Vec<_>>())
+    };
     let width = |duration: &str| {
         let text = plan(&format!("--noise 0.05 --duration {duration}")).stdout;
-        let line = text.lines().find(|line| line.trim_start().starts_with("tau"));
+        let line = text
+            .lines()
+            .find(|line| line.trim_start().starts_with("tau"));
         let words = line.unwrap().split_whitespace();
         let numbers: Vec<f64> = words.filter_map(|word| word.parse().ok()).collect();
         let [tau, low, high] = numbers[..] else {

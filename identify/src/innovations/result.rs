@@ -18,6 +18,9 @@ use crate::posterior::Posterior;
 /// Relative standard deviation of the scale and of the clock of the instruments: no fit makes the intervals narrower.
 const INSTRUMENT: f64 = 1e-3;
 
+/// Damping ratio below which a resonance hardly depends on the input.
+const LEAST_ZETA: f64 = 0.005;
+
 /// The parameter that is the gain in front of the stages.
 pub(super) fn gain_of(structure: Structure) -> Parameter {
     if structure.parameters().contains(&Parameter::KOverTBody) {
@@ -33,6 +36,13 @@ pub(super) fn at_bound(theta: &Theta, bounds: &Bounds) -> Option<Parameter> {
     let above = |index: usize| theta.values[index] >= bounds.high[index] - 1e-9;
     if above(layout.tau()) {
         return Some(Parameter::Tau);
+    }
+    // A resonance without damping oscillates by itself, whatever the input does: it explains any oscillation.
+    if let Some(pair) = layout.pair() {
+        let [c1, c0] = [theta.values[pair], theta.values[pair + 1]];
+        if c1 < 2.0 * LEAST_ZETA * c0.max(0.0).sqrt() {
+            return Some(Parameter::Zeta);
+        }
     }
     let lag = (0..layout.stages.lags).find(|lag| above(*lag));
     lag.map(|lag| [Parameter::TProp, Parameter::TProp2][lag])

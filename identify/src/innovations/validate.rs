@@ -143,18 +143,35 @@ pub(super) fn prediction(
     })
 }
 
-/// Band of frequencies (rad/s) with the central 90 % of the information on the gain, and the frequency of its median:
-/// the spectrum of the filtered response to the input. `None` if the input has no effect.
-pub(super) fn informative(blocks: &Blocks<'_>, at: &Evaluation) -> Option<((f64, f64), f64)> {
-    let rows = &at.input_innovations;
-    let length_s = blocks.block_s() * rows.len() as f64;
-    let (lowest, highest) = (TAU / length_s, std::f64::consts::PI / blocks.block_s());
+/// Band of frequencies (rad/s) with the central 90 % of the information on the gain: the spectrum of the filtered response
+/// to the input. `None` if the input has no effect.
+pub(super) fn informative(blocks: &Blocks<'_>, at: &Evaluation) -> Option<(f64, f64)> {
+    let [low, _, high] = quantiles(&at.input_innovations, blocks.block_s())?;
+    Some((low, high))
+}
+
+/// Period of the frequency (s) below and above which the input has half of its power each.
+pub(super) fn period_s(blocks: &Blocks<'_>) -> Option<f64> {
+    let input = |block: usize| {
+        let range = blocks.range(block);
+        let count = range.len() as f64;
+        blocks.record.input[range].iter().sum::<f64>() / count
+    };
+    let inputs: Vec<f64> = (0..blocks.len()).map(input).collect();
+    let [_, median, _] = quantiles(&inputs, blocks.block_s())?;
+    Some(TAU / median)
+}
+
+/// Frequencies (rad/s) below which 5, 50 and 95 % of the power of `rows` lie. `None` without power.
+fn quantiles(rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
+    let length_s = row_s * rows.len() as f64;
+    let (lowest, highest) = (TAU / length_s, std::f64::consts::PI / row_s);
     let frequency =
         |i: usize| lowest * (highest / lowest).powf(i as f64 / (FREQUENCIES - 1) as f64);
     let mean = rows.iter().sum::<f64>() / rows.len() as f64;
     let power = |omega: f64| {
         let (mut re, mut im) = (0.0, 0.0);
-        let (sin, cos) = (omega * blocks.block_s()).sin_cos();
+        let (sin, cos) = (omega * row_s).sin_cos();
         let (mut c, mut s) = (1.0, 0.0);
         for value in rows {
             re += (value - mean) * c;
@@ -176,5 +193,5 @@ pub(super) fn informative(blocks: &Blocks<'_>, at: &Evaluation) -> Option<((f64,
         });
         frequency(index.unwrap_or(FREQUENCIES - 1))
     };
-    (total > 0.0 && total.is_finite()).then(|| ((quantile(0.05), quantile(0.95)), quantile(0.5)))
+    (total > 0.0 && total.is_finite()).then(|| [0.05, 0.5, 0.95].map(quantile))
 }
