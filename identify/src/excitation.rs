@@ -5,6 +5,10 @@ use crate::reading::Reading;
 
 /// Excitation found in a recording, and its measured properties.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "there is one a result; a box would cost it Copy"
+)]
 #[non_exhaustive]
 pub enum Excitation {
     /// Two-level relay that keeps the process in a steady oscillation.

@@ -151,7 +151,7 @@ fn step(
         matrix[i][i] += damping * normal.matrix[a][a];
         right[i] = -normal.gradient[a];
     }
-    let change = solve(matrix, right)?;
+    let change = solve(&matrix, &right)?;
     let mut next = *here;
     for (&slot, change) in moving.iter().zip(change) {
         next.values[free[slot]] += change;
@@ -161,9 +161,9 @@ fn step(
 
 /// Solution of a small symmetric positive definite system by Cholesky's decomposition, scaled to a unit diagonal.
 /// `None` if the matrix is not positive definite.
-pub(super) fn solve(matrix: Vec<Vec<f64>>, right: Vec<f64>) -> Option<Vec<f64>> {
-    let inverse = inverse(&matrix)?;
-    let row = |row: &Vec<f64>| dot(row, &right);
+fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Option<Vec<f64>> {
+    let inverse = inverse(matrix)?;
+    let row = |row: &Vec<f64>| dot(row, right);
     Some(inverse.iter().map(row).collect())
 }
 

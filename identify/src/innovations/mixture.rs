@@ -9,7 +9,7 @@
 use super::descent::{Found, Patience, descend};
 use super::laplace::Laplace;
 use super::record::Blocks;
-use super::theta::{Bounds, NoiseKind};
+use super::theta::{Bounds, NoiseKind, Theta};
 
 /// Distance of the grid's points in `ln w`.
 const SPACING: f64 = 0.45;
@@ -38,91 +38,103 @@ pub(super) struct Component {
     pub(super) laplace: Laplace,
 }
 
-/// Components about the best fit. Empty if the unknowns have no joint maximum.
-pub(super) fn mixture(blocks: &Blocks<'_>, best: &Found, bounds: &Bounds) -> Vec<Component> {
-    let process: Vec<usize> = (0..=best.theta.layout().tau()).collect();
-    let of = |found: Found| {
+/// Fit with the logarithm of its weight, before the weights are normalised.
+struct Point {
+    log_weight: f64,
+    found: Found,
+    laplace: Laplace,
+}
+
+impl Point {
+    fn of(blocks: &Blocks<'_>, found: Found, bounds: &Bounds) -> Option<Self> {
+        let process: Vec<usize> = (0..=found.theta.layout().tau()).collect();
         let laplace = Laplace::new(blocks, &found, &process, bounds)?;
-        let volume = laplace.half_log_determinant();
-        // An unknown at its bound has no volume. It counts as the others of the best fit do.
-        Some((found.at.log_likelihood + volume, found, laplace))
-    };
-    let Some(centre) = of(best.clone()) else {
-        return vec![];
-    };
-    let unknowns = centre.2.free.len();
-    let mut points = vec![centre];
-    for kind in best.theta.noises() {
-        let index = best.theta.layout().noise(kind);
-        if bounds.is_at_edge(&best.theta, index) {
-            continue;
-        }
-        for direction in [-1.0, 1.0] {
-            let lowest = (3.0 / blocks.length_s()).ln();
-            let mut theta = best.theta;
-            for _ in 0..POINTS {
-                theta.values[index] += direction * SPACING;
-                if theta.values[index] < lowest || theta.values[index] > bounds.high[index] {
-                    break;
-                }
-                let others: Vec<usize> = others(&theta, kind);
-                let fitted = descend(blocks, &theta, &others, bounds, WARM);
-                let Some(point) = fitted.and_then(of) else {
-                    break;
-                };
-                theta = point.1.theta;
-                let (weight, is_whole) = (point.0, point.2.free.len() == unknowns);
-                if is_whole {
-                    points.push(point);
-                }
-                if weight < points[0].0 + NEGLIGIBLE {
-                    break;
-                }
-            }
-        }
-    }
-    for kind in NoiseKind::ALL {
-        // Without an integrator the walk of the output replaces the disturbance: another model.
-        let is_other =
-            kind == NoiseKind::OutputWalk && best.theta.structure.stages().integrators == 0;
-        if best.theta.noise(kind) > 0.0 || is_other {
-            continue;
-        }
-        let mut theta = best.theta;
-        let index = theta.layout().noise(kind);
-        theta.set_noise(kind, 3.0 / blocks.length_s());
-        for _ in 0..HIDDEN_POINTS {
-            let fitted = descend(blocks, &theta, &others(&theta, kind), bounds, HIDDEN);
-            let Some(point) = fitted.and_then(of) else {
-                break;
-            };
-            let weight = point.0;
-            theta = point.1.theta;
-            theta.values[index] += HIDDEN_SPACING;
-            if point.2.free.len() == unknowns {
-                points.push(point);
-            }
-            if weight < points[0].0 + NEGLIGIBLE || theta.values[index] > bounds.high[index] {
-                break;
-            }
-        }
-    }
-    let most = points
-        .iter()
-        .map(|point| point.0)
-        .fold(f64::NEG_INFINITY, f64::max);
-    let total: f64 = points.iter().map(|point| (point.0 - most).exp()).sum();
-    (points.into_iter())
-        .map(|(weight, found, laplace)| Component {
-            weight: (weight - most).exp() / total,
+        Some(Self {
+            log_weight: found.at.log_likelihood + laplace.half_log_determinant(),
             found,
             laplace,
+        })
+    }
+}
+
+/// Components about the best fit. Empty if the unknowns have no joint maximum.
+pub(super) fn mixture(blocks: &Blocks<'_>, best: &Found, bounds: &Bounds) -> Vec<Component> {
+    let Some(centre) = Point::of(blocks, best.clone(), bounds) else {
+        return vec![];
+    };
+    let has_integrator = best.theta.structure.stages().integrators > 0;
+    let mut points = vec![centre];
+    for kind in NoiseKind::ALL {
+        let index = best.theta.layout().noise(kind);
+        if best.theta.noise(kind) > 0.0 {
+            if !bounds.is_at_edge(&best.theta, index) {
+                for step in [-SPACING, SPACING] {
+                    let mut start = best.theta;
+                    start.values[index] += step;
+                    walk(
+                        blocks,
+                        (start, kind),
+                        (step, POINTS, WARM),
+                        bounds,
+                        &mut points,
+                    );
+                }
+            }
+        } else if has_integrator || kind != NoiseKind::OutputWalk {
+            // Without an integrator the walk of the output would replace the disturbance: another model.
+            let mut start = best.theta;
+            start.set_noise(kind, 3.0 / blocks.length_s());
+            let grid = (HIDDEN_SPACING, HIDDEN_POINTS, HIDDEN);
+            walk(blocks, (start, kind), grid, bounds, &mut points);
+        }
+    }
+    let weights = points.iter().map(|point| point.log_weight);
+    let most = weights.clone().fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = weights.map(|weight| (weight - most).exp()).sum();
+    (points.into_iter())
+        .map(|point| Component {
+            weight: (point.log_weight - most).exp() / total,
+            found: point.found,
+            laplace: point.laplace,
         })
         .collect()
 }
 
+/// Adds fits along the intensity of one noise, from `start` in steps of `ln w`, until their weight is negligible. The
+/// first of `points` is the best fit. An unknown at its bound has no volume, so that such a fit has no weight.
+fn walk(
+    blocks: &Blocks<'_>,
+    (start, kind): (Theta, NoiseKind),
+    (step, most, patience): (f64, usize, Patience),
+    bounds: &Bounds,
+    points: &mut Vec<Point>,
+) {
+    let index = start.layout().noise(kind);
+    let lowest = (3.0 / blocks.length_s()).ln();
+    let range = lowest - 1e-9..=bounds.high[index];
+    let mut theta = start;
+    for _ in 0..most {
+        if !range.contains(&theta.values[index]) {
+            break;
+        }
+        let fitted = descend(blocks, &theta, &others(&theta, kind), bounds, patience);
+        let Some(point) = fitted.and_then(|found| Point::of(blocks, found, bounds)) else {
+            break;
+        };
+        theta = point.found.theta;
+        theta.values[index] += step;
+        let is_negligible = point.log_weight < points[0].log_weight + NEGLIGIBLE;
+        if point.laplace.free.len() == points[0].laplace.free.len() {
+            points.push(point);
+        }
+        if is_negligible {
+            break;
+        }
+    }
+}
+
 /// Unknowns to fit while the intensity of `kind` is fixed.
-fn others(theta: &super::theta::Theta, kind: NoiseKind) -> Vec<usize> {
+fn others(theta: &Theta, kind: NoiseKind) -> Vec<usize> {
     let fixed = theta.layout().noise(kind);
     theta
         .free()

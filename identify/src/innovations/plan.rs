@@ -115,7 +115,7 @@ mod tests {
             let count = (60.0 / sample_s) as usize;
             let input: Vec<f64> = (0..count)
                 .map(|k| {
-                    if (k as f64 * sample_s / 4.0) as usize % 2 == 0 {
+                    if ((k as f64 * sample_s / 4.0) as usize).is_multiple_of(2) {
                         1.0
                     } else {
                         -1.0

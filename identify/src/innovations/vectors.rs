@@ -200,6 +200,7 @@ fn responses_with_fractional_long_and_negative_dead_time() {
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of numbers")]
 fn likelihoods() {
     use Structure::{DoubleIntegratorLag, Foptd, Iptd, ResonantLag, Soiptd, Soptd, Toiptd};
     let ln = f64::ln;
@@ -410,6 +411,7 @@ fn check(record: &Record, samples: usize, theta: &Theta, expected: [f64; 5]) -> 
 }
 
 #[test]
+#[expect(clippy::too_many_lines, reason = "a table of numbers")]
 fn best_points_with_their_covariance() {
     use super::descent::{Patience, descend};
     use super::laplace::Laplace;

@@ -208,25 +208,15 @@ impl RecordingCampaign {
                 self.outlier_size,
                 within(0.0, 1e6, self.outlier_size),
             ),
-            (
-                "durations_s",
-                "a list of one time or more",
-                0.0,
-                !self.durations_s.is_empty(),
-            ),
-            (
-                "processes",
-                "a list of one process or more",
-                0.0,
-                !self.processes.is_empty(),
-            ),
-            (
-                "excitations",
-                "a list of one signal or more",
-                0.0,
-                !self.excitations.is_empty(),
-            ),
         ])?;
+        let lists = [
+            ("durations_s", self.durations_s.len()),
+            ("processes", self.processes.len()),
+            ("excitations", self.excitations.len()),
+        ];
+        for (name, length) in lists {
+            first_out_of_range([(name, "a list of one entry or more", 0.0, length > 0)])?;
+        }
         for &duration_s in &self.durations_s {
             let samples = duration_s * self.sample_rate_hz;
             let is_right = within(2.0, MOST_SAMPLES, samples);
