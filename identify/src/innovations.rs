@@ -27,6 +27,7 @@ mod mixture;
 mod orthogonal;
 mod outliers;
 mod plan;
+mod prediction;
 mod prepare;
 mod record;
 mod response;

@@ -21,9 +21,9 @@
 
 use std::f64::consts::TAU as TWO_PI;
 
-use onecycle_design::state_space::{Matrix, StateSpace, identity, product, times};
+use onecycle_design::state_space::{Matrix, StateSpace, identity, product};
 
-use super::lifted::{Lifted, Sample, dot, row_times};
+use super::lifted::{Lifted, Sample, row_times};
 use super::orthogonal::Orthogonal;
 use super::record::Blocks;
 use super::response;
@@ -369,7 +369,7 @@ pub(super) struct Gains<const N: usize> {
 
 impl<const N: usize> Gains<N> {
     /// Covariance of the predicted state.
-    fn covariance(&self) -> &Matrix<N> {
+    pub(super) fn covariance(&self) -> &Matrix<N> {
         &self.covariance
     }
 
@@ -410,149 +410,4 @@ impl<const N: usize> Gains<N> {
         self.steady_kind = None;
         self.last_kind = None;
     }
-}
-
-/// What a fit predicts, row by row.
-pub(super) struct Predictions {
-    /// Output of the model from the input and the state at the first block alone, mean over the samples of each block
-    /// (output unit).
-    pub(super) simulated: Vec<f64>,
-    /// One-block-ahead prediction, mean over the samples of each block (output unit).
-    pub(super) predicted: Vec<f64>,
-    /// Estimate of the disturbance at each block from the blocks before it, in units of the input.
-    pub(super) disturbance: Vec<f64>,
-    /// Output from the state before each block, without the input from there on, `ahead` blocks later (output unit).
-    pub(super) ahead: Vec<f64>,
-    /// Response of the fitted gain to the input, mean over the samples of each block (output unit).
-    pub(super) forced: Vec<f64>,
-    /// Variance of the error of [`Self::ahead`] plus [`Self::forced`] that the noises cause (output unit^2).
-    pub(super) ahead_variance: f64,
-    /// Rows whose innovation was rejected: one sample, or a few, off the path that those before and after follow.
-    pub(super) rejected: Vec<usize>,
-}
-
-/// How [`predict`] filters.
-#[derive(Clone, Copy, Default)]
-pub(super) struct Filtering {
-    /// Number of blocks to predict ahead.
-    pub(super) ahead: usize,
-    /// Innovations over their deviation beyond the first value are rejected, unless so many follow each other.
-    pub(super) reject: Option<(f64, usize)>,
-}
-
-/// Predictions along the record, for the gain and the initial state of `evaluation`.
-pub(super) fn predict(
-    blocks: &Blocks<'_>,
-    theta: &Theta,
-    evaluation: &Evaluation,
-    filtering: Filtering,
-) -> Option<Predictions> {
-    match theta.structure.stages().states() + 1 {
-        2 => predict_sized::<2>(blocks, theta, evaluation, filtering),
-        3 => predict_sized::<3>(blocks, theta, evaluation, filtering),
-        4 => predict_sized::<4>(blocks, theta, evaluation, filtering),
-        5 => predict_sized::<5>(blocks, theta, evaluation, filtering),
-        _ => None,
-    }
-}
-
-fn predict_sized<const N: usize>(
-    blocks: &Blocks<'_>,
-    theta: &Theta,
-    evaluation: &Evaluation,
-    filtering: Filtering,
-) -> Option<Predictions> {
-    let system = System::<N>::new(theta, blocks.record.dt_s);
-    let lifted = system.lifted(blocks);
-    let response = response::sums(&system.model, blocks, theta.tau_s());
-    let mut gains = Gains::new(system.start(blocks, &lifted)?);
-    let start: [f64; N] = std::array::from_fn(|i| evaluation.state[i]);
-    let (mut free, mut filtered) = (start, start);
-    let walks = system.c[N - 1] != 0.0;
-    let later = far_row(&system, blocks, filtering.ahead);
-    let deviation = evaluation.variance.sqrt();
-    let mut found = Predictions::with_capacity(blocks.len());
-    let mut pending: Vec<(usize, f64)> = Vec::new();
-    for (block, &kind) in blocks.kind_of.iter().enumerate() {
-        let model = &lifted[kind as usize];
-        let forced = evaluation.gain * response[block];
-        let count = blocks.present(block).max(1) as f64;
-        let prediction = forced + dot(&model.c, &filtered);
-        found
-            .simulated
-            .push((forced + dot(&model.c, &free)) / count);
-        found.predicted.push(prediction / count);
-        found.forced.push(forced / count);
-        found.ahead.push(dot(&later, &filtered));
-        let disturbance = if walks { 0.0 } else { filtered[N - 1] };
-        found.disturbance.push(disturbance / evaluation.gain);
-        free = times(&model.phi, &free);
-        filtered = times(&model.phi, &filtered);
-        if model.r <= 0.0 {
-            gains.skip(model);
-            continue;
-        }
-        let innovation = blocks.sums[block] * blocks.scale - prediction;
-        let (_, variance) = model.gain(gains.covariance());
-        let size = innovation.abs() / (deviation * variance.sqrt());
-        let is_far =
-            (filtering.reject).is_some_and(|(limit, run)| size > limit && pending.len() < run);
-        if is_far {
-            pending.push((block, innovation));
-            gains.skip(model);
-            continue;
-        }
-        // After a jump the path goes on where the rejected rows are; after an outlier it goes on as before.
-        let returns = |(_, off): &&(usize, f64)| innovation * off.signum() < 0.5 * off.abs();
-        found
-            .rejected
-            .extend(pending.iter().filter(returns).map(|(row, _)| row));
-        pending.clear();
-        gains.update(kind, model);
-        for i in 0..N {
-            filtered[i] += gains.gain[i] * innovation;
-        }
-    }
-    if let Some(full) = lifted.iter().find(|block| block.r > 0.0) {
-        let mut covariance = *gains.covariance();
-        for _ in 0..filtering.ahead {
-            covariance = full.next_covariance(&covariance, &[0.0; N], 0.0);
-        }
-        let (_, variance) = full.gain(&covariance);
-        let samples = blocks.samples as f64;
-        found.ahead_variance = variance * evaluation.variance / (samples * samples);
-    }
-    Some(found)
-}
-
-impl Predictions {
-    fn with_capacity(rows: usize) -> Self {
-        let column = || Vec::with_capacity(rows);
-        Self {
-            simulated: column(),
-            predicted: column(),
-            disturbance: column(),
-            ahead: column(),
-            forced: column(),
-            ahead_variance: 0.0,
-            rejected: vec![],
-        }
-    }
-}
-
-/// Row that gives the mean output of the block `ahead` blocks later from the state now, without input.
-fn far_row<const N: usize>(system: &System<N>, blocks: &Blocks<'_>, ahead: usize) -> [f64; N] {
-    let phi = system.model.step(blocks.record.dt_s).phi;
-    let mut row = system.c;
-    for _ in 0..ahead * blocks.samples {
-        row = row_times(&row, &phi);
-    }
-    let mut sum = [0.0; N];
-    for _ in 0..blocks.samples {
-        for i in 0..N {
-            sum[i] += row[i] / blocks.samples as f64;
-        }
-        row = row_times(&row, &phi);
-    }
-    sum
 }

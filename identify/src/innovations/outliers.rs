@@ -3,7 +3,8 @@
 //! A sample that is far from the polynomial through its six neighbours is an outlier whatever the process is. What is
 //! left is compared with the prediction of a Kalman filter that skips the samples it rejects.
 
-use super::likelihood::{Filtering, Memory, evaluate, predict};
+use super::likelihood::{Memory, evaluate};
+use super::prediction::{Filtering, predict};
 use super::record::{Blocks, Record};
 use super::theta::Theta;
 

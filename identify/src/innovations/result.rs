@@ -4,8 +4,8 @@ use onecycle_design::{Linear, Model, Parameter, Structure};
 
 use super::Fitted;
 use super::descent::Found;
-use super::likelihood::{Filtering, predict};
 use super::mixture::Component;
+use super::prediction::{Filtering, predict};
 use super::record::Blocks;
 use super::search::Candidate;
 use super::theta::{Bounds, NoiseKind, Theta};

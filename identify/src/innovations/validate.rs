@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 
 use super::choose::Limits;
 use super::descent::Patience;
-use super::likelihood::{Evaluation, Filtering, predict};
+use super::likelihood::Evaluation;
 use super::orthogonal::Orthogonal;
+use super::prediction::{Filtering, predict};
 use super::record::{Blocks, Record};
 use super::search;
 use super::theta::Theta;
