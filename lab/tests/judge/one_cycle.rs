@@ -4,7 +4,7 @@ use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::pd;
 use onecycle_design::{Model, Parameter};
 use onecycle_identify::{
-    Identification, Identified, Method, Options, Remark, Signals, Verdict, identify,
+    Identification, Identified, Method, Options, Remark, Road, Signals, Verdict, identify,
 };
 use onecycle_lab::experiments::{Campaign, RelayExperiment};
 use onecycle_onboard::Soiptd;
@@ -70,14 +70,24 @@ impl Experiment {
             sample_period_s: SAMPLE_S,
             breaks: &[],
         };
-        identify(&signals, &Options::default().method(method))
+        identify(
+            &signals,
+            &Options::default().road(Road::Relay).method(method),
+        )
     }
 
     /// Cost of the controller above or below the optimum, as a fraction of it; asserts that it is
     /// stable.
     fn deterioration(&self, identified: &Identified) -> f64 {
         let process = &self.case.process;
-        let best = pd(process, Options::default().specification.phase_margin_rad).unwrap();
+        let best = pd(
+            process,
+            Options::default()
+                .road(Road::Relay)
+                .specification
+                .phase_margin_rad,
+        )
+        .unwrap();
         match deterioration(
             identified.design.unwrap().controller.pd().unwrap(),
             process,
