@@ -17,20 +17,22 @@ pub(super) fn section(chosen: Structure, found: &Innovations, units: &Units) -> 
             [
                 format!("{:+.1}", alternative.bic - least),
                 alternative.noise.kind(),
-                structure.transfer_function().to_owned(),
             ],
         )
     });
     let table = page::plain_table(
         "Best fit of each structure. BIC: above the least; the simplest structure within 6 of it is chosen, with \
          damping where the recording shows damping.",
-        &["structure", "BIC", "noise", "process"],
+        &["structure", "BIC", "noise"],
         rows,
     );
     let values: Vec<(&str, String)> = (found.alternatives.iter())
         .map(|alternative| {
-            let name = alternative.model.structure().name();
-            (name, parameters(alternative, units))
+            // The formulas are too wide for a column on a phone; here they wrap.
+            let structure = alternative.model.structure();
+            let formula = structure.transfer_function();
+            let values = parameters(alternative, units);
+            (structure.name(), format!("{formula}: {values}"))
         })
         .collect();
     Section::new("structures", "Structures", table + &page::facts(&values))
