@@ -63,6 +63,8 @@ const LONGEST_TAU: f64 = 1.0 / 8.0;
 const SKIPPED: f64 = 1.0 / 40.0;
 /// Rows of the final fit, unless a row would be longer than lag and dead time together.
 const ROWS: usize = 1200;
+/// Most samples of the part that chooses the structure.
+const CHOOSING: usize = 20_000;
 /// Rounds of outliers.
 const ROUNDS: usize = 3;
 /// Difference of the log-likelihood above which the input is taken as straight lines between the samples.
@@ -80,8 +82,6 @@ const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
 /// Explained share of the last third below which a fit gets a remark, and below which it is refused.
 const WELL_PREDICTED: f64 = 0.9;
 const LEAST_PREDICTED: f64 = 0.7;
-/// Explained share below which a fit is refused even if its disturbances account for that: they account for everything.
-const NOTHING_PREDICTED: f64 = 0.3;
 /// Mean square of the prediction's error over what the disturbances explain, above which the model is at fault.
 const MOST_ERROR_RATIO: f64 = 4.0;
 
@@ -176,11 +176,16 @@ impl Search<'_> {
             longest_tau_s: longest,
             structure: self.options.structure,
         };
-        let mut choice = choose(&record, &limits);
-        if let Some(gain) = straight(&record, &choice, &limits, self.options) {
+        let mut stretch = most_excited(&record);
+        limits.skip_s = limits
+            .skip_s
+            .min(SKIPPED * stretch.time_s(stretch.len() - 1));
+        let mut choice = choose(&stretch, &limits);
+        if let Some(gain) = straight(&stretch, &choice, &limits, self.options) {
             record.hold = Hold::Interpolated;
+            stretch.hold = Hold::Interpolated;
             self.remarks.push(Remark::Interpolated(gain));
-            choice = choose(&record, &limits);
+            choice = choose(&stretch, &limits);
         }
         let chosen = choice.chosen().ok_or(Verdict::NoFit)?.clone();
         let theta = chosen.found.theta;
@@ -235,9 +240,7 @@ impl Search<'_> {
         }
         let is_wrong = explained < LEAST_PREDICTED || tests.autocorrelation > STRONGLY_COLOURED;
         match prediction {
-            Some(prediction)
-                if is_wrong && ratio > MOST_ERROR_RATIO || explained < NOTHING_PREDICTED =>
-            {
+            Some(prediction) if is_wrong && ratio > MOST_ERROR_RATIO => {
                 Err(Verdict::NoPrediction {
                     explained,
                     horizon_s: prediction.horizon_s,
@@ -394,6 +397,26 @@ impl Fitted {
         let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
         mixture(blocks, &self.wider.found, &bounds)
     }
+}
+
+/// The part of a long record that chooses the structure: the one with the largest changes of the input. The rows of a
+/// longer part would be longer than the lags.
+fn most_excited(record: &Record) -> Record {
+    if record.len() <= CHOOSING {
+        return record.clone();
+    }
+    let change = |start: usize| -> f64 {
+        let input = &record.input[start..start + CHOOSING];
+        input
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).powi(2))
+            .sum()
+    };
+    let starts = (0..=record.len() - CHOOSING).step_by(CHOOSING / 2);
+    let best = starts
+        .max_by(|a, b| change(*a).total_cmp(&change(*b)))
+        .unwrap_or(0);
+    record.part(best..best + CHOOSING)
 }
 
 /// Fits to rows of `samples` samples, marks outliers and fits again. Returns the number of outliers too.
