@@ -161,9 +161,10 @@ impl Search<'_> {
             excitation.hold = fitted.record.hold;
             excitation.informative_rad_per_s = informative;
         }
-        self.judge(&fitted, &components, &tests, prediction.as_ref())?;
+        self.judge(&fitted, &blocks, &components, &tests, prediction.as_ref())?;
         self.remark(&fitted, &tests, prediction.as_ref());
-        self.design(&prepared, &fitted, &components, tests, prediction)
+        let checked = (tests, prediction);
+        self.design(&prepared, &fitted, &blocks, &components, checked)
     }
 
     /// Steps 2 and 3: the structure, and its fit to finer rows.
@@ -171,15 +172,12 @@ impl Search<'_> {
         let mut record = prepared.record.clone();
         let length_s = record.time_s(record.len() - 1);
         let longest = LONGEST_TAU * length_s;
+        let mut stretch = most_excited(&record);
         let mut limits = Limits {
-            skip_s: SKIPPED * length_s,
+            skip_s: SKIPPED * stretch.time_s(stretch.len() - 1),
             longest_tau_s: longest,
             structure: self.options.structure,
         };
-        let mut stretch = most_excited(&record);
-        limits.skip_s = limits
-            .skip_s
-            .min(SKIPPED * stretch.time_s(stretch.len() - 1));
         let mut choice = choose(&stretch, &limits);
         if let Some(gain) = straight(&stretch, &choice, &limits, self.options) {
             record.hold = Hold::Interpolated;
@@ -215,6 +213,7 @@ impl Search<'_> {
     fn judge(
         &self,
         fitted: &Fitted,
+        blocks: &Blocks<'_>,
         components: &[Component],
         tests: &InnovationTests,
         prediction: Option<&Prediction>,
@@ -226,7 +225,7 @@ impl Search<'_> {
                 needed: FEWEST / 2,
             });
         }
-        if let Some(verdict) = self.too_little(fitted, components) {
+        if let Some(verdict) = self.too_little(fitted, blocks, components) {
             return Err(verdict);
         }
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
@@ -251,7 +250,12 @@ impl Search<'_> {
     }
 
     /// Verdict if the record does not tell the gain, or if a bound of the search holds the fit.
-    fn too_little(&self, fitted: &Fitted, components: &[Component]) -> Option<Verdict> {
+    fn too_little(
+        &self,
+        fitted: &Fitted,
+        blocks: &Blocks<'_>,
+        components: &[Component],
+    ) -> Option<Verdict> {
         let theta = &fitted.best.found.theta;
         let gain = |component: &Component| {
             let deviation = component.laplace.gain_deviation(&component.found.at);
@@ -261,8 +265,7 @@ impl Search<'_> {
         if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
             return Some(self.no_information(theta, deviation));
         }
-        let blocks = fitted.blocks();
-        let bounds = Bounds::new(theta.structure, &blocks, fitted.limits.longest_tau_s);
+        let bounds = Bounds::new(theta.structure, blocks, fitted.limits.longest_tau_s);
         result::at_bound(theta, &bounds).map(Verdict::AtBound)
     }
 
@@ -285,12 +288,7 @@ impl Search<'_> {
         tests: &InnovationTests,
         prediction: Option<&Prediction>,
     ) {
-        let present = fitted
-            .record
-            .present
-            .iter()
-            .filter(|present| **present)
-            .count();
+        let present = fitted.record.present_outputs().count();
         let absent = 1.0 - present as f64 / fitted.record.len() as f64;
         if absent > 0.0 {
             self.remarks.push(Remark::Absent(absent));
@@ -327,12 +325,11 @@ impl Search<'_> {
         &mut self,
         prepared: &Prepared,
         fitted: &Fitted,
+        blocks: &Blocks<'_>,
         components: &[Component],
-        tests: InnovationTests,
-        prediction: Option<Prediction>,
+        (tests, prediction): (InnovationTests, Option<Prediction>),
     ) -> Result<Identified, Verdict> {
         let is_coloured = tests.autocorrelation > COLOURED.0 || tests.input_share > COLOURED.1;
-        let blocks = fitted.blocks();
         let (posterior, widened) = result::posterior_of(
             &fitted.best.found,
             components,
@@ -362,7 +359,7 @@ impl Search<'_> {
         let explained = prediction.map_or(1.0, |prediction| prediction.explained);
         let (innovations, points) = result::innovations(
             fitted,
-            &blocks,
+            blocks,
             prepared.start_s,
             (tests, prediction, widened),
         )
@@ -474,12 +471,8 @@ fn describe(prepared: &Prepared, outliers: usize) -> Recorded {
         let squares = values.iter().map(|v| (v - mean) * (v - mean)).sum::<f64>();
         (squares / values.len() as f64).sqrt()
     };
-    let present = record.present.iter().filter(|present| **present).count();
-    let outputs = record.output.iter().zip(&record.present);
-    let outputs: Vec<f64> = outputs
-        .filter(|(_, present)| **present)
-        .map(|(y, _)| *y)
-        .collect();
+    let outputs: Vec<f64> = record.present_outputs().collect();
+    let present = outputs.len();
     Recorded {
         start_s: prepared.start_s,
         end_s: prepared.start_s + record.time_s(record.len() - 1),

@@ -25,9 +25,9 @@ use crate::NoiseSource;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Disturbances {
-    /// Random walk `b` at the input: its standard deviation after one second (input unit).
+    /// Standard deviation, after one second, of the random walk `b` added to the input (input unit).
     pub input_walk: f64,
-    /// White noise `n0` at the input: standard deviation of its mean over one second (input unit).
+    /// White noise `n0` added to the input: standard deviation of its average over one second (input unit).
     pub input_white: f64,
     /// Random walk `e` of the measured output: its standard deviation after one second (output unit).
     pub output_walk: f64,

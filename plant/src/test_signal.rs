@@ -19,7 +19,7 @@ use std::f64::consts::{PI, TAU};
 
 use crate::controller::{Controller, Sensed};
 
-/// A switching time counts as reached this part of the time early: sample times are rounded.
+/// A switching time counts as reached when less than this fraction of it is left: sample times are rounded.
 const ROUNDING: f64 = 1e-12;
 
 /// Orders of a PRBS: periods of 7 to 1,048,575 bits.

@@ -177,13 +177,7 @@ impl Loop {
         if self.law.ki != 0.0 {
             return 1.0;
         }
-        let zero = self
-            .open_loop
-            .denominator
-            .coefficients()
-            .first()
-            .copied()
-            .unwrap_or(0.0);
+        let zero = self.open_loop.denominator.constant();
         self.law.b * self.law.kp / (zero + self.law.kp)
     }
 
@@ -309,13 +303,7 @@ impl Loop {
 
     /// See [`crate::load_response`].
     pub(crate) fn load_response(&self) -> Result<LoadResponse, StepResponseError> {
-        let zero = self
-            .open_loop
-            .denominator
-            .coefficients()
-            .first()
-            .copied()
-            .unwrap_or(0.0);
+        let zero = self.open_loop.denominator.constant();
         let goal = if self.law.ki != 0.0 {
             0.0
         } else {

@@ -57,6 +57,11 @@ impl Polynomial {
         &self.coefficients[..self.count]
     }
 
+    /// Value at `s = 0`.
+    pub(crate) fn constant(&self) -> f64 {
+        self.coefficients[0]
+    }
+
     pub(crate) fn degree(&self) -> usize {
         self.count.saturating_sub(1)
     }

@@ -87,20 +87,8 @@ impl<'a> Curve<'a> {
     pub(crate) fn sensitivity(&self, unit_s: f64) -> Sensitivity {
         let (ms, ms_omega) = self.peak(|value| 1.0 / (1.0 + value).norm());
         let (mt, mt_omega) = self.peak(|value| (value / (1.0 + value)).norm());
-        let n = self
-            .open_loop
-            .numerator
-            .coefficients()
-            .first()
-            .copied()
-            .unwrap_or(0.0);
-        let d = self
-            .open_loop
-            .denominator
-            .coefficients()
-            .first()
-            .copied()
-            .unwrap_or(0.0);
+        let n = self.open_loop.numerator.constant();
+        let d = self.open_loop.denominator.constant();
         let at_zero = (n / (n + d)).abs();
         let is_zero = at_zero >= mt * (1.0 - 1e-9);
         Sensitivity {

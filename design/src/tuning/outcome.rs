@@ -1,4 +1,4 @@
-//! What a design returns: the controller with its figures, or the reason why there is none.
+//! Result of a design: the controller with its cost and margins, or the reason why no controller exists.
 
 use crate::controller::{Controller, Form};
 use crate::model::Structure;

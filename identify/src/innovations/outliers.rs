@@ -22,10 +22,10 @@ const ROUNDS: usize = 5;
 const MOST: f64 = 0.1;
 /// Innovation in robust standard deviations beyond which a sample is rejected,
 const UNLIKELY: f64 = 4.5;
-/// and beyond which at least so many must lie: without these the innovations have heavy tails, but no outliers.
+/// and the larger one that at least three innovations must exceed: otherwise there are heavy tails, but no outliers.
 const GROSS: f64 = 8.0;
 const LEAST_GROSS: usize = 3;
-/// So many innovations in a row that are too large are a disturbance.
+/// Ten innovations in a row that are too large are a disturbance, not outliers.
 const RUN: usize = 10;
 /// Robust standard deviation over the median magnitude of Gaussian values.
 const OF_MEDIAN: f64 = 1.4826;
@@ -33,7 +33,7 @@ const OF_MEDIAN: f64 = 1.4826;
 /// Marks samples far from their neighbours as absent, and returns their number.
 pub(super) fn mark_far(record: &mut Record) -> usize {
     let before = record.present.clone();
-    let visible = VISIBLE * deviation(record);
+    let visible = VISIBLE * record.output_deviation();
     let mut found = 0;
     for _ in 0..ROUNDS {
         let distances = distances(record);
@@ -103,10 +103,6 @@ fn robust(values: &[Option<f64>]) -> f64 {
     let middle = sizes.len() / 2;
     let (_, median, _) = sizes.select_nth_unstable_by(middle, f64::total_cmp);
     OF_MEDIAN * *median
-}
-
-fn deviation(record: &Record) -> f64 {
-    Blocks::new(record, record.len().max(1), 0.0).scale
 }
 
 /// Marks samples that the fit at `theta` predicts badly as absent, and returns their number. `skip_s`: time at the start

@@ -5,6 +5,7 @@
 //! an efficient estimator reaches (the Cramer-Rao bound).
 
 use onecycle_design::Model;
+use onecycle_design::state_space::StateSpace;
 
 use super::descent::Found;
 use super::laplace::Laplace;
@@ -17,7 +18,6 @@ use super::theta::{Bounds, NoiseKind, Theta};
 use super::{LONGEST_TAU, ROWS};
 use crate::outcome::Noise;
 use crate::posterior::Estimate;
-use onecycle_design::state_space::StateSpace;
 
 /// Parameters of `model` with the 90 % intervals that a record of `input`, sampled every `sample_s`, leads to on average
 /// under `noise`. `None` if the record does not tell the parameters, or has fewer than 60 samples.
@@ -100,9 +100,7 @@ mod tests {
 
     use super::*;
 
-    // An integrator `y' = K u` under a constant input of 1 over L seconds: y = K t + y0 + bias... the bias cannot be told
-    // from K, so the input alternates. With u = +-1 in halves and the dead time known, the intervals scale with the
-    // noise and with one over the square root of the number of samples.
+    // Twice the noise doubles the intervals; four times as many samples in the same time halve them.
     #[test]
     fn intervals_scale_with_noise_and_samples() {
         let model = Model::from(

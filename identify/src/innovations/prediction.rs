@@ -32,7 +32,7 @@ pub(super) struct Predictions {
 pub(super) struct Filtering {
     /// Number of blocks to predict ahead.
     pub(super) ahead: usize,
-    /// Innovations over their deviation beyond the first value are rejected, unless so many follow each other.
+    /// Largest innovation, in standard deviations, that is accepted, and the most rows that are rejected in a row.
     pub(super) reject: Option<(f64, usize)>,
 }
 

@@ -58,6 +58,21 @@ impl Record {
         }
     }
 
+    /// Outputs of the samples that are present.
+    pub(crate) fn present_outputs(&self) -> impl Iterator<Item = f64> {
+        let samples = self.output.iter().zip(&self.present);
+        samples.filter(|(_, present)| **present).map(|(y, _)| *y)
+    }
+
+    /// Standard deviation of the outputs present; 1 if they are constant.
+    pub(crate) fn output_deviation(&self) -> f64 {
+        let count = self.present_outputs().count().max(1) as f64;
+        let mean = self.present_outputs().sum::<f64>() / count;
+        let squares = self.present_outputs().map(|y| (y - mean) * (y - mean));
+        let variance = squares.sum::<f64>() / count;
+        if variance > 0.0 { variance.sqrt() } else { 1.0 }
+    }
+
     /// Number of samples, absent ones included.
     pub(crate) fn len(&self) -> usize {
         self.output.len()
@@ -127,7 +142,7 @@ impl<'a> Blocks<'a> {
         let samples = if even { samples.max(1) } else { 1 };
         let first = record.index_at(skip_s);
         let count = record.len().saturating_sub(first) / samples;
-        let scale = deviation(record);
+        let scale = record.output_deviation();
         let mut blocks = Self {
             record,
             samples,
@@ -197,6 +212,16 @@ impl<'a> Blocks<'a> {
         mask.iter().filter(|present| **present).count()
     }
 
+    /// Mean of the input over each block.
+    pub(crate) fn mean_inputs(&self) -> Vec<f64> {
+        let mean = |block: usize| {
+            let range = self.range(block);
+            let count = range.len() as f64;
+            self.record.input[range].iter().sum::<f64>() / count
+        };
+        (0..self.len()).map(mean).collect()
+    }
+
     /// Sums over the samples present in each block of a value of each sample.
     pub(crate) fn sums_of(&self, values: &[f64]) -> Vec<f64> {
         let sum = |block: usize| {
@@ -211,16 +236,4 @@ impl<'a> Blocks<'a> {
         };
         (0..self.len()).map(sum).collect()
     }
-}
-
-/// Standard deviation of the outputs present; 1 if they are constant.
-fn deviation(record: &Record) -> f64 {
-    let present = || {
-        let values = record.output.iter().zip(&record.present);
-        values.filter(|(_, present)| **present).map(|(y, _)| *y)
-    };
-    let count = present().count().max(1) as f64;
-    let mean = present().sum::<f64>() / count;
-    let variance = present().map(|y| (y - mean) * (y - mean)).sum::<f64>() / count;
-    if variance > 0.0 { variance.sqrt() } else { 1.0 }
 }

@@ -141,7 +141,8 @@ impl Theta {
         process
     }
 
-    /// Longest and shortest time of the process (s) but for the dead time: its lags and the inverse of its poles.
+    /// Shortest time constant of the process (s): the least of its lags and of the inverses of its poles. Infinite without
+    /// any.
     pub(super) fn shortest_lag_s(&self) -> f64 {
         let layout = self.layout();
         let lags = (0..layout.stages.lags).map(|lag| self.values[lag].exp());

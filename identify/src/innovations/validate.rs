@@ -46,12 +46,7 @@ pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
 /// Share of the innovations that the input of the blocks before explains, and its F statistic. The input of the same
 /// block is left out: under feedback it contains the innovation.
 fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
-    let input = |block: usize| {
-        let range = blocks.range(block);
-        let count = range.len() as f64;
-        blocks.record.input[range].iter().sum::<f64>() / count
-    };
-    let inputs: Vec<f64> = (0..blocks.len()).map(input).collect();
+    let inputs = blocks.mean_inputs();
     let rows: Vec<usize> = (0..blocks.len())
         .filter(|block| blocks.present(*block) > 0)
         .collect();
@@ -153,12 +148,7 @@ pub(super) fn informative(blocks: &Blocks<'_>, at: &Evaluation) -> Option<(f64, 
 
 /// Period of the frequency (s) below and above which the input has half of its power each.
 pub(super) fn period_s(blocks: &Blocks<'_>) -> Option<f64> {
-    let input = |block: usize| {
-        let range = blocks.range(block);
-        let count = range.len() as f64;
-        blocks.record.input[range].iter().sum::<f64>() / count
-    };
-    let inputs: Vec<f64> = (0..blocks.len()).map(input).collect();
+    let inputs = blocks.mean_inputs();
     let [_, median, _] = quantiles(&inputs, blocks.block_s())?;
     Some(TAU / median)
 }

@@ -89,7 +89,7 @@ fn over_record(fit: &[FitPoint], found: &Innovations, units: &Units) -> Figure {
         Panel::new(Axis::titled(title), vec![series])
     };
     let mut upper = output(fit, "model without disturbances", units);
-    // A long record has so many points that they would hide the line.
+    // The model's line is drawn last: the points of a long record would hide it.
     upper.series.reverse();
     let mut panels = vec![
         upper,
