@@ -121,9 +121,17 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
         return record;
     }
     let median = steps[steps.len() / 2];
-    let on_grid = (1..=4).find_map(|part| indices(times_s, median / f64::from(part)));
-    if let Some((indices, step_s)) = on_grid {
-        return spread(&indices, step_s, input, output);
+    let on_grid = (1..=4).find_map(|part| {
+        let (indices, step_s) = indices(times_s, median / f64::from(part))?;
+        let between = if part == 1 {
+            Between::Lost
+        } else {
+            Between::Never
+        };
+        Some(spread(&indices, step_s, (input, output), between))
+    });
+    if let Some(record) = on_grid {
+        return record;
     }
     record.dt_s = median;
     let unit = median * STAMP;
@@ -165,8 +173,23 @@ fn indices(times_s: &[f64], step_s: f64) -> Option<(Vec<usize>, f64)> {
     (rises && is_dense && mean < OFF_GRID.0 && most < OFF_GRID.1).then_some((indices, step_s))
 }
 
-/// Samples at their indices on a grid; the others are absent, and the input keeps its value there.
-fn spread(indices: &[usize], step_s: f64, input: &[f64], output: &[f64]) -> Record {
+/// What a point of the grid without a sample means.
+#[derive(Clone, Copy, PartialEq)]
+enum Between {
+    /// The sample was lost. Its input is most likely on the line between its neighbours: a switch of the input in between
+    /// is then neither early nor late on average.
+    Lost,
+    /// There was none: the increments are multiples of a shorter step, and the input keeps its value.
+    Never,
+}
+
+/// Samples at their indices on a grid; the others are absent.
+fn spread(
+    indices: &[usize],
+    step_s: f64,
+    (input, output): (&[f64], &[f64]),
+    between: Between,
+) -> Record {
     let count = indices[indices.len() - 1] + 1;
     let mut record = Record {
         uneven_s: vec![],
@@ -180,7 +203,14 @@ fn spread(indices: &[usize], step_s: f64, input: &[f64], output: &[f64]) -> Reco
     for index in 0..count {
         let is_next = indices.get(sample + 1).is_some_and(|next| *next <= index);
         sample += usize::from(is_next);
-        record.input.push(input[sample]);
+        let value = match (between, indices.get(sample + 1)) {
+            (Between::Lost, Some(next)) => {
+                let passed = (index - indices[sample]) as f64 / (next - indices[sample]) as f64;
+                input[sample] + passed * (input[sample + 1] - input[sample])
+            }
+            _ => input[sample],
+        };
+        record.input.push(value);
         record.output.push(output[sample]);
         record.present.push(indices[sample] == index);
     }
@@ -254,7 +284,20 @@ mod tests {
         assert!(found.uneven_s.is_empty() && (found.dt_s - 0.01).abs() < 1e-6);
         assert_eq!(found.len(), 350);
         assert_eq!(found.present.iter().filter(|p| **p).count(), 300);
-        assert!(!found.present[3] && found.input[3] == found.input[2]);
+        let middle = 0.5 * (found.input[2] + found.input[4]);
+        assert!(!found.present[3] && (found.input[3] - middle).abs() < 1e-12);
+    }
+
+    // Increments of 10 and 15 ms in turn: a grid of 5 ms.
+    #[test]
+    fn the_input_is_held_between_samples_of_uneven_increments() {
+        let mut times_s = vec![0.0];
+        for k in 0..200 {
+            times_s.push(times_s[k] + [0.01, 0.015][k % 2]);
+        }
+        let found = prepared(&times_s, &ramp(times_s.len()), &[]).record;
+        assert!((found.dt_s - 0.005).abs() < 1e-9);
+        assert!(!found.present[1] && found.input[1] == found.input[0]);
     }
 
     #[test]
