@@ -16,6 +16,7 @@
 //! The likelihood itself is in `likelihood`, on the matrices of `lifted` and the response of `response`. Method: L. Ljung,
 //! "System Identification" (1999), section 7.4, with unknown initial state (P. de Jong, Biometrika 75 (1988)).
 
+mod check;
 mod choose;
 #[cfg(test)]
 mod dense;
@@ -40,6 +41,7 @@ mod vectors;
 
 use onecycle_design::{Model, Structure, design_over, step_response, tuning};
 
+pub(crate) use self::check::check;
 use self::choose::{Choice, Limits, NEARLY, choose};
 use self::mixture::{Component, mixture};
 pub use self::plan::expected;

@@ -65,6 +65,14 @@ pub enum Remark {
     /// The estimator of steady oscillations leaves a part of the oscillation unexplained and the general one does not, so
     /// the general result is given. The value is that part.
     RelayReplaced(f64),
+    /// The general estimator, fitted to the whole recording, finds another process than that of steady oscillations.
+    GeneralDisagrees {
+        /// Phase margin (rad) that the controller for the steady oscillation has on this process. `None` if the loop is
+        /// unstable.
+        phase_margin_rad: Option<f64>,
+        /// Whether the general result is given. It is not if its innovations are not white.
+        is_replaced: bool,
+    },
     /// Other structures explain the recording nearly as well.
     OtherStructures(Vec<Structure>),
     /// The innovations are not white. The value is their largest autocorrelation; the intervals are widened.
@@ -113,6 +121,7 @@ impl Remark {
             Self::NoController(_) => "no_controller",
             Self::NotASteadyOscillation(_) => "not_a_steady_oscillation",
             Self::RelayReplaced(_) => "relay_replaced",
+            Self::GeneralDisagrees { .. } => "general_disagrees",
             Self::OtherStructures(_) => "other_structures",
             Self::Coloured(_) => "coloured",
             Self::InputLeft(_) => "input_left",

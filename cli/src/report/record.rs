@@ -54,6 +54,9 @@ fn estimator(remarks: &[Remark]) -> String {
         Remark::RelayReplaced(_) => {
             Some("it explains more than the one for steady oscillations".to_owned())
         }
+        Remark::GeneralDisagrees { .. } => Some(
+            "on the whole recording it finds another process than on the steady cycles".to_owned(),
+        ),
         _ => None,
     });
     why.map_or("general".to_owned(), |why| format!("general ({why})"))

@@ -117,6 +117,10 @@ fn of_estimator(remark: &Remark) -> Option<String> {
              unexplained, the general one nothing but white noise. Compare with --estimator relay.",
             100.0 * part
         ),
+        Remark::GeneralDisagrees {
+            phase_margin_rad,
+            is_replaced,
+        } => disagreement(*phase_margin_rad, *is_replaced),
         Remark::OtherStructures(structures) => {
             let names: Vec<&str> = structures
                 .iter()
@@ -143,6 +147,21 @@ fn of_estimator(remark: &Remark) -> Option<String> {
 }
 
 /// `a`, `a and b`, `a, b and c`.
+/// The general estimator finds another process; its result is given if `is_replaced`.
+fn disagreement(phase_margin_rad: Option<f64>, is_replaced: bool) -> String {
+    let margin = phase_margin_rad.map_or("be unstable".to_owned(), |margin| {
+        format!("have a phase margin of {:.1} deg", margin.to_degrees())
+    });
+    let which = if is_replaced {
+        "The general estimator was used: fitted to the whole recording, it finds another process than the one for steady \
+         oscillations, whose controller would"
+    } else {
+        "Do not fly this controller before another test: on the process that the general estimator finds in the whole \
+         recording it would"
+    };
+    format!("{which} {margin} there. Compare with --estimator relay and --estimator general.")
+}
+
 fn listed(names: &[&str]) -> String {
     match names {
         [] => String::new(),
@@ -251,6 +270,14 @@ mod tests {
                 output_is_relay: false,
             })),
             Remark::RelayReplaced(0.041),
+            Remark::GeneralDisagrees {
+                phase_margin_rad: Some(0.2),
+                is_replaced: true,
+            },
+            Remark::GeneralDisagrees {
+                phase_margin_rad: None,
+                is_replaced: false,
+            },
             Remark::OtherStructures(vec![Structure::Soptd, Structure::ResonantLag]),
             Remark::Coloured(0.31),
             Remark::InputLeft(0.024),

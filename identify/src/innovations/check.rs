@@ -1,0 +1,50 @@
+//! A steady oscillation seen by the general estimator: the same structure fitted to the whole recording.
+
+use onecycle_design::{Linear, Model, Structure};
+
+use super::prepare::prepare;
+use super::record::Blocks;
+use super::search::{self, Candidate};
+use super::theta::{NoiseKind, Theta};
+use super::{LONGEST_TAU, ROWS, outliers, result};
+use crate::settings::Options;
+use crate::signals::Signals;
+
+/// Rows a period of the oscillation, at least: with fewer the intervals widen.
+const ROWS_A_PERIOD: f64 = 30.0;
+/// First frequency of a noise over that of the oscillation. The search converges from far above.
+const NOISE_OVER_OSCILLATION: f64 = 0.5;
+
+/// The process that the whole recording shows, transient and disturbances included, in the structure of `found`, which
+/// is the process of a steady oscillation with this period. `None` if nothing can be fitted.
+pub(crate) fn check(
+    signals: &Signals<'_>,
+    options: &Options,
+    found: &Linear,
+    period_s: f64,
+) -> Option<Model> {
+    let mut prepared = prepare(signals, options).ok()?;
+    outliers::mark_far(&mut prepared.record);
+    let record = &prepared.record;
+    let longest_s = LONGEST_TAU * record.time_s(record.len() - 1);
+    let skip_s = (1.5 * found.tau_s() + 2.0 * record.dt_s).min(longest_s);
+    let rows = record.len() - record.index_at(skip_s);
+    let a_period = (period_s / ROWS_A_PERIOD / record.dt_s) as usize;
+    let samples = (rows / ROWS).min(a_period).max(1);
+    let blocks = Blocks::new(record, samples, skip_s);
+    let mut start = Theta::new(Structure::Soiptd);
+    let layout = start.layout();
+    start.values[0] = found.lags_s()[0].ln();
+    start.values[layout.pole()?] = found.pole_per_s();
+    start.values[layout.tau()] = found.tau_s() - prepared.early_s;
+    let candidates = NoiseKind::ALL.into_iter().filter_map(|kind| {
+        let mut start = start;
+        start.set_noise(
+            kind,
+            NOISE_OVER_OSCILLATION * std::f64::consts::TAU / period_s,
+        );
+        search::fit(&blocks, &start, longest_s)
+    });
+    let Candidate { found, .. } = search::best(candidates)?;
+    Some(result::model(&found, prepared.early_s))
+}
