@@ -7,6 +7,7 @@
 //! 1. put the samples on their grid; mark lost, stale and far samples      prepare, outliers
 //! 2. find the simplest structure that explains the record                 choose, search
 //! 3. fit it to finer rows; mark samples it cannot predict, fit again      refine
+//!    add drag and thrust that are quadratic, if the record asks for them   quadratic
 //! 4. average the posterior over the intensity of the noise                mixture, laplace
 //! 5. test the innovations, predict the last third from the first two      validate
 //! 6. refuse what the record does not tell                                 judge
@@ -30,6 +31,7 @@ mod outliers;
 mod plan;
 mod prediction;
 mod prepare;
+mod quadratic;
 mod record;
 mod response;
 mod result;
@@ -200,7 +202,7 @@ impl Search<'_> {
             .damped(best.structure())
             .map(|damped| damped.found.theta);
         let wider = damped.and_then(|theta| search::fit(&blocks, &theta, longest));
-        Ok(Fitted {
+        let mut fitted = Fitted {
             choice,
             limits,
             samples,
@@ -208,7 +210,11 @@ impl Search<'_> {
             best,
             outliers: outliers + found,
             record,
-        })
+        };
+        if let Some(remark) = fitted.add_quadratic() {
+            self.remarks.push(remark);
+        }
+        Ok(fitted)
     }
 
     /// Step 6: reasons to refuse.
@@ -317,7 +323,9 @@ impl Search<'_> {
             .filter(|other| other.bic < best + NEARLY && other.structure() != chosen)
             .map(Candidate::structure)
             .collect();
-        if !others.is_empty() && self.options.structure.is_none() {
+        // The fits of the others lack the quadratic forces.
+        let is_linear = fitted.record.quadratic.len() == 0;
+        if !others.is_empty() && self.options.structure.is_none() && is_linear {
             self.remarks.push(Remark::OtherStructures(others));
         }
     }
@@ -388,6 +396,38 @@ impl Search<'_> {
 impl Fitted {
     fn blocks(&self) -> Blocks<'_> {
         Blocks::new(&self.record, self.samples, self.limits.skip_s)
+    }
+
+    /// Adds the quadratic forces that the record asks for, and fits again.
+    fn add_quadratic(&mut self) -> Option<Remark> {
+        let limits = &self.limits;
+        let body = Structure::Soiptd;
+        if limits.structure.is_some_and(|asked| asked != body) {
+            return None;
+        }
+        let mut of_body = self.choice.candidates.iter();
+        let start = of_body.find(|candidate| candidate.structure() == body)?;
+        let longest_s = limits.longest_tau_s;
+        let rows = (self.samples, limits.skip_s, longest_s);
+        let part = most_excited(&self.record);
+        let is_whole = part.len() == self.record.len();
+        let on_part = Blocks::new(&part, self.samples, limits.skip_s);
+        let best = if is_whole {
+            self.best.clone()
+        } else {
+            search::fit(&on_part, &self.best.found.theta, longest_s)?
+        };
+        let (asked, found) = quadratic::quadratic(&part, &best, &start.found.theta, rows)?;
+        self.record.quadratic = asked.of(&self.record);
+        let blocks = Blocks::new(&self.record, self.samples, limits.skip_s);
+        self.best = if is_whole {
+            found
+        } else {
+            search::fit(&blocks, &found.found.theta, longest_s)?
+        };
+        self.wider = self.best.clone();
+        let [drag, thrust] = result::quadratic(&self.best.found, &self.record.quadratic);
+        Some(Remark::Quadratic { drag, thrust })
     }
 
     /// Step 4: components of the posterior.

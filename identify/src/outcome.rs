@@ -117,6 +117,11 @@ impl Fit {
 pub struct Innovations {
     /// Noise and disturbances beside the response to the input.
     pub noise: Noise,
+    /// Coefficient `c` of a drag `-c v |v|` on the rate `v` of the output (1/output unit), beside the linear damping.
+    /// `None` if the recording does not ask for it.
+    pub drag: Option<f64>,
+    /// Coefficient `c` of a thrust `l + c l^2` of the lagged input `l` (1/input unit). `None` as for the drag.
+    pub thrust: Option<f64>,
     /// Logarithm of the likelihood of the rows of the fit.
     pub log_likelihood: f64,
     /// Bayesian information criterion; lower is better.
@@ -229,6 +234,10 @@ pub struct Prediction {
 pub struct InnovationRow {
     /// Mean time of the samples (s).
     pub time_s: f64,
+    /// Mean of the measured outputs (output unit). `None` if no sample is present.
+    pub measured: Option<f64>,
+    /// Output of the model without disturbances (output unit).
+    pub simulated: f64,
     /// Innovation over its standard deviation. `None` if no sample is present.
     pub innovation: Option<f64>,
     /// Output predicted from the rows before (output unit).

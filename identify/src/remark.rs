@@ -73,6 +73,14 @@ pub enum Remark {
         /// Whether the general result is given. It is not if its innovations are not white.
         is_replaced: bool,
     },
+    /// The model has quadratic forces beside its linear parts, and the controller is designed for the linear parts. At
+    /// least one is there.
+    Quadratic {
+        /// Coefficient `c` of a drag `-c v |v|` on the rate `v` of the output (1/output unit).
+        drag: Option<f64>,
+        /// Coefficient `c` of a thrust `l + c l^2` of the lagged input `l` (1/input unit).
+        thrust: Option<f64>,
+    },
     /// Other structures explain the recording nearly as well.
     OtherStructures(Vec<Structure>),
     /// The innovations are not white. The value is their largest autocorrelation; the intervals are widened.
@@ -122,6 +130,7 @@ impl Remark {
             Self::NotASteadyOscillation(_) => "not_a_steady_oscillation",
             Self::RelayReplaced(_) => "relay_replaced",
             Self::GeneralDisagrees { .. } => "general_disagrees",
+            Self::Quadratic { .. } => "quadratic",
             Self::OtherStructures(_) => "other_structures",
             Self::Coloured(_) => "coloured",
             Self::InputLeft(_) => "input_left",

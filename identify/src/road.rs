@@ -76,6 +76,8 @@ fn automatic(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) 
 /// A reason to try the general estimator although that of steady oscillations accepts a recording.
 #[derive(Clone, Copy)]
 enum Doubt {
+    /// A stretch with this misfit was refused, and another one used.
+    Disturbed(f64),
     /// Some of the oscillation is left unexplained.
     Misfit,
     /// The same structure, fitted to the whole recording, leaves the controller this phase margin (rad; `None` if
@@ -89,10 +91,13 @@ fn doubt(
     steady: &Identification,
     found: &Identified,
 ) -> Option<Doubt> {
-    let is_unexplained =
-        |remark: &Remark| matches!(remark, Remark::Disturbed(_) | Remark::Misfit(_));
-    if steady.remarks.iter().any(is_unexplained) {
-        return Some(Doubt::Misfit);
+    let unexplained = steady.remarks.iter().find_map(|remark| match remark {
+        Remark::Disturbed(misfit) => Some(Doubt::Disturbed(*misfit)),
+        Remark::Misfit(_) => Some(Doubt::Misfit),
+        _ => None,
+    });
+    if unexplained.is_some() {
+        return unexplained;
     }
     let period_s = steady.oscillation()?.period_s;
     let controller = found.design?.controller;
@@ -106,11 +111,19 @@ fn doubt(
     (!is_expected).then_some(Doubt::Margin(margin))
 }
 
-/// The general result if its innovations are white and no controller is lost; else that of the steady oscillation.
+/// The general result if its innovations are white, or if a stretch was refused, and no controller is lost; else that of
+/// the steady oscillation.
 fn settle(mut steady: Identification, mut general: Identification, doubt: Doubt) -> Identification {
-    let is_replaced = is_white(&general) && has_controller(&general) >= has_controller(&steady);
+    let is_better = match doubt {
+        Doubt::Disturbed(_) => general.outcome.is_ok(),
+        Doubt::Misfit | Doubt::Margin(_) => is_white(&general),
+    };
+    let is_replaced = is_better && has_controller(&general) >= has_controller(&steady);
     let remark = match doubt {
-        Doubt::Misfit if !is_replaced => return steady,
+        Doubt::Misfit | Doubt::Disturbed(_) if !is_replaced => return steady,
+        Doubt::Disturbed(misfit) => {
+            Remark::NotASteadyOscillation(Box::new(Verdict::NotThisProcess { misfit }))
+        }
         Doubt::Misfit => {
             let found = steady.outcome.as_ref();
             Remark::RelayReplaced(found.map_or(0.0, |found| found.fit.misfit))

@@ -33,6 +33,10 @@ pub(crate) struct Identify {
     /// Print the report as JSON (schema: docs/identify-json.md)
     #[arg(long)]
     pub(crate) json: bool,
+    /// With --json: add the fit of the general estimator row by row (measured, simulated and predicted output,
+    /// innovation, disturbance)
+    #[arg(long, requires = "json")]
+    pub(crate) rows: bool,
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,

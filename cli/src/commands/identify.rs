@@ -44,7 +44,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         When::Never => false,
     };
     print(&if arguments.json {
-        json::identification(&name, &recording, &found)
+        json::identification(&name, &recording, &found, arguments.rows)
     } else {
         let plotted = is_plotted.then(|| plot::end(&recording, &found, columns()));
         text::identification(&name, &recording, &found) + &plotted.flatten().unwrap_or_default()

@@ -38,6 +38,7 @@ struct IdentifyReport<'a> {
     alternatives: Option<Vec<record::Alternative>>,
     innovations: Option<record::Tests>,
     prediction: Option<record::Prediction>,
+    rows: Option<record::Rows>,
     controller: Option<Controller>,
     margins: Option<MarginsReport>,
     step: Option<Step>,
@@ -175,7 +176,12 @@ struct Step {
 }
 
 /// The report of an identification, one line at the end.
-pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
+pub(crate) fn identification(
+    file: &str,
+    recording: &Recording,
+    found: &Identification,
+    with_rows: bool,
+) -> String {
     let identified = found.outcome.as_ref().ok();
     let design = identified.and_then(|i| i.design.as_ref());
     let innovations = identified.and_then(|i| i.fit.innovations());
@@ -207,6 +213,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
         alternatives: innovations.map(|i| i.alternatives.iter().map(Into::into).collect()),
         innovations: innovations.map(Into::into),
         prediction: (innovations.and_then(|i| i.prediction.as_ref())).map(Into::into),
+        rows: innovations.filter(|_| with_rows).map(Into::into),
         controller: design.map(controller),
         margins: design
             .zip(identified)

@@ -2,7 +2,7 @@
 
 use onecycle::{DesignError, Identification, Parameter, Remark};
 
-use crate::report::number::percent;
+use crate::report::number::{percent, significant};
 
 /// One or two sentences for each remark on a result, with the options of this program.
 pub(crate) fn sentences(found: &Identification) -> Vec<String> {
@@ -121,6 +121,7 @@ fn of_estimator(remark: &Remark) -> Option<String> {
             phase_margin_rad,
             is_replaced,
         } => disagreement(*phase_margin_rad, *is_replaced),
+        Remark::Quadratic { drag, thrust } => quadratic(*drag, *thrust),
         Remark::OtherStructures(structures) => {
             let names: Vec<&str> = structures
                 .iter()
@@ -160,6 +161,23 @@ fn disagreement(phase_margin_rad: Option<f64>, is_replaced: bool) -> String {
          recording it would"
     };
     format!("{which} {margin} there. Compare with --estimator relay and --estimator general.")
+}
+
+/// Quadratic forces: what they mean for the controller.
+fn quadratic(drag: Option<f64>, thrust: Option<f64>) -> String {
+    let drag = drag.map(|c| format!("a drag of {} times the square of the rate", significant(c)));
+    let thrust = thrust.map(|c| {
+        format!(
+            "a thrust of {} times the square of the lagged input",
+            significant(c)
+        )
+    });
+    let forces: Vec<String> = [drag, thrust].into_iter().flatten().collect();
+    format!(
+        "Beside its linear parts the process has {}. The controller is designed for the linear parts, which hold for small \
+         movements. Repeat the test at another amplitude to confirm this.",
+        forces.join(" and ")
+    )
 }
 
 fn listed(names: &[&str]) -> String {
@@ -277,6 +295,10 @@ mod tests {
             Remark::GeneralDisagrees {
                 phase_margin_rad: None,
                 is_replaced: false,
+            },
+            Remark::Quadratic {
+                drag: Some(7.1),
+                thrust: Some(0.2),
             },
             Remark::OtherStructures(vec![Structure::Soptd, Structure::ResonantLag]),
             Remark::Coloured(0.31),

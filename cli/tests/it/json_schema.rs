@@ -43,7 +43,8 @@ fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
 fn the_documented_keys_are_those_of_the_report() {
     let mut found = BTreeSet::new();
     for estimator in ["relay", "general"] {
-        let report = identify(Table::noisy().csv(), &["--estimator", estimator]).identified();
+        let report =
+            identify(Table::noisy().csv(), &["--estimator", estimator, "--rows"]).identified();
         keys(&report.0, "", &mut found);
     }
     for part in [

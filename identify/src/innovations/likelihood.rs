@@ -17,7 +17,10 @@
 //! constant from the first block on. Reference: P. de Jong, "The likelihood for a state space model", Biometrika 75
 //! (1988); G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973).
 //!
-//! Shapes: `N` states (the last one is the disturbance), `blocks` rows, `N + 2` columns `y`, `g`, `X0`.
+//! Quadratic forces of the record add a column each, beside `g`: their coefficients are further linear unknowns.
+//!
+//! Shapes: `N` states (the last one is the disturbance), `blocks` rows, `N + 2` columns `y`, `g`, `X0`, and up to two of
+//! quadratic forces.
 
 use std::f64::consts::TAU as TWO_PI;
 
@@ -29,7 +32,8 @@ use super::record::Blocks;
 use super::response;
 use super::theta::{NoiseKind, Theta};
 
-/// Columns of a row of the filter: room for `y`, `g` and six states, and a multiple of the width of a vector register.
+/// Columns of a row of the filter: room for `y`, `g`, the states and quadratic forces, six of these in all, and a multiple
+/// of the width of a vector register.
 const LANES: usize = 8;
 /// Relative change of the covariance below which the filter of a kind of block is steady.
 const STEADY: f64 = 1e-9;
@@ -49,6 +53,9 @@ pub(super) struct Evaluation {
     pub(super) gain_factor: f64,
     /// State at the first block; the disturbance is the last (output unit, times the gain).
     pub(super) state: Vec<f64>,
+    /// Coefficients of the quadratic forces, and their deviation for fixed nonlinear unknowns (output unit / unit of the
+    /// force).
+    pub(super) quadratic: Vec<(f64, f64)>,
     /// Variance of the disturbance at the first block and its covariance with the gain, for fixed nonlinear unknowns, over
     /// [`Self::variance`].
     pub(super) disturbance_factors: (f64, f64),
@@ -95,6 +102,8 @@ pub(super) struct Memory {
     key: Option<(Theta, bool)>,
     /// `g`, summed over the samples present in each block.
     response: Vec<f64>,
+    /// The same of each quadratic force.
+    quadratic: Vec<Vec<f64>>,
     /// `ln|X0'X0| / 2`.
     log_determinant: f64,
 }
@@ -209,10 +218,10 @@ fn evaluate_sized<const N: usize>(
     let system = System::<N>::new(theta, blocks.record.dt_s);
     let lifted = system.lifted(blocks);
     remember(&system, &lifted, blocks, theta, memory)?;
-    let filtered = filter(&system, &lifted, blocks, &memory.response)?;
-    let columns = Orthogonal::new(&filtered.columns[1..N + 2])?;
+    let filtered = filter(&system, &lifted, blocks, memory)?;
+    let columns = Orthogonal::new(&filtered.columns[1..])?;
     let count = filtered.columns[0].len();
-    let freedom = count as f64 - (N + 1) as f64;
+    let freedom = count as f64 - (filtered.columns.len() - 1) as f64;
     if freedom < 1.0 {
         return None;
     }
@@ -241,7 +250,13 @@ fn evaluate_sized<const N: usize>(
         stretch: stretch / scale,
         gain: coefficients[0] * scale,
         gain_factor: inverse[0][0],
-        state: coefficients[1..].iter().map(|x| x * scale).collect(),
+        state: coefficients[1..=N].iter().map(|x| x * scale).collect(),
+        quadratic: (N + 1..coefficients.len())
+            .map(|column| {
+                let [[factor]] = columns.covariance(&[column]);
+                (coefficients[column] * scale, (factor * squared).sqrt())
+            })
+            .collect(),
         disturbance_factors: (inverse[1][1], inverse[0][1]),
         variance: squared,
         input_innovations,
@@ -265,13 +280,14 @@ fn remember<const N: usize>(
     }
     memory.key = None;
     memory.response = response::sums(&system.model, blocks, theta.tau_s());
+    memory.quadratic = response::of_quadratic(&system.model, blocks, theta.delay_and_lag_s());
     let has_samples = |block: &usize| lifted[blocks.kind_of[*block] as usize].r > 0.0;
     let mut columns = vec![Vec::with_capacity(blocks.len()); N + 1];
-    columns[0].extend(
-        (0..blocks.len())
-            .filter(has_samples)
-            .map(|block| memory.response[block]),
-    );
+    let of_samples = |sums: &[f64]| -> Vec<f64> {
+        let blocks = (0..blocks.len()).filter(has_samples);
+        blocks.map(|block| sums[block]).collect()
+    };
+    columns[0] = of_samples(&memory.response);
     let mut state = identity::<N>();
     for &kind in &blocks.kind_of {
         let block = &lifted[kind as usize];
@@ -282,6 +298,7 @@ fn remember<const N: usize>(
         }
         state = product(&block.phi, &state);
     }
+    columns.extend(memory.quadratic.iter().map(|sums| of_samples(sums)));
     memory.log_determinant = Orthogonal::new(&columns)?.log_determinant();
     memory.key = Some(key);
     Some(())
@@ -289,7 +306,7 @@ fn remember<const N: usize>(
 
 /// Innovations of all columns.
 struct Filtered {
-    /// `y`, `g`, then one column a state; a row for each block that has samples.
+    /// `y`, `g`, one column a state, quadratic forces; a row for each block that has samples.
     columns: Vec<Vec<f64>>,
     /// `sum ln S_k`.
     log_variances: f64,
@@ -300,10 +317,15 @@ fn filter<const N: usize>(
     system: &System<N>,
     lifted: &[Lifted<N>],
     blocks: &Blocks<'_>,
-    response: &[f64],
+    memory: &Memory,
 ) -> Option<Filtered> {
     let mut gains = Gains::new(system.start(blocks, lifted)?);
-    let mut columns = vec![Vec::with_capacity(blocks.len()); N + 2];
+    let forces = &memory.quadratic;
+    let count = N + 2 + forces.len();
+    if count > LANES {
+        return None;
+    }
+    let mut columns = vec![Vec::with_capacity(blocks.len()); count];
     let mut log_variances = 0.0;
     // Row i holds state i of the predictions of all columns. A column of an initial state is the filter of zero data
     // that starts from minus the unit state.
@@ -322,7 +344,10 @@ fn filter<const N: usize>(
         log_variances += gains.log_variance;
         let mut innovation = [0.0; LANES];
         innovation[0] = blocks.sums[block];
-        innovation[1] = response[block];
+        innovation[1] = memory.response[block];
+        for (lane, force) in innovation[N + 2..].iter_mut().zip(forces) {
+            *lane = force[block];
+        }
         for i in 0..N {
             for lane in 0..LANES {
                 innovation[lane] -= model.c[i] * states[i][lane];

@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::record::{Hold, Record};
+use super::record::{Hold, Quadratic, Record};
 use crate::settings::Options;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
@@ -116,6 +116,7 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
         output: output.to_vec(),
         present: vec![true; output.len()],
         hold: Hold::Held,
+        quadratic: Quadratic::default(),
     };
     if is_even {
         return record;
@@ -198,6 +199,7 @@ fn spread(
         output: Vec::with_capacity(count),
         present: Vec::with_capacity(count),
         hold: Hold::Held,
+        quadratic: Quadratic::default(),
     };
     let mut sample = 0;
     for index in 0..count {

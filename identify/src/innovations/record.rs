@@ -42,6 +42,25 @@ pub(crate) struct Record {
     pub(crate) present: Vec<bool>,
     /// Input between the samples.
     pub(crate) hold: Hold,
+    /// Terms of the model that are quadratic.
+    pub(crate) quadratic: Quadratic,
+}
+
+/// Forces behind the actuator lags, beside the input and the disturbance, that are quadratic in what causes them. Their
+/// coefficients are linear unknowns, as the gain is. The default is none.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Quadratic {
+    /// Square of the rate of the output, with its sign, at each sample (output unit^2/s^2): drag. Empty for none.
+    pub(crate) drag: Vec<f64>,
+    /// Whether the force has a part that is quadratic in the lagged input: thrust over rotor speed.
+    pub(crate) thrust: bool,
+}
+
+impl Quadratic {
+    /// Number of coefficients.
+    pub(crate) fn len(&self) -> usize {
+        usize::from(!self.drag.is_empty()) + usize::from(self.thrust)
+    }
 }
 
 impl Record {
@@ -55,6 +74,7 @@ impl Record {
             input,
             output,
             hold: Hold::Held,
+            quadratic: Quadratic::default(),
         }
     }
 
@@ -101,8 +121,12 @@ impl Record {
             dt_s: self.dt_s,
             input: self.input[range.clone()].to_vec(),
             output: self.output[range.clone()].to_vec(),
-            present: self.present[range].to_vec(),
+            present: self.present[range.clone()].to_vec(),
             hold: self.hold,
+            quadratic: Quadratic {
+                drag: self.quadratic.drag.get(range).unwrap_or(&[]).to_vec(),
+                thrust: self.quadratic.thrust,
+            },
         }
     }
 }

@@ -3,12 +3,34 @@
 //! The dead time is `tau = (m + f) dt` with a whole `m` and `0 <= f < 1`. During one sample the delayed input is that of
 //! two samples: a part `f` of the older one, then the newer one. Before the record the input is that of the first
 //! sample. A negative dead time uses later input.
+//!
+//! Quadratic forces are inputs too. They enter behind the actuator lags without a delay, and run straight from sample to
+//! sample.
 
 use onecycle_design::state_space::{Matrix, StateSpace, Step, identity, product, times};
+use onecycle_design::{Linear, Structure};
 
 use super::lifted::{dot, row_times};
 use super::orthogonal::dot as inner;
 use super::record::{BlockKind, Blocks, Hold, Record};
+
+/// Values at the samples of a record that act on a process.
+#[derive(Clone, Copy)]
+struct Source<'a> {
+    values: &'a [f64],
+    hold: Hold,
+    tau_s: f64,
+}
+
+impl<'a> Source<'a> {
+    fn input(record: &'a Record, tau_s: f64) -> Self {
+        Self {
+            values: &record.input,
+            hold: record.hold,
+            tau_s,
+        }
+    }
+}
 
 /// Response summed over the samples present in each block (output unit / input unit for unit gain).
 pub(super) fn sums<const N: usize>(
@@ -16,11 +38,75 @@ pub(super) fn sums<const N: usize>(
     blocks: &Blocks<'_>,
     tau_s: f64,
 ) -> Vec<f64> {
-    if blocks.record.uneven_s.is_empty() {
-        even(model, blocks, tau_s)
-    } else {
-        blocks.sums_of(&uneven(model, blocks.record, tau_s))
+    sums_of(model, blocks, Source::input(blocks.record, tau_s))
+}
+
+/// Responses to the quadratic forces of the record, drag before thrust, as [`sums`]. `lag_s`: the actuator lag, whose
+/// output over the lag is what the thrust is the square of.
+pub(super) fn of_quadratic<const N: usize>(
+    model: &StateSpace<N>,
+    blocks: &Blocks<'_>,
+    (tau_s, lag_s): (f64, f64),
+) -> Vec<Vec<f64>> {
+    let record = blocks.record;
+    let behind = StateSpace {
+        b: model.entry,
+        ..*model
+    };
+    let of_force = |values: &[f64]| {
+        let source = Source {
+            values,
+            hold: Hold::Interpolated,
+            tau_s: 0.0,
+        };
+        sums_of(&behind, blocks, source)
+    };
+    let mut sums = Vec::with_capacity(record.quadratic.len());
+    if !record.quadratic.drag.is_empty() {
+        sums.push(of_force(&record.quadratic.drag));
     }
+    if record.quadratic.thrust {
+        let lag = StateSpace::<2>::new(
+            &Linear::new(Structure::Foptd)
+                .with_gain(1.0)
+                .with_pole_per_s(1.0 / lag_s),
+        );
+        let squares: Vec<f64> = outputs(&lag, record, Source::input(record, tau_s))
+            .iter()
+            .map(|lagged| (lagged / lag_s).powi(2))
+            .collect();
+        sums.push(of_force(&squares));
+    }
+    sums
+}
+
+fn sums_of<const N: usize>(
+    model: &StateSpace<N>,
+    blocks: &Blocks<'_>,
+    source: Source<'_>,
+) -> Vec<f64> {
+    if blocks.record.uneven_s.is_empty() {
+        even(model, blocks, source)
+    } else {
+        blocks.sums_of(&uneven(model, blocks.record, source))
+    }
+}
+
+/// Response at each sample.
+fn outputs<const N: usize>(model: &StateSpace<N>, record: &Record, source: Source<'_>) -> Vec<f64> {
+    if !record.uneven_s.is_empty() {
+        return uneven(model, record, source);
+    }
+    let injection = Injection::new(model, record.dt_s, source);
+    let mut state = [0.0; N];
+    let mut window = Vec::new();
+    let mut outputs = vec![0.0];
+    for sample in 1..record.len() {
+        injection.window(source.values, sample - 1, 1, &mut window);
+        state = injection.advance(&state, &window);
+        outputs.push(state[model.output]);
+    }
+    outputs
 }
 
 /// State at the end of a sample per unit of the delayed input: of the sample before, of this one, and of the next one.
@@ -32,7 +118,8 @@ struct Injection<const N: usize> {
 }
 
 impl<const N: usize> Injection<N> {
-    fn new(model: &StateSpace<N>, dt_s: f64, tau_s: f64, hold: Hold) -> Self {
+    fn new(model: &StateSpace<N>, dt_s: f64, source: Source<'_>) -> Self {
+        let Source { hold, tau_s, .. } = source;
         let whole = (tau_s / dt_s).floor();
         let f = tau_s / dt_s - whole;
         let (older, newer) = (model.step(f * dt_s), model.step((1.0 - f) * dt_s));
@@ -51,6 +138,19 @@ impl<const N: usize> Injection<N> {
             phi: product(&newer.phi, &older.phi),
             inputs,
             delay: whole as i64,
+        }
+    }
+
+    /// Copies the delayed values that act on `count` samples from `start` on, and those of the sample before and after.
+    fn window(&self, values: &[f64], start: usize, count: usize, copy: &mut Vec<f64>) {
+        let first = start as i64 - self.delay - 1;
+        let window = first..first + count as i64 + 2;
+        copy.clear();
+        if window.start >= 0 && window.end <= values.len() as i64 {
+            copy.extend_from_slice(&values[window.start as usize..window.end as usize]);
+        } else {
+            let last = values.len() as i64 - 1;
+            copy.extend(window.map(|k| values[k.clamp(0, last) as usize]));
         }
     }
 
@@ -105,24 +205,16 @@ impl<const N: usize> Weights<N> {
 }
 
 /// Samples on an even grid, block by block.
-fn even<const N: usize>(model: &StateSpace<N>, blocks: &Blocks<'_>, tau_s: f64) -> Vec<f64> {
-    let record = blocks.record;
-    let injection = Injection::new(model, record.dt_s, tau_s, record.hold);
-    let inputs = |start: usize, count: usize, copy: &mut Vec<f64>| {
-        let first = start as i64 - injection.delay - 1;
-        let last = record.len() as i64 - 1;
-        let window = first..first + count as i64 + 2;
-        copy.clear();
-        if window.start >= 0 && window.end <= record.len() as i64 {
-            copy.extend_from_slice(&record.input[window.start as usize..window.end as usize]);
-        } else {
-            copy.extend(window.map(|k| record.input[k.clamp(0, last) as usize]));
-        }
-    };
+fn even<const N: usize>(
+    model: &StateSpace<N>,
+    blocks: &Blocks<'_>,
+    source: Source<'_>,
+) -> Vec<f64> {
+    let injection = Injection::new(model, blocks.record.dt_s, source);
     let mut window = Vec::new();
     let mut state = [0.0; N];
     for sample in 0..blocks.first {
-        inputs(sample, 1, &mut window);
+        injection.window(source.values, sample, 1, &mut window);
         state = injection.advance(&state, &window);
     }
     let of_kind = |kind: &BlockKind| Weights::new(&injection, model.output, &kind.mask);
@@ -130,11 +222,8 @@ fn even<const N: usize>(model: &StateSpace<N>, blocks: &Blocks<'_>, tau_s: f64) 
     let mut sums = Vec::with_capacity(blocks.len());
     for (block, &kind) in blocks.kind_of.iter().enumerate() {
         let weights = &weights[kind as usize];
-        inputs(
-            blocks.first + block * blocks.samples,
-            blocks.samples,
-            &mut window,
-        );
+        let start = blocks.first + block * blocks.samples;
+        injection.window(source.values, start, blocks.samples, &mut window);
         sums.push(dot(&weights.output, &state) + inner(&weights.sum, &window));
         let mut next = times(&weights.phi, &state);
         for i in 0..N {
@@ -146,7 +235,8 @@ fn even<const N: usize>(model: &StateSpace<N>, blocks: &Blocks<'_>, tau_s: f64) 
 }
 
 /// Samples at any times: from edge to edge of the delayed input and from sample to sample.
-fn uneven<const N: usize>(model: &StateSpace<N>, record: &Record, tau_s: f64) -> Vec<f64> {
+fn uneven<const N: usize>(model: &StateSpace<N>, record: &Record, source: Source<'_>) -> Vec<f64> {
+    let tau_s = source.tau_s;
     let times_s = &record.uneven_s;
     let mut steps = Steps::new(model);
     let mut state = [0.0; N];
@@ -158,7 +248,7 @@ fn uneven<const N: usize>(model: &StateSpace<N>, record: &Record, tau_s: f64) ->
         while now_s < end_s {
             let edge_s = times_s.get(acting).map_or(f64::INFINITY, |at| at + tau_s);
             let until_s = end_s.min(edge_s);
-            let (value, slope) = input(record, acting, now_s - tau_s);
+            let (value, slope) = value_at(record, source, acting, now_s - tau_s);
             if until_s > now_s {
                 let step = steps.of(until_s - now_s);
                 let mut next = times(&step.phi, &state);
@@ -175,13 +265,13 @@ fn uneven<const N: usize>(model: &StateSpace<N>, record: &Record, tau_s: f64) ->
     outputs
 }
 
-/// Input and its slope at a time, where `acting` samples have passed.
-fn input(record: &Record, acting: usize, time_s: f64) -> (f64, f64) {
+/// Value of a source and its slope at a time, where `acting` samples have passed.
+fn value_at(record: &Record, source: Source<'_>, acting: usize, time_s: f64) -> (f64, f64) {
     let Some(sample) = acting.checked_sub(1) else {
-        return (record.input[0], 0.0);
+        return (source.values[0], 0.0);
     };
-    let value = record.input[sample];
-    match (record.hold, record.input.get(sample + 1)) {
+    let value = source.values[sample];
+    match (source.hold, source.values.get(sample + 1)) {
         (Hold::Interpolated, Some(next)) => {
             let (start_s, end_s) = (record.uneven_s[sample], record.uneven_s[sample + 1]);
             let slope = (next - value) / (end_s - start_s);

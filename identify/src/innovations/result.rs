@@ -6,7 +6,7 @@ use super::Fitted;
 use super::descent::Found;
 use super::mixture::Component;
 use super::prediction::{Filtering, predict};
-use super::record::Blocks;
+use super::record::{Blocks, Quadratic};
 use super::search::Candidate;
 use super::theta::{Bounds, NoiseKind, Theta};
 use crate::cholesky::cholesky;
@@ -196,6 +196,17 @@ fn noise_of(candidate: &Candidate) -> Noise {
     }
 }
 
+/// Coefficients of drag (1/output unit) and thrust (1/input unit), where the model has them.
+pub(super) fn quadratic(found: &Found, forces: &Quadratic) -> [Option<f64>; 2] {
+    let mut values = found.at.quadratic.iter().map(|(value, _)| *value);
+    let drag = (!forces.drag.is_empty())
+        .then(|| values.next())
+        .flatten()
+        .map(|value| -value);
+    let thrust = forces.thrust.then(|| values.next()).flatten();
+    [drag, thrust.map(|value| value / found.at.gain)]
+}
+
 /// The innovations with their tests, and the fit to the measured output. `None` if the filter does not converge.
 pub(super) fn innovations(
     fitted: &Fitted,
@@ -214,19 +225,20 @@ pub(super) fn innovations(
             0.5 * (blocks.record.time_s(range.start) + blocks.record.time_s(range.end - 1));
         let time_s = start_s + middle;
         let count = blocks.present(block);
+        let measured = (count > 0).then(|| blocks.sums[block] * blocks.scale / count as f64);
         rows.push(InnovationRow {
             time_s,
+            measured,
+            simulated: predicted.simulated[block],
             innovation: if count > 0 { values.next() } else { None },
             predicted: predicted.predicted[block],
             disturbance: predicted.disturbance[block],
         });
-        if count > 0 {
-            points.push(FitPoint {
-                time_s,
-                measured: blocks.sums[block] * blocks.scale / count as f64,
-                fitted: predicted.simulated[block],
-            });
-        }
+        points.extend(measured.map(|measured| FitPoint {
+            time_s,
+            measured,
+            fitted: predicted.simulated[block],
+        }));
     }
     let alternatives = (fitted.choice.candidates.iter())
         .map(|candidate| Alternative {
@@ -235,8 +247,11 @@ pub(super) fn innovations(
             bic: candidate.bic,
         })
         .collect();
+    let [drag, thrust] = quadratic(found, &fitted.record.quadratic);
     let innovations = Innovations {
         noise: noise_of(&fitted.best),
+        drag,
+        thrust,
         log_likelihood: found.at.log_likelihood,
         bic: fitted.best.bic,
         alternatives,

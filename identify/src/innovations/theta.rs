@@ -99,6 +99,13 @@ impl Theta {
         self.values[self.layout().tau()]
     }
 
+    /// Dead time and actuator lag (s); the lag is 0 without one.
+    pub(super) fn delay_and_lag_s(&self) -> (f64, f64) {
+        let lags = self.layout().stages.lags;
+        let lag_s = if lags > 0 { self.values[0].exp() } else { 0.0 };
+        (self.tau_s(), lag_s)
+    }
+
     /// Frequency of a noise (rad/s), zero without it.
     pub(super) fn noise(&self, kind: NoiseKind) -> f64 {
         self.values[self.layout().noise(kind)].exp()

@@ -93,6 +93,8 @@ pub(super) struct Tests {
     input_share: f64,
     input_f: f64,
     widened: f64,
+    drag: Option<f64>,
+    thrust: Option<f64>,
 }
 
 impl From<&Innovations> for Tests {
@@ -104,6 +106,8 @@ impl From<&Innovations> for Tests {
             input_share: of.whiteness.input_share,
             input_f: of.whiteness.input_f,
             widened: of.widened,
+            drag: of.drag,
+            thrust: of.thrust,
         }
     }
 }
@@ -122,6 +126,31 @@ impl From<&identify::Prediction> for Prediction {
             horizon_s: of.horizon_s,
             explained: of.explained,
             error_ratio: of.error_ratio,
+        }
+    }
+}
+
+/// The fit row by row.
+#[derive(Serialize)]
+pub(super) struct Rows {
+    time_s: Vec<f64>,
+    measured: Vec<Option<f64>>,
+    simulated: Vec<f64>,
+    predicted: Vec<f64>,
+    innovation: Vec<Option<f64>>,
+    disturbance: Vec<f64>,
+}
+
+impl From<&Innovations> for Rows {
+    fn from(of: &Innovations) -> Self {
+        let rows = &of.rows;
+        Self {
+            time_s: rows.iter().map(|row| row.time_s).collect(),
+            measured: rows.iter().map(|row| row.measured).collect(),
+            simulated: rows.iter().map(|row| row.simulated).collect(),
+            predicted: rows.iter().map(|row| row.predicted).collect(),
+            innovation: rows.iter().map(|row| row.innovation).collect(),
+            disturbance: rows.iter().map(|row| row.disturbance).collect(),
         }
     }
 }
