@@ -15,6 +15,9 @@ const ROWS_A_PERIOD: f64 = 30.0;
 /// First frequency of a noise over that of the oscillation. The search converges from far above.
 const NOISE_OVER_OSCILLATION: f64 = 0.5;
 
+/// Most samples to fit: of a longer recording the last ones.
+const MOST: usize = 100_000;
+
 /// The process that the whole recording shows, transient and disturbances included, in the structure of `found`, which
 /// is the process of a steady oscillation with this period. `None` if nothing can be fitted.
 pub(crate) fn check(
@@ -23,7 +26,16 @@ pub(crate) fn check(
     found: &Linear,
     period_s: f64,
 ) -> Option<Model> {
-    let mut prepared = prepare(signals, options).ok()?;
+    let from_s = signals
+        .time_s
+        .len()
+        .checked_sub(MOST)
+        .map(|first| signals.time_s[first]);
+    let options = Options {
+        span_s: (from_s, None),
+        ..*options
+    };
+    let mut prepared = prepare(signals, &options).ok()?;
     outliers::mark_far(&mut prepared.record);
     let record = &prepared.record;
     let longest_s = LONGEST_TAU * record.time_s(record.len() - 1);
