@@ -25,6 +25,9 @@
 //! U = kp (b R - F(s) Y) + ki h z/(z - 1) (R - F(s) Y) - kd s F(s) Y
 //! ```
 //!
+//! Up to the square of `h` this is the continuous law with `kp + ki h/2` in place of `kp`, behind the hold's `h/2` of dead
+//! time: `Ms` agrees to 1e-5 at 2.5 ms and to 1.1e-4 at 10 ms (`plant/tests/it/pid.rs`).
+//!
 //! Without a filter (`Tf = 0`) `dyf/dt` is the difference of two values over `h`, with `z` the same as `s = (z - 1)/(h z)`.
 //! A rate that a sensor measures replaces `dyf/dt`, behind a filter `F` of its own. Choose `Tf` zero or at least `h`: a
 //! shorter filter rings.

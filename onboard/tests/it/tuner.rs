@@ -125,8 +125,7 @@ fn proven(settings: &TunerSettings) -> (Tuner<'static>, Axis) {
 }
 
 // A load of 0.05, half the amplitude of the relay: without the integral it shifts the process by 0.05/kp. With it a
-// tenth of that is left after 25 crossover periods over 2 pi, 25/16.7 s, and nothing after 10 s; the integral has found
-// the load.
+// tenth of that is left after 25/w, 1.5 s, and nothing after 10 s; the integral has found the load.
 #[test]
 fn a_load_leaves_no_offset() {
     for (phase_rad, share_then, share_later) in [(0.0, 1.0, 1.0), (0.0873, 0.1, 0.0)] {
