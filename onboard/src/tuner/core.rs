@@ -44,6 +44,8 @@ pub struct TunerCore<'a> {
     identification: StagedIdentification<'a>,
     attempts_left: u8,
     identified: Option<TuningResult>,
+    /// The integral beside the PD found.
+    integral: Integral,
     /// The law of the controller found, once it is in use.
     law: Option<PidLaw>,
     prediction: Option<Prediction>,
@@ -77,6 +79,7 @@ impl<'a> TunerCore<'a> {
             ),
             attempts_left: settings.attempts,
             identified: None,
+            integral: Integral::NONE,
             law: None,
             prediction: None,
             unchecked_s: 0.0,
@@ -129,6 +132,7 @@ impl<'a> TunerCore<'a> {
         self.identification.restart();
         self.attempts_left = self.settings.attempts;
         self.identified = None;
+        self.integral = Integral::NONE;
         self.law = None;
         self.prediction = None;
     }
@@ -289,6 +293,8 @@ impl<'a> TunerCore<'a> {
         let h = self.settings.relay.amplitude;
         let at_rest = -identified.input_bias as f32;
         self.offset = at_rest.max(centre - h).min(centre + h);
+        let phase_rad = f64::from(self.settings.integral_phase_rad);
+        self.integral = Integral::beside(identified.pd, &identified.process, phase_rad);
         let Some(law) = self.law_of(identified) else {
             self.end(Abort::NotFinite);
             return;
@@ -314,15 +320,12 @@ impl<'a> TunerCore<'a> {
 
     /// The PD found with the integral beside it, starting with the offset at the reference of the test.
     fn law_of(&self, identified: &TuningResult) -> Option<PidLaw> {
-        let TuningResult { pd, process, .. } = identified;
-        let phase_rad = f64::from(self.settings.integral_phase_rad);
-        let integral = Integral::beside(*pd, process, phase_rad);
         let settings = PidSettings {
-            ki: integral.ki as f32,
-            ..PidSettings::from(*pd)
+            ki: self.integral.ki as f32,
+            ..PidSettings::from(identified.pd)
         };
         let settings = settings
-            .with_setpoint_weight(integral.setpoint_weight as f32)
+            .with_setpoint_weight(self.integral.setpoint_weight as f32)
             .with_limits(self.settings.output_lowest, self.settings.output_highest);
         let law = PidLaw::new(settings).ok()?;
         let is_finite = self.offset.is_finite();
@@ -371,6 +374,12 @@ impl<'a> TunerCore<'a> {
     #[must_use]
     pub fn identified(&self) -> Option<&TuningResult> {
         self.identified.as_ref()
+    }
+
+    /// The integral beside the PD of [`TunerCore::identified`]; [`Integral::NONE`] before it and where it is switched off.
+    #[must_use]
+    pub fn integral(&self) -> Integral {
+        self.integral
     }
 
     /// The law in use in [`TunerPhase::Control`], with its integral; `None` in any other phase.
