@@ -357,7 +357,7 @@ impl PidLaw {
         next.measure(measurement, dt_s, settings.filter_s);
         if settings.ki != 0.0 {
             let error = reference - next.value.output;
-            next.integral += f64::from(settings.ki * dt_s) * f64::from(error);
+            next.integral += f64::from(settings.ki * dt_s * error);
         }
         let (proportional, derivative) = settings.terms(&next);
         let wanted = next.integral as f32 + proportional + derivative;
