@@ -24,7 +24,7 @@
 //! it: the error of a step under the PD integrates to `(kd + 1/K)/kp` of the step, which would charge the integral by
 //! `ki (kd + 1/K)/kp`; the proportional term gives up just that, and the integral ends where it began.
 
-use libm::tan;
+use libm::{cos, sin};
 
 use crate::control::Pd;
 use crate::crossover::{gain_crossover, power_of_two_cube_root};
@@ -66,7 +66,8 @@ impl Integral {
             process.t_prop_s(),
             power_of_two_cube_root,
         );
-        let ki = pd.kp * omega * tan(phase_rad);
+        // The tangent, without the code of a third function on the board.
+        let ki = pd.kp * omega * sin(phase_rad) / cos(phase_rad);
         let setpoint_weight = 1.0 - ki * (pd.kd + damping / gain) / (pd.kp * pd.kp);
         if ki == 0.0 || !setpoint_weight.is_finite() {
             return Self::NONE;

@@ -4,7 +4,7 @@
 //! code behind the interface is safe; nothing is computed here.
 #![no_std]
 
-mod pid;
+pub mod pid;
 mod settings;
 
 use core::mem::MaybeUninit;
@@ -15,7 +15,6 @@ use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::{TunerCore, TunerError, TunerPhase};
 
-pub use self::pid::{ONECYCLE_PID_WORDS, OnecyclePid, OnecyclePidOutput, OnecyclePidSettings};
 pub use self::settings::{OnecycleSettings, OnecycleStatus};
 
 /// Size of a tuner in words of eight bytes, for 64-bit machines, where it is largest.
