@@ -55,11 +55,12 @@ def predicted(found, step, seconds):
     parts = 10
     h = TICK_S / parts
     line = collections.deque([0.0] * (1 + round(found.tau_s / h)))
-    y = v = f = 0.0
+    y = v = f = integral = 0.0
     values = []
     for _ in range(round(seconds / TICK_S)):
         values.append(y)
-        command = found.kp * (step - y) - found.kd * v
+        integral += found.ki * TICK_S * (step - y)
+        command = found.kp * (found.setpoint_weight * step - y) + integral - found.kd * v
         for _ in range(parts):
             line.append(command)
             u = line.popleft()

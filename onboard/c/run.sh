@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Checks the tuner for firmware in C: builds the static library, compares onecycle.h with the source, compiles the
-# example with gcc, tunes its simulated axis, and compares every output with the tuner in Rust, bit by bit.
+# examples with gcc, tunes a simulated axis, and compares every output with the tuner in Rust, bit by bit.
 # Prints the memory of a tuner. On failure it prints one sentence and exits with status 1.
 # `run.sh header` writes onecycle.h (with the version of cbindgen below).
 set -euo pipefail
@@ -34,10 +34,13 @@ cmp -s onecycle.h "$scratch/onecycle.h" ||
 
 cargo build --release --locked --target-dir "$target" >"$scratch/log" 2>&1 ||
     fail "it does not build." "$scratch/log"
-gcc -std=c99 -O2 -Wall -Wextra -Werror -pedantic -ffp-contract=off examples/axis.c "$library" -lm \
-    -o "$scratch/axis" >"$scratch/log" 2>&1 || fail "the example does not compile." "$scratch/log"
+for example in axis pid; do
+    gcc -std=c99 -O2 -Wall -Wextra -Werror -pedantic -ffp-contract=off "examples/$example.c" "$library" -lm \
+        -o "$scratch/$example" >"$scratch/log" 2>&1 || fail "examples/$example.c does not compile." "$scratch/log"
+done
 "$scratch/axis" trace >"$scratch/trace" 2>"$scratch/said" ||
     fail "the example finds no controller." "$scratch/said"
+"$scratch/pid" 2>>"$scratch/said" || fail "the PID law by itself does not hold its mass." "$scratch/said"
 # The same axis, tuned in Rust.
 cargo run --quiet --release --locked --manifest-path ../cortex-m/Cargo.toml --target-dir "$target" \
     --bin host >"$scratch/lines" 2>"$scratch/log" || fail "the axis in Rust finds no controller." "$scratch/log"
@@ -48,8 +51,9 @@ ticks=$(wc -l <"$scratch/trace")
 [[ $ticks -gt 0 ]] || fail "the example has written no output."
 
 words=$(awk '$2 == "ONECYCLE_TUNER_WORDS" { print $3 }' onecycle.h)
+pid_words=$(awk '$2 == "ONECYCLE_PID_WORDS" { print $3 }' onecycle.h)
 cat <<END
 C interface: ok; a simulated axis tuned from C, $ticks outputs, the same bits as in Rust
 $(cat "$scratch/said")
-  memory of a tuner   $((8 * words)) bytes
+  memory of a tuner   $((8 * words)) bytes, of a PID law $((8 * pid_words)) bytes
 END

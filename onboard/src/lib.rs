@@ -12,7 +12,7 @@
 //! | choice     | value                                                      | file             |
 //! |------------|------------------------------------------------------------|------------------|
 //! | process    | integrator, two lags and delay ([`Soiptd`])                 | `process.rs`     |
-//! | controller | PD with the derivative on the measurement ([`Pd`])          | `control.rs`     |
+//! | controller | PD with the derivative on the measurement ([`Pd`]), and an integral beside it | `control.rs`, `integral.rs` |
 //! | excitation | two-level relay with hysteresis or lead ([`Relay`])         | `relay.rs`       |
 //!
 //! ```text
@@ -53,10 +53,12 @@ pub mod floats;
 pub mod gains;
 pub mod guard;
 pub mod identification;
+pub mod integral;
 pub mod judgement;
 mod least_squares;
 pub mod network;
 pub mod pack;
+pub mod pid;
 mod prediction;
 pub mod process;
 pub mod refine;
@@ -69,6 +71,7 @@ pub mod tuner;
 pub mod window;
 
 pub use control::Pd;
+pub use pid::{PidLaw, PidSettings};
 pub use process::{Soiptd, SoiptdError};
 pub use relay::{Relay, RelayError, RelayPhase, RelaySettings};
 pub use transition::Transition;

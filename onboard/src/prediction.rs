@@ -17,7 +17,8 @@
 
 use libm::{ceil, exp};
 
-use crate::control::PdLaw;
+use crate::control::Measurement;
+use crate::pid::PidLaw;
 use crate::process::Soiptd;
 use crate::transition::{State, Transition};
 use crate::window::Edge;
@@ -43,9 +44,9 @@ pub(crate) struct Beginning<'a> {
 /// Model of the closed loop.
 #[derive(Clone, Debug)]
 pub(crate) struct Prediction {
-    law: PdLaw,
-    lowest: f32,
-    highest: f32,
+    law: PidLaw,
+    /// Time between inputs of the law (s).
+    place_s: f32,
     reference: f32,
     gain: f64,
     input_bias: f64,
@@ -63,11 +64,10 @@ pub(crate) struct Prediction {
 }
 
 impl Prediction {
-    /// A model of a process under a law with output limits, stepped every `sample_s`.
+    /// A model of a process under a law, stepped every `sample_s`.
     pub(crate) fn new(
         process: &Soiptd,
-        law: PdLaw,
-        [lowest, highest]: [f32; 2],
+        law: PidLaw,
         sample_s: f64,
         beginning: &Beginning<'_>,
     ) -> Self {
@@ -76,8 +76,7 @@ impl Prediction {
         let delay = process.tau_s() / place_s;
         let mut prediction = Self {
             law,
-            lowest,
-            highest,
+            place_s: place_s as f32,
             reference: beginning.reference,
             gain: process.k_over_t_body(),
             input_bias: beginning.input_bias,
@@ -117,8 +116,9 @@ impl Prediction {
     pub(crate) fn step(&mut self) -> f32 {
         if self.ticks == 0 {
             let (value, rate) = (self.gain * self.state.y, self.gain * self.state.v);
-            let input = self.law.output(self.reference, value as f32, rate as f32);
-            self.push(input.max(self.lowest).min(self.highest));
+            let measurement = Measurement::of(value as f32).with_rate(rate as f32);
+            let input = self.law.step(self.place_s, self.reference, &measurement);
+            self.push(input);
             let late = self.ago(self.places)
                 + self.part * (self.ago(self.places + 1) - self.ago(self.places));
             let input = f64::from(late) + self.input_bias;
@@ -159,6 +159,7 @@ mod tests {
 
     use super::*;
     use crate::control::Pd;
+    use crate::pid::PidSettings;
 
     const SAMPLE_S: f64 = 0.001;
 
@@ -189,7 +190,9 @@ mod tests {
             (value, rate) = push(input);
             amplitude = amplitude.max(f64::abs(value));
         }
-        let law = PdLaw::new(pd, -0.02);
+        let ki = 0.5 * pd.kp as f32;
+        let settings = PidSettings { ki, ..pd.into() }.with_limits(-10.0, 10.0);
+        let mut law = PidLaw::new(settings).unwrap().started_at(0.0, -0.02);
         let beginning = Beginning {
             edges: &edges,
             time_s: 1.7,
@@ -198,11 +201,12 @@ mod tests {
             reference: 0.0,
             input_bias: 0.02,
         };
-        let mut model = Prediction::new(&process, law, [-10.0, 10.0], SAMPLE_S, &beginning);
+        let mut model = Prediction::new(&process, law, SAMPLE_S, &beginning);
         let mut largest = 0.0_f64;
         for _ in 0..2000 {
             let predicted = model.step();
-            let input = law.output(0.0, value as f32, rate as f32);
+            let measured = Measurement::of(value as f32).with_rate(rate as f32);
+            let input = law.step(SAMPLE_S as f32, 0.0, &measured);
             (value, rate) = push(f64::from(input));
             largest = largest.max((f64::from(predicted) - value).abs());
         }

@@ -1,7 +1,8 @@
 //! Controllers of a simulated loop, and where a test signal enters it.
 
-use onecycle_onboard::Pd;
+use onecycle_onboard::control::Measurement;
 use onecycle_onboard::relay::Relay;
+use onecycle_onboard::{Pd, PidLaw};
 
 /// Measurement of a controller at a sample.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +43,15 @@ impl Controller for Relay {
             (reference - sensed.output) as f32,
             dt_s as f32,
         ))
+    }
+}
+
+/// The PID law of the firmware, with the rate from the measured output.
+impl Controller for PidLaw {
+    #[inline]
+    fn step(&mut self, dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
+        let measured = Measurement::of(sensed.output as f32);
+        f64::from(Self::step(self, dt_s as f32, reference as f32, &measured))
     }
 }
 

@@ -4,6 +4,7 @@
 //! code behind the interface is safe; nothing is computed here.
 #![no_std]
 
+pub mod pid;
 mod settings;
 
 use core::mem::MaybeUninit;
@@ -126,9 +127,9 @@ pub struct OnecycleResult {
     pub kp: f64,
     /// Derivative gain, on the measurement (input unit s / output unit).
     pub kd: f64,
-    /// Offset of the controller: input that holds the process at rest (input unit).
+    /// Offset of the controller, where its integral starts: input that holds the process at rest (input unit).
     pub offset: f64,
-    /// Phase margin (rad).
+    /// Phase margin without the integral (rad).
     pub phase_margin_rad: f64,
     /// Standard deviation of the phase margin (rad).
     pub phase_margin_deviation_rad: f64,
@@ -142,6 +143,10 @@ pub struct OnecycleResult {
     pub score: f64,
     /// Whether the controller runs and its response was as predicted.
     pub is_proven: bool,
+    /// Integral gain of the controller (input unit / (output unit s)); zero without an integral.
+    pub ki: f64,
+    /// Weight of the reference in the proportional term, 0 to 1.
+    pub setpoint_weight: f64,
 }
 
 impl OnecycleTuner {
@@ -185,8 +190,18 @@ unsafe fn parts_at<'a>(
     unsafe { tuner.as_mut() }.and_then(OnecycleTuner::parts)
 }
 
+/// A missing measurement counts as one that is not finite.
+fn measurement_of(measurement: Option<&OnecycleMeasurement>) -> Measurement {
+    measurement.map_or(Measurement::of(f32::NAN), |measurement| Measurement {
+        value: measurement.value,
+        rate: measurement.has_rate.then_some(measurement.rate),
+        age_s: measurement.age_s,
+    })
+}
+
 /// Default settings: a relay of this amplitude (input unit) with noise protection and trim at the distinguishing
-/// phase, ticks every sample_s (s), two cycles; no take-off, no abort limits; the fallback output is zero.
+/// phase, ticks every sample_s (s), two cycles, an integral beside the controller found; no take-off, no abort limits; the
+/// fallback output is zero.
 #[unsafe(no_mangle)]
 pub extern "C" fn onecycle_settings_default(amplitude: f32, sample_s: f32) -> OnecycleSettings {
     OnecycleSettings::new(amplitude, sample_s)
@@ -238,15 +253,8 @@ pub unsafe extern "C" fn onecycle_tuner_step(
     let Some((core, workspace)) = (unsafe { parts_at(tuner) }) else {
         return 0.0;
     };
-    // SAFETY: the caller's promise. A missing measurement counts as one that is not finite.
-    let measurement =
-        unsafe { measurement.as_ref() }.map_or(Measurement::of(f32::NAN), |measurement| {
-            Measurement {
-                value: measurement.value,
-                rate: measurement.has_rate.then_some(measurement.rate),
-                age_s: measurement.age_s,
-            }
-        });
+    // SAFETY: the caller's promise.
+    let measurement = measurement_of(unsafe { measurement.as_ref() });
     core.step(workspace, time_s, &measurement, reference)
 }
 
@@ -363,6 +371,8 @@ pub unsafe extern "C" fn onecycle_tuner_result(
         noise_sigma: found.noise_sigma,
         score: found.score,
         is_proven: tuner.is_proven(),
+        ki: tuner.integral().ki,
+        setpoint_weight: tuner.integral().setpoint_weight,
     };
     true
 }

@@ -2,10 +2,12 @@
 
 use super::TunerPhase;
 use super::settings::{CheckedSettings, TunerSettings};
-use crate::control::{Measurement, PdLaw, RateEstimate};
+use crate::control::{Measurement, RateEstimate};
 use crate::guard::{Abort, Guard, Motion};
 use crate::identification::{Stage, StagedIdentification, TestSample, TuningResult, Workspace};
+use crate::integral::Integral;
 use crate::pack::Pack;
+use crate::pid::{PidLaw, PidSettings};
 use crate::prediction::{Beginning, Prediction};
 use crate::relay::Relay;
 use crate::take_off;
@@ -42,7 +44,10 @@ pub struct TunerCore<'a> {
     identification: StagedIdentification<'a>,
     attempts_left: u8,
     identified: Option<TuningResult>,
-    law: PdLaw,
+    /// The integral beside the PD found.
+    integral: Integral,
+    /// The law of the controller found, once it is in use.
+    law: Option<PidLaw>,
     prediction: Option<Prediction>,
     unchecked_s: f32,
 }
@@ -74,7 +79,8 @@ impl<'a> TunerCore<'a> {
             ),
             attempts_left: settings.attempts,
             identified: None,
-            law: settings.safe,
+            integral: Integral::NONE,
+            law: None,
             prediction: None,
             unchecked_s: 0.0,
             settings: *settings,
@@ -126,7 +132,8 @@ impl<'a> TunerCore<'a> {
         self.identification.restart();
         self.attempts_left = self.settings.attempts;
         self.identified = None;
-        self.law = self.settings.safe;
+        self.integral = Integral::NONE;
+        self.law = None;
         self.prediction = None;
     }
 
@@ -148,7 +155,7 @@ impl<'a> TunerCore<'a> {
             TunerPhase::Idle => self.idle(dt_s),
             TunerPhase::TakeOff => self.take_off(dt_s),
             TunerPhase::Relay | TunerPhase::Identify => self.offset + self.excite(dt_s),
-            TunerPhase::Control => self.control(),
+            TunerPhase::Control => self.control(dt_s),
             TunerPhase::Aborted => self.safe(),
         };
         let output = self.within_limits(output);
@@ -205,7 +212,7 @@ impl<'a> TunerCore<'a> {
         if !matches!(self.phase, TunerPhase::Idle | TunerPhase::Aborted) {
             self.phase = TunerPhase::Aborted;
             self.reason = Some(reason);
-            self.law = self.settings.safe;
+            self.law = None;
             self.prediction = None;
         }
     }
@@ -286,16 +293,17 @@ impl<'a> TunerCore<'a> {
         let h = self.settings.relay.amplitude;
         let at_rest = -identified.input_bias as f32;
         self.offset = at_rest.max(centre - h).min(centre + h);
-        self.law = PdLaw::new(identified.pd, self.offset);
-        if !self.law.is_finite() {
+        let phase_rad = f64::from(self.settings.integral_phase_rad);
+        self.integral = Integral::beside(identified.pd, &identified.process, phase_rad);
+        let Some(law) = self.law_of(identified) else {
             self.end(Abort::NotFinite);
             return;
-        }
+        };
+        self.law = Some(law);
         self.identified = Some(*identified);
         self.prediction = Some(Prediction::new(
             &identified.process,
-            self.law,
-            [self.settings.output_lowest, self.settings.output_highest],
+            law,
             f64::from(self.settings.sample_s),
             &Beginning {
                 edges: self.identification.past_edges(),
@@ -310,7 +318,21 @@ impl<'a> TunerCore<'a> {
         self.phase = TunerPhase::Control;
     }
 
-    fn control(&mut self) -> f32 {
+    /// The PD found with the integral beside it, starting with the offset at the reference of the test.
+    fn law_of(&self, identified: &TuningResult) -> Option<PidLaw> {
+        let settings = PidSettings {
+            ki: self.integral.ki as f32,
+            ..PidSettings::from(identified.pd)
+        };
+        let settings = settings
+            .with_setpoint_weight(self.integral.setpoint_weight as f32)
+            .with_limits(self.settings.output_lowest, self.settings.output_highest);
+        let law = PidLaw::new(settings).ok()?;
+        let is_finite = self.offset.is_finite();
+        is_finite.then(|| law.started_at(self.reference, self.offset))
+    }
+
+    fn control(&mut self, dt_s: f32) -> f32 {
         if let (Some(prediction), Some(identified)) = (&mut self.prediction, &self.identified) {
             let off = (prediction.step() - self.value).abs();
             if off > MOST_MISMATCH * identified.amplitude as f32 {
@@ -322,8 +344,12 @@ impl<'a> TunerCore<'a> {
                 self.prediction = None;
             }
         }
-        self.law
-            .output(self.reference, self.value, self.rate.rate())
+        let measurement = Measurement::of(self.value).with_rate(self.rate.rate());
+        let reference = self.reference;
+        match &mut self.law {
+            Some(law) => law.step(dt_s, reference, &measurement),
+            None => self.safe(),
+        }
     }
 
     fn within_limits(&self, output: f32) -> f32 {
@@ -350,10 +376,16 @@ impl<'a> TunerCore<'a> {
         self.identified.as_ref()
     }
 
-    /// The law in use in [`TunerPhase::Control`]; the safe law in any other phase.
+    /// The integral beside the PD of [`TunerCore::identified`]; [`Integral::NONE`] before it and where it is switched off.
     #[must_use]
-    pub fn law(&self) -> &PdLaw {
-        &self.law
+    pub fn integral(&self) -> Integral {
+        self.integral
+    }
+
+    /// The law in use in [`TunerPhase::Control`], with its integral; `None` in any other phase.
+    #[must_use]
+    pub fn law(&self) -> Option<&PidLaw> {
+        self.law.as_ref()
     }
 
     /// Whether the new controller runs and its response was as predicted.

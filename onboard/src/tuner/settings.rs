@@ -5,6 +5,7 @@ use core::fmt;
 use crate::control::PdLaw;
 use crate::guard::Limits;
 use crate::identification::MOST_CYCLES;
+use crate::integral::{MOST_PHASE_RAD, USUAL_PHASE_RAD};
 use crate::relay::{Relay, RelayError, RelaySettings};
 use crate::take_off::TakeOffSettings;
 
@@ -39,12 +40,15 @@ pub struct TunerSettings {
     pub bias_filter_s: f32,
     /// Time constant of the filter for a rate that is computed from differences (s).
     pub rate_lag_s: f32,
+    /// Phase of the integral beside the controller found (rad), which sets its gain: see
+    /// [`Integral`](crate::integral::Integral). Zero switches the integral off; at most [`MOST_PHASE_RAD`].
+    pub integral_phase_rad: f32,
 }
 
 impl TunerSettings {
-    /// A relay of this amplitude with noise protection and trim at the distinguishing phase, two cycles; no
-    /// take-off, no abort limits; the fallback output is zero. Set limits and a safe controller for a real
-    /// vehicle.
+    /// A relay of this amplitude with noise protection and trim at the distinguishing phase, two cycles; an integral
+    /// beside the controller found; no take-off, no abort limits; the fallback output is zero. Set limits and a safe
+    /// controller for a real vehicle.
     #[must_use]
     pub fn new(amplitude: f32, sample_s: f32) -> Self {
         Self {
@@ -63,6 +67,7 @@ impl TunerSettings {
             safe: PdLaw::ZERO,
             bias_filter_s: 0.0,
             rate_lag_s: 0.0,
+            integral_phase_rad: USUAL_PHASE_RAD,
         }
     }
 
@@ -75,6 +80,7 @@ impl TunerSettings {
         let not_negative = [
             ("the bias filter's time constant", self.bias_filter_s),
             ("the rate's lag", self.rate_lag_s),
+            ("the integral's phase", self.integral_phase_rad),
         ];
         let wrong = (positive
             .into_iter()
@@ -86,6 +92,9 @@ impl TunerSettings {
         .or(self.take_off.and_then(|take_off| take_off.out_of_range()));
         if let Some((name, value)) = wrong {
             return Err(TunerError::Setting(name, value));
+        }
+        if self.integral_phase_rad > MOST_PHASE_RAD {
+            return Err(TunerError::IntegralPhase(self.integral_phase_rad));
         }
         if !(1..=MOST_CYCLES).contains(&self.cycles) {
             return Err(TunerError::Cycles(self.cycles));
@@ -121,6 +130,8 @@ pub enum TunerError {
     Relay(RelayError),
     /// A time, a gain or a limit: name and value.
     Setting(&'static str, f32),
+    /// The phase of the integral exceeds [`MOST_PHASE_RAD`]: its value (rad).
+    IntegralPhase(f32),
     /// The number of cycles: its value.
     Cycles(u8),
     /// The number of attempts or of slices is zero.
@@ -138,6 +149,10 @@ impl fmt::Display for TunerError {
         match self {
             Self::Relay(error) => error.fmt(f),
             Self::Setting(name, value) => write!(f, "{name} must be positive, but is {value}"),
+            Self::IntegralPhase(value) => write!(
+                f,
+                "the integral's phase must be 0 to {MOST_PHASE_RAD} rad, but is {value}"
+            ),
             Self::Cycles(cycles) => {
                 write!(
                     f,

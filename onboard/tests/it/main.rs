@@ -6,6 +6,7 @@
 mod common;
 mod crossover;
 mod pack;
+mod pid;
 mod refine;
 mod relay;
 mod slices;

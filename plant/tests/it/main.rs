@@ -11,6 +11,7 @@ mod multirotor_flight;
 mod multirotor_ground;
 mod multirotor_linearised;
 mod multirotor_relay;
+mod pid;
 mod propagation;
 mod sensor;
 mod signature;
