@@ -80,12 +80,14 @@ pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
     let screened: Vec<Vec<Theta>> = (heads.iter())
         .map(|head| search::screen(record, *head, limits.skip_s, tau_s))
         .collect();
-    let mut all: Vec<Candidate> = Vec::new();
-    for starts in &screened {
-        all.extend(search::singles(&blocks, starts, tau_s));
-    }
+    let starts: Vec<Theta> = screened
+        .iter()
+        .flat_map(|starts| search::best_of_each_noise(starts))
+        .collect();
+    let mut all = search::race(&blocks, &starts, None, tau_s);
     if let Some(lead) = search::best(all.clone()) {
-        all.extend(search::noise_sets(&blocks, &lead, tau_s));
+        let starts = search::noise_sets(lead.found.theta);
+        all.extend(search::race(&blocks, &starts, Some(&lead), tau_s));
     }
     derive(&blocks, &mut all, limits);
     keep_best_of_each(&mut all, limits.structure);
@@ -125,17 +127,20 @@ fn derive(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
             .collect();
         sources.sort_by(|a, b| a.bic.total_cmp(&b.bic));
         sources.truncate(2);
-        for from in sources {
-            for mut start in search::derive(&from.found.theta, structure, blocks.record.dt_s) {
-                // A head keeps its own fits and is tried with the noises of the lead.
-                if HEADS.contains(&structure) {
-                    for kind in NoiseKind::ALL {
-                        start.set_noise(kind, lead.found.theta.noise(kind));
-                    }
+        let mut starts: Vec<Theta> = sources
+            .iter()
+            .flat_map(|from| search::derive(&from.found.theta, structure, blocks.record.dt_s))
+            .collect();
+        // A head keeps its own fits and is tried with the noises of the lead.
+        if HEADS.contains(&structure) {
+            for start in &mut starts {
+                for kind in NoiseKind::ALL {
+                    start.set_noise(kind, lead.found.theta.noise(kind));
                 }
-                all.extend(search::fit(blocks, &start, limits.longest_tau_s));
             }
         }
+        let tau_s = limits.longest_tau_s;
+        all.extend(search::race(blocks, &starts, Some(&lead), tau_s));
     }
 }
 

@@ -26,6 +26,13 @@ pub(super) const FINE: Patience = Patience {
     steps: 40,
     decrease: 1e-7,
 };
+/// Of the fit that chooses: the last step gains less than 0.01 of the log-likelihood.
+const CHOOSING: Patience = Patience {
+    steps: 40,
+    decrease: 1e-5,
+};
+/// Distance in BIC from the best after a short descent beyond which a start is given up.
+const BEHIND: f64 = 40.0;
 /// Rows of the coarse copy.
 const COARSE_BLOCKS: usize = 500;
 /// Number of different starts for each kind of noise.
@@ -211,11 +218,20 @@ fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: 
 
 /// Descends on the record, and puts the lags in order.
 pub(super) fn fit(blocks: &Blocks<'_>, start: &Theta, longest_tau_s: f64) -> Option<Candidate> {
+    fit_within(blocks, start, longest_tau_s, FINE)
+}
+
+fn fit_within(
+    blocks: &Blocks<'_>,
+    start: &Theta,
+    longest_tau_s: f64,
+    patience: Patience,
+) -> Option<Candidate> {
     let bounds = Bounds::new(start.structure, blocks, longest_tau_s);
     let free = start.free();
-    let found = descend(blocks, start, &free, &bounds, FINE)?;
+    let found = descend(blocks, start, &free, &bounds, patience)?;
     let found = match ordered(&found.theta) {
-        Some(theta) => descend(blocks, &theta, &free, &bounds, FINE)?,
+        Some(theta) => descend(blocks, &theta, &free, &bounds, patience)?,
         None => found,
     };
     Some(Candidate::new(found))
@@ -250,23 +266,39 @@ fn ordered(theta: &Theta) -> Option<Theta> {
     (swapped != *theta).then_some(swapped)
 }
 
-/// Candidates of a screened structure with one noise each, from the best starts.
-pub(super) fn singles(blocks: &Blocks<'_>, starts: &[Theta], longest_tau_s: f64) -> Vec<Candidate> {
-    let mut candidates: Vec<Candidate> = Vec::new();
-    for kind in NoiseKind::ALL {
-        let own = starts.iter().find(|theta| theta.noise(kind) > 0.0);
-        candidates.extend(own.and_then(|theta| fit(blocks, theta, longest_tau_s)));
+/// Candidates from `starts`: a short descent from each, and a long one from those that are not far behind the best, or
+/// behind `lead`.
+pub(super) fn race(
+    blocks: &Blocks<'_>,
+    starts: &[Theta],
+    lead: Option<&Candidate>,
+    longest_tau_s: f64,
+) -> Vec<Candidate> {
+    let short = starts
+        .iter()
+        .filter_map(|theta| fit_within(blocks, theta, longest_tau_s, COARSE));
+    let mut candidates: Vec<Candidate> = short.collect();
+    let bics = candidates.iter().chain(lead).map(|candidate| candidate.bic);
+    let limit = bics.fold(f64::INFINITY, f64::min) + BEHIND;
+    for candidate in &mut candidates {
+        if candidate.bic < limit {
+            let theta = candidate.found.theta;
+            if let Some(better) = fit_within(blocks, &theta, longest_tau_s, CHOOSING) {
+                *candidate = better;
+            }
+        }
     }
     candidates
 }
 
-/// The candidate `lead`, which has one noise, with another in its place, with a second one, and without any.
-pub(super) fn noise_sets(
-    blocks: &Blocks<'_>,
-    lead: &Candidate,
-    longest_tau_s: f64,
-) -> Vec<Candidate> {
-    let theta = lead.found.theta;
+/// The best start of each kind of noise.
+pub(super) fn best_of_each_noise(starts: &[Theta]) -> Vec<Theta> {
+    let of_kind = |kind: NoiseKind| starts.iter().find(|theta| theta.noise(kind) > 0.0).copied();
+    NoiseKind::ALL.into_iter().filter_map(of_kind).collect()
+}
+
+/// Starts from the fit `theta`, which has one noise, with another in its place, with a second one, and without any.
+pub(super) fn noise_sets(theta: Theta) -> Vec<Theta> {
     let Some(own) = theta.noises().next() else {
         return vec![];
     };
@@ -280,9 +312,6 @@ pub(super) fn noise_sets(
         starts.extend([beside, instead]);
     }
     starts
-        .iter()
-        .filter_map(|theta| fit(blocks, theta, longest_tau_s))
-        .collect()
 }
 
 /// Starts for `structure` from the best point of a structure that contains it or lacks one lag.
