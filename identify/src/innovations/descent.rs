@@ -55,9 +55,11 @@ pub(super) fn descend(
     let mut normal: Option<Normal> = None;
     for _ in 0..patience.steps {
         if normal.is_none() {
-            normal = Some(linearise(blocks, &here, free, bounds, &mut memory)?);
+            normal = linearise(blocks, &here, free, bounds, &mut memory);
         }
-        let equations = normal.as_ref()?;
+        let Some(equations) = &normal else {
+            break;
+        };
         let Some(theta) = step(equations, &here.theta, free, bounds, damping) else {
             break;
         };

@@ -54,6 +54,10 @@ impl Candidate {
         Self { found, bic }
     }
 
+    pub(super) fn log_likelihood(&self) -> f64 {
+        self.found.at.log_likelihood
+    }
+
     pub(super) fn structure(&self) -> Structure {
         self.found.theta.structure
     }
@@ -314,7 +318,7 @@ pub(super) fn noise_sets(theta: Theta) -> Vec<Theta> {
     starts
 }
 
-/// Starts for `structure` from the best point of a structure that contains it or lacks one lag.
+/// Starts for `structure` from the best point of a structure that contains it, is a limit of it or lacks one lag.
 pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta> {
     let old = from.layout();
     let mut theta = Theta::new(structure);
@@ -330,6 +334,7 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
         _ => f64::INFINITY,
     };
     // Lags that the structure lacks lengthen its dead time.
+    let lost_s = if old.stages.lags > 0 { lag } else { 0.0 };
     let mut starts = Vec::new();
     let mut with = |lags: &[f64], body: f64, lost_s: f64| {
         let mut start = theta;
@@ -343,8 +348,8 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
         starts.push(start);
     };
     match structure {
-        Structure::Iptd => with(&[], 0.0, lag),
-        Structure::Foptd => with(&[], body_s, lag),
+        Structure::Iptd => with(&[], 0.0, lost_s),
+        Structure::Foptd => with(&[], body_s, lost_s),
         Structure::IntegratorLag => {
             with(&[lag], 0.0, 0.0);
             if body_s.is_finite() {
@@ -361,6 +366,12 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
             }
         }
         Structure::Soiptd | Structure::Soptd => with(&[lag], body_s, 0.0),
+        Structure::ResonantLag => {
+            if let (Some(pair), None) = (layout.pair(), old.pair()) {
+                with(&[lag], 0.0, 0.0);
+                starts[0].values[pair] = 1.0 / body_s;
+            }
+        }
         _ => {}
     }
     starts
