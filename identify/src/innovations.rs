@@ -22,10 +22,12 @@ mod choose;
 #[cfg(test)]
 mod dense;
 mod descent;
+mod filter;
 mod laplace;
 mod lifted;
 mod likelihood;
 mod mixture;
+mod normal;
 mod orthogonal;
 mod outliers;
 mod plan;
@@ -149,7 +151,7 @@ impl Search<'_> {
         let blocks = fitted.blocks();
         let components = fitted.posterior(&blocks);
         let tests = validate::tests(&blocks, &fitted.best.found.at);
-        let informative = validate::informative(&blocks, &fitted.best.found.at);
+        let informative = validate::informative(&blocks, &fitted.best.found.theta);
         let horizon_s = validate::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
         let theta = &fitted.best.found.theta;
         let prediction = validate::prediction(

@@ -16,6 +16,17 @@ pub(super) const NEARLY: f64 = 6.0;
 const SHOWN: f64 = 2.7;
 /// Structures whose best fit is worse than this are given up: no further noise makes up for it.
 const HOPELESS: f64 = 80.0;
+/// Log-likelihood by which a structure may fall behind its limit.
+const STUCK: f64 = 0.05;
+/// A structure as the limit of another that has one unknown more, inner ones first.
+const LIMITS: [(Structure, Structure); 6] = [
+    (Structure::Iptd, Structure::Foptd),
+    (Structure::Iptd, Structure::IntegratorLag),
+    (Structure::IntegratorLag, Structure::Soptd),
+    (Structure::DoubleIntegratorLag, Structure::Soiptd),
+    (Structure::Soiptd, Structure::Toiptd),
+    (Structure::Soiptd, Structure::ResonantLag),
+];
 /// Rows of the fit that chooses.
 const ROWS: usize = 900;
 
@@ -80,14 +91,17 @@ pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
     let screened: Vec<Vec<Theta>> = (heads.iter())
         .map(|head| search::screen(record, *head, limits.skip_s, tau_s))
         .collect();
-    let mut all: Vec<Candidate> = Vec::new();
-    for starts in &screened {
-        all.extend(search::singles(&blocks, starts, tau_s));
-    }
+    let starts: Vec<Theta> = screened
+        .iter()
+        .flat_map(|starts| search::best_of_each_noise(starts))
+        .collect();
+    let mut all = search::race(&blocks, &starts, None, tau_s);
     if let Some(lead) = search::best(all.clone()) {
-        all.extend(search::noise_sets(&blocks, &lead, tau_s));
+        let starts = search::noise_sets(lead.found.theta);
+        all.extend(search::race(&blocks, &starts, Some(&lead), tau_s));
     }
     derive(&blocks, &mut all, limits);
+    lift(&blocks, &mut all, limits);
     keep_best_of_each(&mut all, limits.structure);
     Choice {
         candidates: all,
@@ -125,17 +139,20 @@ fn derive(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
             .collect();
         sources.sort_by(|a, b| a.bic.total_cmp(&b.bic));
         sources.truncate(2);
-        for from in sources {
-            for mut start in search::derive(&from.found.theta, structure, blocks.record.dt_s) {
-                // A head keeps its own fits and is tried with the noises of the lead.
-                if HEADS.contains(&structure) {
-                    for kind in NoiseKind::ALL {
-                        start.set_noise(kind, lead.found.theta.noise(kind));
-                    }
+        let mut starts: Vec<Theta> = sources
+            .iter()
+            .flat_map(|from| search::derive(&from.found.theta, structure, blocks.record.dt_s))
+            .collect();
+        // A head keeps its own fits and is tried with the noises of the lead.
+        if HEADS.contains(&structure) {
+            for start in &mut starts {
+                for kind in NoiseKind::ALL {
+                    start.set_noise(kind, lead.found.theta.noise(kind));
                 }
-                all.extend(search::fit(blocks, &start, limits.longest_tau_s));
             }
         }
+        let tau_s = limits.longest_tau_s;
+        all.extend(search::race(blocks, &starts, Some(&lead), tau_s));
     }
 }
 
@@ -151,6 +168,32 @@ fn contains(outer: Structure, inner: Structure) -> bool {
             | (Soptd, Iptd | Foptd | IntegratorLag)
             | (ResonantLag, Resonant | Soptd | Soiptd)
     )
+}
+
+/// Fits a structure again, from a limit of it that explains the record better than it does: it cannot be worse than its
+/// limit, so it was stuck.
+fn lift(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
+    let least = all.iter().map(|candidate| candidate.bic);
+    let hopeless = least.fold(f64::INFINITY, f64::min) + HOPELESS;
+    for (limit, structure) in LIMITS {
+        if limits.structure.is_some_and(|asked| asked != structure) {
+            continue;
+        }
+        let best = |of: Structure| {
+            let own = all.iter().filter(|candidate| candidate.structure() == of);
+            own.max_by(|a, b| a.log_likelihood().total_cmp(&b.log_likelihood()))
+        };
+        let (Some(inner), found) = (best(limit), best(structure)) else {
+            continue;
+        };
+        if inner.bic > hopeless
+            || found.is_some_and(|found| found.log_likelihood() > inner.log_likelihood() - STUCK)
+        {
+            continue;
+        }
+        let starts = search::derive(&inner.found.theta, structure, blocks.record.dt_s);
+        all.extend(search::race(blocks, &starts, None, limits.longest_tau_s));
+    }
 }
 
 fn keep_best_of_each(all: &mut Vec<Candidate>, structure: Option<Structure>) {

@@ -55,9 +55,11 @@ pub(super) fn descend(
     let mut normal: Option<Normal> = None;
     for _ in 0..patience.steps {
         if normal.is_none() {
-            normal = Some(linearise(blocks, &here, free, bounds, &mut memory)?);
+            normal = linearise(blocks, &here, free, bounds, &mut memory);
         }
-        let equations = normal.as_ref()?;
+        let Some(equations) = &normal else {
+            break;
+        };
         let Some(theta) = step(equations, &here.theta, free, bounds, damping) else {
             break;
         };
@@ -92,8 +94,9 @@ fn linearise(
     bounds: &Bounds,
     memory: &mut Memory,
 ) -> Option<Normal> {
-    let mut columns = Vec::with_capacity(free.len());
-    for &index in free {
+    let mut columns = vec![vec![]; free.len()];
+    // Noises first: they stand last, and the response of `here` is still in the memory.
+    for (slot, &index) in free.iter().enumerate().rev() {
         let room = bounds.high[index] - here.theta.values[index];
         let step = if bounds.step[index] <= room {
             bounds.step[index]
@@ -104,11 +107,9 @@ fn linearise(
         theta.values[index] += step;
         let moved = evaluate(blocks, &theta, memory)?.residual;
         let difference = moved.iter().zip(&here.at.residual);
-        columns.push(
-            difference
-                .map(|(a, b)| (a - b) / step)
-                .collect::<Vec<f64>>(),
-        );
+        columns[slot] = difference
+            .map(|(a, b)| (a - b) / step)
+            .collect::<Vec<f64>>();
     }
     let mut normal = Normal {
         matrix: [[0.0; MOST]; MOST],

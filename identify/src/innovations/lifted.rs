@@ -97,6 +97,32 @@ impl<const N: usize> Lifted<N> {
         }
     }
 
+    /// `Phi` of `count` blocks like this one, and the sum of `X' X` over the rows `X = C Phi^k` of the first state, by
+    /// doubling.
+    pub(super) fn observed(&self, count: usize) -> (Matrix<N>, Matrix<N>) {
+        let mut sum = [[0.0; N]; N];
+        let mut phi = identity();
+        let mut power = self.phi;
+        let mut of_power: Matrix<N> =
+            std::array::from_fn(|i| std::array::from_fn(|j| self.c[i] * self.c[j]));
+        let mut left = count;
+        loop {
+            if left & 1 == 1 {
+                let later = congruent(&transpose(&power), &sum);
+                sum = of_power;
+                add(&mut sum, &later);
+                phi = product(&phi, &power);
+            }
+            left >>= 1;
+            if left == 0 {
+                return (phi, sum);
+            }
+            let later = congruent(&transpose(&power), &of_power);
+            add(&mut of_power, &later);
+            power = product(&power, &power);
+        }
+    }
+
     /// Kalman gain and variance of the innovation for the covariance `p` of the predicted state.
     pub(super) fn gain(&self, p: &Matrix<N>) -> ([f64; N], f64) {
         let seen = times(p, &self.c);
@@ -168,7 +194,7 @@ pub(super) fn row_times<const N: usize>(c: &[f64; N], a: &Matrix<N>) -> [f64; N]
     std::array::from_fn(|j| (0..N).map(|i| c[i] * a[i][j]).sum())
 }
 
-fn transpose<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
+pub(super) fn transpose<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
     std::array::from_fn(|i| std::array::from_fn(|j| a[j][i]))
 }
 

@@ -17,26 +17,22 @@
 //! constant from the first block on. Reference: P. de Jong, "The likelihood for a state space model", Biometrika 75
 //! (1988); G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973).
 //!
-//! Quadratic forces of the record add a column each, beside `g`: their coefficients are further linear unknowns.
+//! Quadratic forces of the record add a column each, behind `g`: their coefficients are further linear unknowns.
 //!
-//! Shapes: `N` states (the last one is the disturbance), `blocks` rows, `N + 2` columns `y`, `g`, `X0`, and up to two of
-//! quadratic forces.
+//! Shapes: `N` states (the last one is the disturbance), `blocks` rows, `D` data columns `y`, `g` and up to two of quadratic
+//! forces, and `N` columns `X0`. The linear unknowns are in the order gain, forces, states.
 
 use std::f64::consts::TAU as TWO_PI;
 
-use onecycle_design::state_space::{Matrix, StateSpace, identity, product};
+use onecycle_design::state_space::{Matrix, StateSpace, add, congruent, identity, product, times};
 
-use super::lifted::{Lifted, Sample, row_times};
+use super::filter::{self, Run, runs};
+use super::lifted::{Lifted, Sample, row_times, transpose};
+use super::normal::Normal;
 use super::orthogonal::Orthogonal;
 use super::record::Blocks;
 use super::response;
 use super::theta::{NoiseKind, Theta};
-
-/// Columns of a row of the filter: room for `y`, `g`, the states and quadratic forces, six of these in all, and a multiple
-/// of the width of a vector register.
-const LANES: usize = 8;
-/// Relative change of the covariance below which the filter of a kind of block is steady.
-const STEADY: f64 = 1e-9;
 
 /// Likelihood at one point, with the linear unknowns at their best.
 #[derive(Clone, Debug)]
@@ -61,8 +57,6 @@ pub(super) struct Evaluation {
     pub(super) disturbance_factors: (f64, f64),
     /// Variance `s2` of the white noise of a sample (output unit^2).
     pub(super) variance: f64,
-    /// Innovations of the response to the input, over the standard deviation of an innovation.
-    pub(super) input_innovations: Vec<f64>,
     /// `sum ln S_k` and `ln|X'X| - ln|X0'X0|`.
     #[cfg(test)]
     pub(super) determinants: (f64, f64),
@@ -96,16 +90,24 @@ pub(super) fn evaluate(
     }
 }
 
-/// What the last evaluation computed from the process alone. Steps in the noise find it here.
+/// What the last evaluation computed from the process alone, which steps in the noise find here, and its rows.
 #[derive(Default)]
 pub(super) struct Memory {
     key: Option<(Theta, bool)>,
-    /// `g`, summed over the samples present in each block.
-    response: Vec<f64>,
-    /// The same of each quadratic force.
-    quadratic: Vec<Vec<f64>>,
+    /// `g`, then the response to each quadratic force, summed over the samples present in each block.
+    responses: Vec<Vec<f64>>,
     /// `ln|X0'X0| / 2`.
     log_determinant: f64,
+    /// Innovations of the data columns over their standard deviations, row by row.
+    rows: Vec<f64>,
+}
+
+impl Memory {
+    /// Innovations of the response to the input of the last evaluation, over their standard deviation.
+    pub(super) fn input_innovations(&self) -> impl Iterator<Item = f64> {
+        let width = 1 + self.responses.len().max(1);
+        self.rows.chunks_exact(width).map(|row| row[1])
+    }
 }
 
 impl Memory {
@@ -218,50 +220,142 @@ fn evaluate_sized<const N: usize>(
     let system = System::<N>::new(theta, blocks.record.dt_s);
     let lifted = system.lifted(blocks);
     remember(&system, &lifted, blocks, theta, memory)?;
-    let filtered = filter(&system, &lifted, blocks, memory)?;
-    let columns = Orthogonal::new(&filtered.columns[1..])?;
-    let count = filtered.columns[0].len();
-    let freedom = count as f64 - (filtered.columns.len() - 1) as f64;
+    let (runs, log_variances) = runs(system.start(blocks, &lifted)?, &lifted, blocks);
+    match memory.responses.len() {
+        1 => filtered::<N, 2>(blocks, &runs, log_variances, memory),
+        2 => filtered::<N, 3>(blocks, &runs, log_variances, memory),
+        3 => filtered::<N, 4>(blocks, &runs, log_variances, memory),
+        _ => None,
+    }
+}
+
+/// Likelihood of the responses in `memory` under a filter.
+fn filtered<const N: usize, const D: usize>(
+    blocks: &Blocks<'_>,
+    runs: &[Run<N>],
+    log_variances: f64,
+    memory: &mut Memory,
+) -> Option<Evaluation> {
+    let columns = std::array::from_fn(|column| match column.checked_sub(1) {
+        None => &blocks.sums[..],
+        Some(response) => &memory.responses[response][..],
+    });
+    let rows = filter::of_data::<N, D>(runs, columns, &mut memory.rows);
+    let responses = D - 1;
+    let count = rows.len();
+    let freedom = count as f64 - (responses + N) as f64;
     if freedom < 1.0 {
         return None;
     }
-    let (residual, coefficients) = columns.solve(&filtered.columns[0]);
-    let sum: f64 = residual.iter().map(|r| r * r).sum();
+    let mut fit = least_squares(rows, &filter::of_start(runs))?;
+    let sum: f64 = fit.residual.iter().map(|r| r * r).sum();
     let variance = sum / freedom;
-    let log_x = 2.0 * (columns.log_determinant() - memory.log_determinant);
-    let logs = filtered.log_variances + log_x;
+    let log_x = 2.0 * (fit.log_determinant - memory.log_determinant);
+    let logs = log_variances + log_x;
     let scale = blocks.scale;
     let likelihood = -0.5 * (freedom * (TWO_PI * variance).ln() + freedom + logs);
     let log_likelihood = likelihood - freedom * scale.ln();
     if !log_likelihood.is_finite() {
         return None;
     }
-    let stretch = (0.5 * logs / freedom).exp();
-    let inverse = columns.covariance(&[0, N]);
     let squared = variance * scale * scale;
-    let per_deviation = coefficients[0] / variance.sqrt();
-    let input_innovations = filtered.columns[1]
-        .iter()
-        .map(|g| g * per_deviation)
-        .collect();
+    let stretch = (0.5 * logs / freedom).exp();
+    fit.residual.iter_mut().for_each(|r| *r *= stretch);
     Some(Evaluation {
         log_likelihood,
-        residual: residual.iter().map(|r| r * stretch).collect(),
+        residual: fit.residual,
         stretch: stretch / scale,
-        gain: coefficients[0] * scale,
-        gain_factor: inverse[0][0],
-        state: coefficients[1..=N].iter().map(|x| x * scale).collect(),
-        quadratic: (N + 1..coefficients.len())
-            .map(|column| {
-                let [[factor]] = columns.covariance(&[column]);
-                (coefficients[column] * scale, (factor * squared).sqrt())
+        gain: fit.coefficients[0] * scale,
+        gain_factor: fit.covariance[0][0],
+        state: fit.coefficients[responses..]
+            .iter()
+            .map(|x| x * scale)
+            .collect(),
+        quadratic: (1..responses)
+            .map(|i| {
+                (
+                    fit.coefficients[i] * scale,
+                    (fit.factors[i] * squared).sqrt(),
+                )
             })
             .collect(),
-        disturbance_factors: (inverse[1][1], inverse[0][1]),
+        disturbance_factors: (fit.covariance[1][1], fit.covariance[0][1]),
         variance: squared,
-        input_innovations,
         #[cfg(test)]
-        determinants: (filtered.log_variances, log_x),
+        determinants: (log_variances, log_x),
+    })
+}
+
+/// Fit of `y` by the responses and the columns of the initial state.
+struct LeastSquares {
+    residual: Vec<f64>,
+    coefficients: Vec<f64>,
+    /// `ln|X'X| / 2`.
+    log_determinant: f64,
+    /// Of gain and disturbance, for residuals of unit variance.
+    covariance: [[f64; 2]; 2],
+    /// Variance of the coefficient of each response, for residuals of unit variance.
+    factors: Vec<f64>,
+}
+
+/// `None` if the columns are degenerate. `data`: `y` and the responses; `start`: columns of the initial state, zero after
+/// their end.
+fn least_squares<const N: usize, const D: usize>(
+    data: &[[f64; D]],
+    start: &[[f64; N]],
+) -> Option<LeastSquares> {
+    let (normal, right) = filter::products(data, start);
+    let Some(root) = normal.root() else {
+        return by_orthogonal_columns(data, start);
+    };
+    let coefficients = root.solve(&right);
+    let responses = D - 1;
+    let mut residual: Vec<f64> = data
+        .iter()
+        .map(|row| {
+            let explained = (0..responses).map(|i| coefficients[i] * row[1 + i]);
+            row[0] - explained.sum::<f64>()
+        })
+        .collect();
+    for (residual, row) in residual.iter_mut().zip(start) {
+        for i in 0..N {
+            *residual -= coefficients[responses + i] * row[i];
+        }
+    }
+    Some(LeastSquares {
+        residual,
+        coefficients: coefficients[..responses + N].to_vec(),
+        log_determinant: root.log_determinant(),
+        covariance: root.covariance(&[0, responses + N - 1]),
+        factors: (0..responses)
+            .map(|i| root.covariance(&[i])[0][0])
+            .collect(),
+    })
+}
+
+/// The same for columns that the normal equations do not tell apart.
+fn by_orthogonal_columns<const N: usize, const D: usize>(
+    data: &[[f64; D]],
+    start: &[[f64; N]],
+) -> Option<LeastSquares> {
+    let responses = D - 1;
+    let of_data = |lane: usize| data.iter().map(|row| row[lane]).collect::<Vec<f64>>();
+    let mut columns: Vec<Vec<f64>> = (1..D).map(of_data).collect();
+    for i in 0..N {
+        let mut column: Vec<f64> = start.iter().map(|row| row[i]).collect();
+        column.resize(data.len(), 0.0);
+        columns.push(column);
+    }
+    let columns = Orthogonal::new(&columns)?;
+    let (residual, coefficients) = columns.solve(&of_data(0));
+    Some(LeastSquares {
+        residual,
+        coefficients,
+        log_determinant: columns.log_determinant(),
+        covariance: columns.covariance(&[0, responses + N - 1]),
+        factors: (0..responses)
+            .map(|i| columns.covariance(&[i])[0][0])
+            .collect(),
     })
 }
 
@@ -279,160 +373,104 @@ fn remember<const N: usize>(
         return Some(());
     }
     memory.key = None;
-    memory.response = response::sums(&system.model, blocks, theta.tau_s());
-    memory.quadratic = response::of_quadratic(&system.model, blocks, theta.delay_and_lag_s());
-    let has_samples = |block: &usize| lifted[blocks.kind_of[*block] as usize].r > 0.0;
-    let mut columns = vec![Vec::with_capacity(blocks.len()); N + 1];
-    let of_samples = |sums: &[f64]| -> Vec<f64> {
-        let blocks = (0..blocks.len()).filter(has_samples);
-        blocks.map(|block| sums[block]).collect()
+    memory.responses = vec![response::sums(&system.model, blocks, theta.tau_s())];
+    let forces = response::of_quadratic(&system.model, blocks, theta.delay_and_lag_s());
+    memory.responses.extend(forces);
+    memory.log_determinant = match products(lifted, blocks, &memory.responses).root() {
+        Some(root) => root.log_determinant(),
+        None => Orthogonal::new(&columns(lifted, blocks, &memory.responses))?.log_determinant(),
     };
-    columns[0] = of_samples(&memory.response);
+    memory.key = Some(key);
+    Some(())
+}
+
+/// Products of the columns before the filter. The responses are zero in blocks without samples.
+fn products<const N: usize>(
+    lifted: &[Lifted<N>],
+    blocks: &Blocks<'_>,
+    responses: &[Vec<f64>],
+) -> Normal {
+    let count = responses.len();
+    let mut normal = Normal::new(count + N);
+    for (i, response) in responses.iter().enumerate() {
+        for (j, other) in responses[..=i].iter().enumerate() {
+            normal.products[i][j] = inner(response, other);
+        }
+        let with_start = with_start(lifted, blocks, response);
+        for k in 0..N {
+            normal.products[count + k][i] = with_start[k];
+        }
+    }
+    for (row, of_start) in normal.products[count..]
+        .iter_mut()
+        .zip(of_start(lifted, blocks))
+    {
+        row[count..count + N].copy_from_slice(&of_start);
+    }
+    normal
+}
+
+/// Products of the columns of the initial state, from the last block backwards: the products of a block's row are those
+/// of `C`, and the state at its start has to `Phi` the state at its end.
+fn of_start<const N: usize>(lifted: &[Lifted<N>], blocks: &Blocks<'_>) -> Matrix<N> {
+    let mut products = [[0.0; N]; N];
+    for run in blocks.kind_of.chunk_by(|a, b| a == b).rev() {
+        let (phi, own) = lifted[run[0] as usize].observed(run.len());
+        products = congruent(&transpose(&phi), &products);
+        add(&mut products, &own);
+    }
+    products
+}
+
+/// Products of a response with the columns of the initial state, backwards too.
+fn with_start<const N: usize>(
+    lifted: &[Lifted<N>],
+    blocks: &Blocks<'_>,
+    response: &[f64],
+) -> [f64; N] {
+    let mut products = [0.0; N];
+    let mut end = blocks.len();
+    for run in blocks.kind_of.chunk_by(|a, b| a == b).rev() {
+        let block = &lifted[run[0] as usize];
+        let turned = transpose(&block.phi);
+        for g in response[end - run.len()..end].iter().rev() {
+            products = times(&turned, &products);
+            if block.r > 0.0 {
+                for i in 0..N {
+                    products[i] += block.c[i] * g;
+                }
+            }
+        }
+        end -= run.len();
+    }
+    products
+}
+
+/// Columns before the filter: the responses, and those of the initial state. A row for each block that has samples.
+fn columns<const N: usize>(
+    lifted: &[Lifted<N>],
+    blocks: &Blocks<'_>,
+    responses: &[Vec<f64>],
+) -> Vec<Vec<f64>> {
+    let mut of_start = vec![Vec::with_capacity(blocks.len()); N];
+    let mut of_responses = vec![Vec::with_capacity(blocks.len()); responses.len()];
     let mut state = identity::<N>();
-    for &kind in &blocks.kind_of {
+    for (row, &kind) in blocks.kind_of.iter().enumerate() {
         let block = &lifted[kind as usize];
         if block.r > 0.0 {
-            for (column, value) in columns[1..].iter_mut().zip(row_times(&block.c, &state)) {
+            for (column, response) in of_responses.iter_mut().zip(responses) {
+                column.push(response[row]);
+            }
+            for (column, value) in of_start.iter_mut().zip(row_times(&block.c, &state)) {
                 column.push(value);
             }
         }
         state = product(&block.phi, &state);
     }
-    columns.extend(memory.quadratic.iter().map(|sums| of_samples(sums)));
-    memory.log_determinant = Orthogonal::new(&columns)?.log_determinant();
-    memory.key = Some(key);
-    Some(())
+    of_responses.extend(of_start);
+    of_responses
 }
 
-/// Innovations of all columns.
-struct Filtered {
-    /// `y`, `g`, one column a state, quadratic forces; a row for each block that has samples.
-    columns: Vec<Vec<f64>>,
-    /// `sum ln S_k`.
-    log_variances: f64,
-}
-
-/// Runs the filter over the columns.
-fn filter<const N: usize>(
-    system: &System<N>,
-    lifted: &[Lifted<N>],
-    blocks: &Blocks<'_>,
-    memory: &Memory,
-) -> Option<Filtered> {
-    let mut gains = Gains::new(system.start(blocks, lifted)?);
-    let forces = &memory.quadratic;
-    let count = N + 2 + forces.len();
-    if count > LANES {
-        return None;
-    }
-    let mut columns = vec![Vec::with_capacity(blocks.len()); count];
-    let mut log_variances = 0.0;
-    // Row i holds state i of the predictions of all columns. A column of an initial state is the filter of zero data
-    // that starts from minus the unit state.
-    let mut states = [[0.0; LANES]; N];
-    for i in 0..N {
-        states[i][2 + i] = -1.0;
-    }
-    for (block, &kind) in blocks.kind_of.iter().enumerate() {
-        let model = &lifted[kind as usize];
-        if model.r <= 0.0 {
-            states = moved(&model.phi, &states);
-            gains.skip(model);
-            continue;
-        }
-        gains.update(kind, model);
-        log_variances += gains.log_variance;
-        let mut innovation = [0.0; LANES];
-        innovation[0] = blocks.sums[block];
-        innovation[1] = memory.response[block];
-        for (lane, force) in innovation[N + 2..].iter_mut().zip(forces) {
-            *lane = force[block];
-        }
-        for i in 0..N {
-            for lane in 0..LANES {
-                innovation[lane] -= model.c[i] * states[i][lane];
-            }
-        }
-        states = moved(&model.phi, &states);
-        for i in 0..N {
-            for lane in 0..LANES {
-                states[i][lane] += gains.gain[i] * innovation[lane];
-            }
-        }
-        for (column, value) in columns.iter_mut().zip(innovation) {
-            column.push(value * gains.inverse_deviation);
-        }
-    }
-    Some(Filtered {
-        columns,
-        log_variances,
-    })
-}
-
-/// `Phi X` for the states of all lanes.
-fn moved<const N: usize>(phi: &Matrix<N>, states: &[[f64; LANES]; N]) -> [[f64; LANES]; N] {
-    let mut next = [[0.0; LANES]; N];
-    for i in 0..N {
-        for k in 0..N {
-            for lane in 0..LANES {
-                next[i][lane] += phi[i][k] * states[k][lane];
-            }
-        }
-    }
-    next
-}
-
-/// Gain of the filter, which is constant while blocks of one kind follow each other.
-pub(super) struct Gains<const N: usize> {
-    covariance: Matrix<N>,
-    steady_kind: Option<u32>,
-    last_kind: Option<u32>,
-    pub(super) gain: [f64; N],
-    pub(super) log_variance: f64,
-    pub(super) inverse_deviation: f64,
-}
-
-impl<const N: usize> Gains<N> {
-    /// Covariance of the predicted state.
-    pub(super) fn covariance(&self) -> &Matrix<N> {
-        &self.covariance
-    }
-
-    pub(super) fn new(covariance: Matrix<N>) -> Self {
-        Self {
-            covariance,
-            steady_kind: None,
-            last_kind: None,
-            gain: [0.0; N],
-            log_variance: 0.0,
-            inverse_deviation: 1.0,
-        }
-    }
-
-    /// Gain for the next block, of this kind.
-    pub(super) fn update(&mut self, kind: u32, model: &Lifted<N>) {
-        if self.steady_kind == Some(kind) {
-            return;
-        }
-        let (gain, variance) = model.gain(&self.covariance);
-        let next = model.next_covariance(&self.covariance, &gain, variance);
-        let is_close = |i: usize| {
-            let (old, new) = (self.covariance[i][i], next[i][i]);
-            (new - old).abs() <= STEADY * old.abs()
-        };
-        let is_steady = self.last_kind == Some(kind) && (0..N).all(is_close);
-        self.steady_kind = is_steady.then_some(kind);
-        self.last_kind = Some(kind);
-        self.covariance = next;
-        self.gain = gain;
-        self.log_variance = variance.ln();
-        self.inverse_deviation = 1.0 / variance.sqrt();
-    }
-
-    /// A block without samples.
-    pub(super) fn skip(&mut self, model: &Lifted<N>) {
-        self.covariance = model.next_covariance(&self.covariance, &[0.0; N], 0.0);
-        self.steady_kind = None;
-        self.last_kind = None;
-    }
+fn inner(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

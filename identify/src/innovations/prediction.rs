@@ -2,8 +2,9 @@
 
 use onecycle_design::state_space::times;
 
+use super::filter::Gains;
 use super::lifted::{dot, row_times};
-use super::likelihood::{Evaluation, Gains, System};
+use super::likelihood::{Evaluation, System};
 use super::record::Blocks;
 use super::response;
 use super::theta::Theta;

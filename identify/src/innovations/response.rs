@@ -11,7 +11,6 @@ use onecycle_design::state_space::{Matrix, StateSpace, Step, identity, product, 
 use onecycle_design::{Linear, Structure};
 
 use super::lifted::{dot, row_times};
-use super::orthogonal::dot as inner;
 use super::record::{BlockKind, Blocks, Hold, Record};
 
 /// Values at the samples of a record that act on a process.
@@ -99,11 +98,11 @@ fn outputs<const N: usize>(model: &StateSpace<N>, record: &Record, source: Sourc
     }
     let injection = Injection::new(model, record.dt_s, source);
     let mut state = [0.0; N];
-    let mut window = Vec::new();
+    let mut copy = Vec::new();
     let mut outputs = vec![0.0];
     for sample in 1..record.len() {
-        injection.window(source.values, sample - 1, 1, &mut window);
-        state = injection.advance(&state, &window);
+        let inputs = delayed(source.values, injection.delay, (sample - 1, 1), &mut copy);
+        state = injection.advance(&state, inputs);
         outputs.push(state[model.output]);
     }
     outputs
@@ -141,19 +140,6 @@ impl<const N: usize> Injection<N> {
         }
     }
 
-    /// Copies the delayed values that act on `count` samples from `start` on, and those of the sample before and after.
-    fn window(&self, values: &[f64], start: usize, count: usize, copy: &mut Vec<f64>) {
-        let first = start as i64 - self.delay - 1;
-        let window = first..first + count as i64 + 2;
-        copy.clear();
-        if window.start >= 0 && window.end <= values.len() as i64 {
-            copy.extend_from_slice(&values[window.start as usize..window.end as usize]);
-        } else {
-            let last = values.len() as i64 - 1;
-            copy.extend(window.map(|k| values[k.clamp(0, last) as usize]));
-        }
-    }
-
     /// Moves the state over one sample. `window` holds the three inputs.
     fn advance(&self, state: &[f64; N], window: &[f64]) -> [f64; N] {
         let mut next = times(&self.phi, state);
@@ -166,42 +152,95 @@ impl<const N: usize> Injection<N> {
     }
 }
 
-/// Sum and final state of a block as linear functions of the state at its start and of the delayed inputs: `M + 2` of
-/// them, from that of the sample before the block on.
+/// Sum and final state of a block without absent samples as linear functions of the state at its start and of the
+/// delayed inputs, from that of the sample before the block on to the one after it.
 struct Weights<const N: usize> {
     phi: Matrix<N>,
     output: [f64; N],
-    sum: Vec<f64>,
-    state: [Vec<f64>; N],
+    /// Of each input on the final state. The last state, the disturbance, has no input: its place holds the weight on the
+    /// sum.
+    inputs: Vec<[f64; N]>,
 }
 
 impl<const N: usize> Weights<N> {
-    fn new(injection: &Injection<N>, output: usize, mask: &[bool]) -> Self {
-        let count = mask.len();
+    fn new(injection: &Injection<N>, output: usize, count: usize) -> Self {
         let mut weights = Self {
             phi: identity(),
             output: [0.0; N],
-            sum: vec![0.0; count + 2],
-            state: std::array::from_fn(|_| vec![0.0; count + 2]),
+            inputs: vec![[0.0; N]; count + 2],
         };
-        // Backwards: `phi` is the power that takes a state after sample k to the end, `output` the row that takes it to
-        // the sum of the later samples.
-        for k in (0..count).rev() {
-            for (ahead, column) in injection.inputs.iter().enumerate() {
-                weights.sum[k + ahead] += dot(&weights.output, column);
-                let moved = times(&weights.phi, column);
-                for i in 0..N {
-                    weights.state[i][k + ahead] += moved[i];
+        // Backwards: the effect of an input on the state at the end, and on the sum of the samples until then.
+        for (ahead, column) in injection.inputs.iter().enumerate() {
+            let (mut effect, mut sum) = (*column, 0.0);
+            for k in (0..count).rev() {
+                let weight = &mut weights.inputs[k + ahead];
+                for i in 0..N - 1 {
+                    weight[i] += effect[i];
                 }
+                weight[N - 1] += sum;
+                sum += effect[output];
+                effect = times(&injection.phi, &effect);
             }
-            weights.output = row_times(&weights.output, &injection.phi);
-            if mask[k] {
-                weights.output[output] += 1.0;
+        }
+        let mut row = [0.0; N];
+        row[output] = 1.0;
+        for _ in 0..count {
+            for i in 0..N {
+                weights.output[i] += row[i];
             }
-            weights.phi = product(&weights.phi, &injection.phi);
+            row = row_times(&row, &injection.phi);
+            weights.phi = product(&injection.phi, &weights.phi);
         }
         weights
     }
+
+    /// Sum of the samples, and the state after them.
+    fn advance(&self, state: &[f64; N], inputs: &[f64]) -> (f64, [f64; N]) {
+        // Four sums side by side, so that an addition does not wait for the one before.
+        let mut sums = [[0.0; N]; 4];
+        let (weights, last_weights) = self.inputs.as_chunks::<4>();
+        let (inputs, last_inputs) = inputs.as_chunks::<4>();
+        for (weights, inputs) in weights.iter().zip(inputs) {
+            for part in 0..4 {
+                for lane in 0..N {
+                    sums[part][lane] += weights[part][lane] * inputs[part];
+                }
+            }
+        }
+        for (weight, input) in last_weights.iter().zip(last_inputs) {
+            for lane in 0..N {
+                sums[0][lane] += weight[lane] * input;
+            }
+        }
+        let total: [f64; N] = std::array::from_fn(|lane| {
+            (sums[0][lane] + sums[1][lane]) + (sums[2][lane] + sums[3][lane])
+        });
+        let mut next = times(&self.phi, state);
+        for i in 0..N - 1 {
+            next[i] += total[i];
+        }
+        (dot(&self.output, state) + total[N - 1], next)
+    }
+}
+
+/// Delayed inputs of `count` samples from `start` on, with one before and one after them. `copy` holds them where they
+/// reach beyond the record.
+fn delayed<'a>(
+    values: &'a [f64],
+    delay: i64,
+    (start, count): (usize, usize),
+    copy: &'a mut Vec<f64>,
+) -> &'a [f64] {
+    let first = start as i64 - delay - 1;
+    let inside = usize::try_from(first).ok();
+    if let Some(inputs) = inside.and_then(|first| values.get(first..first + count + 2)) {
+        return inputs;
+    }
+    let last = values.len() as i64 - 1;
+    let window = first..first + count as i64 + 2;
+    copy.clear();
+    copy.extend(window.map(|k| values[k.clamp(0, last) as usize]));
+    copy
 }
 
 /// Samples on an even grid, block by block.
@@ -210,26 +249,39 @@ fn even<const N: usize>(
     blocks: &Blocks<'_>,
     source: Source<'_>,
 ) -> Vec<f64> {
+    let samples = blocks.samples;
     let injection = Injection::new(model, blocks.record.dt_s, source);
-    let mut window = Vec::new();
+    let delay = injection.delay;
+    let values = source.values;
+    let weights = Weights::new(&injection, model.output, samples);
+    let mut copy = Vec::new();
     let mut state = [0.0; N];
-    for sample in 0..blocks.first {
-        injection.window(source.values, sample, 1, &mut window);
-        state = injection.advance(&state, &window);
+    let single = blocks.first % samples;
+    for sample in 0..single {
+        state = injection.advance(&state, delayed(values, delay, (sample, 1), &mut copy));
     }
-    let of_kind = |kind: &BlockKind| Weights::new(&injection, model.output, &kind.mask);
-    let weights: Vec<Weights<N>> = blocks.kinds.iter().map(of_kind).collect();
+    for start in (single..blocks.first).step_by(samples) {
+        let inputs = delayed(values, delay, (start, samples), &mut copy);
+        (_, state) = weights.advance(&state, inputs);
+    }
+    let is_full = |kind: &BlockKind| kind.mask.iter().all(|present| *present);
+    let full: Vec<bool> = blocks.kinds.iter().map(is_full).collect();
     let mut sums = Vec::with_capacity(blocks.len());
     for (block, &kind) in blocks.kind_of.iter().enumerate() {
-        let weights = &weights[kind as usize];
-        let start = blocks.first + block * blocks.samples;
-        injection.window(source.values, start, blocks.samples, &mut window);
-        sums.push(dot(&weights.output, &state) + inner(&weights.sum, &window));
-        let mut next = times(&weights.phi, &state);
-        for i in 0..N {
-            next[i] += inner(&weights.state[i], &window);
+        let start = blocks.range(block).start;
+        let mut sum = 0.0;
+        if full[kind as usize] {
+            let inputs = delayed(values, delay, (start, samples), &mut copy);
+            (sum, state) = weights.advance(&state, inputs);
+        } else {
+            for (sample, present) in (start..).zip(&blocks.kinds[kind as usize].mask) {
+                if *present {
+                    sum += state[model.output];
+                }
+                state = injection.advance(&state, delayed(values, delay, (sample, 1), &mut copy));
+            }
         }
-        state = next;
+        sums.push(sum);
     }
     sums
 }

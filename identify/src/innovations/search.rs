@@ -26,6 +26,13 @@ pub(super) const FINE: Patience = Patience {
     steps: 40,
     decrease: 1e-7,
 };
+/// Of the fit that chooses: the last step gains less than 0.01 of the log-likelihood.
+const CHOOSING: Patience = Patience {
+    steps: 40,
+    decrease: 1e-5,
+};
+/// Distance in BIC from the best after a short descent beyond which a start is given up.
+const BEHIND: f64 = 40.0;
 /// Rows of the coarse copy.
 const COARSE_BLOCKS: usize = 500;
 /// Number of different starts for each kind of noise.
@@ -45,6 +52,10 @@ impl Candidate {
         let rows = found.at.residual.len() as f64;
         let bic = -2.0 * found.at.log_likelihood + unknowns as f64 * rows.ln();
         Self { found, bic }
+    }
+
+    pub(super) fn log_likelihood(&self) -> f64 {
+        self.found.at.log_likelihood
     }
 
     pub(super) fn structure(&self) -> Structure {
@@ -211,11 +222,20 @@ fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: 
 
 /// Descends on the record, and puts the lags in order.
 pub(super) fn fit(blocks: &Blocks<'_>, start: &Theta, longest_tau_s: f64) -> Option<Candidate> {
+    fit_within(blocks, start, longest_tau_s, FINE)
+}
+
+fn fit_within(
+    blocks: &Blocks<'_>,
+    start: &Theta,
+    longest_tau_s: f64,
+    patience: Patience,
+) -> Option<Candidate> {
     let bounds = Bounds::new(start.structure, blocks, longest_tau_s);
     let free = start.free();
-    let found = descend(blocks, start, &free, &bounds, FINE)?;
+    let found = descend(blocks, start, &free, &bounds, patience)?;
     let found = match ordered(&found.theta) {
-        Some(theta) => descend(blocks, &theta, &free, &bounds, FINE)?,
+        Some(theta) => descend(blocks, &theta, &free, &bounds, patience)?,
         None => found,
     };
     Some(Candidate::new(found))
@@ -250,23 +270,39 @@ fn ordered(theta: &Theta) -> Option<Theta> {
     (swapped != *theta).then_some(swapped)
 }
 
-/// Candidates of a screened structure with one noise each, from the best starts.
-pub(super) fn singles(blocks: &Blocks<'_>, starts: &[Theta], longest_tau_s: f64) -> Vec<Candidate> {
-    let mut candidates: Vec<Candidate> = Vec::new();
-    for kind in NoiseKind::ALL {
-        let own = starts.iter().find(|theta| theta.noise(kind) > 0.0);
-        candidates.extend(own.and_then(|theta| fit(blocks, theta, longest_tau_s)));
+/// Candidates from `starts`: a short descent from each, and a long one from those that are not far behind the best, or
+/// behind `lead`.
+pub(super) fn race(
+    blocks: &Blocks<'_>,
+    starts: &[Theta],
+    lead: Option<&Candidate>,
+    longest_tau_s: f64,
+) -> Vec<Candidate> {
+    let short = starts
+        .iter()
+        .filter_map(|theta| fit_within(blocks, theta, longest_tau_s, COARSE));
+    let mut candidates: Vec<Candidate> = short.collect();
+    let bics = candidates.iter().chain(lead).map(|candidate| candidate.bic);
+    let limit = bics.fold(f64::INFINITY, f64::min) + BEHIND;
+    for candidate in &mut candidates {
+        if candidate.bic < limit {
+            let theta = candidate.found.theta;
+            if let Some(better) = fit_within(blocks, &theta, longest_tau_s, CHOOSING) {
+                *candidate = better;
+            }
+        }
     }
     candidates
 }
 
-/// The candidate `lead`, which has one noise, with another in its place, with a second one, and without any.
-pub(super) fn noise_sets(
-    blocks: &Blocks<'_>,
-    lead: &Candidate,
-    longest_tau_s: f64,
-) -> Vec<Candidate> {
-    let theta = lead.found.theta;
+/// The best start of each kind of noise.
+pub(super) fn best_of_each_noise(starts: &[Theta]) -> Vec<Theta> {
+    let of_kind = |kind: NoiseKind| starts.iter().find(|theta| theta.noise(kind) > 0.0).copied();
+    NoiseKind::ALL.into_iter().filter_map(of_kind).collect()
+}
+
+/// Starts from the fit `theta`, which has one noise, with another in its place, with a second one, and without any.
+pub(super) fn noise_sets(theta: Theta) -> Vec<Theta> {
     let Some(own) = theta.noises().next() else {
         return vec![];
     };
@@ -280,12 +316,9 @@ pub(super) fn noise_sets(
         starts.extend([beside, instead]);
     }
     starts
-        .iter()
-        .filter_map(|theta| fit(blocks, theta, longest_tau_s))
-        .collect()
 }
 
-/// Starts for `structure` from the best point of a structure that contains it or lacks one lag.
+/// Starts for `structure` from the best point of a structure that contains it, is a limit of it or lacks one lag.
 pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta> {
     let old = from.layout();
     let mut theta = Theta::new(structure);
@@ -301,6 +334,7 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
         _ => f64::INFINITY,
     };
     // Lags that the structure lacks lengthen its dead time.
+    let lost_s = if old.stages.lags > 0 { lag } else { 0.0 };
     let mut starts = Vec::new();
     let mut with = |lags: &[f64], body: f64, lost_s: f64| {
         let mut start = theta;
@@ -314,8 +348,8 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
         starts.push(start);
     };
     match structure {
-        Structure::Iptd => with(&[], 0.0, lag),
-        Structure::Foptd => with(&[], body_s, lag),
+        Structure::Iptd => with(&[], 0.0, lost_s),
+        Structure::Foptd => with(&[], body_s, lost_s),
         Structure::IntegratorLag => {
             with(&[lag], 0.0, 0.0);
             if body_s.is_finite() {
@@ -332,6 +366,12 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
             }
         }
         Structure::Soiptd | Structure::Soptd => with(&[lag], body_s, 0.0),
+        Structure::ResonantLag => {
+            if let (Some(pair), None) = (layout.pair(), old.pair()) {
+                with(&[lag], 0.0, 0.0);
+                starts[0].values[pair] = 1.0 / body_s;
+            }
+        }
         _ => {}
     }
     starts

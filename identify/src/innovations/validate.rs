@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::choose::Limits;
 use super::descent::Patience;
-use super::likelihood::Evaluation;
+use super::likelihood::{Evaluation, Memory, evaluate};
 use super::orthogonal::Orthogonal;
 use super::prediction::{Filtering, predict};
 use super::record::{Blocks, Record};
@@ -141,8 +141,11 @@ pub(super) fn prediction(
 
 /// Band of frequencies (rad/s) with the central 90 % of the information on the gain: the spectrum of the filtered response
 /// to the input. `None` if the input has no effect.
-pub(super) fn informative(blocks: &Blocks<'_>, at: &Evaluation) -> Option<(f64, f64)> {
-    let [low, _, high] = quantiles(&at.input_innovations, blocks.block_s())?;
+pub(super) fn informative(blocks: &Blocks<'_>, theta: &Theta) -> Option<(f64, f64)> {
+    let mut memory = Memory::default();
+    evaluate(blocks, theta, &mut memory)?;
+    let filtered: Vec<f64> = memory.input_innovations().collect();
+    let [low, _, high] = quantiles(&filtered, blocks.block_s())?;
     Some((low, high))
 }
 
