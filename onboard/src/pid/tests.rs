@@ -231,3 +231,38 @@ fn settings_out_of_range_are_named() {
     // A process that falls when the input rises.
     assert!(PidLaw::new(PidSettings::new(-2.0, -1.0, 0.0)).is_ok());
 }
+
+// Any bits as time step, reference, value, rate and command, among usual ones: every output is finite and within the limits.
+#[test]
+fn no_input_leaves_the_limits() {
+    let mut random = 1_u64;
+    let mut bits = || {
+        random = random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        let any = f32::from_bits((random >> 32) as u32);
+        if random >> 20 & 3 == 0 {
+            any
+        } else {
+            (random >> 40) as f32 / 16_777_216.0
+        }
+    };
+    let settings = PidSettings::new(3.0, 5.0, 0.7)
+        .with_filter_s(0.02)
+        .with_setpoint_weight(0.4)
+        .with_limits(-2.0, 1.5);
+    let mut law = PidLaw::new(settings).unwrap();
+    let mut statuses = [0; 4];
+    for tick in 0..200_000 {
+        let measurement = Measurement::of(bits()).with_rate(bits());
+        if tick % 97 == 0 {
+            law.take_over(bits(), &measurement, bits());
+        }
+        let output = law.step(0.01 * bits(), bits(), &measurement);
+        assert!((-2.0..=1.5).contains(&output), "{tick}: {output}");
+        assert!(law.integral().is_finite());
+        statuses[law.status() as usize] += 1;
+    }
+    // Each status occurs, so the test has seen them.
+    assert!(statuses.iter().all(|count| *count > 1000), "{statuses:?}");
+}
