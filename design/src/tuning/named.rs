@@ -129,7 +129,7 @@ pub(super) fn least_peak(from: f64, is_kept: &mut impl FnMut(f64) -> bool) -> Op
 }
 
 /// The problem in the units of the process.
-pub(super) fn problem(
+pub(crate) fn problem(
     model: &Model,
     specification: &Specification,
 ) -> Result<Problem, DesignError> {
