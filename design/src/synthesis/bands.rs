@@ -191,7 +191,9 @@ struct Scan<'a> {
     tolerance: f64,
     band: Option<Band>,
     bands: Vec<Band>,
-    /// Least gain below a band that turns downwards.
+    /// Turns of the bands so far.
+    turns: i32,
+    /// Least gain below the bands that turned downwards since the turns were last zero: no later band can matter at less.
     least: f64,
     /// The last frequency with its loop. `None` at the first one.
     last: Option<(f64, Complex64)>,
@@ -240,7 +242,11 @@ impl Scan<'_> {
     fn finish(&mut self, omega: f64) {
         if let Some(mut band) = self.band.take() {
             band.finish(omega);
-            if band.turns() < 0 && !band.from_first {
+            self.turns += band.turns();
+            if self.turns >= 0 {
+                // Higher gains are stable again.
+                self.least = f64::INFINITY;
+            } else if band.turns() < 0 && !band.from_first {
                 self.least = self.least.min(band.low);
             }
             self.bands.push(band);
@@ -371,7 +377,7 @@ pub(crate) fn extremum(open_loop: &OpenLoop, limits: &Limits, omega: f64, is_low
 }
 
 /// Gains of the shape in `open_loop` (its gain is 1) that `limits` allow. `path` is the feedback path of the shape, `grid`
-/// the process. The scan starts at the first of `ends`, and `|L|` never rises above the second.
+/// the process. The scan starts at the first of `ends`; neither `|L|` nor the phase rises above the second.
 pub(crate) fn allowed(
     grid: &mut Grid,
     open_loop: &OpenLoop,
@@ -389,9 +395,11 @@ pub(crate) fn allowed(
         },
         band: None,
         bands: Vec::new(),
+        turns: 0,
         least: f64::INFINITY,
         last: None,
     };
+    scan.turns = scan.first_turns();
     let share = (1.0 - 1.0 / limits.ms.min(limits.mt)).min(1.0 / limits.gain_margin);
     let start = grid.first_from(first);
     for i in start..start + MOST_FREQUENCIES {

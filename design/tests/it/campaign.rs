@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
+use std::ops::Range;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -130,16 +131,16 @@ fn outcome(case: u64) -> &'static str {
     }
 }
 
-/// Outcomes of the cases `0..count` with their numbers, on all cores.
-fn campaign(count: u64) -> BTreeMap<&'static str, Vec<u64>> {
-    let (next, outcomes) = (AtomicU64::new(0), Mutex::new(BTreeMap::new()));
+/// Outcomes of the cases with their numbers, on all cores.
+fn campaign(cases: Range<u64>) -> BTreeMap<&'static str, Vec<u64>> {
+    let (next, outcomes) = (AtomicU64::new(cases.start), Mutex::new(BTreeMap::new()));
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     std::thread::scope(|scope| {
         for _ in 0..cores {
             scope.spawn(|| {
                 loop {
                     let case = next.fetch_add(1, Ordering::Relaxed);
-                    if case >= count {
+                    if case >= cases.end {
                         break;
                     }
                     let outcome = outcome(case);
@@ -157,8 +158,9 @@ fn campaign(count: u64) -> BTreeMap<&'static str, Vec<u64>> {
 }
 
 #[expect(clippy::print_stdout, reason = "a campaign shows its counts")]
-fn check(count: u64) {
-    let found = campaign(count);
+fn check(cases: Range<u64>) {
+    let count = cases.end - cases.start;
+    let found = campaign(cases);
     let of = |outcome: &str| found.get(outcome).map_or(0, Vec::len);
     for (outcome, cases) in &found {
         let first = &cases[..cases.len().min(12)];
@@ -179,13 +181,17 @@ fn check(count: u64) {
 // A design is stable, keeps its limits, and is refused for a reason only.
 #[test]
 fn designs_of_a_thousand_processes() {
-    check(1000);
+    check(0..1000);
 }
 
+// The variables FROM and TO of the environment choose a part of the cases.
 #[test]
-#[ignore = "a quarter of an hour on two cores; see docs/benchmarks.md"]
+#[ignore = "ten minutes on two cores; see docs/benchmarks.md"]
 fn designs_of_a_hundred_thousand_processes() {
-    check(100_000);
+    let number = |name: &str, default: u64| {
+        std::env::var(name).map_or(default, |value| value.parse().unwrap())
+    };
+    check(number("FROM", 0)..number("TO", 100_000));
 }
 
 // By hand: the plot of 1 + k e^(-s)/s turns by a quarter below the ultimate gain pi/2, and by a whole turn less above.
