@@ -33,7 +33,7 @@ struct Figures {
     noise: f64,
 }
 
-type Method<'a> = (&'a str, Box<dyn Fn(&Model) -> Option<Controller> + 'a>);
+type Method = (&'static str, Box<dyn Fn(&Model) -> Option<Controller>>);
 
 fn figures(model: &Model, controller: &Controller, period_s: f64) -> Option<Figures> {
     Some(Figures {
@@ -49,12 +49,12 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Prints a row for each method: medians over the processes, IAE and noise per those of the first method.
-fn table(title: &str, models: &[(Model, f64)], methods: &[Method<'_>]) {
+fn table(title: &str, models: &[(Model, f64)], methods: &[Method]) {
     println!("\n{title}: {} processes\n", models.len());
     println!(
         "| controller | none | unstable | Ms | IAE | largest IAE | noise |\n| --- | --- | --- | --- | --- | --- | --- |"
     );
-    let of = |method: &Method<'_>, (model, period_s): &(Model, f64)| {
+    let of = |method: &Method, (model, period_s): &(Model, f64)| {
         method.1(model).map(|controller| figures(model, &controller, *period_s))
     };
     let reference: Vec<_> = models.iter().map(|model| of(&methods[0], model)).collect();
@@ -96,7 +96,7 @@ fn style(form: Form, style: Style) -> impl Fn(&Model) -> Option<Controller> {
 }
 
 /// The styles and the rules in one form.
-fn methods<'a>(form: Form) -> Vec<Method<'a>> {
+fn methods(form: Form) -> Vec<Method> {
     vec![
         ("balanced", Box::new(style(form, Style::Balanced))),
         ("sharp", Box::new(style(form, Style::Sharp))),
@@ -123,12 +123,14 @@ fn methods<'a>(form: Form) -> Vec<Method<'a>> {
     ]
 }
 
-/// A process with the sample period of its noise (s).
+/// A process with the sample period of its noise (s). The half rule has no model of a resonance, which counts with the time of
+/// its actuator lag.
 fn with_period(model: impl Into<Model>) -> (Model, f64) {
     let model = model.into();
-    let half =
-        HalfRule::of(&model, Form::Pid).map_or(model.linear().tau_s(), |half| half.dead_time_s);
-    (model, PERIOD_SHARE * half)
+    let linear = model.linear();
+    let other_s = linear.tau_s() + linear.lags_s().iter().sum::<f64>();
+    let half_s = HalfRule::of(&model, Form::Pid).map_or(other_s, |half| half.dead_time_s);
+    (model, PERIOD_SHARE * half_s)
 }
 
 fn foptd(lag_s: f64, tau_s: f64) -> Linear {
@@ -201,13 +203,16 @@ fn multirotors() -> Vec<(Soiptd, MeasurementNoise)> {
     (1..=50).filter_map(|i| draw(f64::from(i))).collect()
 }
 
-/// Designs of multirotors: noise as a share of the amplitude of the relay, IAE per that of the first method.
-fn multirotor_table(title: &str, has_noise_limit: bool) {
-    println!(
-        "\n{title}\n\n| controller | unstable | Ms | IAE | IAE, least to largest | noise |\n| --- | --- | --- | --- | --- | --- |"
-    );
-    let ours = |form: Form, style: Style| {
-        move |model: &Model, noise: MeasurementNoise| {
+/// A method for a vehicle with its noise.
+type VehicleMethod = (
+    &'static str,
+    Box<dyn Fn(&Model, MeasurementNoise) -> Option<Controller>>,
+);
+
+/// The styles and the rules for a vehicle.
+fn vehicle_methods(has_noise_limit: bool) -> Vec<VehicleMethod> {
+    let ours = |form: Form, style: Style| -> Box<dyn Fn(&Model, MeasurementNoise) -> _> {
+        Box::new(move |model, noise| {
             let asked = Specification::new(form, style);
             let asked = if has_noise_limit {
                 asked.with_noise(noise)
@@ -215,48 +220,32 @@ fn multirotor_table(title: &str, has_noise_limit: bool) {
                 asked
             };
             design(model, &asked).ok().map(|found| found.controller)
-        }
+        })
     };
-    type Row = (
-        &'static str,
-        Box<dyn Fn(&Model, MeasurementNoise) -> Option<Controller>>,
-    );
-    let mut rows: Vec<Row> = vec![
-        ("balanced PID", Box::new(ours(Form::Pid, Style::Balanced))),
-        ("sharp PID", Box::new(ours(Form::Pid, Style::Sharp))),
-        ("calm PID", Box::new(ours(Form::Pid, Style::Calm))),
-        (
-            "balanced cascade, rate PI",
-            Box::new(ours(Form::CascadePi, Style::Balanced)),
-        ),
-        (
-            "balanced cascade, rate PID",
-            Box::new(ours(Form::CascadePid, Style::Balanced)),
-        ),
+    let cascades = [Form::CascadePi, Form::CascadePid].map(|form| ours(form, Style::Balanced));
+    let [rate_pi, rate_pid] = cascades;
+    let rules = methods(Form::Pid).split_off(3);
+    let rules = rules
+        .into_iter()
+        .map(|(name, rule)| -> VehicleMethod { (name, Box::new(move |model, _| rule(model))) });
+    let styles: [VehicleMethod; 5] = [
+        ("balanced PID", ours(Form::Pid, Style::Balanced)),
+        ("sharp PID", ours(Form::Pid, Style::Sharp)),
+        ("calm PID", ours(Form::Pid, Style::Calm)),
+        ("balanced cascade, rate PI", rate_pi),
+        ("balanced cascade, rate PID", rate_pid),
     ];
-    if has_noise_limit {
-        rows.push((
-            "SIMC",
-            Box::new(|model, _| {
-                let half = HalfRule::of(model, Form::Pid)?;
-                simc(&half, half.dead_time_s).map(filtered)
-            }),
-        ));
-        rows.push((
-            "Ziegler-Nichols",
-            Box::new(|model, _| ziegler_nichols(&Ultimate::of(model)?, Form::Pid).map(filtered)),
-        ));
-        rows.push((
-            "Tyreus-Luyben",
-            Box::new(|model, _| tyreus_luyben(&Ultimate::of(model)?, Form::Pid).map(filtered)),
-        ));
-        rows.push((
-            "AMIGO",
-            Box::new(|model, _| amigo(&StepFeatures::of(model)?, Form::Pid).map(filtered)),
-        ));
-    }
+    styles.into_iter().chain(rules).collect()
+}
+
+/// Designs of multirotors: noise as a share of the amplitude of the relay, IAE per that of the first method.
+fn multirotor_table(title: &str, has_noise_limit: bool) {
+    println!(
+        "\n{title}\n\n| controller | unstable | Ms | IAE | IAE, least to largest | noise |\n| --- | --- | --- | --- | --- | --- |"
+    );
+    let rows = vehicle_methods(has_noise_limit);
     let vehicles = multirotors();
-    let of = |row: &Row| -> Vec<Option<(Figures, f64)>> {
+    let of = |row: &VehicleMethod| -> Vec<Option<(Figures, f64)>> {
         let figures = |(process, noise): &(Soiptd, MeasurementNoise)| {
             let model = Model::from(*process);
             let controller = row.1(&model, *noise)?;

@@ -23,8 +23,11 @@ pub(crate) const PENALTY: f64 = 10.0;
 /// Tolerance of the logarithm of a gain that noise or the peak of the input limits.
 const GAIN_TOLERANCE: f64 = 1e-9;
 
+/// A gain whose logarithm exceeds its limit by more than this has not converged.
+const CLOSE: f64 = 1e-6;
+
 /// Most evaluations of noise or peak for one gain.
-const MOST_EVALUATIONS: usize = 12;
+const MOST_EVALUATIONS: usize = 40;
 
 /// Most zeros of a law.
 const ZEROS: f64 = 3.0;
@@ -400,5 +403,5 @@ fn limited(k: f64, excess: impl Fn(f64) -> Option<f64>) -> Option<f64> {
         }
     }
     // On the safe side of the limit.
-    Some((x - f.max(0.0)).exp().min(k))
+    (f < CLOSE).then(|| (x - f.max(0.0)).exp().min(k))
 }

@@ -142,8 +142,12 @@ fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOpti
         }
     };
     let mut cost = |z: &[f64]| objective.cost(z);
-    let first = minimise(&mut cost, &best, FIRST);
-    Ok(minimise(&mut cost, &first, SECOND))
+    let mut best = minimise(&mut cost, &best, FIRST);
+    if best.point.len() > 2 {
+        // With more variables the simplex may collapse on a kink.
+        best = minimise(&mut cost, &best, FIRST);
+    }
+    Ok(minimise(&mut cost, &best, SECOND))
 }
 
 /// A feasible shape with a cost, from an infeasible start: the search minimises the excess of the least gain.

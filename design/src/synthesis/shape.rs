@@ -157,7 +157,7 @@ impl Family {
             start.insert(2, (share * fast).ln());
             start
         };
-        [0.03, 0.1, 0.3, 1.0].map(start).to_vec()
+        [0.011, 0.03, 0.1, 0.3, 1.0].map(start).to_vec()
     }
 
     /// Variables to start a search from. A cascade with PID starts [from one with PI](Self::with_rate_derivative).

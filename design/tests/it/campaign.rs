@@ -175,7 +175,8 @@ fn check(cases: Range<u64>) {
         assert_eq!(of(never), 0, "{never}: {:?}", found.get(never));
     }
     assert!(of("designed") as u64 > count / 2);
-    assert!(of("limit of the noise") as u64 <= count / 500);
+    // Noise that asks for gains thousands of times below those of the other limits: the search gives such loops up.
+    assert!(of("limit of the noise") as u64 <= count / 300);
 }
 
 // A design is stable, keeps its limits, and is refused for a reason only.
