@@ -24,7 +24,7 @@ fn problem(vector: &Vector) -> Problem {
     }
 }
 
-/// Vectors whose gains are not the optimum to 1e-5, with the gains that are: `docs/decisions/0016-reference-gains.md`.
+/// Vectors whose gains are not the optimum to 1e-5, with the gains that are: `docs/decisions/0017-reference-gains.md`.
 /// The same to 3e-7 with steps half and a quarter as long and with differences three times as long or short.
 const CORRECTED: [(usize, [f64; 3]); 5] = [
     (1, [0.836570, 0.793427, 0.316488]),
