@@ -25,9 +25,9 @@ fn with_factors([gain, lag, body, tau]: [f64; 4]) -> Model {
         .into()
 }
 
-/// 200 draws with spreads of 0.5, 3, 12 and 3 % about it, by the Weyl sequence of four irrational numbers.
-fn draws() -> Vec<Model> {
-    let spreads = [0.005, 0.03, 0.12, 0.03];
+/// 200 draws with spreads of 0.5, 3, 12 and 3 % about it times `width`, by the Weyl sequence of four irrational numbers.
+fn draws(width: f64) -> Vec<Model> {
+    let spreads = [0.005, 0.03, 0.12, 0.03].map(|spread| width * spread);
     let steps = [
         2.0_f64.sqrt(),
         3.0_f64.sqrt(),
@@ -69,8 +69,16 @@ fn one_rate_process(bencher: divan::Bencher, form: &str) {
 
 #[divan::bench(args = ["pd", "pid", "cascade_pi", "cascade_pid"], sample_count = 20)]
 fn two_hundred_draws(bencher: divan::Bencher, form: &str) {
-    let (model, draws, asked) = (model(), draws(), balanced(form));
+    let (model, draws, asked) = (model(), draws(1.0), balanced(form));
     bencher.bench(|| design_over(&model, &draws, &asked).expect("feasible"));
+}
+
+// A posterior so wide that no controller keeps the style.
+#[divan::bench(sample_count = 20)]
+fn two_hundred_draws_refused(bencher: divan::Bencher) {
+    let (model, draws) = (model(), draws(40.0));
+    let asked = Specification::new(Form::Pid, Style::Calm);
+    bencher.bench(|| design_over(&model, &draws, &asked).expect_err("infeasible"));
 }
 
 #[divan::bench]

@@ -3,12 +3,15 @@
 //! | rule | needs | reference |
 //! |------|-------|-----------|
 //! | [`simc()`] | [`HalfRule`] | S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", J. Process Control 13 (2003) |
-//! | [`amigo()`] | [`StepFeatures`] | K. J. Astrom, T. Hagglund, "Advanced PID Control" (ISA, 2006), chapter 7 |
+//! | [`amigo()`] | [`StepFeatures`] | K. J. Astrom, T. Hagglund, J. Process Control 14 (2004), 635; "Advanced PID Control" (ISA, 2006), chapter 7 |
 //! | [`ziegler_nichols()`] | [`Ultimate`] | J. G. Ziegler, N. B. Nichols, Trans. ASME 64 (1942) |
-//! | [`tyreus_luyben()`] | [`Ultimate`] | B. D. Tyreus, W. L. Luyben, Ind. Eng. Chem. Res. 31 (1992) |
+//! | [`tyreus_luyben()`] | [`Ultimate`] | PI: B. D. Tyreus, W. L. Luyben, Ind. Eng. Chem. Res. 31 (1992), 2625; PID: W. L. Luyben, the same 35 (1996), 3480 |
+//! | [`Homogeneous`] | a relay oscillation | the paper, equations 11 to 13 |
 //!
 //! All rules return PI or PID without measurement filter; a rule has no controller of another form. They assume a positive
 //! or negative gain of the process and return gains of the same sign.
+
+mod homogeneous;
 
 use std::f64::consts::{PI, TAU};
 
@@ -17,6 +20,8 @@ use crate::controller::{Execution, Form, Ideal, Pid, Series};
 use crate::model::Model;
 use crate::model::state_space::StateSpace;
 use crate::roots::root;
+
+pub use homogeneous::Homogeneous;
 
 /// First- or second-order model by the half rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -362,8 +367,8 @@ mod tests {
         near(rule.integral_time_s, 6.8, 1e-9);
     }
 
-    // Astrom, Hagglund (2006), section 7: 1/(s + 1)^4 has L = 1.42, T = 2.9: PI K = 0.414, Ti = 2.66; PID K = 1.12,
-    // Ti = 2.40, Td = 0.619.
+    // The balanced example of the article, 1/(s + 1)^4 with L = 1.42 and T = 2.9. By hand from the rule: L T/(L + T)^2 = 0.2207,
+    // so PI K = 0.15 + 0.1293 T/L = 0.414, Ti = 2.66; PID K = 0.2 + 0.45 T/L = 1.12, Ti = 2.40, Td = 0.619.
     #[test]
     fn amigo_of_the_balanced_process() {
         let features = StepFeatures::SelfRegulating {
@@ -402,8 +407,8 @@ mod tests {
         near(lag_s, 2.146_193 - tangent, 1e-5);
     }
 
-    // 1/(s + 1)^3 as an example of the rule (Astrom, Hagglund 2006, section 6.2): ultimate gain 8, period 3.63 s; PID K = 4.8,
-    // Ti = 1.81, Td = 0.45.
+    // Our own example: (1 + j w)^3 has the phase -pi at w = sqrt(3), where its magnitude is 8. So the ultimate gain is 8, the
+    // period 2 pi/sqrt(3) = 3.63 s; PID K = 4.8, Ti = 1.81, Td = 0.45.
     #[test]
     fn ziegler_nichols_of_three_lags() {
         let model: Model = Linear::new(Structure::ResonantLag)
@@ -423,7 +428,8 @@ mod tests {
     }
 
     // Tyreus, Luyben (1992): an integrator with dead time D has Ku = pi/(2 K D), Pu = 4 D, and the PI Kc = 0.487/(K D),
-    // Ti = 8.75 D; the rule rounds both to about 1 %.
+    // Ti = 8.75 D; the rule rounds both to about 1 %. Luyben (1996), abstract: the PID has Kc = 0.46 Ku, and Td is the inverse
+    // of the ultimate frequency.
     #[test]
     fn tyreus_luyben_of_an_integrator_with_dead_time() {
         let model: Model = Linear::new(Structure::Iptd)
@@ -436,5 +442,11 @@ mod tests {
         let pi = tyreus_luyben(&ultimate, Form::Pi).unwrap().ideal().unwrap();
         near(pi.gain, 0.487, 0.01);
         near(pi.integral_time_s, 8.75 * 0.5, 0.1);
+        let pid = tyreus_luyben(&ultimate, Form::Pid)
+            .unwrap()
+            .ideal()
+            .unwrap();
+        near(pid.gain / ultimate.gain, 0.46, 0.02);
+        near(pid.derivative_time_s * TAU / ultimate.period_s, 1.0, 0.01);
     }
 }

@@ -23,7 +23,7 @@
 //! The candidates are the optima of the draws: each of them keeps the specified margin on a likely process. An
 //! unconstrained search over both gains finds controllers of the same expected loss with a third of the margin.
 
-mod named;
+pub(crate) mod named;
 mod outcome;
 mod specification;
 

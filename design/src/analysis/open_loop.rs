@@ -83,18 +83,34 @@ impl OpenLoop {
         (ends.0.is_normal() && ends.1.is_finite()).then_some((ends.0, ends.1.max(10.0 * ends.0)))
     }
 
-    /// Grid of frequencies with the loop, from `first` until `is_done(w, L)`. `None` if it needs too many.
-    pub(crate) fn walk(
-        &self,
-        first: f64,
-        is_done: impl Fn(f64, Complex64) -> bool,
-    ) -> Option<Vec<(f64, Complex64)>> {
+    /// Step from a frequency for the loop without its dead time.
+    pub(crate) fn undelayed_step(&self, omega: f64) -> f64 {
+        grid_step(omega, 0.0, self.resonance, GRID_STEP)
+    }
+
+    /// Frequency in a [range](Self::range) above which `|L|` stays below `least`. The dead time does not change `|L|`, so the
+    /// grid has some hundred frequencies also where the dead time is long.
+    pub(crate) fn end(&self, [first, last]: [f64; 2], least: f64) -> f64 {
+        let magnitude =
+            |omega: f64| self.numerator.at(omega).norm() / self.denominator.at(omega).norm();
+        let (mut omega, mut end) = (first, first);
+        while omega < last || magnitude(omega) >= least {
+            let next = omega + self.undelayed_step(omega);
+            if magnitude(omega) >= least || magnitude(next) >= least {
+                end = next;
+            }
+            omega = next;
+        }
+        end
+    }
+
+    /// Grid of frequencies with the loop, from `first` to `end`. `None` if it needs too many.
+    pub(crate) fn walk(&self, first: f64, end: f64) -> Option<Vec<(f64, Complex64)>> {
         let mut points = Vec::with_capacity(1024);
         let mut omega = first;
         while points.len() < MOST_FREQUENCIES {
-            let value = self.at(omega);
-            points.push((omega, value));
-            if is_done(omega, value) {
+            points.push((omega, self.at(omega)));
+            if omega >= end {
                 return Some(points);
             }
             omega += self.step(omega);

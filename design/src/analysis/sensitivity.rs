@@ -51,8 +51,7 @@ impl<'a> Curve<'a> {
     /// `None` if the loop has no finite frequencies of interest.
     pub(crate) fn new(open_loop: &'a OpenLoop) -> Option<Self> {
         let (first, last) = open_loop.range()?;
-        let is_done = |omega: f64, value: Complex64| omega > last && value.norm() < LEAST;
-        let points = open_loop.walk(first, is_done)?;
+        let points = open_loop.walk(first, open_loop.end([first, last], LEAST))?;
         Some(Self { open_loop, points })
     }
 

@@ -2,13 +2,16 @@
 //!
 //! The dead time does not act on the highest power of `f(s) = D(s) + N(s) e^(-tau s)`. So the loop is stable if and only if
 //! `arg f(jw)` grows by `pi/2` for each power from `w = 0` to infinity. The argument is followed in steps of at most
-//! 0.7 rad until `|L| < 1/2` for good; from there on it is that of `D` to within `pi/6`.
+//! 0.7 rad until `|L| < 1/2` for good; from there on it is that of `D` to within `pi/6`, without dead time.
 
 use std::f64::consts::FRAC_PI_2;
 
 use num_complex::Complex64;
 
 use super::open_loop::OpenLoop;
+
+/// Magnitude of `L` from which on its turns do not count.
+const LARGEST_MAGNITUDE: f64 = 0.5;
 
 /// Largest turn of `f` that counts as one step (rad).
 const LARGEST_TURN_RAD: f64 = 0.7;
@@ -43,18 +46,24 @@ fn turn(open_loop: &OpenLoop, first: f64, last: f64) -> Option<f64> {
         let delay = Complex64::cis(-omega * open_loop.tau);
         open_loop.denominator.at(omega) + open_loop.numerator.at(omega) * delay
     };
+    let d = |omega: f64| open_loop.denominator.at(omega);
+    let end = open_loop.end([first, last], LARGEST_MAGNITUDE);
     let mut omega = first;
     let mut here = f(omega);
     let mut turned = 0.0;
     for _ in 0..MOST_STEPS {
-        let magnitude =
-            open_loop.numerator.at(omega).norm() / open_loop.denominator.at(omega).norm();
-        if omega > last && magnitude < 0.5 {
-            // From here to infinity: arg D(inf) - arg D(w) - arg(1 + L(w)). D is its highest power almost.
-            let d = open_loop.denominator.at(omega);
+        if omega >= end {
+            // From here to infinity: arg D(inf) - arg D(w) - arg(1 + L(w)).
+            turned -= (here / d(omega)).arg();
+            while omega < last {
+                let next = omega + open_loop.undelayed_step(omega);
+                turned += (d(next) / d(omega)).arg();
+                omega = next;
+            }
+            // D is its highest power almost.
             let highest = Complex64::i().powu(open_loop.denominator.degree() as u32)
                 * open_loop.denominator.coefficients().last()?.signum();
-            return Some(turned + (highest / d).arg() - (here / d).arg());
+            return Some(turned + (highest / d(omega)).arg());
         }
         let (mut step, mut halvings) = (STEPS * open_loop.step(omega), 0);
         loop {

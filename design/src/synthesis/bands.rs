@@ -191,38 +191,66 @@ struct Scan<'a> {
     tolerance: f64,
     band: Option<Band>,
     bands: Vec<Band>,
-    /// Least gain below a band that turns downwards.
+    /// Turns of the bands so far.
+    turns: i32,
+    /// Least gain below the bands that turned downwards since the turns were last zero: no later band can matter at less.
     least: f64,
-    is_first: bool,
+    /// The last frequency with its loop. `None` at the first one.
+    last: Option<(f64, Complex64)>,
 }
 
 impl Scan<'_> {
     #[inline]
-    fn add(&mut self, before: f64, omega: f64, l: Complex64) {
-        match (self.limits.forbidden(omega, l), &mut self.band) {
+    fn add(&mut self, omega: f64, l: Complex64) {
+        let interval = self.limits.forbidden(omega, l);
+        if let Some((before, last)) = self.last
+            && (last.im < 0.0) != (l.im < 0.0)
+            && last.re.min(l.re) < 0.0
+        {
+            // The phase passes -pi, where gains are always forbidden. A grid that is coarse for the limits may step over them.
+            let is_seen = self.band.is_some() && interval.is_some();
+            if self.limits.gain_margin > 1.0 || !is_seen {
+                self.cross([before, omega], [last, l]);
+            }
+        }
+        match (interval, &mut self.band) {
             (None, None) => {}
             (Some(interval), band) => {
-                let from_first = self.is_first;
+                let from_first = self.last.is_none();
                 let band = band.get_or_insert_with(|| Band::new(l, from_first));
-                if self.limits.gain_margin > 1.0 && (band.last_imaginary < 0.0) != (l.im < 0.0) {
-                    let crossing = root(|omega| self.open_loop.at(omega).im, before, omega, 0.0);
-                    let margin = self.limits.at_phase_crossing(self.open_loop.at(crossing));
-                    band.push(crossing, union(Some(interval), margin).unwrap_or(margin));
-                }
                 band.push(omega, interval);
                 band.last_imaginary = l.im;
             }
-            (None, Some(_)) => {
-                if let Some(mut band) = self.band.take() {
-                    band.finish(omega);
-                    if band.turns() < 0 && !band.from_first {
-                        self.least = self.least.min(band.low);
-                    }
-                    self.bands.push(band);
-                }
-            }
+            (None, Some(_)) => self.finish(omega),
         }
-        self.is_first = false;
+        self.last = Some((omega, l));
+    }
+
+    /// Adds the phase crossing between two frequencies with their loops.
+    fn cross(&mut self, [before, after]: [f64; 2], ends: [Complex64; 2]) {
+        let crossing = root(|omega| self.open_loop.at(omega).im, before, after, 0.0);
+        let l = self.open_loop.at(crossing);
+        if let Some(interval) = self.limits.forbidden(crossing, l) {
+            let margin = self.limits.at_phase_crossing(l);
+            let band = self.band.get_or_insert_with(|| Band::new(ends[0], false));
+            band.push(crossing, union(Some(interval), margin).unwrap_or(margin));
+            band.last_imaginary = ends[1].im;
+        }
+    }
+
+    /// Ends the band before `omega`.
+    fn finish(&mut self, omega: f64) {
+        if let Some(mut band) = self.band.take() {
+            band.finish(omega);
+            self.turns += band.turns();
+            if self.turns >= 0 {
+                // Higher gains are stable again.
+                self.least = f64::INFINITY;
+            } else if band.turns() < 0 && !band.from_first {
+                self.least = self.least.min(band.low);
+            }
+            self.bands.push(band);
+        }
     }
 
     /// Turns at frequency zero, by the integrators of the loop.
@@ -349,7 +377,7 @@ pub(crate) fn extremum(open_loop: &OpenLoop, limits: &Limits, omega: f64, is_low
 }
 
 /// Gains of the shape in `open_loop` (its gain is 1) that `limits` allow. `path` is the feedback path of the shape, `grid`
-/// the process. The scan starts at the first of `ends`, and `|L|` never rises above the second.
+/// the process. The scan starts at the first of `ends`; neither `|L|` nor the phase rises above the second.
 pub(crate) fn allowed(
     grid: &mut Grid,
     open_loop: &OpenLoop,
@@ -367,17 +395,17 @@ pub(crate) fn allowed(
         },
         band: None,
         bands: Vec::new(),
+        turns: 0,
         least: f64::INFINITY,
-        is_first: true,
+        last: None,
     };
+    scan.turns = scan.first_turns();
     let share = (1.0 - 1.0 / limits.ms.min(limits.mt)).min(1.0 / limits.gain_margin);
     let start = grid.first_from(first);
-    let mut before = first;
     for i in start..start + MOST_FREQUENCIES {
         let (omega, process) = grid.point(i);
         let l = process * path(omega);
-        scan.add(before, omega, l);
-        before = omega;
+        scan.add(omega, l);
         // With falling |L| no later frequency forbids gains below share/|l|.
         if omega > corner && share * share > 4.0 * scan.least * scan.least * l.norm_sqr() {
             return scan.allowed();
@@ -391,4 +419,33 @@ pub(crate) fn allowed(
         }
     }
     Err(NoGain::Unbounded)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::analysis::Law;
+    use crate::analysis::process::Stage;
+    use crate::controller::Execution;
+
+    // k e^(-s)/s turns about -1 at k = pi/2. Ms = Mt = m allows a gain below that: the closer, the larger m. The forbidden
+    // phases are 2 asin(1/m) wide, 0.2 rad for m = 10, but a step of the coarse grid turns the plot by 0.6 rad.
+    #[test]
+    fn a_coarse_grid_sees_narrow_bands() {
+        let process =
+            Process::of_stages(1.0, &[Stage::Pole(0.0)], 1.0, &Execution::default()).unwrap();
+        let law = Law::pid(&process, [1.0, 0.0, 0.0], 0.0);
+        let plant = OpenLoop::new(&process, &law);
+        for m in [1.6, 3.0, 10.0] {
+            let found = [0.04, 0.15].map(|fraction| {
+                let mut grid = Grid::new(&process, plant, fraction);
+                let path = |_: f64| Complex64::ONE;
+                allowed(&mut grid, &plant, path, &Limits::of(m), [0.01, 0.0]).unwrap()
+            });
+            assert!((found[1].high / found[0].high - 1.0).abs() < 1e-6, "{m}");
+            let ultimate = std::f64::consts::FRAC_PI_2;
+            let share = found[0].high / ultimate;
+            assert!(share < 1.0 && share > 1.0 - 2.0 / m, "{m} {share}");
+        }
+    }
 }

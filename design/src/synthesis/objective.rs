@@ -23,8 +23,14 @@ pub(crate) const PENALTY: f64 = 10.0;
 /// Tolerance of the logarithm of a gain that noise or the peak of the input limits.
 const GAIN_TOLERANCE: f64 = 1e-9;
 
+/// A gain whose logarithm exceeds its limit by more than this has not converged.
+const CLOSE: f64 = 1e-6;
+
 /// Most evaluations of noise or peak for one gain.
-const MOST_EVALUATIONS: usize = 12;
+const MOST_EVALUATIONS: usize = 40;
+
+/// Most zeros of a law.
+const ZEROS: f64 = 3.0;
 
 /// Below this share of the inverse of its longest time, a loop is its integrators.
 const ASYMPTOTIC: f64 = 0.01;
@@ -140,7 +146,7 @@ impl Problem {
 
     /// Frequencies between which a loop with this law is scanned. Below the first one the loop is its integrators; above the
     /// second one its magnitude never rises: the process falls at least as fast there as the controller can rise, and a
-    /// resonance is passed.
+    /// resonance is passed. Nor does its phase: the zeros of the controller are passed.
     pub(crate) fn ends(&self, law: &Law) -> [f64; 2] {
         let rise = if law.k2 != 0.0 {
             2
@@ -166,8 +172,34 @@ impl Problem {
             .into_iter()
             .filter(|time| time.is_finite())
             .fold(1.0, f64::max);
-        [ASYMPTOTIC / longest, 2.0 * corner.max(resonance)]
+        let zeros = last_rise(law, self.process.tau);
+        [
+            ASYMPTOTIC / longest,
+            (2.0 * corner.max(resonance)).max(zeros),
+        ]
     }
+}
+
+/// Frequency above which the phase of a loop with this law and the dead time `tau` only falls.
+///
+/// Far above the frequency `w0` of a zero its phase rises by less than `w0/w^2` per unit of frequency, that of the dead time
+/// falls by `tau`. A real zero that is faster than the dead time never makes the phase rise, complex ones do.
+fn last_rise(law: &Law, tau: f64) -> f64 {
+    let slope = law.kd + law.kf;
+    let coefficients = [law.ki, law.kp, slope, law.k2];
+    let real = coefficients
+        .windows(2)
+        .map(|pair| (pair[0] / pair[1], false));
+    let complex = coefficients.windows(3).map(|three| {
+        let is_complex = three[1] * three[1] < 4.0 * three[0] * three[2];
+        ((three[0] / three[2]).sqrt(), is_complex)
+    });
+    (real.chain(complex))
+        .filter(|(zero, is_complex)| {
+            zero.is_finite() && *zero > 0.0 && (*is_complex || zero * tau < ZEROS)
+        })
+        .map(|(zero, _)| (ZEROS * zero / tau).sqrt().clamp(2.0 * zero, 10.0 * zero))
+        .fold(0.0, f64::max)
 }
 
 /// Loop of a unit gain: the process itself.
@@ -371,5 +403,5 @@ fn limited(k: f64, excess: impl Fn(f64) -> Option<f64>) -> Option<f64> {
         }
     }
     // On the safe side of the limit.
-    Some((x - f.max(0.0)).exp().min(k))
+    (f < CLOSE).then(|| (x - f.max(0.0)).exp().min(k))
 }

@@ -34,6 +34,9 @@ const WELL_INSIDE: f64 = -0.1;
 /// A result whose least gain exceeds its largest one by more than this is infeasible.
 pub(crate) const FEASIBLE: f64 = 1e-6;
 
+/// The logarithm of the cost is that of the coarse grid within this. More than that is another range of allowed gains.
+const SAME: f64 = 0.05;
+
 /// A shape with its gain.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Optimum {
@@ -71,15 +74,24 @@ pub(crate) fn optimum(problem: Problem) -> Result<Optimum, NoOptimum> {
     }
     let best = search(&mut coarse, &starts)?;
     let mut fine = Objective::new(problem, FINE_GRID);
-    if let Ok(found) = finish(&mut fine, &best.point) {
+    let is_same = |found: &Optimum| found.ln_cost < best.value + SAME;
+    if let Some(found) = finish(&mut fine, &best.point).ok().filter(is_same) {
         return Ok(found);
     }
-    // The coarse grid took an infeasible shape for a feasible one: back inside, and again with shapes that are feasible.
+    // The coarse grid took a shape for feasible that is not, or that is at lower gains only: again with feasible shapes.
+    fine.is_strict = true;
+    let start = Best {
+        value: fine.cost(&best.point),
+        point: best.point.clone(),
+    };
+    let again = minimise(&mut |z: &[f64]| fine.cost(z), &start, SECOND);
+    if again.value < NO_COST {
+        return finish(&mut fine, &again.point);
+    }
     let excess = fine
         .gain(&best.point)
         .map_or(NO_COST, |gain| (gain.low / gain.k).ln());
     let inside = feasible(&mut fine, &best.point, excess).ok_or(NoOptimum::Infeasible)?;
-    fine.is_strict = true;
     let best = minimise(&mut |z: &[f64]| fine.cost(z), &inside, SECOND);
     finish(&mut fine, &best.point)
 }
@@ -130,8 +142,12 @@ fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOpti
         }
     };
     let mut cost = |z: &[f64]| objective.cost(z);
-    let first = minimise(&mut cost, &best, FIRST);
-    Ok(minimise(&mut cost, &first, SECOND))
+    let mut best = minimise(&mut cost, &best, FIRST);
+    if best.point.len() > 2 {
+        // With more variables the simplex may collapse on a kink.
+        best = minimise(&mut cost, &best, FIRST);
+    }
+    Ok(minimise(&mut cost, &best, SECOND))
 }
 
 /// A feasible shape with a cost, from an infeasible start: the search minimises the excess of the least gain.

@@ -214,7 +214,7 @@ fn solve(mut matrix: Matrix) -> Option<Vec<f64>> {
 
 impl Objective {
     /// Logarithm of the cost of a shape with gain `k`, from a refined simulation.
-    fn fine_cost(&self, z: &[f64], k: f64, omega: f64, refinement: f64) -> f64 {
+    pub(super) fn fine_cost(&self, z: &[f64], k: f64, omega: f64, refinement: f64) -> f64 {
         let law = self.problem.family.law(&self.problem.process, z).scaled(k);
         let found = self.problem.integrals(&law, omega, refinement);
         found.map_or(NO_COST, |found| found.iae.ln())

@@ -13,7 +13,8 @@ use super::objective::{NO_COST, Objective, PENALTY, Problem};
 use super::optimum::{NoOptimum, Optimum};
 use super::simplex::{Best, Extent, minimise};
 
-/// Draws over which the cost is averaged.
+/// Draws over which the cost is averaged: in the first simplex, and in the second one and the result.
+const FIRST_COST_DRAWS: usize = 4;
 const COST_DRAWS: usize = 12;
 
 /// Step of the grids of the draws. The extrema are refined, so it only has to find each band.
@@ -119,8 +120,9 @@ impl Draws {
             .unwrap_or((0.0, f64::INFINITY))
     }
 
-    fn mean_cost(&self, z: &[f64], k: f64, omega: f64) -> f64 {
-        let count = self.objectives.len().min(COST_DRAWS);
+    /// Mean cost of a shape with gain `k` over the first draws, at most this many.
+    fn mean_cost(&self, z: &[f64], (k, omega): (f64, f64), most: usize) -> f64 {
+        let count = self.objectives.len().min(most);
         let costs =
             self.objectives
                 .iter()
@@ -152,7 +154,7 @@ impl Draws {
         let kept = intervals.iter().filter(is_kept).count();
         Performance {
             coverage: kept as f64 / count.max(1) as f64,
-            mean_cost: self.mean_cost(&best.z, k, best.gain.omega),
+            mean_cost: self.mean_cost(&best.z, (k, best.gain.omega), COST_DRAWS),
         }
     }
 
@@ -169,67 +171,86 @@ impl Draws {
         Some((k, excess + (high / k).ln()))
     }
 
+    /// Sets the limits of `Ms` and `Mt`.
+    pub(crate) fn set_peak(&mut self, peak: f64) {
+        let problems = self.objectives.iter_mut().map(|draw| &mut draw.problem);
+        for problem in problems.chain([&mut self.nominal]) {
+            (problem.limits.ms, problem.limits.mt) = (peak, peak);
+        }
+    }
+
+    /// Logarithm of the mean cost of a shape over the first draws, with the penalty of an infeasible gain.
+    fn cost(&mut self, z: &[f64], omega: f64, most: usize) -> f64 {
+        let Some((k, excess)) = self.limited(z, omega) else {
+            return NO_COST;
+        };
+        let mean = self.mean_cost(z, (k, omega), most);
+        if mean.is_finite() {
+            mean.ln() + PENALTY * excess.max(0.0)
+        } else {
+            NO_COST
+        }
+    }
+
     /// Optimum over the draws, from the nominal one.
     pub(crate) fn optimum(&mut self, nominal: &Optimum) -> Result<Optimum, NoOptimum> {
         let omega = nominal.gain.omega;
-        let start = self.feasible(nominal).ok_or(NoOptimum::Infeasible)?;
-        let mut cost = |z: &[f64]| {
-            let Some((k, excess)) = self.limited(z, omega) else {
-                return NO_COST;
-            };
-            let mean = self.mean_cost(z, k, omega);
-            if mean.is_finite() {
-                mean.ln() + PENALTY * excess.max(0.0)
-            } else {
-                NO_COST
-            }
-        };
-        let start = Best {
-            value: cost(&start),
-            point: start,
-        };
-        let first = minimise(&mut cost, &start, FIRST);
-        let best = minimise(&mut cost, &first, SECOND);
-        let (k, excess) = self
-            .limited(&best.point, omega)
-            .ok_or(NoOptimum::Infeasible)?;
+        let start = self.feasible(&nominal.z, omega);
+        let mut point = start.ok_or(NoOptimum::Infeasible)?;
+        let mut value = NO_COST;
+        for (extent, most) in [(FIRST, FIRST_COST_DRAWS), (SECOND, COST_DRAWS)] {
+            value = self.cost(&point, omega, most);
+            let mut cost = |z: &[f64]| self.cost(z, omega, most);
+            let best = minimise(&mut cost, &Best { value, point }, extent);
+            (value, point) = (best.value, best.point);
+        }
+        let (k, excess) = self.limited(&point, omega).ok_or(NoOptimum::Infeasible)?;
         let mut found = nominal.clone();
-        (found.z, found.gain.k, found.ln_cost) = (best.point, k, best.value);
-        if excess <= 0.0 && best.value < NO_COST {
+        (found.z, found.gain.k, found.ln_cost) = (point, k, value);
+        if excess <= 0.0 && value < NO_COST {
             Ok(found)
         } else {
             Err(NoOptimum::Infeasible)
         }
     }
 
-    /// A shape that keeps the limits on enough draws.
-    pub(crate) fn feasible(&mut self, nominal: &Optimum) -> Option<Vec<f64>> {
-        let omega = nominal.gain.omega;
+    /// A shape that keeps the limits on enough draws, from a shape that does on fewer. The simulations have the frequency
+    /// `omega`.
+    pub(crate) fn feasible(&mut self, from: &[f64], omega: f64) -> Option<Vec<f64>> {
+        // Longer times of integral and angle loop separate the ends of the gain.
         let slow = self.nominal.family.slow_variables();
+        let longer = LONGER.iter().map(|longer| {
+            let mut point = from.to_vec();
+            point.iter_mut().take(slow).for_each(|z| *z += longer);
+            point
+        });
+        let near = self.feasible_from(longer, omega);
+        // A wide posterior has its shapes far from that of one process.
+        let starts = |draws: &Self| draws.nominal.family.starts(&draws.nominal.process);
+        near.or_else(|| self.feasible_from(starts(self).into_iter(), omega))
+    }
+
+    /// A shape that keeps the limits on enough draws: a search from the first start that does, else from the nearest one.
+    fn feasible_from(
+        &mut self,
+        starts: impl Iterator<Item = Vec<f64>>,
+        omega: f64,
+    ) -> Option<Vec<f64>> {
         let mut excess = |z: &[f64]| {
             self.limited(z, omega)
                 .map_or(NO_COST, |(_, excess)| excess.max(WELL_INSIDE))
         };
-        // Longer times of integral and angle loop separate the ends of the gain.
-        let mut start: Option<Best> = None;
-        for longer in LONGER {
-            let mut point = nominal.z.clone();
-            for variable in point.iter_mut().take(slow) {
-                *variable += longer;
-            }
+        let mut nearest: Option<Best> = None;
+        for point in starts {
             let value = excess(&point);
-            if value < start.as_ref().map_or(f64::INFINITY, |best| best.value) {
-                start = Some(Best { value, point });
-            }
             if value <= 0.0 {
-                break;
+                return Some(point);
+            }
+            if value < nearest.as_ref().map_or(f64::INFINITY, |best| best.value) {
+                nearest = Some(Best { value, point });
             }
         }
-        let start = start?;
-        if start.value <= 0.0 {
-            return Some(start.point);
-        }
-        let found = minimise(&mut excess, &start, FEASIBILITY);
+        let found = minimise(&mut excess, &nearest?, FEASIBILITY);
         (found.value <= 0.0).then_some(found.point)
     }
 }

@@ -157,7 +157,7 @@ impl Family {
             start.insert(2, (share * fast).ln());
             start
         };
-        [0.03, 0.1, 0.3, 1.0].map(start).to_vec()
+        [0.011, 0.03, 0.1, 0.3, 1.0].map(start).to_vec()
     }
 
     /// Variables to start a search from. A cascade with PID starts [from one with PI](Self::with_rate_derivative).
@@ -174,7 +174,7 @@ impl Family {
             integral_times.extend([30.0, 100.0, 300.0, 1000.0]);
         }
         if fast > 0.0 && fast < 0.1 {
-            integral_times.extend([3.0 * fast, 8.0 * fast, 20.0 * fast, 60.0 * fast]);
+            integral_times.extend([3.0, 5.0, 8.0, 13.0, 20.0, 35.0, 60.0].map(|t| t * fast));
         }
         let mut derivative_times = vec![0.1, 0.4, 1.0];
         if is_integrating {
@@ -196,9 +196,9 @@ impl Family {
             Form::Pid => (integral_times.iter())
                 .flat_map(|ti| {
                     let shares: &[f64] = if is_double {
-                        &[0.03, 0.12, 0.3, 0.6]
+                        &[0.03, 0.12, 0.3, 0.45, 0.6]
                     } else {
-                        &[0.12, 0.3, 0.6]
+                        &[0.12, 0.3, 0.45, 0.6]
                     };
                     shares
                         .iter()

@@ -1,11 +1,14 @@
 //! Designs against an independent implementation and brute force.
 
 use crate::analysis::vectors::{VECTORS, Vector};
+use crate::controller::Form;
+use crate::model::{Linear, Model, Structure};
 use crate::synthesis::limits::Limits;
 use crate::synthesis::objective::{Objective, Problem};
 use crate::synthesis::optimum::{FINE_GRID, optimum};
 use crate::synthesis::polish::polish;
 use crate::synthesis::shape::{Family, Filter};
+use crate::tuning::{Specification, Style, named};
 
 fn problem(vector: &Vector) -> Problem {
     let process = vector.process();
@@ -21,10 +24,21 @@ fn problem(vector: &Vector) -> Problem {
     }
 }
 
-/// Vectors whose gains differ by up to 8e-4, where the cost is flat. With the largest gain that their shapes allow, 1, 3 and 11
-/// cost more than ours, by 7e-10, 1e-5 and 1e-7. No gain of the shapes 8 and 10 keeps the limits: the ends of their intervals
-/// miss each other by 8e-6 and 4e-6, and they cost 6e-7 and 2e-6 less.
-const LOOSE: [usize; 5] = [1, 3, 8, 10, 11];
+/// Vectors whose gains are not the optimum to 1e-5, with the gains that are: `docs/decisions/0017-reference-gains.md`.
+/// The same to 3e-7 with steps half and a quarter as long and with differences three times as long or short.
+const CORRECTED: [(usize, [f64; 3]); 5] = [
+    (1, [0.836570, 0.793427, 0.316488]),
+    (3, [6.19286, 2.65243, 2.77929]),
+    (8, [0.598782, 0.178328, 0.262720]),
+    (10, [26.6782, 32.3169, 10.7388]),
+    (11, [47.6914, 93.7459, 13.9438]),
+];
+
+/// Gains of least cost, to six digits.
+fn gains(i: usize) -> [f64; 3] {
+    let corrected = CORRECTED.iter().find(|(vector, _)| *vector == i);
+    corrected.map_or(VECTORS[i].gains, |(_, gains)| *gains)
+}
 
 // The gains of the vectors to 1e-5, and at no more cost. The gains of the vectors are rounded to six digits, so that they
 // exceed the limits by up to 2e-6: their cost may be lower by 3e-6.
@@ -38,13 +52,9 @@ fn gains_of_the_vectors() {
         let found = polish(&mut Objective::new(problem, FINE_GRID), &found);
         let law = problem.family.law(&process, &found.z).scaled(found.gain.k);
         let pid = law.controller(&process);
-        let tolerance = if LOOSE.contains(&i) { 1e-3 } else { 1e-5 };
-        for (found, expected) in [pid.kp, pid.ki, pid.kd].iter().zip(vector.gains) {
+        for (found, expected) in [pid.kp, pid.ki, pid.kd].iter().zip(gains(i)) {
             let off = (found - expected).abs();
-            assert!(
-                off <= tolerance * expected,
-                "vector {i}: {found} {expected}"
-            );
+            assert!(off <= 1e-5 * expected, "vector {i}: {found} {expected}");
         }
         let unit = if law.ki == 0.0 {
             process.unit_s
@@ -59,34 +69,106 @@ fn gains_of_the_vectors() {
     }
 }
 
-// Grids of shapes with steps of 4 % about the whole range find no cost that is lower by more than 0.1 %.
+// About the corrected optima no shape that keeps the limits costs less, in 48 directions at distances of 0.03 to 3 % in the
+// logarithms of the times. The cost is exact to 1e-9; at the gains of the vectors it is higher by up to 1e-5.
 #[test]
-fn brute_force_finds_nothing_better() {
-    for i in [2, 6, 13, 15, 20] {
-        let vector = &VECTORS[i];
-        let problem = problem(vector);
+fn the_corrected_gains_are_optimal() {
+    for (i, _) in CORRECTED {
+        let problem = problem(&VECTORS[i]);
         let found = optimum(problem).unwrap();
         let mut objective = Objective::new(problem, FINE_GRID);
-        objective.is_strict = true;
-        let mut least = f64::INFINITY;
-        let steps = |from: f64, to: f64, step: f64| {
-            (0..=((to - from) / step) as usize).map(move |i| from + step * i as f64)
-        };
-        if found.z.len() == 1 {
-            for ti in steps(-4.0, 3.0, 0.04) {
-                least = least.min(objective.cost(&[ti]));
-            }
-        } else {
-            for ti in steps(-3.0, 2.0, 0.1) {
-                for td in steps(-5.0, 1.0, 0.1) {
-                    least = least.min(objective.cost(&[ti, td]));
+        let best = polish(&mut objective, &found);
+        let mut feasible = 0;
+        for step in 0..48 {
+            let (sin, cos) = (std::f64::consts::TAU * f64::from(step) / 48.0).sin_cos();
+            for distance in [3e-4, 3e-3, 3e-2] {
+                let z = [best.z[0] + distance * cos, best.z[1] + distance * sin];
+                let gain = objective.gain(&z).unwrap();
+                if gain.low > gain.k {
+                    continue;
                 }
+                feasible += 1;
+                let cost = objective.fine_cost(&z, gain.k, best.gain.omega, 4.0);
+                assert!(cost > best.ln_cost - 1e-9, "vector {i}: {cost} {best:?}");
             }
         }
-        assert!(
-            found.ln_cost < least + 1e-3,
-            "vector {i}: {} {least}",
-            found.ln_cost
-        );
+        // At the ends of the gain that meet, half of the directions keep the limits.
+        assert!(feasible > 50, "vector {i}: {feasible}");
     }
+}
+
+/// Process `i` of a Weyl sequence: every structure in turn, lags and dead times over two decades about 1 s, damping ratios from
+/// 0.03 to 3, and a form that fits. `None` if the form does not fit the structure.
+fn random_problem(i: usize) -> Option<Problem> {
+    let uniform = |prime: f64| (i as f64 * prime.sqrt()).fract();
+    let decades =
+        |low: f64, high: f64, prime: f64| 10_f64.powf(low + (high - low) * uniform(prime));
+    let model: Model = Linear::new(Structure::ALL[i % 9])
+        .with_lags_s([decades(-2.0, 0.0, 2.0), decades(-2.0, 0.0, 3.0)])
+        .with_pole_per_s(decades(-1.0, 1.0, 5.0))
+        .with_pair(2.0 * decades(-1.5, 0.5, 7.0), 1.0)
+        .with_tau_s(decades(-2.0, 0.0, 11.0))
+        .into();
+    let styles = [Style::Sharp, Style::Balanced, Style::Calm];
+    let asked = Specification::new(Form::ALL[i / 9 % 6], styles[i / 54 % 3]);
+    let problem = named::problem(&model, &asked).ok()?;
+    let is_hopeless = matches!(asked.form, Form::P | Form::Pi) && problem.process.integrators() > 1;
+    (!is_hopeless).then_some(problem)
+}
+
+/// Logarithm of the least cost of the shapes on a grid over more than the range of the starts.
+fn brute_force(problem: Problem) -> f64 {
+    let mut objective = Objective::new(problem, 0.08);
+    let n = problem
+        .family
+        .starts(&problem.process)
+        .first()
+        .map_or(0, Vec::len);
+    let n = n + usize::from(problem.family.form == Form::CascadePid);
+    let step = [1.0, 0.03, 0.15, 0.3][n];
+    let count = (13.0 / step) as usize;
+    let mut least = f64::INFINITY;
+    for at in 0..count.pow(n as u32) {
+        let index = |variable: usize| at / count.pow(variable as u32) % count;
+        let z: Vec<f64> = (0..n).map(|v| -7.0 + step * index(v) as f64).collect();
+        let is_in_range = problem.family.is_in_range(&problem.process, &z);
+        let Some(gain) = is_in_range.then(|| objective.gain(&z).ok()).flatten() else {
+            continue;
+        };
+        // The bound spares most simulations.
+        if gain.low <= gain.k && problem.least_cost(&z, gain.k) < least {
+            least = least.min(objective.cost(&z));
+        }
+    }
+    least
+}
+
+/// Checks a share of the problems `0..count` against brute force: 2 % at most above the least cost of the grid. Number 211, a
+/// cascade with rate PID, is 4.3 % above: its search ends in another valley.
+fn check_against_brute_force(count: usize, every: usize) -> usize {
+    let problems = (0..count).step_by(every);
+    let problems = problems.filter_map(|i| Some((i, random_problem(i)?)));
+    let (mut checked, mut worse) = (0, Vec::new());
+    for (i, problem) in problems {
+        let found = optimum(problem).map_or(f64::INFINITY, |found| found.ln_cost);
+        let excess = found - brute_force(problem);
+        if excess >= 0.02 {
+            worse.push((i, excess, problem.family.form));
+        }
+        checked += 1;
+    }
+    let is_known = |(i, excess, _): &(usize, f64, Form)| *i == 211 && *excess < 0.05;
+    assert!(worse.iter().all(is_known), "{worse:?}");
+    checked
+}
+
+#[test]
+fn brute_force_finds_nothing_better() {
+    assert!(check_against_brute_force(324, 29) >= 6);
+}
+
+#[test]
+#[ignore = "five minutes; see docs/benchmarks.md"]
+fn brute_force_on_two_hundred_processes_finds_nothing_better() {
+    assert!(check_against_brute_force(324, 1) >= 200);
 }

@@ -55,13 +55,18 @@ pub(super) fn design_over(
     let processes: Vec<Process> = (draws.iter())
         .filter_map(|draw| Process::new(&draw.linear(), &specification.execution))
         .collect();
-    let of = |problem: Problem| Draws::new(problem, &processes, specification.coverage);
-    let mut set = of(problem);
-    let best = set.optimum(&nominal).map_err(|_| DesignError::Infeasible {
-        form: specification.form,
-        least_peak: least_peak(problem.limits.ms.max(problem.limits.mt), |peak| {
-            of(with_peak(problem, peak)).feasible(&nominal).is_some()
-        }),
+    let mut set = Draws::new(problem, &processes, specification.coverage);
+    let best = set.optimum(&nominal).map_err(|_| {
+        let mut shape = nominal.z.clone();
+        let mut is_kept = |peak| {
+            set.set_peak(peak);
+            let found = set.feasible(&shape, nominal.gain.omega);
+            found.map(|found| shape = found).is_some()
+        };
+        DesignError::Infeasible {
+            form: specification.form,
+            least_peak: least_peak(problem.limits.ms.max(problem.limits.mt), &mut is_kept),
+        }
     })?;
     let (found, alone) = (
         set.performance(&best, draws.len()),
@@ -89,7 +94,7 @@ fn refusal(problem: Problem, specification: &Specification, reason: NoOptimum) -
         NoOptimum::Unbounded => DesignError::Unbounded,
         NoOptimum::Infeasible => DesignError::Infeasible {
             form: specification.form,
-            least_peak: least_peak(problem.limits.ms.max(problem.limits.mt), |peak| {
+            least_peak: least_peak(problem.limits.ms.max(problem.limits.mt), &mut |peak| {
                 optimum(with_peak(problem, peak)).is_ok()
             }),
         },
@@ -107,7 +112,7 @@ pub(super) fn with_peak(problem: Problem, peak: f64) -> Problem {
 }
 
 /// Least limit of `Ms` and `Mt` above `from` that is kept. `None` if none up to 10 is.
-pub(super) fn least_peak(from: f64, is_kept: impl Fn(f64) -> bool) -> Option<f64> {
+pub(super) fn least_peak(from: f64, is_kept: &mut impl FnMut(f64) -> bool) -> Option<f64> {
     let (mut low, mut high) = (from.min(LARGEST_PEAK), LARGEST_PEAK);
     if !is_kept(high) {
         return None;
@@ -124,7 +129,7 @@ pub(super) fn least_peak(from: f64, is_kept: impl Fn(f64) -> bool) -> Option<f64
 }
 
 /// The problem in the units of the process.
-pub(super) fn problem(
+pub(crate) fn problem(
     model: &Model,
     specification: &Specification,
 ) -> Result<Problem, DesignError> {

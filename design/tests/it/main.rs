@@ -5,9 +5,11 @@
     reason = "the lint does not recognise helper functions as parts of tests"
 )]
 
+mod campaign;
 mod cost;
 mod designs;
 mod loops;
 mod properties;
+mod random;
 mod step_response;
 mod values;
