@@ -234,9 +234,11 @@ pub use onecycle_onboard::pack::{Pack, PackError};
 // Models, controllers, design.
 #[doc(inline)]
 pub use onecycle_design::{
-    Controller, Design, DesignError, Form, Linear, LinearError, Margins, Model, Parameter,
-    Specification, StepMetrics, StepResponse, StepResponseError, Structure, Unit, design, ise,
-    margins, step_response,
+    Assessment, Autopilot, Controller, Design, DesignError, Execution, Form, Ideal, LeastMargins,
+    Linear, LinearError, LoadResponse, LowPass, Margins, MeasurementNoise, Model, Parameter, Pid,
+    Proposal, Robustness, Sensitivity, Series, Specification, StepMetrics, StepResponse,
+    StepResponseError, Structure, Style, Unit, assess, design, design_over, ise, least_margins,
+    load_iae, load_response, margins, proposals, sensitivity, step_response,
 };
 #[doc(inline)]
 pub use onecycle_onboard::{Pd, Soiptd, SoiptdError};

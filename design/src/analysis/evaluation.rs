@@ -7,7 +7,7 @@ use crate::model::Model;
 use crate::soiptd_pd::loop_response::LoopResponse;
 use crate::soiptd_pd::margins::Margins;
 use crate::soiptd_pd::step_metrics::StepMetrics;
-use crate::soiptd_pd::step_response::{Sample, StepResponse, StepResponseError};
+use crate::soiptd_pd::step_response::{Sample, StepResponse, StepResponseError, interpolated};
 
 use super::law::Law;
 use super::metrics::{Record, reference_metrics};
@@ -47,6 +47,14 @@ pub struct LoadResponse {
     pub peak: f64,
     /// Integral of the absolute error (output unit s). Infinite without an integral term.
     pub iae: f64,
+}
+
+impl LoadResponse {
+    /// Process output (output unit) and controller output (input unit) at a time (s), as [`StepResponse::at`].
+    #[must_use]
+    pub fn at(&self, t_s: f64) -> (f64, f64) {
+        interpolated(&self.samples, t_s)
+    }
 }
 
 /// A loop with its units.
