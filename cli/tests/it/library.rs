@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use onecycle::{
     CsvOptions, Excitation, Identification, Identify, Method, Pack, Recording, Remark, Road,
-    Verdict, with_signals,
+    Specification, Verdict, with_signals,
 };
 use onecycle_identify::{Options, Signals};
 use serde_json::{Value, json};
@@ -58,6 +58,7 @@ fn the_program_says_what_the_library_finds() {
         assert_eq!(report.0["controller"]["form"], json!(form), "{name}");
         for (pointer, ours) in [
             ("/controller/kp", design.controller.kp()),
+            ("/controller/ki", design.controller.ki()),
             ("/controller/kd", design.controller.kd()),
             ("/margins/delay_margin_s", design.margins.delay_margin_s),
             ("/step/overshoot", step.overshoot),
@@ -173,6 +174,7 @@ fn options_and_packs_are_passed_on() {
     let recording = of_samples(&Table::noisy());
     let asked = Identify::new()
         .cycles(2)
+        .specification(Specification::paper())
         .phase_margin_rad(45_f64.to_radians());
     let found = asked.run(&recording);
     assert_eq!(found.oscillation().unwrap().cycles_used, 2);

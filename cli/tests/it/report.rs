@@ -155,7 +155,7 @@ fn a_recording_of_any_kind_as_a_page() {
 #[test]
 fn designs_and_grids_as_pages() {
     let tune = [
-        "tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
+        "tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1", "--style", "paper",
     ];
     let (ran, page) = reported(&tune);
     assert_eq!(ran.code, Some(0));
