@@ -58,7 +58,7 @@ fn the_documented_keys_are_those_of_the_report() {
     let of_against = |key: &String| {
         let parts = ["controller", "margins", "step"];
         let is_part = |part: &&str| key.starts_with(&format!("against.{part}."));
-        parts.iter().any(|part| is_part(&part))
+        parts.iter().any(|part| is_part(part))
     };
     found.retain(|key| !of_against(key));
     for part in [
