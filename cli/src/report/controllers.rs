@@ -141,7 +141,7 @@ pub(super) fn forms(controller: &Controller, units: &Units) -> Vec<(&'static str
     let (gain, rate, integral) = (
         units.controller(""),
         units.controller(" s"),
-        units.controller("/s"),
+        units.integral(),
     );
     let mut forms = vec![];
     if let Controller::Autopilot(autopilot) = controller {

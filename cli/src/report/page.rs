@@ -27,6 +27,8 @@ use crate::words;
 
 /// Processes of the posterior that bands are drawn from: the ends of a 90 % band are then the tenth from either side.
 const DRAWS: usize = 200;
+/// Processes of the posterior whose responses are simulated: the ends of the band are the fourth from either side.
+const RESPONSES: usize = 80;
 /// Harmonics that are looked for in a recording: the fundamental, and what a relay adds to it.
 const HARMONICS: usize = 5;
 /// Times at which a step is drawn.
@@ -178,9 +180,10 @@ impl View<'_> {
         let (model, controller) = (&identified.model, &design.controller);
         let step = step_response(model, controller).ok().map(|response| {
             let times_s = times_s(&response);
-            let bands = step_bands(&draws, controller, &times_s);
+            let few = &draws[..draws.len().min(RESPONSES)];
+            let bands = step_bands(few, controller, &times_s);
             let load = load_response(model, controller).ok();
-            let around = load_bands(&draws, controller, &times_s);
+            let around = load_bands(few, controller, &times_s);
             let load = load.as_ref().map(|load| (load, around.as_ref()));
             step::section(&response, bands.as_ref(), &times_s, load)
         });

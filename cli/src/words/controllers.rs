@@ -37,7 +37,7 @@ pub(crate) fn advice(error: &DesignError) -> String {
         DesignError::NoIntegral(_) => "Use --controller pi or --controller pid".to_owned(),
         DesignError::NoRate(_) => "Use --controller pi or --controller pid".to_owned(),
         DesignError::Unbounded => {
-            "Give the sample period of the controller with --sample-period".to_owned()
+            "The option is --sample-period".to_owned()
         }
         DesignError::PhaseMargin(_) => "Choose another margin with --phase-margin".to_owned(),
         DesignError::Structure(_) => {
@@ -200,5 +200,54 @@ pub(crate) fn style(style: Style) -> &'static str {
     match style {
         Style::Paper => "the paper's",
         other => other.name(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use onecycle::{Execution, Form, MeasurementNoise, Structure};
+
+    use super::*;
+
+    // A limit that can be kept is rounded up: 1.8312 becomes 1.84.
+    #[test]
+    fn every_refusal_names_an_option() {
+        let form = Form::Pid;
+        let infeasible = |least_peak| DesignError::Infeasible { form, least_peak };
+        let errors = [
+            (infeasible(Some(1.8312)), "--ms 1.84 or more"),
+            (infeasible(None), "--controller"),
+            (DesignError::NoIntegral(Form::Pd), "--controller pi"),
+            (DesignError::NoRate(Form::CascadePi), "--controller pid"),
+            (DesignError::Unbounded, "--sample-period"),
+            (DesignError::PhaseMargin(2.0), "--phase-margin"),
+            (DesignError::Structure(Structure::Foptd), "--style sharp"),
+        ];
+        for (error, words) in errors {
+            let text = refusal(&error);
+            assert!(text.contains(words), "{text}");
+            assert!(!text.ends_with('.') && brief(&error).len() < 60, "{text}");
+        }
+        assert_eq!(
+            brief(&infeasible(Some(1.8312))),
+            "none: the least Ms is 1.84"
+        );
+    }
+
+    #[test]
+    fn assumptions_are_those_of_the_recording() {
+        let asked = Specification::default();
+        assert_eq!(assumed(&asked, false), None);
+        let noise = MeasurementNoise::new(0.02, 0.004, 3.0);
+        let sampled = asked
+            .with_noise(noise)
+            .with_execution(Execution::sampled(0.004));
+        assert_eq!(
+            assumed(&sampled, true).as_deref(),
+            Some(
+                "measurement noise 0.02000 in samples every 4.0 ms, input amplitude 3.000; a controller that runs every \
+                 4.0 ms with a computation delay of 4.0 ms"
+            )
+        );
     }
 }

@@ -191,7 +191,7 @@ fn unusable_processes_in_one_word() {
     tune("foptd,K=1,T_body=1,T=2,tau=0.1").misused(&["T_body is given twice"]);
     tune("foptd,K=x,T=1,tau=0.1").misused(&["'x' is not a number for K"]);
     tune("foptd,K,T=1,tau=0.1").misused(&["'K' is not a parameter: write K=2"]);
-    tune("foptd,K=0,T=1,tau=0.1").misused(&["gain"]);
+    tune("foptd,K=0,T=1,tau=0.1").misused(&["K must be finite and not zero"]);
     tune("foptd,K=1,K/T_body=1,T=1,tau=0.1").misused(&["either K or K/T_body"]);
     let twice = ["tune", "--process", "foptd,K=1,T=1,tau=0.1", "--k", "2"];
     run(&twice).misused(&["K is given by --k and by --process"]);
@@ -213,7 +213,7 @@ fn impossible_processes_for_tune() {
     tune("1", "0.3", "inf", "0.1").misused(&["--k-over-t-body"]);
     tune("1", "0.3", "2", "-0.1").misused(&["tau", "positive"]);
     tune("1", "0.3", "2", "nan").misused(&["tau", "positive"]);
-    tune("1", "1e-300", "2", "1e-300").misused(&["too extreme"]);
+    tune("1", "1e-300", "2", "1e-300").misused(&["--sample-period"]);
     tune("1", "0.3", "1e300", "0.1").without_nan();
     tune("1", "1e9", "1e9", "1e9").without_nan();
     let both = [

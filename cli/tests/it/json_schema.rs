@@ -50,7 +50,10 @@ fn the_documented_keys_are_those_of_the_report() {
         "--against",
         "20,0,9",
     ];
-    for arguments in [&cascade[..], &["--estimator", "general"]] {
+    for arguments in [
+        &cascade[..],
+        &["--estimator", "general", "--style", "sharp"],
+    ] {
         let report = identify(Table::noisy().csv(), arguments).identified();
         keys(&report.0, "", &mut found);
     }
@@ -58,7 +61,7 @@ fn the_documented_keys_are_those_of_the_report() {
     let of_against = |key: &String| {
         let parts = ["controller", "margins", "step"];
         let is_part = |part: &&str| key.starts_with(&format!("against.{part}."));
-        parts.iter().any(|part| is_part(part))
+        parts.iter().any(is_part)
     };
     found.retain(|key| !of_against(key));
     for part in [

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use onecycle::{
-    CsvOptions, Excitation, Identification, Identify, Method, Pack, Recording, Remark, Road,
-    Specification, Verdict, with_signals,
+    CsvOptions, Excitation, Form, Identification, Identify, Method, Pack, Recording, Remark, Road,
+    Specification, Style, Verdict, with_signals,
 };
 use onecycle_identify::{Options, Signals};
 use serde_json::{Value, json};
@@ -92,11 +92,12 @@ fn the_program_refuses_what_the_library_refuses() {
     assert_eq!(report.0["verdict"]["message"], verdict.to_string());
     assert!(report.advice().ends_with('.'), "{}", report.advice());
 
-    let found = identify(&recording);
+    let sharp = Specification::new(Form::Pid, Style::Sharp);
+    let found = Identify::new().specification(sharp).run(&recording);
     let recorded = matches!(found.excitation, Some(Excitation::Recorded(_)));
     let identified = found.outcome.unwrap();
     assert!(recorded && identified.fit.innovations().is_some());
-    let report = run(&identify_json).identified();
+    let report = run(&[&identify_json[..], &["--style", "sharp"]].concat()).identified();
     for (parameter, ours) in identified.estimate.iter() {
         let key = parameter.key();
         assert_eq!(report.0["process"][key], interval(&ours), "{key}");
