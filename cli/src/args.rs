@@ -5,6 +5,7 @@ mod campaign;
 mod certify;
 mod completions;
 mod dataset;
+mod design;
 mod fly;
 mod identify;
 mod man;
@@ -26,6 +27,7 @@ pub(crate) use self::campaign::Campaign;
 pub(crate) use self::certify::Certify;
 pub(crate) use self::completions::Completions;
 pub(crate) use self::dataset::Dataset;
+pub(crate) use self::design::DesignArguments;
 pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Estimator, Identify, Method, When};
 pub(crate) use self::man::Man;
@@ -87,33 +89,17 @@ pub(crate) enum Command {
 }
 
 /// Parameters of a process `K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))`.
-#[derive(Clone, Debug, Args)]
-pub(crate) struct ProcessArguments {
-    /// Velocity gain K: output unit / (input unit s)
-    #[arg(
-        long,
-        value_name = "GAIN",
-        allow_negative_numbers = true,
-        required_unless_present = "k_over_t_body",
-        conflicts_with = "k_over_t_body"
-    )]
+#[derive(Clone, Copy, Debug)]
+struct ProcessArguments {
     k: Option<f64>,
-    /// Acceleration gain K/T_body, instead of K: output unit / (input unit s^2)
-    #[arg(long, value_name = "GAIN", allow_negative_numbers = true)]
     k_over_t_body: Option<f64>,
-    /// Time constant of the actuator, in seconds
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     t_prop: f64,
-    /// Time constant of the body, in seconds; inf for no damping (then use --k-over-t-body)
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     t_body: f64,
-    /// Dead time, in seconds
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     tau: f64,
 }
 
 impl ProcessArguments {
-    pub(crate) fn process(&self) -> Result<Soiptd, Failure> {
+    fn process(&self) -> Result<Soiptd, Failure> {
         let made = match (self.k, self.k_over_t_body) {
             (_, Some(_)) if self.t_body.is_nan() || self.t_body <= 0.0 => {
                 Err(SoiptdError::TBody(self.t_body))
@@ -166,20 +152,23 @@ impl FromStr for Share {
     }
 }
 
-/// Design the optimal controller of a known process: gains, margins and the predicted step response.
+/// Design the controller of a known process: gains, margins and the predicted step response.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle tune --k 1 --t-prop 0.3 --t-body 2 --tau 0.1\n",
-    "  onecycle tune --k-over-t-body 40 --t-prop 0.05 --t-body inf --tau 0.015 --phase-margin 45\n"
+    "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --controller pi --style calm\n",
+    "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --against 2.5,0.3,1\n",
+    "  onecycle tune --k 1 --t-prop 0.3 --t-body 2 --tau 0.1 --style paper --phase-margin 45\n\n",
+    "A process is a structure with its parameters: K or K/T_body, T_prop, T_prop2, T_body (or T), w0, zeta, ",
+    "tau.\nStructures: iptd, integrator_lag, double_integrator_lag, soiptd, toiptd, foptd, soptd, resonant, ",
+    "resonant_lag."
 ))]
 pub(crate) struct Tune {
     #[command(flatten)]
-    pub(crate) process: ProcessArguments,
-    /// Minimum phase margin of the controller, in degrees
-    #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true,
-          value_parser = phase_margin)]
-    pub(crate) phase_margin: f64,
+    pub(crate) process: StructureArguments,
+    #[command(flatten)]
+    pub(crate) design: DesignArguments,
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,

@@ -5,6 +5,7 @@ pub(crate) mod campaign;
 pub(crate) mod certify;
 mod clock;
 pub(crate) mod completions;
+mod controllers;
 pub(crate) mod dataset;
 pub(crate) mod fly;
 pub(crate) mod grid;

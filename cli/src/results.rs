@@ -5,6 +5,7 @@ pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certify;
 pub(crate) mod classifier;
+pub(crate) mod controllers;
 pub(crate) mod dataset;
 pub(crate) mod fly;
 pub(crate) mod grid;

@@ -1,16 +1,18 @@
 //! Sentences of the program: what the facts of the libraries mean, and what to do about them.
 
+pub(crate) mod controllers;
 pub(crate) mod recording;
 pub(crate) mod remark;
 pub(crate) mod verdict;
 
 /// With a capital letter at the start and a full stop at the end.
 pub(crate) fn sentence(clause: &str) -> String {
+    capital(clause) + "."
+}
+
+/// With a capital letter at the start.
+pub(crate) fn capital(clause: &str) -> String {
     let mut letters = clause.chars();
     let first = letters.next().map(|letter| letter.to_ascii_uppercase());
-    first
-        .into_iter()
-        .chain(letters)
-        .chain(std::iter::once('.'))
-        .collect()
+    first.into_iter().chain(letters).collect()
 }

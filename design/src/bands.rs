@@ -5,10 +5,9 @@
 
 use num_complex::Complex64;
 
-use crate::closed_loop::{loop_response, step_response};
+use crate::closed_loop::{load_response, loop_response, step_response};
 use crate::controller::Controller;
 use crate::model::Model;
-use crate::soiptd_pd::step_response::StepResponse;
 
 /// Probabilities at the ends of a central 90 % interval.
 const QUANTILES: (f64, f64) = (0.05, 0.95);
@@ -44,7 +43,7 @@ impl Band {
     }
 }
 
-/// Bands of the response to a unit step of the reference.
+/// Bands of the response to a unit step.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct StepBands {
@@ -60,20 +59,34 @@ pub struct StepBands {
 /// none of the models.
 #[must_use]
 pub fn step_bands(models: &[Model], controller: &Controller, times_s: &[f64]) -> Option<StepBands> {
-    let responses: Vec<StepResponse> = (models.iter())
-        .filter_map(|model| step_response(model, controller).ok())
-        .collect();
-    let curves = |value: fn((f64, f64)) -> f64| -> Vec<Vec<f64>> {
-        let at = |response: &StepResponse| {
-            let values = times_s.iter().map(|&time_s| value(response.at(time_s)));
-            values.collect()
-        };
-        responses.iter().map(at).collect()
+    let of = |model: &Model| {
+        let response = step_response(model, controller).ok()?;
+        Some(times_s.iter().map(|&time_s| response.at(time_s)).collect())
+    };
+    bands_of(models, of)
+}
+
+/// Bands of the responses of `models` under `controller` to a unit step of the load, as [`step_bands`].
+#[must_use]
+pub fn load_bands(models: &[Model], controller: &Controller, times_s: &[f64]) -> Option<StepBands> {
+    let of = |model: &Model| {
+        let response = load_response(model, controller).ok()?;
+        Some(times_s.iter().map(|&time_s| response.at(time_s)).collect())
+    };
+    bands_of(models, of)
+}
+
+/// Bands of the curves of output and input of the models that have one.
+fn bands_of(models: &[Model], of: impl Fn(&Model) -> Option<Vec<(f64, f64)>>) -> Option<StepBands> {
+    let found: Vec<Vec<(f64, f64)>> = models.iter().filter_map(of).collect();
+    let curves = |value: fn(&(f64, f64)) -> f64| -> Vec<Vec<f64>> {
+        let one = |curve: &Vec<(f64, f64)>| curve.iter().map(value).collect();
+        found.iter().map(one).collect()
     };
     Some(StepBands {
-        output: Band::of(&curves(|(output, _)| output))?,
-        input: Band::of(&curves(|(_, input)| input))?,
-        settling: responses.len() as f64 / models.len() as f64,
+        output: Band::of(&curves(|(output, _)| *output))?,
+        input: Band::of(&curves(|(_, input)| *input))?,
+        settling: found.len() as f64 / models.len() as f64,
     })
 }
 
@@ -188,6 +201,21 @@ mod tests {
         // A gain moves the locus along its radius by 0.36 of the magnitude. The band is the part of this that is
         // perpendicular to the locus.
         assert!(width > 0.1 * 0.36 * locus.magnitude && width <= 0.36 * locus.magnitude);
+    }
+
+    // A load of 1 on a P loop of gain Kp around an integrating process leaves 1/Kp, and the controller's output comes to -1:
+    // with Kp = 0.5 that is 2 for every process.
+    #[test]
+    fn loads_have_bands() {
+        let (process, _) = optimum();
+        let weak = process.with_gain_scaled(0.9).unwrap();
+        let controller = Controller::from(crate::controller::Pid::new(0.5, 0.0, 0.0));
+        let bands = load_bands(&models(&[weak, process]), &controller, &[0.0, 0.5, 60.0]).unwrap();
+        assert_eq!((bands.output.low[0], bands.settling), (0.0, 1.0));
+        assert!(bands.output.low[1] < bands.output.high[1]);
+        assert!(
+            (bands.output.low[2] - 2.0).abs() < 1e-3 && (bands.input.high[2] + 1.0).abs() < 1e-3
+        );
     }
 
     // The band of one process has no width. Gains of 0.9 and 1.1 lie on either side of it. The loop is unstable at nine

@@ -39,9 +39,9 @@ pub enum Form {
     /// Proportional and integral.
     Pi,
     /// Proportional on the error, derivative on the measurement.
-    #[default]
     Pd,
     /// Proportional, integral, and derivative on the measurement.
+    #[default]
     Pid,
     /// Proportional angle loop around a rate loop with PI.
     CascadePi,

@@ -7,12 +7,14 @@
 //! |------------|------|
 //! | the controller of least cost for a model | [`design()`] |
 //! | the controller of least expected cost for draws from a posterior | [`design_over()`] |
+//! | one controller in each style | [`proposals()`] |
+//! | all figures of a given controller; its margins over draws | [`assess()`], [`least_margins()`] |
 //! | phase, gain and delay margin; `Ms` and `Mt` | [`margins()`], [`sensitivity()`] |
 //! | the cost of a controller: ISE or IAE of a unit step of the reference, IAE of one of the load | [`ise()`], [`reference_iae()`], [`load_iae()`] |
 //! | noise at the actuator | [`noise_amplification()`] |
 //! | the open loop at a frequency, for a Bode or Nyquist plot | [`loop_response()`] |
 //! | the response to a unit step of the reference or the load | [`step_response()`], [`load_response()`] |
-//! | 90 % bands of step response and open loop for draws from a posterior | [`bands::step_bands()`], [`bands::loop_bands()`] |
+//! | 90 % bands of step response and open loop for draws from a posterior | [`bands::step_bands()`], [`bands::load_bands()`], [`bands::loop_bands()`] |
 //! | the gains of SIMC, AMIGO, Ziegler-Nichols, Tyreus-Luyben | [`rules`] |
 //! | cost and phase margin of a cascade with a PID rate loop | [`Cascade::cost()`] |
 //!
@@ -42,7 +44,7 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let model = Model::from(Soiptd::new(1.0, 0.3, 2.0, 0.1)?);
-//! let asked = Specification::default().with_phase_margin_rad(45_f64.to_radians());
+//! let asked = Specification::paper().with_phase_margin_rad(45_f64.to_radians());
 //! let best = design(&model, &asked)?;
 //! assert!((best.margins.phase_margin_rad.to_degrees() - 45.0).abs() < 1e-6);
 //! assert!(step_response(&model, &best.controller)?.metrics.overshoot < 0.1);
@@ -78,7 +80,8 @@ pub use soiptd_pd::margins::Margins;
 pub use soiptd_pd::step_metrics::StepMetrics;
 pub use soiptd_pd::step_response::{Sample, StepResponse, StepResponseError};
 pub use tuning::{
-    Design, DesignError, MeasurementNoise, Robustness, Specification, Style, design, design_over,
+    Assessment, Design, DesignError, LeastMargins, MeasurementNoise, Proposal, Robustness,
+    Specification, Style, assess, design, design_over, forms, least_margins, proposals,
 };
 
 // Compiles and runs the code of the README.

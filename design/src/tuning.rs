@@ -25,6 +25,7 @@
 
 pub(crate) mod named;
 mod outcome;
+mod proposal;
 mod specification;
 
 use crate::closed_loop::{ise, margins};
@@ -33,6 +34,7 @@ use crate::model::Model;
 use crate::soiptd_pd;
 
 pub use outcome::{Design, DesignError, Robustness};
+pub use proposal::{Assessment, LeastMargins, Proposal, assess, forms, least_margins, proposals};
 pub use specification::{MeasurementNoise, Specification, Style};
 
 /// Number of draws that [`design_over`] needs. If the loss varies as much as its mean, the mean of 96 draws has a
@@ -124,7 +126,7 @@ mod tests {
     use super::*;
 
     fn specification() -> Specification {
-        Specification::default().with_phase_margin_rad(0.35)
+        Specification::paper().with_phase_margin_rad(0.35)
     }
 
     fn own(process: &Soiptd) -> Design {

@@ -43,7 +43,7 @@ mod validate;
 #[cfg(test)]
 mod vectors;
 
-use onecycle_design::{Model, Structure, design_over, step_response, tuning};
+use onecycle_design::{Model, Proposal, Structure, step_response};
 
 pub(crate) use self::check::check;
 use self::choose::{Choice, Limits, NEARLY, choose};
@@ -54,6 +54,7 @@ pub use self::record::Hold;
 use self::record::{Blocks, Record};
 use self::search::Candidate;
 use self::theta::{Bounds, Theta};
+use crate::assumed::RecordedLoop;
 use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{Evidence, Fit, Identification, Identified, InnovationTests, Prediction};
 use crate::remark::Remark;
@@ -105,7 +106,7 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
             .and_then(|found| found.informative_rad_per_s))
         .map_or(f64::INFINITY, |(_, high)| std::f64::consts::TAU / high);
         remarks::of_model(identified, period_s, &mut search.remarks);
-        remarks::of_controller(identified, options, &mut search.remarks);
+        remarks::of_controller(identified, &mut search.remarks);
     }
     Identification {
         excitation: search.excitation.map(Excitation::Recorded),
@@ -349,9 +350,10 @@ impl Search<'_> {
             is_coloured,
         );
         let model = result::model(&fitted.best.found, prepared.early_s);
-        let draws = posterior.models(tuning::DRAWS);
+        let specification = recorded_loop(fitted).complete(&self.options.specification);
+        let draws = posterior.models(specification.draws());
         let undamped = model.soiptd().map_or(model, Model::Soiptd);
-        let design = match design_over(&undamped, &draws, &self.options.specification) {
+        let design = match Proposal::new(&undamped, &draws, &specification).outcome {
             Ok(design) => Some(design),
             Err(error) => {
                 self.remarks.push(Remark::NoController(error));
@@ -384,6 +386,7 @@ impl Search<'_> {
             model,
             estimate,
             posterior,
+            specification,
             design,
             phase_margin_rad,
             fit: Fit {
@@ -505,6 +508,22 @@ fn straight(record: &Record, choice: &Choice, limits: &Limits, options: &Options
     let fitted = search::warm(&blocks, &theta, limits.longest_tau_s, search::FINE)?;
     let gain = fitted.at.log_likelihood - lead.found.at.log_likelihood;
     (gain > STRAIGHT).then_some(gain)
+}
+
+/// What the record of a fit says about the loop of a controller.
+fn recorded_loop(fitted: &Fitted) -> RecordedLoop {
+    let record = &fitted.record;
+    let (low, high) = (record.input.iter())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (value.min(low), value.max(high))
+        });
+    RecordedLoop {
+        sigma: fitted.best.found.at.variance.sqrt(),
+        output_size: record.output_deviation(),
+        input_amplitude: 0.5 * (high - low),
+        sample_s: record.dt_s,
+        hold: record.hold,
+    }
 }
 
 /// What is known of a record before any fit.

@@ -16,6 +16,7 @@
 //! | the intervals to expect from a planned test | [`expected`] |
 //! | contours of the posterior | [`density`](fn@density) |
 
+mod assumed;
 pub mod cholesky;
 pub mod diagnose;
 mod excitation;

@@ -1,6 +1,6 @@
 //! Result of an identification.
 
-use onecycle_design::{Design, Model, StepMetrics};
+use onecycle_design::{Design, Model, Proposal, Specification, StepMetrics};
 use onecycle_onboard::refine::Refined;
 
 use crate::excitation::{Excitation, Oscillation};
@@ -55,6 +55,9 @@ pub struct Identified {
     /// Probability that all parameters of the model lie within their intervals at once. `None` if there are no
     /// intervals.
     pub joint_probability: Option<f64>,
+    /// Requirements on the controller, with the noise and the sample period of the recording where the settings leave
+    /// them open.
+    pub specification: Specification,
     /// Controller of least expected cost over the posterior, with its cost and margins on [`Identified::model`]. `None`
     /// if none can be designed; a remark says why.
     pub design: Option<Design>,
@@ -65,6 +68,26 @@ pub struct Identified {
     pub step: Option<StepMetrics>,
     /// Quality of the fit.
     pub fit: Fit,
+}
+
+impl Identified {
+    /// Model to design a controller for, and the first `most` draws that it has to serve. There are no draws if the model
+    /// leaves a part of the oscillation unexplained: the distribution of such an error is not known.
+    #[must_use]
+    pub fn for_design(&self, most: usize) -> (Model, Vec<Model>) {
+        let has_model_error = (self.fit.refined()).is_some_and(|fit| fit.response_error > 0.0);
+        let most = if has_model_error { 0 } else { most };
+        let undamped = self.model.soiptd().map_or(self.model, Model::Soiptd);
+        (undamped, self.posterior.models(most))
+    }
+
+    /// Controller for other requirements than [`Identified::specification`], robust over the posterior. Those of
+    /// [`Proposal::choices`] for `specification` are the ones to compare.
+    #[must_use]
+    pub fn propose(&self, specification: &Specification) -> Proposal {
+        let (model, draws) = self.for_design(specification.draws());
+        Proposal::new(&model, &draws, specification)
+    }
 }
 
 /// Quality of the fit of the model to the recording.

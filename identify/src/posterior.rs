@@ -24,6 +24,10 @@ const SEED: u64 = 0x1c7c_1e00;
 /// the intervals narrower than this.
 const INSTRUMENT: f64 = 1e-3;
 
+/// Draws whose margins are computed where they are not in closed form. The ends of the central 90 % of 1000 draws have a
+/// standard error of 7 % of the standard deviation.
+const SEARCHED_MARGINS: usize = 1000;
+
 /// Estimate with its 90 % interval. `None` stands for infinite or unbounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Interval {
@@ -393,10 +397,15 @@ impl Posterior {
         )
     }
 
-    /// Phase margins (rad) that a controller leaves on the draws. Draws without margins are left out.
+    /// Phase margins (rad) that a controller leaves on the draws; on the first 1000 of them, unless it is a PD without
+    /// filter. Draws without margins are left out.
     #[must_use]
     pub fn phase_margins_rad(&self, controller: &Controller) -> Vec<f64> {
         let margin = |draw: &Draw| draw.phase_margin_rad(controller);
-        self.draws.iter().filter_map(margin).collect()
+        let most = match controller {
+            Controller::Pd(_) => DRAWS,
+            _ => SEARCHED_MARGINS,
+        };
+        self.draws.iter().take(most).filter_map(margin).collect()
     }
 }

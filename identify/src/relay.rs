@@ -20,14 +20,16 @@ mod last_cycle;
 mod oscillation;
 mod saturation;
 
-use onecycle_design::{Model, Specification, design_over, step_response, tuning};
+use onecycle_design::{DesignError, Model, Proposal, Specification, Style, step_response};
 use onecycle_onboard::judgement::{MOST_MISFIT, largest_response_error, misfit};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{PriorKnowledge, RefineError, Refined, ShapePrior, refine_with};
 
 use self::input::{RelayInput, find_relay};
 use self::oscillation::{FitWindow, Past, Stretch};
+use crate::assumed::RecordedLoop;
 use crate::excitation::{Excitation, Oscillation};
+use crate::innovations::Hold;
 use crate::outcome::{Evidence, Fit, Identification, Identified};
 use crate::posterior::Posterior;
 use crate::reading::Reading;
@@ -60,6 +62,7 @@ pub(crate) fn identify(
         excitation: None,
         refusal: None,
         tension: None,
+        no_controller: None,
     };
     let outcome = search.run();
     let mut found = Identification {
@@ -73,7 +76,10 @@ pub(crate) fn identify(
     if let (Ok(_), Some(tension)) = (&found.outcome, search.tension) {
         found.remarks.push(Remark::PriorDropped(tension));
     }
-    let remarks = remarks::remarks(&found, options, pack.is_some());
+    if let (Ok(_), Some(error)) = (&found.outcome, search.no_controller) {
+        found.remarks.push(Remark::NoController(error));
+    }
+    let remarks = remarks::remarks(&found, pack.is_some(), options.cycles);
     found.remarks.extend(remarks);
     found
 }
@@ -101,6 +107,8 @@ struct Search<'a> {
     refusal: Option<Verdict>,
     /// Misfit of the prior in the last fit, if that was dropped.
     tension: Option<f64>,
+    /// Why the identified process has no controller.
+    no_controller: Option<DesignError>,
 }
 
 impl Search<'_> {
@@ -110,11 +118,12 @@ impl Search<'_> {
         let most = self.options.cycles.clamp(1, MOST_CYCLES);
         for stretch in oscillation::stretches(self.signals, &relay, most)? {
             let (window, last_cycle) = self.observe(&stretch, &relay);
+            let oscillation = stretch.describe(self.signals, &relay, &window);
             let excitation = Excitation::Relay {
-                oscillation: stretch.describe(self.signals, &relay, &window),
+                oscillation,
                 last_cycle,
             };
-            match self.identify_stretch(&stretch, &window, last_cycle.as_ref()) {
+            match self.identify_stretch(&stretch, &window, (&oscillation, last_cycle.as_ref())) {
                 Ok(identified) => {
                     self.excitation = Some(excitation);
                     return Ok(identified);
@@ -150,7 +159,7 @@ impl Search<'_> {
         &mut self,
         stretch: &Stretch,
         window: &FitWindow,
-        reading: Option<&Reading>,
+        (oscillation, reading): (&Oscillation, Option<&Reading>),
     ) -> Result<Identified, Verdict> {
         let output = &self.signals.output[stretch.points(self.signals)];
         if let Some(part) = saturation::flat_part(output, stretch.cycles.len()) {
@@ -165,12 +174,17 @@ impl Search<'_> {
             evidence: Evidence::Relay(refined),
             points: oscillation::fit_points(window, stretch.period_s, &refined),
         };
-        design(
-            fit,
-            &refined,
-            window.sample_s(),
-            &self.options.specification,
-        )
+        let recorded = RecordedLoop {
+            sigma: refined.noise_sigma,
+            output_size: oscillation.amplitude,
+            input_amplitude: oscillation.relay_amplitude,
+            sample_s: window.sample_s(),
+            hold: Hold::Held,
+        };
+        let specification = recorded.complete(&self.options.specification);
+        let (identified, refusal) = design(fit, &refined, window.sample_s(), &specification)?;
+        self.no_controller = refusal;
+        Ok(identified)
     }
 
     /// Least squares from the starts that the reading suggests. With the prior of the pack this is the most probable
@@ -215,7 +229,7 @@ impl Search<'_> {
         specification.check().map_err(Verdict::NoController)?;
         let misfit = misfit(refined, window);
         let most_error = match self.refusal {
-            None => largest_response_error(specification.phase_margin_rad),
+            None => largest_response_error(specification.implied_phase_margin_rad()),
             Some(_) => MOST_ERROR_OF_SECOND_CHOICE,
         };
         if misfit > MOST_MISFIT || refined.response_error > most_error {
@@ -257,16 +271,17 @@ fn classified(window: &FitWindow, reading: Option<&Reading>) -> Result<Refined, 
     }
 }
 
-/// Posterior of an accepted fit to samples every `sample_s`, the controller, and its margins and step response.
+/// Posterior of an accepted fit to samples every `sample_s`, the controller, and its margins and step response; and why
+/// there is no controller, if there is none.
 ///
 /// # Errors
-/// The specification is out of range, or the controller may be unstable on a process within the intervals.
+/// The controller may be unstable on a process within the intervals, or the paper's style gives none.
 fn design(
     fit: Fit,
     refined: &Refined,
     sample_s: f64,
     specification: &Specification,
-) -> Result<Identified, Verdict> {
+) -> Result<(Identified, Option<DesignError>), Verdict> {
     let model = Model::from(refined.process);
     let posterior = Posterior::new(refined, sample_s);
     let has_model_error = refined.response_error > 0.0;
@@ -275,11 +290,18 @@ fn design(
     let draws = if has_model_error {
         vec![]
     } else {
-        posterior.models(tuning::DRAWS)
+        posterior.models(specification.draws())
     };
-    let design = design_over(&model, &draws, specification).map_err(Verdict::NoController)?;
-    let phase_margin_rad = posterior.phase_margin_rad(&design.controller);
-    if phase_margin_rad.low.is_none_or(|low| low <= 0.0) {
+    let outcome = Proposal::new(&model, &draws, specification).outcome;
+    let (design, refusal) = match outcome {
+        Ok(design) => (Some(design), None),
+        Err(error) if specification.style == Style::Paper => {
+            return Err(Verdict::NoController(error));
+        }
+        Err(error) => (None, Some(error)),
+    };
+    let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
+    if phase_margin_rad.is_some_and(|margin| margin.low.is_none_or(|low| low <= 0.0)) {
         return Err(if has_model_error {
             Verdict::NotThisProcess { misfit: fit.misfit }
         } else {
@@ -287,16 +309,18 @@ fn design(
         });
     }
     let estimate = posterior.estimate();
-    Ok(Identified {
+    let identified = Identified {
         joint_probability: posterior.joint_probability(&estimate),
-        step: step_response(&model, &design.controller)
-            .ok()
+        step: design
+            .and_then(|design| step_response(&model, &design.controller).ok())
             .map(|step| step.metrics),
         model,
         estimate,
         posterior,
-        design: Some(design),
-        phase_margin_rad: Some(phase_margin_rad),
+        specification: *specification,
+        design,
+        phase_margin_rad,
         fit,
-    })
+    };
+    Ok((identified, refusal))
 }

@@ -6,7 +6,6 @@ use crate::excitation::Oscillation;
 use crate::outcome::{Identification, Identified};
 use crate::reading::Reading;
 use crate::remark::Remark;
-use crate::settings::Options;
 
 /// Noise over amplitude above which the relay needs its protection against switching on noise.
 const MUCH_NOISE: f64 = 0.05;
@@ -32,12 +31,12 @@ const LITTLE_MARGIN: f64 = 0.75;
 /// Overshoot above which a step response rings for long.
 const MUCH_OVERSHOOT: f64 = 0.4;
 
-/// Remarks on `found`.
-pub(crate) fn remarks(found: &Identification, options: &Options, has_pack: bool) -> Vec<Remark> {
+/// Remarks on `found`, for which `cycles` cycles were requested.
+pub(crate) fn remarks(found: &Identification, has_pack: bool, cycles: usize) -> Vec<Remark> {
     let mut remarks = Vec::new();
     if let Some(oscillation) = found.oscillation() {
         let is_known = found.last_cycle().is_some_and(Reading::is_known);
-        of_oscillation(oscillation, is_known, options, &mut remarks);
+        of_oscillation(oscillation, is_known, cycles, &mut remarks);
         if found.outcome.is_ok() {
             match found.last_cycle() {
                 Some(reading) if reading.is_known() => {}
@@ -49,7 +48,7 @@ pub(crate) fn remarks(found: &Identification, options: &Options, has_pack: bool)
         if let Ok(identified) = &found.outcome {
             of_model(identified, oscillation.period_s, &mut remarks);
             of_fit(identified, oscillation, &mut remarks);
-            of_controller(identified, options, &mut remarks);
+            of_controller(identified, &mut remarks);
         }
     }
     remarks
@@ -58,13 +57,13 @@ pub(crate) fn remarks(found: &Identification, options: &Options, has_pack: bool)
 fn of_oscillation(
     oscillation: &Oscillation,
     is_known: bool,
-    options: &Options,
+    cycles: usize,
     remarks: &mut Vec<Remark>,
 ) {
     let used = oscillation.cycles_used;
     if oscillation.cycles_steady == 1 {
         remarks.push(Remark::OneCycle { is_known });
-    } else if oscillation.cycles_steady < 3 || (used < options.cycles && used < 4) {
+    } else if oscillation.cycles_steady < 3 || (used < cycles && used < 4) {
         remarks.push(Remark::FewCycles { used });
     }
     let noise = oscillation.noise_sigma / oscillation.amplitude;
@@ -122,11 +121,12 @@ fn of_fit(identified: &Identified, oscillation: &Oscillation, remarks: &mut Vec<
 }
 
 /// Remarks on the controller.
-pub(crate) fn of_controller(identified: &Identified, options: &Options, remarks: &mut Vec<Remark>) {
+pub(crate) fn of_controller(identified: &Identified, remarks: &mut Vec<Remark>) {
+    let implied_rad = identified.specification.implied_phase_margin_rad();
     let margin = identified.phase_margin_rad;
     if let Some(low) = margin
         .and_then(|margin| margin.low)
-        .filter(|&low| low < LITTLE_MARGIN * options.specification.phase_margin_rad)
+        .filter(|&low| low < LITTLE_MARGIN * implied_rad)
     {
         remarks.push(Remark::MarginMayBeLess(low));
     }

@@ -7,14 +7,16 @@ use crate::innovations::Hold;
 /// Maximum number of cycles that a fit can use: the window of the estimator has room for the switches of 50 cycles.
 pub const MOST_CYCLES: usize = 50;
 
-/// Settings of an identification. `Default`: the last 8 cycles, [`Method::Map`], a PD with 20 degrees of phase margin.
+/// Settings of an identification. `Default`: the last 8 cycles, [`Method::Map`], a PID in the style
+/// `Style::Balanced`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Options {
     /// Number of cycles to fit, counted from the end of the steady oscillation: 1 to [`MOST_CYCLES`]. More cycles
     /// narrow the intervals; fewer follow a process that drifts.
     pub cycles: usize,
-    /// Requirements on the controller.
+    /// Requirements on the controller. The recording completes them: without `noise`, its own; if `execution` has no sample
+    /// period and the input is held, its own, with an output that leaves in the tick of its sample.
     pub specification: Specification,
     /// Method of estimation of a steady oscillation.
     pub method: Method,
@@ -48,6 +50,15 @@ impl Options {
     pub fn cycles(self, cycles: usize) -> Self {
         Self {
             cycles: cycles.clamp(1, MOST_CYCLES),
+            ..self
+        }
+    }
+
+    /// Designs the controller to these requirements.
+    #[must_use]
+    pub fn specification(self, specification: Specification) -> Self {
+        Self {
+            specification,
             ..self
         }
     }

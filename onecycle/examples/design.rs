@@ -1,6 +1,6 @@
 //! Design a controller for a process model: `cargo run -p onecycle --example design`.
 //!
-//! The altitude of the paper's hexacopter at three phase margins. A larger phase margin gives less overshoot and a
+//! The altitude of the paper's hexacopter: the paper's PD at three phase margins. A larger phase margin gives less overshoot and a
 //! larger delay margin, but a larger squared error and a slower rise.
 
 #![expect(clippy::print_stdout, reason = "an example reports")]
@@ -14,7 +14,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let model = Model::from(Soiptd::new(1.0, 0.0321, 1.6886, 0.0237)?);
     println!("margin   Kp      Kd      ISE (s)  rise (s)  settling (s)  overshoot  delay margin");
     for phase_margin_deg in [20.0_f64, 45.0, 60.0] {
-        let asked = Specification::default().with_phase_margin_rad(phase_margin_deg.to_radians());
+        let asked = Specification::paper().with_phase_margin_rad(phase_margin_deg.to_radians());
         let best = design(&model, &asked)?;
         let step = step_response(&model, &best.controller)?.metrics;
         println!(

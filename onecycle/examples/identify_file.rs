@@ -55,8 +55,10 @@ fn report(identified: &Identified) {
         return;
     };
     println!(
-        "u = {:.4} (r - y) - {:.4} dy/dt",
+        "{}: Kp {:.4}, Ki {:.4}, Kd {:.4}",
+        controller.form().law(),
         controller.kp(),
+        controller.ki(),
         controller.kd()
     );
     println!(

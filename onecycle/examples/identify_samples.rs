@@ -38,7 +38,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("{name:<13} {truth:>9.5}  {estimate:>9.5}   {is_within}");
     }
     let controller = identified.design.ok_or("no controller")?.controller;
-    println!("Kp {:.3}, Kd {:.3}", controller.kp(), controller.kd());
+    println!(
+        "Kp {:.3}, Ki {:.3}, Kd {:.3}",
+        controller.kp(),
+        controller.ki(),
+        controller.kd()
+    );
     for remark in &found.remarks {
         println!("- {remark:?}");
     }

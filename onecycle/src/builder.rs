@@ -1,6 +1,6 @@
 //! Builder of an identification.
 
-use onecycle_design::Structure;
+use onecycle_design::{Specification, Structure};
 use onecycle_identify::{Hold, Identification, Method, Options, Road, Signals, identify_by};
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
@@ -37,7 +37,8 @@ impl Default for Identify<'_> {
 }
 
 impl<'a> Identify<'a> {
-    /// Default settings: the last 8 cycles, [`Method::Map`], a PD with 20 degrees of phase margin, the built-in pack.
+    /// Default settings: the last 8 cycles, [`Method::Map`], a PID in the style
+    /// [`Balanced`](crate::Style::Balanced), the built-in pack.
     pub fn new() -> Self {
         Self {
             options: Options::default(),
@@ -50,6 +51,15 @@ impl<'a> Identify<'a> {
     pub fn cycles(self, cycles: usize) -> Self {
         Self {
             options: self.options.cycles(cycles),
+            ..self
+        }
+    }
+
+    /// Designs the controller to these requirements. The recording completes them with its noise and its sample period,
+    /// unless they have their own.
+    pub fn specification(self, specification: Specification) -> Self {
+        Self {
+            options: self.options.specification(specification),
             ..self
         }
     }

@@ -8,7 +8,8 @@ use onecycle::{Hold, Road, Structure};
 use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
-use super::{PackSource, phase_margin, sample_rate, time_unit};
+use super::design::noise;
+use super::{DesignArguments, PackSource, sample_rate, time_unit};
 
 /// Identify the process from a recording and design its controller.
 ///
@@ -21,6 +22,7 @@ use super::{PackSource, phase_margin, sample_rate, time_unit};
     "  onecycle identify examples/simulated_hover.csv\n",
     "  onecycle identify examples/simulated_hover.csv --report report.html\n",
     "  onecycle identify log.csv --time t_ms --input 4 --output roll --cycles 4\n",
+    "  onecycle identify log.csv --against 40,5,12 --style calm\n",
     "  onecycle identify chirp.csv --structure soptd --from 12 --to 40\n",
     "  onecycle identify log.csv --plot always > report.txt\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
@@ -49,10 +51,12 @@ pub(crate) struct Identify {
     #[arg(long, value_name = "N", default_value_t = 8,
           value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
     pub(crate) cycles: u64,
-    /// Minimum phase margin of the controller, in degrees
-    #[arg(long, value_name = "DEG", default_value = "20", allow_negative_numbers = true,
-          value_parser = phase_margin)]
-    pub(crate) phase_margin: f64,
+    #[command(flatten)]
+    pub(crate) design: DesignArguments,
+    /// Maximum noise at the actuator: its standard deviation as a share of the relay's amplitude, or of half the range of
+    /// the input, such as 20% [default: that of the style]
+    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, value_parser = noise)]
+    pub(crate) noise: Option<f64>,
     /// Estimator: whole cycles of a steady relay oscillation (relay), the whole recording with its disturbances
     /// (general), or relay where the recording is one and the general estimator agrees (auto)
     #[arg(long, value_enum, default_value_t = Estimator::Auto)]

@@ -9,9 +9,9 @@ use crate::failure::Failure;
 /// Structure and parameters of a process.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct StructureArguments {
-    /// Structure of the process; --help lists structures and their parameters
-    #[arg(long, value_name = "NAME", default_value = "soiptd", value_parser = structure)]
-    process: Structure,
+    /// Structure of the process, alone or with its parameters: FOPTD,K=2,T=10,tau=1
+    #[arg(long, value_name = "NAME[,K=..]", default_value = "soiptd", value_parser = process)]
+    process: Process,
     /// Gain K: output unit / (input unit s) with an integrator, output unit / input unit without
     #[arg(
         long,
@@ -57,14 +57,80 @@ const OPTIONS: [(Parameter, &str); 8] = [
 
 /// A structure by its name, with `-` or `_` between its words.
 fn structure(name: &str) -> Result<Structure, String> {
-    Structure::from_name(&name.replace('-', "_")).ok_or_else(|| {
+    Structure::from_name(&name.trim().to_lowercase().replace('-', "_")).ok_or_else(|| {
         let names = Structure::ALL.map(Structure::name).join(", ");
         format!("there is no structure '{name}': choose from {names}")
     })
 }
 
+/// A structure with the parameters that were written behind it.
+#[derive(Clone, Debug)]
+struct Process {
+    structure: Structure,
+    values: Vec<(Parameter, f64)>,
+}
+
+/// A structure and its parameters: `FOPTD,K=2,T=10,tau=1`.
+fn process(text: &str) -> Result<Process, String> {
+    let mut parts = text.split(',');
+    let structure = structure(parts.next().unwrap_or_default())?;
+    let mut values: Vec<(Parameter, f64)> = vec![];
+    for part in parts {
+        let (name, value) = (part.split_once('=')).ok_or_else(|| {
+            format!("'{part}' is not a parameter: write K=2, separated by commas")
+        })?;
+        let parameter = parameter(structure, name)?;
+        let value = (value.trim().parse())
+            .map_err(|_| format!("'{value}' is not a number for {}", parameter.symbol()))?;
+        if values.iter().any(|(known, _)| *known == parameter) {
+            return Err(format!("{} is given twice", parameter.symbol()));
+        }
+        values.push((parameter, value));
+    }
+    Ok(Process { structure, values })
+}
+
+/// A parameter by its symbol or its key without the unit. `T` is the only or the longest lag of the structure.
+fn parameter(structure: Structure, name: &str) -> Result<Parameter, String> {
+    let name = name.trim().to_lowercase().replace('-', "_");
+    let own = structure.parameters();
+    if name == "t" {
+        let lags = [Parameter::TBody, Parameter::TProp];
+        if let Some(lag) = lags.into_iter().find(|lag| own.contains(lag)) {
+            return Ok(lag);
+        }
+    }
+    let is_named = |parameter: &&Parameter| {
+        let option = name_of(**parameter);
+        name == parameter.symbol().to_lowercase() || name == option
+    };
+    own.iter().find(is_named).copied().ok_or_else(|| {
+        let symbols: Vec<_> = own.iter().map(|parameter| parameter.symbol()).collect();
+        format!(
+            "'{name}' is not a parameter of {}, which has {}",
+            structure.name(),
+            symbols.join(", ")
+        )
+    })
+}
+
+/// Name of the option of a parameter, with `_` between its words.
+fn name_of(parameter: Parameter) -> String {
+    let option = OPTIONS.iter().find(|(known, _)| *known == parameter);
+    option.map_or(String::new(), |(_, option)| {
+        option.trim_start_matches('-').replace('-', "_")
+    })
+}
+
 impl StructureArguments {
     fn value(&self, parameter: Parameter) -> Option<f64> {
+        let written = self.process.values.iter();
+        let behind = written.filter(|(known, _)| *known == parameter);
+        self.option(parameter)
+            .or(behind.map(|(_, value)| *value).next())
+    }
+
+    fn option(&self, parameter: Parameter) -> Option<f64> {
         match parameter {
             Parameter::K => self.k,
             Parameter::KOverTBody => self.k_over_t_body,
@@ -81,24 +147,26 @@ impl StructureArguments {
     /// The process. An integrator with two lags is checked as `tune` checks it.
     pub(crate) fn model(&self) -> Result<Model, Failure> {
         self.check_names()?;
-        if self.process == Structure::Soiptd {
+        let structure = self.process.structure;
+        if structure == Structure::Soiptd {
             let process = ProcessArguments {
-                k: self.k,
-                k_over_t_body: self.k_over_t_body,
-                t_prop: self.t_prop.unwrap_or(f64::NAN),
-                t_body: self.t_body.unwrap_or(f64::NAN),
-                tau: self.tau.unwrap_or(f64::NAN),
+                k: self.value(Parameter::K),
+                k_over_t_body: self.value(Parameter::KOverTBody),
+                t_prop: self.value(Parameter::TProp).unwrap_or(f64::NAN),
+                t_body: self.value(Parameter::TBody).unwrap_or(f64::NAN),
+                tau: self.value(Parameter::Tau).unwrap_or(f64::NAN),
             };
             return process.process().map(Model::from);
         }
-        Linear::from_parameters(self.process, |parameter| self.value(parameter))
+        Linear::from_parameters(structure, |parameter| self.value(parameter))
             .map(Model::from)
             .map_err(Failure::usage)
     }
 
     /// Whether every parameter is there, and no other.
     fn check_names(&self) -> Result<(), Failure> {
-        let (name, parameters) = (self.process.name(), self.process.parameters());
+        let structure = self.process.structure;
+        let (name, parameters) = (structure.name(), structure.parameters());
         let list = || {
             let own = OPTIONS
                 .iter()
@@ -113,6 +181,13 @@ impl StructureArguments {
                 parameters.contains(&parameter),
                 self.value(parameter).is_some(),
             );
+            let is_behind = |(known, _): &(Parameter, f64)| *known == parameter;
+            if self.option(parameter).is_some() && self.process.values.iter().any(is_behind) {
+                return Err(Failure::usage(format!(
+                    "{} is given by {option} and by --process: leave one out",
+                    parameter.symbol()
+                )));
+            }
             if given && !has {
                 return Err(Failure::usage(format!(
                     "{option} is not a parameter of the process {name}, which has {}",
@@ -125,6 +200,11 @@ impl StructureArguments {
                     list()
                 )));
             }
+        }
+        if gains.iter().all(|gain| self.value(*gain).is_some()) {
+            return Err(Failure::usage(
+                "the gain is given twice: give either K or K/T_body",
+            ));
         }
         if gains.iter().all(|gain| self.value(*gain).is_none()) {
             let own = OPTIONS

@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Structure};
+use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Specification, Structure, Style};
 
-use super::pack;
+use super::{controllers, pack};
 use crate::args::{Estimator, Identify, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
@@ -17,6 +17,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         check_page(path, &arguments.file)?;
     }
     check_estimator(arguments)?;
+    let asked = specification(arguments)?;
     let recording = read(arguments)?;
     check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
@@ -24,7 +25,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let pack = pack::read(&arguments.pack, &bytes)?;
     let found = onecycle::Identify::new()
         .cycles(arguments.cycles as usize)
-        .phase_margin_rad(arguments.phase_margin)
+        .specification(asked)
         .method(arguments.method.into())
         .road(arguments.estimator.into())
         .structure(arguments.structure)
@@ -32,10 +33,17 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .hold(arguments.hold.map(Hold::from))
         .pack(pack)
         .run(&recording);
+    let mut choice = (found.outcome.as_ref().ok())
+        .map(|identified| controllers::of_identified(identified, arguments.design.against()));
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
         waiting.goes_on("drawing");
-        write_text(path, &page::identification(&name, &recording, &found))?;
+        choice = (choice.zip(found.outcome.as_ref().ok()))
+            .map(|(choice, identified)| choice.with_trade_off(&identified.for_design(0).0));
+        write_text(
+            path,
+            &page::identification(&name, &recording, &found, choice.as_ref()),
+        )?;
     }
     drop(waiting);
     let is_plotted = match arguments.plot {
@@ -44,16 +52,31 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         When::Never => false,
     };
     print(&if arguments.json {
-        json::identification(&name, &recording, &found, arguments.rows)
+        json::identification(&name, &recording, &found, choice.as_ref(), arguments.rows)
     } else {
         let plotted = is_plotted.then(|| plot::end(&recording, &found, columns()));
-        text::identification(&name, &recording, &found) + &plotted.flatten().unwrap_or_default()
+        text::identification(&name, &recording, &found, choice.as_ref())
+            + &plotted.flatten().unwrap_or_default()
     })?;
     Ok(ExitCode::from(if found.outcome.is_ok() {
         exit::DONE
     } else {
         exit::NO_PROCESS
     }))
+}
+
+/// The requirements on the controller.
+fn specification(arguments: &Identify) -> Result<Specification, Failure> {
+    let mut asked = arguments.design.specification()?;
+    if let Some(share) = arguments.noise {
+        if asked.style == Style::Paper {
+            return Err(Failure::usage(
+                "--style paper does not limit the noise: leave out --noise, or choose another style",
+            ));
+        }
+        asked.noise_share = share;
+    }
+    Ok(asked)
 }
 
 /// Refuses the standard output and the recording itself as names of the page.

@@ -2,26 +2,37 @@
 
 use std::process::ExitCode;
 
-use onecycle::{Model, Specification, design, step_response};
+use onecycle::{Specification, step_response};
 
+use super::controllers;
 use crate::args::Tune;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_text};
 use crate::report::{json, page, text};
+use crate::words::controllers::refusal;
 
 pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
-    let model = Model::from(arguments.process.process()?);
-    let asked = Specification::default().with_phase_margin_rad(arguments.phase_margin);
-    let best = design(&model, &asked).map_err(Failure::usage)?;
-    let response = step_response(&model, &best.controller).ok();
-    let step = response.as_ref().map(|response| &response.metrics);
+    let model = arguments.process.model()?;
+    let asked: Specification = arguments.design.specification()?;
+    let mut choice = controllers::of_model(&model, &asked, arguments.design.against());
+    let chosen = choice.chosen().map(|row| row.proposal.outcome);
+    let best = match chosen {
+        Some(Ok(design)) => design,
+        Some(Err(error)) => return Err(Failure::usage(refusal(&error))),
+        None => return Err(Failure::usage("there is no such controller")),
+    };
     if let Some(path) = &arguments.report {
-        write_text(path, &page::design(&model, &best, response.as_ref()))?;
+        choice = choice.with_trade_off(&model);
+        let response = step_response(&model, &best.controller).ok();
+        write_text(
+            path,
+            &page::design(&model, &choice, &best, response.as_ref()),
+        )?;
     }
     print(&if arguments.json {
-        json::design(&model, &best, step)
+        json::design(&model, &choice, &best)
     } else {
-        text::design(&model, &best, step)
+        text::design(&model, &choice, &best)
     })?;
     Ok(ExitCode::from(exit::DONE))
 }

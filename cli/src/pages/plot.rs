@@ -118,6 +118,9 @@ pub(crate) struct Axis {
     /// Whether labels and grid are hidden.
     #[serde(default)]
     pub(crate) is_bare: bool,
+    /// Distance of labels on a linear axis [default: chosen by the plot].
+    #[serde(default)]
+    pub(crate) tick: Option<f64>,
 }
 
 impl Axis {
@@ -132,6 +135,13 @@ impl Axis {
     pub(crate) fn logarithmic(self) -> Self {
         Self {
             is_logarithmic: true,
+            ..self
+        }
+    }
+
+    pub(crate) fn every(self, tick: f64) -> Self {
+        Self {
+            tick: Some(tick),
             ..self
         }
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::json::to_text;
 use super::number::significant;
-use super::text::wrapped;
+use super::wrap::wrapped;
 use crate::results::grid::GridRun;
 use crate::style::{headed, verdict};
 

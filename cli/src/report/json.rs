@@ -1,17 +1,20 @@
 //! The JSON reports; docs/identify-json.md is their description. Infinite values are null.
 
+mod controllers;
 mod record;
 
 use std::borrow::Cow;
 
 use onecycle::{
-    Design, Excitation, Identification, Identified, Interval, Margins, Model, Recording,
-    StepMetrics,
+    Assessment, Design, Excitation, Identification, Identified, Interval, Margins, Model,
+    Recording, StepMetrics, Style,
 };
 use onecycle_link::Column;
 use serde::{Serialize, Serializer};
 
+use self::controllers::{AgainstReport, Assumed, Proposed, Robust};
 use self::record::Record;
+use crate::results::controllers::Controllers;
 use crate::words::recording::note;
 use crate::words::remark::sentences;
 use crate::words::verdict::advice;
@@ -42,6 +45,11 @@ struct IdentifyReport<'a> {
     controller: Option<Controller>,
     margins: Option<MarginsReport>,
     step: Option<Step>,
+    robustness: Option<Robust>,
+    assumed: Option<Assumed>,
+    controllers: Option<Vec<Proposed>>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    against: Option<AgainstReport>,
     remarks: Vec<String>,
     remark_kinds: Vec<&'static str>,
     notes: Vec<String>,
@@ -56,6 +64,10 @@ struct TuneReport {
     ise: f64,
     margins: MarginsReport,
     step: Option<Step>,
+    assumed: Assumed,
+    controllers: Vec<Proposed>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    against: Option<AgainstReport>,
 }
 
 #[derive(Serialize)]
@@ -147,16 +159,27 @@ struct Fit {
 #[derive(Serialize)]
 struct Controller {
     form: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    style: Option<&'static str>,
     kp: f64,
+    ki: f64,
     kd: f64,
+    filter_s: f64,
+    setpoint_weight: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     angle_p: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     rate_p: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate_i_per_s: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    rate_d_s: Option<f64>,
 }
 
 #[derive(Serialize)]
 struct MarginsReport {
+    ms: Option<f64>,
+    mt: Option<f64>,
     phase_margin_deg: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     phase_margin_deg_interval: Option<Range>,
@@ -176,10 +199,12 @@ struct Step {
 }
 
 /// The report of an identification, one line at the end.
+/// `choice`: the controllers of an identified process.
 pub(crate) fn identification(
     file: &str,
     recording: &Recording,
     found: &Identification,
+    choice: Option<&Controllers>,
     with_rows: bool,
 ) -> String {
     let identified = found.outcome.as_ref().ok();
@@ -214,11 +239,20 @@ pub(crate) fn identification(
         innovations: innovations.map(Into::into),
         prediction: (innovations.and_then(|i| i.prediction.as_ref())).map(Into::into),
         rows: innovations.filter(|_| with_rows).map(Into::into),
-        controller: design.map(controller),
-        margins: design
-            .zip(identified)
-            .map(|(design, i)| margins(&design.margins, i.phase_margin_rad.as_ref())),
+        controller: design
+            .zip(choice)
+            .map(|(design, choice)| of_style(design, choice.asked.style)),
+        margins: (design.zip(identified)).map(|(design, i)| {
+            let interval = i.phase_margin_rad.as_ref();
+            margins(&design.margins, interval, choice.and_then(figures))
+        }),
         step: identified.and_then(|i| i.step.as_ref()).map(step),
+        robustness: design
+            .and_then(|design| design.robustness.as_ref())
+            .map(Into::into),
+        assumed: choice.map(|choice| (&choice.asked).into()),
+        controllers: choice.map(controllers::proposed),
+        against: choice.and_then(controllers::against),
         remarks: sentences(found),
         remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
         notes: recording.notes().iter().map(note).collect(),
@@ -226,15 +260,19 @@ pub(crate) fn identification(
 }
 
 /// The report of a design.
-pub(crate) fn design(model: &Model, design: &Design, metrics: Option<&StepMetrics>) -> String {
+pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> String {
+    let metrics = figures(choice).and_then(|figures| figures.step.as_ref());
     to_text(&TuneReport {
         schema: TUNE_SCHEMA,
         structure: model.structure().name(),
         process: Parameters::of_model(model),
-        controller: controller(design),
+        controller: of_style(design, choice.asked.style),
         ise: design.ise,
-        margins: margins(&design.margins, None),
+        margins: margins(&design.margins, None, figures(choice)),
         step: metrics.map(step),
+        assumed: (&choice.asked).into(),
+        controllers: controllers::proposed(choice),
+        against: controllers::against(choice),
     })
 }
 
@@ -315,20 +353,49 @@ fn fit(identified: &Identified) -> Fit {
     }
 }
 
-fn controller(design: &Design) -> Controller {
-    let controller = &design.controller;
-    let pd = controller.pd();
+/// The controller of a design in a style.
+fn of_style(design: &Design, style: Style) -> Controller {
     Controller {
-        form: controller.form().name(),
-        kp: controller.kp(),
-        kd: controller.kd(),
-        angle_p: pd.map(|pd| pd.angle_p()),
-        rate_p: pd.map(|pd| pd.rate_p()),
+        style: Some(style.name()),
+        ..controller(&design.controller)
     }
 }
 
-fn margins(margins: &Margins, phase_margin_rad: Option<&Interval>) -> MarginsReport {
+fn controller(controller: &onecycle::Controller) -> Controller {
+    let pid = controller.pid();
+    let gains = match controller {
+        onecycle::Controller::Autopilot(autopilot) => Some(autopilot.gains),
+        _ => None,
+    };
+    let pd = controller.pd();
+    Controller {
+        form: controller.form().name(),
+        style: None,
+        kp: pid.kp,
+        ki: pid.ki,
+        kd: pid.kd,
+        filter_s: pid.filter_s,
+        setpoint_weight: pid.setpoint_weight,
+        angle_p: (gains.map(|gains| gains.angle_p)).or(pd.map(|pd| pd.angle_p())),
+        rate_p: (gains.map(|gains| gains.rate_p)).or(pd.map(|pd| pd.rate_p())),
+        rate_i_per_s: gains.map(|gains| gains.rate_i),
+        rate_d_s: gains.map(|gains| gains.rate_d),
+    }
+}
+
+/// Figures of the chosen controller.
+fn figures(choice: &Controllers) -> Option<&Assessment> {
+    choice.design().map(|(_, figures)| figures)
+}
+
+fn margins(
+    margins: &Margins,
+    phase_margin_rad: Option<&Interval>,
+    figures: Option<&Assessment>,
+) -> MarginsReport {
     MarginsReport {
+        ms: figures.map(|figures| figures.ms),
+        mt: figures.map(|figures| figures.mt),
         phase_margin_deg: margins.phase_margin_rad.to_degrees(),
         phase_margin_deg_interval: phase_margin_rad.map(|interval| Range {
             estimate: interval.estimate.map(f64::to_degrees),

@@ -7,6 +7,11 @@ pub(crate) fn significant(value: f64) -> String {
     digits(value, 4)
 }
 
+/// Three significant digits, for tables.
+pub(crate) fn short(value: f64) -> String {
+    digits(value, 3)
+}
+
 /// A frequency (rad/s) in Hz with two significant digits.
 pub(crate) fn frequency(omega_rad_per_s: f64) -> String {
     format!("{} Hz", digits(omega_rad_per_s / TAU, 2))

@@ -12,36 +12,47 @@ mod thin;
 use std::fmt::Write;
 
 use onecycle::{
-    Design, Excitation, Identification, Identified, Model, Parameter, Recording, StepResponse,
-    step_response, with_signals,
+    Design, Excitation, Identification, Identified, Model, Parameter, Recording, StepMetrics,
+    StepResponse, load_response, step_response, with_signals,
 };
-use onecycle_design::bands::step_bands;
+use onecycle_design::bands::{load_bands, step_bands};
 use onecycle_identify::{Harmonic, harmonics};
 
 use self::stability::Loop;
 use super::number::significant;
 use super::units::Units;
 use crate::pages::page::{self, Section, page};
+use crate::results::controllers::Controllers;
 use crate::words;
 
 /// Processes of the posterior that bands are drawn from: the ends of a 90 % band are then the tenth from either side.
 const DRAWS: usize = 200;
+/// Processes of the posterior whose responses are simulated: the ends of the band are the fourth from either side.
+const RESPONSES: usize = 80;
 /// Harmonics that are looked for in a recording: the fundamental, and what a relay adds to it.
 const HARMONICS: usize = 5;
 /// Times at which a step is drawn.
 const STEP_POINTS: usize = 400;
 
 /// The page of an identification.
-pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
+/// `choice`: the controllers of an identified process.
+pub(crate) fn identification(
+    file: &str,
+    recording: &Recording,
+    found: &Identification,
+    choice: Option<&Controllers>,
+) -> String {
     let units = Units::of(recording);
-    let mut sections = vec![recorded::section(recording, found, &units)];
+    let mut sections = vec![];
+    let recorded = recorded::section(recording, found, &units);
     let mut lead = made_by("identify");
     match &found.outcome {
         Ok(identified) => {
-            lead += &identified_lead(identified, found.remarks.len());
+            lead += &identified_lead(identified, choice, found.remarks.len());
             let view = View {
                 units: &units,
                 identified,
+                choice,
             };
             // One cycle may be one of no steady oscillation, which has no harmonics.
             let steady = (found.oscillation()).filter(|oscillation| oscillation.cycles_used > 1);
@@ -50,7 +61,9 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
                     harmonics(signals, oscillation, HARMONICS)
                 })
             });
-            sections.extend(view.sections(&measured));
+            sections.extend(view.answer(&measured));
+            sections.push(recorded);
+            sections.extend(view.evidence());
         }
         Err(verdict) => {
             let words = format!(
@@ -59,6 +72,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
             );
             lead += &page::verdict(false, &words);
             lead += &page::paragraph("lead", &words::verdict::advice(verdict));
+            sections.push(recorded);
         }
     }
     sections.extend(remarks(found));
@@ -70,27 +84,71 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
 }
 
 /// The page of a design.
-pub(crate) fn design(model: &Model, design: &Design, response: Option<&StepResponse>) -> String {
+pub(crate) fn design(
+    model: &Model,
+    choice: &Controllers,
+    design: &Design,
+    response: Option<&StepResponse>,
+) -> String {
     let mut lead = made_by("tune");
+    let mut text = gains(choice, design);
+    let _ = write!(
+        text,
+        "phase margin {}",
+        stability::phase_margin(&design.margins, None)
+    );
+    text += &predicted(
+        choice
+            .design()
+            .and_then(|(_, figures)| figures.step)
+            .as_ref(),
+    );
+    lead += &page::verdict(true, &(text + "."));
     lead += &page::facts(&parameters::of_model(model));
-    let own = Loop::new(*model, design.controller, design.margins);
+    let own = Loop::new(*model, design.controller, design.margins).outside(peak(choice));
+    let load = load_response(model, &design.controller).ok();
     let sections = [
+        Some(controller::section(
+            choice,
+            design,
+            None,
+            (&Units::default(), None),
+        )),
+        response.map(|response| {
+            let load = load.as_ref().map(|load| (load, None));
+            step::section(response, None, &times_s(response), load)
+        }),
+        controller::trade_off(choice),
         Some(own.section()),
-        response.map(|response| step::section(response, None, &times_s(response))),
-        Some(controller::section(design, &Units::default(), None)),
     ];
     let sections: Vec<Section> = sections.into_iter().flatten().collect();
-    page("Optimal controller of a process", &lead, &sections)
+    page("Controller of a process", &lead, &sections)
+}
+
+/// Maximum sensitivity of the chosen controller.
+fn peak(choice: &Controllers) -> Option<f64> {
+    choice.design().map(|(_, figures)| figures.ms)
 }
 
 /// An identified process and the units of its recording.
 struct View<'a> {
     units: &'a Units,
     identified: &'a Identified,
+    choice: Option<&'a Controllers>,
 }
 
 impl View<'_> {
-    fn sections(&self, measured: &[Harmonic]) -> Vec<Section> {
+    /// The controller: what to type in, and what it will do.
+    fn answer(&self, measured: &[Harmonic]) -> Vec<Section> {
+        match (self.choice, &self.identified.design) {
+            (Some(choice), Some(design)) => self.of_controller(choice, design, measured),
+            (Some(choice), None) => vec![controller::without(choice)],
+            _ => vec![],
+        }
+    }
+
+    /// What the model rests on.
+    fn evidence(&self) -> Vec<Section> {
         let mut sections = vec![
             fit::section(self.identified, self.units),
             parameters::section(self.identified, self.units),
@@ -99,14 +157,16 @@ impl View<'_> {
             let chosen = self.identified.model.structure();
             sections.push(structures::section(chosen, innovations, self.units));
         }
-        if let Some(design) = &self.identified.design {
-            sections.extend(self.of_controller(design, measured));
-        }
         sections
     }
 
-    /// Stability, step and forms of the controller.
-    fn of_controller(&self, design: &Design, measured: &[Harmonic]) -> Vec<Section> {
+    /// Gains, responses, trade-off and stability of the controller.
+    fn of_controller(
+        &self,
+        choice: &Controllers,
+        design: &Design,
+        measured: &[Harmonic],
+    ) -> Vec<Section> {
         let identified = self.identified;
         let draws = identified.posterior.models(DRAWS);
         // Where the interval holds zero there is nothing to subtract.
@@ -115,17 +175,29 @@ impl View<'_> {
             .and_then(|bias| bias.estimate);
         let own = Loop::new(identified.model, design.controller, design.margins)
             .within(&draws, identified.phase_margin_rad)
+            .outside(peak(choice))
             .measured(measured);
-        let response = step_response(&identified.model, &design.controller).ok();
-        let step = response.map(|response| {
+        let (model, controller) = (&identified.model, &design.controller);
+        let step = step_response(model, controller).ok().map(|response| {
             let times_s = times_s(&response);
-            let bands = step_bands(&draws, &design.controller, &times_s);
-            step::section(&response, bands.as_ref(), &times_s)
+            let few = &draws[..draws.len().min(RESPONSES)];
+            let bands = step_bands(few, controller, &times_s);
+            let load = load_response(model, controller).ok();
+            let around = load_bands(few, controller, &times_s);
+            let load = load.as_ref().map(|load| (load, around.as_ref()));
+            step::section(&response, bands.as_ref(), &times_s, load)
         });
+        let margin = identified.phase_margin_rad.as_ref();
         [
-            Some(own.section()),
+            Some(controller::section(
+                choice,
+                design,
+                margin,
+                (self.units, bias),
+            )),
             step,
-            Some(controller::section(design, self.units, bias)),
+            controller::trade_off(choice),
+            Some(own.section()),
         ]
         .into_iter()
         .flatten()
@@ -149,29 +221,57 @@ fn made_by(command: &str) -> String {
     )
 }
 
+/// The style and the gains to type in.
+fn gains(choice: &Controllers, design: &Design) -> String {
+    let pid = design.controller.pid();
+    let gain = |name: &str, value: f64| {
+        if value == 0.0 {
+            String::new()
+        } else {
+            format!("{name} {}, ", significant(value))
+        }
+    };
+    let filter = gain("filter Tf", pid.filter_s).replace(", ", " s, ");
+    format!(
+        "{} {}: {}{}{}{filter}",
+        words::capital(words::controllers::style(choice.asked.style)),
+        design
+            .controller
+            .form()
+            .name()
+            .replace('_', " ")
+            .to_uppercase(),
+        gain("Kp", pid.kp),
+        gain("Ki", pid.ki),
+        gain("Kd", pid.kd),
+    )
+}
+
+/// The predicted step, as the end of a sentence.
+fn predicted(step: Option<&StepMetrics>) -> String {
+    step.map_or(String::new(), |step| {
+        let (overshoot, settled) = (100.0 * step.overshoot, significant(step.settling_time_s));
+        format!(", a step overshoots by {overshoot:.0} % and settles in {settled} s")
+    })
+}
+
 /// What the page comes down to.
-fn identified_lead(identified: &Identified, remarks: usize) -> String {
+fn identified_lead(
+    identified: &Identified,
+    choice: Option<&Controllers>,
+    remarks: usize,
+) -> String {
     let mut text = "Identified. ".to_owned();
-    match &identified.design {
-        Some(design) => {
+    match choice.zip(identified.design.as_ref()) {
+        Some((choice, design)) => {
             let margin_rad = identified.phase_margin_rad.as_ref();
-            let _ = write!(
-                text,
-                "Kp {}, Kd {}: phase margin {}",
-                significant(design.controller.kp()),
-                significant(design.controller.kd()),
-                stability::phase_margin(&design.margins, margin_rad)
-            );
+            let margin = stability::phase_margin(&design.margins, margin_rad);
+            text += &gains(choice, design);
+            let _ = write!(text, "phase margin {margin}");
         }
         None => text += "No controller was designed",
     }
-    if let Some(step) = &identified.step {
-        let (overshoot, settled) = (100.0 * step.overshoot, significant(step.settling_time_s));
-        let _ = write!(
-            text,
-            ", a step overshoots by {overshoot:.0} % and settles in {settled} s"
-        );
-    }
+    text += &predicted(identified.step.as_ref());
     text += match remarks {
         0 => ".",
         1 => ". There is a remark below.",

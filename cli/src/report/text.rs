@@ -3,25 +3,32 @@
 use std::fmt::Write;
 
 use onecycle::{
-    Controller, Design, Estimate, Excitation, Identification, Identified, Interval, Model,
-    Oscillation, Parameter, Recording, StepMetrics,
+    Design, Estimate, Excitation, Identification, Identified, Interval, Model, Oscillation,
+    Parameter, Recording, StepMetrics,
 };
 use onecycle_identify::Reading;
 
-use super::number::{bounded, seconds, significant};
+use super::controllers;
+use super::number::{bounded, significant};
 use super::record::{self, Fact};
 use super::units::Units;
+use super::wrap::wrapped;
+use crate::results::controllers::Controllers;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
+use crate::words;
 use crate::words::recording;
 use crate::words::remark::sentences;
 use crate::words::sentence;
 use crate::words::verdict::advice;
 
-/// Widest line of remarks, as terminals are.
-const WIDTH: usize = 96;
-
 /// The report of an identification.
-pub(crate) fn identification(file: &str, recording: &Recording, found: &Identification) -> String {
+/// `choice`: the controllers of an identified process.
+pub(crate) fn identification(
+    file: &str,
+    recording: &Recording,
+    found: &Identification,
+    choice: Option<&Controllers>,
+) -> String {
     let mut text = String::new();
     let units = Units::of(recording);
     let _ = writeln!(text, "{}", painted(HEADING, file));
@@ -54,8 +61,11 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
                     &record::of_model(identified, innovations, &units),
                 );
             }
-            if let Some(design) = &identified.design {
-                describe_own_controller(&mut text, identified, design, &units);
+            if let Some(choice) = choice {
+                text.push_str(&controllers::table(choice));
+            }
+            if let Some((choice, design)) = choice.zip(identified.design.as_ref()) {
+                describe_own_controller(&mut text, identified, (choice, design), &units);
             }
         }
         Err(verdict) => {
@@ -74,7 +84,7 @@ pub(crate) fn identification(file: &str, recording: &Recording, found: &Identifi
 }
 
 /// The report of a design.
-pub(crate) fn design(model: &Model, design: &Design, step: Option<&StepMetrics>) -> String {
+pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> String {
     let mut text = String::new();
     let structure = model.structure();
     let units = Units::default();
@@ -90,13 +100,15 @@ pub(crate) fn design(model: &Model, design: &Design, step: Option<&StepMetrics>)
             format!("  {name:<10}{value:>12} {unit}").trim_end()
         );
     }
-    describe_controller(&mut text, design, None, &units);
+    text.push_str(&controllers::table(choice));
+    describe_controller(&mut text, (choice, design), None, &units);
     let _ = writeln!(
         text,
         "  squared error of a unit step {}",
         significant(design.ise)
     );
-    describe_step(&mut text, step, &units);
+    let step = choice.design().and_then(|(_, figures)| figures.step);
+    describe_step(&mut text, step.as_ref(), &units);
     text
 }
 
@@ -212,13 +224,14 @@ fn describe_process(text: &mut String, identified: &Identified, units: &Units) {
 fn describe_own_controller(
     text: &mut String,
     identified: &Identified,
-    design: &Design,
+    (choice, design): (&Controllers, &Design),
     units: &Units,
 ) {
     let margin = identified.phase_margin_rad.as_ref();
-    describe_controller(text, design, margin, units);
+    describe_controller(text, (choice, design), margin, units);
     let bias = identified.estimate.get(Parameter::InputBias);
-    if bias.is_some_and(|bias| !bias.holds(0.0)) {
+    let is_left = !design.controller.form().has_integral();
+    if is_left && bias.is_some_and(|bias| !bias.holds(0.0)) {
         text.push_str("  subtract the input bias from u: there is no integral action\n");
     }
     describe_step(text, identified.step.as_ref(), units);
@@ -226,56 +239,25 @@ fn describe_own_controller(
 
 fn describe_controller(
     text: &mut String,
-    design: &Design,
+    (choice, design): (&Controllers, &Design),
     phase_margin_rad: Option<&Interval>,
     units: &Units,
 ) {
     let law = design.controller.form().law();
-    text.push_str(&headed(&format!("\nController  {law}\n")));
-    describe_gains(text, &design.controller, units);
-    let margins = &design.margins;
-    let _ = write!(
-        text,
-        "  phase margin {:.1} deg",
-        margins.phase_margin_rad.to_degrees()
-    );
-    if let Some(Interval {
-        low: Some(low),
-        high: Some(high),
-        ..
-    }) = phase_margin_rad
-    {
-        let _ = write!(
-            text,
-            " (90 %: {:.1} .. {:.1})",
-            low.to_degrees(),
-            high.to_degrees()
-        );
+    let style = words::controllers::style(choice.asked.style);
+    text.push_str(&headed(&format!("\nController  {style}: {law}\n")));
+    for (name, value) in controllers::forms(&design.controller, units) {
+        wrapped(text, &format!("  {name:<12}"), &value);
     }
-    if let Some(gain_margin) = margins.gain_margin {
-        let decibels = 20.0 * gain_margin.log10();
-        let _ = write!(text, "   gain margin {gain_margin:.2} ({decibels:.1} dB)");
+    let margins = controllers::margins(choice, design, phase_margin_rad);
+    wrapped(text, "  margins     ", &margins);
+    if let Some(robustness) = &design.robustness {
+        let price = words::controllers::price(robustness);
+        wrapped(text, "  robustness  ", &price);
     }
-    let _ = writeln!(text, "   delay margin {}", seconds(margins.delay_margin_s));
-}
-
-fn describe_gains(text: &mut String, controller: &Controller, units: &Units) {
-    let (gain, rate) = (units.controller(""), units.controller(" s"));
-    let _ = write!(
-        text,
-        "  Kp {}{gain}   Kd {}{rate}",
-        significant(controller.kp()),
-        significant(controller.kd())
-    );
-    if let Some(pd) = controller.pd() {
-        let _ = write!(
-            text,
-            "   as cascade: angle P {} 1/s, rate P {}{rate}",
-            significant(pd.angle_p()),
-            significant(pd.rate_p())
-        );
+    if let Some(assumed) = words::controllers::assumed(&choice.asked, choice.is_recorded) {
+        wrapped(text, "  assumed     ", &assumed);
     }
-    text.push('\n');
 }
 
 fn describe_step(text: &mut String, step: Option<&StepMetrics>, units: &Units) {
@@ -313,23 +295,4 @@ fn remark(text: &mut String, lead: &str, words: &str) {
     let mut lines = String::new();
     wrapped(&mut lines, lead, words);
     text.push_str(&painted(REMARK, &lines));
-}
-
-/// Writes `words` behind `lead`, in lines as wide as a terminal, indented like the first.
-pub(super) fn wrapped(text: &mut String, lead: &str, words: &str) {
-    let mut line = lead.to_owned();
-    let mut is_first = true;
-    for word in words.split_whitespace() {
-        if !is_first && line.len() + 1 + word.len() > WIDTH {
-            let _ = writeln!(text, "{line}");
-            line = " ".repeat(lead.len());
-            is_first = true;
-        }
-        if !is_first {
-            line.push(' ');
-        }
-        line.push_str(word);
-        is_first = false;
-    }
-    let _ = writeln!(text, "{line}");
 }

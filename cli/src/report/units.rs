@@ -52,6 +52,14 @@ impl Units {
         format!(" {}{times}/{}", self.input, self.output)
     }
 
+    /// Unit of an integral gain, with a blank before it: ` input/(output s)`.
+    pub(super) fn integral(&self) -> String {
+        if self.input.is_empty() || self.output.is_empty() {
+            return String::new();
+        }
+        format!(" {}/({} s)", self.input, self.output)
+    }
+
     /// Title of an axis: a name with its unit in brackets, where there is one.
     pub(super) fn titled(name: &str, unit: &str) -> String {
         if unit.is_empty() {

@@ -2,6 +2,7 @@
 
 use onecycle::{DesignError, Identification, Parameter, Remark};
 
+use super::controllers;
 use crate::report::number::{percent, significant};
 
 /// One or two sentences for each remark on a result, with the options of this program.
@@ -189,18 +190,11 @@ fn listed(names: &[&str]) -> String {
 }
 
 fn without_controller(error: &DesignError) -> String {
-    match error {
-        DesignError::Structure(structure) => format!(
-            "This version designs no controller for the structure {}. The model and its intervals are valid.",
-            structure.name()
-        ),
-        DesignError::PhaseMargin(_) => {
-            format!(
-                "No controller was designed: {error}. Choose another margin with --phase-margin."
-            )
-        }
-        _ => format!("No controller was designed: {error}. The model and its intervals are valid."),
-    }
+    let advice = controllers::advice(error);
+    format!(
+        "No controller was designed: {error}. The model and its intervals are valid. {}",
+        super::sentence(&advice)
+    )
 }
 
 /// Remarks on intervals, with the way to narrower ones.
@@ -231,7 +225,7 @@ fn of_interval(remark: &Remark, is_relay: bool) -> Option<String> {
         ),
         Remark::MarginMayBeLess(margin_rad) => format!(
             "Within the intervals the phase margin may be as low as {:.1} deg; {}, or ask for a larger margin with \
-             --phase-margin.",
+             --phase-margin or --style calm.",
             margin_rad.to_degrees(),
             longer
         ),
@@ -266,8 +260,8 @@ fn of_result(remark: &Remark) -> Option<String> {
             100.0 * part
         ),
         Remark::Overshoot(part) => format!(
-            "The step overshoots by {:.0} %, which is usual for the least squared error at this phase margin. Less \
-             overshoot: --phase-margin 45, or a filter on the reference.",
+            "The step overshoots by {:.0} %. For less overshoot choose --style balanced or --style calm, or filter the \
+             reference.",
             100.0 * part
         ),
         _ => return None,

@@ -43,6 +43,9 @@ fn unusable_options_of_identify() {
         let both = [&general[..], &["--estimator", "relay"]].concat();
         with(&both).misused(&[general[0], "--estimator relay", "leave out"]);
     }
+    with(&["--noise", "0"]).misused(&["--noise", "share of noise"]);
+    with(&["--noise", "much"]).misused(&["--noise", "neither a number nor a percentage"]);
+    with(&["--noise", "20%", "--style", "paper"]).misused(&["--style paper", "--noise"]);
     with(&["--nosuch"]).misused(&["--nosuch"]);
     run(&["identify"]).misused(&["required"]);
 }
@@ -132,6 +135,68 @@ fn extreme_simulations_do_not_crash() {
     process("1e-300", "0", &[]).misused(&[]);
 }
 
+// Both commands have the same requirements; `tune` needs no file.
+#[test]
+fn unusable_requirements_on_a_controller() {
+    let process = ["tune", "--process", "FOPTD,K=1,T=1,tau=0.2"];
+    let with = |arguments: &[&str]| run(&[&process[..], arguments].concat());
+    with(&["--style", "wild"]).misused(&["--style", "wild"]);
+    with(&["--controller", "lqr"]).misused(&["--controller", "lqr"]);
+    with(&["--ms", "1"]).misused(&["--ms", "between 1.05 and 10"]);
+    with(&["--ms", "nan"]).misused(&["--ms", "between 1.05 and 10"]);
+    with(&["--gain-margin", "0.5"]).misused(&["--gain-margin", "factor"]);
+    with(&["--input-peak", "-3"]).misused(&["--input-peak", "positive"]);
+    with(&["--sample-period", "0"]).misused(&["--sample-period", "positive"]);
+    with(&["--phase-margin", "0"]).misused(&["--phase-margin", "between 0 and 90"]);
+    for gains in ["1", "1,2", "1,2,x", "1,2,3,4,5", ""] {
+        with(&["--against", gains]).misused(&["--against", "Kp,Ki,Kd"]);
+    }
+    with(&["--against", "0,0,0"]).misused(&["--against", "not zero"]);
+    with(&["--against", "1,2,3,-1"]).misused(&["--against", "filter"]);
+    with(&["--style", "paper"]).misused(&["paper's method", "--style sharp, balanced or calm"]);
+    with(&["--style", "paper", "--ms", "2"]).misused(&["--style paper", "leave out --ms"]);
+    with(&["--style", "paper", "--controller", "pi"]).misused(&["a PD and no pi"]);
+    with(&["--controller", "pd"]).misused(&["integral", "--controller pi"]);
+    with(&["--controller", "cascade-pi"]).misused(&["integrator", "--controller pi"]);
+    // No controller has a phase margin of 89 degrees and a gain margin of 90.
+    with(&[
+        "--controller",
+        "pi",
+        "--phase-margin",
+        "89",
+        "--gain-margin",
+        "90",
+    ]);
+    // Two integrators and a lag: a PI cannot stabilise them.
+    let double = [
+        "--process",
+        "double_integrator_lag,K/T_body=1,T_prop=0.1,tau=0.05",
+    ];
+    let refused = run(&[&["tune", "--controller", "pi"], &double[..]].concat());
+    refused.misused(&["no controller of the form pi", "--controller"]);
+    // Nothing delays the loop.
+    let undelayed = ["tune", "--process", "iptd,K=1,tau=0"];
+    run(&undelayed).misused(&["--sample-period"]);
+    let sampled = run(&[&undelayed[..], &["--sample-period", "0.01"]].concat());
+    assert_eq!(sampled.code, Some(0), "{sampled:?}");
+}
+
+#[test]
+fn unusable_processes_in_one_word() {
+    let tune = |process: &str| run(&["tune", "--process", process]);
+    tune("pt1,K=1").misused(&["--process", "there is no structure 'pt1'"]);
+    tune("foptd,K=1,T=1").misused(&["foptd needs --tau"]);
+    tune("foptd,K=1,T=1,tau=0.1,zeta=2").misused(&["'zeta' is not a parameter of foptd"]);
+    tune("foptd,K=1,K=2,T=1,tau=0.1").misused(&["K is given twice"]);
+    tune("foptd,K=1,T_body=1,T=2,tau=0.1").misused(&["T_body is given twice"]);
+    tune("foptd,K=x,T=1,tau=0.1").misused(&["'x' is not a number for K"]);
+    tune("foptd,K,T=1,tau=0.1").misused(&["'K' is not a parameter: write K=2"]);
+    tune("foptd,K=0,T=1,tau=0.1").misused(&["K must be finite and not zero"]);
+    tune("foptd,K=1,K/T_body=1,T=1,tau=0.1").misused(&["either K or K/T_body"]);
+    let twice = ["tune", "--process", "foptd,K=1,T=1,tau=0.1", "--k", "2"];
+    run(&twice).misused(&["K is given by --k and by --process"]);
+}
+
 #[test]
 fn impossible_processes_for_tune() {
     let tune = |k: &str, t_prop: &str, t_body: &str, tau: &str| {
@@ -148,7 +213,7 @@ fn impossible_processes_for_tune() {
     tune("1", "0.3", "inf", "0.1").misused(&["--k-over-t-body"]);
     tune("1", "0.3", "2", "-0.1").misused(&["tau", "positive"]);
     tune("1", "0.3", "2", "nan").misused(&["tau", "positive"]);
-    tune("1", "1e-300", "2", "1e-300").misused(&["too extreme"]);
+    tune("1", "1e-300", "2", "1e-300").misused(&["--sample-period"]);
     tune("1", "0.3", "1e300", "0.1").without_nan();
     tune("1", "1e9", "1e9", "1e9").without_nan();
     let both = [
@@ -163,7 +228,7 @@ fn impossible_processes_for_tune() {
         "1",
     ];
     run(&both).misused(&["--k", "--k-over-t-body"]);
-    run(&["tune", "--k", "1"]).misused(&["required"]);
+    run(&["tune", "--k", "1"]).misused(&["needs --t-prop"]);
     run(&[]).misused_without_command();
 }
 

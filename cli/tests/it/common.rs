@@ -236,8 +236,9 @@ impl Outcome {
             "/fit/misfit",
             "/controller/kp",
             "/controller/kd",
-            "/controller/angle_p",
-            "/controller/rate_p",
+            "/controller/ki",
+            "/controller/filter_s",
+            "/margins/ms",
             "/margins/phase_margin_deg",
             "/margins/delay_margin_s",
         ];

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use onecycle::{
-    CsvOptions, Excitation, Identification, Identify, Method, Pack, Recording, Remark, Road,
-    Verdict, with_signals,
+    CsvOptions, Excitation, Form, Identification, Identify, Method, Pack, Recording, Remark, Road,
+    Specification, Style, Verdict, with_signals,
 };
 use onecycle_identify::{Options, Signals};
 use serde_json::{Value, json};
@@ -58,6 +58,7 @@ fn the_program_says_what_the_library_finds() {
         assert_eq!(report.0["controller"]["form"], json!(form), "{name}");
         for (pointer, ours) in [
             ("/controller/kp", design.controller.kp()),
+            ("/controller/ki", design.controller.ki()),
             ("/controller/kd", design.controller.kd()),
             ("/margins/delay_margin_s", design.margins.delay_margin_s),
             ("/step/overshoot", step.overshoot),
@@ -91,11 +92,12 @@ fn the_program_refuses_what_the_library_refuses() {
     assert_eq!(report.0["verdict"]["message"], verdict.to_string());
     assert!(report.advice().ends_with('.'), "{}", report.advice());
 
-    let found = identify(&recording);
+    let sharp = Specification::new(Form::Pid, Style::Sharp);
+    let found = Identify::new().specification(sharp).run(&recording);
     let recorded = matches!(found.excitation, Some(Excitation::Recorded(_)));
     let identified = found.outcome.unwrap();
     assert!(recorded && identified.fit.innovations().is_some());
-    let report = run(&identify_json).identified();
+    let report = run(&[&identify_json[..], &["--style", "sharp"]].concat()).identified();
     for (parameter, ours) in identified.estimate.iter() {
         let key = parameter.key();
         assert_eq!(report.0["process"][key], interval(&ours), "{key}");
@@ -173,6 +175,7 @@ fn options_and_packs_are_passed_on() {
     let recording = of_samples(&Table::noisy());
     let asked = Identify::new()
         .cycles(2)
+        .specification(Specification::paper())
         .phase_margin_rad(45_f64.to_radians());
     let found = asked.run(&recording);
     assert_eq!(found.oscillation().unwrap().cycles_used, 2);

@@ -25,6 +25,7 @@ fn an_identification_as_a_page() {
         "recording",
         "fit",
         "process",
+        "trade-off",
         "stability",
         "step",
         "controller",
@@ -35,8 +36,9 @@ fn an_identification_as_a_page() {
         );
     }
     let figures = figures(&page);
-    // Recording, fit, correlogram, seven marginals, contours, correlations, Nyquist, Bode, step.
-    assert_eq!(figures.len(), 15);
+    // Step, load, trade-off, Nyquist, Bode, gang of four, recording, fit, correlogram, seven marginals, contours,
+    // correlations.
+    assert_eq!(figures.len(), 21);
     let notes = notes(&figures);
     let margins = &report["margins"];
     let phase = format!(
@@ -111,7 +113,7 @@ fn a_refusal_as_a_page() {
 // absent, and the page is below 2 MB.
 #[test]
 fn a_recording_of_any_kind_as_a_page() {
-    let (ran, page) = reported(&["identify", UNSTEADY, "--json"]);
+    let (ran, page) = reported(&["identify", UNSTEADY, "--style", "sharp", "--json"]);
     assert_eq!(ran.code, Some(0));
     for section in [
         "recording",
@@ -137,8 +139,9 @@ fn a_recording_of_any_kind_as_a_page() {
         );
     }
     let figures = figures(&page);
-    // Recording, fit, correlogram, seven marginals, contours, correlations, Nyquist, Bode, step.
-    assert_eq!(figures.len(), 15);
+    // Step, load, trade-off, Nyquist, Bode, gang of four, recording, fit, correlogram, seven marginals, contours,
+    // correlations.
+    assert_eq!(figures.len(), 21);
     for trace in figures
         .iter()
         .flat_map(|figure| figure["data"].as_array().unwrap())
@@ -151,16 +154,17 @@ fn a_recording_of_any_kind_as_a_page() {
     assert!(page.len() < 2_000_000, "{}", page.len());
 }
 
-// A design has three figures, with the requested margin in both stability plots; a grid has five.
+// A design has nine figures, with the requested margin in both stability plots; a grid has five.
 #[test]
 fn designs_and_grids_as_pages() {
     let tune = [
-        "tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
+        "tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1", "--style", "paper",
     ];
     let (ran, page) = reported(&tune);
     assert_eq!(ran.code, Some(0));
     let tuned = figures(&page);
-    assert_eq!(tuned.len(), 3);
+    // Step, load, trade-off, Nyquist, Bode, gang of four.
+    assert_eq!(tuned.len(), 9);
     let found = notes(&tuned);
     let margins = found.iter().filter(|note| *note == "phase margin 20.0 deg");
     assert_eq!(margins.count(), 2);

@@ -1,5 +1,6 @@
 //! A given loop in the units of the user: margins, peaks, integrals, responses.
 
+use std::cell::OnceCell;
 use std::f64::consts::PI;
 
 use crate::controller::Controller;
@@ -7,7 +8,7 @@ use crate::model::Model;
 use crate::soiptd_pd::loop_response::LoopResponse;
 use crate::soiptd_pd::margins::Margins;
 use crate::soiptd_pd::step_metrics::StepMetrics;
-use crate::soiptd_pd::step_response::{Sample, StepResponse, StepResponseError};
+use crate::soiptd_pd::step_response::{Sample, StepResponse, StepResponseError, interpolated};
 
 use super::law::Law;
 use super::metrics::{Record, reference_metrics};
@@ -49,6 +50,14 @@ pub struct LoadResponse {
     pub iae: f64,
 }
 
+impl LoadResponse {
+    /// Process output (output unit) and controller output (input unit) at a time (s), as [`StepResponse::at`].
+    #[must_use]
+    pub fn at(&self, t_s: f64) -> (f64, f64) {
+        interpolated(&self.samples, t_s)
+    }
+}
+
 /// A loop with its units.
 pub(crate) struct Loop {
     process: Process,
@@ -56,7 +65,8 @@ pub(crate) struct Loop {
     open_loop: OpenLoop,
     /// Dead time of the process alone (s).
     model_tau_s: f64,
-    is_stable: bool,
+    /// Decided when it is asked for: the open loop alone does not need it.
+    is_stable: OnceCell<bool>,
 }
 
 impl Loop {
@@ -75,13 +85,17 @@ impl Loop {
             process,
             law,
             model_tau_s,
-            is_stable: is_stable(&open_loop),
+            is_stable: OnceCell::new(),
             open_loop,
         })
     }
 
+    fn is_stable(&self) -> bool {
+        *self.is_stable.get_or_init(|| is_stable(&self.open_loop))
+    }
+
     fn curve(&self) -> Option<Curve<'_>> {
-        if self.is_stable {
+        if self.is_stable() {
             Curve::new(&self.open_loop)
         } else {
             None
@@ -184,7 +198,7 @@ impl Loop {
     /// See [`crate::noise_amplification`].
     pub(crate) fn noise_amplification(&self, sample_period_s: f64) -> Option<f64> {
         let period = sample_period_s / self.process.unit_s;
-        (self.is_stable && period.is_normal() && period > 0.0).then(|| {
+        (period.is_normal() && period > 0.0 && self.is_stable()).then(|| {
             let kappa = noise::amplification(&self.process, &self.law, period);
             kappa / self.process.gain.abs()
         })
@@ -221,7 +235,7 @@ impl Loop {
 
     /// Steps of a response until it settles at `goal`, and the time of the first one.
     fn record(&self, excitation: Excitation, goal: f64) -> Result<Record, StepResponseError> {
-        if !self.is_stable {
+        if !self.is_stable() {
             return Err(StepResponseError::Unstable);
         }
         let curve = self.curve().ok_or(StepResponseError::TooSlow)?;

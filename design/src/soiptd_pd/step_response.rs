@@ -74,24 +74,29 @@ impl StepResponse {
     /// those of the first sample, after the last sample those of the last.
     #[must_use]
     pub fn at(&self, t_s: f64) -> (f64, f64) {
-        let next = self.samples.partition_point(|sample| sample.t_s <= t_s);
-        let (Some(before), Some(after)) = (
-            self.samples.get(next.saturating_sub(1)),
-            self.samples.get(next).or(self.samples.last()),
-        ) else {
-            return (0.0, 0.0);
-        };
-        let length_s = after.t_s - before.t_s;
-        let part = if length_s > 0.0 {
-            ((t_s - before.t_s) / length_s).clamp(0.0, 1.0)
-        } else {
-            0.0
-        };
-        (
-            before.y + part * (after.y - before.y),
-            before.u + part * (after.u - before.u),
-        )
+        interpolated(&self.samples, t_s)
     }
+}
+
+/// `y` and `u` at a time (s), by linear interpolation between samples; constant outside them.
+pub(crate) fn interpolated(samples: &[Sample], t_s: f64) -> (f64, f64) {
+    let next = samples.partition_point(|sample| sample.t_s <= t_s);
+    let (Some(before), Some(after)) = (
+        samples.get(next.saturating_sub(1)),
+        samples.get(next).or(samples.last()),
+    ) else {
+        return (0.0, 0.0);
+    };
+    let length_s = after.t_s - before.t_s;
+    let part = if length_s > 0.0 {
+        ((t_s - before.t_s) / length_s).clamp(0.0, 1.0)
+    } else {
+        0.0
+    };
+    (
+        before.y + part * (after.y - before.y),
+        before.u + part * (after.u - before.u),
+    )
 }
 
 /// Why there is no step response.

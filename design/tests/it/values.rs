@@ -3,8 +3,8 @@
 use std::collections::HashSet;
 
 use onecycle_design::{
-    Controller, DesignError, Form, Model, Parameter, Specification, Structure, Unit, design,
-    design_over, ise, margins,
+    Controller, DesignError, Execution, Form, MeasurementNoise, Model, Parameter, Specification,
+    Structure, Style, Unit, design, design_over, ise, margins,
 };
 use onecycle_onboard::Soiptd;
 
@@ -84,12 +84,53 @@ fn a_structure_lists_the_parameters_of_its_models() {
 }
 
 #[test]
-fn a_specification_is_the_papers_by_default() {
+fn a_specification_is_a_balanced_pid_by_default() {
     let default = Specification::default();
-    assert_eq!(default.form, Form::Pd);
-    assert_eq!(default.phase_margin_rad, 20_f64.to_radians());
+    assert_eq!((default.form, default.style), (Form::Pid, Style::Balanced));
+    assert_eq!(
+        (default.ms, default.mt, default.noise_share),
+        (1.6, 1.6, 0.25)
+    );
+    assert_eq!(default.phase_margin_rad, 0.0);
     let larger = default.with_phase_margin_rad(1.0);
-    assert_eq!((larger.form, larger.phase_margin_rad), (Form::Pd, 1.0));
+    assert_eq!((larger.form, larger.phase_margin_rad), (Form::Pid, 1.0));
+    let paper = Specification::paper();
+    assert_eq!((paper.form, paper.style), (Form::Pd, Style::Paper));
+    assert_eq!(paper.phase_margin_rad, 20_f64.to_radians());
+    assert_eq!((default.draws(), paper.draws()), (200, 96));
+    // Ms = 2 leaves 2 asin(1/4) = 28.955 degrees.
+    let sharp = Specification::new(Form::Pi, Style::Sharp);
+    assert!((sharp.implied_phase_margin_rad().to_degrees() - 28.955).abs() < 1e-3);
+    assert_eq!(paper.implied_phase_margin_rad(), paper.phase_margin_rad);
+}
+
+// Another style has its own limits, and keeps what belongs to the task: form, noise, sampling, further limits. The
+// paper's form and margin do not go over to another style, nor the other way round.
+#[test]
+fn another_style_keeps_the_task() {
+    let noise = MeasurementNoise::new(0.1, 0.01, 2.0);
+    let asked = Specification::new(Form::Pi, Style::Balanced)
+        .with_peak(1.5)
+        .with_noise(noise)
+        .with_execution(Execution::sampled(0.01))
+        .with_phase_margin_rad(0.9);
+    assert_eq!(asked.in_style(Style::Balanced), asked);
+    let calm = asked.in_style(Style::Calm);
+    let expected = Specification::new(Form::Pi, Style::Calm)
+        .with_noise(noise)
+        .with_execution(Execution::sampled(0.01))
+        .with_phase_margin_rad(0.9);
+    assert_eq!(calm, expected);
+    let paper = asked.in_style(Style::Paper);
+    assert_eq!(
+        (paper.form, paper.phase_margin_rad),
+        (Form::Pd, 20_f64.to_radians())
+    );
+    assert_eq!(paper.noise, Some(noise));
+    let back = Specification::paper()
+        .with_phase_margin_rad(0.5)
+        .in_style(Style::Sharp);
+    assert_eq!(back, Specification::new(Form::Pid, Style::Sharp));
 }
 
 // Margins and cost of a design are those of its controller on the model: margins to the bit, since both come from the
@@ -98,7 +139,7 @@ fn a_specification_is_the_papers_by_default() {
 fn a_design_reports_the_margins_and_cost_of_its_controller() {
     for model in models() {
         for margin_deg in [5.0_f64, 20.0, 45.0, 60.0] {
-            let asked = Specification::default().with_phase_margin_rad(margin_deg.to_radians());
+            let asked = Specification::paper().with_phase_margin_rad(margin_deg.to_radians());
             let found = design(&model, &asked).unwrap();
             assert_eq!(Some(found.margins), margins(&model, &found.controller));
             assert!(found.margins.phase_margin_rad >= margin_deg.to_radians() - 1e-12);
@@ -114,7 +155,7 @@ fn a_design_reports_the_margins_and_cost_of_its_controller() {
 fn a_design_over_draws_reports_margins_and_cost_on_the_model() {
     let [model, ..] = models();
     let strong = model.soiptd().unwrap().with_gain_scaled(1.1).unwrap();
-    let asked = Specification::default();
+    let asked = Specification::paper();
     let found = design_over(&model, &[strong.into(); 3], &asked).unwrap();
     assert_eq!(
         found.controller,
@@ -136,7 +177,7 @@ fn a_controller_is_its_gains() {
 #[test]
 fn a_design_error_names_the_value() {
     let [model, ..] = models();
-    let asked = Specification::default().with_phase_margin_rad(1.6);
+    let asked = Specification::paper().with_phase_margin_rad(1.6);
     let error = design(&model, &asked).unwrap_err();
     assert_eq!(error, DesignError::PhaseMargin(1.6));
     assert_eq!(

@@ -1,6 +1,9 @@
 //! Outcomes of an identification on a simulated relay test without noise.
 
-use onecycle_design::{DesignError, Parameter, Structure, margins};
+use onecycle_design::{
+    DesignError, Execution, Form, Parameter, Proposal, Specification, Structure, Style, assess,
+    margins,
+};
 use onecycle_identify::{
     Excitation, Identification, MOST_CYCLES, Method, Options, Signals, Verdict, identify,
     identify_by,
@@ -93,11 +96,72 @@ fn model_estimate_and_margins_agree() {
     assert!(interval.holds(design.margins.phase_margin_rad));
 }
 
+// A clean simulation has no noise to limit the gains; the controller runs at the sample period of the recording, and its
+// output leaves at once. What the user sets stays.
+#[test]
+fn a_recording_completes_the_requirements() {
+    let found = identified_with(&Options::default()).outcome.unwrap();
+    let completed = found.specification;
+    assert_eq!(
+        (completed.form, completed.style),
+        (Form::Pid, Style::Balanced)
+    );
+    assert_eq!(completed.noise, None);
+    let sample_s = completed.execution.sample_period_s;
+    assert!((sample_s / SAMPLE_S - 1.0).abs() < 1e-12);
+    assert_eq!(completed.execution.dead_time_s(), 0.5 * sample_s);
+    let own = Specification::paper().with_execution(Execution::sampled(0.004));
+    let found = identified_with(&Options::default().specification(own))
+        .outcome
+        .unwrap();
+    assert_eq!(found.specification, own);
+    assert!(found.design.unwrap().controller.pd().is_some());
+    // The other styles of the same recording, with the design of the library.
+    let calm = found.propose(&own.in_style(Style::Calm));
+    let design = calm.outcome.unwrap();
+    assert_eq!(design.controller.execution(), own.execution);
+    assert!(design.robustness.unwrap().coverage >= 0.95);
+    let choices = Proposal::choices(found.model.structure(), &found.specification);
+    assert_eq!(choices.len(), Style::ALL.len());
+}
+
+// Noise of 1 % of the amplitude limits the gains: the noise at the actuator is at most a quarter of the relay's
+// amplitude. The noise is a fixed sequence of +-sigma.
+#[test]
+fn noise_of_the_recording_limits_the_gains() {
+    let [time_s, input, mut output] = relay_test();
+    let mut state = 1_u32;
+    for value in &mut output {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        *value += if state >> 31 == 0 { 3e-5 } else { -3e-5 };
+    }
+    let columns = [time_s, input, output];
+    let found = identify(&signals(&columns), &Options::default())
+        .outcome
+        .unwrap();
+    let noise = found.specification.noise.unwrap();
+    assert!((noise.std / 3e-5 - 1.0).abs() < 0.1, "{noise:?}");
+    assert!((noise.sample_period_s / SAMPLE_S - 1.0).abs() < 1e-12);
+    assert_eq!(noise.input_amplitude, 0.5);
+    let controller = found.design.unwrap().controller;
+    let figures = assess(&found.model, &controller, Some(&noise)).unwrap();
+    let share = figures.noise_share.unwrap();
+    assert!(share > 0.2 && share < 0.26, "{share}");
+}
+
 // A phase margin out of range is a verdict that names the value. The oscillation is reported all the same.
 #[test]
 fn a_phase_margin_out_of_range_is_a_verdict() {
-    for margin_rad in [0.0, -1.0, 2.0, f64::INFINITY, f64::NAN] {
-        let found = identified_with(&Options::default().phase_margin_rad(margin_rad));
+    // Zero is no limit in the style balanced, and no margin in the paper's style.
+    let paper = Options::default().specification(Specification::paper());
+    for (margin_rad, options) in [
+        (0.0, paper),
+        (-1.0, Options::default()),
+        (2.0, Options::default()),
+        (f64::INFINITY, paper),
+        (f64::NAN, Options::default()),
+    ] {
+        let found = identified_with(&options.phase_margin_rad(margin_rad));
         let Err(Verdict::NoController(DesignError::PhaseMargin(named))) = found.outcome else {
             panic!("{margin_rad}: {:?}", found.outcome);
         };
@@ -147,7 +211,6 @@ fn without_a_pack_least_squares_is_left() {
 // A pack names what it is for as the values off board do.
 #[test]
 fn packs_name_structure_excitation_and_form() {
-    use onecycle_design::{Form, Structure};
     use onecycle_onboard::pack::{CONTROLLER_FORM, EXCITATION, STRUCTURE};
     let found = identified_with(&Options::default());
     let excitation = found.excitation.unwrap();

@@ -1,6 +1,7 @@
 //! Evaluation on out-of-family processes: does the classification of one cycle, or the identification
 //! from one, two and eight cycles, refuse them, and what would the controller do?
 
+use onecycle_design::Specification;
 use onecycle_identify::{Options, identify};
 use onecycle_onboard::classify::{Calibration, Classification, Familiarity, OUTPUTS, classify};
 use onecycle_onboard::signature::Signature;
@@ -118,7 +119,9 @@ pub fn scored(
 
 fn identified(experiment: &RelayExperiment, trace: &Trace, cycles: usize) -> Option<Harm> {
     let signals = signals_of(trace, experiment.sample_s);
-    let options = Options::default().cycles(cycles);
+    let options = Options::default()
+        .cycles(cycles)
+        .specification(Specification::paper());
     let found = identify(&signals, &options).outcome.ok()?;
     Some(Harm::of(experiment, &found.model.soiptd()?))
 }

@@ -1,6 +1,7 @@
 //! Outcomes of a campaign's experiments: whether the relay becomes steady, how good the identified
 //! process is.
 
+use onecycle_design::Specification;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_identify::{Identification, Options, identify};
 use onecycle_onboard::Soiptd;
@@ -114,9 +115,10 @@ pub fn identification_outcome(
 ) -> Result<IdentificationOutcome, ExperimentError> {
     let (trace, _) = experiment.run(IDENTIFICATION_PERIODS)?;
     let signals = signals_of(&trace, experiment.sample_s);
+    let paper = Specification::paper().with_phase_margin_rad(PHASE_MARGIN_DEG.to_radians());
     let options = Options::default()
         .cycles(campaign.cycles)
-        .phase_margin_rad(PHASE_MARGIN_DEG.to_radians())
+        .specification(paper)
         .method(campaign.method);
     let found = identify(&signals, &options);
     let truth = in_order(&experiment.process)?;

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use onecycle_design::{Parameter, Structure};
+use onecycle_design::{Parameter, Specification, Structure};
 use onecycle_identify::{Estimate, Interval, Options, Road, identify};
 
 use crate::experiments::recording::SimulatedRecording;
@@ -43,7 +43,10 @@ pub fn recording_outcome(
     structure: Option<Structure>,
 ) -> RecordingOutcome {
     let signals = signals_of(&recording.trace, recording.sample_s);
-    let options = Options::default().road(Road::General).structure(structure);
+    let options = Options::default()
+        .road(Road::General)
+        .structure(structure)
+        .specification(Specification::paper());
     match identify(&signals, &options).outcome {
         Err(verdict) => RecordingOutcome::Refused(verdict.kind().to_owned()),
         Ok(identified) => RecordingOutcome::Identified {

@@ -2,7 +2,7 @@
 
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::pd;
-use onecycle_design::{Model, Parameter};
+use onecycle_design::{Model, Parameter, Specification};
 use onecycle_identify::{
     Identification, Identified, Method, Options, Remark, Road, Signals, Verdict, identify,
 };
@@ -72,7 +72,10 @@ impl Experiment {
         };
         identify(
             &signals,
-            &Options::default().road(Road::Relay).method(method),
+            &Options::default()
+                .road(Road::Relay)
+                .method(method)
+                .specification(Specification::paper()),
         )
     }
 
@@ -80,14 +83,7 @@ impl Experiment {
     /// stable.
     fn deterioration(&self, identified: &Identified) -> f64 {
         let process = &self.case.process;
-        let best = pd(
-            process,
-            Options::default()
-                .road(Road::Relay)
-                .specification
-                .phase_margin_rad,
-        )
-        .unwrap();
+        let best = pd(process, Specification::paper().phase_margin_rad).unwrap();
         match deterioration(
             identified.design.unwrap().controller.pd().unwrap(),
             process,

@@ -109,6 +109,9 @@ fn axis(axis: &Axis, places: Option<&Places>) -> Value {
         out["showticklabels"] = json!(false);
         out["showgrid"] = json!(false);
     }
+    if let Some(tick) = axis.tick {
+        out["dtick"] = json!(tick);
+    }
     if let Some((low, high)) = axis.range {
         out["range"] = json!([scaled(axis, low), scaled(axis, high)]);
     }

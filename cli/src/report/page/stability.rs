@@ -1,6 +1,7 @@
 //! How far the loop is from instability: Nyquist's and Bode's plots.
 
 mod bode;
+mod four;
 mod nyquist;
 
 use std::f64::consts::TAU;
@@ -25,6 +26,8 @@ pub(crate) struct Loop {
     controller: Controller,
     margins: Margins,
     phase_margin_rad: Option<Interval>,
+    /// Maximum sensitivity: the locus stays out of the circle of radius `1/Ms` about -1.
+    ms: Option<f64>,
     omegas_rad_per_s: Vec<f64>,
     own: Vec<LoopResponse>,
     bands: Option<LoopBands>,
@@ -46,6 +49,7 @@ impl Loop {
             controller,
             margins,
             phase_margin_rad: None,
+            ms: None,
             own: curve(&model, &controller, &omegas_rad_per_s),
             omegas_rad_per_s,
             bands: None,
@@ -62,6 +66,11 @@ impl Loop {
             phase_margin_rad,
             ..self
         }
+    }
+
+    /// With the circle of the maximum sensitivity.
+    pub(super) fn outside(self, ms: Option<f64>) -> Self {
+        Self { ms, ..self }
     }
 
     /// With the harmonics measured in the recording; whole turns bring their phases near the model's.
@@ -102,6 +111,7 @@ impl Loop {
             title: "Stability".to_owned(),
             body: page::figure(&self.nyquist())
                 + &page::figure(&bode::figure(self))
+                + &page::row(&four::figures(self))
                 + &page::facts(&self.facts()),
         }
     }

@@ -1,6 +1,6 @@
 //! The predicted step response.
 
-use onecycle::StepResponse;
+use onecycle::{LoadResponse, StepResponse};
 use onecycle_design::bands::StepBands;
 
 use super::significant;
@@ -12,7 +12,11 @@ pub(super) fn section(
     response: &StepResponse,
     bands: Option<&StepBands>,
     times_s: &[f64],
+    load: Option<(&LoadResponse, Option<&StepBands>)>,
 ) -> Section {
+    let load = load.map_or(String::new(), |(load, bands)| {
+        page::figure(&load_figure(load, bands, times_s))
+    });
     let mut upper = Panel::new(Axis::titled("output"), output(response, bands, times_s));
     upper.notes = notes(response);
     let lower = Panel::new(
@@ -27,9 +31,26 @@ pub(super) fn section(
     );
     Section {
         id: "step".to_owned(),
-        title: "Predicted step".to_owned(),
-        body: page::figure(&figure) + &page::facts(&facts(response, bands)),
+        title: "Predicted responses".to_owned(),
+        body: page::figure(&figure) + &load + &page::facts(&facts(response, bands)),
     }
+}
+
+fn load_figure(load: &LoadResponse, bands: Option<&StepBands>, times_s: &[f64]) -> Figure {
+    let band = bands.map(|StepBands { output, .. }| {
+        Series::between("90 % band", times_s, &output.low, &output.high).hue(Hue::Model)
+    });
+    let points = times_s.iter().map(|&time_s| (time_s, load.at(time_s).0));
+    let curve = Series::of_points("output", Marks::Line, points).hue(Hue::Model);
+    let panel = Panel::new(
+        Axis::titled("output"),
+        band.into_iter().chain([curve]).collect(),
+    );
+    Figure::single(
+        "Response to a unit step of the load at the input of the process, such as wind or payload.",
+        Axis::titled("time (s)"),
+        panel,
+    )
 }
 
 fn output(response: &StepResponse, bands: Option<&StepBands>, times_s: &[f64]) -> Vec<Series> {

@@ -8,6 +8,7 @@ use crate::judge::baselines::rules::Rule;
 use crate::judge::baselines::{BaselineAnswer, BaselineError, arx, asymmetric, gmvc, pem, rules};
 use crate::space::Space;
 use crate::space::rule::TuningRule;
+use onecycle_design::Specification;
 use onecycle_identify::{Method, Options, Signals, identify};
 
 /// A method of the benchmark.
@@ -171,9 +172,10 @@ impl Contender {
 
 /// Our method, from a recording to a controller.
 fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, String> {
+    let paper = Specification::paper().with_phase_margin_rad(PHASE_MARGIN_DEG.to_radians());
     let options = Options::default()
         .cycles(cycles)
-        .phase_margin_rad(PHASE_MARGIN_DEG.to_radians())
+        .specification(paper)
         .method(method);
     let identified = identify(signals, &options).outcome;
     let identified = identified.map_err(|verdict| verdict.to_string())?;

@@ -11,13 +11,17 @@ const PHASES_DEG: (f64, f64) = (-360.0, 0.0);
 
 pub(super) fn figure(of: &Loop) -> Figure {
     let names = [OWN, TRUTH, MEASURED, BAND];
-    let magnitude = Axis::titled("magnitude").logarithmic();
-    let phase = Axis::titled("phase (deg)").spanning(PHASES_DEG.0, PHASES_DEG.1);
-    let magnitudes = of.bands.as_ref().map(|bands| &bands.magnitude);
-    let phases = of.bands.as_ref().map(|bands| in_degrees(&bands.phase_rad));
+    let magnitude = Axis::titled("magnitude (dB)").every(20.0);
+    let phase = Axis::titled("phase (deg)")
+        .spanning(PHASES_DEG.0, PHASES_DEG.1)
+        .every(45.0);
+    let magnitudes = (of.bands.as_ref()).map(|bands| mapped(&bands.magnitude, decibels));
+    let phases = (of.bands.as_ref()).map(|bands| mapped(&bands.phase_rad, f64::to_degrees));
     let mut upper = Panel::new(
         magnitude,
-        series(of, names, magnitudes, 1.0, |at| at.magnitude),
+        series(of, names, magnitudes.as_ref(), 0.0, |at| {
+            decibels(at.magnitude)
+        }),
     );
     let lower = series(of, [""; 4], phases.as_ref(), -180.0, |at| {
         at.phase_rad.to_degrees()
@@ -38,7 +42,7 @@ pub(super) fn figure(of: &Loop) -> Figure {
         upper.notes.push(Note {
             text: format!("gain margin {text}"),
             x: omega,
-            y: 1.0 / factor,
+            y: -decibels(factor),
             away: (10.0, -40.0),
         });
     }
@@ -52,12 +56,16 @@ pub(super) fn figure(of: &Loop) -> Figure {
     Figure::stacked(caption, x, vec![upper, lower])
 }
 
-fn in_degrees(band: &Band) -> Band {
-    let degrees = |values: &[f64]| values.iter().map(|value| value.to_degrees()).collect();
+fn mapped(band: &Band, unit: fn(f64) -> f64) -> Band {
+    let all = |values: &[f64]| values.iter().map(|value| unit(*value)).collect();
     Band {
-        low: degrees(&band.low),
-        high: degrees(&band.high),
+        low: all(&band.low),
+        high: all(&band.high),
     }
+}
+
+fn decibels(factor: f64) -> f64 {
+    20.0 * factor.log10()
 }
 
 /// The curves of a panel; `level` is what margins count from.

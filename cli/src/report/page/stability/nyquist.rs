@@ -30,7 +30,10 @@ pub(super) fn figure(of: &Loop) -> Figure {
     });
     panel.y = panel.y.spanning(below, above);
     let mut caption =
-        "Nyquist's plot of the open loop: the farther from -1, the better.".to_owned();
+        "Nyquist's plot of the open loop: the farther from -1 (grey ring), the better.".to_owned();
+    if of.ms.is_some() {
+        caption += " The circle about -1 is that of the maximum sensitivity Ms: the curve touches it and stays outside.";
+    }
     if !of.measured.is_empty() {
         caption += " The points under the relay are measured, output over input at the oscillation's harmonics, times \
                     the controller: no model is in them.";
@@ -54,6 +57,13 @@ fn series(of: &Loop) -> Vec<Series> {
         Series::of_points("", marks, angles.map(|angle| (angle.cos(), angle.sin())))
     };
     let mut series = vec![arc(0.0, TAU, Marks::Dashes).hue(Hue::Reference)];
+    if let Some(ms) = of.ms {
+        let circle = arc(0.0, TAU, Marks::Line);
+        let around = |(x, y): (&f64, &f64)| (-1.0 + x / ms, y / ms);
+        let points: Vec<_> = circle.x.iter().zip(&circle.y).map(around).collect();
+        let name = format!("Ms {ms:.2}");
+        series.push(Series::of_points(&name, Marks::Line, points).hue(Hue::Measured));
+    }
     if let Some(LoopBands {
         locus: (low, high), ..
     }) = &of.bands
@@ -66,7 +76,7 @@ fn series(of: &Loop) -> Vec<Series> {
         series.push(locus(TRUTH, Marks::Dashes, &of.truth).hue(Hue::Measured));
     }
     series.push(arc(-PI, -PI + of.margins.phase_margin_rad, Marks::Line).hue(Hue::Input));
-    series.push(Series::of_points("", Marks::Points, [(-1.0, 0.0)]).hue(Hue::Input));
+    series.push(Series::of_points("", Marks::Rings, [(-1.0, 0.0)]).hue(Hue::Measured));
     if !of.measured.is_empty() {
         let points = of.measured.iter().map(|(_, at)| point(at));
         series.push(Series::of_points(MEASURED, Marks::Rings, points).hue(Hue::Input));

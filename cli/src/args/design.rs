@@ -1,0 +1,159 @@
+//! Requirements on a controller, for `identify` and `tune`.
+
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use onecycle::{Execution, Form, Pid, Specification, Style};
+
+use super::{Share, phase_margin};
+use crate::failure::Failure;
+
+/// Requirements on a controller, and the gains to compare it with.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct DesignArguments {
+    /// Compromise between speed and robustness: sharp (Ms 2.0), balanced (Ms 1.6), calm (Ms 1.4), or the paper's PD of
+    /// least squared error (paper)
+    #[arg(long, value_name = "STYLE", default_value = "balanced", value_parser = style())]
+    style: Style,
+    /// Form of the controller: p, pi, pd, pid, cascade-pi or cascade-pid [default: pid; pd with --style paper]
+    #[arg(long, value_name = "FORM", value_parser = form())]
+    controller: Option<Form>,
+    /// Maximum sensitivity Ms, and maximum complementary sensitivity Mt [default: that of the style]
+    #[arg(long, value_name = "MS", allow_negative_numbers = true, value_parser = peak)]
+    ms: Option<f64>,
+    /// Minimum phase margin, in degrees, beside the limits of the style [default: 20 with --style paper, else none]
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = phase_margin)]
+    phase_margin: Option<f64>,
+    /// Minimum gain margin, as a factor, beside the limits of the style
+    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = gain_margin)]
+    gain_margin: Option<f64>,
+    /// Maximum output of the controller after a unit step of the reference, in the unit of the input
+    #[arg(long, value_name = "INPUT", allow_negative_numbers = true, value_parser = positive)]
+    input_peak: Option<f64>,
+    /// Sample period of the controller, in seconds; its output leaves one period after the sample [default: that of the
+    /// recording, and the output leaves at once; continuous without a recording]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    sample_period: Option<f64>,
+    /// Judge these gains of a controller in parallel form too: Kp,Ki,Kd or Kp,Ki,Kd,Tf with the time Tf of the
+    /// measurement filter in seconds
+    #[arg(long, value_name = "KP,KI,KD", allow_hyphen_values = true, value_parser = gains)]
+    against: Option<Pid>,
+}
+
+impl DesignArguments {
+    /// The requirements, without noise.
+    pub(crate) fn specification(&self) -> Result<Specification, Failure> {
+        if self.style == Style::Paper {
+            return self.paper();
+        }
+        let form = self.controller.unwrap_or(Specification::default().form);
+        let mut asked = Specification::new(form, self.style);
+        if let Some(peak) = self.ms {
+            asked = asked.with_peak(peak);
+        }
+        if let Some(margin_rad) = self.phase_margin {
+            asked = asked.with_phase_margin_rad(margin_rad);
+        }
+        asked.gain_margin = self.gain_margin.unwrap_or(asked.gain_margin);
+        asked.input_peak = self.input_peak;
+        Ok(asked.with_execution(self.execution()))
+    }
+
+    /// The paper's style, which has one limit and one form.
+    fn paper(&self) -> Result<Specification, Failure> {
+        let others = [
+            ("--ms", self.ms.is_some()),
+            ("--gain-margin", self.gain_margin.is_some()),
+            ("--input-peak", self.input_peak.is_some()),
+        ];
+        if let Some((option, _)) = others.iter().find(|(_, is_given)| *is_given) {
+            return Err(Failure::usage(format!(
+                "--style paper limits the phase margin only: leave out {option}, or choose another style"
+            )));
+        }
+        let mut asked = Specification::paper().with_execution(self.execution());
+        if let Some(form) = self.controller.filter(|form| *form != asked.form) {
+            return Err(Failure::usage(format!(
+                "--style paper designs a PD and no {}: leave out --controller, or choose another style",
+                form.name().replace('_', "-")
+            )));
+        }
+        if let Some(margin_rad) = self.phase_margin {
+            asked = asked.with_phase_margin_rad(margin_rad);
+        }
+        Ok(asked)
+    }
+
+    fn execution(&self) -> Execution {
+        (self.sample_period).map_or_else(Execution::default, Execution::sampled)
+    }
+
+    /// The gains in force.
+    pub(crate) fn against(&self) -> Option<Pid> {
+        self.against
+    }
+}
+
+fn style() -> impl TypedValueParser<Value = Style> {
+    PossibleValuesParser::new(Style::ALL.map(Style::name))
+        .try_map(|name| Style::from_name(&name).ok_or("there is no such style"))
+}
+
+fn form() -> impl TypedValueParser<Value = Form> {
+    let names = ["p", "pi", "pd", "pid", "cascade-pi", "cascade-pid"];
+    PossibleValuesParser::new(names).try_map(|name| {
+        Form::from_name(&name.replace('-', "_")).ok_or("there is no such controller")
+    })
+}
+
+fn peak(text: &str) -> Result<f64, String> {
+    number(text)
+        .filter(|peak| (1.05..=10.0).contains(peak))
+        .ok_or_else(|| "Ms lies between 1.05 and 10; usual are 1.2 to 2.0".to_owned())
+}
+
+fn gain_margin(text: &str) -> Result<f64, String> {
+    number(text)
+        .filter(|factor| (1.0..=100.0).contains(factor))
+        .ok_or_else(|| "a gain margin is a factor between 1 and 100; 2 is 6 dB".to_owned())
+}
+
+/// A share of noise, as a number or a percentage.
+pub(super) fn noise(text: &str) -> Result<f64, String> {
+    let share = text.trim().parse::<Share>()?.of(1.0);
+    if (1e-6..=100.0).contains(&share) {
+        Ok(share)
+    } else {
+        Err("a share of noise lies between 0.0001 % and 10000 %, such as 25%".to_owned())
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text)
+        .filter(|value| *value > 0.0)
+        .ok_or_else(|| "this is a positive number".to_owned())
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.trim()
+        .parse()
+        .ok()
+        .filter(|value: &f64| value.is_finite())
+}
+
+/// Gains in parallel form.
+fn gains(text: &str) -> Result<Pid, String> {
+    let values: Option<Vec<f64>> = text.split(',').map(number).collect();
+    let wanted = "write the gains as Kp,Ki,Kd or Kp,Ki,Kd,Tf, such as 40,5,12 or 40,0,12,0.002";
+    let (gains, filter_s) = match values.as_deref() {
+        Some([kp, ki, kd]) => ([*kp, *ki, *kd], 0.0),
+        Some([kp, ki, kd, filter_s]) => ([*kp, *ki, *kd], *filter_s),
+        _ => return Err(wanted.to_owned()),
+    };
+    if gains.iter().all(|gain| *gain == 0.0) {
+        return Err("at least one of the gains Kp,Ki,Kd is not zero".to_owned());
+    }
+    if filter_s < 0.0 {
+        return Err("the time Tf of the filter is zero or positive".to_owned());
+    }
+    Ok(Pid::new(gains[0], gains[1], gains[2]).with_filter_s(filter_s))
+}

@@ -1,0 +1,116 @@
+//! Controllers of a process to choose from: designs and figures, on the threads of the machine.
+
+use onecycle::{
+    Controller, Design, Identified, Model, Pid, Proposal, Specification, Style, assess, design,
+    least_margins,
+};
+use rayon::prelude::*;
+
+use crate::results::controllers::{Against, Controllers, Row};
+
+/// Draws over which the gains in force are judged.
+const DRAWS: usize = 200;
+
+/// Controllers of an identified process.
+pub(super) fn of_identified(identified: &Identified, against: Option<Pid>) -> Controllers {
+    let asked = identified.specification;
+    let made = identified.design;
+    let draws = identified.posterior.models(DRAWS);
+    let (model, _) = identified.for_design(0);
+    let propose = |specification: &Specification| match made {
+        Some(design) if specification.style == asked.style => {
+            Proposal::of(*specification, Ok(design))
+        }
+        _ => identified.propose(specification),
+    };
+    controllers(&model, &draws, &asked, against, propose)
+}
+
+/// Controllers of a known process.
+pub(super) fn of_model(model: &Model, asked: &Specification, against: Option<Pid>) -> Controllers {
+    let propose = |specification: &Specification| Proposal::new(model, &[], specification);
+    controllers(model, &[], asked, against, propose)
+}
+
+/// Limits of `Ms` of a curve.
+const PEAKS: [f64; 10] = [1.2, 1.25, 1.3, 1.4, 1.5, 1.6, 1.8, 2.0, 2.25, 2.5];
+
+impl Controllers {
+    /// With the designs for `model` over limits of `Ms`; the other limits are those of the chosen controller.
+    pub(super) fn with_trade_off(self, model: &Model) -> Self {
+        let base = match self.asked.style {
+            Style::Paper => self.asked.in_style(Style::Balanced),
+            _ => self.asked,
+        };
+        let at = |peak: &f64| {
+            let design = design(model, &base.with_peak(*peak)).ok()?;
+            Some((
+                *peak,
+                assess(model, &design.controller, base.noise.as_ref())?,
+            ))
+        };
+        Self {
+            trade_off: PEAKS.par_iter().filter_map(at).collect(),
+            ..self
+        }
+    }
+}
+
+fn controllers(
+    model: &Model,
+    draws: &[Model],
+    asked: &Specification,
+    against: Option<Pid>,
+    propose: impl Fn(&Specification) -> Proposal + Sync,
+) -> Controllers {
+    let noise = asked.noise.as_ref();
+    let mut choices = Proposal::choices(model.structure(), asked);
+    if !choices.iter().any(|choice| choice.style == asked.style) {
+        choices.insert(0, *asked);
+    }
+    let row = |specification: &Specification| {
+        let proposal = propose(specification);
+        let design = proposal.outcome.as_ref().ok();
+        Row {
+            figures: design.and_then(|design| assess(model, &design.controller, noise)),
+            proposal,
+        }
+    };
+    let rows: Vec<Row> = choices.par_iter().map(row).collect();
+    let chosen = rows
+        .iter()
+        .find(|row| row.proposal.specification.style == asked.style);
+    let design = chosen.and_then(|row| row.proposal.outcome.as_ref().ok());
+    let against = against.map(|pid| {
+        let filter_s = needed_filter_s(model, &pid, design);
+        let pid = pid
+            .with_filter_s(filter_s.unwrap_or(pid.filter_s))
+            .with_execution(asked.execution);
+        let controller = Controller::from(pid);
+        Against {
+            controller,
+            filter_s,
+            figures: assess(model, &controller, noise),
+            least: least_margins(draws, &controller),
+        }
+    });
+    Controllers {
+        asked: *asked,
+        rows,
+        against,
+        trade_off: vec![],
+        is_recorded: !draws.is_empty() || noise.is_some(),
+    }
+}
+
+/// Time (s) of a measurement filter for gains with a derivative and without filter, on a process that does not attenuate
+/// the derivative: the filter of the chosen controller, or a tenth of the derivative time.
+fn needed_filter_s(model: &Model, pid: &Pid, chosen: Option<&Design>) -> Option<f64> {
+    let is_attenuated = model.structure().stages().states() > 1;
+    if pid.kd == 0.0 || pid.filter_s > 0.0 || is_attenuated {
+        return None;
+    }
+    let own = chosen.map(|design| design.controller.pid().filter_s);
+    let tenth = 0.1 * (pid.kd / pid.kp).abs();
+    (own.into_iter().chain([tenth])).find(|time_s| time_s.is_normal())
+}

@@ -1,0 +1,270 @@
+//! Controllers to choose from, as text: a table, the forms of a controller, its margins.
+
+use std::fmt::Write;
+
+use onecycle::{Assessment, Controller, Design, Interval};
+
+use super::number::{seconds, short, significant};
+use super::units::Units;
+use super::wrap::wrapped;
+use crate::results::controllers::{Controllers, Row};
+use crate::style::{HOLDS, headed, painted};
+use crate::words::controllers::{brief, change, judgement};
+use crate::words::sentence;
+
+/// Titles of the columns and their widths in the text.
+const COLUMNS: [(&str, usize); 11] = [
+    ("Kp", 9),
+    ("Ki", 9),
+    ("Kd", 9),
+    ("filter", 8),
+    ("phase", 9),
+    ("gain", 6),
+    ("Ms", 6),
+    ("over-", 6),
+    ("settling", 9),
+    ("load", 8),
+    ("noise", 7),
+];
+
+/// Titles of the columns on a page.
+pub(super) const TITLES: [&str; 11] = [
+    "Kp",
+    "Ki",
+    "Kd",
+    "filter Tf",
+    "phase margin (deg)",
+    "gain margin",
+    "Ms",
+    "overshoot (%)",
+    "settling",
+    "load",
+    "noise",
+];
+
+/// Second line of the titles.
+const UNITS: [&str; 11] = ["", "", "", "Tf", "deg", "", "", "shoot", "", "IAE", "share"];
+
+/// The table of all styles and the gains in force.
+pub(super) fn table(choice: &Controllers) -> String {
+    let mut text = headed("\nControllers\n");
+    for titles in [COLUMNS.map(|(title, _)| title), UNITS] {
+        let line = line("", &titles.map(str::to_owned));
+        let _ = writeln!(text, "{}", line.trim_end());
+    }
+    if let Some(against) = &choice.against {
+        let cells = cells(choice, &against.controller, against.figures.as_ref());
+        let _ = writeln!(text, "{}", line("  yours", &cells).trim_end());
+    }
+    for row in &choice.rows {
+        let name = name(choice, row);
+        let shown = match &row.proposal.outcome {
+            Ok(design) => line(
+                &name,
+                &cells(choice, &design.controller, row.figures.as_ref()),
+            ),
+            Err(error) => format!("{name:<10}  {}", brief(error)),
+        };
+        let is_chosen = choice.is_chosen(row) && row.figures.is_some();
+        let _ = match shown.trim_end() {
+            shown if is_chosen => writeln!(text, "{}", painted(HOLDS, shown)),
+            shown => writeln!(text, "{shown}"),
+        };
+    }
+    if let Some(against) = &choice.against {
+        wrapped(&mut text, "  ", &sentence(&judgement(against)));
+        if let Some(change) = change(choice) {
+            wrapped(&mut text, "  ", &sentence(&change));
+        }
+    }
+    text
+}
+
+/// Name of a row; the chosen one is marked.
+fn name(choice: &Controllers, row: &Row) -> String {
+    let mark = if choice.is_chosen(row) { ">" } else { " " };
+    format!("{mark} {}", row.proposal.specification.style.name())
+}
+
+fn line(name: &str, cells: &[String; 11]) -> String {
+    let mut line = format!("{name:<10}");
+    for (cell, (_, width)) in cells.iter().zip(COLUMNS) {
+        let _ = write!(line, "{cell:>width$}");
+    }
+    line
+}
+
+/// The cells of a controller, without units.
+pub(super) fn cells(
+    choice: &Controllers,
+    controller: &Controller,
+    figures: Option<&Assessment>,
+) -> [String; 11] {
+    let pid = controller.pid();
+    let none = || "-".to_owned();
+    let or_none = |value: Option<String>| value.unwrap_or_else(none);
+    let gain = |value: f64| if value == 0.0 { none() } else { short(value) };
+    let filter = if pid.filter_s == 0.0 {
+        none()
+    } else {
+        seconds(pid.filter_s)
+    };
+    let phase = figures.map(|of| format!("{:.1}", of.margins.phase_margin_rad.to_degrees()));
+    let step = figures.and_then(|figures| figures.step);
+    [
+        gain(pid.kp),
+        gain(pid.ki),
+        gain(pid.kd),
+        filter,
+        phase.unwrap_or_else(|| "unstable".to_owned()),
+        or_none(figures.and_then(|of| Some(format!("{:.2}", of.margins.gain_margin?)))),
+        or_none(figures.map(|of| format!("{:.2}", of.ms))),
+        or_none(step.map(|step| format!("{:.0} %", 100.0 * step.overshoot))),
+        or_none(step.map(|step| seconds(step.settling_time_s))),
+        or_none(figures.and_then(|of| load(choice, of))),
+        or_none(figures.and_then(|of| Some(format!("{:.0} %", 100.0 * of.noise_share?)))),
+    ]
+}
+
+/// Load IAE relative to that of the chosen controller.
+fn load(choice: &Controllers, figures: &Assessment) -> Option<String> {
+    let iae = figures.load_iae?;
+    if iae.is_infinite() {
+        return Some("offset".to_owned());
+    }
+    Some(format!("{:.2}", iae / choice.load_reference()?))
+}
+
+/// Names and values of the forms in which a controller is typed in.
+pub(super) fn forms(controller: &Controller, units: &Units) -> Vec<(&'static str, String)> {
+    let pid = controller.pid();
+    let (gain, rate, integral) = (
+        units.controller(""),
+        units.controller(" s"),
+        units.integral(),
+    );
+    let mut forms = vec![];
+    if let Controller::Autopilot(autopilot) = controller {
+        let of = autopilot.gains;
+        forms.push((
+            "cascade",
+            format!(
+                "angle P {} 1/s, rate P {}{rate}, rate I {} 1/s, rate D {} s",
+                significant(of.angle_p),
+                significant(of.rate_p),
+                significant(of.rate_i),
+                significant(of.rate_d)
+            ),
+        ));
+    }
+    if !matches!(controller, Controller::Autopilot(of) if of.gains.rate_d != 0.0) {
+        let mut parallel = format!("Kp {}{gain}", significant(pid.kp));
+        if pid.ki != 0.0 {
+            let _ = write!(parallel, ", Ki {}{integral}", significant(pid.ki));
+        }
+        if pid.kd != 0.0 {
+            let _ = write!(parallel, ", Kd {}{rate}", significant(pid.kd));
+        }
+        forms.push(("parallel", parallel));
+        if pid.ki != 0.0 {
+            forms.extend(with_times(&pid, &gain));
+        }
+    }
+    if let Some(pd) = controller.pd() {
+        let (angle_p, rate_p) = (significant(pd.angle_p()), significant(pd.rate_p()));
+        forms.push((
+            "cascade",
+            format!("angle P {angle_p} 1/s, rate P {rate_p}{rate}"),
+        ));
+    }
+    forms.extend(filter(&pid));
+    forms
+}
+
+/// The ideal and the series form of a controller with an integral term.
+fn with_times(pid: &onecycle::Pid, gain: &str) -> Vec<(&'static str, String)> {
+    let times = |k: f64, ti_s: f64, td_s: f64| {
+        let derivative = if td_s == 0.0 {
+            String::new()
+        } else {
+            format!(", Td {}", seconds_of(td_s))
+        };
+        format!(
+            "K {}{gain}, Ti {}{derivative}",
+            significant(k),
+            seconds_of(ti_s)
+        )
+    };
+    let mut forms = vec![];
+    if let Some(of) = pid.ideal() {
+        let value = times(of.gain, of.integral_time_s, of.derivative_time_s);
+        forms.push(("ideal", value));
+    }
+    if pid.kd != 0.0 {
+        let series = pid.series().map_or_else(
+            || "none: the zeros are complex (Ti < 4 Td)".to_owned(),
+            |of| times(of.gain, of.integral_time_s, of.derivative_time_s),
+        );
+        forms.push(("series", series));
+    }
+    forms
+}
+
+fn seconds_of(time_s: f64) -> String {
+    format!("{} s", significant(time_s))
+}
+
+/// The measurement filter and the set-point weight, where there are any.
+fn filter(pid: &onecycle::Pid) -> Option<(&'static str, String)> {
+    let mut parts = vec![];
+    if pid.filter_s > 0.0 {
+        let cutoff_hz = std::f64::consts::SQRT_2 / (std::f64::consts::TAU * pid.filter_s);
+        parts.push(format!(
+            "Tf {}, second order on the measurement (cutoff {} Hz)",
+            seconds_of(pid.filter_s),
+            short(cutoff_hz)
+        ));
+    }
+    if pid.ki != 0.0 {
+        parts.push(format!("set-point weight b {:.2}", pid.setpoint_weight));
+    }
+    (!parts.is_empty()).then(|| ("filter", parts.join("; ")))
+}
+
+/// The margins of the chosen controller, in one line.
+pub(super) fn margins(
+    choice: &Controllers,
+    design: &Design,
+    phase_margin_rad: Option<&Interval>,
+) -> String {
+    let margins = &design.margins;
+    let mut text = format!(
+        "phase margin {:.1} deg",
+        margins.phase_margin_rad.to_degrees()
+    );
+    if let Some(Interval {
+        low: Some(low),
+        high: Some(high),
+        ..
+    }) = phase_margin_rad
+    {
+        let (low, high) = (low.to_degrees(), high.to_degrees());
+        let _ = write!(text, " (90 %: {low:.1} .. {high:.1})");
+    }
+    if let Some(gain_margin) = margins.gain_margin {
+        let decibels = 20.0 * gain_margin.log10();
+        let _ = write!(text, ", gain margin {gain_margin:.2} ({decibels:.1} dB)");
+    }
+    let _ = write!(text, ", delay margin {}", seconds(margins.delay_margin_s));
+    if let Some((_, figures)) = choice.design() {
+        let _ = write!(text, ", Ms {:.2}, Mt {:.2}", figures.ms, figures.mt);
+        if let Some(share) = figures.noise_share {
+            let _ = write!(
+                text,
+                ", noise at the actuator {:.0} % of the input amplitude",
+                100.0 * share
+            );
+        }
+    }
+    text
+}

@@ -1,0 +1,142 @@
+//! Controllers to choose from, in JSON.
+
+use onecycle::{Assessment, LeastMargins, Robustness, Specification};
+use serde::Serialize;
+
+use super::{Controller, MarginsReport, Step, controller, margins, of_style, step};
+use crate::results::controllers::{Controllers, Row};
+
+#[derive(Serialize)]
+pub(super) struct Robust {
+    coverage: f64,
+    mean_iae: Option<f64>,
+    nominal_coverage: f64,
+    nominal_mean_iae: Option<f64>,
+}
+
+/// What noise and sampling a design counts with.
+#[derive(Serialize)]
+pub(super) struct Assumed {
+    noise_sigma: Option<f64>,
+    noise_sample_s: Option<f64>,
+    input_amplitude: Option<f64>,
+    sample_period_s: f64,
+    computation_delay_s: f64,
+}
+
+/// A style and its controller, or why there is none.
+#[derive(Serialize)]
+pub(super) struct Proposed {
+    style: &'static str,
+    is_chosen: bool,
+    controller: Option<Controller>,
+    #[serde(flatten)]
+    figures: Figures,
+    robustness: Option<Robust>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error: Option<String>,
+}
+
+#[derive(Serialize)]
+struct Figures {
+    margins: Option<MarginsReport>,
+    step: Option<Step>,
+    load_iae: Option<f64>,
+    load_peak: Option<f64>,
+    noise_share: Option<f64>,
+}
+
+/// The gains in force.
+#[derive(Serialize)]
+pub(super) struct AgainstReport {
+    controller: Controller,
+    is_stable: bool,
+    #[serde(flatten)]
+    figures: Figures,
+    least: Option<Least>,
+}
+
+/// Margins at the bad end of the central 90 % of the posterior.
+#[derive(Serialize)]
+struct Least {
+    stable: f64,
+    ms: Option<f64>,
+    phase_margin_deg: f64,
+    gain_margin: Option<f64>,
+    delay_margin_s: f64,
+}
+
+pub(super) fn proposed(choice: &Controllers) -> Vec<Proposed> {
+    let of = |row: &Row| {
+        let specification = &row.proposal.specification;
+        let design = row.proposal.outcome.as_ref();
+        Proposed {
+            style: specification.style.name(),
+            is_chosen: choice.is_chosen(row),
+            controller: (design.ok()).map(|design| of_style(design, specification.style)),
+            figures: Figures::of(row.figures.as_ref()),
+            robustness: (design.ok().and_then(|design| design.robustness.as_ref())).map(Into::into),
+            error: design.err().map(ToString::to_string),
+        }
+    };
+    choice.rows.iter().map(of).collect()
+}
+
+pub(super) fn against(choice: &Controllers) -> Option<AgainstReport> {
+    choice.against.as_ref().map(|against| AgainstReport {
+        controller: controller(&against.controller),
+        is_stable: against.figures.is_some(),
+        figures: Figures::of(against.figures.as_ref()),
+        least: against.least.as_ref().map(Into::into),
+    })
+}
+
+impl Figures {
+    fn of(figures: Option<&Assessment>) -> Self {
+        let finite = |value: f64| value.is_finite().then_some(value);
+        Self {
+            margins: figures.map(|of| margins(&of.margins, None, Some(of))),
+            step: figures.and_then(|of| of.step.as_ref()).map(step),
+            load_iae: figures.and_then(|of| of.load_iae).and_then(finite),
+            load_peak: figures.and_then(|of| of.load_peak).and_then(finite),
+            noise_share: figures.and_then(|of| of.noise_share).and_then(finite),
+        }
+    }
+}
+
+impl From<&Robustness> for Robust {
+    fn from(of: &Robustness) -> Self {
+        let finite = |value: f64| value.is_finite().then_some(value);
+        Self {
+            coverage: of.coverage,
+            mean_iae: finite(of.mean_iae),
+            nominal_coverage: of.nominal_coverage,
+            nominal_mean_iae: finite(of.nominal_mean_iae),
+        }
+    }
+}
+
+impl From<&Specification> for Assumed {
+    fn from(of: &Specification) -> Self {
+        Self {
+            noise_sigma: of.noise.map(|noise| noise.std),
+            noise_sample_s: of.noise.map(|noise| noise.sample_period_s),
+            input_amplitude: of.noise.map(|noise| noise.input_amplitude),
+            sample_period_s: of.execution.sample_period_s,
+            computation_delay_s: of.execution.computation_delay_s,
+        }
+    }
+}
+
+impl From<&LeastMargins> for Least {
+    fn from(of: &LeastMargins) -> Self {
+        let finite = |value: f64| value.is_finite().then_some(value);
+        Self {
+            stable: of.stable,
+            ms: finite(of.ms),
+            phase_margin_deg: of.phase_margin_rad.to_degrees(),
+            gain_margin: finite(of.gain_margin),
+            delay_margin_s: of.delay_margin_s,
+        }
+    }
+}

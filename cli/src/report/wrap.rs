@@ -1,0 +1,25 @@
+//! Lines as wide as a terminal.
+
+use std::fmt::Write;
+
+/// Widest line of remarks, as terminals are.
+const WIDTH: usize = 96;
+
+/// Writes `words` behind `lead`, in lines as wide as a terminal, indented like the first.
+pub(super) fn wrapped(text: &mut String, lead: &str, words: &str) {
+    let mut line = lead.to_owned();
+    let mut is_first = true;
+    for word in words.split_whitespace() {
+        if !is_first && line.len() + 1 + word.len() > WIDTH {
+            let _ = writeln!(text, "{line}");
+            line = " ".repeat(lead.len());
+            is_first = true;
+        }
+        if !is_first {
+            line.push(' ');
+        }
+        line.push_str(word);
+        is_first = false;
+    }
+    let _ = writeln!(text, "{line}");
+}

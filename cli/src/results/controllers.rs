@@ -1,0 +1,58 @@
+//! Controllers of a process to choose from, with the figures of each.
+
+use onecycle::{Assessment, Controller, Design, LeastMargins, Proposal, Specification};
+
+/// Controllers of a process, one for each style, and the gains in force.
+pub(crate) struct Controllers {
+    /// The requirements of the chosen one, with what the recording added.
+    pub(crate) asked: Specification,
+    /// One row for each style, the chosen one included.
+    pub(crate) rows: Vec<Row>,
+    pub(crate) against: Option<Against>,
+    /// Designs for the most probable process over limits of `Ms`, in ascending order. Empty unless a page is drawn.
+    pub(crate) trade_off: Vec<(f64, Assessment)>,
+    /// Whether the model comes from a recording, whose noise and sample period complete the requirements.
+    pub(crate) is_recorded: bool,
+}
+
+/// A proposal and its figures.
+#[derive(Clone)]
+pub(crate) struct Row {
+    pub(crate) proposal: Proposal,
+    /// `None` without a controller.
+    pub(crate) figures: Option<Assessment>,
+}
+
+/// The gains in force, judged like the proposals.
+pub(crate) struct Against {
+    pub(crate) controller: Controller,
+    /// Time (s) of the measurement filter, if one was added: the process needs one and the user gave none.
+    pub(crate) filter_s: Option<f64>,
+    /// `None` if the loop is unstable.
+    pub(crate) figures: Option<Assessment>,
+    /// Margins over the posterior. `None` without one.
+    pub(crate) least: Option<LeastMargins>,
+}
+
+impl Controllers {
+    pub(crate) fn is_chosen(&self, row: &Row) -> bool {
+        row.proposal.specification.style == self.asked.style
+    }
+
+    /// The row of the chosen controller.
+    pub(crate) fn chosen(&self) -> Option<&Row> {
+        self.rows.iter().find(|row| self.is_chosen(row))
+    }
+
+    /// The chosen controller and its figures. `None` if there is no controller.
+    pub(crate) fn design(&self) -> Option<(&Design, &Assessment)> {
+        let row = self.chosen()?;
+        row.proposal.outcome.as_ref().ok().zip(row.figures.as_ref())
+    }
+
+    /// Load IAE that others are compared with: that of the chosen controller, or of the first one with an integral.
+    pub(crate) fn load_reference(&self) -> Option<f64> {
+        let of = |row: &Row| row.figures?.load_iae.filter(|iae| iae.is_finite());
+        (self.chosen().and_then(of)).or_else(|| self.rows.iter().find_map(of))
+    }
+}

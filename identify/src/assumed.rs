@@ -1,0 +1,43 @@
+//! What a recording says about the loop that a controller will close: noise, amplitude of the input, sample period.
+
+use onecycle_design::{MeasurementNoise, Specification};
+
+use crate::innovations::Hold;
+
+/// Noise below this share of the output's deviation is rounding, not noise.
+const LEAST_NOISE: f64 = 1e-6;
+
+/// Properties of a recording that a specification may leave open.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RecordedLoop {
+    /// Standard deviation of the white noise of one sample (output unit).
+    pub(crate) sigma: f64,
+    /// Amplitude or standard deviation of the output (output unit).
+    pub(crate) output_size: f64,
+    /// Amplitude of a relay, or half of the range of the input (input unit).
+    pub(crate) input_amplitude: f64,
+    /// Sample period (s).
+    pub(crate) sample_s: f64,
+    pub(crate) hold: Hold,
+}
+
+impl RecordedLoop {
+    /// `specification` with the values that it leaves open: the noise, and the sample period of a controller whose output
+    /// leaves in the tick of its sample. Input that is not held says nothing about the sample period.
+    pub(crate) fn complete(&self, specification: &Specification) -> Specification {
+        let mut complete = *specification;
+        let is_noisy = self.sigma > LEAST_NOISE * self.output_size && self.input_amplitude > 0.0;
+        if complete.noise.is_none() && is_noisy {
+            complete.noise = Some(MeasurementNoise::new(
+                self.sigma,
+                self.sample_s,
+                self.input_amplitude,
+            ));
+        }
+        let is_open = complete.execution.sample_period_s == 0.0;
+        if is_open && self.hold == Hold::Held {
+            complete.execution.sample_period_s = self.sample_s;
+        }
+        complete
+    }
+}
