@@ -1,11 +1,11 @@
 """The general estimator beside other programs, on the same recordings.
 
     python any_peers.py --onecycle PATH/TO/onecycle -o any-peers           # all methods
-    python any_peers.py --onecycle PATH/TO/onecycle -o any-peers --methods onecycle,scipy
+    python any_peers.py --onecycle PATH/TO/onecycle -o any-peers-w0 --disturbance w0=10 --methods onecycle,scipy-filtered
 
 Makes recordings by `onecycle simulate` (those that are there already stay), identifies them by each method, and prints
 a table for each kind of recording: error of K/T_body, T_prop and tau in per cent (median, worst), how often 90 %
-intervals hold the truth, processor time. Answers go to OUT/METHOD.csv.
+intervals hold the truth, processor time of one recording. Answers go to OUT/METHOD.csv.
 
 Process: K/T_body e^(-tau s) / (s (T_prop s + 1)(s + 1/T_body)), which all methods are told. 100 Hz, 20 s, noise of 1 % of
 the amplitude, constant input bias. Needs numpy and scipy; `sippy_unipi` for sippy; Octave with its control package
@@ -31,6 +31,7 @@ import argparse
 import csv
 import json
 import pathlib
+import resource
 import subprocess
 import time
 
@@ -42,15 +43,17 @@ SAMPLE_S = 0.01
 DURATION_S = 20
 KEYS = ["k_over_t_body", "t_prop_s", "tau_s"]
 LOOP = ["--loop", "4,2.5,0.02"]
+# The strength is that of the option --disturbance.
+WALK = ["--disturbance", "w1=3"]
 KINDS = {
     "open loop, calm": ["--excitation", "multisine", "--band", "0.2,5"],
-    "open loop, random walk": ["--excitation", "multisine", "--band", "0.2,5", "--disturbance", "w1=3"],
-    "closed loop, set-point steps, random walk": [
+    "open loop, disturbed": ["--excitation", "multisine", "--band", "0.2,5", *WALK],
+    "closed loop, set-point steps, disturbed": [
         *LOOP, "--excitation", "prbs", "--pulse", "0.5", "--inject", "setpoint", "--amplitude", "0.3",
-        "--disturbance", "w1=3",
+        *WALK,
     ],
-    "closed loop, multisine, random walk": [
-        *LOOP, "--excitation", "multisine", "--band", "0.2,5", "--disturbance", "w1=3",
+    "closed loop, multisine, disturbed": [
+        *LOOP, "--excitation", "multisine", "--band", "0.2,5", *WALK,
     ],
     "steady relay": ["--excitation", "relay"],
 }  # fmt: skip
@@ -67,7 +70,7 @@ HALF_WIDTH = 1.6449
 OMEGA = 2 * np.pi * np.geomspace(0.3, 3.0, 30)
 
 
-def make(onecycle, folder, cases):
+def make(onecycle, folder, cases, disturbance="w1=3"):
     """Recordings of all kinds: their files and true processes."""
     folder.mkdir(parents=True, exist_ok=True)
     recordings = []
@@ -87,6 +90,7 @@ def make(onecycle, folder, cases):
                 continue
             process = [f"--{key[:-2] if key.endswith('_s') else key}={value}" for key, value in truth.items()]
             common = ["--noise=1%", f"--bias={bias}", f"--seed={case}", "--preroll=0", "--sample-rate=100"]
+            test = [disturbance if argument == WALK[1] else argument for argument in test]
             arguments = [argument.replace("_", "-") for argument in process] + test + common
             command = [onecycle, "simulate", *arguments, f"--duration={DURATION_S}", "--out", file]
             subprocess.run(command, check=True)
@@ -233,12 +237,12 @@ def answers_of(method, arguments, recordings):
         near = [truth["k_over_t_body"], truth["t_prop_s"], truth["t_body_s"], truth["tau_s"]]
         u, y = read(file)
         begin = time.process_time()
-        wall = time.perf_counter()
+        of_program = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
         seconds = None
         try:
             if method in own:
                 answer = by_onecycle(arguments.onecycle, file, own[method])
-                seconds = time.perf_counter() - wall
+                seconds = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - of_program
             elif octave is not None:
                 extra, response = octave[str(file)]
                 answer = nearest(response, near)
@@ -286,9 +290,10 @@ def main():
     parser.add_argument("--cases", type=int, default=20, help="recordings of each kind")
     names = "onecycle,onecycle-auto,scipy,scipy-filtered,sippy,octave-arx,octave-moen4"
     parser.add_argument("--methods", default=names)
+    parser.add_argument("--disturbance", default=WALK[1], help="as `onecycle simulate` has it; takes a folder of its own")
     parser.add_argument("-o", "--out", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
-    recordings = make(arguments.onecycle, arguments.out / "recordings", arguments.cases)
+    recordings = make(arguments.onecycle, arguments.out / "recordings", arguments.cases, arguments.disturbance)
     print("| recording | method | K/T_body (%) | T_prop (%) | tau (%) | intervals hold (%) | no answer | time (s) |")
     print("| --- | --- | --- | --- | --- | --- | --- | --- |")
     for method in arguments.methods.split(","):
