@@ -85,11 +85,12 @@ fn of_recordings(arguments: &args::Campaign) -> Result<Table, Failure> {
     campaign
         .validate()
         .map_err(|error| Failure::unreadable(&arguments.file, error))?;
+    let options = campaign.options();
     let (cases, journal) = finished(arguments, campaign.cases, |n| {
         let recording = campaign
             .record(n)
             .map_err(|error| Failure::unreadable(&arguments.file, error))?;
-        Ok(recording_outcome(&recording, campaign.structure))
+        Ok(recording_outcome(&recording, &options))
     })?;
     Ok((report::recording::table(&campaign, &cases), journal))
 }

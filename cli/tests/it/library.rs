@@ -92,12 +92,11 @@ fn the_program_refuses_what_the_library_refuses() {
     assert_eq!(report.0["verdict"]["message"], verdict.to_string());
     assert!(report.advice().ends_with('.'), "{}", report.advice());
 
-    let sharp = Specification::new(Form::Pid, Style::Sharp);
-    let found = Identify::new().specification(sharp).run(&recording);
+    let found = Identify::new().run(&recording);
     let recorded = matches!(found.excitation, Some(Excitation::Recorded(_)));
     let identified = found.outcome.unwrap();
     assert!(recorded && identified.fit.innovations().is_some());
-    let report = run(&[&identify_json[..], &["--style", "sharp"]].concat()).identified();
+    let report = run(&identify_json).identified();
     for (parameter, ours) in identified.estimate.iter() {
         let key = parameter.key();
         assert_eq!(report.0["process"][key], interval(&ours), "{key}");

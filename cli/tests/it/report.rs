@@ -113,7 +113,7 @@ fn a_refusal_as_a_page() {
 // absent, and the page is below 2 MB.
 #[test]
 fn a_recording_of_any_kind_as_a_page() {
-    let (ran, page) = reported(&["identify", UNSTEADY, "--style", "sharp", "--json"]);
+    let (ran, page) = reported(&["identify", UNSTEADY, "--json"]);
     assert_eq!(ran.code, Some(0));
     for section in [
         "recording",

@@ -12,24 +12,28 @@
 //! excitations = [{ signal = "chirp", amplitude = 1, band_hz = [0.2, 5] }, { signal = "relay", amplitude = 1 }]
 //! disturbances = [{}, { w1_rad_per_s = 3 }]
 //! loops = [{ kp = 8, kd = 5, filter_s = 0.02, entry = "setpoint" }]
+//! sensors = [{}, { outliers = 0.01, outlier_size = 0.1 }, { drop_outs = 0.05 }]
 //! ```
 //!
-//! A parameter is a number, or two numbers between which it is uniform. Optional: `structure`, `disturbances` (none),
-//! `loops` (open loop), `bias`, `drop_outs`, `outliers`, `outlier_size`. The noise-free amplitude is half the span of the
-//! output of the same test without bias, noise and disturbances.
+//! A parameter is a number, or two numbers between which it is uniform. Optional: `structure`, `road` (`general`),
+//! `disturbances` (none), `loops` (open loop), `sensors` (no defects), `bias`. The noise-free amplitude is half the span of
+//! the output of the same test without bias, noise and disturbances.
 //!
 //! Case `n` depends on the seed and `n` only.
 
 mod parts;
 
-use onecycle_design::{LinearError, Model, Parameter, Structure};
+use onecycle_design::{LinearError, Model, Parameter, Specification, Structure};
+use onecycle_identify::{Noise, Options};
 use onecycle_onboard::RelayError;
-use onecycle_plant::{Experiment, Noise, Sensor, TestSignalError, Trace};
+use onecycle_plant as plant;
+use onecycle_plant::{Experiment, Sensor, TestSignalError, Trace};
 use rand::RngExt;
 use serde::Deserialize;
 
 pub use self::parts::{
-    ClosedLoop, DisturbanceLevel, EntryName, Excitation, ProcessRange, Signal, Span,
+    ClosedLoop, DisturbanceLevel, EntryName, Excitation, ProcessRange, RoadName, SensorDefects,
+    Signal, Span,
 };
 use self::parts::{some_structure, within};
 
@@ -56,15 +60,9 @@ pub struct RecordingCampaign {
     /// Largest input bias over the amplitude of the test signal; uniform from minus to plus this value.
     #[serde(default)]
     pub bias: f64,
-    /// Share of the samples that the sensor drops.
+    /// Estimator.
     #[serde(default)]
-    pub drop_outs: f64,
-    /// Share of the samples with an outlier.
-    #[serde(default)]
-    pub outliers: f64,
-    /// Size of an outlier, over the noise-free amplitude.
-    #[serde(default)]
-    pub outlier_size: f64,
+    pub road: RoadName,
     /// Structure that the estimator fits. `None`: it chooses.
     #[serde(default, deserialize_with = "some_structure")]
     pub structure: Option<Structure>,
@@ -78,6 +76,9 @@ pub struct RecordingCampaign {
     /// Loops. Empty: open loop.
     #[serde(default)]
     pub loops: Vec<ClosedLoop>,
+    /// Defects of the sensor. Empty: none.
+    #[serde(default)]
+    pub sensors: Vec<SensorDefects>,
 }
 
 /// Why a campaign of recordings cannot run.
@@ -144,6 +145,7 @@ pub struct Combination {
     pub disturbance: usize,
     pub duration: usize,
     pub closed_loop: usize,
+    pub sensor: usize,
 }
 
 /// A simulated recording with its truth.
@@ -153,6 +155,8 @@ pub struct SimulatedRecording {
     pub model: Model,
     /// The true input bias (input unit).
     pub input_bias: f64,
+    /// Noise and disturbances. `None` if a disturbance is given in physical units.
+    pub noise: Option<Noise>,
     /// Sample period (s).
     pub sample_s: f64,
     /// Samples that the sensor did not drop.
@@ -190,24 +194,6 @@ impl RecordingCampaign {
                 within(0.0, 100.0, self.noise),
             ),
             ("bias", "0 to 100", self.bias, within(0.0, 100.0, self.bias)),
-            (
-                "drop_outs",
-                "0 to 0.9",
-                self.drop_outs,
-                within(0.0, 0.9, self.drop_outs),
-            ),
-            (
-                "outliers",
-                "0 to 0.9",
-                self.outliers,
-                within(0.0, 0.9, self.outliers),
-            ),
-            (
-                "outlier_size",
-                "0 to 1e6",
-                self.outlier_size,
-                within(0.0, 1e6, self.outlier_size),
-            ),
         ])?;
         let lists = [
             ("durations_s", self.durations_s.len()),
@@ -231,9 +217,21 @@ impl RecordingCampaign {
         for closed_loop in &self.loops {
             closed_loop.check()?;
         }
+        for sensor in &self.sensors {
+            sensor.check()?;
+        }
         self.processes
             .iter()
             .try_for_each(|process| process.check(self.sample_rate_hz))
+    }
+
+    /// Settings of the identification.
+    #[must_use]
+    pub fn options(&self) -> Options {
+        Options::default()
+            .road(self.road.road())
+            .structure(self.structure)
+            .specification(Specification::paper())
     }
 
     /// Combination of case `n`. All combinations come in turn.
@@ -252,6 +250,7 @@ impl RecordingCampaign {
             disturbance: digit(self.disturbances.len()),
             duration: digit(self.durations_s.len()),
             closed_loop: digit(self.loops.len()),
+            sensor: digit(self.sensors.len()),
         }
     }
 
@@ -268,7 +267,7 @@ impl RecordingCampaign {
         let sample_s = 1.0 / self.sample_rate_hz;
         let quiet = Experiment::new(process, sample_s, self.durations_s[at.duration]);
         // The noise has a stream of its own, so that it does not depend on how many numbers were drawn.
-        let mut noise = Noise::from_seed(!self.seed.wrapping_add(n));
+        let mut noise = plant::Noise::from_seed(!self.seed.wrapping_add(n));
         let closed_loop = self.loops.get(at.closed_loop);
         let mut controller = excitation.controller(closed_loop, quiet.duration_s, 0.0)?;
         let amplitude = quiet
@@ -280,9 +279,10 @@ impl RecordingCampaign {
             .get(at.disturbance)
             .copied()
             .unwrap_or_default();
+        let defects = self.sensors.get(at.sensor).copied().unwrap_or_default();
         let sensor = Sensor::noisy(noise_sigma)
-            .with_drop_outs(self.drop_outs)
-            .with_outliers(self.outliers, self.outlier_size * amplitude);
+            .with_drop_outs(defects.drop_outs)
+            .with_outliers(defects.outliers, defects.outlier_size * amplitude);
         let experiment = quiet
             .with_sensor(sensor)
             .with_input_bias(input_bias)
@@ -296,6 +296,7 @@ impl RecordingCampaign {
         Ok(SimulatedRecording {
             model: process.into(),
             input_bias,
+            noise: level.relative_noise(noise_sigma),
             sample_s,
             trace,
         })

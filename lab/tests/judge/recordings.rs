@@ -3,7 +3,9 @@
 use onecycle_design::{Parameter, Structure};
 use onecycle_lab::experiments::RecordingCampaign;
 use onecycle_lab::experiments::campaign::Measure;
-use onecycle_lab::experiments::recording::{Excitation, ProcessRange, Signal, Span};
+use onecycle_lab::experiments::recording::{
+    Excitation, ProcessRange, RoadName, SensorDefects, Signal, Span,
+};
 use onecycle_lab::judge::recording::{RecordingTally, recording_outcome};
 
 /// Lag processes with a chirp or a PRBS, in open loop.
@@ -23,9 +25,7 @@ fn campaign() -> RecordingCampaign {
         durations_s: vec![8.0],
         noise: 0.02,
         bias: 0.1,
-        drop_outs: 0.02,
-        outliers: 0.0,
-        outlier_size: 0.0,
+        road: RoadName::General,
         structure: Some(Structure::Foptd),
         processes: vec![ProcessRange {
             structure: Structure::Foptd,
@@ -44,6 +44,10 @@ fn campaign() -> RecordingCampaign {
         ],
         disturbances: vec![],
         loops: vec![],
+        sensors: vec![SensorDefects {
+            drop_outs: 0.02,
+            ..SensorDefects::default()
+        }],
     }
 }
 
@@ -83,7 +87,7 @@ fn a_small_campaign_is_calibrated() {
         let recording = campaign.record(n).unwrap();
         tally.add(
             Structure::Foptd,
-            &recording_outcome(&recording, campaign.structure),
+            &recording_outcome(&recording, &campaign.options()),
         );
     }
     assert_eq!((tally.refusals(), tally.true_structures()), (0, 60));

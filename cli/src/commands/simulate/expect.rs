@@ -53,7 +53,8 @@ pub(super) fn text(arguments: &Simulate, plan: &Plan) -> Result<String, Failure>
     Ok(text::expected(&plan.model, &estimate))
 }
 
-/// Input of the process during the test, one value a sample.
+/// Input of the process during the test with its bias, one value a sample: a loop cancels the bias, and a mean of the
+/// commanded input alone would tell more than the test does.
 fn input(arguments: &Simulate, plan: &Plan) -> Result<Vec<f64>, Failure> {
     let mut input = Vec::new();
     let mut end = Ok(());
@@ -61,7 +62,7 @@ fn input(arguments: &Simulate, plan: &Plan) -> Result<Vec<f64>, Failure> {
     let mut noise = Source::from_seed(arguments.seed);
     plan.experiment.observe(&mut controller, &mut noise, |row| {
         if row.input.abs() <= LARGEST {
-            input.push(row.input);
+            input.push(row.input + plan.experiment.input_bias);
             ControlFlow::Continue(())
         } else {
             end = Err(plan::diverged(arguments, row.time_s));

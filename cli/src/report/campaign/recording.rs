@@ -5,7 +5,9 @@ use std::fmt::Write;
 
 use onecycle_design::{Parameter, Structure};
 use onecycle_lab::experiments::RecordingCampaign;
-use onecycle_lab::experiments::recording::{Combination, DisturbanceLevel, EntryName};
+use onecycle_lab::experiments::recording::{
+    Combination, DisturbanceLevel, EntryName, ProcessRange, SensorDefects,
+};
 use onecycle_lab::judge::recording::{ParameterTally, RecordingOutcome, RecordingTally};
 
 use super::or_dash;
@@ -35,7 +37,8 @@ pub(crate) fn table(campaign: &RecordingCampaign, outcomes: &[RecordingOutcome])
         campaign.bias,
     );
     outcome_rows(&mut text, &rows);
-    let blocks: [(&str, Figure, f64, usize); 3] = [
+    remark_rows(&mut text, &rows);
+    let blocks: [(&str, Figure, f64, usize); 4] = [
         (
             "90 % intervals hold (%)",
             ParameterTally::coverage,
@@ -51,6 +54,12 @@ pub(crate) fn table(campaign: &RecordingCampaign, outcomes: &[RecordingOutcome])
         (
             "rms error / standard deviation",
             ParameterTally::rms,
+            1.0,
+            2,
+        ),
+        (
+            "rms error / Cramer-Rao bound",
+            ParameterTally::rms_over_bound,
             1.0,
             2,
         ),
@@ -90,27 +99,59 @@ fn rows(
 }
 
 /// Entry of a combination in each list of the campaign, with the length of the list.
-fn indices(campaign: &RecordingCampaign, at: &Combination) -> [(usize, usize); 5] {
+fn indices(campaign: &RecordingCampaign, at: &Combination) -> [(usize, usize); 6] {
     [
         (at.process, campaign.processes.len()),
         (at.excitation, campaign.excitations.len()),
         (at.disturbance, campaign.disturbances.len()),
         (at.duration, campaign.durations_s.len()),
         (at.closed_loop, campaign.loops.len()),
+        (at.sensor, campaign.sensors.len()),
     ]
 }
 
 /// Name of an entry of a list, in the order of [`indices`].
 fn name(campaign: &RecordingCampaign, list: usize, entry: usize) -> String {
     match list {
-        0 => campaign.processes[entry].structure.name().to_owned(),
+        0 => process(campaign, entry),
         1 => campaign.excitations[entry].signal.name().to_owned(),
         2 => disturbance(&campaign.disturbances[entry]),
         3 => format!("{} s", campaign.durations_s[entry]),
-        _ => match campaign.loops[entry].entry {
+        4 => match campaign.loops[entry].entry {
             EntryName::Input => "at the input".to_owned(),
             EntryName::Setpoint => "at the set-point".to_owned(),
         },
+        _ => sensor(&campaign.sensors[entry]),
+    }
+}
+
+/// Structure of a process, with its number among several of the same structure.
+fn process(campaign: &RecordingCampaign, entry: usize) -> String {
+    let structure = campaign.processes[entry].structure;
+    let is_same = |process: &&ProcessRange| process.structure == structure;
+    let before = campaign.processes[..entry].iter().filter(is_same).count();
+    match campaign.processes.iter().filter(is_same).count() {
+        1 => structure.name().to_owned(),
+        _ => format!("{}, process {}", structure.name(), before + 1),
+    }
+}
+
+fn sensor(defects: &SensorDefects) -> String {
+    let mut named = vec![];
+    if defects.outliers > 0.0 {
+        named.push(format!(
+            "{} % outliers of {}",
+            100.0 * defects.outliers,
+            defects.outlier_size
+        ));
+    }
+    if defects.drop_outs > 0.0 {
+        named.push(format!("{} % dropped", 100.0 * defects.drop_outs));
+    }
+    if named.is_empty() {
+        "good sensor".to_owned()
+    } else {
+        named.join(", ")
     }
 }
 
@@ -128,7 +169,7 @@ fn disturbance(level: &DisturbanceLevel) -> String {
 
 /// Cases, refusals and structures. Writing to a string cannot fail.
 fn outcome_rows(text: &mut String, rows: &[(String, RecordingTally)]) {
-    let _ = writeln!(text, "\n{:<22} cases refused (%) true structure (%)", "");
+    let _ = writeln!(text, "\n{:<28} cases refused (%) true structure (%)", "");
     for (name, tally) in rows {
         let accepted = tally.cases - tally.refusals();
         let percent = |count: usize, of: usize| {
@@ -144,12 +185,25 @@ fn outcome_rows(text: &mut String, rows: &[(String, RecordingTally)]) {
                 .map(|((truth, found), count)| format!("{truth} taken for {found} {count}")),
         );
         let line = format!(
-            "{name:<22} {:5} {:>11} {:>18}  {}",
+            "{name:<28} {:5} {:>11} {:>18}  {}",
             tally.cases,
             percent(tally.refusals(), tally.cases),
             percent(tally.true_structures(), accepted),
             notes.join(", ")
         );
+        let _ = writeln!(text, "{}", line.trim_end());
+    }
+}
+
+/// How often each remark stands on an identified recording.
+fn remark_rows(text: &mut String, rows: &[(String, RecordingTally)]) {
+    let _ = writeln!(text, "\nidentified recordings with a remark (%)");
+    for (name, tally) in rows {
+        let accepted = (tally.cases - tally.refusals()) as f64;
+        let remarks: Vec<String> = (tally.remarks.iter())
+            .map(|(kind, count)| format!("{kind} {:.1}", 100.0 * *count as f64 / accepted))
+            .collect();
+        let line = format!("{name:<28} {}", remarks.join(", "));
         let _ = writeln!(text, "{}", line.trim_end());
     }
 }
@@ -166,13 +220,13 @@ fn parameter_rows(
     let columns: Vec<_> = (PARAMETERS.iter())
         .filter(|parameter| all.parameters.contains_key(parameter.key()))
         .collect();
-    let _ = write!(text, "\n{title}\n{:<22}", "");
+    let _ = write!(text, "\n{title}\n{:<28}", "");
     for parameter in &columns {
         let _ = write!(text, " {:>10}", parameter.symbol());
     }
     let _ = writeln!(text);
     for (name, tally) in rows {
-        let _ = write!(text, "{name:<22}");
+        let _ = write!(text, "{name:<28}");
         for parameter in &columns {
             let value = tally.parameters.get(parameter.key()).and_then(figure);
             let _ = write!(text, " {:>10}", or_dash(value.map(|v| scale * v), decimals));

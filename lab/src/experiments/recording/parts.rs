@@ -1,6 +1,7 @@
 //! What a campaign of recordings combines: processes, test signals, disturbances and loops, as files describe them.
 
 use onecycle_design::{Linear, Parameter, Structure};
+use onecycle_identify::{Noise, Road};
 use onecycle_onboard::{Pd, Relay, RelaySettings};
 use onecycle_plant::test_signal::prbs_order;
 use onecycle_plant::{
@@ -171,6 +172,25 @@ impl DisturbanceLevel {
         first_out_of_range([("gust_correlation_s", "positive", time_s, is_right)])
     }
 
+    /// The disturbances beside white noise of this standard deviation. `None` if one is given in physical units.
+    pub(super) fn relative_noise(&self, sigma: f64) -> Option<Noise> {
+        let relative = Self {
+            w1_rad_per_s: self.w1_rad_per_s,
+            w0_rad_per_s: self.w0_rad_per_s,
+            wy_rad_per_s: self.wy_rad_per_s,
+            ..Self::default()
+        };
+        let some = |value: f64| (value > 0.0).then_some(value);
+        (*self == relative).then(|| {
+            Noise::new(
+                sigma,
+                some(self.w1_rad_per_s),
+                some(self.w0_rad_per_s),
+                some(self.wy_rad_per_s),
+            )
+        })
+    }
+
     pub(super) fn of(&self, process: &Linear, noise_sigma: f64, sample_s: f64) -> Disturbances {
         let mut bandwidths = Bandwidths::default();
         bandwidths.w1_rad_per_s = self.w1_rad_per_s;
@@ -183,6 +203,66 @@ impl DisturbanceLevel {
             .with_input_white(self.input_white.hypot(relative.input_white))
             .with_output_walk(self.output_walk.hypot(relative.output_walk))
             .with_gusts(self.gust_sigma, self.gust_correlation_s)
+    }
+}
+
+/// Defects of a sensor beside its noise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct SensorDefects {
+    /// Share of the samples that the sensor drops.
+    pub drop_outs: f64,
+    /// Share of the samples with an outlier.
+    pub outliers: f64,
+    /// Size of an outlier, over the noise-free amplitude.
+    pub outlier_size: f64,
+}
+
+impl SensorDefects {
+    pub(super) fn check(&self) -> Result<(), FieldError> {
+        let Self {
+            drop_outs,
+            outliers,
+            outlier_size,
+        } = *self;
+        first_out_of_range([
+            (
+                "drop_outs",
+                "0 to 0.9",
+                drop_outs,
+                within(0.0, 0.9, drop_outs),
+            ),
+            ("outliers", "0 to 0.9", outliers, within(0.0, 0.9, outliers)),
+            (
+                "outlier_size",
+                "0 to 1e6",
+                outlier_size,
+                within(0.0, 1e6, outlier_size),
+            ),
+        ])
+    }
+}
+
+/// An estimator by its name in files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RoadName {
+    /// The general one.
+    #[default]
+    General,
+    /// That of steady relay oscillations.
+    Relay,
+    /// Whichever the recording takes.
+    Automatic,
+}
+
+impl RoadName {
+    pub(super) fn road(self) -> Road {
+        match self {
+            Self::General => Road::General,
+            Self::Relay => Road::Relay,
+            Self::Automatic => Road::Automatic,
+        }
     }
 }
 
