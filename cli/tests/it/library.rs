@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use onecycle::{
-    CsvOptions, Excitation, Form, Identification, Identify, Method, Pack, Recording, Remark, Road,
-    Specification, Style, Verdict, with_signals,
+    CsvOptions, Excitation, Identification, Identify, Method, Pack, Recording, Remark, Road,
+    Specification, Verdict, with_signals,
 };
 use onecycle_identify::{Options, Signals};
 use serde_json::{Value, json};
