@@ -43,6 +43,8 @@ mod validate;
 #[cfg(test)]
 mod vectors;
 
+use std::ops::Range;
+
 use onecycle_design::{Model, Proposal, Structure, step_response};
 
 pub(crate) use self::check::check;
@@ -72,6 +74,9 @@ const SKIPPED: f64 = 1.0 / 40.0;
 const ROWS: usize = 1200;
 /// Most samples of the part that chooses the structure.
 const CHOOSING: usize = 20_000;
+/// Samples between the outputs of a second difference that shows how much such a part moves: several periods of what moves
+/// it, and less of its noise than between neighbours.
+const CURVED: usize = CHOOSING / 100;
 /// Rounds of outliers.
 const ROUNDS: usize = 3;
 /// Difference of the log-likelihood above which the input is taken as straight lines between the samples.
@@ -117,6 +122,8 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
 
 /// A fit and all that the result needs of it.
 struct Fitted {
+    /// Samples that chose the structure.
+    part: Range<usize>,
     choice: Choice,
     record: Record,
     limits: Limits,
@@ -179,26 +186,21 @@ impl Search<'_> {
         let mut record = prepared.record.clone();
         let length_s = record.time_s(record.len() - 1);
         let longest = LONGEST_TAU * length_s;
-        let mut stretch = most_excited(&record);
         let mut limits = Limits {
-            skip_s: SKIPPED * stretch.time_s(stretch.len() - 1),
+            skip_s: 0.0,
             longest_tau_s: longest,
             structure: self.options.structure,
         };
-        let mut choice = choose(&stretch, &limits);
-        if let Some(gain) = straight(&stretch, &choice, &limits, self.options) {
-            record.hold = Hold::Interpolated;
-            stretch.hold = Hold::Interpolated;
-            self.remarks.push(Remark::Interpolated(gain));
-            choice = choose(&stretch, &limits);
+        let mut choices = Vec::new();
+        for part in excited_parts(&record) {
+            if let Some(choice) = self.choose_on(&mut record, part.clone()) {
+                choices.push((part, choice));
+            }
         }
-        let chosen = choice.chosen().ok_or(Verdict::NoFit)?.clone();
-        let theta = chosen.found.theta;
-        let tau_s = theta.tau_s().max(0.0);
-        limits.skip_s = (1.5 * tau_s + 2.0 * record.dt_s).min(longest);
-        let rows = record.len() - record.index_at(limits.skip_s);
-        let fast_s = theta.shortest_lag_s().min(length_s) + tau_s;
-        let samples = (rows / ROWS).min((fast_s / record.dt_s) as usize).max(1);
+        let (part, choice) = most_likely(choices, &record, longest).ok_or(Verdict::NoFit)?;
+        let theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
+        let (samples, skip_s) = rows_for(&record, &theta);
+        limits.skip_s = skip_s;
         let (best, found) = refine(&mut record, &theta, &limits, samples).ok_or(Verdict::NoFit)?;
         let blocks = Blocks::new(&record, samples, limits.skip_s);
         let damped = choice
@@ -206,6 +208,7 @@ impl Search<'_> {
             .map(|damped| damped.found.theta);
         let wider = damped.and_then(|theta| search::fit(&blocks, &theta, longest));
         let mut fitted = Fitted {
+            part,
             choice,
             limits,
             samples,
@@ -218,6 +221,27 @@ impl Search<'_> {
             self.remarks.push(remark);
         }
         Ok(fitted)
+    }
+
+    /// Step 2 on a part of a record, whose input is taken as straight lines from then on if that explains the part better.
+    fn choose_on(&mut self, record: &mut Record, part: Range<usize>) -> Option<Choice> {
+        let mut part = record.part(part);
+        let length_s = part.time_s(part.len() - 1);
+        let limits = Limits {
+            skip_s: SKIPPED * length_s,
+            longest_tau_s: LONGEST_TAU * length_s,
+            structure: self.options.structure,
+        };
+        let mut choice = choose(&part, &limits);
+        if record.hold == Hold::Held
+            && let Some(gain) = straight(&part, &choice, &limits, self.options)
+        {
+            record.hold = Hold::Interpolated;
+            part.hold = Hold::Interpolated;
+            self.remarks.push(Remark::Interpolated(gain));
+            choice = choose(&part, &limits);
+        }
+        choice.chosen().is_some().then_some(choice)
     }
 
     /// Step 6: reasons to refuse.
@@ -414,7 +438,7 @@ impl Fitted {
         let start = of_body.find(|candidate| candidate.structure() == body)?;
         let longest_s = limits.longest_tau_s;
         let rows = (self.samples, limits.skip_s, longest_s);
-        let part = most_excited(&self.record);
+        let part = self.record.part(self.part.clone());
         let is_whole = part.len() == self.record.len();
         let on_part = Blocks::new(&part, self.samples, limits.skip_s);
         let best = if is_whole {
@@ -443,24 +467,69 @@ impl Fitted {
     }
 }
 
-/// The part of a long record that chooses the structure: the one with the largest changes of the input. The rows of a
-/// longer part would be longer than the lags.
-fn most_excited(record: &Record) -> Record {
+/// The parts of a long record that choose the structure: that with the largest changes of the input, and that with the
+/// largest curvature of the output. The rows of a longer part would be longer than the lags. In a chirp the first part has
+/// the highest frequencies, to which the process hardly answers.
+fn excited_parts(record: &Record) -> Vec<Range<usize>> {
     if record.len() <= CHOOSING {
-        return record.clone();
+        return std::iter::once(0..record.len()).collect();
     }
-    let change = |start: usize| -> f64 {
-        let input = &record.input[start..start + CHOOSING];
-        input
-            .windows(2)
-            .map(|pair| (pair[1] - pair[0]).powi(2))
+    let of_input = |part: &Range<usize>| -> f64 {
+        let pairs = record.input[part.clone()].windows(2);
+        pairs.map(|pair| (pair[1] - pair[0]).powi(2)).sum()
+    };
+    // Second differences, since an output may drift at any rate.
+    let of_output = |part: &Range<usize>| -> f64 {
+        let triples = record.output[part.clone()].windows(2 * CURVED + 1);
+        triples
+            .map(|y| (y[0] - 2.0 * y[CURVED] + y[2 * CURVED]).powi(2))
             .sum()
     };
-    let starts = (0..=record.len() - CHOOSING).step_by(CHOOSING / 2);
-    let best = starts
-        .max_by(|a, b| change(*a).total_cmp(&change(*b)))
-        .unwrap_or(0);
-    record.part(best..best + CHOOSING)
+    let largest = |size: &dyn Fn(&Range<usize>) -> f64| {
+        (0..=record.len() - CHOOSING)
+            .step_by(CHOOSING / 2)
+            .map(|start| start..start + CHOOSING)
+            .max_by(|a, b| size(a).total_cmp(&size(b)))
+    };
+    let mut parts: Vec<Range<usize>> = largest(&of_input).into_iter().collect();
+    parts.extend(largest(&of_output).filter(|part| !parts.contains(part)));
+    parts
+}
+
+/// The choice that explains the whole record best.
+fn most_likely(
+    mut choices: Vec<(Range<usize>, Choice)>,
+    record: &Record,
+    longest_tau_s: f64,
+) -> Option<(Range<usize>, Choice)> {
+    if choices.len() == 1 {
+        return choices.pop();
+    }
+    let thetas: Vec<Theta> = (choices.iter())
+        .filter_map(|(_, choice)| Some(choice.chosen()?.found.theta))
+        .collect();
+    // Likelihoods of different rows do not compare.
+    let rows = thetas.iter().map(|theta| rows_for(record, theta));
+    let (samples, skip_s) = rows.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+    let blocks = Blocks::new(record, samples, skip_s);
+    let bic = |theta: &Theta| {
+        let found = search::fit(&blocks, theta, longest_tau_s);
+        found.map_or(f64::INFINITY, |found| found.bic)
+    };
+    let bics: Vec<f64> = thetas.iter().map(bic).collect();
+    let best = (0..bics.len()).min_by(|a, b| bics[*a].total_cmp(&bics[*b]))?;
+    Some(choices.swap_remove(best))
+}
+
+/// Samples a row of the fit to a record, and the time at its start (s) whose output is not used.
+fn rows_for(record: &Record, theta: &Theta) -> (usize, f64) {
+    let length_s = record.time_s(record.len() - 1);
+    let tau_s = theta.tau_s().max(0.0);
+    let skip_s = (1.5 * tau_s + 2.0 * record.dt_s).min(LONGEST_TAU * length_s);
+    let rows = record.len() - record.index_at(skip_s);
+    let fast_s = theta.shortest_lag_s().min(length_s) + tau_s;
+    let samples = (rows / ROWS).min((fast_s / record.dt_s) as usize).max(1);
+    (samples, skip_s)
 }
 
 /// Fits to rows of `samples` samples, marks outliers and fits again. Returns the number of outliers too.

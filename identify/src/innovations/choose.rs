@@ -123,17 +123,18 @@ fn heads(structure: Option<Structure>) -> Vec<Structure> {
 }
 
 /// Adds the structures that are not screened, from the best of those that contain them; and the screened ones with the
-/// noises that proved best in another.
+/// noises that proved best in another. These come first: what they find leads to the others.
 fn derive(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
-    let screened = all.clone();
-    let Some(lead) = search::best(screened.clone()) else {
-        return;
-    };
-    for structure in Structure::ALL {
+    let others = (Structure::ALL.into_iter()).filter(|structure| !HEADS.contains(structure));
+    for structure in HEADS.into_iter().chain(others) {
+        let best = all.iter().min_by(|a, b| a.bic.total_cmp(&b.bic));
+        let Some(lead) = best.cloned() else {
+            return;
+        };
         if limits.structure.is_some_and(|asked| asked != structure) {
             continue;
         }
-        let mut sources: Vec<&Candidate> = (screened.iter())
+        let mut sources: Vec<&Candidate> = (all.iter())
             .filter(|from| from.structure() != structure && contains(from.structure(), structure))
             .filter(|from| from.bic < lead.bic + HOPELESS)
             .collect();
