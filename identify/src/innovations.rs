@@ -7,7 +7,7 @@
 //! 1. put the samples on their grid; mark lost, stale and far samples      prepare, outliers
 //! 2. find the simplest structure that explains the record                 choose, search
 //! 3. fit it to finer rows; mark samples it cannot predict, fit again      refine
-//!    add drag and thrust that are quadratic, if the record asks for them   quadratic
+//!    add drag, friction and thrust, if the record asks for them           forces
 //! 4. average the posterior over the intensity of the noise                mixture, laplace
 //! 5. test the innovations, predict the last third from the first two      validate
 //! 6. refuse what the record does not tell                                 judge
@@ -23,6 +23,7 @@ mod choose;
 mod dense;
 mod descent;
 mod filter;
+mod forces;
 mod laplace;
 mod lifted;
 mod likelihood;
@@ -33,7 +34,6 @@ mod outliers;
 mod plan;
 mod prediction;
 mod prepare;
-mod quadratic;
 mod record;
 mod response;
 mod result;
@@ -217,7 +217,7 @@ impl Search<'_> {
             outliers: outliers + found,
             record,
         };
-        if let Some(remark) = fitted.add_quadratic() {
+        if let Some(remark) = fitted.add_forces() {
             self.remarks.push(remark);
         }
         Ok(fitted)
@@ -350,8 +350,8 @@ impl Search<'_> {
             .filter(|other| other.bic < best + NEARLY && other.structure() != chosen)
             .map(Candidate::structure)
             .collect();
-        // The fits of the others lack the quadratic forces.
-        let is_linear = fitted.record.quadratic.len() == 0;
+        // The fits of the others lack the nonlinear forces.
+        let is_linear = fitted.record.forces.len() == 0;
         if !others.is_empty() && self.options.structure.is_none() && is_linear {
             self.remarks.push(Remark::OtherStructures(others));
         }
@@ -427,8 +427,8 @@ impl Fitted {
         Blocks::new(&self.record, self.samples, self.limits.skip_s)
     }
 
-    /// Adds the quadratic forces that the record asks for, and fits again.
-    fn add_quadratic(&mut self) -> Option<Remark> {
+    /// Adds the nonlinear forces that the record asks for, and fits again.
+    fn add_forces(&mut self) -> Option<Remark> {
         let limits = &self.limits;
         let body = Structure::Soiptd;
         if limits.structure.is_some_and(|asked| asked != body) {
@@ -446,8 +446,8 @@ impl Fitted {
         } else {
             search::fit(&on_part, &self.best.found.theta, longest_s)?
         };
-        let (asked, found) = quadratic::quadratic(&part, &best, &start.found.theta, rows)?;
-        self.record.quadratic = asked.of(&self.record);
+        let (asked, found) = forces::forces(&part, &best, &start.found.theta, rows)?;
+        self.record.forces = asked.of(&self.record);
         let blocks = Blocks::new(&self.record, self.samples, limits.skip_s);
         self.best = if is_whole {
             found
@@ -455,8 +455,8 @@ impl Fitted {
             search::fit(&blocks, &found.found.theta, longest_s)?
         };
         self.wider = self.best.clone();
-        let [drag, thrust] = result::quadratic(&self.best.found, &self.record.quadratic);
-        Some(Remark::Quadratic { drag, thrust })
+        let found = result::nonlinear(&self.best.found, &self.record.forces);
+        Some(Remark::Nonlinear(found))
     }
 
     /// Step 4: components of the posterior.

@@ -41,7 +41,7 @@ pub use excitation::{Excitation, Oscillation, Recorded};
 pub use innovations::{Hold, expected};
 pub use outcome::{
     Alternative, Evidence, Fit, FitPoint, Identification, Identified, InnovationRow,
-    InnovationTests, Innovations, Noise, Prediction,
+    InnovationTests, Innovations, Noise, Nonlinear, Prediction,
 };
 pub use posterior::{Draw, Estimate, Interval, Posterior};
 pub use reading::Reading;

@@ -140,11 +140,8 @@ impl Fit {
 pub struct Innovations {
     /// Noise and disturbances beside the response to the input.
     pub noise: Noise,
-    /// Coefficient `c` of a drag `-c v |v|` on the rate `v` of the output (1/output unit), beside the linear damping.
-    /// `None` if the recording does not ask for it.
-    pub drag: Option<f64>,
-    /// Coefficient `c` of a thrust `l + c l^2` of the lagged input `l` (1/input unit). `None` as for the drag.
-    pub thrust: Option<f64>,
+    /// Nonlinear forces beside the linear process.
+    pub nonlinear: Nonlinear,
     /// Logarithm of the likelihood of the rows of the fit.
     pub log_likelihood: f64,
     /// Bayesian information criterion; lower is better.
@@ -175,6 +172,18 @@ pub struct Noise {
     pub w0_rad_per_s: Option<f64>,
     /// Random walk of the measured output, as an angle integrated from a gyro (rad/s).
     pub wy_rad_per_s: Option<f64>,
+}
+
+/// Nonlinear forces that act where the disturbance does. Each is `None` unless the recording asks for it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[non_exhaustive]
+pub struct Nonlinear {
+    /// Coefficient `c` of a drag `-c v |v|` on the rate `v` of the output, beside the linear damping (1/output unit).
+    pub drag: Option<f64>,
+    /// Dry friction: the input (input unit) that it takes to overcome it.
+    pub friction: Option<f64>,
+    /// Coefficient `c` of a thrust `l + c l^2` of the lagged input `l` (1/input unit).
+    pub thrust: Option<f64>,
 }
 
 impl Noise {

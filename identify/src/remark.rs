@@ -2,6 +2,7 @@
 
 use onecycle_design::{DesignError, Parameter, Structure};
 
+use crate::outcome::Nonlinear;
 use crate::verdict::Verdict;
 
 /// Something that limits a result or deserves attention, as facts. The program that shows it writes the sentence.
@@ -73,14 +74,8 @@ pub enum Remark {
         /// Whether the general result is given. It is not if its innovations are not white.
         is_replaced: bool,
     },
-    /// The model has quadratic forces beside its linear parts, and the controller is designed for the linear parts. At
-    /// least one is there.
-    Quadratic {
-        /// Coefficient `c` of a drag `-c v |v|` on the rate `v` of the output (1/output unit).
-        drag: Option<f64>,
-        /// Coefficient `c` of a thrust `l + c l^2` of the lagged input `l` (1/input unit).
-        thrust: Option<f64>,
-    },
+    /// The model has nonlinear forces, at least one, and the controller is designed for its linear parts.
+    Nonlinear(Nonlinear),
     /// Other structures explain the recording nearly as well.
     OtherStructures(Vec<Structure>),
     /// The innovations are not white. The value is their largest autocorrelation; the intervals are widened.
@@ -130,7 +125,7 @@ impl Remark {
             Self::NotASteadyOscillation(_) => "not_a_steady_oscillation",
             Self::RelayReplaced(_) => "relay_replaced",
             Self::GeneralDisagrees { .. } => "general_disagrees",
-            Self::Quadratic { .. } => "quadratic",
+            Self::Nonlinear(_) => "nonlinear",
             Self::OtherStructures(_) => "other_structures",
             Self::Coloured(_) => "coloured",
             Self::InputLeft(_) => "input_left",

@@ -1,6 +1,7 @@
 //! What a remark means.
 
 use onecycle::{DesignError, Identification, Parameter, Remark};
+use onecycle_identify::Nonlinear;
 
 use super::controllers;
 use crate::report::number::{percent, significant};
@@ -122,7 +123,7 @@ fn of_estimator(remark: &Remark) -> Option<String> {
             phase_margin_rad,
             is_replaced,
         } => disagreement(*phase_margin_rad, *is_replaced),
-        Remark::Quadratic { drag, thrust } => quadratic(*drag, *thrust),
+        Remark::Nonlinear(forces) => nonlinear(forces),
         Remark::OtherStructures(structures) => {
             let names: Vec<&str> = structures
                 .iter()
@@ -164,20 +165,29 @@ fn disagreement(phase_margin_rad: Option<f64>, is_replaced: bool) -> String {
     format!("{which} {margin} there. Compare with --estimator relay and --estimator general.")
 }
 
-/// Quadratic forces: what they mean for the controller.
-fn quadratic(drag: Option<f64>, thrust: Option<f64>) -> String {
-    let drag = drag.map(|c| format!("a drag of {} times the square of the rate", significant(c)));
-    let thrust = thrust.map(|c| {
-        format!(
-            "a thrust of {} times the square of the lagged input",
-            significant(c)
-        )
+/// Nonlinear forces: what they mean for the controller.
+fn nonlinear(forces: &Nonlinear) -> String {
+    let drag = forces.drag.map(|c| {
+        let c = significant(c);
+        format!("a drag of {c} times the square of the rate")
     });
-    let forces: Vec<String> = [drag, thrust].into_iter().flatten().collect();
+    let friction = forces.friction.map(|c| {
+        let c = significant(c);
+        format!("a dry friction that takes an input of {c} to overcome")
+    });
+    let thrust = forces.thrust.map(|c| {
+        let c = significant(c);
+        format!("a thrust of {c} times the square of the lagged input")
+    });
+    let found: Vec<String> = [drag, friction, thrust].into_iter().flatten().collect();
+    let advice = if forces.friction.is_some() {
+        "Friction may keep the loop from settling: an integral term then hunts."
+    } else {
+        "They hold for small movements. Repeat the test at another amplitude to confirm this."
+    };
     format!(
-        "Beside its linear parts the process has {}. The controller is designed for the linear parts, which hold for small \
-         movements. Repeat the test at another amplitude to confirm this.",
-        forces.join(" and ")
+        "Beside its linear parts the process has {}. The controller is designed for the linear parts. {advice}",
+        found.join(" and ")
     )
 }
 
@@ -289,10 +299,6 @@ mod tests {
             Remark::GeneralDisagrees {
                 phase_margin_rad: None,
                 is_replaced: false,
-            },
-            Remark::Quadratic {
-                drag: Some(7.1),
-                thrust: Some(0.2),
             },
             Remark::OtherStructures(vec![Structure::Soptd, Structure::ResonantLag]),
             Remark::Coloured(0.31),

@@ -17,9 +17,9 @@
 //! constant from the first block on. Reference: P. de Jong, "The likelihood for a state space model", Biometrika 75
 //! (1988); G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973).
 //!
-//! Quadratic forces of the record add a column each, behind `g`: their coefficients are further linear unknowns.
+//! Nonlinear forces of the record add a column each, behind `g`: their coefficients are further linear unknowns.
 //!
-//! Shapes: `N` states (the last one is the disturbance), `blocks` rows, `D` data columns `y`, `g` and up to two of quadratic
+//! Shapes: `N` states (the last one is the disturbance), `blocks` rows, `D` data columns `y`, `g` and up to two of nonlinear
 //! forces, and `N` columns `X0`. The linear unknowns are in the order gain, forces, states.
 
 use std::f64::consts::TAU as TWO_PI;
@@ -49,9 +49,9 @@ pub(super) struct Evaluation {
     pub(super) gain_factor: f64,
     /// State at the first block; the disturbance is the last (output unit, times the gain).
     pub(super) state: Vec<f64>,
-    /// Coefficients of the quadratic forces, and their deviation for fixed nonlinear unknowns (output unit / unit of the
+    /// Coefficients of the nonlinear forces, and their deviation for fixed nonlinear unknowns (output unit / unit of the
     /// force).
-    pub(super) quadratic: Vec<(f64, f64)>,
+    pub(super) forces: Vec<(f64, f64)>,
     /// Variance of the disturbance at the first block and its covariance with the gain, for fixed nonlinear unknowns, over
     /// [`Self::variance`].
     pub(super) disturbance_factors: (f64, f64),
@@ -94,7 +94,7 @@ pub(super) fn evaluate(
 #[derive(Default)]
 pub(super) struct Memory {
     key: Option<(Theta, bool)>,
-    /// `g`, then the response to each quadratic force, summed over the samples present in each block.
+    /// `g`, then the response to each nonlinear force, summed over the samples present in each block.
     responses: Vec<Vec<f64>>,
     /// `ln|X0'X0| / 2`.
     log_determinant: f64,
@@ -271,7 +271,7 @@ fn filtered<const N: usize, const D: usize>(
             .iter()
             .map(|x| x * scale)
             .collect(),
-        quadratic: (1..responses)
+        forces: (1..responses)
             .map(|i| {
                 (
                     fit.coefficients[i] * scale,
@@ -374,7 +374,7 @@ fn remember<const N: usize>(
     }
     memory.key = None;
     memory.responses = vec![response::sums(&system.model, blocks, theta.tau_s())];
-    let forces = response::of_quadratic(&system.model, blocks, theta.delay_and_lag_s());
+    let forces = response::of_forces(&system.model, blocks, theta.delay_and_lag_s());
     memory.responses.extend(forces);
     memory.log_determinant = match products(lifted, blocks, &memory.responses).root() {
         Some(root) => root.log_determinant(),

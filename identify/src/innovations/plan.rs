@@ -11,7 +11,7 @@ use super::descent::Found;
 use super::laplace::Laplace;
 use super::likelihood::{Memory, evaluate};
 use super::mixture::Component;
-use super::record::{Blocks, Hold, Quadratic, Record};
+use super::record::{Blocks, Forces, Hold, Record};
 use super::response;
 use super::result;
 use super::theta::{Bounds, NoiseKind, Theta};
@@ -38,7 +38,7 @@ pub fn expected(
     let theta = theta_of(model, noise);
     let gain = model.linear().gain();
     let mut record = Record {
-        quadratic: Quadratic::default(),
+        forces: Forces::default(),
         uneven_s: vec![],
         dt_s: sample_s,
         input: input.to_vec(),

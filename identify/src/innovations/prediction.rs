@@ -20,7 +20,7 @@ pub(super) struct Predictions {
     pub(super) disturbance: Vec<f64>,
     /// Output from the state before each block, without the input from there on, `ahead` blocks later (output unit).
     pub(super) ahead: Vec<f64>,
-    /// Response to the input and the quadratic forces, mean over the samples of each block (output unit).
+    /// Response to the input and the nonlinear forces, mean over the samples of each block (output unit).
     pub(super) forced: Vec<f64>,
     /// Variance of the error of [`Self::ahead`] plus [`Self::forced`] that the noises cause (output unit^2).
     pub(super) ahead_variance: f64,
@@ -62,7 +62,7 @@ fn predict_sized<const N: usize>(
     let system = System::<N>::new(theta, blocks.record.dt_s);
     let lifted = system.lifted(blocks);
     let response = response::sums(&system.model, blocks, theta.tau_s());
-    let forces = response::of_quadratic(&system.model, blocks, theta.delay_and_lag_s());
+    let forces = response::of_forces(&system.model, blocks, theta.delay_and_lag_s());
     let mut gains = Gains::new(system.start(blocks, &lifted)?);
     let start: [f64; N] = std::array::from_fn(|i| evaluation.state[i]);
     let (mut free, mut filtered) = (start, start);
@@ -73,11 +73,11 @@ fn predict_sized<const N: usize>(
     let mut pending: Vec<(usize, f64)> = Vec::new();
     for (block, &kind) in blocks.kind_of.iter().enumerate() {
         let model = &lifted[kind as usize];
-        let terms = forces.iter().zip(&evaluation.quadratic);
-        let quadratic: f64 = terms
+        let terms = forces.iter().zip(&evaluation.forces);
+        let nonlinear: f64 = terms
             .map(|(force, (coefficient, _))| coefficient * force[block])
             .sum();
-        let forced = evaluation.gain * response[block] + quadratic;
+        let forced = evaluation.gain * response[block] + nonlinear;
         let count = blocks.present(block).max(1) as f64;
         let prediction = forced + dot(&model.c, &filtered);
         found

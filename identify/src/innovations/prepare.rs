@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::record::{Hold, Quadratic, Record};
+use super::record::{Forces, Hold, Record};
 use crate::settings::Options;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
@@ -116,7 +116,7 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
         output: output.to_vec(),
         present: vec![true; output.len()],
         hold: Hold::Held,
-        quadratic: Quadratic::default(),
+        forces: Forces::default(),
     };
     if is_even {
         return record;
@@ -199,7 +199,7 @@ fn spread(
         output: Vec::with_capacity(count),
         present: Vec::with_capacity(count),
         hold: Hold::Held,
-        quadratic: Quadratic::default(),
+        forces: Forces::default(),
     };
     let mut sample = 0;
     for index in 0..count {

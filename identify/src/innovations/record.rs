@@ -42,24 +42,32 @@ pub(crate) struct Record {
     pub(crate) present: Vec<bool>,
     /// Input between the samples.
     pub(crate) hold: Hold,
-    /// Terms of the model that are quadratic.
-    pub(crate) quadratic: Quadratic,
+    /// Nonlinear terms of the model.
+    pub(crate) forces: Forces,
 }
 
-/// Forces behind the actuator lags, beside the input and the disturbance, that are quadratic in what causes them. Their
-/// coefficients are linear unknowns, as the gain is. The default is none.
+/// Nonlinear forces behind the actuator lags, beside the input and the disturbance. Their coefficients are linear unknowns,
+/// as the gain is. The default is none.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Quadratic {
+pub(crate) struct Forces {
     /// Square of the rate of the output, with its sign, at each sample (output unit^2/s^2): drag. Empty for none.
     pub(crate) drag: Vec<f64>,
+    /// Sign of the rate of the output at each sample, smoothed near zero: dry friction. Empty for none.
+    pub(crate) friction: Vec<f64>,
     /// Whether the force has a part that is quadratic in the lagged input: thrust over rotor speed.
     pub(crate) thrust: bool,
 }
 
-impl Quadratic {
-    /// Number of coefficients.
+impl Forces {
+    /// Forces that the rate of the output causes, sample by sample, in the order of their coefficients.
+    pub(crate) fn of_rate(&self) -> impl Iterator<Item = &[f64]> {
+        let forces = [&self.drag, &self.friction].into_iter();
+        forces.filter(|force| !force.is_empty()).map(Vec::as_slice)
+    }
+
+    /// Number of coefficients, those of the rate first.
     pub(crate) fn len(&self) -> usize {
-        usize::from(!self.drag.is_empty()) + usize::from(self.thrust)
+        self.of_rate().count() + usize::from(self.thrust)
     }
 }
 
@@ -74,7 +82,7 @@ impl Record {
             input,
             output,
             hold: Hold::Held,
-            quadratic: Quadratic::default(),
+            forces: Forces::default(),
         }
     }
 
@@ -123,9 +131,10 @@ impl Record {
             output: self.output[range.clone()].to_vec(),
             present: self.present[range.clone()].to_vec(),
             hold: self.hold,
-            quadratic: Quadratic {
-                drag: self.quadratic.drag.get(range).unwrap_or(&[]).to_vec(),
-                thrust: self.quadratic.thrust,
+            forces: Forces {
+                drag: (self.forces.drag.get(range.clone()).unwrap_or(&[])).to_vec(),
+                friction: self.forces.friction.get(range).unwrap_or(&[]).to_vec(),
+                thrust: self.forces.thrust,
             },
         }
     }

@@ -4,7 +4,7 @@
 //! two samples: a part `f` of the older one, then the newer one. Before the record the input is that of the first
 //! sample. A negative dead time uses later input.
 //!
-//! Quadratic forces are inputs too. They enter behind the actuator lags without a delay, and run straight from sample to
+//! Nonlinear forces are inputs too. They enter behind the actuator lags without a delay, and run straight from sample to
 //! sample.
 
 use onecycle_design::state_space::{Matrix, StateSpace, Step, identity, product, times};
@@ -40,9 +40,9 @@ pub(super) fn sums<const N: usize>(
     sums_of(model, blocks, Source::input(blocks.record, tau_s))
 }
 
-/// Responses to the quadratic forces of the record, drag before thrust, as [`sums`]. `lag_s`: the actuator lag, whose
+/// Responses to the nonlinear forces of the record in the order of their coefficients, as [`sums`]. `lag_s`: the actuator lag, whose
 /// output over the lag is what the thrust is the square of.
-pub(super) fn of_quadratic<const N: usize>(
+pub(super) fn of_forces<const N: usize>(
     model: &StateSpace<N>,
     blocks: &Blocks<'_>,
     (tau_s, lag_s): (f64, f64),
@@ -60,11 +60,9 @@ pub(super) fn of_quadratic<const N: usize>(
         };
         sums_of(&behind, blocks, source)
     };
-    let mut sums = Vec::with_capacity(record.quadratic.len());
-    if !record.quadratic.drag.is_empty() {
-        sums.push(of_force(&record.quadratic.drag));
-    }
-    if record.quadratic.thrust {
+    let mut sums = Vec::with_capacity(record.forces.len());
+    sums.extend(record.forces.of_rate().map(of_force));
+    if record.forces.thrust {
         let lag = StateSpace::<2>::new(
             &Linear::new(Structure::Foptd)
                 .with_gain(1.0)

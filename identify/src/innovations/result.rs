@@ -6,12 +6,13 @@ use super::Fitted;
 use super::descent::Found;
 use super::mixture::Component;
 use super::prediction::{Filtering, predict};
-use super::record::{Blocks, Quadratic};
+use super::record::{Blocks, Forces};
 use super::search::Candidate;
 use super::theta::{Bounds, NoiseKind, Theta};
 use crate::cholesky::cholesky;
 use crate::outcome::{
-    Alternative, FitPoint, InnovationRow, InnovationTests, Innovations, Noise, Prediction,
+    Alternative, FitPoint, InnovationRow, InnovationTests, Innovations, Noise, Nonlinear,
+    Prediction,
 };
 use crate::posterior::Posterior;
 
@@ -196,15 +197,16 @@ fn noise_of(candidate: &Candidate) -> Noise {
     }
 }
 
-/// Coefficients of drag (1/output unit) and thrust (1/input unit), where the model has them.
-pub(super) fn quadratic(found: &Found, forces: &Quadratic) -> [Option<f64>; 2] {
-    let mut values = found.at.quadratic.iter().map(|(value, _)| *value);
-    let drag = (!forces.drag.is_empty())
-        .then(|| values.next())
-        .flatten()
-        .map(|value| -value);
-    let thrust = forces.thrust.then(|| values.next()).flatten();
-    [drag, thrust.map(|value| value / found.at.gain)]
+/// Coefficients of the nonlinear forces that the model has.
+pub(super) fn nonlinear(found: &Found, forces: &Forces) -> Nonlinear {
+    let gain = found.at.gain;
+    let mut values = found.at.forces.iter().map(|(value, _)| *value);
+    let mut next = |is_there: bool| is_there.then(|| values.next()).flatten();
+    Nonlinear {
+        drag: next(!forces.drag.is_empty()).map(|value| -value),
+        friction: next(!forces.friction.is_empty()).map(|value| -value / gain.abs()),
+        thrust: next(forces.thrust).map(|value| value / gain),
+    }
 }
 
 /// The innovations with their tests, and the fit to the measured output. `None` if the filter does not converge.
@@ -247,11 +249,9 @@ pub(super) fn innovations(
             bic: candidate.bic,
         })
         .collect();
-    let [drag, thrust] = quadratic(found, &fitted.record.quadratic);
     let innovations = Innovations {
         noise: noise_of(&fitted.best),
-        drag,
-        thrust,
+        nonlinear: nonlinear(found, &fitted.record.forces),
         log_likelihood: found.at.log_likelihood,
         bic: fitted.best.bic,
         alternatives,

@@ -11,7 +11,7 @@ use onecycle_design::Structure;
 
 use super::descent::{Found, Patience, descend};
 use super::likelihood::{Memory, evaluate};
-use super::record::{Blocks, Quadratic, Record};
+use super::record::{Blocks, Forces, Record};
 use super::theta::{Bounds, NoiseKind, Theta};
 
 /// Structures that are screened. Every other structure is a limit of one of them, or adds one lag.
@@ -48,7 +48,7 @@ pub(super) struct Candidate {
 
 impl Candidate {
     pub(super) fn new(found: Found) -> Self {
-        let unknowns = found.theta.free().len() + 1 + found.at.quadratic.len();
+        let unknowns = found.theta.free().len() + 1 + found.at.forces.len();
         let rows = found.at.residual.len() as f64;
         let bic = -2.0 * found.at.log_likelihood + unknowns as f64 * rows.ln();
         Self { found, bic }
@@ -83,7 +83,7 @@ fn coarse(record: &Record, samples: usize) -> (Record, f64) {
         output: vec![],
         present: vec![],
         hold: record.hold,
-        quadratic: Quadratic::default(),
+        forces: Forces::default(),
     };
     for start in (0..=record.len().saturating_sub(samples)).step_by(samples) {
         let range = start..start + samples;

@@ -5,6 +5,6 @@
     reason = "the lint does not recognise helper functions as parts of tests"
 )]
 
+mod forces;
 mod names;
 mod outcomes;
-mod quadratic;

@@ -94,6 +94,7 @@ pub(super) struct Tests {
     input_f: f64,
     widened: f64,
     drag: Option<f64>,
+    friction: Option<f64>,
     thrust: Option<f64>,
 }
 
@@ -106,8 +107,9 @@ impl From<&Innovations> for Tests {
             input_share: of.whiteness.input_share,
             input_f: of.whiteness.input_f,
             widened: of.widened,
-            drag: of.drag,
-            thrust: of.thrust,
+            drag: of.nonlinear.drag,
+            friction: of.nonlinear.friction,
+            thrust: of.nonlinear.thrust,
         }
     }
 }

@@ -1,14 +1,14 @@
-//! Forces that are quadratic: drag in the rate of the output, thrust in the lagged input.
+//! Nonlinear forces: drag and dry friction of the rate of the output, thrust quadratic in the lagged input.
 //!
 //! A relay, and any test at one amplitude, lets a linear damping explain most of a quadratic one; the lag and the dead
-//! time then make up for the rest, and the controller loses its margin. So each force is tried after the linear fit, and
-//! taken if the likelihood asks for it.
+//! time then make up for the rest, and the controller loses its margin. Friction passes for a disturbance in the same way.
+//! So each force is tried after the linear fit, and taken if the likelihood asks for it.
 //!
 //! The rate is the derivative of a cubic through the output around each sample: A. Savitzky, M. J. E. Golay, Anal. Chem. 36
 //! (1964). With noise of 5 % of the output at one amplitude a linear damping explains the record as well: only a second
 //! amplitude tells.
 
-use super::record::{Blocks, Quadratic, Record};
+use super::record::{Blocks, Forces, Record};
 use super::search::{self, Candidate};
 use super::theta::Theta;
 use super::validate;
@@ -19,36 +19,53 @@ const HALF_WIDTH: f64 = 1.0 / 14.0;
 const POINTS: usize = 50;
 /// Difference of the BIC from which a force is taken: a likelihood ratio of `e^10`.
 const ASKED: f64 = 20.0;
+/// Most forces: there is room for two columns beside the linear ones.
+const MOST: usize = 2;
+/// Rate below which the friction is smoothed, over the root mean square of the rate.
+const CREEP: f64 = 0.05;
+
+/// A nonlinear force.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Force {
+    Drag,
+    Friction,
+    Thrust,
+}
 
 /// Which forces a record asks for.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Debug)]
 pub(super) struct Asked {
-    drag: bool,
-    thrust: bool,
+    forces: Vec<Force>,
     /// Period of the excitation (s).
     period_s: f64,
 }
 
 impl Asked {
     /// These forces along `record`.
-    pub(super) fn of(self, record: &Record) -> Quadratic {
-        let square = |v: f64| v * v.abs();
-        let drag = self.drag.then(|| {
-            rate(record, self.period_s)
-                .into_iter()
-                .map(square)
-                .collect()
-        });
-        Quadratic {
-            drag: drag.unwrap_or_default(),
-            thrust: self.thrust,
+    pub(super) fn of(&self, record: &Record) -> Forces {
+        let mut forces = Forces {
+            thrust: self.forces.contains(&Force::Thrust),
+            ..Forces::default()
+        };
+        if self.forces.iter().all(|force| *force == Force::Thrust) {
+            return forces;
         }
+        let rate = rate(record, self.period_s);
+        if self.forces.contains(&Force::Drag) {
+            forces.drag = rate.iter().map(|v| v * v.abs()).collect();
+        }
+        if self.forces.contains(&Force::Friction) {
+            let mean = rate.iter().map(|v| v * v).sum::<f64>() / rate.len() as f64;
+            let creep = CREEP * CREEP * mean;
+            forces.friction = rate.iter().map(|v| v / (v * v + creep).sqrt()).collect();
+        }
+        forces
     }
 }
 
-/// The quadratic forces that explain `record` better than the linear fit `best`, and the fit with them from `start`, an
+/// The nonlinear forces that explain `record` better than the linear fit `best`, and the fit with them from `start`, an
 /// integrator with two lags. `None` if the record asks for none, and with uneven samples.
-pub(super) fn quadratic(
+pub(super) fn forces(
     record: &Record,
     best: &Candidate,
     start: &Theta,
@@ -60,36 +77,39 @@ pub(super) fn quadratic(
     let period_s = validate::period_s(&Blocks::new(record, samples, skip_s))?;
     let mut trial = record.clone();
     let mut chosen: Option<(Asked, Candidate)> = None;
-    // Each alone, then both.
-    for (drag, thrust) in [(true, false), (false, true), (true, true)] {
-        if drag && thrust && chosen.is_none() {
-            break;
-        }
-        let asked = Asked {
-            drag,
-            thrust,
-            period_s,
+    // The best force alone; then another one beside it.
+    for _ in 0..MOST {
+        let (known, bic) = match &chosen {
+            Some((asked, found)) => (asked.forces.clone(), found.bic),
+            None => (vec![], best.bic),
         };
-        trial.quadratic = asked.of(record);
-        let blocks = Blocks::new(&trial, samples, skip_s);
-        let Some(found) = search::fit(&blocks, start, longest_tau_s) else {
-            continue;
-        };
-        let rival = chosen.as_ref().map_or(best.bic - ASKED, |(other, found)| {
-            let is_one_more = drag && thrust && !(other.drag && other.thrust);
-            found.bic - if is_one_more { ASKED } else { 0.0 }
-        });
-        if found.bic < rival && is_physical(&trial.quadratic, &found) {
-            chosen = Some((asked, found));
+        let others = [Force::Drag, Force::Friction, Force::Thrust].into_iter();
+        let mut next: Option<(Asked, Candidate)> = None;
+        for force in others.filter(|force| !known.contains(force)) {
+            let mut forces = known.clone();
+            forces.push(force);
+            let asked = Asked { forces, period_s };
+            trial.forces = asked.of(record);
+            let blocks = Blocks::new(&trial, samples, skip_s);
+            let Some(found) = search::fit(&blocks, start, longest_tau_s) else {
+                continue;
+            };
+            let least = next.as_ref().map_or(bic - ASKED, |(_, next)| next.bic);
+            if found.bic < least && is_physical(&trial.forces, &found) {
+                next = Some((asked, found));
+            }
         }
+        let Some(found) = next else { break };
+        chosen = Some(found);
     }
     chosen
 }
 
-/// Whether the drag opposes the motion.
-fn is_physical(quadratic: &Quadratic, found: &Candidate) -> bool {
-    let coefficient = found.found.at.quadratic.first();
-    quadratic.drag.is_empty() || coefficient.is_some_and(|(value, _)| *value < 0.0)
+/// Whether the forces of the rate oppose the motion.
+fn is_physical(forces: &Forces, found: &Candidate) -> bool {
+    let coefficients = found.found.at.forces.iter();
+    let mut of_rate = coefficients.take(forces.of_rate().count());
+    of_rate.all(|(value, _)| *value < 0.0)
 }
 
 /// Rate of the output at each sample (output unit/s).
