@@ -38,6 +38,8 @@ mod record;
 mod response;
 mod result;
 mod search;
+#[cfg(test)]
+mod starts;
 mod theta;
 mod validate;
 #[cfg(test)]
