@@ -38,6 +38,8 @@ mod record;
 mod response;
 mod result;
 mod search;
+#[cfg(test)]
+mod starts;
 mod theta;
 mod validate;
 #[cfg(test)]
@@ -55,7 +57,7 @@ use self::prepare::{FEWEST, Prepared, prepare};
 pub use self::record::Hold;
 use self::record::{Blocks, Record};
 use self::search::Candidate;
-use self::theta::{Bounds, Theta};
+use self::theta::{Bounds, NoiseKind, Theta};
 use crate::assumed::RecordedLoop;
 use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{Evidence, Fit, Identification, Identified, InnovationTests, Prediction};
@@ -70,8 +72,11 @@ const LONGEST_TAU: f64 = 1.0 / 8.0;
 /// Time at the start whose outputs are left out while the dead time is not known, as a share of the record. Most records
 /// begin with the input at rest, and some with all their excitation.
 const SKIPPED: f64 = 1.0 / 40.0;
-/// Rows of the final fit, unless a row would be longer than lag and dead time together.
+/// Rows of the final fit, unless a row would be longer than the dead time with the shortest lag, or with the time in which
+/// the disturbance outgrows the noise.
 const ROWS: usize = 1200;
+/// Most rows of the final fit: they take a few seconds.
+const MOST_ROWS: usize = 40_000;
 /// Most samples of the part that chooses the structure.
 const CHOOSING: usize = 20_000;
 /// Samples between the outputs of a second difference that shows how much such a part moves: several periods of what moves
@@ -527,9 +532,11 @@ fn rows_for(record: &Record, theta: &Theta) -> (usize, f64) {
     let tau_s = theta.tau_s().max(0.0);
     let skip_s = (1.5 * tau_s + 2.0 * record.dt_s).min(LONGEST_TAU * length_s);
     let rows = record.len() - record.index_at(skip_s);
-    let fast_s = theta.shortest_lag_s().min(length_s) + tau_s;
-    let samples = (rows / ROWS).min((fast_s / record.dt_s) as usize).max(1);
-    (samples, skip_s)
+    let fastest_noise = NoiseKind::ALL.map(|kind| theta.noise(kind));
+    let noise_s = 1.0 / fastest_noise.into_iter().fold(0.0, f64::max);
+    let fast_s = theta.shortest_lag_s().min(noise_s).min(length_s) + tau_s;
+    let samples = (rows / ROWS).min((fast_s / record.dt_s) as usize);
+    (samples.max(rows.div_ceil(MOST_ROWS)).max(1), skip_s)
 }
 
 /// Fits to rows of `samples` samples, marks outliers and fits again. Returns the number of outliers too.
