@@ -61,6 +61,7 @@ use self::theta::{Bounds, NoiseKind, Theta};
 use crate::assumed::RecordedLoop;
 use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{Evidence, Fit, Identification, Identified, InnovationTests, Prediction};
+use crate::posterior::Interval;
 use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::Options;
@@ -88,6 +89,9 @@ const ROUNDS: usize = 3;
 const STRAIGHT: f64 = 3.0;
 /// Relative standard deviation of the gain above which the record tells nothing.
 const MOST_DEVIATION: f64 = 0.3;
+/// Share of the input's power in the informative band below which a fit rests on rounding errors, as that of a sine does
+/// which has nothing to do with the output. A relay has 0.1 % beyond its 140th harmonic.
+const LEAST_POWER: f64 = 1e-5;
 /// Half width of the interval of the gain over the estimate above which the record tells nothing.
 const MOST_WIDTH: f64 = 0.5;
 /// Autocorrelation and share of the input above which the innovations are coloured.
@@ -179,6 +183,11 @@ impl Search<'_> {
             excitation.samples_per_row = fitted.samples;
             excitation.hold = fitted.record.hold;
             excitation.informative_rad_per_s = informative;
+        }
+        let is_excited =
+            informative.is_none_or(|band| validate::input_share(&blocks, band) > LEAST_POWER);
+        if !is_excited {
+            return Err(self.no_information(&fitted.best.found.theta, None));
         }
         self.judge(&fitted, &blocks, &components, &tests, prediction.as_ref())?;
         self.remark(&fitted, &tests, prediction.as_ref());
@@ -390,7 +399,8 @@ impl Search<'_> {
             }
         };
         let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
-        if phase_margin_rad.is_some_and(|margin| margin.low.is_none_or(|low| low <= 0.0)) {
+        let is_unsafe = |margin: Interval| margin.low.is_none_or(|low| low <= 0.0);
+        if phase_margin_rad.is_some_and(is_unsafe) || !posterior.keeps_stable(&undamped, &draws) {
             return Err(Verdict::TooUncertain);
         }
         let estimate = posterior.estimate();

@@ -6,7 +6,9 @@
 //! inverse may be zero is unbounded above.
 
 use onecycle_design::bands::quantiles;
-use onecycle_design::{Controller, Linear, Model, Parameter, Structure, margins};
+use onecycle_design::{
+    Controller, Linear, Model, Parameter, Specification, Structure, design_over, margins,
+};
 use onecycle_onboard::refine::{Refined, coordinate};
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -385,6 +387,19 @@ impl Posterior {
         let count = columns.len();
         let row = |i: usize| (0..count).map(|j| entry(i, j)).collect();
         (!self.draws.is_empty()).then(|| (0..count).map(row).collect())
+    }
+
+    /// Whether the paper's controller, the least robust one on offer, stays stable on at least 95 % of the draws. It is
+    /// designed for `model` over `draws`. True where the paper has no controller for the structure.
+    ///
+    /// What is known of a process is judged by this one controller, so no other style turns a refusal into an answer.
+    pub(crate) fn keeps_stable(&self, model: &Model, draws: &[Model]) -> bool {
+        let draws = &draws[..draws.len().min(Specification::paper().draws())];
+        let design = design_over(model, draws, &Specification::paper());
+        design.map_or(true, |design| {
+            let margin = self.phase_margin_rad(&design.controller);
+            margin.low.is_some_and(|low| low > 0.0)
+        })
     }
 
     /// Phase margin (rad) that a controller leaves on the most probable model, with its 90 % interval over the draws.

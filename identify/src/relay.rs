@@ -31,7 +31,7 @@ use crate::assumed::RecordedLoop;
 use crate::excitation::{Excitation, Oscillation};
 use crate::innovations::Hold;
 use crate::outcome::{Evidence, Fit, Identification, Identified};
-use crate::posterior::Posterior;
+use crate::posterior::{Interval, Posterior};
 use crate::reading::Reading;
 use crate::remark::Remark;
 use crate::remarks;
@@ -228,8 +228,12 @@ impl Search<'_> {
         let specification = &self.options.specification;
         specification.check().map_err(Verdict::NoController)?;
         let misfit = misfit(refined, window);
+        // No style of controller turns a refusal into an answer.
+        let margin_rad = specification
+            .implied_phase_margin_rad()
+            .min(Specification::paper().phase_margin_rad);
         let most_error = match self.refusal {
-            None => largest_response_error(specification.implied_phase_margin_rad()),
+            None => largest_response_error(margin_rad),
             Some(_) => MOST_ERROR_OF_SECOND_CHOICE,
         };
         if misfit > MOST_MISFIT || refined.response_error > most_error {
@@ -301,7 +305,8 @@ fn design(
         Err(error) => (None, Some(error)),
     };
     let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
-    if phase_margin_rad.is_some_and(|margin| margin.low.is_none_or(|low| low <= 0.0)) {
+    let is_unsafe = |margin: Interval| margin.low.is_none_or(|low| low <= 0.0);
+    if phase_margin_rad.is_some_and(is_unsafe) || !posterior.keeps_stable(&model, &draws) {
         return Err(if has_model_error {
             Verdict::NotThisProcess { misfit: fit.misfit }
         } else {

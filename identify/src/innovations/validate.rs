@@ -1,6 +1,6 @@
 //! Tests of a fit: innovations, prediction of data that it was not fitted to, information.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use super::choose::Limits;
 use super::descent::Patience;
@@ -149,6 +149,43 @@ pub(super) fn informative(blocks: &Blocks<'_>, theta: &Theta) -> Option<(f64, f6
     Some((low, high))
 }
 
+/// Share of the power of the input in a band of frequencies (rad/s), over the first 2,000 rows.
+pub(super) fn input_share(blocks: &Blocks<'_>, (low, high): (f64, f64)) -> f64 {
+    const MOST_ROWS: usize = 2000;
+    let mut rows = blocks.mean_inputs();
+    rows.truncate(MOST_ROWS);
+    let count = rows.len();
+    let mean = rows.iter().sum::<f64>() / count as f64;
+    // The Hann window keeps the power of a line where the line is.
+    for (row, value) in rows.iter_mut().enumerate() {
+        *value = (*value - mean) * (PI * row as f64 / count as f64).sin().powi(2);
+    }
+    let line = TAU / (count as f64 * blocks.block_s());
+    let (mut inside, mut total) = (0.0, 0.0);
+    for index in 1..=count / 2 {
+        let omega = index as f64 * line;
+        let power = power(&rows, omega * blocks.block_s());
+        total += power;
+        if omega >= low && omega <= high {
+            inside += power;
+        }
+    }
+    if total > 0.0 { inside / total } else { 0.0 }
+}
+
+/// Squared magnitude of the Fourier sum of `rows` at a phase step (rad).
+fn power(rows: &[f64], step: f64) -> f64 {
+    let (sin, cos) = step.sin_cos();
+    let (mut re, mut im) = (0.0, 0.0);
+    let (mut c, mut s) = (1.0, 0.0);
+    for value in rows {
+        re += value * c;
+        im += value * s;
+        (c, s) = (c * cos - s * sin, s * cos + c * sin);
+    }
+    re * re + im * im
+}
+
 /// Period of the frequency (s) below and above which the input has half of its power each.
 pub(super) fn period_s(blocks: &Blocks<'_>) -> Option<f64> {
     let inputs = blocks.mean_inputs();
@@ -159,21 +196,12 @@ pub(super) fn period_s(blocks: &Blocks<'_>) -> Option<f64> {
 /// Frequencies (rad/s) below which 5, 50 and 95 % of the power of `rows` lie. `None` without power.
 fn quantiles(rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
     let length_s = row_s * rows.len() as f64;
-    let (lowest, highest) = (TAU / length_s, std::f64::consts::PI / row_s);
+    let (lowest, highest) = (TAU / length_s, PI / row_s);
     let frequency =
         |i: usize| lowest * (highest / lowest).powf(i as f64 / (FREQUENCIES - 1) as f64);
     let mean = rows.iter().sum::<f64>() / rows.len() as f64;
-    let power = |omega: f64| {
-        let (mut re, mut im) = (0.0, 0.0);
-        let (sin, cos) = (omega * row_s).sin_cos();
-        let (mut c, mut s) = (1.0, 0.0);
-        for value in rows {
-            re += (value - mean) * c;
-            im += (value - mean) * s;
-            (c, s) = (c * cos - s * sin, s * cos + c * sin);
-        }
-        re * re + im * im
-    };
+    let rows: Vec<f64> = rows.iter().map(|value| value - mean).collect();
+    let power = |omega: f64| power(&rows, omega * row_s);
     // On a logarithmic grid a frequency stands for a band as wide as itself.
     let powers: Vec<f64> = (0..FREQUENCIES)
         .map(|i| power(frequency(i)) * frequency(i))
@@ -188,4 +216,25 @@ fn quantiles(rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
         frequency(index.unwrap_or(FREQUENCIES - 1))
     };
     (total > 0.0 && total.is_finite()).then(|| [0.05, 0.5, 0.95].map(quantile))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::record::Record;
+    use super::*;
+
+    // A sine of 5 rad/s has all of its power there; a square wave has 8/(9 pi^2) = 9.0 % in its third harmonic.
+    #[test]
+    fn power_of_the_input_in_a_band() {
+        let times: Vec<f64> = (0..2000).map(|k| 0.01 * f64::from(k)).collect();
+        let sine: Vec<f64> = times.iter().map(|t| (5.0 * t).sin()).collect();
+        let square = sine.iter().map(|v| v.signum()).collect();
+        let share = |input: Vec<f64>, band| {
+            let record = Record::even(0.01, input, vec![0.0; 2000]);
+            input_share(&Blocks::new(&record, 1, 0.0), band)
+        };
+        assert!(share(sine.clone(), (4.0, 6.0)) > 0.999);
+        assert!(share(sine, (50.0, 300.0)) < 1e-9);
+        assert!((share(square, (14.0, 16.0)) - 0.09).abs() < 0.005);
+    }
 }
