@@ -103,7 +103,9 @@ const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
 /// Explained share of the last third below which a fit gets a remark, and below which it is refused.
 const WELL_PREDICTED: f64 = 0.9;
 const LEAST_PREDICTED: f64 = 0.7;
-/// Mean square of the prediction's error over what the disturbances explain, above which the model is at fault.
+/// Mean square of the prediction's error over what the disturbances explain, above which a weak prediction gets a remark,
+/// and above which the model is at fault.
+const EXPECTED_ERROR_RATIO: f64 = 2.0;
 const MOST_ERROR_RATIO: f64 = 4.0;
 
 /// Identifies the process from a record of any input.
@@ -342,13 +344,16 @@ impl Search<'_> {
         if absent > 0.0 {
             self.remarks.push(Remark::Absent(absent));
         }
-        if tests.autocorrelation > COLOURED.0 {
+        if is_coloured(tests) {
             self.remarks.push(Remark::Coloured(tests.autocorrelation));
         }
         if tests.input_share > COLOURED.1 && tests.input_f > ANOTHER_KIND.1 {
             self.remarks.push(Remark::InputLeft(tests.input_share));
         }
-        if let Some(prediction) = prediction.filter(|p| p.explained < WELL_PREDICTED) {
+        let is_weak = |found: &&Prediction| {
+            found.explained < WELL_PREDICTED && found.error_ratio > EXPECTED_ERROR_RATIO
+        };
+        if let Some(prediction) = prediction.filter(is_weak) {
             self.remarks.push(Remark::WeakPrediction {
                 explained: prediction.explained,
                 horizon_s: prediction.horizon_s,
@@ -380,13 +385,9 @@ impl Search<'_> {
         components: &[Component],
         (tests, prediction): (InnovationTests, Option<Prediction>),
     ) -> Result<Identified, Verdict> {
-        let is_coloured = tests.autocorrelation > COLOURED.0 || tests.input_share > COLOURED.1;
-        let (posterior, widened) = result::posterior_of(
-            &fitted.best.found,
-            components,
-            prepared.early_s,
-            is_coloured,
-        );
+        let is_wider = is_coloured(&tests) || tests.input_share > COLOURED.1;
+        let (posterior, widened) =
+            result::posterior_of(&fitted.best.found, components, prepared.early_s, is_wider);
         let model = result::model(&fitted.best.found, prepared.early_s);
         let specification = recorded_loop(fitted).complete(&self.options.specification);
         let draws = posterior.models(specification.draws());
@@ -480,6 +481,12 @@ impl Fitted {
         let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
         mixture(blocks, &self.wider.found, &bounds)
     }
+}
+
+/// Whether the innovations are coloured: the largest of twenty autocorrelations exceeds what chance explains. Of white
+/// innovations it exceeds 3.5 standard deviations once in a hundred records.
+fn is_coloured(tests: &InnovationTests) -> bool {
+    tests.autocorrelation > COLOURED.0.max(3.5 / (tests.rows as f64).sqrt())
 }
 
 /// The parts of a long record that choose the structure: that with the largest changes of the input, and that with the

@@ -245,6 +245,8 @@ pub struct InnovationTests {
     pub input_share: f64,
     /// F statistic of that share: 1 if the input explains nothing.
     pub input_f: f64,
+    /// Number of innovations.
+    pub rows: usize,
 }
 
 /// Prediction of data that the model was not fitted to.

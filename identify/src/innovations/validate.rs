@@ -40,6 +40,7 @@ pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
         ljung_box: n * (n + 2.0) * sum / lags.max(1) as f64,
         input_share,
         input_f,
+        rows: count,
     }
 }
 
