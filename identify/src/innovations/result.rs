@@ -2,8 +2,8 @@
 
 use onecycle_design::{Linear, Model, Parameter, Structure};
 
-use super::Fitted;
 use super::descent::Found;
+use super::fitted::Fitted;
 use super::mixture::Component;
 use super::prediction::{Filtering, predict};
 use super::record::{Blocks, Forces};

@@ -1,0 +1,296 @@
+//! A record with the structure that explains it best, and its fit: steps 2 and 3 of the [module](super).
+
+use std::ops::Range;
+
+use onecycle_design::Structure;
+
+use super::choose::{Choice, Limits, choose};
+use super::mixture::{Component, mixture};
+use super::prepare::Prepared;
+use super::record::{Blocks, Hold, Record};
+use super::search::{self, Candidate};
+use super::theta::{Bounds, NoiseKind, Theta};
+use super::{LONGEST_TAU, ROWS, forces, outliers, result};
+use crate::assumed::RecordedLoop;
+use crate::remark::Remark;
+use crate::settings::Options;
+use crate::verdict::Verdict;
+
+/// Time at the start whose outputs are left out while the dead time is not known, as a share of the record. Most records
+/// begin with the input at rest, and some with all their excitation.
+const SKIPPED: f64 = 1.0 / 40.0;
+/// Most rows of the final fit: they take a few seconds.
+const MOST_ROWS: usize = 40_000;
+/// Most samples of the part that chooses the structure.
+const CHOOSING: usize = 20_000;
+/// Samples between the outputs of a second difference that shows how much such a part moves: several periods of what moves
+/// it, and less of its noise than between neighbours.
+const CURVED: usize = CHOOSING / 100;
+/// Rounds of outliers.
+const ROUNDS: usize = 3;
+/// Difference of the log-likelihood above which the input is taken as straight lines between the samples.
+const STRAIGHT: f64 = 3.0;
+
+/// A fit and all that the result needs of it.
+pub(super) struct Fitted {
+    /// Samples that chose the structure.
+    pub(super) part: Range<usize>,
+    pub(super) choice: Choice,
+    pub(super) record: Record,
+    pub(super) limits: Limits,
+    /// Samples a row.
+    pub(super) samples: usize,
+    pub(super) best: Candidate,
+    /// Fit of the structure that contains the best one and has its damping as a further unknown. The posterior is that
+    /// of this structure: damping that a record does not show may be there.
+    pub(super) wider: Candidate,
+    pub(super) outliers: usize,
+}
+
+impl Fitted {
+    /// Steps 2 and 3 of the [module](super): the structure, and its fit to finer rows.
+    pub(super) fn new(
+        prepared: &Prepared,
+        outliers: usize,
+        options: &Options,
+        remarks: &mut Vec<Remark>,
+    ) -> Result<Self, Verdict> {
+        let mut record = prepared.record.clone();
+        let length_s = record.time_s(record.len() - 1);
+        let longest = LONGEST_TAU * length_s;
+        let mut limits = Limits {
+            skip_s: 0.0,
+            longest_tau_s: longest,
+            structure: options.structure,
+        };
+        let mut choices = Vec::new();
+        for part in excited_parts(&record) {
+            if let Some(choice) = choose_on(&mut record, part.clone(), options, remarks) {
+                choices.push((part, choice));
+            }
+        }
+        let (part, choice) = most_likely(choices, &record, longest).ok_or(Verdict::NoFit)?;
+        let theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
+        let (samples, skip_s) = rows_for(&record, &theta);
+        limits.skip_s = skip_s;
+        let (best, found) = refine(&mut record, &theta, &limits, samples).ok_or(Verdict::NoFit)?;
+        let blocks = Blocks::new(&record, samples, limits.skip_s);
+        let damped = choice
+            .damped(best.structure())
+            .map(|damped| damped.found.theta);
+        let wider = damped.and_then(|theta| search::fit(&blocks, &theta, longest));
+        let mut fitted = Self {
+            part,
+            choice,
+            limits,
+            samples,
+            wider: wider.unwrap_or_else(|| best.clone()),
+            best,
+            outliers: outliers + found,
+            record,
+        };
+        if let Some(remark) = fitted.add_forces() {
+            remarks.push(remark);
+        }
+        Ok(fitted)
+    }
+
+    pub(super) fn blocks(&self) -> Blocks<'_> {
+        Blocks::new(&self.record, self.samples, self.limits.skip_s)
+    }
+
+    /// Adds the nonlinear forces that the record asks for, and fits again.
+    fn add_forces(&mut self) -> Option<Remark> {
+        let limits = &self.limits;
+        let body = Structure::Soiptd;
+        if limits.structure.is_some_and(|asked| asked != body) {
+            return None;
+        }
+        let mut of_body = self.choice.candidates.iter();
+        let start = of_body.find(|candidate| candidate.structure() == body)?;
+        let longest_s = limits.longest_tau_s;
+        let rows = (self.samples, limits.skip_s, longest_s);
+        let part = self.record.part(self.part.clone());
+        let is_whole = part.len() == self.record.len();
+        let on_part = Blocks::new(&part, self.samples, limits.skip_s);
+        let best = if is_whole {
+            self.best.clone()
+        } else {
+            search::fit(&on_part, &self.best.found.theta, longest_s)?
+        };
+        let (asked, found) = forces::forces(&part, &best, &start.found.theta, rows)?;
+        self.record.forces = asked.of(&self.record);
+        let blocks = Blocks::new(&self.record, self.samples, limits.skip_s);
+        self.best = if is_whole {
+            found
+        } else {
+            search::fit(&blocks, &found.found.theta, longest_s)?
+        };
+        self.wider = self.best.clone();
+        let found = result::nonlinear(&self.best.found, &self.record.forces);
+        Some(Remark::Nonlinear(found))
+    }
+
+    /// Step 4: components of the posterior.
+    pub(super) fn posterior(&self, blocks: &Blocks<'_>) -> Vec<Component> {
+        let structure = self.wider.structure();
+        let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
+        mixture(blocks, &self.wider.found, &bounds)
+    }
+
+    /// What the record says about the loop of a controller.
+    pub(super) fn recorded_loop(&self) -> RecordedLoop {
+        let record = &self.record;
+        let (low, high) = (record.input.iter())
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                (value.min(low), value.max(high))
+            });
+        RecordedLoop {
+            sigma: self.best.found.at.variance.sqrt(),
+            output_size: record.output_deviation(),
+            input_amplitude: 0.5 * (high - low),
+            sample_s: record.dt_s,
+            hold: record.hold,
+        }
+    }
+}
+
+/// Step 2 on a part of a record, whose input is taken as straight lines from then on if that explains the part better.
+fn choose_on(
+    record: &mut Record,
+    part: Range<usize>,
+    options: &Options,
+    remarks: &mut Vec<Remark>,
+) -> Option<Choice> {
+    let mut part = record.part(part);
+    let length_s = part.time_s(part.len() - 1);
+    let limits = Limits {
+        skip_s: SKIPPED * length_s,
+        longest_tau_s: LONGEST_TAU * length_s,
+        structure: options.structure,
+    };
+    let mut choice = choose(&part, &limits);
+    if record.hold == Hold::Held
+        && let Some(gain) = straight(&part, &choice, &limits, options)
+    {
+        record.hold = Hold::Interpolated;
+        part.hold = Hold::Interpolated;
+        remarks.push(Remark::Interpolated(gain));
+        choice = choose(&part, &limits);
+    }
+    choice.chosen().is_some().then_some(choice)
+}
+
+/// The parts of a long record that choose the structure: that with the largest changes of the input, and that with the
+/// largest curvature of the output. The rows of a longer part would be longer than the lags. In a chirp the first part has
+/// the highest frequencies, to which the process hardly answers.
+fn excited_parts(record: &Record) -> Vec<Range<usize>> {
+    if record.len() <= CHOOSING {
+        return std::iter::once(0..record.len()).collect();
+    }
+    let of_input = |part: &Range<usize>| -> f64 {
+        let pairs = record.input[part.clone()].windows(2);
+        pairs.map(|pair| (pair[1] - pair[0]).powi(2)).sum()
+    };
+    // Second differences, since an output may drift at any rate.
+    let of_output = |part: &Range<usize>| -> f64 {
+        let triples = record.output[part.clone()].windows(2 * CURVED + 1);
+        triples
+            .map(|y| (y[0] - 2.0 * y[CURVED] + y[2 * CURVED]).powi(2))
+            .sum()
+    };
+    let largest = |size: &dyn Fn(&Range<usize>) -> f64| {
+        (0..=record.len() - CHOOSING)
+            .step_by(CHOOSING / 2)
+            .map(|start| start..start + CHOOSING)
+            .max_by(|a, b| size(a).total_cmp(&size(b)))
+    };
+    let mut parts: Vec<Range<usize>> = largest(&of_input).into_iter().collect();
+    parts.extend(largest(&of_output).filter(|part| !parts.contains(part)));
+    parts
+}
+
+/// The choice that explains the whole record best.
+fn most_likely(
+    mut choices: Vec<(Range<usize>, Choice)>,
+    record: &Record,
+    longest_tau_s: f64,
+) -> Option<(Range<usize>, Choice)> {
+    if choices.len() == 1 {
+        return choices.pop();
+    }
+    let thetas: Vec<Theta> = (choices.iter())
+        .filter_map(|(_, choice)| Some(choice.chosen()?.found.theta))
+        .collect();
+    // Likelihoods of different rows do not compare.
+    let rows = thetas.iter().map(|theta| rows_for(record, theta));
+    let (samples, skip_s) = rows.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+    let blocks = Blocks::new(record, samples, skip_s);
+    let bic = |theta: &Theta| {
+        let found = search::fit(&blocks, theta, longest_tau_s);
+        found.map_or(f64::INFINITY, |found| found.bic)
+    };
+    let bics: Vec<f64> = thetas.iter().map(bic).collect();
+    let best = (0..bics.len()).min_by(|a, b| bics[*a].total_cmp(&bics[*b]))?;
+    Some(choices.swap_remove(best))
+}
+
+/// Samples a row of the fit to a record, and the time at its start (s) whose output is not used.
+fn rows_for(record: &Record, theta: &Theta) -> (usize, f64) {
+    let length_s = record.time_s(record.len() - 1);
+    let tau_s = theta.tau_s().max(0.0);
+    let skip_s = (1.5 * tau_s + 2.0 * record.dt_s).min(LONGEST_TAU * length_s);
+    let rows = record.len() - record.index_at(skip_s);
+    let fastest_noise = NoiseKind::ALL.map(|kind| theta.noise(kind));
+    let noise_s = 1.0 / fastest_noise.into_iter().fold(0.0, f64::max);
+    let fast_s = theta.shortest_lag_s().min(noise_s).min(length_s) + tau_s;
+    let samples = (rows / ROWS).min((fast_s / record.dt_s) as usize);
+    (samples.max(rows.div_ceil(MOST_ROWS)).max(1), skip_s)
+}
+
+/// Fits to rows of `samples` samples, marks outliers and fits again. Returns the number of outliers too.
+fn refine(
+    record: &mut Record,
+    theta: &Theta,
+    limits: &Limits,
+    samples: usize,
+) -> Option<(Candidate, usize)> {
+    let fit = |record: &Record, theta: &Theta| {
+        let blocks = Blocks::new(record, samples, limits.skip_s);
+        search::fit(&blocks, theta, limits.longest_tau_s)
+    };
+    let mut best = fit(record, theta)?;
+    let mut outliers = 0;
+    for _ in 0..ROUNDS {
+        let found = outliers::mark_unlikely(record, &best.found.theta, limits.skip_s);
+        if found == 0 {
+            break;
+        }
+        outliers += found;
+        best = fit(record, &best.found.theta)?;
+    }
+    Some((best, outliers))
+}
+
+/// Gain of the log-likelihood if the input runs straight from sample to sample, where that explains the record better.
+/// `None` otherwise, and if the input is piecewise constant or the user has said what it does.
+fn straight(record: &Record, choice: &Choice, limits: &Limits, options: &Options) -> Option<f64> {
+    let held = record
+        .input
+        .windows(2)
+        .filter(|pair| pair[0] == pair[1])
+        .count();
+    if options.hold.is_some() || 2 * held > record.len() {
+        return None;
+    }
+    let lead = choice.candidates.first()?;
+    let mut other = record.clone();
+    other.hold = Hold::Interpolated;
+    let blocks = Blocks::new(&other, choice.samples, limits.skip_s);
+    // Half a sample lies between the two readings of the input.
+    let mut theta = lead.found.theta;
+    theta.values[theta.layout().tau()] += 0.5 * record.dt_s;
+    let fitted = search::warm(&blocks, &theta, limits.longest_tau_s, search::FINE)?;
+    let gain = fitted.at.log_likelihood - lead.found.at.log_likelihood;
+    (gain > STRAIGHT).then_some(gain)
+}
