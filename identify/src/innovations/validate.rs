@@ -150,7 +150,8 @@ pub(super) fn informative(blocks: &Blocks<'_>, theta: &Theta) -> Option<(f64, f6
     Some((low, high))
 }
 
-/// Share of the power of the input in a band of frequencies (rad/s), over the first 2,000 rows.
+/// Share of the power of the input in a band of frequencies (rad/s), a quarter wider on both sides, over the first 2,000
+/// rows.
 pub(super) fn input_share(blocks: &Blocks<'_>, (low, high): (f64, f64)) -> f64 {
     const MOST_ROWS: usize = 2000;
     let mut rows = blocks.mean_inputs();
@@ -167,7 +168,7 @@ pub(super) fn input_share(blocks: &Blocks<'_>, (low, high): (f64, f64)) -> f64 {
         let omega = index as f64 * line;
         let power = power(&rows, omega * blocks.block_s());
         total += power;
-        if omega >= low && omega <= high {
+        if omega > 0.8 * low - 2.0 * line && omega < 1.25 * high + 2.0 * line {
             inside += power;
         }
     }
