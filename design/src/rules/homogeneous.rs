@@ -19,7 +19,7 @@ use std::f64::consts::TAU;
 
 use crate::controller::{Ideal, Pid};
 
-/// Parameter of the relay and the three numbers of a rule. See the [module](self).
+/// Parameter of the relay and the three numbers of a rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Homogeneous {
