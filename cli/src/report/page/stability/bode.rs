@@ -14,7 +14,7 @@ pub(super) fn figure(of: &Loop) -> Figure {
     let magnitude = Axis::titled("magnitude (dB)").every(20.0);
     let phase = Axis::titled("phase (deg)")
         .spanning(PHASES_DEG.0, PHASES_DEG.1)
-        .every(45.0);
+        .every(90.0);
     let magnitudes = (of.bands.as_ref()).map(|bands| mapped(&bands.magnitude, decibels));
     let phases = (of.bands.as_ref()).map(|bands| mapped(&bands.phase_rad, f64::to_degrees));
     let mut upper = Panel::new(
