@@ -205,7 +205,7 @@ mod tests {
     fn a_phase_margin_out_of_range_has_no_controller() {
         let recording = onecycle_link::read("../examples/simulated_hover.csv", &Default::default());
         let recording = recording.unwrap();
-        for margin_rad in [0.0, -0.1, 1.6, f64::NAN] {
+        for margin_rad in [-0.1, 1.6, f64::NAN] {
             let found = Identify::new().phase_margin_rad(margin_rad).run(&recording);
             let verdict = found.outcome.unwrap_err();
             assert_eq!(verdict.kind(), "no_controller");
