@@ -21,6 +21,7 @@ pub mod cholesky;
 pub mod diagnose;
 mod excitation;
 mod innovations;
+mod nonlinear;
 mod outcome;
 mod posterior;
 mod reading;
@@ -39,9 +40,10 @@ pub use diagnose::harmonics::{Harmonic, harmonics};
 pub use diagnose::whiteness::{Whiteness, whiteness};
 pub use excitation::{Excitation, Oscillation, Recorded};
 pub use innovations::{Hold, expected};
+pub use nonlinear::Nonlinear;
 pub use outcome::{
     Alternative, Evidence, Fit, FitPoint, Identification, Identified, InnovationRow,
-    InnovationTests, Innovations, Noise, Nonlinear, Prediction,
+    InnovationTests, Innovations, Noise, Prediction,
 };
 pub use posterior::{Draw, Estimate, Interval, Posterior};
 pub use reading::Reading;

@@ -4,6 +4,7 @@ use onecycle_design::{Design, Model, Proposal, Specification, StepMetrics};
 use onecycle_onboard::refine::Refined;
 
 use crate::excitation::{Excitation, Oscillation};
+use crate::nonlinear::Nonlinear;
 use crate::posterior::{Estimate, Interval, Posterior};
 use crate::reading::Reading;
 use crate::remark::Remark;
@@ -172,18 +173,6 @@ pub struct Noise {
     pub w0_rad_per_s: Option<f64>,
     /// Random walk of the measured output, as an angle integrated from a gyro (rad/s).
     pub wy_rad_per_s: Option<f64>,
-}
-
-/// Nonlinear forces that act where the disturbance does. Each is `None` unless the recording asks for it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[non_exhaustive]
-pub struct Nonlinear {
-    /// Coefficient `c` of a drag `-c v |v|` on the rate `v` of the output, beside the linear damping (1/output unit).
-    pub drag: Option<f64>,
-    /// Dry friction: the input (input unit) that it takes to overcome it.
-    pub friction: Option<f64>,
-    /// Coefficient `c` of a thrust `l + c l^2` of the lagged input `l` (1/input unit).
-    pub thrust: Option<f64>,
 }
 
 impl Noise {

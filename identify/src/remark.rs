@@ -2,7 +2,7 @@
 
 use onecycle_design::{DesignError, Parameter, Structure};
 
-use crate::outcome::Nonlinear;
+use crate::nonlinear::Nonlinear;
 use crate::verdict::Verdict;
 
 /// Something that limits a result or deserves attention, as facts. The program that shows it writes the sentence.

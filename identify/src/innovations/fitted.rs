@@ -10,7 +10,7 @@ use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, NoiseKind, Theta};
-use super::{LONGEST_TAU, ROWS, forces, outliers, result};
+use super::{LONGEST_TAU, ROWS, forces, outliers};
 use crate::assumed::RecordedLoop;
 use crate::remark::Remark;
 use crate::settings::Options;
@@ -127,7 +127,7 @@ impl Fitted {
             search::fit(&blocks, &found.found.theta, longest_s)?
         };
         self.wider = self.best.clone();
-        let found = result::nonlinear(&self.best.found, &self.record.forces);
+        let found = forces::nonlinear(&self.best.found, &self.record.forces);
         Some(Remark::Nonlinear(found))
     }
 

@@ -8,10 +8,12 @@
 //! (1964). With noise of 5 % of the output at one amplitude a linear damping explains the record as well: only a second
 //! amplitude tells.
 
+use super::descent::Found;
 use super::record::{Blocks, Forces, Record};
 use super::search::{self, Candidate};
 use super::theta::Theta;
 use super::validate;
+use crate::nonlinear::Nonlinear;
 
 /// Half width of the cubic over the period of the excitation.
 const HALF_WIDTH: f64 = 1.0 / 14.0;
@@ -103,6 +105,18 @@ pub(super) fn forces(
         chosen = Some(found);
     }
     chosen
+}
+
+/// Coefficients of the nonlinear forces that the model has.
+pub(super) fn nonlinear(found: &Found, forces: &Forces) -> Nonlinear {
+    let gain = found.at.gain;
+    let mut values = found.at.forces.iter().map(|(value, _)| *value);
+    let mut next = |is_there: bool| is_there.then(|| values.next()).flatten();
+    Nonlinear {
+        drag: next(!forces.drag.is_empty()).map(|value| -value),
+        friction: next(!forces.friction.is_empty()).map(|value| -value / gain.abs()),
+        thrust: next(forces.thrust).map(|value| value / gain),
+    }
 }
 
 /// Whether the forces of the rate oppose the motion.

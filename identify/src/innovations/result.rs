@@ -4,15 +4,15 @@ use onecycle_design::{Linear, Model, Parameter, Structure};
 
 use super::descent::Found;
 use super::fitted::Fitted;
+use super::forces;
 use super::mixture::Component;
 use super::prediction::{Filtering, predict};
-use super::record::{Blocks, Forces};
+use super::record::Blocks;
 use super::search::Candidate;
 use super::theta::{Bounds, NoiseKind, Theta};
 use crate::cholesky::cholesky;
 use crate::outcome::{
-    Alternative, FitPoint, InnovationRow, InnovationTests, Innovations, Noise, Nonlinear,
-    Prediction,
+    Alternative, FitPoint, InnovationRow, InnovationTests, Innovations, Noise, Prediction,
 };
 use crate::posterior::Posterior;
 
@@ -197,18 +197,6 @@ fn noise_of(candidate: &Candidate) -> Noise {
     }
 }
 
-/// Coefficients of the nonlinear forces that the model has.
-pub(super) fn nonlinear(found: &Found, forces: &Forces) -> Nonlinear {
-    let gain = found.at.gain;
-    let mut values = found.at.forces.iter().map(|(value, _)| *value);
-    let mut next = |is_there: bool| is_there.then(|| values.next()).flatten();
-    Nonlinear {
-        drag: next(!forces.drag.is_empty()).map(|value| -value),
-        friction: next(!forces.friction.is_empty()).map(|value| -value / gain.abs()),
-        thrust: next(forces.thrust).map(|value| value / gain),
-    }
-}
-
 /// The innovations with their tests, and the fit to the measured output. `None` if the filter does not converge.
 pub(super) fn innovations(
     fitted: &Fitted,
@@ -251,7 +239,7 @@ pub(super) fn innovations(
         .collect();
     let innovations = Innovations {
         noise: noise_of(&fitted.best),
-        nonlinear: nonlinear(found, &fitted.record.forces),
+        nonlinear: forces::nonlinear(found, &fitted.record.forces),
         log_likelihood: found.at.log_likelihood,
         bic: fitted.best.bic,
         alternatives,
