@@ -60,7 +60,6 @@ use self::search::Candidate;
 use self::theta::{Bounds, Theta};
 use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{Evidence, Fit, Identification, Identified, InnovationTests, Prediction};
-use crate::posterior::Interval;
 use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::Options;
@@ -306,8 +305,7 @@ impl Search<'_> {
             }
         };
         let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
-        let is_unsafe = |margin: Interval| margin.low.is_none_or(|low| low <= 0.0);
-        if phase_margin_rad.is_some_and(is_unsafe) || !posterior.keeps_stable(&undamped, &draws) {
+        if !posterior.is_narrow_enough(&undamped, &draws, phase_margin_rad) {
             return Err(Verdict::TooUncertain);
         }
         let estimate = posterior.estimate();

@@ -389,16 +389,25 @@ impl Posterior {
         (!self.draws.is_empty()).then(|| (0..count).map(row).collect())
     }
 
-    /// Whether the paper's controller, the least robust one on offer, stays stable on at least 95 % of the draws. It is
-    /// designed for `model` over `draws`. True where the paper has no controller for the structure.
+    /// Whether the posterior is narrow enough for control: on at least 95 % of the draws the designed controller is stable,
+    /// whose phase margin is `designed` (`None` without a controller), and so is the paper's, the least robust one on offer.
+    /// The latter is designed for `model` over `draws`, and not asked for where the paper has none for the structure.
     ///
-    /// What is known of a process is judged by this one controller, so no other style turns a refusal into an answer.
-    pub(crate) fn keeps_stable(&self, model: &Model, draws: &[Model]) -> bool {
-        let draws = &draws[..draws.len().min(Specification::paper().draws())];
-        let design = design_over(model, draws, &Specification::paper());
+    /// The paper's controller judges every result, so no other style turns a refusal into an answer.
+    pub(crate) fn is_narrow_enough(
+        &self,
+        model: &Model,
+        draws: &[Model],
+        designed: Option<Interval>,
+    ) -> bool {
+        let is_stable = |margin: Interval| margin.low.is_some_and(|low| low > 0.0);
+        if !designed.is_none_or(is_stable) {
+            return false;
+        }
+        let paper = Specification::paper();
+        let design = design_over(model, &draws[..draws.len().min(paper.draws())], &paper);
         design.map_or(true, |design| {
-            let margin = self.phase_margin_rad(&design.controller);
-            margin.low.is_some_and(|low| low > 0.0)
+            is_stable(self.phase_margin_rad(&design.controller))
         })
     }
 

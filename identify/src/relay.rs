@@ -31,7 +31,7 @@ use crate::assumed::RecordedLoop;
 use crate::excitation::{Excitation, Oscillation};
 use crate::innovations::Hold;
 use crate::outcome::{Evidence, Fit, Identification, Identified};
-use crate::posterior::{Interval, Posterior};
+use crate::posterior::Posterior;
 use crate::reading::Reading;
 use crate::remark::Remark;
 use crate::remarks;
@@ -275,8 +275,8 @@ fn classified(window: &FitWindow, reading: Option<&Reading>) -> Result<Refined, 
     }
 }
 
-/// Posterior of an accepted fit to samples every `sample_s`, the controller, and its margins and step response; and why
-/// there is no controller, if there is none.
+/// Posterior of an accepted fit to samples every `sample_s`, with controller, margins and step response. The second value
+/// is the error of the design if it failed.
 ///
 /// # Errors
 /// The controller may be unstable on a process within the intervals, or the paper's style gives none.
@@ -305,8 +305,7 @@ fn design(
         Err(error) => (None, Some(error)),
     };
     let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
-    let is_unsafe = |margin: Interval| margin.low.is_none_or(|low| low <= 0.0);
-    if phase_margin_rad.is_some_and(is_unsafe) || !posterior.keeps_stable(&model, &draws) {
+    if !posterior.is_narrow_enough(&model, &draws, phase_margin_rad) {
         return Err(if has_model_error {
             Verdict::NotThisProcess { misfit: fit.misfit }
         } else {

@@ -1,4 +1,5 @@
-//! Sentences about controllers: why there is none, what was assumed, what robustness costs, how the gains in force do.
+//! Sentences about controllers: the reason why a design failed, the assumed noise and sampling, the cost of robustness, and
+//! the verdict on the gains that the user flies now.
 
 use onecycle::{DesignError, Robustness, Specification, Style};
 

@@ -17,7 +17,7 @@ use super::specification::{MeasurementNoise, Specification, Style};
 pub struct Proposal {
     /// What was asked for.
     pub specification: Specification,
-    /// The controller, or why there is none.
+    /// The designed controller, or the error that prevented a design.
     pub outcome: Result<Design, DesignError>,
 }
 

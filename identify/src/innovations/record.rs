@@ -46,8 +46,8 @@ pub(crate) struct Record {
     pub(crate) forces: Forces,
 }
 
-/// Nonlinear forces behind the actuator lags, beside the input and the disturbance. Their coefficients are linear unknowns,
-/// as the gain is. The default is none.
+/// Nonlinear forces that act on the process behind the actuator lags, together with the input and the disturbance. The
+/// model is linear in their coefficients. `Default`: no force.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Forces {
     /// Square of the rate of the output, with its sign, at each sample (output unit^2/s^2): drag. Empty for none.

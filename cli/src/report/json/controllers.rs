@@ -24,7 +24,7 @@ pub(super) struct Assumed {
     computation_delay_s: f64,
 }
 
-/// A style and its controller, or why there is none.
+/// One style: its controller with margins and step, or the error that prevented a design.
 #[derive(Serialize)]
 pub(super) struct Proposed {
     style: &'static str,
