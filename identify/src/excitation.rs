@@ -50,9 +50,22 @@ pub struct Recorded {
     /// Band of frequencies (rad/s) that holds the central 90 % of the information on the gain. `None` if nothing was
     /// fitted.
     pub informative_rad_per_s: Option<(f64, f64)>,
+    /// Highest frequency (rad/s) up to which the recording shows the response without a break: in each half octave the
+    /// deviation of the gain is at most 20 %. `None` if nothing was fitted.
+    pub excited_rad_per_s: Option<f64>,
 }
 
 impl Excitation {
+    /// Highest frequency that the recording excites (rad/s): that of the relay's oscillation, or up to which any other
+    /// recording shows the response. `None` if nothing was fitted.
+    #[must_use]
+    pub fn highest_rad_per_s(&self) -> Option<f64> {
+        match self {
+            Self::Relay { oscillation, .. } => Some(std::f64::consts::TAU / oscillation.period_s),
+            Self::Recorded(recorded) => recorded.excited_rad_per_s,
+        }
+    }
+
     /// Name in JSON.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -89,4 +102,17 @@ pub struct Oscillation {
     pub noise_sigma: f64,
     /// Sample period (s).
     pub sample_s: f64,
+}
+
+/// Ratio at which the relay of a recording switched, if its switches follow such a law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Switching {
+    /// Mean over the cycles of `beta`, as in [`onecycle_onboard::relay`]: minus the output at a switch over the extreme
+    /// before it, both from the reference. An input that is logged late shows a larger one.
+    pub beta: f64,
+    /// Standard error of the mean.
+    pub deviation: f64,
+    /// Number of cycles.
+    pub cycles: usize,
 }

@@ -111,6 +111,8 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
     Identification {
         excitation: search.excitation.map(Excitation::Recorded),
         outcome,
+        switching: None,
+        amplitudes: None,
         remarks: search.remarks,
     }
 }
@@ -152,10 +154,11 @@ impl Search<'_> {
             excitation.outliers = fitted.outliers;
             excitation.samples_per_row = fitted.samples;
             excitation.hold = fitted.record.hold;
-            excitation.informative_rad_per_s = informative;
+            excitation.informative_rad_per_s = informative.map(|found| found.band_rad_per_s);
+            excitation.excited_rad_per_s = informative.map(|found| found.highest_rad_per_s);
         }
-        let is_excited =
-            informative.is_none_or(|band| validate::input_share(&blocks, band) > LEAST_POWER);
+        let is_excited = informative
+            .is_none_or(|found| validate::input_share(&blocks, found.band_rad_per_s) > LEAST_POWER);
         if !is_excited {
             return Err(self.no_information(&fitted.best.found.theta, None));
         }
@@ -294,7 +297,9 @@ impl Search<'_> {
         let (posterior, widened) =
             result::posterior_of(&fitted.best.found, components, prepared.early_s, is_wider);
         let model = result::model(&fitted.best.found, prepared.early_s);
-        let specification = fitted.recorded_loop().complete(&self.options.specification);
+        let excited = self.excitation.and_then(|found| found.excited_rad_per_s);
+        let recorded = fitted.recorded_loop(excited);
+        let specification = recorded.complete(&self.options.specification);
         let draws = posterior.models(specification.draws());
         let undamped = model.soiptd().map_or(model, Model::Soiptd);
         let design = match Proposal::new(&undamped, &draws, &specification).outcome {
@@ -333,6 +338,7 @@ impl Search<'_> {
             specification,
             design,
             phase_margin_rad,
+            resonance: None,
             fit: Fit {
                 misfit: (1.0 - explained).max(0.0).sqrt(),
                 points,
@@ -370,5 +376,6 @@ fn describe(prepared: &Prepared, outliers: usize) -> Recorded {
         input_deviation: deviation(&record.input),
         output_deviation: deviation(&outputs),
         informative_rad_per_s: None,
+        excited_rad_per_s: None,
     }
 }

@@ -16,7 +16,9 @@
 //! | the intervals to expect from a planned test | [`expected`] |
 //! | contours of the posterior | [`density`](fn@density) |
 
+mod amplitude;
 mod assumed;
+mod checks;
 pub mod cholesky;
 pub mod diagnose;
 mod excitation;
@@ -35,10 +37,11 @@ mod verdict;
 
 use onecycle_onboard::pack::Pack;
 
+pub use amplitude::TwoAmplitudes;
 pub use diagnose::density::{Density, density};
 pub use diagnose::harmonics::{Harmonic, harmonics};
 pub use diagnose::whiteness::{Whiteness, whiteness};
-pub use excitation::{Excitation, Oscillation, Recorded};
+pub use excitation::{Excitation, Oscillation, Recorded, Switching};
 pub use innovations::{Hold, expected};
 pub use nonlinear::Nonlinear;
 pub use outcome::{

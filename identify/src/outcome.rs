@@ -3,7 +3,8 @@
 use onecycle_design::{Design, Model, Proposal, Specification, StepMetrics};
 use onecycle_onboard::refine::Refined;
 
-use crate::excitation::{Excitation, Oscillation};
+use crate::amplitude::TwoAmplitudes;
+use crate::excitation::{Excitation, Oscillation, Switching};
 use crate::nonlinear::Nonlinear;
 use crate::posterior::{Estimate, Interval, Posterior};
 use crate::reading::Reading;
@@ -18,6 +19,11 @@ pub struct Identification {
     pub excitation: Option<Excitation>,
     /// Process and controller, or the reason why no process was identified.
     pub outcome: Result<Identified, Verdict>,
+    /// Ratio at which the relay switched. `None` if nothing was identified, if the input is no relay, or if it switches at
+    /// other times.
+    pub switching: Option<Switching>,
+    /// Comparison of the two amplitudes of a relay test. `None` if it has one, or if one of them has no process.
+    pub amplitudes: Option<TwoAmplitudes>,
     /// What limits the result or deserves attention.
     pub remarks: Vec<Remark>,
 }
@@ -67,6 +73,9 @@ pub struct Identified {
     /// Predicted response to a unit step of the reference. `None` without a controller, or if it is too slow to
     /// simulate.
     pub step: Option<StepMetrics>,
+    /// Largest factor by which a resonance above 1.5 times the highest frequency that the recording excites may raise the response of the
+    /// process before the loop becomes unstable. `None` without a controller.
+    pub resonance: Option<f64>,
     /// Quality of the fit.
     pub fit: Fit,
 }

@@ -17,8 +17,11 @@
 
 mod input;
 mod last_cycle;
+pub(crate) mod law;
 mod oscillation;
 mod saturation;
+
+use std::f64::consts::TAU;
 
 use onecycle_design::{DesignError, Model, Proposal, Specification, Style, step_response};
 use onecycle_onboard::judgement::{MOST_MISFIT, largest_response_error, misfit};
@@ -68,6 +71,8 @@ pub(crate) fn identify(
     let mut found = Identification {
         excitation: search.excitation,
         outcome,
+        switching: None,
+        amplitudes: None,
         remarks: vec![],
     };
     if let (Ok(_), Some(Verdict::NotThisProcess { misfit })) = (&found.outcome, &search.refusal) {
@@ -94,6 +99,11 @@ pub fn find_oscillation(signals: &Signals<'_>, cycles: usize) -> Result<Oscillat
     let first = stretches.first().ok_or(Verdict::TooShort { cycles: 0 })?;
     let window = first.window(signals, &relay, Past::Held);
     Ok(first.describe(signals, &relay, &window))
+}
+
+/// Whether the input switches between two levels.
+pub(crate) fn has_two_levels(signals: &Signals<'_>) -> bool {
+    find_relay(signals).is_ok()
 }
 
 /// Search for a stretch of the recording from which the process can be identified.
@@ -180,6 +190,7 @@ impl Search<'_> {
             input_amplitude: oscillation.relay_amplitude,
             sample_s: window.sample_s(),
             hold: Hold::Held,
+            excited_rad_per_s: Some(TAU / oscillation.period_s),
         };
         let specification = recorded.complete(&self.options.specification);
         let (identified, refusal) = design(fit, &refined, window.sample_s(), &specification)?;
@@ -324,6 +335,7 @@ fn design(
         specification: *specification,
         design,
         phase_margin_rad,
+        resonance: None,
         fit,
     };
     Ok((identified, refusal))

@@ -96,6 +96,43 @@ pub enum Remark {
     /// The input between the samples is taken as straight lines and not as held, because that explains the recording
     /// better. The value is the difference of the log-likelihood.
     Interpolated(f64),
+    /// The relay switches at a ratio of which no relay is known: either it has this `beta`, or its input was logged late.
+    ClockUnknown {
+        /// The ratio seen.
+        seen: f64,
+        /// `beta` of the relay that it is compared with.
+        beta: f64,
+        /// Time by which the input was logged late if the relay has that `beta` (s). `None` if no offset explains the switches.
+        late_s: Option<f64>,
+        /// Phase margin (rad) of the controller in that case. `None` if the loop is unstable.
+        phase_margin_rad: Option<f64>,
+        /// Phase margin (rad) that each second of an offset costs: the gain crossover. `None` without a controller.
+        rad_per_s: Option<f64>,
+    },
+    /// The gain crossover of the controller lies above the frequencies that the recording excites.
+    Extrapolated {
+        /// Crossover over the highest excited frequency.
+        ratio: f64,
+        /// Whether that is too far, so that no controller is given.
+        is_withdrawn: bool,
+    },
+    /// The input has two levels, which do not show how the gain depends on the size of the input.
+    OneAmplitude,
+    /// The other amplitude of a relay test at two amplitudes was refused. The value is the verdict.
+    OtherAmplitudeRefused(Box<Verdict>),
+    /// The gain margin of the controller is below 6 dB. The value is the margin, a factor.
+    LittleGainMargin(f64),
+    /// Noise moves the actuator much. The value is its standard deviation as a share of the amplitude of the input.
+    NoiseAtActuator(f64),
+    /// A step of the reference asks for more input than was tried.
+    InputPeak {
+        /// Largest step of the reference that does not (output unit); smaller than the movement in the recording.
+        step: f64,
+        /// Amplitude of the input that was tried (input unit).
+        input: f64,
+    },
+    /// The analysis with default settings refuses the recording. The value is its verdict.
+    DefaultRefused(Box<Verdict>),
     /// The recording disagrees with the prior of the pack, so the prior was not used. The value is the squared
     /// distance, in standard deviations of the residual, by which the prior would have moved the fit.
     PriorDropped(f64),
@@ -133,6 +170,14 @@ impl Remark {
             Self::Absent(_) => "absent",
             Self::PartUsed(_) => "part_used",
             Self::Interpolated(_) => "interpolated",
+            Self::ClockUnknown { .. } => "clock_unknown",
+            Self::Extrapolated { .. } => "extrapolated",
+            Self::OneAmplitude => "one_amplitude",
+            Self::OtherAmplitudeRefused(_) => "other_amplitude_refused",
+            Self::LittleGainMargin(_) => "little_gain_margin",
+            Self::NoiseAtActuator(_) => "noise_at_actuator",
+            Self::InputPeak { .. } => "input_peak",
+            Self::DefaultRefused(_) => "default_refused",
             Self::PriorDropped(_) => "prior_dropped",
         }
     }

@@ -11,6 +11,8 @@
 use onecycle_design::{Structure, margins};
 use onecycle_onboard::pack::Pack;
 
+use crate::amplitude::{self, Parts};
+use crate::checks;
 use crate::innovations;
 use crate::outcome::{Identification, Identified};
 use crate::relay;
@@ -30,6 +32,68 @@ pub(crate) fn identify(
     options: &Options,
     pack: Option<&Pack<'_>>,
 ) -> Identification {
+    let earlier = (options.input_late_s)
+        .filter(|late_s| *late_s != 0.0)
+        .map(|late_s| signals.input_earlier(late_s));
+    let corrected = Signals {
+        input: earlier.as_deref().unwrap_or(signals.input),
+        ..*signals
+    };
+    let is_whole = options.span_s == (None, None);
+    match amplitude::parts(corrected.input).filter(|_| is_whole) {
+        Some(parts) => at_two_amplitudes(&corrected, options, pack, &parts),
+        None => checked(&corrected, options, pack),
+    }
+}
+
+fn checked(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) -> Identification {
+    let mut found = by_road(signals, options, pack);
+    checks::check(signals, options, pack, &mut found);
+    found
+}
+
+/// The process that the first amplitude shows, compared with that of the second one; or that of the part that shows one.
+fn at_two_amplitudes(
+    signals: &Signals<'_>,
+    options: &Options,
+    pack: Option<&Pack<'_>>,
+    parts: &Parts,
+) -> Identification {
+    let mut breaks = [vec![], vec![]];
+    let [early, late] = &mut breaks;
+    let first = checked(&signals.part(0..parts.second, early), options, pack);
+    let second = checked(
+        &signals.part(parts.second..signals.input.len(), late),
+        options,
+        pack,
+    );
+    let (mut kept, other) = if first.outcome.is_ok() || second.outcome.is_err() {
+        (first, second)
+    } else {
+        (second, first)
+    };
+    match (&kept.outcome, &other.outcome) {
+        (Ok(one), Ok(another)) => {
+            let compared = amplitude::compare(parts.amplitudes, one, another);
+            kept.amplitudes = compared;
+            if let Some(compared) = compared {
+                kept.remarks
+                    .retain(|remark| *remark != Remark::OneAmplitude);
+                if !compared.is_alike {
+                    kept.outcome = Err(Verdict::AmplitudeDependent(compared));
+                }
+            }
+        }
+        (Ok(_), Err(verdict)) => {
+            let verdict = Box::new(verdict.clone());
+            kept.remarks.push(Remark::OtherAmplitudeRefused(verdict));
+        }
+        _ => {}
+    }
+    kept
+}
+
+fn by_road(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) -> Identification {
     match road(options) {
         Road::Relay => relay::identify(signals, options, pack),
         Road::General => innovations::identify(signals, options),

@@ -28,6 +28,11 @@ pub struct Options {
     pub span_s: (Option<f64>, Option<f64>),
     /// Input between two samples. `None`: the likelihood decides.
     pub hold: Option<Hold>,
+    /// `beta` of the relay that made the recording. A recording whose switches contradict it is refused.
+    pub beta: Option<f64>,
+    /// Time (s) by which the input was logged after it acted, negative if before; the recording is corrected by it. With a
+    /// value, zero too, the clocks are not judged by the relay's law.
+    pub input_late_s: Option<f64>,
 }
 
 impl Default for Options {
@@ -40,6 +45,8 @@ impl Default for Options {
             structure: None,
             span_s: (None, None),
             hold: None,
+            beta: None,
+            input_late_s: None,
         }
     }
 }
@@ -96,6 +103,22 @@ impl Options {
     pub fn span_s(self, from_s: Option<f64>, to_s: Option<f64>) -> Self {
         Self {
             span_s: (from_s, to_s),
+            ..self
+        }
+    }
+
+    /// Expects switches of a relay with this `beta`, or of a relay that is not known if `None`.
+    #[must_use]
+    pub fn beta(self, beta: Option<f64>) -> Self {
+        Self { beta, ..self }
+    }
+
+    /// Corrects the recording for an input that was logged this much late (s), or judges the clocks by the relay's law if
+    /// `None`.
+    #[must_use]
+    pub fn input_late_s(self, input_late_s: Option<f64>) -> Self {
+        Self {
+            input_late_s,
             ..self
         }
     }

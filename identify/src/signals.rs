@@ -16,3 +16,58 @@ pub struct Signals<'a> {
     /// Index of the first point after each gap, ascending.
     pub breaks: &'a [usize],
 }
+
+impl Signals<'_> {
+    /// The input moved to `late_s` (s) before its time stamps: of each point the mean over its time. Before its first and
+    /// after its last value the input is held.
+    pub(crate) fn input_earlier(&self, late_s: f64) -> Vec<f64> {
+        let count = self.input.len();
+        let mut integral = vec![0.0];
+        for index in 1..count {
+            let step_s = self.time_s[index] - self.time_s[index - 1];
+            integral.push(integral[index - 1] + self.input[index - 1] * step_s);
+        }
+        let until = |time_s: f64| {
+            let index = self.time_s.partition_point(|t| *t <= time_s).max(1) - 1;
+            integral[index] + self.input[index] * (time_s - self.time_s[index])
+        };
+        let start_s = |index: usize| match self.time_s.get(index) {
+            Some(time_s) => time_s + late_s,
+            None => self.time_s[count - 1] + self.sample_period_s + late_s,
+        };
+        let mean = |index: usize| {
+            let (from_s, to_s) = (start_s(index), start_s(index + 1));
+            let at = self.time_s.partition_point(|t| *t <= from_s).max(1);
+            // Exactly the value where nothing changes in between.
+            if self.time_s.get(at).is_none_or(|next_s| *next_s >= to_s) {
+                return self.input[at - 1];
+            }
+            (until(to_s) - until(from_s)) / (to_s - from_s)
+        };
+        (0..count).map(mean).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // A step at 3 s that acted 1 s, or 1.5 s, before: the point at 1 s then holds half of it.
+    #[test]
+    fn the_input_is_moved_by_whole_and_half_samples() {
+        let time_s = [0.0, 1.0, 2.0, 3.0, 4.0];
+        let input = [0.0, 0.0, 0.0, 2.0, 2.0];
+        let signals = Signals {
+            time_s: &time_s,
+            input: &input,
+            output: &input,
+            samples_per_point: 1,
+            sample_period_s: 1.0,
+            breaks: &[],
+        };
+        assert_eq!(signals.input_earlier(1.0), [0.0, 0.0, 2.0, 2.0, 2.0]);
+        assert_eq!(signals.input_earlier(1.5), [0.0, 1.0, 2.0, 2.0, 2.0]);
+        assert_eq!(signals.input_earlier(-1.0), [0.0, 0.0, 0.0, 0.0, 2.0]);
+        assert_eq!(signals.input_earlier(100.0), [2.0; 5]);
+    }
+}

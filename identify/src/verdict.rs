@@ -5,6 +5,8 @@ use std::fmt;
 use onecycle_design::{DesignError, Parameter};
 use onecycle_onboard::refine::DomainEdge;
 
+use crate::amplitude::TwoAmplitudes;
+
 /// Reason why no process was identified.
 ///
 /// `Display` writes one clause that says what is wrong, without a capital and without a full stop. Advice is left to
@@ -100,6 +102,18 @@ pub enum Verdict {
         /// Share of the innovations' variance.
         share: f64,
     },
+    /// The relay did not switch as one of its `beta` does: input and output are not on one clock, or the relay is another.
+    ClockOffset {
+        /// Ratio at which the relay switches in the recording.
+        seen: f64,
+        /// `beta` of the relay.
+        beta: f64,
+        /// Time by which the input was logged late (s), negative if it was logged early. `None` if no offset explains the
+        /// switches.
+        late_s: Option<f64>,
+    },
+    /// At another amplitude of the relay the process is another.
+    AmplitudeDependent(TwoAmplitudes),
     /// A process was identified, but no controller meets the specification.
     NoController(DesignError),
 }
@@ -123,6 +137,8 @@ impl Verdict {
             Self::Unknown { .. } => "unknown",
             Self::TooUncertain => "too_uncertain",
             Self::EdgeOfDomain(_) | Self::AtBound(_) => "edge_of_domain",
+            Self::ClockOffset { .. } => "clock_offset",
+            Self::AmplitudeDependent(_) => "amplitude_dependent",
             Self::NoController(_) => "no_controller",
         }
     }
@@ -148,6 +164,8 @@ impl fmt::Display for Verdict {
             | Self::TooUncertain
             | Self::EdgeOfDomain(_)
             | Self::NoFit
+            | Self::ClockOffset { .. }
+            | Self::AmplitudeDependent(_)
             | Self::NoController(_) => self.write_model(f),
             Self::TooFewRows { .. }
             | Self::NoInformation { .. }
@@ -290,6 +308,37 @@ impl Verdict {
             Self::NoFit => {
                 f.write_str("not this kind of process: the output does not follow the input")
             }
+            Self::ClockOffset { seen, beta, late_s } => {
+                write!(
+                    f,
+                    "not on one clock: a relay with beta {beta:.2} made this recording, but it switches as one with beta \
+                     {seen:.2}"
+                )?;
+                match late_s {
+                    Some(late_s) if *late_s >= 0.0 => {
+                        write!(
+                            f,
+                            ", as if the input had been logged {:.1} ms late",
+                            1e3 * late_s
+                        )
+                    }
+                    Some(late_s) => write!(
+                        f,
+                        ", as if the output had been logged {:.1} ms late",
+                        -1e3 * late_s
+                    ),
+                    None => Ok(()),
+                }
+            }
+            Self::AmplitudeDependent(found) => write!(
+                f,
+                "the gain depends on the amplitude: between relay amplitudes of {:.3} and {:.3} it changes by {:.0} %, and \
+                 the phase by {:.0} deg",
+                found.amplitudes[0],
+                found.amplitudes[1],
+                100.0 * (found.gain_ratio - 1.0).abs(),
+                found.phase_rad.to_degrees().abs()
+            ),
             Self::NoController(error) => write!(f, "no controller: {error}"),
             _ => f.write_str(self.kind()),
         }

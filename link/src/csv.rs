@@ -100,7 +100,7 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
     if let Some(line) = records.state().cut_line {
         table.builder.note(Note::LastLineIncomplete { line });
     }
-    Ok(table.builder.finish()?)
+    Ok(table.builder.finish()?.with_relay_beta(preview.relay_beta))
 }
 
 /// Accepts a last line that lacks cells, or whose last cell was cut off.

@@ -186,6 +186,7 @@ pub struct Recording {
     gaps: Vec<Gap>,
     columns: Columns,
     notes: Vec<Note>,
+    relay_beta: Option<f64>,
 }
 
 impl Recording {
@@ -293,6 +294,18 @@ impl Recording {
     /// What the reader chose, assumed or dropped.
     pub fn notes(&self) -> &[Note] {
         &self.notes
+    }
+
+    /// `beta` of the relay that made the recording, if the source states it: a comment of a table with the word `beta` and
+    /// a number between -1 and 1, such as `# relay: amplitude 1, beta -0.73`.
+    pub fn relay_beta(&self) -> Option<f64> {
+        self.relay_beta
+    }
+
+    /// The recording of a relay with this `beta`.
+    #[must_use]
+    pub fn with_relay_beta(self, relay_beta: Option<f64>) -> Self {
+        Self { relay_beta, ..self }
     }
 }
 

@@ -416,6 +416,20 @@ impl Relay {
         Ok(())
     }
 
+    /// Changes half the jump of the output (input unit) from the next tick on. The running excursion and the state are kept.
+    ///
+    /// # Errors
+    /// [`RelayError::Amplitude`] unless `amplitude` is positive and finite; the relay is unchanged then.
+    pub fn set_amplitude(&mut self, amplitude: f32) -> Result<(), RelayError> {
+        let settings = RelaySettings {
+            amplitude,
+            ..self.settings
+        };
+        settings.validate()?;
+        self.settings = settings;
+        Ok(())
+    }
+
     /// What the relay is doing.
     #[must_use]
     pub fn phase(&self) -> RelayPhase {

@@ -1,7 +1,9 @@
 //! Builder of an identification.
 
 use onecycle_design::{Specification, Structure};
-use onecycle_identify::{Hold, Identification, Method, Options, Road, Signals, identify_by};
+use onecycle_identify::{
+    Hold, Identification, Method, Options, Remark, Road, Signals, identify_by,
+};
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
 
@@ -114,6 +116,24 @@ impl<'a> Identify<'a> {
         }
     }
 
+    /// `beta` of the relay that made the recording. Without it, the one that the recording states
+    /// ([`Recording::relay_beta`]). A recording whose switches contradict it is refused.
+    pub fn beta(self, beta: impl Into<Option<f64>>) -> Self {
+        Self {
+            options: self.options.beta(beta.into()),
+            ..self
+        }
+    }
+
+    /// The input was logged this much late (s), negative if early: the recording is corrected by it. With a value, zero too,
+    /// the clocks are not judged by the relay's law.
+    pub fn input_late_s(self, input_late_s: impl Into<Option<f64>>) -> Self {
+        Self {
+            options: self.options.input_late_s(input_late_s.into()),
+            ..self
+        }
+    }
+
     /// Reads the last cycle with this pack instead of the built-in one.
     pub fn pack(self, pack: Pack<'a>) -> Self {
         Self {
@@ -129,10 +149,26 @@ impl<'a> Identify<'a> {
     }
 
     /// Identifies the process from `recording`. Cycles with a gap are not used.
+    ///
+    /// If other settings than the default ones lead to a process, and the default ones do not, a remark says so
+    /// ([`Remark::DefaultRefused`](crate::Remark::DefaultRefused)).
     #[must_use]
     pub fn run(&self, recording: &Recording) -> Identification {
+        let options = (self.options).beta(self.options.beta.or(recording.relay_beta()));
+        let usual = Options::default()
+            .specification(options.specification)
+            .beta(options.beta)
+            .input_late_s(options.input_late_s);
         with_signals(recording, |signals| {
-            identify_by(signals, &self.options, self.pack.as_ref())
+            let mut found = identify_by(signals, &options, self.pack.as_ref());
+            if found.outcome.is_ok() && options != usual {
+                let default = identify_by(signals, &usual, self.pack.as_ref());
+                if let Err(verdict) = default.outcome {
+                    let verdict = Box::new(verdict);
+                    found.remarks.push(Remark::DefaultRefused(verdict));
+                }
+            }
+            found
         })
     }
 }

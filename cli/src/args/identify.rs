@@ -74,6 +74,14 @@ pub(crate) struct Identify {
     /// (interpolated), if it has fewer [default: what explains the recording better]
     #[arg(long, value_name = "KIND", value_enum)]
     pub(crate) hold: Option<Between>,
+    /// beta of the relay that made the recording: a recording whose switches contradict it is refused [default: from a
+    /// comment of the file]
+    #[arg(long, value_name = "BETA", allow_negative_numbers = true, value_parser = beta)]
+    pub(crate) beta: Option<f64>,
+    /// Time by which the input was logged late, in seconds (negative: early): it is corrected. 0 says that both columns
+    /// come from one clock [default: judged by the switches of the relay]
+    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
+    pub(crate) input_late: Option<f64>,
     /// Method for a steady relay oscillation: the network of the pack alone (classify), least squares alone (refine),
     /// or least squares with the network's prior (map)
     #[arg(long, value_enum, default_value_t = Method::Map)]
@@ -108,6 +116,11 @@ fn structure() -> impl TypedValueParser<Value = Structure> {
 fn time_s(text: &str) -> Result<f64, String> {
     let time_s = text.parse().ok().filter(|time_s: &f64| time_s.is_finite());
     time_s.ok_or_else(|| "a time is a number of seconds".to_owned())
+}
+
+fn beta(text: &str) -> Result<f64, String> {
+    let beta = text.parse().ok().filter(|beta: &f64| beta.abs() < 1.0);
+    beta.ok_or_else(|| "beta is a number between -1 and 1".to_owned())
 }
 
 /// When a plot is drawn.

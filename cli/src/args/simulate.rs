@@ -63,6 +63,10 @@ pub(crate) struct Simulate {
         allow_negative_numbers = true
     )]
     pub(crate) amplitude: f64,
+    /// Amplitude of the relay in the second half of the test: two amplitudes show whether the actuator is linear; 0.6 of
+    /// --amplitude is usual
+    #[arg(long, value_name = "H", allow_negative_numbers = true)]
+    pub(crate) second_amplitude: Option<f64>,
     /// Length of one half of a doublet, of the unit of 3-2-1-1 or of one bit of a PRBS, in seconds
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub(crate) pulse: Option<f64>,

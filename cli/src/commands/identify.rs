@@ -31,6 +31,8 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .structure(arguments.structure)
         .span_s(arguments.from, arguments.to)
         .hold(arguments.hold.map(Hold::from))
+        .beta(arguments.beta)
+        .input_late_s(arguments.input_late)
         .pack(pack)
         .run(&recording);
     let mut choice = (found.outcome.as_ref().ok())

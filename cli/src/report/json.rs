@@ -33,6 +33,8 @@ struct IdentifyReport<'a> {
     oscillation: Option<Oscillation>,
     record: Option<Record>,
     last_cycle: Option<LastCycle>,
+    switching: Option<Switching>,
+    amplitudes: Option<Amplitudes>,
     structure: Option<&'static str>,
     process: Option<Process>,
     joint_probability: Option<f64>,
@@ -46,6 +48,8 @@ struct IdentifyReport<'a> {
     margins: Option<MarginsReport>,
     step: Option<Step>,
     robustness: Option<Robust>,
+    excited_rad_per_s: Option<f64>,
+    resonance_factor: Option<f64>,
     assumed: Option<Assumed>,
     controllers: Option<Vec<Proposed>>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -53,6 +57,23 @@ struct IdentifyReport<'a> {
     remarks: Vec<String>,
     remark_kinds: Vec<&'static str>,
     notes: Vec<String>,
+}
+
+/// Ratio at which the relay switched.
+#[derive(Serialize)]
+struct Switching {
+    beta: f64,
+    deviation: f64,
+    cycles: usize,
+}
+
+/// Comparison of the two amplitudes of a relay test.
+#[derive(Serialize)]
+struct Amplitudes {
+    relay_amplitudes: [f64; 2],
+    gain_ratio: f64,
+    phase_deg: f64,
+    is_alike: bool,
 }
 
 #[derive(Serialize)]
@@ -230,6 +251,17 @@ pub(crate) fn identification(
             is_known: reading.is_known(),
             score: reading.classification.score,
         }),
+        switching: found.switching.map(|seen| Switching {
+            beta: seen.beta,
+            deviation: seen.deviation,
+            cycles: seen.cycles,
+        }),
+        amplitudes: found.amplitudes.map(|test| Amplitudes {
+            relay_amplitudes: test.amplitudes,
+            gain_ratio: test.gain_ratio,
+            phase_deg: test.phase_rad.to_degrees(),
+            is_alike: test.is_alike,
+        }),
         structure: identified.map(|i| i.model.structure().name()),
         process: identified.map(process),
         joint_probability: identified.and_then(|i| i.joint_probability),
@@ -250,6 +282,8 @@ pub(crate) fn identification(
         robustness: design
             .and_then(|design| design.robustness.as_ref())
             .map(Into::into),
+        excited_rad_per_s: (found.excitation).and_then(|found| found.highest_rad_per_s()),
+        resonance_factor: identified.and_then(|i| i.resonance),
         assumed: choice.map(|choice| (&choice.asked).into()),
         controllers: choice.map(controllers::proposed),
         against: choice.and_then(controllers::against),

@@ -44,6 +44,30 @@ pub(super) fn of_recording(found: &Identification, record: &Recorded, units: &Un
         );
         facts.push(("excited", band));
     }
+    facts.extend(of_relay(found));
+    facts
+}
+
+/// How the relay switched, and what its two amplitudes show.
+pub(super) fn of_relay(found: &Identification) -> Vec<Fact> {
+    let mut facts = vec![];
+    if let Some(switching) = found.switching {
+        facts.push((
+            "beta seen",
+            format!("{:.2} ({} cycles)", switching.beta, switching.cycles),
+        ));
+    }
+    if let Some(test) = found.amplitudes.filter(|test| test.is_alike) {
+        let [first, second] = test.amplitudes.map(significant);
+        facts.push((
+            "amplitudes",
+            format!(
+                "{first} and {second}: the same process (gain {:+.1} %, phase {:+.1} deg)",
+                100.0 * (test.gain_ratio - 1.0),
+                test.phase_rad.to_degrees()
+            ),
+        ));
+    }
     facts
 }
 

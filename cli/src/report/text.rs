@@ -44,6 +44,7 @@ pub(crate) fn identification(
             if let Some(reading) = last_cycle {
                 describe_last_cycle(&mut text, reading);
             }
+            facts(&mut text, &record::of_relay(found));
         }
         Some(Excitation::Recorded(recorded)) => {
             text.push_str(&headed("\nRecording\n"));
@@ -66,6 +67,15 @@ pub(crate) fn identification(
             }
             if let Some((choice, design)) = choice.zip(identified.design.as_ref()) {
                 describe_own_controller(&mut text, identified, (choice, design), &units);
+                let excited = found.excitation.and_then(|found| found.highest_rad_per_s());
+                if let Some((factor, excited)) = identified.resonance.zip(excited) {
+                    text.push('\n');
+                    wrapped(
+                        &mut text,
+                        "",
+                        &words::controllers::resonance(factor, excited),
+                    );
+                }
             }
         }
         Err(verdict) => {

@@ -3,7 +3,7 @@
 
 use onecycle::{DesignError, Robustness, Specification, Style};
 
-use crate::report::number::{seconds, significant};
+use crate::report::number::{frequency, seconds, significant};
 use crate::results::controllers::{Against, Controllers};
 
 /// Why there is no controller, as the cell of a table.
@@ -202,6 +202,16 @@ pub(crate) fn style(style: Style) -> &'static str {
         Style::Paper => "the paper's",
         other => other.name(),
     }
+}
+
+/// Resonance that the loop bears above 1.5 times the highest frequency that the recording excites, `excited` (rad/s).
+pub(crate) fn resonance(factor: f64, excited: f64) -> String {
+    format!(
+        "The recording excites frequencies up to {}. A resonance above {}, which it would not show, makes the loop unstable \
+         if it raises the response of the process by a factor of {factor:.1} or more.",
+        frequency(excited),
+        frequency(1.5 * excited)
+    )
 }
 
 #[cfg(test)]

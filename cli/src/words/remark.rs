@@ -3,7 +3,7 @@
 use onecycle::{DesignError, Identification, Parameter, Remark};
 use onecycle_identify::Nonlinear;
 
-use super::controllers;
+use super::{caution, controllers};
 use crate::report::number::{percent, significant};
 
 /// One or two sentences for each remark on a result, with the options of this program.
@@ -21,6 +21,7 @@ fn sentence(remark: &Remark, is_relay: bool) -> String {
         .or_else(|| of_estimator(remark))
         .or_else(|| of_interval(remark, is_relay))
         .or_else(|| of_result(remark))
+        .or_else(|| caution::sentence(remark))
         .unwrap_or_else(|| format!("{}.", remark.kind()))
 }
 

@@ -155,6 +155,14 @@ fn of_relay(verdict: &Verdict) -> &'static str {
         Verdict::EdgeOfDomain(DomainEdge::LongDelay) => {
             "Check that input and output share one clock: the delay appears longer than half a period."
         }
+        Verdict::ClockOffset { .. } => {
+            "Correct a known offset with --input-late. If both columns come from one clock, give --input-late 0, or the \
+             right --beta."
+        }
+        Verdict::AmplitudeDependent(_) => {
+            "Look for a dead zone, backlash, friction or saturation of the actuator, and test at the amplitudes at which \
+             the controller will work."
+        }
         Verdict::NoFit => "Check the choice of columns: the output does not follow the input.",
         // Facts that this program does not know yet.
         _ => "Record a relay test of at least four cycles, or a chirp.",

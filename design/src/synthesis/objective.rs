@@ -29,6 +29,9 @@ const CLOSE: f64 = 1e-6;
 /// Most evaluations of noise or peak for one gain.
 const MOST_EVALUATIONS: usize = 40;
 
+/// Frequencies over the limit of the crossover at which the loop is looked at. Its magnitude falls nearly everywhere.
+const BEYOND: [f64; 7] = [1.0, 1.1, 1.25, 1.5, 2.0, 4.0, 10.0];
+
 /// Most zeros of a law.
 const ZEROS: f64 = 3.0;
 
@@ -53,6 +56,8 @@ pub(crate) struct Problem {
     pub noise: Option<NoiseLimit>,
     /// Largest output of the controller after a unit step of the reference with `b = 0`, or `b = 1` without integral.
     pub input_peak: Option<f64>,
+    /// Highest gain crossover.
+    pub crossover: Option<f64>,
 }
 
 /// Which loop and which end of the forbidden gains an extremum belongs to.
@@ -106,11 +111,18 @@ impl Problem {
         integrals(&self.process, law, self.excitation(), omega, step)
     }
 
-    /// The gain `k` of a shape, or a smaller one that keeps the limits of noise and input. `None` if no simulation ends.
+    /// The gain `k` of a shape, or a smaller one that keeps the limits of crossover, noise and input. `None` if no simulation
+    /// ends.
     pub(crate) fn limited(&self, z: &[f64], k: f64, omega: f64) -> Option<f64> {
         let process = &self.process;
         let law = self.family.law(process, z);
         let mut k = k;
+        if let Some(limit) = self.crossover {
+            let largest = self.largest_beyond(&law, limit);
+            if k * largest > 1.0 {
+                k = 1.0 / largest;
+            }
+        }
         if let Some(limit) = self.noise {
             let excess = |ln: f64| {
                 let found = noise::amplification(process, &law.scaled(ln.exp()), limit.period);
@@ -136,6 +148,17 @@ impl Problem {
             k = limited(k, excess)?;
         }
         Some(k)
+    }
+
+    /// Largest magnitude of the loop of this law from a frequency on.
+    fn largest_beyond(&self, law: &Law, omega: f64) -> f64 {
+        let open_loop = OpenLoop::new(&self.process, law);
+        let resonance = self.process.resonance().map(|(peak, _)| peak);
+        let above = BEYOND.map(|factor| factor * omega);
+        (above.into_iter())
+            .chain(resonance.filter(|peak| *peak > omega))
+            .map(|omega| open_loop.at(omega).norm())
+            .fold(0.0, f64::max)
     }
 
     /// Lower bound of the logarithm of the cost of a shape with gain `k`: the IAE is at least `1/ki`.

@@ -21,6 +21,7 @@ fn problem(vector: &Vector) -> Problem {
         limits: Limits::of(vector.m),
         noise: None,
         input_peak: None,
+        crossover: None,
     }
 }
 

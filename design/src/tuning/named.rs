@@ -172,6 +172,9 @@ pub(crate) fn problem(
             period: noise.sample_period_s / unit_s,
         }),
         input_peak: specification.input_peak.map(|peak| peak * k),
+        crossover: specification
+            .crossover_rad_per_s
+            .map(|omega| omega * unit_s),
     })
 }
 

@@ -128,6 +128,8 @@ pub struct Specification {
     pub noise_share: f64,
     /// Maximum output of the controller after a unit step of the reference (input unit).
     pub input_peak: Option<f64>,
+    /// Highest gain crossover (rad/s): `|L| < 1` above it. `None`: no limit. The paper's style has none.
+    pub crossover_rad_per_s: Option<f64>,
     /// Time of the measurement filter (s). `None`: chosen with the gains.
     pub filter_s: Option<f64>,
     /// Known filters and sampling.
@@ -161,6 +163,7 @@ impl Specification {
             noise: None,
             noise_share: style.noise_share(),
             input_peak: None,
+            crossover_rad_per_s: None,
             filter_s: None,
             execution: Execution::default(),
             coverage: 0.95,
@@ -328,6 +331,10 @@ impl Specification {
         values.extend(
             self.input_peak
                 .map(|peak| ("input_peak", peak, Range::Positive)),
+        );
+        values.extend(
+            self.crossover_rad_per_s
+                .map(|omega| ("crossover_rad_per_s", omega, Range::Positive)),
         );
         values.extend(
             self.filter_s

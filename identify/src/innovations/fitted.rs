@@ -139,7 +139,7 @@ impl Fitted {
     }
 
     /// What the record says about the loop of a controller.
-    pub(super) fn recorded_loop(&self) -> RecordedLoop {
+    pub(super) fn recorded_loop(&self, excited_rad_per_s: Option<f64>) -> RecordedLoop {
         let record = &self.record;
         let (low, high) = (record.input.iter())
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
@@ -151,6 +151,7 @@ impl Fitted {
             input_amplitude: 0.5 * (high - low),
             sample_s: record.dt_s,
             hold: record.hold,
+            excited_rad_per_s,
         }
     }
 }

@@ -1,6 +1,6 @@
 //! Tests of a fit: innovations, prediction of data that it was not fitted to, information.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 use super::choose::Limits;
 use super::descent::Patience;
@@ -140,33 +140,89 @@ pub(super) fn prediction(
     })
 }
 
-/// Band of frequencies (rad/s) with the central 90 % of the information on the gain: the spectrum of the filtered response
-/// to the input. `None` if the input has no effect.
-pub(super) fn informative(blocks: &Blocks<'_>, theta: &Theta) -> Option<(f64, f64)> {
+/// Frequencies that a record tells about.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Informative {
+    /// Band (rad/s) with the central 90 % of the information on the gain.
+    pub(super) band_rad_per_s: (f64, f64),
+    /// Highest frequency (rad/s) up to which the record shows the response without a break. See [`highest`].
+    pub(super) highest_rad_per_s: f64,
+}
+
+/// Frequencies that the record tells about: the spectrum of the filtered response to the input. `None` if the input has no
+/// effect.
+pub(super) fn informative(blocks: &Blocks<'_>, theta: &Theta) -> Option<Informative> {
     let mut memory = Memory::default();
-    evaluate(blocks, theta, &mut memory)?;
+    let at = evaluate(blocks, theta, &mut memory)?;
     let filtered: Vec<f64> = memory.input_innovations().collect();
     let [low, _, high] = quantiles(&filtered, blocks.block_s())?;
-    Some((low, high))
+    let lines = lines(filtered, blocks.block_s());
+    // Information on the logarithm of the gain.
+    let scale = at.gain * at.gain / at.variance;
+    let lines: Vec<(f64, f64)> = (lines.into_iter())
+        .map(|(omega, sum)| (omega, scale * sum))
+        .collect();
+    Some(Informative {
+        band_rad_per_s: (low, high),
+        highest_rad_per_s: highest(&lines).unwrap_or(high),
+    })
+}
+
+/// Highest frequency of an unbroken row of half octaves in each of which the information on the logarithm of the gain, in
+/// `lines` of frequency (rad/s) and information, is at least 25 (a deviation of 20 %), and a share of that in the best half
+/// octave. A resonance in between would show.
+fn highest(lines: &[(f64, f64)]) -> Option<f64> {
+    const LEAST: f64 = 25.0;
+    const LEAST_SHARE: f64 = 1e-4;
+    /// Share of a half octave's information in a line that counts as its highest.
+    const LINE: f64 = 0.05;
+    let window = |high: f64| {
+        let inside = move |omega: f64| omega > high / SQRT_2 && omega <= high * (1.0 + 1e-9);
+        lines.iter().filter(move |(omega, _)| inside(*omega))
+    };
+    let sum = |high: f64| {
+        window(high)
+            .map(|(_, information)| information)
+            .sum::<f64>()
+    };
+    let sums: Vec<f64> = lines.iter().map(|(omega, _)| sum(*omega)).collect();
+    let best = (0..lines.len()).max_by(|a, b| sums[*a].total_cmp(&sums[*b]))?;
+    let least = LEAST.max(LEAST_SHARE * sums[best]);
+    let last = (best..lines.len())
+        .take_while(|index| sums[*index] >= least)
+        .last()?;
+    let (_, strong) = (lines[last].0, LINE * sums[last]);
+    let highest = window(lines[last].0).filter(|(_, information)| *information >= strong);
+    highest.map(|(omega, _)| *omega).last()
+}
+
+/// Frequencies (rad/s) of the Fourier sums of `rows`, with their shares of the sum of squares: under a Hann window, which
+/// keeps the power of a line where the line is. Of more than 2,000 rows the first ones.
+fn lines(mut rows: Vec<f64>, row_s: f64) -> Vec<(f64, f64)> {
+    const MOST_ROWS: usize = 2000;
+    let whole = rows.len();
+    rows.truncate(MOST_ROWS);
+    let count = rows.len();
+    let mean = rows.iter().sum::<f64>() / count as f64;
+    for (row, value) in rows.iter_mut().enumerate() {
+        *value = (*value - mean) * (PI * row as f64 / count as f64).sin().powi(2);
+    }
+    // The mean square of the window is 3/8, and each line stands for its negative frequency too.
+    let scale = 2.0 / (0.375 * count as f64) * whole as f64 / count as f64;
+    let line = TAU / (count as f64 * row_s);
+    (1..=count / 2)
+        .map(|index| index as f64 * line)
+        .map(|omega| (omega, scale * power(&rows, omega * row_s)))
+        .collect()
 }
 
 /// Share of the power of the input in a band of frequencies (rad/s), a quarter wider on both sides, over the first 2,000
 /// rows.
 pub(super) fn input_share(blocks: &Blocks<'_>, (low, high): (f64, f64)) -> f64 {
-    const MOST_ROWS: usize = 2000;
-    let mut rows = blocks.mean_inputs();
-    rows.truncate(MOST_ROWS);
-    let count = rows.len();
-    let mean = rows.iter().sum::<f64>() / count as f64;
-    // The Hann window keeps the power of a line where the line is.
-    for (row, value) in rows.iter_mut().enumerate() {
-        *value = (*value - mean) * (PI * row as f64 / count as f64).sin().powi(2);
-    }
-    let line = TAU / (count as f64 * blocks.block_s());
+    let lines = lines(blocks.mean_inputs(), blocks.block_s());
+    let line = lines.first().map_or(0.0, |(omega, _)| *omega);
     let (mut inside, mut total) = (0.0, 0.0);
-    for index in 1..=count / 2 {
-        let omega = index as f64 * line;
-        let power = power(&rows, omega * blocks.block_s());
+    for (omega, power) in lines {
         total += power;
         if omega > 0.8 * low - 2.0 * line && omega < 1.25 * high + 2.0 * line {
             inside += power;

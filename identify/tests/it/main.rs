@@ -5,6 +5,7 @@
     reason = "the lint does not recognise helper functions as parts of tests"
 )]
 
+mod checks;
 mod forces;
 mod names;
 mod outcomes;

@@ -35,6 +35,8 @@ pub(super) struct State {
     pub(super) lines: u64,
     /// The last comment before the table, without its mark, and its line.
     pub(super) comment: Option<(u64, Vec<u8>)>,
+    /// `beta` of the relay, if a comment before the table states it.
+    pub(super) relay_beta: Option<f64>,
     /// Whether the text ended without a line ending.
     pub(super) ends_open: bool,
     /// Number of the last line, if it was dropped because it ends within quotes.
@@ -115,6 +117,7 @@ impl<R: Read> Lines<R> {
         let text = line.trim_ascii_start();
         if let Some(comment) = self.comment(text) {
             if !self.state.preface_over {
+                self.state.relay_beta = relay_beta(comment).or(self.state.relay_beta);
                 self.state.comment = Some((number, comment.to_vec()));
             }
         } else if !matches!(text, [] | [0x1a, ..]) {
@@ -167,6 +170,17 @@ impl<R: Read> Read for Lines<R> {
         self.sent += count;
         Ok(count)
     }
+}
+
+/// Number after the word `beta` in a comment, if it can be that of a relay.
+fn relay_beta(comment: &[u8]) -> Option<f64> {
+    let text = String::from_utf8_lossy(comment).to_ascii_lowercase();
+    let mut words = text
+        .split([' ', '\t', ',', ';', '=', ':'])
+        .filter(|word| !word.is_empty());
+    words.find(|word| *word == "beta")?;
+    let beta: f64 = words.next()?.trim_end_matches('.').parse().ok()?;
+    (-1.0..=1.0).contains(&beta).then_some(beta)
 }
 
 #[cfg(test)]
@@ -242,5 +256,19 @@ mod tests {
         let mut lines = Lines::new("1,2\n3,\"4".as_bytes(), Separator::Comma);
         io::copy(&mut lines, &mut io::sink()).unwrap();
         assert_eq!(lines.state().cut_line, Some(2));
+    }
+
+    #[test]
+    fn the_relay_is_read_from_a_comment() {
+        for (comment, beta) in [
+            ("# relay: amplitude 1, beta -0.73, trim on", Some(-0.73)),
+            ("# Beta = 0.5", Some(0.5)),
+            ("# beta:-0.6; h 2", Some(-0.6)),
+            ("# alphabeta 0.5", None),
+            ("# beta 7", None),
+            ("# beta of the relay", None),
+        ] {
+            assert_eq!(relay_beta(comment[1..].as_bytes()), beta, "{comment}");
+        }
     }
 }

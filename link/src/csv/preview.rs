@@ -20,6 +20,8 @@ pub(super) struct Preview {
     pub(super) names: Option<Vec<Name>>,
     /// Line of the names, if they come from a comment.
     pub(super) comment_line: Option<u64>,
+    /// `beta` of the relay, if a comment states it.
+    pub(super) relay_beta: Option<f64>,
     /// Number of lines of text before the header.
     pub(super) skipped: usize,
     /// Number of columns.
@@ -59,6 +61,7 @@ impl Preview {
         }
         let lines = records.state().lines;
         let mut preview = preview.ok_or(ReadError::NoData { lines })?;
+        preview.relay_beta = records.state().relay_beta;
         if preview.names.is_none()
             && let Some((line, comment)) = records.state().comment.take()
         {
@@ -94,6 +97,7 @@ impl Preview {
         let mut preview = Self {
             names,
             comment_line: None,
+            relay_beta: None,
             skipped,
             width,
             first_line: line,

@@ -185,6 +185,7 @@ impl RecordingBuilder {
             gaps: self.gaps,
             columns: self.columns,
             notes: self.notes,
+            relay_beta: None,
         })
     }
 

@@ -84,8 +84,11 @@ fn excitation(arguments: &Simulate) -> String {
     let amplitude = arguments.amplitude;
     if arguments.excitation == Excitation::Relay {
         let trim = if arguments.no_trim { "off" } else { "on" };
+        let second = (arguments.second_amplitude).map_or(String::new(), |second| {
+            format!(", second_amplitude {second}")
+        });
         return format!(
-            "relay: amplitude {amplitude}, beta {}, trim {trim}",
+            "relay: amplitude {amplitude}{second}, beta {}, trim {trim}",
             arguments.beta
         );
     }

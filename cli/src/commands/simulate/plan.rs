@@ -39,6 +39,9 @@ impl Plan {
         let model = arguments.process.model()?;
         positive("--sample-rate", arguments.sample_rate)?;
         positive("--amplitude", arguments.amplitude)?;
+        if let Some(second) = arguments.second_amplitude {
+            positive("--second-amplitude", second)?;
+        }
         not_negative("the pre-roll", arguments.preroll)?;
         check_combination(arguments)?;
         if arguments.excitation == Excitation::Relay {
@@ -144,11 +147,13 @@ impl Plan {
                 let noise_sigma = sensor.noise_sigma.max(sensor.quantum);
                 let relay = relay(arguments, arguments.preroll, noise_sigma)?;
                 let at_setpoint = arguments.inject == Some(Inject::Setpoint);
-                if self.model.linear().gain() > 0.0 || at_setpoint {
-                    Box::new(relay)
-                } else {
-                    Box::new(Reversed(relay))
-                }
+                let is_direct = self.model.linear().gain() > 0.0 || at_setpoint;
+                Box::new(TestRelay {
+                    relay,
+                    sign: if is_direct { 1.0 } else { -1.0 },
+                    second: arguments.second_amplitude.map(|amplitude| amplitude as f32),
+                    left_s: 0.5 * self.experiment.duration_s,
+                })
             }
         };
         let Some(gains) = arguments.closed else {
@@ -230,12 +235,27 @@ impl Plan {
     }
 }
 
-/// A relay with reversed output, for a process with negative gain.
-struct Reversed(Relay);
+/// The relay of a test.
+struct TestRelay {
+    relay: Relay,
+    /// -1 for a process with negative gain.
+    sign: f64,
+    /// Amplitude of the second half of the test.
+    second: Option<f32>,
+    /// Time until then (s).
+    left_s: f64,
+}
 
-impl Controller for Reversed {
+impl Controller for TestRelay {
     fn step(&mut self, dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
-        -Controller::step(&mut self.0, dt_s, reference, sensed)
+        self.left_s -= dt_s;
+        if self.left_s <= 0.0
+            && let Some(amplitude) = self.second.take()
+        {
+            // Its range is checked with the arguments.
+            let _ = self.relay.set_amplitude(amplitude);
+        }
+        self.sign * Controller::step(&mut self.relay, dt_s, reference, sensed)
     }
 }
 
@@ -316,6 +336,11 @@ fn check_combination(arguments: &Simulate) -> Result<(), Failure> {
         ),
         (is_relay, arguments.no_trim, "--no-trim"),
         (is_relay, arguments.bare, "--bare"),
+        (
+            is_relay,
+            arguments.second_amplitude.is_some(),
+            "--second-amplitude",
+        ),
         (
             is_relay,
             (arguments.beta, arguments.asymmetry) != defaults,

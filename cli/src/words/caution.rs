@@ -1,0 +1,151 @@
+//! What the checks beside the fit found: clocks, amplitudes, frequencies, limits of the controller.
+
+use onecycle::Remark;
+
+use crate::report::number::significant;
+
+/// One or two sentences. `None` for a remark of another kind.
+pub(super) fn sentence(remark: &Remark) -> Option<String> {
+    Some(match remark {
+        Remark::ClockUnknown {
+            seen,
+            beta,
+            late_s,
+            phase_margin_rad,
+            rad_per_s,
+        } => {
+            let cost = rad_per_s.map_or(String::new(), |rad_per_s| {
+                let deg = (5e-3 * rad_per_s).to_degrees();
+                format!(" Each 5 ms of an offset cost {deg:.1} deg.")
+            });
+            clock(*seen, *beta, late_s.map(|late_s| (late_s, *phase_margin_rad)), &cost)
+        }
+        Remark::Extrapolated {
+            ratio,
+            is_withdrawn: false,
+        } => format!(
+            "The gain crossover lies at {ratio:.1} times the highest frequency that the recording excites: a resonance \
+             there would not have shown. A relay that leads (beta -0.73) or a chirp excites higher frequencies."
+        ),
+        Remark::Extrapolated { ratio, .. } => format!(
+            "No controller is given: its gain crossover would lie at {ratio:.1} times the highest frequency that the \
+             recording excites, where a resonance would not have shown. Use a relay that leads (beta -0.73) or a chirp."
+        ),
+        Remark::OneAmplitude => "One amplitude of the input does not show a dead zone, backlash or saturation of the \
+                                 actuator: repeat the test at 0.6 of it, best in the same recording."
+            .to_owned(),
+        Remark::OtherAmplitudeRefused(verdict) => format!(
+            "The part of the recording at the other amplitude of the relay was refused ({verdict}), so the amplitudes could \
+             not be compared."
+        ),
+        Remark::LittleGainMargin(margin) => format!(
+            "The gain margin is a factor of {margin:.1} only ({:.1} dB). Ask for more with --style balanced or \
+             --gain-margin 2.",
+            20.0 * margin.log10()
+        ),
+        Remark::NoiseAtActuator(share) => format!(
+            "Noise moves the actuator with a standard deviation of {:.0} % of the amplitude of the input. Limit it with \
+             --noise 10%.",
+            100.0 * share
+        ),
+        Remark::InputPeak { step, input } => format!(
+            "A step of the reference above {} asks for more input than the {} that the test tried: take larger steps along \
+             a ramp, or limit the input with --input-peak.",
+            significant(*step),
+            significant(*input)
+        ),
+        Remark::DefaultRefused(verdict) => format!(
+            "With default options this recording is refused ({verdict}). Trust this result only if you know why the \
+             refusal is wrong."
+        ),
+        _ => return None,
+    })
+}
+
+/// `later`: the offset of the clocks if the relay has this `beta` (s), and the phase margin then (rad).
+fn clock(seen: f64, beta: f64, later: Option<(f64, Option<f64>)>, cost: &str) -> String {
+    let ask = "State the relay's beta with --beta, or give --input-late 0 if both columns come from one clock.";
+    let Some((late_s, margin_rad)) = later else {
+        return format!(
+            "The relay switches as one with beta {seen:.2}, which no usual relay has.{cost} {ask}"
+        );
+    };
+    let column = if late_s < 0.0 { "output" } else { "input" };
+    let margin = match margin_rad {
+        Some(margin) => format!("the phase margin would be {:.0} deg", margin.to_degrees()),
+        None => "the loop would be unstable".to_owned(),
+    };
+    format!(
+        "The relay switches as one with beta {seen:.2}. If it is one with beta {beta:.2}, the {column} was logged {:.1} ms \
+         late, and {margin}.{cost} {ask}",
+        1e3 * late_s.abs()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use onecycle::Verdict;
+
+    use super::*;
+
+    // A quarter turn is 90 deg; a factor of 1.5 is 3.5 dB.
+    #[test]
+    fn sentences_name_the_figures() {
+        let clock = |late_s, phase_margin_rad| Remark::ClockUnknown {
+            seen: -0.6,
+            beta: -0.73,
+            late_s,
+            phase_margin_rad,
+            rad_per_s: Some(20.0),
+        };
+        for (remark, words) in [
+            (
+                clock(Some(0.01), Some(std::f64::consts::FRAC_PI_2)),
+                "the input was logged 10.0 ms late, and the phase margin would be 90 deg",
+            ),
+            (
+                clock(Some(-0.002), None),
+                "the output was logged 2.0 ms late, and the loop would be unstable",
+            ),
+            (clock(None, None), "Each 5 ms of an offset cost 5.7 deg."),
+            (clock(None, None), "beta -0.60, which no usual relay has"),
+            (
+                Remark::LittleGainMargin(1.5),
+                "a factor of 1.5 only (3.5 dB)",
+            ),
+            (Remark::NoiseAtActuator(0.18), "18 % of the amplitude"),
+            (
+                Remark::InputPeak {
+                    step: 0.2,
+                    input: 1.0,
+                },
+                "above 0.2",
+            ),
+            (
+                Remark::DefaultRefused(Box::new(Verdict::NoFit)),
+                "is refused (not this kind of process",
+            ),
+            (
+                Remark::Extrapolated {
+                    ratio: 1.75,
+                    is_withdrawn: false,
+                },
+                "1.8 times",
+            ),
+            (
+                Remark::Extrapolated {
+                    ratio: 2.5,
+                    is_withdrawn: true,
+                },
+                "No controller is given",
+            ),
+        ] {
+            let sentence = sentence(&remark).unwrap();
+            assert!(
+                sentence.contains(words) && sentence.ends_with('.'),
+                "{sentence}"
+            );
+        }
+        assert_eq!(sentence(&Remark::NegativeGain), None);
+    }
+}

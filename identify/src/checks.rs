@@ -1,0 +1,265 @@
+//! Checks of a result against what its fit cannot see.
+//!
+//! ```text
+//! clocks         an input that was logged late looks like less dead time: the relay's own law tells     clock
+//! frequencies    a resonance above the frequencies that the recording excites does not show             extrapolation
+//! amplitudes     two levels of the input do not show how an actuator's gain depends on its size         amplitude
+//! limits         what the controller asks for: gain margin, noise at the actuator, input of a step      limits
+//! ```
+
+use onecycle_design::{Controller, Model, loop_response, margins, noise_amplification};
+use onecycle_onboard::pack::Pack;
+
+use crate::assumed::MOST_EXTRAPOLATION;
+use crate::excitation::{Excitation, Switching};
+use crate::outcome::{Identification, Identified};
+use crate::relay;
+use crate::relay::law::Law;
+use crate::remark::Remark;
+use crate::settings::Options;
+use crate::signals::Signals;
+use crate::verdict::Verdict;
+
+/// Largest time, as a share of the period, by which a relay that averages the error over a few per cent of its half period
+/// switches after the measurement has reached the ratio. The relay on board averages over 3 %, and its protection against
+/// noise adds as much again.
+const AVERAGING: f64 = 0.015;
+/// Largest time, as a share of the period, by which noise makes a relay without averaging switch early; to it comes the
+/// noise over the amplitude.
+const EARLY: f64 = 0.02;
+/// Ratio above which a relay has hysteresis, and is not one that leads.
+const LEADING: f64 = -0.05;
+/// Crossover over the highest excited frequency above which a remark says so, and the rounding of its limit.
+const EXTRAPOLATED: f64 = 1.5;
+const ROUNDING: f64 = 1.01;
+/// Least gain margin without a remark: 6 dB.
+const LEAST_GAIN_MARGIN: f64 = 2.0;
+/// Largest noise at the actuator without a remark, as a share of the amplitude of the input.
+const MOST_NOISE: f64 = 0.1;
+
+/// Adds to a result what its fit cannot see, and withdraws what rests on too little.
+pub(crate) fn check(
+    signals: &Signals<'_>,
+    options: &Options,
+    pack: Option<&Pack<'_>>,
+    found: &mut Identification,
+) {
+    let Ok(identified) = &mut found.outcome else {
+        return;
+    };
+    let Some(excitation) = &found.excitation else {
+        return;
+    };
+    let law = law(signals, excitation, identified);
+    found.switching = law.as_ref().and_then(Law::switching);
+    if let Some((law, switching)) = law.zip(found.switching) {
+        let noise = match excitation {
+            Excitation::Relay { oscillation, .. } => {
+                oscillation.noise_sigma / oscillation.amplitude
+            }
+            Excitation::Recorded(recorded) => {
+                let sigma = identified
+                    .specification
+                    .noise
+                    .map_or(0.0, |noise| noise.std);
+                sigma / recorded.output_deviation
+            }
+        };
+        let clock = Clock {
+            law,
+            switching,
+            noise,
+        };
+        match clock.judge(options, pack, identified) {
+            Ok(remark) => found.remarks.extend(remark),
+            Err(verdict) => {
+                found.outcome = Err(verdict);
+                return;
+            }
+        }
+    }
+    if let Some(excited) = excitation.highest_rad_per_s() {
+        found.remarks.extend(extrapolation(excited, identified));
+    }
+    if relay::has_two_levels(signals) {
+        found.remarks.push(Remark::OneAmplitude);
+    }
+    limits(excitation, identified, &mut found.remarks);
+}
+
+/// Law of the relay over the part of the recording that was used.
+fn law<'a>(
+    signals: &'a Signals<'a>,
+    excitation: &Excitation,
+    identified: &Identified,
+) -> Option<Law<'a>> {
+    let span_s = match excitation {
+        Excitation::Relay { oscillation, .. } => (oscillation.start_s, oscillation.end_s),
+        Excitation::Recorded(recorded) => (recorded.start_s, recorded.end_s),
+    };
+    Law::find(signals, span_s, identified.model.linear().gain() > 0.0)
+}
+
+/// The relay's law, against what is known of the relay.
+struct Clock<'a> {
+    law: Law<'a>,
+    switching: Switching,
+    /// Noise over the amplitude of the output.
+    noise: f64,
+}
+
+impl Clock<'_> {
+    /// A remark, or the reason to refuse the recording.
+    fn judge(
+        &self,
+        options: &Options,
+        pack: Option<&Pack<'_>>,
+        identified: &Identified,
+    ) -> Result<Option<Remark>, Verdict> {
+        if options.input_late_s.is_some() {
+            return Ok(None);
+        }
+        let seen = self.switching.beta;
+        if let Some(beta) = options.beta {
+            return if self.is_that_of(beta) {
+                Ok(None)
+            } else {
+                Err(Verdict::ClockOffset {
+                    seen,
+                    beta,
+                    late_s: self.law.late_s(beta),
+                })
+            };
+        }
+        let leading =
+            pack.map(|pack| f64::from(0.5 * (pack.domain().beta[0] + pack.domain().beta[1])));
+        if leading
+            .into_iter()
+            .chain([0.0])
+            .any(|beta| self.is_that_of(beta))
+        {
+            return Ok(None);
+        }
+        let has_hysteresis = seen > LEADING;
+        let Some(beta) = leading
+            .filter(|_| !has_hysteresis)
+            .or(has_hysteresis.then_some(0.0))
+        else {
+            return Ok(None);
+        };
+        let late_s = self.law.late_s(beta);
+        let controller = identified.design.map(|design| design.controller);
+        let later = late_s
+            .map(|late_s| delayed(&identified.model, late_s))
+            .zip(controller);
+        let margin = later.map(|(model, controller)| margin_rad(&model, &controller));
+        // Only a relay that leads is made by few other programs than ours.
+        if margin == Some(None) && !has_hysteresis {
+            return Err(Verdict::ClockOffset { seen, beta, late_s });
+        }
+        Ok(Some(Remark::ClockUnknown {
+            seen,
+            beta,
+            late_s,
+            phase_margin_rad: margin.flatten(),
+            rad_per_s: (identified.design).map(|design| design.margins.gain_crossover_rad_per_s),
+        }))
+    }
+
+    /// Whether a relay with this `beta` may have made the recording, with both columns on one clock.
+    fn is_that_of(&self, beta: f64) -> bool {
+        let (period_s, sample_s) = (self.law.period_s(), self.law.sample_s());
+        let early_s = (EARLY + self.noise) * period_s + sample_s;
+        let averaged_s = AVERAGING * period_s + sample_s;
+        let late_s = self.law.late_s(beta);
+        late_s.is_some_and(|late_s| late_s > -early_s && late_s < averaged_s)
+    }
+}
+
+/// The model with more dead time (s), at least zero.
+fn delayed(model: &Model, late_s: f64) -> Model {
+    let linear = model.linear();
+    Model::from(linear.with_tau_s((linear.tau_s() + late_s).max(0.0)))
+}
+
+/// Phase margin (rad). `None` if the loop is unstable.
+fn margin_rad(model: &Model, controller: &Controller) -> Option<f64> {
+    margins(model, controller)
+        .map(|margins| margins.phase_margin_rad)
+        .filter(|margin| *margin > 0.0)
+}
+
+/// Compares the crossover with the highest excited frequency (rad/s). A controller too far beyond is withdrawn.
+fn extrapolation(excited: f64, identified: &mut Identified) -> Option<Remark> {
+    let design = identified.design?;
+    identified.resonance = resonance(&identified.model, &design.controller, excited);
+    let ratio = design.margins.gain_crossover_rad_per_s / excited;
+    let is_withdrawn = ratio > ROUNDING * MOST_EXTRAPOLATION;
+    if is_withdrawn {
+        identified.design = None;
+        identified.phase_margin_rad = None;
+        identified.step = None;
+        identified.resonance = None;
+    }
+    (ratio > EXTRAPOLATED).then_some(Remark::Extrapolated {
+        ratio,
+        is_withdrawn,
+    })
+}
+
+/// Largest factor by which a resonance above 1.5 times the frequency `excited` (rad/s) may raise the response of the process before
+/// the loop becomes unstable: `1 + 1/|T|`, by the small-gain theorem.
+fn resonance(model: &Model, controller: &Controller, excited: f64) -> Option<f64> {
+    const DECADES: f64 = 1.5;
+    const POINTS: i32 = 150;
+    let ratio = |point: i32| {
+        let omega =
+            EXTRAPOLATED * excited * 10_f64.powf(DECADES * f64::from(point) / f64::from(POINTS));
+        let l = loop_response(model, controller, omega)?;
+        // |1 + L|^2 by the law of cosines.
+        let distance_sq = 1.0 + l.magnitude * (l.magnitude + 2.0 * l.phase_rad.cos());
+        Some(l.magnitude / distance_sq.sqrt())
+    };
+    let largest = (0..=POINTS).filter_map(ratio).fold(0.0, f64::max);
+    (largest > 0.0).then(|| 1.0 + 1.0 / largest)
+}
+
+/// Remarks on what the controller asks for.
+fn limits(excitation: &Excitation, identified: &Identified, remarks: &mut Vec<Remark>) {
+    let Some(design) = &identified.design else {
+        return;
+    };
+    remarks.extend(
+        (design.margins.gain_margin)
+            .filter(|margin| *margin < LEAST_GAIN_MARGIN / ROUNDING)
+            .map(Remark::LittleGainMargin),
+    );
+    if let Some(noise) = identified.specification.noise {
+        let period_s = noise.sample_period_s;
+        let share = noise_amplification(&identified.model, &design.controller, period_s)
+            .map(|factor| factor * noise.std / noise.input_amplitude);
+        remarks.extend(
+            share
+                .filter(|share| *share > MOST_NOISE)
+                .map(Remark::NoiseAtActuator),
+        );
+    }
+    let (input, output) = match excitation {
+        Excitation::Relay { oscillation, .. } => {
+            (oscillation.relay_amplitude, oscillation.amplitude)
+        }
+        Excitation::Recorded(recorded) => (
+            identified
+                .specification
+                .noise
+                .map_or(f64::INFINITY, |noise| noise.input_amplitude),
+            recorded.output_deviation,
+        ),
+    };
+    let largest_step = identified.step.map(|step| input / step.peak_input.abs());
+    remarks.extend(
+        largest_step
+            .filter(|step| *step < output)
+            .map(|step| Remark::InputPeak { step, input }),
+    );
+}
