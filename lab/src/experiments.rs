@@ -11,18 +11,22 @@
 //! | [`defect`]      | defects that take a process out of the family                             |
 //! | [`campaign`]    | experiments on the paper's multirotors, described by a TOML file          |
 //! | [`recording`]   | campaigns of recordings of any process and test signal                    |
+//! | [`honesty`]     | campaigns of wrong data, with the plant that they were recorded on        |
+//! | [`actuator`]    | actuators that do not do what they are told                               |
 //! | [`benchmark`]   | the public benchmark: truths and recordings                               |
 //! | [`experiment`]  | one experiment: relay, pre-roll, noise, plant                             |
 //! | [`relays`]      | relays of other relay tests                                               |
 //! | [`oscillation`] | period and amplitude without bias, noise and defect                       |
 //! | [`cut`]         | cycles, signatures and samples of a recording                             |
 
+pub mod actuator;
 pub mod benchmark;
 pub mod campaign;
 pub mod cut;
 pub mod defect;
 pub mod draw;
 pub mod experiment;
+pub mod honesty;
 pub mod oscillation;
 pub mod recipe;
 pub mod recording;
@@ -34,6 +38,7 @@ pub use cut::{SampledCycle, SteadyCycle, cycles, last_steady_cycle, signals_of};
 pub use defect::{Defect, DefectKind};
 pub use draw::Drawn;
 pub use experiment::{ExperimentError, RelayExperiment, RelaySetup, Simulation};
+pub use honesty::{HonestyCampaign, HonestyError};
 pub use oscillation::Oscillation;
 pub use recipe::{Family, Recipe, RecipeError};
 pub use recording::{RecordingCampaign, RecordingError};

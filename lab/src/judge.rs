@@ -5,6 +5,7 @@ pub mod calibrate;
 pub mod evaluate;
 pub mod flights;
 pub mod harm;
+pub mod honesty;
 pub mod out_of_family;
 pub mod outcome;
 pub mod recording;

@@ -3,8 +3,10 @@
 use std::process::ExitCode;
 
 use onecycle_lab::experiments::{
-    Campaign, DefectKind, ExperimentError, Measure, RecordingCampaign, RelayExperiment,
+    Campaign, DefectKind, ExperimentError, HonestyCampaign, Measure, RecordingCampaign,
+    RelayExperiment,
 };
+use onecycle_lab::judge::honesty::honesty_outcome;
 use onecycle_lab::judge::out_of_family::{CycleClassifier, evaluate};
 use onecycle_lab::judge::outcome::{identification_outcome, relay_outcome};
 use onecycle_lab::judge::recording::recording_outcome;
@@ -26,6 +28,7 @@ use crate::{args, settings};
 pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
     let (table, journal) = match settings::read::<Head>(&arguments.file)?.measure {
         Measure::Recording => of_recordings(arguments)?,
+        Measure::Honesty => of_wrong_data(arguments)?,
         measure => of_relay_tests(arguments, measure)?,
     };
     if let Some(out) = &arguments.out {
@@ -67,19 +70,44 @@ fn of_relay_tests(arguments: &args::Campaign, measure: Measure) -> Result<Table,
     })
 }
 
-/// The table of recordings of any kind.
-fn of_recordings(arguments: &args::Campaign) -> Result<Table, Failure> {
+/// Refuses options of the campaigns of relay tests.
+fn check_options(arguments: &args::Campaign) -> Result<(), Failure> {
     let of_relays = [
         ("--cycles", arguments.cycles.is_some()),
         ("--method", arguments.method.is_some()),
         ("--sigma", arguments.sigma.is_some()),
         ("--time-scale", arguments.time_scale.is_some()),
     ];
-    if let Some((option, _)) = of_relays.iter().find(|(_, given)| *given) {
-        return Err(Failure::usage(format!(
+    match of_relays.iter().find(|(_, given)| *given) {
+        Some((option, _)) => Err(Failure::usage(format!(
             "{option} has no effect on a campaign of recordings: leave it out and change the file"
-        )));
+        ))),
+        None => Ok(()),
     }
+}
+
+/// The table of wrong data.
+fn of_wrong_data(arguments: &args::Campaign) -> Result<Table, Failure> {
+    check_options(arguments)?;
+    let mut campaign: HonestyCampaign = settings::read(&arguments.file)?;
+    campaign.cases = arguments.cases.unwrap_or(campaign.cases);
+    campaign
+        .validate()
+        .map_err(|error| Failure::unreadable(&arguments.file, error))?;
+    let count = campaign.cases * campaign.kinds.len() as u64;
+    let (cases, journal) = finished(arguments, count, |piece| {
+        let kind = (piece / campaign.cases) as usize;
+        let recording = campaign
+            .record(kind, piece % campaign.cases)
+            .map_err(|error| Failure::unreadable(&arguments.file, error))?;
+        Ok(honesty_outcome(recording.as_ref()))
+    })?;
+    Ok((report::honesty::table(&campaign, &cases), journal))
+}
+
+/// The table of recordings of any kind.
+fn of_recordings(arguments: &args::Campaign) -> Result<Table, Failure> {
+    check_options(arguments)?;
     let mut campaign: RecordingCampaign = settings::read(&arguments.file)?;
     campaign.cases = arguments.cases.unwrap_or(campaign.cases);
     campaign

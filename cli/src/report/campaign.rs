@@ -1,5 +1,6 @@
 //! The tables of a campaign.
 
+pub(crate) mod honesty;
 pub(crate) mod recording;
 
 use std::fmt::Write;

@@ -84,6 +84,8 @@ pub enum Measure {
     /// Errors, intervals and structures of the general estimator on any recording; the file describes a
     /// [`RecordingCampaign`](super::RecordingCampaign).
     Recording,
+    /// Whether wrong data are refused or named; the file describes an [`HonestyCampaign`](super::HonestyCampaign).
+    Honesty,
 }
 
 /// Sample period of an unscaled experiment (s): the paper's.

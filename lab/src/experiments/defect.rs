@@ -20,6 +20,9 @@
 //! | `slow_sensor`    | a lag of the sensor                                    | 0.1..0.5 T                     |
 //! | `tone`           | a foreign sinusoid in the measurement                  | 0.1..0.4 a, at 0.2..5 / T      |
 //! | `other_cycle`    | a limit cycle that the input does not drive, which the relay only follows | van der Pol's, or that of a loop with three lags |
+//! | `asymmetric_lag` | the actuator is slower downwards than upwards          | 1.5..3 `T_prop` downwards      |
+//! | `drag`           | damping by the square of the rate                      | 0.1..0.5 h at the oscillation's rate |
+//! | `thrust`         | curved characteristic of the actuator, `f + c f^2 / h` | c of 0.1..0.4                  |
 //!
 //! A dead zone in front of the actuator's lag is left out: under a relay it acts as a smaller relay
 //! amplitude, and no experiment with two levels can tell the two apart.
@@ -28,6 +31,7 @@ pub mod plant;
 
 use std::f64::consts::TAU;
 
+use num_complex::Complex64;
 use onecycle_onboard::Soiptd;
 use onecycle_plant::{NoiseSource, Sensor};
 use rand::{Rng, RngExt};
@@ -35,7 +39,8 @@ use rand::{Rng, RngExt};
 use super::oscillation::Oscillation;
 
 /// Kinds of defects. See the [module](self).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum DefectKind {
     /// No defect: a process of the family.
     InFamily,
@@ -65,10 +70,17 @@ pub enum DefectKind {
     Tone,
     /// A limit cycle that the input does not drive.
     OtherCycle,
+    /// The actuator is slower downwards than upwards.
+    AsymmetricLag,
+    /// Damping by the square of the rate.
+    Drag,
+    /// Curved characteristic of the actuator.
+    Thrust,
 }
 
 impl DefectKind {
-    /// All kinds that take a process out of the family.
+    /// The kinds of [`Measure::Unknown`](super::Measure::Unknown): all that took a process out of the family before the
+    /// estimators had forces of their own for drag and thrust.
     pub const OUTSIDE: [Self; 13] = [
         Self::Resonance,
         Self::ExtraLag,
@@ -103,6 +115,9 @@ impl DefectKind {
             Self::SlowSensor => "slow_sensor",
             Self::Tone => "tone",
             Self::OtherCycle => "other_cycle",
+            Self::AsymmetricLag => "asymmetric_lag",
+            Self::Drag => "drag",
+            Self::Thrust => "thrust",
         }
     }
 }
@@ -194,6 +209,23 @@ pub enum Defect {
         /// Integral gain per lag.
         integral: f64,
     },
+    /// The actuator is slower downwards than upwards.
+    AsymmetricLag {
+        /// Time constant of a falling force (s); a rising one has `T_prop`.
+        falling_s: f64,
+    },
+    /// Damping by the square of the rate.
+    Drag {
+        /// Force (input unit) at the rate below.
+        force: f64,
+        /// Rate (output unit / s).
+        rate: f64,
+    },
+    /// Curved characteristic of the actuator: the force `f` acts as `f + curvature f^2`.
+    Thrust {
+        /// Curvature (1 / input unit).
+        curvature: f64,
+    },
 }
 
 impl Defect {
@@ -256,6 +288,16 @@ impl Defect {
                 phase_rad: between(0.0, TAU),
             },
             DefectKind::OtherCycle => Self::draw_other(oscillation, rng),
+            DefectKind::AsymmetricLag => Self::AsymmetricLag {
+                falling_s: process.t_prop_s() * between(1.5, 3.0),
+            },
+            DefectKind::Drag => Self::Drag {
+                force: between(0.1, 0.5),
+                rate: TAU * amplitude / period_s,
+            },
+            DefectKind::Thrust => Self::Thrust {
+                curvature: between(0.1, 0.4),
+            },
         }
     }
 
@@ -294,6 +336,34 @@ impl Defect {
     #[must_use]
     pub fn is_undriven(&self) -> bool {
         matches!(self, Self::VanDerPol { .. } | Self::OtherLoop { .. })
+    }
+
+    /// What the defect multiplies the frequency response of the process by, at a frequency (rad/s). One for a defect
+    /// that a small signal does not see; `None` if there is no such factor.
+    #[must_use]
+    pub fn response(&self, rad_per_s: f64) -> Option<Complex64> {
+        let s = Complex64::new(0.0, rad_per_s);
+        match *self {
+            Self::Resonance {
+                rad_per_s: own,
+                damping,
+                mass_ratio,
+            } => {
+                let second = own * own / (s * s + 2.0 * damping * own * s + own * own);
+                Some(if mass_ratio > 0.0 {
+                    1.0 + mass_ratio * (1.0 - second)
+                } else {
+                    second
+                })
+            }
+            Self::ExtraLag { lag_s } | Self::SlowSensor { lag_s } => Some(1.0 / (lag_s * s + 1.0)),
+            Self::SecondPath { share, delay_s } => {
+                Some((1.0 - share) + share * (-s * delay_s).exp())
+            }
+            Self::RateSensor => Some(s),
+            Self::VanDerPol { .. } | Self::OtherLoop { .. } => None,
+            _ => Some(Complex64::ONE),
+        }
     }
 
     /// Reading of a sensor at this time (s after the pre-roll) and this output (output unit).

@@ -31,11 +31,12 @@ use onecycle_plant::{Experiment, Sensor, TestSignalError, Trace};
 use rand::RngExt;
 use serde::Deserialize;
 
+use self::parts::some_structure;
 pub use self::parts::{
     ClosedLoop, DisturbanceLevel, EntryName, Excitation, ProcessRange, RoadName, SensorDefects,
     Signal, Span,
 };
-use self::parts::{some_structure, within};
+pub(super) use self::parts::{distinguishing_beta, within};
 
 use super::campaign::{MOST_CASES, Measure};
 use super::draw::stream;

@@ -196,6 +196,7 @@ impl DefectPlant {
         let [y, v, f, extra, extra_rate] = *state;
         let b = self.process.k_over_t_body();
         let mut force = f;
+        let mut lag_s = self.process.t_prop_s();
         let mut of_extra = [0.0; 2];
         match self.defect {
             Defect::Resonance {
@@ -211,12 +212,15 @@ impl DefectPlant {
             Defect::SlowSensor { lag_s } => of_extra[0] = (y - extra) / lag_s,
             Defect::DeadZone { half_width } => force = f - f.clamp(-half_width, half_width),
             Defect::Friction { force: most } => force = f - most * (v / self.creep).tanh(),
+            Defect::AsymmetricLag { falling_s } if input < f => lag_s = falling_s,
+            Defect::Drag { force: most, rate } => force = f - most * (v / rate) * (v / rate).abs(),
+            Defect::Thrust { curvature } => force = f + curvature * f * f,
             _ => {}
         }
         [
             v,
             b * force - self.process.inv_t_body_per_s() * v,
-            (input - f) / self.process.t_prop_s(),
+            (input - f) / lag_s,
             of_extra[0],
             of_extra[1],
         ]

@@ -27,7 +27,7 @@ pub enum Span {
 }
 
 impl Span {
-    fn ends(self) -> (f64, f64) {
+    pub(in crate::experiments) fn ends(self) -> (f64, f64) {
         match self {
             Self::Value(value) => (value, value),
             Self::Range(low, high) => (low, high),
@@ -35,7 +35,7 @@ impl Span {
     }
 
     /// A random value; takes a number from `rng` for a range only.
-    fn draw(self, rng: &mut impl Rng) -> f64 {
+    pub(in crate::experiments) fn draw(self, rng: &mut impl Rng) -> f64 {
         match self {
             Self::Value(value) => value,
             Self::Range(low, high) => low + (high - low) * rng.random_range(0.0..=1.0),
@@ -63,10 +63,11 @@ pub struct ProcessRange {
 }
 
 /// A test signal by its name in files.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Signal {
     /// Relay in the place of the controller, or beside it.
+    #[default]
     Relay,
     /// Step.
     Step,
@@ -127,7 +128,7 @@ pub struct Excitation {
 /// Sines of a multisine.
 const SINES: u32 = 12;
 
-fn distinguishing_beta() -> f64 {
+pub(in crate::experiments) fn distinguishing_beta() -> f64 {
     Space::MULTIROTOR.beta
 }
 
@@ -163,7 +164,7 @@ impl DisturbanceLevel {
         .filter(|(_, value)| *value != 0.0)
     }
 
-    pub(super) fn check(&self) -> Result<(), FieldError> {
+    pub(in crate::experiments) fn check(&self) -> Result<(), FieldError> {
         for (name, value) in self.named() {
             first_out_of_range([(name, "0 to 1e9", value, within(0.0, 1e9, value))])?;
         }
@@ -191,7 +192,12 @@ impl DisturbanceLevel {
         })
     }
 
-    pub(super) fn of(&self, process: &Linear, noise_sigma: f64, sample_s: f64) -> Disturbances {
+    pub(in crate::experiments) fn of(
+        &self,
+        process: &Linear,
+        noise_sigma: f64,
+        sample_s: f64,
+    ) -> Disturbances {
         let mut bandwidths = Bandwidths::default();
         bandwidths.w1_rad_per_s = self.w1_rad_per_s;
         bandwidths.w0_rad_per_s = self.w0_rad_per_s;
@@ -293,7 +299,7 @@ impl ClosedLoop {
     }
 }
 
-pub(super) fn within(low: f64, high: f64, value: f64) -> bool {
+pub(in crate::experiments) fn within(low: f64, high: f64, value: f64) -> bool {
     (low..=high).contains(&value)
 }
 
@@ -346,7 +352,10 @@ impl ProcessRange {
     }
 
     /// A process with parameters drawn one after the other.
-    pub(super) fn draw(&self, rng: &mut impl Rng) -> Result<Linear, RecordingError> {
+    pub(in crate::experiments) fn draw(
+        &self,
+        rng: &mut impl Rng,
+    ) -> Result<Linear, RecordingError> {
         let own = self.structure.parameters().iter();
         let drawn: Vec<_> = own
             .filter_map(|&parameter| Some((parameter, self.span(parameter)?.draw(rng))))
@@ -357,7 +366,7 @@ impl ProcessRange {
             .map_err(|error| RecordingError::Parameter { structure, error })
     }
 
-    pub(super) fn check(&self, sample_rate_hz: f64) -> Result<(), RecordingError> {
+    pub(in crate::experiments) fn check(&self, sample_rate_hz: f64) -> Result<(), RecordingError> {
         use Parameter::{K, KOverTBody, NaturalFrequency, TBody, TProp, TProp2, Tau, Zeta};
         let structure = self.structure;
         let own = structure.parameters();
@@ -400,7 +409,11 @@ impl ProcessRange {
 }
 
 impl Excitation {
-    pub(super) fn check(&self, duration_s: f64, sample_rate_hz: f64) -> Result<(), RecordingError> {
+    pub(in crate::experiments) fn check(
+        &self,
+        duration_s: f64,
+        sample_rate_hz: f64,
+    ) -> Result<(), RecordingError> {
         let signal = self.signal;
         let settings = [
             ("band_hz", signal.has_band(), self.band_hz.is_some()),
@@ -436,7 +449,7 @@ impl Excitation {
     }
 
     /// What makes the input: the signal alone, or in the loop.
-    pub(super) fn controller(
+    pub(in crate::experiments) fn controller(
         &self,
         closed_loop: Option<&ClosedLoop>,
         duration_s: f64,

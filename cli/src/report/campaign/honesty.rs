@@ -1,0 +1,139 @@
+//! The table of a campaign of wrong data.
+
+use std::fmt::Write;
+
+use onecycle_lab::experiments::HonestyCampaign;
+use onecycle_lab::experiments::honesty::Kind;
+use onecycle_lab::judge::honesty::{Accepted, Broken, HonestyOutcome, HonestyTally};
+
+use super::or_dash;
+
+/// One line for each kind, the sums beside the targets, then every promise that was broken without a naming remark.
+/// Writing to a string cannot fail.
+pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> String {
+    let mut text = format!(
+        "{} recordings of each of {} kinds; wrong: a promise does not hold on the real plant\n\n\
+         {:<34} cases refused  named  remark: right wrong  silent: right wrong  unstable unnamed\n",
+        campaign.cases,
+        campaign.kinds.len(),
+        "kind",
+    );
+    let kinds: Vec<_> = kinds(campaign, outcomes).collect();
+    let [mut control, mut faulty] = [HonestyTally::default(); 2];
+    for (kind, outcomes) in &kinds {
+        let mut tally = HonestyTally::default();
+        for outcome in *outcomes {
+            tally.add(outcome, &kind.named_by);
+        }
+        row(&mut text, &kind.name, &tally);
+        let sum = if kind.control {
+            &mut control
+        } else {
+            &mut faulty
+        };
+        *sum = sum.and(tally);
+    }
+    text.push('\n');
+    let all = control.and(faulty);
+    row(&mut text, "right data", &control);
+    row(&mut text, "wrong data", &faulty);
+    row(&mut text, "all", &all);
+    targets(&mut text, &control, &all);
+    text.push_str("\nwrong and not named (kind, case, strength, promised margin, true margin, remarks, what broke)\n");
+    for (kind, outcomes) in &kinds {
+        for (n, outcome) in outcomes.iter().enumerate() {
+            if let HonestyOutcome::Accepted(accepted) = outcome
+                && !accepted.broken.is_empty()
+                && !accepted.is_named(&kind.named_by)
+            {
+                let _ = writeln!(text, "{}", line(&kind.name, n, accepted));
+            }
+        }
+    }
+    text
+}
+
+/// The kinds with the outcomes of their cases.
+fn kinds<'a>(
+    campaign: &'a HonestyCampaign,
+    outcomes: &'a [HonestyOutcome],
+) -> impl Iterator<Item = (&'a Kind, &'a [HonestyOutcome])> {
+    campaign
+        .kinds
+        .iter()
+        .zip(outcomes.chunks(campaign.cases as usize))
+}
+
+fn row(text: &mut String, name: &str, tally: &HonestyTally) {
+    let _ = writeln!(
+        text,
+        "{name:<34} {:5} {:7} {:6} {:14} {:5} {:14} {:5} {:9} {:7}",
+        tally.cases,
+        tally.refused,
+        tally.named,
+        tally.remarked_right,
+        tally.remarked_wrong,
+        tally.silent_right,
+        tally.silent_wrong,
+        tally.unstable,
+        tally.unstable_unnamed,
+    );
+}
+
+fn targets(text: &mut String, control: &HonestyTally, all: &HonestyTally) {
+    let percent =
+        |count: usize, of: usize| or_dash((of > 0).then(|| 100.0 * count as f64 / of as f64), 1);
+    let _ = writeln!(
+        text,
+        "\nsilent and wrong         {} % (target: 1 % at most)\n\
+         unnamed and wrong        {} %\n\
+         unstable and not named   {} (target: none)\n\
+         right data refused       {} % (target: 3 % at most)",
+        percent(all.silent_wrong, all.cases),
+        percent(all.silent_wrong + all.remarked_wrong, all.cases),
+        all.unstable_unnamed,
+        percent(control.refused, control.cases),
+    );
+}
+
+fn line(name: &str, n: usize, accepted: &Accepted) -> String {
+    let degrees = |margin: Option<f64>| or_dash(margin, 1);
+    let remarks = if accepted.remarks.is_empty() {
+        "silent".to_owned()
+    } else {
+        accepted.remarks.join("+")
+    };
+    let broken: Vec<String> = accepted.broken.iter().map(broken).collect();
+    format!(
+        "{name} #{n}, {}, {} deg, {} deg, {}, {remarks}: {}",
+        or_dash(accepted.strength, 4),
+        degrees(accepted.promised_margin_deg),
+        degrees(accepted.true_margin_deg),
+        accepted.structure,
+        broken.join("; ")
+    )
+}
+
+fn broken(broken: &Broken) -> String {
+    match broken {
+        Broken::Unstable { limit_cycle: None } => "unstable".to_owned(),
+        Broken::Unstable {
+            limit_cycle: Some(amplitude),
+        } => format!("limit cycle of {amplitude:.2} a"),
+        Broken::Margin {
+            promised_deg,
+            true_deg,
+        } => format!("margin {true_deg:.1} below {promised_deg:.1} deg"),
+        Broken::Parameter {
+            key,
+            low,
+            high,
+            truth,
+        } => format!(
+            "{key} {truth:.5} not in {} to {}",
+            or_dash(*low, 5),
+            or_dash(*high, 5)
+        ),
+        _ => "another promise".to_owned(),
+    }
+}
