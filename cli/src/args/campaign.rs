@@ -37,7 +37,10 @@ pub(crate) struct Campaign {
     /// Multiply all times by this factor, the sample period included [default: from the file]
     #[arg(long, value_name = "FACTOR")]
     pub(crate) time_scale: Option<f64>,
-    /// Also write the table to this file
+    /// Print the outcome of every case as JSON instead of the table
+    #[arg(long)]
+    pub(crate) json: bool,
+    /// Also write what is printed to this file
     #[arg(long, short, value_name = "OUT")]
     pub(crate) out: Option<PathBuf>,
     /// Discard the work of an interrupted run and start over

@@ -48,6 +48,19 @@ struct Head {
 /// The table of a campaign, and the journal to remove once it is written.
 type Table = (String, Option<Journal>);
 
+/// What is printed: the table, or the outcomes of all cases as JSON.
+fn shown<T: Serialize>(
+    arguments: &args::Campaign,
+    cases: &[T],
+    table: impl FnOnce() -> String,
+) -> Result<String, Failure> {
+    if !arguments.json {
+        return Ok(table());
+    }
+    let shown = json!({ "settings": settings(arguments)?, "cases": cases });
+    Ok(format!("{shown:#}\n"))
+}
+
 /// The table of relay tests on the paper's multirotors.
 fn of_relay_tests(arguments: &args::Campaign, measure: Measure) -> Result<Table, Failure> {
     let campaign = campaign(arguments)?;
@@ -56,7 +69,8 @@ fn of_relay_tests(arguments: &args::Campaign, measure: Measure) -> Result<Table,
             let case =
                 |experiment: &RelayExperiment| relay_outcome(experiment).map(RelayCase::from);
             let (cases, journal) = of_family(arguments, &campaign, case)?;
-            (report::relay(&campaign, &cases), journal)
+            let text = shown(arguments, &cases, || report::relay(&campaign, &cases))?;
+            (text, journal)
         }
         Measure::Unknown => of_kinds(arguments, &campaign)?,
         _ => {
@@ -65,7 +79,10 @@ fn of_relay_tests(arguments: &args::Campaign, measure: Measure) -> Result<Table,
                     .map(|outcome| IdentificationCase::of(&outcome))
             };
             let (cases, journal) = of_family(arguments, &campaign, case)?;
-            (report::identification(&campaign, &cases), journal)
+            let text = shown(arguments, &cases, || {
+                report::identification(&campaign, &cases)
+            })?;
+            (text, journal)
         }
     })
 }
@@ -102,7 +119,11 @@ fn of_wrong_data(arguments: &args::Campaign) -> Result<Table, Failure> {
             .map_err(|error| Failure::unreadable(&arguments.file, error))?;
         Ok(honesty_outcome(recording.as_ref()))
     })?;
-    Ok((report::honesty::table(&campaign, &cases), journal))
+    let named = report::honesty::named(&campaign, &cases);
+    let text = shown(arguments, &named, || {
+        report::honesty::table(&campaign, &cases)
+    })?;
+    Ok((text, journal))
 }
 
 /// The table of recordings of any kind.
@@ -120,7 +141,10 @@ fn of_recordings(arguments: &args::Campaign) -> Result<Table, Failure> {
             .map_err(|error| Failure::unreadable(&arguments.file, error))?;
         Ok(recording_outcome(&recording, &options))
     })?;
-    Ok((report::recording::table(&campaign, &cases), journal))
+    let text = shown(arguments, &cases, || {
+        report::recording::table(&campaign, &cases)
+    })?;
+    Ok((text, journal))
 }
 
 /// The campaign of the file, changed by the arguments.
@@ -188,20 +212,24 @@ fn of_kinds(arguments: &args::Campaign, campaign: &Campaign) -> Result<Table, Fa
         Ok(judged.map(OutsiderCase::from))
     })?;
     let mut rest = &cases[..];
-    let rows = kinds.into_iter().map(|kind| {
-        let count = match kind {
-            DefectKind::InFamily => in_family,
-            _ => campaign.cases,
-        };
-        let (own, others) = rest.split_at(count as usize);
-        rest = others;
-        // Processes that do not oscillate even without their defect are left out.
-        (kind, own.iter().copied().flatten().collect())
-    });
-    Ok((
-        report::unknown(campaign, &rows.collect::<Vec<_>>()),
-        journal,
-    ))
+    let rows: Vec<(DefectKind, Vec<OutsiderCase>)> = kinds
+        .into_iter()
+        .map(|kind| {
+            let count = match kind {
+                DefectKind::InFamily => in_family,
+                _ => campaign.cases,
+            };
+            let (own, others) = rest.split_at(count as usize);
+            rest = others;
+            // Processes that do not oscillate even without their defect are left out.
+            (kind, own.iter().copied().flatten().collect())
+        })
+        .collect();
+    let named: Vec<(&str, &OutsiderCase)> = (rows.iter())
+        .flat_map(|(kind, cases)| cases.iter().map(|case| (kind.name(), case)))
+        .collect();
+    let text = shown(arguments, &named, || report::unknown(campaign, &rows))?;
+    Ok((text, journal))
 }
 
 /// Cases of each thread between two writes to the journal: a few seconds of work.

@@ -26,27 +26,27 @@
 //! plants.
 
 mod fault;
+mod kind;
 mod plant;
+mod run;
 
+use onecycle_design::Parameter::{InverseTBody, KOverTBody, TBody, TProp};
 use onecycle_design::{Linear, Model};
-use onecycle_onboard::{Relay, RelaySettings};
-use onecycle_plant::{Controller, Noise, NoiseSource, Sensed, Sensor};
+use onecycle_plant::Noise;
 use rand::{Rng, RngExt};
 use serde::Deserialize;
 
 pub use self::fault::{DrawnFault, Fault};
+pub use self::kind::{Kind, Test};
 pub use self::plant::{RealPlant, TruePlant};
+use self::run::Run;
 
 use super::campaign::{MOST_CASES, Measure};
-use super::defect::{Defect, DefectKind};
+use super::defect::Defect;
 use super::draw::stream;
 use super::experiment::ExperimentError;
 use super::oscillation::Oscillation;
-use super::recording::{
-    DisturbanceLevel, Excitation, ProcessRange, RecordingError, Signal, Span, distinguishing_beta,
-    within,
-};
-use super::relays::AsymmetricRelay;
+use super::recording::{ProcessRange, RecordingError, Span, within};
 use crate::space::{FieldError, first_out_of_range};
 
 /// A campaign of wrong data as a file describes it. See the [module](self).
@@ -69,76 +69,11 @@ pub struct HonestyCampaign {
     pub samples_per_period: Span,
     /// Processes.
     pub process: ProcessRange,
+    /// Remarks that stand on nearly every recording, so that they tell nothing about one; but they may name a trouble.
+    #[serde(default)]
+    pub standing: Vec<String>,
     /// Kinds of data.
     pub kinds: Vec<Kind>,
-}
-
-/// A kind of data. What is `None` is that of the campaign.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Kind {
-    /// Name in the table.
-    pub name: String,
-    /// Whether the data are right.
-    #[serde(default)]
-    pub control: bool,
-    /// Fault of the recording or its plant.
-    pub fault: Option<Fault>,
-    /// Strength of the fault, in its unit.
-    pub strength: Option<Span>,
-    /// Defect of the process, of random strength. Needs an integrator with two lags.
-    pub defect: Option<DefectKind>,
-    /// Kinds of the remarks that name the trouble.
-    #[serde(default)]
-    pub named_by: Vec<String>,
-    /// The experiment.
-    #[serde(default)]
-    pub test: Test,
-    /// Processes.
-    pub process: Option<ProcessRange>,
-    /// Noise.
-    pub noise: Option<Span>,
-    /// Largest bias.
-    pub bias: Option<f64>,
-    /// Length of the test.
-    pub periods: Option<f64>,
-    /// Disturbances; not beside a defect.
-    #[serde(default)]
-    pub wind: DisturbanceLevel,
-}
-
-/// An experiment, in the units `T`, `a` and `h`.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Test {
-    /// The test signal.
-    pub signal: Signal,
-    /// Parameter of the relay.
-    pub beta: f64,
-    /// Asymmetry of the relay, which then trims the bias away.
-    pub asymmetry: Option<f32>,
-    /// Hysteresis in `a`, of a relay with two fixed levels in place of the board's.
-    pub hysteresis: Option<f64>,
-    /// Lower level of that relay, below zero.
-    pub low: f64,
-    /// Lowest and highest frequency of a chirp or a multisine, in `1/T`.
-    pub band: Option<[f64; 2]>,
-    /// Length of a pulse, in `T`.
-    pub pulse: Option<f64>,
-}
-
-impl Default for Test {
-    fn default() -> Self {
-        Self {
-            signal: Signal::Relay,
-            beta: distinguishing_beta(),
-            asymmetry: None,
-            hysteresis: None,
-            low: -1.0,
-            band: None,
-            pulse: None,
-        }
-    }
 }
 
 /// Why a campaign of wrong data cannot run.
@@ -214,14 +149,8 @@ pub struct FaultyRecording {
     pub noise_sigma: f64,
 }
 
-/// Least noise that the relay is told, in `a`: it chatters without.
-const LEAST_RELAY_NOISE: f64 = 1e-3;
-/// Steps of a wind.
-const WIND_STEPS: usize = 3;
 /// Most samples of a test.
 const MOST_SAMPLES: f64 = 1e6;
-/// Largest output, in `a`: beyond it the experiment has failed.
-const LARGEST: f64 = 1e6;
 
 impl HonestyCampaign {
     /// Checks every field.
@@ -278,6 +207,13 @@ impl HonestyCampaign {
         if kind.fault.is_some_and(Fault::has_strength) && kind.strength.is_none() {
             return Err(HonestyError::Strength { kind: name() });
         }
+        let second = kind.test.second_amplitude.unwrap_or(1.0);
+        first_out_of_range([(
+            "second_amplitude",
+            "0.01 to 100",
+            second,
+            within(0.01, 100.0, second),
+        )])?;
         let (low, high) = kind.strength.map_or((0.0, 0.0), Span::ends);
         first_out_of_range([(
             "strength",
@@ -313,7 +249,7 @@ impl HonestyCampaign {
         };
         let mut rng = stream(self.seed, n);
         let range = kind.process.as_ref().unwrap_or(&self.process);
-        let process = range.draw(&mut rng).map_err(part)?;
+        let process = ordered(range.draw(&mut rng).map_err(part)?);
         let beta = match kind.test {
             Test {
                 hysteresis: Some(_),
@@ -369,6 +305,24 @@ impl HonestyCampaign {
     }
 }
 
+/// The same process with its lags in order: `T_body` is the longer one, as an identification reports it.
+fn ordered(process: Linear) -> Linear {
+    let (lag_s, body_s) = (process.parameter(TProp), process.parameter(TBody));
+    let (Some(lag_s), Some(body_s)) = (lag_s, body_s) else {
+        return process;
+    };
+    if lag_s <= body_s || process.structure().stages().lags > 1 {
+        return process;
+    }
+    let swapped = |parameter| match parameter {
+        TProp => Some(body_s),
+        TBody => Some(lag_s),
+        InverseTBody | KOverTBody => None,
+        other => process.parameter(other),
+    };
+    Linear::from_parameters(process.structure(), swapped).unwrap_or(process)
+}
+
 fn drawn_defect(
     kind: &Kind,
     process: &Linear,
@@ -385,139 +339,31 @@ fn drawn_defect(
     Ok(Defect::draw(defect, &soiptd, oscillation, rng))
 }
 
-/// An experiment that is ready to run.
-struct Run<'a> {
-    kind: &'a Kind,
-    truth: &'a TruePlant,
-    fault: Option<DrawnFault>,
-    noise_sigma: f64,
-    bias: f64,
-    step_s: f64,
-    duration_s: f64,
-}
+#[cfg(test)]
+mod tests {
+    use onecycle_design::{Parameter, Structure};
 
-impl Run<'_> {
-    fn strength(&self, fault: Fault) -> f64 {
-        self.fault.map_or(0.0, |drawn| drawn.of(fault))
-    }
+    use super::*;
 
-    /// `None` if the output runs away.
-    fn run(&self, noise: &mut Noise, rng: &mut impl Rng) -> Result<Option<Columns>, HonestyError> {
-        let TruePlant {
-            defect,
-            oscillation,
-            ..
-        } = *self.truth;
-        let amplitude = oscillation.amplitude;
-        let quantum = self.strength(Fault::Quantised) * amplitude;
-        let sensor = Sensor::noisy(self.noise_sigma).with_quantum(quantum);
-        let told = (self.noise_sigma).max(quantum) / amplitude;
-        let sizes = (amplitude, told.max(LEAST_RELAY_NOISE));
-        let mut controller =
-            (self.kind.test).controller(self.kind, self.duration_s, oscillation.period_s, sizes)?;
-        let disturbances = (self.kind.wind).of(&self.truth.process, self.noise_sigma, self.step_s);
-        let jitter = self.strength(Fault::Jitter);
-        let mut plant = self
-            .truth
-            .plant(self.step_s, &disturbances, jitter > 0.0, noise);
-        let wind = self.wind(rng);
-        let samples = (self.duration_s / self.step_s).round() as usize;
-        let mut columns = Columns {
-            sample_s: self.step_s,
-            time_s: Vec::with_capacity(samples),
-            input: Vec::with_capacity(samples),
-            output: Vec::with_capacity(samples),
-        };
-        let feedback = self.strength(Fault::UnloggedFeedback) / amplitude;
-        for sample in 0..samples {
-            let time_s = sample as f64 * self.step_s;
-            let output = plant.output();
-            if output.is_nan() || output.abs() > LARGEST * amplitude {
-                return Ok(None);
-            }
-            let sensed = Sensed {
-                output: defect.sense(output, time_s, &sensor, noise),
-                rate: plant.rate(),
-            };
-            let input = controller.step(self.step_s, 0.0, sensed);
-            columns.time_s.push(time_s);
-            columns.input.push(input);
-            columns.output.push(sensed.output);
-            let part = time_s / self.duration_s;
-            plant.gain = 1.0 - (1.0 - self.truth.last_gain) * part;
-            let gust: f64 = wind
-                .iter()
-                .filter(|(from, _)| part >= *from)
-                .map(|(_, u)| u)
-                .sum();
-            let late = if jitter > 0.0 {
-                (1.0 + jitter * noise.standard_normal()).clamp(0.1, 1.9)
-            } else {
-                1.0
-            };
-            let other = self.bias + gust - feedback * output;
-            plant.step(input, other, late * self.step_s, noise);
-        }
-        Ok(Some(columns))
-    }
-
-    /// Steps of the wind: from which part of the test on, and by how much (input unit).
-    fn wind(&self, rng: &mut impl Rng) -> Vec<(f64, f64)> {
-        let size = self.strength(Fault::WindSteps);
-        let count = if size > 0.0 { WIND_STEPS } else { 0 };
-        (0..count)
-            .map(|_| {
-                let sign = if rng.random_bool(0.5) { size } else { -size };
-                (rng.random_range(0.1..0.95), sign)
+    // K = 3, lags of 0.3 and 0.2 s: the longer one is T_body, and the frequency response is the same.
+    #[test]
+    fn the_longer_lag_is_that_of_the_body() {
+        let value = |parameter| {
+            Some(match parameter {
+                Parameter::K => 3.0,
+                TProp => 0.3,
+                TBody => 0.2,
+                Parameter::Tau => 0.01,
+                _ => return None,
             })
-            .collect()
-    }
-}
-
-impl Test {
-    /// The test signal for a period of the oscillation (s).
-    fn excitation(&self, period_s: f64) -> Excitation {
-        Excitation {
-            signal: self.signal,
-            amplitude: 1.0,
-            band_hz: self.band.map(|band| band.map(|edge| edge / period_s)),
-            pulse_s: self.pulse.map(|pulse| pulse * period_s),
-            beta: self.beta,
-        }
-    }
-
-    /// What makes the input, for an amplitude (output unit) and a noise (in amplitudes).
-    fn controller(
-        &self,
-        kind: &Kind,
-        duration_s: f64,
-        period_s: f64,
-        (amplitude, noise): (f64, f64),
-    ) -> Result<Box<dyn Controller>, HonestyError> {
-        let of_recording = |error| HonestyError::Part {
-            kind: kind.name.clone(),
-            error,
         };
-        if let Some(hysteresis) = self.hysteresis {
-            let relay = AsymmetricRelay::new(1.0, self.low, hysteresis * amplitude);
-            let relay = relay.map_err(|error| HonestyError::Relay {
-                kind: kind.name.clone(),
-                error,
-            })?;
-            return Ok(Box::new(relay));
+        for structure in [Structure::Soiptd, Structure::Soptd] {
+            let drawn = Linear::from_parameters(structure, value).unwrap();
+            let ordered = ordered(drawn);
+            let of = |parameter| ordered.parameter(parameter).unwrap();
+            assert!((of(TProp) - 0.2).abs() < 1e-15 && (of(TBody) - 0.3).abs() < 1e-15);
+            let difference = ordered.frequency_response(4.0) - drawn.frequency_response(4.0);
+            assert!(difference.norm() < 1e-12, "{difference}");
         }
-        let noise_sigma = noise * amplitude;
-        if let (Signal::Relay, Some(asymmetry)) = (self.signal, self.asymmetry) {
-            let relay = Relay::new(RelaySettings {
-                noise_sigma: noise_sigma as f32,
-                trim_gain: RelaySettings::TRIM_GAIN,
-                asymmetry,
-                ..RelaySettings::new(1.0, self.beta as f32)
-            });
-            return Ok(Box::new(relay.map_err(|error| of_recording(error.into()))?));
-        }
-        (self.excitation(period_s))
-            .controller(None, duration_s, noise_sigma)
-            .map_err(of_recording)
     }
 }

@@ -5,17 +5,19 @@
 //!
 //! - the loop is unstable: it diverges, or ends in a limit cycle;
 //! - the phase margin on the real plant is below the low end of its interval by more than 3 degrees;
+//! - the step of the paper's PD, which reaches the reference on a process with an integrator, ends more than 5 % away from
+//!   it;
 //! - a parameter lies outside its 90 % interval by more than half of the width of the interval, and by more than 1 % of its
 //!   value.
 
-use std::f64::consts::{PI, TAU};
-
-use num_complex::Complex64;
-use onecycle_design::{Controller, Model, Parameter, Structure};
+use onecycle_design::soiptd_pd::margins::margins;
+use onecycle_design::{Model, Parameter, Specification, Structure};
 use onecycle_identify::{Identification, Identified, Interval, Options, Remark, Signals, identify};
-use onecycle_onboard::{PidLaw, PidSettings};
-use onecycle_plant::{Disturbances, Noise, Sensed};
+use onecycle_onboard::Pd;
 
+mod trial;
+
+use self::trial::{LoopEnd, Trial};
 use crate::experiments::honesty::{FaultyRecording, TruePlant};
 
 /// Result of one recording.
@@ -44,6 +46,9 @@ pub struct Accepted {
     pub promised_margin_deg: Option<f64>,
     /// Phase margin on the real plant (degrees). `None` without a controller or a gain crossover.
     pub true_margin_deg: Option<f64>,
+    /// Phase margin of the paper's PD, which promises 20 degrees, on the real plant (degrees). `None` where there is no such
+    /// PD, and on a plant that is no integrator with two lags.
+    pub paper_margin_deg: Option<f64>,
     /// Promises that do not hold.
     pub broken: Vec<Broken>,
 }
@@ -64,6 +69,11 @@ pub enum Broken {
         promised_deg: f64,
         /// On the real plant.
         true_deg: f64,
+    },
+    /// The step of the paper's PD does not end at the reference.
+    FinalValue {
+        /// Where it ends, over the reference.
+        truth: f64,
     },
     /// A parameter is not within its interval.
     Parameter {
@@ -91,10 +101,18 @@ impl Accepted {
     pub fn is_named(&self, kinds: &[String]) -> bool {
         self.remarks.iter().any(|remark| kinds.contains(remark))
     }
+
+    /// Whether there is no remark but of these kinds.
+    #[must_use]
+    pub fn is_silent(&self, standing: &[String]) -> bool {
+        self.remarks.iter().all(|remark| standing.contains(remark))
+    }
 }
 
 /// Degrees by which a margin may be below its interval.
 const TOLERATED_DEG: f64 = 3.0;
+/// Part of the reference by which a step may miss it.
+const TOLERATED_END: f64 = 0.05;
 /// Part of a parameter by which its interval may miss it.
 const TOLERATED_PART: f64 = 0.01;
 
@@ -128,53 +146,66 @@ fn judge(recording: &FaultyRecording, identified: &Identified, remarks: &[Remark
     if truth.has_parameters() {
         broken.extend(parameters(&truth, identified));
     }
-    let controller = identified.design.map(|design| design.controller);
-    let crossover = identified
-        .design
-        .map(|design| design.margins.gain_crossover_rad_per_s);
-    let promised_deg = identified
-        .phase_margin_rad
-        .and_then(|margin| Some(margin.low?.to_degrees()));
+    let paper = paper_pd(identified);
+    broken.extend(paper.and_then(|pd| final_value(&truth, identified, pd.kp)));
+    let paper_margin_deg = (paper.zip(Model::from(truth.process).soiptd()))
+        .filter(|_| truth.has_parameters())
+        .and_then(|(pd, process)| margins(&process, pd))
+        .map(|margins| margins.phase_margin_rad.to_degrees());
+    let margin = identified.phase_margin_rad;
+    let promised_margin_deg = margin.and_then(|margin| Some(margin.low?.to_degrees()));
     let mut true_margin_deg = None;
-    if let (Some(controller), Some(crossover)) = (&controller, crossover) {
-        let loop_end = run(
-            &truth,
-            controller,
-            crossover,
-            columns_step(recording),
-            recording.noise_sigma,
-        );
-        let margin = least_margin_rad(&truth, controller, crossover).map(f64::to_degrees);
-        true_margin_deg = margin.map(|margin| match loop_end {
+    if let Some(design) = &identified.design {
+        let trial = Trial {
+            truth,
+            controller: design.controller,
+            crossover_rad_per_s: design.margins.gain_crossover_rad_per_s,
+        };
+        let end = trial.run(recording.columns.sample_s, recording.noise_sigma);
+        let margin = trial.least_margin_rad().map(f64::to_degrees);
+        true_margin_deg = margin.map(|margin| match end {
             LoopEnd::Settled => margin,
             _ => margin.min(-margin),
         });
-        broken.extend(loop_end.broken());
-        if let (Some(promised_deg), Some(true_deg)) = (promised_deg, true_margin_deg)
-            && true_deg < promised_deg - TOLERATED_DEG
-        {
-            broken.push(Broken::Margin {
-                promised_deg,
-                true_deg,
-            });
-        }
+        broken.extend(end.broken());
     }
+    if let (Some(promised_deg), Some(true_deg)) = (promised_margin_deg, true_margin_deg)
+        && true_deg < promised_deg - TOLERATED_DEG
+    {
+        broken.push(Broken::Margin {
+            promised_deg,
+            true_deg,
+        });
+    }
+    let kinds = remarks.iter().map(Remark::kind);
     Accepted {
-        remarks: remarks
-            .iter()
-            .map(Remark::kind)
-            .map(str::to_owned)
-            .collect(),
+        remarks: kinds.map(str::to_owned).collect(),
         structure: identified.model.structure().name().to_owned(),
         strength: recording.strength,
-        promised_margin_deg: promised_deg,
+        promised_margin_deg,
         true_margin_deg,
+        paper_margin_deg,
         broken,
     }
 }
 
-fn columns_step(recording: &FaultyRecording) -> f64 {
-    recording.columns.sample_s
+/// The paper's PD for an identified integrator with two lags.
+fn paper_pd(identified: &Identified) -> Option<Pd> {
+    (identified.model.structure() == Structure::Soiptd).then_some(())?;
+    let proposal = identified.propose(&Specification::paper());
+    proposal.outcome.ok()?.controller.pd()
+}
+
+/// The end of a step that was promised to reach the reference, on a process without an integrator.
+fn final_value(truth: &TruePlant, identified: &Identified, kp: f64) -> Option<Broken> {
+    let integrators = |structure: Structure| structure.stages().integrators;
+    let is_promised = integrators(identified.model.structure()) > 0;
+    if !is_promised || integrators(truth.process.structure()) > 0 {
+        return None;
+    }
+    let gain = kp * truth.process.parameter(Parameter::K)?;
+    let end = gain / (1.0 + gain);
+    ((end - 1.0).abs() > TOLERATED_END).then_some(Broken::FinalValue { truth: end })
 }
 
 /// Parameters whose intervals miss the truth by too much.
@@ -231,122 +262,6 @@ fn misses(interval: &Interval, value: f64, scale: f64) -> bool {
     below.max(above) > half.max(TOLERATED_PART * scale)
 }
 
-/// Turns of the gain crossover for which a loop is simulated: at 5 degrees of phase margin `exp(-40 tan(5 deg) pi) = 2e-5`
-/// remains.
-const TURNS: f64 = 40.0;
-/// Fewest and most samples of that.
-const SAMPLES: (f64, f64) = (1e3, 1e5);
-/// Output over the step at which a loop has diverged.
-const DIVERGED: f64 = 1e3;
-/// Amplitude of a limit cycle over that of the relay oscillation, and over the noise, that a loop may keep.
-const QUIET: (f64, f64) = (0.02, 5.0);
-/// Ratio of the amplitudes of the last two quarters above which an oscillation does not decay.
-const LASTING: f64 = 0.8;
-
-/// How the step of a loop ends.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum LoopEnd {
-    Settled,
-    /// Amplitude over that of the relay oscillation.
-    LimitCycle(f64),
-    Diverged,
-}
-
-impl LoopEnd {
-    fn broken(self) -> Option<Broken> {
-        let limit_cycle = match self {
-            Self::Settled => return None,
-            Self::LimitCycle(amplitude) => Some(amplitude),
-            Self::Diverged => None,
-        };
-        Some(Broken::Unstable { limit_cycle })
-    }
-}
-
-/// The loop of a controller with the real plant under a step of one amplitude of the oscillation, without noise.
-fn run(
-    truth: &TruePlant,
-    controller: &Controller,
-    crossover_rad_per_s: f64,
-    sample_s: f64,
-    noise_sigma: f64,
-) -> LoopEnd {
-    let pid = controller.pid();
-    let own_s = pid.execution.sample_period_s;
-    let step_s = if own_s > 0.0 { own_s } else { sample_s };
-    let settings = PidSettings::new(pid.kp as f32, pid.ki as f32, pid.kd as f32)
-        .with_filter_s(pid.filter_s as f32)
-        .with_setpoint_weight(pid.setpoint_weight as f32);
-    let Ok(mut law) = PidLaw::new(settings) else {
-        return LoopEnd::Diverged;
-    };
-    if truth.defect.is_undriven() {
-        return LoopEnd::Diverged;
-    }
-    let mut noise = Noise::from_seed(0);
-    let mut plant = truth.plant(step_s, &Disturbances::default(), false, &mut noise);
-    plant.gain = truth.last_gain;
-    let amplitude = truth.oscillation.amplitude;
-    let samples = (TURNS * TAU / crossover_rad_per_s / step_s).clamp(SAMPLES.0, SAMPLES.1);
-    let mut quarters = [(f64::INFINITY, f64::NEG_INFINITY); 4];
-    for sample in 0..samples as usize {
-        let output = plant.output();
-        if output.is_nan() || output.abs() > DIVERGED * amplitude {
-            return LoopEnd::Diverged;
-        }
-        let (low, high) = &mut quarters[(4 * sample / samples as usize).min(3)];
-        (*low, *high) = (low.min(output), high.max(output));
-        let sensed = Sensed {
-            output,
-            rate: plant.rate(),
-        };
-        let input = onecycle_plant::Controller::step(&mut law, step_s, amplitude, sensed);
-        plant.step(input, 0.0, step_s, &mut noise);
-    }
-    let [.., before, last] = quarters.map(|(low, high)| 0.5 * (high - low));
-    let quiet = (QUIET.0 * amplitude).max(QUIET.1 * noise_sigma);
-    if last > quiet && last > LASTING * before {
-        LoopEnd::LimitCycle(last / amplitude)
-    } else {
-        LoopEnd::Settled
-    }
-}
-
-/// Range of frequencies about the designed crossover in which the true one is searched, and their number.
-const AROUND: f64 = 100.0;
-const FREQUENCIES: usize = 8000;
-
-/// Least distance of the loop from -1 in phase, over its gain crossovers and over the processes that the plant is near to
-/// (rad). `None` if the loop has no crossover.
-fn least_margin_rad(
-    truth: &TruePlant,
-    controller: &Controller,
-    crossover_rad_per_s: f64,
-) -> Option<f64> {
-    let responses = truth.responses();
-    let margins = responses.iter().flat_map(|response| {
-        let at = |k: usize| {
-            let part = 2.0 * k as f64 / FREQUENCIES as f64 - 1.0;
-            let omega = crossover_rad_per_s * AROUND.powf(part);
-            controller.frequency_response(omega) * response(omega)
-        };
-        (0..FREQUENCIES).filter_map(move |k| crossing_rad(at(k), at(k + 1)))
-    });
-    margins.min_by(|a, b| a.abs().total_cmp(&b.abs()))
-}
-
-/// Phase above -180 degrees (rad, -pi to pi) where the magnitude passes 1 between two points of an open loop.
-fn crossing_rad(from: Complex64, to: Complex64) -> Option<f64> {
-    let (a, b) = (from.norm().ln(), to.norm().ln());
-    if (a > 0.0) == (b > 0.0) {
-        return None;
-    }
-    let turn = (to / from).arg();
-    let phase = from.arg() + turn * a / (a - b);
-    let above = phase + PI;
-    Some(above - TAU * (above / TAU).round())
-}
-
 /// Counts over the recordings of one kind, or of several.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct HonestyTally {
@@ -371,8 +286,9 @@ pub struct HonestyTally {
 }
 
 impl HonestyTally {
-    /// Adds an outcome of a kind with these naming remarks. Tests that ran away leave no recording, so they do not count.
-    pub fn add(&mut self, outcome: &HonestyOutcome, named_by: &[String]) {
+    /// Adds an outcome of a kind whose trouble the remarks `named_by` name; the remarks `standing` tell nothing. Tests that
+    /// ran away leave no recording, so they do not count.
+    pub fn add(&mut self, outcome: &HonestyOutcome, named_by: &[String], standing: &[String]) {
         let accepted = match outcome {
             HonestyOutcome::NotRecorded => return,
             HonestyOutcome::Refused(_) => {
@@ -384,7 +300,7 @@ impl HonestyTally {
         };
         let is_named = accepted.is_named(named_by);
         let is_right = accepted.broken.is_empty();
-        let count = match (is_named, accepted.remarks.is_empty(), is_right) {
+        let count = match (is_named, accepted.is_silent(standing), is_right) {
             (true, ..) => &mut self.named,
             (_, false, true) => &mut self.remarked_right,
             (_, false, false) => &mut self.remarked_wrong,
@@ -411,5 +327,29 @@ impl HonestyTally {
             unstable: self.unstable + other.unstable,
             unstable_unnamed: self.unstable_unnamed + other.unstable_unnamed,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // An interval of 0.9 to 1.1 has a half width of 0.1: it misses 1.21 and does not miss 1.19. One of 0.999 to 1.001 misses
+    // 1.005 by more than its width, but not by a hundredth; it misses 1.02.
+    #[test]
+    fn an_interval_misses_by_more_than_half_its_width_and_a_hundredth() {
+        let interval = |low, high| Interval {
+            estimate: Some(1.0),
+            low,
+            high,
+        };
+        let wide = interval(Some(0.9), Some(1.1));
+        let found = [1.0, 1.19, 1.21, 0.81, 0.79].map(|value| misses(&wide, value, value));
+        assert_eq!(found, [false, false, true, false, true]);
+        let narrow = interval(Some(0.999), Some(1.001));
+        let found = [1.005, 1.02].map(|value| misses(&narrow, value, value));
+        assert_eq!(found, [false, true]);
+        let open = interval(Some(0.9), None);
+        assert!(!misses(&open, 1e9, 1.0) && misses(&open, 0.5, 0.5));
     }
 }

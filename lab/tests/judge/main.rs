@@ -11,6 +11,7 @@ mod campaigns;
 mod evaluate;
 mod flights;
 mod harmonics;
+mod honesty;
 mod one_cycle;
 mod out_of_family;
 mod recordings;

@@ -1,12 +1,45 @@
 //! The table of a campaign of wrong data.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
 use onecycle_lab::experiments::HonestyCampaign;
 use onecycle_lab::experiments::honesty::Kind;
 use onecycle_lab::judge::honesty::{Accepted, Broken, HonestyOutcome, HonestyTally};
 
+use serde::Serialize;
+
 use super::or_dash;
+
+/// A case in JSON.
+#[derive(Serialize)]
+pub(crate) struct Named<'a> {
+    kind: &'a str,
+    case: usize,
+    /// Whether a remark names the trouble.
+    is_named: bool,
+    outcome: &'a HonestyOutcome,
+}
+
+/// The outcomes with their kinds.
+pub(crate) fn named<'a>(
+    campaign: &'a HonestyCampaign,
+    outcomes: &'a [HonestyOutcome],
+) -> Vec<Named<'a>> {
+    let of_kind = |(kind, outcomes): OfKind<'a>| {
+        let is_named = |outcome: &HonestyOutcome| matches!(outcome, HonestyOutcome::Accepted(found) if found.is_named(&kind.named_by));
+        outcomes
+            .iter()
+            .enumerate()
+            .map(move |(case, outcome)| Named {
+                kind: &kind.name,
+                case,
+                is_named: is_named(outcome),
+                outcome,
+            })
+    };
+    kinds(campaign, outcomes).flat_map(of_kind).collect()
+}
 
 /// One line for each kind, the sums beside the targets, then every promise that was broken without a naming remark.
 /// Writing to a string cannot fail.
@@ -23,7 +56,7 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
     for (kind, outcomes) in &kinds {
         let mut tally = HonestyTally::default();
         for outcome in *outcomes {
-            tally.add(outcome, &kind.named_by);
+            tally.add(outcome, &kind.named_by, &campaign.standing);
         }
         row(&mut text, &kind.name, &tally);
         let sum = if kind.control {
@@ -39,6 +72,8 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
     row(&mut text, "wrong data", &faulty);
     row(&mut text, "all", &all);
     targets(&mut text, &control, &all);
+    paper(&mut text, &kinds);
+    remarks(&mut text, &kinds);
     text.push_str("\nwrong and not named (kind, case, strength, promised margin, true margin, remarks, what broke)\n");
     for (kind, outcomes) in &kinds {
         for (n, outcome) in outcomes.iter().enumerate() {
@@ -53,11 +88,68 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
     text
 }
 
+/// A kind with the outcomes of its cases.
+type OfKind<'a> = (&'a Kind, &'a [HonestyOutcome]);
+
+fn accepted<'a>(kinds: &'a [OfKind<'a>]) -> impl Iterator<Item = (&'a Kind, &'a Accepted)> {
+    let of = |(kind, outcomes): &OfKind<'a>| {
+        let kind = *kind;
+        outcomes.iter().filter_map(move |outcome| match outcome {
+            HonestyOutcome::Accepted(accepted) => Some((kind, accepted)),
+            _ => None,
+        })
+    };
+    kinds.iter().flat_map(of)
+}
+
+/// The paper's PD on the real plants.
+fn paper(text: &mut String, kinds: &[OfKind<'_>]) {
+    let margins: Vec<f64> = accepted(kinds)
+        .filter_map(|(_, accepted)| accepted.paper_margin_deg)
+        .collect();
+    let below = |limit: f64| margins.iter().filter(|margin| **margin < limit).count();
+    let _ = writeln!(
+        text,
+        "PD of the paper, 20 deg  {} judged, {} below 17 deg, {} unstable",
+        margins.len(),
+        below(17.0),
+        below(0.0),
+    );
+}
+
+/// How often each remark stands on accepted right and wrong data: one that stands on both alike tells nothing.
+fn remarks(text: &mut String, kinds: &[OfKind<'_>]) {
+    let mut counts: BTreeMap<&str, [usize; 2]> = BTreeMap::new();
+    let mut all = [0; 2];
+    for (kind, accepted) in accepted(kinds) {
+        let group = usize::from(!kind.control);
+        all[group] += 1;
+        // One of each kind: a remark that names a parameter may stand there for several.
+        for remark in accepted.remarks.iter().collect::<BTreeSet<_>>() {
+            counts.entry(remark).or_default()[group] += 1;
+        }
+    }
+    let percent = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
+    let _ = writeln!(
+        text,
+        "\n{:<34} right data (%) wrong data (%)",
+        "remark, of the accepted"
+    );
+    for (remark, [right, wrong]) in counts {
+        let _ = writeln!(
+            text,
+            "{remark:<34} {:14.1} {:14.1}",
+            percent(right, all[0]),
+            percent(wrong, all[1]),
+        );
+    }
+}
+
 /// The kinds with the outcomes of their cases.
 fn kinds<'a>(
     campaign: &'a HonestyCampaign,
     outcomes: &'a [HonestyOutcome],
-) -> impl Iterator<Item = (&'a Kind, &'a [HonestyOutcome])> {
+) -> impl Iterator<Item = OfKind<'a>> {
     campaign
         .kinds
         .iter()
@@ -124,6 +216,7 @@ fn broken(broken: &Broken) -> String {
             promised_deg,
             true_deg,
         } => format!("margin {true_deg:.1} below {promised_deg:.1} deg"),
+        Broken::FinalValue { truth } => format!("step of the PD ends at {truth:.2}"),
         Broken::Parameter {
             key,
             low,
