@@ -57,7 +57,8 @@ Exit codes:
   4  finished, with a negative result: no process could be identified (the verdict says why and what
      to do), a space is not certified, a grid leaves holes, a mission ended early, or a pack fails
      its self-test
-  5  the output cannot be written";
+  5  the output cannot be written
+  6  identify: the time stamps can be read in more than one way; --time-unit settles it";
 
 /// Identify a process from a recording and design its optimal controller.
 #[derive(Debug, Parser)]
@@ -307,7 +308,8 @@ fn sample_rate(text: &str) -> Result<f64, String> {
 }
 
 fn time_unit(text: &str) -> Result<TimeUnit, String> {
-    TimeUnit::from_name(text).ok_or_else(|| "a unit of time is h, min, s, ms, us or ns".to_owned())
+    TimeUnit::from_name(text)
+        .ok_or_else(|| "a unit of time is d, h, min, s, ms, us or ns".to_owned())
 }
 
 #[cfg(test)]

@@ -19,6 +19,8 @@ pub(crate) mod exit {
     pub(crate) const NO_PROCESS: u8 = 4;
     /// The output cannot be written.
     pub(crate) const OUTPUT: u8 = 5;
+    /// The time stamps of a recording can be read in more than one way.
+    pub(crate) const AMBIGUOUS: u8 = 6;
 }
 
 /// The reason why a command did not finish.
@@ -89,7 +91,13 @@ impl Failure {
     pub(crate) fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => exit::USAGE,
-            Self::Recording { .. } | Self::Unreadable { .. } => exit::INPUT,
+            Self::Recording { reason, .. } => match **reason {
+                ReadError::AmbiguousTime { .. } | ReadError::AmbiguousDate { .. } => {
+                    exit::AMBIGUOUS
+                }
+                _ => exit::INPUT,
+            },
+            Self::Unreadable { .. } => exit::INPUT,
             Self::Output { .. } => exit::OUTPUT,
         }
     }

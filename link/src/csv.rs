@@ -6,11 +6,12 @@
 //! lines -> rows      quotes, separators                                     records.rs
 //! first rows         separator, header, units, which column is which        dialect.rs, preview.rs,
 //!                                                                           names.rs, columns.rs
-//! rows -> samples    numbers, stamps                                        number.rs, clock.rs
+//! rows -> samples    numbers, stamps                                        number.rs, clock.rs, unit.rs, date.rs
 //! ```
 
 mod clock;
 mod columns;
+mod date;
 mod dialect;
 mod error;
 mod lines;
@@ -21,6 +22,7 @@ mod preview;
 mod records;
 mod separator;
 mod text;
+mod unit;
 mod write;
 
 use std::fs::File;
@@ -31,6 +33,7 @@ use ::csv::ByteRecord;
 
 use self::clock::{Clock, Stamp};
 use self::columns::Choice;
+use self::date::Fault;
 use self::error::quoted;
 use self::number::{Cell, Mark};
 use self::preview::Preview;
@@ -100,7 +103,11 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
     if let Some(line) = records.state().cut_line {
         table.builder.note(Note::LastLineIncomplete { line });
     }
-    Ok(table.builder.finish()?.with_relay_beta(preview.relay_beta))
+    let recording = table.builder.finish()?.with_relay_beta(preview.relay_beta);
+    match table.doubt {
+        Some(doubt) => Err(doubt),
+        None => Ok(recording),
+    }
 }
 
 /// Accepts a last line that lacks cells, or whose last cell was cut off.
@@ -126,6 +133,8 @@ struct Table<'a> {
     choice: Choice,
     builder: RecordingBuilder,
     clock: Clock,
+    /// Why the unit of time is not known, if it is not.
+    doubt: Option<ReadError>,
     sample_rate_hz: f64,
     /// Number of rows so far.
     rows: u64,
@@ -157,11 +166,11 @@ impl<'a> Table<'a> {
                 count: preview.skipped,
             });
         }
-        let mut unit = TimeUnit::Seconds;
+        let (mut unit, mut doubt) = (TimeUnit::Seconds, None);
         if let Some(time) = choice.time {
-            let (found, note) = clock::unit_of(preview, time, options.time_unit);
-            unit = found;
-            note.into_iter().for_each(|note| builder.note(note));
+            let found = unit::find(preview, time, options.time_unit);
+            (unit, doubt) = (found.unit, found.doubt);
+            found.note.into_iter().for_each(|note| builder.note(note));
         }
         let sample_rate_hz = options.sample_rate_hz.unwrap_or(1.0);
         if let Some(time) = choice.ignored {
@@ -176,6 +185,7 @@ impl<'a> Table<'a> {
             choice,
             builder,
             clock: Clock::new(unit),
+            doubt,
             sample_rate_hz,
             rows: 0,
             last_stamp: Stamp::Whole(0),
@@ -238,7 +248,15 @@ impl<'a> Table<'a> {
         if !missing && let Some(note) = self.clock.start(stamp) {
             self.builder.note(note);
         }
-        Ok((stamp, self.clock.seconds(stamp)))
+        let time_s = self.clock.seconds(stamp).map_err(|fault| {
+            let (line, column, text) = self.place(row, column);
+            match fault {
+                Fault::NoSuchDay => ReadError::ClockTime { line, column, text },
+                Fault::AmongNumbers => ReadError::NotANumber { line, column, text },
+                Fault::EitherOrder => ReadError::AmbiguousDate { line, column, text },
+            }
+        })?;
+        Ok((stamp, time_s))
     }
 
     /// The number in a column; NaN if it is missing.

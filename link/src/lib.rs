@@ -8,7 +8,7 @@ pub use csv::{
     ColumnRef, CsvOptions, CsvWriter, ReadError, SAMPLE_RATES_HZ, read, read_from, write_csv,
 };
 pub use recording::{
-    ChosenBy, Column, ColumnLabel, Columns, GAP_PERIODS, Gap, MAX_POINTS, Note, Position,
+    Cell, ChosenBy, Column, ColumnLabel, Columns, GAP_PERIODS, Gap, MAX_POINTS, Note, Position,
     Recording, RecordingBuilder, RecordingError, Role,
 };
 pub use time_unit::TimeUnit;

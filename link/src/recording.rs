@@ -7,13 +7,20 @@
 //! `time_s[i] + (n - 1) / 2 * T` with `T = sample_period_s`, and `input[i]` is the mean over time
 //! of the held input.
 //!
+//! Single corrupt cells of the input or of the output are replaced or dropped, and of an output that is held over several
+//! rows only the rows with a new value are kept, if no other row tells anything. Notes say so.
+//!
 //! No group reaches across a gap. The samples of an incomplete group, before a gap or at the end,
 //! are dropped and counted in a note, so that every point has exactly `n` samples. During a gap
 //! the input is unknown.
 
 mod builder;
+mod clean;
+mod corrupt;
 mod error;
+mod held;
 mod note;
+mod places;
 mod rhythm;
 
 use std::fmt;
@@ -22,7 +29,7 @@ pub(crate) use builder::FAR_START_S;
 pub use builder::RecordingBuilder;
 pub use error::RecordingError;
 pub(crate) use note::counted;
-pub use note::{ChosenBy, Note};
+pub use note::{Cell, ChosenBy, Note};
 
 /// Maximum number of points in a recording: 2^22; three columns of `f64` then take 96 MiB.
 pub const MAX_POINTS: usize = 1 << 22;
@@ -192,7 +199,8 @@ pub struct Recording {
 impl Recording {
     /// Makes a recording from three vectors of equal length, as a simulator has them.
     ///
-    /// Unlike a reader it drops no sample. As in every recording, more than [`MAX_POINTS`] samples
+    /// Unlike a reader it refuses samples that are not finite or repeat a time stamp. As in every recording, corrupt cells
+    /// are replaced, rows of a held output are dropped ([`Note`] says which), more than [`MAX_POINTS`] samples
     /// are averaged, and a time that starts beyond 1e7 s is counted from its first time stamp.
     ///
     /// # Errors

@@ -4,6 +4,8 @@
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TimeUnit {
+    /// 86,400 s, as spreadsheets count dates.
+    Days,
     /// 3600 s.
     Hours,
     /// 60 s.
@@ -22,6 +24,7 @@ impl TimeUnit {
     /// The unit of this name or symbol, in any case: `s`, `ms`, `usec`, `minutes`, ...
     pub fn from_name(name: &str) -> Option<Self> {
         Some(match name.trim().to_lowercase().as_str() {
+            "d" | "day" | "days" => Self::Days,
             "h" | "hr" | "hrs" | "hour" | "hours" => Self::Hours,
             "min" | "mins" | "minute" | "minutes" => Self::Minutes,
             "s" | "sec" | "secs" | "second" | "seconds" => Self::Seconds,
@@ -38,6 +41,7 @@ impl TimeUnit {
     /// Its symbol, such as `ms`.
     pub fn symbol(self) -> &'static str {
         match self {
+            Self::Days => "d",
             Self::Hours => "h",
             Self::Minutes => "min",
             Self::Seconds => "s",
@@ -51,6 +55,7 @@ impl TimeUnit {
     pub fn seconds(self, time: f64) -> f64 {
         // Division by a whole number is rounded once; the factor 1e-3 would be rounded twice.
         match self {
+            Self::Days => time * 86_400.0,
             Self::Hours => time * 3600.0,
             Self::Minutes => time * 60.0,
             Self::Seconds => time,

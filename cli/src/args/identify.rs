@@ -27,7 +27,7 @@ use super::{DesignArguments, PackSource, sample_rate, time_unit};
     "  onecycle identify log.csv --plot always > report.txt\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
     "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process identified (see the ",
-    "verdict), 5 output not written"
+    "verdict), 5 output not written, 6 time stamps that can be read in more than one way (give --time-unit)"
 ))]
 pub(crate) struct Identify {
     /// Recording; - reads the standard input
@@ -102,7 +102,7 @@ pub(crate) struct Identify {
     #[arg(long, value_name = "HZ", conflicts_with_all = ["time", "time_unit"],
           allow_negative_numbers = true, value_parser = sample_rate)]
     pub(crate) sample_rate: Option<f64>,
-    /// Unit of the time column: h, min, s, ms, us or ns [default: from its header]
+    /// Unit of the time column: d, h, min, s, ms, us or ns [default: from its header]
     #[arg(long, value_name = "UNIT", value_parser = time_unit)]
     pub(crate) time_unit: Option<TimeUnit>,
 }

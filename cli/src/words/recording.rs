@@ -1,11 +1,22 @@
 //! Sentences about recordings: why a file could not be read, what the reader noted, and which flags
 //! help.
 
-use onecycle_link::{ChosenBy, Note, ReadError, RecordingError, Role};
+use std::borrow::Cow;
+
+use onecycle_link::{ChosenBy, Note, ReadError, RecordingError, Role, TimeUnit};
 
 /// What is wrong with a file, where, and what to do.
 pub(crate) fn refusal(error: &ReadError) -> String {
-    advised(error.to_string(), advice_on_file(error))
+    let advice = match error {
+        ReadError::AmbiguousTime {
+            step,
+            possible,
+            usual,
+            ..
+        } => Some(Cow::Owned(advice_on_unit(*step, possible, *usual))),
+        _ => advice_on_file(error).map(Cow::Borrowed),
+    };
+    advised(error.to_string(), advice)
 }
 
 /// What the reader chose, assumed or dropped, and the flag that changes a guess.
@@ -21,11 +32,28 @@ pub(crate) fn note(note: &Note) -> String {
     advised(note.to_string(), advice)
 }
 
-fn advised(fact: String, advice: Option<&str>) -> String {
+fn advised(fact: String, advice: Option<impl AsRef<str>>) -> String {
     match advice {
-        Some(advice) => format!("{fact}; {advice}"),
+        Some(advice) => format!("{fact}; {}", advice.as_ref()),
         None => fact,
     }
+}
+
+/// The option for each possible unit; the most usual unit first.
+fn advice_on_unit(step: f64, possible: &[TimeUnit], usual: Option<TimeUnit>) -> String {
+    let Some(usual) = usual else {
+        return "give --time-unit, or the sample rate with --sample-rate".to_owned();
+    };
+    let others = possible.iter().filter(|unit| **unit != usual);
+    let others: Vec<String> = others
+        .map(|unit| format!("--time-unit {}", unit.symbol()))
+        .collect();
+    let rate = match step {
+        1.0 => ", or, if the column counts rows, --sample-rate",
+        _ => "",
+    };
+    let (usual, others) = (usual.symbol(), others.join(" or "));
+    format!("give --time-unit {usual}, the most usual of these, or {others}{rate}")
 }
 
 fn advice_on_file(error: &ReadError) -> Option<&'static str> {
@@ -47,8 +75,10 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
         }
         E::MixedDecimals { .. } => "use one of them (thousands separators are not supported)",
         E::ClockTime { .. } => {
-            "export seconds from the start instead, or give the sample rate with --sample-rate"
+            "export seconds from the start, or date and time of day in one column, or give the sample \
+             rate with --sample-rate"
         }
+        E::AmbiguousDate { .. } => "export the dates as yyyy-mm-dd, or seconds from the start",
         E::TimeGoesBack { .. } => "keep one run and cut the rest",
         E::UnknownColumn { role, .. } | E::AmbiguousColumn { role, .. } => match role {
             Role::Time => "choose it with --time, or give the sample rate with --sample-rate",
@@ -171,8 +201,14 @@ mod tests {
     fn times() {
         assert_refused(
             "12:00:01,1,1\n12:00:02,2,1\n",
-            "line 1, column 1: \"12:00:01\" is a date or a time of day; \
-             export seconds from the start instead, or give the sample rate with --sample-rate",
+            "line 1, column 1: \"12:00:01\" is not a date with a time of day; \
+             export seconds from the start, or date and time of day in one column, or give the \
+             sample rate with --sample-rate",
+        );
+        assert_refused(
+            "t,y,u\n1/2/2024 12:00,1,1\n1/4/2024 12:00,2,1\n",
+            "line 3, \"t\" (column 1): \"1/4/2024 12:00\" does not show which number is the day and \
+             which the month; export the dates as yyyy-mm-dd, or seconds from the start",
         );
         assert_refused(
             &table_with(40, "3.85,4,1"),
@@ -197,6 +233,25 @@ mod tests {
             "time stamps as large as 1.000e12 s cannot resolve a sample period of 1.023e-3 s; \
              subtract the first time stamp before writing the file, or give the sample rate with \
              --sample-rate",
+        );
+    }
+
+    #[test]
+    fn units_of_time_in_doubt() {
+        assert_refused(
+            "t,y,u\n0,1,1\n1,2,1\n2,3,1\n",
+            "\"t\" (column 1) gives no unit of time: a step of 1 is 1 ms or 1 s; give --time-unit s, \
+             the most usual of these, or --time-unit ms, or, if the column counts rows, --sample-rate",
+        );
+        assert_refused(
+            "t,y,u\n0,1,1\n4000,2,1\n8000,3,1\n",
+            "\"t\" (column 1) gives no unit of time: a step of 4000 is 4000 us or 4000 ms; give \
+             --time-unit us, the most usual of these, or --time-unit ms",
+        );
+        assert_refused(
+            "t,y,u\n133000000000000000,1,1\n133000000000100000,2,1\n",
+            "\"t\" (column 1) gives no unit of time: a step of 100000 is no usual sample period in any \
+             unit; give --time-unit, or the sample rate with --sample-rate",
         );
     }
 
@@ -244,7 +299,9 @@ mod tests {
 
     #[test]
     fn guesses_name_the_flags_that_change_them() {
-        let rows: String = (0..30).map(|i| format!("{i},{i}.5,{}\n", i / 15)).collect();
+        let rows: String = (0..30)
+            .map(|i| format!("{},{i}.5,{}\n", 70 * i, i / 15))
+            .collect();
         let recording = read_from(rows.as_bytes(), &CsvOptions::default()).unwrap();
         let notes: Vec<String> = recording.notes().iter().map(note).collect();
         let expected = [

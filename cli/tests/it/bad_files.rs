@@ -4,7 +4,7 @@ use std::io::Write;
 use std::process::Stdio;
 
 use crate::common::{
-    HOVER, HOVER_K_OVER_T_BODY, Report, Sample, Scratch, Table, UNREADABLE, identify,
+    AMBIGUOUS, HOVER, HOVER_K_OVER_T_BODY, Report, Sample, Scratch, Table, UNREADABLE, identify,
     identify_as_text, is_hover, onecycle, run, run_with_input, simulate,
 };
 
@@ -308,11 +308,10 @@ fn time_in_other_units() {
         same_process(&report);
     }
     for (factor, unit) in [(1e3, "ms"), (1e6, "us")] {
-        // The unit is guessed, with a note; and given as an argument.
+        // A step of 1 is 1 ms or 1 s, one of 1000 is 1 ms or 1 s: neither is taken, and the advice works.
         let text = table.csv_of("time,pv,u", whole(factor));
-        let report = identify(&text, &[]).identified();
-        report.noted(&["gives no unit", unit]);
-        same_process(&report);
+        let advice = format!("--time-unit {unit}");
+        identify(&text, &[]).refused(AMBIGUOUS, &["gives no unit of time", &advice]);
         same_process(&identify(&text, &["--time-unit", unit]).identified());
     }
 }

@@ -12,10 +12,11 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use tempfile::TempDir;
 
-/// Exit codes: unreadable input, no process identified, unwritable output.
+/// Exit codes: unreadable input, no process identified, unwritable output, time stamps in doubt.
 pub(crate) const UNREADABLE: i32 = 3;
 pub(crate) const NOT_IDENTIFIED: i32 = 4;
 pub(crate) const NOT_WRITTEN: i32 = 5;
+pub(crate) const AMBIGUOUS: i32 = 6;
 
 /// A multirotor's attitude: oscillates with a period of 0.44 s and an amplitude of 3.3e-3.
 pub(crate) const HOVER: [&str; 8] = [

@@ -77,7 +77,7 @@ fn the_documented_keys_are_those_of_the_report() {
 #[test]
 fn a_refusal_has_the_same_keys() {
     let whole = identify(Table::noisy().csv(), &[]).identified();
-    let report = identify("t,u,y\n0,1,0\n1,1,0\n2,1,0\n", &[]).no_process("no_relay");
+    let report = identify("t_s,u,y\n0,1,0\n1,1,0\n2,1,0\n", &[]).no_process("no_relay");
     let top = |value: &Value| {
         value
             .as_object()

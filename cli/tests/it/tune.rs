@@ -274,7 +274,7 @@ fn help_lists_commands_and_exit_codes() {
         assert!(own.contains("Usage: onecycle"), "{own}");
     }
     let codes = all.split("Exit codes:").nth(1).unwrap_or_default();
-    for code in ["0  ", "2  ", "3  ", "4  ", "5  "] {
+    for code in ["0  ", "2  ", "3  ", "4  ", "5  ", "6  "] {
         assert!(codes.contains(code), "{code}: {all}");
     }
     let identify = help(&["identify", "--help"]).stdout;

@@ -2,7 +2,7 @@
 //!
 //! 1. As the options say.
 //! 2. By name: `t`, `time`, ...; `u`, `input`, `relay`, ...; `y`, `pv`, `output`, ...
-//! 3. Without a header, time is the first column.
+//! 3. Else, time is the column of dates; without a header, it is the first column.
 //! 4. If one signal and one column are left, they belong together.
 //! 5. If input, output and two columns are left, the input is the column with 2 to 8 different
 //!    values, provided that the other column has at least three times as many.
@@ -76,7 +76,12 @@ pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, 
     if !timed {
         ignored = by_name(Role::Time).first().copied().or(first);
     } else if time.is_none() {
-        time = single(by_name(Role::Time), Role::Time, preview)?.or(first);
+        let dates = preview
+            .date
+            .filter(|column| !given.contains(&Some(*column)));
+        time = single(by_name(Role::Time), Role::Time, preview)?
+            .or(dates)
+            .or(first);
     }
     if timed {
         check_clock_time(preview, time)?;
@@ -119,7 +124,7 @@ pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, 
     })
 }
 
-/// Refuses dates and times of day in the time column, or in any column if there is no time column.
+/// Refuses times of day without a date, and the reverse, in the time column, or in any column if there is no time column.
 fn check_clock_time(preview: &Preview, time: Option<usize>) -> Result<(), ReadError> {
     match &preview.clock_time {
         Some((column, text)) if time.is_none_or(|time| time == *column) => {

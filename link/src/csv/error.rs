@@ -7,6 +7,7 @@ use thiserror::Error;
 
 use super::options::ColumnRef;
 use crate::recording::{ColumnLabel, RecordingError, Role, counted};
+use crate::time_unit::TimeUnit;
 
 /// Why a file does not make a recording. `Display` states what is wrong and where; what to do
 /// about it is up to the caller. Text from the file is shortened to 32 printable characters.
@@ -104,9 +105,33 @@ pub enum ReadError {
         /// The cell.
         text: String,
     },
-    /// A time stamp is a time of day or a date.
-    #[error("line {line}, {column}: \"{text}\" is a date or a time of day")]
+    /// A time stamp is a time of day without a date, a date without a time of day, or of an unknown form.
+    #[error("line {line}, {column}: \"{text}\" is not a date with a time of day")]
     ClockTime {
+        /// Line in the file, from 1.
+        line: u64,
+        /// Column.
+        column: ColumnLabel,
+        /// The cell.
+        text: String,
+    },
+    /// Neither the header nor the stamps show the unit of time. Nothing else is wrong with the file.
+    #[error("{column} gives no unit of time: {}", possibilities(*.step, .possible))]
+    AmbiguousTime {
+        /// Time column.
+        column: ColumnLabel,
+        /// Median increment, in the unit that is unknown.
+        step: f64,
+        /// The units that give a possible sample period.
+        possible: Vec<TimeUnit>,
+        /// The one of them that is most usual for such stamps.
+        usual: Option<TimeUnit>,
+    },
+    /// Day and month of a date can be taken in either order.
+    #[error(
+        "line {line}, {column}: \"{text}\" does not show which number is the day and which the month"
+    )]
+    AmbiguousDate {
         /// Line in the file, from 1.
         line: u64,
         /// Column.
@@ -190,6 +215,19 @@ fn listed(columns: &[ColumnLabel]) -> String {
         list += &format!(" and {} more", columns.len() - MOST_LISTED);
     }
     list
+}
+
+/// What a step of time stamps may be in each unit: `a step of 1 is 1 ms or 1 s`.
+fn possibilities(step: f64, units: &[TimeUnit]) -> String {
+    // Four significant digits.
+    let step = format!("{step:.3e}").parse().unwrap_or(step);
+    let shown: Vec<String> = (units.iter())
+        .map(|unit| format!("{step} {}", unit.symbol()))
+        .collect();
+    match shown.as_slice() {
+        [] => format!("a step of {step} is no usual sample period in any unit"),
+        all => format!("a step of {step} is {}", all.join(" or ")),
+    }
 }
 
 /// Longest text that an error or a note quotes, in characters.

@@ -4,11 +4,14 @@ use crate::recording::{Column, Role};
 use crate::time_unit::TimeUnit;
 
 /// Usual names of the time, in lower case, words joined by `_`, without unit.
-const TIME: [&str; 15] = [
+const TIME: [&str; 18] = [
     "t",
     "time",
     "timestamp",
     "time_stamp",
+    "datetime",
+    "date_time",
+    "date_and_time",
     "stamp",
     "ts",
     "tick",
@@ -187,6 +190,10 @@ pub(super) fn key(name: &str) -> String {
 }
 
 fn is_known_unit(unit: &str) -> bool {
+    // In names such as `y_d` the letter stands for "desired" or "derivative".
+    if unit.eq_ignore_ascii_case("d") {
+        return false;
+    }
     TimeUnit::from_name(unit).is_some() || UNITS.contains(&unit.to_lowercase().as_str())
 }
 
@@ -246,6 +253,9 @@ mod tests {
             ("pv []", "pv", None),
             ("", "", None),
             ("(s)", "(s)", None),
+            ("t [d]", "t", Some("d")),
+            ("time_days", "time", Some("days")),
+            ("y_d", "y_d", None),
         ] {
             let name = Name::parse(text);
             assert_eq!(

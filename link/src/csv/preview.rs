@@ -1,5 +1,6 @@
 //! Preview of a table: its header and its first rows.
 
+use super::date;
 use super::error::{ReadError, quoted};
 use super::names::{Name, is_unit};
 use super::number::{self, Cell};
@@ -28,7 +29,9 @@ pub(super) struct Preview {
     pub(super) width: usize,
     /// First line of numbers.
     pub(super) first_line: u64,
-    /// Column and text of the first cell on that line that is a date or a time of day, if any.
+    /// Column of the first cell on that line that is a date with a time of day, if any.
+    pub(super) date: Option<usize>,
+    /// Column and text of the first cell on that line that is another date or time of day, if any.
     pub(super) clock_time: Option<(usize, String)>,
     /// First rows, row by row; NaN where a cell is not a number.
     cells: Vec<f64>,
@@ -101,9 +104,12 @@ impl Preview {
             skipped,
             width,
             first_line: line,
+            date: cells[..width]
+                .iter()
+                .position(|cell| date::parse(cell).is_some()),
             clock_time: cells[..width]
                 .iter()
-                .position(|cell| number::is_clock_time(cell))
+                .position(|cell| number::is_clock_time(cell) && date::parse(cell).is_none())
                 .map(|column| (column, quoted(cells[column]))),
             cells: Vec::new(),
             whole: vec![true; width],
@@ -241,7 +247,7 @@ fn is_data<'a>(cells: impl Iterator<Item = &'a [u8]> + Clone) -> bool {
 /// as data, so this is found before the columns are chosen.
 fn check_leading(line: u64, first: Option<&[u8]>) -> Result<(), ReadError> {
     match first {
-        Some(cell) if number::is_clock_time(cell) => {
+        Some(cell) if number::is_clock_time(cell) && date::parse(cell).is_none() => {
             let column = ColumnLabel {
                 name: None,
                 number: 1,

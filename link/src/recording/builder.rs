@@ -8,6 +8,7 @@
 //!     if the store is full when a point is due, average the points in pairs, n <- 2 n
 //! ```
 
+use super::places::Places;
 use super::rhythm::Rhythm;
 use super::{Columns, Gap, MAX_POINTS, Note, Position, Recording, RecordingError, Role};
 
@@ -47,6 +48,8 @@ pub struct RecordingBuilder {
     time_s: Vec<f64>,
     input: Vec<f64>,
     output: Vec<f64>,
+    /// Positions of the points, until they are averaged.
+    places: Places,
     gaps: Vec<Gap>,
     samples_per_point: usize,
     group: Group,
@@ -73,6 +76,7 @@ impl RecordingBuilder {
             time_s: Vec::new(),
             input: Vec::new(),
             output: Vec::new(),
+            places: Places::default(),
             gaps: Vec::new(),
             samples_per_point: 1,
             group: Group::default(),
@@ -146,6 +150,7 @@ impl RecordingBuilder {
             self.settle(newest, time_s);
         }
         self.newest = Some(Sample {
+            at,
             time_s,
             input,
             output,
@@ -175,7 +180,7 @@ impl RecordingBuilder {
             });
         }
         self.note_what_happened(&rhythm);
-        Ok(Recording {
+        let mut recording = Recording {
             time_s: self.time_s,
             input: self.input,
             output: self.output,
@@ -186,7 +191,9 @@ impl RecordingBuilder {
             columns: self.columns,
             notes: self.notes,
             relay_beta: None,
-        })
+        };
+        recording.clean(&self.places);
+        Ok(recording)
     }
 
     /// Refuses too few rows, too many missing or repeated ones, and coarse time stamps.
@@ -291,6 +298,9 @@ impl RecordingBuilder {
         }
         if self.group.samples == self.samples_per_point {
             let group = std::mem::take(&mut self.group);
+            if let Some(at) = group.at.filter(|_| self.samples_per_point == 1) {
+                self.places.push(self.time_s.len(), at);
+            }
             self.time_s.push(group.start_s);
             self.input.push(group.input);
             self.output.push(group.output);
@@ -352,11 +362,13 @@ impl RecordingBuilder {
         self.input.truncate(kept);
         self.output.truncate(kept);
         self.samples_per_point *= 2;
+        self.places.clear();
     }
 
     /// A stored point as a group that ends at the given time.
     fn point(&self, index: usize, end_s: f64) -> Group {
         Group {
+            at: None,
             start_s: self.time_s[index],
             samples: self.samples_per_point,
             held_s: end_s - self.time_s[index],
@@ -418,6 +430,7 @@ impl RecordingBuilder {
 /// One row.
 #[derive(Debug, Clone, Copy)]
 struct Sample {
+    at: Position,
     time_s: f64,
     input: f64,
     output: f64,
@@ -426,6 +439,8 @@ struct Sample {
 /// Consecutive samples without a gap between them: mean output, and mean of the input over time.
 #[derive(Debug, Clone, Default)]
 struct Group {
+    /// Position of the first sample.
+    at: Option<Position>,
     start_s: f64,
     samples: usize,
     held_s: f64,
@@ -436,11 +451,13 @@ struct Group {
 impl Group {
     fn add(&mut self, sample: Sample, held_s: f64) {
         let Sample {
+            at,
             time_s: start_s,
             input,
             output,
         } = sample;
         self.append(&Self {
+            at: Some(at),
             start_s,
             samples: 1,
             held_s,

@@ -121,6 +121,52 @@ pub enum Note {
         /// Start of the longest gap in seconds.
         at_s: f64,
     },
+    /// Single values of the input between two samples of one level of a relay, at neither of its levels; or peaks of one
+    /// sample in the output. They were replaced by the level, or by the line between the neighbours.
+    #[error("replaced {}, the first at {first}: {:?} by {by:?}", replaced(*.count, .first.role), .first.value)]
+    CellsReplaced {
+        /// Number of cells.
+        count: u64,
+        /// The first of them.
+        first: Cell,
+        /// The value that it has now.
+        by: f64,
+    },
+    /// Rows whose input is at neither level of a relay, beside a switch. They were dropped, with a gap in their place.
+    #[error(
+        "dropped {} whose input is at neither of its two levels, beside a switch, the first at {first}: {:?}",
+        counted(*.count, "row"), .first.value
+    )]
+    OffLevelDropped {
+        /// Number of rows.
+        count: u64,
+        /// The first of them.
+        first: Cell,
+    },
+    /// A value of the input far outside the range of all others. It was kept.
+    #[error("the input at {cell} is {:?}, far outside the range of all other values, {least:?} to {most:?}", .cell.value)]
+    CellInDoubt {
+        /// The cell.
+        cell: Cell,
+        /// Least of the other values.
+        least: f64,
+        /// Largest of the other values.
+        most: f64,
+    },
+    /// The output is held over several rows: its sensor is slower than the log.
+    #[error(
+        "the output changes at every {rows}{} row only: its sample period is {} s{}",
+        ending(*.rows), rounded(*.period_s),
+        if *.is_kept { "" } else { "; kept only the rows with a new output" }
+    )]
+    OutputHeld {
+        /// Rows for each new value.
+        rows: usize,
+        /// Time between two new values (s).
+        period_s: f64,
+        /// Whether all rows were kept, because the input changes in between.
+        is_kept: bool,
+    },
     /// The sample period varies by more than 10 %.
     #[error(
         "the sample period varies by {:.0} % (standard deviation) around {} s",
@@ -132,6 +178,29 @@ pub enum Note {
         /// Sample period in seconds.
         sample_period_s: f64,
     },
+}
+
+/// A cell of a recording; `Display` gives its place: `line 42 (3.97 s)`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Cell {
+    /// Its signal.
+    pub role: Role,
+    /// Its position in the source; `None` in a recording that was averaged.
+    pub at: Option<Position>,
+    /// Its time (s).
+    pub time_s: f64,
+    /// Its value, in the unit of its column.
+    pub value: f64,
+}
+
+impl fmt::Display for Cell {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.at {
+            Some(at) => write!(f, "{at} ({:?} s)", self.time_s),
+            None => write!(f, "{:?} s", self.time_s),
+        }
+    }
 }
 
 /// What decided which column holds which signal.
@@ -162,6 +231,32 @@ impl fmt::Display for ChosenBy {
 /// `1 row`, `2 rows`.
 pub(crate) fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
+}
+
+/// What was replaced in a signal.
+fn replaced(count: u64, role: Role) -> String {
+    match role {
+        Role::Output => {
+            let peaks = counted(count, "single peak");
+            format!("{peaks} of the output by the line between its neighbours")
+        }
+        _ => {
+            let values = counted(count, "single value");
+            let verb = if count == 1 { "is" } else { "are" };
+            format!("{values} of the {role} that {verb} at neither of its two levels")
+        }
+    }
+}
+
+/// `nd` of `2nd`, `th` of `5th`.
+fn ending(number: usize) -> &'static str {
+    match (number % 10, number % 100) {
+        (_, 11..=13) => "th",
+        (1, _) => "st",
+        (2, _) => "nd",
+        (3, _) => "rd",
+        _ => "th",
+    }
 }
 
 /// Four significant digits.

@@ -209,13 +209,124 @@ fn units_of_time() {
     // Micro sign in Latin-1.
     assert_plain(b"time (\xb5s),pv,u\n0,0.25,1\n500000,-1.5,1\n1000000,2,-1\n");
     assert_plain(b"time [ns],pv,u\n0,0.25,1\n500000000,-1.5,1\n1000000000,2,-1\n");
+    let text = b"t,pv,u\n0,0.25,1\n70,-1.5,1\n140,2,-1\n";
+    assert!(notes(&try_read(text).unwrap()).contains("its time stamps were read in ms"));
     let text = b"t,pv,u\n0,0.25,1\n500,-1.5,1\n1000,2,-1\n";
-    assert!(notes(&assert_plain(text)).contains("its time stamps were read in ms"));
     let options = CsvOptions::default().time_unit(TimeUnit::Minutes);
     assert_eq!(
         read_from(&text[..], &options).unwrap().time_s()[1],
         30_000.0
     );
+}
+
+/// Rows of these time stamps; the relay switches every ten rows.
+fn table_of(stamps: impl Iterator<Item = String>) -> String {
+    let row = |(i, stamp): (u32, String)| {
+        let (y, u) = (
+            f64::from(i * i % 97) / 10.0,
+            if i % 20 < 10 { 1 } else { -1 },
+        );
+        format!("{stamp};{y};{u}\n")
+    };
+    std::iter::once("t;pv;u\n".to_owned())
+        .chain((0..).zip(stamps).map(row))
+        .collect()
+}
+
+// Neither 0, 1, 2 ... nor 0, 20, 40 ... nor 0, 1000, 2000 ... shows its unit. The caller settles it.
+#[test]
+fn a_unit_in_doubt_is_settled_by_the_caller() {
+    for (step, units, usual) in [
+        (
+            1,
+            [TimeUnit::Milliseconds, TimeUnit::Seconds],
+            TimeUnit::Seconds,
+        ),
+        (
+            20,
+            [TimeUnit::Milliseconds, TimeUnit::Seconds],
+            TimeUnit::Milliseconds,
+        ),
+        (
+            1000,
+            [TimeUnit::Microseconds, TimeUnit::Milliseconds],
+            TimeUnit::Microseconds,
+        ),
+    ] {
+        let text = table_of((0..100).map(|i| format!("{}", i * step)));
+        match try_read(text.as_bytes()) {
+            Err(ReadError::AmbiguousTime {
+                possible,
+                usual: found,
+                ..
+            }) => {
+                assert_eq!((possible.as_slice(), found), (&units[..], Some(usual)));
+            }
+            other => panic!("{step}: {other:?}"),
+        }
+        for unit in units {
+            let options = CsvOptions::default().time_unit(unit);
+            let recording = read_from(text.as_bytes(), &options).unwrap();
+            assert_eq!(recording.time_s()[3], unit.seconds(f64::from(3 * step)));
+        }
+    }
+    // Any other fault is reported first.
+    let text = table_of((0..100).map(|i| format!("{}", i / 2)));
+    assert!(
+        try_read(text.as_bytes())
+            .unwrap_err()
+            .to_string()
+            .contains("repeat the time stamp")
+    );
+}
+
+#[test]
+fn days_of_a_spreadsheet() {
+    // 2024-01-31 12:00:00 and every second from there, with the ten digits that Excel exports.
+    let text = table_of((0..100).map(|i| format!("{:.10}", 45_322.5 + f64::from(i) / 86_400.0)));
+    let recording = try_read(text.as_bytes()).unwrap();
+    assert!(notes(&recording).contains("its time stamps were read in d"));
+    assert!((recording.time_s()[99] - recording.time_s()[0] - 99.0).abs() < 1e-4);
+    assert!((recording.sample_period_s() - 1.0).abs() < 1e-6);
+}
+
+// All forms of ten dates, 0.2 s apart, across midnight.
+#[test]
+fn dates() {
+    type Form = fn(u32, u32, &str) -> String;
+    let forms: [Form; 7] = [
+        |_, day, time| format!("2024-02-{day:02}T{time}Z"),
+        |_, day, time| format!("2024-02-{day:02} {time}+01:00"),
+        |_, day, time| format!("{day}.2.2024 {}", time.replace('.', ",")),
+        |_, day, time| format!("{day:02}/02/2024 {time}"),
+        |_, day, time| format!("2/{day}/2024 {time}"),
+        |_, day, time| format!("{day:02}-02-2024 {time}"),
+        |i, _, time| {
+            format!(
+                "2024-03-01 {}:{}",
+                if i < 5 { "11:59" } else { "12:00" },
+                &time[6..]
+            )
+        },
+    ];
+    for (number, form) in forms.iter().enumerate() {
+        let stamp = |i: u32| match i {
+            0..5 => form(i, 8, &format!("23:59:59.{}", 2 * i)),
+            _ => form(i, 9, &format!("00:00:00.{}", 2 * (i - 5))),
+        };
+        let text = table_of((0..10).map(stamp));
+        let recording = try_read(text.as_bytes()).unwrap_or_else(|error| panic!("{text}{error}"));
+        for (i, &time_s) in recording.time_s().iter().enumerate() {
+            assert!(
+                (time_s - 0.2 * i as f64).abs() < 1e-12,
+                "form {number}, row {i}: {time_s}"
+            );
+        }
+        assert!(notes(&recording).contains("time is counted from the first time stamp, "));
+    }
+    // A column of dates is the time, whatever its name.
+    let text = "pv,when,u\n0,2024-01-31 12:00:00.0,1\n1,2024-01-31 12:00:00.5,1\n2,2024-01-31 12:00:01.0,1\n";
+    assert_eq!(try_read(text.as_bytes()).unwrap().time_s(), [0.0, 0.5, 1.0]);
 }
 
 #[test]

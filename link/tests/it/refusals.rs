@@ -142,10 +142,36 @@ fn clock_times() {
     let parts = ["line 2", "\"time\" (column 1)", "12:00:00.1", "time of day"];
     assert_plainly_refused("time,pv,u\n12:00:00.1,1,1\n12:00:00.2,2,1\n", &parts);
     assert_plainly_refused(
-        "time,pv,u\n2024-01-31T12:00:00Z,1,1\n",
-        &["line 2", "2024-01-31"],
+        "time,pv,u\n2024-01-31,1,1\n",
+        &["line 2", "2024-01-31", "time of day"],
     );
     assert_plainly_refused("12:00:00.1,1,1\n12:00:00.2,2,1\n", &["12:00:00.1"]);
+}
+
+#[test]
+fn dates_that_are_not_time_stamps() {
+    let dates = |second: &str| format!("time,pv,u\n01/02/2024 12:00:00,1,1\n{second},2,1\n");
+    // Two days later, or two months.
+    let parts = [
+        "line 3",
+        "\"time\" (column 1)",
+        "03/04/2024",
+        "the day and which the month",
+    ];
+    assert_plainly_refused(&dates("03/04/2024 12:00:00"), &parts);
+    for other in [
+        "2024-02-01 12:00:01",
+        "01/32/2024 12:00:01",
+        "13",
+        "01/02/2024 99:00:01",
+    ] {
+        assert_plainly_refused(&dates(other), &["line 3", other]);
+    }
+    let back = [
+        "time goes back on line 3",
+        "01/02/2024 11:59:59 follows 01/02/2024 12:00:00",
+    ];
+    assert_plainly_refused(&dates("01/02/2024 11:59:59"), &back);
 }
 
 #[test]
