@@ -59,7 +59,6 @@ pub(crate) enum NoOptimum {
 
 /// Shape of least cost.
 pub(crate) fn optimum(problem: Problem) -> Result<Optimum, NoOptimum> {
-    let mut coarse = Objective::new(problem, COARSE_GRID);
     let mut starts = problem.family.starts(&problem.process);
     if let Some(family) = problem.family.without_rate_derivative() {
         // The derivative of the rate starts from the cascade without it.
@@ -72,7 +71,17 @@ pub(crate) fn optimum(problem: Problem) -> Result<Optimum, NoOptimum> {
             .family
             .with_rate_derivative(&problem.process, &best.point);
     }
-    let best = search(&mut coarse, &starts)?;
+    optimum_from(problem, &starts)
+}
+
+/// Shape of least cost, from the optimum `near` it within lower limits.
+pub(crate) fn optimum_near(problem: Problem, near: &[f64]) -> Result<Optimum, NoOptimum> {
+    optimum_from(problem, &[near.to_vec()]).or_else(|_| optimum(problem))
+}
+
+fn optimum_from(problem: Problem, starts: &[Vec<f64>]) -> Result<Optimum, NoOptimum> {
+    let mut coarse = Objective::new(problem, COARSE_GRID);
+    let best = search(&mut coarse, starts)?;
     let mut fine = Objective::new(problem, FINE_GRID);
     let is_same = |found: &Optimum| found.ln_cost < best.value + SAME;
     if let Some(found) = finish(&mut fine, &best.point).ok().filter(is_same) {

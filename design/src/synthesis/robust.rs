@@ -6,14 +6,19 @@
 //!
 //! `r` is the largest number for which at least the specified share of the posterior keeps the limits with a probability
 //! of 93 %: with 200 draws and 95 % it is 5, not 10. The expected cost is the mean over the first draws.
+//!
+//! Few draws limit the gain, and about the same ones for all shapes near each other. The search *watches* those: a shape
+//! that the watched draws forbid is forbidden by all draws, whichever the others are. What it finds is confirmed on all
+//! draws; where other draws forbid it, they are watched too and the search goes on.
 
 use crate::analysis::process::Process;
 
-use super::objective::{NO_COST, Objective, PENALTY, Problem};
-use super::optimum::{NoOptimum, Optimum};
+use super::limits::Limits;
+use super::objective::{NO_COST, NoiseLimit, Objective, PENALTY, Problem};
+use super::optimum::{NoOptimum, Optimum, optimum};
 use super::simplex::{Best, Extent, minimise};
 
-/// Draws over which the cost is averaged: in the first simplex, and in the second one and the result.
+/// Draws over which the cost is averaged: in the first simplex, and in the others and the result.
 const FIRST_COST_DRAWS: usize = 4;
 const COST_DRAWS: usize = 12;
 
@@ -23,25 +28,41 @@ const GRID: f64 = 0.15;
 /// Probability that fewer draws miss the limits than the share of the posterior that does.
 const DOUBT: f64 = 0.07;
 
+/// Draws watched at either end of the gain, beside those that may be given up.
+const SPARE: usize = 4;
+
+/// Searches with more watched draws each, before the result is moved back to where all draws keep the limits.
+const ROUNDS: usize = 5;
+
+/// Halvings of the way back.
+const HALVINGS: usize = 8;
+
 const FIRST: Extent = Extent {
-    size: 0.3,
-    tolerance: 3e-2,
-    evaluations: 30,
-};
-const SECOND: Extent = Extent {
-    size: 0.1,
-    tolerance: 2e-2,
-    evaluations: 15,
-};
-const FEASIBILITY: Extent = Extent {
     size: 0.3,
     tolerance: 3e-2,
     evaluations: 40,
 };
+const SECOND: Extent = Extent {
+    size: 0.1,
+    tolerance: 2e-2,
+    evaluations: 20,
+};
+const FEASIBILITY: Extent = Extent {
+    size: 0.4,
+    tolerance: 3e-3,
+    evaluations: 120,
+};
 const WELL_INSIDE: f64 = -0.05;
+
+/// Starts from which the search for a feasible shape goes on.
+const TRIES: usize = 3;
 
 /// Logarithms of the factors of the times of integral and angle loop that are tried first.
 const LONGER: [f64; 6] = [0.0, 0.15, 0.4, 0.8, 1.4, 2.2];
+
+/// Limits of `Ms` and `Mt`, less 1, as shares of those asked for: an optimum for one process at a lower peak keeps the
+/// higher one on many.
+const LOWER_PEAKS: [f64; 3] = [0.7, 0.45, 0.25];
 
 /// Draws of a posterior in the units of the nominal process.
 pub(crate) struct Draws {
@@ -51,6 +72,8 @@ pub(crate) struct Draws {
     nominal: Problem,
     /// Draws that may be given up.
     given_up: usize,
+    /// Draws that the search looks at.
+    watched: Vec<usize>,
 }
 
 /// How a shape with its gain does on the draws.
@@ -62,9 +85,33 @@ pub(crate) struct Performance {
     pub mean_cost: f64,
 }
 
+/// Gains of a shape that a draw allows, per gain of the nominal process, and the frequency that limits them.
+#[derive(Clone, Copy, Debug)]
+struct Ends {
+    low: f64,
+    high: f64,
+    omega: f64,
+}
+
+/// Gain of a shape over the draws.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Found {
+    pub k: f64,
+    pub omega: f64,
+    /// Logarithm by which the gain is infeasible.
+    pub excess: f64,
+}
+
+/// Which draws.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Over {
+    All,
+    Watched,
+}
+
 impl Draws {
-    /// Draws that have the sign of gain and the stability of the nominal process; the others count as given up.
-    pub(crate) fn new(nominal: Problem, draws: &[Process], coverage: f64) -> Self {
+    /// Draws that have the sign of gain and the stability of the nominal process; the others of `count` are given up.
+    pub(crate) fn new(nominal: Problem, draws: &[Process], count: usize, coverage: f64) -> Self {
         let mut ratios = Vec::with_capacity(draws.len());
         let mut objectives = Vec::with_capacity(draws.len());
         for draw in draws {
@@ -75,49 +122,121 @@ impl Draws {
                 ratios.push(ratio);
             }
         }
-        let lost = draws.len() - ratios.len();
-        let given_up = most_given_up(draws.len(), 1.0 - coverage).saturating_sub(lost);
+        let lost = count - ratios.len();
+        let given_up = most_given_up(count, 1.0 - coverage).saturating_sub(lost);
         Self {
             objectives,
             ratios,
             nominal,
             given_up,
+            watched: Vec::new(),
         }
     }
 
-    /// Intervals of the gain of a shape, per gain of the nominal process: ends, and whether there is one.
-    fn intervals(&mut self, z: &[f64]) -> Vec<(f64, f64)> {
-        let draws = self.objectives.iter_mut().zip(&self.ratios);
-        draws
-            .map(|(objective, ratio)| match objective.allowed(z) {
-                Ok((whole, inner)) => {
-                    let (low, high) =
-                        inner.map_or((0.0, f64::INFINITY), |inner| (inner.low, inner.high));
-                    (whole.low.max(low) / ratio, whole.high.min(high) / ratio)
-                }
-                Err(_) => (f64::INFINITY, 0.0),
-            })
+    /// Sets the limits of the loop and of the noise.
+    pub(crate) fn set_limits(&mut self, limits: Limits, noise: Option<NoiseLimit>) {
+        let problems = self.objectives.iter_mut().map(|draw| &mut draw.problem);
+        for problem in problems.chain([&mut self.nominal]) {
+            (problem.limits, problem.noise) = (limits, noise);
+        }
+    }
+
+    /// Gains of a shape that one draw allows.
+    fn ends(&mut self, draw: usize, z: &[f64]) -> Ends {
+        let ratio = self.ratios[draw];
+        let Ok((whole, inner)) = self.objectives[draw].allowed(z) else {
+            return Ends {
+                low: f64::INFINITY,
+                high: 0.0,
+                omega: 0.0,
+            };
+        };
+        let (mut low, mut high, mut omega) = (whole.low, whole.high, whole.omega);
+        if let Some(inner) = inner {
+            low = low.max(inner.low);
+            if inner.high < high {
+                (high, omega) = (inner.high, inner.omega);
+            }
+        }
+        Ends {
+            low: low / ratio,
+            high: high / ratio,
+            omega,
+        }
+    }
+
+    fn all_ends(&mut self, z: &[f64]) -> Vec<Ends> {
+        (0..self.objectives.len())
+            .map(|draw| self.ends(draw, z))
             .collect()
     }
 
-    /// Highest gain that at most the allowed number of draws forbid, and the logarithm by which it is infeasible.
-    fn gain(&mut self, z: &[f64]) -> (f64, f64) {
-        let intervals = self.intervals(z);
-        let mut highs: Vec<f64> = intervals.iter().map(|interval| interval.1).collect();
-        let mut lows: Vec<f64> = intervals.iter().map(|interval| interval.0).collect();
-        highs.sort_by(f64::total_cmp);
-        lows.sort_by(|a, b| b.total_cmp(a));
-        let split = |j: usize| {
-            let (high, low) = (highs.get(j)?, lows.get(self.given_up - j)?);
-            Some((*high, (low / high).ln()))
+    /// Highest gain of a shape that at most the allowed number of draws forbid, within the limits of noise and input. `None`
+    /// if the shape is out of range, or if no gain is near the limits.
+    fn gain(&mut self, z: &[f64], over: Over) -> Option<Found> {
+        if !self.nominal.family.is_in_range(&self.nominal.process, z) {
+            return None;
+        }
+        let ends = match over {
+            Over::All => {
+                let ends = self.all_ends(z);
+                self.watch(&ends);
+                ends
+            }
+            Over::Watched => {
+                let watched = std::mem::take(&mut self.watched);
+                let ends = watched.iter().map(|draw| self.ends(*draw, z)).collect();
+                self.watched = watched;
+                ends
+            }
         };
-        let splits: Vec<(f64, f64)> = (0..=self.given_up).filter_map(split).collect();
-        let feasible = splits.iter().rev().find(|(_, excess)| *excess <= 0.0);
-        let nearest = || splits.iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        feasible
-            .or_else(nearest)
-            .copied()
-            .unwrap_or((0.0, f64::INFINITY))
+        self.of_ends(z, ends)
+    }
+
+    fn of_ends(&self, z: &[f64], mut ends: Vec<Ends>) -> Option<Found> {
+        let mut lows: Vec<f64> = ends.iter().map(|ends| ends.low).collect();
+        lows.sort_by(|a, b| b.total_cmp(a));
+        ends.sort_by(|a, b| a.high.total_cmp(&b.high));
+        let most = |cap: f64, last: usize| {
+            let split = |j: usize| {
+                let (end, low) = (ends.get(j)?, lows.get(self.given_up - j)?);
+                let k = end.high.min(cap);
+                let found = Found {
+                    k,
+                    omega: end.omega * (k / end.high).sqrt(),
+                    excess: (low / k).ln(),
+                };
+                (k > 0.0 && found.excess < f64::INFINITY).then_some((j, found))
+            };
+            let splits: Vec<(usize, Found)> = (0..=last).filter_map(split).collect();
+            let feasible = splits.iter().filter(|(_, found)| found.excess <= 0.0);
+            let highest = feasible.max_by(|a, b| a.1.k.total_cmp(&b.1.k));
+            let nearest = || {
+                splits
+                    .iter()
+                    .min_by(|a, b| a.1.excess.total_cmp(&b.1.excess))
+            };
+            highest.or_else(nearest).copied()
+        };
+        let (last, found) = most(f64::INFINITY, self.given_up)?;
+        let cap = self.nominal.limited(z, found.k, found.omega)?;
+        if cap == found.k {
+            return Some(found);
+        }
+        // With less gain fewer draws are given up at the upper end, and more may be at the lower one.
+        most(cap, last).map(|(_, found)| found)
+    }
+
+    /// Watches the draws with the lowest upper ends and those with the highest lower ends.
+    fn watch(&mut self, ends: &[Ends]) {
+        let count = (self.given_up + 1 + SPARE).min(ends.len());
+        let mut order: Vec<usize> = (0..ends.len()).collect();
+        order.sort_by(|a, b| ends[*a].high.total_cmp(&ends[*b].high));
+        self.watched.extend(&order[..count]);
+        order.sort_by(|a, b| ends[*b].low.total_cmp(&ends[*a].low));
+        self.watched.extend(&order[..count]);
+        self.watched.sort_unstable();
+        self.watched.dedup();
     }
 
     /// Mean cost of a shape with gain `k` over the first draws, at most this many.
@@ -143,80 +262,107 @@ impl Draws {
         costs.sum::<f64>() / count.max(1) as f64
     }
 
-    /// Coverage and mean cost of an optimum.
+    /// Coverage and mean cost of an optimum among `count` draws.
     pub(crate) fn performance(&mut self, best: &Optimum, count: usize) -> Performance {
         let k = best.gain.k;
-        let intervals = self.intervals(&best.z);
         let rounding = 1e-6;
-        let is_kept = |(low, high): &&(f64, f64)| {
-            *low <= k * (1.0 + rounding) && k <= *high * (1.0 + rounding)
-        };
-        let kept = intervals.iter().filter(is_kept).count();
+        let is_kept =
+            |ends: &&Ends| ends.low <= k * (1.0 + rounding) && k <= ends.high * (1.0 + rounding);
+        let kept = self.all_ends(&best.z).iter().filter(is_kept).count();
         Performance {
             coverage: kept as f64 / count.max(1) as f64,
             mean_cost: self.mean_cost(&best.z, (k, best.gain.omega), COST_DRAWS),
         }
     }
 
-    /// Gain of a shape with the limits of noise and input, and its infeasibility.
-    fn limited(&mut self, z: &[f64], omega: f64) -> Option<(f64, f64)> {
-        if !self.nominal.family.is_in_range(&self.nominal.process, z) {
-            return None;
-        }
-        let (high, excess) = self.gain(z);
-        if !(high > 0.0 && excess < f64::INFINITY) {
-            return None;
-        }
-        let k = self.nominal.limited(z, high, omega)?;
-        Some((k, excess + (high / k).ln()))
-    }
-
-    /// Sets the limits of `Ms` and `Mt`.
-    pub(crate) fn set_peak(&mut self, peak: f64) {
-        let problems = self.objectives.iter_mut().map(|draw| &mut draw.problem);
-        for problem in problems.chain([&mut self.nominal]) {
-            (problem.limits.ms, problem.limits.mt) = (peak, peak);
-        }
-    }
-
     /// Logarithm of the mean cost of a shape over the first draws, with the penalty of an infeasible gain.
-    fn cost(&mut self, z: &[f64], omega: f64, most: usize) -> f64 {
-        let Some((k, excess)) = self.limited(z, omega) else {
+    fn cost(&mut self, z: &[f64], most: usize) -> f64 {
+        let Some(found) = self.gain(z, Over::Watched) else {
             return NO_COST;
         };
-        let mean = self.mean_cost(z, (k, omega), most);
+        let mean = self.mean_cost(z, (found.k, found.omega), most);
         if mean.is_finite() {
-            mean.ln() + PENALTY * excess.max(0.0)
+            mean.ln() + PENALTY * found.excess.max(0.0)
         } else {
             NO_COST
         }
     }
 
-    /// Optimum over the draws, from the nominal one.
-    pub(crate) fn optimum(&mut self, nominal: &Optimum) -> Result<Optimum, NoOptimum> {
-        let omega = nominal.gain.omega;
-        let start = self.feasible(&nominal.z, omega);
-        let mut point = start.ok_or(NoOptimum::Infeasible)?;
-        let mut value = NO_COST;
-        for (extent, most) in [(FIRST, FIRST_COST_DRAWS), (SECOND, COST_DRAWS)] {
-            value = self.cost(&point, omega, most);
-            let mut cost = |z: &[f64]| self.cost(z, omega, most);
-            let best = minimise(&mut cost, &Best { value, point }, extent);
-            (value, point) = (best.value, best.point);
+    /// Optimum over the draws, from the nominal one and from shapes that are near the optimum.
+    pub(crate) fn optimum(
+        &mut self,
+        nominal: &Optimum,
+        near: Option<&[f64]>,
+    ) -> Result<Optimum, NoOptimum> {
+        let start = self.feasible(&nominal.z, near);
+        let (mut kept, mut found) = start.ok_or(NoOptimum::Infeasible)?;
+        let mut point = kept.clone();
+        for round in 0..ROUNDS {
+            let extents: &[(Extent, usize)] = if round == 0 {
+                &[(FIRST, FIRST_COST_DRAWS), (SECOND, COST_DRAWS)]
+            } else {
+                &[(SECOND, COST_DRAWS)]
+            };
+            for (extent, most) in extents {
+                let value = self.cost(&point, *most);
+                let mut cost = |z: &[f64]| self.cost(z, *most);
+                point = minimise(&mut cost, &Best { value, point }, *extent).point;
+            }
+            if let Some(confirmed) = self.confirmed(&point) {
+                (kept, found) = (point.clone(), confirmed);
+                break;
+            }
         }
-        let (k, excess) = self.limited(&point, omega).ok_or(NoOptimum::Infeasible)?;
-        let mut found = nominal.clone();
-        (found.z, found.gain.k, found.ln_cost) = (point, k, value);
-        if excess <= 0.0 && value < NO_COST {
-            Ok(found)
+        if kept != point {
+            (kept, found) = self.towards(&point, (kept, found));
+        }
+        let mut best = nominal.clone();
+        best.ln_cost = self
+            .mean_cost(&kept, (found.k, found.omega), COST_DRAWS)
+            .ln();
+        (best.z, best.gain.k, best.gain.omega) = (kept, found.k, found.omega);
+        if best.ln_cost < NO_COST {
+            Ok(best)
         } else {
             Err(NoOptimum::Infeasible)
         }
     }
 
-    /// A shape that keeps the limits on enough draws, from a shape that does on fewer. The simulations have the frequency
-    /// `omega`.
-    pub(crate) fn feasible(&mut self, from: &[f64], omega: f64) -> Option<Vec<f64>> {
+    /// Gain of a shape if enough of all draws keep the limits. The draws that limit it are watched from then on.
+    fn confirmed(&mut self, z: &[f64]) -> Option<Found> {
+        self.gain(z, Over::All).filter(|found| found.excess <= 0.0)
+    }
+
+    /// The shape nearest to `point`, on the way from one that keeps the limits, that still does.
+    fn towards(
+        &mut self,
+        point: &[f64],
+        (mut kept, mut found): (Vec<f64>, Found),
+    ) -> (Vec<f64>, Found) {
+        let from = kept.clone();
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let share = 0.5 * (low + high);
+            let between = |(a, b): (&f64, &f64)| a + share * (b - a);
+            let z: Vec<f64> = from.iter().zip(point).map(between).collect();
+            if let Some(confirmed) = self.confirmed(&z) {
+                (low, kept, found) = (share, z, confirmed);
+            } else {
+                high = share;
+            }
+        }
+        (kept, found)
+    }
+
+    /// A shape that keeps the limits on enough draws, with its gain, from shapes that do on fewer.
+    pub(crate) fn feasible(
+        &mut self,
+        from: &[f64],
+        near: Option<&[f64]>,
+    ) -> Option<(Vec<f64>, Found)> {
+        if self.watched.is_empty() {
+            self.confirmed(from);
+        }
         // Longer times of integral and angle loop separate the ends of the gain.
         let slow = self.nominal.family.slow_variables();
         let longer = LONGER.iter().map(|longer| {
@@ -224,34 +370,67 @@ impl Draws {
             point.iter_mut().take(slow).for_each(|z| *z += longer);
             point
         });
-        let near = self.feasible_from(longer, omega);
+        let starts = longer.chain(near.map(<[f64]>::to_vec)).collect();
+        if let Some(found) = self.feasible_from(starts) {
+            return Some(found);
+        }
         // A wide posterior has its shapes far from that of one process.
-        let starts = |draws: &Self| draws.nominal.family.starts(&draws.nominal.process);
-        near.or_else(|| self.feasible_from(starts(self).into_iter(), omega))
+        let mut starts = self.nominal.family.starts(&self.nominal.process);
+        starts.extend(LOWER_PEAKS.iter().filter_map(|share| {
+            let mut problem = self.nominal;
+            let lower = |peak: f64| 1.0 + share * (peak - 1.0);
+            problem.limits.ms = lower(problem.limits.ms);
+            problem.limits.mt = lower(problem.limits.mt);
+            optimum(problem).ok().map(|found| found.z)
+        }));
+        self.feasible_from(starts)
     }
 
-    /// A shape that keeps the limits on enough draws: a search from the first start that does, else from the nearest one.
-    fn feasible_from(
-        &mut self,
-        starts: impl Iterator<Item = Vec<f64>>,
-        omega: f64,
-    ) -> Option<Vec<f64>> {
-        let mut excess = |z: &[f64]| {
-            self.limited(z, omega)
-                .map_or(NO_COST, |(_, excess)| excess.max(WELL_INSIDE))
-        };
-        let mut nearest: Option<Best> = None;
+    /// The start of least cost that keeps the limits on enough draws; if none does, a shape that does, from the nearest
+    /// starts.
+    fn feasible_from(&mut self, starts: Vec<Vec<f64>>) -> Option<(Vec<f64>, Found)> {
+        let mut kept = Vec::new();
+        let mut missed = Vec::new();
         for point in starts {
-            let value = excess(&point);
-            if value <= 0.0 {
-                return Some(point);
-            }
-            if value < nearest.as_ref().map_or(f64::INFINITY, |best| best.value) {
-                nearest = Some(Best { value, point });
+            match self.gain(&point, Over::Watched) {
+                Some(found) if found.excess <= 0.0 => {
+                    kept.push((self.nominal.least_cost(&point, found.k), point));
+                }
+                Some(found) => missed.push((found.excess, point)),
+                None => {}
             }
         }
-        let found = minimise(&mut excess, &nearest?, FEASIBILITY);
-        (found.value <= 0.0).then_some(found.point)
+        for list in [&mut kept, &mut missed] {
+            list.sort_by(|a, b| a.0.total_cmp(&b.0));
+        }
+        let best = kept
+            .iter()
+            .find_map(|(_, point)| Some((point.clone(), self.confirmed(point)?)));
+        best.or_else(|| {
+            let near = kept.iter().chain(&missed).take(TRIES);
+            near.filter_map(|(_, point)| self.feasible_near(point.clone()))
+                .next()
+        })
+    }
+
+    /// A shape that keeps the limits on enough draws: a search for the least excess from one that does not.
+    fn feasible_near(&mut self, mut point: Vec<f64>) -> Option<(Vec<f64>, Found)> {
+        for _ in 0..ROUNDS {
+            let mut excess = |z: &[f64]| {
+                let found = self.gain(z, Over::Watched);
+                found.map_or(NO_COST, |found| found.excess.max(WELL_INSIDE))
+            };
+            let value = excess(&point);
+            let found = minimise(&mut excess, &Best { value, point }, FEASIBILITY);
+            if found.value > 0.0 {
+                return None;
+            }
+            point = found.point;
+            if let Some(found) = self.confirmed(&point) {
+                return Some((point, found));
+            }
+        }
+        None
     }
 }
 

@@ -6,7 +6,7 @@ use crate::controller::{Controller, Form};
 use crate::model::Model;
 use crate::synthesis::limits::Limits;
 use crate::synthesis::objective::{NoiseLimit, Objective, Problem};
-use crate::synthesis::optimum::{FINE_GRID, NoOptimum, Optimum, optimum};
+use crate::synthesis::optimum::{FINE_GRID, NoOptimum, Optimum, optimum, optimum_near};
 use crate::synthesis::polish::polish;
 use crate::synthesis::robust::Draws;
 use crate::synthesis::setpoint;
@@ -22,8 +22,9 @@ const FILTER_SHARE: f64 = 0.05;
 /// Largest limit of `Ms` and `Mt` that is offered where the specified one cannot be kept.
 const LARGEST_PEAK: f64 = 10.0;
 
-/// Bisections of the least limit: exact to a percent.
-const BISECTIONS: usize = 8;
+/// The least limit is searched upwards in steps of this factor, squared each time, and bisected to the second one.
+const FIRST_STEP: f64 = 1.05;
+const LEAST_STEP: f64 = 5e-3;
 
 /// A designed loop exceeds its limits by rounding at most.
 const ROUNDING: f64 = 1e-6;
@@ -47,56 +48,118 @@ pub(super) fn design_over(
     draws: &[Model],
     specification: &Specification,
 ) -> Result<Design, DesignError> {
-    if draws.is_empty() {
-        return design(model, specification);
+    let mut over = DesignOver::new(model, draws, specification)?;
+    over.design(specification)
+}
+
+/// Designs for one model and the same draws, each from the one before: in order of rising limits that saves most of the
+/// search.
+pub(super) struct DesignOver<'a> {
+    model: &'a Model,
+    count: usize,
+    set: Draws,
+    /// Shapes of the last design: for the most probable model alone, and over the draws.
+    last: Option<[Vec<f64>; 2]>,
+}
+
+impl<'a> DesignOver<'a> {
+    /// The specifications of the designs may differ from this one in their limits only.
+    pub(super) fn new(
+        model: &'a Model,
+        draws: &[Model],
+        specification: &Specification,
+    ) -> Result<Self, DesignError> {
+        let problem = problem(model, specification)?;
+        let processes: Vec<Process> = (draws.iter())
+            .filter_map(|draw| Process::new(&draw.linear(), &specification.execution))
+            .collect();
+        Ok(Self {
+            model,
+            count: draws.len(),
+            set: Draws::new(problem, &processes, draws.len(), specification.coverage),
+            last: None,
+        })
     }
-    let problem = problem(model, specification)?;
-    let nominal = optimum(problem).map_err(|reason| refusal(problem, specification, reason))?;
-    let processes: Vec<Process> = (draws.iter())
-        .filter_map(|draw| Process::new(&draw.linear(), &specification.execution))
-        .collect();
-    let mut set = Draws::new(problem, &processes, specification.coverage);
-    let best = set.optimum(&nominal).map_err(|_| {
-        let mut shape = nominal.z.clone();
-        let mut is_kept = |peak| {
-            set.set_peak(peak);
-            let found = set.feasible(&shape, nominal.gain.omega);
-            found.map(|found| shape = found).is_some()
+
+    /// Controller of least mean cost over the draws, or for the model alone if there are none.
+    pub(super) fn design(&mut self, specification: &Specification) -> Result<Design, DesignError> {
+        if self.count == 0 {
+            return design(self.model, specification);
+        }
+        let problem = problem(self.model, specification)?;
+        let last = self.last.as_ref();
+        let nominal = match last {
+            Some([nominal, _]) => optimum_near(problem, nominal),
+            None => optimum(problem),
         };
+        let nominal = match nominal {
+            Ok(nominal) => nominal,
+            Err(NoOptimum::Unbounded) => return Err(DesignError::Unbounded),
+            Err(NoOptimum::Infeasible) => return Err(self.refusal(specification, problem, None)),
+        };
+        self.set.set_limits(problem.limits, problem.noise);
+        let near = last.map(|[_, robust]| robust.as_slice());
+        let Ok(best) = self.set.optimum(&nominal, near) else {
+            return Err(self.refusal(specification, problem, Some(&nominal)));
+        };
+        let found = self.set.performance(&best, self.count);
+        let alone = self.set.performance(&nominal, self.count);
+        let mut designed = loop_of(self.model, specification, &problem, &best)?;
+        // A cost after a step of the load is in the unit of the gain.
+        let gain = if specification.form.has_integral() {
+            problem.process.gain.abs()
+        } else {
+            1.0
+        };
+        let unit = gain * problem.process.unit_s;
+        designed.robustness = Some(Robustness {
+            coverage: found.coverage,
+            mean_iae: found.mean_cost * unit,
+            nominal_coverage: alone.coverage,
+            nominal_mean_iae: alone.mean_cost * unit,
+        });
+        self.last = Some([nominal.z, best.z]);
+        Ok(designed)
+    }
+
+    /// The refusal with the least limit that the draws allow, which is that of the model alone or more. `nominal` is the
+    /// optimum of the model at the specified limits.
+    fn refusal(
+        &mut self,
+        specification: &Specification,
+        problem: Problem,
+        nominal: Option<&Optimum>,
+    ) -> DesignError {
+        let asked = problem.limits.ms.max(problem.limits.mt);
+        let start = match nominal {
+            Some(nominal) => Some((asked, nominal.z.clone())),
+            None => least_peak(asked, &mut |peak| {
+                optimum(with_peak(problem, peak)).ok().map(|found| found.z)
+            }),
+        };
+        let least = start.and_then(|(from, mut shape)| {
+            least_peak(from, &mut |peak| {
+                self.set
+                    .set_limits(with_peak(problem, peak).limits, problem.noise);
+                (shape, _) = self.set.feasible(&shape, None)?;
+                Some(shape.clone())
+            })
+        });
         DesignError::Infeasible {
             form: specification.form,
-            least_peak: least_peak(problem.limits.ms.max(problem.limits.mt), &mut is_kept),
+            least_peak: least.map(|(peak, _)| peak),
         }
-    })?;
-    let (found, alone) = (
-        set.performance(&best, draws.len()),
-        set.performance(&nominal, draws.len()),
-    );
-    let mut designed = loop_of(model, specification, &problem, &best)?;
-    // A cost after a step of the load is in the unit of the gain.
-    let gain = if specification.form.has_integral() {
-        problem.process.gain.abs()
-    } else {
-        1.0
-    };
-    let unit = gain * problem.process.unit_s;
-    designed.robustness = Some(Robustness {
-        coverage: found.coverage,
-        mean_iae: found.mean_cost * unit,
-        nominal_coverage: alone.coverage,
-        nominal_mean_iae: alone.mean_cost * unit,
-    });
-    Ok(designed)
+    }
 }
 
 fn refusal(problem: Problem, specification: &Specification, reason: NoOptimum) -> DesignError {
+    let asked = problem.limits.ms.max(problem.limits.mt);
     match reason {
         NoOptimum::Unbounded => DesignError::Unbounded,
         NoOptimum::Infeasible => DesignError::Infeasible {
             form: specification.form,
-            least_peak: least_peak(problem.limits.ms.max(problem.limits.mt), &mut |peak| {
-                optimum(with_peak(problem, peak)).is_ok()
-            }),
+            least_peak: least_peak(asked, &mut |peak| optimum(with_peak(problem, peak)).ok())
+                .map(|(peak, _)| peak),
         },
     }
 }
@@ -111,21 +174,29 @@ pub(super) fn with_peak(problem: Problem, peak: f64) -> Problem {
     Problem { limits, ..problem }
 }
 
-/// Least limit of `Ms` and `Mt` above `from` that is kept. `None` if none up to 10 is.
-pub(super) fn least_peak(from: f64, is_kept: &mut impl FnMut(f64) -> bool) -> Option<f64> {
-    let (mut low, mut high) = (from.min(LARGEST_PEAK), LARGEST_PEAK);
-    if !is_kept(high) {
-        return None;
-    }
-    for _ in 0..BISECTIONS {
-        let middle = (low * high).sqrt();
-        if is_kept(middle) {
-            high = middle;
-        } else {
-            low = middle;
+/// Least limit of `Ms` and `Mt` from `from` on that is kept, with what keeps it. `None` if none up to 10 is.
+pub(super) fn least_peak<T>(
+    from: f64,
+    kept: &mut impl FnMut(f64) -> Option<T>,
+) -> Option<(f64, T)> {
+    let mut low = from.min(LARGEST_PEAK);
+    let mut step = FIRST_STEP;
+    let mut best = loop {
+        let peak = (low * step).min(LARGEST_PEAK);
+        match kept(peak) {
+            Some(found) => break (peak, found),
+            None if peak == LARGEST_PEAK => return None,
+            None => (low, step) = (peak, step * step),
+        }
+    };
+    while best.0 > low * (1.0 + LEAST_STEP) {
+        let middle = (low * best.0).sqrt();
+        match kept(middle) {
+            Some(found) => best = (middle, found),
+            None => low = middle,
         }
     }
-    Some(high)
+    Some(best)
 }
 
 /// The problem in the units of the process.
