@@ -4,6 +4,7 @@
 //! bytes -> tables     flights, topics, parameters; only the chosen columns     ulog.rs, dataflash.rs, blackbox.rs
 //! ```
 
+mod blackbox;
 mod dataflash;
 mod error;
 mod loops;
@@ -32,6 +33,7 @@ pub fn read_tables(bytes: impl Read, wanted: &Wanted) -> Result<LogTables, LogEr
         Some(LogFormat::ULog) => ulog::read(source, wanted),
         Some(LogFormat::DataFlash) => dataflash::read(source, wanted),
         Some(LogFormat::DataFlashText) => dataflash::read_text(source, wanted),
-        Some(LogFormat::Blackbox) | None => Err(LogError::UnknownFormat),
+        Some(LogFormat::Blackbox) => blackbox::read(source, wanted),
+        None => Err(LogError::UnknownFormat),
     }
 }
