@@ -1,11 +1,16 @@
 #![doc = include_str!("../README.md")]
 
 mod csv;
+mod log;
 mod recording;
 mod time_unit;
 
 pub use csv::{
     ColumnRef, CsvOptions, CsvWriter, ReadError, SAMPLE_RATES_HZ, read, read_from, write_csv,
+};
+pub use log::{
+    Axis, ControlLoop, FlightTables, LogError, LogFormat, LogParameter, LogTables, Loss, Topic,
+    Wanted, read_tables,
 };
 pub use recording::{
     Cell, ChosenBy, Column, ColumnLabel, Columns, GAP_PERIODS, Gap, MAX_POINTS, Note, Position,
