@@ -29,7 +29,7 @@ pub(crate) use self::completions::Completions;
 pub(crate) use self::dataset::Dataset;
 pub(crate) use self::design::DesignArguments;
 pub(crate) use self::fly::Fly;
-pub(crate) use self::identify::{Estimator, Identify, Method, When};
+pub(crate) use self::identify::{Between, Estimator, Identify, Method, When};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};

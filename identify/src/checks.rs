@@ -10,25 +10,28 @@
 use onecycle_design::{Controller, Model, loop_response, margins, noise_amplification};
 use onecycle_onboard::pack::Pack;
 
+use crate::amplitude;
 use crate::assumed::MOST_EXTRAPOLATION;
 use crate::excitation::{Excitation, Switching};
 use crate::outcome::{Identification, Identified};
-use crate::relay;
 use crate::relay::law::Law;
 use crate::remark::Remark;
 use crate::settings::Options;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
 
-/// Largest time, as a share of the period, by which a relay that averages the error over a few per cent of its half period
-/// switches after the measurement has reached the ratio. The relay on board averages over 3 %, and its protection against
-/// noise adds as much again.
-const AVERAGING: f64 = 0.015;
+/// Time, as a share of the period, by which a relay that averages the error over 3 % of its half period switches after the
+/// measurement has reached the ratio, with some rounding. Above the second value both columns are not on one clock: the
+/// protection against noise adds as much again.
+const AVERAGING: f64 = 0.0085;
+const MOST_AVERAGING: f64 = 0.015;
 /// Largest time, as a share of the period, by which noise makes a relay without averaging switch early; to it comes the
 /// noise over the amplitude.
 const EARLY: f64 = 0.02;
 /// Ratio above which a relay has hysteresis, and is not one that leads.
 const LEADING: f64 = -0.05;
+/// Phase margin (rad) that a sample period costs, above which it matters when between two samples the relay switches.
+const MUCH_BETWEEN_RAD: f64 = 0.05;
 /// Crossover over the highest excited frequency above which a remark says so, and the rounding of its limit.
 const EXTRAPOLATED: f64 = 1.5;
 const ROUNDING: f64 = 1.01;
@@ -77,11 +80,24 @@ pub(crate) fn check(
                 return;
             }
         }
+    } else if let Some(design) = identified.design.filter(|_| options.input_late_s.is_none()) {
+        let rad_per_s = design.margins.gain_crossover_rad_per_s;
+        found.remarks.push(Remark::ClockUnchecked { rad_per_s });
+    }
+    if found.switching.is_some() && options.hold.is_none() && options.input_late_s.is_none() {
+        let crossover = identified
+            .design
+            .map(|design| design.margins.gain_crossover_rad_per_s);
+        let cost_rad = crossover.map(|crossover| crossover * signals.sample_period_s);
+        let much = cost_rad.filter(|cost| *cost > MUCH_BETWEEN_RAD);
+        found
+            .remarks
+            .extend(much.map(Remark::SwitchesBetweenSamples));
     }
     if let Some(excited) = excitation.highest_rad_per_s() {
         found.remarks.extend(extrapolation(excited, identified));
     }
-    if relay::has_two_levels(signals) {
+    if amplitude::is_one(signals.input) {
         found.remarks.push(Remark::OneAmplitude);
     }
     limits(excitation, identified, &mut found.remarks);
@@ -121,56 +137,61 @@ impl Clock<'_> {
         }
         let seen = self.switching.beta;
         if let Some(beta) = options.beta {
-            return if self.is_that_of(beta) {
-                Ok(None)
-            } else {
-                Err(Verdict::ClockOffset {
+            return match self.is_that_of(beta, MOST_AVERAGING) {
+                true if self.is_that_of(beta, AVERAGING) => Ok(None),
+                true => Ok(Some(self.remark(beta, identified))),
+                false => Err(Verdict::ClockOffset {
                     seen,
                     beta,
                     late_s: self.law.late_s(beta),
-                })
+                }),
             };
         }
         let leading =
             pack.map(|pack| f64::from(0.5 * (pack.domain().beta[0] + pack.domain().beta[1])));
-        if leading
-            .into_iter()
-            .chain([0.0])
-            .any(|beta| self.is_that_of(beta))
-        {
+        let mut usual = leading.into_iter().chain([0.0]);
+        if usual.any(|beta| self.is_that_of(beta, AVERAGING)) {
             return Ok(None);
         }
         let has_hysteresis = seen > LEADING;
-        let Some(beta) = leading
-            .filter(|_| !has_hysteresis)
-            .or(has_hysteresis.then_some(0.0))
-        else {
-            return Ok(None);
-        };
-        let late_s = self.law.late_s(beta);
-        let controller = identified.design.map(|design| design.controller);
-        let later = late_s
-            .map(|late_s| delayed(&identified.model, late_s))
-            .zip(controller);
-        let margin = later.map(|(model, controller)| margin_rad(&model, &controller));
-        // Only a relay that leads is made by few other programs than ours.
-        if margin == Some(None) && !has_hysteresis {
-            return Err(Verdict::ClockOffset { seen, beta, late_s });
+        let beta = leading.filter(|_| !has_hysteresis).unwrap_or(0.0);
+        let remark = self.remark(beta, identified);
+        match remark {
+            // Only a relay that leads is made by few other programs than ours.
+            Remark::ClockUnknown {
+                late_s: Some(late_s),
+                phase_margin_rad: None,
+                ..
+            } if !has_hysteresis && identified.design.is_some() => Err(Verdict::ClockOffset {
+                seen,
+                beta,
+                late_s: Some(late_s),
+            }),
+            remark => Ok(Some(remark)),
         }
-        Ok(Some(Remark::ClockUnknown {
-            seen,
-            beta,
-            late_s,
-            phase_margin_rad: margin.flatten(),
-            rad_per_s: (identified.design).map(|design| design.margins.gain_crossover_rad_per_s),
-        }))
     }
 
-    /// Whether a relay with this `beta` may have made the recording, with both columns on one clock.
-    fn is_that_of(&self, beta: f64) -> bool {
+    /// What it means if the relay has this `beta`.
+    fn remark(&self, beta: f64, identified: &Identified) -> Remark {
+        let late_s = self.law.late_s(beta);
+        let later = late_s.map(|late_s| delayed(&identified.model, late_s));
+        let controller = identified.design.map(|design| design.controller);
+        Remark::ClockUnknown {
+            seen: self.switching.beta,
+            beta,
+            late_s,
+            phase_margin_rad: (later.zip(controller))
+                .and_then(|(model, controller)| margin_rad(&model, &controller)),
+            rad_per_s: (identified.design).map(|design| design.margins.gain_crossover_rad_per_s),
+        }
+    }
+
+    /// Whether a relay with this `beta` may have made the recording, with both columns on one clock: it switches at most
+    /// `averaging` periods late.
+    fn is_that_of(&self, beta: f64, averaging: f64) -> bool {
         let (period_s, sample_s) = (self.law.period_s(), self.law.sample_s());
         let early_s = (EARLY + self.noise) * period_s + sample_s;
-        let averaged_s = AVERAGING * period_s + sample_s;
+        let averaged_s = averaging * period_s + sample_s;
         let late_s = self.law.late_s(beta);
         late_s.is_some_and(|late_s| late_s > -early_s && late_s < averaged_s)
     }

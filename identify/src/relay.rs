@@ -101,11 +101,6 @@ pub fn find_oscillation(signals: &Signals<'_>, cycles: usize) -> Result<Oscillat
     Ok(first.describe(signals, &relay, &window))
 }
 
-/// Whether the input switches between two levels.
-pub(crate) fn has_two_levels(signals: &Signals<'_>) -> bool {
-    find_relay(signals).is_ok()
-}
-
 /// Search for a stretch of the recording from which the process can be identified.
 struct Search<'a> {
     signals: &'a Signals<'a>,

@@ -109,6 +109,11 @@ pub enum Remark {
         /// Phase margin (rad) that each second of an offset costs: the gain crossover. `None` without a controller.
         rad_per_s: Option<f64>,
     },
+    /// Nothing in the recording shows whether input and output were logged by one clock.
+    ClockUnchecked {
+        /// Phase margin (rad) that each second of an offset costs: the gain crossover.
+        rad_per_s: f64,
+    },
     /// The gain crossover of the controller lies above the frequencies that the recording excites.
     Extrapolated {
         /// Crossover over the highest excited frequency.
@@ -118,6 +123,11 @@ pub enum Remark {
     },
     /// The input has two levels, which do not show how the gain depends on the size of the input.
     OneAmplitude,
+    /// Two amplitudes of a relay show the same process, but its jumps overcome an actuator that sticks at small changes.
+    JumpsOnly,
+    /// The relay may switch between two samples, if it runs faster than the log. The value is the phase margin (rad) that a
+    /// sample period costs.
+    SwitchesBetweenSamples(f64),
     /// The other amplitude of a relay test at two amplitudes was refused. The value is the verdict.
     OtherAmplitudeRefused(Box<Verdict>),
     /// The gain margin of the controller is below 6 dB. The value is the margin, a factor.
@@ -171,8 +181,11 @@ impl Remark {
             Self::PartUsed(_) => "part_used",
             Self::Interpolated(_) => "interpolated",
             Self::ClockUnknown { .. } => "clock_unknown",
+            Self::ClockUnchecked { .. } => "clock_unchecked",
             Self::Extrapolated { .. } => "extrapolated",
             Self::OneAmplitude => "one_amplitude",
+            Self::JumpsOnly => "jumps_only",
+            Self::SwitchesBetweenSamples(_) => "switches_between_samples",
             Self::OtherAmplitudeRefused(_) => "other_amplitude_refused",
             Self::LittleGainMargin(_) => "little_gain_margin",
             Self::NoiseAtActuator(_) => "noise_at_actuator",

@@ -13,7 +13,7 @@ use onecycle_onboard::pack::Pack;
 
 use crate::amplitude::{self, Parts};
 use crate::checks;
-use crate::innovations;
+use crate::innovations::{self, Hold};
 use crate::outcome::{Identification, Identified};
 use crate::relay;
 use crate::remark::Remark;
@@ -79,7 +79,9 @@ fn at_two_amplitudes(
             if let Some(compared) = compared {
                 kept.remarks
                     .retain(|remark| *remark != Remark::OneAmplitude);
-                if !compared.is_alike {
+                if compared.is_alike {
+                    kept.remarks.push(Remark::JumpsOnly);
+                } else {
                     kept.outcome = Err(Verdict::AmplitudeDependent(compared));
                 }
             }
@@ -106,7 +108,7 @@ fn by_road(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) ->
 fn road(options: &Options) -> Road {
     let is_relays = matches!(options.structure, None | Some(Structure::Soiptd))
         && options.span_s == (None, None)
-        && options.hold.is_none();
+        && options.hold != Some(Hold::Interpolated);
     match options.road {
         Road::Automatic if !is_relays => Road::General,
         Road::Automatic if options.method != Method::Map => Road::Relay,
@@ -124,7 +126,7 @@ fn automatic(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) 
         Err(verdict) if is_final(verdict) => steady,
         Err(verdict) => {
             let mut general = innovations::identify(signals, options);
-            if general.outcome.is_err() && steady.excitation.is_some() {
+            if steady.excitation.is_some() && !is_beyond_doubt(&general) {
                 // There is a relay oscillation: its verdict tells more.
                 return steady;
             }
@@ -204,6 +206,20 @@ fn settle(mut steady: Identification, mut general: Identification, doubt: Doubt)
     };
     kept.remarks.push(remark);
     if is_replaced { general } else { steady }
+}
+
+/// Whether the general estimator explains a steady oscillation that the other one refuses, and not by chance: at hardly more
+/// than one frequency a pair of complex poles explains a limit cycle that the input does not even drive.
+fn is_beyond_doubt(general: &Identification) -> bool {
+    let Ok(found) = &general.outcome else {
+        return false;
+    };
+    let is_resonant = matches!(
+        found.model.structure(),
+        Structure::Resonant | Structure::ResonantLag
+    );
+    let is_left = (general.remarks.iter()).any(|remark| matches!(remark, Remark::InputLeft(_)));
+    is_white(general) && !is_left && !is_resonant
 }
 
 /// Whether the general estimator explains the recording up to white innovations.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Specification, Structure, Style};
 
 use super::{controllers, pack};
-use crate::args::{Estimator, Identify, When};
+use crate::args::{Between, Estimator, Identify, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::reading::open_with_bar;
@@ -108,7 +108,10 @@ fn check_estimator(arguments: &Identify) -> Result<(), Failure> {
         ("--structure", arguments.structure.is_some_and(is_other)),
         ("--from", arguments.from.is_some()),
         ("--to", arguments.to.is_some()),
-        ("--hold", arguments.hold.is_some()),
+        (
+            "--hold interpolated",
+            arguments.hold == Some(Between::Interpolated),
+        ),
     ];
     match refused.iter().find(|(_, is_given)| *is_given) {
         Some((option, _)) => Err(Failure::usage(format!(

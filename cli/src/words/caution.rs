@@ -20,6 +20,11 @@ pub(super) fn sentence(remark: &Remark) -> Option<String> {
             });
             clock(*seen, *beta, late_s.map(|late_s| (late_s, *phase_margin_rad)), &cost)
         }
+        Remark::ClockUnchecked { rad_per_s } => format!(
+            "Nothing in this recording shows whether both columns come from one clock: each 5 ms by which the input was \
+             logged late cost {:.1} deg of phase margin. --input-late 0 says that they do.",
+            (5e-3 * rad_per_s).to_degrees()
+        ),
         Remark::Extrapolated {
             ratio,
             is_withdrawn: false,
@@ -34,6 +39,14 @@ pub(super) fn sentence(remark: &Remark) -> Option<String> {
         Remark::OneAmplitude => "One amplitude of the input does not show a dead zone, backlash or saturation of the \
                                  actuator: repeat the test at 0.6 of it, best in the same recording."
             .to_owned(),
+        Remark::JumpsOnly => "Both amplitudes show the same process. The jumps of a relay overcome a valve or joint that sticks: \
+                              if it may, try small steps too."
+            .to_owned(),
+        Remark::SwitchesBetweenSamples(cost_rad) => format!(
+            "If the relay runs faster than the log, its switches come up to one sample before they are logged, which may \
+             cost {:.1} deg of phase margin. Log every step of the relay, or say that the log does with --hold held.",
+            cost_rad.to_degrees()
+        ),
         Remark::OtherAmplitudeRefused(verdict) => format!(
             "The part of the recording at the other amplitude of the relay was refused ({verdict}), so the amplitudes could \
              not be compared."
@@ -109,6 +122,10 @@ mod tests {
             ),
             (clock(None, None), "Each 5 ms of an offset cost 5.7 deg."),
             (clock(None, None), "beta -0.60, which no usual relay has"),
+            (
+                Remark::ClockUnchecked { rad_per_s: 20.0 },
+                "logged late cost 5.7 deg",
+            ),
             (
                 Remark::LittleGainMargin(1.5),
                 "a factor of 1.5 only (3.5 dB)",
