@@ -25,7 +25,7 @@
 //! Plant, noise and bias of case `n` of a kind depend on the seed and `n` only, so that every kind is tried on the same
 //! plants.
 
-mod fault;
+pub mod fault;
 mod kind;
 mod plant;
 mod run;
@@ -244,7 +244,7 @@ impl HonestyCampaign {
             .map(|_| ())
     }
 
-    /// Name, sizes and noise of case `n` of kind number `kind`.
+    /// Simulates case `n` of kind number `kind`. `None` if the output runs away.
     ///
     /// # Errors
     /// [`HonestyError::NoOscillation`], or a field that [`Self::validate`] refuses.
