@@ -18,6 +18,7 @@ mod common;
 mod dataset;
 mod fly;
 mod grid;
+mod honesty;
 mod identifier;
 mod imports;
 mod json_schema;

@@ -25,7 +25,7 @@
 //! Plant, noise and bias of case `n` of a kind depend on the seed and `n` only, so that every kind is tried on the same
 //! plants.
 
-mod fault;
+pub mod fault;
 mod kind;
 mod plant;
 mod run;
@@ -99,8 +99,8 @@ pub enum HonestyError {
         /// What is wrong.
         error: ExperimentError,
     },
-    /// A defect of another process than an integrator with two lags.
-    #[error("kind \"{kind}\": a defect needs the structure soiptd")]
+    /// A defect of another process than an integrator with two lags, or beside what its simulation does not have.
+    #[error("kind \"{kind}\": a defect needs the structure soiptd, no wind and no jitter")]
     Defect {
         /// Name of the kind.
         kind: String,
@@ -186,15 +186,20 @@ impl HonestyCampaign {
     fn check(&self, kind: &Kind) -> Result<(), HonestyError> {
         let name = || kind.name.clone();
         let periods = kind.periods.unwrap_or(self.periods);
+        let (low, high) = kind.strength.map_or((0.0, 0.0), Span::ends);
+        let steps = match kind.fault {
+            Some(Fault::Decimated) => high.max(1.0),
+            _ => 1.0,
+        };
         let bias = kind.bias.unwrap_or(self.bias);
         let noise = kind.noise.unwrap_or(self.noise).ends();
         first_out_of_range([
             (
                 "periods",
-                "1 to 1000, and at most a million samples",
+                "1 to 1000, and at most a million steps of the relay",
                 periods,
                 within(1.0, 1e3, periods)
-                    && periods * self.samples_per_period.ends().1 <= MOST_SAMPLES,
+                    && periods * self.samples_per_period.ends().1 * steps <= MOST_SAMPLES,
             ),
             ("bias", "0 to 100", bias, within(0.0, 100.0, bias)),
             (
@@ -214,7 +219,6 @@ impl HonestyCampaign {
             second,
             within(0.01, 100.0, second),
         )])?;
-        let (low, high) = kind.strength.map_or((0.0, 0.0), Span::ends);
         first_out_of_range([(
             "strength",
             "0 to 10,000, the lower value first",
@@ -227,6 +231,9 @@ impl HonestyCampaign {
         };
         let process = kind.process.as_ref().unwrap_or(&self.process);
         process.check(1.0).map_err(part)?;
+        if kind.defect.is_some() && !kind.allows_defect(process) {
+            return Err(HonestyError::Defect { kind: name() });
+        }
         kind.wind.check().map_err(|error| part(error.into()))?;
         // In units of the period; the sample rate is the least.
         let rate_hz = self.samples_per_period.ends().0;
@@ -237,7 +244,7 @@ impl HonestyCampaign {
             .map(|_| ())
     }
 
-    /// Name, sizes and noise of case `n` of kind number `kind`.
+    /// Simulates case `n` of kind number `kind`. `None` if the output runs away.
     ///
     /// # Errors
     /// [`HonestyError::NoOscillation`], or a field that [`Self::validate`] refuses.

@@ -1,5 +1,6 @@
 //! A kind of data: its experiment and its fault.
 
+use onecycle_design::Structure;
 use onecycle_onboard::{Relay, RelaySettings};
 use onecycle_plant::Controller;
 use serde::Deserialize;
@@ -80,6 +81,15 @@ impl Default for Test {
             band: None,
             pulse: None,
         }
+    }
+}
+
+impl Kind {
+    /// Whether the simulation of a process with a defect has what this kind asks for.
+    pub(super) fn allows_defect(&self, process: &ProcessRange) -> bool {
+        process.structure == Structure::Soiptd
+            && self.wind.named().next().is_none()
+            && self.fault != Some(Fault::Jitter)
     }
 }
 
