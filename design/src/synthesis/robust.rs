@@ -15,11 +15,13 @@ use crate::analysis::process::Process;
 
 use super::limits::Limits;
 use super::objective::{NO_COST, NoiseLimit, Objective, PENALTY, Problem};
-use super::optimum::{NoOptimum, Optimum, optimum};
+use super::optimum::{Effort, NoOptimum, Optimum, optimum};
 use super::simplex::{Best, Extent, minimise};
 
-/// Draws over which the cost is averaged: in the first simplex, and in the others and the result.
-const FIRST_COST_DRAWS: usize = 4;
+/// Draws over which the cost is averaged: in the first simplex, in the others, and in the result. They come in pairs on
+/// opposite sides of the most probable process, so that a pair has its cost but for the curvature.
+const FIRST_COST_DRAWS: usize = 2;
+const SECOND_COST_DRAWS: usize = 6;
 const COST_DRAWS: usize = 12;
 
 /// Step of the grids of the draws. The extrema are refined, so it only has to find each band.
@@ -299,9 +301,9 @@ impl Draws {
         let mut point = kept.clone();
         for round in 0..ROUNDS {
             let extents: &[(Extent, usize)] = if round == 0 {
-                &[(FIRST, FIRST_COST_DRAWS), (SECOND, COST_DRAWS)]
+                &[(FIRST, FIRST_COST_DRAWS), (SECOND, SECOND_COST_DRAWS)]
             } else {
-                &[(SECOND, COST_DRAWS)]
+                &[(SECOND, SECOND_COST_DRAWS)]
             };
             for (extent, most) in extents {
                 let value = self.cost(&point, *most);
@@ -381,7 +383,7 @@ impl Draws {
             let lower = |peak: f64| 1.0 + share * (peak - 1.0);
             problem.limits.ms = lower(problem.limits.ms);
             problem.limits.mt = lower(problem.limits.mt);
-            optimum(problem).ok().map(|found| found.z)
+            optimum(problem, Effort::Rough).ok().map(|found| found.z)
         }));
         self.feasible_from(starts)
     }
