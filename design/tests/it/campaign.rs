@@ -7,8 +7,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use onecycle_design::{
-    Controller, DesignError, Form, Model, Specification, Structure, design,
-    noise_amplification,
+    Controller, DesignError, Form, Model, Specification, Structure, design, noise_amplification,
 };
 
 use crate::random::Random;
