@@ -27,7 +27,7 @@ pub(crate) use self::campaign::Campaign;
 pub(crate) use self::certify::Certify;
 pub(crate) use self::completions::Completions;
 pub(crate) use self::dataset::Dataset;
-pub(crate) use self::design::DesignArguments;
+pub(crate) use self::design::{DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
 pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Between, Estimator, Identify, Method, When};
 pub(crate) use self::man::Man;
@@ -160,6 +160,7 @@ impl FromStr for Share {
     "  onecycle tune --k 1 --t-prop 0.3 --t-body 2 --tau 0.1\n",
     "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --controller pi --style calm\n",
     "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --against 2.5,0.3,1\n",
+    "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --noise 0.05 --sample-period 0.1\n",
     "  onecycle tune --k 1 --t-prop 0.3 --t-body 2 --tau 0.1 --style paper --phase-margin 45\n\n",
     "A process is a structure with its parameters: K or K/T_body, T_prop, T_prop2, T_body (or T), w0, zeta, ",
     "tau.\nStructures: iptd, integrator_lag, double_integrator_lag, soiptd, toiptd, foptd, soptd, resonant, ",
@@ -170,6 +171,8 @@ pub(crate) struct Tune {
     pub(crate) process: StructureArguments,
     #[command(flatten)]
     pub(crate) design: DesignArguments,
+    #[command(flatten)]
+    pub(crate) noise: NoiseArguments,
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,

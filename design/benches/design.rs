@@ -1,7 +1,7 @@
 //! Time of a design: one process, and 200 draws from a posterior.
 
 use onecycle_design::{
-    Form, Linear, Model, Specification, Structure, Style, design, design_over, margins,
+    Form, Linear, Model, Specification, Structure, Style, design, design_over, margins, proposals,
     sensitivity, step_response,
 };
 
@@ -73,12 +73,25 @@ fn two_hundred_draws(bencher: divan::Bencher, form: &str) {
     bencher.bench(|| design_over(&model, &draws, &asked).expect("feasible"));
 }
 
-// A posterior so wide that no controller keeps the style.
+// Six double integrators among the draws, which no PI controls.
 #[divan::bench(sample_count = 20)]
 fn two_hundred_draws_refused(bencher: divan::Bencher) {
-    let (model, draws) = (model(), draws(40.0));
-    let asked = Specification::new(Form::Pid, Style::Calm);
+    let (model, mut draws) = (model(), draws(1.0));
+    draws[..6].fill(
+        Linear::new(Structure::Soiptd)
+            .with_lags_s([0.03, 1.0])
+            .with_tau_s(0.02)
+            .into(),
+    );
+    let asked = balanced("pi");
     bencher.bench(|| design_over(&model, &draws, &asked).expect_err("infeasible"));
+}
+
+// Sharp, balanced and calm: these share most of the work.
+#[divan::bench(sample_count = 20)]
+fn three_styles_over_two_hundred_draws(bencher: divan::Bencher) {
+    let (model, draws, asked) = (model(), draws(1.0), balanced("pid"));
+    bencher.bench(|| proposals(&model, &draws, &asked, None));
 }
 
 #[divan::bench]

@@ -7,11 +7,11 @@
 #![expect(clippy::print_stdout, reason = "the tables are the result")]
 
 use onecycle_design::rules::{
-    HalfRule, StepFeatures, Ultimate, amigo, simc, tyreus_luyben, ziegler_nichols,
+    Gmvc, HalfRule, StepFeatures, Ultimate, amigo, simc, tyreus_luyben, ziegler_nichols,
 };
 use onecycle_design::{
-    Controller, Form, Linear, MeasurementNoise, Model, Pid, Specification, Structure, Style,
-    design, load_iae, noise_amplification, sensitivity,
+    Autopilot, Controller, Form, Linear, MeasurementNoise, Model, Pid, Specification, Structure,
+    Style, design, load_iae, noise_amplification, sensitivity,
 };
 use onecycle_onboard::Soiptd;
 
@@ -203,6 +203,34 @@ fn multirotors() -> Vec<(Soiptd, MeasurementNoise)> {
     (1..=50).filter_map(|i| draw(f64::from(i))).collect()
 }
 
+/// PX4's gains for a vehicle, from the model that its identification would find without error: the rate at samples a sixteenth
+/// of the period of the relay test apart, or one dead time, since the model holds no longer one.
+fn px4(model: &Model) -> Option<Controller> {
+    let process = model.soiptd()?;
+    let omega = process.frequency_at_phase(BETA.asin() - std::f64::consts::PI)?;
+    let period_s = std::f64::consts::TAU / omega;
+    let sample_s = process.tau_s().max(period_s / 16.0);
+    let (gain, fast_s, slow_s) = (process.k()?, process.t_prop_s(), process.t_body_s()?);
+    // Rate after a unit step of the input, at sample `k`.
+    let step = |k: f64| {
+        let t = k * sample_s - process.tau_s();
+        let part = |lag_s: f64| lag_s * (-t / lag_s).exp();
+        let rest = (part(slow_s) - part(fast_s)) / (slow_s - fast_s);
+        if t > 0.0 { gain * (1.0 - rest) } else { 0.0 }
+    };
+    let [h1, h2, h3] = [1.0, 2.0, 3.0].map(|k| step(k) - step(k - 1.0));
+    let [fast, slow] = [fast_s, slow_s].map(|lag_s| (-sample_s / lag_s).exp());
+    let (a1, a2) = (-fast - slow, fast * slow);
+    let coefficients = [a1, a2, h1, h2 + a1 * h1, h3 + a1 * h2 + a2 * h1];
+    let ratio = 4.0 / std::f64::consts::PI * process.magnitude(omega);
+    let gains = Gmvc::scaled_to(period_s, ratio).cascade(&coefficients, sample_s)?;
+    Some(
+        Autopilot::from(gains)
+            .with_filter_s(FILTER_SHARE * gains.rate_d)
+            .into(),
+    )
+}
+
 /// A method for a vehicle with its noise.
 type VehicleMethod = (
     &'static str,
@@ -235,7 +263,8 @@ fn vehicle_methods(has_noise_limit: bool) -> Vec<VehicleMethod> {
         ("balanced cascade, rate PI", rate_pi),
         ("balanced cascade, rate PID", rate_pid),
     ];
-    styles.into_iter().chain(rules).collect()
+    let px4: VehicleMethod = ("PX4's GMVC", Box::new(|model, _| px4(model)));
+    styles.into_iter().chain(rules).chain([px4]).collect()
 }
 
 /// Designs of multirotors: noise as a share of the amplitude of the relay, IAE per that of the first method.

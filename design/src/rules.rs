@@ -11,6 +11,7 @@
 //! All rules return PI or PID without measurement filter; a rule has no controller of another form. They assume a positive
 //! or negative gain of the process and return gains of the same sign.
 
+mod gmvc;
 mod homogeneous;
 
 use std::f64::consts::{PI, TAU};
@@ -21,6 +22,7 @@ use crate::model::Model;
 use crate::model::state_space::StateSpace;
 use crate::roots::root;
 
+pub use gmvc::Gmvc;
 pub use homogeneous::Homogeneous;
 
 /// First- or second-order model by the half rule.

@@ -310,7 +310,7 @@ impl Search<'_> {
             }
         };
         let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
-        if !posterior.is_narrow_enough(&undamped, &draws, phase_margin_rad) {
+        if !posterior.is_narrow_enough(&undamped, &draws, (&specification, phase_margin_rad)) {
             return Err(Verdict::TooUncertain);
         }
         let estimate = posterior.estimate();

@@ -1,6 +1,6 @@
 //! Result of an identification.
 
-use onecycle_design::{Design, Model, Proposal, Specification, StepMetrics};
+use onecycle_design::{Design, Model, Proposal, Specification, StepMetrics, proposals};
 use onecycle_onboard::refine::Refined;
 
 use crate::amplitude::TwoAmplitudes;
@@ -89,6 +89,15 @@ impl Identified {
         let most = if has_model_error { 0 } else { most };
         let undamped = self.model.soiptd().map_or(self.model, Model::Soiptd);
         (undamped, self.posterior.models(most))
+    }
+
+    /// Controllers to choose from, robust over the posterior: one for each of [`Proposal::choices`] for
+    /// [`Identified::specification`], [`Identified::design`] among them. Three styles cost about one and a half times the
+    /// first.
+    #[must_use]
+    pub fn proposals(&self) -> Vec<Proposal> {
+        let (model, draws) = self.for_design(Specification::default().draws());
+        proposals(&model, &draws, &self.specification, self.design.as_ref())
     }
 
     /// Controller for other requirements than [`Identified::specification`], robust over the posterior. Those of

@@ -391,20 +391,26 @@ impl Posterior {
 
     /// Whether the posterior is narrow enough for control: on at least 95 % of the draws the designed controller is stable,
     /// whose phase margin is `designed` (`None` without a controller), and so is the paper's, the least robust one on offer.
-    /// The latter is designed for `model` over `draws`, and not asked for where the paper has none for the structure.
+    /// The latter is designed for `model` over `draws`, unless it is the one `asked` for already, and left out where the
+    /// paper has none for the structure.
     ///
     /// The paper's controller judges every result, so no other style turns a refusal into an answer.
     pub(crate) fn is_narrow_enough(
         &self,
         model: &Model,
         draws: &[Model],
-        designed: Option<Interval>,
+        (asked, designed): (&Specification, Option<Interval>),
     ) -> bool {
         let is_stable = |margin: Interval| margin.low.is_some_and(|low| low > 0.0);
         if !designed.is_none_or(is_stable) {
             return false;
         }
         let paper = Specification::paper();
+        let is_asked =
+            asked.style == paper.style && asked.phase_margin_rad == paper.phase_margin_rad;
+        if is_asked && designed.is_some() {
+            return true;
+        }
         let design = design_over(model, &draws[..draws.len().min(paper.draws())], &paper);
         design.map_or(true, |design| {
             is_stable(self.phase_margin_rad(&design.controller))

@@ -311,7 +311,7 @@ fn design(
         Err(error) => (None, Some(error)),
     };
     let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
-    if !posterior.is_narrow_enough(&model, &draws, phase_margin_rad) {
+    if !posterior.is_narrow_enough(&model, &draws, (specification, phase_margin_rad)) {
         return Err(if has_model_error {
             Verdict::NotThisProcess { misfit: fit.misfit }
         } else {

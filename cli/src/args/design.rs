@@ -2,10 +2,14 @@
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use onecycle::{Execution, Form, Pid, Specification, Style};
+use onecycle::{Execution, Form, MeasurementNoise, Pid, Specification, Style};
 
 use super::{Share, phase_margin};
 use crate::failure::Failure;
+
+/// Why the paper's style takes no noise.
+pub(crate) const PAPER_HAS_NO_NOISE: &str =
+    "--style paper does not limit the noise: leave out --noise, or choose another style";
 
 /// Requirements on a controller, and the gains to compare it with.
 #[derive(Clone, Debug, Args)]
@@ -90,6 +94,38 @@ impl DesignArguments {
     /// The gains in force.
     pub(crate) fn against(&self) -> Option<Pid> {
         self.against
+    }
+}
+
+/// Noise of a known process, which a recording would show.
+#[derive(Clone, Copy, Debug, Args)]
+pub(crate) struct NoiseArguments {
+    /// Standard deviation of the measurement noise of one sample, in the unit of the output. The style limits the noise at
+    /// the actuator to a share of --input-amplitude: sharp 50 %, balanced 25 %, calm 10 %. Needs --sample-period
+    #[arg(long, value_name = "STD", allow_negative_numbers = true, value_parser = positive)]
+    noise: Option<f64>,
+    /// Amplitude that the actuator has for control, in the unit of the input: what --noise is compared with
+    #[arg(long, value_name = "INPUT", default_value_t = 1.0, allow_negative_numbers = true,
+          value_parser = positive)]
+    input_amplitude: f64,
+}
+
+impl NoiseArguments {
+    /// `asked` with the noise.
+    pub(crate) fn complete(&self, asked: Specification) -> Result<Specification, Failure> {
+        let Some(std) = self.noise else {
+            return Ok(asked);
+        };
+        if asked.style == Style::Paper {
+            return Err(Failure::usage(PAPER_HAS_NO_NOISE));
+        }
+        let period_s = asked.execution.sample_period_s;
+        if period_s == 0.0 {
+            return Err(Failure::usage(
+                "--noise is that of one sample: add the sample period of the controller, such as --sample-period 0.001",
+            ));
+        }
+        Ok(asked.with_noise(MeasurementNoise::new(std, period_s, self.input_amplitude)))
     }
 }
 

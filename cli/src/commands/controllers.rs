@@ -13,23 +13,22 @@ const DRAWS: usize = 200;
 
 /// Controllers of an identified process.
 pub(super) fn of_identified(identified: &Identified, against: Option<Pid>) -> Controllers {
-    let asked = identified.specification;
-    let made = identified.design;
     let draws = identified.posterior.models(DRAWS);
     let (model, _) = identified.for_design(0);
-    let propose = |specification: &Specification| match made {
-        Some(design) if specification.style == asked.style => {
-            Proposal::of(*specification, Ok(design))
-        }
-        _ => identified.propose(specification),
-    };
-    controllers(&model, &draws, &asked, against, propose)
+    let asked = &identified.specification;
+    Controllers {
+        is_recorded: true,
+        ..controllers(&model, &draws, asked, against, identified.proposals())
+    }
 }
 
 /// Controllers of a known process.
 pub(super) fn of_model(model: &Model, asked: &Specification, against: Option<Pid>) -> Controllers {
-    let propose = |specification: &Specification| Proposal::new(model, &[], specification);
-    controllers(model, &[], asked, against, propose)
+    let choices = Proposal::choices(model.structure(), asked);
+    let proposals = (choices.par_iter())
+        .map(|choice| Proposal::new(model, &[], choice))
+        .collect();
+    controllers(model, &[], asked, against, proposals)
 }
 
 /// Limits of `Ms` of a curve.
@@ -61,22 +60,22 @@ fn controllers(
     draws: &[Model],
     asked: &Specification,
     against: Option<Pid>,
-    propose: impl Fn(&Specification) -> Proposal + Sync,
+    mut proposals: Vec<Proposal>,
 ) -> Controllers {
     let noise = asked.noise.as_ref();
-    let mut choices = Proposal::choices(model.structure(), asked);
-    if !choices.iter().any(|choice| choice.style == asked.style) {
-        choices.insert(0, *asked);
+    let is_asked = |proposal: &Proposal| proposal.specification.style == asked.style;
+    if !proposals.iter().any(is_asked) {
+        // The paper's style for a structure that it does not cover: the row says so.
+        proposals.insert(0, Proposal::new(model, &[], asked));
     }
-    let row = |specification: &Specification| {
-        let proposal = propose(specification);
+    let row = |proposal: Proposal| {
         let design = proposal.outcome.as_ref().ok();
         Row {
             figures: design.and_then(|design| assess(model, &design.controller, noise)),
             proposal,
         }
     };
-    let rows: Vec<Row> = choices.par_iter().map(row).collect();
+    let rows: Vec<Row> = proposals.into_par_iter().map(row).collect();
     let chosen = rows
         .iter()
         .find(|row| row.proposal.specification.style == asked.style);
@@ -99,7 +98,7 @@ fn controllers(
         rows,
         against,
         trade_off: vec![],
-        is_recorded: !draws.is_empty() || noise.is_some(),
+        is_recorded: false,
     }
 }
 

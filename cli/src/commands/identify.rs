@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Specification, Structure, Style};
 
 use super::{controllers, pack};
-use crate::args::{Between, Estimator, Identify, When};
+use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::reading::open_with_bar;
@@ -72,9 +72,7 @@ fn specification(arguments: &Identify) -> Result<Specification, Failure> {
     let mut asked = arguments.design.specification()?;
     if let Some(share) = arguments.noise {
         if asked.style == Style::Paper {
-            return Err(Failure::usage(
-                "--style paper does not limit the noise: leave out --noise, or choose another style",
-            ));
+            return Err(Failure::usage(PAPER_HAS_NO_NOISE));
         }
         asked.noise_share = share;
     }

@@ -13,7 +13,7 @@ use crate::words::controllers::refusal;
 
 pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
     let model = arguments.process.model()?;
-    let asked: Specification = arguments.design.specification()?;
+    let asked: Specification = (arguments.noise).complete(arguments.design.specification()?)?;
     let mut choice = controllers::of_model(&model, &asked, arguments.design.against());
     let chosen = choice.chosen().map(|row| row.proposal.outcome);
     let best = match chosen {

@@ -147,6 +147,11 @@ fn unusable_requirements_on_a_controller() {
     with(&["--gain-margin", "0.5"]).misused(&["--gain-margin", "factor"]);
     with(&["--input-peak", "-3"]).misused(&["--input-peak", "positive"]);
     with(&["--sample-period", "0"]).misused(&["--sample-period", "positive"]);
+    with(&["--noise", "0.01"]).misused(&["--noise", "--sample-period 0.001"]);
+    let sampled = ["--sample-period", "0.01", "--noise"];
+    with(&[&sampled[..], &["1%"]].concat()).misused(&["--noise", "positive number"]);
+    with(&[&sampled[..], &["1", "--style", "paper"]].concat()).misused(&["leave out --noise"]);
+    with(&["--input-amplitude", "0"]).misused(&["--input-amplitude", "positive"]);
     with(&["--phase-margin", "0"]).misused(&["--phase-margin", "between 0 and 90"]);
     for gains in ["1", "1,2", "1,2,x", "1,2,3,4,5", ""] {
         with(&["--against", gains]).misused(&["--against", "Kp,Ki,Kd"]);

@@ -141,6 +141,26 @@ fn tune_a_process_in_one_word() {
     assert!(widest <= Some(100), "{}", text.stdout);
 }
 
+// Noise of 0.05 in samples every 0.1 s: without the limit the PID puts about twice the input amplitude of 1 on the actuator
+// (kappa^2 = h kd^2/Tf^3 with kd 1.4 and Tf 0.05 s). Balanced allows a quarter of the amplitude, which the optimum uses; half
+// the amplitude needs a slower filter.
+#[test]
+fn tune_with_noise() {
+    let process = ["--process", "FOPTD,K=2,T=10,tau=1"];
+    let noise = ["--sample-period", "0.1", "--noise", "0.05"];
+    let report = tune(&process, &noise);
+    assert_eq!(report.0["controllers"][1]["style"], "balanced");
+    let share = report.number("/controllers/1/noise_share");
+    assert!((share - 0.25).abs() < 1e-4, "{share}");
+    let weaker = tune(
+        &process,
+        &[&noise[..], &["--input-amplitude", "0.5"]].concat(),
+    );
+    let share = weaker.number("/controllers/1/noise_share");
+    assert!((share - 0.25).abs() < 1e-4, "{share}");
+    assert!(weaker.number("/controller/filter_s") > report.number("/controller/filter_s"));
+}
+
 // A cascade: its gains are those of the PID with the same terms, kp = rate_p (angle_p + rate_i).
 #[test]
 fn tune_a_cascade() {

@@ -129,7 +129,11 @@ impl Loop {
     /// ISE of a unit step of the reference (output unit^2 s), to a relative 1e-4.
     pub(crate) fn reference_ise(&self) -> Option<f64> {
         let omega = self.fastest(&self.curve()?);
-        let step = (STEP_RAD / omega, Ending::COARSE);
+        let ending = Ending {
+            squares: true,
+            ..Ending::COARSE
+        };
+        let step = (STEP_RAD / omega, ending);
         let found = integrals(&self.process, &self.law, Excitation::Reference, omega, step)?;
         Some(found.ise * self.process.unit_s)
     }

@@ -35,6 +35,10 @@ const BEYOND: [f64; 7] = [1.0, 1.1, 1.25, 1.5, 2.0, 4.0, 10.0];
 /// Most zeros of a law.
 const ZEROS: f64 = 3.0;
 
+/// From this share of the inverse of its time on the filter of second order falls by 1.9 decades per decade:
+/// `-2 x^4/(4 + x^4)` at `x = 3`.
+const FILTERED: f64 = 3.0;
+
 /// Below this share of the inverse of its longest time, a loop is its integrators.
 const ASYMPTOTIC: f64 = 0.01;
 
@@ -168,8 +172,8 @@ impl Problem {
     }
 
     /// Frequencies between which a loop with this law is scanned. Below the first one the loop is its integrators; above the
-    /// second one its magnitude never rises: the process falls at least as fast there as the controller can rise, and a
-    /// resonance is passed. Nor does its phase: the zeros of the controller are passed.
+    /// second one its magnitude never rises: process and filter fall at least as fast there as the controller can rise, and
+    /// a resonance is passed. Nor does its phase: the zeros of the controller are passed.
     pub(crate) fn ends(&self, law: &Law) -> [f64; 2] {
         let rise = if law.k2 != 0.0 {
             2
@@ -177,8 +181,13 @@ impl Problem {
             usize::from(law.kd != 0.0 || law.kf != 0.0)
         };
         let times = self.process.times();
+        let corner_of = |index: usize| times.get(index).map_or(0.0, |time| 1.0 / time);
         let corner = match rise.checked_sub(1) {
-            Some(index) => times.get(index).map_or(0.0, |time| 1.0 / time),
+            Some(index) => {
+                // The filter takes back one rise, and two together with the first corner.
+                let first = if index > 0 { corner_of(0) } else { 0.0 };
+                corner_of(index).min(first.max(FILTERED / law.tf))
+            }
             None => 0.0,
         };
         let resonance = self.process.resonance().map_or(0.0, |(peak, _)| peak);

@@ -57,8 +57,17 @@ pub(crate) enum NoOptimum {
     Infeasible,
 }
 
+/// How far a search goes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Effort {
+    /// To the optimum.
+    Full,
+    /// Near the optimum: where another search starts.
+    Rough,
+}
+
 /// Shape of least cost.
-pub(crate) fn optimum(problem: Problem) -> Result<Optimum, NoOptimum> {
+pub(crate) fn optimum(problem: Problem, effort: Effort) -> Result<Optimum, NoOptimum> {
     let mut starts = problem.family.starts(&problem.process);
     if let Some(family) = problem.family.without_rate_derivative() {
         // The derivative of the rate starts from the cascade without it.
@@ -66,22 +75,38 @@ pub(crate) fn optimum(problem: Problem) -> Result<Optimum, NoOptimum> {
         let best = search(
             &mut Objective::new(simpler, COARSE_GRID),
             &family.starts(&problem.process),
+            effort,
         )?;
         starts = problem
             .family
             .with_rate_derivative(&problem.process, &best.point);
     }
-    optimum_from(problem, &starts)
+    optimum_from(problem, &starts, effort)
 }
 
-/// Shape of least cost, from the optimum `near` it within lower limits.
+/// Shape near that of least cost, from one that is near it within lower limits.
 pub(crate) fn optimum_near(problem: Problem, near: &[f64]) -> Result<Optimum, NoOptimum> {
-    optimum_from(problem, &[near.to_vec()]).or_else(|_| optimum(problem))
+    let found = optimum_from(problem, &[near.to_vec()], Effort::Rough);
+    found.or_else(|_| optimum(problem, Effort::Rough))
 }
 
-fn optimum_from(problem: Problem, starts: &[Vec<f64>]) -> Result<Optimum, NoOptimum> {
+fn optimum_from(
+    problem: Problem,
+    starts: &[Vec<f64>],
+    effort: Effort,
+) -> Result<Optimum, NoOptimum> {
     let mut coarse = Objective::new(problem, COARSE_GRID);
-    let best = search(&mut coarse, starts)?;
+    let mut best = search(&mut coarse, starts, effort)?;
+    if let Some(other) = problem
+        .family
+        .exchanged(&best.point)
+        .filter(|_| effort == Effort::Full)
+    {
+        let found = search(&mut coarse, &[other], effort).ok();
+        best = found
+            .filter(|found| found.value < best.value)
+            .unwrap_or(best);
+    }
     let mut fine = Objective::new(problem, FINE_GRID);
     let is_same = |found: &Optimum| found.ln_cost < best.value + SAME;
     if let Some(found) = finish(&mut fine, &best.point).ok().filter(is_same) {
@@ -106,7 +131,11 @@ fn optimum_from(problem: Problem, starts: &[Vec<f64>]) -> Result<Optimum, NoOpti
 }
 
 /// Search from the best of the starts, from the least infeasible one if none is feasible.
-fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOptimum> {
+fn search(
+    objective: &mut Objective,
+    starts: &[Vec<f64>],
+    effort: Effort,
+) -> Result<Best, NoOptimum> {
     let mut ranked = Vec::with_capacity(starts.len());
     let mut reason = NoOptimum::Infeasible;
     for start in starts {
@@ -152,6 +181,9 @@ fn search(objective: &mut Objective, starts: &[Vec<f64>]) -> Result<Best, NoOpti
     };
     let mut cost = |z: &[f64]| objective.cost(z);
     let mut best = minimise(&mut cost, &best, FIRST);
+    if effort == Effort::Rough {
+        return Ok(best);
+    }
     if best.point.len() > 2 {
         // With more variables the simplex may collapse on a kink.
         best = minimise(&mut cost, &best, FIRST);

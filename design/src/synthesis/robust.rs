@@ -15,11 +15,13 @@ use crate::analysis::process::Process;
 
 use super::limits::Limits;
 use super::objective::{NO_COST, NoiseLimit, Objective, PENALTY, Problem};
-use super::optimum::{NoOptimum, Optimum, optimum};
+use super::optimum::{Effort, NoOptimum, Optimum, optimum};
 use super::simplex::{Best, Extent, minimise};
 
-/// Draws over which the cost is averaged: in the first simplex, and in the others and the result.
-const FIRST_COST_DRAWS: usize = 4;
+/// Draws over which the cost is averaged: in the first simplex, in the others, and in the result. They come in pairs on
+/// opposite sides of the most probable process, so that a pair has its cost but for the curvature.
+const FIRST_COST_DRAWS: usize = 2;
+const SECOND_COST_DRAWS: usize = 6;
 const COST_DRAWS: usize = 12;
 
 /// Step of the grids of the draws. The extrema are refined, so it only has to find each band.
@@ -100,6 +102,55 @@ pub(crate) struct Found {
     pub omega: f64,
     /// Logarithm by which the gain is infeasible.
     pub excess: f64,
+}
+
+/// The feasible gain that is highest; if none is, the least infeasible one.
+fn better(found: impl Iterator<Item = Found>) -> Option<Found> {
+    found.reduce(|a, b| match (a.excess <= 0.0, b.excess <= 0.0) {
+        (true, true) if b.k > a.k => b,
+        (false, true) => b,
+        (false, false) if b.excess < a.excess => b,
+        _ => a,
+    })
+}
+
+/// Gains that some draws allow, where a number of draws may be given up: some at the upper end and the others at the lower
+/// one.
+struct Split {
+    /// In ascending order of the upper ends.
+    ends: Vec<Ends>,
+    /// Lower ends in descending order.
+    lows: Vec<f64>,
+    given_up: usize,
+}
+
+impl Split {
+    fn new(ends: &[Ends], given_up: usize) -> Self {
+        let mut ends = ends.to_vec();
+        let mut lows: Vec<f64> = ends.iter().map(|ends| ends.low).collect();
+        lows.sort_by(|a, b| b.total_cmp(a));
+        ends.sort_by(|a, b| a.high.total_cmp(&b.high));
+        Self {
+            ends,
+            lows,
+            given_up,
+        }
+    }
+
+    /// Highest gain up to `cap`.
+    fn most(&self, cap: f64) -> Option<Found> {
+        let split = |j: usize| {
+            let (end, low) = (self.ends.get(j)?, self.lows.get(self.given_up - j)?);
+            let k = end.high.min(cap);
+            let found = Found {
+                k,
+                omega: end.omega * (k / end.high).sqrt(),
+                excess: (low / k).ln(),
+            };
+            (k > 0.0 && found.excess < f64::INFINITY).then_some(found)
+        };
+        better((0..=self.given_up).filter_map(split))
+    }
 }
 
 /// Which draws.
@@ -194,37 +245,25 @@ impl Draws {
     }
 
     fn of_ends(&self, z: &[f64], mut ends: Vec<Ends>) -> Option<Found> {
-        let mut lows: Vec<f64> = ends.iter().map(|ends| ends.low).collect();
-        lows.sort_by(|a, b| b.total_cmp(a));
-        ends.sort_by(|a, b| a.high.total_cmp(&b.high));
-        let most = |cap: f64, last: usize| {
-            let split = |j: usize| {
-                let (end, low) = (ends.get(j)?, lows.get(self.given_up - j)?);
-                let k = end.high.min(cap);
-                let found = Found {
-                    k,
-                    omega: end.omega * (k / end.high).sqrt(),
-                    excess: (low / k).ln(),
-                };
-                (k > 0.0 && found.excess < f64::INFINITY).then_some((j, found))
-            };
-            let splits: Vec<(usize, Found)> = (0..=last).filter_map(split).collect();
-            let feasible = splits.iter().filter(|(_, found)| found.excess <= 0.0);
-            let highest = feasible.max_by(|a, b| a.1.k.total_cmp(&b.1.k));
-            let nearest = || {
-                splits
-                    .iter()
-                    .min_by(|a, b| a.1.excess.total_cmp(&b.1.excess))
-            };
-            highest.or_else(nearest).copied()
-        };
-        let (last, found) = most(f64::INFINITY, self.given_up)?;
+        // A draw without any gain is given up once, and not at both ends.
+        let emptiness = |ends: &Ends| ends.low / ends.high;
+        ends.sort_by(|a, b| emptiness(b).total_cmp(&emptiness(a)));
+        let empty = ends.iter().filter(|ends| ends.low > ends.high).count();
+        let empty = empty.min(self.given_up);
+        let ways = [
+            Split::new(&ends, self.given_up),
+            Split::new(&ends[empty..], self.given_up - empty),
+        ];
+        let ways = &ways[..if empty > 0 { 2 } else { 1 }];
+        let most = |cap: f64| better(ways.iter().filter_map(|way| way.most(cap)));
+        let found = most(f64::INFINITY)?;
         let cap = self.nominal.limited(z, found.k, found.omega)?;
-        if cap == found.k {
-            return Some(found);
-        }
         // With less gain fewer draws are given up at the upper end, and more may be at the lower one.
-        most(cap, last).map(|(_, found)| found)
+        if cap == found.k {
+            Some(found)
+        } else {
+            most(cap)
+        }
     }
 
     /// Watches the draws with the lowest upper ends and those with the highest lower ends.
@@ -299,9 +338,9 @@ impl Draws {
         let mut point = kept.clone();
         for round in 0..ROUNDS {
             let extents: &[(Extent, usize)] = if round == 0 {
-                &[(FIRST, FIRST_COST_DRAWS), (SECOND, COST_DRAWS)]
+                &[(FIRST, FIRST_COST_DRAWS), (SECOND, SECOND_COST_DRAWS)]
             } else {
-                &[(SECOND, COST_DRAWS)]
+                &[(SECOND, SECOND_COST_DRAWS)]
             };
             for (extent, most) in extents {
                 let value = self.cost(&point, *most);
@@ -381,7 +420,7 @@ impl Draws {
             let lower = |peak: f64| 1.0 + share * (peak - 1.0);
             problem.limits.ms = lower(problem.limits.ms);
             problem.limits.mt = lower(problem.limits.mt);
-            optimum(problem).ok().map(|found| found.z)
+            optimum(problem, Effort::Rough).ok().map(|found| found.z)
         }));
         self.feasible_from(starts)
     }

@@ -160,6 +160,16 @@ impl Family {
         [0.011, 0.03, 0.1, 0.3, 1.0].map(start).to_vec()
     }
 
+    /// The variables of a cascade with rate derivative, the times of its integral and of its angle loop exchanged: nearly the
+    /// same to the whole loop, but not to the rate loop, so that each order has its own optimum.
+    pub(crate) fn exchanged(&self, z: &[f64]) -> Option<Vec<f64>> {
+        (self.form == Form::CascadePid).then(|| {
+            let mut other = z.to_vec();
+            other.swap(0, 1);
+            other
+        })
+    }
+
     /// Variables to start a search from. A cascade with PID starts [from one with PI](Self::with_rate_derivative).
     pub(crate) fn starts(&self, process: &Process) -> Vec<Vec<f64>> {
         let is_integrating = process.integrators() > 0;

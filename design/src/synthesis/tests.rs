@@ -5,7 +5,7 @@ use crate::controller::Form;
 use crate::model::{Linear, Model, Structure};
 use crate::synthesis::limits::Limits;
 use crate::synthesis::objective::{Objective, Problem};
-use crate::synthesis::optimum::{FINE_GRID, optimum};
+use crate::synthesis::optimum::{Effort, FINE_GRID, optimum};
 use crate::synthesis::polish::polish;
 use crate::synthesis::shape::{Family, Filter};
 use crate::tuning::{Specification, Style, named};
@@ -48,7 +48,7 @@ fn gains_of_the_vectors() {
     for (i, vector) in VECTORS.iter().enumerate() {
         let problem = problem(vector);
         let process = problem.process;
-        let found = optimum(problem).unwrap();
+        let found = optimum(problem, Effort::Full).unwrap();
         let coarse = found.ln_cost;
         let found = polish(&mut Objective::new(problem, FINE_GRID), &found);
         let law = problem.family.law(&process, &found.z).scaled(found.gain.k);
@@ -76,7 +76,7 @@ fn gains_of_the_vectors() {
 fn the_corrected_gains_are_optimal() {
     for (i, _) in CORRECTED {
         let problem = problem(&VECTORS[i]);
-        let found = optimum(problem).unwrap();
+        let found = optimum(problem, Effort::Full).unwrap();
         let mut objective = Objective::new(problem, FINE_GRID);
         let best = polish(&mut objective, &found);
         let mut feasible = 0;
@@ -144,28 +144,36 @@ fn brute_force(problem: Problem) -> f64 {
     least
 }
 
-/// Checks a share of the problems `0..count` against brute force: 2 % at most above the least cost of the grid. Number 211, a
-/// cascade with rate PID, is 4.3 % above: its search ends in another valley.
+/// Checks a share of the problems `0..count` against brute force: 2 % at most above the least cost of the grid.
 fn check_against_brute_force(count: usize, every: usize) -> usize {
     let problems = (0..count).step_by(every);
     let problems = problems.filter_map(|i| Some((i, random_problem(i)?)));
     let (mut checked, mut worse) = (0, Vec::new());
     for (i, problem) in problems {
-        let found = optimum(problem).map_or(f64::INFINITY, |found| found.ln_cost);
+        let found = optimum(problem, Effort::Full).map_or(f64::INFINITY, |found| found.ln_cost);
         let excess = found - brute_force(problem);
         if excess >= 0.02 {
             worse.push((i, excess, problem.family.form));
         }
         checked += 1;
     }
-    let is_known = |(i, excess, _): &(usize, f64, Form)| *i == 211 && *excess < 0.05;
-    assert!(worse.iter().all(is_known), "{worse:?}");
+    assert!(worse.is_empty(), "{worse:?}");
     checked
 }
 
 #[test]
 fn brute_force_finds_nothing_better() {
     assert!(check_against_brute_force(324, 29) >= 6);
+}
+
+// A cascade with rate PID whose optimum has a short integral time and a slow angle loop. With the two exchanged there is
+// another valley, 8 % higher.
+#[test]
+fn brute_force_finds_nothing_better_in_two_valleys() {
+    let problem = random_problem(211).unwrap();
+    let found = optimum(problem, Effort::Full).unwrap();
+    assert!(found.z[0] < found.z[1]);
+    assert!(found.ln_cost < brute_force(problem) + 0.02);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::controller::{Controller, Form};
 use crate::model::Model;
 use crate::synthesis::limits::Limits;
 use crate::synthesis::objective::{NoiseLimit, Objective, Problem};
-use crate::synthesis::optimum::{FINE_GRID, NoOptimum, Optimum, optimum, optimum_near};
+use crate::synthesis::optimum::{Effort, FINE_GRID, NoOptimum, Optimum, optimum, optimum_near};
 use crate::synthesis::polish::polish;
 use crate::synthesis::robust::Draws;
 use crate::synthesis::setpoint;
@@ -32,7 +32,7 @@ const ROUNDING: f64 = 1e-6;
 /// See [`super::design`].
 pub(super) fn design(model: &Model, specification: &Specification) -> Result<Design, DesignError> {
     let problem = problem(model, specification)?;
-    match optimum(problem) {
+    match optimum(problem, Effort::Full) {
         Ok(best) if specification.refined && problem.noise.is_none() => {
             let best = polish(&mut Objective::new(problem, FINE_GRID), &best);
             checked(model, specification, &problem, &best)
@@ -90,7 +90,7 @@ impl<'a> DesignOver<'a> {
         let last = self.last.as_ref();
         let nominal = match last {
             Some([nominal, _]) => optimum_near(problem, nominal),
-            None => optimum(problem),
+            None => optimum(problem, Effort::Rough),
         };
         let nominal = match nominal {
             Ok(nominal) => nominal,
@@ -134,7 +134,9 @@ impl<'a> DesignOver<'a> {
         let start = match nominal {
             Some(nominal) => Some((asked, nominal.z.clone())),
             None => least_peak(asked, &mut |peak| {
-                optimum(with_peak(problem, peak)).ok().map(|found| found.z)
+                optimum(with_peak(problem, peak), Effort::Rough)
+                    .ok()
+                    .map(|found| found.z)
             }),
         };
         let least = start.and_then(|(from, mut shape)| {
@@ -158,8 +160,10 @@ fn refusal(problem: Problem, specification: &Specification, reason: NoOptimum) -
         NoOptimum::Unbounded => DesignError::Unbounded,
         NoOptimum::Infeasible => DesignError::Infeasible {
             form: specification.form,
-            least_peak: least_peak(asked, &mut |peak| optimum(with_peak(problem, peak)).ok())
-                .map(|(peak, _)| peak),
+            least_peak: least_peak(asked, &mut |peak| {
+                optimum(with_peak(problem, peak), Effort::Rough).ok()
+            })
+            .map(|(peak, _)| peak),
         },
     }
 }

@@ -11,5 +11,6 @@ mod designs;
 mod loops;
 mod properties;
 mod random;
+mod robust;
 mod step_response;
 mod values;

@@ -190,8 +190,8 @@ fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, 
 fn by_gmvc(signals: &Signals<'_>) -> Result<Answer, BaselineError> {
     let settings = arx::ArxSettings::scaled_to_oscillation(signals)?;
     let model = arx::Model::of_differences(signals, &settings)?;
-    let design = gmvc::Design::scaled_to_oscillation(signals)?;
-    Ok(Answer::of_gains(design.cascade(&model)?))
+    let law = gmvc::scaled_to_oscillation(signals)?;
+    Ok(Answer::of_gains(gmvc::cascade(&law, &model)?))
 }
 
 /// The answer of a baseline: a process gets the same controller as those of all methods.

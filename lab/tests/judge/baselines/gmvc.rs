@@ -1,12 +1,13 @@
 //! PX4's gains.
 
 use onecycle_design::cascade::Cascade;
+use onecycle_design::rules::Gmvc;
 use onecycle_design::soiptd_pd::optimum::pd;
 use onecycle_identify::Signals;
 use onecycle_lab::experiments::signals_of;
 use onecycle_lab::judge::baselines::BaselineError;
 use onecycle_lab::judge::baselines::arx::{ArxSettings, Model};
-use onecycle_lab::judge::baselines::gmvc::Design;
+use onecycle_lab::judge::baselines::gmvc::{cascade, scaled_to_oscillation};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 
 use super::{SAMPLE_S, margin, process, processes, relay_test, run};
@@ -27,64 +28,11 @@ fn assert_gains(found: Cascade, expected: Cascade, tolerance: f64) {
     }
 }
 
-// Poles 0.9 and 0.9, and a rise time with exp(-2 rho) = 0.8: p = -1.6, 0.64, so e1 = 1.2, f0 = 1.39, f1
-// = -2.322, f2 = 0.972; f0 + f1 + f2 = P(1) = 0.04. With sum b = 0.15 and lambda = 0.17, nu is 0.5: k =
-// 0.378/0.5, 1/Ti = 0.04/(0.01 0.378)/5, Td = 0.01 0.972/0.378; the angle gain is 3/0.756.
-#[test]
-fn the_law_by_hand() {
-    let model = Model {
-        coefficients: [-1.8, 0.81, 0.1, 0.07, -0.02],
-        sample_s: 0.01,
-    };
-    let design = Design {
-        rise_time_s: 0.01 / (-0.5 * 0.8_f64.ln()),
-        detuning: 0.17,
-        stiffness: 3.0,
-        ..Design::PX4
-    };
-    let expected = Cascade {
-        angle_p: 3.0 / 0.756,
-        rate_p: 0.756,
-        rate_i: 0.04 / (5.0 * 0.01 * 0.378),
-        rate_d: 0.00972 / 0.378,
-    };
-    assert_gains(design.cascade(&model).unwrap(), expected, 1e-12);
-    // The angle gain is limited to 2 .. 6.5 1/s.
-    for (stiffness, angle_p) in [(0.1, 2.0), (90.0, 6.5)] {
-        let design = Design {
-            stiffness,
-            ..design
-        };
-        assert_eq!(design.cascade(&model).unwrap().angle_p, angle_p);
-    }
-}
-
-// Expected values of PX4's own test of its law, to the stated digits: k 0.129, 1/Ti 11.911/5 1/s, Td
-// 0.0463 s, at a rise time of 0.1 s, nearly Butterworth, detuning 0.5.
-#[test]
-fn the_law_is_px4s() {
-    let model = Model {
-        coefficients: [-1.814, 0.822, 0.0098, -0.162, 0.147],
-        sample_s: 0.004,
-    };
-    let design = Design {
-        rise_time_s: 0.1,
-        damping: 0.51,
-        detuning: 0.5,
-        ..Design::PX4
-    };
-    let found = design.cascade(&model).unwrap();
-    assert!((found.rate_p - 0.129).abs() < 1e-3, "{found:?}");
-    assert!((found.rate_i - 11.911 / 5.0).abs() < 1e-3, "{found:?}");
-    assert!((found.rate_d - 0.0463).abs() < 1e-4, "{found:?}");
-}
-
 /// The gains for a recording, with all settings scaled to its oscillation.
 fn scaled(signals: &Signals<'_>) -> Cascade {
     let settings = ArxSettings::scaled_to_oscillation(signals).unwrap();
     let model = Model::of_differences(signals, &settings).unwrap();
-    let design = Design::scaled_to_oscillation(signals).unwrap();
-    design.cascade(&model).unwrap()
+    cascade(&scaled_to_oscillation(signals).unwrap(), &model).unwrap()
 }
 
 // With the output in a unit ten times as small and the input in a unit four times as large, the gains
@@ -128,14 +76,14 @@ fn it_flies_its_own_vehicle_and_others() {
     let trace = run(vehicle, 0.0, 12.0, &mut relay);
     let signals = signals_of(&trace, SAMPLE_S);
     let model = Model::of_differences(&signals, &ArxSettings::PX4).unwrap();
-    let saved = below(Design::PX4.cascade(&model).unwrap(), &vehicle, 48.5);
+    let saved = below(cascade(&Gmvc::PX4, &model).unwrap(), &vehicle, 48.5);
     assert!((saved - 0.189).abs() < 0.005, "{saved}");
-    let design = Design::scaled_to_oscillation(&signals).unwrap();
+    let design = scaled_to_oscillation(&signals).unwrap();
     for (scaled, own) in [
-        (design.rise_time_s, Design::PX4.rise_time_s),
-        (design.detuning, Design::PX4.detuning),
-        (design.stiffness, Design::PX4.stiffness),
-        (design.angle_p_range.1, Design::PX4.angle_p_range.1),
+        (design.rise_time_s, Gmvc::PX4.rise_time_s),
+        (design.detuning, Gmvc::PX4.detuning),
+        (design.stiffness, Gmvc::PX4.stiffness),
+        (design.angle_p_range.1, Gmvc::PX4.angle_p_range.1),
     ] {
         assert!(close(scaled, own, 0.25), "{design:?}");
     }
@@ -155,7 +103,7 @@ fn wrong_models_are_refused() {
             coefficients,
             sample_s: 0.01,
         };
-        let found = Design::PX4.cascade(&model);
+        let found = cascade(&Gmvc::PX4, &model);
         assert!(
             matches!(found, Err(BaselineError::NotThisProcess(_))),
             "{found:?}"
