@@ -439,6 +439,8 @@ fn wrong_answers_are_refused() {
     }
     let missing = format!("mine={}", folder.name("nosuch.csv"));
     bench_run(&path, &["--answers", &missing]).refused(UNREADABLE, &["nosuch.csv"]);
+    #[cfg(unix)]
+    bench_run(&path, &["--answers", "mine=/dev/zero"]).refused(UNREADABLE, &["/dev/zero", "bytes"]);
     let file = folder.write("right.csv", b"experiment,kp,kd\n1,2,3\n");
     let twice = format!("mine={file}");
     bench_run(&path, &["--answers", &twice, "--answers", &twice]).refused(2, &["'mine'"]);

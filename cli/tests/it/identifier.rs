@@ -111,7 +111,12 @@ fn wrong_recipes_are_refused_in_one_sentence() {
         (
             "choosing = 60",
             "choosing = 0",
-            "choosing must be 1 or more",
+            "choosing must be 1 to 1000000000",
+        ),
+        (
+            "learning = 300",
+            "learning = 9223372036854775807",
+            "learning must be 1 to 1000000000",
         ),
         (
             "batch = 32",

@@ -14,6 +14,7 @@ use onecycle_lab::judge::evaluate::files::read_truth;
 use serde::Deserialize;
 
 use crate::failure::Failure;
+use crate::reading::{MOST_OF_A_TABLE, MOST_OF_SETTINGS, text_at_most};
 use crate::results::bench::{BenchManifest, FORMAT};
 
 pub(super) const MANIFEST: &str = "benchmark.json";
@@ -86,12 +87,11 @@ fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
 /// Reads the manifest and the true processes of a folder.
 pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure> {
     let path = folder.join(MANIFEST);
-    let text = std::fs::read_to_string(&path).map_err(|error| {
-        Failure::unreadable(
-            &path,
-            format!("{error}: name a folder written by onecycle bench make"),
-        )
-    })?;
+    if !path.is_file() {
+        let reason = "there is no such file: name a folder written by onecycle bench make";
+        return Err(Failure::unreadable(&path, reason));
+    }
+    let text = text_at_most(&path, MOST_OF_SETTINGS)?;
     #[derive(Deserialize)]
     struct Version {
         format: String,
@@ -126,5 +126,5 @@ pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure
 
 /// The text of a file.
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| Failure::unreadable(path, error))
+    text_at_most(path, MOST_OF_A_TABLE)
 }
