@@ -184,7 +184,13 @@ mod tests {
 
     /// A relay between -1 and 1 that switches every 50 samples, after 100 samples at rest.
     fn relay() -> Vec<f64> {
-        let level = |i: usize| if i / 50 % 2 == 0 { 1.0 } else { -1.0 };
+        let level = |i: usize| {
+            if (i / 50).is_multiple_of(2) {
+                1.0
+            } else {
+                -1.0
+            }
+        };
         [0.0; 100].into_iter().chain((0..900).map(level)).collect()
     }
 
