@@ -55,8 +55,8 @@ Exit codes:
   2  bad arguments
   3  an input file cannot be read; the message says where and what to do
   4  finished, with a negative result: no process could be identified (the verdict says why and what
-     to do), a space is not certified, a grid leaves holes, a mission ended early, or a pack fails
-     its self-test
+     to do), a space is not certified, a grid leaves holes, a mission ended early, a pack fails
+     its self-test, or a trained pack is of little use
   5  the output cannot be written
   6  identify: the time stamps can be read in more than one way; --time-unit settles it";
 

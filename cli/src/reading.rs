@@ -4,7 +4,36 @@ use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
+use crate::failure::Failure;
 use crate::output::Waiting;
+
+/// Largest file of settings, in bytes: the longest of ours has 10 kB.
+pub(crate) const MOST_OF_SETTINGS: u64 = 1 << 20;
+/// Largest file of a table, such as the answers of a benchmark or a grid with its matrix, in bytes.
+pub(crate) const MOST_OF_A_TABLE: u64 = 1 << 28;
+
+/// The bytes of a file of at most this size.
+pub(crate) fn bytes_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
+    let file = open_with_bar(path).map_err(|error| Failure::unreadable(path, error))?;
+    let mut bytes = Vec::new();
+    let read = file.take(most + 1).read_to_end(&mut bytes);
+    match read {
+        Ok(count) if count as u64 > most => {
+            let reason = format!(
+                "the file has more than {most} bytes, too many for its kind: check its name"
+            );
+            Err(Failure::unreadable(path, reason))
+        }
+        Ok(_) => Ok(bytes),
+        Err(error) => Err(Failure::unreadable(path, error)),
+    }
+}
+
+/// The text of a file of at most this size.
+pub(crate) fn text_at_most(path: &Path, most: u64) -> Result<String, Failure> {
+    let bytes = bytes_at_most(path, most)?;
+    String::from_utf8(bytes).map_err(|_| Failure::unreadable(path, "the file is not UTF-8 text"))
+}
 
 /// Opens a file. While it is read, a bar of its bytes is shown on the error output if reading takes longer than half a
 /// second and that is a terminal; the bar goes when the reader is dropped.

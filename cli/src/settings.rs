@@ -6,10 +6,11 @@ use onecycle_lab::space::Space;
 use serde::de::DeserializeOwned;
 
 use crate::failure::Failure;
+use crate::reading::{MOST_OF_SETTINGS, text_at_most};
 
 /// Reads a file and checks the types of its fields; the caller checks their values.
 pub(crate) fn read<T: DeserializeOwned>(path: &Path) -> Result<T, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::unreadable(path, error))?;
+    let text = text_at_most(path, MOST_OF_SETTINGS)?;
     toml::from_str(&text).map_err(|error| Failure::unreadable(path, located(&text, &error)))
 }
 

@@ -19,7 +19,8 @@ use super::MOST_THREADS;
     "  onecycle train --recipe cli/reproduction/paper_network.toml -o paper.onnx --json table.json\n\n",
     "With --out, every epoch is kept in the folder OUT.part until the result is written: the same command\n",
     "resumes an interrupted run, to the same bits; --restart starts over.\n\n",
-    "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or part, 5 output not written"
+    "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or part, 4 the pack is written but of little \
+     use (the report says why), 5 output not written"
 ))]
 pub(crate) struct Train {
     /// Recipe, a TOML file (see experiments/)

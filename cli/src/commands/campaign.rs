@@ -150,6 +150,10 @@ fn of_recordings(arguments: &args::Campaign) -> Result<Table, Failure> {
 /// The campaign of the file, changed by the arguments.
 fn campaign(arguments: &args::Campaign) -> Result<Campaign, Failure> {
     let mut campaign: Campaign = settings::read(&arguments.file)?;
+    // A fault from here on is one of the file, after this of the arguments.
+    campaign
+        .validate()
+        .map_err(|error| Failure::unreadable(&arguments.file, error))?;
     campaign.cases = arguments.cases.unwrap_or(campaign.cases);
     campaign.cycles = arguments
         .cycles
@@ -159,9 +163,7 @@ fn campaign(arguments: &args::Campaign) -> Result<Campaign, Failure> {
     if let Some(sigma) = arguments.sigma {
         (campaign.sigma, campaign.sigma_uniform) = (sigma, false);
     }
-    campaign
-        .validate()
-        .map_err(|error| Failure::unreadable(&arguments.file, error))?;
+    campaign.validate().map_err(Failure::usage)?;
     Ok(campaign)
 }
 

@@ -2,7 +2,7 @@
 
 mod kept;
 
-use std::io::{self, BufWriter};
+use std::io::BufWriter;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -16,7 +16,7 @@ use super::workers::Workers;
 use crate::args;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_file, write_text};
-use crate::reading::open_with_bar;
+use crate::reading::{MOST_OF_A_TABLE, text_at_most};
 use crate::results::grid::{CostsAlongRay, GridRun};
 use crate::{report, settings};
 
@@ -54,8 +54,7 @@ pub(crate) fn run(arguments: &args::Grid) -> Result<ExitCode, Failure> {
 
 fn read(arguments: &args::Grid, path: &Path, workers: &Workers) -> Result<GridRun, Failure> {
     let failed = |reason: String| Failure::unreadable(path, reason);
-    let text = open_with_bar(path).and_then(io::read_to_string);
-    let text = text.map_err(|error| failed(error.to_string()))?;
+    let text = text_at_most(path, MOST_OF_A_TABLE)?;
     let file = GridFile::read(&text).map_err(|error| failed(error.to_string()))?;
     let grid = file
         .grid(workers)
@@ -223,7 +222,7 @@ fn write(
                 grid::write(&mut file, grid, check, Some(&mut rows))
             }
         }?;
-        io::Write::flush(&mut file)
+        std::io::Write::flush(&mut file)
     })?;
     kept.map_or(Ok(()), KeptGrid::remove)
 }

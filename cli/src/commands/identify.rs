@@ -22,7 +22,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
-    let pack = pack::read(&arguments.pack, &bytes)?;
+    let pack = pack::usable(&arguments.pack, &bytes)?;
     let found = onecycle::Identify::new()
         .cycles(arguments.cycles as usize)
         .specification(asked)

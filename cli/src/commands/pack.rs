@@ -1,8 +1,6 @@
 //! `onecycle pack`: show, verify, export and import the packs of identifiers.
 
 use std::borrow::Cow;
-use std::fs::File;
-use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
@@ -20,6 +18,7 @@ use serde_json::{Value, json};
 use crate::args::{self, PackAction, PackSource};
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_file};
+use crate::reading::bytes_at_most;
 use crate::report;
 use crate::results::pack::{ImportedPack, VerifiedPack};
 
@@ -175,7 +174,7 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
 
 /// The network of a file, and its normalisation if the file has one.
 fn learnt(path: &Path) -> Result<(Option<Normalisation>, Network), Failure> {
-    let imported = onnx::import(&read_at_most(path, MOST_OF_A_MODEL)?)
+    let imported = onnx::import(&bytes_at_most(path, MOST_OF_A_MODEL)?)
         .map_err(|error| Failure::unreadable(path, error.to_string()))?;
     Ok((imported.normalisation, imported.network))
 }
@@ -217,7 +216,7 @@ fn path(source: &PackSource) -> PathBuf {
 pub(super) fn bytes(source: &PackSource) -> Result<Cow<'static, [u8]>, Failure> {
     match source {
         PackSource::Embedded => Ok(Cow::Borrowed(DEFAULT)),
-        PackSource::File(path) => read_at_most(path, MOST_OF_A_PACK).map(Cow::Owned),
+        PackSource::File(path) => bytes_at_most(path, MOST_OF_A_PACK).map(Cow::Owned),
     }
 }
 
@@ -225,18 +224,18 @@ pub(super) fn read<'a>(source: &PackSource, bytes: &'a [u8]) -> Result<Pack<'a>,
     Pack::read(bytes).map_err(|error| Failure::unreadable(&path(source), error.to_string()))
 }
 
-/// The bytes of a file of at most this size.
-fn read_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
-    let failed = |error: io::Error| Failure::unreadable(path, error.to_string());
-    let mut bytes = Vec::new();
-    let file = File::open(path).map_err(failed)?;
-    let read = file
-        .take(most + 1)
-        .read_to_end(&mut bytes)
-        .map_err(failed)?;
-    if read as u64 > most {
-        let reason = format!("the file has more than {most} bytes, too many for a pack or a model");
-        return Err(Failure::unreadable(path, reason));
+/// A pack to identify with: its network gives the outputs that the pack stores, as `pack verify` checks.
+pub(super) fn usable<'a>(source: &PackSource, bytes: &'a [u8]) -> Result<Pack<'a>, Failure> {
+    let pack = read(source, bytes)?;
+    let verified = VerifiedPack {
+        name: source.to_string(),
+        pack: &pack,
+        worst: pack.self_test(),
+    };
+    if verified.passes() {
+        return Ok(pack);
     }
-    Ok(bytes)
+    let reason = "the pack fails its self-test, so it was changed after it was made (see onecycle pack verify): take \
+                  the original, or train a new one";
+    Err(Failure::unreadable(&path(source), reason))
 }

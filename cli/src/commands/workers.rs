@@ -31,8 +31,9 @@ impl Workers {
 
     /// Sets the progress bar to a number of pieces, some of them done.
     pub(crate) fn expect(&self, count: usize, done: usize) {
-        self.bar.reset();
+        // The length first: a bar of no length is drawn full.
         self.bar.set_length(count as u64);
+        self.bar.reset();
         self.bar.set_position(done as u64);
     }
 

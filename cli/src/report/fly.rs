@@ -12,7 +12,7 @@ use super::cycles::cross_table;
 use super::number::percent;
 use super::page::stability::Loop;
 use crate::pages::page::{self, Cell, Section, page};
-use crate::pages::plot::{self, Figure, Marks, Panel, Series};
+use crate::pages::plot::{self, Figure, Hue, Marks, Note, Panel, Series};
 use crate::results::fly::{Flight, MissionFlights};
 use crate::style::{HEADING, painted, verdict};
 
@@ -361,6 +361,30 @@ fn cycles_table(cycles: &Cycles) -> String {
     page::table("J_ij", &columns, &rows)
 }
 
+/// A panel over time with a vertical line and the name at each event.
+fn with_events(mut panel: Panel, flown: &Flown) -> Panel {
+    let values = || panel.series.iter().flat_map(|series| &series.y);
+    let low = values().copied().fold(f64::INFINITY, f64::min);
+    let high = values().copied().fold(f64::NEG_INFINITY, f64::max);
+    if low > high {
+        return panel;
+    }
+    for (index, (time_s, name)) in flown.events.iter().enumerate() {
+        let line = [(*time_s, low), (*time_s, high)];
+        let line = Series::of_points("", Marks::Dashes, line).hue(Hue::Reference);
+        panel.series.push(line);
+        // Names of events that follow each other closely stand at different heights.
+        let height = -14.0 - 16.0 * (index % 2) as f64;
+        panel.notes.push(Note {
+            text: (*name).to_owned(),
+            x: *time_s,
+            y: high,
+            away: (0.0, height),
+        });
+    }
+    panel
+}
+
 fn pictures(mission: Mission, flown: &Flown) -> Vec<Figure> {
     let series = |name: &str, value: &dyn Fn(&FlightRecord) -> f64| {
         let every = flown.records.len().div_ceil(POINTS).max(1);
@@ -375,7 +399,7 @@ fn pictures(mission: Mission, flown: &Flown) -> Vec<Figure> {
         .map(|(time_s, name)| format!("{name} at {time_s:.1} s"))
         .collect();
     let figure = |title: &str, series: Vec<Series>| {
-        let panel = Panel::new(plot::Axis::titled(title), series);
+        let panel = with_events(Panel::new(plot::Axis::titled(title), series), flown);
         Figure::single(&events.join(", "), plot::Axis::titled("time (s)"), panel)
     };
     let degrees = |name: &str, axis: Axis| {

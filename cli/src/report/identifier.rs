@@ -72,6 +72,10 @@ pub(crate) fn text(run: &IdentifierRun, out: &Path) -> String {
     for scored in &run.scores {
         text += &row(scored);
     }
+    if !run.is_useful() {
+        text += "\nOf little use: a useful pack has a median |J| up to 10 %, an answer to half of the cycles and at most \
+                 1 % unstable loops. Raise learning and epochs in the recipe.\n";
+    }
     text
 }
 

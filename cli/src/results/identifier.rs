@@ -24,6 +24,28 @@ pub(crate) struct IdentifierRun {
     pub(crate) seconds: [f64; 2],
 }
 
+/// Median deterioration above which a pack is of little use: thirty times that of the built-in one (0.35 %).
+const MOST_DETERIORATION: f64 = 0.1;
+/// Share of cycles without an answer, and of unstable loops, above which a pack is of little use.
+const MOST_UNKNOWN: f64 = 0.5;
+const MOST_UNSTABLE: f64 = 0.01;
+
+impl IdentifierRun {
+    /// Whether the controllers of the pack are worth anything, on all families together.
+    pub(crate) fn is_useful(&self) -> bool {
+        self.scores
+            .iter()
+            .filter(|scored| scored.family.is_none())
+            .all(|scored| {
+                let scores = &scored.scores;
+                let most = |share: f64| share * scores.cycles as f64;
+                scores.median <= MOST_DETERIORATION
+                    && scores.unknown as f64 <= most(MOST_UNKNOWN)
+                    && scores.unstable as f64 <= most(MOST_UNSTABLE)
+            })
+    }
+}
+
 /// Scores of all cycles, or of those of one family.
 #[derive(Serialize)]
 pub(crate) struct FamilyScores {

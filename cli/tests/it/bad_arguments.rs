@@ -396,6 +396,33 @@ fn a_malformed_campaign_of_recordings_is_one_sentence() {
     run(&["campaign", &path, "--sigma", "0.1"]).refused(2, &["--sigma has no effect"]);
 }
 
+// A wrong value is blamed on the argument, not on the file, which is right.
+#[test]
+fn wrong_values_beside_a_campaign_are_those_of_the_arguments() {
+    let folder = Scratch::new();
+    let text = "measure = \"relay\"\ncases = 2\nseed = 1\nbias = 0\nsigma = 0\ntrim = true\n";
+    let path = folder.write("right.toml", text.as_bytes());
+    for (option, name) in [("--sigma", "sigma"), ("--time-scale", "time_scale")] {
+        let outcome = run(&["campaign", &path, option, "nan"]);
+        assert!(!outcome.stderr.contains("right.toml"), "{outcome:?}");
+        outcome.misused(&[name]);
+    }
+}
+
+// Settings have a limit of size, and an endless file is refused at once.
+#[cfg(unix)]
+#[test]
+fn an_endless_file_is_refused() {
+    for arguments in [
+        &["campaign", "/dev/zero"][..],
+        &["phase", "/dev/zero"],
+        &["train", "--recipe", "/dev/zero", "-o", "never.pack"],
+        &["grid", "--from", "/dev/zero"],
+    ] {
+        run(arguments).refused(UNREADABLE, &["/dev/zero", "bytes", "check its name"]);
+    }
+}
+
 #[test]
 fn a_campaign_that_identifies_nothing_has_no_nan() {
     let outcome = campaign_with("bias = 0.5\nsigma = 5");

@@ -3,7 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use crate::common::{NOT_IDENTIFIED, NOT_WRITTEN, Outcome, Scratch, UNREADABLE, names_in, run};
+use crate::common::{
+    NOT_IDENTIFIED, NOT_WRITTEN, Outcome, Scratch, UNREADABLE, killed_when, names_in, run,
+};
 use serde_json::Value;
 
 /// Makes a benchmark of four experiments.
@@ -415,6 +417,33 @@ fn wrong_folders_are_refused() {
     bench_run(&path, &["--methods", "rules"]).refused(UNREADABLE, &["truth.csv"]);
 }
 
+// A run that is killed leaves a folder that says what to do; the next one replaces it and says so.
+#[test]
+fn an_interrupted_folder_is_replaced() {
+    let folder = Scratch::new();
+    let out = folder.name("bench");
+    let make = ["bench", "make", "-o", &out, "--cases", "4", "--seed", "5"];
+    let many = [
+        "bench", "make", "-o", &out, "--cases", "5000", "--seed", "5",
+    ];
+    let mark = folder.path("bench.part/UNFINISHED");
+    killed_when(&many, || mark.exists());
+    assert!(
+        std::fs::read_to_string(&mark)
+            .unwrap()
+            .contains("same command again")
+    );
+    let outcome = run(&make);
+    assert_eq!(outcome.code, Some(0), "{outcome:?}");
+    assert!(outcome.stderr.contains("starting over: "), "{outcome:?}");
+    assert_eq!(folder.files(), ["bench"]);
+    assert!(!folder.path("bench/UNFINISHED").exists());
+    // A folder of that name without the mark is not ours.
+    let other = folder.name("other");
+    std::fs::create_dir(folder.path("other.part")).unwrap();
+    run(&["bench", "make", "-o", &other, "--cases", "4"]).refused(NOT_WRITTEN, &["other.part"]);
+}
+
 #[test]
 fn wrong_answers_are_refused() {
     let folder = Scratch::new();
@@ -439,6 +468,8 @@ fn wrong_answers_are_refused() {
     }
     let missing = format!("mine={}", folder.name("nosuch.csv"));
     bench_run(&path, &["--answers", &missing]).refused(UNREADABLE, &["nosuch.csv"]);
+    #[cfg(unix)]
+    bench_run(&path, &["--answers", "mine=/dev/zero"]).refused(UNREADABLE, &["/dev/zero", "bytes"]);
     let file = folder.write("right.csv", b"experiment,kp,kd\n1,2,3\n");
     let twice = format!("mine={file}");
     bench_run(&path, &["--answers", &twice, "--answers", &twice]).refused(2, &["'mine'"]);

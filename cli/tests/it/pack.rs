@@ -16,7 +16,7 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 use serde_json::{Value, json};
 
-use crate::common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, run};
+use crate::common::{NOT_WRITTEN, Outcome, Scratch, Table, UNREADABLE, run};
 
 /// The exit code of a pack that fails its self-test.
 const FAILED: i32 = 4;
@@ -143,6 +143,9 @@ fn a_pack_with_other_outputs_fails() {
         outcome.stdout.contains("Do not use this pack"),
         "{outcome:?}"
     );
+    // Nobody can use it.
+    let table = folder.write("test.csv", Table::clean().csv().as_bytes());
+    run(&["identify", &table, "--pack", &path]).refused(UNREADABLE, &["wrong.pack", "self-test"]);
 }
 
 #[test]

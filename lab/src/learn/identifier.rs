@@ -111,6 +111,9 @@ impl Default for IdentifierRecipe {
     }
 }
 
+/// Largest number of experiments, epochs or cycles that a recipe may ask for: years of work.
+const MOST: u64 = 1_000_000_000;
+
 /// Epochs over which the learning rate rises to its highest.
 const WARM_UP_EPOCHS: f64 = 0.5;
 /// Learning rate of the last epoch over the highest.
@@ -153,7 +156,10 @@ impl IdentifierRecipe {
     pub fn validate(&self) -> Result<(), IdentifierError> {
         let wrong = self.hidden.iter().find(|&width| !(1..=128).contains(width));
         let positive = |value: f64| value.is_finite() && value > 0.0;
-        let some = |field, value: u64| (field, "1 or more", value as f64, value > 0);
+        let some = |field, value: u64| {
+            let is_some = (1..=MOST).contains(&value);
+            (field, "1 to 1000000000", value as f64, is_some)
+        };
         first_out_of_range([
             (
                 "hidden",

@@ -71,17 +71,12 @@ pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, 
     if output.is_none() {
         output = single(by_name(Role::Output), Role::Output, preview)?;
     }
-    let first = first_is_time(preview, input, output);
+    let unnamed = unnamed_time(preview, input, output);
     let mut ignored = None;
     if !timed {
-        ignored = by_name(Role::Time).first().copied().or(first);
+        ignored = by_name(Role::Time).first().copied().or(unnamed);
     } else if time.is_none() {
-        let dates = preview
-            .date
-            .filter(|column| !given.contains(&Some(*column)));
-        time = single(by_name(Role::Time), Role::Time, preview)?
-            .or(dates)
-            .or(first);
+        time = single(by_name(Role::Time), Role::Time, preview)?.or(unnamed);
     }
     if timed {
         check_clock_time(preview, time)?;
@@ -223,8 +218,13 @@ fn single(found: Vec<usize>, role: Role, preview: &Preview) -> Result<Option<usi
     }
 }
 
-/// The first column, if the file has no header, the column is free, and its values never decrease.
-fn first_is_time(preview: &Preview, input: Option<usize>, output: Option<usize>) -> Option<usize> {
+/// The column of dates, if it is free; else the first column, if the file has no header, the column is free, and its
+/// values never decrease.
+fn unnamed_time(preview: &Preview, input: Option<usize>, output: Option<usize>) -> Option<usize> {
+    let is_free = |column: &usize| ![input, output].contains(&Some(*column));
+    if let Some(dates) = preview.date.filter(is_free) {
+        return Some(dates);
+    }
     let free = preview.names.is_none() && input != Some(0) && output != Some(0);
     let stamps = preview.column(0).filter(|stamp| !stamp.is_nan());
     let rises = stamps.clone().is_sorted();

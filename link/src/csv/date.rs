@@ -19,9 +19,9 @@ const DAY_NS: i64 = 86_400 * SECOND_NS;
 /// Order of the numbers of a date.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Order {
-    YearFirst,
-    DayFirst,
-    MonthFirst,
+    YearMonthDay,
+    DayMonthYear,
+    MonthDayYear,
 }
 
 /// A date and a time of day as in the file.
@@ -54,10 +54,10 @@ impl Date {
     /// The order, if this date alone shows it.
     fn order(&self) -> Option<Order> {
         match (self.numbers, self.mark) {
-            ([year, ..], _) if year > 99 => Some(Order::YearFirst),
-            (_, b'.') => Some(Order::DayFirst),
-            ([first, ..], _) if first > 12 => Some(Order::DayFirst),
-            ([_, second, _], _) if second > 12 => Some(Order::MonthFirst),
+            ([year, ..], _) if year > 99 => Some(Order::YearMonthDay),
+            (_, b'.') => Some(Order::DayMonthYear),
+            ([first, ..], _) if first > 12 => Some(Order::DayMonthYear),
+            ([_, second, _], _) if second > 12 => Some(Order::MonthDayYear),
             _ => None,
         }
     }
@@ -66,9 +66,9 @@ impl Date {
     fn days(&self, order: Order) -> Option<i64> {
         let [a, b, c] = self.numbers.map(i64::from);
         let (year, month, day) = match order {
-            Order::YearFirst => (a, b, c),
-            Order::DayFirst => (c, b, a),
-            Order::MonthFirst => (c, a, b),
+            Order::YearMonthDay => (a, b, c),
+            Order::DayMonthYear => (c, b, a),
+            Order::MonthDayYear => (c, a, b),
         };
         let is_leap = year % 4 == 0 && (year % 100 != 0 || year % 400 == 0);
         let length = match month {
@@ -132,7 +132,7 @@ impl Calendar {
 
     /// The order in which a date is the day after the first one: at most one of the two.
     fn next_day(&self, date: &Date) -> Option<Order> {
-        [Order::DayFirst, Order::MonthFirst]
+        [Order::DayMonthYear, Order::MonthDayYear]
             .into_iter()
             .find(|&order| {
                 let days = |date: &Date| date.days(order);
@@ -164,7 +164,7 @@ pub(super) fn parse(cell: &[u8]) -> Option<Date> {
     };
     let orders = match date.order() {
         Some(order) => vec![order],
-        None => vec![Order::DayFirst, Order::MonthFirst],
+        None => vec![Order::DayMonthYear, Order::MonthDayYear],
     };
     let exists = orders.into_iter().any(|order| date.days(order).is_some());
     (is_date && exists).then_some(date)
@@ -271,7 +271,7 @@ mod tests {
             ("2100-12-31 23:59:59", 4_133_980_799),
         ] {
             let date = date(text);
-            let days = date.days(Order::YearFirst).unwrap();
+            let days = date.days(Order::YearMonthDay).unwrap();
             assert_eq!(days * 86_400 + date.of_day_ns / SECOND_NS, unix_s, "{text}");
         }
     }

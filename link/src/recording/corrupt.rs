@@ -1,9 +1,9 @@
 //! Corrupt cells: single samples that the signal cannot have.
 //!
 //! ```text
-//! input   switches between two levels, and a sample is at neither, nor held
+//! input   switches between two levels, and a sample is at neither
 //!         between two samples of one level    replaced by the sample before
-//!         beside a switch                     dropped: during a gap the input is unknown
+//!         beside a switch, or several         dropped: during a gap the input is unknown
 //! output  a peak of one sample, ten times    replaced by the line between its
 //!         the peaks of the noise              neighbours
 //! ```
@@ -26,8 +26,6 @@ const LARGE_JUMP: f64 = 0.4;
 const FEWEST_JUMPS: usize = 3;
 /// Maximum share of samples between the two levels while the relay runs.
 const MOST_BETWEEN: f64 = 0.01;
-/// Consecutive samples off the levels that are a level of their own.
-const HELD: usize = 3;
 /// Distance beyond the range of all other values at which a single value of any input is noted, in ranges.
 const FAR: f64 = 0.5;
 /// Least peak of a corrupt output, as a multiple of the peak that 1 % of the samples exceed: for Gaussian noise 26
@@ -65,21 +63,11 @@ pub(super) fn of_input(input: &[f64]) -> Vec<(usize, Fault)> {
         return doubtful(input, low, high);
     }
     let mut faults = Vec::new();
-    let mut start = 0;
-    let is_odd = |i: usize| outside(input[i]) || (between(input[i]) && single(i));
-    for run in input.chunk_by(|a, b| outside(*a) == outside(*b)) {
-        let indices = start..start + run.len();
-        start = indices.end;
-        if outside(run[0]) && run.len() >= HELD {
-            continue;
-        }
-        for i in indices.filter(|i| is_odd(*i)) {
-            let fault = if single(i) {
-                Fault::Replace(input[i - 1])
-            } else {
-                Fault::Drop
-            };
-            faults.push((i, fault));
+    for (i, &u) in input.iter().enumerate() {
+        if single(i) && (outside(u) || between(u)) {
+            faults.push((i, Fault::Replace(input[i - 1])));
+        } else if outside(u) {
+            faults.push((i, Fault::Drop));
         }
     }
     if faults.len() as f64 > (MOST_CORRUPT * input.len() as f64).max(1.0) {
@@ -196,7 +184,13 @@ mod tests {
 
     /// A relay between -1 and 1 that switches every 50 samples, after 100 samples at rest.
     fn relay() -> Vec<f64> {
-        let level = |i: usize| if i / 50 % 2 == 0 { 1.0 } else { -1.0 };
+        let level = |i: usize| {
+            if (i / 50).is_multiple_of(2) {
+                1.0
+            } else {
+                -1.0
+            }
+        };
         [0.0; 100].into_iter().chain((0..900).map(level)).collect()
     }
 
@@ -230,11 +224,16 @@ mod tests {
         // A pulse to the other level, a third level, a trim.
         let mut input = relay();
         input[520] = -1.0;
-        input[300..305].fill(3.0);
+        input[300..306].fill(3.0);
         for (i, u) in input.iter_mut().enumerate() {
             *u += 0.3 * (i as f64 / 1000.0);
         }
         assert_eq!(of_input(&input), []);
+        // Two to five of a thousand samples are not a level.
+        let mut input = relay();
+        input[320..325].fill(-9.0);
+        let expected: Vec<_> = (320..325).map(|i| (i, Fault::Drop)).collect();
+        assert_eq!(of_input(&input), expected);
         // A sine with noise-free steps, a ramp, a constant.
         let sine: Vec<f64> = (0..1000).map(|i| (f64::from(i) / 10.0).sin()).collect();
         assert_eq!(of_input(&sine), []);

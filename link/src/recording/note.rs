@@ -123,7 +123,7 @@ pub enum Note {
     },
     /// Single values of the input between two samples of one level of a relay, at neither of its levels; or peaks of one
     /// sample in the output. They were replaced by the level, or by the line between the neighbours.
-    #[error("replaced {}, the first at {first}: {:?} by {by:?}", replaced(*.count, .first.role), .first.value)]
+    #[error("replaced {}, the first at {first}: {} by {}", replaced(*.count, .first.role), rounded(.first.value), rounded(*.by))]
     CellsReplaced {
         /// Number of cells.
         count: u64,
@@ -132,10 +132,11 @@ pub enum Note {
         /// The value that it has now.
         by: f64,
     },
-    /// Rows whose input is at neither level of a relay, beside a switch. They were dropped, with a gap in their place.
+    /// Rows whose input is outside both levels of a relay, several in a row or beside a switch: the true level is unknown.
+    /// They were dropped, with a gap in their place.
     #[error(
-        "dropped {} whose input is at neither of its two levels, beside a switch, the first at {first}: {:?}",
-        counted(*.count, "row"), .first.value
+        "dropped {} whose input is at neither of its two levels, the first at {first}: {}",
+        counted(*.count, "row"), rounded(.first.value)
     )]
     OffLevelDropped {
         /// Number of rows.
@@ -144,7 +145,8 @@ pub enum Note {
         first: Cell,
     },
     /// A value of the input far outside the range of all others. It was kept.
-    #[error("the input at {cell} is {:?}, far outside the range of all other values, {least:?} to {most:?}", .cell.value)]
+    #[error("the input at {cell} is {}, far outside the range of all other values, {} to {}",
+        rounded(.cell.value), rounded(*.least), rounded(*.most))]
     CellInDoubt {
         /// The cell.
         cell: Cell,
@@ -197,8 +199,8 @@ pub struct Cell {
 impl fmt::Display for Cell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.at {
-            Some(at) => write!(f, "{at} ({:?} s)", self.time_s),
-            None => write!(f, "{:?} s", self.time_s),
+            Some(at) => write!(f, "{at} ({} s)", significant(self.time_s, 7)),
+            None => write!(f, "{} s", significant(self.time_s, 7)),
         }
     }
 }
@@ -261,7 +263,12 @@ fn ending(number: usize) -> &'static str {
 
 /// Four significant digits.
 fn rounded(value: f64) -> String {
-    let digits = format!("{value:.3e}");
+    significant(value, 4)
+}
+
+/// A number of significant digits.
+fn significant(value: f64, count: usize) -> String {
+    let digits = format!("{value:.*e}", count - 1);
     digits
         .parse()
         .map_or(digits, |rounded: f64| format!("{rounded:?}"))

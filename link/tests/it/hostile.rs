@@ -1,7 +1,10 @@
 //! For any bytes, the reader does not panic and returns either a valid recording or an error. A
 //! written recording reads back to the same bits.
 
-use onecycle_link::{ColumnRef, CsvOptions, Recording, TimeUnit, read_from, write_csv};
+use onecycle_link::{
+    Column, ColumnRef, Columns, CsvOptions, Position, Recording, RecordingBuilder, TimeUnit,
+    read_from, write_csv,
+};
 use proptest::prelude::*;
 
 /// A valid file with many features of the dialects.
@@ -160,6 +163,28 @@ proptest! {
             text += &format!("{t},{y},{u}\n");
         }
         survives(text.as_bytes());
+    }
+
+    // Relays with spikes, third levels and gaps, with and without averaging.
+    #[test]
+    fn corrupt_cells_leave_a_sound_recording(
+        rows in prop::collection::vec((0..300_usize, 0..600_usize, 0..200_usize), 100..400),
+        half_period in 5..60_usize,
+        max_points in prop_oneof![Just(64_usize), Just(1 << 20)],
+    ) {
+        let columns = Columns::new(Column::named("t"), Column::named("u"), Column::named("y"));
+        let mut builder = RecordingBuilder::new(columns).with_max_points(max_points);
+        let mut time_s = 0.0;
+        for (row, (output, input, gap)) in rows.into_iter().enumerate() {
+            time_s += if gap == 0 { 1.0 } else { 0.01 };
+            let level = if row / half_period % 2 == 0 { 1.0 } else { -1.0 };
+            let input = match input { 0 => -9.0, 1 => 1e300, 2 => 0.1, _ => level };
+            let output = if output == 0 { -1e300 } else { level * (row % half_period) as f64 };
+            builder.push(Position::Sample(row as u64), time_s, input, output).unwrap();
+        }
+        if let Ok(recording) = builder.finish() {
+            assert_sound(&recording, max_points);
+        }
     }
 
     #[test]

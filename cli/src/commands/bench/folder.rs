@@ -14,6 +14,8 @@ use onecycle_lab::judge::evaluate::files::read_truth;
 use serde::Deserialize;
 
 use crate::failure::Failure;
+use crate::output::{tell, with_ending, write_text};
+use crate::reading::{MOST_OF_A_TABLE, MOST_OF_SETTINGS, text_at_most};
 use crate::results::bench::{BenchManifest, FORMAT};
 
 pub(super) const MANIFEST: &str = "benchmark.json";
@@ -48,50 +50,52 @@ pub(super) fn refuse_filled(out: &Path) -> Result<(), Failure> {
     }
 }
 
-/// Writes a new or empty folder, whole or not at all: `fill` writes to a temporary folder beside it.
+/// Marks the work folder of a run that has not ended.
+const UNFINISHED: &str = "UNFINISHED";
+
+/// Writes a new or empty folder, whole or not at all: `fill` writes to the folder `OUT.part`, which an interrupted run
+/// leaves and the next one replaces.
 pub(super) fn write_whole(
     out: &Path,
     fill: impl FnOnce(&Path) -> Result<(), Failure>,
 ) -> Result<(), Failure> {
     refuse_filled(out)?;
     let failed = |error| Failure::output(out, error);
-    let parent = out.parent().filter(|parent| !parent.as_os_str().is_empty());
-    let staged = tempfile::Builder::new()
-        .prefix(".onecycle-bench-")
-        .tempdir_in(parent.unwrap_or(Path::new(".")))
-        .map_err(failed)?;
-    fill(staged.path())?;
-    set_usual_permissions(staged.path()).map_err(failed)?;
+    let staged = with_ending(out, "part");
+    let mark = staged.join(UNFINISHED);
+    if mark.is_file() {
+        let folder = staged.display();
+        tell(&format!(
+            "starting over: {folder} is of a run that was interrupted, and is replaced"
+        ));
+        std::fs::remove_dir_all(&staged).map_err(failed)?;
+    }
+    std::fs::create_dir(&staged).map_err(|error| Failure::output(&staged, error))?;
+    let filled = write_text(
+        &mark,
+        "Run the same command again: it replaces this folder.\n",
+    )
+    .and_then(|()| fill(&staged));
+    if filled.is_err() {
+        // The first error is the one to report.
+        let _ = std::fs::remove_dir_all(&staged);
+        return filled;
+    }
+    std::fs::remove_file(&mark).map_err(failed)?;
     if out.exists() {
         std::fs::remove_dir(out).map_err(failed)?;
     }
-    std::fs::rename(staged.path(), out).map_err(failed)?;
-    // The temporary folder is moved; there is nothing to remove.
-    let _ = staged.keep();
-    Ok(())
-}
-
-/// Temporary folders are private; an output folder is readable like any other.
-#[cfg(unix)]
-fn set_usual_permissions(folder: &Path) -> std::io::Result<()> {
-    use std::os::unix::fs::PermissionsExt;
-    std::fs::set_permissions(folder, std::fs::Permissions::from_mode(0o755))
-}
-
-#[cfg(not(unix))]
-fn set_usual_permissions(_: &Path) -> std::io::Result<()> {
-    Ok(())
+    std::fs::rename(&staged, out).map_err(failed)
 }
 
 /// Reads the manifest and the true processes of a folder.
 pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure> {
     let path = folder.join(MANIFEST);
-    let text = std::fs::read_to_string(&path).map_err(|error| {
-        Failure::unreadable(
-            &path,
-            format!("{error}: name a folder written by onecycle bench make"),
-        )
-    })?;
+    if !path.is_file() {
+        let reason = "there is no such file: name a folder written by onecycle bench make";
+        return Err(Failure::unreadable(&path, reason));
+    }
+    let text = text_at_most(&path, MOST_OF_SETTINGS)?;
     #[derive(Deserialize)]
     struct Version {
         format: String,
@@ -126,5 +130,5 @@ pub(super) fn read(folder: &Path) -> Result<(BenchManifest, Vec<Truth>), Failure
 
 /// The text of a file.
 pub(super) fn read_text(path: &Path) -> Result<String, Failure> {
-    std::fs::read_to_string(path).map_err(|error| Failure::unreadable(path, error))
+    text_at_most(path, MOST_OF_A_TABLE)
 }

@@ -77,7 +77,11 @@ pub(super) fn run(arguments: &args::Train, recipe: &IdentifierRecipe) -> Result<
     if arguments.dataset.is_none() {
         folder.remove()?;
     }
-    Ok(ExitCode::from(exit::DONE))
+    Ok(ExitCode::from(if trained.is_useful() {
+        exit::DONE
+    } else {
+        exit::NO_PROCESS
+    }))
 }
 
 fn learn(

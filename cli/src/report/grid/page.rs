@@ -21,8 +21,13 @@ pub(crate) fn html(run: &GridRun) -> String {
     let settings = &run.grid.settings;
     let mut lead = page::paragraph(
         "lead",
-        "Processes that represent a space: for every process of the space, the controller of one member costs at most \
-         J* more than the optimum.",
+        &format!(
+            "Processes that represent a space: for every process of the space, the controller of one member costs at \
+             most J* = {} % more than the optimum of that process. The cost is the integral of the squared error (ISE) \
+             after a step of the reference. The radius of a process is r = sqrt(T_prop^2 + T_body^2 + tau^2); processes on \
+             one ray have the same ratios of their times and differ in r only.",
+            100.0 * settings.deterioration
+        ),
     );
     if let Some(check) = &run.check {
         let (processes, seed) = (check.processes, check.seed);
