@@ -47,6 +47,8 @@ pub struct RecordingBuilder {
     time_s: Vec<f64>,
     input: Vec<f64>,
     output: Vec<f64>,
+    /// Empty unless there is a column for it.
+    set_point: Vec<f64>,
     gaps: Vec<Gap>,
     samples_per_point: usize,
     group: Group,
@@ -73,6 +75,7 @@ impl RecordingBuilder {
             time_s: Vec::new(),
             input: Vec::new(),
             output: Vec::new(),
+            set_point: Vec::new(),
             gaps: Vec::new(),
             samples_per_point: 1,
             group: Group::default(),
@@ -112,6 +115,21 @@ impl RecordingBuilder {
         input: f64,
         output: f64,
     ) -> Result<(), RecordingError> {
+        self.push_with(at, time_s, [input, output], None)
+    }
+
+    /// Adds a sample of input and output with its set-point. `None`, or a set-point that is not finite or beyond 1e300:
+    /// that of the sample before.
+    ///
+    /// # Errors
+    /// As [`push`](Self::push).
+    pub fn push_with(
+        &mut self,
+        at: Position,
+        time_s: f64,
+        [input, output]: [f64; 2],
+        set_point: Option<f64>,
+    ) -> Result<(), RecordingError> {
         self.rows += 1;
         for (role, value) in Role::ALL.into_iter().zip([time_s, input, output]) {
             if !value.is_finite() {
@@ -145,10 +163,13 @@ impl RecordingBuilder {
             }
             self.settle(newest, time_s);
         }
+        let known = set_point.filter(|value| value.abs() <= LARGEST);
+        let before = self.newest.map_or(0.0, |newest| newest.set_point);
         self.newest = Some(Sample {
             time_s,
             input,
             output,
+            set_point: known.unwrap_or(before),
         });
         Ok(())
     }
@@ -179,6 +200,7 @@ impl RecordingBuilder {
             time_s: self.time_s,
             input: self.input,
             output: self.output,
+            set_point: self.set_point,
             samples_per_point: self.samples_per_point,
             sample_period_s: rhythm.period_s(),
             jitter: rhythm.jitter(),
@@ -293,6 +315,9 @@ impl RecordingBuilder {
             self.time_s.push(group.start_s);
             self.input.push(group.input);
             self.output.push(group.output);
+            if self.columns.set_point.is_some() {
+                self.set_point.push(group.set_point);
+            }
         }
     }
 
@@ -321,6 +346,9 @@ impl RecordingBuilder {
                 self.time_s[kept] = pair.start_s;
                 self.input[kept] = pair.input;
                 self.output[kept] = pair.output;
+                if let Some(set_point) = self.set_point.get_mut(kept) {
+                    *set_point = pair.set_point;
+                }
                 kept += 1;
             }
             let odd = (end - start) % 2 == 1;
@@ -350,6 +378,7 @@ impl RecordingBuilder {
         self.time_s.truncate(kept);
         self.input.truncate(kept);
         self.output.truncate(kept);
+        self.set_point.truncate(kept);
         self.samples_per_point *= 2;
     }
 
@@ -361,6 +390,7 @@ impl RecordingBuilder {
             held_s: end_s - self.time_s[index],
             input: self.input[index],
             output: self.output[index],
+            set_point: self.set_point.get(index).copied().unwrap_or(0.0),
         }
     }
 
@@ -420,9 +450,10 @@ struct Sample {
     time_s: f64,
     input: f64,
     output: f64,
+    set_point: f64,
 }
 
-/// Consecutive samples without a gap between them: mean output, and mean of the input over time.
+/// Consecutive samples without a gap between them: mean output, and means of the input and the set-point over time.
 #[derive(Debug, Clone, Default)]
 struct Group {
     start_s: f64,
@@ -430,6 +461,7 @@ struct Group {
     held_s: f64,
     input: f64,
     output: f64,
+    set_point: f64,
 }
 
 impl Group {
@@ -438,6 +470,7 @@ impl Group {
             time_s: start_s,
             input,
             output,
+            set_point,
         } = sample;
         self.append(&Self {
             start_s,
@@ -445,6 +478,7 @@ impl Group {
             held_s,
             input,
             output,
+            set_point,
         });
     }
 
@@ -457,6 +491,7 @@ impl Group {
         let samples = self.samples + next.samples;
         // In this form the mean of equal numbers is exactly that number.
         self.input += (next.input - self.input) * (next.held_s / held_s);
+        self.set_point += (next.set_point - self.set_point) * (next.held_s / held_s);
         self.output += (next.output - self.output) * (next.samples as f64 / samples as f64);
         self.held_s = held_s;
         self.samples = samples;
