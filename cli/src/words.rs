@@ -1,6 +1,7 @@
 //! Sentences of the program: what the facts of the libraries mean, and what to do about them.
 
 pub(crate) mod controllers;
+pub(crate) mod log;
 pub(crate) mod recording;
 pub(crate) mod remark;
 pub(crate) mod verdict;

@@ -30,7 +30,9 @@ pub use plan::Signals;
 pub use tables::{FlightTables, LogFormat, LogParameter, LogTables, Loss, Topic, Wanted};
 
 use self::source::Source;
-use crate::recording::{Column, Columns, Position, Recording, RecordingBuilder, RecordingError};
+use crate::recording::{
+    Column, Columns, Note, Position, Recording, RecordingBuilder, RecordingError,
+};
 
 /// What a flight log holds.
 ///
@@ -118,7 +120,7 @@ impl FlightLog {
         };
         let tables = read_tables(bytes, &plan.wanted())?;
         match tables.flights.get(flight - 1) {
-            Some(flight) => Ok(plan.join(flight)),
+            Some(tables) => Ok(plan.join(flight, tables)),
             None => Err(no_flight),
         }
     }
@@ -137,6 +139,17 @@ impl Signals {
             columns = columns.with_set_point(Column::named("set-point").with_unit(unit));
         }
         let mut builder = RecordingBuilder::new(columns);
+        let [input, output] = self.names.clone();
+        builder.note(Note::LogSignals {
+            flight: self.flight,
+            control_loop: self.control_loop.to_string(),
+            input,
+            output,
+        });
+        if self.rows_dropped > 0 {
+            let count = self.rows_dropped;
+            builder.note(Note::LogRowsDropped { count });
+        }
         for (row, &time_s) in self.time_s.iter().enumerate() {
             let at = Position::Sample(row as u64);
             let set_point = self.set_point.as_ref().map(|values| values[row]);

@@ -212,6 +212,8 @@ pub(super) struct Plan {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Signals {
+    /// The flight, from 1.
+    pub flight: usize,
     /// The loop.
     pub control_loop: ControlLoop,
     /// Clock of the firmware, in seconds, strictly increasing.
@@ -260,8 +262,8 @@ impl Plan {
             .fold(Wanted::nothing(), |wanted, quantity| quantity.want(wanted))
     }
 
-    /// Joins the columns that were read.
-    pub(super) fn join(&self, flight: &FlightTables) -> Signals {
+    /// Joins the columns that were read of the flight with this number.
+    pub(super) fn join(&self, number: usize, flight: &FlightTables) -> Signals {
         let output = self.output.rows(flight);
         let mut input = self.input.rows(flight);
         if let Some(sign) = &self.sign
@@ -285,6 +287,7 @@ impl Plan {
         });
         let [set_points, throttles] = others;
         let mut signals = Signals {
+            flight: number,
             control_loop: self.control_loop,
             time_s: Vec::new(),
             input: Vec::new(),
