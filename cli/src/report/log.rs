@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use onecycle_link::{Flight, FlightLog, LoggedLoop, LoggedSignal, Setting, Span};
+use onecycle_link::{Firmware, Flight, FlightLog, LoggedLoop, LoggedSignal, Setting, Span};
 use serde::Serialize;
 
 use super::json::to_text;
@@ -81,6 +81,15 @@ fn describe(text: &mut String, number: usize, flight: &Flight) {
         advice
             .iter()
             .for_each(|sentence| wrapped(text, "  ", sentence));
+    }
+}
+
+/// Name and version; versions of some firmware begin with the name.
+fn firmware(about: &Firmware) -> String {
+    if about.version.starts_with(char::is_alphabetic) {
+        about.version.clone()
+    } else {
+        format!("{} {}", words::firmware(about.kind), about.version)
     }
 }
 
