@@ -32,10 +32,7 @@ fn describe(text: &mut String, number: usize, flight: &Flight) {
     let Span { from_s, to_s, .. } = flight.span;
     let about = &flight.firmware;
     let mut facts = vec![
-        (
-            "firmware",
-            format!("{} {}", words::firmware(about.kind), about.version),
-        ),
+        ("firmware", firmware(about)),
         ("board", about.board.clone()),
         (
             "time",
