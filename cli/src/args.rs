@@ -8,6 +8,7 @@ mod dataset;
 mod design;
 mod fly;
 mod identify;
+mod log;
 mod man;
 mod pack;
 mod reproduce;
@@ -30,6 +31,7 @@ pub(crate) use self::dataset::Dataset;
 pub(crate) use self::design::{DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
 pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Between, Estimator, Identify, Method, When};
+pub(crate) use self::log::{Log, LogArguments};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};
@@ -72,7 +74,8 @@ pub(crate) struct Arguments {
 /// training.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    Identify(Identify),
+    Identify(Box<Identify>),
+    Log(Log),
     Simulate(Box<Simulate>),
     Tune(Tune),
     Fly(Fly),

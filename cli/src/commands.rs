@@ -10,6 +10,7 @@ pub(crate) mod dataset;
 pub(crate) mod fly;
 pub(crate) mod grid;
 pub(crate) mod identify;
+pub(crate) mod log;
 pub(crate) mod man;
 pub(crate) mod pack;
 pub(crate) mod phase;

@@ -30,6 +30,7 @@ pub fn run() -> ExitCode {
     let arguments = Arguments::parse();
     let result = match &arguments.command {
         Command::Identify(identify) => commands::identify::run(identify),
+        Command::Log(log) => commands::log::run(log),
         Command::Simulate(simulate) => commands::simulate::run(simulate),
         Command::Tune(tune) => commands::tune::run(tune),
         Command::Fly(fly) => commands::fly::run(fly),

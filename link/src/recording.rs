@@ -134,7 +134,7 @@ impl Column {
     }
 }
 
-/// The three columns of a recording.
+/// The columns of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Columns {
@@ -144,6 +144,8 @@ pub struct Columns {
     pub input: Column,
     /// Column of the output.
     pub output: Column,
+    /// Column of the set-point of the output, if it was recorded.
+    pub set_point: Option<Column>,
 }
 
 impl Columns {
@@ -153,7 +155,15 @@ impl Columns {
             time,
             input,
             output,
+            set_point: None,
         }
+    }
+
+    /// The columns with that of the set-point.
+    #[must_use]
+    pub fn with_set_point(mut self, set_point: Column) -> Self {
+        self.set_point = Some(set_point);
+        self
     }
 
     /// The column of a signal.
@@ -187,6 +197,8 @@ pub struct Recording {
     time_s: Vec<f64>,
     input: Vec<f64>,
     output: Vec<f64>,
+    /// Empty if it was not recorded.
+    set_point: Vec<f64>,
     samples_per_point: usize,
     sample_period_s: f64,
     jitter: f64,
@@ -264,6 +276,12 @@ impl Recording {
     /// Measurement of each point, in the unit of its column.
     pub fn output(&self) -> &[f64] {
         &self.output
+    }
+
+    /// Set-point of the output at each point, held until the next point starts, in the unit of its column. `None`: it
+    /// was not recorded. A sample without a number keeps the set-point before it.
+    pub fn set_point(&self) -> Option<&[f64]> {
+        (!self.set_point.is_empty()).then_some(&*self.set_point)
     }
 
     /// Consecutive samples averaged into each point: 1, or a power of two in a long recording.

@@ -9,13 +9,14 @@ use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
 use super::design::noise;
-use super::{DesignArguments, PackSource, sample_rate, time_unit};
+use super::{DesignArguments, LogArguments, PackSource, sample_rate, time_unit};
 
 /// Identify the process from a recording and design its controller.
 ///
 /// The recording may hold a relay test, a chirp, steps or any other input that excites the process. It is
 /// a table with the columns time, input (what acts on the process) and output (the measurement),
-/// separated by commas, semicolons, tabs or blanks, with or without a header.
+/// separated by commas, semicolons, tabs or blanks, with or without a header; or a flight log (PX4 ULog, ArduPilot
+/// DataFlash, Betaflight or INAV blackbox), of which one control loop is taken.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -23,6 +24,7 @@ use super::{DesignArguments, PackSource, sample_rate, time_unit};
     "  onecycle identify examples/simulated_hover.csv --report report.html\n",
     "  onecycle identify log.csv --time t_ms --input 4 --output roll --cycles 4\n",
     "  onecycle identify log.csv --against 40,5,12 --style calm\n",
+    "  onecycle identify examples/logs/px4_chirps.ulg --axis roll --loop rate --from 197 --to 203\n",
     "  onecycle identify chirp.csv --structure soptd --from 12 --to 40\n",
     "  onecycle identify log.csv --plot always > report.txt\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
@@ -89,6 +91,8 @@ pub(crate) struct Identify {
     /// Identifier pack; "default" is the built-in one
     #[arg(long, value_name = "FILE", default_value = "default")]
     pub(crate) pack: PackSource,
+    #[command(flatten)]
+    pub(crate) log: LogArguments,
     /// Time column, by name or by number from 1
     #[arg(long, value_name = "COLUMN")]
     pub(crate) time: Option<String>,

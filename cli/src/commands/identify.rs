@@ -3,9 +3,9 @@
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Specification, Structure, Style};
+use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Road, Specification, Structure, Style};
 
-use super::{controllers, pack};
+use super::{controllers, log, pack};
 use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .cycles(arguments.cycles as usize)
         .specification(asked)
         .method(arguments.method.into())
-        .road(arguments.estimator.into())
+        .road(road(arguments))
         .structure(arguments.structure)
         .span_s(arguments.from, arguments.to)
         .hold(arguments.hold.map(Hold::from))
@@ -65,6 +65,14 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     } else {
         exit::NO_PROCESS
     }))
+}
+
+/// The estimator. A flight log is no relay test, unless the user says so.
+fn road(arguments: &Identify) -> Road {
+    match arguments.estimator {
+        Estimator::Auto if log::is_log(&arguments.file) => Road::General,
+        estimator => estimator.into(),
+    }
 }
 
 /// The requirements on the controller.
@@ -136,6 +144,38 @@ fn check_span(arguments: &Identify, recording: &Recording) -> Result<(), Failure
 }
 
 fn read(arguments: &Identify) -> Result<Recording, Failure> {
+    if log::is_log(&arguments.file) {
+        refuse_columns(arguments)?;
+        return log::recording(&arguments.file, &arguments.log);
+    }
+    if let Some(option) = arguments.log.given() {
+        return Err(Failure::usage(format!(
+            "{option} is for flight logs, and {} is none: leave out {option}",
+            arguments.file.display()
+        )));
+    }
+    read_table(arguments)
+}
+
+/// Refuses the names of columns, which a flight log does not have.
+fn refuse_columns(arguments: &Identify) -> Result<(), Failure> {
+    let options = [
+        ("--time", arguments.time.is_some()),
+        ("--input", arguments.input.is_some()),
+        ("--output", arguments.output.is_some()),
+        ("--sample-rate", arguments.sample_rate.is_some()),
+        ("--time-unit", arguments.time_unit.is_some()),
+    ];
+    match options.iter().find(|(_, is_given)| *is_given) {
+        Some((option, _)) => Err(Failure::usage(format!(
+            "{option} is for tables, and {} is a flight log: choose its signals with --axis and --loop",
+            arguments.file.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn read_table(arguments: &Identify) -> Result<Recording, Failure> {
     let column = |name: &Option<String>| name.as_deref().map(ColumnRef::from);
     let mut options = CsvOptions::default();
     options.time_column = column(&arguments.time);

@@ -26,6 +26,7 @@ pub(crate) fn note(note: &Note) -> String {
             by: ChosenBy::Position | ChosenBy::Values,
             ..
         } => Some("if that is wrong, give --time, --input and --output"),
+        Note::LogSignals { .. } => Some("choose others with --axis, --loop and --flight"),
         Note::TimeUnitGuessed { .. } => Some("if that is wrong, give --time-unit"),
         _ => None,
     };

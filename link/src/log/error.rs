@@ -35,7 +35,11 @@ pub enum LogError {
         flights: usize,
     },
     /// The firmware did not log the signals of this loop.
-    #[error("the log lacks the signals of the {control_loop} loop: {}", .missing.join(", "))]
+    #[error(
+        "the log lacks the signals of the {control_loop} loop{}{}",
+        if .missing.is_empty() { "" } else { ": " },
+        .missing.join(", ")
+    )]
     NotLogged {
         /// The loop asked for.
         control_loop: ControlLoop,

@@ -234,6 +234,15 @@ impl FlightTables {
         self.parameters.get(name).map(|parameter| parameter.value)
     }
 
+    /// Names, counts and times without the rows that were kept.
+    pub(super) fn without_rows(mut self) -> Self {
+        for topic in &mut self.topics {
+            topic.time_s = Vec::new();
+            topic.columns = Vec::new();
+        }
+        self
+    }
+
     /// Stores a parameter, or its change.
     pub(super) fn set(&mut self, name: &str, value: f64, is_integer: bool, changed_s: Option<f64>) {
         if let Some(parameter) = self.parameters.get_mut(name) {

@@ -50,6 +50,8 @@ pub struct RecordingBuilder {
     output: Vec<f64>,
     /// Positions of the points, until they are averaged.
     places: Places,
+    /// Empty unless there is a column for it.
+    set_point: Vec<f64>,
     gaps: Vec<Gap>,
     samples_per_point: usize,
     group: Group,
@@ -77,6 +79,7 @@ impl RecordingBuilder {
             input: Vec::new(),
             output: Vec::new(),
             places: Places::default(),
+            set_point: Vec::new(),
             gaps: Vec::new(),
             samples_per_point: 1,
             group: Group::default(),
@@ -116,6 +119,21 @@ impl RecordingBuilder {
         input: f64,
         output: f64,
     ) -> Result<(), RecordingError> {
+        self.push_with(at, time_s, [input, output], None)
+    }
+
+    /// Adds a sample of input and output with its set-point. `None`, or a set-point that is not finite or beyond 1e300:
+    /// that of the sample before.
+    ///
+    /// # Errors
+    /// As [`push`](Self::push).
+    pub fn push_with(
+        &mut self,
+        at: Position,
+        time_s: f64,
+        [input, output]: [f64; 2],
+        set_point: Option<f64>,
+    ) -> Result<(), RecordingError> {
         self.rows += 1;
         for (role, value) in Role::ALL.into_iter().zip([time_s, input, output]) {
             if !value.is_finite() {
@@ -149,11 +167,14 @@ impl RecordingBuilder {
             }
             self.settle(newest, time_s);
         }
+        let known = set_point.filter(|value| value.abs() <= LARGEST);
+        let before = self.newest.map_or(0.0, |newest| newest.set_point);
         self.newest = Some(Sample {
             at,
             time_s,
             input,
             output,
+            set_point: known.unwrap_or(before),
         });
         Ok(())
     }
@@ -184,6 +205,7 @@ impl RecordingBuilder {
             time_s: self.time_s,
             input: self.input,
             output: self.output,
+            set_point: self.set_point,
             samples_per_point: self.samples_per_point,
             sample_period_s: rhythm.period_s(),
             jitter: rhythm.jitter(),
@@ -304,6 +326,9 @@ impl RecordingBuilder {
             self.time_s.push(group.start_s);
             self.input.push(group.input);
             self.output.push(group.output);
+            if self.columns.set_point.is_some() {
+                self.set_point.push(group.set_point);
+            }
         }
     }
 
@@ -332,6 +357,9 @@ impl RecordingBuilder {
                 self.time_s[kept] = pair.start_s;
                 self.input[kept] = pair.input;
                 self.output[kept] = pair.output;
+                if let Some(set_point) = self.set_point.get_mut(kept) {
+                    *set_point = pair.set_point;
+                }
                 kept += 1;
             }
             let odd = (end - start) % 2 == 1;
@@ -361,6 +389,7 @@ impl RecordingBuilder {
         self.time_s.truncate(kept);
         self.input.truncate(kept);
         self.output.truncate(kept);
+        self.set_point.truncate(kept);
         self.samples_per_point *= 2;
         self.places.clear();
     }
@@ -374,6 +403,7 @@ impl RecordingBuilder {
             held_s: end_s - self.time_s[index],
             input: self.input[index],
             output: self.output[index],
+            set_point: self.set_point.get(index).copied().unwrap_or(0.0),
         }
     }
 
@@ -434,9 +464,10 @@ struct Sample {
     time_s: f64,
     input: f64,
     output: f64,
+    set_point: f64,
 }
 
-/// Consecutive samples without a gap between them: mean output, and mean of the input over time.
+/// Consecutive samples without a gap between them: mean output, and means of the input and the set-point over time.
 #[derive(Debug, Clone, Default)]
 struct Group {
     /// Position of the first sample.
@@ -446,6 +477,7 @@ struct Group {
     held_s: f64,
     input: f64,
     output: f64,
+    set_point: f64,
 }
 
 impl Group {
@@ -455,6 +487,7 @@ impl Group {
             time_s: start_s,
             input,
             output,
+            set_point,
         } = sample;
         self.append(&Self {
             at: Some(at),
@@ -463,6 +496,7 @@ impl Group {
             held_s,
             input,
             output,
+            set_point,
         });
     }
 
@@ -475,6 +509,7 @@ impl Group {
         let samples = self.samples + next.samples;
         // In this form the mean of equal numbers is exactly that number.
         self.input += (next.input - self.input) * (next.held_s / held_s);
+        self.set_point += (next.set_point - self.set_point) * (next.held_s / held_s);
         self.output += (next.output - self.output) * (next.samples as f64 / samples as f64);
         self.held_s = held_s;
         self.samples = samples;

@@ -90,7 +90,7 @@ impl Recording {
                     end_s: self.time_s[index + 1],
                 });
             }
-            for values in [&mut self.time_s, &mut self.input, &mut self.output] {
+            for values in self.filled_columns() {
                 values.remove(index);
             }
         }
@@ -106,6 +106,14 @@ impl Recording {
         });
         gaps.retain(|gap| gap.index > 0 && gap.index < self.time_s.len());
         self.gaps = gaps;
+    }
+
+    /// The columns, and the set-point if there is one.
+    fn filled_columns(&mut self) -> impl Iterator<Item = &mut Vec<f64>> {
+        let set_point = Some(&mut self.set_point).filter(|values| !values.is_empty());
+        [&mut self.time_s, &mut self.input, &mut self.output]
+            .into_iter()
+            .chain(set_point)
     }
 
     /// Keeps only the rows with a new output, if no other row tells anything.
@@ -125,7 +133,7 @@ impl Recording {
         });
         if !is_kept {
             self.sample_period_s = period_s;
-            for values in [&mut self.time_s, &mut self.input, &mut self.output] {
+            for values in self.filled_columns() {
                 *values = held.thinned(values);
             }
         }

@@ -75,6 +75,24 @@ pub enum Note {
         /// Its number.
         line: u64,
     },
+    /// The samples are those of a control loop in a flight log.
+    #[error("{control_loop} loop of flight {flight}: input is {input}, output is {output}")]
+    LogSignals {
+        /// Flight, from 1.
+        flight: usize,
+        /// Its name, such as `roll rate`.
+        control_loop: String,
+        /// Input as the firmware names it.
+        input: String,
+        /// Output as the firmware names it.
+        output: String,
+    },
+    /// Rows of a flight log that lack the input or the set-point were dropped.
+    #[error("dropped {} without input or set-point", counted(*.count, "row"))]
+    LogRowsDropped {
+        /// Number of rows.
+        count: u64,
+    },
     /// Rows that lack a number were dropped.
     #[error(
         "dropped {} whose {role} is not a number, the first at {first}",

@@ -2,5 +2,6 @@
 
 mod averaging;
 mod dialects;
+mod flight_logs;
 mod hostile;
 mod refusals;

@@ -1,0 +1,86 @@
+//! Arguments of `log`, and which loop of a flight log a command takes.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use onecycle_link::{Axis, ControlLoop};
+
+/// List what a flight log holds: flights, signals of each control loop, gains in force, excitation.
+///
+/// PX4 ULog, ArduPilot DataFlash (binary or text), Betaflight and INAV blackbox; the format is found by the
+/// content of the file.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle log examples/logs/px4_chirps.ulg\n",
+    "  onecycle log examples/logs/betaflight_acro.bfl --json\n\n",
+    "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 5 output not written"
+))]
+pub(crate) struct Log {
+    /// Flight log
+    pub(crate) file: PathBuf,
+    /// Print the result as JSON
+    #[arg(long)]
+    pub(crate) json: bool,
+}
+
+/// Which part of a flight log is identified.
+#[derive(Clone, Copy, Debug, Args)]
+#[command(next_help_heading = "Flight logs")]
+pub(crate) struct LogArguments {
+    /// Axis [default: roll]
+    #[arg(long, value_enum)]
+    pub(crate) axis: Option<LogAxis>,
+    /// Control loop: rate (torque to angular rate), attitude (set-point of the rate to angle) or altitude (thrust to
+    /// climb rate) [default: rate]
+    #[arg(long = "loop", value_enum)]
+    pub(crate) control_loop: Option<LoopKind>,
+    /// Flight, from 1; a blackbox file may hold several [default: the longest]
+    #[arg(long, value_name = "N")]
+    pub(crate) flight: Option<usize>,
+}
+
+impl LogArguments {
+    /// The loop of the arguments, or the default one.
+    pub(crate) fn control_loop(&self) -> ControlLoop {
+        let axis = match self.axis {
+            None | Some(LogAxis::Roll) => Axis::Roll,
+            Some(LogAxis::Pitch) => Axis::Pitch,
+            Some(LogAxis::Yaw) => Axis::Yaw,
+        };
+        match self.control_loop {
+            None | Some(LoopKind::Rate) => ControlLoop::Rate(axis),
+            Some(LoopKind::Attitude) => ControlLoop::Attitude(axis),
+            Some(LoopKind::Altitude) => ControlLoop::Altitude,
+        }
+    }
+
+    /// The first of these options that was given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        let options = [
+            ("--axis", self.axis.is_some()),
+            ("--loop", self.control_loop.is_some()),
+            ("--flight", self.flight.is_some()),
+        ];
+        options
+            .into_iter()
+            .find(|(_, is_given)| *is_given)
+            .map(|(option, _)| option)
+    }
+}
+
+/// Axis of the body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LogAxis {
+    Roll,
+    Pitch,
+    Yaw,
+}
+
+/// What a control loop controls.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum LoopKind {
+    Rate,
+    Attitude,
+    Altitude,
+}

@@ -1,0 +1,173 @@
+//! What a flight log tells about the vehicle: the types.
+
+use super::loops::{Axis, ControlLoop};
+use super::tables::FlightTables;
+
+/// Firmware that wrote the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FirmwareKind {
+    /// PX4.
+    Px4,
+    /// ArduPilot.
+    ArduPilot,
+    /// Betaflight, or Cleanflight.
+    Betaflight,
+    /// INAV.
+    Inav,
+}
+
+/// Firmware and board.
+#[derive(Debug, Clone, PartialEq, Eq)]
+#[non_exhaustive]
+pub struct Firmware {
+    /// Which firmware.
+    pub kind: FirmwareKind,
+    /// Its version as the log tells it; empty if it does not.
+    pub version: String,
+    /// Board; empty if the log does not tell.
+    pub board: String,
+}
+
+/// A stretch of time, in seconds of the log's clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Span {
+    /// Start.
+    pub from_s: f64,
+    /// End.
+    pub to_s: f64,
+}
+
+/// What makes a deliberate excitation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum MarkKind {
+    /// PX4 multicopter autotune.
+    Px4Autotune,
+    /// ArduPilot flight mode SYSTEMID.
+    ArduPilotSystemId,
+    /// ArduPilot AutoTune.
+    ArduPilotAutotune,
+    /// Betaflight chirp.
+    BetaflightChirp,
+}
+
+/// A stretch of deliberate excitation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct Mark {
+    /// What made it.
+    pub kind: MarkKind,
+    /// The axis, if the log tells.
+    pub axis: Option<Axis>,
+    /// When.
+    pub span: Span,
+}
+
+/// Term of a controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Term {
+    /// Factor of all terms.
+    Factor,
+    /// Proportional.
+    Proportional,
+    /// Integral.
+    Integral,
+    /// Derivative.
+    Derivative,
+    /// Upper limit of a derivative gain that rises with the stick (Betaflight), or lower one.
+    DerivativeLimit,
+    /// Feed-forward of the set-point.
+    FeedForward,
+}
+
+/// A gain in force.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Gain {
+    /// Which term.
+    pub term: Term,
+    /// Name of the parameter.
+    pub name: String,
+    /// Value of the parameter at the start of the flight.
+    pub value: f64,
+    /// The gain in SI units: input of the process per rad/s, rad, rad/s^2 (P, I, D of a rate) or 1/s (attitude).
+    /// `None`: the conversion is not known.
+    pub si: Option<f64>,
+}
+
+/// A parameter with its value.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Setting {
+    /// Name in the firmware.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+}
+
+/// A signal of a loop.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct LoggedSignal {
+    /// Topic and columns.
+    pub name: String,
+    /// Rows per second, without pauses of the log.
+    pub rate_hz: f64,
+}
+
+/// A control loop as it was logged.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct LoggedLoop {
+    /// Which loop.
+    pub control_loop: ControlLoop,
+    /// Input of the process. `None`: not logged.
+    pub input: Option<LoggedSignal>,
+    /// Output. `None`: not logged.
+    pub output: Option<LoggedSignal>,
+    /// Set-point. `None`: not logged.
+    pub set_point: Option<LoggedSignal>,
+    /// Gains in force at the start.
+    pub gains: Vec<Gain>,
+}
+
+impl LoggedLoop {
+    /// Whether input and output are there, so that a process can be identified.
+    pub fn is_complete(&self) -> bool {
+        self.input.is_some() && self.output.is_some()
+    }
+}
+
+/// One flight of a log.
+#[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
+pub struct Flight {
+    /// Firmware and board.
+    pub firmware: Firmware,
+    /// First and last row of the topic with the most rows, in seconds of the firmware's clock.
+    pub span: Span,
+    /// Every loop, also those that were not logged.
+    pub loops: Vec<LoggedLoop>,
+    /// Topics with their rates, parameters, facts and messages.
+    pub tables: FlightTables,
+    /// Filters of gyro and derivative that are in force.
+    pub filters: Vec<Setting>,
+    /// Geometry of the motors as far as parameters tell.
+    pub mixer: Vec<Setting>,
+    /// Deliberate excitation.
+    pub marks: Vec<Mark>,
+    /// When the motors were armed. `None`: the log does not tell.
+    pub armed: Option<Vec<Span>>,
+    /// When the vehicle was in the air. `None`: the log does not tell.
+    pub airborne: Option<Vec<Span>>,
+}
+
+impl Flight {
+    /// A loop as it was logged.
+    pub fn logged_loop(&self, of: ControlLoop) -> Option<&LoggedLoop> {
+        self.loops.iter().find(|own| own.control_loop == of)
+    }
+}

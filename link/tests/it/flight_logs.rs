@@ -1,0 +1,365 @@
+//! Flight logs: equal to other programs, whole and damaged.
+
+use std::fs;
+use std::path::PathBuf;
+
+use onecycle_link::{
+    Axis, ControlLoop, FlightLog, LogError, LogFormat, LogTables, MarkKind, Wanted, read_tables,
+};
+
+const LOGS: [&str; 6] = [
+    "ap_sysid_roll.bin",
+    "betaflight_acro.bfl",
+    "betaflight_two_flights.bbl",
+    "px4_chirps.ulg",
+    "px4_dropout.ulg",
+    "px4_motor_failure.ulg",
+];
+
+fn bytes(name: &str) -> Vec<u8> {
+    let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "examples", "logs", name]
+        .iter()
+        .collect();
+    fs::read(path).unwrap()
+}
+
+fn all(name: &str) -> LogTables {
+    read_tables(&*bytes(name), &Wanted::everything()).unwrap()
+}
+
+// Rows, sums, extremes, first and last values of all columns as pyulog, pymavlink and orangebox give them. Sums differ
+// by rounding: 1e-9 of the sum of magnitudes is allowed.
+#[test]
+fn columns_equal_those_of_other_programs() {
+    let oracle = include_str!("../oracles/logs.txt");
+    let mut compared = 0;
+    for name in LOGS {
+        let rows: Vec<&str> = oracle
+            .lines()
+            .filter(|line| line.starts_with(name))
+            .collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let tables = all(name);
+        for line in rows {
+            let cells: Vec<&str> = line.split(' ').collect();
+            let topic = tables.flights[0].topic(cells[2]).unwrap();
+            let values = topic.column(cells[3]).unwrap();
+            let expected: Vec<f64> = cells[4..]
+                .iter()
+                .map(|cell| cell.parse().unwrap())
+                .collect();
+            let finite = || values.iter().copied().filter(|value| value.is_finite());
+            let found = [
+                values.len() as f64,
+                finite().sum(),
+                finite().fold(f64::INFINITY, f64::min),
+                finite().fold(f64::NEG_INFINITY, f64::max),
+                values[0],
+                values[values.len() - 1],
+            ];
+            let rounding = 1e-9 * finite().map(f64::abs).sum::<f64>();
+            for (at, (found, expected)) in found.iter().zip(&expected).enumerate() {
+                let tolerance = if at == 1 {
+                    rounding
+                } else {
+                    1e-12 * expected.abs()
+                };
+                let is_equal = (found - expected).abs() <= tolerance
+                    || found == expected
+                    || found.is_nan() && expected.is_nan();
+                assert!(is_equal, "{line}: {found} at {at}");
+            }
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, oracle.lines().count() - 1);
+}
+
+#[test]
+fn whole_logs_lose_nothing_and_cut_ones_say_so() {
+    for name in LOGS {
+        let log = FlightLog::scan(&*bytes(name)).unwrap();
+        let is_cut = name == "px4_dropout.ulg";
+        assert_eq!(log.loss.is_truncated, is_cut, "{name}");
+        // The rest of a message that was cut.
+        assert_eq!(
+            log.loss.bytes_skipped,
+            if is_cut { 84 } else { 0 },
+            "{name}"
+        );
+        assert_eq!(log.loss.dropouts, u64::from(is_cut), "{name}");
+    }
+}
+
+// SYSTEMID ran once, on roll (axis 10, the mixer), from 66.65 to 92.67 s.
+#[test]
+fn excitation_gains_and_signals_of_ardupilot() {
+    let bytes = bytes("ap_sysid_roll.bin");
+    let log = FlightLog::scan(&*bytes).unwrap();
+    assert_eq!(log.format, LogFormat::DataFlash);
+    let flight = &log.flights[0];
+    let [mark] = flight.marks[..] else {
+        panic!("{:?}", flight.marks);
+    };
+    assert_eq!(
+        (mark.kind, mark.axis),
+        (MarkKind::ArduPilotSystemId, Some(Axis::Roll))
+    );
+    assert!((mark.span.from_s - 66.65).abs() < 0.01 && (mark.span.to_s - 92.67).abs() < 0.01);
+    let rate = flight.logged_loop(ControlLoop::Rate(Axis::Roll)).unwrap();
+    assert_eq!(
+        (rate.gains[0].name.as_str(), rate.gains[0].value as f32),
+        ("ATC_RAT_RLL_P", 0.135)
+    );
+    let signals = log
+        .signals(&*bytes, 1, ControlLoop::Rate(Axis::Roll))
+        .unwrap();
+    let recording = signals.recording().unwrap();
+    assert_eq!(recording.set_point().unwrap().len(), recording.len());
+    // 400 Hz.
+    assert!((recording.sample_period_s() - 0.0025).abs() < 1e-5);
+    let missing = log.signals(&*bytes, 1, ControlLoop::Altitude);
+    assert!(
+        matches!(missing, Err(LogError::NotLogged { .. })),
+        "{missing:?}"
+    );
+    let missing = log.signals(&*bytes, 2, ControlLoop::Rate(Axis::Roll));
+    assert!(matches!(
+        missing,
+        Err(LogError::NoSuchFlight {
+            wanted: 2,
+            flights: 1
+        })
+    ));
+}
+
+// Torque and gyro of PX4 are joined on the stamp of the sample: the input of a row is that of the very gyro sample.
+#[test]
+fn torque_and_gyro_share_their_sample() {
+    let bytes = bytes("px4_chirps.ulg");
+    let log = FlightLog::scan(&*bytes).unwrap();
+    let signals = log
+        .signals(&*bytes, 1, ControlLoop::Rate(Axis::Pitch))
+        .unwrap();
+    let tables = all("px4_chirps.ulg");
+    let pairs = |name: &str| {
+        let topic = tables.flights[0].topic(name).unwrap();
+        let stamps = topic.column("timestamp_sample").unwrap().iter();
+        let pairs = stamps
+            .map(|stamp| *stamp as u64)
+            .zip(topic.column("xyz[1]").unwrap().to_vec());
+        pairs.collect::<std::collections::BTreeMap<u64, f64>>()
+    };
+    let (torque, gyro) = (
+        pairs("vehicle_torque_setpoint"),
+        pairs("vehicle_angular_velocity"),
+    );
+    assert!(signals.time_s.len() > 5000);
+    for (row, time_s) in signals.time_s.iter().enumerate() {
+        let stamp = (time_s * 1e6).round() as u64;
+        assert_eq!(
+            (signals.input[row], signals.output[row]),
+            (torque[&stamp], gyro[&stamp])
+        );
+    }
+}
+
+// The proportional term in the log, 0.032029 P (r - y) per deg/s in thousandths, tells unit, scale and sign of set-point
+// and gyro: P / 544.9 (r - y) must be axisP / 1000. The firmware cuts off the decimals of
+// the term: half a unit on average. The second flight of
+// this log has no throttle, at which the firmware would lower P.
+#[test]
+fn betaflight_gains_and_units_agree_with_its_proportional_term() {
+    let bytes = bytes("betaflight_two_flights.bbl");
+    let log = FlightLog::scan(&*bytes).unwrap();
+    let tables = all("betaflight_two_flights.bbl");
+    let main = tables.flights[1].topic("main").unwrap();
+    for axis in [Axis::Roll, Axis::Pitch] {
+        let control_loop = ControlLoop::Rate(axis);
+        let signals = log.signals(&*bytes, 2, control_loop).unwrap();
+        let gain = log.flights[1].logged_loop(control_loop).unwrap().gains[0]
+            .si
+            .unwrap();
+        let terms = main.column(&format!("axisP[{}]", axis.index())).unwrap();
+        let errors = signals
+            .set_point
+            .as_ref()
+            .unwrap()
+            .iter()
+            .zip(&signals.output)
+            .map(|(r, y)| r - y);
+
+        let (mut products, mut squares) = (0.0, 0.0);
+        for (error, term) in errors.zip(terms) {
+            if term.abs() >= 10.0 {
+                products += error * (term + 0.5 * term.signum()) * 1e-3;
+                squares += error * error;
+            }
+        }
+        let ratio = products / squares / gain;
+        assert!((ratio - 1.0).abs() < 0.02, "{axis:?}: {ratio}");
+    }
+    // The motors' yaw has the sign of the controller's output, whatever the direction of the propellers.
+    let yaw = log
+        .signals(&*bytes, 2, ControlLoop::Rate(Axis::Yaw))
+        .unwrap();
+    let errors = yaw
+        .set_point
+        .as_ref()
+        .unwrap()
+        .iter()
+        .zip(&yaw.output)
+        .map(|(r, y)| r - y);
+    assert!(
+        errors
+            .zip(&yaw.input)
+            .map(|(error, input)| error * input)
+            .sum::<f64>()
+            > 0.0
+    );
+}
+
+#[test]
+fn a_blackbox_holds_several_flights() {
+    let log = FlightLog::scan(&*bytes("betaflight_two_flights.bbl")).unwrap();
+    let rows: Vec<u64> = log
+        .flights
+        .iter()
+        .map(|flight| flight.tables.topics[0].rows)
+        .collect();
+    assert_eq!((rows.len(), rows[0]), (2, 98));
+}
+
+#[test]
+fn the_text_form_of_dataflash() {
+    let text = "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+                FMT, 1, 31, PARM, QNff, TimeUS,Name,Value,Default\n\
+                FMT, 2, 19, RATE, Qff, TimeUS,RDes,R\n\
+                FMT, 3, 75, MSG, QZ, TimeUS,Message\n\
+                PARM, 100, ATC_RAT_RLL_P, 0.135, 0\n\
+                MSG, 150, ArduCopter V4.5.1, custom\n\
+                RATE, 2000, 1.5, -2\nRATE, 4500, nonsense\nRATE, 4500, 2.5, -3\nWHAT, 1\n";
+    let tables = read_tables(text.as_bytes(), &Wanted::everything()).unwrap();
+    assert_eq!(tables.format, LogFormat::DataFlashText);
+    let flight = &tables.flights[0];
+    assert_eq!(
+        flight.topic("RATE").unwrap().column("R"),
+        Some(&[-2.0, -3.0][..])
+    );
+    assert_eq!(flight.topic("RATE").unwrap().time_s, [0.002, 0.0045]);
+    assert_eq!(flight.parameter("ATC_RAT_RLL_P"), Some(0.135));
+    assert_eq!(flight.messages[0].1, "ArduCopter V4.5.1, custom");
+    // The row with two cells, and the unknown topic.
+    assert_eq!(tables.loss.rows_dropped, 2);
+}
+
+// A thousand bytes missing in the middle cost what they held, and at most some rows beside them.
+#[test]
+fn reading_goes_on_after_damage() {
+    let topics = [
+        ("ap_sysid_roll.bin", "RATE", 40),
+        ("px4_chirps.ulg", "vehicle_angular_velocity", 40),
+        // Up to the next I frame: 32 frames, and those that the bytes held.
+        ("betaflight_acro.bfl", "main", 150),
+    ];
+    for (name, topic, most) in topics {
+        let whole = bytes(name);
+        let rows = |bytes: &[u8]| {
+            let tables = read_tables(bytes, &Wanted::nothing()).unwrap();
+            (tables.flights[0].topic(topic).unwrap().rows, tables.loss)
+        };
+        let mut cut = whole.clone();
+        cut.drain(whole.len() / 2 + 7..whole.len() / 2 + 1007);
+        let ((before, _), (after, loss)) = (rows(&whole), rows(&cut));
+        assert!(
+            before - after <= most && after < before,
+            "{name}: {before} {after} {loss:?}"
+        );
+        assert!(
+            loss.rows_dropped + loss.bytes_skipped > 0,
+            "{name}: {loss:?}"
+        );
+    }
+}
+
+/// Random numbers of 64 bits (splitmix64).
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ z >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ z >> 31) % end as u64) as usize
+    }
+}
+
+/// The bytes, damaged in one of several ways.
+fn damaged(bytes: &[u8], random: &mut Random) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    match random.below(4) {
+        0 => bytes.truncate(random.below(bytes.len())),
+        1 => {
+            let from = random.below(bytes.len());
+            let to = (from + random.below(5000)).min(bytes.len());
+            bytes.drain(from..to);
+        }
+        kind => {
+            // Many flips among the definitions at the start, or anywhere.
+            let end = if kind == 2 { 20_000 } else { bytes.len() };
+            for _ in 0..1 + random.below(50) {
+                let at = 24 + random.below(end.min(bytes.len()) - 24);
+                bytes[at] = random.below(256) as u8;
+            }
+        }
+    }
+    bytes
+}
+
+// 500 damaged logs of each format: no panic, no row out of nothing, every loop joins or is refused.
+#[test]
+fn damaged_logs_do_no_harm() {
+    let mut random = Random(1);
+    let mut text = String::from(
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+         FMT, 2, 19, RATE, Qfff, TimeUS,RDes,R,ROut\n",
+    );
+    for row in 0..5000 {
+        text += &format!("RATE, {}, {}.5, -{row}, 0.25\n", 2500 * row, row % 7);
+    }
+    let logs = [
+        bytes("ap_sysid_roll.bin"),
+        bytes("betaflight_two_flights.bbl"),
+        bytes("px4_dropout.ulg"),
+        text.into_bytes(),
+    ];
+    for mut log in logs {
+        log.truncate(250_000);
+        for _ in 0..500 {
+            let bytes = damaged(&log, &mut random);
+            let Ok(tables) = read_tables(&*bytes, &Wanted::everything()) else {
+                continue;
+            };
+            let rows = tables
+                .flights
+                .iter()
+                .flat_map(|flight| &flight.topics)
+                .map(|topic| topic.rows);
+            assert!(rows.sum::<u64>() <= bytes.len() as u64);
+            assert!(tables.loss.bytes_skipped <= bytes.len() as u64);
+            if random.below(10) == 0
+                && let Ok(log) = FlightLog::scan(&*bytes)
+            {
+                for control_loop in ControlLoop::ALL {
+                    if let Ok(signals) = log.signals(&*bytes, 1, control_loop) {
+                        assert!(signals.time_s.is_sorted_by(|a, b| a < b));
+                        let _ = signals.recording();
+                    }
+                }
+            }
+        }
+    }
+}
