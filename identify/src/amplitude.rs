@@ -8,6 +8,7 @@ use onecycle_design::Model;
 
 use crate::outcome::Identified;
 use crate::signals::Signals;
+use crate::two_amplitudes::TwoAmplitudes;
 
 /// Fewest switches of the relay at each amplitude: two cycles and the transient between the parts.
 const FEWEST_SWITCHES: usize = 6;
@@ -23,20 +24,6 @@ const JUMP: f64 = 0.3;
 const ALIKE: (f64, f64) = (0.03, 0.035);
 /// Draws of each posterior.
 const DRAWS: usize = 100;
-
-/// Result of a test at two amplitudes.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct TwoAmplitudes {
-    /// Amplitudes of the relay in order of time (input unit).
-    pub amplitudes: [f64; 2],
-    /// Gain of the process at the smaller amplitude over that at the larger one, at the crossover of the controller.
-    pub gain_ratio: f64,
-    /// Phase at the smaller amplitude less that at the larger one (rad).
-    pub phase_rad: f64,
-    /// Whether the difference is within the uncertainty of both.
-    pub is_alike: bool,
-}
 
 /// The two parts of a recording with two amplitudes.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -33,11 +33,11 @@ mod remarks;
 mod road;
 mod settings;
 mod signals;
+mod two_amplitudes;
 mod verdict;
 
 use onecycle_onboard::pack::Pack;
 
-pub use amplitude::TwoAmplitudes;
 pub use diagnose::density::{Density, density};
 pub use diagnose::harmonics::{Harmonic, harmonics};
 pub use diagnose::whiteness::{Whiteness, whiteness};
@@ -54,6 +54,7 @@ pub use relay::find_oscillation;
 pub use remark::Remark;
 pub use settings::{MOST_CYCLES, Method, Options, Road};
 pub use signals::Signals;
+pub use two_amplitudes::TwoAmplitudes;
 pub use verdict::Verdict;
 
 /// Identifies the process from a recording, with the built-in pack.

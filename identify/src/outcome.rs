@@ -3,12 +3,12 @@
 use onecycle_design::{Design, Model, Proposal, Specification, StepMetrics, proposals};
 use onecycle_onboard::refine::Refined;
 
-use crate::amplitude::TwoAmplitudes;
 use crate::excitation::{Excitation, Oscillation, Switching};
 use crate::nonlinear::Nonlinear;
 use crate::posterior::{Estimate, Interval, Posterior};
 use crate::reading::Reading;
 use crate::remark::Remark;
+use crate::two_amplitudes::TwoAmplitudes;
 use crate::verdict::Verdict;
 
 /// Result of an identification.

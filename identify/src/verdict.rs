@@ -5,7 +5,7 @@ use std::fmt;
 use onecycle_design::{DesignError, Parameter};
 use onecycle_onboard::refine::DomainEdge;
 
-use crate::amplitude::TwoAmplitudes;
+use crate::two_amplitudes::TwoAmplitudes;
 
 /// Reason why no process was identified.
 ///

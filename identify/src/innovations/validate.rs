@@ -178,7 +178,7 @@ fn highest(lines: &[(f64, f64)]) -> Option<f64> {
     const LINE: f64 = 0.05;
     let window = |high: f64| {
         let inside = move |omega: f64| omega > high / SQRT_2 && omega <= high * (1.0 + 1e-9);
-        lines.iter().filter(move |(omega, _)| inside(*omega))
+        lines.iter().filter(move |line| inside(line.0))
     };
     let sum = |high: f64| {
         window(high)
@@ -191,9 +191,9 @@ fn highest(lines: &[(f64, f64)]) -> Option<f64> {
     let last = (best..lines.len())
         .take_while(|index| sums[*index] >= least)
         .last()?;
-    let (_, strong) = (lines[last].0, LINE * sums[last]);
-    let highest = window(lines[last].0).filter(|(_, information)| *information >= strong);
-    highest.map(|(omega, _)| *omega).last()
+    let strong = LINE * sums[last];
+    let mut highest = window(lines[last].0).filter(|(_, information)| *information >= strong);
+    highest.next_back().map(|(omega, _)| *omega)
 }
 
 /// Frequencies (rad/s) of the Fourier sums of `rows`, with their shares of the sum of squares: under a Hann window, which
