@@ -74,7 +74,7 @@ pub(crate) struct Arguments {
 /// training.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    Identify(Box<Identify>),
+    Identify(Identify),
     Log(Log),
     Simulate(Box<Simulate>),
     Tune(Tune),

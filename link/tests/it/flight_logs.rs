@@ -20,11 +20,11 @@ fn bytes(name: &str) -> Vec<u8> {
     let path: PathBuf = [env!("CARGO_MANIFEST_DIR"), "..", "examples", "logs", name]
         .iter()
         .collect();
-    fs::read(path).unwrap()
+    fs::read(path).expect("an example of the repository")
 }
 
 fn all(name: &str) -> LogTables {
-    read_tables(&*bytes(name), &Wanted::everything()).unwrap()
+    read_tables(&*bytes(name), &Wanted::everything()).expect("a log")
 }
 
 // Rows, sums, extremes, first and last values of all columns as pyulog, pymavlink and orangebox give them. Sums differ
