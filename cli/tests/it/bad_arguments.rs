@@ -38,7 +38,7 @@ fn unusable_options_of_identify() {
         ["--structure", "foptd"],
         ["--from", "1"],
         ["--to", "5"],
-        ["--hold", "held"],
+        ["--hold", "interpolated"],
     ] {
         let both = [&general[..], &["--estimator", "relay"]].concat();
         with(&both).misused(&[general[0], "--estimator relay", "leave out"]);

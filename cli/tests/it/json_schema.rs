@@ -6,7 +6,7 @@ use std::path::Path;
 use onecycle::Structure;
 use serde_json::Value;
 
-use crate::common::{Table, identify};
+use crate::common::{Table, identify, simulate};
 
 fn document() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/identify-json.md");
@@ -54,6 +54,21 @@ fn the_documented_keys_are_those_of_the_report() {
         let report = identify(Table::noisy().csv(), arguments).identified();
         keys(&report.0, "", &mut found);
     }
+    let process = [
+        "--k", "1", "--t-prop", "0.0321", "--t-body", "1.6886", "--tau", "0.0237",
+    ];
+    let two = simulate(
+        &process,
+        &[
+            "--second-amplitude",
+            "0.6",
+            "--noise",
+            "1%",
+            "--duration",
+            "8",
+        ],
+    );
+    keys(&identify(two, &[]).identified().0, "", &mut found);
     // Those of a controller, its margins and its step are documented once.
     let of_against = |key: &String| {
         let parts = ["controller", "margins", "step"];

@@ -25,6 +25,8 @@ const STEPS: i32 = 50;
 /// Largest standard deviation of `beta` from cycle to cycle of an input that follows such a law. Switches at other times
 /// scatter far more.
 const MOST_SCATTER: f64 = 0.1;
+/// Largest distance of the share of time high from one half at which the ratio is that of `beta`.
+const MOST_ASYMMETRY: f64 = 0.12;
 /// Fewest cycles that show a scatter.
 const FEWEST_CYCLES: usize = 3;
 
@@ -56,8 +58,8 @@ impl<'a> Law<'a> {
         Self::new(signals, &relay, span_s, rises)
     }
 
-    /// Switches between two times (s). `rises`: whether the output rises after a switch to high. `None` if there are fewer
-    /// than three cycles, or if the samples were averaged.
+    /// Switches between two times (s). `rises`: whether the output rises after a switch to high. `None` if there is no
+    /// complete cycle, or if the samples were averaged.
     fn new(
         signals: &'a Signals<'a>,
         relay: &RelayInput,
@@ -109,24 +111,26 @@ impl<'a> Law<'a> {
                 to_low: switch(pair[1]),
             })
             .collect();
-        (law.cycles.len() >= FEWEST_CYCLES).then_some(law)
+        (!law.cycles.is_empty()).then_some(law)
     }
 
-    /// The ratio, if the input follows such a law.
+    /// Mean ratio.
+    pub(crate) fn mean_beta(&self) -> f64 {
+        let betas = self.cycles.iter().map(|cycle| self.beta(cycle, 0.0));
+        betas.sum::<f64>() / self.cycles.len() as f64
+    }
+
+    /// The ratio, if the input follows such a law over three cycles or more.
     pub(crate) fn switching(&self) -> Option<Switching> {
-        let betas: Vec<f64> = self
-            .cycles
-            .iter()
-            .map(|cycle| self.beta(cycle, 0.0))
-            .collect();
-        let count = betas.len() as f64;
-        let beta = betas.iter().sum::<f64>() / count;
-        let square = betas.iter().map(|b| (b - beta) * (b - beta)).sum::<f64>();
-        let scatter = (square / (count - 1.0)).sqrt();
-        (scatter < MOST_SCATTER).then_some(Switching {
+        let beta = self.mean_beta();
+        let squares = (self.cycles.iter()).map(|cycle| (self.beta(cycle, 0.0) - beta).powi(2));
+        let count = self.cycles.len() as f64;
+        let scatter = (squares.sum::<f64>() / (count - 1.0)).sqrt();
+        let is_law = self.cycles.len() >= FEWEST_CYCLES && scatter < MOST_SCATTER;
+        is_law.then_some(Switching {
             beta,
             deviation: scatter / count.sqrt(),
-            cycles: betas.len(),
+            cycles: self.cycles.len(),
         })
     }
 
@@ -159,6 +163,16 @@ impl<'a> Law<'a> {
         let nearest = [crossing(1.0), crossing(-1.0)].into_iter().flatten();
         let late_s = nearest.min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
         Some(late_s - 0.5 * self.signals.sample_period_s)
+    }
+
+    /// Whether the relay is high for about half of the time. Against a bias that is not trimmed a relay with protection
+    /// against turning back early switches later on one side than its `beta` says.
+    pub(crate) fn is_symmetric(&self) -> bool {
+        let high_s: f64 = (self.cycles.iter())
+            .map(|cycle| cycle.to_low.time_s - cycle.to_high.time_s)
+            .sum();
+        let share = high_s / self.cycles.len() as f64 / self.period_s();
+        (share - 0.5).abs() < MOST_ASYMMETRY
     }
 
     /// Mean period of the cycles (s).
