@@ -71,7 +71,9 @@ impl Plan {
         match (arguments.duration, self.relay_test(arguments)) {
             (Some(duration_s), _) => positive("--duration", duration_s),
             (None, Some(process)) => {
-                Ok(arguments.preroll + PERIODS * period_s(arguments, &process)?)
+                // The oscillation becomes steady once more at the second amplitude.
+                let parts = 1.0 + f64::from(u8::from(arguments.second_amplitude.is_some()));
+                Ok(arguments.preroll + parts * PERIODS * period_s(arguments, &process)?)
             }
             (None, None) => Err(Failure::usage(
                 "give --duration: only a relay on a soiptd in open loop has a default, 20 periods of its oscillation",
