@@ -38,7 +38,7 @@ pub(crate) struct Law<'a> {
     cycles: Vec<Cycle>,
 }
 
-/// A switch to high after a low phase, and the switch to low after it.
+/// The switches at the ends of a low phase and of a high phase, one after the other.
 struct Cycle {
     to_high: Switch,
     to_low: Switch,
@@ -75,13 +75,14 @@ impl<'a> Law<'a> {
             starts.push(starts[starts.len() - 1] + phase.len());
         }
         let is_high = |phase: usize| levels[starts[phase] - relay.span.start];
+        let rounding_s = 0.5 * signals.sample_period_s;
         let inside = |phase: usize| {
             let (start, end) = (starts[phase], starts[phase + 1]);
             // A gap inside a phase may hide its extreme or a switch.
             phase > 0
-                && signals.time_s[start] >= from_s
                 && end < signals.time_s.len()
-                && signals.time_s[end] <= to_s
+                && signals.time_s[start] > from_s - rounding_s
+                && signals.time_s[end] < to_s + rounding_s
                 && !signals.breaks.iter().any(|at| (start..=end).contains(at))
         };
         // The first phase has no beginning, the last one no end.
@@ -102,13 +103,16 @@ impl<'a> Law<'a> {
             time_s: signals.time_s[starts[phase + 1]],
             extreme: law.extreme(starts[phase]..starts[phase + 1], is_high(phase) != rises),
         };
-        let pairs = phases
-            .windows(2)
-            .filter(|pair| pair[1] == pair[0] + 1 && !is_high(pair[0]));
+        let pairs = (phases.chunks_exact(2)).filter(|pair| pair[1] == pair[0] + 1);
         law.cycles = pairs
-            .map(|pair| Cycle {
-                to_high: switch(pair[0]),
-                to_low: switch(pair[1]),
+            .map(|pair| {
+                let [first, second] = [switch(pair[0]), switch(pair[1])];
+                let (to_low, to_high) = if is_high(pair[0]) {
+                    (first, second)
+                } else {
+                    (second, first)
+                };
+                Cycle { to_high, to_low }
             })
             .collect();
         (!law.cycles.is_empty()).then_some(law)
@@ -169,7 +173,7 @@ impl<'a> Law<'a> {
     /// against turning back early switches later on one side than its `beta` says.
     pub(crate) fn is_symmetric(&self) -> bool {
         let high_s: f64 = (self.cycles.iter())
-            .map(|cycle| cycle.to_low.time_s - cycle.to_high.time_s)
+            .map(|cycle| (cycle.to_low.time_s - cycle.to_high.time_s).rem_euclid(self.period_s()))
             .sum();
         let share = high_s / self.cycles.len() as f64 / self.period_s();
         (share - 0.5).abs() < MOST_ASYMMETRY
