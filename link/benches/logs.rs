@@ -1,6 +1,6 @@
 //! Throughput of the readers of flight logs, with the signals of a rate loop kept.
 //!
-//! Beside it, on the whole files: pyulog 1.3.0, pymavlink 2.4.50, orangebox 0.5.0 (docs/benchmarks.md).
+//! Python readers on the same files, for comparison: pyulog 1.3.0, pymavlink 2.4.50, orangebox 0.5.0.
 
 use std::fs;
 
