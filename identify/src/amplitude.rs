@@ -7,11 +7,13 @@
 use onecycle_design::Model;
 
 use crate::outcome::Identified;
-use crate::signals::Signals;
+use crate::signals::{Signals, range};
 use crate::two_amplitudes::TwoAmplitudes;
 
 /// Fewest switches of the relay at each amplitude: two cycles and the transient between the parts.
 const FEWEST_SWITCHES: usize = 6;
+/// Most switches of a test: every one is tried as the change, so the work grows with their square.
+const MOST_SWITCHES: usize = 2000;
 /// Least ratio of the amplitudes.
 const LEAST_RATIO: f64 = 1.2;
 /// Distance of a jump from the median of its part, as a share, and least share of the jumps that are as near. The others
@@ -35,15 +37,14 @@ pub(crate) struct Parts {
 
 /// Where the amplitude of the relay changes. `None` if it does not, or if the input is no relay.
 pub(crate) fn parts(input: &[f64]) -> Option<Parts> {
-    let (low, high) = input
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), u| {
-            (low.min(*u), high.max(*u))
-        });
+    let (low, high) = range(input);
     let jumps: Vec<(usize, f64)> = (input.windows(2).enumerate())
         .map(|(index, pair)| (index + 1, (pair[1] - pair[0]).abs()))
         .filter(|(_, size)| *size > JUMP * (high - low))
         .collect();
+    if jumps.len() > MOST_SWITCHES {
+        return None;
+    }
     let sizes: Vec<f64> = jumps.iter().map(|(_, size)| *size).collect();
     let last = sizes.len().checked_sub(FEWEST_SWITCHES)?;
     // Between the parts one jump goes from a level of one to a level of the other.
@@ -74,8 +75,7 @@ pub(crate) fn is_one(input: &[f64]) -> bool {
     let part = input.len().div_ceil(PARTS).max(1);
     let ranges: Vec<f64> = (input.chunks(part))
         .map(|part| {
-            let low = part.iter().copied().fold(f64::INFINITY, f64::min);
-            let high = part.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let (low, high) = range(part);
             high - low
         })
         .collect();
@@ -92,8 +92,7 @@ pub(crate) fn is_one(input: &[f64]) -> bool {
 /// Median of the jumps, and how many are near it.
 fn median(sizes: &[f64]) -> (f64, f64) {
     let mut sorted = sizes.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let median = sorted[sorted.len() / 2];
+    let (_, &mut median, _) = sorted.select_nth_unstable_by(sizes.len() / 2, f64::total_cmp);
     let is_near = |size: &&f64| (*size / median - 1.0).abs() < MOST_SPREAD;
     (median, sizes.iter().filter(is_near).count() as f64)
 }
@@ -136,7 +135,7 @@ pub(crate) fn compare(
 }
 
 impl Signals<'_> {
-    /// The points from `first` until before `end`.
+    /// The points of a range. `breaks` is filled with the indices of its gaps.
     pub(crate) fn part<'a>(
         &'a self,
         range: std::ops::Range<usize>,

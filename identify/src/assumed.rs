@@ -29,8 +29,8 @@ pub(crate) struct RecordedLoop {
 }
 
 impl RecordedLoop {
-    /// `specification` with the values that it leaves open: the noise, the highest crossover, and the sample period of a controller whose output
-    /// leaves in the tick of its sample. Input that is not held says nothing about the sample period.
+    /// `specification` with the values that it leaves open: the noise, the highest crossover, and the sample period of a
+    /// controller whose output leaves in the tick of its sample. Input that is not held says nothing about the sample period.
     pub(crate) fn complete(&self, specification: &Specification) -> Specification {
         let mut complete = *specification;
         let is_noisy = self.sigma > LEAST_NOISE * self.output_size && self.input_amplitude > 0.0;

@@ -28,8 +28,8 @@ const MOST_AVERAGING: f64 = 0.015;
 /// Largest time, as a share of the period, by which noise makes a relay without averaging switch early; to it comes the
 /// noise over the amplitude.
 const EARLY: f64 = 0.02;
-/// Ratio above which a relay is plain or has hysteresis, and is not one that leads. The oscillation of a leading one is near
-/// the crossover of any controller: of 630 loops on processes with a flexible mode 9 were unstable, all with a crossover
+/// Ratio above which a relay is plain or has hysteresis. A relay with a lower ratio switches before the output crosses the
+/// reference (it leads), and oscillates near the crossover of any controller: of 630 loops on processes with a flexible mode 9 were unstable, all with a crossover
 /// below 1.2 times the frequency of the oscillation.
 const LEADING: f64 = -0.05;
 /// Phase margin (rad) that a sample period costs, above which it matters when between two samples the relay switches.
@@ -235,8 +235,8 @@ fn extrapolation(excited: f64, leads: bool, identified: &mut Identified) -> Opti
     })
 }
 
-/// Largest factor by which a resonance above 1.5 times the frequency `excited` (rad/s) may raise the response of the process before
-/// the loop becomes unstable: `1 + 1/|T|`, by the small-gain theorem.
+/// Largest factor by which a resonance above 1.5 times the frequency `excited` (rad/s) may raise the response of the
+/// process before the loop becomes unstable: `1 + 1/|T|`, by the small-gain theorem.
 fn resonance(model: &Model, controller: &Controller, excited: f64) -> Option<f64> {
     const DECADES: f64 = 1.5;
     const POINTS: i32 = 150;

@@ -17,6 +17,13 @@ pub struct Signals<'a> {
     pub breaks: &'a [usize],
 }
 
+/// Least and largest value.
+pub(crate) fn range(values: &[f64]) -> (f64, f64) {
+    (values.iter()).fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+        (value.min(low), value.max(high))
+    })
+}
+
 impl Signals<'_> {
     /// The input moved to `late_s` (s) before its time stamps: of each point the mean over its time. Before its first and
     /// after its last value the input is held.

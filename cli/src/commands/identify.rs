@@ -150,7 +150,7 @@ fn read(arguments: &Identify) -> Result<Recording, Failure> {
     }
     if let Some(option) = arguments.log.given() {
         return Err(Failure::usage(format!(
-            "{option} is for flight logs, and {} is none: leave out {option}",
+            "{option} is for flight logs, and {} is not a flight log: leave out {option}",
             arguments.file.display()
         )));
     }

@@ -81,7 +81,7 @@ impl<'a> DesignOver<'a> {
         })
     }
 
-    /// Controller of least mean cost over the draws, or for the model alone if there are none.
+    /// Controller of least mean cost over the draws; without draws, of least cost for the model.
     pub(super) fn design(&mut self, specification: &Specification) -> Result<Design, DesignError> {
         if self.count == 0 {
             return design(self.model, specification);

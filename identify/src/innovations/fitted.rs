@@ -14,6 +14,7 @@ use super::{LONGEST_TAU, ROWS, forces, outliers};
 use crate::assumed::RecordedLoop;
 use crate::remark::Remark;
 use crate::settings::Options;
+use crate::signals::range;
 use crate::verdict::Verdict;
 
 /// Time at the start whose outputs are left out while the dead time is not known, as a share of the record. Most records
@@ -141,10 +142,7 @@ impl Fitted {
     /// What the record says about the loop of a controller.
     pub(super) fn recorded_loop(&self, excited_rad_per_s: Option<f64>) -> RecordedLoop {
         let record = &self.record;
-        let (low, high) = (record.input.iter())
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                (value.min(low), value.max(high))
-            });
+        let (low, high) = range(&record.input);
         RecordedLoop {
             sigma: self.best.found.at.variance.sqrt(),
             output_size: record.output_deviation(),

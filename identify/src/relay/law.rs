@@ -18,6 +18,8 @@ use crate::signals::Signals;
 /// Half width of the window (share of the period; samples) in which the output is smoothed by a parabola.
 const WINDOW: f64 = 0.04;
 const WINDOW_SAMPLES: f64 = 2.6;
+/// Most points of a phase that are compared, and of a window that are smoothed: a recording may have millions in a period.
+const MOST_POINTS: usize = 400;
 /// Largest offset of the clock that is looked for, as a share of the period.
 const FARTHEST: f64 = 0.25;
 /// Steps from no offset to the farthest.
@@ -199,7 +201,9 @@ impl<'a> Law<'a> {
     /// Largest or smallest smoothed output of a phase.
     fn extreme(&self, phase: std::ops::Range<usize>, is_largest: bool) -> f64 {
         let sign = if is_largest { 1.0 } else { -1.0 };
-        let smoothed = phase.map(|index| sign * self.smooth(self.signals.time_s[index]));
+        let every = (phase.len() / MOST_POINTS).max(1);
+        let smoothed =
+            (phase.step_by(every)).map(|index| sign * self.smooth(self.signals.time_s[index]));
         sign * smoothed.fold(f64::NEG_INFINITY, f64::max)
     }
 
@@ -210,7 +214,8 @@ impl<'a> Law<'a> {
         let end = times_s.partition_point(|t| *t <= time_s + self.half_width_s);
         let mut moments = [0.0; 5];
         let mut products = [0.0; 3];
-        for index in first..end {
+        let every = ((end - first) / MOST_POINTS).max(1);
+        for index in (first..end).step_by(every) {
             let x = (times_s[index] - time_s) / self.half_width_s;
             let y = self.signals.output[index];
             let mut power = 1.0;

@@ -3,12 +3,12 @@
 use std::f64::consts::TAU;
 
 use onecycle_design::{Parameter, Specification};
-use onecycle_identify::{Identification, Options, Remark, Signals, Verdict, identify};
+use onecycle_identify::{Identification, Options, Remark, Verdict, identify};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::{FixedStepProcess, Noise, NoiseSource};
 
-/// Sample period (s).
-const SAMPLE_S: f64 = 1e-3;
+use crate::outcomes::{SAMPLE_S, signals};
+
 /// Dead time (s).
 const TAU_S: f64 = 0.0237;
 /// Standard deviation of the measurement noise (output unit), half a per cent of the oscillation.
@@ -41,16 +41,8 @@ fn relay_test(beta: f32, has_two: bool, dead_zone: f64) -> [Vec<f64>; 3] {
     columns
 }
 
-fn found([time_s, input, output]: &[Vec<f64>; 3], options: &Options) -> Identification {
-    let signals = Signals {
-        time_s,
-        input,
-        output,
-        samples_per_point: 1,
-        sample_period_s: SAMPLE_S,
-        breaks: &[],
-    };
-    identify(&signals, options)
+fn found(columns: &[Vec<f64>; 3], options: &Options) -> Identification {
+    identify(&signals(columns), options)
 }
 
 fn has(found: &Identification, kind: &str) -> bool {

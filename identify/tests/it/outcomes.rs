@@ -12,7 +12,7 @@ use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 use onecycle_plant::FixedStepProcess;
 
 /// Sample period (s).
-const SAMPLE_S: f64 = 1e-3;
+pub(crate) const SAMPLE_S: f64 = 1e-3;
 
 /// Eight seconds of the paper's hexacopter under a relay: time (s), input, output.
 fn relay_test() -> [Vec<f64>; 3] {
@@ -35,7 +35,7 @@ fn relay_test() -> [Vec<f64>; 3] {
     columns
 }
 
-fn signals([time_s, input, output]: &[Vec<f64>; 3]) -> Signals<'_> {
+pub(crate) fn signals([time_s, input, output]: &[Vec<f64>; 3]) -> Signals<'_> {
     Signals {
         time_s,
         input,

@@ -69,7 +69,7 @@ impl Clock {
     /// Time of a stamp (s).
     ///
     /// # Errors
-    /// A date that is none, or a date among numbers or a number among dates.
+    /// A date that does not exist, a date in a column of numbers, or a number in a column of dates.
     pub(super) fn seconds(&mut self, stamp: Stamp) -> Result<f64, date::Fault> {
         let time = match (stamp, &mut self.calendar) {
             (Stamp::Date(date), Some(calendar)) => {

@@ -124,7 +124,7 @@ pub enum ReadError {
         step: f64,
         /// The units that give a possible sample period.
         possible: Vec<TimeUnit>,
-        /// The one of them that is most usual for such stamps.
+        /// Which of the possible units such stamps usually have.
         usual: Option<TimeUnit>,
     },
     /// Day and month of a date can be taken in either order.

@@ -69,7 +69,7 @@ pub(super) fn find(preview: &Preview, column: usize, forced: Option<TimeUnit>) -
     }
 }
 
-/// First stamp and median of the increments that are positive; `None` if there is none.
+/// First stamp and median of the positive increments; `None` if no increment is positive.
 fn first_and_step(stamps: impl Iterator<Item = f64> + Clone) -> Option<(f64, f64)> {
     let first = stamps.clone().next()?;
     let increments = stamps.clone().zip(stamps.skip(1)).map(|(a, b)| b - a);

@@ -165,7 +165,7 @@ impl Rows {
         products.sum::<f64>() < 0.0
     }
 
-    /// Value of the last row at or before each time; `None` if there is none in the last second.
+    /// Value of the last row at or before each time; `None` if the last second before has no row.
     fn held<'a>(&'a self, times_s: &'a [f64]) -> impl Iterator<Item = Option<f64>> + 'a {
         let mut next = 0;
         times_s.iter().map(move |&time_s| {
