@@ -42,6 +42,7 @@ mod search;
 #[cfg(test)]
 mod starts;
 mod theta;
+mod unfilter;
 mod validate;
 #[cfg(test)]
 mod vectors;
@@ -52,6 +53,7 @@ pub(crate) use self::check::check;
 use self::choose::NEARLY;
 use self::fitted::Fitted;
 use self::mixture::Component;
+pub(crate) use self::orthogonal::Orthogonal;
 pub use self::plan::expected;
 use self::prepare::{FEWEST, Prepared, prepare};
 use self::record::Blocks;
@@ -78,8 +80,6 @@ const MOST_DEVIATION: f64 = 0.3;
 const LEAST_POWER: f64 = 1e-5;
 /// Half width of the interval of the gain over the estimate above which the record tells nothing.
 const MOST_WIDTH: f64 = 0.5;
-/// Autocorrelation and share of the input above which the innovations are coloured.
-const COLOURED: (f64, f64) = (0.1, 0.02);
 /// Autocorrelation of the innovations above which an error of the prediction is the model's fault.
 const STRONGLY_COLOURED: f64 = 0.3;
 /// Share of the input and its F statistic above which the model is of another kind, if it also predicts little.
@@ -87,6 +87,9 @@ const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
 /// Explained share of the last third below which a fit gets a remark, and below which it is refused.
 const WELL_PREDICTED: f64 = 0.9;
 const LEAST_PREDICTED: f64 = 0.7;
+/// Explained share of the last third from which coloured innovations are no reason to refuse: where noise is that small,
+/// they show errors of the model that do not matter.
+const BEYOND_DOUBT: f64 = 0.98;
 /// Mean square of the prediction's error over what the disturbances explain, above which a weak prediction gets a remark,
 /// and above which the model is at fault.
 const EXPECTED_ERROR_RATIO: f64 = 2.0;
@@ -133,6 +136,9 @@ impl Search<'_> {
         let mut prepared = prepare(signals, self.options)?;
         let outliers = outliers::mark_far(&mut prepared.record);
         self.excitation = Some(describe(&prepared, outliers));
+        if let Some(delay_s) = prepared.filter_s {
+            self.remarks.push(Remark::OutputFilter { delay_s });
+        }
         if prepared.part_used < 0.999 {
             self.remarks.push(Remark::PartUsed(prepared.part_used));
         }
@@ -196,7 +202,13 @@ impl Search<'_> {
                 share: tests.input_share,
             });
         }
-        let is_wrong = explained < LEAST_PREDICTED || tests.autocorrelation > STRONGLY_COLOURED;
+        let is_coloured = tests.autocorrelation > STRONGLY_COLOURED;
+        let is_wrong = explained
+            < if is_coloured {
+                BEYOND_DOUBT
+            } else {
+                LEAST_PREDICTED
+            };
         match prediction {
             Some(prediction) if is_wrong && ratio > MOST_ERROR_RATIO => {
                 Err(Verdict::NoPrediction {
@@ -252,10 +264,10 @@ impl Search<'_> {
         if absent > 0.0 {
             self.remarks.push(Remark::Absent(absent));
         }
-        if is_coloured(tests) {
+        if validate::is_coloured(tests) {
             self.remarks.push(Remark::Coloured(tests.autocorrelation));
         }
-        if tests.input_share > COLOURED.1 && tests.input_f > ANOTHER_KIND.1 {
+        if validate::is_left_to_the_input(tests) {
             self.remarks.push(Remark::InputLeft(tests.input_share));
         }
         let is_weak = |found: &&Prediction| {
@@ -293,9 +305,15 @@ impl Search<'_> {
         components: &[Component],
         (tests, prediction): (InnovationTests, Option<Prediction>),
     ) -> Result<Identified, Verdict> {
-        let is_wider = is_coloured(&tests) || tests.input_share > COLOURED.1;
-        let (posterior, widened) =
-            result::posterior_of(&fitted.best.found, components, prepared.early_s, is_wider);
+        let is_wider = validate::is_coloured(&tests) || validate::is_left_to_the_input(&tests);
+        // An error of the prediction that the noise does not explain is one of the model.
+        let least = prediction.map_or(1.0, |found| found.error_ratio.max(1.0).sqrt());
+        let (posterior, widened) = result::posterior_of(
+            &fitted.best.found,
+            components,
+            prepared.early_s,
+            is_wider.then_some(least),
+        );
         let model = result::model(&fitted.best.found, prepared.early_s);
         let excited = self.excitation.and_then(|found| found.excited_rad_per_s);
         let recorded = fitted.recorded_loop(excited);
@@ -346,12 +364,6 @@ impl Search<'_> {
             },
         })
     }
-}
-
-/// Whether the innovations are coloured: the largest of twenty autocorrelations exceeds what chance explains. Of white
-/// innovations it exceeds 3.5 standard deviations once in a hundred records.
-fn is_coloured(tests: &InnovationTests) -> bool {
-    tests.autocorrelation > COLOURED.0.max(3.5 / (tests.rows as f64).sqrt())
 }
 
 /// What is known of a record before any fit.

@@ -34,6 +34,7 @@ mod road;
 mod settings;
 mod signals;
 mod two_amplitudes;
+mod two_stage;
 mod verdict;
 
 use onecycle_onboard::pack::Pack;
@@ -55,6 +56,7 @@ pub use remark::Remark;
 pub use settings::{MOST_CYCLES, Method, Options, Road};
 pub use signals::Signals;
 pub use two_amplitudes::TwoAmplitudes;
+pub use two_stage::{Caused, caused_by_set_point};
 pub use verdict::Verdict;
 
 /// Identifies the process from a recording, with the built-in pack.

@@ -17,6 +17,16 @@ pub enum Remark {
         /// Whether the pack knows the cycle as one of a steady oscillation.
         is_known: bool,
     },
+    /// A known low-pass was taken out of the output, and its delay is in the dead time.
+    OutputFilter {
+        /// Delay of a slow signal through the filter (s).
+        delay_s: f64,
+    },
+    /// Noise came back through the controller, so the fit used the part of the input that the set-point caused.
+    TwoStage {
+        /// Share of this part in the variance of the input.
+        share: f64,
+    },
     /// Few cycles: the steady run has fewer than 3, or the fit used fewer than 4 although more were requested.
     FewCycles {
         /// Number of cycles used.
@@ -155,6 +165,8 @@ impl Remark {
         match self {
             Self::Disturbed(_) => "disturbed",
             Self::OneCycle { .. } => "one_cycle",
+            Self::OutputFilter { .. } => "output_filter",
+            Self::TwoStage { .. } => "two_stage",
             Self::FewCycles { .. } => "few_cycles",
             Self::Unknown(_) => "unknown",
             Self::Unread => "unread",

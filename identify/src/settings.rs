@@ -33,6 +33,9 @@ pub struct Options {
     /// Time (s) by which the input was logged after it acted, negative if before; the recording is corrected by it. With a
     /// value, zero too, the clocks are not judged by the relay's law.
     pub input_late_s: Option<f64>,
+    /// Cutoff (Hz) of a second-order Butterworth low-pass through which the output was recorded, as that of a gyro. The
+    /// general estimator takes it out of the output and adds its delay to the dead time.
+    pub output_filter_hz: Option<f64>,
 }
 
 impl Default for Options {
@@ -47,6 +50,7 @@ impl Default for Options {
             hold: None,
             beta: None,
             input_late_s: None,
+            output_filter_hz: None,
         }
     }
 }
@@ -119,6 +123,15 @@ impl Options {
     pub fn input_late_s(self, input_late_s: Option<f64>) -> Self {
         Self {
             input_late_s,
+            ..self
+        }
+    }
+
+    /// Takes a low-pass of this cutoff (Hz) out of the output, or none if `None`.
+    #[must_use]
+    pub fn output_filter_hz(self, output_filter_hz: Option<f64>) -> Self {
+        Self {
+            output_filter_hz,
             ..self
         }
     }

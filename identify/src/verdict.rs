@@ -102,6 +102,18 @@ pub enum Verdict {
         /// Share of the innovations' variance.
         share: f64,
     },
+    /// The input follows the output: noise came back through the controller, and the set-point hardly moved the input.
+    NotExcited {
+        /// Share of the output's variance that the set-point explains.
+        share: f64,
+    },
+    /// The output moved too little for any conclusion, as in calm flight.
+    Calm {
+        /// Standard deviation of the output (output unit).
+        deviation: f64,
+        /// The least that is accepted (output unit).
+        least: f64,
+    },
     /// The relay did not switch as one of its `beta` does: input and output are not on one clock, or the relay is another.
     ClockOffset {
         /// Ratio at which the relay switches in the recording.
@@ -134,6 +146,7 @@ impl Verdict {
             | Self::NoFit
             | Self::NoPrediction { .. }
             | Self::InputLeft { .. } => "not_this_process",
+            Self::NotExcited { .. } | Self::Calm { .. } => "not_excited",
             Self::Unknown { .. } => "unknown",
             Self::TooUncertain => "too_uncertain",
             Self::EdgeOfDomain(_) | Self::AtBound(_) => "edge_of_domain",
@@ -171,6 +184,8 @@ impl fmt::Display for Verdict {
             | Self::NoInformation { .. }
             | Self::AtBound(_)
             | Self::NoPrediction { .. }
+            | Self::NotExcited { .. }
+            | Self::Calm { .. }
             | Self::InputLeft { .. } => self.write_record(f),
         }
     }
@@ -267,6 +282,16 @@ impl Verdict {
                 "not this kind of process: a model of the first two thirds predicts {:.0} % of the variance of the \
                  last third, {horizon_s:.3} s ahead",
                 100.0 * explained.max(0.0)
+            ),
+            Self::Calm { deviation, least } => write!(
+                f,
+                "not excited: the standard deviation of the output is {deviation:.3}, and less than {least} tells nothing"
+            ),
+            Self::NotExcited { share } => write!(
+                f,
+                "not excited: the set-point explains {:.0} % of the output, and the input follows the rest through the \
+                 controller",
+                100.0 * share
             ),
             Self::InputLeft { share } => write!(
                 f,

@@ -120,7 +120,10 @@ impl FlightLog {
         };
         let tables = read_tables(bytes, &plan.wanted())?;
         match tables.flights.get(flight - 1) {
-            Some(tables) => Ok(plan.join(flight, tables)),
+            Some(tables) => Ok(Signals {
+                output_filter_hz: firmware::output_filter_hz(kind, &about.tables, control_loop),
+                ..plan.join(flight, tables)
+            }),
             None => Err(no_flight),
         }
     }
@@ -155,7 +158,8 @@ impl Signals {
             let set_point = self.set_point.as_ref().map(|values| values[row]);
             builder.push_with(at, time_s, [self.input[row], self.output[row]], set_point)?;
         }
-        builder.finish()
+        let recording = builder.finish()?;
+        Ok(recording.with_output_filter_hz(self.output_filter_hz))
     }
 }
 

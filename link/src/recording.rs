@@ -206,6 +206,7 @@ pub struct Recording {
     columns: Columns,
     notes: Vec<Note>,
     relay_beta: Option<f64>,
+    output_filter_hz: Option<f64>,
 }
 
 impl Recording {
@@ -332,6 +333,26 @@ impl Recording {
     #[must_use]
     pub fn with_relay_beta(self, relay_beta: Option<f64>) -> Self {
         Self { relay_beta, ..self }
+    }
+
+    /// Cutoff (Hz) of the second-order Butterworth low-pass through which the output was recorded, if the parameters of a
+    /// flight log state one.
+    pub fn output_filter_hz(&self) -> Option<f64> {
+        self.output_filter_hz
+    }
+
+    /// Sets [`Recording::output_filter_hz`].
+    #[must_use]
+    pub fn with_output_filter_hz(self, output_filter_hz: Option<f64>) -> Self {
+        Self {
+            output_filter_hz,
+            ..self
+        }
+    }
+
+    /// Whether it is a control loop of a flight log.
+    pub fn is_of_a_flight_log(&self) -> bool {
+        (self.notes.iter()).any(|note| matches!(note, Note::LogSignals { .. }))
     }
 }
 

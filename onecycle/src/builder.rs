@@ -7,6 +7,8 @@ use onecycle_identify::{
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
 
+use crate::feedback;
+
 /// Identification to run: settings, and the pack whose network reads the last cycle.
 ///
 /// ```
@@ -134,6 +136,15 @@ impl<'a> Identify<'a> {
         }
     }
 
+    /// Cutoff (Hz) of a second-order Butterworth low-pass through which the output was recorded. Without it, the one that the
+    /// recording states ([`Recording::output_filter_hz`]); 0 for none.
+    pub fn output_filter_hz(self, output_filter_hz: impl Into<Option<f64>>) -> Self {
+        Self {
+            options: self.options.output_filter_hz(output_filter_hz.into()),
+            ..self
+        }
+    }
+
     /// Reads the last cycle with this pack instead of the built-in one.
     pub fn pack(self, pack: Pack<'a>) -> Self {
         Self {
@@ -154,15 +165,37 @@ impl<'a> Identify<'a> {
     /// ([`Remark::DefaultRefused`](crate::Remark::DefaultRefused)).
     #[must_use]
     pub fn run(&self, recording: &Recording) -> Identification {
-        let options = (self.options).beta(self.options.beta.or(recording.relay_beta()));
+        let filter_hz = self.options.output_filter_hz;
+        let options = (self.options)
+            .beta(self.options.beta.or(recording.relay_beta()))
+            .output_filter_hz(filter_hz.or(recording.output_filter_hz()))
+            .road(self.road_of(recording));
+        // The calm parts of a flight are not what is tried.
+        let usual_span_s = match recording.is_of_a_flight_log() {
+            true => options.span_s,
+            false => (None, None),
+        };
         let usual = Options::default()
             .specification(options.specification)
             .beta(options.beta)
+            .output_filter_hz(options.output_filter_hz)
+            .road(Self::new().road_of(recording))
+            .span_s(usual_span_s.0, usual_span_s.1)
             .input_late_s(options.input_late_s);
         with_signals(recording, |signals| {
-            let mut found = identify_by(signals, &options, self.pack.as_ref());
+            let calm = feedback::calm(recording, signals);
+            let by = |options: &Options| match recording.set_point() {
+                Some(set_point) if options.road == Road::General => {
+                    feedback::identify(signals, set_point, (options, self.pack.as_ref()))
+                }
+                _ => identify_by(signals, options, self.pack.as_ref()),
+            };
+            let mut found = by(&options);
+            if let Some(verdict) = calm.filter(|_| found.outcome.is_ok()) {
+                found.outcome = Err(verdict);
+            }
             if found.outcome.is_ok() && options != usual {
-                let default = identify_by(signals, &usual, self.pack.as_ref());
+                let default = by(&usual);
                 if let Err(verdict) = default.outcome {
                     let verdict = Box::new(verdict);
                     found.remarks.push(Remark::DefaultRefused(verdict));
@@ -170,6 +203,16 @@ impl<'a> Identify<'a> {
             }
             found
         })
+    }
+}
+
+impl Identify<'_> {
+    /// The estimator. A flight log is no relay test, unless the user says so.
+    fn road_of(&self, recording: &Recording) -> Road {
+        match self.options.road {
+            Road::Automatic if recording.is_of_a_flight_log() => Road::General,
+            road => road,
+        }
     }
 }
 

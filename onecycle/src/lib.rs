@@ -239,6 +239,7 @@
 //! linear processes with application to unmanned aerial vehicles", IEEE Access 8 (2020).
 
 mod builder;
+mod feedback;
 
 pub use builder::{Identify, with_signals};
 

@@ -84,6 +84,10 @@ pub(crate) struct Identify {
     /// come from one clock [default: judged by the switches of the relay]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
     pub(crate) input_late: Option<f64>,
+    /// Cutoff (Hz) of a second-order low-pass (Butterworth) that the output passed before it was recorded: it is taken out
+    /// for the fit, and its delay is part of tau. 0: none [default: of a flight log, the gyro's filter in its parameters]
+    #[arg(long, value_name = "HZ", value_parser = cutoff_hz)]
+    pub(crate) output_filter: Option<f64>,
     /// Method for a steady relay oscillation: the network of the pack alone (classify), least squares alone (refine),
     /// or least squares with the network's prior (map)
     #[arg(long, value_enum, default_value_t = Method::Map)]
@@ -120,6 +124,12 @@ fn structure() -> impl TypedValueParser<Value = Structure> {
 fn time_s(text: &str) -> Result<f64, String> {
     let time_s = text.parse().ok().filter(|time_s: &f64| time_s.is_finite());
     time_s.ok_or_else(|| "a time is a number of seconds".to_owned())
+}
+
+fn cutoff_hz(text: &str) -> Result<f64, String> {
+    let cutoff_hz = text.parse().ok();
+    let cutoff_hz = cutoff_hz.filter(|hz: &f64| hz.is_finite() && *hz >= 0.0);
+    cutoff_hz.ok_or_else(|| "a cutoff is a number of Hz, 0 for none".to_owned())
 }
 
 fn beta(text: &str) -> Result<f64, String> {

@@ -27,7 +27,8 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .cycles(arguments.cycles as usize)
         .specification(asked)
         .method(arguments.method.into())
-        .road(road(arguments))
+        .road(Road::from(arguments.estimator))
+        .output_filter_hz(arguments.output_filter)
         .structure(arguments.structure)
         .span_s(arguments.from, arguments.to)
         .hold(arguments.hold.map(Hold::from))
@@ -65,14 +66,6 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     } else {
         exit::NO_PROCESS
     }))
-}
-
-/// The estimator. A flight log is no relay test, unless the user says so.
-fn road(arguments: &Identify) -> Road {
-    match arguments.estimator {
-        Estimator::Auto if log::is_log(&arguments.file) => Road::General,
-        estimator => estimator.into(),
-    }
 }
 
 /// The requirements on the controller.

@@ -52,6 +52,15 @@ fn of_recording(remark: &Remark) -> Option<String> {
                  {rest}"
             )
         }
+        Remark::OutputFilter { delay_s } => format!(
+            "The output passed a known low-pass filter. The fit took it out; its delay of {} ms is part of tau.",
+            significant(1e3 * delay_s)
+        ),
+        Remark::TwoStage { share } => format!(
+            "Noise came back through the controller. The fit used the part of the input that the set-point caused \
+             ({:.0} % of its variance); the noise below includes the effect of the rest.",
+            100.0 * share
+        ),
         Remark::FewCycles { used } => format!(
             "Only {used} steady cycles could be used; more cycles would narrow the intervals."
         ),

@@ -21,9 +21,14 @@ pub(crate) fn advice(verdict: &Verdict) -> Cow<'static, str> {
         Verdict::TooFewRows { .. } | Verdict::NoPrediction { .. } | Verdict::InputLeft { .. } => {
             of_record(verdict).into()
         }
+        Verdict::NotExcited { .. } | Verdict::Calm { .. } => NOT_EXCITED.into(),
         _ => of_relay(verdict).into(),
     }
 }
+
+/// What to record instead of calm flight.
+const NOT_EXCITED: &str = "Move the set-point: 30 s of quick stick movements on this axis, or a chirp of the rate set-point from 1 Hz to the \
+     frequency at which the loop does not follow any more.";
 
 /// Lowest frequency of a chirp, as a fraction of its highest, and its length in periods of the lowest: a chirp of 20 s
 /// from 1 to 20 Hz.

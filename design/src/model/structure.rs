@@ -18,6 +18,9 @@ pub enum Structure {
     Foptd,
     /// Second order plus dead time, two real lags: the rate of a damped vehicle.
     Soptd,
+    /// Third order plus dead time, three real lags: the rate of a damped vehicle with a second lag, as that of a gyro's
+    /// filter.
+    Toptd,
     /// Second order with a resonance, or two slow lags, and dead time.
     Resonant,
     /// [`Structure::Resonant`] with an actuator lag.
@@ -54,7 +57,7 @@ impl Stages {
 
 impl Structure {
     /// Every structure.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Iptd,
         Self::IntegratorLag,
         Self::DoubleIntegratorLag,
@@ -62,6 +65,7 @@ impl Structure {
         Self::Toiptd,
         Self::Foptd,
         Self::Soptd,
+        Self::Toptd,
         Self::Resonant,
         Self::ResonantLag,
     ];
@@ -77,6 +81,7 @@ impl Structure {
             Self::Toiptd => "toiptd",
             Self::Foptd => "foptd",
             Self::Soptd => "soptd",
+            Self::Toptd => "toptd",
             Self::Resonant => "resonant",
             Self::ResonantLag => "resonant_lag",
         }
@@ -101,6 +106,7 @@ impl Structure {
             Self::Toiptd => (2, 1, 0, 1),
             Self::Foptd => (0, 1, 0, 0),
             Self::Soptd => (1, 1, 0, 0),
+            Self::Toptd => (2, 1, 0, 0),
             Self::Resonant => (0, 0, 1, 0),
             Self::ResonantLag => (1, 0, 1, 0),
         };
@@ -123,6 +129,7 @@ impl Structure {
             Self::Toiptd => "K e^(-tau s) / (s (T_prop s + 1)(T_prop2 s + 1)(T_body s + 1))",
             Self::Foptd => "K e^(-tau s) / (T_body s + 1)",
             Self::Soptd => "K e^(-tau s) / ((T_prop s + 1)(T_body s + 1))",
+            Self::Toptd => "K e^(-tau s) / ((T_prop s + 1)(T_prop2 s + 1)(T_body s + 1))",
             Self::Resonant => "K e^(-tau s) / (s^2/w0^2 + 2 zeta s/w0 + 1)",
             Self::ResonantLag => "K e^(-tau s) / ((T_prop s + 1)(s^2/w0^2 + 2 zeta s/w0 + 1))",
         }
@@ -137,7 +144,7 @@ impl Structure {
             Self::IntegratorLag => &[K, TProp, Tau],
             Self::DoubleIntegratorLag => &[KOverTBody, TProp, Tau],
             Self::Soiptd | Self::Soptd => &[K, KOverTBody, TProp, TBody, Tau],
-            Self::Toiptd => &[K, KOverTBody, TProp, TProp2, TBody, Tau],
+            Self::Toiptd | Self::Toptd => &[K, KOverTBody, TProp, TProp2, TBody, Tau],
             Self::Foptd => &[K, KOverTBody, TBody, Tau],
             Self::Resonant => &[K, NaturalFrequency, Zeta, Tau],
             Self::ResonantLag => &[K, NaturalFrequency, Zeta, TProp, Tau],

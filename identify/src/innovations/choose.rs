@@ -22,11 +22,12 @@ const HOPELESS: f64 = 80.0;
 /// Log-likelihood by which a structure may fall behind its limit.
 const STUCK: f64 = 0.05;
 /// A structure as the limit of another that has one unknown more, inner ones first.
-const LIMITS: [(Structure, Structure); 6] = [
+const LIMITS: [(Structure, Structure); 7] = [
     (Structure::Iptd, Structure::Foptd),
     (Structure::Iptd, Structure::IntegratorLag),
     (Structure::IntegratorLag, Structure::Soptd),
     (Structure::DoubleIntegratorLag, Structure::Soiptd),
+    (Structure::Soptd, Structure::Toptd),
     (Structure::Soiptd, Structure::Toiptd),
     (Structure::Soiptd, Structure::ResonantLag),
 ];
@@ -82,12 +83,14 @@ pub(super) struct Limits {
     pub(super) longest_tau_s: f64,
     /// The only structure to fit.
     pub(super) structure: Option<Structure>,
+    /// Fewest samples a row.
+    pub(super) fewest_samples: usize,
 }
 
 /// Fits the structures to a record.
 pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
     let rows = record.len() - record.index_at(limits.skip_s);
-    let samples = (rows / ROWS).max(1);
+    let samples = (rows / ROWS).max(limits.fewest_samples);
     let blocks = Blocks::new(record, samples, limits.skip_s);
     let tau_s = limits.longest_tau_s;
     let heads = heads(limits.structure);
@@ -119,7 +122,7 @@ fn heads(structure: Option<Structure>) -> Vec<Structure> {
     };
     match structure {
         Structure::Resonant | Structure::ResonantLag => vec![Structure::ResonantLag],
-        Structure::Foptd | Structure::Soptd => vec![Structure::Soptd],
+        Structure::Foptd | Structure::Soptd | Structure::Toptd => vec![Structure::Soptd],
         Structure::IntegratorLag | Structure::Iptd => vec![Structure::Soptd, Structure::Soiptd],
         _ => vec![Structure::Soiptd],
     }
@@ -164,13 +167,13 @@ fn derive(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
 fn contains(outer: Structure, inner: Structure) -> bool {
     use Structure::{
         DoubleIntegratorLag, Foptd, IntegratorLag, Iptd, Resonant, ResonantLag, Soiptd, Soptd,
-        Toiptd,
+        Toiptd, Toptd,
     };
     matches!(
         (outer, inner),
         (Soiptd, Iptd | IntegratorLag | DoubleIntegratorLag | Toiptd)
-            | (Soptd, Iptd | Foptd | IntegratorLag)
-            | (ResonantLag, Resonant | Soptd | Soiptd)
+            | (Soptd, Iptd | Foptd | IntegratorLag | Toptd)
+            | (ResonantLag, Resonant | Soptd | Soiptd | Toptd)
     )
 }
 

@@ -10,7 +10,7 @@ use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, NoiseKind, Theta};
-use super::{LONGEST_TAU, ROWS, forces, outliers};
+use super::{LONGEST_TAU, ROWS, forces, outliers, validate};
 use crate::assumed::RecordedLoop;
 use crate::remark::Remark;
 use crate::settings::Options;
@@ -29,6 +29,12 @@ const CHOOSING: usize = 20_000;
 const CURVED: usize = CHOOSING / 100;
 /// Rounds of outliers.
 const ROUNDS: usize = 3;
+/// Rows that are tried where the innovations of shorter rows are coloured, in lengths of these.
+const LONGER: [usize; 8] = [2, 3, 4, 6, 8, 12, 16, 24];
+/// Longest of them, as a share of the shortest period of the input.
+const LONGEST_ROW: f64 = 1.0 / 6.0;
+/// Fewest of them.
+const FEWEST_LONG_ROWS: usize = 300;
 /// Difference of the log-likelihood above which the input is taken as straight lines between the samples.
 const STRAIGHT: f64 = 3.0;
 
@@ -63,18 +69,27 @@ impl Fitted {
             skip_s: 0.0,
             longest_tau_s: longest,
             structure: options.structure,
+            fewest_samples: 1,
         };
-        let mut choices = Vec::new();
-        for part in excited_parts(&record) {
-            if let Some(choice) = choose_on(&mut record, part.clone(), options, remarks) {
-                choices.push((part, choice));
-            }
-        }
-        let (part, choice) = most_likely(choices, &record, longest).ok_or(Verdict::NoFit)?;
-        let theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
-        let (samples, skip_s) = rows_for(&record, &theta);
+        let choice = choose_on_parts(&mut record, &limits, options, remarks);
+        let (mut part, mut choice) = choice.ok_or(Verdict::NoFit)?;
+        let mut theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
+        let (mut samples, skip_s) = rows_for(&record, &theta);
         limits.skip_s = skip_s;
-        let (best, found) = refine(&mut record, &theta, &limits, samples).ok_or(Verdict::NoFit)?;
+        let fit = refine(&mut record, &theta, &limits, samples);
+        let (mut best, mut found) = fit.ok_or(Verdict::NoFit)?;
+        if let Some(longer) = whiter(&record, &best, &limits, samples) {
+            limits.fewest_samples = longer;
+            if longer > choice.samples {
+                let again = choose_on_parts(&mut record, &limits, options, remarks);
+                (part, choice) = again.ok_or(Verdict::NoFit)?;
+                theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
+            }
+            let fit = refine(&mut record, &theta, &limits, longer).ok_or(Verdict::NoFit)?;
+            samples = longer;
+            best = fit.0;
+            found += fit.1;
+        }
         let blocks = Blocks::new(&record, samples, limits.skip_s);
         let damped = choice
             .damped(best.structure())
@@ -154,10 +169,32 @@ impl Fitted {
     }
 }
 
+/// Step 2: the choice on the part of a record that tells most, and this part.
+fn choose_on_parts(
+    record: &mut Record,
+    limits: &Limits,
+    options: &Options,
+    remarks: &mut Vec<Remark>,
+) -> Option<(Range<usize>, Choice)> {
+    let mut choices = Vec::new();
+    for part in excited_parts(record) {
+        let choice = choose_on(
+            record,
+            part.clone(),
+            limits.fewest_samples,
+            options,
+            remarks,
+        );
+        choices.extend(choice.map(|choice| (part, choice)));
+    }
+    most_likely(choices, record, limits.longest_tau_s)
+}
+
 /// Step 2 on a part of a record, whose input is taken as straight lines from then on if that explains the part better.
 fn choose_on(
     record: &mut Record,
     part: Range<usize>,
+    fewest_samples: usize,
     options: &Options,
     remarks: &mut Vec<Remark>,
 ) -> Option<Choice> {
@@ -167,6 +204,7 @@ fn choose_on(
         skip_s: SKIPPED * length_s,
         longest_tau_s: LONGEST_TAU * length_s,
         structure: options.structure,
+        fewest_samples,
     };
     let mut choice = choose(&part, &limits);
     if record.hold == Hold::Held
@@ -245,6 +283,35 @@ fn rows_for(record: &Record, theta: &Theta) -> (usize, f64) {
     let fast_s = theta.shortest_lag_s().min(noise_s).min(length_s) + tau_s;
     let samples = (rows / ROWS).min((fast_s / record.dt_s) as usize);
     (samples.max(rows.div_ceil(MOST_ROWS)).max(1), skip_s)
+}
+
+/// Samples a row that make the innovations white, where rows of `samples` samples leave them coloured: noise that passed a
+/// filter, as that of a gyro, is coloured over a few samples and white over longer times. `None` if the innovations are
+/// white already, or if no rows that are short beside the lags make them white.
+fn whiter(record: &Record, best: &Candidate, limits: &Limits, samples: usize) -> Option<usize> {
+    let tests = |samples: usize, theta: &Theta| {
+        let blocks = Blocks::new(record, samples, limits.skip_s);
+        let found = search::warm(&blocks, theta, limits.longest_tau_s, search::FINE)?;
+        Some(validate::tests(&blocks, &found.at))
+    };
+    let theta = &best.found.theta;
+    let blocks = Blocks::new(record, samples, limits.skip_s);
+    if !validate::is_coloured(&validate::tests(&blocks, &best.found.at)) {
+        return None;
+    }
+    let longest_s = LONGEST_ROW * validate::shortest_period_s(&blocks)?;
+    let is_short = |count: &usize| {
+        *count as f64 * record.dt_s < longest_s && record.len() / count >= FEWEST_LONG_ROWS
+    };
+    LONGER
+        .into_iter()
+        .map(|factor| factor * samples)
+        .take_while(is_short)
+        .find(|count| {
+            tests(*count, theta).is_some_and(|tests| {
+                !validate::is_coloured(&tests) && !validate::is_left_to_the_input(&tests)
+            })
+        })
 }
 
 /// Fits to rows of `samples` samples, marks outliers and fits again. Returns the number of outliers too.

@@ -7,7 +7,7 @@
 const LEAST: f64 = 1e-13;
 
 /// Orthonormal columns `Q` and triangular `R` of a matrix, `X = Q R diag(scale)`.
-pub(super) struct Orthogonal {
+pub(crate) struct Orthogonal {
     q: Vec<Vec<f64>>,
     /// `r[j][i]`, `i <= j`: component of column `j` along `q[i]`.
     r: Vec<Vec<f64>>,
@@ -16,7 +16,7 @@ pub(super) struct Orthogonal {
 
 impl Orthogonal {
     /// Decomposes columns of equal length. `None` if one is zero, not finite, or a combination of those before it.
-    pub(super) fn new(columns: &[Vec<f64>]) -> Option<Self> {
+    pub(crate) fn new(columns: &[Vec<f64>]) -> Option<Self> {
         let mut found = Self {
             q: Vec::with_capacity(columns.len()),
             r: Vec::with_capacity(columns.len()),
@@ -56,7 +56,7 @@ impl Orthogonal {
     }
 
     /// Residual and coefficients of the least-squares fit to `y`.
-    pub(super) fn solve(&self, y: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    pub(crate) fn solve(&self, y: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let mut residual = y.to_vec();
         let mut x = self.project(&mut residual);
         for j in (0..x.len()).rev() {

@@ -69,7 +69,7 @@ pub fn expected(
         laplace,
     };
     let best = component.found.clone();
-    let (posterior, _) = result::posterior_of(&best, &[component], 0.0, false);
+    let (posterior, _) = result::posterior_of(&best, &[component], 0.0, None);
     Some(posterior.estimate())
 }
 

@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::record::{Forces, Hold, Record};
+use super::unfilter::{self, unfilter};
 use crate::settings::Options;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
@@ -11,7 +12,7 @@ use crate::verdict::Verdict;
 pub(super) const FEWEST: usize = 60;
 /// Increments that differ by less than this share of the sample period are even.
 const EVEN: f64 = 1e-4;
-/// Mean and largest distance of time stamps from their grid, in steps, for samples on a grid with some absent.
+/// Mean and largest difference of increments of time from whole steps, in steps, for samples on a grid with some absent.
 const OFF_GRID: (f64, f64) = (0.05, 0.45);
 /// Most steps of a grid for each sample.
 const SPARSE: usize = 6;
@@ -31,6 +32,8 @@ pub(super) struct Prepared {
     pub(super) part_used: f64,
     /// Delay from the stamp of a point to the mean time of its samples (s): the dead time appears shorter by it.
     pub(super) early_s: f64,
+    /// Delay (s) of a low-pass that was taken out of the output. `None`: none was.
+    pub(super) filter_s: Option<f64>,
 }
 
 /// Record of the longest part of the recording without a gap, within the span of `options`.
@@ -58,7 +61,12 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
     check(input, output)?;
     let part_used = range.len() as f64 / asked.len() as f64;
     let times_s = &signals.time_s[range];
-    let mut record = gridded(times_s, input, output);
+    let unfiltered = (options.output_filter_hz)
+        .and_then(|hz| unfilter(times_s, output, hz, signals.sample_period_s));
+    let mut record = match &unfiltered {
+        Some(found) => gridded(times_s, input, &found.output, &found.usable),
+        None => gridded(times_s, input, output, &vec![true; output.len()]),
+    };
     mark_stale(&mut record);
     record.hold = options.hold.unwrap_or(Hold::Held);
     let points = f64::from(signals.samples_per_point.saturating_sub(1));
@@ -66,7 +74,11 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
         record,
         start_s: times_s[0],
         part_used,
-        early_s: 0.5 * points * signals.sample_period_s,
+        early_s: 0.5 * points * signals.sample_period_s
+            + unfiltered.as_ref().map_or(0.0, |found| found.late_s),
+        filter_s: unfiltered
+            .and(options.output_filter_hz)
+            .map(unfilter::delay_s),
     })
 }
 
@@ -102,7 +114,7 @@ fn check(input: &[f64], output: &[f64]) -> Result<(), Verdict> {
 }
 
 /// Samples on an even grid, with absent samples if time stamps are missing from it; or with their uneven time stamps.
-fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
+fn gridded(times_s: &[f64], input: &[f64], output: &[f64], usable: &[bool]) -> Record {
     let mut steps: Vec<f64> = times_s.windows(2).map(|t| t[1] - t[0]).collect();
     let mean = (times_s[times_s.len() - 1] - times_s[0]) / steps.len() as f64;
     let is_even = steps
@@ -114,7 +126,7 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
         dt_s: mean,
         input: input.to_vec(),
         output: output.to_vec(),
-        present: vec![true; output.len()],
+        present: usable.to_vec(),
         hold: Hold::Held,
         forces: Forces::default(),
     };
@@ -129,7 +141,7 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64]) -> Record {
         } else {
             Between::Never
         };
-        Some(spread(&indices, step_s, (input, output), between))
+        Some(spread(&indices, step_s, (input, output, usable), between))
     });
     if let Some(record) = on_grid {
         return record;
@@ -164,9 +176,14 @@ fn indices(times_s: &[f64], step_s: f64) -> Option<(Vec<usize>, f64)> {
     };
     let (products, squares) = stamps().fold((0.0, 0.0), |(p, s), (k, t)| (p + k * t, s + k * k));
     let step_s = products / squares;
-    let off = |(k, t): (f64, f64)| (t / step_s - k).abs();
-    let mean = stamps().map(off).sum::<f64>() / indices.len() as f64;
-    let most = stamps().map(off).fold(0.0, f64::max);
+    // From stamp to stamp: a clock that wanders, or a tick that slips by a part of a step, moves input and output alike.
+    let off = || {
+        let steps = indices.windows(2).map(|pair| (pair[1] - pair[0]) as f64);
+        (times_s.windows(2).zip(steps))
+            .map(|(pair, steps)| ((pair[1] - pair[0]) / step_s - steps).abs())
+    };
+    let mean = off().sum::<f64>() / indices.len() as f64;
+    let most = off().fold(0.0, f64::max);
     let rises = indices.windows(2).all(|pair| pair[1] > pair[0]);
     let is_dense = indices
         .last()
@@ -188,7 +205,7 @@ enum Between {
 fn spread(
     indices: &[usize],
     step_s: f64,
-    (input, output): (&[f64], &[f64]),
+    (input, output, usable): (&[f64], &[f64], &[bool]),
     between: Between,
 ) -> Record {
     let count = indices[indices.len() - 1] + 1;
@@ -214,7 +231,9 @@ fn spread(
         };
         record.input.push(value);
         record.output.push(output[sample]);
-        record.present.push(indices[sample] == index);
+        record
+            .present
+            .push(indices[sample] == index && usable[sample]);
     }
     record
 }

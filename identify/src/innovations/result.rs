@@ -68,18 +68,19 @@ fn clamped(process: &Linear) -> Linear {
         .with_pair(c1.max(0.0), c0.max(0.0))
 }
 
-/// Posterior over all components, and the factor by which its deviations were widened.
+/// Posterior over all components, and the factor by which its deviations were widened: that of coloured innovations, at
+/// least `least_widening`. `None`: the innovations are white.
 pub(super) fn posterior_of(
     best: &Found,
     components: &[Component],
     early_s: f64,
-    is_coloured: bool,
+    least_widening: Option<f64>,
 ) -> (Posterior, f64) {
     let factors: Vec<Vec<f64>> = (components.iter())
         .map(|component| {
             let coloured = component.laplace.coloured.iter();
             coloured
-                .map(|v| if is_coloured { v.max(1.0) } else { 1.0 })
+                .map(|v| least_widening.map_or(1.0, |least| v.max(least)))
                 .collect()
         })
         .collect();

@@ -357,7 +357,12 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
             }
         }
         Structure::DoubleIntegratorLag => with(&[lag], 0.0, 0.0),
-        Structure::Toiptd => with(&[lag, 0.3 * lag], body_s, -0.3 * lag),
+        Structure::Toptd if old.pair().is_some() => {
+            if let Some((slow_s, fast_s)) = from.real_lags_s() {
+                with(&[lag, fast_s], slow_s, 0.0);
+            }
+        }
+        Structure::Toiptd | Structure::Toptd => with(&[lag, 0.3 * lag], body_s, -0.3 * lag),
         Structure::Resonant => {
             if let (Some(pair), Some(own)) = (layout.pair(), old.pair()) {
                 with(&[], 0.0, lag);

@@ -148,6 +148,15 @@ impl Theta {
         process
     }
 
+    /// Time constants (s) of the second-order stage if it is two real lags, the longer first.
+    pub(super) fn real_lags_s(&self) -> Option<(f64, f64)> {
+        let pair = self.layout().pair()?;
+        let (c1, c0) = (self.values[pair], self.values[pair + 1]);
+        let root = (0.25 * c1 * c1 - c0).sqrt();
+        let slow = c0 / (0.5 * c1 + root);
+        (slow > 0.0).then(|| (1.0 / slow, 1.0 / (0.5 * c1 + root)))
+    }
+
     /// Shortest time constant of the process (s): the least of its lags and of the inverses of its poles. Infinite without
     /// any.
     pub(super) fn shortest_lag_s(&self) -> f64 {

@@ -14,8 +14,23 @@ use crate::outcome::{InnovationTests, Prediction};
 
 /// Lags of the tests.
 const LAGS: usize = 20;
+/// Autocorrelation below which innovations count as white.
+const COLOURED: f64 = 0.1;
+/// Share of the innovations and its F statistic up to which the input explains nothing.
+const LEFT: (f64, f64) = (0.02, 3.0);
 /// Most rows between which a correlation is computed exactly; frequencies of the information's spectrum.
 const FREQUENCIES: usize = 120;
+
+/// Whether the innovations are coloured: the largest of twenty autocorrelations exceeds what chance explains. Of white
+/// innovations it exceeds 3.5 standard deviations once in a hundred records.
+pub(super) fn is_coloured(tests: &InnovationTests) -> bool {
+    tests.autocorrelation > COLOURED.max(3.5 / (tests.rows as f64).sqrt())
+}
+
+/// Whether the input explains a part of the innovations that chance does not.
+pub(super) fn is_left_to_the_input(tests: &InnovationTests) -> bool {
+    tests.input_share > LEFT.0 && tests.input_f > LEFT.1
+}
 
 /// Tests of the innovations against whiteness and against the input.
 pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
@@ -249,6 +264,12 @@ pub(super) fn period_s(blocks: &Blocks<'_>) -> Option<f64> {
     let inputs = blocks.mean_inputs();
     let [_, median, _] = quantiles(&inputs, blocks.block_s())?;
     Some(TAU / median)
+}
+
+/// Period of the frequency (s) above which the input has 5 % of its power.
+pub(super) fn shortest_period_s(blocks: &Blocks<'_>) -> Option<f64> {
+    let [_, _, high] = quantiles(&blocks.mean_inputs(), blocks.block_s())?;
+    Some(TAU / high)
 }
 
 /// Frequencies (rad/s) below which 5, 50 and 95 % of the power of `rows` lie. `None` without power.

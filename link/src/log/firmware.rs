@@ -103,6 +103,21 @@ pub(super) fn settings(kind: FirmwareKind, flight: &FlightTables) -> [Vec<Settin
     })
 }
 
+/// Cutoff (Hz) of the second-order low-pass through which the output of a loop was logged. `None`: there is none, or it is
+/// not of this kind.
+pub(super) fn output_filter_hz(
+    kind: FirmwareKind,
+    flight: &FlightTables,
+    of: ControlLoop,
+) -> Option<f64> {
+    let name = match (kind, of) {
+        (FirmwareKind::Px4, ControlLoop::Rate(_)) => px4::GYRO_FILTER,
+        (FirmwareKind::ArduPilot, ControlLoop::Rate(_)) => ardupilot::GYRO_FILTER,
+        _ => return None,
+    };
+    flight.parameter(name).filter(|cutoff_hz| *cutoff_hz > 0.0)
+}
+
 /// Deliberate excitation.
 pub(super) fn marks(kind: FirmwareKind, flight: &FlightTables) -> Vec<Mark> {
     match kind {

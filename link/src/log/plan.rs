@@ -232,6 +232,8 @@ pub struct Signals {
     pub units: [&'static str; 2],
     /// Rows of the output that were dropped because another signal had no value there, or because time went back.
     pub rows_dropped: u64,
+    /// Cutoff (Hz) of the second-order low-pass (Butterworth) through which the output was logged; `None`: not known.
+    pub output_filter_hz: Option<f64>,
 }
 
 impl Plan {
@@ -297,6 +299,7 @@ impl Plan {
             names: [self.input.name(), self.output.name()],
             units: [self.input_unit, self.output_unit()],
             rows_dropped: output.dropped,
+            output_filter_hz: None,
         };
         for (row, &time_s) in times_s.iter().enumerate() {
             let set_point = set_points.as_ref().map_or(Some(0.0), |values| values[row]);

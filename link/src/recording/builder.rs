@@ -213,6 +213,7 @@ impl RecordingBuilder {
             columns: self.columns,
             notes: self.notes,
             relay_beta: None,
+            output_filter_hz: None,
         };
         recording.clean(&self.places);
         Ok(recording)

@@ -33,6 +33,9 @@ pub(super) const FILTERS: &[&str] = &[
     "ATC_RAT_YAW_FLT",
 ];
 
+/// Cutoff (Hz) of the low-pass of the gyro, `LowPassFilter2p`.
+pub(super) const GYRO_FILTER: &str = "INS_GYRO_FILTER";
+
 pub(super) const MIXER: &[&str] = &[
     "FRAME_CLASS",
     "FRAME_TYPE",

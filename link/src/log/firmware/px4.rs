@@ -22,6 +22,9 @@ pub(super) const FILTERS: &[&str] = &[
     "IMU_GYRO_DNF",
 ];
 
+/// Cutoff (Hz) of the low-pass of the gyro, `LowPassFilter2p`.
+pub(super) const GYRO_FILTER: &str = "IMU_GYRO_CUTOFF";
+
 pub(super) const MIXER: &[&str] = &["CA_AIRFRAME", "CA_ROTOR", "MAV_TYPE", "THR_MDL_FAC"];
 
 /// `vehicle_status.arming_state` of an armed vehicle.

@@ -1,0 +1,110 @@
+//! Recordings of a closed loop with their set-point: from the input as it is, or from the part of it that the set-point
+//! caused.
+
+use onecycle_identify::{
+    Caused, Evidence, Identification, Innovations, Options, Remark, Signals, Verdict,
+    caused_by_set_point, identify_by,
+};
+use onecycle_link::Recording;
+use onecycle_onboard::pack::Pack;
+
+/// Standard deviation of the output below which a flight is calm: rate (3 deg/s), angle (1 deg), climb rate.
+const CALM: [(&str, f64); 3] = [("rad/s", 0.05), ("rad", 0.0175), ("m/s", 0.05)];
+/// Share of the output's variance that the set-point has to cause for a fit to the part of the input that it caused. In calm
+/// flight it is a few hundredths.
+const LEAST_SHARE: f64 = 0.3;
+/// Largest autocorrelation of the innovations, and share of them that the past input explains, up to which the fit to the
+/// input as it is stands.
+const CLEAN: (f64, f64) = (0.1, 0.02);
+/// Steady output for a unit set-point from which the output follows the set-point.
+const LEAST_GAIN: f64 = 0.5;
+/// Explained share of the prediction below which the fit to that part is refused.
+const LEAST_PREDICTED: f64 = 0.7;
+/// Explained share of the prediction from which a fit to the input as it is stands in any case.
+const BEYOND_DOUBT: f64 = 0.98;
+
+/// Verdict on a flight that was too calm for any conclusion: so small movements pass friction, dead zones and the steps of
+/// the actuator, which larger ones do not notice. A flight log states its units; other recordings are not judged.
+pub(crate) fn calm(recording: &Recording, signals: &Signals<'_>) -> Option<Verdict> {
+    if !recording.is_of_a_flight_log() {
+        return None;
+    }
+    let unit = recording.columns().output.unit.as_deref();
+    let least = CALM.iter().find(|(own, _)| Some(*own) == unit)?.1;
+    let count = signals.output.len() as f64;
+    let mean = signals.output.iter().sum::<f64>() / count;
+    let square: f64 = signals.output.iter().map(|y| (y - mean).powi(2)).sum();
+    let deviation = (square / count).sqrt();
+    (deviation < least).then_some(Verdict::Calm { deviation, least })
+}
+
+/// Identifies the process from a closed loop with its set-point.
+///
+/// Where the set-point explains little of the output, noise went round the loop, and the recording tells of the controller
+/// rather than of the process: it is refused, unless a fit predicts nearly everything, as with a test signal that is added
+/// to the input. Else the fit to the input as it is stands if its innovations are white and owe nothing to the past input.
+/// Otherwise noise came back through the controller, and the part of the input that the set-point caused takes its place.
+pub(crate) fn identify(
+    signals: &Signals<'_>,
+    set_point: &[f64],
+    (options, pack): (&Options, Option<&Pack<'_>>),
+) -> Identification {
+    let mut direct = identify_by(signals, options, pack);
+    let caused = caused_by_set_point(signals, set_point);
+    let follows = |caused: &Caused| caused.output_gain >= LEAST_GAIN;
+    let share = (caused.as_ref().filter(|caused| follows(caused)))
+        .map_or(0.0, |caused| caused.output_share);
+    let Some(caused) = caused.filter(|_| share >= LEAST_SHARE) else {
+        if direct.outcome.is_ok() && explained(&direct) < BEYOND_DOUBT {
+            direct.outcome = Err(Verdict::NotExcited { share });
+        }
+        return direct;
+    };
+    if is_clean(&direct) {
+        return direct;
+    }
+    let projected = Signals {
+        input: &caused.input,
+        ..*signals
+    };
+    let mut found = identify_by(&projected, options, pack);
+    if found.outcome.is_err() && explained(&direct) > BEYOND_DOUBT {
+        return direct;
+    }
+    // Noise that came back is part of what disturbs the process now: a fit that predicts little of the rest found nothing.
+    let weak = evidence(&found)
+        .and_then(|evidence| evidence.prediction.as_ref())
+        .filter(|prediction| prediction.explained < LEAST_PREDICTED)
+        .map(|prediction| Verdict::NoPrediction {
+            explained: prediction.explained,
+            horizon_s: prediction.horizon_s,
+        });
+    if let Some(verdict) = weak {
+        found.outcome = Err(verdict);
+    }
+    let share = caused.share;
+    found.remarks.insert(0, Remark::TwoStage { share });
+    found
+}
+
+fn evidence(found: &Identification) -> Option<&Innovations> {
+    match &found.outcome.as_ref().ok()?.fit.evidence {
+        Evidence::Innovations(innovations) => Some(innovations),
+        _ => None,
+    }
+}
+
+fn is_clean(found: &Identification) -> bool {
+    evidence(found).is_some_and(|evidence| {
+        let tests = &evidence.whiteness;
+        let chance = 3.5 / (tests.rows as f64).sqrt();
+        tests.autocorrelation < CLEAN.0.max(chance)
+            && (tests.input_share < CLEAN.1 || tests.input_f < 3.0)
+    })
+}
+
+/// Share of the variance of the last third that a fit to the first two predicts.
+fn explained(found: &Identification) -> f64 {
+    let prediction = evidence(found).and_then(|evidence| evidence.prediction.as_ref());
+    prediction.map_or(0.0, |prediction| prediction.explained)
+}
