@@ -114,7 +114,7 @@ fn a_refusal_as_a_page() {
 fn a_refused_fit_is_on_the_page() {
     let (ran, page) = reported(&["identify", HOVER, "--beta", "-0.3"]);
     assert_eq!(ran.code, Some(NOT_IDENTIFIED));
-    assert!(page.contains("not on one clock"));
+    assert!(page.contains("Not on one clock"));
     assert!(page.contains("Fit that was refused"));
     assert_eq!(figures(&page).len(), 3);
 }
