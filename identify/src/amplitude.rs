@@ -66,29 +66,6 @@ pub(crate) fn parts(input: &[f64]) -> Option<Parts> {
     best.map(|(_, parts)| parts)
 }
 
-/// Whether the input moves by about the same amplitude wherever it moves: a relay, a chirp, pulses or sines of a test.
-pub(crate) fn is_one(input: &[f64]) -> bool {
-    const PARTS: usize = 8;
-    /// Share of the largest movement below which a part is at rest, and above which it is as large.
-    const REST: f64 = 0.1;
-    const AS_LARGE: f64 = 0.7;
-    let part = input.len().div_ceil(PARTS).max(1);
-    let ranges: Vec<f64> = (input.chunks(part))
-        .map(|part| {
-            let (low, high) = range(part);
-            high - low
-        })
-        .collect();
-    let largest = ranges.iter().copied().fold(0.0, f64::max);
-    let moving = ranges.iter().filter(|range| **range > REST * largest);
-    moving
-        .clone()
-        .filter(|range| **range < AS_LARGE * largest)
-        .count()
-        * 4
-        <= moving.count()
-}
-
 /// Median of the jumps, and how many are near it.
 fn median(sizes: &[f64]) -> (f64, f64) {
     let mut sorted = sizes.to_vec();
@@ -183,19 +160,5 @@ mod tests {
             .collect();
         assert_eq!(parts(&input), None);
         assert_eq!(parts(&[0.0; 100]), None);
-    }
-
-    // A relay, a sine of rising frequency after a rest, and one that grows.
-    #[test]
-    fn one_amplitude_is_seen() {
-        let relay: Vec<f64> = relay(1.0, 0.3, 20).collect();
-        assert!(is_one(&relay));
-        let sine = |k: i32| (1e-4 * f64::from(k * k)).sin();
-        let chirp: Vec<f64> = (-300..2000)
-            .map(|k| if k < 0 { 0.0 } else { sine(k) })
-            .collect();
-        assert!(is_one(&chirp));
-        let growing: Vec<f64> = (0..2000).map(|k| f64::from(k) * sine(k)).collect();
-        assert!(!is_one(&growing));
     }
 }

@@ -1,21 +1,24 @@
 //! Checks of a result against what its fit cannot see.
 //!
 //! ```text
+//! sampling       samples that were not taken at their stamps scatter more where the output is steep             sampling
 //! clocks         an input that was logged late looks like less dead time: the relay's own law tells     clock
 //! frequencies    a resonance above the frequencies that the recording excites does not show             extrapolation
-//! amplitudes     two levels of the input do not show how an actuator's gain depends on its size         amplitude
+//! amplitudes     a fit does not show how an actuator's gain depends on its size, unless two are compared  amplitude
 //! limits         what the controller asks for: gain margin, noise at the actuator, input of a step      limits
 //! ```
+
+use std::f64::consts::TAU;
 
 use onecycle_design::{Controller, Model, loop_response, margins, noise_amplification};
 use onecycle_onboard::pack::Pack;
 
-use crate::amplitude;
 use crate::assumed::MOST_EXTRAPOLATION;
 use crate::excitation::{Excitation, Switching};
 use crate::outcome::{Identification, Identified};
 use crate::relay::law::Law;
 use crate::remark::Remark;
+use crate::sampling;
 use crate::settings::Options;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
@@ -80,7 +83,7 @@ pub(crate) fn check(
         match clock.judge(options, pack, identified) {
             Ok(remark) => found.remarks.extend(remark),
             Err(verdict) => {
-                found.outcome = Err(verdict);
+                found.refuse(verdict);
                 return;
             }
         }
@@ -103,9 +106,11 @@ pub(crate) fn check(
             .remarks
             .extend(extrapolation(excited, leads, identified));
     }
-    if amplitude::is_one(signals.input) {
-        found.remarks.push(Remark::OneAmplitude);
-    }
+    // Two amplitudes are compared where there are two: see `road`.
+    found.remarks.push(Remark::OneAmplitude);
+    let period_s = excitation.highest_rad_per_s().map(|omega| TAU / omega);
+    let jitter = period_s.and_then(|period_s| sampling::jitter(signals, period_s));
+    found.remarks.extend(jitter.map(Remark::Jitter));
     limits(excitation, identified, &mut found.remarks);
 }
 

@@ -61,7 +61,9 @@ pub use self::record::Hold;
 use self::search::Candidate;
 use self::theta::{Bounds, Theta};
 use crate::excitation::{Excitation, Recorded};
-use crate::outcome::{Evidence, Fit, Identification, Identified, InnovationTests, Prediction};
+use crate::outcome::{
+    Evidence, Fit, Identification, Identified, InnovationTests, Prediction, Refused,
+};
 use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::Options;
@@ -100,6 +102,7 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
     let mut search = Search {
         options,
         excitation: None,
+        refused: None,
         remarks: vec![],
     };
     let outcome = search.run(signals);
@@ -113,6 +116,7 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
     }
     Identification {
         excitation: search.excitation.map(Excitation::Recorded),
+        refused: search.refused.filter(|_| outcome.is_err()),
         outcome,
         switching: None,
         amplitudes: None,
@@ -123,6 +127,7 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
 struct Search<'a> {
     options: &'a Options,
     excitation: Option<Recorded>,
+    refused: Option<Refused>,
     remarks: Vec<Remark>,
 }
 
@@ -163,15 +168,18 @@ impl Search<'_> {
             excitation.informative_rad_per_s = informative.map(|found| found.band_rad_per_s);
             excitation.excited_rad_per_s = informative.map(|found| found.highest_rad_per_s);
         }
-        let is_excited = informative
-            .is_none_or(|found| validate::input_share(&blocks, found.band_rad_per_s) > LEAST_POWER);
-        if !is_excited {
-            return Err(self.no_information(&fitted.best.found.theta, None));
+        let judged = self.judge(&fitted, &blocks, &components, &tests, prediction.as_ref());
+        let outcome = judged.and_then(|()| {
+            self.remark(&fitted, &tests, prediction.as_ref());
+            let checked = (tests, prediction);
+            self.design(&prepared, &fitted, &blocks, &components, checked)
+        });
+        if outcome.is_err() {
+            let fit = fit(&fitted, &blocks, prepared.start_s, (tests, prediction, 1.0));
+            let model = result::model(&fitted.best.found, prepared.early_s);
+            self.refused = fit.map(|fit| Refused { model, fit });
         }
-        self.judge(&fitted, &blocks, &components, &tests, prediction.as_ref())?;
-        self.remark(&fitted, &tests, prediction.as_ref());
-        let checked = (tests, prediction);
-        self.design(&prepared, &fitted, &blocks, &components, checked)
+        outcome
     }
 
     /// Step 6: reasons to refuse.
@@ -183,6 +191,10 @@ impl Search<'_> {
         tests: &InnovationTests,
         prediction: Option<&Prediction>,
     ) -> Result<(), Verdict> {
+        let informative = (self.excitation).and_then(|found| found.informative_rad_per_s);
+        if informative.is_some_and(|band| validate::input_share(blocks, band) <= LEAST_POWER) {
+            return Err(self.no_information(&fitted.best.found.theta, None));
+        }
         let rows = fitted.best.found.at.residual.len();
         if rows < FEWEST / 2 {
             return Err(Verdict::TooFewRows {
@@ -337,14 +349,8 @@ impl Search<'_> {
         if width.is_none_or(|width| width > MOST_WIDTH) {
             return Err(self.no_information(&fitted.best.found.theta, width));
         }
-        let explained = prediction.map_or(1.0, |prediction| prediction.explained);
-        let (innovations, points) = result::innovations(
-            fitted,
-            blocks,
-            prepared.start_s,
-            (tests, prediction, widened),
-        )
-        .ok_or(Verdict::NoFit)?;
+        let checked = (tests, prediction, widened);
+        let fit = fit(fitted, blocks, prepared.start_s, checked).ok_or(Verdict::NoFit)?;
         Ok(Identified {
             joint_probability: posterior.joint_probability(&estimate),
             step: design
@@ -357,13 +363,25 @@ impl Search<'_> {
             design,
             phase_margin_rad,
             resonance: None,
-            fit: Fit {
-                misfit: (1.0 - explained).max(0.0).sqrt(),
-                points,
-                evidence: Evidence::Innovations(innovations),
-            },
+            fit,
         })
     }
+}
+
+/// The fit as a result. `None` if the filter does not converge.
+fn fit(
+    fitted: &Fitted,
+    blocks: &Blocks<'_>,
+    start_s: f64,
+    checked: (InnovationTests, Option<Prediction>, f64),
+) -> Option<Fit> {
+    let explained = checked.1.map_or(1.0, |prediction| prediction.explained);
+    let (innovations, points) = result::innovations(fitted, blocks, start_s, checked)?;
+    Some(Fit {
+        misfit: (1.0 - explained).max(0.0).sqrt(),
+        points,
+        evidence: Evidence::Innovations(innovations),
+    })
 }
 
 /// What is known of a record before any fit.

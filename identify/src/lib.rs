@@ -31,6 +31,7 @@ mod relay;
 mod remark;
 mod remarks;
 mod road;
+mod sampling;
 mod settings;
 mod signals;
 mod two_amplitudes;
@@ -47,12 +48,12 @@ pub use innovations::{Hold, expected};
 pub use nonlinear::Nonlinear;
 pub use outcome::{
     Alternative, Evidence, Fit, FitPoint, Identification, Identified, InnovationRow,
-    InnovationTests, Innovations, Noise, Prediction,
+    InnovationTests, Innovations, Noise, Prediction, Refused,
 };
 pub use posterior::{Draw, Estimate, Interval, Posterior};
 pub use reading::Reading;
 pub use relay::find_oscillation;
-pub use remark::Remark;
+pub use remark::{About, Remark};
 pub use settings::{MOST_CYCLES, Method, Options, Road};
 pub use signals::Signals;
 pub use two_amplitudes::TwoAmplitudes;

@@ -19,6 +19,9 @@ pub struct Identification {
     pub excitation: Option<Excitation>,
     /// Process and controller, or the reason why no process was identified.
     pub outcome: Result<Identified, Verdict>,
+    /// Fit that was refused: the reason of the verdict shows in its residual. `None` if a process was identified, or if there
+    /// was nothing to fit.
+    pub refused: Option<Refused>,
     /// Ratio at which the relay switched. `None` if nothing was identified, if the input is no relay, or if it switches at
     /// other times.
     pub switching: Option<Switching>,
@@ -47,6 +50,26 @@ impl Identification {
             _ => None,
         }
     }
+
+    /// Refuses what was identified.
+    pub(crate) fn refuse(&mut self, verdict: Verdict) {
+        if let Ok(identified) = std::mem::replace(&mut self.outcome, Err(verdict)) {
+            self.refused = Some(Refused {
+                model: identified.model,
+                fit: identified.fit,
+            });
+        }
+    }
+}
+
+/// A fit that was made and refused.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Refused {
+    /// Model of least residual.
+    pub model: Model,
+    /// Its quality.
+    pub fit: Fit,
 }
 
 /// Identified process and its controller.

@@ -33,7 +33,7 @@ use self::oscillation::{FitWindow, Past, Stretch};
 use crate::assumed::RecordedLoop;
 use crate::excitation::{Excitation, Oscillation};
 use crate::innovations::Hold;
-use crate::outcome::{Evidence, Fit, Identification, Identified};
+use crate::outcome::{Evidence, Fit, Identification, Identified, Refused};
 use crate::posterior::Posterior;
 use crate::reading::Reading;
 use crate::remark::Remark;
@@ -64,12 +64,14 @@ pub(crate) fn identify(
         options,
         excitation: None,
         refusal: None,
+        refused: None,
         tension: None,
         no_controller: None,
     };
     let outcome = search.run();
     let mut found = Identification {
         excitation: search.excitation,
+        refused: search.refused.filter(|_| outcome.is_err()),
         outcome,
         switching: None,
         amplitudes: None,
@@ -110,6 +112,8 @@ struct Search<'a> {
     excitation: Option<Excitation>,
     /// Verdict on the first stretch, if that was refused.
     refusal: Option<Verdict>,
+    /// Fit to the first stretch, if that was refused.
+    refused: Option<Refused>,
     /// Misfit of the prior in the last fit, if that was dropped.
     tension: Option<f64>,
     /// Why the identified process has no controller.
@@ -175,7 +179,7 @@ impl Search<'_> {
             Method::Refine | Method::Map => self.fit(stretch.period_s, window, reading)?,
         };
         let fit = Fit {
-            misfit: self.judge(&refined, window)?,
+            misfit: misfit(&refined, window),
             evidence: Evidence::Relay(refined),
             points: oscillation::fit_points(window, stretch.period_s, &refined),
         };
@@ -188,9 +192,22 @@ impl Search<'_> {
             excited_rad_per_s: Some(TAU / oscillation.period_s),
         };
         let specification = recorded.complete(&self.options.specification);
-        let (identified, refusal) = design(fit, &refined, window.sample_s(), &specification)?;
-        self.no_controller = refusal;
-        Ok(identified)
+        let judged = self.judge(&refined, fit.misfit);
+        let designed =
+            judged.and_then(|()| design(fit.clone(), &refined, window.sample_s(), &specification));
+        match designed {
+            Ok((identified, refusal)) => {
+                self.no_controller = refusal;
+                Ok(identified)
+            }
+            Err(verdict) => {
+                let model = Model::from(refined.process);
+                if self.refusal.is_none() {
+                    self.refused = Some(Refused { model, fit });
+                }
+                Err(verdict)
+            }
+        }
     }
 
     /// Least squares from the starts that the reading suggests. With the prior of the pack this is the most probable
@@ -229,11 +246,10 @@ impl Search<'_> {
         Ok(refined)
     }
 
-    /// Misfit of an acceptable fit.
-    fn judge(&self, refined: &Refined, window: &FitWindow) -> Result<f64, Verdict> {
+    /// Whether a fit with this misfit is acceptable.
+    fn judge(&self, refined: &Refined, misfit: f64) -> Result<(), Verdict> {
         let specification = &self.options.specification;
         specification.check().map_err(Verdict::NoController)?;
-        let misfit = misfit(refined, window);
         // No style of controller turns a refusal into an answer.
         let margin_rad = specification
             .implied_phase_margin_rad()
@@ -247,7 +263,7 @@ impl Search<'_> {
         }
         refined
             .edge
-            .map_or(Ok(misfit), |edge| Err(Verdict::EdgeOfDomain(edge)))
+            .map_or(Ok(()), |edge| Err(Verdict::EdgeOfDomain(edge)))
     }
 
     /// Keeps the first excitation, and the first reading of a last cycle.

@@ -131,8 +131,11 @@ pub enum Remark {
         /// Whether that is too far, so that no controller is given.
         is_withdrawn: bool,
     },
-    /// The input has two levels, which do not show how the gain depends on the size of the input.
+    /// No two amplitudes of the input were compared, so the result does not show how the gain depends on the amplitude.
     OneAmplitude,
+    /// The samples were not taken at the times of their stamps: the output scatters more where it is steep. The value is the
+    /// standard deviation of the time, as a share of the sample period, if the samples jitter independently.
+    Jitter(f64),
     /// Two amplitudes of a relay show the same process, but its jumps overcome an actuator that sticks at small changes.
     JumpsOnly,
     /// The relay may switch between two samples, if it runs faster than the log. The value is the phase margin (rad) that a
@@ -158,7 +161,55 @@ pub enum Remark {
     PriorDropped(f64),
 }
 
+/// What a remark is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum About {
+    /// Something in this recording is unusual or too little: it may be wrong.
+    Recording,
+    /// A test of this kind does not show it, in any recording.
+    Test,
+    /// The proposed controller asks for it.
+    Controller,
+}
+
+impl About {
+    /// All of them, in the order in which they are shown.
+    pub const ALL: [Self; 3] = [Self::Recording, Self::Test, Self::Controller];
+
+    /// Name for programs: an entry of `remark_about` in JSON.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Recording => "recording",
+            Self::Test => "test",
+            Self::Controller => "controller",
+        }
+    }
+}
+
 impl Remark {
+    /// What the remark is about. Only one about the recording is a reason to suspect it: those about the test stand on every
+    /// recording of its kind.
+    #[must_use]
+    pub fn about(&self) -> About {
+        match self {
+            Self::OneAmplitude
+            | Self::JumpsOnly
+            | Self::ClockUnchecked { .. }
+            | Self::SwitchesBetweenSamples(_)
+            | Self::OutputFilter { .. }
+            | Self::DampingNotSeen(_) => About::Test,
+            // No fault: the input is another test signal.
+            Self::NotASteadyOscillation(verdict) if verdict.kind() == "no_relay" => About::Test,
+            Self::LittleGainMargin(_)
+            | Self::NoiseAtActuator(_)
+            | Self::InputPeak { .. }
+            | Self::Overshoot(_) => About::Controller,
+            _ => About::Recording,
+        }
+    }
+
     /// Name for programs: an entry of `remark_kinds` in JSON.
     #[must_use]
     pub fn kind(&self) -> &'static str {
@@ -196,6 +247,7 @@ impl Remark {
             Self::ClockUnchecked { .. } => "clock_unchecked",
             Self::Extrapolated { .. } => "extrapolated",
             Self::OneAmplitude => "one_amplitude",
+            Self::Jitter(_) => "jitter",
             Self::JumpsOnly => "jumps_only",
             Self::SwitchesBetweenSamples(_) => "switches_between_samples",
             Self::OtherAmplitudeRefused(_) => "other_amplitude_refused",

@@ -84,7 +84,7 @@ fn at_two_amplitudes(
                 if compared.is_alike {
                     kept.remarks.push(Remark::JumpsOnly);
                 } else {
-                    kept.outcome = Err(Verdict::AmplitudeDependent(compared));
+                    kept.refuse(Verdict::AmplitudeDependent(compared));
                 }
             }
         }
@@ -132,8 +132,13 @@ fn automatic(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) 
                 // There is a relay oscillation: its verdict tells more.
                 return steady;
             }
-            let verdict = Box::new(verdict.clone());
+            let is_relay = verdict.kind() != "no_relay";
+            if is_relay && is_resonant(&general) && (is_left(&general) || !is_white(&general)) {
+                // Complex poles explain a limit cycle that the input does not drive.
+                general.refuse(verdict.clone());
+            }
             if general.outcome.is_ok() {
+                let verdict = Box::new(verdict.clone());
                 general.remarks.push(Remark::NotASteadyOscillation(verdict));
             }
             general
@@ -151,6 +156,9 @@ enum Doubt {
     /// The same structure, fitted to the whole recording, leaves the controller this phase margin (rad; `None` if
     /// unstable), which is not the one expected.
     Margin(Option<f64>),
+    /// The whole recording asks for a nonlinear force, in whose place the steady cycles show a linear damping, and with it the
+    /// controller has another phase margin.
+    Nonlinear,
 }
 
 fn doubt(
@@ -171,28 +179,36 @@ fn doubt(
     let controller = found.design?.controller;
     let expected = found.phase_margin_rad?;
     let whole = innovations::check(signals, options, &found.model.linear(), period_s)?;
-    let margin = margins(&whole, &controller).map(|margins| margins.phase_margin_rad);
-    let is_expected = margin.is_some_and(|margin| {
-        margin > expected.low.unwrap_or(f64::NEG_INFINITY) - ANOTHER_MARGIN_RAD
-            && margin < expected.high.unwrap_or(f64::INFINITY) + ANOTHER_MARGIN_RAD
-    });
-    (!is_expected).then_some(Doubt::Margin(margin))
+    let margin_of = |model| margins(model, &controller).map(|margins| margins.phase_margin_rad);
+    let is_expected = |margin: Option<f64>| {
+        margin.is_some_and(|margin| {
+            margin > expected.low.unwrap_or(f64::NEG_INFINITY) - ANOTHER_MARGIN_RAD
+                && margin < expected.high.unwrap_or(f64::INFINITY) + ANOTHER_MARGIN_RAD
+        })
+    };
+    let margin = margin_of(&whole.model);
+    if !is_expected(margin) {
+        return Some(Doubt::Margin(margin));
+    }
+    let with_forces = whole.with_forces?;
+    (!is_expected(margin_of(&with_forces))).then_some(Doubt::Nonlinear)
 }
 
 /// The general result if its innovations are white, or if a stretch was refused, and no controller is lost; else that of
 /// the steady oscillation.
 fn settle(mut steady: Identification, mut general: Identification, doubt: Doubt) -> Identification {
     let is_better = match doubt {
-        Doubt::Disturbed(_) => general.outcome.is_ok(),
-        Doubt::Misfit | Doubt::Margin(_) => is_white(&general),
+        Doubt::Disturbed(_) => general.outcome.is_ok() && !is_resonant(&general),
+        Doubt::Misfit | Doubt::Margin(_) => is_white(&general) && !is_resonant(&general),
+        Doubt::Nonlinear => is_nonlinear(&general),
     };
     let is_replaced = is_better && has_controller(&general) >= has_controller(&steady);
     let remark = match doubt {
-        Doubt::Misfit | Doubt::Disturbed(_) if !is_replaced => return steady,
+        Doubt::Misfit | Doubt::Disturbed(_) | Doubt::Nonlinear if !is_replaced => return steady,
         Doubt::Disturbed(misfit) => {
             Remark::NotASteadyOscillation(Box::new(Verdict::NotThisProcess { misfit }))
         }
-        Doubt::Misfit => {
+        Doubt::Misfit | Doubt::Nonlinear => {
             let found = steady.outcome.as_ref();
             Remark::RelayReplaced(found.map_or(0.0, |found| found.fit.misfit))
         }
@@ -216,14 +232,30 @@ fn is_beyond_doubt(general: &Identification) -> bool {
     let Ok(found) = &general.outcome else {
         return false;
     };
-    let is_resonant = matches!(
-        found.model.structure(),
-        Structure::Resonant | Structure::ResonantLag
-    );
-    let is_left = (general.remarks.iter()).any(|remark| matches!(remark, Remark::InputLeft(_)));
+    let is_left = is_left(general);
     // Without noise nothing is white: what is left are the digits of the file.
     let is_exact = found.fit.misfit < EXACT;
-    !is_resonant && (is_exact || is_white(general) && !is_left)
+    !is_resonant(general) && (is_exact || is_white(general) && !is_left)
+}
+
+/// Whether the process has complex poles.
+fn is_resonant(found: &Identification) -> bool {
+    let structure = (found.outcome.as_ref().ok()).map(|identified| identified.model.structure());
+    matches!(
+        structure,
+        Some(Structure::Resonant | Structure::ResonantLag)
+    )
+}
+
+/// Whether the past input explains a part of the innovations.
+fn is_left(found: &Identification) -> bool {
+    (found.remarks.iter()).any(|remark| matches!(remark, Remark::InputLeft(_)))
+}
+
+/// Whether the model has a nonlinear force.
+fn is_nonlinear(found: &Identification) -> bool {
+    let is_force = |remark: &Remark| matches!(remark, Remark::Nonlinear(_));
+    found.outcome.is_ok() && found.remarks.iter().any(is_force)
 }
 
 /// Whether the general estimator explains the recording up to white innovations.

@@ -14,7 +14,6 @@ pub mod certificate;
 pub mod grid;
 pub mod limit_cycle;
 pub mod phase;
-pub mod rule;
 pub mod surface;
 
 use rand::{Rng, RngExt};

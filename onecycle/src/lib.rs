@@ -253,8 +253,8 @@ pub use onecycle_link::{
 // Identification.
 #[doc(inline)]
 pub use onecycle_identify::{
-    Estimate, Evidence, Excitation, Hold, Identification, Identified, Innovations, Interval,
-    Method, Oscillation, Posterior, Recorded, Remark, Road, Verdict,
+    About, Estimate, Evidence, Excitation, Hold, Identification, Identified, Innovations, Interval,
+    Method, Oscillation, Posterior, Recorded, Refused, Remark, Road, Verdict,
 };
 #[doc(inline)]
 pub use onecycle_onboard::pack::{Pack, PackError};

@@ -39,6 +39,7 @@ struct IdentifyReport<'a> {
     process: Option<Process>,
     joint_probability: Option<f64>,
     fit: Option<Fit>,
+    refused: Option<RefusedFit>,
     noise: Option<record::Noise>,
     alternatives: Option<Vec<record::Alternative>>,
     innovations: Option<record::Tests>,
@@ -56,6 +57,7 @@ struct IdentifyReport<'a> {
     against: Option<AgainstReport>,
     remarks: Vec<String>,
     remark_kinds: Vec<&'static str>,
+    remark_about: Vec<&'static str>,
     notes: Vec<String>,
 }
 
@@ -169,6 +171,14 @@ impl Parameters<Option<f64>> {
     }
 }
 
+/// A fit that was made and refused.
+#[derive(Serialize)]
+struct RefusedFit {
+    structure: &'static str,
+    process: Parameters<Option<f64>>,
+    fit: Fit,
+}
+
 #[derive(Serialize)]
 struct Fit {
     misfit: f64,
@@ -265,7 +275,8 @@ pub(crate) fn identification(
         structure: identified.map(|i| i.model.structure().name()),
         process: identified.map(process),
         joint_probability: identified.and_then(|i| i.joint_probability),
-        fit: identified.map(fit),
+        fit: identified.map(|i| fit(&i.fit)),
+        refused: found.refused.as_ref().map(refused),
         noise: innovations.map(|i| (&i.noise).into()),
         alternatives: innovations.map(|i| i.alternatives.iter().map(Into::into).collect()),
         innovations: innovations.map(Into::into),
@@ -289,6 +300,9 @@ pub(crate) fn identification(
         against: choice.and_then(controllers::against),
         remarks: sentences(found),
         remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
+        remark_about: (found.remarks.iter())
+            .map(|remark| remark.about().name())
+            .collect(),
         notes: recording.notes().iter().map(note).collect(),
     })
 }
@@ -375,11 +389,19 @@ fn process(identified: &Identified) -> Process {
     }
 }
 
-fn fit(identified: &Identified) -> Fit {
-    let refined = identified.fit.refined();
-    let innovations = identified.fit.innovations();
+fn refused(of: &onecycle::Refused) -> RefusedFit {
+    RefusedFit {
+        structure: of.model.structure().name(),
+        process: Parameters::of_model(&of.model),
+        fit: fit(&of.fit),
+    }
+}
+
+fn fit(of: &onecycle_identify::Fit) -> Fit {
+    let refined = of.refined();
+    let innovations = of.innovations();
     Fit {
-        misfit: identified.fit.misfit,
+        misfit: of.misfit,
         response_error: refined.map(|refined| refined.response_error),
         residual_sigma: refined.map(|refined| refined.residual_sigma),
         noise_sigma: (refined.map(|refined| refined.noise_sigma))

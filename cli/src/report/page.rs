@@ -12,8 +12,8 @@ mod thin;
 use std::fmt::Write;
 
 use onecycle::{
-    Design, Excitation, Identification, Identified, Model, Parameter, Recording, StepMetrics,
-    StepResponse, load_response, step_response, with_signals,
+    About, Design, Excitation, Identification, Identified, Model, Parameter, Recording,
+    StepMetrics, StepResponse, load_response, step_response, with_signals,
 };
 use onecycle_design::bands::{load_bands, step_bands};
 use onecycle_identify::{Harmonic, harmonics};
@@ -46,9 +46,12 @@ pub(crate) fn identification(
     let mut sections = vec![];
     let recorded = recorded::section(recording, found, &units);
     let mut lead = made_by("identify");
+    let findings = (found.remarks.iter())
+        .filter(|remark| remark.about() == About::Recording)
+        .count();
     match &found.outcome {
         Ok(identified) => {
-            lead += &identified_lead(identified, choice, found.remarks.len());
+            lead += &identified_lead(identified, choice, findings);
             let view = View {
                 units: &units,
                 identified,
@@ -73,6 +76,10 @@ pub(crate) fn identification(
             lead += &page::verdict(false, &words);
             lead += &page::paragraph("lead", &words::verdict::advice(verdict));
             sections.push(recorded);
+            sections.extend(found.refused.as_ref().map(|refused| {
+                let structure = refused.model.structure();
+                fit::section("Fit that was refused", structure, &refused.fit, &units)
+            }));
         }
     }
     sections.extend(remarks(found));
@@ -150,7 +157,12 @@ impl View<'_> {
     /// What the model rests on.
     fn evidence(&self) -> Vec<Section> {
         let mut sections = vec![
-            fit::section(self.identified, self.units),
+            fit::section(
+                "Fit",
+                self.identified.model.structure(),
+                &self.identified.fit,
+                self.units,
+            ),
             parameters::section(self.identified, self.units),
         ];
         if let Some(innovations) = self.identified.fit.innovations() {
@@ -281,10 +293,14 @@ fn identified_lead(
 }
 
 fn remarks(found: &Identification) -> Option<Section> {
-    let remarks = words::remark::sentences(found);
-    (!remarks.is_empty()).then(|| Section {
+    let groups = words::remark::grouped(found);
+    let body = |(heading, sentences): &(&str, Vec<String>)| {
+        let under = page::paragraph("lead", &format!("{heading}:"));
+        under + &page::list(sentences)
+    };
+    (!groups.is_empty()).then(|| Section {
         id: "remarks".to_owned(),
         title: "Remarks".to_owned(),
-        body: page::list(&remarks),
+        body: groups.iter().map(body).collect(),
     })
 }

@@ -5,6 +5,7 @@
 use std::fmt::Write;
 
 use onecycle::{Excitation, Identification, Oscillation, Recorded, Recording};
+use onecycle_identify::Fit;
 
 use super::number::{seconds, significant};
 use crate::style::{FIT, HEADING, PLAIN, painted};
@@ -33,7 +34,7 @@ const LEVELS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█
 
 /// The plot for a terminal with this number of columns; without a terminal, in full width. Drawn are the last cycles of
 /// an oscillation; of another recording, as many of the last points of the fit as there are columns of dots. The fit is
-/// drawn if a process was identified. `None` if nothing was found that excites the process.
+/// drawn if there is one, also a refused one. `None` if nothing was found that excites the process.
 pub(crate) fn end(
     recording: &Recording,
     found: &Identification,
@@ -46,15 +47,15 @@ pub(crate) fn end(
         _ => return None,
     };
     let shown = |time_s: f64| (from_s..=end_s).contains(&time_s);
-    let (measured, fitted): (Vec<Point>, Vec<Point>) = match &found.outcome {
-        Ok(identified) => (identified.fit.points.iter())
+    let (measured, fitted): (Vec<Point>, Vec<Point>) = match fit_of(found) {
+        Some(fit) => (fit.points.iter())
             .filter(|point| shown(point.time_s))
             .map(|point| {
                 let of = |value| (point.time_s, value);
                 (of(point.measured), of(point.fitted))
             })
             .unzip(),
-        Err(_) => {
+        None => {
             let points = recording.time_s().iter().zip(recording.output());
             let points = points.map(|(time_s, output)| (*time_s, *output));
             (points.filter(|point| shown(point.0)).collect(), vec![])
@@ -84,7 +85,7 @@ fn last_cycles(found: &Oscillation) -> (f64, f64, String) {
 
 /// Start and end (s) of the last `most` points of the fit, or of the part that was used, and the heading.
 fn last_points(found: &Identification, record: &Recorded, most: usize) -> (f64, f64, String) {
-    let points = (found.outcome.as_ref()).map_or(&[][..], |identified| &identified.fit.points);
+    let points = fit_of(found).map_or(&[][..], |fit| &fit.points);
     let first = points.len().saturating_sub(most);
     let from_s = (points.get(first).filter(|_| first > 0)).map_or(record.start_s, |at| at.time_s);
     let heading = if from_s > record.start_s {
@@ -95,11 +96,21 @@ fn last_points(found: &Identification, record: &Recorded, most: usize) -> (f64, 
     (from_s, record.end_s, heading)
 }
 
+/// The fit that was accepted, or the one that was refused.
+fn fit_of(found: &Identification) -> Option<&Fit> {
+    let accepted = found.outcome.as_ref().map(|identified| &identified.fit);
+    accepted
+        .ok()
+        .or(found.refused.as_ref().map(|refused| &refused.fit))
+}
+
 /// What the line is: disturbances move the output of a recording away from that of the model alone.
 fn fit_name(found: &Identification, fitted: &[Point]) -> Option<&'static str> {
-    let name = match found.oscillation() {
-        Some(_) => "fit",
-        None => "model without disturbances",
+    let name = match (found.oscillation(), &found.outcome) {
+        (Some(_), Ok(_)) => "fit",
+        (Some(_), Err(_)) => "fit that was refused",
+        (None, Ok(_)) => "model without disturbances",
+        (None, Err(_)) => "refused model without disturbances",
     };
     (!fitted.is_empty()).then_some(name)
 }

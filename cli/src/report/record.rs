@@ -1,6 +1,6 @@
 //! What the general estimator used, chose and checked, as rows of a name and a value, for the text and the page.
 
-use onecycle::{Identification, Identified, Innovations, Recorded, Remark, Structure};
+use onecycle::{Identification, Innovations, Recorded, Remark, Structure};
 use onecycle_identify::{Alternative, InnovationTests, Noise, Prediction};
 
 use super::number::{frequency, percent, seconds, significant};
@@ -103,12 +103,7 @@ fn used(record: &Recorded) -> String {
 }
 
 /// How the model was chosen, its noise and its checks.
-pub(super) fn of_model(
-    identified: &Identified,
-    innovations: &Innovations,
-    units: &Units,
-) -> Vec<Fact> {
-    let chosen = identified.model.structure();
+pub(super) fn of_model(chosen: Structure, innovations: &Innovations, units: &Units) -> Vec<Fact> {
     vec![
         ("structure", choice(chosen, &innovations.alternatives)),
         ("noise", noise(&innovations.noise, &units.output)),

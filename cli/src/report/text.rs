@@ -17,7 +17,7 @@ use crate::results::controllers::Controllers;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
 use crate::words;
 use crate::words::recording;
-use crate::words::remark::sentences;
+use crate::words::remark::grouped;
 use crate::words::sentence;
 use crate::words::verdict::advice;
 
@@ -59,7 +59,7 @@ pub(crate) fn identification(
                 text.push_str(&headed("\nModel\n"));
                 facts(
                     &mut text,
-                    &record::of_model(identified, innovations, &units),
+                    &record::of_model(identified.model.structure(), innovations, &units),
                 );
             }
             if let Some(choice) = choice {
@@ -84,9 +84,9 @@ pub(crate) fn identification(
             wrapped(&mut text, "  ", &advice(verdict));
         }
     }
-    if !found.remarks.is_empty() {
-        text.push_str(&headed("\nRemarks\n"));
-        for sentence in sentences(found) {
+    for (heading, sentences) in grouped(found) {
+        text.push_str(&headed(&format!("\n{heading}\n")));
+        for sentence in sentences {
             remark(&mut text, "  - ", &sentence);
         }
     }

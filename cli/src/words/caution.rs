@@ -36,8 +36,9 @@ pub(super) fn sentence(remark: &Remark) -> Option<String> {
             "No controller is given: its gain crossover would lie at {ratio:.1} times the highest frequency that the \
              recording excites, where a resonance would not have shown. Use a relay that leads (beta -0.73) or a chirp."
         ),
-        Remark::OneAmplitude => "One amplitude of the input does not show a dead zone, backlash or saturation of the \
-                                 actuator: repeat the test at 0.6 of it, best in the same recording."
+        Remark::OneAmplitude => "No two amplitudes of the input were compared, so a dead zone, backlash or saturation of the \
+                                 actuator, or a valve that sticks, may stay hidden: repeat the test at 0.6 of the \
+                                 amplitude, best in the same recording."
             .to_owned(),
         Remark::JumpsOnly => "Both amplitudes show the same process. The jumps of a relay overcome a valve or joint that sticks: \
                               if it may, try small steps too."

@@ -1,6 +1,6 @@
 //! What a remark means.
 
-use onecycle::{DesignError, Identification, Parameter, Remark};
+use onecycle::{About, DesignError, Identification, Parameter, Remark};
 use onecycle_identify::Nonlinear;
 
 use super::{caution, controllers};
@@ -12,6 +12,25 @@ pub(crate) fn sentences(found: &Identification) -> Vec<String> {
     (found.remarks.iter())
         .map(|remark| sentence(remark, is_relay))
         .collect()
+}
+
+/// The same, with a heading for each thing that remarks are about.
+pub(crate) fn grouped(found: &Identification) -> Vec<(&'static str, Vec<String>)> {
+    let is_relay = found.oscillation().is_some();
+    let group = |about: About| {
+        let remarks = found
+            .remarks
+            .iter()
+            .filter(|remark| remark.about() == about);
+        let sentences: Vec<String> = remarks.map(|remark| sentence(remark, is_relay)).collect();
+        let heading = match about {
+            About::Test => "What this test does not show",
+            About::Controller => "What the controller asks for",
+            _ => "Remarks",
+        };
+        (!sentences.is_empty()).then_some((heading, sentences))
+    };
+    About::ALL.into_iter().filter_map(group).collect()
 }
 
 /// One or two sentences. `is_relay`: whether the cycles of a relay oscillation were fitted.
@@ -27,6 +46,11 @@ fn sentence(remark: &Remark, is_relay: bool) -> String {
 
 fn of_recording(remark: &Remark) -> Option<String> {
     Some(match *remark {
+        Remark::Jitter(share) => format!(
+            "The samples were not taken at the times of their stamps: the output scatters more where it is steep, as if \
+             they jittered by {:.0} % of the sample period. Log the time of each sample.",
+            100.0 * share
+        ),
         Remark::Disturbed(part) => format!(
             "With more cycles {:.1} % of the oscillation stays unexplained, as after a gust or a changing bias: only \
              the cycles named above were fitted.",

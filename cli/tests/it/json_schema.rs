@@ -69,6 +69,11 @@ fn the_documented_keys_are_those_of_the_report() {
         ],
     );
     keys(&identify(two, &[]).identified().0, "", &mut found);
+    let refused = identify(Table::noisy().csv(), &["--beta", "-0.3"]).no_process("clock_offset");
+    keys(&refused.0["refused"], "refused", &mut found);
+    // Those of a structure and of a fit are documented once.
+    let again = ["refused.process.", "refused.fit."];
+    found.retain(|key| !again.iter().any(|part| key.starts_with(part)));
     // Those of a controller, its margins and its step are documented once.
     let of_against = |key: &String| {
         let parts = ["controller", "margins", "step"];

@@ -109,6 +109,16 @@ fn a_refusal_as_a_page() {
     assert_eq!(figures(&page).len(), 1);
 }
 
+// A refusal after a fit shows it: recording, fit with residuals, correlogram. A relay of beta -0.3 did not make this one.
+#[test]
+fn a_refused_fit_is_on_the_page() {
+    let (ran, page) = reported(&["identify", HOVER, "--beta", "-0.3"]);
+    assert_eq!(ran.code, Some(NOT_IDENTIFIED));
+    assert!(page.contains("Not on one clock"));
+    assert!(page.contains("Fit that was refused"));
+    assert_eq!(figures(&page).len(), 3);
+}
+
 // A recording of any kind: the same sections and one for the structures; no figure holds a null, although samples are
 // absent, and the page is below 2 MB.
 #[test]

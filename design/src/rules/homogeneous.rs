@@ -51,6 +51,17 @@ impl Homogeneous {
         })
     }
 
+    /// Rule of a PD with this lead and this phase margin (rad), both from 0 to `pi/2`.
+    #[must_use]
+    pub fn from_lead(lead_rad: f64, phase_margin_rad: f64) -> Self {
+        Self {
+            beta: (phase_margin_rad - lead_rad).sin(),
+            c1: lead_rad.cos(),
+            c2: f64::INFINITY,
+            c3: lead_rad.tan() / TAU,
+        }
+    }
+
     /// The PID from an oscillation: its `|G|` (output unit / input unit) and its period (s).
     #[must_use]
     pub fn pid(&self, amplitude_ratio: f64, period_s: f64) -> Pid {
@@ -92,6 +103,22 @@ mod tests {
         let (pid, _) = on(&process(), &rule);
         assert!((pid.kp / best.pd.kp - 1.0).abs() < 2e-3, "{pid:?} {best:?}");
         assert_eq!(pid.ki, 0.0);
+    }
+
+    // The relay of the optimum's rule oscillates, by the describing function, at the optimum's crossover, so the rule gives
+    // back the optimum: for (0.3, 2, 0.1) asin(beta) = -46.88 deg. It is the rule with this derivative time.
+    #[test]
+    fn a_lead_gives_back_the_optimum() {
+        let margin_rad = 20_f64.to_radians();
+        let best = pd_at_phase_margin(&process(), margin_rad).unwrap();
+        let rule = Homogeneous::from_lead(best.lead_rad, margin_rad);
+        let beta_deg = rule.beta.asin().to_degrees();
+        assert!((beta_deg + 46.88).abs() < 0.005, "{beta_deg}");
+        let (pid, _) = on(&process(), &rule);
+        assert!((pid.kp / best.pd.kp - 1.0).abs() < 1e-12);
+        assert!((pid.kd / best.pd.kd - 1.0).abs() < 1e-12);
+        let same = Homogeneous::new(margin_rad, f64::INFINITY, rule.c3).unwrap();
+        assert!((same.c1 - rule.c1).abs() < 1e-15 && (same.beta - rule.beta).abs() < 1e-15);
     }
 
     // Equations 12 and 13 make the oscillation the gain crossover, with the specified phase margin: to rounding.

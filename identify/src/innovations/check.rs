@@ -4,9 +4,9 @@ use onecycle_design::{Linear, Model, Structure};
 
 use super::prepare::prepare;
 use super::record::Blocks;
-use super::search::{self, Candidate};
+use super::search;
 use super::theta::{NoiseKind, Theta};
-use super::{LONGEST_TAU, ROWS, outliers, result};
+use super::{LONGEST_TAU, ROWS, forces, outliers, result};
 use crate::settings::Options;
 use crate::signals::Signals;
 
@@ -18,6 +18,14 @@ const NOISE_OVER_OSCILLATION: f64 = 0.5;
 /// Most samples to fit: of a longer recording the last ones.
 const MOST: usize = 100_000;
 
+/// What the whole recording shows.
+pub(crate) struct Checked {
+    /// The process.
+    pub(crate) model: Model,
+    /// The linear part of the process with the nonlinear forces that the recording asks for, if it asks for any.
+    pub(crate) with_forces: Option<Model>,
+}
+
 /// The process that the whole recording shows, transient and disturbances included, in the structure of `found`, which
 /// is the process of a steady oscillation with this period. `None` if nothing can be fitted.
 pub(crate) fn check(
@@ -25,7 +33,7 @@ pub(crate) fn check(
     options: &Options,
     found: &Linear,
     period_s: f64,
-) -> Option<Model> {
+) -> Option<Checked> {
     let from_s = signals
         .time_s
         .len()
@@ -57,6 +65,11 @@ pub(crate) fn check(
         );
         search::fit(&blocks, &start, longest_s)
     });
-    let Candidate { found, .. } = search::best(candidates)?;
-    Some(result::model(&found, prepared.early_s))
+    let best = search::best(candidates)?;
+    let theta = &best.found.theta;
+    let asked = forces::forces(record, &best, theta, (samples, skip_s, longest_s));
+    Some(Checked {
+        model: result::model(&best.found, prepared.early_s),
+        with_forces: asked.map(|(_, with)| result::model(&with.found, prepared.early_s)),
+    })
 }

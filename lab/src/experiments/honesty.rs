@@ -69,9 +69,6 @@ pub struct HonestyCampaign {
     pub samples_per_period: Span,
     /// Processes.
     pub process: ProcessRange,
-    /// Remarks that stand on nearly every recording, so that they tell nothing about one; but they may name a trouble.
-    #[serde(default)]
-    pub standing: Vec<String>,
     /// Kinds of data.
     pub kinds: Vec<Kind>,
 }

@@ -12,7 +12,9 @@
 
 use onecycle_design::soiptd_pd::margins::margins;
 use onecycle_design::{Model, Parameter, Specification, Structure};
-use onecycle_identify::{Identification, Identified, Interval, Options, Remark, Signals, identify};
+use onecycle_identify::{
+    About, Identification, Identified, Interval, Options, Remark, Signals, identify,
+};
 use onecycle_onboard::Pd;
 
 mod trial;
@@ -38,6 +40,8 @@ pub enum HonestyOutcome {
 pub struct Accepted {
     /// Kinds of the remarks.
     pub remarks: Vec<String>,
+    /// Whether no remark is about the recording: those about the test or the controller are no reason to suspect it.
+    pub is_silent: bool,
     /// Name of the structure.
     pub structure: String,
     /// Strength of the fault, where it has one.
@@ -100,12 +104,6 @@ impl Accepted {
     #[must_use]
     pub fn is_named(&self, kinds: &[String]) -> bool {
         self.remarks.iter().any(|remark| kinds.contains(remark))
-    }
-
-    /// Whether there is no remark but of these kinds.
-    #[must_use]
-    pub fn is_silent(&self, standing: &[String]) -> bool {
-        self.remarks.iter().all(|remark| standing.contains(remark))
     }
 }
 
@@ -180,6 +178,7 @@ fn judge(recording: &FaultyRecording, identified: &Identified, remarks: &[Remark
     let kinds = remarks.iter().map(Remark::kind);
     Accepted {
         remarks: kinds.map(str::to_owned).collect(),
+        is_silent: !(remarks.iter()).any(|remark| remark.about() == About::Recording),
         structure: identified.model.structure().name().to_owned(),
         strength: recording.strength,
         promised_margin_deg,
@@ -275,9 +274,9 @@ pub struct HonestyTally {
     pub remarked_right: usize,
     /// Accepted with other remarks, and a promise is broken.
     pub remarked_wrong: usize,
-    /// Accepted without remark, and every promise holds.
+    /// Accepted without a remark about the recording, and every promise holds.
     pub silent_right: usize,
-    /// Accepted without remark, and a promise is broken.
+    /// Accepted without a remark about the recording, and a promise is broken.
     pub silent_wrong: usize,
     /// Accepted, and the loop with the real plant is unstable.
     pub unstable: usize,
@@ -286,9 +285,8 @@ pub struct HonestyTally {
 }
 
 impl HonestyTally {
-    /// Adds an outcome of a kind whose trouble the remarks `named_by` name; the remarks `standing` tell nothing. Tests that
-    /// ran away leave no recording, so they do not count.
-    pub fn add(&mut self, outcome: &HonestyOutcome, named_by: &[String], standing: &[String]) {
+    /// Adds an outcome of a kind whose trouble the remarks `named_by` name. Tests that ran away leave no recording, so they do not count.
+    pub fn add(&mut self, outcome: &HonestyOutcome, named_by: &[String]) {
         let accepted = match outcome {
             HonestyOutcome::NotRecorded => return,
             HonestyOutcome::Refused(_) => {
@@ -300,7 +298,7 @@ impl HonestyTally {
         };
         let is_named = accepted.is_named(named_by);
         let is_right = accepted.broken.is_empty();
-        let count = match (is_named, accepted.is_silent(standing), is_right) {
+        let count = match (is_named, accepted.is_silent, is_right) {
             (true, ..) => &mut self.named,
             (_, false, true) => &mut self.remarked_right,
             (_, false, false) => &mut self.remarked_wrong,

@@ -23,9 +23,9 @@
 
 use onecycle_onboard::{Soiptd, SoiptdError};
 
-use crate::space::rule::TuningRule;
 use crate::space::{Range, Space};
 use onecycle_design::roots::{falling_root, root};
+use onecycle_design::rules::Homogeneous;
 use onecycle_design::soiptd_pd::cost::ise_at_crossover;
 use onecycle_design::soiptd_pd::open_loop::{OpenLoop, lead_for_margin};
 use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd_at_phase_margin};
@@ -38,7 +38,7 @@ const LEAD_TOLERANCE_RAD: f64 = 1e-12;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AppliedRule {
     /// The rule.
-    pub rule: TuningRule,
+    pub rule: Homogeneous,
     /// Lead of the controllers at the gain crossover (rad).
     pub lead_rad: f64,
     /// Phase of the relay's oscillation, `asin(beta)` (rad).
@@ -177,7 +177,7 @@ impl LocalOptima {
         }
         let (worst, worst_on_s) = worst.ok_or(PhaseError::Empty)?;
         Ok(AppliedRule {
-            rule: TuningRule::from_lead(lead_rad, self.phase_margin_rad),
+            rule: Homogeneous::from_lead(lead_rad, self.phase_margin_rad),
             lead_rad,
             phase_rad: self.phase_margin_rad - lead_rad,
             worst,

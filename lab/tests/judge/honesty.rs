@@ -56,7 +56,6 @@ fn campaign() -> HonestyCampaign {
             zeta: None,
             tau_s: range(0.02, 0.04),
         },
-        standing: vec![],
         kinds: vec![
             kind("right", None, None),
             kind("swapped", Some(Fault::SwappedColumns), None),
@@ -160,6 +159,7 @@ fn a_tally_by_hand() {
     let accepted = |remarks: &[&str], broken: Vec<Broken>| {
         HonestyOutcome::Accepted(Accepted {
             remarks: remarks.iter().map(|&remark| remark.to_owned()).collect(),
+            is_silent: !remarks.contains(&"noisy"),
             structure: "soiptd".to_owned(),
             strength: None,
             promised_margin_deg: None,
@@ -171,7 +171,7 @@ fn a_tally_by_hand() {
     let unstable = || vec![Broken::Unstable { limit_cycle: None }];
     let strings =
         |kinds: &[&str]| -> Vec<String> { kinds.iter().map(|&kind| kind.to_owned()).collect() };
-    let (named_by, standing) = (strings(&["clock"]), strings(&["one_amplitude"]));
+    let named_by = strings(&["clock"]);
     let mut tally = HonestyTally::default();
     for outcome in [
         HonestyOutcome::NotRecorded,
@@ -183,7 +183,7 @@ fn a_tally_by_hand() {
         accepted(&[], vec![]),
         accepted(&[], unstable()),
     ] {
-        tally.add(&outcome, &named_by, &standing);
+        tally.add(&outcome, &named_by);
     }
     let expected = HonestyTally {
         cases: 7,

@@ -1,8 +1,8 @@
 //! Numbers printed in the paper and those of an independent prototype of its method.
 
+use onecycle_design::rules::Homogeneous;
 use onecycle_design::soiptd_pd::cost::ise;
 use onecycle_design::soiptd_pd::optimum::{Optimum, pd, pd_at_phase_margin};
-use onecycle_lab::space::rule::TuningRule;
 use onecycle_onboard::Soiptd;
 
 const PHASE_MARGIN_RAD: f64 = std::f64::consts::PI / 9.0;
@@ -62,7 +62,7 @@ fn derivative_times_match_the_paper() {
 // = -46.88 deg.
 #[test]
 fn slowest_process_has_the_paper_s_phase() {
-    let rule = TuningRule::from_lead(optimum(0.3, 2.0, 0.1).lead_rad, PHASE_MARGIN_RAD);
+    let rule = Homogeneous::from_lead(optimum(0.3, 2.0, 0.1).lead_rad, PHASE_MARGIN_RAD);
     assert!(prints_as(rule.beta.asin().to_degrees(), -46.88, 0.01));
     assert!(prints_as(rule.beta, -0.73, 0.01));
 }

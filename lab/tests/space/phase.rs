@@ -4,6 +4,7 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
+use onecycle_design::rules::Homogeneous;
 use onecycle_design::soiptd_pd::cost::ise;
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::margins::margins;
@@ -11,7 +12,6 @@ use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 use onecycle_lab::space::Space;
 use onecycle_lab::space::phase::PhaseError;
 use onecycle_lab::space::phase::{DistinguishingPhase, LocalOptima, distinguishing_phase};
-use onecycle_lab::space::rule::TuningRule;
 use onecycle_onboard::{Pd, Soiptd};
 
 /// The paper's distinguishing phase (deg) and `beta`.
@@ -260,14 +260,18 @@ fn every_applied_controller_has_the_margin() {
         let phase_margin_rad = space.phase_margin_rad();
         let phase = distinguishing_phase(&space, 5, 5).unwrap();
         for local in &phase.rules {
-            let rule: TuningRule = local.applied.rule;
+            let rule: Homogeneous = local.applied.rule;
             let mut worst = 0.0_f64;
             for times_s in processes(&phase) {
                 let process = process(times_s);
                 let omega = process
                     .frequency_at_phase(-PI + rule.beta.asin())
                     .expect("damped processes oscillate");
-                let pd = rule.pd(process.magnitude(omega), TAU / omega);
+                let pid = rule.pid(process.magnitude(omega), TAU / omega);
+                let pd = Pd {
+                    kp: pid.kp,
+                    kd: pid.kd,
+                };
                 let left = margins(&process, pd).unwrap().phase_margin_rad;
                 assert!((left - phase_margin_rad).abs() < 1e-12, "{left}");
                 let own = pd_at_phase_margin(&process, phase_margin_rad).unwrap();

@@ -56,7 +56,7 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
     for (kind, outcomes) in &kinds {
         let mut tally = HonestyTally::default();
         for outcome in *outcomes {
-            tally.add(outcome, &kind.named_by, &campaign.standing);
+            tally.add(outcome, &kind.named_by);
         }
         row(&mut text, &kind.name, &tally);
         let sum = if kind.control {

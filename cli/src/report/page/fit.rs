@@ -1,7 +1,7 @@
 //! The model over the data, and the residuals.
 
-use onecycle::{Identified, Innovations};
-use onecycle_identify::{FitPoint, Whiteness, whiteness};
+use onecycle::{Innovations, Structure};
+use onecycle_identify::{Fit, FitPoint, Whiteness, whiteness};
 use onecycle_onboard::refine::Refined;
 
 use super::significant;
@@ -16,8 +16,8 @@ use crate::report::units::Units;
 const LAGS: usize = 25;
 const RESIDUALS_PER_LAG: usize = 4;
 
-pub(super) fn section(identified: &Identified, units: &Units) -> Section {
-    let fit = &identified.fit;
+/// The fit of a `structure`, which was accepted unless `title` says otherwise.
+pub(super) fn section(title: &str, structure: Structure, fit: &Fit, units: &Units) -> Section {
     let (figure, what, residuals) = match fit.innovations() {
         None => (
             over_cycles(&fit.points, units),
@@ -35,7 +35,7 @@ pub(super) fn section(identified: &Identified, units: &Units) -> Section {
         None => fit
             .refined()
             .map_or(vec![], |refined| of_relay(fit.misfit, refined)),
-        Some(found) => record::of_model(identified, found, units),
+        Some(found) => record::of_model(structure, found, units),
     };
     let lags = LAGS.min(residuals.len() / RESIDUALS_PER_LAG);
     // No parameter was fitted to these bins alone: zero degrees of freedom are subtracted.
@@ -46,7 +46,7 @@ pub(super) fn section(identified: &Identified, units: &Units) -> Section {
     body += &page::facts(&facts);
     Section {
         id: "fit".to_owned(),
-        title: "Fit".to_owned(),
+        title: title.to_owned(),
         body,
     }
 }

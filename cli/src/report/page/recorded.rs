@@ -19,7 +19,10 @@ pub(super) fn section(recording: &Recording, found: &Identification, units: &Uni
                 "cycles are those that were",
                 (oscillation.start_s, oscillation.end_s),
             )),
-            facts(oscillation),
+            facts(oscillation)
+                .into_iter()
+                .chain(record::of_relay(found))
+                .collect(),
         ),
         Some(Excitation::Recorded(recorded)) => (
             Some(("part was", (recorded.start_s, recorded.end_s))),

@@ -28,12 +28,13 @@
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
-use onecycle_onboard::Soiptd;
+use onecycle_onboard::{Pd, Soiptd};
 
 use super::{BaselineAnswer, BaselineError, steady_cycles};
 use crate::space::Space;
 use crate::space::limit_cycle::symmetric;
-use crate::space::rule::TuningRule;
+use onecycle_design::Pid;
+use onecycle_design::rules::Homogeneous;
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 use onecycle_identify::Signals;
 
@@ -41,7 +42,7 @@ use onecycle_identify::Signals;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Rule {
     /// A rule for the relay of the recording, from half the peak-to-peak output.
-    Amplitude(TuningRule),
+    Amplitude(Homogeneous),
     /// The rule for the measured phase, from the first harmonics of output and input.
     FirstHarmonic {
         /// Phase margin of the controller (rad).
@@ -53,7 +54,7 @@ impl Rule {
     /// The paper's rule, with the lead that the describing function gives for a relay with this `beta`.
     #[must_use]
     pub fn of_relay(beta: f64, phase_margin_rad: f64) -> Self {
-        Self::Amplitude(TuningRule::from_lead(
+        Self::Amplitude(Homogeneous::from_lead(
             phase_margin_rad - beta.asin(),
             phase_margin_rad,
         ))
@@ -66,7 +67,11 @@ impl Rule {
 ///
 /// # Errors
 /// [`BaselineError::NotThisProcess`] if no shape has a limit cycle; a process may have no controller.
-pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRule, BaselineError> {
+pub fn calibrated(
+    space: &Space,
+    rows: usize,
+    columns: usize,
+) -> Result<Homogeneous, BaselineError> {
     let (mut ln_c1, mut ln_c3, mut count) = (0.0, 0.0, 0.0);
     for shape in space.shapes(rows, columns) {
         let Some((_, radius_s)) = space.radius_range_s(shape) else {
@@ -87,11 +92,10 @@ pub fn calibrated(space: &Space, rows: usize, columns: usize) -> Result<TuningRu
             "no ratio of its time constants has a limit cycle",
         ));
     }
-    Ok(TuningRule {
-        beta: space.beta,
-        c1: (ln_c1 / count).exp(),
-        c3: (ln_c3 / count).exp(),
-    })
+    let mut rule = Homogeneous::from_lead(0.0, space.beta.asin());
+    rule.c1 = (ln_c1 / count).exp();
+    rule.c3 = (ln_c3 / count).exp();
+    Ok(rule)
 }
 
 /// `|G|` by the describing function, from the amplitudes of the output and of the relay.
@@ -127,7 +131,7 @@ pub fn identify(
                     "the measured phase gives a lead outside 0 to pi/2",
                 ));
             }
-            let rule = TuningRule::from_lead(lead_rad, phase_margin_rad);
+            let rule = Homogeneous::from_lead(lead_rad, phase_margin_rad);
             (rule, response.norm() * hold_rad / hold_rad.sin())
         }
     };
@@ -137,9 +141,10 @@ pub fn identify(
     if !(ratio.is_finite() && ratio > 0.0) {
         return Err(BaselineError::NotThisProcess("its output is constant"));
     }
+    let Pid { kp, kd, .. } = rule.pid(ratio, found.period_s);
     Ok(BaselineAnswer {
         process: None,
-        pd: rule.pd(ratio, found.period_s),
+        pd: Pd { kp, kd },
     })
 }
 

@@ -7,8 +7,8 @@ use crate::experiments::{CYCLES_KEPT, Recorded, RelayTest};
 use crate::judge::baselines::rules::Rule;
 use crate::judge::baselines::{BaselineAnswer, BaselineError, arx, asymmetric, gmvc, pem, rules};
 use crate::space::Space;
-use crate::space::rule::TuningRule;
 use onecycle_design::Specification;
+use onecycle_design::rules::Homogeneous;
 use onecycle_identify::{Method, Options, Signals, identify};
 
 /// A method of the benchmark.
@@ -79,7 +79,7 @@ const ASYMMETRIC_CYCLES: usize = CYCLES_KEPT;
 const RULE_SHAPES: usize = 8;
 
 /// The exact rule, computed once by the first experiment that needs it.
-static EXACT_RULE: LazyLock<Result<TuningRule, BaselineError>> =
+static EXACT_RULE: LazyLock<Result<Homogeneous, BaselineError>> =
     LazyLock::new(|| rules::calibrated(&Space::MULTIROTOR, RULE_SHAPES, RULE_SHAPES));
 
 impl Contender {
