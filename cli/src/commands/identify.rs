@@ -36,7 +36,8 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .pack(pack)
         .run(&recording);
     let mut choice = (found.outcome.as_ref().ok())
-        .map(|identified| controllers::of_identified(identified, arguments.design.against()));
+        .map(|identified| controllers::of_identified(identified, arguments.design.against()))
+        .map(|choice| choice.in_plant(arguments.design.plant()));
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
         waiting.goes_on("drawing");
@@ -163,6 +164,8 @@ fn refuse_columns(arguments: &Identify) -> Result<(), Failure> {
         ("--time", arguments.time.is_some()),
         ("--input", arguments.input.is_some()),
         ("--output", arguments.output.is_some()),
+        ("--set-point", arguments.set_point.is_some()),
+        ("--tag", arguments.tag.is_some()),
         ("--sample-rate", arguments.sample_rate.is_some()),
         ("--time-unit", arguments.time_unit.is_some()),
     ];
@@ -181,6 +184,8 @@ fn read_table(arguments: &Identify) -> Result<Recording, Failure> {
     options.time_column = column(&arguments.time);
     options.input_column = column(&arguments.input);
     options.output_column = column(&arguments.output);
+    options.set_point_column = column(&arguments.set_point);
+    options.control_loop.clone_from(&arguments.tag);
     options.sample_rate_hz = arguments.sample_rate;
     options.time_unit = arguments.time_unit;
     let result = if arguments.file == Path::new("-") {

@@ -256,8 +256,12 @@ fn describe_controller(
     let law = design.controller.form().law();
     let style = words::controllers::style(choice.asked.style);
     text.push_str(&headed(&format!("\nController  {style}: {law}\n")));
-    for (name, value) in controllers::forms(&design.controller, units) {
-        wrapped(text, &format!("  {name:<12}"), &value);
+    let plant = controllers::in_plant(choice, &design.controller);
+    for (name, value) in controllers::forms(&design.controller, units)
+        .into_iter()
+        .chain(plant)
+    {
+        wrapped(text, &format!("  {name:<11} "), &value);
     }
     let margins = controllers::margins(choice, design, phase_margin_rad);
     wrapped(text, "  margins     ", &margins);

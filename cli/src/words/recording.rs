@@ -27,6 +27,10 @@ pub(crate) fn note(note: &Note) -> String {
             ..
         } => Some("if that is wrong, give --time, --input and --output"),
         Note::LogSignals { .. } => Some("choose others with --axis, --loop and --flight"),
+        Note::TagsChosen { .. } => Some("if that is wrong, give --tag, or --input and --output"),
+        Note::Compressed { .. } | Note::Interpolated { .. } => {
+            Some("switch the compression of this tag off and record again")
+        }
         Note::TimeUnitGuessed { .. } => Some("if that is wrong, give --time-unit"),
         _ => None,
     };
@@ -71,10 +75,17 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
         E::RaggedRow { .. } => {
             "correct the line, or separate the columns by semicolons if they hold decimal commas"
         }
-        E::NotANumber { .. } => {
-            "correct it or leave it empty (thousands separators are not supported)"
+        E::NotANumber { .. } => "correct it or leave it empty",
+        E::MixedDecimals { .. } => "export it with one of them and without separators of thousands",
+        E::SeveralLoops { .. } => "choose one with --tag",
+        E::NoSuchLoop { .. } => {
+            "choose another with --tag, or the columns with --input and --output"
         }
-        E::MixedDecimals { .. } => "use one of them (thousands separators are not supported)",
+        E::UnknownTag { role, .. } => match role {
+            Role::Input => "choose it with --input",
+            _ => "choose it with --output",
+        },
+        E::TooManyValues { .. } => "export one loop, or less time",
         E::ClockTime { .. } => {
             "export seconds from the start, or date and time of day in one column, or give the sample \
              rate with --sample-rate"
@@ -103,6 +114,7 @@ fn advice_on_samples(error: &RecordingError) -> Option<&'static str> {
             "choose another column with --time, or give the sample rate with --sample-rate"
         }
         E::TooManyMissing { .. } => "choose another column or cut the recording",
+        E::TooManyBad { .. } => "export raw samples of a time when the sensor worked",
         E::TooManyDuplicates { .. } => {
             "the time column is too coarse: give the sample rate with --sample-rate"
         }
@@ -180,12 +192,12 @@ mod tests {
         assert_refused(
             &table_with(40, "4,abc,1"),
             "line 42, \"pv\" (column 2): \"abc\" is not a number; \
-             correct it or leave it empty (thousands separators are not supported)",
+             correct it or leave it empty",
         );
         assert_refused(
             &table_with(40, "4,\"1,234\",1"),
             "line 42, \"pv\" (column 2): \"1,234\" and earlier cells mix decimal commas and decimal \
-             points; use one of them (thousands separators are not supported)",
+             points; export it with one of them and without separators of thousands",
         );
         assert_refused(
             &table_with(40, "4,1e305,1"),

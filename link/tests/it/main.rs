@@ -4,4 +4,5 @@ mod averaging;
 mod dialects;
 mod flight_logs;
 mod hostile;
+mod plant;
 mod refusals;
