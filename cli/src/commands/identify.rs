@@ -1,11 +1,13 @@
 //! `onecycle identify`: a recording in, the process and its controller out.
 
+use std::io::Read;
 use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Road, Specification, Structure, Style};
 
-use super::{controllers, log, pack};
+use super::log::{self, Piped, Source};
+use super::{controllers, pack};
 use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
@@ -18,7 +20,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     }
     check_estimator(arguments)?;
     let asked = specification(arguments)?;
-    let recording = read(arguments)?;
+    let (recording, is_log) = read(arguments)?;
     check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
@@ -27,7 +29,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .cycles(arguments.cycles as usize)
         .specification(asked)
         .method(arguments.method.into())
-        .road(road(arguments))
+        .road(road(arguments, is_log))
         .structure(arguments.structure)
         .span_s(arguments.from, arguments.to)
         .hold(arguments.hold.map(Hold::from))
@@ -69,9 +71,9 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
 }
 
 /// The estimator. A flight log is no relay test, unless the user says so.
-fn road(arguments: &Identify) -> Road {
+fn road(arguments: &Identify, is_log: bool) -> Road {
     match arguments.estimator {
-        Estimator::Auto if log::is_log(&arguments.file) => Road::General,
+        Estimator::Auto if is_log => Road::General,
         estimator => estimator.into(),
     }
 }
@@ -144,18 +146,33 @@ fn check_span(arguments: &Identify, recording: &Recording) -> Result<(), Failure
     Ok(())
 }
 
-fn read(arguments: &Identify) -> Result<Recording, Failure> {
-    if log::is_log(&arguments.file) {
+/// The recording, and whether it is that of a flight log.
+fn read(arguments: &Identify) -> Result<(Recording, bool), Failure> {
+    let path = arguments.file.as_path();
+    let piped = match path == Path::new("-") {
+        true => Some(log::piped()?),
+        false => None,
+    };
+    let (bytes, head) = match piped {
+        Some(Piped::Log(bytes)) => (Some(bytes), vec![]),
+        Some(Piped::Other(head)) => (None, head),
+        None => (None, vec![]),
+    };
+    if bytes.is_some() || log::is_log(path) {
         refuse_columns(arguments)?;
-        return log::recording(&arguments.file, &arguments.log);
+        let bytes = bytes.as_deref();
+        return Ok((
+            log::recording(&Source { path, bytes }, &arguments.log)?,
+            true,
+        ));
     }
     if let Some(option) = arguments.log.given() {
         return Err(Failure::usage(format!(
             "{option} is for flight logs, and {} is not a flight log: leave out {option}",
-            arguments.file.display()
+            path.display()
         )));
     }
-    read_table(arguments)
+    Ok((read_table(arguments, &head)?, false))
 }
 
 /// Refuses the names of columns, which a flight log does not have.
@@ -178,7 +195,8 @@ fn refuse_columns(arguments: &Identify) -> Result<(), Failure> {
     }
 }
 
-fn read_table(arguments: &Identify) -> Result<Recording, Failure> {
+/// `head`: the first bytes of the standard input, which have been read.
+fn read_table(arguments: &Identify, head: &[u8]) -> Result<Recording, Failure> {
     let column = |name: &Option<String>| name.as_deref().map(ColumnRef::from);
     let mut options = CsvOptions::default();
     options.time_column = column(&arguments.time);
@@ -190,7 +208,7 @@ fn read_table(arguments: &Identify) -> Result<Recording, Failure> {
     options.time_unit = arguments.time_unit;
     let result = if arguments.file == Path::new("-") {
         let _waiting = Waiting::on("reading the standard input");
-        onecycle::read_from(std::io::stdin().lock(), &options)
+        onecycle::read_from(head.chain(std::io::stdin().lock()), &options)
     } else {
         match open_with_bar(&arguments.file) {
             Ok(file) => onecycle::read_from(file, &options),

@@ -82,6 +82,9 @@ pub(crate) fn identification(
             let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
             wrapped(&mut text, "  ", &sentence(&verdict.to_string()));
             wrapped(&mut text, "  ", &advice(verdict));
+            if let Some(stops) = recording::input_stops(recording) {
+                wrapped(&mut text, "  ", &stops);
+            }
         }
     }
     if !found.remarks.is_empty() {
