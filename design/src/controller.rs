@@ -22,6 +22,7 @@
 mod autopilot;
 mod execution;
 mod pid;
+mod vendor;
 
 use num_complex::Complex64;
 use onecycle_onboard::Pd;
@@ -29,6 +30,7 @@ use onecycle_onboard::Pd;
 pub use autopilot::Autopilot;
 pub use execution::{Execution, LowPass};
 pub use pid::{Ideal, Pid, Series};
+pub use vendor::{Spans, TypedGain, Vendor, VendorError};
 
 /// Form of a controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

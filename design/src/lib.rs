@@ -73,7 +73,10 @@ pub use closed_loop::{
     LoadResponse, ise, load_iae, load_response, loop_response, margins, noise_amplification,
     reference_iae, sensitivity, step_response,
 };
-pub use controller::{Autopilot, Controller, Execution, Form, Ideal, LowPass, Pid, Series};
+pub use controller::{
+    Autopilot, Controller, Execution, Form, Ideal, LowPass, Pid, Series, Spans, TypedGain, Vendor,
+    VendorError,
+};
 pub use model::{Linear, LinearError, Model, Parameter, Stages, Structure, Unit, state_space};
 pub use soiptd_pd::loop_response::LoopResponse;
 pub use soiptd_pd::margins::Margins;

@@ -3,6 +3,7 @@
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use onecycle::{Execution, Form, MeasurementNoise, Pid, Specification, Style};
+use onecycle_design::{Spans, Vendor};
 
 use super::{Share, phase_margin};
 use crate::failure::Failure;
@@ -41,9 +42,25 @@ pub(crate) struct DesignArguments {
     /// measurement filter in seconds
     #[arg(long, value_name = "KP,KI,KD", allow_hyphen_values = true, value_parser = gains)]
     against: Option<Pid>,
+    /// Gains as a controller of a process control system takes them, in percent of the ranges: isa, proportional-band,
+    /// interacting, deltav, deltav-series, tdc3000, centum, pide, pide-independent or control-expert
+    #[arg(long, value_name = "NAME", value_parser = vendor(), requires = "output_range", hide_possible_values = true)]
+    vendor: Option<Vendor>,
+    /// With --vendor: range of the measurement in the controller, in the unit of the output, such as 0..200
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
+    output_range: Option<f64>,
+    /// With --vendor: range of the controller's output, in the unit of the input [default: 0..100]
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
+    input_range: Option<f64>,
 }
 
 impl DesignArguments {
+    /// The controller in which the gains are typed, and its ranges.
+    pub(crate) fn plant(&self) -> Option<(Vendor, Spans)> {
+        let output = self.input_range.unwrap_or(100.0);
+        Some((self.vendor?, Spans::new(self.output_range?, output)))
+    }
+
     /// The requirements, without noise.
     pub(crate) fn specification(&self) -> Result<Specification, Failure> {
         if self.style == Style::Paper {
@@ -132,6 +149,20 @@ impl NoiseArguments {
 fn style() -> impl TypedValueParser<Value = Style> {
     PossibleValuesParser::new(Style::ALL.map(Style::name))
         .try_map(|name| Style::from_name(&name).ok_or("there is no such style"))
+}
+
+fn vendor() -> impl TypedValueParser<Value = Vendor> {
+    PossibleValuesParser::new(Vendor::ALL.map(Vendor::name))
+        .try_map(|name| Vendor::from_name(&name).ok_or("there is no such controller"))
+}
+
+/// The span of a range such as `0..200`.
+fn span(text: &str) -> Result<f64, String> {
+    let ends = text.split_once("..");
+    let ends = ends.and_then(|(low, high)| Some((number(low)?, number(high)?)));
+    ends.map(|(low, high)| high - low)
+        .filter(|span| span.is_normal() && *span > 0.0)
+        .ok_or_else(|| "write a range as LOW..HIGH, such as 0..200".to_owned())
 }
 
 fn form() -> impl TypedValueParser<Value = Form> {

@@ -26,6 +26,7 @@ use super::{DesignArguments, LogArguments, PackSource, sample_rate, time_unit};
     "  onecycle identify log.csv --against 40,5,12 --style calm\n",
     "  onecycle identify examples/logs/px4_chirps.ulg --axis roll --loop rate --from 197 --to 203\n",
     "  onecycle identify chirp.csv --structure soptd --from 12 --to 40\n",
+    "  onecycle identify historian.csv --tag LIC101\n",
     "  onecycle identify log.csv --plot always > report.txt\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
     "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process identified (see the ",
@@ -106,6 +107,12 @@ pub(crate) struct Identify {
     /// Output column, the measurement, by name or number
     #[arg(long, value_name = "COLUMN")]
     pub(crate) output: Option<String>,
+    /// Set-point column, by name or number; it is kept beside the output [default: by name]
+    #[arg(long, value_name = "COLUMN")]
+    pub(crate) set_point: Option<String>,
+    /// Control loop of a table with several: LIC101 takes the columns, or the tags, LIC101.PV, LIC101.OP and LIC101.SP
+    #[arg(long, value_name = "LOOP")]
+    pub(crate) tag: Option<String>,
     /// Sample rate in hertz, for a table without a usable time column
     #[arg(long, value_name = "HZ", conflicts_with_all = ["time", "time_unit"],
           allow_negative_numbers = true, value_parser = sample_rate)]

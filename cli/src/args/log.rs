@@ -17,7 +17,7 @@ use onecycle_link::{Axis, ControlLoop};
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 5 output not written"
 ))]
 pub(crate) struct Log {
-    /// Flight log
+    /// Flight log; - reads the standard input
     pub(crate) file: PathBuf,
     /// Print the result as JSON
     #[arg(long)]

@@ -4,6 +4,7 @@ use onecycle::{
     Controller, Design, Identified, Model, Pid, Proposal, Specification, Style, assess, design,
     least_margins,
 };
+use onecycle_design::{Spans, Vendor};
 use rayon::prelude::*;
 
 use crate::results::controllers::{Against, Controllers, Row};
@@ -35,6 +36,11 @@ pub(super) fn of_model(model: &Model, asked: &Specification, against: Option<Pid
 const PEAKS: [f64; 10] = [1.2, 1.25, 1.3, 1.4, 1.5, 1.6, 1.8, 2.0, 2.25, 2.5];
 
 impl Controllers {
+    /// With the gains as this controller of a process control system takes them.
+    pub(super) fn in_plant(self, plant: Option<(Vendor, Spans)>) -> Self {
+        Self { plant, ..self }
+    }
+
     /// With the designs for `model` over limits of `Ms`; the other limits are those of the chosen controller.
     pub(super) fn with_trade_off(self, model: &Model) -> Self {
         let base = match self.asked.style {
@@ -99,6 +105,7 @@ fn controllers(
         against,
         trade_off: vec![],
         is_recorded: false,
+        plant: None,
     }
 }
 

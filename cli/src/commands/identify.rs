@@ -1,11 +1,13 @@
 //! `onecycle identify`: a recording in, the process and its controller out.
 
+use std::io::Read;
 use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Road, Specification, Structure, Style};
 
-use super::{controllers, log, pack};
+use super::log::{self, Piped, Source};
+use super::{controllers, pack};
 use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
@@ -37,7 +39,8 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .pack(pack)
         .run(&recording);
     let mut choice = (found.outcome.as_ref().ok())
-        .map(|identified| controllers::of_identified(identified, arguments.design.against()));
+        .map(|identified| controllers::of_identified(identified, arguments.design.against()))
+        .map(|choice| choice.in_plant(arguments.design.plant()));
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
         waiting.goes_on("drawing");
@@ -137,17 +140,28 @@ fn check_span(arguments: &Identify, recording: &Recording) -> Result<(), Failure
 }
 
 fn read(arguments: &Identify) -> Result<Recording, Failure> {
-    if log::is_log(&arguments.file) {
+    let path = arguments.file.as_path();
+    let piped = match path == Path::new("-") {
+        true => Some(log::piped()?),
+        false => None,
+    };
+    let (bytes, head) = match piped {
+        Some(Piped::Log(bytes)) => (Some(bytes), vec![]),
+        Some(Piped::Other(head)) => (None, head),
+        None => (None, vec![]),
+    };
+    if bytes.is_some() || log::is_log(path) {
         refuse_columns(arguments)?;
-        return log::recording(&arguments.file, &arguments.log);
+        let bytes = bytes.as_deref();
+        return log::recording(&Source { path, bytes }, &arguments.log);
     }
     if let Some(option) = arguments.log.given() {
         return Err(Failure::usage(format!(
             "{option} is for flight logs, and {} is not a flight log: leave out {option}",
-            arguments.file.display()
+            path.display()
         )));
     }
-    read_table(arguments)
+    read_table(arguments, &head)
 }
 
 /// Refuses the names of columns, which a flight log does not have.
@@ -156,6 +170,8 @@ fn refuse_columns(arguments: &Identify) -> Result<(), Failure> {
         ("--time", arguments.time.is_some()),
         ("--input", arguments.input.is_some()),
         ("--output", arguments.output.is_some()),
+        ("--set-point", arguments.set_point.is_some()),
+        ("--tag", arguments.tag.is_some()),
         ("--sample-rate", arguments.sample_rate.is_some()),
         ("--time-unit", arguments.time_unit.is_some()),
     ];
@@ -168,17 +184,20 @@ fn refuse_columns(arguments: &Identify) -> Result<(), Failure> {
     }
 }
 
-fn read_table(arguments: &Identify) -> Result<Recording, Failure> {
+/// `head`: the first bytes of the standard input, which have been read.
+fn read_table(arguments: &Identify, head: &[u8]) -> Result<Recording, Failure> {
     let column = |name: &Option<String>| name.as_deref().map(ColumnRef::from);
     let mut options = CsvOptions::default();
     options.time_column = column(&arguments.time);
     options.input_column = column(&arguments.input);
     options.output_column = column(&arguments.output);
+    options.set_point_column = column(&arguments.set_point);
+    options.control_loop.clone_from(&arguments.tag);
     options.sample_rate_hz = arguments.sample_rate;
     options.time_unit = arguments.time_unit;
     let result = if arguments.file == Path::new("-") {
         let _waiting = Waiting::on("reading the standard input");
-        onecycle::read_from(std::io::stdin().lock(), &options)
+        onecycle::read_from(head.chain(std::io::stdin().lock()), &options)
     } else {
         match open_with_bar(&arguments.file) {
             Ok(file) => onecycle::read_from(file, &options),

@@ -1,7 +1,7 @@
 //! `onecycle log`: what a flight log holds; and the recording of one of its control loops.
 
 use std::fs::File;
-use std::io::Read;
+use std::io::{self, Read};
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -10,13 +10,85 @@ use onecycle_link::{FlightLog, LogError, LogFormat};
 
 use crate::args::{Log, LogArguments};
 use crate::failure::{Failure, exit};
-use crate::output::print;
+use crate::output::{Waiting, print};
 use crate::reading::open_with_bar;
 use crate::report::log as report;
 use crate::words::log::refusal;
 
+/// Largest flight log on the standard input, in bytes: it is read twice, so it is kept.
+const MOST_PIPED: u64 = 1 << 29;
+
+/// What the standard input holds.
+pub(super) enum Piped {
+    /// An entire flight log.
+    Log(Vec<u8>),
+    /// The first bytes of anything else; the others are still to be read.
+    Other(Vec<u8>),
+}
+
+/// Where a flight log comes from.
+pub(super) struct Source<'a> {
+    pub(super) path: &'a Path,
+    /// The log, if it came from the standard input.
+    pub(super) bytes: Option<&'a [u8]>,
+}
+
+impl Source<'_> {
+    fn open(&self) -> Result<Box<dyn Read + '_>, Failure> {
+        match self.bytes {
+            Some(bytes) => Ok(Box::new(bytes)),
+            None => match open_with_bar(self.path) {
+                Ok(file) => Ok(Box::new(file)),
+                Err(error) => Err(Failure::unreadable(self.path, error)),
+            },
+        }
+    }
+
+    fn scan(&self) -> Result<FlightLog, Failure> {
+        FlightLog::scan(self.open()?).map_err(|error| unreadable(self.path, &error))
+    }
+}
+
+/// Reads the standard input if it is a flight log, or else its first bytes.
+pub(super) fn piped() -> Result<Piped, Failure> {
+    let failed = |error: io::Error| Failure::unreadable(Path::new("-"), error);
+    let mut bytes = Vec::new();
+    let mut input = io::stdin().lock();
+    let most = LogFormat::HEAD_BYTES as u64;
+    input
+        .by_ref()
+        .take(most)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
+    if LogFormat::detect(&bytes).is_none() {
+        return Ok(Piped::Other(bytes));
+    }
+    let _waiting = Waiting::on("reading the standard input");
+    input
+        .take(MOST_PIPED)
+        .read_to_end(&mut bytes)
+        .map_err(failed)?;
+    if bytes.len() as u64 > MOST_PIPED {
+        let reason =
+            format!("the log has more than {MOST_PIPED} bytes: write it to a file and name that");
+        return Err(Failure::unreadable(Path::new("-"), reason));
+    }
+    Ok(Piped::Log(bytes))
+}
+
 pub(crate) fn run(arguments: &Log) -> Result<ExitCode, Failure> {
-    let log = scan(&arguments.file)?;
+    let bytes = match arguments.file == Path::new("-") {
+        true => Some(match piped()? {
+            Piped::Log(bytes) | Piped::Other(bytes) => bytes,
+        }),
+        false => None,
+    };
+    let path = arguments.file.as_path();
+    let log = Source {
+        path,
+        bytes: bytes.as_deref(),
+    }
+    .scan()?;
     let name = arguments.file.display().to_string();
     print(&if arguments.json {
         report::json(&name, &log)
@@ -39,24 +111,16 @@ pub(super) fn is_log(path: &Path) -> bool {
 }
 
 /// The recording of a control loop.
-pub(super) fn recording(path: &Path, asked: &LogArguments) -> Result<Recording, Failure> {
-    let log = scan(path)?;
+pub(super) fn recording(source: &Source<'_>, asked: &LogArguments) -> Result<Recording, Failure> {
+    let log = source.scan()?;
     let longest = log.flights.iter().enumerate().max_by(|(_, a), (_, b)| {
         let length_s = |flight: &onecycle_link::Flight| flight.span.to_s - flight.span.from_s;
         length_s(a).total_cmp(&length_s(b))
     });
     let flight = asked.flight.unwrap_or(1 + longest.map_or(0, |(at, _)| at));
-    let signals = log.signals(open(path)?, flight, asked.control_loop());
+    let signals = log.signals(source.open()?, flight, asked.control_loop());
     let recording = signals.and_then(|signals| Ok(signals.recording()?));
-    recording.map_err(|error| unreadable(path, &error))
-}
-
-fn scan(path: &Path) -> Result<FlightLog, Failure> {
-    FlightLog::scan(open(path)?).map_err(|error| unreadable(path, &error))
-}
-
-fn open(path: &Path) -> Result<impl Read, Failure> {
-    open_with_bar(path).map_err(|error| Failure::unreadable(path, error))
+    recording.map_err(|error| unreadable(source.path, &error))
 }
 
 fn unreadable(path: &Path, error: &LogError) -> Failure {

@@ -14,7 +14,8 @@ use crate::words::controllers::refusal;
 pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
     let model = arguments.process.model()?;
     let asked: Specification = (arguments.noise).complete(arguments.design.specification()?)?;
-    let mut choice = controllers::of_model(&model, &asked, arguments.design.against());
+    let mut choice = controllers::of_model(&model, &asked, arguments.design.against())
+        .in_plant(arguments.design.plant());
     let chosen = choice.chosen().map(|row| row.proposal.outcome);
     let best = match chosen {
         Some(Ok(design)) => design,

@@ -3,13 +3,14 @@
 use std::fmt::Write;
 
 use onecycle::{Assessment, Controller, Design, Interval};
+use onecycle_design::{Spans, TypedGain};
 
 use super::number::{seconds, short, significant};
 use super::units::Units;
 use super::wrap::wrapped;
 use crate::results::controllers::{Controllers, Row};
 use crate::style::{HOLDS, headed, painted};
-use crate::words::controllers::{brief, change, judgement};
+use crate::words::controllers::{self as words, brief, change, judgement};
 use crate::words::sentence;
 
 /// Titles of the columns and their widths in the text.
@@ -179,6 +180,40 @@ pub(super) fn forms(controller: &Controller, units: &Units) -> Vec<(&'static str
     }
     forms.extend(filter(&pid));
     forms
+}
+
+/// The gains as the controller of a process control system takes them: its name and their values.
+pub(super) fn in_plant(
+    choice: &Controllers,
+    controller: &Controller,
+) -> Option<(&'static str, String)> {
+    let (vendor, spans) = choice.plant?;
+    let value = match vendor.typed(&controller.pid(), &spans) {
+        Ok(gains) => typed(&gains, &spans),
+        Err(error) => format!("none: {}", words::no_gains(error)),
+    };
+    Some((vendor.name(), value))
+}
+
+fn typed(gains: &[TypedGain], spans: &Spans) -> String {
+    let is_on = |gain: &&TypedGain| gain.value != 0.0 && gain.value.is_finite();
+    let shown = gains.iter().filter(is_on).map(|gain| {
+        let value = format!(
+            "{} {} {}",
+            gain.name,
+            significant(gain.value.abs()),
+            gain.unit
+        );
+        value.trim_end().to_owned()
+    });
+    let is_direct = gains.first().is_some_and(|gain| gain.value < 0.0);
+    let action = if is_direct { "direct" } else { "reverse" };
+    format!(
+        "{}; {action} action; measurement span {}, output span {}; without filter and set-point weight",
+        shown.collect::<Vec<_>>().join(", "),
+        significant(spans.measurement),
+        significant(spans.output)
+    )
 }
 
 /// The ideal and the series form of a controller with an integral term.

@@ -82,6 +82,9 @@ pub(crate) fn identification(
             let _ = writeln!(text, "\n{}", painted(REFUSAL, "No process identified"));
             wrapped(&mut text, "  ", &sentence(&verdict.to_string()));
             wrapped(&mut text, "  ", &advice(verdict));
+            if let Some(stops) = recording::input_stops(recording) {
+                wrapped(&mut text, "  ", &stops);
+            }
         }
     }
     for (heading, sentences) in grouped(found) {
@@ -256,8 +259,12 @@ fn describe_controller(
     let law = design.controller.form().law();
     let style = words::controllers::style(choice.asked.style);
     text.push_str(&headed(&format!("\nController  {style}: {law}\n")));
-    for (name, value) in controllers::forms(&design.controller, units) {
-        wrapped(text, &format!("  {name:<12}"), &value);
+    let plant = controllers::in_plant(choice, &design.controller);
+    for (name, value) in controllers::forms(&design.controller, units)
+        .into_iter()
+        .chain(plant)
+    {
+        wrapped(text, &format!("  {name:<11} "), &value);
     }
     let margins = controllers::margins(choice, design, phase_margin_rad);
     wrapped(text, "  margins     ", &margins);

@@ -1,6 +1,7 @@
 //! Controllers of a process to choose from, with the figures of each.
 
 use onecycle::{Assessment, Controller, Design, LeastMargins, Proposal, Specification};
+use onecycle_design::{Spans, Vendor};
 
 /// Controllers of a process, one for each style, and the gains in force.
 pub(crate) struct Controllers {
@@ -13,6 +14,8 @@ pub(crate) struct Controllers {
     pub(crate) trade_off: Vec<(f64, Assessment)>,
     /// Whether the model comes from a recording, whose noise and sample period complete the requirements.
     pub(crate) is_recorded: bool,
+    /// The controller of a process control system in which the gains are typed, and its ranges.
+    pub(crate) plant: Option<(Vendor, Spans)>,
 }
 
 /// A proposal and its figures.

@@ -2,9 +2,21 @@
 //! the verdict on the gains that the user flies now.
 
 use onecycle::{DesignError, Robustness, Specification, Style};
+use onecycle_design::VendorError;
 
 use crate::report::number::{frequency, seconds, significant};
 use crate::results::controllers::{Against, Controllers};
+
+/// Why the controller of a process control system cannot take the gains, and what to do.
+pub(crate) fn no_gains(error: VendorError) -> &'static str {
+    match error {
+        VendorError::ComplexZeros => {
+            "its form is in series and needs Ti of at least 4 Td; use --controller pi, or a controller in ideal form"
+        }
+        VendorError::NoProportional => "its form needs a proportional gain",
+        _ => "check --output-range and --input-range",
+    }
+}
 
 /// Why there is no controller, as the cell of a table.
 pub(crate) fn brief(error: &DesignError) -> String {

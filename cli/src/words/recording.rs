@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use onecycle_link::{ChosenBy, Note, ReadError, RecordingError, Role, TimeUnit};
+use onecycle_link::{ChosenBy, Note, ReadError, Recording, RecordingError, Role, TimeUnit};
 
 /// What is wrong with a file, where, and what to do.
 pub(crate) fn refusal(error: &ReadError) -> String {
@@ -27,10 +27,32 @@ pub(crate) fn note(note: &Note) -> String {
             ..
         } => Some("if that is wrong, give --time, --input and --output"),
         Note::LogSignals { .. } => Some("choose others with --axis, --loop and --flight"),
+        Note::TagsChosen { .. } => Some("if that is wrong, give --tag, or --input and --output"),
+        Note::Compressed { .. } | Note::Interpolated { .. } => {
+            Some("switch the compression of this tag off and record again")
+        }
         Note::TimeUnitGuessed { .. } => Some("if that is wrong, give --time-unit"),
         _ => None,
     };
     advised(note.to_string(), advice)
+}
+
+/// Share of a recording after the last change of the input from which the test has stopped early.
+const STOPPED: f64 = 0.75;
+
+/// That the input stops to change long before the end of the recording, and what to do. `None` if it does not.
+pub(crate) fn input_stops(recording: &Recording) -> Option<String> {
+    let (times_s, input) = (recording.time_s(), recording.input());
+    let last = (1..input.len()).rev().find(|&i| input[i] != input[i - 1])?;
+    let (start_s, end_s) = (*times_s.first()?, *times_s.last()?);
+    let is_stopped = end_s - times_s[last] > STOPPED * (end_s - start_s);
+    is_stopped.then(|| {
+        format!(
+            "The input changes for the last time at {:.1} s and the recording ends at {end_s:.1} s: after that it shows \
+             disturbances only, as when a test fails. Repeat the test and let the input switch until the end.",
+            times_s[last]
+        )
+    })
 }
 
 fn advised(fact: String, advice: Option<impl AsRef<str>>) -> String {
@@ -71,10 +93,17 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
         E::RaggedRow { .. } => {
             "correct the line, or separate the columns by semicolons if they hold decimal commas"
         }
-        E::NotANumber { .. } => {
-            "correct it or leave it empty (thousands separators are not supported)"
+        E::NotANumber { .. } => "correct it or leave it empty",
+        E::MixedDecimals { .. } => "export it with one of them and without separators of thousands",
+        E::SeveralLoops { .. } => "choose one with --tag",
+        E::NoSuchLoop { .. } => {
+            "choose another with --tag, or the columns with --input and --output"
         }
-        E::MixedDecimals { .. } => "use one of them (thousands separators are not supported)",
+        E::UnknownTag { role, .. } => match role {
+            Role::Input => "choose it with --input",
+            _ => "choose it with --output",
+        },
+        E::TooManyValues { .. } => "export one loop, or less time",
         E::ClockTime { .. } => {
             "export seconds from the start, or date and time of day in one column, or give the sample \
              rate with --sample-rate"
@@ -103,6 +132,7 @@ fn advice_on_samples(error: &RecordingError) -> Option<&'static str> {
             "choose another column with --time, or give the sample rate with --sample-rate"
         }
         E::TooManyMissing { .. } => "choose another column or cut the recording",
+        E::TooManyBad { .. } => "export raw samples of a time when the sensor worked",
         E::TooManyDuplicates { .. } => {
             "the time column is too coarse: give the sample rate with --sample-rate"
         }
@@ -180,12 +210,12 @@ mod tests {
         assert_refused(
             &table_with(40, "4,abc,1"),
             "line 42, \"pv\" (column 2): \"abc\" is not a number; \
-             correct it or leave it empty (thousands separators are not supported)",
+             correct it or leave it empty",
         );
         assert_refused(
             &table_with(40, "4,\"1,234\",1"),
             "line 42, \"pv\" (column 2): \"1,234\" and earlier cells mix decimal commas and decimal \
-             points; use one of them (thousands separators are not supported)",
+             points; export it with one of them and without separators of thousands",
         );
         assert_refused(
             &table_with(40, "4,1e305,1"),
@@ -196,6 +226,22 @@ mod tests {
             "2 of 100 rows have no number in the output (pv), the first at line 42; \
              at most 1 % may be missing; choose another column or cut the recording",
         );
+    }
+
+    #[test]
+    fn a_test_that_stops_early() {
+        let stops = |last: usize| {
+            let time_s: Vec<f64> = (0..100_u32).map(f64::from).collect();
+            let input: Vec<f64> = (0..100).map(|i| f64::from(u8::from(i < last))).collect();
+            let output: Vec<f64> = time_s.iter().map(|t| t.sin()).collect();
+            input_stops(&Recording::from_samples(&time_s, &input, &output).unwrap())
+        };
+        let found = stops(20).unwrap();
+        assert!(
+            found.starts_with("The input changes for the last time at 20.0 s"),
+            "{found}"
+        );
+        assert_eq!((stops(60), stops(100)), (None, None));
     }
 
     #[test]

@@ -293,6 +293,9 @@ fn of_result(remark: &Remark) -> Option<String> {
                  K/T_body, which is known."
             )
         }
+        Remark::WeakDelay { low_s, high_s } if high_s >= 1.0 => {
+            format!("The delay is only known to lie between {low_s:.2} and {high_s:.2} s.")
+        }
         Remark::WeakDelay { low_s, high_s } => format!(
             "The delay is only known to lie between {:.2} and {:.2} ms.",
             1e3 * low_s,

@@ -140,7 +140,8 @@ fn of_relay(verdict: &Verdict) -> &'static str {
         }
         Verdict::NotThisProcess { .. } => {
             "Look for a resonance, friction, wind, or another loop at work: the process is not an integrator with two \
-             lags and a delay."
+             lags and a delay. For a self-regulating process (flow, temperature) give --structure foptd or --structure \
+             soptd."
         }
         Verdict::Unknown { .. } => {
             "Leave out --method classify, choose a pack of this family with --pack, or look for a resonance, friction, \

@@ -96,7 +96,7 @@ pub(super) fn parse(cell: &[u8]) -> Option<(Stamp, number::Mark)> {
     }
     match number::parse(cell) {
         Cell::Number(stamp, mark) => Some((Stamp::Real(stamp), mark)),
-        Cell::Missing => Some((Stamp::Real(f64::NAN), number::Mark::None)),
+        Cell::Missing | Cell::Bad => Some((Stamp::Real(f64::NAN), number::Mark::None)),
         Cell::Text => date::parse(cell).map(|date| (Stamp::Date(date), number::Mark::None)),
     }
 }

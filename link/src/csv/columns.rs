@@ -2,6 +2,7 @@
 //!
 //! 1. As the options say.
 //! 2. By name: `t`, `time`, ...; `u`, `input`, `relay`, ...; `y`, `pv`, `output`, ...
+//!    With tags such as `LIC101.PV` and `LIC101.OP`, those of the only loop, or of the loop that the options name.
 //! 3. Else, time is the column of dates; without a header, it is the first column.
 //! 4. If one signal and one column are left, they belong together.
 //! 5. If input, output and two columns are left, the input is the column with 2 to 8 different
@@ -10,9 +11,11 @@
 use std::collections::HashSet;
 
 use super::error::{ReadError, quoted};
+use super::long::Loop;
 use super::names::{Name, key};
 use super::options::{ColumnRef, CsvOptions};
 use super::preview::Preview;
+use super::tags::{self, Signal};
 use crate::recording::{ChosenBy, ColumnLabel, Note, Role};
 
 /// Maximum number of different values of a relay: two levels, and some for start, end and bias.
@@ -22,12 +25,17 @@ const MOST_LEVELS: usize = 8;
 const MORE_VALUES: usize = 3;
 
 /// The columns to read, from 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Choice {
     /// `None` if the sample rate is given.
     pub(super) time: Option<usize>,
     pub(super) input: usize,
     pub(super) output: usize,
+    pub(super) set_point: Option<usize>,
+    /// Time of day, if the time column has dates only.
+    pub(super) time_of_day: Option<usize>,
+    /// Status of the samples of the chosen columns.
+    pub(super) status: Vec<usize>,
     /// A time column that is not read because the sample rate is given.
     pub(super) ignored: Option<usize>,
     by: ChosenBy,
@@ -48,28 +56,33 @@ impl Choice {
 pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, ReadError> {
     let timed = options.sample_rate_hz.is_none();
     let by_option = |wanted: &Option<ColumnRef>, role| {
-        wanted
-            .as_ref()
-            .map(|wanted| find(wanted, role, preview))
-            .transpose()
+        let found = wanted.as_ref().map(|wanted| find(wanted, role, preview));
+        found.transpose()
     };
-    let mut time = if timed {
-        by_option(&options.time_column, Role::Time)?
-    } else {
-        None
+    let mut time = match timed {
+        true => by_option(&options.time_column, Role::Time)?,
+        false => None,
     };
     let mut input = by_option(&options.input_column, Role::Input)?;
     let mut output = by_option(&options.output_column, Role::Output)?;
+    let split = preview.split.filter(|_| timed && time.is_none());
+    let (date, time_of_day) = split.unzip();
+    time = time.or(date);
     check_distinct(time, input, output, preview)?;
     let all_given = input.is_some() && output.is_some() && (time.is_some() || !timed);
 
-    let given = [time, input, output];
-    let by_name = |role| named(preview, role, &given);
-    if input.is_none() {
-        input = single(by_name(Role::Input), Role::Input, preview)?;
-    }
-    if output.is_none() {
-        output = single(by_name(Role::Output), Role::Output, preview)?;
+    let names = preview.names.as_deref().unwrap_or_default();
+    let found = Loop::choose(names, [input, output], options)?;
+    let of_loop = |signal| found.as_ref().and_then(|found| found.of(signal));
+    input = input.or_else(|| of_loop(Signal::Input));
+    output = output.or_else(|| of_loop(Signal::Output));
+
+    let given = [time, input, output, time_of_day];
+    let by_name = |role| named(preview, role, &given, found.is_none());
+    for (column, role) in [(&mut input, Role::Input), (&mut output, Role::Output)] {
+        if column.is_none() {
+            *column = single(by_name(role), role, preview)?;
+        }
     }
     let unnamed = unnamed_time(preview, input, output);
     let mut ignored = None;
@@ -82,10 +95,8 @@ pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, 
         check_clock_time(preview, time)?;
     }
 
-    let taken = [time, input, output, ignored];
-    let left: Vec<usize> = (0..preview.width)
-        .filter(|&column| !taken.contains(&Some(column)))
-        .collect();
+    let taken = [time, input, output, ignored, time_of_day];
+    let left = free(preview, &taken);
     let mut by_values = false;
     match (timed && time.is_none(), input, output, left.as_slice()) {
         (true, Some(_), Some(_), &[only]) => time = Some(only),
@@ -98,24 +109,113 @@ pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, 
         }
         _ => {}
     }
-    let unknown = |role| ReadError::UnknownColumn {
-        role,
-        columns: all_labels(preview),
-    };
+    let unknown = |role| unknown(role, preview);
     if timed && (time.is_none() || (preview.width == 2 && preview.names.is_none())) {
         return Err(unknown(Role::Time));
     }
+    let set_point = by_option(&options.set_point_column, Role::Output)?
+        .or_else(|| of_loop(Signal::SetPoint))
+        .or_else(|| only_set_point(names));
     Ok(Choice {
         time,
         input: input.ok_or_else(|| unknown(Role::Input))?,
         output: output.ok_or_else(|| unknown(Role::Output))?,
+        set_point: set_point.filter(|column| !taken.contains(&Some(*column))),
+        time_of_day,
+        status: status_of(names, &[time, input, output]),
         ignored,
-        by: match preview.names {
-            _ if all_given => ChosenBy::Caller,
-            _ if by_values => ChosenBy::Values,
-            Some(_) => ChosenBy::Name,
-            None => ChosenBy::Position,
-        },
+        by: chosen_by(preview, all_given, by_values),
+    })
+}
+
+fn chosen_by(preview: &Preview, all_given: bool, by_values: bool) -> ChosenBy {
+    match preview.names {
+        _ if all_given => ChosenBy::Caller,
+        _ if by_values => ChosenBy::Values,
+        Some(_) => ChosenBy::Name,
+        None => ChosenBy::Position,
+    }
+}
+
+/// The columns that can be a signal: neither taken, nor a set-point, nor a status.
+fn free(preview: &Preview, taken: &[Option<usize>]) -> Vec<usize> {
+    let is_other = |column: &usize| {
+        let name = preview.names.as_ref().and_then(|names| names.get(*column));
+        name.is_some_and(|name| {
+            name.signal() == Some(Signal::SetPoint) || tags::status_of(&name.full).is_some()
+        })
+    };
+    (0..preview.width)
+        .filter(|column| !taken.contains(&Some(*column)) && !is_other(column))
+        .collect()
+}
+
+/// The only set-point that is not one of a loop.
+fn only_set_point(names: &[Name]) -> Option<usize> {
+    let is_one = |name: &Name| name.signal() == Some(Signal::SetPoint) && name.tag().is_none();
+    let mut all = (0..names.len()).filter(|&column| is_one(&names[column]));
+    all.next().filter(|_| all.next().is_none())
+}
+
+/// The columns with the status of the chosen ones: of the same name, or the next to the right.
+fn status_of(names: &[Name], chosen: &[Option<usize>]) -> Vec<usize> {
+    let is_status = |column: &usize| tags::status_of(&names[*column].full).is_some();
+    let of = |column: usize| match tags::status_of(&names[column].full)? {
+        Some(stem) => names
+            .iter()
+            .position(|name| key(&name.full) == key(stem) || key(&name.bare) == key(stem)),
+        None => (0..column).rev().find(|column| !is_status(column)),
+    };
+    (0..names.len())
+        .filter(|&column| of(column).is_some_and(|of| chosen.contains(&Some(of))))
+        .filter(|column| !chosen.contains(&Some(*column)))
+        .collect()
+}
+
+/// The columns of a table of one value a row: time, value, and the status.
+pub(super) fn choose_long(preview: &Preview, tags: usize) -> Result<Choice, ReadError> {
+    let names = preview.names.as_deref().unwrap_or_default();
+    let is_status = |column: usize| {
+        names
+            .get(column)
+            .is_some_and(|name| tags::status_of(&name.full).is_some())
+    };
+    let (time, time_of_day) = match preview.split {
+        Some((date, of_day)) => (Some(date), Some(of_day)),
+        None => {
+            let named = named(preview, Role::Time, &[Some(tags)], false)
+                .first()
+                .copied();
+            (
+                named.or_else(|| unnamed_time(preview, Some(tags), None)),
+                None,
+            )
+        }
+    };
+    check_clock_time(preview, time)?;
+    let free = |column: &usize| {
+        ![time, time_of_day, Some(tags)].contains(&Some(*column)) && !is_status(*column)
+    };
+    let by_name = (0..preview.width).filter(free).find(|&column| {
+        names
+            .get(column)
+            .is_some_and(|name| name.role() == Some(Role::Output))
+    });
+    let has_numbers = |column: &usize| preview.column(*column).any(f64::is_finite);
+    let value = by_name.or_else(|| (0..preview.width).filter(free).find(has_numbers));
+    let unknown = |role| unknown(role, preview);
+    let value = value.ok_or_else(|| unknown(Role::Output))?;
+    Ok(Choice {
+        time: Some(time.ok_or_else(|| unknown(Role::Time))?),
+        input: value,
+        output: value,
+        set_point: None,
+        time_of_day,
+        status: (0..preview.width)
+            .filter(|&column| is_status(column))
+            .collect(),
+        ignored: None,
+        by: ChosenBy::Name,
     })
 }
 
@@ -195,12 +295,24 @@ fn check_distinct(
     Ok(())
 }
 
-/// Columns whose name stands for this signal and that are not chosen for another.
-fn named(preview: &Preview, role: Role, given: &[Option<usize>]) -> Vec<usize> {
+/// Columns whose name stands for this signal and that are not chosen for another; of tags of any loop if no loop is chosen.
+fn named(preview: &Preview, role: Role, given: &[Option<usize>], of_any_loop: bool) -> Vec<usize> {
     let names = preview.names.as_deref().unwrap_or_default();
-    (0..names.len())
-        .filter(|&column| names[column].role() == Some(role) && !given.contains(&Some(column)))
-        .collect()
+    let signal = match role {
+        Role::Input => Some(Signal::Input),
+        Role::Output => Some(Signal::Output),
+        _ => None,
+    };
+    let all = |is: &dyn Fn(&Name) -> bool| -> Vec<usize> {
+        (0..names.len())
+            .filter(|&column| is(&names[column]) && !given.contains(&Some(column)))
+            .collect()
+    };
+    let usual = all(&|name| name.role() == Some(role));
+    match (usual.is_empty(), signal) {
+        (true, Some(signal)) if of_any_loop => all(&|name| name.signal() == Some(signal)),
+        _ => usual,
+    }
 }
 
 /// The only candidate, or `None` without candidates.
@@ -252,6 +364,11 @@ fn tell_apart(preview: &Preview, a: usize, b: usize) -> Result<(usize, usize), R
             columns: [preview.label(a), preview.label(b)],
         })
     }
+}
+
+fn unknown(role: Role, preview: &Preview) -> ReadError {
+    let columns = all_labels(preview);
+    ReadError::UnknownColumn { role, columns }
 }
 
 fn all_labels(preview: &Preview) -> Vec<ColumnLabel> {

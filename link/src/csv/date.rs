@@ -3,7 +3,8 @@
 //! ```text
 //! 2024-01-31T12:00:01.5+01:00   2024/01/31 12:00:01     year first, as ISO 8601 writes it
 //! 31.01.2024 12:00:01,5                                 with points the day is first
-//! 31/01/2024 12:00   1/31/2024 12:00:01 PM              a number above 12 is the day
+//! 31/01/2024 12:00   1/31/24 12:00:01 PM                a number above 12 is the day
+//! 31-Jan-24 12:00:01.5                                  as the PI system writes it
 //! ```
 //!
 //! While all dates are the same, the order of day and month does not matter. It is settled by a number above 12, or by
@@ -31,6 +32,8 @@ pub(super) struct Date {
     numbers: [u16; 3],
     /// Between these numbers: `-`, `/` or `.`.
     mark: u8,
+    /// Whether the month is a name; the day is first then.
+    has_month: bool,
     /// Time of day, less the distance of the time zone from UTC (ns).
     of_day_ns: i64,
 }
@@ -54,6 +57,7 @@ impl Date {
     /// The order, if this date alone shows it.
     fn order(&self) -> Option<Order> {
         match (self.numbers, self.mark) {
+            _ if self.has_month => Some(Order::DayMonthYear),
             ([year, ..], _) if year > 99 => Some(Order::YearMonthDay),
             (_, b'.') => Some(Order::DayMonthYear),
             ([first, ..], _) if first > 12 => Some(Order::DayMonthYear),
@@ -149,9 +153,16 @@ pub(super) fn parse(cell: &[u8]) -> Option<Date> {
     let (date, of_day) = text.split_once(['T', 't', ' ', '_'])?;
     let mark = date.bytes().find(|byte| !byte.is_ascii_digit())?;
     let mut parts = date.split(char::from(mark));
-    let mut numbers = [0; 3];
-    for number in &mut numbers {
-        *number = digits(parts.next()?, 4)?;
+    let texts = [parts.next()?, parts.next()?, parts.next()?];
+    let month = month(texts[1]);
+    let number = |at: usize| match month {
+        Some(month) if at == 1 => Some(month),
+        _ => digits(texts[at], 4),
+    };
+    let mut numbers = [number(0)?, number(1)?, number(2)?];
+    // A year of two digits; with `-` it could be the first number.
+    if texts[2].len() == 2 && texts[0].len() < 3 && (mark != b'-' || month.is_some()) {
+        numbers[2] += 2000;
     }
     // One of the ends is the year, with four digits.
     let is_date = matches!(mark, b'-' | b'/' | b'.')
@@ -160,6 +171,7 @@ pub(super) fn parse(cell: &[u8]) -> Option<Date> {
     let date = Date {
         numbers,
         mark,
+        has_month: month.is_some(),
         of_day_ns: of_day_ns(of_day.trim())?,
     };
     let orders = match date.order() {
@@ -168,6 +180,28 @@ pub(super) fn parse(cell: &[u8]) -> Option<Date> {
     };
     let exists = orders.into_iter().any(|order| date.days(order).is_some());
     (is_date && exists).then_some(date)
+}
+
+/// A date and a time of day of two cells, as one.
+pub(super) fn joined(date: &[u8], of_day: &[u8]) -> Vec<u8> {
+    [number::bare(date), b" ", number::bare(of_day)].concat()
+}
+
+/// Number of the month of this name, in English or German.
+fn month(name: &str) -> Option<u16> {
+    const NAMES: [&str; 12] = [
+        "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec",
+    ];
+    let name = name.get(..3)?.to_ascii_lowercase();
+    let name = match name.as_str() {
+        "mai" => "may",
+        "okt" => "oct",
+        "dez" => "dec",
+        "mrz" => "mar",
+        name => name,
+    };
+    let at = NAMES.iter().position(|known| *known == name)?;
+    u16::try_from(at + 1).ok()
 }
 
 /// `12:00`, `12:00:01,5`, `1:00 PM`, `12:00:01.5+01:00`, `12:00Z`: time of day less the zone (ns).
@@ -288,6 +322,10 @@ mod tests {
             "31/01/2024 13:00:01.5",
             "1/31/2024 1:00:01.5 PM",
             "31-01-2024 13:00:01.5 UTC",
+            "31-Jan-2024 13:00:01.5",
+            "31-Jan-24 13:00:01.5",
+            "31.01.24 13:00:01,5",
+            "1/31/24 1:00:01.5 PM",
         ] {
             let date = date(text);
             let days = date.days(date.order().unwrap()).unwrap();
@@ -336,7 +374,8 @@ mod tests {
         for text in [
             "12:00:01",
             "2024-01-31",
-            "31.01.24 12:00",
+            "24-01-31 12:00",
+            "31-Foo-24 12:00",
             "2023-02-29 12:00",
             "2024-13-01 12:00",
             "2024-01-31 25:00",

@@ -1,10 +1,11 @@
 //! Detects the separator of the columns.
 //!
 //! The first lines are split by each separator in turn. The separator with the largest fraction of
-//! numbers among its cells wins; of equals, the first of tab, semicolon, bar, comma, blanks.
+//! numbers and dates among its cells wins; of equals, the first of tab, semicolon, bar, comma, blanks.
 
 use std::io::Read;
 
+use super::date;
 use super::error::ReadError;
 use super::number::{self, Cell};
 use super::records::Records;
@@ -37,7 +38,7 @@ pub(super) fn detect(head: &[u8], whole: bool) -> Result<Separator, ReadError> {
 /// How well a separator splits the first lines.
 #[derive(Debug, Clone, Copy, Default)]
 struct Score {
-    /// Number of cells that are numbers, in rows of at least two cells.
+    /// Number of cells that are numbers or dates, in rows of at least two cells.
     numbers: usize,
     /// Number of cells.
     cells: usize,
@@ -53,7 +54,11 @@ impl Score {
             let Some(row) = records.next()? else { break };
             score.cells += row.cells.len();
             if row.cells.len() > 1 {
-                let is_number = |cell: &&[u8]| matches!(number::parse(cell), Cell::Number(..));
+                let is_number = |cell: &&[u8]| match number::parse(cell) {
+                    Cell::Number(..) => true,
+                    Cell::Text => date::parse(cell).is_some(),
+                    Cell::Missing | Cell::Bad => false,
+                };
                 score.numbers += row.cells.iter().filter(is_number).count();
                 score.rows += 1;
             }

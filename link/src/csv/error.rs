@@ -175,6 +175,34 @@ pub enum ReadError {
         /// The columns.
         candidates: Vec<ColumnLabel>,
     },
+    /// The file holds several control loops.
+    #[error("the file holds several control loops: {}", names(.loops))]
+    SeveralLoops {
+        /// Their names.
+        loops: Vec<String>,
+    },
+    /// The control loop that the caller named is not in the file.
+    #[error("there is no control loop {wanted}; {}", loops_found(.loops))]
+    NoSuchLoop {
+        /// The name that the caller gave.
+        wanted: String,
+        /// The loops of the file.
+        loops: Vec<String>,
+    },
+    /// No tag of a table of one value a row is recognised as this signal.
+    #[error("no tag is known to be the {role}; the tags are {}", names(.tags))]
+    UnknownTag {
+        /// Which signal.
+        role: Role,
+        /// The tags of the file.
+        tags: Vec<String>,
+    },
+    /// A table of one value a row has too many values to keep.
+    #[error("the file has more than {limit} values of tags")]
+    TooManyValues {
+        /// Most values that are kept.
+        limit: usize,
+    },
     /// Input and output cannot be told apart by their values.
     #[error(
         "the values of {} and {} do not show which is the input and which the output",
@@ -215,6 +243,23 @@ fn listed(columns: &[ColumnLabel]) -> String {
         list += &format!(" and {} more", columns.len() - MOST_LISTED);
     }
     list
+}
+
+fn names(all: &[String]) -> String {
+    let mut list = all[..all.len().min(MOST_LISTED)].join(", ");
+    if all.len() > MOST_LISTED {
+        list += &format!(" and {} more", all.len() - MOST_LISTED);
+    }
+    list
+}
+
+fn loops_found(loops: &[String]) -> String {
+    match loops {
+        [] => {
+            "no two columns have the names of one loop, such as LIC101.PV and LIC101.OP".to_owned()
+        }
+        loops => format!("the loops are {}", names(loops)),
+    }
 }
 
 /// What a step of time stamps may be in each unit: `a step of 1 is 1 ms or 1 s`.

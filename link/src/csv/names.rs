@@ -1,5 +1,6 @@
 //! Column names: their units and the signals they stand for.
 
+use super::tags::{self, Signal, Tag};
 use crate::recording::{Column, Role};
 use crate::time_unit::TimeUnit;
 
@@ -96,12 +97,84 @@ const OUTPUT: [&str; 25] = [
 ];
 
 /// Units other than those of time: at the end of a name after `_`, or in a row of units.
-const UNITS: [&str; 58] = [
-    "rad", "deg", "rad/s", "deg/s", "rad_s", "deg_s", "rads", "degs", "rpm", "m", "mm", "cm", "km",
-    "m/s", "m_s", "m/s2", "m/s^2", "n", "nm", "n.m", "n*m", "kn", "v", "mv", "a", "ma", "w", "kw",
-    "k", "c", "degc", "\u{b0}c", "\u{b0}", "f", "degf", "pa", "kpa", "mpa", "bar", "mbar", "psi",
-    "kg", "g", "l", "l/min", "l/s", "m3/h", "hz", "khz", "%", "pct", "percent", "-", "1", "norm",
-    "counts", "raw", "none",
+const UNITS: [&str; 77] = [
+    "rad",
+    "deg",
+    "rad/s",
+    "deg/s",
+    "rad_s",
+    "deg_s",
+    "rads",
+    "degs",
+    "rpm",
+    "m",
+    "mm",
+    "cm",
+    "km",
+    "m/s",
+    "m_s",
+    "m/s2",
+    "m/s^2",
+    "n",
+    "nm",
+    "n.m",
+    "n*m",
+    "kn",
+    "v",
+    "mv",
+    "a",
+    "ma",
+    "w",
+    "kw",
+    "k",
+    "c",
+    "degc",
+    "\u{b0}c",
+    "\u{b0}",
+    "f",
+    "degf",
+    "pa",
+    "kpa",
+    "mpa",
+    "bar",
+    "mbar",
+    "psi",
+    "kg",
+    "g",
+    "l",
+    "l/min",
+    "l/s",
+    "l/h",
+    "m3/h",
+    "m\u{b3}/h",
+    "m3/s",
+    "kg/h",
+    "kg/s",
+    "t/h",
+    "nm3/h",
+    "gpm",
+    "scfm",
+    "mmh2o",
+    "inh2o",
+    "barg",
+    "bara",
+    "psig",
+    "deg c",
+    "deg f",
+    "\u{b0}f",
+    "\u{fffd}c",
+    "ph",
+    "hz",
+    "khz",
+    "%",
+    "pct",
+    "percent",
+    "-",
+    "1",
+    "norm",
+    "counts",
+    "raw",
+    "none",
 ];
 
 /// A name in a header.
@@ -119,7 +192,10 @@ impl Name {
     /// Splits `pv [rad]`, `time (ms)`, `t / s`, `u_N` or `TimeUS` into name and unit.
     pub(super) fn parse(cell: &str) -> Self {
         let full = cell.trim().trim_matches(['"', '\'']).trim().to_owned();
-        let (bare, unit) = match in_brackets(&full).or_else(|| after_mark(&full)) {
+        // In `LIC101.MV` the last word is no unit.
+        let is_tag = tags::parse(&full).is_some();
+        let marked = || after_mark(&full).filter(|_| !is_tag);
+        let (bare, unit) = match in_brackets(&full).or_else(marked) {
             Some((bare, unit)) => (
                 bare.to_owned(),
                 Some(unit.to_owned()).filter(|u| !u.is_empty()),
@@ -153,6 +229,25 @@ impl Name {
             Some(Role::Output)
         } else {
             None
+        }
+    }
+
+    /// The loop and the signal of a tag such as `LIC101.PV`, unless the name is a usual one of a signal.
+    pub(super) fn tag(&self) -> Option<Tag> {
+        match self.role() {
+            Some(_) => None,
+            None => tags::parse(&self.bare),
+        }
+    }
+
+    /// The signal that the name stands for: as a usual name, or as the end of a tag.
+    pub(super) fn signal(&self) -> Option<Signal> {
+        match self.role() {
+            Some(Role::Input) => Some(Signal::Input),
+            Some(Role::Output) => Some(Signal::Output),
+            Some(_) => None,
+            None if tags::is_set_point(&key(&self.bare)) => Some(Signal::SetPoint),
+            None => self.tag().map(|tag| tag.signal),
         }
     }
 

@@ -11,6 +11,8 @@ pub(super) enum Cell {
     Number(f64, Mark),
     /// An empty cell, a word that logs write for a missing number, or an infinity.
     Missing,
+    /// What historians and control systems write in place of a sample that is no good.
+    Bad,
     /// Anything else.
     Text,
 }
@@ -44,6 +46,47 @@ const MISSING: [&str; 17] = [
     "-infinity",
 ];
 
+/// How the words begin that historians and control systems write for a sample that is no good, in lower case: digital
+/// states of the PI system, status of OPC, errors of Excel. An interpolated sample was not measured.
+const BAD: [&str; 34] = [
+    "bad",
+    "no data",
+    "nodata",
+    "no good data",
+    "no result",
+    "no sample",
+    "no value",
+    "i/o timeout",
+    "io timeout",
+    "timeout",
+    "comm fail",
+    "comm error",
+    "not connect",
+    "disconnect",
+    "scan off",
+    "scan timeout",
+    "scan time-out",
+    "shutdown",
+    "intf shut",
+    "pt created",
+    "configure",
+    "over range",
+    "overrange",
+    "under range",
+    "underrange",
+    "calc failed",
+    "error",
+    "failed",
+    "invalid",
+    "stale",
+    "offline",
+    "unavailable",
+    "interpolated",
+    "[-",
+];
+/// Errors of Excel.
+const ERRORS: [&str; 5] = ["#value!", "#ref!", "#div/0!", "#name?", "#num!"];
+
 /// Longest number accepted, in bytes; no logger writes a longer one.
 const LONGEST: usize = 128;
 
@@ -57,10 +100,11 @@ const POWERS: [f64; 23] = [
 pub(super) fn parse(cell: &[u8]) -> Cell {
     let cell = bare(cell);
     let Some(decimal) = Decimal::scan(cell) else {
-        return if is_missing(cell) {
-            Cell::Missing
-        } else {
-            Cell::Text
+        return match ungrouped(cell, None) {
+            Some(plain) => parse(&plain),
+            None if is_missing(cell) => Cell::Missing,
+            None if is_bad(cell) => Cell::Bad,
+            None => Cell::Text,
         };
     };
     match decimal.fast_value().or_else(|| slow_value(cell)) {
@@ -106,6 +150,74 @@ pub(super) fn bare(cell: &[u8]) -> &[u8] {
         [b'"', inner @ .., b'"'] | [b'\'', inner @ .., b'\''] => inner.trim_ascii(),
         _ => cell,
     }
+}
+
+/// Whether a cell says that a sample is no good.
+pub(super) fn is_bad(cell: &[u8]) -> bool {
+    let cell = bare(cell);
+    let begins = |word: &&str| {
+        let start = cell.get(..word.len());
+        start.is_some_and(|start| start.eq_ignore_ascii_case(word.as_bytes()))
+    };
+    BAD.iter().chain(&ERRORS).any(begins)
+}
+
+/// The separator of thousands of a cell that proves one: by both marks, as in `1,234.5`, by two groups, or by an
+/// apostrophe or a blank.
+pub(super) fn thousands(cell: &[u8]) -> Option<char> {
+    let cell = bare(cell);
+    if cell.len() > LONGEST || Decimal::scan(cell).is_some() {
+        return None;
+    }
+    let text = std::str::from_utf8(cell).ok()?;
+    let (mark, groups) = grouped(text)?;
+    let is_proved = groups > 1 || !matches!(mark, '.' | ',') || text.contains(other(mark));
+    is_proved.then_some(mark)
+}
+
+/// A number without its separators of thousands; `known` is the separator that another cell proved.
+pub(super) fn ungrouped(cell: &[u8], known: Option<char>) -> Option<Vec<u8>> {
+    let mark = thousands(cell).or(known)?;
+    let text = std::str::from_utf8(bare(cell)).ok()?;
+    let (found, _) = grouped(text)?;
+    (found == mark).then(|| text.replace(mark, "").into_bytes())
+}
+
+/// The separator of the groups of three digits before the decimal mark, and how many there are.
+fn grouped(text: &str) -> Option<(char, usize)> {
+    let unsigned = text.trim_start_matches(['+', '-']);
+    let mark = unsigned.chars().find(|c| !c.is_ascii_digit())?;
+    if !matches!(
+        mark,
+        ',' | '.' | '\'' | ' ' | '\u{a0}' | '\u{202f}' | '\u{2019}'
+    ) {
+        return None;
+    }
+    // `.` after `,` and the reverse; after other separators either.
+    let decimals = match mark {
+        ',' => &['.'][..],
+        '.' => &[','],
+        _ => &['.', ','],
+    };
+    let whole = unsigned.split(decimals).next()?;
+    let mut groups = whole.split(mark);
+    let first = groups.next()?;
+    let mut count = 0;
+    for group in groups {
+        if group.len() != 3 || !group.bytes().all(|byte| byte.is_ascii_digit()) {
+            return None;
+        }
+        count += 1;
+    }
+    let is_first = (1..=3).contains(&first.len()) && !first.starts_with('0');
+    let fraction = unsigned.get(whole.len()..)?.get(1..).unwrap_or("");
+    let is_fraction = fraction.bytes().all(|byte| byte.is_ascii_digit());
+    (is_first && is_fraction && count > 0).then_some((mark, count))
+}
+
+/// The decimal mark beside a separator of thousands.
+fn other(mark: char) -> char {
+    if mark == ',' { '.' } else { ',' }
 }
 
 fn is_missing(cell: &[u8]) -> bool {
@@ -230,6 +342,52 @@ mod tests {
     }
 
     #[test]
+    fn thousands_that_a_cell_proves() {
+        for (cell, value) in [
+            ("1,234.5", 1234.5),
+            ("1.234,5", 1234.5),
+            ("-12.345.678", -12_345_678.0),
+            ("1'234.5", 1234.5),
+            ("1\u{a0}234,5", 1234.5),
+            ("12 345", 12_345.0),
+        ] {
+            assert_eq!(number(cell), value, "{cell}");
+        }
+        // One group may be a decimal; another cell can prove that it is none.
+        assert_eq!(number("1,234"), 1.234);
+        assert_eq!(ungrouped(b"1,234", Some(',')), Some(b"1234".to_vec()));
+        for cell in [
+            "1,23.4",
+            "0,123.4",
+            "1,234.5.6",
+            "1234,567.8",
+            "1,2345.6",
+            ",123.4",
+            "1,,234",
+        ] {
+            assert_eq!(parse(cell.as_bytes()), Cell::Text, "{cell}");
+        }
+    }
+
+    #[test]
+    fn samples_that_are_no_good() {
+        for cell in [
+            "Bad",
+            "No Data",
+            "I/O Timeout",
+            "Bad Input",
+            "#DIV/0!",
+            "[-11059] No Good Data",
+            "Interpolated",
+        ] {
+            assert_eq!(parse(cell.as_bytes()), Cell::Bad, "{cell}");
+        }
+        for cell in ["Good", "running", "abc"] {
+            assert_eq!(parse(cell.as_bytes()), Cell::Text, "{cell}");
+        }
+    }
+
+    #[test]
     fn reads_the_usual_forms() {
         assert_eq!(number(" 1.5 "), 1.5);
         assert_eq!(number("+1.5"), 1.5);
@@ -255,7 +413,17 @@ mod tests {
             assert_eq!(parse(missing.as_bytes()), Cell::Missing, "{missing}");
         }
         let texts = [
-            "1,234.5", "1.2.3", "e5", ".", "-", "1e", "0x10", "1 2", "abc", "--1", "1e5.0",
+            "1,234.5.6",
+            "1.2.3",
+            "e5",
+            ".",
+            "-",
+            "1e",
+            "0x10",
+            "1 2",
+            "abc",
+            "--1",
+            "1e5.0",
         ];
         for text in texts {
             assert_eq!(parse(text.as_bytes()), Cell::Text, "{text}");

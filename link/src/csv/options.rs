@@ -28,6 +28,10 @@ pub struct CsvOptions {
     pub input_column: Option<ColumnRef>,
     /// Column of the output.
     pub output_column: Option<ColumnRef>,
+    /// Column of the set-point of the output.
+    pub set_point_column: Option<ColumnRef>,
+    /// Control loop of which the columns are taken: `LIC101` of `LIC101.PV` and `LIC101.OP`.
+    pub control_loop: Option<String>,
     /// Sample rate in hertz; time is then counted by rows, and no time column is read.
     pub sample_rate_hz: Option<f64>,
     /// Unit of the time column; overrules the header.
@@ -42,6 +46,8 @@ impl Default for CsvOptions {
             time_column: None,
             input_column: None,
             output_column: None,
+            set_point_column: None,
+            control_loop: None,
             sample_rate_hz: None,
             time_unit: None,
             max_points: MAX_POINTS,
@@ -68,6 +74,20 @@ impl CsvOptions {
     #[must_use]
     pub fn output_column(mut self, column: impl Into<ColumnRef>) -> Self {
         self.output_column = Some(column.into());
+        self
+    }
+
+    /// Reads the set-point of the output from this column.
+    #[must_use]
+    pub fn set_point_column(mut self, column: impl Into<ColumnRef>) -> Self {
+        self.set_point_column = Some(column.into());
+        self
+    }
+
+    /// Takes the columns of this control loop: `LIC101` of `LIC101.PV` and `LIC101.OP`.
+    #[must_use]
+    pub fn control_loop(mut self, name: &str) -> Self {
+        self.control_loop = Some(name.to_owned());
         self
     }
 

@@ -9,7 +9,7 @@
 //! ```
 
 use super::places::Places;
-use super::rhythm::Rhythm;
+use super::rhythm::{self, Rhythm};
 use super::{Columns, Gap, MAX_POINTS, Note, Position, Recording, RecordingError, Role};
 
 /// Largest number accepted: differences of such numbers and their weighted sums stay finite.
@@ -30,6 +30,9 @@ const MOST_DROPPED: f64 = 0.1;
 
 /// Maximum rounding of a time stamp, as a fraction of the sample period.
 const COARSEST_STAMP: f64 = 0.01;
+
+/// Maximum fraction of rows that the source marks as bad.
+const MOST_BAD: f64 = 0.5;
 
 /// Jitter above which the recording gets a note.
 const NOTED_JITTER: f64 = 0.1;
@@ -65,6 +68,10 @@ pub struct RecordingBuilder {
     rows: u64,
     missing: [Tally; 3],
     duplicates: Tally,
+    bad: Tally,
+    /// What the source says about the first bad sample.
+    fault: String,
+    has_own_stamps: bool,
     dropped: u64,
 }
 
@@ -90,6 +97,9 @@ impl RecordingBuilder {
             rows: 0,
             missing: [Tally::default(); 3],
             duplicates: Tally::default(),
+            bad: Tally::default(),
+            fault: String::new(),
+            has_own_stamps: false,
             dropped: 0,
         }
     }
@@ -179,6 +189,20 @@ impl RecordingBuilder {
         Ok(())
     }
 
+    /// Leaves out a sample that its source marks as bad: it was not measured, so it is a gap and no fault of the file.
+    /// `fault` is what the source says about it.
+    pub fn leave_out(&mut self, at: Position, fault: &str) {
+        if self.bad.first.is_none() {
+            fault.clone_into(&mut self.fault);
+        }
+        self.bad.add(at);
+    }
+
+    /// Says that the output has stamps of its own, which show whether it was stored by exception or compression.
+    pub(crate) fn mark_own_stamps(&mut self) {
+        self.has_own_stamps = true;
+    }
+
     /// Returns the recording.
     ///
     /// # Errors
@@ -236,6 +260,16 @@ impl RecordingBuilder {
                 role,
                 column: self.columns.of(role).name.clone(),
                 first,
+            });
+        }
+        if let Some(first) = self.bad.first
+            && self.bad.count as f64 > MOST_BAD * (rows + self.bad.count) as f64
+        {
+            return Err(RecordingError::TooManyBad {
+                count: self.bad.count,
+                rows: rows + self.bad.count,
+                first,
+                fault: self.fault.clone(),
             });
         }
         let stamps = rows - missing - self.duplicates.count;
@@ -424,6 +458,15 @@ impl RecordingBuilder {
                 self.notes.push(Note::RowsDropped { role, count, first });
             }
         }
+        let Tally { count, first } = self.bad;
+        if let Some(first) = first {
+            let fault = std::mem::take(&mut self.fault);
+            self.notes.push(Note::BadLeftOut {
+                count,
+                first,
+                fault,
+            });
+        }
         let Tally { count, first } = self.duplicates;
         if let Some(first) = first {
             self.notes.push(Note::DuplicatesDropped { count, first });
@@ -448,7 +491,11 @@ impl RecordingBuilder {
                 at_s,
             });
         }
-        if rhythm.jitter() > NOTED_JITTER {
+        if let Some((least_s, most_s)) =
+            rhythm::spread_s(&self.time_s).filter(|_| self.has_own_stamps)
+        {
+            self.notes.push(Note::Compressed { least_s, most_s });
+        } else if rhythm.jitter() > NOTED_JITTER {
             let (jitter, sample_period_s) = (rhythm.jitter(), rhythm.period_s());
             self.notes.push(Note::Jitter {
                 jitter,

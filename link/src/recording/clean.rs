@@ -3,13 +3,20 @@
 use super::corrupt::{self, Fault};
 use super::held::Held;
 use super::places::Places;
+use super::rhythm;
 use super::{Cell, Gap, Note, Recording, Role};
+
+/// Largest distance from the line through both neighbours, as a share of the range: files with six digits.
+const ON_LINE: f64 = 2e-6;
+/// At least this many samples for each change of slope.
+const FEW_KNOTS: usize = 4;
 
 impl Recording {
     /// Replaces or drops corrupt cells and rows without a new output, with a note on each kind.
     pub(super) fn clean(&mut self, places: &Places) {
         self.clean_input(places);
         self.clean_output(places);
+        self.note_straight_lines();
         self.thin();
     }
 
@@ -114,6 +121,37 @@ impl Recording {
         [&mut self.time_s, &mut self.input, &mut self.output]
             .into_iter()
             .chain(set_point)
+    }
+
+    /// Notes an output of straight lines between few samples, irregularly spaced, as a historian draws it.
+    fn note_straight_lines(&mut self) {
+        if self.samples_per_point > 1 {
+            return;
+        }
+        let (time_s, output) = (&self.time_s, &self.output);
+        let (least, most) = output
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(least, most), &y| {
+                (least.min(y), most.max(y))
+            });
+        let is_knot = |i: &usize| {
+            let share = (time_s[*i] - time_s[i - 1]) / (time_s[i + 1] - time_s[i - 1]);
+            let line = output[i - 1] + share * (output[i + 1] - output[i - 1]);
+            (output[*i] - line).abs() > ON_LINE * (most - least)
+        };
+        let moves = |i: &usize| output[*i] != output[i - 1];
+        let knots: Vec<usize> = (1..output.len().saturating_sub(1))
+            .filter(is_knot)
+            .collect();
+        let moving = (1..output.len()).filter(moves).count();
+        let lengths_s: Vec<f64> = knots.iter().map(|knot| time_s[*knot]).collect();
+        let is_irregular = rhythm::spread_s(&lengths_s).is_some();
+        if is_irregular && 2 * moving > output.len() && FEW_KNOTS * knots.len() < output.len() {
+            self.notes.push(Note::Interpolated {
+                knots: knots.len(),
+                samples: output.len(),
+            });
+        }
     }
 
     /// Keeps only the rows with a new output, if no other row tells anything.

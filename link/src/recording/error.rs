@@ -77,6 +77,18 @@ pub enum RecordingError {
         /// First row that lacks a number in this column.
         first: Position,
     },
+    /// More than half of the rows are marked as bad by their source.
+    #[error("{count} of {rows} samples are bad by their status, the first at {first}: \"{fault}\"")]
+    TooManyBad {
+        /// Rows marked as bad.
+        count: u64,
+        /// All rows.
+        rows: u64,
+        /// The first of them.
+        first: Position,
+        /// What the source says about the first.
+        fault: String,
+    },
     /// More than 5 % of the rows repeat the time stamp of the row before.
     #[error(
         "{count} of {rows} rows repeat the time stamp of the row before, the first at {first}; \

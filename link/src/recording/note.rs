@@ -106,6 +106,71 @@ pub enum Note {
         /// The first of them.
         first: Position,
     },
+    /// Samples that their source marks as bad, not measured or interpolated were left out.
+    #[error(
+        "left out {} by their status, the first at {first}: \"{fault}\"",
+        counted(*.count, "sample")
+    )]
+    BadLeftOut {
+        /// Number of samples.
+        count: u64,
+        /// The first of them.
+        first: Position,
+        /// What the source says about the first.
+        fault: String,
+    },
+    /// The set-point was read from a column too.
+    #[error("set-point is {column}")]
+    SetPoint {
+        /// The column.
+        column: ColumnLabel,
+    },
+    /// A table of one value a row, each with its tag, was read as signals with stamps of their own.
+    #[error("one value a row: input is tag \"{input}\", output is tag \"{output}\"{}", set_point_tag(.set_point))]
+    TagsChosen {
+        /// Tag of the input.
+        input: String,
+        /// Tag of the output.
+        output: String,
+        /// Tag of the set-point, if there is one.
+        set_point: Option<String>,
+    },
+    /// Input and output have stamps of their own: the points are at those of the output, and the input of each is the mean
+    /// of the held input until the next.
+    #[error(
+        "input and output are sampled at different times: the rows are the {} of the output, the input is held between \
+         its own {} and averaged over each row",
+        counted(*.outputs, "sample"), counted(*.inputs, "sample")
+    )]
+    Woven {
+        /// Samples of the input.
+        inputs: u64,
+        /// Samples of the output.
+        outputs: u64,
+    },
+    /// The output was stored by exception or compression.
+    #[error(
+        "the output was stored by exception or compression (swinging door): 90 % of its samples are {} to {} s apart; what \
+         the historian left out is lost, and with it fast dynamics and the noise",
+        rounded(*.least_s), rounded(*.most_s)
+    )]
+    Compressed {
+        /// 5 % of the increments of time are shorter (s).
+        least_s: f64,
+        /// 5 % of the increments of time are longer (s).
+        most_s: f64,
+    },
+    /// The output consists of straight lines: it was interpolated from few stored samples.
+    #[error(
+        "the output consists of straight lines through {knots} of its {samples} samples: a historian interpolated \
+         compressed data (swinging door), and fast dynamics and the noise are lost"
+    )]
+    Interpolated {
+        /// Samples at which the slope changes.
+        knots: usize,
+        /// All samples.
+        samples: usize,
+    },
     /// Rows that repeat the time stamp of the row before were dropped.
     #[error("dropped {} that repeated a time stamp, the first at {first}", counted(*.count, "row"))]
     DuplicatesDropped {
@@ -266,6 +331,11 @@ fn replaced(count: u64, role: Role) -> String {
             format!("{values} of the {role} that {verb} at neither of its two levels")
         }
     }
+}
+
+fn set_point_tag(tag: &Option<String>) -> String {
+    tag.as_ref()
+        .map_or_else(String::new, |tag| format!(", set-point is tag \"{tag}\""))
 }
 
 /// `nd` of `2nd`, `th` of `5th`.

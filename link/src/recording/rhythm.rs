@@ -68,6 +68,23 @@ impl Rhythm {
     }
 }
 
+/// Increments of time that differ by more than this factor are those of compressed data.
+const COMPRESSED: f64 = 3.0;
+/// Fewest samples that show it.
+const FEWEST: usize = 20;
+
+/// The 5th and the 95th percentile of the increments of time, if they differ as much as those of compressed data.
+pub(super) fn spread_s(times_s: &[f64]) -> Option<(f64, f64)> {
+    let mut increments_s: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    increments_s.sort_by(f64::total_cmp);
+    let at = |share: f64| increments_s[(share * (increments_s.len() - 1) as f64) as usize];
+    if increments_s.len() < FEWEST {
+        return None;
+    }
+    let (least_s, most_s) = (at(0.05), at(0.95));
+    (most_s > COMPRESSED * least_s).then_some((least_s, most_s))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

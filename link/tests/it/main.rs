@@ -3,5 +3,7 @@
 mod averaging;
 mod dialects;
 mod flight_logs;
+mod fuzz_targets;
 mod hostile;
+mod plant;
 mod refusals;

@@ -5,7 +5,7 @@ use onecycle::{Assessment, Design, Interval};
 use super::significant;
 use crate::pages::page::{self, Cell, Section};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Note, Panel, Series};
-use crate::report::controllers::{TITLES, cells, forms, margins};
+use crate::report::controllers::{TITLES, cells, forms, in_plant, margins};
 use crate::report::units::Units;
 use crate::results::controllers::Controllers;
 use crate::words::controllers::{assumed, brief, change, judgement, price};
@@ -23,6 +23,7 @@ pub(super) fn section(
     let controller = &design.controller;
     let law = controller.form().law().to_owned();
     let mut facts: Vec<(&str, String)> = forms(controller, units);
+    facts.extend(in_plant(choice, controller));
     facts.push(("law", law));
     facts.push(("margins", margins(choice, design, phase_margin_rad)));
     facts.extend(
