@@ -9,9 +9,10 @@ pub use csv::{
     ColumnRef, CsvOptions, CsvWriter, ReadError, SAMPLE_RATES_HZ, read, read_from, write_csv,
 };
 pub use log::{
-    Axis, ControlLoop, Firmware, FirmwareKind, Flight, FlightLog, FlightTables, Gain, LogError,
-    LogFormat, LogParameter, LogTables, LoggedLoop, LoggedSignal, Loss, Mark, MarkKind, Setting,
-    Signals, Span, Term, Topic, Wanted, read_tables,
+    Agreement, Axis, ControlLoop, Firmware, FirmwareKind, Flight, FlightLog, FlightTables, Gain,
+    LogError, LogFormat, LogParameter, LogTables, LoggedLoop, LoggedSignal, Loss, LowPassSetting,
+    Mark, MarkKind, RateLaw, ReadBack, ReadTerm, Setting, Signals, Span, Term, Topic, Wanted,
+    read_tables,
 };
 pub use recording::{
     Cell, ChosenBy, Column, ColumnLabel, Columns, GAP_PERIODS, Gap, MAX_POINTS, Note, Position,
