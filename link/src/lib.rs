@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 
 mod csv;
+mod gains;
 mod log;
 mod recording;
 mod time_unit;
@@ -8,6 +9,7 @@ mod time_unit;
 pub use csv::{
     ColumnRef, CsvOptions, CsvWriter, ReadError, SAMPLE_RATES_HZ, read, read_from, write_csv,
 };
+pub use gains::{Change, GainsError, LoopGains, ParameterFiles, changes, files};
 pub use log::{
     Agreement, Axis, ControlLoop, Firmware, FirmwareKind, Flight, FlightLog, FlightTables, Gain,
     LogError, LogFormat, LogParameter, LogTables, LoggedLoop, LoggedSignal, Loss, LowPassSetting,
