@@ -5,27 +5,32 @@ use std::process::ExitCode;
 
 use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Road, Specification, Structure, Style};
 
+use super::log_gains::{self, LogLoop};
 use super::{controllers, log, pack};
 use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::reading::open_with_bar;
-use crate::report::{json, page, plot, text};
+use crate::report::{json, log_gains as log_report, page, plot, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.report {
         check_page(path, &arguments.file)?;
     }
     check_estimator(arguments)?;
+    log_gains::check(arguments)?;
     let asked = specification(arguments)?;
     let recording = read(arguments)?;
+    let of_log = LogLoop::of(arguments)?;
     check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::usable(&arguments.pack, &bytes)?;
     let found = onecycle::Identify::new()
         .cycles(arguments.cycles as usize)
-        .specification(asked)
+        .specification(of_log.as_ref().map_or(asked, |of_log| {
+            of_log.specification(asked, arguments.design.is_form_given())
+        }))
         .method(arguments.method.into())
         .road(road(arguments))
         .structure(arguments.structure)
@@ -35,8 +40,13 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .input_late_s(arguments.input_late)
         .pack(pack)
         .run(&recording);
-    let mut choice = (found.outcome.as_ref().ok())
-        .map(|identified| controllers::of_identified(identified, arguments.design.against()));
+    let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
+    let against = arguments.design.against().or_else(in_force);
+    let identified = found.outcome.as_ref().ok();
+    let mut choice = identified.map(|identified| controllers::of_identified(identified, against));
+    let gains = of_log
+        .map(|of_log| of_log.report(&arguments.write, identified, choice.as_ref()))
+        .transpose()?;
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
         waiting.goes_on("drawing");
@@ -54,13 +64,23 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         When::Never => false,
     };
     print(&if arguments.json {
-        json::identification(&name, &recording, &found, choice.as_ref(), arguments.rows)
+        let gains = gains.as_ref();
+        json::identification(
+            &name,
+            &recording,
+            &found,
+            choice.as_ref(),
+            gains,
+            arguments.rows,
+        )
     } else {
         let plotted = is_plotted.then(|| plot::end(&recording, &found, columns()));
         text::identification(&name, &recording, &found, choice.as_ref())
+            + &gains.as_ref().map(log_report::text).unwrap_or_default()
             + &plotted.flatten().unwrap_or_default()
     })?;
-    Ok(ExitCode::from(if found.outcome.is_ok() {
+    let is_written = !gains.is_some_and(|gains| matches!(gains.written, Some(Err(_))));
+    Ok(ExitCode::from(if found.outcome.is_ok() && is_written {
         exit::DONE
     } else {
         exit::NO_PROCESS

@@ -8,6 +8,7 @@ use std::process::ExitCode;
 use onecycle::Recording;
 use onecycle_link::{FlightLog, LogError, LogFormat};
 
+use super::log_gains;
 use crate::args::{Log, LogArguments};
 use crate::failure::{Failure, exit};
 use crate::output::print;
@@ -18,10 +19,17 @@ use crate::words::log::refusal;
 pub(crate) fn run(arguments: &Log) -> Result<ExitCode, Failure> {
     let log = scan(&arguments.file)?;
     let name = arguments.file.display().to_string();
-    print(&if arguments.json {
-        report::json(&name, &log)
+    let checks = if arguments.check {
+        let of = |number| log_gains::read_back(&arguments.file, &log, number);
+        let checks: Result<Vec<_>, Failure> = (1..=log.flights.len()).map(of).collect();
+        Some(checks?)
     } else {
-        report::text(&name, &log)
+        None
+    };
+    print(&if arguments.json {
+        report::json(&name, &log, checks.as_deref())
+    } else {
+        report::text(&name, &log, checks.as_deref())
     })?;
     Ok(ExitCode::from(exit::DONE))
 }
@@ -40,25 +48,34 @@ pub(super) fn is_log(path: &Path) -> bool {
 
 /// The recording of a control loop.
 pub(super) fn recording(path: &Path, asked: &LogArguments) -> Result<Recording, Failure> {
+    let (log, flight) = scan_flight(path, asked)?;
+    let signals = log.signals(open(path)?, flight, asked.control_loop());
+    let recording = signals.and_then(|signals| Ok(signals.recording()?));
+    recording.map_err(|error| unreadable(path, &error))
+}
+
+/// What a log holds, and which flight (from 1) is meant.
+pub(super) fn scan_flight(
+    path: &Path,
+    asked: &LogArguments,
+) -> Result<(FlightLog, usize), Failure> {
     let log = scan(path)?;
     let longest = log.flights.iter().enumerate().max_by(|(_, a), (_, b)| {
         let length_s = |flight: &onecycle_link::Flight| flight.span.to_s - flight.span.from_s;
         length_s(a).total_cmp(&length_s(b))
     });
     let flight = asked.flight.unwrap_or(1 + longest.map_or(0, |(at, _)| at));
-    let signals = log.signals(open(path)?, flight, asked.control_loop());
-    let recording = signals.and_then(|signals| Ok(signals.recording()?));
-    recording.map_err(|error| unreadable(path, &error))
+    Ok((log, flight))
 }
 
 fn scan(path: &Path) -> Result<FlightLog, Failure> {
     FlightLog::scan(open(path)?).map_err(|error| unreadable(path, &error))
 }
 
-fn open(path: &Path) -> Result<impl Read, Failure> {
+pub(super) fn open(path: &Path) -> Result<impl Read, Failure> {
     open_with_bar(path).map_err(|error| Failure::unreadable(path, error))
 }
 
-fn unreadable(path: &Path, error: &LogError) -> Failure {
+pub(super) fn unreadable(path: &Path, error: &LogError) -> Failure {
     Failure::unreadable(path, refusal(error))
 }
