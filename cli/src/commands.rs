@@ -12,6 +12,7 @@ pub(crate) mod grid;
 pub(crate) mod identify;
 pub(crate) mod log;
 mod log_gains;
+mod log_overlay;
 pub(crate) mod man;
 pub(crate) mod pack;
 pub(crate) mod phase;

@@ -122,10 +122,14 @@ impl LoopGains {
         self
     }
 
-    /// From these gains a share of the way, 0 to 1, to others.
+    /// From these gains a share of the way, 0 to 1, to others: of a ratio for gains that rise, of a difference for those
+    /// that fall. Each is the smaller of both moves.
     #[must_use]
     pub fn toward(self, other: Self, share: f64) -> Self {
-        let between = |from: f64, to: f64| from + share * (to - from);
+        let between = |from: f64, to: f64| match from > 0.0 && to > from {
+            true => from * (to / from).powf(share),
+            false => from + share * (to - from),
+        };
         Self {
             proportional: between(self.proportional, other.proportional),
             integral: between(self.integral, other.integral),
@@ -323,6 +327,15 @@ mod tests {
             close(new.derivative, asked.derivative);
             assert_eq!(super::changes(&flight, ROLL, old).unwrap(), []);
         }
+    }
+
+    // Half-way up from 1 to 4 is 2, down from 4 to 1 it is 2.5; from zero it is the half. All the way is exact.
+    #[test]
+    fn steps_by_hand() {
+        let [a, b] = [LoopGains::new(1.0, 4.0, 0.0), LoopGains::new(4.0, 1.0, 3.0)];
+        assert_eq!(a.toward(b, 0.5), LoopGains::new(2.0, 2.5, 1.5));
+        assert_eq!(a.toward(b, 1.0), b);
+        assert_eq!(a.toward(a, 0.3), a);
     }
 
     // By hand. Betaflight 4.2: P 77, I 119, D 83 with d_min 55. P = 544.9 Kp: Kp 0.1 is 54.49; Ki 1.4 is 99.99; Kd 0.001 is

@@ -45,7 +45,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let identified = found.outcome.as_ref().ok();
     let mut choice = identified.map(|identified| controllers::of_identified(identified, against));
     let gains = of_log
-        .map(|of_log| of_log.report(&arguments.write, identified, choice.as_ref()))
+        .map(|of_log| of_log.report(&arguments.write, &recording, &found, choice.as_ref()))
         .transpose()?;
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
@@ -54,15 +54,11 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
             .map(|(choice, identified)| choice.with_trade_off(&identified.for_design(0).0));
         write_text(
             path,
-            &page::identification(&name, &recording, &found, choice.as_ref()),
+            &page::identification(&name, &recording, &found, choice.as_ref(), gains.as_ref()),
         )?;
     }
     drop(waiting);
-    let is_plotted = match arguments.plot {
-        When::Auto => is_terminal(),
-        When::Always => true,
-        When::Never => false,
-    };
+    let is_plotted = is_plotted(arguments.plot);
     print(&if arguments.json {
         let gains = gains.as_ref();
         json::identification(
@@ -85,6 +81,14 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     } else {
         exit::NO_PROCESS
     }))
+}
+
+fn is_plotted(when: When) -> bool {
+    match when {
+        When::Auto => is_terminal(),
+        When::Always => true,
+        When::Never => false,
+    }
 }
 
 /// The estimator. A flight log is no relay test, unless the user says so.

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use onecycle::{
-    Controller, Execution, Form, Identified, LowPass, Pid, Specification, Style, assess,
-    least_margins,
+    Controller, Execution, Form, Identification, Identified, LowPass, Pid, Recording,
+    Specification, Style, assess, least_margins,
 };
 use onecycle_link::{
     Agreement, ControlLoop, Flight, FlightLog, LoopGains, LowPassSetting, RateLaw, ReadBack,
@@ -12,6 +12,7 @@ use onecycle_link::{
 };
 
 use super::log;
+use super::log_overlay::overlay;
 use crate::args::{Identify, WriteArguments};
 use crate::failure::Failure;
 use crate::output::{with_ending, write_text};
@@ -94,9 +95,11 @@ impl LogLoop {
     pub(super) fn report(
         self,
         asked: &WriteArguments,
-        identified: Option<&Identified>,
+        recording: &Recording,
+        found: &Identification,
         choice: Option<&Controllers>,
     ) -> Result<LogGains, Failure> {
+        let identified = found.outcome.as_ref().ok();
         let written = match &asked.write {
             None => None,
             Some(path) => Some(match self.judged(asked, identified, choice) {
@@ -104,10 +107,17 @@ impl LogLoop {
                 Ok(to_write) => Ok(self.write(path, to_write)?),
             }),
         };
+        let overlay = match (self.control_loop, self.in_force(), choice) {
+            (ControlLoop::Rate(axis), Some(pid), Some(choice)) => {
+                let as_run = pid.with_execution(choice.asked.execution);
+                overlay(&self.flight, axis, as_run, recording, found)
+            }
+            _ => None,
+        };
         Ok(LogGains {
             control_loop: self.control_loop,
             read_back: self.read_back,
-            overlay: None,
+            overlay,
             written,
         })
     }

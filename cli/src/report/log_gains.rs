@@ -51,13 +51,12 @@ pub(crate) fn text(log: &LogGains) -> String {
 /// One row for each term, and a sentence.
 pub(crate) fn table(read: &ReadBack) -> String {
     let mut text = format!(
-        "  {:22}{:>12}{:>12}{:>12}{:>8}  {}\n",
+        "  {:22}{:>12}{:>12}{:>12}{:>8}\n",
         read.axis.name(),
         "stated",
         "read back",
         "std error",
-        "ratio",
-        ""
+        "ratio"
     );
     for term in &read.terms {
         let [low, high] = term.stated;
@@ -76,7 +75,7 @@ pub(crate) fn table(read: &ReadBack) -> String {
         let line = format!(
             "  {:22}{stated:>12}{value:>12}{std:>12}{ratio:>8}  {}\n",
             term.name,
-            verdict(term.agreement)
+            words::agreement(term.agreement)
         );
         text.push_str(&match term.agreement {
             Agreement::Differs => painted(REFUSAL, &line),
@@ -91,14 +90,6 @@ pub(crate) fn table(read: &ReadBack) -> String {
     };
     wrapped(&mut text, "  ", &painted(style, &sentence));
     text
-}
-
-fn verdict(agreement: Agreement) -> &'static str {
-    match agreement {
-        Agreement::Agrees => "agrees",
-        Agreement::Differs => "differs",
-        _ => "cannot tell",
-    }
 }
 
 /// Read-back in JSON.
@@ -164,7 +155,6 @@ pub(crate) struct LogGainsReport {
     read_back: Option<ReadBackReport>,
     overlay_explained: Option<f64>,
     written: Option<WrittenReport>,
-    #[serde(skip_serializing_if = "Option::is_none")]
     not_written: Option<String>,
 }
 

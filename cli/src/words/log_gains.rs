@@ -1,7 +1,8 @@
 //! Sentences about the gains of a flight log: read-back, overlay, parameters that are written or not.
 
-use onecycle_link::{Agreement, ControlLoop, GainsError, ReadBack};
+use onecycle_link::{Agreement, ControlLoop, GainsError, ReadBack, ReadTerm};
 
+use crate::report::number::short;
 use crate::results::log_gains::Written;
 
 pub(crate) const NOTHING_IDENTIFIED: &str =
@@ -65,6 +66,34 @@ pub(crate) fn read_back(read: &ReadBack) -> String {
     }
 }
 
+/// A term that was read back, as the value of its name.
+pub(crate) fn term(term: &ReadTerm) -> String {
+    let [low, high] = term.stated;
+    let stated = if low == high {
+        short(low)
+    } else {
+        format!("{} to {}", short(low), short(high))
+    };
+    let verdict = agreement(term.agreement);
+    match term.recovered {
+        Some((value, std)) => format!(
+            "stated {stated}, read back {} (standard error {}): {verdict}",
+            short(value),
+            short(std)
+        ),
+        None => format!("stated {stated}: {verdict}"),
+    }
+}
+
+/// The verdict on a term.
+pub(crate) fn agreement(agreement: Agreement) -> &'static str {
+    match agreement {
+        Agreement::Agrees => "agrees",
+        Agreement::Differs => "differs",
+        _ => "cannot tell",
+    }
+}
+
 /// How far the simulated loop explains the log.
 pub(crate) fn overlay(explained: f64) -> String {
     format!(
@@ -88,9 +117,15 @@ pub(crate) fn written(written: &Written) -> Vec<String> {
             100.0 * least.stable
         )
     });
+    let overshoot = written.figures.step.map_or(String::new(), |step| {
+        format!(
+            ", an overshoot of {:.0} % after a step of the set-point",
+            100.0 * step.overshoot
+        )
+    });
     let mut sentences = vec![
         format!(
-            "With these values the loop has a phase margin of {:.1} deg{gain} and Ms {:.2}{least}.",
+            "With these values the loop has a phase margin of {:.1} deg{gain}, Ms {:.2}{overshoot}{least}.",
             margins.phase_margin_rad.to_degrees(),
             written.figures.ms
         ),
@@ -100,6 +135,12 @@ pub(crate) fn written(written: &Written) -> Vec<String> {
             written.restore.display()
         ),
     ];
+    if written.least.is_none() {
+        sentences.push(
+            "The margins are those of the most probable process only: the recording gives no distribution of it."
+                .to_owned(),
+        );
+    }
     if written.share < 1.0 {
         sentences.push(format!(
             "The step is {:.0} % of the way to the proposed gains. Fly and log again before the next one, or use --step 1.",
