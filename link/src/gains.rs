@@ -8,11 +8,7 @@
 //!
 //! Feed-forward is left alone. Ranges: PX4 parameter reference, ArduPilot parameter list, Betaflight CLI.
 
-mod files;
-
 use crate::log::{Axis, ControlLoop, Firmware, FirmwareKind, Flight, Gain, Term};
-
-pub use files::{ParameterFiles, files};
 
 /// Gains of a loop in SI units, as [`Gain::si`] has them.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -288,11 +284,11 @@ fn parameter(flight: &Flight, of: ControlLoop, gain: &Gain) -> (String, [f64; 2]
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::log::FlightLog;
 
-    pub(super) fn flight(name: &str) -> Flight {
+    pub(crate) fn flight(name: &str) -> Flight {
         let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../examples/logs/");
         let bytes = std::fs::read(format!("{folder}{name}")).unwrap();
         FlightLog::scan(&bytes[..]).unwrap().flights.remove(0)
@@ -402,7 +398,7 @@ mod tests {
             changes(&flight, ROLL, gains),
             Err(GainsError::Firmware(_))
         ));
-        assert_eq!(files(&flight, &[]), None);
+        assert_eq!(crate::parameter_files::files(&flight, &[]), None);
     }
 
     #[test]

@@ -6,9 +6,8 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::Recording;
-use onecycle_link::{FlightLog, LogError, LogFormat};
+use onecycle_link::{FlightLog, LogError, LogFormat, ReadBack};
 
-use super::log_gains;
 use crate::args::{Log, LogArguments};
 use crate::failure::{Failure, exit};
 use crate::output::print;
@@ -20,7 +19,7 @@ pub(crate) fn run(arguments: &Log) -> Result<ExitCode, Failure> {
     let log = scan(&arguments.file)?;
     let name = arguments.file.display().to_string();
     let checks = if arguments.check {
-        let of = |number| log_gains::read_back(&arguments.file, &log, number);
+        let of = |number| read_back(&arguments.file, &log, number);
         let checks: Result<Vec<_>, Failure> = (1..=log.flights.len()).map(of).collect();
         Some(checks?)
     } else {
@@ -72,10 +71,20 @@ fn scan(path: &Path) -> Result<FlightLog, Failure> {
     FlightLog::scan(open(path)?).map_err(|error| unreadable(path, &error))
 }
 
-pub(super) fn open(path: &Path) -> Result<impl Read, Failure> {
+fn open(path: &Path) -> Result<impl Read, Failure> {
     open_with_bar(path).map_err(|error| Failure::unreadable(path, error))
 }
 
-pub(super) fn unreadable(path: &Path, error: &LogError) -> Failure {
+fn unreadable(path: &Path, error: &LogError) -> Failure {
     Failure::unreadable(path, refusal(error))
+}
+
+/// The gains of every rate loop of a flight, read back.
+pub(super) fn read_back(
+    path: &Path,
+    log: &FlightLog,
+    flight: usize,
+) -> Result<Vec<ReadBack>, Failure> {
+    log.read_back(open(path)?, flight)
+        .map_err(|error| unreadable(path, &error))
 }

@@ -7,8 +7,7 @@ use onecycle::{
     Specification, Style, assess, least_margins,
 };
 use onecycle_link::{
-    Agreement, ControlLoop, Flight, FlightLog, LoopGains, LowPassSetting, RateLaw, ReadBack,
-    changes, files,
+    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, RateLaw, ReadBack, changes, files,
 };
 
 use super::log;
@@ -48,7 +47,7 @@ impl LogLoop {
         let (log, number) = log::scan_flight(&arguments.file, &arguments.log)?;
         let control_loop = arguments.log.control_loop();
         let read_back = match control_loop {
-            ControlLoop::Rate(axis) => read_back(&arguments.file, &log, number)?
+            ControlLoop::Rate(axis) => log::read_back(&arguments.file, &log, number)?
                 .into_iter()
                 .find(|read| read.axis == axis),
             _ => None,
@@ -235,16 +234,6 @@ fn restore_path(path: &Path, ending: &str) -> PathBuf {
     };
     let ending = own.unwrap_or_else(|| ending.to_owned());
     with_ending(&stem, &format!("restore.{ending}"))
-}
-
-/// The gains of every rate loop of a flight, read back.
-pub(super) fn read_back(
-    path: &Path,
-    log: &FlightLog,
-    flight: usize,
-) -> Result<Vec<ReadBack>, Failure> {
-    log.read_back(log::open(path)?, flight)
-        .map_err(|error| log::unreadable(path, &error))
 }
 
 fn pid(gains: LoopGains) -> Pid {

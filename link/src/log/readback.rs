@@ -12,7 +12,7 @@ use std::io::Read;
 use super::error::LogError;
 use super::flight::{FirmwareKind, Flight, Term};
 use super::loops::{Axis, ControlLoop};
-use super::plan::{Plan, Quantity, Signals};
+use super::plan::{Plan, Signals};
 use super::tables::{FlightTables, Wanted};
 use super::{FlightLog, firmware, read_tables};
 use equations::{Equation, equations};
@@ -297,15 +297,6 @@ fn counts(about: &Flight, signals: &Signals) -> Vec<bool> {
         is_in && is_full
     };
     signals.time_s.iter().enumerate().map(counts).collect()
-}
-
-/// A quantity at the times of the output; NaN becomes 0.
-fn held(quantity: &Quantity, tables: &FlightTables, times_s: &[f64]) -> Option<Vec<f64>> {
-    let column = quantity.held_at(tables, times_s);
-    column.iter().any(Option::is_some).then(|| {
-        let fill = |value: Option<f64>| value.filter(|value| value.is_finite()).unwrap_or(0.0);
-        column.into_iter().map(fill).collect()
-    })
 }
 
 #[cfg(test)]

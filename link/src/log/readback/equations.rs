@@ -7,7 +7,6 @@ use crate::log::plan::{Quantity, Signals};
 use crate::log::tables::FlightTables;
 
 use super::fit::{derivative, filtered, integral};
-use super::held;
 
 /// Terms and their columns.
 type Columns = Vec<(Term, Vec<f64>)>;
@@ -223,4 +222,13 @@ fn betaflight(
         })
     };
     read.filter_map(equation).collect()
+}
+
+/// A quantity at the times of the output; NaN becomes 0.
+fn held(quantity: &Quantity, tables: &FlightTables, times_s: &[f64]) -> Option<Vec<f64>> {
+    let column = quantity.held_at(tables, times_s);
+    column.iter().any(Option::is_some).then(|| {
+        let fill = |value: Option<f64>| value.filter(|value| value.is_finite()).unwrap_or(0.0);
+        column.into_iter().map(fill).collect()
+    })
 }

@@ -10,7 +10,7 @@ use std::fmt::Write;
 
 use crate::log::{FirmwareKind, Flight};
 
-use super::{Change, version_numbers};
+use crate::gains::{Change, version_numbers};
 
 /// Two files: the new values, and the old ones.
 #[derive(Debug, Clone, PartialEq, Eq)]
