@@ -31,7 +31,7 @@ pub(crate) use self::dataset::Dataset;
 pub(crate) use self::design::{DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
 pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Between, Estimator, Identify, Method, When};
-pub(crate) use self::log::{Log, LogArguments};
+pub(crate) use self::log::{Log, LogArguments, WriteArguments};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};

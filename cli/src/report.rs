@@ -12,6 +12,7 @@ pub(crate) mod grid;
 pub(crate) mod identifier;
 pub(crate) mod json;
 pub(crate) mod log;
+pub(crate) mod log_gains;
 pub(crate) mod number;
 pub(crate) mod pack;
 pub(crate) mod page;

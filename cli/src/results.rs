@@ -10,6 +10,7 @@ pub(crate) mod dataset;
 pub(crate) mod fly;
 pub(crate) mod grid;
 pub(crate) mod identifier;
+pub(crate) mod log_gains;
 pub(crate) mod pack;
 pub(crate) mod phase;
 pub(crate) mod reproduction;

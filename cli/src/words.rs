@@ -3,6 +3,7 @@
 mod caution;
 pub(crate) mod controllers;
 pub(crate) mod log;
+pub(crate) mod log_gains;
 pub(crate) mod recording;
 pub(crate) mod remark;
 pub(crate) mod verdict;

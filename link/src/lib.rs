@@ -1,18 +1,23 @@
 #![doc = include_str!("../README.md")]
 
 mod csv;
+mod gains;
 mod log;
+mod parameter_files;
 mod recording;
 mod time_unit;
 
 pub use csv::{
     ColumnRef, CsvOptions, CsvWriter, ReadError, SAMPLE_RATES_HZ, read, read_from, write_csv,
 };
+pub use gains::{Change, GainsError, LoopGains, changes};
 pub use log::{
-    Axis, ControlLoop, Firmware, FirmwareKind, Flight, FlightLog, FlightTables, Gain, LogError,
-    LogFormat, LogParameter, LogTables, LoggedLoop, LoggedSignal, Loss, Mark, MarkKind, Setting,
-    Signals, Span, Term, Topic, Wanted, read_tables,
+    Agreement, Axis, ControlLoop, Firmware, FirmwareKind, Flight, FlightLog, FlightTables, Gain,
+    LogError, LogFormat, LogParameter, LogTables, LoggedLoop, LoggedSignal, Loss, LowPassSetting,
+    Mark, MarkKind, RateLaw, ReadBack, ReadTerm, Setting, Signals, Span, Term, Topic, Wanted,
+    read_tables,
 };
+pub use parameter_files::{ParameterFiles, files};
 pub use recording::{
     Cell, ChosenBy, Column, ColumnLabel, Columns, GAP_PERIODS, Gap, MAX_POINTS, Note, Position,
     Recording, RecordingBuilder, RecordingError, Role,

@@ -4,6 +4,7 @@
 //! bytes -> tables     flights, topics, parameters; only the chosen columns     ulog.rs, dataflash.rs, blackbox.rs
 //! tables -> flight    firmware, loops, gains, filters, marks                   firmware.rs, flight.rs
 //! tables -> signals   set-point, input and output of a loop on one clock       plan.rs
+//! signals -> gains    recovered by least squares, beside the parameters        law.rs, readback.rs
 //! ```
 
 mod blackbox;
@@ -11,8 +12,10 @@ mod dataflash;
 mod error;
 mod firmware;
 mod flight;
+mod law;
 mod loops;
 mod plan;
+mod readback;
 mod scalar;
 mod source;
 mod tables;
@@ -25,8 +28,10 @@ pub use flight::{
     Firmware, FirmwareKind, Flight, Gain, LoggedLoop, LoggedSignal, Mark, MarkKind, Setting, Span,
     Term,
 };
+pub use law::{LowPassSetting, RateLaw};
 pub use loops::{Axis, ControlLoop};
 pub use plan::Signals;
+pub use readback::{Agreement, ReadBack, ReadTerm};
 pub use tables::{FlightTables, LogFormat, LogParameter, LogTables, Loss, Topic, Wanted};
 
 use self::source::Source;

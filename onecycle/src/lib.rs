@@ -275,7 +275,7 @@ pub use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 #[doc(inline)]
 pub use onecycle_onboard::{Relay, RelayError, RelaySettings};
 #[doc(inline)]
-pub use onecycle_plant::{Experiment, FixedStepProcess, Noise, Sensor, Trace};
+pub use onecycle_plant::{Experiment, FixedStepProcess, FollowedLoop, Noise, Sensor, Trace};
 
 // Compiles the code of the README.
 #[cfg(doctest)]

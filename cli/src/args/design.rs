@@ -108,6 +108,11 @@ impl DesignArguments {
         (self.sample_period).map_or_else(Execution::default, Execution::sampled)
     }
 
+    /// Whether the form of the controller was chosen.
+    pub(crate) fn is_form_given(&self) -> bool {
+        self.controller.is_some()
+    }
+
     /// The gains in force.
     pub(crate) fn against(&self) -> Option<Pid> {
         self.against

@@ -9,7 +9,7 @@ use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
 use super::design::noise;
-use super::{DesignArguments, LogArguments, PackSource, sample_rate, time_unit};
+use super::{DesignArguments, LogArguments, PackSource, WriteArguments, sample_rate, time_unit};
 
 /// Identify the process from a recording and design its controller.
 ///
@@ -25,6 +25,7 @@ use super::{DesignArguments, LogArguments, PackSource, sample_rate, time_unit};
     "  onecycle identify log.csv --time t_ms --input 4 --output roll --cycles 4\n",
     "  onecycle identify log.csv --against 40,5,12 --style calm\n",
     "  onecycle identify examples/logs/px4_chirps.ulg --axis roll --loop rate --from 197 --to 203\n",
+    "  onecycle identify examples/logs/px4_chirps.ulg --axis pitch --write pitch.params\n",
     "  onecycle identify chirp.csv --structure soptd --from 12 --to 40\n",
     "  onecycle identify historian.csv --tag LIC101\n",
     "  onecycle identify log.csv --plot always > report.txt\n",
@@ -98,6 +99,8 @@ pub(crate) struct Identify {
     pub(crate) pack: PackSource,
     #[command(flatten)]
     pub(crate) log: LogArguments,
+    #[command(flatten)]
+    pub(crate) write: WriteArguments,
     /// Time column, by name or by number from 1
     #[arg(long, value_name = "COLUMN")]
     pub(crate) time: Option<String>,

@@ -13,7 +13,8 @@ use onecycle_link::{Axis, ControlLoop};
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle log examples/logs/px4_chirps.ulg\n",
-    "  onecycle log examples/logs/betaflight_acro.bfl --json\n\n",
+    "  onecycle log examples/logs/betaflight_acro.bfl --json\n",
+    "  onecycle log examples/logs/px4_chirps.ulg --check\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 5 output not written"
 ))]
 pub(crate) struct Log {
@@ -22,6 +23,9 @@ pub(crate) struct Log {
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
+    /// Recover the gains of the rate loops from the logged signals, and compare them with the parameters of the log
+    #[arg(long)]
+    pub(crate) check: bool,
 }
 
 /// Which part of a flight log is identified.
@@ -67,6 +71,38 @@ impl LogArguments {
             .find(|(_, is_given)| *is_given)
             .map(|(option, _)| option)
     }
+}
+
+/// Parameters to write.
+#[derive(Clone, Debug, Args)]
+#[command(next_help_heading = "Flight logs")]
+pub(crate) struct WriteArguments {
+    /// Write the changed parameters of the loop in the format of the firmware: PX4 .params, ArduPilot .param, Betaflight
+    /// CLI. A second file, NAME.restore.EXT, sets the old values again
+    #[arg(long, value_name = "NAME.EXT")]
+    pub(crate) write: Option<PathBuf>,
+    /// With --write: share of the way from the gains in force to the proposed ones, above 0 up to 1
+    #[arg(long, value_name = "SHARE", default_value_t = 0.5, requires = "write", allow_negative_numbers = true,
+          value_parser = step)]
+    pub(crate) step: f64,
+    /// With --write: replace files that exist
+    #[arg(long, requires = "write")]
+    pub(crate) force: bool,
+}
+
+impl WriteArguments {
+    /// `--write`, if it was given.
+    pub(crate) fn given(&self) -> Option<&'static str> {
+        self.write.as_ref().map(|_| "--write")
+    }
+}
+
+fn step(text: &str) -> Result<f64, String> {
+    let step = text
+        .parse()
+        .ok()
+        .filter(|step: &f64| *step > 0.0 && *step <= 1.0);
+    step.ok_or_else(|| "a step is a share above 0, at most 1; 1 goes all the way".to_owned())
 }
 
 /// Axis of the body.

@@ -7,27 +7,31 @@ use std::process::ExitCode;
 use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Road, Specification, Structure, Style};
 
 use super::log::{self, Piped, Source};
+use super::log_gains::{self, LogLoop};
 use super::{controllers, pack};
 use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::reading::open_with_bar;
-use crate::report::{json, page, plot, text};
+use crate::report::{json, log_gains as log_report, page, plot, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.report {
         check_page(path, &arguments.file)?;
     }
     check_estimator(arguments)?;
+    log_gains::check(arguments)?;
     let asked = specification(arguments)?;
-    let recording = read(arguments)?;
+    let (recording, of_log) = read(arguments)?;
     check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::usable(&arguments.pack, &bytes)?;
     let found = onecycle::Identify::new()
         .cycles(arguments.cycles as usize)
-        .specification(asked)
+        .specification(of_log.as_ref().map_or(asked, |of_log| {
+            of_log.specification(asked, arguments.design.is_form_given())
+        }))
         .method(arguments.method.into())
         .road(Road::from(arguments.estimator))
         .output_filter_hz(arguments.output_filter)
@@ -38,9 +42,15 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         .input_late_s(arguments.input_late)
         .pack(pack)
         .run(&recording);
-    let mut choice = (found.outcome.as_ref().ok())
-        .map(|identified| controllers::of_identified(identified, arguments.design.against()))
+    let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
+    let against = arguments.design.against().or_else(in_force);
+    let identified = found.outcome.as_ref().ok();
+    let mut choice = identified
+        .map(|identified| controllers::of_identified(identified, against))
         .map(|choice| choice.in_plant(arguments.design.plant()));
+    let gains = of_log
+        .map(|of_log| of_log.report(&arguments.write, &recording, &found, choice.as_ref()))
+        .transpose()?;
     let name = arguments.file.display().to_string();
     if let Some(path) = &arguments.report {
         waiting.goes_on("drawing");
@@ -48,27 +58,41 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
             .map(|(choice, identified)| choice.with_trade_off(&identified.for_design(0).0));
         write_text(
             path,
-            &page::identification(&name, &recording, &found, choice.as_ref()),
+            &page::identification(&name, &recording, &found, choice.as_ref(), gains.as_ref()),
         )?;
     }
     drop(waiting);
-    let is_plotted = match arguments.plot {
-        When::Auto => is_terminal(),
-        When::Always => true,
-        When::Never => false,
-    };
+    let is_plotted = is_plotted(arguments.plot);
     print(&if arguments.json {
-        json::identification(&name, &recording, &found, choice.as_ref(), arguments.rows)
+        let gains = gains.as_ref();
+        json::identification(
+            &name,
+            &recording,
+            &found,
+            choice.as_ref(),
+            gains,
+            arguments.rows,
+        )
     } else {
         let plotted = is_plotted.then(|| plot::end(&recording, &found, columns()));
         text::identification(&name, &recording, &found, choice.as_ref())
+            + &gains.as_ref().map(log_report::text).unwrap_or_default()
             + &plotted.flatten().unwrap_or_default()
     })?;
-    Ok(ExitCode::from(if found.outcome.is_ok() {
+    let is_written = !gains.is_some_and(|gains| matches!(gains.written, Some(Err(_))));
+    Ok(ExitCode::from(if found.outcome.is_ok() && is_written {
         exit::DONE
     } else {
         exit::NO_PROCESS
     }))
+}
+
+fn is_plotted(when: When) -> bool {
+    match when {
+        When::Auto => is_terminal(),
+        When::Always => true,
+        When::Never => false,
+    }
 }
 
 /// The requirements on the controller.
@@ -139,7 +163,8 @@ fn check_span(arguments: &Identify, recording: &Recording) -> Result<(), Failure
     Ok(())
 }
 
-fn read(arguments: &Identify) -> Result<Recording, Failure> {
+/// The recording, and the loop of the flight log that it is.
+fn read(arguments: &Identify) -> Result<(Recording, Option<LogLoop>), Failure> {
     let path = arguments.file.as_path();
     let piped = match path == Path::new("-") {
         true => Some(log::piped()?),
@@ -153,7 +178,15 @@ fn read(arguments: &Identify) -> Result<Recording, Failure> {
     if bytes.is_some() || log::is_log(path) {
         refuse_columns(arguments)?;
         let bytes = bytes.as_deref();
-        return log::recording(&Source { path, bytes }, &arguments.log);
+        let source = Source { path, bytes };
+        let recording = log::recording(&source, &arguments.log)?;
+        return Ok((recording, LogLoop::of(&source, arguments)?));
+    }
+    if let Some(option) = arguments.write.given() {
+        return Err(Failure::usage(format!(
+            "{option} writes parameters of an autopilot, and {} is not a flight log: leave out {option}",
+            path.display()
+        )));
     }
     if let Some(option) = arguments.log.given() {
         return Err(Failure::usage(format!(
@@ -161,7 +194,7 @@ fn read(arguments: &Identify) -> Result<Recording, Failure> {
             path.display()
         )));
     }
-    read_table(arguments, &head)
+    Ok((read_table(arguments, &head)?, None))
 }
 
 /// Refuses the names of columns, which a flight log does not have.

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::Recording;
-use onecycle_link::{FlightLog, LogError, LogFormat};
+use onecycle_link::{FlightLog, LogError, LogFormat, ReadBack};
 
 use crate::args::{Log, LogArguments};
 use crate::failure::{Failure, exit};
@@ -84,16 +84,23 @@ pub(crate) fn run(arguments: &Log) -> Result<ExitCode, Failure> {
         false => None,
     };
     let path = arguments.file.as_path();
-    let log = Source {
+    let source = Source {
         path,
         bytes: bytes.as_deref(),
-    }
-    .scan()?;
+    };
+    let log = source.scan()?;
     let name = arguments.file.display().to_string();
-    print(&if arguments.json {
-        report::json(&name, &log)
+    let checks = if arguments.check {
+        let of = |number| read_back(&source, &log, number);
+        let checks: Result<Vec<_>, Failure> = (1..=log.flights.len()).map(of).collect();
+        Some(checks?)
     } else {
-        report::text(&name, &log)
+        None
+    };
+    print(&if arguments.json {
+        report::json(&name, &log, checks.as_deref())
+    } else {
+        report::text(&name, &log, checks.as_deref())
     })?;
     Ok(ExitCode::from(exit::DONE))
 }
@@ -112,17 +119,36 @@ pub(super) fn is_log(path: &Path) -> bool {
 
 /// The recording of a control loop.
 pub(super) fn recording(source: &Source<'_>, asked: &LogArguments) -> Result<Recording, Failure> {
+    let (log, flight) = scan_flight(source, asked)?;
+    let signals = log.signals(source.open()?, flight, asked.control_loop());
+    let recording = signals.and_then(|signals| Ok(signals.recording()?));
+    recording.map_err(|error| unreadable(source.path, &error))
+}
+
+/// What a log holds, and which flight (from 1) is meant.
+pub(super) fn scan_flight(
+    source: &Source<'_>,
+    asked: &LogArguments,
+) -> Result<(FlightLog, usize), Failure> {
     let log = source.scan()?;
     let longest = log.flights.iter().enumerate().max_by(|(_, a), (_, b)| {
         let length_s = |flight: &onecycle_link::Flight| flight.span.to_s - flight.span.from_s;
         length_s(a).total_cmp(&length_s(b))
     });
     let flight = asked.flight.unwrap_or(1 + longest.map_or(0, |(at, _)| at));
-    let signals = log.signals(source.open()?, flight, asked.control_loop());
-    let recording = signals.and_then(|signals| Ok(signals.recording()?));
-    recording.map_err(|error| unreadable(source.path, &error))
+    Ok((log, flight))
 }
 
 fn unreadable(path: &Path, error: &LogError) -> Failure {
     Failure::unreadable(path, refusal(error))
+}
+
+/// The gains of every rate loop of a flight, read back.
+pub(super) fn read_back(
+    source: &Source<'_>,
+    log: &FlightLog,
+    flight: usize,
+) -> Result<Vec<ReadBack>, Failure> {
+    log.read_back(source.open()?, flight)
+        .map_err(|error| unreadable(source.path, &error))
 }

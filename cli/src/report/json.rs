@@ -14,7 +14,9 @@ use serde::{Serialize, Serializer};
 
 use self::controllers::{AgainstReport, Assumed, Proposed, Robust};
 use self::record::Record;
+use super::log_gains::LogGainsReport;
 use crate::results::controllers::Controllers;
+use crate::results::log_gains::LogGains;
 use crate::words::recording::note;
 use crate::words::remark::sentences;
 use crate::words::verdict::advice;
@@ -55,6 +57,8 @@ struct IdentifyReport<'a> {
     controllers: Option<Vec<Proposed>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     against: Option<AgainstReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    log: Option<LogGainsReport>,
     remarks: Vec<String>,
     remark_kinds: Vec<&'static str>,
     remark_about: Vec<&'static str>,
@@ -236,6 +240,7 @@ pub(crate) fn identification(
     recording: &Recording,
     found: &Identification,
     choice: Option<&Controllers>,
+    gains: Option<&LogGains>,
     with_rows: bool,
 ) -> String {
     let identified = found.outcome.as_ref().ok();
@@ -298,6 +303,7 @@ pub(crate) fn identification(
         assumed: choice.map(|choice| (&choice.asked).into()),
         controllers: choice.map(controllers::proposed),
         against: choice.and_then(controllers::against),
+        log: gains.map(Into::into),
         remarks: sentences(found),
         remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
         remark_about: (found.remarks.iter())

@@ -2,10 +2,13 @@
 
 use std::fmt::Write;
 
-use onecycle_link::{Firmware, Flight, FlightLog, LoggedLoop, LoggedSignal, Setting, Span};
+use onecycle_link::{
+    Firmware, Flight, FlightLog, LoggedLoop, LoggedSignal, ReadBack, Setting, Span,
+};
 use serde::Serialize;
 
 use super::json::to_text;
+use super::log_gains::{self, ReadBackReport};
 use super::number::short;
 use super::wrap::wrapped;
 use crate::style::{HEADING, REMARK, headed, painted};
@@ -15,7 +18,9 @@ use crate::words::log as words;
 const SCHEMA: &str = "onecycle.log/1";
 
 /// The report for people.
-pub(crate) fn text(file: &str, log: &FlightLog) -> String {
+///
+/// `checks`: read-back of the gains of each flight.
+pub(crate) fn text(file: &str, log: &FlightLog, checks: Option<&[Vec<ReadBack>]>) -> String {
     let mut text = format!("{}\n", painted(HEADING, file));
     let _ = writeln!(text, "  {}", words::format(log.format));
     if let Some(lost) = words::loss(&log.loss) {
@@ -23,6 +28,14 @@ pub(crate) fn text(file: &str, log: &FlightLog) -> String {
     }
     for (at, flight) in log.flights.iter().enumerate() {
         describe(&mut text, at + 1, flight);
+        if let Some(checks) = checks.and_then(|checks| checks.get(at)) {
+            text.push_str(&headed(
+                "\nRead-back of the gains in force from the logged signals\n",
+            ));
+            checks
+                .iter()
+                .for_each(|read| text.push_str(&log_gains::table(read)));
+        }
     }
     text
 }
@@ -134,6 +147,8 @@ struct FlightReport<'a> {
     parameters: Vec<SettingReport<'a>>,
     topics: Vec<TopicReport<'a>>,
     advice: Vec<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    read_back: Option<Vec<ReadBackReport>>,
 }
 
 #[derive(Serialize)]
@@ -180,7 +195,9 @@ struct TopicReport<'a> {
 }
 
 /// The report for programs.
-pub(crate) fn json(file: &str, log: &FlightLog) -> String {
+///
+/// `checks`: read-back of the gains of each flight.
+pub(crate) fn json(file: &str, log: &FlightLog, checks: Option<&[Vec<ReadBack>]>) -> String {
     to_text(&LogReport {
         schema: SCHEMA,
         file,
@@ -192,7 +209,14 @@ pub(crate) fn json(file: &str, log: &FlightLog) -> String {
             dropout_s: log.loss.dropout_s,
             is_truncated: log.loss.is_truncated,
         },
-        flights: log.flights.iter().map(flight_report).collect(),
+        flights: (log.flights.iter().enumerate())
+            .map(|(at, flight)| FlightReport {
+                read_back: checks
+                    .and_then(|checks| checks.get(at))
+                    .map(|checks| checks.iter().map(Into::into).collect()),
+                ..flight_report(flight)
+            })
+            .collect(),
     })
 }
 
@@ -237,6 +261,7 @@ fn flight_report(flight: &Flight) -> FlightReport<'_> {
             })
             .collect(),
         advice: words::advice(flight),
+        read_back: None,
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod controller;
 mod fit;
+mod overlay;
 mod parameters;
 mod recorded;
 pub(crate) mod stability;
@@ -23,6 +24,7 @@ use super::number::significant;
 use super::units::Units;
 use crate::pages::page::{self, Section, page};
 use crate::results::controllers::Controllers;
+use crate::results::log_gains::LogGains;
 use crate::words;
 
 /// Processes of the posterior that bands are drawn from: the ends of a 90 % band are then the tenth from either side.
@@ -41,6 +43,7 @@ pub(crate) fn identification(
     recording: &Recording,
     found: &Identification,
     choice: Option<&Controllers>,
+    gains: Option<&LogGains>,
 ) -> String {
     let units = Units::of(recording);
     let mut sections = vec![];
@@ -82,6 +85,7 @@ pub(crate) fn identification(
             }));
         }
     }
+    sections.extend(gains.and_then(overlay::section));
     sections.extend(remarks(found));
     let kind = match found.excitation {
         Some(Excitation::Recorded(_)) => "Recording",

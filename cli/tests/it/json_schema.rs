@@ -6,7 +6,7 @@ use std::path::Path;
 use onecycle::Structure;
 use serde_json::Value;
 
-use crate::common::{Table, identify, simulate};
+use crate::common::{Scratch, Table, identify, run, simulate};
 
 fn document() -> String {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/identify-json.md");
@@ -74,6 +74,18 @@ fn the_documented_keys_are_those_of_the_report() {
     // Those of a structure and of a fit are documented once.
     let again = ["refused.process.", "refused.fit."];
     found.retain(|key| !again.iter().any(|part| key.starts_with(part)));
+    let folder = Scratch::new();
+    let log = format!(
+        "{}/../examples/logs/px4_chirps.ulg",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let file = folder.name("x.params");
+    let outcome = run(&["identify", &log, "--json", "--write", &file]);
+    keys(
+        &serde_json::from_str(&outcome.stdout).unwrap(),
+        "",
+        &mut found,
+    );
     // Those of a controller, its margins and its step are documented once.
     let of_against = |key: &String| {
         let parts = ["controller", "margins", "step"];

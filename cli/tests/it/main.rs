@@ -16,6 +16,7 @@ mod certify;
 mod commands;
 mod common;
 mod dataset;
+mod flight_log_gains;
 mod flight_logs;
 mod fly;
 mod grid;

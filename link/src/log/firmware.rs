@@ -181,5 +181,6 @@ fn gain(flight: &FlightTables, term: Term, name: String, si_per_unit: Option<f64
         name,
         value,
         si: si_per_unit.map(|factor| factor * value),
+        si_per_unit,
     })
 }

@@ -96,6 +96,8 @@ pub struct Gain {
     /// The gain in SI units: input of the process per rad/s, rad, rad/s^2 (P, I, D of a rate) or 1/s (attitude).
     /// `None`: the conversion is not known.
     pub si: Option<f64>,
+    /// The gain in SI units of a parameter of one.
+    pub si_per_unit: Option<f64>,
 }
 
 /// A parameter with its value.

@@ -74,11 +74,16 @@ impl Quantity {
         (topic.rows > 1 && self.fields.iter().all(|field| topic.has(field))).then_some(topic)
     }
 
-    fn want(&self, mut wanted: Wanted) -> Wanted {
+    pub(super) fn want(&self, mut wanted: Wanted) -> Wanted {
         for field in self.fields.iter().map(String::as_str).chain(self.stamp) {
             wanted = wanted.and(self.topic, field);
         }
         wanted
+    }
+
+    /// The last value at or before each time; `None` where the last second before has none.
+    pub(super) fn held_at(&self, flight: &FlightTables, times_s: &[f64]) -> Vec<Option<f64>> {
+        self.rows(flight).held(times_s).collect()
     }
 
     /// Times (s) and values of the rows whose time goes on.

@@ -306,6 +306,15 @@ impl Wanted {
         self
     }
 
+    /// What either wants.
+    #[must_use]
+    pub(super) fn with(mut self, other: Self) -> Self {
+        self.everything |= other.everything;
+        self.columns.extend(other.columns);
+        self.changes.extend(other.changes);
+        self
+    }
+
     /// Indices of the fields to keep, and whether only changes are kept.
     fn of(&self, topic: &str, instance: u32, fields: &[String]) -> (Vec<usize>, bool) {
         let is_wanted = |field: &String| {

@@ -1,0 +1,261 @@
+//! Gains of a flight log: the loop as the firmware runs it, the gains in force, and the files that change them.
+
+use std::path::{Path, PathBuf};
+
+use onecycle::{
+    Controller, Execution, Form, Identification, Identified, LowPass, Pid, Recording,
+    Specification, Style, assess, least_margins,
+};
+use onecycle_link::{
+    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, RateLaw, ReadBack, changes, files,
+};
+
+use super::log::{self, Source};
+use super::log_overlay::overlay;
+use crate::args::{Identify, WriteArguments};
+use crate::failure::Failure;
+use crate::output::{with_ending, write_text};
+use crate::results::controllers::Controllers;
+use crate::results::log_gains::{LogGains, Written};
+use crate::words::log_gains as words;
+
+/// Draws over which the gains to write are judged.
+const DRAWS: usize = 200;
+
+/// Least share of the draws on which the gains to write must be stable.
+const LEAST_STABLE: f64 = 0.99;
+
+/// The loop of a log that is identified.
+pub(super) struct LogLoop {
+    flight: Flight,
+    control_loop: ControlLoop,
+    read_back: Option<ReadBack>,
+}
+
+impl LogLoop {
+    /// The loop that the arguments choose. `None`: the log has no such flight.
+    pub(super) fn of(source: &Source<'_>, arguments: &Identify) -> Result<Option<Self>, Failure> {
+        let (log, number) = log::scan_flight(source, &arguments.log)?;
+        let control_loop = arguments.log.control_loop();
+        let read_back = match control_loop {
+            ControlLoop::Rate(axis) => log::read_back(source, &log, number)?
+                .into_iter()
+                .find(|read| read.axis == axis),
+            _ => None,
+        };
+        let flight = log.flights.into_iter().nth(number.saturating_sub(1));
+        Ok(flight.map(|flight| Self {
+            flight,
+            control_loop,
+            read_back,
+        }))
+    }
+
+    /// `asked` for the loop as the firmware runs it: its filters and rate of execution where the user gave none, and only P
+    /// around an attitude loop.
+    pub(super) fn specification(&self, asked: Specification, is_form_given: bool) -> Specification {
+        if asked.style == Style::Paper {
+            return asked;
+        }
+        match self.control_loop {
+            ControlLoop::Rate(axis) => {
+                let law = self.flight.rate_law(axis);
+                let mut asked = asked.with_execution(execution(&law, asked.execution));
+                if asked.execution.derivative_filter.is_some() {
+                    // The firmware has no other filter.
+                    asked.filter_s = Some(0.0);
+                }
+                asked
+            }
+            ControlLoop::Attitude(_) if !is_form_given => {
+                let mut asked = asked;
+                asked.form = Form::P;
+                asked
+            }
+            _ => asked,
+        }
+    }
+
+    /// The gains in force. `None`: the log has none.
+    pub(super) fn in_force(&self) -> Option<Pid> {
+        LoopGains::in_force(&self.flight, self.control_loop).map(pid)
+    }
+
+    /// What the report says, after writing parameters if that was asked for.
+    pub(super) fn report(
+        self,
+        asked: &WriteArguments,
+        recording: &Recording,
+        found: &Identification,
+        choice: Option<&Controllers>,
+    ) -> Result<LogGains, Failure> {
+        let identified = found.outcome.as_ref().ok();
+        let written = match &asked.write {
+            None => None,
+            Some(path) => Some(match self.judged(asked, identified, choice) {
+                Err(reason) => Err(reason),
+                Ok(to_write) => Ok(self.write(path, to_write)?),
+            }),
+        };
+        let overlay = match (self.control_loop, self.in_force(), choice) {
+            (ControlLoop::Rate(axis), Some(pid), Some(choice)) => {
+                let as_run = pid.with_execution(choice.asked.execution);
+                overlay(&self.flight, axis, as_run, recording, found)
+            }
+            _ => None,
+        };
+        Ok(LogGains {
+            control_loop: self.control_loop,
+            read_back: self.read_back,
+            overlay,
+            written,
+        })
+    }
+
+    /// The parameters to write with their margins, or why there are none.
+    fn judged(
+        &self,
+        asked: &WriteArguments,
+        identified: Option<&Identified>,
+        choice: Option<&Controllers>,
+    ) -> Result<Written, String> {
+        let (Some(identified), Some(choice)) = (identified, choice) else {
+            return Err(words::NOTHING_IDENTIFIED.to_owned());
+        };
+        let read = self.read_back.as_ref().map(ReadBack::agreement);
+        if read == Some(Agreement::Differs) {
+            return Err(words::CONTRADICTED.to_owned());
+        }
+        let Some((design, _)) = choice.design() else {
+            return Err(words::NO_DESIGN.to_owned());
+        };
+        let no_gains = || words::no_gains(self.control_loop);
+        let old = LoopGains::in_force(&self.flight, self.control_loop).ok_or_else(no_gains)?;
+        let proposed = design.controller.pid();
+        if proposed.filter_s > 0.0 || matches!(design.controller, Controller::Autopilot(_)) {
+            return Err(words::NOT_ITS_FORM.to_owned());
+        }
+        let proposed = LoopGains::new(proposed.kp, proposed.ki, proposed.kd);
+        let wanted = old.toward(proposed, asked.step);
+        let changes = changes(&self.flight, self.control_loop, wanted)
+            .map_err(|error| words::unwritable(&error))?;
+        if changes.is_empty() {
+            return Err(words::NO_CHANGE.to_owned());
+        }
+        let execution = choice.asked.execution;
+        let controller = Controller::from(pid(old.changed(&changes)).with_execution(execution));
+        let (model, _) = identified.for_design(0);
+        let least = least_margins(&identified.posterior.models(DRAWS), &controller);
+        let figures = assess(&model, &controller, choice.asked.noise.as_ref());
+        let is_stable = least.is_none_or(|least| least.stable >= LEAST_STABLE);
+        let Some(figures) = figures.filter(|_| is_stable) else {
+            return Err(words::unstable(least.map(|least| least.stable)));
+        };
+        Ok(Written {
+            path: PathBuf::new(),
+            restore: PathBuf::new(),
+            changes,
+            share: asked.step,
+            figures,
+            least,
+        })
+    }
+
+    /// Writes both files or none.
+    fn write(&self, path: &Path, to_write: Written) -> Result<Written, Failure> {
+        let Some(files) = files(&self.flight, &to_write.changes) else {
+            return Err(Failure::usage(words::no_gains(self.control_loop)));
+        };
+        let restore = restore_path(path, files.ending);
+        write_text(&restore, &files.restore)?;
+        if let Err(failure) = write_text(path, &files.apply) {
+            // A restore file alone would puzzle its reader.
+            let _ = std::fs::remove_file(&restore);
+            return Err(failure);
+        }
+        Ok(Written {
+            path: path.to_owned(),
+            restore,
+            ..to_write
+        })
+    }
+}
+
+/// Refuses what would be overwritten, before any work is done.
+pub(super) fn check(arguments: &Identify) -> Result<(), Failure> {
+    let Some(path) = &arguments.write.write else {
+        return Ok(());
+    };
+    if path == Path::new("-") || path.file_name().is_none() {
+        return Err(Failure::usage(
+            "--write needs the name of a file, because a second file to restore the old values is written beside it",
+        ));
+    }
+    // The ending of the firmware is not known yet: a name without one gets each of them.
+    let restore = ["params", "param", "txt"].map(|ending| restore_path(path, ending));
+    let there = |path: &Path| path.canonicalize().ok();
+    let all = || std::iter::once(path).chain(&restore);
+    let recording = there(&arguments.file);
+    if all().any(|path| there(path).is_some() && there(path) == recording) {
+        return Err(Failure::usage(format!(
+            "--write {} would overwrite the flight log: name another file",
+            path.display()
+        )));
+    }
+    if let Some(existing) = all()
+        .find(|path| path.exists())
+        .filter(|_| !arguments.write.force)
+    {
+        return Err(Failure::usage(format!(
+            "{} exists: name another file with --write, or add --force to replace it",
+            existing.display()
+        )));
+    }
+    Ok(())
+}
+
+/// `NAME.restore.EXT` beside `NAME.EXT`.
+fn restore_path(path: &Path, ending: &str) -> PathBuf {
+    let own = path
+        .extension()
+        .map(|own| own.to_string_lossy().into_owned());
+    let stem = match own {
+        Some(_) => path.with_extension(""),
+        None => path.to_owned(),
+    };
+    let ending = own.unwrap_or_else(|| ending.to_owned());
+    with_ending(&stem, &format!("restore.{ending}"))
+}
+
+fn pid(gains: LoopGains) -> Pid {
+    Pid::new(gains.proportional, gains.integral, gains.derivative)
+}
+
+/// What the firmware does between measurement and output, beside what `own` says.
+fn execution(law: &RateLaw, own: Execution) -> Execution {
+    let mut execution = own;
+    if own.sample_period_s == 0.0 {
+        execution.sample_period_s = law.sample_period_s.unwrap_or(0.0);
+    }
+    execution.derivative_filter = in_series(&law.derivative);
+    // In the loop, filters of the error and of the output are filters of the measurement.
+    let others: Vec<LowPassSetting> = law.error.into_iter().chain(law.output).collect();
+    execution.sensor_filter = in_series(&others);
+    execution
+}
+
+/// One filter for several in series, with the same delay at low frequencies.
+fn in_series(filters: &[LowPassSetting]) -> Option<LowPass> {
+    let low_pass = |filter: &LowPassSetting| match filter.order {
+        1 => LowPass::first_order(filter.cutoff_hz),
+        _ => LowPass::second_order(filter.cutoff_hz),
+    };
+    match filters {
+        [] => None,
+        [one] => Some(low_pass(one)),
+        several => {
+            let times_s = several.iter().map(|filter| low_pass(filter).time_s());
+            Some(LowPass::SecondOrder(times_s.sum()))
+        }
+    }
+}

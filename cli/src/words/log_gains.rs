@@ -1,0 +1,151 @@
+//! Sentences about the gains of a flight log: read-back, overlay, parameters that are written or not.
+
+use onecycle_link::{Agreement, ControlLoop, GainsError, ReadBack, ReadTerm};
+
+use crate::report::number::short;
+use crate::results::log_gains::Written;
+
+pub(crate) const NOTHING_IDENTIFIED: &str =
+    "no process was identified, so no gains can be justified.";
+pub(crate) const CONTRADICTED: &str = "the gains read back from the signals contradict the parameters of the log. Check \
+    that no parameter was changed in flight, and that the axes are not exchanged or mounted the other way round.";
+pub(crate) const NO_DESIGN: &str =
+    "no controller keeps the limits; choose a calmer --style or another stretch of the log.";
+pub(crate) const NOT_ITS_FORM: &str = "the proposed controller has a form that the firmware does not have: leave out \
+    --controller, and choose --style sharp, balanced or calm.";
+pub(crate) const NO_CHANGE: &str =
+    "the step leaves every parameter as it is; the gains in force are near the proposed ones.";
+
+/// The loop has no gains to write.
+pub(crate) fn no_gains(of: ControlLoop) -> String {
+    format!("the log has no gains of the {of} loop whose scale is known; choose a rate loop.")
+}
+
+/// Why gains are no parameters of the firmware, and what to do.
+pub(crate) fn unwritable(error: &GainsError) -> String {
+    let advice = match error {
+        GainsError::Range { .. } => "take a smaller --step, or a calmer --style",
+        GainsError::Firmware(_) | GainsError::Version(_) => {
+            "type the gains in by hand, in the scale of your firmware"
+        }
+        _ => "choose another loop with --axis and --loop",
+    };
+    format!("{error}; {advice}.")
+}
+
+/// The gains to write are not stable, with the share of draws on which they are.
+pub(crate) fn unstable(stable: Option<f64>) -> String {
+    let share = stable.map_or(String::new(), |share| {
+        format!(" ({:.0} % of the draws are stable)", 100.0 * share)
+    });
+    format!(
+        "the gains of this step are unstable on processes that the log allows{share}. Choose another --step, or record a \
+         longer or stronger excitation."
+    )
+}
+
+/// What a read-back tells about the log.
+pub(crate) fn read_back(read: &ReadBack) -> String {
+    let explained = read.explained.map_or(String::new(), |share| {
+        format!(
+            " The recovered law explains {:.1} % of the output of the controller.",
+            100.0 * share
+        )
+    });
+    match read.agreement() {
+        Agreement::Agrees => {
+            format!("The signals agree with the parameters of the log.{explained}")
+        }
+        Agreement::Differs => format!(
+            "The signals contradict the parameters of the log: an axis, a sign, a unit or the version is not what it seems, \
+             or a gain was changed in flight.{explained}"
+        ),
+        _ => format!(
+            "The signals cannot confirm the parameters: the axis moved too little, or the log is too slow.{explained}"
+        ),
+    }
+}
+
+/// A term that was read back, as the value of its name.
+pub(crate) fn term(term: &ReadTerm) -> String {
+    let [low, high] = term.stated;
+    let stated = if low == high {
+        short(low)
+    } else {
+        format!("{} to {}", short(low), short(high))
+    };
+    let verdict = agreement(term.agreement);
+    match term.recovered {
+        Some((value, std)) => format!(
+            "stated {stated}, read back {} (standard error {}): {verdict}",
+            short(value),
+            short(std)
+        ),
+        None => format!("stated {stated}: {verdict}"),
+    }
+}
+
+/// The verdict on a term.
+pub(crate) fn agreement(agreement: Agreement) -> &'static str {
+    match agreement {
+        Agreement::Agrees => "agrees",
+        Agreement::Differs => "differs",
+        _ => "cannot tell",
+    }
+}
+
+/// How far the simulated loop explains the log.
+pub(crate) fn overlay(explained: f64) -> String {
+    format!(
+        "The identified process under the gains in force, driven by the logged set-point, explains {:.1} % of the variance \
+         of the logged output.",
+        100.0 * explained
+    )
+}
+
+/// Margins of the gains that were written, and how to go on.
+pub(crate) fn written(written: &Written) -> Vec<String> {
+    let margins = &written.figures.margins;
+    let gain = margins
+        .gain_margin
+        .map_or(String::new(), |gain| format!(", gain margin {gain:.2}"));
+    let least = written.least.map_or(String::new(), |least| {
+        format!(
+            "; over the posterior at least {:.1} deg and at most Ms {:.2} (90 %), stable on {:.0} % of the draws",
+            least.phase_margin_rad.to_degrees(),
+            least.ms,
+            100.0 * least.stable
+        )
+    });
+    let overshoot = written.figures.step.map_or(String::new(), |step| {
+        format!(
+            ", an overshoot of {:.0} % after a step of the set-point",
+            100.0 * step.overshoot
+        )
+    });
+    let mut sentences = vec![
+        format!(
+            "With these values the loop has a phase margin of {:.1} deg{gain}, Ms {:.2}{overshoot}{least}.",
+            margins.phase_margin_rad.to_degrees(),
+            written.figures.ms
+        ),
+        format!(
+            "Written to {}; {} sets the old values again.",
+            written.path.display(),
+            written.restore.display()
+        ),
+    ];
+    if written.least.is_none() {
+        sentences.push(
+            "The margins are those of the most probable process only: the recording gives no distribution of it."
+                .to_owned(),
+        );
+    }
+    if written.share < 1.0 {
+        sentences.push(format!(
+            "The step is {:.0} % of the way to the proposed gains. Fly and log again before the next one, or use --step 1.",
+            100.0 * written.share
+        ));
+    }
+    sentences
+}

@@ -1,0 +1,98 @@
+//! Gains of flight logs: read back, laid over the log, written to parameter files.
+
+use crate::common::{NOT_IDENTIFIED, Scratch, run};
+
+fn example(name: &str) -> String {
+    format!("{}/../examples/logs/{name}", env!("CARGO_MANIFEST_DIR"))
+}
+
+#[test]
+fn gains_are_read_back() {
+    let text = run(&["log", &example("ap_sysid_roll.bin"), "--check"]).stdout;
+    assert_eq!(
+        text.matches("The signals agree with the parameters")
+            .count(),
+        3,
+        "{text}"
+    );
+    let json = run(&["log", &example("px4_chirps.ulg"), "--check", "--json"]).stdout;
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let read = &report["flights"][0]["read_back"];
+    assert_eq!(read.as_array().unwrap().len(), 3);
+    assert_eq!(read[0]["agreement"], "agrees");
+    let ratio = read[0]["terms"][0]["ratio"].as_f64().unwrap();
+    assert!((ratio - 1.0).abs() < 0.02, "{ratio}");
+}
+
+// Half-way parameters, a restore file, figures of the loop as written; nothing is replaced without --force.
+#[test]
+fn parameters_are_written_with_their_restore_file() {
+    let folder = Scratch::new();
+    let path = folder.name("pitch.params");
+    let log = example("px4_chirps.ulg");
+    let ask = [
+        "identify", &log, "--axis", "pitch", "--json", "--write", &path,
+    ];
+    let report: serde_json::Value = serde_json::from_str(&run(&ask).stdout).unwrap();
+    let of_log = &report["log"];
+    assert_eq!(of_log["read_back"]["agreement"], "agrees");
+    assert!(
+        of_log["overlay_explained"].as_f64().unwrap() > 0.95,
+        "{of_log}"
+    );
+    assert!(of_log["written"]["ms"].as_f64().unwrap() < 1.7, "{of_log}");
+    assert!(report["against"]["is_stable"].as_bool().unwrap());
+    let values = |name: &str| -> Vec<(String, f64)> {
+        let text = std::fs::read_to_string(folder.path(name)).unwrap();
+        let lines = text.lines().filter(|line| !line.starts_with('#'));
+        lines
+            .map(|line| {
+                let cells: Vec<&str> = line.split('\t').collect();
+                assert_eq!(
+                    (cells.len(), cells[0], cells[1], cells[4]),
+                    (5, "1", "1", "9"),
+                    "{line}"
+                );
+                (cells[2].to_owned(), cells[3].parse().unwrap())
+            })
+            .collect()
+    };
+    let (new, old) = (values("pitch.params"), values("pitch.restore.params"));
+    assert_eq!(new.len(), old.len());
+    assert!(
+        old.contains(&("MC_PITCHRATE_P".to_owned(), 0.15)),
+        "{old:?}"
+    );
+    assert!(
+        new.iter()
+            .zip(&old)
+            .all(|(new, old)| new.0 == old.0 && new.1 != old.1)
+    );
+    run(&ask).misused(&["pitch.params exists", "--force"]);
+}
+
+// Gains beyond the integers of the firmware are refused, and no file is left.
+#[test]
+fn what_the_firmware_cannot_hold_is_not_written() {
+    let folder = Scratch::new();
+    let path = folder.name("roll.txt");
+    let log = example("betaflight_acro.bfl");
+    let outcome = run(&["identify", &log, "--write", &path, "--step", "1"]);
+    assert!(
+        outcome.stdout.contains("outside of the range 0 to 250"),
+        "{outcome:?}"
+    );
+    assert_eq!(outcome.code, Some(NOT_IDENTIFIED));
+    assert_eq!(folder.files(), Vec::<String>::new());
+}
+
+#[test]
+fn wrong_uses_of_write() {
+    let folder = Scratch::new();
+    let table = folder.write("table.csv", b"t,u,y\n0,1,2\n1,2,3\n");
+    let path = folder.name("x.params");
+    run(&["identify", &table, "--write", &path]).misused(&["--write", "not a flight log"]);
+    let log = example("px4_chirps.ulg");
+    run(&["identify", &log, "--write", &path, "--step", "0"]).misused(&["above 0"]);
+    run(&["identify", &log, "--write", "-"]).misused(&["--write needs the name of a file"]);
+}
