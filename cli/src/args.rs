@@ -166,7 +166,7 @@ impl FromStr for Share {
     "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --noise 0.05 --sample-period 0.1\n",
     "  onecycle tune --k 1 --t-prop 0.3 --t-body 2 --tau 0.1 --style paper --phase-margin 45\n\n",
     "A process is a structure with its parameters: K or K/T_body, T_prop, T_prop2, T_body (or T), w0, zeta, ",
-    "tau.\nStructures: iptd, integrator_lag, double_integrator_lag, soiptd, toiptd, foptd, soptd, resonant, ",
+    "tau.\nStructures: iptd, integrator_lag, double_integrator_lag, soiptd, toiptd, foptd, soptd, toptd, resonant, ",
     "resonant_lag."
 ))]
 pub(crate) struct Tune {

@@ -2,6 +2,7 @@
 
 mod caution;
 pub(crate) mod controllers;
+pub(crate) mod flight;
 pub(crate) mod log;
 pub(crate) mod log_gains;
 pub(crate) mod recording;

@@ -18,6 +18,7 @@ mod plan;
 mod readback;
 mod scalar;
 mod source;
+mod stretches;
 mod tables;
 mod ulog;
 

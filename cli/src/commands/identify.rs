@@ -8,7 +8,7 @@ use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Road, Specification, Stru
 
 use super::log::{self, Piped, Source};
 use super::log_gains::{self, LogLoop};
-use super::{controllers, pack};
+use super::{controllers, flight, pack};
 use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE, When};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
@@ -22,26 +22,18 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     check_estimator(arguments)?;
     log_gains::check(arguments)?;
     let asked = specification(arguments)?;
+    if flight::is_asked(arguments) {
+        return flight::run(arguments, &asked);
+    }
     let (recording, of_log) = read(arguments)?;
     check_span(arguments, &recording)?;
     let waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::usable(&arguments.pack, &bytes)?;
-    let found = onecycle::Identify::new()
-        .cycles(arguments.cycles as usize)
-        .specification(of_log.as_ref().map_or(asked, |of_log| {
-            of_log.specification(asked, arguments.design.is_form_given())
-        }))
-        .method(arguments.method.into())
-        .road(Road::from(arguments.estimator))
-        .output_filter_hz(arguments.output_filter)
-        .structure(arguments.structure)
-        .span_s(arguments.from, arguments.to)
-        .hold(arguments.hold.map(Hold::from))
-        .beta(arguments.beta)
-        .input_late_s(arguments.input_late)
-        .pack(pack)
-        .run(&recording);
+    let asked = of_log.as_ref().map_or(asked, |of_log| {
+        of_log.specification(asked, arguments.design.is_form_given())
+    });
+    let found = settings(arguments, asked).pack(pack).run(&recording);
     let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
     let against = arguments.design.against().or_else(in_force);
     let identified = found.outcome.as_ref().ok();
@@ -85,6 +77,21 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     } else {
         exit::NO_PROCESS
     }))
+}
+
+/// The settings of the arguments.
+fn settings<'a>(arguments: &Identify, asked: Specification) -> onecycle::Identify<'a> {
+    onecycle::Identify::new()
+        .cycles(arguments.cycles as usize)
+        .specification(asked)
+        .method(arguments.method.into())
+        .road(Road::from(arguments.estimator))
+        .output_filter_hz(arguments.output_filter)
+        .structure(arguments.structure)
+        .span_s(arguments.from, arguments.to)
+        .hold(arguments.hold.map(Hold::from))
+        .beta(arguments.beta)
+        .input_late_s(arguments.input_late)
 }
 
 fn is_plotted(when: When) -> bool {

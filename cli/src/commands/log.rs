@@ -6,7 +6,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::Recording;
-use onecycle_link::{FlightLog, LogError, LogFormat, ReadBack};
+use onecycle_link::{ControlLoop, FlightLog, LogError, LogFormat, ReadBack, Signals};
 
 use crate::args::{Log, LogArguments};
 use crate::failure::{Failure, exit};
@@ -120,9 +120,19 @@ pub(super) fn is_log(path: &Path) -> bool {
 /// The recording of a control loop.
 pub(super) fn recording(source: &Source<'_>, asked: &LogArguments) -> Result<Recording, Failure> {
     let (log, flight) = scan_flight(source, asked)?;
-    let signals = log.signals(source.open()?, flight, asked.control_loop());
-    let recording = signals.and_then(|signals| Ok(signals.recording()?));
-    recording.map_err(|error| unreadable(source.path, &error))
+    let recording = signals(source, &log, flight, asked.control_loop())?.recording();
+    recording.map_err(|error| unreadable(source.path, &LogError::from(error)))
+}
+
+/// The signals of a loop of a flight (from 1).
+pub(super) fn signals(
+    source: &Source<'_>,
+    log: &FlightLog,
+    flight: usize,
+    of: ControlLoop,
+) -> Result<Signals, Failure> {
+    let signals = log.signals(source.open()?, flight, of);
+    signals.map_err(|error| unreadable(source.path, &error))
 }
 
 /// What a log holds, and which flight (from 1) is meant.

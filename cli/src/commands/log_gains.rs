@@ -33,6 +33,15 @@ pub(super) struct LogLoop {
 }
 
 impl LogLoop {
+    /// A loop without a read-back of its gains.
+    pub(super) fn new(flight: Flight, control_loop: ControlLoop) -> Self {
+        Self {
+            flight,
+            control_loop,
+            read_back: None,
+        }
+    }
+
     /// The loop that the arguments choose. `None`: the log has no such flight.
     pub(super) fn of(source: &Source<'_>, arguments: &Identify) -> Result<Option<Self>, Failure> {
         let (log, number) = log::scan_flight(source, &arguments.log)?;

@@ -20,15 +20,7 @@ pub(super) fn sentence(remark: &Remark) -> Option<String> {
             });
             clock(*seen, *beta, late_s.map(|late_s| (late_s, *phase_margin_rad)), &cost)
         }
-        Remark::ClockUnchecked { rad_per_s } => {
-            // A loop of a plant with a crossover below 1 rad/s does not feel 5 ms.
-            let (offset, offset_s) = if *rad_per_s < 1.0 { ("second", 1.0) } else { ("5 ms", 5e-3) };
-            format!(
-                "Nothing in this recording shows whether both columns come from one clock: each {offset} by which the \
-                 input was logged late cost {:.1} deg of phase margin. --input-late 0 says that they do.",
-                (offset_s * rad_per_s).to_degrees()
-            )
-        }
+        Remark::ClockUnchecked { rad_per_s } => clock_unchecked(*rad_per_s),
         Remark::Extrapolated {
             ratio,
             is_withdrawn: false,
@@ -78,6 +70,20 @@ pub(super) fn sentence(remark: &Remark) -> Option<String> {
         ),
         _ => return None,
     })
+}
+
+/// Nothing shows an offset of the clocks, which would act at the gain crossover `rad_per_s`.
+fn clock_unchecked(rad_per_s: f64) -> String {
+    // A loop of a plant with a crossover below 1 rad/s does not feel 5 ms.
+    let (offset, offset_s) = match rad_per_s < 1.0 {
+        true => ("second", 1.0),
+        false => ("5 ms", 5e-3),
+    };
+    format!(
+        "Nothing in this recording shows whether both columns come from one clock: each {offset} by which the input was \
+         logged late cost {:.1} deg of phase margin. --input-late 0 says that they do.",
+        (offset_s * rad_per_s).to_degrees()
+    )
 }
 
 /// `later`: the offset of the clocks if the relay has this `beta` (s), and the phase margin then (rad).

@@ -71,15 +71,17 @@ fn parameters_are_written_with_their_restore_file() {
     run(&ask).misused(&["pitch.params exists", "--force"]);
 }
 
-// Gains beyond the integers of the firmware are refused, and no file is left.
+// Without a process there is nothing to write, and no file is left.
 #[test]
-fn what_the_firmware_cannot_hold_is_not_written() {
+fn a_refused_flight_writes_nothing() {
     let folder = Scratch::new();
     let path = folder.name("roll.txt");
     let log = example("betaflight_acro.bfl");
     let outcome = run(&["identify", &log, "--write", &path, "--step", "1"]);
     assert!(
-        outcome.stdout.contains("outside of the range 0 to 250"),
+        outcome
+            .stdout
+            .contains("Nothing was written: no process was identified"),
         "{outcome:?}"
     );
     assert_eq!(outcome.code, Some(NOT_IDENTIFIED));

@@ -55,3 +55,50 @@ fn what_does_not_fit_is_refused_with_advice() {
     run(&["identify", &table, "--axis", "roll"]).misused(&["--axis", "flight logs"]);
     run(&["log", &table]).refused(UNREADABLE, &["not a ULog, DataFlash or blackbox log"]);
 }
+
+fn loops(log: &str) -> Vec<serde_json::Value> {
+    let json = run(&["identify", &example(log), "--json"]).stdout;
+    let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(report["schema"], "onecycle.flight/1");
+    report["loops"].as_array().unwrap().clone()
+}
+
+fn gain_of(loops: &[serde_json::Value], name: &str) -> Option<[f64; 3]> {
+    let own = loops.iter().find(|own| own["name"] == name).unwrap();
+    let ends = own["gain"].as_array()?;
+    Some([0, 1, 2].map(|at: usize| ends[at].as_f64().unwrap()))
+}
+
+// The simulators' own gains: 113.1 rad/s^2 for pitch in
+// PX4's SIH (examples/logs/README.md), and 290 to 305 rad/s^2 for roll in ArduPilot's SITL, by least squares on its noise-free rates.
+#[test]
+fn the_rate_loops_of_simulated_flights_have_the_gains_of_the_simulators() {
+    let [low, gain, high] = gain_of(&loops("px4_chirps.ulg"), "pitch rate").unwrap();
+    assert!((gain / 113.1 - 1.0).abs() < 0.05, "{gain}");
+    assert!(low < 113.1 && high > 113.1, "{low} {high}");
+    let all = loops("ap_sysid_roll.bin");
+    let [_, gain, _] = gain_of(&all, "roll rate").unwrap();
+    assert!((gain / 297.5 - 1.0).abs() < 0.05, "{gain}");
+    // SYSTEMID excited roll only.
+    assert_eq!(gain_of(&all, "pitch rate"), None);
+    assert_eq!(gain_of(&all, "yaw rate"), None);
+}
+
+#[test]
+fn every_loop_of_a_flight_is_listed_with_its_parts() {
+    let text = run(&["identify", &example("px4_chirps.ulg")]).stdout;
+    for fact in [
+        "Flight 1         parts  gain (90 %)",
+        "pitch rate      1 of 1",
+        "rad/s^2",
+        "Pitch rate",
+        "--axis AXIS --loop LOOP",
+    ] {
+        assert!(text.contains(fact), "{fact}: {text}");
+    }
+    // A vehicle in the air that nobody moves tells nothing about its rate loops.
+    let calm = loops("px4_motor_failure.ulg");
+    for name in ["roll rate", "pitch rate", "yaw rate"] {
+        assert_eq!(gain_of(&calm, name), None, "{name}");
+    }
+}

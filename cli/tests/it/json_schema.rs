@@ -80,7 +80,9 @@ fn the_documented_keys_are_those_of_the_report() {
         env!("CARGO_MANIFEST_DIR")
     );
     let file = folder.name("x.params");
-    let outcome = run(&["identify", &log, "--json", "--write", &file]);
+    let outcome = run(&[
+        "identify", &log, "--axis", "pitch", "--json", "--write", &file,
+    ]);
     keys(
         &serde_json::from_str(&outcome.stdout).unwrap(),
         "",

@@ -1,0 +1,192 @@
+//! `onecycle identify LOG` without a choice of the loop: every loop of the flight, from the parts worth using.
+
+use std::process::ExitCode;
+
+use onecycle::{Controller, Identified, Parameter, Specification, Structure, Verdict};
+use onecycle_link::{ControlLoop, Flight, FlightLog, Signals};
+use rayon::prelude::*;
+
+use super::controllers;
+use super::log::{self, Source};
+use super::log_gains::LogLoop;
+use crate::args::Identify;
+use crate::failure::{Failure, exit};
+use crate::output::{Waiting, print};
+use crate::report::flight as report;
+use crate::results::flight::{FlightLoop, Found, Judged, Part, Refusal};
+
+/// Whether the arguments ask for every loop of a flight log.
+pub(super) fn is_asked(arguments: &Identify) -> bool {
+    let asked = &arguments.log;
+    let is_one = asked.axis.is_some()
+        || asked.control_loop.is_some()
+        || arguments.from.is_some()
+        || arguments.to.is_some()
+        || arguments.structure.is_some()
+        || arguments.report.is_some()
+        || arguments.write.write.is_some();
+    !is_one && log::is_log(&arguments.file)
+}
+
+pub(super) fn run(arguments: &Identify, asked: &Specification) -> Result<ExitCode, Failure> {
+    let source = Source {
+        path: &arguments.file,
+        bytes: None,
+    };
+    let (log, number) = log::scan_flight(&source, &arguments.log)?;
+    let Some(flight) = log.flights.get(number.saturating_sub(1)) else {
+        // The error names the flights that there are.
+        log::signals(&source, &log, number, ControlLoop::ALL[0])?;
+        return Ok(ExitCode::from(exit::NO_PROCESS));
+    };
+    let waiting = Waiting::on("identifying");
+    let complete = flight.loops.iter().filter(|one| one.is_complete());
+    let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
+    let found: Result<Vec<FlightLoop>, Failure> = (loops.into_par_iter())
+        .map(|of| survey(&source, &log, number, (flight, of), asked))
+        .collect();
+    let found = found?;
+    drop(waiting);
+    let name = arguments.file.display().to_string();
+    print(&if arguments.json {
+        report::json(&name, number, &found)
+    } else {
+        report::text(&name, number, &found)
+    })?;
+    let is_any = found.iter().any(|one| one.best().is_some());
+    Ok(ExitCode::from(if is_any {
+        exit::DONE
+    } else {
+        exit::NO_PROCESS
+    }))
+}
+
+fn survey(
+    source: &Source<'_>,
+    log: &FlightLog,
+    number: usize,
+    (flight, of): (&Flight, ControlLoop),
+    asked: &Specification,
+) -> Result<FlightLoop, Failure> {
+    let signals = log::signals(source, log, number, of)?;
+    let of_log = LogLoop::new(flight.clone(), of);
+    let asked = of_log.specification(*asked, false);
+    let outcomes: Vec<_> = (flight.stretches(&signals).into_par_iter())
+        .filter_map(|span| Some((span, identified(&signals.part(span), &asked)?)))
+        .collect();
+    let mut parts = Vec::new();
+    let mut processes = Vec::new();
+    for (span, outcome) in outcomes {
+        let found = match outcome {
+            Ok(identified) => {
+                let found = found(&identified).ok_or(Refusal::Verdict(Verdict::TooUncertain));
+                processes.push(Some(identified));
+                found.and_then(|found| plausible(found, &signals.part(span)))
+            }
+            Err(verdict) => {
+                processes.push(None);
+                Err(Refusal::Verdict(verdict))
+            }
+        };
+        parts.push(Part {
+            span,
+            outcome: found,
+        });
+    }
+    let mut one = FlightLoop {
+        control_loop: of,
+        units: signals.units,
+        parts,
+        in_force: None,
+        proposed: None,
+    };
+    if let Some(best) = one.best().and_then(|at| processes.swap_remove(at)) {
+        let choice = controllers::of_identified(&best, of_log.in_force());
+        one.in_force = choice.against.as_ref().and_then(|against| {
+            Some(Judged {
+                pid: pid(&against.controller)?,
+                figures: against.figures,
+            })
+        });
+        one.proposed = choice.design().and_then(|(design, figures)| {
+            Some(Judged {
+                pid: pid(&design.controller)?,
+                figures: Some(*figures),
+            })
+        });
+    }
+    Ok(one)
+}
+
+/// The process of a part. `None`: its signals make no recording.
+fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified, Verdict>> {
+    let recording = part.recording().ok()?;
+    // An angle integrates the rate, a climb rate the thrust, behind a loop or motors with a lag.
+    let structure = match part.control_loop {
+        ControlLoop::Rate(_) => None,
+        _ => Some(Structure::IntegratorLag),
+    };
+    let identify = (onecycle::Identify::new())
+        .specification(*asked)
+        .structure(structure);
+    Some(identify.run(&recording).outcome)
+}
+
+/// What is shown of a process. `None`: its gain has no interval.
+fn found(identified: &Identified) -> Option<Found> {
+    let structure = identified.model.structure();
+    let is_body = structure.parameters().contains(&Parameter::KOverTBody);
+    let parameter = match is_body {
+        true => Parameter::KOverTBody,
+        false => Parameter::K,
+    };
+    let value = |parameter: Parameter| identified.estimate.get(parameter)?.estimate;
+    let gain = identified.estimate.get(parameter)?;
+    let lags_s = [Parameter::TProp, Parameter::TProp2, Parameter::Tau]
+        .map(|parameter| value(parameter).unwrap_or(0.0));
+    Some(Found {
+        structure,
+        parameter,
+        gain: [gain.low?, gain.estimate?, gain.high?],
+        delay_s: lags_s.iter().sum::<f64>() + slow_pair_s(structure, &value),
+    })
+}
+
+/// Refuses a gain that the loop of a vehicle cannot have: the firmware's signs make every gain positive, an angle is the
+/// integral of the rate, and the mean thrust of a flight carries the weight.
+fn plausible(found: Found, part: &Signals) -> Result<Found, Refusal> {
+    const GRAVITY: f64 = 9.81;
+    let expected = match part.control_loop {
+        ControlLoop::Rate(_) => (0.0, f64::INFINITY),
+        ControlLoop::Attitude(_) => (0.7, 1.4),
+        _ => {
+            let mean = part.input.iter().sum::<f64>() / part.input.len() as f64;
+            (0.6 * GRAVITY / mean, 1.7 * GRAVITY / mean)
+        }
+    };
+    let [_, gain, _] = found.gain;
+    if gain > expected.0 && gain < expected.1 {
+        Ok(found)
+    } else {
+        Err(Refusal::Implausible { gain, expected })
+    }
+}
+
+/// Delay (s) of a resonance at low frequencies.
+fn slow_pair_s(structure: Structure, value: &impl Fn(Parameter) -> Option<f64>) -> f64 {
+    match structure {
+        Structure::Resonant | Structure::ResonantLag => {
+            let (zeta, frequency) = (value(Parameter::Zeta), value(Parameter::NaturalFrequency));
+            zeta.zip(frequency)
+                .map_or(0.0, |(zeta, w0)| 2.0 * zeta / w0)
+        }
+        _ => 0.0,
+    }
+}
+
+fn pid(controller: &Controller) -> Option<onecycle::Pid> {
+    match controller {
+        Controller::Pid(pid) => Some(*pid),
+        _ => None,
+    }
+}

@@ -1,0 +1,120 @@
+//! The control loops of a flight, each identified from several parts of it.
+
+use onecycle::{Assessment, Parameter, Pid, Structure, Verdict};
+use onecycle_link::{ControlLoop, Span};
+
+/// A loop with its parts.
+pub(crate) struct FlightLoop {
+    pub(crate) control_loop: ControlLoop,
+    /// Units of input and output.
+    pub(crate) units: [&'static str; 2],
+    pub(crate) parts: Vec<Part>,
+    /// Gains in force on the process of the best part. `None`: not known.
+    pub(crate) in_force: Option<Judged>,
+    /// Proposed controller for that process.
+    pub(crate) proposed: Option<Judged>,
+}
+
+/// A controller and its figures; without them the loop is unstable.
+pub(crate) struct Judged {
+    pub(crate) pid: Pid,
+    pub(crate) figures: Option<Assessment>,
+}
+
+/// A part of the flight.
+pub(crate) struct Part {
+    pub(crate) span: Span,
+    pub(crate) outcome: Result<Found, Refusal>,
+}
+
+/// Why a part tells nothing.
+pub(crate) enum Refusal {
+    Verdict(Verdict),
+    /// The gain is none that this loop of a vehicle can have, so what was found is not the process.
+    Implausible {
+        gain: f64,
+        /// Least and largest gain.
+        expected: (f64, f64),
+    },
+}
+
+impl Refusal {
+    /// Name in JSON.
+    pub(crate) fn kind(&self) -> &'static str {
+        match self {
+            Self::Verdict(verdict) => verdict.kind(),
+            Self::Implausible { .. } => "implausible",
+        }
+    }
+}
+
+/// What a part tells.
+#[derive(Clone, Copy)]
+pub(crate) struct Found {
+    pub(crate) structure: Structure,
+    /// The parameter that is the gain of the loop: `K/T_body`, or `K` of a structure without a body.
+    pub(crate) parameter: Parameter,
+    /// Gain with its 90 % interval: low, estimate, high.
+    pub(crate) gain: [f64; 3],
+    /// Dead time and actuator lags together (s).
+    pub(crate) delay_s: f64,
+}
+
+impl Found {
+    fn relative_width(&self) -> f64 {
+        (self.gain[2] - self.gain[0]) / self.gain[1].abs()
+    }
+
+    /// Whether the gains of both are of one kind.
+    fn is_like(&self, other: &Self) -> bool {
+        self.structure.unit(self.parameter) == other.structure.unit(other.parameter)
+    }
+}
+
+impl FlightLoop {
+    /// Index of the part with the narrowest interval of the gain.
+    pub(crate) fn best(&self) -> Option<usize> {
+        let widths = self.parts.iter().enumerate().filter_map(|(at, part)| {
+            let found = part.outcome.as_ref().ok()?;
+            Some((at, found.relative_width()))
+        });
+        widths.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(at, _)| at)
+    }
+
+    /// The parts whose gain is of the same kind as that of the best one, that one first.
+    pub(crate) fn alike(&self) -> Vec<Found> {
+        let found = |at: usize| self.parts[at].outcome.as_ref().ok().copied();
+        let Some((best, first)) = self.best().and_then(|at| Some((at, found(at)?))) else {
+            return vec![];
+        };
+        let others = (0..self.parts.len()).filter(|at| *at != best);
+        let like = others
+            .filter_map(found)
+            .filter(|other| other.is_like(&first));
+        std::iter::once(first).chain(like).collect()
+    }
+
+    /// Gain of the best part, with an interval that holds those of all parts: its ends grow by what the parts differ.
+    pub(crate) fn gain(&self) -> Option<[f64; 3]> {
+        let alike = self.alike();
+        let first = alike.first()?;
+        let hold = |[low, estimate, high]: [f64; 3], other: &Found| {
+            [low.min(other.gain[0]), estimate, high.max(other.gain[2])]
+        };
+        Some(alike.iter().fold(first.gain, hold))
+    }
+
+    /// Whether the intervals of two parts have no value in common.
+    pub(crate) fn parts_disagree(&self) -> bool {
+        let alike = self.alike();
+        let low = alike
+            .iter()
+            .map(|found| found.gain[0])
+            .fold(f64::NEG_INFINITY, f64::max);
+        let high = alike
+            .iter()
+            .map(|found| found.gain[2])
+            .fold(f64::INFINITY, f64::min);
+        low > high
+    }
+}

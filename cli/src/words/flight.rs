@@ -1,0 +1,62 @@
+//! Sentences about the control loops of a flight.
+
+use onecycle_design::Unit;
+use onecycle_link::ControlLoop;
+
+use crate::report::number::short;
+use crate::results::flight::Found;
+
+pub(crate) const NOTHING_LOGGED: &str =
+    "The log has input and output of no control loop. onecycle log FILE says what to log.";
+pub(crate) const NO_PART: &str = "No part of the flight can be used: the vehicle was not armed and in the air for 5 s, or \
+                                  the actuator was at its limit.";
+pub(crate) const DISAGREE: &str = "The parts disagree by more than their intervals: the process changed in flight (battery, \
+                                   throttle, load). Design for the part in which the vehicle has to be stable first.";
+
+/// What to do with a loop that was identified.
+pub(crate) fn next(file: &str) -> String {
+    format!(
+        "The interval of a loop holds those of its parts. Gains, delay and margins are those of the part with the narrowest \
+         interval. The whole report of a loop: onecycle identify {file} --axis AXIS --loop LOOP --from S --to S; with \
+         --write FILE it writes the parameters."
+    )
+}
+
+/// A gain that the loop cannot have.
+pub(crate) fn implausible(gain: f64, (low, high): (f64, f64)) -> String {
+    let range = match high.is_finite() {
+        true => format!("{} to {}", short(low), short(high)),
+        false => format!("more than {}", short(low)),
+    };
+    format!(
+        "Not the process: the gain found is {}, and this loop of a vehicle can have {range}.",
+        short(gain)
+    )
+}
+
+/// Heading of a loop.
+pub(crate) fn title(of: ControlLoop) -> String {
+    let name = of.to_string();
+    let mut letters = name.chars();
+    letters.next().map_or(String::new(), |first| {
+        first.to_uppercase().chain(letters).collect()
+    })
+}
+
+/// Unit of the gain of a process with these units of input and output.
+pub(crate) fn gain_unit([input, output]: [&str; 2], found: Found) -> String {
+    let per = match found.structure.unit(found.parameter) {
+        Unit::OutputPerInputSecond => " s",
+        Unit::OutputPerInputSecondSquared => " s^2",
+        _ => "",
+    };
+    match (input, per) {
+        ("1", "") => output.to_owned(),
+        ("1", " s") if output.ends_with("/s") => format!("{output}^2"),
+        ("1", per) => format!("{output}/{}", per.trim()),
+        // An angle over the integral of a rate.
+        ("rad/s", " s") if output == "rad" => String::new(),
+        (input, "") => format!("{output}/({input})"),
+        (input, per) => format!("{output}/({input}{per})"),
+    }
+}
