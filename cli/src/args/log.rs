@@ -32,7 +32,7 @@ pub(crate) struct Log {
 #[derive(Clone, Copy, Debug, Args)]
 #[command(next_help_heading = "Flight logs")]
 pub(crate) struct LogArguments {
-    /// Axis [default: roll]
+    /// Axis [default: roll; without --axis, --loop, --from, --to, --structure, --report and --write: a table of all loops]
     #[arg(long, value_enum)]
     pub(crate) axis: Option<LogAxis>,
     /// Control loop: rate (torque to angular rate), attitude (set-point of the rate to angle) or altitude (thrust to

@@ -39,6 +39,7 @@ pub(crate) const BETA: f64 = -0.73;
     "  double_integrator_lag  K/T_body e^(-tau s) / (s^2 (T_prop s + 1))\n",
     "  foptd                  K e^(-tau s) / (T_body s + 1)\n",
     "  soptd                  K e^(-tau s) / ((T_prop s + 1)(T_body s + 1))\n",
+    "  toptd                  K e^(-tau s) / ((T_prop s + 1)(T_prop2 s + 1)(T_body s + 1))\n",
     "  resonant               K e^(-tau s) / (s^2/w0^2 + 2 zeta s/w0 + 1)\n",
     "  resonant_lag           K e^(-tau s) / ((T_prop s + 1)(s^2/w0^2 + 2 zeta s/w0 + 1))\n\n",
     "Disturbances (--disturbance), each by its strength:\n",
