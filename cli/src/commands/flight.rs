@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::controllers;
 use super::log::{self, Source};
 use super::log_gains::LogLoop;
-use crate::args::Identify;
+use crate::args::{Estimator, Identify};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print};
 use crate::report::flight as report;
@@ -23,6 +23,12 @@ pub(super) fn is_asked(arguments: &Identify) -> bool {
         || arguments.from.is_some()
         || arguments.to.is_some()
         || arguments.structure.is_some()
+        || arguments.hold.is_some()
+        || arguments.beta.is_some()
+        || arguments.input_late.is_some()
+        || arguments.output_filter.is_some()
+        || arguments.estimator != Estimator::Auto
+        || arguments.rows
         || arguments.report.is_some()
         || arguments.write.write.is_some();
     !is_one && log::is_log(&arguments.file)

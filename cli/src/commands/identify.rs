@@ -23,6 +23,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     log_gains::check(arguments)?;
     let asked = specification(arguments)?;
     if flight::is_asked(arguments) {
+        refuse_columns(arguments)?;
         return flight::run(arguments, &asked);
     }
     let (recording, of_log) = read(arguments)?;

@@ -35,6 +35,7 @@ const LIMITS: [(Structure, Structure); 7] = [
 const ROWS: usize = 900;
 
 /// Candidates of all structures in ascending order of BIC, the best of each structure, on one set of rows.
+#[derive(Clone)]
 pub(super) struct Choice {
     pub(super) candidates: Vec<Candidate>,
     /// Samples a row.
@@ -108,6 +109,9 @@ pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
     }
     derive(&blocks, &mut all, limits);
     lift(&blocks, &mut all, limits);
+    if limits.structure.is_none() {
+        all.retain(|candidate| !has_hidden_lag(&candidate.found.theta, record.dt_s));
+    }
     keep_best_of_each(&mut all, limits.structure);
     Choice {
         candidates: all,
@@ -201,6 +205,11 @@ fn lift(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
         let starts = search::derive(&inner.found.theta, structure, blocks.record.dt_s);
         all.extend(search::race(blocks, &starts, None, limits.longest_tau_s));
     }
+}
+
+/// Whether a second lag is shorter than a sample: no output shows it, it stands for an error of the samples' times.
+fn has_hidden_lag(theta: &Theta, sample_s: f64) -> bool {
+    theta.structure.stages().lags > 1 && theta.shortest_lag_s() < sample_s
 }
 
 fn keep_best_of_each(all: &mut Vec<Candidate>, structure: Option<Structure>) {

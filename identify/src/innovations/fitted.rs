@@ -73,22 +73,26 @@ impl Fitted {
         };
         let choice = choose_on_parts(&mut record, &limits, options, remarks);
         let (mut part, mut choice) = choice.ok_or(Verdict::NoFit)?;
-        let mut theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
+        let theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
         let (mut samples, skip_s) = rows_for(&record, &theta);
         limits.skip_s = skip_s;
         let fit = refine(&mut record, &theta, &limits, samples);
         let (mut best, mut found) = fit.ok_or(Verdict::NoFit)?;
         if let Some(longer) = whiter(&record, &best, &limits, samples) {
             limits.fewest_samples = longer;
-            if longer > choice.samples {
-                let again = choose_on_parts(&mut record, &limits, options, remarks);
-                (part, choice) = again.ok_or(Verdict::NoFit)?;
-                theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
+            let again = match longer > choice.samples {
+                true => choose_on_parts(&mut record, &limits, options, remarks),
+                false => Some((part.clone(), choice.clone())),
+            };
+            let fit = again.and_then(|(part, choice)| {
+                let theta = choice.chosen()?.found.theta;
+                Some((part, choice, refine(&mut record, &theta, &limits, longer)?))
+            });
+            if let Some((of, with, (fit, more))) = fit {
+                (part, choice, best) = (of, with, fit);
+                samples = longer;
+                found += more;
             }
-            let fit = refine(&mut record, &theta, &limits, longer).ok_or(Verdict::NoFit)?;
-            samples = longer;
-            best = fit.0;
-            found += fit.1;
         }
         let blocks = Blocks::new(&record, samples, limits.skip_s);
         let damped = choice

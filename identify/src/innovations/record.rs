@@ -169,11 +169,14 @@ pub(crate) struct Blocks<'a> {
 }
 
 impl<'a> Blocks<'a> {
-    /// Blocks of `samples` samples (one for uneven samples), from `skip_s` after the first sample on.
+    /// Blocks of `samples` samples (one for uneven samples), from the first output present `skip_s` after the first
+    /// sample on: outputs that come later tell nothing of a state that has faded by then.
     pub(crate) fn new(record: &'a Record, samples: usize, skip_s: f64) -> Self {
         let even = record.uneven_s.is_empty();
         let samples = if even { samples.max(1) } else { 1 };
-        let first = record.index_at(skip_s);
+        let start = record.index_at(skip_s);
+        let first = (start..record.len()).find(|sample| record.present[*sample]);
+        let first = first.unwrap_or(start);
         let count = record.len().saturating_sub(first) / samples;
         let scale = record.output_deviation();
         let mut blocks = Self {
