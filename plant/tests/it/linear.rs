@@ -55,6 +55,10 @@ fn step_response(structure: Structure, time_s: f64) -> f64 {
         }
         Structure::Foptd => 1.0 - decay(t1),
         Structure::Soptd => 1.0 - (t1 * decay(t1) - t2 * decay(t2)) / (t1 - t2),
+        Structure::Toptd => {
+            let part = |a: f64, b: f64, c: f64| a * a * decay(a) / ((a - b) * (a - c));
+            1.0 - part(t1, t2, t3) - part(t2, t3, t1) - part(t3, t1, t2)
+        }
         // 1 - C e^(-t/T2) - e^(-zeta w0 t) (A cos + B sin); at zero the response and its slope are zero.
         Structure::Resonant | Structure::ResonantLag => {
             let x = W0_RAD_PER_S * t2;
