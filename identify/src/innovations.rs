@@ -47,7 +47,7 @@ mod validate;
 #[cfg(test)]
 mod vectors;
 
-use onecycle_design::{Model, Proposal, Structure, step_response};
+use onecycle_design::Structure;
 
 pub(crate) use self::check::check;
 use self::choose::NEARLY;
@@ -58,8 +58,10 @@ pub use self::plan::expected;
 use self::prepare::{FEWEST, Prepared, prepare};
 use self::record::Blocks;
 pub use self::record::Hold;
+pub(crate) use self::result::gain_of;
 use self::search::Candidate;
 use self::theta::{Bounds, Theta};
+use crate::conclusion::conclude;
 use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{
     Evidence, Fit, Identification, Identified, InnovationTests, Prediction, Refused,
@@ -80,8 +82,6 @@ const MOST_DEVIATION: f64 = 0.3;
 /// Share of the input's power in the informative band below which a fit rests on rounding errors, as that of a sine does
 /// which has nothing to do with the output. A relay has 0.1 % beyond its 140th harmonic.
 const LEAST_POWER: f64 = 1e-5;
-/// Half width of the interval of the gain over the estimate above which the record tells nothing.
-const MOST_WIDTH: f64 = 0.5;
 /// Autocorrelation of the innovations above which an error of the prediction is the model's fault.
 const STRONGLY_COLOURED: f64 = 0.3;
 /// Share of the input and its F statistic above which the model is of another kind, if it also predicts little.
@@ -258,7 +258,7 @@ impl Search<'_> {
         let length_s = found.map_or(f64::INFINITY, |found| found.end_s - found.start_s);
         let lag_s = theta.shortest_lag_s().min(LONGEST_TAU * length_s);
         Verdict::NoInformation {
-            parameter: result::gain_of(theta.structure),
+            parameter: gain_of(theta.structure),
             deviation,
             informative_rad_per_s: found.and_then(|found| found.informative_rad_per_s),
             needed_rad_per_s: 1.0 / (lag_s + theta.tau_s().max(0.0)),
@@ -330,41 +330,17 @@ impl Search<'_> {
         let excited = self.excitation.and_then(|found| found.excited_rad_per_s);
         let recorded = fitted.recorded_loop(excited);
         let specification = recorded.complete(&self.options.specification);
-        let draws = posterior.models(specification.draws());
-        let undamped = model.soiptd().map_or(model, Model::Soiptd);
-        let design = match Proposal::new(&undamped, &draws, &specification).outcome {
-            Ok(design) => Some(design),
-            Err(error) => {
-                self.remarks.push(Remark::NoController(error));
-                None
-            }
-        };
-        let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
-        if !posterior.is_narrow_enough(&undamped, &draws, (&specification, phase_margin_rad)) {
-            return Err(Verdict::TooUncertain);
-        }
-        let estimate = posterior.estimate();
-        let gain = result::gain_of(model.structure());
-        let width = (estimate.get(gain)).and_then(|interval| interval.relative_half_width());
-        if width.is_none_or(|width| width > MOST_WIDTH) {
-            return Err(self.no_information(&fitted.best.found.theta, width));
-        }
         let checked = (tests, prediction, widened);
-        let fit = fit(fitted, blocks, prepared.start_s, checked).ok_or(Verdict::NoFit)?;
-        Ok(Identified {
-            joint_probability: posterior.joint_probability(&estimate),
-            step: design
-                .and_then(|design| step_response(&undamped, &design.controller).ok())
-                .map(|step| step.metrics),
-            model,
-            estimate,
-            posterior,
+        let mut remarks = std::mem::take(&mut self.remarks);
+        let found = conclude(
+            (model, posterior),
             specification,
-            design,
-            phase_margin_rad,
-            resonance: None,
-            fit,
-        })
+            &mut remarks,
+            |width| self.no_information(&fitted.best.found.theta, width),
+            || fit(fitted, blocks, prepared.start_s, checked),
+        );
+        self.remarks = remarks;
+        found
     }
 }
 

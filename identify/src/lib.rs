@@ -20,9 +20,11 @@ mod amplitude;
 mod assumed;
 mod checks;
 pub mod cholesky;
+mod conclusion;
 pub mod diagnose;
 mod excitation;
 mod innovations;
+mod instrument;
 mod nonlinear;
 mod outcome;
 mod posterior;
@@ -45,10 +47,11 @@ pub use diagnose::harmonics::{Harmonic, harmonics};
 pub use diagnose::whiteness::{Whiteness, whiteness};
 pub use excitation::{Excitation, Oscillation, Recorded, Switching};
 pub use innovations::{Hold, expected};
+pub use instrument::{contradicts_set_point, identify_by_set_point};
 pub use nonlinear::Nonlinear;
 pub use outcome::{
     Alternative, Evidence, Fit, FitPoint, Identification, Identified, InnovationRow,
-    InnovationTests, Innovations, Noise, Prediction, Refused,
+    InnovationTests, Innovations, Noise, Prediction, Refused, ResponsePoint, SetPointResponse,
 };
 pub use posterior::{Draw, Estimate, Interval, Posterior};
 pub use reading::Reading;

@@ -1,5 +1,6 @@
 //! Result of an identification.
 
+use num_complex::Complex64;
 use onecycle_design::{Design, Model, Proposal, Specification, StepMetrics, proposals};
 use onecycle_onboard::refine::Refined;
 
@@ -138,9 +139,10 @@ impl Identified {
 pub struct Fit {
     /// Part of the output that the model leaves unexplained. Of a steady oscillation: root mean square of the residual
     /// in excess of the noise, divided by that of the oscillation. Of any other record: root of the unexplained share of
-    /// the variance, in a prediction of the last third from the model of the first two thirds.
+    /// the variance, in a prediction of the last third from the model of the first two thirds; of a response to a set-point:
+    /// root of [`SetPointResponse::unexplained`].
     pub misfit: f64,
-    /// Measured and fitted output over the cycles, or over the record, used.
+    /// Measured and fitted output over the cycles, or over the record, used. Empty if the fit is one of spectra.
     pub points: Vec<FitPoint>,
     /// How the model was estimated.
     pub evidence: Evidence,
@@ -154,6 +156,8 @@ pub enum Evidence {
     Relay(Refined),
     /// Likelihood of the whole record with disturbances.
     Innovations(Innovations),
+    /// Cross-spectra with the set-point of a closed loop.
+    SetPoint(SetPointResponse),
 }
 
 impl Fit {
@@ -162,7 +166,7 @@ impl Fit {
     pub fn refined(&self) -> Option<&Refined> {
         match &self.evidence {
             Evidence::Relay(refined) => Some(refined),
-            Evidence::Innovations(_) => None,
+            _ => None,
         }
     }
 
@@ -170,10 +174,53 @@ impl Fit {
     #[must_use]
     pub fn innovations(&self) -> Option<&Innovations> {
         match &self.evidence {
-            Evidence::Relay(_) => None,
             Evidence::Innovations(innovations) => Some(innovations),
+            _ => None,
         }
     }
+
+    /// Response to the set-point of a closed loop, where that told the process. `None` elsewhere.
+    #[must_use]
+    pub fn set_point_response(&self) -> Option<&SetPointResponse> {
+        match &self.evidence {
+            Evidence::SetPoint(response) => Some(response),
+            _ => None,
+        }
+    }
+}
+
+/// Frequency response of a process in a closed loop, from what the set-point caused.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct SetPointResponse {
+    /// Measured response and model, in ascending order of frequency.
+    pub points: Vec<ResponsePoint>,
+    /// Segments of the record, each overlapping the next by half.
+    pub segments: usize,
+    /// Sum of the squared errors of the model over their deviations: chi-squared if the model is right.
+    pub chi_squared: f64,
+    /// Degrees of freedom of that sum.
+    pub freedom: f64,
+    /// Share of the power of the output's cross-spectrum with the set-point that the model does not explain.
+    pub unexplained: f64,
+    /// Factor by which the deviations were widened because the sum is larger than its degrees of freedom; 1 if it is not.
+    pub widened: f64,
+    /// Standard deviation of white noise of a sample that has the power of the output's highest frequencies (output unit).
+    pub noise_sigma: f64,
+}
+
+/// Response at one frequency.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct ResponsePoint {
+    /// Frequency (rad/s).
+    pub omega_rad_per_s: f64,
+    /// Ratio of the cross-spectra of output and input with the set-point (output unit over input unit).
+    pub measured: Complex64,
+    /// Its deviation over its size. Above 0.3 or so the ratio is biased towards the inverse of the controller.
+    pub deviation: f64,
+    /// Response of the model.
+    pub fitted: Complex64,
 }
 
 /// Result of the general estimator: the innovations, which are what a Kalman filter of the model could not predict.

@@ -18,7 +18,7 @@ use crate::cholesky::cholesky;
 
 /// Number of draws. The standard error of the probability below the 5 % quantile is `sqrt(0.05 * 0.95 / 4000)`, 0.35 of
 /// a percentage point.
-const DRAWS: usize = 4000;
+pub(crate) const DRAWS: usize = 4000;
 /// Seed of the draws: arbitrary, fixed so that the same recording gives the same bits.
 const SEED: u64 = 0x1c7c_1e00;
 
@@ -281,6 +281,22 @@ impl Posterior {
             best: Draw::of_linear(best, structure, input_bias.unwrap_or(0.0)),
             has_bias: input_bias.is_some(),
             draws,
+        }
+    }
+
+    /// Posterior about `best` of which `draws` are known. The input bias is not estimated.
+    pub(crate) fn of_draws(best: &Linear, draws: &[Linear]) -> Self {
+        let structure = best.structure();
+        // Neighbours of a chain are alike: every 617th in turn, a prime, so that the first few represent all.
+        let count = draws.len();
+        let shuffled = (0..count).map(|k| &draws[617 * k % count]);
+        Self {
+            structure,
+            best: Draw::of_linear(best, structure, 0.0),
+            has_bias: false,
+            draws: shuffled
+                .map(|draw| Draw::of_linear(draw, structure, 0.0))
+                .collect(),
         }
     }
 

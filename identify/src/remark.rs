@@ -27,6 +27,14 @@ pub enum Remark {
         /// Share of this part in the variance of the input.
         share: f64,
     },
+    /// No fit to the input explained the recording, so the process was found from what input and output have in common with
+    /// the set-point, at many frequencies.
+    BySetPoint {
+        /// Segments of the recording, each overlapping the next by half.
+        segments: usize,
+        /// Lowest and highest frequency used (rad/s).
+        band_rad_per_s: (f64, f64),
+    },
     /// Few cycles: the steady run has fewer than 3, or the fit used fewer than 4 although more were requested.
     FewCycles {
         /// Number of cycles used.
@@ -218,6 +226,7 @@ impl Remark {
             Self::OneCycle { .. } => "one_cycle",
             Self::OutputFilter { .. } => "output_filter",
             Self::TwoStage { .. } => "two_stage",
+            Self::BySetPoint { .. } => "by_set_point",
             Self::FewCycles { .. } => "few_cycles",
             Self::Unknown(_) => "unknown",
             Self::Unread => "unread",

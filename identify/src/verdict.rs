@@ -107,6 +107,11 @@ pub enum Verdict {
         /// Share of the output's variance that the set-point explains.
         share: f64,
     },
+    /// No structure explains the response of the output to the set-point of a closed loop.
+    SetPointLeft {
+        /// Mean square of its errors over what noise explains.
+        ratio: f64,
+    },
     /// The output moved too little for any conclusion, as in calm flight.
     Calm {
         /// Standard deviation of the output (output unit).
@@ -145,7 +150,8 @@ impl Verdict {
             Self::NotThisProcess { .. }
             | Self::NoFit
             | Self::NoPrediction { .. }
-            | Self::InputLeft { .. } => "not_this_process",
+            | Self::InputLeft { .. }
+            | Self::SetPointLeft { .. } => "not_this_process",
             Self::NotExcited { .. } | Self::Calm { .. } => "not_excited",
             Self::Unknown { .. } => "unknown",
             Self::TooUncertain => "too_uncertain",
@@ -186,6 +192,7 @@ impl fmt::Display for Verdict {
             | Self::NoPrediction { .. }
             | Self::NotExcited { .. }
             | Self::Calm { .. }
+            | Self::SetPointLeft { .. }
             | Self::InputLeft { .. } => self.write_record(f),
         }
     }
@@ -292,6 +299,11 @@ impl Verdict {
                 "not excited: the set-point explains {:.0} % of the output, and the input follows the rest through the \
                  controller",
                 100.0 * share
+            ),
+            Self::SetPointLeft { ratio } => write!(
+                f,
+                "not this kind of process: no structure explains how the output follows the set-point; the mean square \
+                 of the errors is {ratio:.1} times that of the noise"
             ),
             Self::InputLeft { share } => write!(
                 f,

@@ -2,8 +2,8 @@
 //! caused.
 
 use onecycle_identify::{
-    Caused, Evidence, Identification, Innovations, Options, Remark, Signals, Verdict,
-    caused_by_set_point, identify_by,
+    Caused, Evidence, Excitation, Identification, Innovations, Options, Remark, Signals, Verdict,
+    caused_by_set_point, contradicts_set_point, identify_by, identify_by_set_point,
 };
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
@@ -44,6 +44,7 @@ pub(crate) fn calm(recording: &Recording, signals: &Signals<'_>) -> Option<Verdi
 /// rather than of the process: it is refused, unless a fit predicts nearly everything, as with a test signal that is added
 /// to the input. Else the fit to the input as it is stands if its innovations are white and owe nothing to the past input.
 /// Otherwise noise came back through the controller, and the part of the input that the set-point caused takes its place.
+/// If that has no fit either, or one that the response to the set-point contradicts, the response itself is fitted.
 pub(crate) fn identify(
     signals: &Signals<'_>,
     set_point: &[f64],
@@ -60,6 +61,40 @@ pub(crate) fn identify(
         }
         return direct;
     };
+    let is_contradicted = |found: &Identification| {
+        let model = found
+            .outcome
+            .as_ref()
+            .ok()
+            .map(|identified| identified.model);
+        let contradicts =
+            model.and_then(|model| contradicts_set_point(signals, set_point, options, &model));
+        contradicts == Some(true)
+    };
+    let recorded = match &direct.excitation {
+        Some(Excitation::Recorded(recorded)) => Some(*recorded),
+        _ => None,
+    };
+    let found = in_two_stages(signals, &caused, direct, (options, pack));
+    if found.outcome.is_ok() && !is_contradicted(&found) {
+        return found;
+    }
+    let by_spectra = identify_by_set_point(signals, set_point, options, recorded);
+    match (&found.outcome, &by_spectra.outcome) {
+        // What the response lacks is the better advice.
+        (Err(_), Err(Verdict::NoInformation { .. } | Verdict::TooUncertain)) => by_spectra,
+        (Err(_), Err(_)) => found,
+        _ => by_spectra,
+    }
+}
+
+/// The fit to the input as it is, `direct`, or to the part of it that the set-point caused.
+fn in_two_stages(
+    signals: &Signals<'_>,
+    caused: &Caused,
+    direct: Identification,
+    (options, pack): (&Options, Option<&Pack<'_>>),
+) -> Identification {
     if is_clean(&direct) {
         return direct;
     }

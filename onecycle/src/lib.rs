@@ -35,7 +35,7 @@
 //! | read and write recordings | [`read`], [`read_from`], [`CsvOptions`], [`ColumnRef`], [`TimeUnit`], [`Recording`], [`Gap`], [`Note`], [`write_csv`] |
 //! | identify | [`Identify`], [`Structure`], [`Road`], [`Hold`], [`Method`], [`Pack`] |
 //! | use the result | [`Identification`], [`Identified`], [`Estimate`], [`Interval`], [`Posterior`] |
-//! | see what the estimate rests on | [`Excitation`], [`Oscillation`], [`Recorded`], [`Evidence`], [`Innovations`] |
+//! | see what the estimate rests on | [`Excitation`], [`Oscillation`], [`Recorded`], [`Evidence`], [`Innovations`], [`SetPointResponse`] |
 //! | find out why there is no result, or what limits it | [`Verdict`], [`Remark`] |
 //! | describe a process | [`Model`], [`Structure`], [`Parameter`], [`Unit`], [`Soiptd`], [`Linear`] |
 //! | design a controller | [`design()`], [`design_over()`], [`Specification`], [`Style`], [`MeasurementNoise`], [`Execution`], [`LowPass`], [`Design`], [`Robustness`] |
@@ -254,7 +254,8 @@ pub use onecycle_link::{
 #[doc(inline)]
 pub use onecycle_identify::{
     About, Estimate, Evidence, Excitation, Hold, Identification, Identified, Innovations, Interval,
-    Method, Oscillation, Posterior, Recorded, Refused, Remark, Road, Verdict,
+    Method, Oscillation, Posterior, Recorded, Refused, Remark, ResponsePoint, Road,
+    SetPointResponse, Verdict,
 };
 #[doc(inline)]
 pub use onecycle_onboard::pack::{Pack, PackError};

@@ -77,9 +77,16 @@ fn survey(
     let signals = log::signals(source, log, number, of)?;
     let of_log = LogLoop::new(flight.clone(), of);
     let asked = of_log.specification(*asked, false);
-    let outcomes: Vec<_> = (flight.stretches(&signals).into_par_iter())
-        .filter_map(|span| Some((span, identified(&signals.part(span), &asked)?)))
+    let spans = flight.stretches(&signals);
+    let mut outcomes: Vec<_> = (spans.par_iter())
+        .filter_map(|span| Some((*span, identified(&signals.part(*span), &asked)?)))
         .collect();
+    // What no part tells alone, all of the flight may tell.
+    if spans.len() > 1 && outcomes.iter().all(|(_, outcome)| outcome.is_err()) {
+        let whole = spans.iter().fold(spans[0], |all, span| all.with(*span));
+        let outcome = identified(&signals.part(whole), &asked);
+        outcomes.extend(outcome.map(|outcome| (whole, outcome)));
+    }
     let mut parts = Vec::new();
     let mut processes = Vec::new();
     for (span, outcome) in outcomes {

@@ -189,6 +189,21 @@ struct Fit {
     response_error: Option<f64>,
     residual_sigma: Option<f64>,
     noise_sigma: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    response: Option<Response>,
+}
+
+/// Frequency response by the set-point of a closed loop.
+#[derive(Serialize)]
+struct Response {
+    segments: usize,
+    chi_squared: f64,
+    degrees_of_freedom: f64,
+    widened: f64,
+    frequency_rad_per_s: Vec<f64>,
+    measured: Vec<[f64; 2]>,
+    relative_deviation: Vec<f64>,
+    fitted: Vec<[f64; 2]>,
 }
 
 #[derive(Serialize)]
@@ -411,7 +426,30 @@ fn fit(of: &onecycle_identify::Fit) -> Fit {
         response_error: refined.map(|refined| refined.response_error),
         residual_sigma: refined.map(|refined| refined.residual_sigma),
         noise_sigma: (refined.map(|refined| refined.noise_sigma))
-            .or(innovations.map(|innovations| innovations.noise.sigma)),
+            .or(innovations.map(|innovations| innovations.noise.sigma))
+            .or(of.set_point_response().map(|response| response.noise_sigma)),
+        response: of.set_point_response().map(response),
+    }
+}
+
+fn response(of: &onecycle::SetPointResponse) -> Response {
+    Response {
+        segments: of.segments,
+        chi_squared: of.chi_squared,
+        degrees_of_freedom: of.freedom,
+        widened: of.widened,
+        frequency_rad_per_s: of.points.iter().map(|at| at.omega_rad_per_s).collect(),
+        measured: of
+            .points
+            .iter()
+            .map(|at| [at.measured.re, at.measured.im])
+            .collect(),
+        relative_deviation: of.points.iter().map(|at| at.deviation).collect(),
+        fitted: of
+            .points
+            .iter()
+            .map(|at| [at.fitted.re, at.fitted.im])
+            .collect(),
     }
 }
 

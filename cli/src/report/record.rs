@@ -1,6 +1,6 @@
 //! What the general estimator used, chose and checked, as rows of a name and a value, for the text and the page.
 
-use onecycle::{Identification, Innovations, Recorded, Remark, Structure};
+use onecycle::{Identification, Innovations, Recorded, Remark, SetPointResponse, Structure};
 use onecycle_identify::{Alternative, InnovationTests, Noise, Prediction};
 
 use super::number::{frequency, percent, seconds, significant};
@@ -111,6 +111,46 @@ pub(super) fn of_model(chosen: Structure, innovations: &Innovations, units: &Uni
         (
             "innovations",
             tests(&innovations.whiteness, innovations.widened),
+        ),
+    ]
+}
+
+/// The response to a set-point that a model was fitted to.
+pub(super) fn of_response(chosen: Structure, found: &SetPointResponse, units: &Units) -> Vec<Fact> {
+    let band = match (found.points.first(), found.points.last()) {
+        (Some(first), Some(last)) => format!(
+            "{} frequencies from {} to {} over {} segments",
+            found.points.len(),
+            frequency(first.omega_rad_per_s),
+            frequency(last.omega_rad_per_s),
+            found.segments
+        ),
+        _ => "none".to_owned(),
+    };
+    let ratio = found.chi_squared / found.freedom;
+    let widened = match found.widened > 1.0 {
+        true => format!(
+            "; the intervals are {} times wider for it",
+            significant(found.widened)
+        ),
+        false => String::new(),
+    };
+    vec![
+        ("structure", chosen.name().to_owned()),
+        ("response", band),
+        (
+            "errors",
+            format!(
+                "mean square {} times that of the noise{widened}",
+                significant(ratio)
+            ),
+        ),
+        (
+            "noise",
+            format!(
+                "standard deviation {} at the highest frequencies",
+                with_unit(found.noise_sigma, &units.output)
+            ),
         ),
     ]
 }

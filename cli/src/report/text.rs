@@ -55,13 +55,7 @@ pub(crate) fn identification(
     match &found.outcome {
         Ok(identified) => {
             describe_process(&mut text, identified, &units);
-            if let Some(innovations) = identified.fit.innovations() {
-                text.push_str(&headed("\nModel\n"));
-                facts(
-                    &mut text,
-                    &record::of_model(identified.model.structure(), innovations, &units),
-                );
-            }
+            describe_model(&mut text, identified, &units);
             if let Some(choice) = choice {
                 text.push_str(&controllers::table(choice));
             }
@@ -216,6 +210,18 @@ fn describe_estimate(
         let line = format!("  {name:<10}{estimate:>12}   {range:<26} {unit}");
         let _ = writeln!(text, "{}", line.trim_end());
     }
+}
+
+/// What the model rests on. A steady oscillation says so elsewhere.
+fn describe_model(text: &mut String, identified: &Identified, units: &Units) {
+    let (structure, fit) = (identified.model.structure(), &identified.fit);
+    let of_model = match (fit.innovations(), fit.set_point_response()) {
+        (Some(innovations), _) => record::of_model(structure, innovations, units),
+        (_, Some(response)) => record::of_response(structure, response, units),
+        _ => return,
+    };
+    text.push_str(&headed("\nModel\n"));
+    facts(text, &of_model);
 }
 
 fn describe_process(text: &mut String, identified: &Identified, units: &Units) {

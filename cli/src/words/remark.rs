@@ -85,6 +85,15 @@ fn of_recording(remark: &Remark) -> Option<String> {
              ({:.0} % of its variance); the noise below includes the effect of the rest.",
             100.0 * share
         ),
+        Remark::BySetPoint {
+            segments,
+            band_rad_per_s: (low, high),
+        } => format!(
+            "No fit to the input explained the recording. The process was found from what its input and output have in \
+             common with the set-point, from {} to {} Hz, over {segments} short segments.",
+            significant(low / std::f64::consts::TAU),
+            significant(high / std::f64::consts::TAU)
+        ),
         Remark::FewCycles { used } => format!(
             "Only {used} steady cycles could be used; more cycles would narrow the intervals."
         ),

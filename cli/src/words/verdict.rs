@@ -21,6 +21,7 @@ pub(crate) fn advice(verdict: &Verdict) -> Cow<'static, str> {
         Verdict::TooFewRows { .. } | Verdict::NoPrediction { .. } | Verdict::InputLeft { .. } => {
             of_record(verdict).into()
         }
+        Verdict::SetPointLeft { .. } => of_record(verdict).into(),
         Verdict::NotExcited { .. } | Verdict::Calm { .. } => NOT_EXCITED.into(),
         _ => of_relay(verdict).into(),
     }

@@ -23,7 +23,7 @@ const INSTRUMENT: f64 = 1e-3;
 const LEAST_ZETA: f64 = 0.005;
 
 /// The parameter that is the gain in front of the stages.
-pub(super) fn gain_of(structure: Structure) -> Parameter {
+pub(crate) fn gain_of(structure: Structure) -> Parameter {
     if structure.parameters().contains(&Parameter::KOverTBody) {
         Parameter::KOverTBody
     } else {

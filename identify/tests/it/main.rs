@@ -7,5 +7,6 @@
 
 mod checks;
 mod forces;
+mod instrument;
 mod names;
 mod outcomes;

@@ -39,6 +39,17 @@ pub struct Span {
     pub to_s: f64,
 }
 
+impl Span {
+    /// The span from the earlier start to the later end of both.
+    #[must_use]
+    pub fn with(self, other: Self) -> Self {
+        Self {
+            from_s: self.from_s.min(other.from_s),
+            to_s: self.to_s.max(other.to_s),
+        }
+    }
+}
+
 /// What makes a deliberate excitation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]

@@ -1,6 +1,6 @@
 //! The model over the data, and the residuals.
 
-use onecycle::{Innovations, Structure};
+use onecycle::{Innovations, ResponsePoint, SetPointResponse, Structure};
 use onecycle_identify::{Fit, FitPoint, Whiteness, whiteness};
 use onecycle_onboard::refine::Refined;
 
@@ -12,12 +12,22 @@ use crate::report::number::percent;
 use crate::report::record::{self, Fact};
 use crate::report::units::Units;
 
+/// Relative deviation of a measured response above which it is not drawn.
+const LARGEST_DEVIATION: f64 = 1.0 / 3.0;
 /// Lags that residuals are compared at, and the least number of residuals for each.
 const LAGS: usize = 25;
 const RESIDUALS_PER_LAG: usize = 4;
 
 /// The fit of a `structure`, which was accepted unless `title` says otherwise.
 pub(super) fn section(title: &str, structure: Structure, fit: &Fit, units: &Units) -> Section {
+    if let Some(response) = fit.set_point_response() {
+        return Section {
+            id: "fit".to_owned(),
+            title: title.to_owned(),
+            body: page::figure(&of_response(response))
+                + &page::facts(&record::of_response(structure, response, units)),
+        };
+    }
     let (figure, what, residuals) = match fit.innovations() {
         None => (
             over_cycles(&fit.points, units),
@@ -115,6 +125,44 @@ fn over_record(fit: &[FitPoint], found: &Innovations, units: &Units) -> Figure {
          one, acts at the process input. Each point is the mean of consecutive samples, as used in the fit.",
         Axis::titled("time (s)"),
         panels,
+    )
+}
+
+/// Measured response above the model's, where the set-point shows.
+fn of_response(found: &SetPointResponse) -> Figure {
+    let shown = || (found.points.iter()).filter(|point| point.deviation < LARGEST_DEVIATION);
+    let model = |value: fn(&ResponsePoint) -> f64, name| {
+        let points = found.points.iter();
+        let points = points.map(|point| (point.omega_rad_per_s, value(point)));
+        Series::of_points(name, Marks::Line, points).hue(Hue::Model)
+    };
+    let measured = |points: Vec<(f64, f64)>, name| {
+        Series::of_points(name, Marks::Points, points).hue(Hue::Measured)
+    };
+    let magnitudes =
+        shown().map(|point| (point.omega_rad_per_s, 20.0 * point.measured.norm().log10()));
+    let errors = shown().map(|point| {
+        let turn = (point.measured / point.fitted).arg();
+        (point.omega_rad_per_s, turn.to_degrees())
+    });
+    Figure::stacked(
+        "Response of the process: output over input, both as far as the set-point caused them, and the model. Below, the \
+         phase that the model leaves. Frequencies at which the measured response is uncertain by more than a third are \
+         left out; the fit uses them with their small weight.",
+        Axis::titled("frequency (rad/s)").logarithmic(),
+        vec![
+            Panel::new(
+                Axis::titled("magnitude (dB)"),
+                vec![
+                    model(|point| 20.0 * point.fitted.norm().log10(), "model"),
+                    measured(magnitudes.collect(), "measured"),
+                ],
+            ),
+            Panel::new(
+                Axis::titled("phase of measured over model (deg)"),
+                vec![model(|_| 0.0, ""), measured(errors.collect(), "")],
+            ),
+        ],
     )
 }
 

@@ -1,0 +1,58 @@
+//! From a posterior to a result: controller, margins, and the refusals for want of information.
+
+use onecycle_design::{Model, Proposal, Specification, step_response};
+
+use crate::innovations::gain_of;
+use crate::outcome::{Fit, Identified};
+use crate::posterior::Posterior;
+use crate::remark::Remark;
+use crate::verdict::Verdict;
+
+/// Half width of the interval of the gain over the estimate above which the record tells nothing.
+const MOST_WIDTH: f64 = 0.5;
+
+/// The result of a model with its posterior, for a specification.
+///
+/// `no_information` makes the verdict of a gain whose interval has this half width over the estimate, and `fit` the quality
+/// of the fit (`None` if it has none).
+pub(crate) fn conclude(
+    (model, posterior): (Model, Posterior),
+    specification: Specification,
+    remarks: &mut Vec<Remark>,
+    no_information: impl FnOnce(Option<f64>) -> Verdict,
+    fit: impl FnOnce() -> Option<Fit>,
+) -> Result<Identified, Verdict> {
+    let draws = posterior.models(specification.draws());
+    let undamped = model.soiptd().map_or(model, Model::Soiptd);
+    let design = match Proposal::new(&undamped, &draws, &specification).outcome {
+        Ok(design) => Some(design),
+        Err(error) => {
+            remarks.push(Remark::NoController(error));
+            None
+        }
+    };
+    let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
+    if !posterior.is_narrow_enough(&undamped, &draws, (&specification, phase_margin_rad)) {
+        return Err(Verdict::TooUncertain);
+    }
+    let estimate = posterior.estimate();
+    let width = (estimate.get(gain_of(model.structure())))
+        .and_then(|interval| interval.relative_half_width());
+    if width.is_none_or(|width| width > MOST_WIDTH) {
+        return Err(no_information(width));
+    }
+    Ok(Identified {
+        joint_probability: posterior.joint_probability(&estimate),
+        step: design
+            .and_then(|design| step_response(&undamped, &design.controller).ok())
+            .map(|step| step.metrics),
+        model,
+        estimate,
+        posterior,
+        specification,
+        design,
+        phase_margin_rad,
+        resonance: None,
+        fit: fit().ok_or(Verdict::NoFit)?,
+    })
+}
