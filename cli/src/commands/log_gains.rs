@@ -11,7 +11,7 @@ use onecycle_link::{
 };
 
 use super::log::{self, Source};
-use super::log_overlay::overlay;
+use super::log_overlay::{overlay, overshoot};
 use crate::args::{Identify, WriteArguments};
 use crate::failure::Failure;
 use crate::output::{with_ending, write_text};
@@ -60,12 +60,14 @@ impl LogLoop {
         }))
     }
 
-    /// `asked` for the loop as the firmware runs it: its filters and rate of execution where the user gave none, and only P
-    /// around an attitude loop.
+    /// `asked` for the loop as the firmware runs it: its set-point weight, its filters and rate of execution where the user
+    /// gave none, and only P around an attitude loop.
     pub(super) fn specification(&self, asked: Specification, is_form_given: bool) -> Specification {
         if asked.style == Style::Paper {
             return asked;
         }
+        // The firmwares have the proportional term on the error.
+        let asked = asked.with_setpoint_weight(1.0);
         match self.control_loop {
             ControlLoop::Rate(axis) => {
                 let law = self.flight.rate_law(axis);
@@ -152,7 +154,8 @@ impl LogLoop {
             return Err(words::NO_CHANGE.to_owned());
         }
         let execution = choice.asked.execution;
-        let controller = Controller::from(pid(old.changed(&changes)).with_execution(execution));
+        let new = pid(old.changed(&changes)).with_execution(execution);
+        let controller = Controller::from(new);
         let (model, _) = identified.for_design(0);
         let least = least_margins(&identified.posterior.models(DRAWS), &controller);
         let figures = assess(&model, &controller, choice.asked.noise.as_ref());
@@ -160,11 +163,16 @@ impl LogLoop {
         let Some(figures) = figures.filter(|_| is_stable) else {
             return Err(words::unstable(least.map(|least| least.stable)));
         };
+        let simulated = match self.control_loop {
+            ControlLoop::Rate(axis) => overshoot(&self.flight, axis, new, &model, &figures),
+            _ => figures.step.map(|step| step.overshoot),
+        };
         Ok(Written {
             path: PathBuf::new(),
             restore: PathBuf::new(),
             changes,
             share: asked.step,
+            overshoot: simulated,
             figures,
             least,
         })
