@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use onecycle::{
     Controller, Execution, Form, Identification, Identified, LowPass, Pid, Recording,
-    Specification, Style, assess, least_margins,
+    Specification, Structure, Style, assess, least_margins,
 };
 use onecycle_link::{
     Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, RateLaw, ReadBack, changes, files,
@@ -60,6 +60,11 @@ impl LogLoop {
         }))
     }
 
+    /// Which loop it is.
+    pub(super) fn control_loop(&self) -> ControlLoop {
+        self.control_loop
+    }
+
     /// `asked` for the loop as the firmware runs it: its set-point weight, its filters and rate of execution where the user
     /// gave none, and only P around an attitude loop.
     pub(super) fn specification(&self, asked: Specification, is_form_given: bool) -> Specification {
@@ -79,8 +84,10 @@ impl LogLoop {
                 asked
             }
             ControlLoop::Attitude(_) if !is_form_given => {
+                // A bare gain: there is no filter to choose.
                 let mut asked = asked;
                 asked.form = Form::P;
+                asked.filter_s = Some(0.0);
                 asked
             }
             _ => asked,
@@ -195,6 +202,16 @@ impl LogLoop {
             restore,
             ..to_write
         })
+    }
+}
+
+/// Structure of the process of a loop. `None`: the recording decides.
+///
+/// An angle integrates the rate, a climb rate the thrust, behind a loop or motors with a lag.
+pub(super) fn structure(of: ControlLoop) -> Option<Structure> {
+    match of {
+        ControlLoop::Rate(_) => None,
+        _ => Some(Structure::IntegratorLag),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! With an integral term the cost is the IAE of a unit step of the load, without one that of a unit step of the
 //! reference. A shape whose least gain exceeds its largest one costs more, in proportion to the logarithm of the excess, and
-//! so does one that overshoots its limit where the set-point weight is fixed.
+//! so does one with integral term that overshoots its limit where the set-point weight is fixed.
 
 use crate::analysis::noise;
 use crate::analysis::process::Process;
@@ -75,7 +75,7 @@ pub(crate) struct Problem {
     pub input_peak: Option<f64>,
     /// Highest gain crossover.
     pub crossover: Option<f64>,
-    /// Set-point weight of a controller with integral term. `None`: chosen after the gains.
+    /// `None`: the set-point weight is chosen after the gains, or 1 without integral term.
     pub fixed_weight: Option<FixedWeight>,
 }
 
@@ -132,22 +132,24 @@ impl Problem {
 
     /// Logarithm by which a cost grows with an overshoot over its limit. Zero without a fixed set-point weight.
     pub(crate) fn overshoot_penalty(&self, law: &Law, omega: f64) -> f64 {
-        let Some(fixed) = self.fixed_weight else {
-            return 0.0;
-        };
-        let law = Law {
-            b: fixed.weight,
-            ..*law
-        };
-        let step = (STEP_RAD / omega, Ending::COARSE);
-        match integrals(&self.process, &law, Excitation::Reference, omega, step) {
-            Some(found) => OVERSHOOT_PENALTY * (found.peak_output - 1.0 - fixed.overshoot).max(0.0),
-            None => NO_COST,
-        }
+        self.fixed_weight.map_or(0.0, |fixed| {
+            let peak = self.peak_output(law, omega, fixed.weight);
+            peak.map_or(NO_COST, |peak| {
+                OVERSHOOT_PENALTY * (peak - 1.0 - fixed.overshoot).max(0.0)
+            })
+        })
     }
 
-    /// The gain `k` of a shape, or a smaller one that keeps the limits of crossover, noise and input. `None` if no simulation
-    /// ends.
+    /// Largest output after a unit step of the reference with the set-point weight `b`. `None` if no simulation ends.
+    fn peak_output(&self, law: &Law, omega: f64, b: f64) -> Option<f64> {
+        let law = Law { b, ..*law };
+        let step = (STEP_RAD / omega, Ending::COARSE);
+        let found = integrals(&self.process, &law, Excitation::Reference, omega, step)?;
+        Some(found.peak_output)
+    }
+
+    /// The gain `k` of a shape, or a smaller one that keeps the limits of crossover, noise and input, and without an integral
+    /// term that of the overshoot. `None` if no simulation ends.
     pub(crate) fn limited(&self, z: &[f64], k: f64, omega: f64) -> Option<f64> {
         let process = &self.process;
         let law = self.family.law(process, z);
@@ -162,6 +164,13 @@ impl Problem {
             let excess = |ln: f64| {
                 let found = noise::amplification(process, &law.scaled(ln.exp()), limit.period);
                 Some((found / limit.amplification).ln())
+            };
+            k = limited(k, excess)?;
+        }
+        if let Some(fixed) = (self.fixed_weight).filter(|_| !self.family.form.has_integral()) {
+            let excess = |ln: f64| {
+                let peak = self.peak_output(&law.scaled(ln.exp()), omega, fixed.weight)?;
+                Some((peak / (1.0 + fixed.overshoot)).ln())
             };
             k = limited(k, excess)?;
         }

@@ -9,7 +9,7 @@ use crate::synthesis::objective::{Excitation, FixedWeight, Objective, Problem};
 use crate::synthesis::optimum::{Effort, FINE_GRID, Optimum, optimum};
 use crate::synthesis::polish::polish;
 use crate::synthesis::shape::{Family, Filter};
-use crate::tuning::{Specification, Style, named};
+use crate::tuning::{Specification, Style, design, named};
 
 fn problem(vector: &Vector) -> Problem {
     let process = vector.process();
@@ -176,6 +176,22 @@ fn brute_force_finds_nothing_better_in_two_valleys() {
     let found = optimum(problem, Effort::Full).unwrap();
     assert!(found.z[0] < found.z[1]);
     assert!(found.ln_cost < brute_force(problem) + 0.02);
+}
+
+// A P on an integrator with the lag T overshoots by exp(-pi z/sqrt(1 - z^2)) with z = 1/(2 sqrt(Kp K T)): 5 % at z = 0.690107, so
+// Kp K T = 0.524937. The dead time, without which the search has no largest gain, is a hundred thousandth of the lag.
+#[test]
+fn a_fixed_weight_limits_the_gain_of_a_p() {
+    let lag_s = 0.06;
+    let model: Model = Linear::new(Structure::IntegratorLag)
+        .with_lags_s([lag_s, 0.0])
+        .with_tau_s(1e-5 * lag_s)
+        .into();
+    let asked = Specification::new(Form::P, Style::Balanced).with_filter_s(0.0);
+    let kp = |asked: &Specification| design(&model, asked).unwrap().controller.kp();
+    assert!(kp(&asked) * lag_s > 0.8);
+    let found = kp(&asked.with_setpoint_weight(1.0)) * lag_s;
+    assert!((found - 0.524_937).abs() < 2e-5, "{found}");
 }
 
 // With the set-point weight fixed at 1, the designs keep 5 % of overshoot where they exceeded it, and no shape of the grid

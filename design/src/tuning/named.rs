@@ -256,7 +256,7 @@ pub(crate) fn problem(
             .crossover_rad_per_s
             .map(|omega| omega * unit_s),
         fixed_weight: (specification.setpoint_weight)
-            .filter(|_| matches!(form, Form::Pi | Form::Pid))
+            .filter(|_| !is_cascade)
             .map(|weight| FixedWeight {
                 weight,
                 overshoot: specification.overshoot,

@@ -135,8 +135,9 @@ pub struct Specification {
     pub crossover_rad_per_s: Option<f64>,
     /// Time of the measurement filter (s). `None`: chosen with the gains.
     pub filter_s: Option<f64>,
-    /// Set-point weight of a PI or PID. `None`: the largest one of at most 1 that keeps the overshoot, chosen after the gains.
-    /// A weight that the firmware fixes limits the gains instead, as far as the form can keep the overshoot.
+    /// Set-point weight. `None`: of a PI or PID the largest one of at most 1 that keeps the overshoot, chosen after the gains.
+    /// A weight that the firmware fixes limits the gains instead, as far as the form can keep the overshoot. A cascade has no
+    /// weight.
     pub setpoint_weight: Option<f64>,
     /// Largest overshoot after a step of the reference, as a share of the step.
     pub overshoot: f64,
