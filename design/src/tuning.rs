@@ -44,7 +44,8 @@ pub const DRAWS: usize = 96;
 /// Controller of least cost among those that meet `specification` on `model`.
 ///
 /// The cost is the IAE of a unit step of the load, for a form without integral term that of a unit step of the reference,
-/// and for [`Style::Paper`] the ISE of a unit step of the reference.
+/// and for [`Style::Paper`] the ISE of a unit step of the reference. With a
+/// [set-point weight](Specification::setpoint_weight) that is fixed the gains of a PI or PID also keep the overshoot.
 ///
 /// # Errors
 /// - [`DesignError::PhaseMargin`], [`DesignError::Setting`]: a value of the specification is out of range.

@@ -20,6 +20,15 @@ pub(super) fn table(bytes: &[u8]) {
     }
 }
 
+/// A MATLAB file behind its head of 128 bytes.
+pub(super) fn matlab(bytes: &[u8]) {
+    let mut file = b"MATLAB 5.0 MAT-file".to_vec();
+    file.resize(124, b' ');
+    file.extend(b"\x00\x01IM");
+    file.extend(bytes);
+    table(&file);
+}
+
 /// A PX4 ULog.
 pub(super) fn ulog(bytes: &[u8]) {
     log(b"ULog\x01\x12\x35", bytes);

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! bytes -> text      byte order marks, UTF-16; refuses what is not text     text.rs
+//!                    arrays of MATLAB files (feature `matlab`)              matlab.rs
 //! text -> lines      line endings, comments, runs of blanks                 lines.rs
 //! lines -> rows      quotes, separators                                     records.rs
 //! first rows         separator, header, units, which column is which        dialect.rs, preview.rs,
@@ -18,6 +19,8 @@ mod dialect;
 mod error;
 mod lines;
 mod long;
+#[cfg(feature = "matlab")]
+mod matlab;
 mod names;
 mod number;
 mod options;
@@ -68,6 +71,9 @@ pub fn read(path: impl AsRef<Path>, options: &CsvOptions) -> Result<Recording, R
 
 /// Reads a recording from bytes, in one pass and in bounded memory. `bytes` need not be buffered.
 ///
+/// With the feature `matlab` the bytes may be those of a MATLAB file of version 5 (`save -v7`): the columns of matrices, and the
+/// fields of structures, of one length are the columns of the table. Line 1 then stands for the names, line 2 for the first row.
+///
 /// # Errors
 /// As [`read`].
 pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, ReadError> {
@@ -77,6 +83,8 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
     {
         return Err(ReadError::BadSampleRate { rate_hz });
     }
+    #[cfg(feature = "matlab")]
+    let (bytes, mat) = opened(bytes)?;
     let text = Text::open(bytes)?;
     let separator = dialect::detect(&text.head, text.whole)?;
     let preview = Preview::of(&text, separator)?;
@@ -88,6 +96,9 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
     if text.utf16 {
         table.builder.note(Note::Utf16);
     }
+
+    #[cfg(feature = "matlab")]
+    mat.into_iter().for_each(|note| table.builder.note(note));
 
     let mut records = Records::new(text.head.as_slice().chain(text.rest), separator);
     while let Some(row) = records.next()? {
@@ -104,6 +115,26 @@ pub fn read_from(bytes: impl Read, options: &CsvOptions) -> Result<Recording, Re
         table.builder.note(Note::LastLineIncomplete { line });
     }
     table.finish(options)
+}
+
+/// The bytes of a table of text; a MATLAB file as such, with a note about it.
+#[cfg(feature = "matlab")]
+fn opened<'a>(mut bytes: impl Read + 'a) -> Result<(Box<dyn Read + 'a>, Option<Note>), ReadError> {
+    let mut head = Vec::new();
+    (bytes.by_ref().take(matlab::MAGIC.len() as u64))
+        .read_to_end(&mut head)
+        .map_err(|reason| ReadError::Interrupted { line: 0, reason })?;
+    let is_mat = head == matlab::MAGIC;
+    let bytes = std::io::Cursor::new(head).chain(bytes);
+    if !is_mat {
+        return Ok((Box::new(bytes), None));
+    }
+    let table = matlab::read(bytes)?;
+    let note = Note::MatFile {
+        columns: table.columns,
+        rows: table.rows,
+    };
+    Ok((table.text, Some(note)))
 }
 
 /// Accepts a last line that lacks cells, or whose last cell was cut off.

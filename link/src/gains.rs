@@ -266,8 +266,7 @@ fn parameter(flight: &Flight, of: ControlLoop, gain: &Gain) -> (String, [f64; 2]
             };
             return (format!("{letter}_{}", axis.name()), [0.0, 250.0]);
         }
-        (FirmwareKind::Px4, Term::Proportional) if !is_rate => 12.0,
-        (FirmwareKind::ArduPilot, Term::Proportional) if !is_rate => 12.0,
+        (_, Term::Proportional) if !is_rate => 12.0,
         (FirmwareKind::Px4, Term::Proportional) if is_yaw => 0.6,
         (FirmwareKind::Px4, Term::Proportional) => 0.5,
         (FirmwareKind::Px4, Term::Derivative) if !is_yaw => 0.01,
@@ -369,6 +368,25 @@ pub(crate) mod tests {
             (gain.si, gain.si_per_unit) = (gain.si.map(|si| 2.0 * si), Some(2.0));
         }
         assert_eq!(of(&px4), own(&expected));
+    }
+
+    // Angle gains are in 1/s in both firmwares. Betaflight's loop is in other units: nothing is written.
+    #[test]
+    fn attitude_gains() {
+        let of = ControlLoop::Attitude(Axis::Pitch);
+        let gains = LoopGains::new(5.0, 0.0, 0.0);
+        for (log, name) in [
+            ("px4_chirps.ulg", "MC_PITCH_P"),
+            ("ap_sysid_roll.bin", "ATC_ANG_PIT_P"),
+        ] {
+            let changes = changes(&flight(log), of, gains).unwrap();
+            assert_eq!((changes.len(), changes[0].new), (1, 5.0), "{log}");
+            assert_eq!(changes[0].name, name);
+            let refused = super::changes(&flight(log), of, LoopGains::new(5.0, 1.0, 0.0));
+            assert_eq!(refused, Err(GainsError::NoTerm(of, Term::Integral)));
+        }
+        let refused = changes(&flight("betaflight_acro.bfl"), of, gains);
+        assert_eq!(refused, Err(GainsError::NoGains(of)));
     }
 
     #[test]

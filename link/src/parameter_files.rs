@@ -92,6 +92,10 @@ fn betaflight(text: &mut String, flight: &Flight, changes: &[Change], is_restore
     let mode = mode
         .and_then(|mode| modes.get(mode as usize))
         .unwrap_or(&"OFF");
+    // The header of a log has the gains of the active profile, but not its number.
+    text.push_str(
+        "# PID profile: the one selected. Select that of the flight first: profile 0, 1, 2 or 3\n",
+    );
     if has_sliders && !is_restore {
         text.push_str("set simplified_pids_mode = OFF\n");
     }
@@ -162,7 +166,8 @@ mod tests {
         assert_eq!(
             files.apply,
             format!(
-                "# p_roll: 77 -> 62\n# d_roll: 83 -> 42\n# d_min_roll: 55 -> 28\n{lines}save\n"
+                "# p_roll: 77 -> 62\n# d_roll: 83 -> 42\n# d_min_roll: 55 -> 28\n\
+                 # PID profile: the one selected. Select that of the flight first: profile 0, 1, 2 or 3\n{lines}save\n"
             )
         );
         assert!(

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::controllers;
 use super::log::{self, Source};
-use super::log_gains::LogLoop;
+use super::log_gains::{self, LogLoop};
 use crate::args::{Estimator, Identify};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print};
@@ -134,14 +134,9 @@ fn survey(
 /// The process of a part. `None`: its signals make no recording.
 fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified, Verdict>> {
     let recording = part.recording().ok()?;
-    // An angle integrates the rate, a climb rate the thrust, behind a loop or motors with a lag.
-    let structure = match part.control_loop {
-        ControlLoop::Rate(_) => None,
-        _ => Some(Structure::IntegratorLag),
-    };
     let identify = (onecycle::Identify::new())
         .specification(*asked)
-        .structure(structure);
+        .structure(log_gains::structure(part.control_loop));
     Some(identify.run(&recording).outcome)
 }
 

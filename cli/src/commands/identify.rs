@@ -34,7 +34,13 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let asked = of_log.as_ref().map_or(asked, |of_log| {
         of_log.specification(asked, arguments.design.is_form_given())
     });
-    let found = settings(arguments, asked).pack(pack).run(&recording);
+    let structure = of_log
+        .as_ref()
+        .and_then(|of_log| log_gains::structure(of_log.control_loop()));
+    let found = settings(arguments, asked)
+        .structure(arguments.structure.or(structure))
+        .pack(pack)
+        .run(&recording);
     let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
     let against = arguments.design.against().or_else(in_force);
     let identified = found.outcome.as_ref().ok();
@@ -88,7 +94,6 @@ fn settings<'a>(arguments: &Identify, asked: Specification) -> onecycle::Identif
         .method(arguments.method.into())
         .road(Road::from(arguments.estimator))
         .output_filter_hz(arguments.output_filter)
-        .structure(arguments.structure)
         .span_s(arguments.from, arguments.to)
         .hold(arguments.hold.map(Hold::from))
         .beta(arguments.beta)

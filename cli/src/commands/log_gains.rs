@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use onecycle::{
     Controller, Execution, Form, Identification, Identified, LowPass, Pid, Recording,
-    Specification, Style, assess, least_margins,
+    Specification, Structure, Style, assess, least_margins,
 };
 use onecycle_link::{
     Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, RateLaw, ReadBack, changes, files,
 };
 
 use super::log::{self, Source};
-use super::log_overlay::overlay;
+use super::log_overlay::{overlay, overshoot};
 use crate::args::{Identify, WriteArguments};
 use crate::failure::Failure;
 use crate::output::{with_ending, write_text};
@@ -60,12 +60,19 @@ impl LogLoop {
         }))
     }
 
-    /// `asked` for the loop as the firmware runs it: its filters and rate of execution where the user gave none, and only P
-    /// around an attitude loop.
+    /// Which loop it is.
+    pub(super) fn control_loop(&self) -> ControlLoop {
+        self.control_loop
+    }
+
+    /// `asked` for the loop as the firmware runs it: its set-point weight, its filters and rate of execution where the user
+    /// gave none, and only P around an attitude loop.
     pub(super) fn specification(&self, asked: Specification, is_form_given: bool) -> Specification {
         if asked.style == Style::Paper {
             return asked;
         }
+        // The firmwares have the proportional term on the error.
+        let asked = asked.with_setpoint_weight(1.0);
         match self.control_loop {
             ControlLoop::Rate(axis) => {
                 let law = self.flight.rate_law(axis);
@@ -77,8 +84,10 @@ impl LogLoop {
                 asked
             }
             ControlLoop::Attitude(_) if !is_form_given => {
+                // A bare gain: there is no filter to choose.
                 let mut asked = asked;
                 asked.form = Form::P;
+                asked.filter_s = Some(0.0);
                 asked
             }
             _ => asked,
@@ -152,7 +161,8 @@ impl LogLoop {
             return Err(words::NO_CHANGE.to_owned());
         }
         let execution = choice.asked.execution;
-        let controller = Controller::from(pid(old.changed(&changes)).with_execution(execution));
+        let new = pid(old.changed(&changes)).with_execution(execution);
+        let controller = Controller::from(new);
         let (model, _) = identified.for_design(0);
         let least = least_margins(&identified.posterior.models(DRAWS), &controller);
         let figures = assess(&model, &controller, choice.asked.noise.as_ref());
@@ -160,11 +170,16 @@ impl LogLoop {
         let Some(figures) = figures.filter(|_| is_stable) else {
             return Err(words::unstable(least.map(|least| least.stable)));
         };
+        let simulated = match self.control_loop {
+            ControlLoop::Rate(axis) => overshoot(&self.flight, axis, new, &model, &figures),
+            _ => figures.step.map(|step| step.overshoot),
+        };
         Ok(Written {
             path: PathBuf::new(),
             restore: PathBuf::new(),
             changes,
             share: asked.step,
+            overshoot: simulated,
             figures,
             least,
         })
@@ -187,6 +202,16 @@ impl LogLoop {
             restore,
             ..to_write
         })
+    }
+}
+
+/// Structure of the process of a loop. `None`: the recording decides.
+///
+/// An angle integrates the rate, a climb rate the thrust, behind a loop or motors with a lag.
+pub(super) fn structure(of: ControlLoop) -> Option<Structure> {
+    match of {
+        ControlLoop::Rate(_) => None,
+        _ => Some(Structure::IntegratorLag),
     }
 }
 

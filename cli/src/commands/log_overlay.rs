@@ -1,12 +1,19 @@
 //! The closed loop with the gains in force, driven by the logged set-point, beside the logged output.
 
-use onecycle::{Excitation, FollowedLoop, Identification, Identified, LowPass, Pid, Recording};
+use onecycle::{
+    Assessment, Excitation, FollowedLoop, Identification, Identified, LowPass, Model, Pid,
+    Recording,
+};
 use onecycle_link::{Axis, ControlLoop, FirmwareKind, Flight, MarkKind, Term};
 
 use crate::results::log_gains::Overlay;
 
 /// Time (s) after which the state of the loop at the start is forgotten.
 const START_S: f64 = 0.5;
+
+/// Samples of a response to a step, over this many settling times.
+const STEP_SAMPLES: usize = 2000;
+const SETTLING_TIMES: f64 = 2.0;
 
 /// Fewest samples of an overlay.
 const LEAST_SAMPLES: usize = 50;
@@ -52,6 +59,26 @@ pub(super) fn overlay(
         simulated,
         explained,
     })
+}
+
+/// Overshoot after a step of the set-point, in the law of the firmware: P and I on the error, its filters, and its derivative
+/// and feed-forward, but for one on the derivative of the set-point, which a step does not have. `None`: the response has no
+/// end, or is too long to simulate.
+pub(super) fn overshoot(
+    flight: &Flight,
+    axis: Axis,
+    pid: Pid,
+    model: &Model,
+    figures: &Assessment,
+) -> Option<f64> {
+    let mut followed = as_flown(flight, axis, pid);
+    followed.feed_forward_rate = 0.0;
+    let settled_s = figures.step?.settling_time_s;
+    let time_s: Vec<f64> = (0..=STEP_SAMPLES)
+        .map(|row| SETTLING_TIMES * settled_s * row as f64 / STEP_SAMPLES as f64)
+        .collect();
+    let output = followed.follow(model, &time_s, &vec![1.0; time_s.len()])?;
+    Some(output.into_iter().fold(1.0, f64::max) - 1.0)
 }
 
 /// The loop as the firmware runs it, feed-forward included.

@@ -167,6 +167,7 @@ struct WrittenReport {
     phase_margin_deg: f64,
     gain_margin: Option<f64>,
     ms: f64,
+    overshoot: Option<f64>,
     stable_share: Option<f64>,
 }
 
@@ -206,6 +207,7 @@ impl From<&Written> for WrittenReport {
             phase_margin_deg: margins.phase_margin_rad.to_degrees(),
             gain_margin: margins.gain_margin,
             ms: written.figures.ms,
+            overshoot: written.overshoot,
             stable_share: written.least.map(|least| least.stable),
         }
     }

@@ -33,6 +33,8 @@ pub(crate) struct Written {
     pub(crate) changes: Vec<Change>,
     /// Share of the way from the gains in force to the proposed ones.
     pub(crate) share: f64,
+    /// Overshoot after a step of the set-point, as a share of the step. `None`: the response is too long to simulate.
+    pub(crate) overshoot: Option<f64>,
     /// Of the gains as written, on the most probable process and over the posterior.
     pub(crate) figures: Assessment,
     pub(crate) least: Option<LeastMargins>,

@@ -117,10 +117,10 @@ pub(crate) fn written(written: &Written) -> Vec<String> {
             100.0 * least.stable
         )
     });
-    let overshoot = written.figures.step.map_or(String::new(), |step| {
+    let overshoot = written.overshoot.map_or(String::new(), |overshoot| {
         format!(
             ", an overshoot of {:.0} % after a step of the set-point",
-            100.0 * step.overshoot
+            100.0 * overshoot
         )
     });
     let mut sentences = vec![

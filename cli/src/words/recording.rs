@@ -84,6 +84,10 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
     Some(match error {
         E::Empty | E::NoData { .. } => "expected rows of time, output and input",
         E::NotText { .. } => "export the recording as CSV first",
+        E::MatTooLarge => "save fewer variables, or a part of the recording",
+        E::MatNoTable { .. } => {
+            "save time, input and output as vectors of the same length, outside of cells and objects"
+        }
         E::NulByte { .. } => "cut the file before that line",
         E::LineTooLong { .. } => "a recording has one short row per line",
         E::UnclosedQuote { .. } => "close or remove the quote",

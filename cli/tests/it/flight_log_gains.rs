@@ -41,6 +41,10 @@ fn parameters_are_written_with_their_restore_file() {
         "{of_log}"
     );
     assert!(of_log["written"]["ms"].as_f64().unwrap() < 1.7, "{of_log}");
+    // The firmware has P on the error. Gains for a set-point weight of zero overshot by 21 %.
+    let overshoot = of_log["written"]["overshoot"].as_f64().unwrap();
+    assert!((0.0..0.1).contains(&overshoot), "{of_log}");
+    assert_eq!(report["controller"]["setpoint_weight"], 1.0);
     assert!(report["against"]["is_stable"].as_bool().unwrap());
     let values = |name: &str| -> Vec<(String, f64)> {
         let text = std::fs::read_to_string(folder.path(name)).unwrap();

@@ -8,6 +8,7 @@
 )]
 
 mod architecture;
+mod attitude_gains;
 mod bad_arguments;
 mod bad_files;
 mod bad_signals;

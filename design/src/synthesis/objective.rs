@@ -1,7 +1,8 @@
 //! Cost of a shape on one process, at the largest gain that the limits allow.
 //!
 //! With an integral term the cost is the IAE of a unit step of the load, without one that of a unit step of the
-//! reference. A shape whose least gain exceeds its largest one costs more, in proportion to the logarithm of the excess.
+//! reference. A shape whose least gain exceeds its largest one costs more, in proportion to the logarithm of the excess, and
+//! so does one with integral term that overshoots its limit where the set-point weight is fixed.
 
 use crate::analysis::noise;
 use crate::analysis::process::Process;
@@ -19,6 +20,9 @@ pub(crate) const NO_COST: f64 = 1e3;
 
 /// Weight of an infeasible gain: exact for slopes of the cost below it.
 pub(crate) const PENALTY: f64 = 10.0;
+
+/// Weight of an overshoot over its limit: the IAE falls by less than this factor per 1 % of overshoot.
+const OVERSHOOT_PENALTY: f64 = 100.0;
 
 /// Tolerance of the logarithm of a gain that noise or the peak of the input limits.
 const GAIN_TOLERANCE: f64 = 1e-9;
@@ -51,6 +55,14 @@ pub(crate) struct NoiseLimit {
     pub period: f64,
 }
 
+/// A set-point weight that is not the design's to choose, and the overshoot that the gains must keep with it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct FixedWeight {
+    pub weight: f64,
+    /// Largest overshoot after a step of the reference, as a share of the step.
+    pub overshoot: f64,
+}
+
 /// What a controller is designed for, in the units of the process.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Problem {
@@ -58,10 +70,13 @@ pub(crate) struct Problem {
     pub family: Family,
     pub limits: Limits,
     pub noise: Option<NoiseLimit>,
-    /// Largest output of the controller after a unit step of the reference with `b = 0`, or `b = 1` without integral.
+    /// Largest output of the controller after a unit step of the reference with the fixed weight; else with `b = 0`, or
+    /// `b = 1` without integral.
     pub input_peak: Option<f64>,
     /// Highest gain crossover.
     pub crossover: Option<f64>,
+    /// `None`: the set-point weight is chosen after the gains, or 1 without integral term.
+    pub fixed_weight: Option<FixedWeight>,
 }
 
 /// Which loop and which end of the forbidden gains an extremum belongs to.
@@ -115,8 +130,26 @@ impl Problem {
         integrals(&self.process, law, self.excitation(), omega, step)
     }
 
-    /// The gain `k` of a shape, or a smaller one that keeps the limits of crossover, noise and input. `None` if no simulation
-    /// ends.
+    /// Logarithm by which a cost grows with an overshoot over its limit. Zero without a fixed set-point weight.
+    pub(crate) fn overshoot_penalty(&self, law: &Law, omega: f64) -> f64 {
+        self.fixed_weight.map_or(0.0, |fixed| {
+            let peak = self.peak_output(law, omega, fixed.weight);
+            peak.map_or(NO_COST, |peak| {
+                OVERSHOOT_PENALTY * (peak - 1.0 - fixed.overshoot).max(0.0)
+            })
+        })
+    }
+
+    /// Largest output after a unit step of the reference with the set-point weight `b`. `None` if no simulation ends.
+    fn peak_output(&self, law: &Law, omega: f64, b: f64) -> Option<f64> {
+        let law = Law { b, ..*law };
+        let step = (STEP_RAD / omega, Ending::COARSE);
+        let found = integrals(&self.process, &law, Excitation::Reference, omega, step)?;
+        Some(found.peak_output)
+    }
+
+    /// The gain `k` of a shape, or a smaller one that keeps the limits of crossover, noise and input, and without an integral
+    /// term that of the overshoot. `None` if no simulation ends.
     pub(crate) fn limited(&self, z: &[f64], k: f64, omega: f64) -> Option<f64> {
         let process = &self.process;
         let law = self.family.law(process, z);
@@ -134,11 +167,18 @@ impl Problem {
             };
             k = limited(k, excess)?;
         }
+        if let Some(fixed) = (self.fixed_weight).filter(|_| !self.family.form.has_integral()) {
+            let excess = |ln: f64| {
+                let peak = self.peak_output(&law.scaled(ln.exp()), omega, fixed.weight)?;
+                Some((peak / (1.0 + fixed.overshoot)).ln())
+            };
+            k = limited(k, excess)?;
+        }
         if let Some(limit) = self.input_peak {
-            let b = if self.family.form.has_integral() {
-                0.0
-            } else {
-                1.0
+            let b = match self.fixed_weight {
+                Some(fixed) => fixed.weight,
+                None if self.family.form.has_integral() => 0.0,
+                None => 1.0,
             };
             let step = (STEP_RAD / omega, Ending::COARSE);
             let excess = |ln: f64| {
@@ -402,7 +442,10 @@ impl Objective {
             .law(&self.problem.process, z)
             .scaled(gain.k);
         match self.problem.integrals(&law, gain.omega, 1.0) {
-            Some(found) if found.iae > 0.0 => found.iae.ln() + penalty(gain.low, gain.k),
+            Some(found) if found.iae > 0.0 => {
+                let overshoot = self.problem.overshoot_penalty(&law, gain.omega);
+                found.iae.ln() + penalty(gain.low, gain.k) + overshoot
+            }
             _ => NO_COST,
         }
     }

@@ -321,7 +321,12 @@ impl Draws {
         };
         let mean = self.mean_cost(z, (found.k, found.omega), most);
         if mean.is_finite() {
-            mean.ln() + PENALTY * found.excess.max(0.0)
+            let Problem {
+                process, family, ..
+            } = &self.nominal;
+            let law = family.law(process, z).scaled(found.k);
+            let overshoot = self.nominal.overshoot_penalty(&law, found.omega);
+            mean.ln() + PENALTY * found.excess.max(0.0) + overshoot
         } else {
             NO_COST
         }

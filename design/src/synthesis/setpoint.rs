@@ -9,9 +9,6 @@ use crate::analysis::propagator::NODES;
 use crate::analysis::realisation::Excitation;
 use crate::analysis::response::{STEP_RAD, run};
 
-/// Largest overshoot of the chosen weight.
-const LARGEST_OVERSHOOT: f64 = 0.05;
-
 /// Bisections of the weight: exact to 1e-6.
 const BISECTIONS: usize = 20;
 
@@ -21,9 +18,14 @@ const LONGEST: usize = 20_000;
 /// The responses have settled within this.
 const SETTLED: f64 = 1e-3;
 
-/// Largest weight of at most 1 with at most 5 % of overshoot, and outputs of the controller of at most `input_peak`. Zero
-/// if no weight has.
-pub(crate) fn weight(process: &Process, law: &Law, omega: f64, input_peak: Option<f64>) -> f64 {
+/// Largest weight of at most 1 with at most this overshoot (a share of the step), and outputs of the controller of at most
+/// `input_peak`. Zero if no weight has.
+pub(crate) fn weight(
+    process: &Process,
+    law: &Law,
+    omega: f64,
+    (overshoot, input_peak): (f64, Option<f64>),
+) -> f64 {
     let response = |b: f64| {
         let mut nodes = Vec::new();
         let mut quiet = 0;
@@ -46,7 +48,7 @@ pub(crate) fn weight(process: &Process, law: &Law, omega: f64, input_peak: Optio
             (0..NODES).all(|i| {
                 let u = y0[i] + b * (y1[i] - y0[i]);
                 let y = y0[NODES + i] + b * (y1[NODES + i] - y0[NODES + i]);
-                y <= 1.0 + LARGEST_OVERSHOOT && input_peak.is_none_or(|limit| u.abs() <= limit)
+                y <= 1.0 + overshoot && input_peak.is_none_or(|limit| u.abs() <= limit)
             })
         })
     };

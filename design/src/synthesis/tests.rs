@@ -1,14 +1,15 @@
 //! Designs against an independent implementation and brute force.
 
+use crate::analysis::response::{Ending, integrals};
 use crate::analysis::vectors::{VECTORS, Vector};
 use crate::controller::Form;
 use crate::model::{Linear, Model, Structure};
 use crate::synthesis::limits::Limits;
-use crate::synthesis::objective::{Objective, Problem};
-use crate::synthesis::optimum::{Effort, FINE_GRID, optimum};
+use crate::synthesis::objective::{Excitation, FixedWeight, Objective, Problem};
+use crate::synthesis::optimum::{Effort, FINE_GRID, Optimum, optimum};
 use crate::synthesis::polish::polish;
 use crate::synthesis::shape::{Family, Filter};
-use crate::tuning::{Specification, Style, named};
+use crate::tuning::{Specification, Style, design, named};
 
 fn problem(vector: &Vector) -> Problem {
     let process = vector.process();
@@ -22,6 +23,7 @@ fn problem(vector: &Vector) -> Problem {
         noise: None,
         input_peak: None,
         crossover: None,
+        fixed_weight: None,
     }
 }
 
@@ -174,6 +176,59 @@ fn brute_force_finds_nothing_better_in_two_valleys() {
     let found = optimum(problem, Effort::Full).unwrap();
     assert!(found.z[0] < found.z[1]);
     assert!(found.ln_cost < brute_force(problem) + 0.02);
+}
+
+// A P on an integrator with the lag T overshoots by exp(-pi z/sqrt(1 - z^2)) with z = 1/(2 sqrt(Kp K T)): 5 % at z = 0.690107, so
+// Kp K T = 0.524937. The dead time, without which the search has no largest gain, is a hundred thousandth of the lag.
+#[test]
+fn a_fixed_weight_limits_the_gain_of_a_p() {
+    let lag_s = 0.06;
+    let model: Model = Linear::new(Structure::IntegratorLag)
+        .with_lags_s([lag_s, 0.0])
+        .with_tau_s(1e-5 * lag_s)
+        .into();
+    let asked = Specification::new(Form::P, Style::Balanced).with_filter_s(0.0);
+    let kp = |asked: &Specification| design(&model, asked).unwrap().controller.kp();
+    assert!(kp(&asked) * lag_s > 0.8);
+    let found = kp(&asked.with_setpoint_weight(1.0)) * lag_s;
+    assert!((found - 0.524_937).abs() < 2e-5, "{found}");
+}
+
+// With the set-point weight fixed at 1, the designs keep 5 % of overshoot where they exceeded it, and no shape of the grid
+// that keeps it as well costs less.
+#[test]
+fn a_fixed_weight_limits_the_overshoot() {
+    let mut moved = 0;
+    for (i, free) in (0..324)
+        .step_by(29)
+        .filter_map(|i| Some((i, random_problem(i)?)))
+    {
+        if !matches!(free.family.form, Form::Pi | Form::Pid) || free.process.integrators() > 0 {
+            continue;
+        }
+        let fixed_weight = Some(FixedWeight {
+            weight: 1.0,
+            overshoot: 0.05,
+        });
+        let problem = Problem {
+            fixed_weight,
+            ..free
+        };
+        let overshoot = |found: &Optimum| {
+            let law = problem.family.law(&problem.process, &found.z);
+            let law = law.scaled(found.gain.k);
+            let step = (0.1 / found.gain.omega, Ending::COARSE);
+            let excited = Excitation::Reference;
+            let response = integrals(&problem.process, &law, excited, found.gain.omega, step);
+            response.unwrap().peak_output - 1.0
+        };
+        let found = optimum(problem, Effort::Full).unwrap();
+        let before = optimum(free, Effort::Full).unwrap();
+        moved += usize::from(overshoot(&before) > 0.051);
+        assert!(overshoot(&found) < 0.051, "{i} {}", overshoot(&found));
+        assert!(found.ln_cost < brute_force(problem) + 0.02, "{i}");
+    }
+    assert!(moved >= 2, "{moved}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use crate::analysis::process::Process;
 use crate::controller::{Controller, Form};
 use crate::model::Model;
 use crate::synthesis::limits::Limits;
-use crate::synthesis::objective::{NoiseLimit, Objective, Problem};
+use crate::synthesis::objective::{FixedWeight, NoiseLimit, Objective, Problem};
 use crate::synthesis::optimum::{Effort, FINE_GRID, NoOptimum, Optimum, optimum, optimum_near};
 use crate::synthesis::polish::polish;
 use crate::synthesis::robust::Draws;
@@ -33,13 +33,18 @@ const ROUNDING: f64 = 1e-6;
 pub(super) fn design(model: &Model, specification: &Specification) -> Result<Design, DesignError> {
     let problem = problem(model, specification)?;
     match optimum(problem, Effort::Full) {
-        Ok(best) if specification.refined && problem.noise.is_none() => {
+        Ok(best) if is_smooth(specification, &problem) => {
             let best = polish(&mut Objective::new(problem, FINE_GRID), &best);
             checked(model, specification, &problem, &best)
         }
         Ok(best) => checked(model, specification, &problem, &best),
         Err(reason) => Err(refusal(problem, specification, reason)),
     }
+}
+
+/// Whether the search continues to six digits: neither noise nor overshoot limits the gains.
+fn is_smooth(specification: &Specification, problem: &Problem) -> bool {
+    specification.refined && problem.noise.is_none() && problem.fixed_weight.is_none()
 }
 
 /// See [`super::design_over`].
@@ -250,6 +255,12 @@ pub(crate) fn problem(
         crossover: specification
             .crossover_rad_per_s
             .map(|omega| omega * unit_s),
+        fixed_weight: (specification.setpoint_weight)
+            .filter(|_| !is_cascade)
+            .map(|weight| FixedWeight {
+                weight,
+                overshoot: specification.overshoot,
+            }),
     })
 }
 
@@ -263,9 +274,11 @@ pub(super) fn controller(
         process, family, ..
     } = problem;
     let law = family.law(process, &best.z).scaled(best.gain.k);
-    let b = match specification.form {
-        Form::Pi | Form::Pid => {
-            setpoint::weight(process, &law, best.gain.omega, problem.input_peak)
+    let b = match (problem.fixed_weight, specification.form) {
+        (Some(fixed), _) => fixed.weight,
+        (None, Form::Pi | Form::Pid) => {
+            let limits = (specification.overshoot, problem.input_peak);
+            setpoint::weight(process, &law, best.gain.omega, limits)
         }
         _ => law.b,
     };

@@ -75,6 +75,9 @@ impl Style {
     }
 }
 
+/// Largest overshoot after a step of the reference, as a share of the step.
+const OVERSHOOT: f64 = 0.05;
+
 /// Draws of a robust design. Five of them may miss the limits, so that with a probability of 94 % at least 95 % of the
 /// posterior keeps them.
 const ROBUST_DRAWS: usize = 200;
@@ -132,6 +135,12 @@ pub struct Specification {
     pub crossover_rad_per_s: Option<f64>,
     /// Time of the measurement filter (s). `None`: chosen with the gains.
     pub filter_s: Option<f64>,
+    /// Set-point weight. `None`: of a PI or PID the largest one of at most 1 that keeps the overshoot, chosen after the gains.
+    /// A weight that the firmware fixes limits the gains instead, as far as the form can keep the overshoot. A cascade has no
+    /// weight.
+    pub setpoint_weight: Option<f64>,
+    /// Largest overshoot after a step of the reference, as a share of the step.
+    pub overshoot: f64,
     /// Known filters and sampling.
     pub execution: Execution,
     /// Share of the draws on which the limits must hold.
@@ -165,6 +174,8 @@ impl Specification {
             input_peak: None,
             crossover_rad_per_s: None,
             filter_s: None,
+            setpoint_weight: None,
+            overshoot: OVERSHOOT,
             execution: Execution::default(),
             coverage: 0.95,
             refined: false,
@@ -252,6 +263,15 @@ impl Specification {
         Self { execution, ..self }
     }
 
+    /// Sets the set-point weight that the controller has.
+    #[must_use]
+    pub fn with_setpoint_weight(self, weight: f64) -> Self {
+        Self {
+            setpoint_weight: Some(weight),
+            ..self
+        }
+    }
+
     /// Sets the time of the measurement filter (s).
     #[must_use]
     pub fn with_filter_s(self, filter_s: f64) -> Self {
@@ -311,6 +331,7 @@ impl Specification {
             ("gain_margin", self.gain_margin, Range::OneOrMore),
             ("delay_margin_s", self.delay_margin_s, Range::ZeroOrMore),
             ("noise_share", self.noise_share, Range::Positive),
+            ("overshoot", self.overshoot, Range::ZeroOrMore),
             ("coverage", self.coverage, Range::Share),
         ];
         if let Some(noise) = self.noise {
@@ -335,6 +356,10 @@ impl Specification {
         values.extend(
             self.crossover_rad_per_s
                 .map(|omega| ("crossover_rad_per_s", omega, Range::Positive)),
+        );
+        values.extend(
+            self.setpoint_weight
+                .map(|weight| ("setpoint_weight", weight, Range::ZeroOrMore)),
         );
         values.extend(
             self.filter_s

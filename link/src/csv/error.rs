@@ -41,6 +41,17 @@ pub enum ReadError {
         /// What the content looks like, with an article: `a PNG image`.
         looks_like: &'static str,
     },
+    /// A MATLAB file has more than 2^28 bytes, or more than 2^24 numbers in columns.
+    #[error("the MATLAB file is larger than 268 MB, or has more than 16.7 million numbers")]
+    MatTooLarge,
+    /// A MATLAB file has no two columns of numbers of the same length.
+    #[error(
+        "the MATLAB file has no two columns of numbers of the same length; its variables are {}", found.join(", ")
+    )]
+    MatNoTable {
+        /// Names of its first variables.
+        found: Vec<String>,
+    },
     /// A NUL byte in the middle of the text.
     #[error("line {line} holds a NUL byte, so the file is damaged")]
     NulByte {

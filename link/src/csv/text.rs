@@ -9,7 +9,7 @@ const HEAD_BYTES: usize = 1 << 20;
 
 /// First bytes of file formats that are sometimes mistaken for tables. MATLAB, PDF and ROS bag files
 /// begin like text, so these bytes are checked first.
-const MAGIC: [(&[u8], &str); 21] = [
+const MAGIC: [(&[u8], &str); 22] = [
     (b"\x89PNG", "a PNG image"),
     (b"\xff\xd8\xff", "a JPEG image"),
     (b"GIF8", "a GIF image"),
@@ -25,6 +25,10 @@ const MAGIC: [(&[u8], &str); 21] = [
     (b"\xa3\x95", "an ArduPilot DataFlash log"),
     (b"H Product:Blackbox", "a Betaflight blackbox log"),
     (b"MATLAB 5.0 MAT-file", "a MATLAB MAT-file"),
+    (
+        b"MATLAB 7.3 MAT-file",
+        "a MATLAB 7.3 MAT-file (save -v7 writes one that can be read)",
+    ),
     (b"\x89HDF", "an HDF5 file (a MATLAB 7.3 MAT-file is one)"),
     (b"PAR1", "a Parquet file"),
     (b"\x89MCAP0", "an MCAP log"),

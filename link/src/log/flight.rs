@@ -92,6 +92,8 @@ pub enum Term {
     DerivativeLimit,
     /// Feed-forward of the set-point.
     FeedForward,
+    /// Mix of the motors.
+    Mixer,
 }
 
 /// A gain in force.

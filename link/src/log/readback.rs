@@ -18,6 +18,9 @@ use super::{FlightLog, firmware, read_tables};
 use equations::{Equation, equations};
 use fit::Rows;
 
+/// How columns of motors begin, and the name of the mixer as a term.
+const MIXER: &str = "motor";
+
 /// What the comparison of a recovered gain with the stated one tells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -36,9 +39,9 @@ pub enum Agreement {
 pub struct ReadTerm {
     /// Which term.
     pub term: Term,
-    /// Name of the parameter.
+    /// Name of the parameter; of the mixer `motor`.
     pub name: String,
-    /// Stated gain, in SI units (input of the process per rad/s, rad or rad/s^2): lower and upper end. They differ where
+    /// Stated gain (of the mixer 1: the mix of the motors over the output of the controller), in SI units (input of the process per rad/s, rad or rad/s^2): lower and upper end. They differ where
     /// the firmware moves the gain in flight.
     pub stated: [f64; 2],
     /// Recovered gain in the same unit, and its standard error. `None`: it cannot be computed.
@@ -91,7 +94,7 @@ impl ReadBack {
 /// outside.
 fn tolerance(term: Term) -> f64 {
     match term {
-        Term::Proportional => 0.2,
+        Term::Proportional | Term::Mixer => 0.2,
         Term::Derivative => 0.35,
         _ => 0.5,
     }
@@ -175,7 +178,10 @@ fn read_axis(
             continue;
         };
         read.rows = read.rows.max(fit.rows);
-        if !matches!(columns.as_slice(), [(Term::Integral, _)]) {
+        if !matches!(
+            columns.as_slice(),
+            [(Term::Integral | Term::FeedForward | Term::Mixer, _)]
+        ) {
             let least = read.explained.unwrap_or(f64::INFINITY).min(fit.explained);
             read.explained = Some(least);
         }
@@ -188,7 +194,7 @@ fn read_axis(
     for term in &mut terms {
         term.agreement = match agreement(term, tolerance(term.term)) {
             Agreement::Differs if rate_hz < least_rate_hz(term.term) => Agreement::Unknown,
-            Agreement::Differs if may_be_lowered(term) => Agreement::Unknown,
+            Agreement::Differs if may_be_lowered(about.firmware.kind, term) => Agreement::Unknown,
             agreement => agreement,
         };
     }
@@ -212,13 +218,19 @@ fn slowest_hz(about: &Flight, axis: Axis) -> f64 {
     rates.fold(f64::INFINITY, f64::min)
 }
 
-/// Whether limits, anti-windup or relaxation explain the recovered value: all of them lower the integral term.
-fn may_be_lowered(term: &ReadTerm) -> bool {
+/// Whether limits, anti-windup or relaxation explain the recovered value: all of them lower the integral term. Smoothing,
+/// interpolation and limits lower the feed-forward of Betaflight.
+fn may_be_lowered(kind: FirmwareKind, term: &ReadTerm) -> bool {
     let Some((value, std)) = term.recovered else {
         return true;
     };
     let [stated, _] = term.stated;
-    term.term == Term::Integral && (value + 3.0 * std) / stated > 0.0 && value / stated < 1.0
+    let is_lowered = match term.term {
+        Term::Integral => true,
+        Term::FeedForward => kind == FirmwareKind::Betaflight,
+        _ => false,
+    };
+    is_lowered && (value + 3.0 * std) / stated > 0.0 && value / stated < 1.0
 }
 
 /// The stated gains in SI units that are not zero. A gain that the firmware moves has two ends.
@@ -251,7 +263,20 @@ fn stated(about: &Flight, axis: Axis) -> Vec<ReadTerm> {
             agreement: Agreement::Unknown,
         })
     };
-    gains.iter().filter_map(term).collect()
+    let mut terms: Vec<ReadTerm> = gains.iter().filter_map(term).collect();
+    let input = about
+        .logged_loop(ControlLoop::Rate(axis))
+        .and_then(|of| of.input.as_ref());
+    if !terms.is_empty() && input.is_some_and(|input| input.name.contains(MIXER)) {
+        terms.push(ReadTerm {
+            term: Term::Mixer,
+            name: MIXER.to_owned(),
+            stated: [1.0, 1.0],
+            recovered: None,
+            agreement: Agreement::Unknown,
+        });
+    }
+    terms
 }
 
 fn agreement(term: &ReadTerm, tolerance: f64) -> Agreement {
@@ -387,6 +412,43 @@ mod tests {
         assert_eq!(verdict(&right), Agreement::Agrees);
         assert_eq!(verdict(&crossed), Agreement::Differs);
         assert_eq!(verdict(&opposed), Agreement::Differs);
+    }
+
+    // The motors of Betaflight mix to the sum of the terms; not those of another axis, nor with the other sign.
+    #[test]
+    fn mixer_of_betaflight() {
+        let (bytes, log) = log("betaflight_acro.bfl");
+        let read = log.read_back(&bytes[..], 1).unwrap();
+        assert!(
+            (ratio(&read[0], Term::Mixer) - 1.0).abs() < 0.03,
+            "{read:?}"
+        );
+        assert!(
+            (ratio(&read[2], Term::Mixer) - 1.0).abs() < 0.05,
+            "{read:?}"
+        );
+        let about = &log.flights[0];
+        let tables = read_tables(&bytes[..], &Wanted::everything()).unwrap();
+        let tables = &tables.flights[0];
+        let kind = FirmwareKind::Betaflight;
+        let signals = |axis| {
+            let plan = firmware::plan(kind, tables, ControlLoop::Rate(axis)).unwrap();
+            plan.join(1, tables)
+        };
+        let mixer = |signals: &Signals| {
+            let read = read_axis(about, tables, Axis::Roll, signals).unwrap();
+            let own = read.terms.iter().find(|own| own.term == Term::Mixer);
+            (own.unwrap().agreement, read.agreement())
+        };
+        let right = signals(Axis::Roll);
+        assert_eq!(mixer(&right), (Agreement::Agrees, Agreement::Agrees));
+        let mut crossed = right.clone();
+        crossed.input = signals(Axis::Yaw).input;
+        let mut opposed = right.clone();
+        opposed.input.iter_mut().for_each(|input| *input = -*input);
+        for wrong in [crossed, opposed] {
+            assert_eq!(mixer(&wrong), (Agreement::Differs, Agreement::Differs));
+        }
     }
 
     // A log at 9 Hz and one of an axis that hardly moves prove nothing.

@@ -28,6 +28,14 @@ pub enum Note {
         /// What decided.
         by: ChosenBy,
     },
+    /// The table is that of a MATLAB file.
+    #[error("the MATLAB file has {columns} columns of {rows} rows; line 2 is the first row")]
+    MatFile {
+        /// Number of columns of this length.
+        columns: usize,
+        /// Number of rows.
+        rows: usize,
+    },
     /// The names of the columns were taken from a comment.
     #[error("the names of the columns come from the comment on line {line}")]
     HeaderInComment {

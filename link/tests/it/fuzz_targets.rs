@@ -6,7 +6,7 @@ mod targets;
 use std::path::Path;
 
 /// Calls a target with `count` mutations of the first bytes of a file: bytes changed, pieces dropped or doubled.
-fn mutated(file: &str, most: usize, count: u32, target: fn(&[u8])) {
+fn mutated(file: &str, most: usize, count: u32, target: impl Fn(&[u8])) {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../examples")
         .join(file);
@@ -50,6 +50,16 @@ fn tables() {
     mutated("plant/lic101_export.csv", 4000, 300, targets::table);
     mutated("plant/tic205_values.csv", 4000, 300, targets::table);
     mutated("simulated_hover.csv", 2000, 100, targets::table);
+}
+
+#[cfg(feature = "matlab")]
+#[test]
+fn matlab_files() {
+    let behind_head = |bytes: &[u8]| targets::matlab(bytes.get(128..).unwrap_or_default());
+    for name in ["scipy_plain", "scipy_loops", "octave_struct"] {
+        let file = format!("../link/tests/data/{name}.mat");
+        mutated(&file, 10_000, 100, behind_head);
+    }
 }
 
 #[test]

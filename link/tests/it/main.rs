@@ -5,5 +5,7 @@ mod dialects;
 mod flight_logs;
 mod fuzz_targets;
 mod hostile;
+#[cfg(feature = "matlab")]
+mod matlab;
 mod plant;
 mod refusals;

@@ -193,7 +193,8 @@ fn excitations(
     .collect()
 }
 
-/// Betaflight logs each term. Its feed-forward is smoothed and boosted, and is not read back.
+/// Betaflight logs each term, and the motors: their mix is the sum of the terms. Its feed-forward is the smoothed derivative of
+/// the set-point, with a share of the second derivative (boost).
 fn betaflight(
     about: &Flight,
     tables: &FlightTables,
@@ -208,20 +209,36 @@ fn betaflight(
             // A set-point that was computed from the proportional term proves nothing about it.
             set_point.name.contains("axisP")
         });
-    let terms = [Term::Proportional, Term::Integral, Term::Derivative];
-    let read = terms
-        .into_iter()
-        .filter(|term| !is_derived || *term == Term::Derivative);
+    let read = (Term::READ.into_iter()).filter(|term| !is_derived || *term == Term::Derivative);
+    let times_s = &signals.time_s;
+    let of = |term: Term| held(&logged_term(term, axis.index()), tables, times_s);
     let equation = |term: Term| {
-        let columns = columns(&[term]);
-        let target = held(&logged_term(term, axis.index()), tables, &signals.time_s)?;
-        (!columns.is_empty()).then_some(Equation {
-            target,
+        let mut columns = columns(&[term]);
+        let (_, column) = columns.first_mut()?;
+        let mut nuisance = Vec::new();
+        if term == Term::FeedForward {
+            *column = derivative(times_s, column);
+            nuisance.push(derivative(times_s, column));
+        }
+        Some(Equation {
+            target: of(term)?,
             columns,
-            nuisance: Vec::new(),
+            nuisance,
         })
     };
-    read.filter_map(equation).collect()
+    let is_mixed = logged
+        .and_then(|of| of.input.as_ref())
+        .is_some_and(|input| input.name.contains("motor"));
+    let mixed = is_mixed.then(|| {
+        let terms = Term::READ.into_iter().filter_map(of);
+        let sum = terms.reduce(|sum, term| sum.iter().zip(&term).map(|(a, b)| a + b).collect());
+        Some(Equation {
+            target: signals.input.clone(),
+            columns: vec![(Term::Mixer, sum?)],
+            nuisance: Vec::new(),
+        })
+    });
+    read.filter_map(equation).chain(mixed.flatten()).collect()
 }
 
 /// A quantity at the times of the output; NaN becomes 0.
