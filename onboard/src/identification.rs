@@ -14,7 +14,7 @@
 //! - **gains** from the pack's lead table; **design**: the uncertainty of their phase margin.
 //!
 //! After [`StagedIdentification::confirm`] one more cycle is collected, at another amplitude of the relay, and refine fits
-//! its gain alone, which must be that of the process found ([`amplitude`](crate::amplitude)).
+//! its gain alone, which must be that of the process found ([`amplitude`]).
 //!
 //! [`StagedIdentification::observe`] takes a sample. [`StagedIdentification::advance`] does one slice of the
 //! work, a few thousand operations at most (see the table in [`refine`](crate::refine)). A board without double
