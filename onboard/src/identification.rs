@@ -13,12 +13,19 @@
 //! - **refine**: the most probable process, starting from there; **judge**: whether to accept it;
 //! - **gains** from the pack's lead table; **design**: the uncertainty of their phase margin.
 //!
+//! After [`StagedIdentification::confirm`] one more cycle is collected, at another amplitude of the relay, and refine fits
+//! its gain alone, which must be that of the process found ([`amplitude`]).
+//!
 //! [`StagedIdentification::observe`] takes a sample. [`StagedIdentification::advance`] does one slice of the
 //! work, a few thousand operations at most (see the table in [`refine`](crate::refine)). A board without double
 //! precision in hardware does one slice per tick, others several.
 
-use core::fmt;
+mod past;
+mod refusal;
 
+use self::past::Past;
+pub use self::refusal::Refusal;
+use crate::amplitude;
 use crate::classify::{Classifier, Familiarity};
 use crate::control::Pd;
 use crate::cycle::{Cycle, CycleDetector, SteadyRun};
@@ -27,7 +34,7 @@ use crate::judgement::{
 };
 use crate::pack::Pack;
 use crate::process::Soiptd;
-use crate::refine::{DomainEdge, PriorKnowledge, Refined, Refiner, ShapePrior};
+use crate::refine::{PriorKnowledge, Refined, Refiner, ShapePrior};
 use crate::signature::Signature;
 use crate::window::{Edge, Window};
 
@@ -43,53 +50,6 @@ pub const EDGES: usize = 20;
 pub const PAST_EDGES: usize = 8;
 /// Maximum number of cycles that are fitted together, given by the number of edges.
 pub const MOST_CYCLES: u8 = 4;
-
-/// Why a cycle led to no controller.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum Refusal {
-    /// The last cycle has no signature: the output is constant or samples are missing.
-    NoSignature,
-    /// No process of the pack's family explains the last cycle: its misfit score (limit 1).
-    Unknown(f64),
-    /// No process fits the window.
-    NoFit,
-    /// The fit leaves this part of the oscillation unexplained.
-    Misfit(f64),
-    /// The best fit lies on a limit of the domain.
-    Edge(DomainEdge),
-    /// The pack has no lead table, or its table has no gains for the process.
-    NoGains,
-    /// The phase margin is too uncertain: margin and standard deviation (rad).
-    TooUncertain(f64, f64),
-}
-
-impl fmt::Display for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::NoSignature => write!(f, "the last cycle is constant or lacks samples"),
-            Self::Unknown(score) => write!(
-                f,
-                "no process of the pack's family explains the last cycle (score {score:.1}, the \
-                 limit is 1)"
-            ),
-            Self::NoFit => write!(f, "the output does not follow the input"),
-            Self::Misfit(part) => write!(
-                f,
-                "the best fit leaves {:.1} % of the oscillation unexplained",
-                100.0 * part
-            ),
-            Self::Edge(_) => write!(f, "the best fit lies on a limit of the domain"),
-            Self::NoGains => write!(f, "the lead table has no gains for the process"),
-            Self::TooUncertain(margin, sigma) => write!(
-                f,
-                "the phase margin is too uncertain: {:.0} degrees with a standard deviation of {:.0}",
-                margin.to_degrees(),
-                sigma.to_degrees()
-            ),
-        }
-    }
-}
 
 /// Result of a test: process, controller and their uncertainty.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -220,6 +180,9 @@ pub struct StagedIdentification<'a> {
     score: f64,
     refined: Option<Refined>,
     design: Option<Design>,
+    /// Whether a cycle at another amplitude has to confirm the result.
+    is_confirming: bool,
+    gain_deviation: f64,
     stage: Stage,
 }
 
@@ -240,6 +203,8 @@ impl<'a> StagedIdentification<'a> {
             score: f64::INFINITY,
             refined: None,
             design: None,
+            is_confirming: false,
+            gain_deviation: 0.0,
             stage: Stage::Wait,
         }
     }
@@ -250,7 +215,21 @@ impl<'a> StagedIdentification<'a> {
         self.run = SteadyRun::default();
         self.past = Past::default();
         self.was_high = true;
+        self.is_confirming = false;
         self.stage = Stage::Wait;
+    }
+
+    /// After a result: goes on with one cycle at another amplitude of the relay, which changes with the next sample. The next
+    /// outcome is the same result if the gain is the same there.
+    pub fn confirm(&mut self) {
+        self.is_confirming = true;
+        self.run = SteadyRun::default();
+        self.stage = Stage::Wait;
+    }
+
+    /// Number of cycles to collect.
+    fn wanted(&self) -> u8 {
+        if self.is_confirming { 1 } else { self.cycles }
     }
 
     /// The latest changes of the input.
@@ -312,6 +291,7 @@ impl<'a> StagedIdentification<'a> {
         rises_now: bool,
         cycle: Option<Cycle>,
     ) {
+        let wanted = self.wanted();
         let so_far = &mut self.collected;
         if sample.undone != so_far.undone || !self.run.is_steady() {
             self.stage = Stage::Wait;
@@ -319,13 +299,15 @@ impl<'a> StagedIdentification<'a> {
         }
         so_far.rises += u8::from(rises_now);
         // Samples after the last cycle do not belong to it, although its end is not yet certain.
-        let is_inside = so_far.rises < self.cycles;
+        let is_inside = so_far.rises < wanted;
         if let Some(cycle) = cycle
             && cycle.start_s >= workspace.coarse.start_s()
         {
             so_far.complete += 1;
-            if so_far.complete == self.cycles {
-                self.last = Some(cycle);
+            if so_far.complete == wanted {
+                if !self.is_confirming {
+                    self.last = Some(cycle);
+                }
                 self.stage = Stage::Sign;
                 return;
             }
@@ -354,6 +336,9 @@ impl<'a> StagedIdentification<'a> {
     /// identification waits for another cycle.
     pub fn advance(&mut self, workspace: &mut Workspace) -> Option<Result<TuningResult, Refusal>> {
         let outcome = match (self.stage, self.last) {
+            (Stage::Sign, Some(cycle)) if self.is_confirming => {
+                self.begin_comparison(workspace, &cycle).map(|()| None)
+            }
             (Stage::Sign, Some(cycle)) => self.sign(workspace, &cycle).map(|()| None),
             (Stage::Classify, Some(cycle)) => self.classify(workspace, &cycle).map(|()| None),
             (Stage::Refine, Some(_)) => self.refine(workspace).map(|()| None),
@@ -400,10 +385,16 @@ impl<'a> StagedIdentification<'a> {
     }
 
     fn refine(&mut self, workspace: &mut Workspace) -> Result<(), Refusal> {
-        if let Some(refined) = workspace.refiner.advance(&workspace.coarse) {
-            self.refined = Some(refined.map_err(|_| Refusal::NoFit)?);
-            self.stage = Stage::Judge;
+        let Some(refined) = workspace.refiner.advance(&workspace.coarse) else {
+            return Ok(());
+        };
+        let refined = refined.map_err(|_| Refusal::NoFit)?;
+        if self.is_confirming {
+            return self.compare(workspace, &refined);
         }
+        self.refined = Some(refined);
+        self.gain_deviation = workspace.refiner.gain_deviation();
+        self.stage = Stage::Judge;
         Ok(())
     }
 
@@ -471,26 +462,33 @@ impl<'a> StagedIdentification<'a> {
             noise_sigma: refined.noise_sigma,
         }))
     }
-}
 
-/// The latest changes of the input, for the next window.
-#[derive(Clone, Copy, Debug, Default)]
-struct Past {
-    edges: [Edge; PAST_EDGES],
-    count: usize,
-}
-
-impl Past {
-    fn push(&mut self, time_s: f64, input: f64) {
-        if self.edges().last().is_some_and(|edge| edge.input == input) {
-            return;
-        }
-        self.edges.rotate_left(1);
-        self.edges[PAST_EDGES - 1] = Edge { time_s, input };
-        self.count = PAST_EDGES.min(self.count + 1);
+    fn begin_comparison(
+        &mut self,
+        workspace: &mut Workspace,
+        cycle: &Cycle,
+    ) -> Result<(), Refusal> {
+        let found = self.refined.as_ref().ok_or(Refusal::NoFit)?;
+        (workspace.refiner)
+            .begin_gain(&workspace.coarse, cycle.period_s, &found.process)
+            .map_err(|_| Refusal::NoFit)?;
+        self.stage = Stage::Refine;
+        Ok(())
     }
 
-    fn edges(&self) -> &[Edge] {
-        &self.edges[PAST_EDGES - self.count..]
+    /// Accepts or refuses the fit at the second amplitude. The design, which is complete, leads to the result again.
+    fn compare(&mut self, workspace: &Workspace, refined: &Refined) -> Result<(), Refusal> {
+        let found = self.refined.as_ref().ok_or(Refusal::NoFit)?;
+        let ratio = refined.process.k_over_t_body() / found.process.k_over_t_body();
+        let deviations = [self.gain_deviation, workspace.refiner.gain_deviation()];
+        if !amplitude::is_alike(ratio, deviations) {
+            return Err(Refusal::AmplitudeDependent(ratio));
+        }
+        let misfit = misfit(refined, &workspace.coarse);
+        if misfit > MOST_MISFIT {
+            return Err(Refusal::Misfit(misfit));
+        }
+        self.stage = Stage::Design;
+        Ok(())
     }
 }

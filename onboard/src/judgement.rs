@@ -49,6 +49,7 @@ pub const HALF_90_PERCENT: f64 = 1.645;
 
 /// Misfit: residual beyond the noise over the oscillation, both as root mean squares of the bins.
 #[must_use]
+#[inline(never)]
 pub fn misfit<const BINS: usize, const EDGES: usize>(
     refined: &Refined,
     window: &Window<BINS, EDGES>,

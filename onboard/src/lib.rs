@@ -42,6 +42,7 @@
 //! vehicles", IEEE Access 8 (2020); called "the paper" throughout.
 #![no_std]
 
+pub mod amplitude;
 pub mod classify;
 mod complex;
 pub mod control;

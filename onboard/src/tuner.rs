@@ -8,6 +8,7 @@
 //! | Relay    | offset and relay                  | the cycles are complete and steady                | Identify |
 //! | Identify | offset and relay; some slices of work per tick | a controller has been found          | Control  |
 //! |          |                                   | the cycles were refused and attempts are left     | Relay    |
+//! |          |                                   | a second amplitude is set and not yet tried       | Relay, at that amplitude |
 //! | Control  | controller found                  | (stays; proven when the response was as predicted)|          |
 //! | Aborted  | safe controller                   | [`TunerCore::reset`]                              | Idle     |
 //!

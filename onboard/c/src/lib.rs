@@ -11,6 +11,7 @@ use core::mem::MaybeUninit;
 
 use onecycle_onboard::control::Measurement;
 use onecycle_onboard::guard::Abort;
+use onecycle_onboard::identification::Refusal;
 use onecycle_onboard::identification::Workspace;
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::{TunerCore, TunerError, TunerPhase};
@@ -101,6 +102,8 @@ pub enum OnecycleReason {
     Refused,
     /// The response with the new gains differs from the prediction.
     Mismatch,
+    /// The gain depends on the amplitude of the relay: dead zone, saturation or backlash of the actuator.
+    AmplitudeDependent,
 }
 
 /// Result of a test.
@@ -329,6 +332,7 @@ pub unsafe extern "C" fn onecycle_tuner_reason(tuner: *const OnecycleTuner) -> O
         Some(Abort::Rate(_)) => OnecycleReason::Rate,
         Some(Abort::Duration(_)) => OnecycleReason::Duration,
         Some(Abort::NoOscillation(_)) => OnecycleReason::NoOscillation,
+        Some(Abort::Refused(Refusal::AmplitudeDependent(_))) => OnecycleReason::AmplitudeDependent,
         Some(Abort::Refused(_)) => OnecycleReason::Refused,
         Some(Abort::Mismatch(_)) => OnecycleReason::Mismatch,
     }

@@ -65,6 +65,9 @@ pub struct OnecycleSettings {
     /// Phase of the integral beside the controller found (rad), 0 to 0.349; 0 switches the integral off. At 0.087, the
     /// default, the phase margin of a multirotor loses 0.3 degrees at most.
     pub integral_phase_rad: f32,
+    /// Second amplitude of the relay as a part of the first, 0.3 to 0.8, usually 0.6: the test goes on with one cycle there
+    /// and ends with the reason amplitude_dependent if the gain changes with the amplitude. 0, the default, switches it off.
+    pub second_amplitude: f32,
 }
 
 /// Status of an initialisation.
@@ -105,6 +108,8 @@ pub enum OnecycleStatus {
     Filter,
     /// The set-point weight is not between 0 and 1.
     SetpointWeight,
+    /// The second amplitude of the relay is not 0 or 0.3 to 0.8.
+    SecondAmplitude,
 }
 
 impl From<TunerError> for OnecycleStatus {
@@ -116,6 +121,7 @@ impl From<TunerError> for OnecycleStatus {
             TunerError::Relay(RelayError::Setting(..)) => Self::RelaySetting,
             TunerError::Setting(..) => Self::Setting,
             TunerError::IntegralPhase(_) => Self::IntegralPhase,
+            TunerError::SecondAmplitude(_) => Self::SecondAmplitude,
             TunerError::Cycles(_) => Self::Cycles,
             TunerError::NoWork => Self::NoWork,
             TunerError::OutputLimits(..) => Self::OutputLimits,
@@ -155,6 +161,7 @@ impl OnecycleSettings {
             bias_filter_s: new.bias_filter_s,
             rate_lag_s: new.rate_lag_s,
             integral_phase_rad: new.integral_phase_rad,
+            second_amplitude: new.second_amplitude,
         }
     }
 
@@ -193,6 +200,7 @@ impl OnecycleSettings {
             bias_filter_s: self.bias_filter_s,
             rate_lag_s: self.rate_lag_s,
             integral_phase_rad: self.integral_phase_rad,
+            second_amplitude: self.second_amplitude,
             ..new
         }
     }

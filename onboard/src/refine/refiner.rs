@@ -5,13 +5,14 @@ use core::task::Poll;
 use libm::sqrt;
 
 use super::descent::NormalEquations;
-use super::domain::{Shape, clamp, domain_edge};
+use super::domain::{Shape, clamp, domain_edge, shape_of};
 use super::fundamental::{STARTS, Sums};
 use super::linear_fit::{Bench, Jacobian, LinearFit, PARTS};
 use super::problem::Problem;
 use super::search::{MOST_STEPS, MOST_TRIALS, Next, SEARCHED, Search};
 use super::uncertainty::Uncertainty;
 use super::{ALL, GIVEN, LINEAR, PriorKnowledge, RefineError, Refined, SHAPE};
+use crate::process::Soiptd;
 use crate::window::Window;
 use crate::{distortion, response};
 
@@ -48,6 +49,8 @@ pub struct Refiner<const BINS: usize> {
     problem: Problem<BINS>,
     given: [Shape; GIVEN],
     given_count: usize,
+    /// The only shape to fit, without a search.
+    only: Option<Shape>,
     fit: LinearFit<BINS>,
     bench: Bench<BINS>,
     search: Search,
@@ -93,6 +96,7 @@ impl<const BINS: usize> Refiner<BINS> {
             problem: Problem::NONE,
             given: [[0.0; SHAPE]; GIVEN],
             given_count: 0,
+            only: None,
             fit: LinearFit::NONE,
             bench: Bench::NONE,
             search: Search::ROOM,
@@ -113,6 +117,7 @@ impl<const BINS: usize> Refiner<BINS> {
     ) -> Result<(), RefineError> {
         self.stage = Stage::Idle;
         self.problem.set(window, period_s, prior_knowledge.prior)?;
+        self.only = None;
         self.given_count = 0;
         for (place, given) in self.given.iter_mut().zip(prior_knowledge.starts) {
             *place = clamp(given);
@@ -121,6 +126,28 @@ impl<const BINS: usize> Refiner<BINS> {
         self.search = Search::NONE;
         self.stage = Stage::Oscillation(Sums::default());
         Ok(())
+    }
+
+    /// Begins the fit of gain, bias and initial state alone: poles and dead time stay those of `process`.
+    ///
+    /// # Errors
+    /// A [`RefineError`] if the window does not permit a fit.
+    pub(crate) fn begin_gain<const EDGES: usize>(
+        &mut self,
+        window: &Window<BINS, EDGES>,
+        period_s: f64,
+        process: &Soiptd,
+    ) -> Result<(), RefineError> {
+        self.begin(window, period_s, &PriorKnowledge::default())?;
+        self.only = Some(shape_of(process, period_s));
+        Ok(())
+    }
+
+    /// Relative standard deviation of the gain of the last fit with its poles and its dead time given.
+    pub(crate) fn gain_deviation(&self) -> f64 {
+        let of_gain = self.fit.triangle[LINEAR - 1][LINEAR - 1] * self.fit.coefficients[LINEAR - 1];
+        let freedom = (self.problem.used - ALL) as f64;
+        (sqrt(self.fit.cost / freedom) / of_gain).abs()
     }
 
     /// Does one slice; give it the same window each time. Returns the result after the last slice, `None`
@@ -155,7 +182,7 @@ impl<const BINS: usize> Refiner<BINS> {
             Stage::Oscillation(sums) => {
                 if let Some(fundamental) = sums.advance(window, problem.period_s) {
                     self.problem.settle(fundamental);
-                    self.next_start(0)?;
+                    self.first_fit()?;
                 }
             }
             Stage::Start(index) => {
@@ -201,6 +228,9 @@ impl<const BINS: usize> Refiner<BINS> {
             Stage::Last => {
                 if let Poll::Ready(cost) = self.fit.advance(problem, window, bench) {
                     cost.ok_or(RefineError::NoFit)?;
+                    if self.only.is_some() {
+                        return self.refined(None).map(Poll::Ready);
+                    }
                     self.uncertainty.begin();
                     self.stage = Stage::Uncertainty;
                 }
@@ -213,6 +243,16 @@ impl<const BINS: usize> Refiner<BINS> {
             }
         }
         Ok(Poll::Pending)
+    }
+
+    /// Begins the first start, or the fit of the only shape.
+    fn first_fit(&mut self) -> Result<(), RefineError> {
+        let Some(shape) = self.only else {
+            return self.next_start(0);
+        };
+        self.fit.begin(&shape);
+        self.stage = Stage::Last;
+        Ok(())
     }
 
     /// Begins the linear fit at a start; the given ones come first.

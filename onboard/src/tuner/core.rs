@@ -4,7 +4,9 @@ use super::TunerPhase;
 use super::settings::{CheckedSettings, TunerSettings};
 use crate::control::{Measurement, RateEstimate};
 use crate::guard::{Abort, Guard, Motion};
-use crate::identification::{Stage, StagedIdentification, TestSample, TuningResult, Workspace};
+use crate::identification::{
+    Refusal, Stage, StagedIdentification, TestSample, TuningResult, Workspace,
+};
 use crate::integral::Integral;
 use crate::pack::Pack;
 use crate::pid::{PidLaw, PidSettings};
@@ -50,6 +52,8 @@ pub struct TunerCore<'a> {
     law: Option<PidLaw>,
     prediction: Option<Prediction>,
     unchecked_s: f32,
+    /// Whether the relay has its second amplitude.
+    is_second: bool,
 }
 
 impl<'a> TunerCore<'a> {
@@ -83,6 +87,7 @@ impl<'a> TunerCore<'a> {
             law: None,
             prediction: None,
             unchecked_s: 0.0,
+            is_second: false,
             settings: *settings,
         }
     }
@@ -135,6 +140,7 @@ impl<'a> TunerCore<'a> {
         self.integral = Integral::NONE;
         self.law = None;
         self.prediction = None;
+        self.is_second = false;
     }
 
     /// One tick. Takes time (s), measurement and reference (output unit); returns the input to hold until the
@@ -273,7 +279,13 @@ impl<'a> TunerCore<'a> {
         let outcome =
             (0..self.settings.slices).find_map(|_| self.identification.advance(workspace));
         match outcome {
-            Some(Ok(identified)) => self.enter_control(time_s, &identified),
+            Some(Ok(identified)) if self.is_second || self.settings.second_amplitude == 0.0 => {
+                self.enter_control(time_s, &identified);
+            }
+            Some(Ok(_)) => self.enter_second(),
+            Some(Err(refusal @ Refusal::AmplitudeDependent(_))) => {
+                self.end(Abort::Refused(refusal));
+            }
             Some(Err(refusal)) => {
                 self.attempts_left -= 1;
                 self.phase = TunerPhase::Relay;
@@ -284,6 +296,18 @@ impl<'a> TunerCore<'a> {
             None if self.identification.has_work() => self.phase = TunerPhase::Identify,
             None => {}
         }
+    }
+
+    /// Goes on with the second amplitude of the relay from the next tick on.
+    fn enter_second(&mut self) {
+        let amplitude = self.settings.relay.amplitude * self.settings.second_amplitude;
+        if self.relay.set_amplitude(amplitude).is_err() {
+            self.end(Abort::NotFinite);
+            return;
+        }
+        self.identification.confirm();
+        self.is_second = true;
+        self.phase = TunerPhase::Relay;
     }
 
     /// Switches to the new controller from the next tick on. Its offset holds the process at rest and stays

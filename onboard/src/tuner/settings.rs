@@ -9,6 +9,9 @@ use crate::integral::{MOST_PHASE_RAD, USUAL_PHASE_RAD};
 use crate::relay::{Relay, RelayError, RelaySettings};
 use crate::take_off::TakeOffSettings;
 
+/// Second amplitudes as a part of the first: far enough from it to show a nonlinearity, and above the noise.
+const SECOND_AMPLITUDES: core::ops::RangeInclusive<f32> = 0.3..=0.8;
+
 /// Settings of a tuner. Start from [`TunerSettings::new`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TunerSettings {
@@ -43,9 +46,16 @@ pub struct TunerSettings {
     /// Phase of the integral beside the controller found (rad), which sets its gain: see
     /// [`Integral`](crate::integral::Integral). Zero switches the integral off; at most [`MOST_PHASE_RAD`].
     pub integral_phase_rad: f32,
+    /// Second amplitude of the relay as a part of the first, 0.3 to 0.8, usually
+    /// [`SECOND_AMPLITUDE`](Self::SECOND_AMPLITUDE). The test goes on with one cycle there and is refused if the gain
+    /// changes with the amplitude ([`amplitude`](crate::amplitude)). Zero, the default, ends the test after the first.
+    pub second_amplitude: f32,
 }
 
 impl TunerSettings {
+    /// Usual second amplitude of the relay.
+    pub const SECOND_AMPLITUDE: f32 = 0.6;
+
     /// A relay of this amplitude with noise protection and trim at the distinguishing phase, two cycles; an integral
     /// beside the controller found; no take-off, no abort limits; the fallback output is zero. Set limits and a safe
     /// controller for a real vehicle.
@@ -68,6 +78,7 @@ impl TunerSettings {
             bias_filter_s: 0.0,
             rate_lag_s: 0.0,
             integral_phase_rad: USUAL_PHASE_RAD,
+            second_amplitude: 0.0,
         }
     }
 
@@ -95,6 +106,10 @@ impl TunerSettings {
         }
         if self.integral_phase_rad > MOST_PHASE_RAD {
             return Err(TunerError::IntegralPhase(self.integral_phase_rad));
+        }
+        let second = self.second_amplitude;
+        if second != 0.0 && !SECOND_AMPLITUDES.contains(&second) {
+            return Err(TunerError::SecondAmplitude(second));
         }
         if !(1..=MOST_CYCLES).contains(&self.cycles) {
             return Err(TunerError::Cycles(self.cycles));
@@ -132,6 +147,8 @@ pub enum TunerError {
     Setting(&'static str, f32),
     /// The phase of the integral exceeds [`MOST_PHASE_RAD`]: its value (rad).
     IntegralPhase(f32),
+    /// The second amplitude of the relay: its part of the first.
+    SecondAmplitude(f32),
     /// The number of cycles: its value.
     Cycles(u8),
     /// The number of attempts or of slices is zero.
@@ -152,6 +169,10 @@ impl fmt::Display for TunerError {
             Self::IntegralPhase(value) => write!(
                 f,
                 "the integral's phase must be 0 to {MOST_PHASE_RAD} rad, but is {value}"
+            ),
+            Self::SecondAmplitude(value) => write!(
+                f,
+                "the second amplitude must be 0 or 0.3 to 0.8, but is {value}"
             ),
             Self::Cycles(cycles) => {
                 write!(

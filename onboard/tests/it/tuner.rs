@@ -1,5 +1,6 @@
 //! The tuner on simulated axes: from rest, from the ground, and with all kinds of faults.
 
+mod amplitude;
 mod axis;
 mod faults;
 
