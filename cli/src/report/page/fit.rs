@@ -159,7 +159,7 @@ fn of_response(found: &SetPointResponse) -> Figure {
                 ],
             ),
             Panel::new(
-                Axis::titled("phase of measured over model (deg)"),
+                Axis::titled("phase error (deg)"),
                 vec![model(|_| 0.0, ""), measured(errors.collect(), "")],
             ),
         ],

@@ -102,9 +102,16 @@ fn facts(found: &Oscillation) -> Vec<Fact> {
     .into()
 }
 
+/// Longest name beside an axis: that of several signals of a log is cut.
+const LONGEST_NAME: usize = 18;
+
 fn titled(column: &Column) -> String {
+    let mut name = column.name.clone();
+    if name.chars().count() > LONGEST_NAME {
+        name = name.chars().take(LONGEST_NAME).chain(['…']).collect();
+    }
     match &column.unit {
-        Some(unit) => format!("{} ({unit})", column.name),
-        None => column.name.clone(),
+        Some(unit) => format!("{name} ({unit})"),
+        None => name,
     }
 }
