@@ -17,7 +17,7 @@ mod fit;
 mod spectra;
 
 use num_complex::Complex64;
-use onecycle_design::{Linear, Model, Structure};
+use onecycle_design::{Linear, Model, Parameter, Structure};
 
 use self::fit::{Candidate, Problem};
 use self::spectra::Spectra;
@@ -129,6 +129,9 @@ impl Search {
         if ratio > MOST_COST {
             return Err(Verdict::SetPointLeft { ratio });
         }
+        if !has_delay(&best.point.process(), spectra.sample_s) {
+            return Err(Verdict::AtBound(Parameter::Tau));
+        }
         let band_rad_per_s = spectra.band_rad_per_s();
         self.remarks.push(Remark::BySetPoint {
             segments: spectra.segments,
@@ -182,6 +185,14 @@ impl Search {
             },
         )
     }
+}
+
+/// Whether a process answers later than half a sample after its input. A loop that is faster than its log hides its delay, and
+/// a controller for none would be too fast.
+fn has_delay(process: &Linear, sample_s: f64) -> bool {
+    let lags = process.structure().stages().lags;
+    let lags_s: f64 = process.lags_s()[..lags].iter().sum();
+    process.tau_s() + lags_s > 0.5 * sample_s
 }
 
 /// Whether the best fit lies amid the draws: otherwise the response has two explanations.

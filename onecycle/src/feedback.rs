@@ -13,6 +13,10 @@ const CALM: [(&str, f64); 3] = [("rad/s", 0.05), ("rad", 0.0175), ("m/s", 0.05)]
 /// Share of the output's variance that the set-point has to cause for a fit to the part of the input that it caused. In calm
 /// flight it is a few hundredths.
 const LEAST_SHARE: f64 = 0.3;
+/// Share of the output's variance that the set-point has to cause for a fit to the response to it. A set-point of an outer loop
+/// follows what else moves the output, so it is no instrument unless it causes nearly everything: in three flights with
+/// manoeuvres it caused 93 to 100 %.
+const LEAST_OF_RESPONSE: f64 = 0.8;
 /// Largest autocorrelation of the innovations, and share of them that the past input explains, up to which the fit to the
 /// input as it is stands.
 const CLEAN: (f64, f64) = (0.1, 0.02);
@@ -76,7 +80,7 @@ pub(crate) fn identify(
         _ => None,
     };
     let found = in_two_stages(signals, &caused, direct, (options, pack));
-    if found.outcome.is_ok() && !is_contradicted(&found) {
+    if share < LEAST_OF_RESPONSE || found.outcome.is_ok() && !is_contradicted(&found) {
         return found;
     }
     let by_spectra = identify_by_set_point(signals, set_point, options, recorded);

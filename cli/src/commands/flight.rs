@@ -81,10 +81,15 @@ fn survey(
     let mut outcomes: Vec<_> = (spans.par_iter())
         .filter_map(|span| Some((*span, identified(&signals.part(*span), &asked)?)))
         .collect();
-    // What no part tells alone, all of the flight may tell.
+    // What no part tells alone, the response to the set-point over all of the flight may tell. A fit to the input that no part
+    // confirms is not taken.
     if spans.len() > 1 && outcomes.iter().all(|(_, outcome)| outcome.is_err()) {
         let whole = spans.iter().fold(spans[0], |all, span| all.with(*span));
         let outcome = identified(&signals.part(whole), &asked);
+        let outcome = outcome.filter(|outcome| {
+            let found = outcome.as_ref().ok();
+            found.is_some_and(|found| found.fit.set_point_response().is_some())
+        });
         outcomes.extend(outcome.map(|outcome| (whole, outcome)));
     }
     let mut parts = Vec::new();

@@ -88,6 +88,10 @@ fn the_documented_keys_are_those_of_the_report() {
         "",
         &mut found,
     );
+    let acro = log.replace("px4_chirps.ulg", "betaflight_acro.bfl");
+    let by_response = run(&["identify", &acro, "--axis", "yaw", "--json"]).stdout;
+    let by_response: Value = serde_json::from_str(&by_response).unwrap();
+    keys(&by_response["fit"], "fit", &mut found);
     // Those of a controller, its margins and its step are documented once.
     let of_against = |key: &String| {
         let parts = ["controller", "margins", "step"];
