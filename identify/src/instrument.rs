@@ -38,8 +38,8 @@ use crate::verdict::Verdict;
 const EQUAL: f64 = 2.0;
 /// Decrease of the sum of squares from which damping shows, as for the general estimator.
 const SHOWN: f64 = 2.7;
-/// Sum of squared errors over its degrees of freedom above which no structure explains the response. One of 1.3 comes
-/// once in a hundred right records of forty frequencies; 1.5 in ten thousand.
+/// Sum of squared errors over its degrees of freedom above which no structure explains the response. One right record of
+/// forty frequencies in four hundred exceeds it.
 const MOST_COST: f64 = 1.5;
 /// Golden ratio, whose multiples' fractions are even.
 const GOLDEN: f64 = 0.618_033_988_749_895;
