@@ -23,14 +23,31 @@ use crate::settings::Options;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
 
-/// Time, as a share of the period, by which a relay that averages the error over 3 % of its half period switches after the
-/// measurement has reached the ratio, with some rounding. Above the second value both columns are not on one clock: the
-/// protection against noise adds as much again.
-const AVERAGING: f64 = 0.0085;
-const MOST_AVERAGING: f64 = 0.015;
-/// Largest time, as a share of the period, by which noise makes a relay without averaging switch early; to it comes the
-/// noise over the amplitude.
-const EARLY: f64 = 0.02;
+/// How early and how late a relay may switch after the output has reached its ratio, with both columns on one clock.
+#[derive(Clone, Copy)]
+struct Tolerance {
+    /// Largest lead in a recording without noise, as a share of the period.
+    early: f64,
+    /// Lead for each unit of noise over amplitude, as a share of the period: noise makes a relay without averaging switch
+    /// early. Near the ratio -0.72 the output moves by the amplitude in 0.23 of a period, and the first of some samples to
+    /// exceed the ratio is 2.5 standard deviations off.
+    early_per_noise: f64,
+    /// Largest lag, as a share of the period: a relay that averages the error over 3 % of its half period lags by that.
+    late: f64,
+}
+
+/// No remark is needed.
+const USUAL: Tolerance = Tolerance {
+    early: 0.002,
+    early_per_noise: 0.6,
+    late: 0.0085,
+};
+/// Beyond it both columns are not on one clock.
+const AT_MOST: Tolerance = Tolerance {
+    early: 0.02,
+    early_per_noise: 1.0,
+    late: 0.015,
+};
 /// Ratio above which a relay is plain or has hysteresis. A relay with a lower ratio switches before the output crosses the
 /// reference (it leads), and oscillates near the crossover of any controller: of 630 loops on processes with a flexible mode 9 were unstable, all with a crossover
 /// below 1.2 times the frequency of the oscillation.
@@ -61,6 +78,9 @@ pub(crate) fn check(
     let law = law(signals, excitation, identified);
     let leads = law.as_ref().is_some_and(|law| law.mean_beta() < LEADING);
     found.switching = law.as_ref().and_then(Law::switching);
+    if let Some((switching, pack)) = found.switching.zip(pack) {
+        without_family(&switching, pack, &mut found.remarks);
+    }
     let symmetric = law.filter(Law::is_symmetric).zip(found.switching);
     if let Some((law, switching)) = symmetric {
         let noise = match excitation {
@@ -114,6 +134,21 @@ pub(crate) fn check(
     limits(excitation, identified, &mut found.remarks);
 }
 
+/// The pack does not know the cycles of a relay with another ratio: that they are unlike those of its family says nothing.
+fn without_family(switching: &Switching, pack: &Pack<'_>, remarks: &mut [Remark]) {
+    /// Distance of the ratio from those of the pack. Averaging and noise change it by less.
+    const FAR: f64 = 0.2;
+    let [lowest, highest] = pack.domain().beta.map(f64::from);
+    if (lowest - FAR..=highest + FAR).contains(&switching.beta) {
+        return;
+    }
+    for remark in remarks {
+        if matches!(remark, Remark::Unknown(_)) {
+            *remark = Remark::Unread;
+        }
+    }
+}
+
 /// Law of the relay over the part of the recording that was used.
 fn law<'a>(
     signals: &'a Signals<'a>,
@@ -148,20 +183,20 @@ impl Clock<'_> {
         }
         let seen = self.switching.beta;
         if let Some(beta) = options.beta {
-            return match self.is_that_of(beta, MOST_AVERAGING) {
-                true if self.is_that_of(beta, AVERAGING) => Ok(None),
-                true => Ok(Some(self.remark(beta, identified))),
-                false => Err(Verdict::ClockOffset {
+            return match self.is_that_of(beta, AT_MOST) {
+                true if self.is_that_of(beta, USUAL) => Ok(None),
+                false if !self.has_halved(beta) => Err(Verdict::ClockOffset {
                     seen,
                     beta,
                     late_s: self.law.late_s(beta),
                 }),
+                _ => Ok(Some(self.remark(beta, identified))),
             };
         }
         let leading =
             pack.map(|pack| f64::from(0.5 * (pack.domain().beta[0] + pack.domain().beta[1])));
         let mut usual = leading.into_iter().chain([0.0]);
-        if usual.any(|beta| self.is_that_of(beta, AVERAGING)) {
+        if usual.any(|beta| self.is_that_of(beta, USUAL)) {
             return Ok(None);
         }
         let has_hysteresis = seen > LEADING;
@@ -173,11 +208,13 @@ impl Clock<'_> {
                 late_s: Some(late_s),
                 phase_margin_rad: None,
                 ..
-            } if !has_hysteresis && identified.design.is_some() => Err(Verdict::ClockOffset {
-                seen,
-                beta,
-                late_s: Some(late_s),
-            }),
+            } if !has_hysteresis && identified.design.is_some() && !self.has_halved(beta) => {
+                Err(Verdict::ClockOffset {
+                    seen,
+                    beta,
+                    late_s: Some(late_s),
+                })
+            }
             remark => Ok(Some(remark)),
         }
     }
@@ -197,14 +234,21 @@ impl Clock<'_> {
         }
     }
 
-    /// Whether a relay with this `beta` may have made the recording, with both columns on one clock: it switches at most
-    /// `averaging` periods late.
-    fn is_that_of(&self, beta: f64, averaging: f64) -> bool {
+    /// Whether a relay that began with this `beta` may have halved it: that of the board does where the output turns back
+    /// before it has crossed zero.
+    fn has_halved(&self, beta: f64) -> bool {
+        const MOST_HALVINGS: i32 = 3;
+        beta < LEADING && (1..=MOST_HALVINGS).any(|n| self.is_that_of(beta / 2_f64.powi(n), USUAL))
+    }
+
+    /// Whether a relay with this `beta` may have made the recording, with both columns on one clock.
+    fn is_that_of(&self, beta: f64, tolerance: Tolerance) -> bool {
         let (period_s, sample_s) = (self.law.period_s(), self.law.sample_s());
-        let early_s = (EARLY + self.noise) * period_s + sample_s;
-        let averaged_s = averaging * period_s + sample_s;
+        let early = tolerance.early + tolerance.early_per_noise * self.noise;
         let late_s = self.law.late_s(beta);
-        late_s.is_some_and(|late_s| late_s > -early_s && late_s < averaged_s)
+        late_s.is_some_and(|late_s| {
+            late_s > -(early * period_s + sample_s) && late_s < tolerance.late * period_s + sample_s
+        })
     }
 }
 

@@ -207,6 +207,7 @@ impl Remark {
             | Self::ClockUnchecked { .. }
             | Self::SwitchesBetweenSamples(_)
             | Self::OutputFilter { .. }
+            | Self::Unread
             | Self::DampingNotSeen(_) => About::Test,
             // No fault: the input is another test signal.
             Self::NotASteadyOscillation(verdict) if verdict.kind() == "no_relay" => About::Test,

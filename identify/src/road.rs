@@ -235,7 +235,10 @@ fn is_beyond_doubt(general: &Identification) -> bool {
     let is_left = is_left(general);
     // Without noise nothing is white: what is left are the digits of the file.
     let is_exact = found.fit.misfit < EXACT;
-    !is_resonant(general) && (is_exact || is_white(general) && !is_left)
+    // A disturbance large enough to make up the oscillation predicts it worse than its mean would.
+    let prediction = found.fit.innovations().and_then(|found| found.prediction);
+    let predicts = prediction.is_none_or(|prediction| prediction.explained > 0.0);
+    !is_resonant(general) && predicts && (is_exact || is_white(general) && !is_left)
 }
 
 /// Whether the process has complex poles.

@@ -265,7 +265,7 @@ impl Verdict {
                 parameter,
                 deviation: Some(deviation),
                 ..
-            } => write!(
+            } if *deviation < 1.0 => write!(
                 f,
                 "no information: the standard deviation of {} is {:.0} % of its value",
                 parameter.symbol(),

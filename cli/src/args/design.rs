@@ -34,6 +34,10 @@ pub(crate) struct DesignArguments {
     /// Maximum output of the controller after a unit step of the reference, in the unit of the input
     #[arg(long, value_name = "INPUT", allow_negative_numbers = true, value_parser = positive)]
     input_peak: Option<f64>,
+    /// Largest overshoot after a step of the reference, such as 15% or 0.15. PI and PID keep it by the set-point weight; the
+    /// loops of a flight log, whose weight is 1, by less integral action [default: 5%; none with --style paper]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = overshoot)]
+    overshoot: Option<f64>,
     /// Sample period of the controller, in seconds; its output leaves one period after the sample [default: that of the
     /// recording, and the output leaves at once; continuous without a recording]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
@@ -76,6 +80,7 @@ impl DesignArguments {
         }
         asked.gain_margin = self.gain_margin.unwrap_or(asked.gain_margin);
         asked.input_peak = self.input_peak;
+        asked.overshoot = self.overshoot.unwrap_or(asked.overshoot);
         Ok(asked.with_execution(self.execution()))
     }
 
@@ -85,6 +90,7 @@ impl DesignArguments {
             ("--ms", self.ms.is_some()),
             ("--gain-margin", self.gain_margin.is_some()),
             ("--input-peak", self.input_peak.is_some()),
+            ("--overshoot", self.overshoot.is_some()),
         ];
         if let Some((option, _)) = others.iter().find(|(_, is_given)| *is_given) {
             return Err(Failure::usage(format!(
@@ -187,6 +193,16 @@ fn gain_margin(text: &str) -> Result<f64, String> {
     number(text)
         .filter(|factor| (1.0..=100.0).contains(factor))
         .ok_or_else(|| "a gain margin is a factor between 1 and 100; 2 is 6 dB".to_owned())
+}
+
+/// A share of a step, as a number or a percentage.
+fn overshoot(text: &str) -> Result<f64, String> {
+    let share = text.trim().parse::<Share>()?.of(1.0);
+    if (0.0..=1.0).contains(&share) {
+        Ok(share)
+    } else {
+        Err("an overshoot lies between 0 % and 100 %, such as 15% or 0.15".to_owned())
+    }
 }
 
 /// A share of noise, as a number or a percentage.

@@ -94,6 +94,11 @@ fn clock(seen: f64, beta: f64, later: Option<(f64, Option<f64>)>, cost: &str) ->
             "The relay switches as one with beta {seen:.2}, which no usual relay has.{cost} {ask}"
         );
     };
+    // The relay of the board halves its beta where the output turns back.
+    let halved = match beta < 0.0 && seen > 0.6 * beta {
+        true => " A relay that turned back and halved its beta would look the same.",
+        false => "",
+    };
     let column = if late_s < 0.0 { "output" } else { "input" };
     let margin = match margin_rad {
         Some(margin) => format!("the phase margin would be {:.0} deg", margin.to_degrees()),
@@ -101,7 +106,7 @@ fn clock(seen: f64, beta: f64, later: Option<(f64, Option<f64>)>, cost: &str) ->
     };
     format!(
         "The relay switches as one with beta {seen:.2}. If it is one with beta {beta:.2}, the {column} was logged {:.1} ms \
-         late, and {margin}.{cost} {ask}",
+         late, and {margin}.{cost}{halved} {ask}",
         1e3 * late_s.abs()
     )
 }

@@ -190,6 +190,19 @@ mod tests {
         advice(&verdict).into_owned()
     }
 
+    // A deviation above the value itself is no measure of it.
+    #[test]
+    fn a_parameter_that_may_be_anything_has_no_deviation() {
+        let of = |deviation| Verdict::NoInformation {
+            parameter: Parameter::K,
+            deviation: Some(deviation),
+            informative_rad_per_s: None,
+            needed_rad_per_s: 1.0,
+        };
+        assert!(of(0.54).to_string().ends_with("of K is 54 % of its value"));
+        assert!(of(39.0).to_string().ends_with("does not tell K"));
+    }
+
     // A chirp up to 20 Hz begins at 1 Hz; 20 periods of 1 Hz are 20 s.
     #[test]
     fn the_missing_excitation_is_a_chirp() {

@@ -146,6 +146,8 @@ fn unusable_requirements_on_a_controller() {
     with(&["--ms", "nan"]).misused(&["--ms", "between 1.05 and 10"]);
     with(&["--gain-margin", "0.5"]).misused(&["--gain-margin", "factor"]);
     with(&["--input-peak", "-3"]).misused(&["--input-peak", "positive"]);
+    with(&["--overshoot", "120%"]).misused(&["--overshoot", "between 0 % and 100 %"]);
+    with(&["--overshoot", "5%", "--style", "paper"]).misused(&["leave out --overshoot"]);
     with(&["--sample-period", "0"]).misused(&["--sample-period", "positive"]);
     with(&["--noise", "0.01"]).misused(&["--noise", "--sample-period 0.001"]);
     let sampled = ["--sample-period", "0.01", "--noise"];

@@ -384,6 +384,20 @@ fn limits_of_the_user_hold() {
     let quiet = with(&["--noise", "5%"]);
     let share = quiet.0["controllers"][2]["noise_share"].as_f64().unwrap();
     assert!(share < 0.051, "{share}");
+    for overshoot in ["0.02", "20%"] {
+        let process = [
+            "tune",
+            "--process",
+            "FOPTD,K=1,T=1,tau=0.4",
+            "--controller",
+            "pi",
+        ];
+        let limits = ["--ms", "2", "--json", "--overshoot", overshoot];
+        let found = run(&[&process[..], &limits].concat()).report();
+        let promised = found.number("/step/overshoot");
+        let limit = if overshoot == "0.02" { 0.02 } else { 0.2 };
+        assert!((promised - limit).abs() < 1e-4, "{promised}");
+    }
     let sampled = with(&["--sample-period", "0.005"]);
     assert_eq!(sampled.number("/assumed/sample_period_s"), 0.005);
     assert_eq!(sampled.number("/assumed/computation_delay_s"), 0.005);

@@ -101,6 +101,34 @@ fn a_late_input_contradicts_the_law() {
     assert!((tau.estimate.unwrap() - TAU_S).abs() < 1e-3, "{tau:?}");
 }
 
+// A relay that leads switches at -0.37 if it has halved its beta, or if its input was logged late by an eighth of the
+// period: nothing tells which, and so it is a remark.
+#[test]
+fn a_relay_that_halved_its_beta_is_not_refused() {
+    let columns = relay_test(-0.365, false, 0.0);
+    let halved = found(&columns, &Options::default().beta(Some(-0.73)));
+    assert!(halved.outcome.is_ok() && has(&halved, "clock_unknown"));
+    let other = found(&columns, &Options::default().beta(Some(-0.5)));
+    assert!(matches!(other.outcome, Err(Verdict::ClockOffset { .. })));
+}
+
+// The noise of this recording is far too small for a relay that switches 8 ms before its ratio.
+#[test]
+fn an_output_that_was_logged_late_is_remarked_on() {
+    let [time_s, input, output] = relay_test(-0.73, false, 0.0);
+    let mut later = vec![output[0]; 8];
+    later.extend(&output[..output.len() - 8]);
+    let found = found(&[time_s, input, later], &Options::default());
+    let late_s = found.remarks.iter().find_map(|remark| match remark {
+        Remark::ClockUnknown { late_s, .. } => *late_s,
+        _ => None,
+    });
+    assert!(
+        late_s.is_some_and(|late_s| (late_s + 8e-3).abs() < 3e-3),
+        "{late_s:?}"
+    );
+}
+
 // With a dead zone of 0.2, relays of 1 and 0.6 act as 0.8 and 0.4: the gain changes from 0.8 to 0.67, by a sixth.
 #[test]
 fn two_amplitudes_show_a_dead_zone() {
