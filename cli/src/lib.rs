@@ -5,6 +5,7 @@
 
 mod args;
 mod commands;
+pub mod embed;
 mod failure;
 mod journal;
 mod output;

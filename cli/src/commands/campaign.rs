@@ -1,5 +1,6 @@
 //! `onecycle campaign`: many random experiments and a table of their outcomes.
 
+use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle_lab::experiments::{
@@ -15,7 +16,7 @@ use onecycle_onboard::pack::Pack;
 use onecycle_onboard::signature::Signature;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::workers::Workers;
 use crate::failure::{Failure, exit};
@@ -85,6 +86,66 @@ fn of_relay_tests(arguments: &args::Campaign, measure: Measure) -> Result<Table,
             (text, journal)
         }
     })
+}
+
+/// The cases of a campaign one by one, for programs that share them out.
+pub(crate) enum Cases {
+    Relay(Campaign),
+    Identification(Campaign),
+    Recording(RecordingCampaign),
+}
+
+impl Cases {
+    pub(crate) fn read(file: &Path) -> Result<Self, Failure> {
+        let of_relays = || -> Result<Campaign, Failure> {
+            let campaign: Campaign = settings::read(file)?;
+            let fault = |error| Failure::unreadable(file, error);
+            campaign.validate().map_err(fault)?;
+            Ok(campaign)
+        };
+        match settings::read::<Head>(file)?.measure {
+            Measure::Relay => of_relays().map(Self::Relay),
+            Measure::Identification => of_relays().map(Self::Identification),
+            Measure::Recording => {
+                let campaign: RecordingCampaign = settings::read(file)?;
+                let fault = |error| Failure::unreadable(file, error);
+                campaign.validate().map_err(fault)?;
+                Ok(Self::Recording(campaign))
+            }
+            Measure::Unknown | Measure::Honesty => Err(Failure::unreadable(
+                file,
+                "campaigns of this measure are not shared out: run `onecycle campaign` on one machine",
+            )),
+        }
+    }
+
+    pub(crate) fn count(&self) -> u64 {
+        match self {
+            Self::Relay(campaign) | Self::Identification(campaign) => campaign.cases,
+            Self::Recording(campaign) => campaign.cases,
+        }
+    }
+
+    /// The outcome of case `n`, as `onecycle campaign --json` prints it.
+    pub(crate) fn case(&self, n: u64) -> Result<Value, Failure> {
+        let shown = match self {
+            Self::Relay(campaign) => {
+                let outcome = (campaign.experiment(n)).and_then(|of| relay_outcome(&of));
+                serde_json::to_value(RelayCase::from(outcome.map_err(Failure::usage)?))
+            }
+            Self::Identification(campaign) => {
+                let outcome = (campaign.experiment(n))
+                    .and_then(|of| identification_outcome(campaign, &of))
+                    .map_err(Failure::usage)?;
+                serde_json::to_value(IdentificationCase::of(&outcome))
+            }
+            Self::Recording(campaign) => {
+                let recording = campaign.record(n).map_err(Failure::usage)?;
+                serde_json::to_value(recording_outcome(&recording, &campaign.options()))
+            }
+        };
+        shown.map_err(Failure::usage)
+    }
 }
 
 /// Refuses options of the campaigns of relay tests.
@@ -286,7 +347,7 @@ fn finished<T: Send + Serialize + DeserializeOwned>(
 }
 
 /// Everything that decides the outcomes: the file and the arguments that change it.
-fn settings(arguments: &args::Campaign) -> Result<serde_json::Value, Failure> {
+fn settings(arguments: &args::Campaign) -> Result<Value, Failure> {
     let file: toml::Table = settings::read(&arguments.file)?;
     let method = arguments.method.map(|method| format!("{method:?}"));
     Ok(json!({

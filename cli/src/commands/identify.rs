@@ -4,7 +4,9 @@ use std::io::Read;
 use std::path::Path;
 use std::process::ExitCode;
 
-use onecycle::{ColumnRef, CsvOptions, Hold, Recording, Road, Specification, Structure, Style};
+use onecycle::{
+    ColumnRef, CsvOptions, Hold, Identification, Recording, Road, Specification, Structure, Style,
+};
 
 use super::log::{self, Piped, Source};
 use super::log_gains::{self, LogLoop};
@@ -14,21 +16,110 @@ use crate::failure::{Failure, exit};
 use crate::output::{Waiting, columns, is_terminal, print, write_text};
 use crate::reading::open_with_bar;
 use crate::report::{json, log_gains as log_report, page, plot, text};
+use crate::results::controllers::Controllers;
+use crate::results::log_gains::LogGains;
+
+/// A recording, what was identified from it, and the controllers to choose from.
+pub(crate) struct Found {
+    name: String,
+    pub(crate) recording: Recording,
+    pub(crate) identification: Identification,
+    choice: Option<Controllers>,
+    gains: Option<LogGains>,
+}
+
+impl Found {
+    /// The report of docs/identify-json.md.
+    pub(crate) fn json(&self, has_rows: bool) -> String {
+        json::identification(
+            &self.name,
+            &self.recording,
+            &self.identification,
+            self.choice.as_ref(),
+            self.gains.as_ref(),
+            has_rows,
+        )
+    }
+
+    /// The page, for which designs over limits of `Ms` are made on first use.
+    pub(crate) fn page(&mut self) -> String {
+        self.choice = (self.choice.take()).map(|choice| match &self.identification.outcome {
+            Ok(identified) if choice.trade_off.is_empty() => {
+                choice.with_trade_off(&identified.for_design(0).0)
+            }
+            _ => choice,
+        });
+        page::identification(
+            &self.name,
+            &self.recording,
+            &self.identification,
+            self.choice.as_ref(),
+            self.gains.as_ref(),
+        )
+    }
+
+    pub(crate) fn text(&self) -> String {
+        text::identification(
+            &self.name,
+            &self.recording,
+            &self.identification,
+            self.choice.as_ref(),
+        ) + &self
+            .gains
+            .as_ref()
+            .map(log_report::text)
+            .unwrap_or_default()
+    }
+}
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     if let Some(path) = &arguments.report {
         check_page(path, &arguments.file)?;
     }
-    check_estimator(arguments)?;
-    log_gains::check(arguments)?;
-    let asked = specification(arguments)?;
     if flight::is_asked(arguments) {
+        let asked = checked(arguments)?;
         refuse_columns(arguments)?;
         return flight::run(arguments, &asked);
     }
-    let (recording, of_log) = read(arguments)?;
+    let mut found = find(arguments, None)?;
+    if let Some(path) = &arguments.report {
+        let _waiting = Waiting::on("drawing");
+        write_text(path, &found.page())?;
+    }
+    print(&if arguments.json {
+        found.json(arguments.rows)
+    } else {
+        let draw = || plot::end(&found.recording, &found.identification, columns());
+        let plotted = is_plotted(arguments.plot).then(draw).flatten();
+        found.text() + &plotted.unwrap_or_default()
+    })?;
+    let is_written =
+        !(found.gains.as_ref()).is_some_and(|gains| matches!(gains.written, Some(Err(_))));
+    Ok(ExitCode::from(
+        if found.identification.outcome.is_ok() && is_written {
+            exit::DONE
+        } else {
+            exit::NO_PROCESS
+        },
+    ))
+}
+
+/// Refuses arguments that contradict each other; the requirements on the controller.
+fn checked(arguments: &Identify) -> Result<Specification, Failure> {
+    check_estimator(arguments)?;
+    log_gains::check(arguments)?;
+    specification(arguments)
+}
+
+/// Identifies from the recording that is given, or else from the file of the arguments.
+pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Found, Failure> {
+    let asked = checked(arguments)?;
+    let (recording, of_log) = match given {
+        Some(recording) => (recording, None),
+        None => read(arguments)?,
+    };
     check_span(arguments, &recording)?;
-    let waiting = Waiting::on("identifying");
+    let _waiting = Waiting::on("identifying");
     let bytes = pack::bytes(&arguments.pack)?;
     let pack = pack::usable(&arguments.pack, &bytes)?;
     let asked = of_log.as_ref().map_or(asked, |of_log| {
@@ -37,53 +128,33 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let structure = of_log
         .as_ref()
         .and_then(|of_log| log_gains::structure(of_log.control_loop()));
-    let found = settings(arguments, asked)
+    let identification = settings(arguments, asked)
         .structure(arguments.structure.or(structure))
         .pack(pack)
         .run(&recording);
     let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
     let against = arguments.design.against().or_else(in_force);
-    let identified = found.outcome.as_ref().ok();
-    let mut choice = identified
+    let identified = identification.outcome.as_ref().ok();
+    let choice = identified
         .map(|identified| controllers::of_identified(identified, against))
         .map(|choice| choice.in_plant(arguments.design.plant()));
     let gains = of_log
-        .map(|of_log| of_log.report(&arguments.write, &recording, &found, choice.as_ref()))
+        .map(|of_log| {
+            of_log.report(
+                &arguments.write,
+                &recording,
+                &identification,
+                choice.as_ref(),
+            )
+        })
         .transpose()?;
-    let name = arguments.file.display().to_string();
-    if let Some(path) = &arguments.report {
-        waiting.goes_on("drawing");
-        choice = (choice.zip(found.outcome.as_ref().ok()))
-            .map(|(choice, identified)| choice.with_trade_off(&identified.for_design(0).0));
-        write_text(
-            path,
-            &page::identification(&name, &recording, &found, choice.as_ref(), gains.as_ref()),
-        )?;
-    }
-    drop(waiting);
-    let is_plotted = is_plotted(arguments.plot);
-    print(&if arguments.json {
-        let gains = gains.as_ref();
-        json::identification(
-            &name,
-            &recording,
-            &found,
-            choice.as_ref(),
-            gains,
-            arguments.rows,
-        )
-    } else {
-        let plotted = is_plotted.then(|| plot::end(&recording, &found, columns()));
-        text::identification(&name, &recording, &found, choice.as_ref())
-            + &gains.as_ref().map(log_report::text).unwrap_or_default()
-            + &plotted.flatten().unwrap_or_default()
-    })?;
-    let is_written = !gains.is_some_and(|gains| matches!(gains.written, Some(Err(_))));
-    Ok(ExitCode::from(if found.outcome.is_ok() && is_written {
-        exit::DONE
-    } else {
-        exit::NO_PROCESS
-    }))
+    Ok(Found {
+        name: arguments.file.display().to_string(),
+        recording,
+        identification,
+        choice,
+        gains,
+    })
 }
 
 /// The settings of the arguments.
@@ -177,7 +248,7 @@ fn check_span(arguments: &Identify, recording: &Recording) -> Result<(), Failure
 }
 
 /// The recording, and the loop of the flight log that it is.
-fn read(arguments: &Identify) -> Result<(Recording, Option<LogLoop>), Failure> {
+pub(crate) fn read(arguments: &Identify) -> Result<(Recording, Option<LogLoop>), Failure> {
     let path = arguments.file.as_path();
     let piped = match path == Path::new("-") {
         true => Some(log::piped()?),

@@ -26,7 +26,7 @@ const DRAWS: usize = 200;
 const LEAST_STABLE: f64 = 0.99;
 
 /// The loop of a log that is identified.
-pub(super) struct LogLoop {
+pub(crate) struct LogLoop {
     flight: Flight,
     control_loop: ControlLoop,
     read_back: Option<ReadBack>,
