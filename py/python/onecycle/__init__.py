@@ -229,7 +229,7 @@ def design(model: Model, **options) -> dict:
         f"{_SYMBOLS[key]}={value!r}" for key, value in model.parameters.items() if value is not None
         and not (key == "k_over_t_body" and model.parameters.get("k") is not None)
     ])
-    return json.loads(_onecycle.design([f"--structure={structure}"] + _options(options)))
+    return json.loads(_onecycle.design([f"--process={structure}"] + _options(options)))
 
 
 _SYMBOLS = {
