@@ -7,7 +7,7 @@ mod clock;
 pub(crate) mod completions;
 mod controllers;
 pub(crate) mod dataset;
-mod flight;
+pub(crate) mod flight;
 pub(crate) mod fly;
 pub(crate) mod grid;
 pub(crate) mod identify;

@@ -2,14 +2,16 @@
 //!
 //! Options are those of the command line, such as `["--structure", "foptd"]`. An error is one sentence.
 
-use std::path::Path;
-
+use anstream::adapter::strip_str;
 use clap::Parser;
 use onecycle::{Identification, Recording};
+use onecycle_lab::learn::dataset::shards::{Entry, Manifest};
+use onecycle_lab::workers::OneThread;
 
 use crate::args::{Arguments, Command, Identify};
-use crate::commands::{campaign, identify, tune};
-use crate::failure::Failure;
+use crate::commands::campaign::plan;
+use crate::commands::dataset::folder::Folder;
+use crate::commands::{dataset, flight, identify, tune};
 use crate::words::remark::sentences;
 use crate::words::verdict::advice;
 
@@ -39,6 +41,11 @@ impl Found {
 
     fn of(name: &str, given: Option<Recording>, options: &[String]) -> Result<Self, String> {
         let arguments = arguments_of_identify(name, options)?;
+        if given.is_none() && flight::is_asked(&arguments) {
+            return Err(format!(
+                "{name} is a flight log: choose one of its loops with --axis and --loop"
+            ));
+        }
         let found = identify::find(&arguments, given).map_err(|failure| failure.to_string())?;
         Ok(Self(found))
     }
@@ -69,7 +76,7 @@ impl Found {
     /// The report as text.
     #[must_use]
     pub fn text(&self) -> String {
-        self.0.text()
+        plain(&self.0.text())
     }
 
     /// One sentence for each remark.
@@ -84,6 +91,23 @@ impl Found {
         let verdict = self.0.identification.outcome.as_ref().err()?;
         Some(format!("{verdict}: {}", advice(verdict)))
     }
+}
+
+/// Every loop of a flight log, as `onecycle identify LOG` shows it: the table, and the JSON report `onecycle.flight/1` of
+/// docs/identify-json.md.
+///
+/// # Errors
+/// One sentence: an option or the file cannot be used.
+pub fn flight(file: &str, options: &[String]) -> Result<(String, String), String> {
+    let arguments = arguments_of_identify(file, options)?;
+    if !flight::is_asked(&arguments) {
+        return Err(format!(
+            "{file} is no flight log, or an option chooses one of its loops"
+        ));
+    }
+    let survey = || flight::Surveyed::of(&arguments, &identify::checked(&arguments)?);
+    let surveyed = survey().map_err(|failure| failure.to_string())?;
+    Ok((plain(&surveyed.text()), surveyed.json()))
 }
 
 /// Reads a recording as `onecycle identify FILE` does.
@@ -107,33 +131,128 @@ pub fn design(options: &[String]) -> Result<String, String> {
     }
 }
 
-/// The cases of a campaign: each depends on the file and its number only.
-pub struct Campaign(campaign::Cases);
+/// A campaign, whose cases depend on the file, the options and their number only: they can be computed anywhere and in any
+/// order.
+pub struct Campaign {
+    plan: Box<dyn plan::Shared>,
+    arguments: crate::args::Campaign,
+}
 
 impl Campaign {
-    /// Reads the file of a campaign.
+    /// Reads the file of a campaign. Options are those of `onecycle campaign`, such as `["--cases", "100"]`.
     ///
     /// # Errors
-    /// One sentence: the file cannot be used.
-    pub fn read(file: &Path) -> Result<Self, String> {
-        let cases = campaign::Cases::read(file);
-        cases.map(Self).map_err(|failure| failure.to_string())
+    /// One sentence: the file or an option cannot be used.
+    pub fn read(file: &str, options: &[String]) -> Result<Self, String> {
+        let Command::Campaign(arguments) = parsed("campaign", &[file], options)? else {
+            return Err("not the command campaign".to_owned());
+        };
+        let plan = plan::of(&arguments).map_err(|failure| failure.to_string())?;
+        Ok(Self { plan, arguments })
     }
 
     /// Number of cases.
     #[must_use]
     pub fn count(&self) -> u64 {
-        self.0.count()
+        self.plan.count()
     }
 
-    /// The outcome of case `n`, as JSON on one line: an element of `cases` in `onecycle campaign --json`.
+    /// The outcome of case `n`, as JSON on one line.
     ///
     /// # Errors
-    /// One sentence: the case cannot be simulated.
+    /// One sentence: there is no such case, or it cannot be simulated.
     pub fn case(&self, n: u64) -> Result<String, String> {
-        let shown = self.0.case(n).map(|case| case.to_string());
-        shown.map_err(|failure: Failure| failure.to_string())
+        if n >= self.count() {
+            return Err(format!("there is no case {n}: there are {}", self.count()));
+        }
+        self.plan.line(n).map_err(|failure| failure.to_string())
     }
+
+    /// What `onecycle campaign` prints for the outcomes of all cases, in the order of their numbers: with the option
+    /// `--json` the JSON report, else the table.
+    ///
+    /// # Errors
+    /// One sentence: these are not the outcomes of this campaign.
+    pub fn text(&self, cases: &[String]) -> Result<String, String> {
+        if cases.len() as u64 != self.count() {
+            return Err(format!(
+                "{} outcomes of {} cases",
+                cases.len(),
+                self.count()
+            ));
+        }
+        let text = self.plan.text(&self.arguments, cases);
+        text.map(|text| plain(&text))
+            .map_err(|failure| failure.to_string())
+    }
+}
+
+/// A folder of experiments to train on, whose files are made by others.
+pub struct Dataset(Folder);
+
+impl Dataset {
+    /// Opens or begins the folder. Options are those of `onecycle dataset`, such as `["--examples", "40000", "--into",
+    /// "multirotors"]`.
+    ///
+    /// # Errors
+    /// One sentence: the recipe, the folder or an option cannot be used.
+    pub fn open(recipe: Option<&str>, options: &[String]) -> Result<Self, String> {
+        let files = recipe.as_slice();
+        let Command::Dataset(arguments) = parsed("dataset", files, options)? else {
+            return Err("not the command dataset".to_owned());
+        };
+        let open = || {
+            let recipe = dataset::recipe(arguments.recipe.as_deref())?;
+            let asked = (recipe, arguments.examples);
+            dataset::opened(&arguments.into, asked, arguments.restart)
+        };
+        open().map(Self).map_err(|failure| failure.to_string())
+    }
+
+    /// The manifest, from which [`dataset_file`] makes the files.
+    #[must_use]
+    pub fn manifest(&self) -> String {
+        self.0.manifest().text()
+    }
+
+    /// Numbers of the files that are not there yet.
+    #[must_use]
+    pub fn missing(&self) -> Vec<usize> {
+        self.0.missing()
+    }
+
+    /// Keeps a file: its bytes and its number of examples.
+    ///
+    /// # Errors
+    /// One sentence: it cannot be written, or there is no file of this number.
+    pub fn keep(&mut self, file: usize, bytes: &[u8], rows: usize) -> Result<(), String> {
+        let count = self.0.manifest().shards.len();
+        if file >= count {
+            return Err(format!("there is no file {file}: there are {count}"));
+        }
+        let kept = self.0.keep(file, bytes, Entry::of(rows, bytes));
+        kept.map_err(|failure| failure.to_string())
+    }
+}
+
+/// Makes a file of a dataset in this thread: its bytes and its number of examples.
+///
+/// # Errors
+/// One sentence: this is no manifest, or it has no file of this number.
+pub fn dataset_file(manifest: &str, file: usize) -> Result<(Vec<u8>, usize), String> {
+    let manifest = Manifest::read(manifest).map_err(|error| error.to_string())?;
+    let count = manifest.shards.len();
+    if file >= count {
+        return Err(format!("there is no file {file}: there are {count}"));
+    }
+    let made = manifest.make(file, &OneThread);
+    let (bytes, entry) = made.map_err(|error| error.to_string())?;
+    Ok((bytes, entry.rows))
+}
+
+/// Without the styles of a terminal.
+fn plain(text: &str) -> String {
+    strip_str(text).to_string()
 }
 
 fn arguments_of_identify(file: &str, options: &[String]) -> Result<Identify, String> {

@@ -224,6 +224,34 @@ impl Recording {
         input: &[f64],
         output: &[f64],
     ) -> Result<Self, RecordingError> {
+        Self::of_samples(time_s, input, output, None)
+    }
+
+    /// As [`from_samples`](Self::from_samples), with the set-point of a closed loop (output unit).
+    ///
+    /// # Errors
+    /// As there; also if the set-point has another length.
+    pub fn from_closed_loop(
+        time_s: &[f64],
+        input: &[f64],
+        output: &[f64],
+        set_point: &[f64],
+    ) -> Result<Self, RecordingError> {
+        if set_point.len() != time_s.len() {
+            return Err(RecordingError::SetPointLength {
+                time: time_s.len(),
+                set_point: set_point.len(),
+            });
+        }
+        Self::of_samples(time_s, input, output, Some(set_point))
+    }
+
+    fn of_samples(
+        time_s: &[f64],
+        input: &[f64],
+        output: &[f64],
+        set_point: Option<&[f64]>,
+    ) -> Result<Self, RecordingError> {
         if input.len() != time_s.len() || output.len() != time_s.len() {
             return Err(RecordingError::LengthsDiffer {
                 time: time_s.len(),
@@ -231,11 +259,15 @@ impl Recording {
                 output: output.len(),
             });
         }
-        let mut builder = RecordingBuilder::new(Columns::new(
+        let mut columns = Columns::new(
             Column::named("time").with_unit("s"),
             Column::named("input"),
             Column::named("output"),
-        ));
+        );
+        if set_point.is_some() {
+            columns = columns.with_set_point(Column::named("set-point"));
+        }
+        let mut builder = RecordingBuilder::new(columns);
         let mut before_s = f64::NEG_INFINITY;
         for (index, ((&time_s, &input), &output)) in (0..).zip(time_s.iter().zip(input).zip(output))
         {
@@ -253,7 +285,8 @@ impl Recording {
                 });
             }
             before_s = time_s;
-            builder.push(at, time_s, input, output)?;
+            let set_point = set_point.map(|values| values[index as usize]);
+            builder.push_with(at, time_s, [input, output], set_point)?;
         }
         builder.finish()
     }

@@ -10,7 +10,7 @@
 
 mod process;
 
-use std::path::Path;
+use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
@@ -19,6 +19,7 @@ use onecycle_cli::embed;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 
 create_exception!(
     _onecycle,
@@ -67,13 +68,18 @@ struct Recording(onecycle::Recording);
 #[pymethods]
 impl Recording {
     #[new]
+    #[pyo3(signature = (t, u, y, r = None))]
     fn new(
         t: PyReadonlyArray1<'_, f64>,
         u: PyReadonlyArray1<'_, f64>,
         y: PyReadonlyArray1<'_, f64>,
+        r: Option<PyReadonlyArray1<'_, f64>>,
     ) -> PyResult<Self> {
-        let recording =
-            onecycle::Recording::from_samples(t.as_slice()?, u.as_slice()?, y.as_slice()?);
+        let (t, u, y) = (t.as_slice()?, u.as_slice()?, y.as_slice()?);
+        let recording = match &r {
+            None => onecycle::Recording::from_samples(t, u, y),
+            Some(r) => onecycle::Recording::from_closed_loop(t, u, y, r.as_slice()?),
+        };
         recording.map(Self).map_err(refused)
     }
 
@@ -182,26 +188,87 @@ fn identify_recording(
     waited(py, work)?.map(Found).map_err(refused)
 }
 
+/// Table and JSON report of every loop of a flight log.
+#[pyfunction]
+fn identify_flight(
+    py: Python<'_>,
+    path: String,
+    options: Vec<String>,
+) -> PyResult<(String, String)> {
+    waited(py, move || embed::flight(&path, &options))?.map_err(refused)
+}
+
 #[pyfunction]
 fn design(py: Python<'_>, options: Vec<String>) -> PyResult<String> {
     waited(py, move || embed::design(&options))?.map_err(refused)
 }
 
-#[pyfunction]
-fn campaign_cases(file: &str) -> PyResult<u64> {
-    let campaign = embed::Campaign::read(Path::new(file)).map_err(refused)?;
-    Ok(campaign.count())
+/// A campaign, whose cases can be computed anywhere.
+#[pyclass(frozen, module = "onecycle")]
+struct Campaign(Arc<embed::Campaign>);
+
+#[pymethods]
+impl Campaign {
+    #[new]
+    fn new(file: &str, options: Vec<String>) -> PyResult<Self> {
+        let campaign = embed::Campaign::read(file, &options).map_err(refused)?;
+        Ok(Self(Arc::new(campaign)))
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.count() as usize
+    }
+
+    /// Outcomes of the cases from `first` to before `end`, each as JSON on one line.
+    fn cases(&self, py: Python<'_>, first: u64, end: u64) -> PyResult<Vec<String>> {
+        let campaign = Arc::clone(&self.0);
+        let work = move || (first..end).map(|n| campaign.case(n)).collect();
+        let cases: Result<Vec<String>, String> = waited(py, work)?;
+        cases.map_err(refused)
+    }
+
+    /// What the program prints for the outcomes of all cases.
+    fn text(&self, py: Python<'_>, cases: Vec<String>) -> PyResult<String> {
+        let campaign = Arc::clone(&self.0);
+        waited(py, move || campaign.text(&cases))?.map_err(refused)
+    }
 }
 
-/// Outcomes of the cases from `first` to before `end`, each as JSON.
+/// A folder of experiments to train on.
+#[pyclass(module = "onecycle")]
+struct Dataset(embed::Dataset);
+
+#[pymethods]
+impl Dataset {
+    #[new]
+    fn new(recipe: Option<&str>, options: Vec<String>) -> PyResult<Self> {
+        let dataset = embed::Dataset::open(recipe, &options).map_err(refused)?;
+        Ok(Self(dataset))
+    }
+
+    fn manifest(&self) -> String {
+        self.0.manifest()
+    }
+
+    fn missing(&self) -> Vec<usize> {
+        self.0.missing()
+    }
+
+    fn keep(&mut self, file: usize, bytes: &[u8], rows: usize) -> PyResult<()> {
+        self.0.keep(file, bytes, rows).map_err(refused)
+    }
+}
+
+/// Bytes and number of examples of a file.
 #[pyfunction]
-fn campaign_shard(py: Python<'_>, file: String, first: u64, end: u64) -> PyResult<Vec<String>> {
-    let work = move || {
-        let campaign = embed::Campaign::read(Path::new(&file))?;
-        (first..end).map(|n| campaign.case(n)).collect()
-    };
-    let cases: Result<Vec<String>, String> = waited(py, work)?;
-    cases.map_err(refused)
+fn dataset_file<'py>(
+    py: Python<'py>,
+    manifest: String,
+    file: usize,
+) -> PyResult<(Bound<'py, PyBytes>, usize)> {
+    let made = waited(py, move || embed::dataset_file(&manifest, file))?;
+    let (bytes, rows) = made.map_err(refused)?;
+    Ok((PyBytes::new(py, &bytes), rows))
 }
 
 #[pymodule]
@@ -214,8 +281,10 @@ fn _onecycle(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(read, module)?)?;
     module.add_function(wrap_pyfunction!(identify_file, module)?)?;
     module.add_function(wrap_pyfunction!(identify_recording, module)?)?;
+    module.add_function(wrap_pyfunction!(identify_flight, module)?)?;
     module.add_function(wrap_pyfunction!(design, module)?)?;
-    module.add_function(wrap_pyfunction!(campaign_cases, module)?)?;
-    module.add_function(wrap_pyfunction!(campaign_shard, module)?)?;
+    module.add_class::<Campaign>()?;
+    module.add_class::<Dataset>()?;
+    module.add_function(wrap_pyfunction!(dataset_file, module)?)?;
     Ok(())
 }

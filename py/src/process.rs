@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 
 use numpy::{Complex64, IntoPyArray, PyArray1, PyReadonlyArray1};
-use onecycle::{Controller, FixedStepProcess, Linear, Pid, Structure};
+use onecycle::{Controller, Linear, Noise, Pid, Structure};
+use onecycle_plant::{Disturbances, FixedStepLinear};
 use pyo3::prelude::*;
 
 use crate::refused;
@@ -122,19 +123,34 @@ impl Model {
         u: PyReadonlyArray1<'_, f64>,
         sample_s: f64,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let process =
-            (self.0.soiptd()).ok_or_else(|| refused("simulate needs the structure soiptd"))?;
         if !(sample_s.is_finite() && sample_s > 0.0) {
             return Err(refused(format!(
                 "the sample period {sample_s} s must be positive"
             )));
         }
-        let mut process = FixedStepProcess::new(&process, sample_s);
-        let mut output = Vec::with_capacity(u.as_array().len());
-        for &input in u.as_array() {
-            output.push(process.output());
-            process.step(input);
+        let process = self.0.linear();
+        let steps = process.tau_s() / sample_s;
+        if steps > MOST_STEPS {
+            return Err(refused(format!(
+                "a dead time of {steps:.0} sample periods is too long: the limit is {MOST_STEPS:.0}"
+            )));
         }
+        let input = u.as_slice()?;
+        let output = py.detach(|| {
+            // Without disturbances no number is drawn.
+            let mut noise = Noise::from_seed(0);
+            let mut process =
+                FixedStepLinear::new(&process, &Disturbances::default(), sample_s, &mut noise);
+            let outputs = input.iter().map(|&input| {
+                let output = process.output();
+                process.step(input, &mut noise);
+                output
+            });
+            outputs.collect::<Vec<f64>>()
+        });
         Ok(output.into_pyarray(py))
     }
 }
+
+/// Longest dead time of a simulation, in sample periods.
+const MOST_STEPS: f64 = 1e7;

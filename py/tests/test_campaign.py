@@ -1,14 +1,20 @@
-"""Campaigns on a real scheduler with four worker processes."""
+"""Campaigns and training sets on a real scheduler with four worker processes."""
 
 import json
 import os
+import signal
 import subprocess
+import sys
+import time
+from pathlib import Path
 
+import pyarrow.parquet
 import pytest
 from distributed import Client, LocalCluster
 
 import onecycle
 
+ROOT = Path(__file__).parents[2]
 RECIPE = """measure = "identification"
 cases = 60
 seed = 1
@@ -16,6 +22,16 @@ bias = 0.3
 sigma = 0.02
 trim = true
 """
+SMALL = {
+    "relay": 'measure = "relay"\ncases = 9\nseed = 3\nbias = 0.3\nsigma = 0.02\ntrim = true\n',
+    "unknown": 'measure = "unknown"\ncases = 1\nseed = 3\nbias = 0.3\nsigma = 0.02\ntrim = true\n',
+}
+
+
+@pytest.fixture(scope="module")
+def client():
+    with LocalCluster(n_workers=4, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
+        yield client
 
 
 @pytest.fixture
@@ -25,32 +41,120 @@ def recipe(tmp_path):
     return path
 
 
-def by_program(recipe):
-    run = subprocess.run([os.environ["ONECYCLE"], "campaign", str(recipe), "--json"], capture_output=True, text=True)
-    return json.loads(run.stdout)["cases"]
+def program(*words):
+    run = subprocess.run([os.environ["ONECYCLE"], *map(str, words)], capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    return run.stdout
 
 
-def slow(dask_worker):
+def slow():
     os.nice(19)
 
 
-def test_same_bits_with_a_worker_killed(recipe, tmp_path):
+def test_same_bits_with_a_worker_killed_and_one_slow(recipe, tmp_path):
     out = tmp_path / "out"
     with LocalCluster(n_workers=4, threads_per_worker=1, dashboard_address=None) as cluster, Client(cluster) as client:
         processes = client.run(os.getpid)
         addresses = list(processes)
         client.run(slow, workers=addresses[:1])
-        # The second worker dies while it has work.
-        killer = subprocess.Popen(["sh", "-c", f"sleep 0.3; kill -9 {processes[addresses[1]]}"])
-        cases = onecycle.campaign(recipe, client=client, out=out, shard=2)
-        killer.wait()
-        assert cases == by_program(recipe)
+        killed = []
+
+        # The second worker dies when the first results are there: it has work then.
+        def kill(done, count):
+            if not killed:
+                assert done < count
+                os.kill(processes[addresses[1]], signal.SIGKILL)
+                killed.append(done)
+
+        outcomes = onecycle.campaign(recipe, client=client, out=out, shard=2, progress=kill)
+        assert killed
+        assert outcomes.to_json() == program("campaign", recipe, "--json")
+        assert str(outcomes) == program("campaign", recipe)
         # A resumed run computes only what is missing.
         parts = sorted(out.glob("*.parquet"))
         assert len(parts) == 30
         kept, lost = parts[0].stat().st_mtime_ns, parts[7]
         lost.unlink()
-        assert onecycle.campaign(recipe, client=client, out=out, shard=2) == cases
+        again = onecycle.campaign(recipe, client=client, out=out, shard=2)
+        assert again.to_json() == outcomes.to_json()
         assert lost.exists() and parts[0].stat().st_mtime_ns == kept
         with pytest.raises(onecycle.OnecycleError, match="another"):
             onecycle.campaign(recipe, client=client, out=out, shard=3)
+
+
+def test_numbers_are_columns(recipe, tmp_path, client):
+    outcomes = onecycle.campaign(recipe, client=client, out=tmp_path / "out", shard=5, cases=10)
+    table = pyarrow.parquet.read_table(tmp_path / "out" / "part-000000005.parquet")
+    assert table.column("n").to_pylist() == [5, 6, 7, 8, 9]
+    numbers = [name for name in table.column_names if table.schema.field(name).type == pyarrow.float64()]
+    assert len(numbers) > 5
+    frame = outcomes.to_pandas()
+    for name in numbers:
+        column = table.column(name).to_pylist()
+        assert column == [None if value != value else value for value in frame[name][5:]], name
+
+
+@pytest.mark.parametrize("measure", ["relay", "unknown", "recording", "honesty"])
+def test_every_measure_gives_the_table_of_the_program(measure, tmp_path, client):
+    path = tmp_path / "campaign.toml"
+    if measure in SMALL:
+        path.write_text(SMALL[measure])
+        options = {}
+    else:
+        path = ROOT / "experiments" / {"recording": "any_open.toml", "honesty": "honesty.toml"}[measure]
+        options = {"cases": 4 if measure == "recording" else 1}
+    if measure == "honesty":
+        # The first kinds are enough.
+        head, *kinds = path.read_text().split("[[kinds]]\n")
+        path = tmp_path / "campaign.toml"
+        path.write_text("[[kinds]]\n".join([head] + kinds[:5]))
+    outcomes = onecycle.campaign(path, client=client, shard=2, **options)
+    words = [f"--{key}={value}" for key, value in options.items()]
+    assert str(outcomes) == program("campaign", path, *words)
+    assert outcomes.to_json() == program("campaign", path, "--json", *words)
+
+
+def test_training_sets_have_the_bytes_of_the_program(tmp_path, client):
+    here, there = tmp_path / "here", tmp_path / "there"
+    onecycle.dataset(None, 4200, here, client=client)
+    program("dataset", "--examples", 4200, "--into", there)
+    names = sorted(path.name for path in there.iterdir())
+    assert names == ["manifest.json", "shard-00000.npz", "shard-00001.npz"]
+    assert all((here / name).read_bytes() == (there / name).read_bytes() for name in names)
+    # A damaged file is made again.
+    (here / names[2]).write_bytes(b"")
+    onecycle.dataset(None, 4200, here, client=client)
+    assert (here / names[2]).read_bytes() == (there / names[2]).read_bytes()
+
+
+def test_a_killed_command_is_resumed_without_loss(recipe, tmp_path, client):
+    address = client.scheduler.address
+    words = [sys.executable, "-m", "onecycle.campaign", recipe, "--scheduler", address, "--out", tmp_path / "out"]
+    words = [str(word) for word in [*words, "--shard", 2, "--cases=40"]]
+    first = subprocess.Popen(words, stdout=subprocess.DEVNULL)
+    while not list((tmp_path / "out").glob("*.parquet")) and first.poll() is None:
+        time.sleep(0.01)
+    first.kill()
+    first.wait()
+    parts = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*.parquet")}
+    assert parts
+    second = subprocess.run(words, capture_output=True, text=True)
+    assert second.stdout == program("campaign", recipe, "--cases=40"), second.stderr
+    assert all(path.stat().st_mtime_ns == before for path, before in parts.items())
+
+
+def test_errors_are_sentences(tmp_path, client):
+    path = tmp_path / "campaign.toml"
+    path.write_text(RECIPE.replace("cases = 60", "cases = 0"))
+    with pytest.raises(onecycle.OnecycleError, match="cases"):
+        onecycle.campaign(path, client=client)
+    with pytest.raises(onecycle.OnecycleError, match="missing.toml"):
+        onecycle.campaign(tmp_path / "missing.toml", client=client)
+    path.write_text(RECIPE)
+    with pytest.raises(onecycle.OnecycleError, match="--colour"):
+        onecycle.campaign(path, client=client, colour="red")
+    words = [sys.executable, "-m", "onecycle.campaign", "missing.toml", "--out", str(tmp_path / "out")]
+    run = subprocess.run([*words, "--scheduler", client.scheduler.address], capture_output=True, text=True)
+    assert run.returncode == 3 and run.stderr.startswith("error: ") and "missing.toml" in run.stderr
+    assert not (tmp_path / "out").exists()
+    assert json.loads(onecycle.campaign(path, client=client, cases=1).to_json())["cases"]

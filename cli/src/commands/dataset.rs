@@ -1,6 +1,6 @@
 //! `onecycle dataset`: simulate experiments to train on, one file at a time on all threads.
 
-pub(super) mod folder;
+pub(crate) mod folder;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -60,16 +60,7 @@ pub(super) fn filled(
     restart: bool,
     workers: &Workers,
 ) -> Result<(Folder, usize, u64), Failure> {
-    let waiting = Waiting::on(format!("checking {}", path.display()));
-    let mut folder = Folder::open(path, recipe, examples, restart)?;
-    let damaged = folder.drop_damaged();
-    drop(waiting);
-    if !damaged.is_empty() {
-        tell(&format!(
-            "made again because they are missing or damaged: {}",
-            damaged.join(", ")
-        ));
-    }
+    let mut folder = opened(path, (recipe, examples), restart)?;
     let missing = folder.missing();
     let kept = folder.manifest().shards.len() - missing.len();
     if kept > 0 && !missing.is_empty() {
@@ -83,7 +74,26 @@ pub(super) fn filled(
     Ok((folder, kept, made))
 }
 
-fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
+/// Opens or begins the folder of a recipe, without the files that are missing or damaged.
+pub(crate) fn opened(
+    path: &Path,
+    (recipe, examples): (Recipe, u64),
+    restart: bool,
+) -> Result<Folder, Failure> {
+    let waiting = Waiting::on(format!("checking {}", path.display()));
+    let mut folder = Folder::open(path, recipe, examples, restart)?;
+    let damaged = folder.drop_damaged();
+    drop(waiting);
+    if !damaged.is_empty() {
+        tell(&format!(
+            "made again because they are missing or damaged: {}",
+            damaged.join(", ")
+        ));
+    }
+    Ok(folder)
+}
+
+pub(crate) fn recipe(path: Option<&Path>) -> Result<Recipe, Failure> {
     let Some(path) = path else {
         return Ok(Recipe::default());
     };

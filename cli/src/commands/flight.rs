@@ -16,7 +16,7 @@ use crate::report::flight as report;
 use crate::results::flight::{FlightLoop, Found, Judged, Part, Refusal};
 
 /// Whether the arguments ask for every loop of a flight log.
-pub(super) fn is_asked(arguments: &Identify) -> bool {
+pub(crate) fn is_asked(arguments: &Identify) -> bool {
     let asked = &arguments.log;
     let is_one = asked.axis.is_some()
         || asked.control_loop.is_some()
@@ -35,36 +35,66 @@ pub(super) fn is_asked(arguments: &Identify) -> bool {
 }
 
 pub(super) fn run(arguments: &Identify, asked: &Specification) -> Result<ExitCode, Failure> {
-    let source = Source {
-        path: &arguments.file,
-        bytes: None,
-    };
-    let (log, number) = log::scan_flight(&source, &arguments.log)?;
-    let Some(flight) = log.flights.get(number.saturating_sub(1)) else {
-        // The error names the flights that there are.
-        log::signals(&source, &log, number, ControlLoop::ALL[0])?;
-        return Ok(ExitCode::from(exit::NO_PROCESS));
-    };
-    let waiting = Waiting::on("identifying");
-    let complete = flight.loops.iter().filter(|one| one.is_complete());
-    let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
-    let found: Result<Vec<FlightLoop>, Failure> = (loops.into_par_iter())
-        .map(|of| survey(&source, &log, number, (flight, of), asked))
-        .collect();
-    let found = found?;
-    drop(waiting);
-    let name = arguments.file.display().to_string();
+    let surveyed = Surveyed::of(arguments, asked)?;
     print(&if arguments.json {
-        report::json(&name, number, &found)
+        surveyed.json()
     } else {
-        report::text(&name, number, &found)
+        surveyed.text()
     })?;
-    let is_any = found.iter().any(|one| one.best().is_some());
+    let is_any = surveyed.loops.iter().any(|one| one.best().is_some());
     Ok(ExitCode::from(if is_any {
         exit::DONE
     } else {
         exit::NO_PROCESS
     }))
+}
+
+/// Every loop of a flight.
+pub(crate) struct Surveyed {
+    name: String,
+    number: usize,
+    loops: Vec<FlightLoop>,
+}
+
+impl Surveyed {
+    pub(crate) fn of(arguments: &Identify, asked: &Specification) -> Result<Self, Failure> {
+        let source = Source {
+            path: &arguments.file,
+            bytes: None,
+        };
+        let (log, number) = log::scan_flight(&source, &arguments.log)?;
+        let name = arguments.file.display().to_string();
+        let Some(flight) = log.flights.get(number.saturating_sub(1)) else {
+            // The error names the flights that there are.
+            log::signals(&source, &log, number, ControlLoop::ALL[0])?;
+            let loops = vec![];
+            return Ok(Self {
+                name,
+                number,
+                loops,
+            });
+        };
+        let _waiting = Waiting::on("identifying");
+        let complete = flight.loops.iter().filter(|one| one.is_complete());
+        let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
+        let loops: Result<Vec<FlightLoop>, Failure> = (loops.into_par_iter())
+            .map(|of| survey(&source, &log, number, (flight, of), asked))
+            .collect();
+        Ok(Self {
+            name,
+            number,
+            loops: loops?,
+        })
+    }
+
+    /// The report `onecycle.flight/1` of docs/identify-json.md.
+    pub(crate) fn json(&self) -> String {
+        report::json(&self.name, self.number, &self.loops)
+    }
+
+    pub(crate) fn text(&self) -> String {
+        report::text(&self.name, self.number, &self.loops)
+    }
 }
 
 fn survey(

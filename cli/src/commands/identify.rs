@@ -105,7 +105,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
 }
 
 /// Refuses arguments that contradict each other; the requirements on the controller.
-fn checked(arguments: &Identify) -> Result<Specification, Failure> {
+pub(crate) fn checked(arguments: &Identify) -> Result<Specification, Failure> {
     check_estimator(arguments)?;
     log_gains::check(arguments)?;
     specification(arguments)

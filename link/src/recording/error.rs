@@ -20,6 +20,16 @@ pub enum RecordingError {
         /// Number of outputs.
         output: usize,
     },
+    /// The set-point has another length than the time.
+    #[error(
+        "the set-point has {set_point} samples, but the time has {time}: give one set-point for each sample"
+    )]
+    SetPointLength {
+        /// Samples of time.
+        time: usize,
+        /// Samples of the set-point.
+        set_point: usize,
+    },
     /// A value is NaN or infinite.
     #[error("the {role} at {at} is not a finite number")]
     NotFinite {

@@ -18,8 +18,8 @@ from . import _onecycle
 from ._onecycle import OnecycleError, __version__
 
 __all__ = [
-    "Controller", "Identification", "Model", "OnecycleError", "Recording", "__version__",
-    "campaign", "design", "identify", "margins", "read", "simulate", "step",
+    "Controller", "Flight", "Identification", "Model", "OnecycleError", "Recording", "__version__",
+    "campaign", "dataset", "design", "identify", "identify_flight", "margins", "read", "simulate", "step",
 ]
 
 
@@ -40,21 +40,22 @@ def _samples(values):
 
 
 class Recording:
-    """Time stamps `t` (s), process input `u` and process output `y`; `r` is the set-point that a file has."""
+    """Time stamps `t` (s), process input `u` and process output `y`, and for a closed loop its set-point `r`."""
 
-    def __init__(self, t, u, y):
-        self._inner = _onecycle.Recording(_samples(t), _samples(u), _samples(y))
+    def __init__(self, t, u, y, r=None):
+        r = None if r is None else _samples(r)
+        self._inner = _onecycle.Recording(_samples(t), _samples(u), _samples(y), r)
         self.name = "recording"
 
     @classmethod
-    def from_pandas(cls, frame, input="u", output="y"):
+    def from_pandas(cls, frame, input="u", output="y", set_point=None):
         """Columns of a DataFrame whose index is the time, in seconds or as dates."""
         index = frame.index
         if hasattr(index, "asi8") and not np.issubdtype(index.dtype, np.number):
             t = (index - index[0]).total_seconds()
         else:
             t = index
-        return cls(t, frame[input], frame[output])
+        return cls(t, frame[input], frame[output], None if set_point is None else frame[set_point])
 
     def to_pandas(self):
         import pandas
@@ -150,6 +151,33 @@ class Model:
         return f"Model({self.structure!r}{given})"
 
 
+class Flight:
+    """What a flight log says about each of its loops. `print(flight)` shows the table of the program."""
+
+    def __init__(self, text, report):
+        self._text, self._json = text, report
+
+    def to_dict(self) -> dict:
+        """The JSON report `onecycle.flight/1` of the program: docs/identify-json.md."""
+        return json.loads(self._json)
+
+    def to_json(self) -> str:
+        """The text that `onecycle identify LOG --json` prints."""
+        return self._json
+
+    def __str__(self):
+        return self._text
+
+    def _repr_html_(self):
+        return _preformatted(self._text)
+
+
+def _preformatted(text):
+    from html import escape
+
+    return f"<pre>{escape(text)}</pre>"
+
+
 class Identification:
     """What a recording says about its process."""
 
@@ -210,21 +238,25 @@ class Identification:
         return self._inner.text()
 
     def _repr_html_(self):
-        from html import escape
-
-        return f"<pre>{escape(str(self))}</pre>"
+        return _preformatted(str(self))
 
 
 def identify(recording, **options) -> Identification:
-    """Identifies from a `Recording`, or from a file, of which a flight log's gains in force are judged too."""
+    """Identifies from a `Recording` or from a file. Of a flight log, choose a loop: `axis="roll"`, `loop="rate"`; its gains
+    in force are judged too."""
     words = _options(options)
     if isinstance(recording, Recording):
         return Identification(_onecycle.identify_recording(recording.name, recording._inner, words))
     return Identification(_onecycle.identify_file(os.fspath(recording), words))
 
 
+def identify_flight(path, **options) -> Flight:
+    """Identifies every loop of a flight log from the parts of the flight worth using."""
+    return Flight(*_onecycle.identify_flight(os.fspath(path), _options(options)))
+
+
 def design(model: Model, **options) -> dict:
-    """The JSON report of `onecycle tune` for a process: `design(model, form="pi", style="calm")`."""
+    """The JSON report of `onecycle tune` for a process: `design(model, controller="pi", style="calm")`."""
     structure = ",".join([model.structure] + [
         f"{_SYMBOLS[key]}={value!r}" for key, value in model.parameters.items() if value is not None
         and not (key == "k_over_t_body" and model.parameters.get("k") is not None)
@@ -255,12 +287,27 @@ def step(model: Model, controller: Controller):
 
 
 def simulate(model: Model, u, sample_s) -> np.ndarray:
-    """Output at every tick, from rest, under an input held over each tick. Structure soiptd only."""
+    """Output at every tick, from rest, under an input held over each tick of `sample_s` seconds. Exact, with the dead time."""
     return model._inner.simulate(_samples(u), float(sample_s))
 
 
-def campaign(recipe, client=None, out=None, shard=64):
-    """Runs a campaign on Dask; with `out` it writes Parquet there and resumes."""
+def campaign(recipe, client=None, out=None, shard=64, progress=None, **options):
+    """Runs a campaign (a TOML file) on Dask and returns its outcomes.
+
+    `client` is a `distributed.Client`; without one, workers are started on this machine. A task is `shard` cases. In the
+    folder `out` every shard leaves a Parquet file, and finished shards found there are not computed again.
+    `progress(done, count)` is called after each shard. Options are those of `onecycle campaign`: `cases=1000`.
+    """
     from ._cluster import run
 
-    return run(recipe, client=client, out=out, shard=shard)
+    return run(recipe, client, out, shard, progress, tuple(_options(options)))
+
+
+def dataset(recipe, examples, into, client=None, progress=None, restart=False):
+    """Makes a training set on Dask in the folder `into`: the files of `onecycle dataset`, to the bit.
+
+    `recipe` is a TOML file, or None for the paper's multirotors. The same call resumes an interrupted run.
+    """
+    from ._cluster import fill
+
+    return fill(recipe, examples, into, client, progress, restart)

@@ -1,8 +1,13 @@
-"""Campaigns on Dask: a task is a range of cases, and a case depends on the recipe and its number only."""
+"""Campaigns and training sets on Dask.
+
+A task is a range of cases, and a case depends on the recipe and its number only: the results are the same bits for any
+number of workers, in any order, on any machine with the same package.
+"""
 
 import json
 import os
 import tempfile
+from functools import lru_cache
 from pathlib import Path
 
 from . import _onecycle
@@ -13,97 +18,190 @@ AHEAD = 4
 RETRIES = 5
 
 
-def _with_file(text, work):
+@lru_cache(maxsize=8)
+def _campaign(text, options):
     # The workers need not see the file system of the client.
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "campaign.toml")
         path.write_text(text, encoding="utf-8")
-        return work(str(path))
+        return _onecycle.Campaign(str(path), list(options))
 
 
-def shard_cases(text, first, end):
+def shard_cases(text, options, first, end):
     """Outcomes of the cases from `first` to before `end`, each as JSON. Runs on a worker."""
-    return _with_file(text, lambda path: _onecycle.campaign_shard(path, first, end))
+    return _campaign(text, options).cases(first, end)
 
 
-def _write(path, first, cases):
+def _cells(case):
+    """The numbers, truth values and names of an outcome by their paths: `{"fit": {"misfit": 0.1}}` is `fit.misfit`."""
+    cells = {}
+
+    def walk(path, value):
+        if isinstance(value, dict):
+            for key, inner in value.items():
+                walk(f"{path}.{key}" if path else key, inner)
+        elif isinstance(value, list):
+            for index, inner in enumerate(value):
+                walk(f"{path}[{index}]", inner)
+        elif value is not None:
+            cells[path or "value"] = float(value) if type(value) is int else value
+
+    walk("", case)
+    return cells
+
+
+def _write(path, first, lines):
     import pyarrow
     import pyarrow.parquet
 
-    table = pyarrow.table({
-        "n": pyarrow.array(range(first, first + len(cases)), pyarrow.uint64()),
-        "case": pyarrow.array(cases, pyarrow.string()),
-    })
+    rows = [_cells(json.loads(line)) for line in lines]
+    names = sorted(set().union(*rows))
+    columns = {"n": pyarrow.array(range(first, first + len(lines)), pyarrow.uint64())}
+    columns |= {name: pyarrow.array([row.get(name) for row in rows]) for name in names}
+    # What a resumed run goes on from: the digits of all numbers, and what has no column.
+    columns["case"] = pyarrow.array(lines, pyarrow.string())
     part = path.with_suffix(".tmp")
-    pyarrow.parquet.write_table(table, part)
+    pyarrow.parquet.write_table(pyarrow.table(columns), part)
     os.replace(part, path)
 
 
 def _read(path):
     import pyarrow.parquet
 
-    return pyarrow.parquet.read_table(path).column("case").to_pylist()
+    return pyarrow.parquet.read_table(path, columns=["case"]).column("case").to_pylist()
 
 
-def _folder(out, text, shard):
+def _folder(out, settings):
     folder = Path(out)
     folder.mkdir(parents=True, exist_ok=True)
-    stated = json.dumps({"version": _onecycle.__version__, "shard": shard, "recipe": text})
-    settings = folder / "settings.json"
-    if not settings.exists():
-        settings.write_text(stated, encoding="utf-8")
-    elif settings.read_text(encoding="utf-8") != stated:
+    stated = json.dumps(settings)
+    path = folder / "settings.json"
+    if not path.exists():
+        part = path.with_suffix(".tmp")
+        part.write_text(stated, encoding="utf-8")
+        os.replace(part, path)
+    elif path.read_text(encoding="utf-8") != stated:
         raise _onecycle.OnecycleError(
-            f"{folder} holds the results of another recipe, shard or version: name another folder"
+            f"{folder} holds the results of another recipe, option, shard or version: name another folder"
         )
     return folder
 
 
-def run(recipe, client=None, out=None, shard=64):
-    """Outcomes of all cases in order, as dictionaries: `cases` of `onecycle campaign FILE --json`.
-
-    `recipe` is the path of a TOML file. `out` is a folder for one Parquet file for each shard; finished shards found
-    there are not computed again.
-    """
+def _spread(client, keys, submit, keep):
+    """Computes `submit(client, key)` for every key, a few ahead of what the cluster can do, and calls `keep(key, result)`
+    as results arrive, in any order."""
     from distributed import Client, as_completed
 
-    if shard < 1:
-        raise _onecycle.OnecycleError(f"a shard of {shard} cases is empty: use 1 or more")
-    count = _onecycle.campaign_cases(os.fspath(recipe))
-    text = Path(recipe).read_text(encoding="utf-8")
-    folder = None if out is None else _folder(out, text, shard)
-    part = (lambda first: folder / f"part-{first:09}.parquet") if folder else None
-    done = {}
-    for first in range(0, count, shard):
-        if part and part(first).exists():
-            done[first] = _read(part(first))
-    left = iter([first for first in range(0, count, shard) if first not in done])
     own = Client() if client is None else None
     client = client or own
-    firsts = {}
+    left = iter(keys)
+    running = {}
 
-    def submit():
-        first = next(left, None)
-        if first is None:
-            return None
-        task = client.submit(
-            shard_cases, text, first, min(first + shard, count), retries=RETRIES, pure=False
-        )
-        firsts[task.key] = first
-        return task
+    def following():
+        key = next(left, None)
+        if key is None:
+            return []
+        future = submit(client, key)
+        running[future.key] = key
+        return [future]
 
     try:
         ahead = AHEAD * max(1, sum(client.nthreads().values()))
-        tasks = as_completed([task for task in (submit() for _ in range(ahead)) if task])
-        for task in tasks:
-            first = firsts.pop(task.key)
-            done[first] = task.result()
-            if part:
-                _write(part(first), first, done[first])
-            following = submit()
-            if following:
-                tasks.add(following)
+        futures = as_completed([future for _ in range(ahead) for future in following()])
+        for future in futures:
+            keep(running.pop(future.key), future.result())
+            for more in following():
+                futures.add(more)
     finally:
         if own:
             own.close()
-    return [json.loads(case) for first in sorted(done) for case in done[first]]
+
+
+class Outcomes:
+    """Outcomes of all cases of a campaign.
+
+    `len(outcomes)` is the number of cases; `print(outcomes)` shows the table of `onecycle campaign FILE`.
+    """
+
+    def __init__(self, text, options, lines):
+        self._text, self._options, self._lines = text, options, lines
+
+    def __len__(self):
+        return len(self._lines)
+
+    @property
+    def cases(self) -> list:
+        """The outcome of every case."""
+        return [json.loads(line) for line in self._lines]
+
+    def to_json(self) -> str:
+        """The text that `onecycle campaign FILE --json` prints."""
+        return _campaign(self._text, (*self._options, "--json")).text(self._lines)
+
+    def to_pandas(self):
+        """One row for each case."""
+        import pandas
+
+        return pandas.DataFrame([_cells(case) for case in self.cases]).rename_axis("n")
+
+    def __str__(self):
+        return _campaign(self._text, self._options).text(self._lines)
+
+
+def run(recipe, client=None, out=None, shard=64, progress=None, options=()):
+    if shard < 1:
+        raise _onecycle.OnecycleError(f"a shard of {shard} cases is empty: use 1 or more")
+    # Names the file in its errors.
+    count = len(_onecycle.Campaign(os.fspath(recipe), list(options)))
+    text = Path(recipe).read_text(encoding="utf-8")
+    settings = {"version": _onecycle.__version__, "shard": shard, "options": list(options), "recipe": text}
+    folder = None if out is None else _folder(out, settings)
+    done = {}
+
+    def path(first):
+        return folder / f"part-{first:09}.parquet"
+
+    def submit(client, first):
+        end = min(first + shard, count)
+        return client.submit(shard_cases, text, options, first, end, retries=RETRIES, pure=False)
+
+    def keep(first, lines):
+        if folder:
+            _write(path(first), first, lines)
+        done[first] = lines
+        if progress:
+            progress(min(len(done) * shard, count), count)
+
+    if folder:
+        done = {first: _read(path(first)) for first in range(0, count, shard) if path(first).exists()}
+    missing = [first for first in range(0, count, shard) if first not in done]
+    if missing:
+        _spread(client, missing, submit, keep)
+    return Outcomes(text, options, [line for first in sorted(done) for line in done[first]])
+
+
+def dataset_file(manifest, number):
+    """Bytes and number of examples of a file of a dataset. Runs on a worker."""
+    return _onecycle.dataset_file(manifest, number)
+
+
+def fill(recipe, examples, into, client=None, progress=None, restart=False):
+    words = [f"--examples={examples}", f"--into={os.fspath(into)}"] + ["--restart"] * bool(restart)
+    folder = _onecycle.Dataset(None if recipe is None else os.fspath(recipe), words)
+    manifest = folder.manifest()
+    missing = folder.missing()
+    kept = 0
+
+    def submit(client, number):
+        return client.submit(dataset_file, manifest, number, retries=RETRIES, pure=False)
+
+    def keep(number, made):
+        nonlocal kept
+        folder.keep(number, *made)
+        kept += 1
+        if progress:
+            progress(kept, len(missing))
+
+    if missing:
+        _spread(client, missing, submit, keep)
+    return Path(into)

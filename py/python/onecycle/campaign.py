@@ -1,28 +1,48 @@
-"""`python -m onecycle.campaign FILE --scheduler ADDRESS --out FOLDER`: a campaign on a cluster."""
+"""`python -m onecycle.campaign FILE --scheduler ADDRESS --out FOLDER`: a campaign or a training set on a cluster."""
 
 import argparse
 import sys
 
 
+def _bar(done, count):
+    if sys.stderr.isatty():
+        end = "\n" if done >= count else ""
+        print(f"\r{done} of {count}", end=end, file=sys.stderr, flush=True)
+
+
 def main():
-    parser = argparse.ArgumentParser(prog="python -m onecycle.campaign", description=__doc__)
-    parser.add_argument("file", help="file of the campaign (TOML)")
+    parser = argparse.ArgumentParser(
+        prog="python -m onecycle.campaign",
+        description="Runs a campaign, or with --examples a training set, on Dask workers. The same command resumes an "
+        "interrupted run.",
+        epilog="Options that are not listed are those of `onecycle campaign`, such as --cases=1000.",
+    )
+    parser.add_argument("file", help="file of the campaign, or recipe of the training set (TOML)")
     parser.add_argument("--scheduler", help="address of a Dask scheduler (default: workers on this machine)")
-    parser.add_argument("--out", required=True, help="folder of the results; an interrupted run is resumed from it")
+    parser.add_argument("--out", required=True, help="folder of the results")
     parser.add_argument("--shard", type=int, default=64, help="cases of a task (default 64)")
-    arguments = parser.parse_args()
+    parser.add_argument("--examples", type=int, help="makes a training set of this number of experiments")
+    parser.add_argument("--json", action="store_true", help="print the outcome of every case instead of the table")
+    arguments, options = parser.parse_known_args()
+    if arguments.examples is not None and options:
+        parser.error(f"a training set has no option {options[0]}")
+
     from distributed import Client
 
     from onecycle import OnecycleError
-    from onecycle._cluster import run
+    from onecycle._cluster import fill, run
 
     try:
         with Client(arguments.scheduler) as client:
-            cases = run(arguments.file, client=client, out=arguments.out, shard=arguments.shard)
+            if arguments.examples is not None:
+                fill(arguments.file, arguments.examples, arguments.out, client, _bar)
+                print(f"{arguments.examples} experiments in {arguments.out}")
+                return 0
+            outcomes = run(arguments.file, client, arguments.out, arguments.shard, _bar, tuple(options))
+        print(outcomes.to_json() if arguments.json else outcomes, end="")
     except (OnecycleError, OSError) as error:
         print(f"error: {error}", file=sys.stderr)
         return 3
-    print(f"{len(cases)} cases in {arguments.out}")
     return 0
 
 

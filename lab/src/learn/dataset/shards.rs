@@ -124,6 +124,15 @@ pub struct Entry {
 }
 
 impl Entry {
+    /// The entry of a file with these bytes and this number of examples.
+    #[must_use]
+    pub fn of(rows: usize, bytes: &[u8]) -> Self {
+        Self {
+            rows,
+            sha256: sha256(bytes),
+        }
+    }
+
     /// Whether these are the bytes of the file.
     #[must_use]
     pub fn is_of(&self, bytes: &[u8]) -> bool {
@@ -251,10 +260,7 @@ impl Manifest {
         let made: Vec<Option<ExampleRecord>> = made.into_iter().collect::<Result<_, _>>()?;
         let records: Vec<ExampleRecord> = made.into_iter().flatten().collect();
         let bytes = npz::write(&columns(&records));
-        let entry = Entry {
-            rows: records.len(),
-            sha256: sha256(&bytes),
-        };
+        let entry = Entry::of(records.len(), &bytes);
         Ok((bytes, entry))
     }
 
