@@ -7,11 +7,13 @@ use clap::Parser;
 use onecycle::{Identification, Recording};
 use onecycle_lab::learn::dataset::shards::{Entry, Manifest};
 use onecycle_lab::workers::OneThread;
+use serde_json::Value;
 
 use crate::args::{Arguments, Command, Identify};
-use crate::commands::campaign::plan;
+use crate::commands::campaign::{self, plan};
 use crate::commands::dataset::folder::Folder;
 use crate::commands::{dataset, flight, identify, tune};
+use crate::failure::Failure;
 use crate::words::remark::sentences;
 use crate::words::verdict::advice;
 
@@ -135,7 +137,8 @@ pub fn design(options: &[String]) -> Result<String, String> {
 /// order.
 pub struct Campaign {
     plan: Box<dyn plan::Shared>,
-    arguments: crate::args::Campaign,
+    /// Those of the JSON report. `None`: the table is asked for.
+    settings: Option<Value>,
 }
 
 impl Campaign {
@@ -147,8 +150,13 @@ impl Campaign {
         let Command::Campaign(arguments) = parsed("campaign", &[file], options)? else {
             return Err("not the command campaign".to_owned());
         };
-        let plan = plan::of(&arguments).map_err(|failure| failure.to_string())?;
-        Ok(Self { plan, arguments })
+        let read = || {
+            let plan = plan::of(&arguments)?;
+            let settings = arguments.json.then(|| campaign::settings(&arguments));
+            Ok((plan, settings.transpose()?))
+        };
+        let (plan, settings) = read().map_err(|failure: Failure| failure.to_string())?;
+        Ok(Self { plan, settings })
     }
 
     /// Number of cases.
@@ -181,7 +189,7 @@ impl Campaign {
                 self.count()
             ));
         }
-        let text = self.plan.text(&self.arguments, cases);
+        let text = self.plan.text(self.settings.as_ref(), cases);
         text.map(|text| plain(&text))
             .map_err(|failure| failure.to_string())
     }

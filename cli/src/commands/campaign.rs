@@ -27,12 +27,6 @@ pub(crate) fn run(arguments: &args::Campaign) -> Result<ExitCode, Failure> {
 /// The table of a campaign, and the journal to remove once it is written.
 type Table = (String, Option<Journal>);
 
-/// The outcomes of all cases as JSON.
-fn shown(arguments: &args::Campaign, cases: &Value) -> Result<String, Failure> {
-    let shown = json!({ "settings": settings(arguments)?, "cases": cases });
-    Ok(format!("{shown:#}\n"))
-}
-
 /// Cases of each thread between two writes to the journal: a few seconds of work.
 const LOT: usize = 64;
 
@@ -40,6 +34,7 @@ const LOT: usize = 64;
 /// journal.
 fn finished<T: Send + Serialize + DeserializeOwned>(
     arguments: &args::Campaign,
+    settings: &Value,
     count: u64,
     case: impl Fn(u64) -> Result<T, Failure> + Send + Sync,
 ) -> Result<(Vec<T>, Option<Journal>), Failure> {
@@ -47,7 +42,6 @@ fn finished<T: Send + Serialize + DeserializeOwned>(
     let mut journal = match &arguments.out {
         None => None,
         Some(out) => {
-            let settings = settings(arguments)?;
             let take = |lot: Vec<T>| {
                 done.extend(lot);
                 Ok(())
@@ -56,7 +50,7 @@ fn finished<T: Send + Serialize + DeserializeOwned>(
             Some(Journal::open(
                 &folder,
                 "campaign",
-                &settings,
+                settings,
                 arguments.restart,
                 take,
             )?)
@@ -85,7 +79,7 @@ fn finished<T: Send + Serialize + DeserializeOwned>(
 }
 
 /// Everything that decides the outcomes: the file and the arguments that change it.
-fn settings(arguments: &args::Campaign) -> Result<Value, Failure> {
+pub(crate) fn settings(arguments: &args::Campaign) -> Result<Value, Failure> {
     let file: toml::Table = settings::read(&arguments.file)?;
     let method = arguments.method.map(|method| format!("{method:?}"));
     Ok(json!({

@@ -16,7 +16,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
-use super::{Table, finished, shown};
+use super::{Table, finished};
 use crate::failure::Failure;
 use crate::report::campaign as report;
 use crate::results::campaign::{IdentificationCase, OutsiderCase, RelayCase};
@@ -50,8 +50,9 @@ pub(crate) trait Shared: Send + Sync {
     /// The outcome of case `n`, as JSON on one line.
     fn line(&self, n: u64) -> Result<String, Failure>;
 
-    /// What `onecycle campaign` prints for these outcomes, in the order of their numbers.
-    fn text(&self, arguments: &args::Campaign, lines: &[String]) -> Result<String, Failure>;
+    /// The table of these outcomes, which are in the order of their numbers; with the settings of the campaign, the JSON
+    /// report.
+    fn text(&self, settings: Option<&Value>, lines: &[String]) -> Result<String, Failure>;
 
     /// Computes all cases in the threads of this machine.
     fn run(&self, arguments: &args::Campaign) -> Result<Table, Failure>;
@@ -67,27 +68,27 @@ impl<P: Plan> Shared for P {
         serde_json::to_string(&case).map_err(Failure::usage)
     }
 
-    fn text(&self, arguments: &args::Campaign, lines: &[String]) -> Result<String, Failure> {
+    fn text(&self, settings: Option<&Value>, lines: &[String]) -> Result<String, Failure> {
         let cases = lines.iter().map(|line| serde_json::from_str(line));
         let cases: Vec<P::Case> = cases.collect::<Result<_, _>>().map_err(Failure::usage)?;
-        printed(self, arguments, &cases)
+        Ok(printed(self, settings, &cases))
     }
 
     fn run(&self, arguments: &args::Campaign) -> Result<Table, Failure> {
-        let (cases, journal) = finished(arguments, Plan::count(self), |n| self.case(n))?;
-        Ok((printed(self, arguments, &cases)?, journal))
+        let settings = super::settings(arguments)?;
+        let shown = arguments.json.then_some(&settings);
+        let (cases, journal) = finished(arguments, &settings, Plan::count(self), |n| self.case(n))?;
+        Ok((printed(self, shown, &cases), journal))
     }
 }
 
-fn printed<P: Plan>(
-    plan: &P,
-    arguments: &args::Campaign,
-    cases: &[P::Case],
-) -> Result<String, Failure> {
-    if arguments.json {
-        shown(arguments, &plan.listed(cases))
-    } else {
-        Ok(plan.table(cases))
+fn printed<P: Plan>(plan: &P, settings: Option<&Value>, cases: &[P::Case]) -> String {
+    match settings {
+        Some(settings) => {
+            let shown = json!({ "settings": settings, "cases": plan.listed(cases) });
+            format!("{shown:#}\n")
+        }
+        None => plan.table(cases),
     }
 }
 
