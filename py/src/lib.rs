@@ -12,7 +12,7 @@ mod process;
 
 use std::sync::Arc;
 use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use onecycle_cli::embed;
@@ -124,12 +124,31 @@ fn read(py: Python<'_>, path: String, options: Vec<String>) -> PyResult<Recordin
     recording.map(Recording).map_err(refused)
 }
 
-/// What was identified.
+/// What was identified, and the time that it took (s).
 #[pyclass(module = "onecycle")]
-struct Found(embed::Found);
+struct Found(embed::Found, f64);
+
+/// Identifies in another thread.
+fn found(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<embed::Found, String> + Send + 'static,
+) -> PyResult<Found> {
+    let (found, took_s) = waited(py, move || {
+        let begin = Instant::now();
+        let found = work();
+        (found, begin.elapsed().as_secs_f64())
+    })?;
+    let found = found.map_err(refused)?;
+    Ok(Found(found, took_s))
+}
 
 #[pymethods]
 impl Found {
+    #[getter]
+    fn took_s(&self) -> f64 {
+        self.1
+    }
+
     fn json(&self) -> String {
         self.0.json()
     }
@@ -172,8 +191,7 @@ impl Found {
 
 #[pyfunction]
 fn identify_file(py: Python<'_>, path: String, options: Vec<String>) -> PyResult<Found> {
-    let found = waited(py, move || embed::Found::in_file(&path, &options))?;
-    found.map(Found).map_err(refused)
+    found(py, move || embed::Found::in_file(&path, &options))
 }
 
 #[pyfunction]
@@ -184,8 +202,9 @@ fn identify_recording(
     options: Vec<String>,
 ) -> PyResult<Found> {
     let recording = recording.0.clone();
-    let work = move || embed::Found::in_recording(&name, recording, &options);
-    waited(py, work)?.map(Found).map_err(refused)
+    found(py, move || {
+        embed::Found::in_recording(&name, recording, &options)
+    })
 }
 
 /// Table and JSON report of every loop of a flight log.

@@ -12,7 +12,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 /// Each crate with the crates of this workspace that it may depend on, tests included.
-const ALLOWED: [(&str, &[&str]); 8] = [
+const ALLOWED: [(&str, &[&str]); 9] = [
     ("onecycle-onboard", &[]),
     ("onecycle-plant", &["onecycle-design", "onecycle-onboard"]),
     ("onecycle-link", &[]),
@@ -43,6 +43,10 @@ const ALLOWED: [(&str, &[&str]); 8] = [
             "onecycle-onboard",
             "onecycle-plant",
         ],
+    ),
+    (
+        "onecycle-py",
+        &["onecycle", "onecycle-cli", "onecycle-plant"],
     ),
 ];
 

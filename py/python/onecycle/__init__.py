@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import json
 import os
+from functools import cached_property
 
 import numpy as np
 
@@ -183,8 +184,14 @@ class Identification:
 
     def __init__(self, inner):
         self._inner = inner
-        self._json = inner.json()
-        self._dict = json.loads(self._json)
+
+    @cached_property
+    def _json(self):
+        return self._inner.json()
+
+    @cached_property
+    def _dict(self):
+        return json.loads(self._json)
 
     @property
     def model(self) -> Model | None:
@@ -194,7 +201,8 @@ class Identification:
     @property
     def intervals(self) -> dict:
         """Estimate, low and high of every parameter; a value that is unbounded is None."""
-        return self._dict["process"] or {}
+        found = self._dict["process"] or {}
+        return {key: value for key, value in found.items() if isinstance(value, dict)}
 
     @property
     def posterior(self) -> dict:
@@ -220,6 +228,11 @@ class Identification:
     def remarks(self) -> list:
         """One sentence for each remark; their fixed names are `to_dict()["remark_kinds"]`."""
         return self._inner.remarks()
+
+    @property
+    def took_s(self) -> float:
+        """Time that the identification took (s)."""
+        return self._inner.took_s
 
     def to_dict(self) -> dict:
         """The JSON report of the program: docs/identify-json.md."""
