@@ -43,6 +43,21 @@ fn identify_takes_the_loop_asked_for() {
     assert!(outcome.stdout.contains(expected), "{outcome:?}");
 }
 
+// The second that the test data hold is too short to identify from, which identify says of each loop.
+#[test]
+fn a_bag_of_ros_2_is_a_flight_log_of_px4() {
+    let bag = format!(
+        "{}/../link/tests/data/px4_zstd.mcap",
+        env!("CARGO_MANIFEST_DIR")
+    );
+    let listed = run(&["log", &bag]).stdout;
+    for fact in ["MCAP", "roll rate     245 Hz", "246 Hz", "parameters  0"] {
+        assert!(listed.contains(fact), "{fact}: {listed}");
+    }
+    let found = run(&["identify", &bag]).stdout;
+    assert!(found.contains("pitch rate      0 of"), "{found}");
+}
+
 #[test]
 fn what_does_not_fit_is_refused_with_advice() {
     let log = example("px4_chirps.ulg");
@@ -53,7 +68,7 @@ fn what_does_not_fit_is_refused_with_advice() {
     let folder = Scratch::new();
     let table = folder.write("table.csv", b"t,u,y\n0,1,2\n1,2,3\n");
     run(&["identify", &table, "--axis", "roll"]).misused(&["--axis", "flight logs"]);
-    run(&["log", &table]).refused(UNREADABLE, &["not a ULog, DataFlash or blackbox log"]);
+    run(&["log", &table]).refused(UNREADABLE, &["not a ULog, DataFlash, blackbox or MCAP log"]);
 }
 
 fn loops(log: &str) -> Vec<serde_json::Value> {

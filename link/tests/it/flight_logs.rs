@@ -284,6 +284,17 @@ fn reading_goes_on_after_damage() {
     }
 }
 
+// Without its feature an MCAP file is known, and refused.
+#[cfg(not(feature = "mcap"))]
+#[test]
+fn mcap_needs_its_feature() {
+    let error = FlightLog::scan(&b"\x89MCAP0\r\n"[..]).unwrap_err();
+    assert!(
+        matches!(error, LogError::NotBuilt(LogFormat::Mcap)),
+        "{error}"
+    );
+}
+
 /// Random numbers of 64 bits (splitmix64).
 struct Random(u64);
 
