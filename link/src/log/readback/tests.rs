@@ -20,7 +20,7 @@ fn ratio(read: &ReadBack, term: Term) -> f64 {
 fn gains_of_three_firmwares() {
     let cases = [
         ("px4_chirps.ulg", [0.02, 0.05]),
-        ("ap_sysid_roll.bin", [0.05, 0.25]),
+        ("ap_sysid_roll.bin", [0.01, 0.01]),
         ("betaflight_acro.bfl", [0.06, 0.05]),
     ];
     for (name, [p, d]) in cases {
