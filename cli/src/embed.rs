@@ -112,14 +112,16 @@ pub fn flight(file: &str, options: &[String]) -> Result<(String, String), String
     Ok((plain(&surveyed.text()), surveyed.json()))
 }
 
-/// Reads a recording as `onecycle identify FILE` does.
+/// Reads a recording as `onecycle identify FILE` does: of a flight log the part that tells most, without a choice of the
+/// part.
 ///
 /// # Errors
 /// One sentence: an option or the file cannot be used.
 pub fn read(file: &str, options: &[String]) -> Result<Recording, String> {
-    let read = identify::read(&arguments_of_identify(file, options)?);
-    read.map(|(recording, _)| recording)
-        .map_err(|failure| failure.to_string())
+    let arguments = arguments_of_identify(file, options)?;
+    let read = || identify::read(&arguments, &identify::checked(&arguments)?);
+    let (recording, _) = read().map_err(|failure| failure.to_string())?;
+    Ok(recording)
 }
 
 /// The JSON report of `onecycle tune`.

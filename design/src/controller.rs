@@ -221,7 +221,10 @@ impl Controller {
             pid.ki / s
         };
         let measurement = LowPass::SecondOrder(pid.filter_s).frequency_response(omega)
-            * filtered(pid.execution.sensor_filter);
-        (terms + integral) * measurement * Complex64::cis(-omega * pid.execution.dead_time_s())
+            * filtered(pid.execution.sensor_filter)
+            * filtered(pid.execution.recorded_filter);
+        let recorded_s = pid.execution.recorded_filter.map_or(0.0, LowPass::time_s);
+        let dead_time_s = pid.execution.dead_time_s() - recorded_s;
+        (terms + integral) * measurement * Complex64::cis(-omega * dead_time_s)
     }
 }

@@ -55,6 +55,11 @@ pub(super) fn blackbox(bytes: &[u8]) {
     );
 }
 
+/// An MCAP log of ROS 2.
+pub(super) fn mcap(bytes: &[u8]) {
+    log(b"\x89MCAP0\r\n", bytes);
+}
+
 /// A flight log; `head` is put before bytes that do not begin with it.
 fn log(head: &[u8], bytes: &[u8]) {
     let begins = bytes.starts_with(&head[..head.len().min(7)]);

@@ -1,6 +1,6 @@
 //! What a recording says about the loop that a controller will close: noise, amplitude of the input, sample period.
 
-use onecycle_design::{MeasurementNoise, Specification};
+use onecycle_design::{LowPass, MeasurementNoise, Model, Specification};
 
 use crate::innovations::Hold;
 
@@ -26,11 +26,20 @@ pub(crate) struct RecordedLoop {
     pub(crate) hold: Hold,
     /// Highest frequency that the recording excites (rad/s).
     pub(crate) excited_rad_per_s: Option<f64>,
+    /// Known filter of the output whose delay is part of the dead time.
+    pub(crate) filter: Option<LowPass>,
+}
+
+/// The known filter of the output that the loop of a controller contains instead of its delay. A fit that has less dead time
+/// than the filter has delay explains the rest by a lag: then a faster filter, so that the delay of the loop stays.
+pub(crate) fn recorded_filter(filter: Option<LowPass>, model: &Model) -> Option<LowPass> {
+    let time_s = filter?.time_s().min(model.linear().tau_s());
+    (time_s > 0.0).then_some(LowPass::SecondOrder(time_s))
 }
 
 impl RecordedLoop {
-    /// `specification` with the values that it leaves open: the noise, the highest crossover, and the sample period of a
-    /// controller whose output leaves in the tick of its sample. Input that is not held says nothing about the sample period.
+    /// `specification` with the known filter of the output and the values that it leaves open: the noise, the highest
+    /// crossover, and the sample period of a controller whose output leaves in the tick of its sample. Input that is not held says nothing about the sample period.
     pub(crate) fn complete(&self, specification: &Specification) -> Specification {
         let mut complete = *specification;
         let is_noisy = self.sigma > LEAST_NOISE * self.output_size && self.input_amplitude > 0.0;
@@ -45,6 +54,7 @@ impl RecordedLoop {
             complete.crossover_rad_per_s =
                 (self.excited_rad_per_s).map(|omega| MOST_EXTRAPOLATION * omega);
         }
+        complete.execution.recorded_filter = self.filter;
         let is_open = complete.execution.sample_period_s == 0.0;
         if is_open && self.hold == Hold::Held {
             complete.execution.sample_period_s = self.sample_s;

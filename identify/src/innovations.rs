@@ -61,6 +61,7 @@ pub use self::record::Hold;
 pub(crate) use self::result::gain_of;
 use self::search::Candidate;
 use self::theta::{Bounds, Theta};
+use crate::assumed::recorded_filter;
 use crate::conclusion::conclude;
 use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{
@@ -141,7 +142,8 @@ impl Search<'_> {
         let mut prepared = prepare(signals, self.options)?;
         let outliers = outliers::mark_far(&mut prepared.record);
         self.excitation = Some(describe(&prepared, outliers));
-        if let Some(delay_s) = prepared.filter_s {
+        if let Some(filter) = prepared.filter {
+            let delay_s = filter.time_s();
             self.remarks.push(Remark::OutputFilter { delay_s });
         }
         if prepared.part_used < 0.999 {
@@ -328,7 +330,8 @@ impl Search<'_> {
         );
         let model = result::model(&fitted.best.found, prepared.early_s);
         let excited = self.excitation.and_then(|found| found.excited_rad_per_s);
-        let recorded = fitted.recorded_loop(excited);
+        let filter = recorded_filter(prepared.filter, &model);
+        let recorded = fitted.recorded_loop(excited, filter);
         let specification = recorded.complete(&self.options.specification);
         let checked = (tests, prediction, widened);
         let mut remarks = std::mem::take(&mut self.remarks);

@@ -17,11 +17,11 @@ mod fit;
 mod spectra;
 
 use num_complex::Complex64;
-use onecycle_design::{Linear, Model, Parameter, Structure};
+use onecycle_design::{Linear, LowPass, Model, Parameter, Structure};
 
 use self::fit::{Candidate, Problem};
 use self::spectra::Spectra;
-use crate::assumed::RecordedLoop;
+use crate::assumed::{RecordedLoop, recorded_filter};
 use crate::checks;
 use crate::conclusion::conclude;
 use crate::excitation::{Excitation, Recorded};
@@ -161,6 +161,10 @@ impl Search {
         let posterior = Posterior::of_draws(&process, &draws);
         let evidence = evidence(&problem, &best, widened.sqrt());
         let (low, high) = range(signals.input);
+        let model = Model::from(process);
+        let filter = (options.output_filter_hz)
+            .filter(|hz| *hz > 0.0)
+            .map(LowPass::second_order);
         let recorded = RecordedLoop {
             sigma: evidence.noise_sigma,
             output_size: self.recorded.map_or(0.0, |found| found.output_deviation),
@@ -168,8 +172,8 @@ impl Search {
             sample_s: signals.sample_period_s,
             hold: options.hold.unwrap_or(Hold::Held),
             excited_rad_per_s: Some(band_rad_per_s.1),
+            filter: recorded_filter(filter, &model),
         };
-        let model = Model::from(process);
         let misfit = evidence.unexplained.sqrt();
         conclude(
             (model, posterior),

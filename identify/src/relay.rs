@@ -190,6 +190,7 @@ impl Search<'_> {
             sample_s: window.sample_s(),
             hold: Hold::Held,
             excited_rad_per_s: Some(TAU / oscillation.period_s),
+            filter: None,
         };
         let specification = recorded.complete(&self.options.specification);
         let judged = self.judge(&refined, fit.misfit);

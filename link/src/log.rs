@@ -1,7 +1,7 @@
-//! Flight logs: PX4 ULog, ArduPilot DataFlash, Betaflight and INAV blackbox.
+//! Flight logs: PX4 ULog and MCAP, ArduPilot DataFlash, Betaflight and INAV blackbox.
 //!
 //! ```text
-//! bytes -> tables     flights, topics, parameters; only the chosen columns     ulog.rs, dataflash.rs, blackbox.rs
+//! bytes -> tables     flights, topics, parameters; only the chosen columns     ulog.rs, dataflash.rs, blackbox.rs, mcap.rs
 //! tables -> flight    firmware, loops, gains, filters, marks                   firmware.rs, flight.rs
 //! tables -> signals   set-point, input and output of a loop on one clock       plan.rs
 //! signals -> gains    recovered by least squares, beside the parameters        law.rs, readback.rs
@@ -14,6 +14,8 @@ mod firmware;
 mod flight;
 mod law;
 mod loops;
+#[cfg(feature = "mcap")]
+mod mcap;
 mod plan;
 mod readback;
 mod scalar;
@@ -182,6 +184,10 @@ pub fn read_tables(bytes: impl Read, wanted: &Wanted) -> Result<LogTables, LogEr
         Some(LogFormat::DataFlash) => dataflash::read(source, wanted),
         Some(LogFormat::DataFlashText) => dataflash::read_text(source, wanted),
         Some(LogFormat::Blackbox) => blackbox::read(source, wanted),
+        #[cfg(feature = "mcap")]
+        Some(LogFormat::Mcap) => mcap::read(source, wanted),
+        #[cfg(not(feature = "mcap"))]
+        Some(format @ LogFormat::Mcap) => Err(LogError::NotBuilt(format)),
         None => Err(LogError::UnknownFormat),
     }
 }

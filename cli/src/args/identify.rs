@@ -16,7 +16,7 @@ use super::{DesignArguments, LogArguments, PackSource, WriteArguments, sample_ra
 /// The recording may hold a relay test, a chirp, steps or any other input that excites the process. It is
 /// a table with the columns time, input (what acts on the process) and output (the measurement),
 /// separated by commas, semicolons, tabs or blanks, with or without a header; or a flight log (PX4 ULog, ArduPilot
-/// DataFlash, Betaflight or INAV blackbox), of which one control loop is taken.
+/// DataFlash, Betaflight or INAV blackbox, MCAP of ROS 2), of which one control loop is taken.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",

@@ -7,8 +7,8 @@ use onecycle_link::{Axis, ControlLoop};
 
 /// List what a flight log holds: flights, signals of each control loop, gains in force, excitation.
 ///
-/// PX4 ULog, ArduPilot DataFlash (binary or text), Betaflight and INAV blackbox; the format is found by the
-/// content of the file.
+/// PX4 ULog, ArduPilot DataFlash (binary or text), Betaflight and INAV blackbox, MCAP with messages of PX4
+/// through ROS 2; the format is found by the content of the file.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",

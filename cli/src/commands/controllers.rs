@@ -1,8 +1,8 @@
 //! Controllers of a process to choose from: designs and figures, on the threads of the machine.
 
 use onecycle::{
-    Controller, Design, Identified, Model, Pid, Proposal, Specification, Style, assess, design,
-    least_margins,
+    Controller, Design, Execution, Identified, Model, Pid, Proposal, Specification, Style, assess,
+    design, least_margins,
 };
 use onecycle_design::{Spans, Vendor};
 use rayon::prelude::*;
@@ -87,7 +87,7 @@ fn controllers(
         .find(|row| row.proposal.specification.style == asked.style);
     let design = chosen.and_then(|row| row.proposal.outcome.as_ref().ok());
     let against = against.map(|pid| {
-        let filter_s = needed_filter_s(model, &pid, design);
+        let filter_s = needed_filter_s(model, &pid, &asked.execution, design);
         let pid = pid
             .with_filter_s(filter_s.unwrap_or(pid.filter_s))
             .with_execution(asked.execution);
@@ -109,10 +109,21 @@ fn controllers(
     }
 }
 
-/// Time (s) of a measurement filter for gains with a derivative and without filter, on a process that does not attenuate
-/// the derivative: the filter of the chosen controller, or a tenth of the derivative time.
-fn needed_filter_s(model: &Model, pid: &Pid, chosen: Option<&Design>) -> Option<f64> {
-    let is_attenuated = model.structure().stages().states() > 1;
+/// Time (s) of a measurement filter for gains with a derivative and without filter, where neither the process nor a known
+/// filter attenuates the derivative: the filter of the chosen controller, or a tenth of the derivative time.
+fn needed_filter_s(
+    model: &Model,
+    pid: &Pid,
+    execution: &Execution,
+    chosen: Option<&Design>,
+) -> Option<f64> {
+    let filters = [
+        execution.sensor_filter,
+        execution.recorded_filter,
+        execution.derivative_filter,
+    ];
+    let is_attenuated =
+        model.structure().stages().states() > 1 || filters.iter().any(Option::is_some);
     if pid.kd == 0.0 || pid.filter_s > 0.0 || is_attenuated {
         return None;
     }

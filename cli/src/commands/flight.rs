@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use onecycle::{Controller, Identified, Parameter, Specification, Structure, Verdict};
-use onecycle_link::{ControlLoop, Flight, FlightLog, Signals};
+use onecycle_link::{ControlLoop, Flight, FlightLog, Signals, Span};
 use rayon::prelude::*;
 
 use super::controllers;
@@ -107,15 +107,51 @@ fn survey(
     let signals = log::signals(source, log, number, of)?;
     let of_log = LogLoop::new(flight.clone(), of);
     let asked = of_log.specification(*asked, false);
-    let spans = flight.stretches(&signals);
+    let (mut one, mut processes) = parts(&signals, flight, &asked);
+    if let Some(best) = one.best().and_then(|at| processes.swap_remove(at)) {
+        let choice = controllers::of_identified(&best, of_log.in_force());
+        one.in_force = choice.against.as_ref().and_then(|against| {
+            Some(Judged {
+                pid: pid(&against.controller)?,
+                figures: against.figures,
+            })
+        });
+        one.proposed = choice.design().and_then(|(design, figures)| {
+            Some(Judged {
+                pid: pid(&design.controller)?,
+                figures: Some(*figures),
+            })
+        });
+    }
+    Ok(one)
+}
+
+/// The part of a flight that tells most about a loop, as in the table of all loops; if none tells anything, from the first
+/// part to the last. `None`: no part is worth using.
+pub(super) fn best_part(signals: &Signals, flight: &Flight, asked: &Specification) -> Option<Span> {
+    let (one, _) = parts(signals, flight, asked);
+    let spans = one.parts.iter().map(|part| part.span);
+    match one.best() {
+        Some(best) => Some(one.parts[best].span),
+        None => spans.reduce(Span::with),
+    }
+}
+
+/// A loop with the parts of the flight worth using, and the process of each.
+fn parts(
+    signals: &Signals,
+    flight: &Flight,
+    asked: &Specification,
+) -> (FlightLoop, Vec<Option<Identified>>) {
+    let spans = flight.stretches(signals);
     let mut outcomes: Vec<_> = (spans.par_iter())
-        .filter_map(|span| Some((*span, identified(&signals.part(*span), &asked)?)))
+        .filter_map(|span| Some((*span, identified(&signals.part(*span), asked)?)))
         .collect();
     // What no part tells alone, the response to the set-point over all of the flight may tell. A fit to the input that no part
     // confirms is not taken.
     if spans.len() > 1 && outcomes.iter().all(|(_, outcome)| outcome.is_err()) {
         let whole = spans.iter().fold(spans[0], |all, span| all.with(*span));
-        let outcome = identified(&signals.part(whole), &asked);
+        let outcome = identified(&signals.part(whole), asked);
         let outcome = outcome.filter(|outcome| {
             let found = outcome.as_ref().ok();
             found.is_some_and(|found| found.fit.set_point_response().is_some())
@@ -141,29 +177,14 @@ fn survey(
             outcome: found,
         });
     }
-    let mut one = FlightLoop {
-        control_loop: of,
+    let one = FlightLoop {
+        control_loop: signals.control_loop,
         units: signals.units,
         parts,
         in_force: None,
         proposed: None,
     };
-    if let Some(best) = one.best().and_then(|at| processes.swap_remove(at)) {
-        let choice = controllers::of_identified(&best, of_log.in_force());
-        one.in_force = choice.against.as_ref().and_then(|against| {
-            Some(Judged {
-                pid: pid(&against.controller)?,
-                figures: against.figures,
-            })
-        });
-        one.proposed = choice.design().and_then(|(design, figures)| {
-            Some(Judged {
-                pid: pid(&design.controller)?,
-                figures: Some(*figures),
-            })
-        });
-    }
-    Ok(one)
+    (one, processes)
 }
 
 /// The process of a part. `None`: its signals make no recording.

@@ -116,7 +116,7 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
     let asked = checked(arguments)?;
     let (recording, of_log) = match given {
         Some(recording) => (recording, None),
-        None => read(arguments)?,
+        None => read(arguments, &asked)?,
     };
     check_span(arguments, &recording)?;
     let _waiting = Waiting::on("identifying");
@@ -247,8 +247,11 @@ fn check_span(arguments: &Identify, recording: &Recording) -> Result<(), Failure
     Ok(())
 }
 
-/// The recording, and the loop of the flight log that it is.
-pub(crate) fn read(arguments: &Identify) -> Result<(Recording, Option<LogLoop>), Failure> {
+/// The recording, and the loop of the flight log that it is: without a choice of the part, the part that tells most.
+pub(crate) fn read(
+    arguments: &Identify,
+    asked: &Specification,
+) -> Result<(Recording, Option<LogLoop>), Failure> {
     let path = arguments.file.as_path();
     let piped = match path == Path::new("-") {
         true => Some(log::piped()?),
@@ -263,8 +266,15 @@ pub(crate) fn read(arguments: &Identify) -> Result<(Recording, Option<LogLoop>),
         refuse_columns(arguments)?;
         let bytes = bytes.as_deref();
         let source = Source { path, bytes };
-        let recording = log::recording(&source, &arguments.log)?;
-        return Ok((recording, LogLoop::of(&source, arguments)?));
+        let (signals, of_log) = LogLoop::of(&source, arguments)?;
+        let is_cut = arguments.from.is_some() || arguments.to.is_some();
+        let part = of_log.as_ref().filter(|_| !is_cut).and_then(|of_log| {
+            let _waiting = Waiting::on("comparing the parts of the flight");
+            let asked = of_log.specification(*asked, arguments.design.is_form_given());
+            flight::best_part(&signals, of_log.flight(), &asked)
+        });
+        let signals = part.map_or_else(|| signals.clone(), |part| signals.part(part));
+        return Ok((log::recording(&source, &signals)?, of_log));
     }
     if let Some(option) = arguments.write.given() {
         return Err(Failure::usage(format!(

@@ -117,10 +117,9 @@ pub(super) fn is_log(path: &Path) -> bool {
     read.is_ok() && LogFormat::detect(&head).is_some()
 }
 
-/// The recording of a control loop.
-pub(super) fn recording(source: &Source<'_>, asked: &LogArguments) -> Result<Recording, Failure> {
-    let (log, flight) = scan_flight(source, asked)?;
-    let recording = signals(source, &log, flight, asked.control_loop())?.recording();
+/// The recording of signals.
+pub(super) fn recording(source: &Source<'_>, signals: &Signals) -> Result<Recording, Failure> {
+    let recording = signals.recording();
     recording.map_err(|error| unreadable(source.path, &LogError::from(error)))
 }
 

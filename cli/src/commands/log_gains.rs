@@ -7,7 +7,8 @@ use onecycle::{
     Specification, Structure, Style, assess, least_margins,
 };
 use onecycle_link::{
-    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, RateLaw, ReadBack, changes, files,
+    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, RateLaw, ReadBack, Signals, changes,
+    files,
 };
 
 use super::log::{self, Source};
@@ -42,10 +43,14 @@ impl LogLoop {
         }
     }
 
-    /// The loop that the arguments choose. `None`: the log has no such flight.
-    pub(super) fn of(source: &Source<'_>, arguments: &Identify) -> Result<Option<Self>, Failure> {
+    /// The loop that the arguments choose, with its signals. The loop is `None` if the log has no such flight.
+    pub(super) fn of(
+        source: &Source<'_>,
+        arguments: &Identify,
+    ) -> Result<(Signals, Option<Self>), Failure> {
         let (log, number) = log::scan_flight(source, &arguments.log)?;
         let control_loop = arguments.log.control_loop();
+        let signals = log::signals(source, &log, number, control_loop)?;
         let read_back = match control_loop {
             ControlLoop::Rate(axis) => log::read_back(source, &log, number)?
                 .into_iter()
@@ -53,11 +58,17 @@ impl LogLoop {
             _ => None,
         };
         let flight = log.flights.into_iter().nth(number.saturating_sub(1));
-        Ok(flight.map(|flight| Self {
+        let of_log = flight.map(|flight| Self {
             flight,
             control_loop,
             read_back,
-        }))
+        });
+        Ok((signals, of_log))
+    }
+
+    /// The flight.
+    pub(super) fn flight(&self) -> &Flight {
+        &self.flight
     }
 
     /// Which loop it is.

@@ -11,8 +11,9 @@ const LEAST_RATE_HZ: f64 = 100.0;
 pub(crate) fn refusal(error: &LogError) -> String {
     let advice = match error {
         LogError::UnknownFormat => {
-            "expected a PX4 ULog, an ArduPilot DataFlash log or a blackbox log"
+            "expected a PX4 ULog, an ArduPilot DataFlash log, a blackbox log or an MCAP file"
         }
+        LogError::NotBuilt(_) => "build onecycle-link with its feature mcap",
         LogError::Empty => "download it from the vehicle again",
         LogError::NoSuchFlight { .. } => "choose another one with --flight",
         LogError::NotLogged { .. } => "choose another loop; `onecycle log FILE` lists them",
@@ -31,6 +32,7 @@ pub(crate) fn format(format: LogFormat) -> &'static str {
         LogFormat::DataFlash => "ArduPilot DataFlash",
         LogFormat::DataFlashText => "ArduPilot DataFlash (text)",
         LogFormat::Blackbox => "blackbox",
+        LogFormat::Mcap => "MCAP",
         _ => "flight log",
     }
 }

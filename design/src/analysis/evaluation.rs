@@ -221,11 +221,13 @@ impl Loop {
                 Stage::Pair(c1, c0) => (c1 * omega).atan2(c0 - omega * omega),
             })
             .sum();
-        let sensor = self.process.sensor.map_or(0.0, |filter| {
+        let filters = self.process.sensors.iter().flatten();
+        let sensor: f64 = (filters.map(|filter| {
             // Between -pi and 0: continuous.
             let response = filter.frequency_response(omega);
             (-response.im).atan2(response.re)
-        });
+        }))
+        .sum();
         let (numerator, denominator) = self.law.transfer();
         let path = numerator.at(omega) / denominator.at(omega);
         // F lags by less than pi, the rest of the path leads or lags by less than pi.

@@ -30,9 +30,9 @@ pub(crate) fn amplification(process: &Process, law: &Law, period: f64) -> f64 {
     let mut sum = 0.0;
     for i in 0..=INTERVALS {
         let path = numerator.at(omega) / denominator.at(omega);
-        let sensor = process
-            .sensor
-            .map_or(1.0, |filter| filter.frequency_response(omega).norm_sqr());
+        let filters = process.sensors.iter().flatten();
+        let sensor: f64 =
+            (filters.map(|filter| filter.frequency_response(omega).norm_sqr())).product();
         let noise = path.norm_sqr() * sensor / (1.0 + open_loop.at(omega)).norm_sqr();
         let weight = match i {
             0 | INTERVALS => 1.0,

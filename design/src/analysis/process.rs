@@ -76,15 +76,15 @@ impl Stage {
     }
 }
 
-/// Process with the known filter of the measurement, in its own units. See the [module](self).
+/// Process with the known filters of the measurement, in its own units. See the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Process {
     stages: [Stage; 6],
     count: usize,
     /// Dead time, that of sampling included.
     pub tau: f64,
-    /// Filter of the measurement.
-    pub sensor: Option<LowPass>,
+    /// Filters of the measurement, in series.
+    pub sensors: [Option<LowPass>; 2],
     /// Filter of the derivative term.
     pub derivative_filter: Option<LowPass>,
     /// Unit of time (s).
@@ -119,7 +119,8 @@ impl Process {
     ) -> Option<Self> {
         let finite_times = list.iter().flat_map(|stage| stage.times());
         let lags_s: f64 = finite_times.filter(|time| time.is_finite()).sum();
-        let tau_s = tau_s + execution.dead_time_s();
+        let is_valid = tau_s >= 0.0 && execution.is_valid();
+        let tau_s = execution.loop_dead_time_s(tau_s);
         let sum_s = tau_s + lags_s;
         let unit_s = if sum_s > 0.0 { sum_s } else { 1.0 };
         let powers: i32 = list.iter().map(|stage| stage.powers_of_time()).sum();
@@ -131,16 +132,16 @@ impl Process {
             stages,
             count: list.len().min(6),
             tau: tau_s / unit_s,
-            sensor: execution.sensor_filter.map(|filter| filter.in_unit(unit_s)),
+            sensors: (execution.measurement_filters())
+                .map(|filter| filter.map(|filter| filter.in_unit(unit_s))),
             derivative_filter: (execution.derivative_filter).map(|filter| filter.in_unit(unit_s)),
             unit_s,
             gain: gain * unit_s.powi(powers),
         };
         let denominator = built.denominator();
         let in_range = unit_s.is_normal()
-            && tau_s >= 0.0
             && built.gain.is_normal()
-            && execution.is_valid()
+            && is_valid
             && (denominator.coefficients().iter()).all(|c| c.is_finite())
             && denominator.degree() > 0;
         in_range.then_some(built)
@@ -157,7 +158,7 @@ impl Process {
         Self {
             stages: self.stages.map(|stage| stage.in_unit(ratio)),
             tau: self.tau / ratio,
-            sensor: self.sensor.map(|filter| filter.in_unit(ratio)),
+            sensors: (self.sensors).map(|filter| filter.map(|filter| filter.in_unit(ratio))),
             derivative_filter: self.derivative_filter.map(|filter| filter.in_unit(ratio)),
             unit_s,
             gain: self.gain * ratio.powi(powers),
@@ -186,13 +187,11 @@ impl Process {
         })
     }
 
-    /// Denominator of the process and of the filter of the measurement.
+    /// Denominator of the process and of the filters of the measurement.
     pub(crate) fn denominator(&self) -> Polynomial {
-        let stages = self.stage_denominator();
-        match self.sensor {
-            Some(filter) => stages.times(&Polynomial::new(&filter.denominator())),
-            None => stages,
-        }
+        (self.sensors.iter().flatten()).fold(self.stage_denominator(), |product, filter| {
+            product.times(&Polynomial::new(&filter.denominator()))
+        })
     }
 
     /// Number of integrators.
@@ -207,15 +206,18 @@ impl Process {
         self.stages().iter().all(|stage| stage.is_stable())
     }
 
-    /// Time constants of stages and filter, the longest first; infinite for integrators.
+    /// Time constants of stages and filters, the longest first; infinite for integrators.
     pub(crate) fn times(&self) -> Vec<f64> {
-        let filter = match self.sensor {
-            Some(LowPass::FirstOrder(time)) => [time, 0.0],
-            Some(LowPass::SecondOrder(time)) => [0.5 * time; 2],
-            None => [0.0; 2],
-        };
+        let filters = self
+            .sensors
+            .iter()
+            .flatten()
+            .flat_map(|filter| match filter {
+                LowPass::FirstOrder(time) => [*time, 0.0],
+                LowPass::SecondOrder(time) => [0.5 * time; 2],
+            });
         let stages = self.stages().iter().flat_map(|stage| stage.times());
-        let mut times: Vec<f64> = stages.chain(filter).filter(|time| *time > 0.0).collect();
+        let mut times: Vec<f64> = stages.chain(filters).filter(|time| *time > 0.0).collect();
         times.sort_by(|a, b| b.total_cmp(a));
         times
     }

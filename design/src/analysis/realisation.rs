@@ -49,7 +49,7 @@ pub(crate) fn states(process: &Process, law: &Law) -> usize {
         .derivative_filter
         .filter(|_| law.uses_derivative_filter());
     stages.sum::<usize>()
-        + order(process.sensor)
+        + process.sensors.map(order).iter().sum::<usize>()
         + order(filter(law))
         + order(derivative)
         + usize::from(law.ki != 0.0)
@@ -86,8 +86,11 @@ impl<const N: usize> Realisation<N> {
                 built.a[i][N - 1] += built.b[i];
             }
         }
-        let measured = built.filter(built.cy, process.sensor);
-        let measured = built.filter(measured, filter(law));
+        let measured = (process.sensors.into_iter())
+            .chain([filter(law)])
+            .fold(built.cy, |measured, low_pass| {
+                built.filter(measured, low_pass)
+            });
         let reference = if excitation == Excitation::Reference {
             1.0
         } else {

@@ -13,8 +13,6 @@
 //! A response ends when the error has stayed small, or when the rest of the IE is that of an exponential with the present
 //! slope: then only the slowest mode is left, and the rest is known.
 
-use crate::controller::LowPass;
-
 use super::law::Law;
 use super::process::Process;
 use super::propagator::{MONOMIALS, NODES};
@@ -121,7 +119,8 @@ pub(crate) fn run(
 fn known_integral(process: &Process, law: &Law, excitation: Excitation) -> Option<f64> {
     let denominator = process.stage_denominator();
     let of_power = |i: usize| denominator.coefficients().get(i).copied().unwrap_or(0.0);
-    let lags = law.tf + process.sensor.map_or(0.0, LowPass::time_s);
+    let filters = process.sensors.iter().flatten();
+    let lags = law.tf + filters.map(|filter| filter.time_s()).sum::<f64>();
     match excitation {
         Excitation::Load => (law.ki != 0.0).then(|| 1.0 / law.ki),
         Excitation::Reference if law.ki != 0.0 => {

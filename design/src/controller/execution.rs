@@ -1,6 +1,7 @@
 //! What stands between controller and process in a real loop: known filters, and execution at a sample period.
 //!
-//! A filter that the recording already contains belongs to the identified model: set only the others here. A recording
+//! A filter that the recording already contains belongs to the identified model: set only the others here, or set it as
+//! [`Execution::recorded_filter`] if the model has its delay as dead time. A recording
 //! shows the held output of a sampled controller as input, so the hold is never part of the dead time of the model.
 
 use num_complex::Complex64;
@@ -76,6 +77,10 @@ impl LowPass {
 pub struct Execution {
     /// Filter of the measurement before the controller, for example the gyro low-pass of an autopilot.
     pub sensor_filter: Option<LowPass>,
+    /// Filter of the measurement that the recording already contains, and whose delay at low frequencies ([`LowPass::time_s`])
+    /// is part of the dead time of the model. The loop has the filter itself instead of this delay, so that the filter
+    /// attenuates.
+    pub recorded_filter: Option<LowPass>,
     /// Filter of the derivative term alone, for example the D low-pass of an autopilot.
     pub derivative_filter: Option<LowPass>,
     /// Sample period of the controller (s). Zero: continuous.
@@ -113,6 +118,15 @@ impl Execution {
         }
     }
 
+    /// Sets the filter of the measurement whose delay is part of the dead time of the model.
+    #[must_use]
+    pub fn with_recorded_filter(self, filter: LowPass) -> Self {
+        Self {
+            recorded_filter: Some(filter),
+            ..self
+        }
+    }
+
     /// Sets the filter of the derivative term.
     #[must_use]
     pub fn with_derivative_filter(self, filter: LowPass) -> Self {
@@ -128,6 +142,18 @@ impl Execution {
         0.5 * self.sample_period_s + self.computation_delay_s
     }
 
+    /// Dead time (s) of the loop on a process with this dead time: that of sampling is added, that of the recorded filter is
+    /// taken out.
+    pub(crate) fn loop_dead_time_s(&self, tau_s: f64) -> f64 {
+        let recorded_s = self.recorded_filter.map_or(0.0, LowPass::time_s);
+        (tau_s - recorded_s).max(0.0) + self.dead_time_s()
+    }
+
+    /// The filters of the measurement: that of the recording first.
+    pub(crate) fn measurement_filters(&self) -> [Option<LowPass>; 2] {
+        [self.recorded_filter, self.sensor_filter]
+    }
+
     /// Whether all times are finite and not negative.
     pub(crate) fn is_valid(&self) -> bool {
         let time = |filter: Option<LowPass>| filter.map_or(0.0, LowPass::time_s);
@@ -135,6 +161,7 @@ impl Execution {
             self.sample_period_s,
             self.computation_delay_s,
             time(self.sensor_filter),
+            time(self.recorded_filter),
             time(self.derivative_filter),
         ]
         .iter()

@@ -1,8 +1,8 @@
 //! Designs in the named styles: limits, draws, scales, refusals.
 
 use onecycle_design::{
-    Controller, DesignError, Execution, Form, Linear, LowPass, Model, Parameter, Specification,
-    Structure, Style, design, design_over, load_iae, sensitivity, step_response,
+    Controller, DesignError, Execution, Form, Linear, LowPass, Model, Parameter, Pid,
+    Specification, Structure, Style, design, design_over, load_iae, sensitivity, step_response,
 };
 
 use crate::random::Random;
@@ -163,6 +163,41 @@ fn filters_and_sampling_are_in_the_loop() {
     );
     assert!((delay / sampled - 1.0).abs() < 1e-9, "{delay} {sampled}");
     assert!(sampled > 1.65);
+}
+
+// A filter that the recording contains: the model has its delay T as dead time, the loop has the filter itself. The loop is
+// that of the process without the delay behind the same filter as a sensor filter.
+#[test]
+fn a_recorded_filter_replaces_its_delay() {
+    let filter = LowPass::second_order(20.0);
+    let process = Linear::new(Structure::Foptd)
+        .with_gain(305.0)
+        .with_pole_per_s(2.7)
+        .with_tau_s(0.001);
+    let recorded: Model = process.with_tau_s(0.001 + filter.time_s()).into();
+    let run = Execution::default()
+        .with_derivative_filter(LowPass::first_order(20.0))
+        .with_computation_delay_s(0.00125);
+    let law = |execution: Execution| Pid::new(0.135, 0.135, 0.0036).with_execution(execution);
+    let [before, after]: [Controller; 2] = [
+        law(run.with_sensor_filter(filter)).into(),
+        law(run.with_recorded_filter(filter)).into(),
+    ];
+    let ms = |model: &Model, controller| sensitivity(model, controller).unwrap().ms;
+    let (apart, within) = (ms(&process.into(), &before), ms(&recorded, &after));
+    assert!((apart / within - 1.0).abs() < 1e-9, "{apart} {within}");
+    let as_delay = ms(&recorded, &law(run).into());
+    assert!(as_delay > 1.2 * within, "{as_delay} {within}");
+    for omega in [3.0, 130.0, 400.0] {
+        let response = |model: &Model, controller: &Controller| {
+            controller.frequency_response(omega) * model.frequency_response(omega)
+        };
+        let [one, other] = [
+            response(&process.into(), &before),
+            response(&recorded, &after),
+        ];
+        assert!((one / other - 1.0).norm() < 1e-12, "{one} {other}");
+    }
 }
 
 // Refusals name their reason.

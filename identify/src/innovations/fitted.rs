@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use onecycle_design::Structure;
+use onecycle_design::{LowPass, Structure};
 
 use super::choose::{Choice, Limits, choose};
 use super::mixture::{Component, mixture};
@@ -158,8 +158,12 @@ impl Fitted {
         mixture(blocks, &self.wider.found, &bounds)
     }
 
-    /// What the record says about the loop of a controller.
-    pub(super) fn recorded_loop(&self, excited_rad_per_s: Option<f64>) -> RecordedLoop {
+    /// What the record says about the loop of a controller, with the known filter of its output.
+    pub(super) fn recorded_loop(
+        &self,
+        excited_rad_per_s: Option<f64>,
+        filter: Option<LowPass>,
+    ) -> RecordedLoop {
         let record = &self.record;
         let (low, high) = range(&record.input);
         RecordedLoop {
@@ -169,6 +173,7 @@ impl Fitted {
             sample_s: record.dt_s,
             hold: record.hold,
             excited_rad_per_s,
+            filter,
         }
     }
 }

@@ -2,8 +2,10 @@
 
 use std::ops::Range;
 
+use onecycle_design::LowPass;
+
 use super::record::{Forces, Hold, Record};
-use super::unfilter::{self, unfilter};
+use super::unfilter::{alike_smooth, unfilter};
 use crate::settings::Options;
 use crate::signals::Signals;
 use crate::verdict::Verdict;
@@ -32,8 +34,8 @@ pub(super) struct Prepared {
     pub(super) part_used: f64,
     /// Delay from the stamp of a point to the mean time of its samples (s): the dead time appears shorter by it.
     pub(super) early_s: f64,
-    /// Delay (s) of a low-pass that was taken out of the output. `None`: none was.
-    pub(super) filter_s: Option<f64>,
+    /// Low-pass that was taken out of the output. `None`: none was.
+    pub(super) filter: Option<LowPass>,
 }
 
 /// Record of the longest part of the recording without a gap, within the span of `options`.
@@ -64,7 +66,7 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
     let unfiltered = (options.output_filter_hz)
         .and_then(|hz| unfilter(times_s, output, hz, signals.sample_period_s));
     let mut record = match &unfiltered {
-        Some(found) => gridded(times_s, input, &found.output, &found.usable),
+        Some(found) => gridded(times_s, &alike_smooth(input), &found.output, &found.usable),
         None => gridded(times_s, input, output, &vec![true; output.len()]),
     };
     mark_stale(&mut record);
@@ -76,9 +78,9 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
         part_used,
         early_s: 0.5 * points * signals.sample_period_s
             + unfiltered.as_ref().map_or(0.0, |found| found.late_s),
-        filter_s: unfiltered
+        filter: unfiltered
             .and(options.output_filter_hz)
-            .map(unfilter::delay_s),
+            .map(LowPass::second_order),
     })
 }
 

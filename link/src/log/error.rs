@@ -5,6 +5,7 @@ use std::io;
 use thiserror::Error;
 
 use super::loops::ControlLoop;
+use super::tables::LogFormat;
 use crate::recording::RecordingError;
 
 /// Why a flight log gives no signals. `Display` states the fact; what to do about it is up to the caller.
@@ -21,8 +22,11 @@ pub enum LogError {
         reason: io::Error,
     },
     /// The first bytes are those of no flight log that is known.
-    #[error("this is not a ULog, DataFlash or blackbox log")]
+    #[error("this is not a ULog, DataFlash, blackbox or MCAP log")]
     UnknownFormat,
+    /// The library was built without the feature that reads this format.
+    #[error("this build does not read {0:?} files")]
+    NotBuilt(LogFormat),
     /// The log has no row of data.
     #[error("the log holds no data")]
     Empty,

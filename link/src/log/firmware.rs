@@ -28,7 +28,7 @@ pub(super) fn wanted() -> Wanted {
 /// Which firmware wrote a flight.
 pub(super) fn firmware(format: LogFormat, flight: &FlightTables) -> Firmware {
     match format {
-        LogFormat::ULog => px4::firmware(flight),
+        LogFormat::ULog | LogFormat::Mcap => px4::firmware(flight),
         LogFormat::DataFlash | LogFormat::DataFlashText => ardupilot::firmware(flight),
         LogFormat::Blackbox => betaflight::firmware(flight),
     }

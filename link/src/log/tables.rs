@@ -29,6 +29,8 @@ pub enum LogFormat {
     DataFlashText,
     /// Betaflight or INAV blackbox (`.bbl`, `.bfl`, `.txt`).
     Blackbox,
+    /// MCAP with messages of PX4 through ROS 2 (`.mcap`). Read with the feature `mcap`.
+    Mcap,
 }
 
 impl LogFormat {
@@ -46,6 +48,8 @@ impl LogFormat {
             Some(Self::Blackbox)
         } else if starts(b"FMT, 128,") || starts(b"FMT,128,") {
             Some(Self::DataFlashText)
+        } else if starts(b"\x89MCAP0\r\n") {
+            Some(Self::Mcap)
         } else {
             None
         }

@@ -62,6 +62,15 @@ fn matlab_files() {
     }
 }
 
+#[cfg(feature = "mcap")]
+#[test]
+fn mcap_files() {
+    for name in ["px4_none", "px4_lz4", "px4_zstd"] {
+        let file = format!("../link/tests/data/{name}.mcap");
+        mutated(&file, 60_000, 60, targets::mcap);
+    }
+}
+
 #[test]
 fn logs() {
     mutated("logs/px4_dropout.ulg", 60_000, 60, targets::ulog);

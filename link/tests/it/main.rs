@@ -7,5 +7,7 @@ mod fuzz_targets;
 mod hostile;
 #[cfg(feature = "matlab")]
 mod matlab;
+#[cfg(feature = "mcap")]
+mod mcap;
 mod plant;
 mod refusals;

@@ -77,7 +77,8 @@ class Recording:
 
 
 def read(path, **options) -> Recording:
-    """Reads a table or a loop of a flight log: `read("flight.ulg", axis="roll", loop="rate")`."""
+    """Reads a table, or a loop of a flight log: `read("flight.ulg", axis="roll", loop="rate")`. Of a flight log it is the part
+    that tells most about the loop, or the one that `from_` and `to` choose."""
     recording = Recording.__new__(Recording)
     recording._inner = _onecycle.read(os.fspath(path), _options(options))
     recording.name = os.fspath(path)

@@ -168,12 +168,17 @@ fn terms(axis: Axis, has: &dyn Fn(&str) -> bool) -> Option<Quantity> {
     (!terms.is_empty()).then(|| linear(terms, weights))
 }
 
-/// The set-point, or what the proportional term tells about it.
+/// The set-point, or what the proportional term of Betaflight tells about it.
 fn set_point(flight: &FlightTables, axis: Axis, has: &dyn Fn(&str) -> bool) -> Option<Quantity> {
     let at = axis.index();
     let field = format!("setpoint[{at}]");
     if has(&field) {
         return Some(Quantity::scaled("main", field, DEGREE / finer(flight)));
+    }
+    if firmware(flight).kind == FirmwareKind::Inav {
+        // Its proportional gain has another unit.
+        let rate = format!("axisRate[{at}]");
+        return has(&rate).then(|| Quantity::scaled("main", rate, DEGREE));
     }
     let p = flight
         .parameter(&format!("{}PID[0]", axis.name()))

@@ -84,6 +84,19 @@ fn low_passed(time_s: &[f64], column: &[f64], filter: Option<&LowPassSetting>) -
     }
 }
 
+/// The set-point a tick of the controller earlier: ArduPilot runs the rate controller first in its loop, then sets the next
+/// set-point, and logs both at the end.
+fn one_tick_before(times_s: &[f64], set_point: &[f64], period_s: f64) -> Vec<f64> {
+    let first = set_point.first().copied();
+    let before = |row: usize| {
+        let step_s = times_s[row + 1] - times_s[row];
+        let share = (period_s / step_s).min(1.0);
+        set_point[row + 1] + share * (set_point[row] - set_point[row + 1])
+    };
+    let rest = 0..set_point.len().saturating_sub(1);
+    first.into_iter().chain(rest.map(before)).collect()
+}
+
 /// The equations that this log allows; `has` tells which terms have a gain.
 pub(super) fn equations(
     about: &Flight,
@@ -97,14 +110,18 @@ pub(super) fn equations(
     let Some(set_point) = &signals.set_point else {
         return Vec::new();
     };
-    let target = low_passed(times_s, set_point, law.target.as_ref());
+    let kind = about.firmware.kind;
+    let used = match (kind, law.sample_period_s) {
+        (FirmwareKind::ArduPilot, Some(period_s)) => one_tick_before(times_s, set_point, period_s),
+        _ => set_point.clone(),
+    };
+    let target = low_passed(times_s, &used, law.target.as_ref());
     let error: Vec<f64> = target
         .iter()
         .zip(&signals.output)
         .map(|(r, y)| r - y)
         .collect();
     let error = low_passed(times_s, &error, law.error.as_ref());
-    let kind = about.firmware.kind;
     let acceleration = || {
         let logged = match kind {
             FirmwareKind::Px4 => accelerations(axis.index())
