@@ -5,6 +5,7 @@
 //! ```
 //!
 //! `F_e` is the filter of the measurement of the [`Execution`](onecycle_design::Execution), `F_d` that of the derivative.
+//! A recorded filter is part of the output `y`, instead of its delay in the model.
 //! The process starts at rest and has no disturbances. Between its samples the controller holds its output.
 
 use onecycle_design::{LowPass, Model, Pid};
@@ -64,11 +65,14 @@ impl FollowedLoop {
         }
         // Without disturbances nothing is drawn.
         let mut noise = Noise::from_seed(0);
+        let execution = &self.pid.execution;
+        let recorded_s = execution.recorded_filter.map_or(0.0, LowPass::time_s);
         let linear = model.linear();
+        let linear = linear.with_tau_s((linear.tau_s() - recorded_s).max(0.0));
         let mut process =
             FixedStepLinear::new(&linear, &Disturbances::default(), step_s, &mut noise);
-        let execution = &self.pid.execution;
-        let [mut target, mut ahead, mut error, mut slope] = [
+        let [mut recorded, mut target, mut ahead, mut error, mut slope] = [
+            Filter::new(execution.recorded_filter),
             Filter::new(self.target),
             Filter::new(Some(LowPass::first_order(AHEAD_HZ))),
             Filter::new(execution.sensor_filter),
@@ -80,7 +84,7 @@ impl FollowedLoop {
         for (row, &until_s) in time_s.iter().enumerate() {
             let reference = set_point.get(row.saturating_sub(1)).copied()?;
             while first_s + step_s * (step as f64) < until_s {
-                let y = process.output();
+                let (y, _) = recorded.step(process.output(), step_s);
                 let (aim, _) = target.step(reference, step_s);
                 let (_, aim_rate) = ahead.step(aim, step_s);
                 let (e, _) = error.step(aim - y, step_s);
@@ -95,7 +99,10 @@ impl FollowedLoop {
                 process.step(u, &mut noise);
                 step += 1;
             }
-            outputs.push(process.output());
+            outputs.push(match recorded.kind {
+                Some(_) => recorded.value,
+                None => process.output(),
+            });
         }
         let size = |values: &[f64]| {
             values
@@ -111,6 +118,7 @@ impl FollowedLoop {
         let filters = [
             self.target,
             execution.sensor_filter,
+            execution.recorded_filter,
             execution.derivative_filter,
         ];
         let times_s = filters
@@ -195,6 +203,27 @@ mod tests {
             (last - 1.5 * (1.0 - (-4.0_f64).exp())).abs() < 2e-2,
             "{last}"
         );
+    }
+
+    // A recorded filter instead of its delay: the ramp that a feed-forward drives through an integrator comes out as late, but
+    // its beginning is no corner.
+    #[test]
+    fn a_recorded_filter_takes_the_place_of_its_delay() {
+        let filter = LowPass::second_order(20.0);
+        let tau_s = 0.01 + filter.time_s();
+        let model = Model::from(
+            Linear::new(Structure::Iptd)
+                .with_gain(1.0)
+                .with_tau_s(tau_s),
+        );
+        let time_s: Vec<f64> = (0..200).map(|row| 0.001 * f64::from(row)).collect();
+        let execution = Execution::default().with_recorded_filter(filter);
+        let mut open = FollowedLoop::new(Pid::new(0.0, 0.0, 0.0).with_execution(execution));
+        open.feed_forward = 1.0;
+        let y = open.follow(&model, &time_s, &vec![1.0; 200]).unwrap();
+        assert!((y[199] - (0.199 - tau_s)).abs() < 2e-3, "{}", y[199]);
+        // When the delay would end (21 ms), more than 1 ms of the ramp has passed the filter.
+        assert!(y[21] > 1e-3 && y[9] < 1e-9, "{} {}", y[21], y[9]);
     }
 
     // Filters of unit gain leave the final value; an unstable loop and a record without length give nothing.
