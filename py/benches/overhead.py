@@ -3,11 +3,10 @@
 import os
 import statistics
 import sys
-import tempfile
 import time
 from pathlib import Path
 
-from distributed import Client, LocalCluster
+from distributed import Client, LocalCluster, get_task_stream
 
 import onecycle
 
@@ -27,23 +26,29 @@ def of_identify():
           f"(at most {1e3 * max(beyond):.2f} ms) from Python to Rust and back")
 
 
-def of_campaign(client, workers, tasks_each, text):
-    """Seconds that the cluster takes beyond the work, as a share. A shard is about a second of work."""
-    path = Path(tempfile.mkdtemp()) / "campaign.toml"
-    path.write_text(text)
+def relay_campaign(cases):
+    return onecycle._onecycle.Campaign(str(ROOT / "experiments/relay.toml"), [f"--cases={cases}"])
+
+
+def alone(cases):
+    """Seconds that one thread needs for the cases without Dask, and bytes of an outcome."""
+    campaign = relay_campaign(cases)
     begin = time.perf_counter()
-    onecycle._onecycle.Campaign(str(path), []).cases(0, 200)
-    case_s = (time.perf_counter() - begin) / 200
-    shard = max(1, round(1 / case_s))
-    cases = shard * tasks_each * workers
+    lines = campaign.cases(0, cases)
+    return time.perf_counter() - begin, sum(map(len, lines)) / cases
+
+
+def of_campaign(client, workers, shard, tasks):
+    """Seconds of the same cases on the cluster, and those that the workers computed."""
+    recipe = ROOT / "experiments/relay.toml"
     # Once without measuring, so that every worker has loaded the package.
-    onecycle.campaign(path, client=client, shard=1, cases=4 * workers)
+    onecycle.campaign(recipe, client=client, shard=1, cases=8 * workers)
     begin = time.perf_counter()
-    onecycle.campaign(path, client=client, shard=shard, cases=cases)
-    took = time.perf_counter() - begin
-    print(f"{workers} worker(s): {cases} relay experiments in {cases // shard} tasks of {1e3 * shard * case_s:.0f} ms: "
-          f"{took:.2f} s, {cases / took:.0f} experiments a second")
-    return cases / took
+    with get_task_stream(client) as stream:
+        onecycle.campaign(recipe, client=client, shard=shard, cases=shard * tasks)
+        took_s = time.perf_counter() - begin
+    spans = (span for task in stream.data for span in task["startstops"] if span["action"] == "compute")
+    return took_s, sum(span["stop"] - span["start"] for span in spans)
 
 
 def of_scheduler(client):
@@ -51,26 +56,24 @@ def of_scheduler(client):
     count = 3000
     begin = time.perf_counter()
     client.gather(client.map(len, [[n] for n in range(count)], pure=False))
-    print(f"empty tasks: {count / (time.perf_counter() - begin):.0f} a second")
+    return count / (time.perf_counter() - begin)
 
 
 def main():
     of_identify()
-    text = (ROOT / "experiments/relay.toml").read_text()
-    rates = {}
+    took_s, _ = alone(500)
+    shard, tasks = max(1, round(500 / took_s)), 20
+    cases = shard * tasks
     for workers in sorted({1, os.cpu_count() or 1}):
+        took_s, size = alone(cases)
         with LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None) as cluster:
             with Client(cluster) as client:
-                rates[workers] = of_campaign(client, workers, 10, text)
-                of_scheduler(client)
-    path = ROOT / "experiments/relay.toml"
-    campaign = onecycle._onecycle.Campaign(str(path), [])
-    begin = time.perf_counter()
-    lines = campaign.cases(0, 2000)
-    alone = 2000 / (time.perf_counter() - begin)
-    print(f"without Dask, one thread: {alone:.0f} experiments a second; an outcome has {len(lines[0])} bytes")
-    for workers, rate in rates.items():
-        print(f"{workers} worker(s): overhead {100 * (alone * workers / rate - 1):.1f} %")
+                on_cluster_s, computed_s = of_campaign(client, workers, shard, tasks)
+                tasks_a_second = of_scheduler(client)
+        print(f"{workers} worker(s): {cases} relay experiments in {tasks} tasks of {computed_s / tasks:.2f} s: "
+              f"{on_cluster_s:.2f} s, of which the workers were idle {100 * (1 - computed_s / workers / on_cluster_s):.1f} %; "
+              f"{took_s:.2f} s in one thread without Dask; {tasks_a_second:.0f} empty tasks a second; "
+              f"{size:.0f} bytes an outcome", flush=True)
 
 
 if __name__ == "__main__":
