@@ -14,8 +14,8 @@ from . import _onecycle
 
 #: Tasks sent ahead for each thread of the cluster: enough to keep it busy.
 AHEAD = 4
-#: Attempts beyond the first for a task whose worker is lost.
-RETRIES = 5
+#: Attempts beyond the first for a task that fails on its worker, as for want of memory. Lost workers are Dask's own affair.
+RETRIES = 2
 
 
 @lru_cache(maxsize=8)
