@@ -4,12 +4,17 @@
     python bench_answers.py relay-benchmark --method scipy -o scipy.csv
     onecycle bench run relay-benchmark --methods onecycle-2 --answers scipy=scipy.csv
 
-Needs `pip install numpy scipy`, and `sippy_unipi` for `--method sippy`. Nothing of truth.csv is read.
+Needs `pip install numpy scipy`, and `sippy_unipi` for `--method sippy`. Nothing of truth.csv is read without `--from-truth`.
 
-scipy: an output-error fit over the last two cycles, as a careful user would write it. `least_squares`
+scipy: an output-error fit over the last cycles (two), as a careful user would write it. `least_squares`
 searches for the logarithms of T_prop, T_body and tau; the gain, a constant input bias and the three
 initial states are linear and solved for at each step; simulated by `scipy.signal` as zero-order hold, a
-delay of any part of a sample included; the best of several starts.
+delay of any part of a sample included; the best of several starts. `--step 1e-4` is the relative step of
+its finite differences: with SciPy's default (`--step 0`) rounding stops the search far from the optimum.
+multistart: the same model at 80 samples a period, from 18 starts over the benchmark's ranges.
+`--cycles N` fits the last N cycles, `--cycles 0` everything from the first rise of the input on.
+`--from-truth` starts at the true process as well, which no user could do: it shows whether the search
+finds its optimum.
 sippy: its output-error model of third order, 40 samples a cycle, for several dead times, the one of least
 error; the process with the frequency response nearest to it from the oscillation to its third harmonic.
 """
@@ -24,11 +29,21 @@ from scipy.optimize import least_squares
 from scipy.signal import cont2discrete, lfilter
 
 SAMPLE_S = 1e-3
-CYCLES = 2
 # T_prop, T_body, tau (s): spread over what the benchmark's README allows.
 STARTS = np.log(
     [[0.05, 0.5, 0.005], [0.05, 1.5, 0.05], [0.15, 0.5, 0.05], [0.2, 1.2, 0.01], [0.1, 1.0, 0.03]]
 )
+# A wide grid for the fit with many starts.
+MANY_STARTS = np.log(
+    [
+        [t_prop, t_body, tau]
+        for t_prop in (0.025, 0.08, 0.22)
+        for t_body in (0.35, 1.2)
+        for tau in (0.003, 0.02, 0.07)
+    ]
+)
+# Samples a period of the fit with many starts.
+BINS = 80
 # Dead times that SIPPY is given, in its samples: a relay's cycle hides up to a sixth of itself.
 DELAYS = [0, 2, 4, 6]
 BOUNDS = np.log([[1e-3, 1e-2, 1e-4], [5.0, 50.0, 0.5]])
@@ -39,32 +54,49 @@ def rises(u):
     return np.flatnonzero(np.diff(u) > 1.0) + 1
 
 
-def delayed(u, delay_s, first):
-    """Mean of the held input over each sample from `first` on, `delay_s` ago."""
-    whole, part = divmod(delay_s / SAMPLE_S, 1.0)
-    at = np.arange(first, len(u)) - int(whole)
-    return (1 - part) * u[np.clip(at, 0, None)] + part * u[np.clip(at - 1, 0, None)]
+def delayed(u, delay_s, at, every):
+    """Mean of the held input over each `every` samples from the indices `at` on, `delay_s` ago."""
+    total = np.concatenate([[0.0], np.cumsum(u)])
+    knots = np.arange(len(total))
+
+    def integral(when):
+        # The first input has always been there.
+        return np.where(when < 0, when * u[0], np.interp(when, knots, total))
+
+    begin = at - delay_s / SAMPLE_S
+    return (integral(begin + every) - integral(begin)) / every
 
 
-def by_scipy(u, y):
-    first = rises(u)[-1 - CYCLES]
-    measured = y[first:]
+def by_scipy(u, y, settings, starts, bins=None):
+    """Output error over the last cycles. With `bins`, at so many points a period: the output is averaged
+    over the samples around each point, the input held at its mean from point to point."""
+    ups = rises(u)
+    every = 1 if bins is None else max(round(np.diff(ups).mean() / bins), 1)
+    first = ups[-1 - settings.cycles] if settings.cycles else ups[0]
+    at = np.arange(first, len(u) - every + 1, every)
+    measured = y[at[:, None] + np.arange(every)].mean(axis=1)
+    # The mean of `every` samples stands at the middle of them.
+    centre = at + (every - 1) / 2
 
     def solve(x):
         """The gain, and what the model leaves of the output."""
         t_prop, t_body, tau = np.exp(x)
         process = ([1.0], np.polymul([1.0, 0.0], np.polymul([t_prop, 1.0], [t_body, 1.0])))
-        b, a, _ = cont2discrete(process, SAMPLE_S)
+        b, a, _ = cont2discrete(process, SAMPLE_S * every)
         none = np.zeros(len(measured))
-        columns = [lfilter(b[0], a, one) for one in (delayed(u, tau, first), none + 1.0)]
+        columns = [lfilter(b[0], a, one) for one in (delayed(u, tau, centre, every), none + 1.0)]
         columns += [lfilter(b[0], a, none, zi=state)[0] for state in np.eye(3)]
         columns = np.stack(columns, axis=1)
         sizes = np.linalg.norm(columns, axis=0)
         factors = np.linalg.lstsq(columns / sizes, measured, rcond=None)[0] / sizes
         return factors[0], (measured - columns @ factors) / measured.std()
 
-    fits = [least_squares(lambda x: solve(x)[1], start, bounds=BOUNDS) for start in STARTS]
-    best = min(fits, key=lambda found: found.cost)
+    def fit(start):
+        return least_squares(
+            lambda x: solve(x)[1], start, bounds=BOUNDS, diff_step=settings.step or None
+        )
+
+    best = min(map(fit, starts), key=lambda found: found.cost)
     return (solve(best.x)[0], *np.exp(best.x))
 
 
@@ -105,14 +137,31 @@ def by_sippy(u, y):
     return np.exp(min(fits, key=lambda found: found.cost).x)
 
 
+def identify(u, y, arguments, more):
+    """The process by the method asked for; `more` are further starts."""
+    if arguments.method == "sippy":
+        return by_sippy(u, y)
+    if arguments.method == "multistart":
+        return by_scipy(u, y, arguments, np.concatenate([MANY_STARTS, more]), BINS)
+    return by_scipy(u, y, arguments, np.concatenate([STARTS, more]))
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=pathlib.Path)
-    parser.add_argument("--method", choices=["scipy", "sippy"], default="scipy")
+    parser.add_argument("--method", choices=["scipy", "multistart", "sippy"], default="scipy")
+    parser.add_argument("--cycles", type=int, default=2)
+    parser.add_argument("--step", type=float, default=1e-4)
+    parser.add_argument("--from-truth", action="store_true")
     parser.add_argument("--experiments", type=int, default=None)
     parser.add_argument("-o", "--out", type=pathlib.Path, required=True)
     arguments = parser.parse_args()
-    identify = {"scipy": by_scipy, "sippy": by_sippy}[arguments.method]
+    truth = {}
+    if arguments.from_truth:
+        with (arguments.folder / "truth.csv").open(newline="") as file:
+            for row in csv.DictReader(file):
+                times = [float(row[name]) for name in ("T_prop_s", "T_body_s", "tau_s")]
+                truth[int(row["experiment"])] = np.log([times])
     files = sorted((arguments.folder / "recordings").glob("*.csv"))[: arguments.experiments]
     with arguments.out.open("w", newline="", buffering=1) as out:
         table = csv.writer(out)
@@ -120,7 +169,8 @@ def main():
         for file in files:
             _, y, u = np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
             begin = time.perf_counter()
-            process = identify(u, y)
+            more = truth.get(int(file.stem), np.empty((0, 3)))
+            process = identify(u, y, arguments, more)
             seconds = time.perf_counter() - begin
             table.writerow([int(file.stem), *map(float, process), round(seconds, 3)])
 
