@@ -21,8 +21,13 @@ error; the process with the frequency response nearest to it from the oscillatio
 
 import argparse
 import csv
+import os
 import pathlib
 import time
+
+# The matrices are small: more threads only wait for each other.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from scipy.optimize import least_squares
@@ -54,14 +59,19 @@ def rises(u):
     return np.flatnonzero(np.diff(u) > 1.0) + 1
 
 
-def delayed(u, delay_s, at, every):
+def integrals(u):
+    """Integral of the held input up to each sample, and the input before the first."""
+    return np.concatenate([[0.0], np.cumsum(u)]), u[0]
+
+
+def delayed(integrated, delay_s, at, every):
     """Mean of the held input over each `every` samples from the indices `at` on, `delay_s` ago."""
-    total = np.concatenate([[0.0], np.cumsum(u)])
+    total, before = integrated
     knots = np.arange(len(total))
 
     def integral(when):
         # The first input has always been there.
-        return np.where(when < 0, when * u[0], np.interp(when, knots, total))
+        return np.where(when < 0, when * before, np.interp(when, knots, total))
 
     begin = at - delay_s / SAMPLE_S
     return (integral(begin + every) - integral(begin)) / every
@@ -77,6 +87,7 @@ def by_scipy(u, y, settings, starts, bins=None):
     measured = y[at[:, None] + np.arange(every)].mean(axis=1)
     # The mean of `every` samples stands at the middle of them.
     centre = at + (every - 1) / 2
+    integrated = integrals(u)
 
     def solve(x):
         """The gain, and what the model leaves of the output."""
@@ -84,7 +95,7 @@ def by_scipy(u, y, settings, starts, bins=None):
         process = ([1.0], np.polymul([1.0, 0.0], np.polymul([t_prop, 1.0], [t_body, 1.0])))
         b, a, _ = cont2discrete(process, SAMPLE_S * every)
         none = np.zeros(len(measured))
-        columns = [lfilter(b[0], a, one) for one in (delayed(u, tau, centre, every), none + 1.0)]
+        columns = [lfilter(b[0], a, one) for one in (delayed(integrated, tau, centre, every), none + 1.0)]
         columns += [lfilter(b[0], a, none, zi=state)[0] for state in np.eye(3)]
         columns = np.stack(columns, axis=1)
         sizes = np.linalg.norm(columns, axis=0)
