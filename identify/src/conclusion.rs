@@ -8,13 +8,15 @@ use crate::posterior::Posterior;
 use crate::remark::Remark;
 use crate::verdict::Verdict;
 
-/// Half width of the interval of the gain over the estimate above which the record tells nothing.
+/// Half width of the 90 % interval of the gain, over the estimate, above which the record tells nothing.
 const MOST_WIDTH: f64 = 0.5;
+/// That half width in standard deviations of a normal distribution.
+const HALF_WIDTH: f64 = 1.645;
 
 /// The result of a model with its posterior, for a specification.
 ///
-/// `no_information` makes the verdict of a gain whose interval has this half width over the estimate, and `fit` the quality
-/// of the fit (`None` if it has none).
+/// `no_information` makes the verdict of a gain with this relative standard deviation, and `fit` the quality of the fit
+/// (`None` if it has none).
 pub(crate) fn conclude(
     (model, posterior): (Model, Posterior),
     specification: Specification,
@@ -39,7 +41,7 @@ pub(crate) fn conclude(
     let width = (estimate.get(gain_of(model.structure())))
         .and_then(|interval| interval.relative_half_width());
     if width.is_none_or(|width| width > MOST_WIDTH) {
-        return Err(no_information(width));
+        return Err(no_information(width.map(|width| width / HALF_WIDTH)));
     }
     Ok(Identified {
         joint_probability: posterior.joint_probability(&estimate),

@@ -22,8 +22,12 @@ const LEAST_OF_RESPONSE: f64 = 0.8;
 const CLEAN: (f64, f64) = (0.1, 0.02);
 /// Steady output for a unit set-point from which the output follows the set-point.
 const LEAST_GAIN: f64 = 0.5;
-/// Explained share of the prediction below which the fit to that part is refused.
+/// Explained share of the prediction below which the fit to that part is refused, unless the fit to the input as it is
+/// confirms it.
 const LEAST_PREDICTED: f64 = 0.7;
+/// Relative difference of their responses up to which one fit confirms the other. Feedback of noise draws a fit to the input
+/// towards `-1/C`, with opposite sign, and not one to the part that the set-point caused.
+const CONFIRMED: f64 = 0.1;
 /// Explained share of the prediction from which a fit to the input as it is stands in any case.
 const BEYOND_DOUBT: f64 = 0.98;
 
@@ -111,9 +115,10 @@ fn in_two_stages(
         return direct;
     }
     // Noise that came back is part of what disturbs the process now: a fit that predicts little of the rest found nothing.
+    // A record whose end is calm gives little to predict, so it is not refused if both fits found the same process.
     let weak = evidence(&found)
         .and_then(|evidence| evidence.prediction.as_ref())
-        .filter(|prediction| prediction.explained < LEAST_PREDICTED)
+        .filter(|prediction| prediction.explained < LEAST_PREDICTED && !confirm(&direct, &found))
         .map(|prediction| Verdict::NoPrediction {
             explained: prediction.explained,
             horizon_s: prediction.horizon_s,
@@ -124,6 +129,21 @@ fn in_two_stages(
     let share = caused.share;
     found.remarks.insert(0, Remark::TwoStage { share });
     found
+}
+
+/// Whether both found the same response in the middle of the frequencies that tell the second its gain.
+fn confirm(one: &Identification, other: &Identification) -> bool {
+    let (Ok(one), Ok(model), Some(Excitation::Recorded(recorded))) =
+        (&one.outcome, &other.outcome, &other.excitation)
+    else {
+        return false;
+    };
+    let Some((low, high)) = recorded.informative_rad_per_s else {
+        return false;
+    };
+    let middle_rad_per_s = (low * high).sqrt();
+    let [one, other] = [one, model].map(|found| found.model.frequency_response(middle_rad_per_s));
+    (one - other).norm() < CONFIRMED * other.norm()
 }
 
 fn evidence(found: &Identification) -> Option<&Innovations> {

@@ -149,8 +149,8 @@ fn of_relay(verdict: &Verdict) -> &'static str {
              or a wrong sensor."
         }
         Verdict::TooUncertain => {
-            "Use more cycles or a larger relay amplitude: the intervals are too wide for a controller that is surely \
-             stable."
+            "Excite the process more strongly or longer (a relay test: a larger amplitude, more cycles): the intervals \
+             are too wide for a controller that is surely stable."
         }
         Verdict::EdgeOfDomain(DomainEdge::SlowLags) => {
             "Check that the output is a position and not its rate: both lags appear longer than the period."

@@ -84,13 +84,16 @@ fn gain_of(loops: &[serde_json::Value], name: &str) -> Option<[f64; 3]> {
     Some([0, 1, 2].map(|at: usize| ends[at].as_f64().unwrap()))
 }
 
-// The simulators' own gains: 113.1 rad/s^2 for pitch in
+// The simulators' own gains: 113.1 rad/s^2 for roll and pitch in
 // PX4's SIH (examples/logs/README.md), and 290 to 305 rad/s^2 for roll in ArduPilot's SITL, by least squares on its noise-free rates.
 #[test]
 fn the_rate_loops_of_simulated_flights_have_the_gains_of_the_simulators() {
-    let [low, gain, high] = gain_of(&loops("px4_chirps.ulg"), "pitch rate").unwrap();
-    assert!((gain / 113.1 - 1.0).abs() < 0.05, "{gain}");
-    assert!(low < 113.1 && high > 113.1, "{low} {high}");
+    let all = loops("px4_chirps.ulg");
+    for name in ["roll rate", "pitch rate"] {
+        let [low, gain, high] = gain_of(&all, name).unwrap();
+        assert!((gain / 113.1 - 1.0).abs() < 0.05, "{name} {gain}");
+        assert!(low < 113.1 && high > 113.1, "{name} {low} {high}");
+    }
     let all = loops("ap_sysid_roll.bin");
     let [_, gain, _] = gain_of(&all, "roll rate").unwrap();
     assert!((gain / 297.5 - 1.0).abs() < 0.05, "{gain}");
@@ -164,4 +167,17 @@ fn an_acro_flight_tells_the_roll_rate_loop() {
     let measured = response["measured"].as_array().unwrap().len();
     assert_eq!(measured, response["fitted"].as_array().unwrap().len());
     assert!(measured > 50, "{measured}");
+}
+
+// Pitch has the propellers and nearly the inertia of roll: its interval reaches into that of roll.
+#[test]
+fn an_acro_flight_tells_all_rate_loops() {
+    let all = loops("betaflight_acro_long.bbl");
+    let [roll, pitch] = ["roll rate", "pitch rate"].map(|name| gain_of(&all, name).unwrap());
+    assert!(
+        pitch[2] > roll[0] && pitch[0] < roll[2],
+        "{roll:?} {pitch:?}"
+    );
+    assert!(pitch[2] < 2.0 * pitch[0], "{pitch:?}");
+    assert!(gain_of(&all, "yaw rate").is_some());
 }

@@ -78,12 +78,7 @@ impl Candidate {
         self.point.structure
     }
 
-    /// Bayesian information criterion, up to a constant.
-    pub(super) fn bic(&self, spectra: &Spectra) -> f64 {
-        let rows = 2.0 * spectra.bins.len() as f64;
-        self.cost + Point::count(self.structure()) as f64 * rows.ln()
-    }
-
+    /// Degrees of freedom of the sum.
     pub(super) fn freedom(&self, spectra: &Spectra) -> f64 {
         2.0 * spectra.bins.len() as f64 - Point::count(self.structure()) as f64
     }

@@ -25,6 +25,8 @@ const HIGHEST: f64 = 0.35;
 const LEAST_F: f64 = 2.0;
 const LARGEST_F: f64 = 10.0;
 const NEIGHBOURS: usize = 15;
+/// Least power of the noise of a segment over the mean, so that few segments do not count for all.
+const LEAST_POWER: f64 = 0.25;
 
 /// Sums over the segments at one frequency. `U`, `Y`, `R` are the transforms of a segment, of input, output, set-point.
 #[derive(Clone, Copy, Debug, Default)]
@@ -108,6 +110,8 @@ impl Bin {
 #[derive(Clone, Debug)]
 pub(super) struct Spectra {
     pub(super) bins: Vec<Bin>,
+    /// Transforms of input, output and set-point: of each segment, at each frequency.
+    transforms: Vec<Vec<[Complex64; 3]>>,
     pub(super) segments: usize,
     /// Time from point to point (s).
     pub(super) sample_s: f64,
@@ -133,7 +137,7 @@ impl Spectra {
                 ..Bin::default()
             })
             .collect();
-        let (mut segments, mut energy) = (0, 0.0);
+        let (mut all, mut energy) = (Vec::new(), 0.0);
         let window = window(points);
         for run in runs(&range, signals.breaks) {
             // Increments: what is slow would leak into what is fast.
@@ -150,24 +154,73 @@ impl Spectra {
                     break;
                 }
                 let columns = [0, 1, 2].map(|k| windowed(&even[k][start..start + points], &window));
-                for bin in &mut bins {
-                    bin.add(transforms(&columns, bin.omega_rad_per_s * sample_s));
-                }
-                segments += 1;
+                let own: Vec<[Complex64; 3]> = (bins.iter_mut())
+                    .map(|bin| {
+                        let own = transforms(&columns, bin.omega_rad_per_s * sample_s);
+                        bin.add(own);
+                        own
+                    })
+                    .collect();
+                all.push(own);
                 energy += window.iter().map(|w| w * w).sum::<f64>();
             }
         }
-        if segments < FEWEST_SEGMENTS {
+        if all.len() < FEWEST_SEGMENTS {
             return None;
         }
         let top = highest(&bins)?;
         bins.truncate(top + 1);
+        for own in &mut all {
+            own.truncate(top + 1);
+        }
         Some(Self {
             bins,
-            segments,
+            segments: all.len(),
+            transforms: all,
             sample_s,
             energy,
         })
+    }
+
+    /// The spectra with a set-point that counts for less in noisy segments: over the power, near the frequency but not at it,
+    /// of what the output has beside the response of `process`. Noise of motors rises with the throttle. The phase of the noise
+    /// remains independent of such a set-point, so that the response that leaves nothing correlated is still the process.
+    pub(super) fn weighted(&self, process: &Linear, around: &[Complex64]) -> Self {
+        let response: Vec<Complex64> = (self.bins.iter().zip(around))
+            .map(|(bin, around)| around * process.frequency_response(bin.omega_rad_per_s))
+            .collect();
+        let mut powers: Vec<Vec<f64>> = (self.transforms.iter())
+            .map(|own| {
+                let errors = own.iter().zip(&response);
+                errors
+                    .map(|([u, y, _], g)| (y - g * u).norm_sqr())
+                    .collect()
+            })
+            .collect();
+        for at in 0..self.bins.len() {
+            let sum: f64 = powers.iter().map(|own| own[at]).sum();
+            let mean = (sum / powers.len() as f64).max(f64::MIN_POSITIVE);
+            powers.iter_mut().for_each(|own| own[at] /= mean);
+        }
+        let bins = self.bins.iter().enumerate().map(|(at, bin)| {
+            let mut weighted = Bin {
+                omega_rad_per_s: bin.omega_rad_per_s,
+                ..Bin::default()
+            };
+            let near = at.saturating_sub(NEIGHBOURS / 2)..(at + NEIGHBOURS / 2 + 1);
+            for (own, powers) in self.transforms.iter().zip(&powers) {
+                let near = near.start..near.end.min(powers.len());
+                let others = (near.len() - 1).max(1) as f64;
+                let power = (powers[near].iter().sum::<f64>() - powers[at]) / others;
+                let [u, y, r] = own[at];
+                weighted.add([u, y, r / power.max(LEAST_POWER)]);
+            }
+            weighted
+        });
+        Self {
+            bins: bins.collect(),
+            ..self.clone()
+        }
     }
 
     /// Standard deviation of white noise of one point that has the power which a process leaves at the highest frequencies:

@@ -33,6 +33,11 @@ impl Recorded {
     /// A minute of a rate loop with a P controller: the set-point, of this size, changes every 0.4 s; wind and noise of the
     /// gyro that passed a low-pass go round the loop.
     fn new(size: f64, seed: u64) -> Self {
+        Self::with_noise(size, seed, |_| 1.0)
+    }
+
+    /// Noise of the gyro times `loudness` of the second.
+    fn with_noise(size: f64, seed: u64, loudness: fn(u32) -> f64) -> Self {
         let mut noise = Noise::from_seed(seed);
         let mut disturbances = Disturbances::default();
         disturbances.input_walk = 0.02;
@@ -50,7 +55,8 @@ impl Recorded {
                 target = size * noise.standard_normal();
             }
             set_point += 0.1 * (target - set_point);
-            coloured += 0.3 * (0.2 * noise.standard_normal() - coloured);
+            let sigma = 0.2 * loudness(k / 250);
+            coloured += 0.3 * (sigma * noise.standard_normal() - coloured);
             let output = process.output() + coloured;
             let input = KP * (set_point - output);
             recorded.time_s.push(f64::from(k) * STEP_S);
@@ -81,12 +87,12 @@ impl Recorded {
     }
 }
 
-// Of 24 intervals of 90 % 21.6 hold the truth on average; fewer than 18 come once in forty.
-#[test]
-fn intervals_hold_although_noise_goes_round() {
+/// Of 72 intervals of 90 % 64.8 hold the truth on average, with a deviation of 2.5. `loudness` of the noise in each second.
+fn assert_intervals_hold(loudness: fn(u32) -> f64) {
     let mut held = 0;
-    for seed in 0..8 {
-        let found = Recorded::new(2.0, seed).identify().outcome.unwrap();
+    for seed in 100..124 {
+        let recorded = Recorded::with_noise(2.0, seed, loudness);
+        let found = recorded.identify().outcome.unwrap();
         for (parameter, value) in [
             (Parameter::K, K),
             (Parameter::TProp, T_PROP_S),
@@ -96,16 +102,24 @@ fn intervals_hold_although_noise_goes_round() {
             held += usize::from(interval.holds(value));
         }
         let gain = found.estimate.get(Parameter::K).unwrap();
+        assert!(gain.relative_half_width().unwrap() < 0.4, "{seed} {gain:?}");
         assert!(
-            gain.relative_half_width().unwrap() < 0.15,
-            "{seed} {gain:?}"
-        );
-        assert!(
-            (gain.estimate.unwrap() / K - 1.0).abs() < 0.1,
+            (gain.estimate.unwrap() / K - 1.0).abs() < 0.15,
             "{seed} {gain:?}"
         );
     }
-    assert!(held >= 18, "{held} of 24");
+    assert!(held >= 58, "{held} of 72");
+}
+
+#[test]
+fn intervals_hold_although_noise_goes_round() {
+    assert_intervals_hold(|_| 1.0);
+}
+
+// As the motors' at full throttle. Without weights of the segments three quarters of the intervals hold.
+#[test]
+fn intervals_hold_although_half_the_record_is_loud() {
+    assert_intervals_hold(|second| if second % 20 < 10 { 4.0 } else { 1.0 });
 }
 
 // The set-point hardly moves: the noise that goes round shows the inverse of the controller, 1/0.05, and no interval.
