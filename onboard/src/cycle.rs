@@ -8,6 +8,9 @@
 /// A level counts when it has lasted this part of the last half period. The dwell of the relay is longer; levels
 /// that the relay reverses are shorter.
 const LASTING: f64 = 0.25;
+/// Time without a switch, in last half periods, from which these no longer measure the oscillation: a large bias makes the
+/// first one up to six times as long as the others, which would then all be too short to count.
+const OUTDATED: f64 = 4.0;
 
 /// One complete cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -64,11 +67,18 @@ impl CycleDetector {
             return None;
         }
         let (_, began_s) = *self.candidate.get_or_insert((high, time_s));
-        if time_s - began_s < LASTING * self.half_s {
+        let old_s = began_s - since_s;
+        let is_outdated = self.half_s > 0.0 && old_s > OUTDATED * self.half_s;
+        let lasting_s = if is_outdated {
+            LASTING * self.half_s * (OUTDATED * self.half_s / old_s)
+        } else {
+            LASTING * self.half_s
+        };
+        if time_s - began_s < lasting_s {
             return None;
         }
         self.candidate = None;
-        self.half_s = began_s - since_s;
+        self.half_s = if is_outdated { lasting_s } else { old_s };
         self.level = Some((high, began_s));
         self.turn(began_s, high)
     }
@@ -177,6 +187,18 @@ mod tests {
             64.0 - phase as f64
         };
         (phase < 24, triangle / 8.0 - 1.0)
+    }
+
+    // A first half period of 200 samples asks for levels of 50, and those of the oscillation last 24 and 40. After four times
+    // 200 samples without a switch, 50 begins to fall, and is below 40 after 1,000 samples.
+    #[test]
+    fn a_long_first_half_does_not_hide_the_oscillation() {
+        let first = (0..64).chain(std::iter::repeat_n(0, 200)).map(square);
+        let found = cycles(first.chain((0..64 * 40).map(square)));
+        assert!(found.len() > 20, "{}", found.len());
+        for cycle in &found[2..] {
+            assert_eq!(cycle.period_s, 1.0);
+        }
     }
 
     // The detector waits for a quarter of the last half period, 24 or 40 samples, before a level counts, and
