@@ -165,7 +165,9 @@ fn parts(
             Ok(identified) => {
                 let found = found(&identified).ok_or(Refusal::Verdict(Verdict::TooUncertain));
                 processes.push(Some(identified));
-                found.and_then(|found| plausible(found, &signals.part(span)))
+                let input = &signals.part(span).input;
+                let mean_input = input.iter().sum::<f64>() / input.len() as f64;
+                found.and_then(|found| plausible(found, signals.control_loop, mean_input))
             }
             Err(verdict) => {
                 processes.push(None);
@@ -217,23 +219,27 @@ fn found(identified: &Identified) -> Option<Found> {
 }
 
 /// Refuses a gain that the loop of a vehicle cannot have: the firmware's signs make every gain positive, an angle is the
-/// integral of the rate, and the mean thrust of a flight carries the weight.
-fn plausible(found: Found, part: &Signals) -> Result<Found, Refusal> {
+/// integral of the rate, and the mean thrust of a flight carries the weight while thrust grows at least in proportion to the
+/// command.
+fn plausible(found: Found, of: ControlLoop, mean_input: f64) -> Result<Found, Refusal> {
     const GRAVITY: f64 = 9.81;
-    let expected = match part.control_loop {
-        ControlLoop::Rate(_) => (0.0, f64::INFINITY),
-        ControlLoop::Attitude(_) => (0.7, 1.4),
+    // The drag of a climb, which the structure leaves out, makes the estimate low, its interval less.
+    const DRAG: f64 = 0.7;
+    let [_, gain, high] = found.gain;
+    let (expected, is_low) = match of {
+        ControlLoop::Rate(_) => ((0.0, f64::INFINITY), gain <= 0.0),
+        ControlLoop::Attitude(_) => ((0.7, 1.4), gain <= 0.7),
         _ => {
-            let mean = part.input.iter().sum::<f64>() / part.input.len() as f64;
-            (0.6 * GRAVITY / mean, 1.7 * GRAVITY / mean)
+            let expected = (0.85 * GRAVITY / mean_input, 1.7 * GRAVITY / mean_input);
+            let is_low = high <= expected.0 || gain <= DRAG * expected.0;
+            (expected, is_low)
         }
     };
-    let [_, gain, _] = found.gain;
-    if gain > expected.0 && gain < expected.1 {
-        Ok(found)
-    } else {
-        Err(Refusal::Implausible { gain, expected })
+    if is_low || gain >= expected.1 {
+        let gain = found.gain;
+        return Err(Refusal::Implausible { gain, expected });
     }
+    Ok(found)
 }
 
 /// Delay (s) of a resonance at low frequencies.
@@ -252,5 +258,29 @@ fn pid(controller: &Controller) -> Option<onecycle::Pid> {
     match controller {
         Controller::Pid(pid) => Some(*pid),
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // A vehicle that hovers at 0.5 has 19.6 m/s^2 for all of the thrust if thrust is in proportion to the command.
+    #[test]
+    fn thrust_carries_the_weight() {
+        let is_taken = |gain: [f64; 3]| {
+            let found = Found {
+                structure: Structure::IntegratorLag,
+                parameter: Parameter::K,
+                gain,
+                delay_s: 0.0,
+            };
+            plausible(found, ControlLoop::Altitude, 0.5).is_ok()
+        };
+        assert!(is_taken([18.0, 20.0, 22.0]));
+        assert!(is_taken([9.0, 13.0, 21.0]));
+        assert!(!is_taken([10.0, 13.0, 16.0]));
+        assert!(!is_taken([5.0, 8.0, 21.0]));
+        assert!(!is_taken([30.0, 35.0, 40.0]));
     }
 }

@@ -32,7 +32,8 @@ pub(crate) enum Refusal {
     Verdict(Verdict),
     /// The gain is none that this loop of a vehicle can have, so what was found is not the process.
     Implausible {
-        gain: f64,
+        /// Low end, estimate and high end.
+        gain: [f64; 3],
         /// Least and largest gain.
         expected: (f64, f64),
     },

@@ -23,14 +23,16 @@ pub(crate) fn next(file: &str) -> String {
 }
 
 /// A gain that the loop cannot have.
-pub(crate) fn implausible(gain: f64, (low, high): (f64, f64)) -> String {
+pub(crate) fn implausible(gain: [f64; 3], (low, high): (f64, f64)) -> String {
     let range = match high.is_finite() {
         true => format!("{} to {}", short(low), short(high)),
         false => format!("more than {}", short(low)),
     };
     format!(
-        "Not the process: the gain found is {}, and this loop of a vehicle can have {range}.",
-        short(gain)
+        "Not the process: the gain found is {} ({} .. {}), and this loop of a vehicle can have {range}.",
+        short(gain[1]),
+        short(gain[0]),
+        short(gain[2])
     )
 }
 
