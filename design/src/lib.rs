@@ -13,7 +13,7 @@
 //! | the cost of a controller: ISE or IAE of a unit step of the reference, IAE of one of the load | [`ise()`], [`reference_iae()`], [`load_iae()`] |
 //! | noise at the actuator | [`noise_amplification()`] |
 //! | the open loop at a frequency, for a Bode or Nyquist plot | [`loop_response()`] |
-//! | the response to a unit step of the reference or the load | [`step_response()`], [`load_response()`] |
+//! | the response to a unit step of the reference or the load | [`step_response()`], [`step_metrics()`], [`load_response()`] |
 //! | 90 % bands of step response and open loop for draws from a posterior | [`bands::step_bands()`], [`bands::load_bands()`], [`bands::loop_bands()`] |
 //! | the gains of SIMC, AMIGO, Ziegler-Nichols, Tyreus-Luyben | [`rules`] |
 //! | cost and phase margin of a cascade with a PID rate loop | [`Cascade::cost()`] |
@@ -71,7 +71,7 @@ pub use analysis::sensitivity::Sensitivity;
 pub use cascade::{Cascade, CascadeCost};
 pub use closed_loop::{
     LoadResponse, ise, load_iae, load_response, loop_response, margins, noise_amplification,
-    reference_iae, sensitivity, step_response,
+    reference_iae, sensitivity, step_metrics, step_response,
 };
 pub use controller::{
     Autopilot, Controller, Execution, Form, Ideal, LowPass, Pid, Series, Spans, TypedGain, Vendor,

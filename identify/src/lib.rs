@@ -53,7 +53,7 @@ pub use outcome::{
     Alternative, Evidence, Fit, FitPoint, Identification, Identified, InnovationRow,
     InnovationTests, Innovations, Noise, Prediction, Refused, ResponsePoint, SetPointResponse,
 };
-pub use posterior::{Draw, Estimate, Interval, Posterior};
+pub use posterior::{Draw, Estimate, Interval, Posterior, StepIntervals};
 pub use reading::Reading;
 pub use relay::find_oscillation;
 pub use remark::{About, Remark};

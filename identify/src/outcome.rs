@@ -6,7 +6,7 @@ use onecycle_onboard::refine::Refined;
 
 use crate::excitation::{Excitation, Oscillation, Switching};
 use crate::nonlinear::Nonlinear;
-use crate::posterior::{Estimate, Interval, Posterior};
+use crate::posterior::{Estimate, Interval, Posterior, StepIntervals};
 use crate::reading::Reading;
 use crate::remark::Remark;
 use crate::two_amplitudes::TwoAmplitudes;
@@ -113,6 +113,13 @@ impl Identified {
         let most = if has_model_error { 0 } else { most };
         let undamped = self.model.soiptd().map_or(self.model, Model::Soiptd);
         (undamped, self.posterior.models(most))
+    }
+
+    /// [`Identified::step`] with 90 % intervals over the posterior. `None` without a predicted step.
+    #[must_use]
+    pub fn step_intervals(&self) -> Option<StepIntervals> {
+        let (step, design) = self.step.as_ref().zip(self.design.as_ref())?;
+        Some(self.posterior.step(step, &design.controller))
     }
 
     /// Controllers to choose from, robust over the posterior: one for each of [`Proposal::choices`] for

@@ -8,4 +8,5 @@ pub mod harm;
 pub mod honesty;
 pub mod out_of_family;
 pub mod outcome;
+pub mod promises;
 pub mod recording;

@@ -34,14 +34,14 @@
 //! |------|-------|
 //! | read and write recordings | [`read`], [`read_from`], [`CsvOptions`], [`ColumnRef`], [`TimeUnit`], [`Recording`], [`Gap`], [`Note`], [`write_csv`] |
 //! | identify | [`Identify`], [`Structure`], [`Road`], [`Hold`], [`Method`], [`Pack`] |
-//! | use the result | [`Identification`], [`Identified`], [`Estimate`], [`Interval`], [`Posterior`] |
+//! | use the result | [`Identification`], [`Identified`], [`Estimate`], [`Interval`], [`Posterior`], [`StepIntervals`] |
 //! | see what the estimate rests on | [`Excitation`], [`Oscillation`], [`Recorded`], [`Evidence`], [`Innovations`], [`SetPointResponse`] |
 //! | find out why there is no result, or what limits it | [`Verdict`], [`Remark`] |
 //! | describe a process | [`Model`], [`Structure`], [`Parameter`], [`Unit`], [`Soiptd`], [`Linear`] |
 //! | design a controller | [`design()`], [`design_over()`], [`Specification`], [`Style`], [`MeasurementNoise`], [`Execution`], [`LowPass`], [`Design`], [`Robustness`] |
 //! | type a controller in | [`Controller`], [`Form`], [`Pid`], [`Pd`], [`Ideal`], [`Series`], [`Autopilot`] |
 //! | choose between controllers, judge the gains in force | [`Proposal`], [`proposals()`], [`assess()`], [`Assessment`], [`least_margins()`], [`LeastMargins`] |
-//! | analyse a loop | [`margins()`], [`Margins`], [`sensitivity()`], [`Sensitivity`], [`ise()`], [`load_iae()`], [`step_response()`], [`StepResponse`], [`StepMetrics`], [`load_response()`], [`LoadResponse`] |
+//! | analyse a loop | [`margins()`], [`Margins`], [`sensitivity()`], [`Sensitivity`], [`ise()`], [`load_iae()`], [`step_response()`], [`StepResponse`], [`step_metrics()`], [`StepMetrics`], [`load_response()`], [`LoadResponse`] |
 //! | simulate a relay test | [`Experiment`], [`Sensor`], [`Trace`], [`FixedStepProcess`], [`Relay`], [`RelaySettings`] |
 //! | handle errors | [`ReadError`], [`RecordingError`], [`PackError`], [`DesignError`], [`StepResponseError`], [`SoiptdError`], [`LinearError`], [`RelayError`] |
 //!
@@ -255,7 +255,7 @@ pub use onecycle_link::{
 pub use onecycle_identify::{
     About, Estimate, Evidence, Excitation, Hold, Identification, Identified, Innovations, Interval,
     Method, Oscillation, Posterior, Recorded, Refused, Remark, ResponsePoint, Road,
-    SetPointResponse, Verdict,
+    SetPointResponse, StepIntervals, Verdict,
 };
 #[doc(inline)]
 pub use onecycle_onboard::pack::{Pack, PackError};
@@ -267,7 +267,7 @@ pub use onecycle_design::{
     Linear, LinearError, LoadResponse, LowPass, Margins, MeasurementNoise, Model, Parameter, Pid,
     Proposal, Robustness, Sensitivity, Series, Specification, StepMetrics, StepResponse,
     StepResponseError, Structure, Style, Unit, assess, design, design_over, ise, least_margins,
-    load_iae, load_response, margins, proposals, sensitivity, step_response,
+    load_iae, load_response, margins, proposals, sensitivity, step_metrics, step_response,
 };
 #[doc(inline)]
 pub use onecycle_onboard::{Pd, Soiptd, SoiptdError};

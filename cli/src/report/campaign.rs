@@ -9,6 +9,7 @@ use onecycle_lab::experiments::Campaign;
 use onecycle_lab::experiments::DefectKind;
 use onecycle_lab::judge::evaluate::{Costs, quantile};
 use onecycle_lab::judge::out_of_family::CYCLES;
+use onecycle_lab::judge::promises::PROMISES;
 use onecycle_onboard::refine::coordinate;
 
 use crate::results::campaign::{IdentificationCase, OutsiderCase, RelayCase};
@@ -71,11 +72,15 @@ pub(crate) fn identification(campaign: &Campaign, cases: &[IdentificationCase]) 
     let costs = Costs::of(cases.iter().map(IdentificationCase::deterioration));
     let percent = |cost: Option<f64>, decimals| or_dash(cost.map(|cost| 100.0 * cost), decimals);
     let bound = error_over_bound(cases);
-    let coverage = |k: usize| {
-        let count = held.iter().filter(|held| held[k]).count();
-        100.0 * count as f64 / held.len().max(1) as f64
-    };
-    let [k, k_over_t_body, t_prop, t_body, tau, bias] = std::array::from_fn(coverage);
+    let [k, k_over_t_body, t_prop, t_body, tau, bias] = coverage(&held);
+    let promised: Vec<_> = (cases.iter())
+        .filter_map(|case| case.promises_held)
+        .collect();
+    let shares = PROMISES.into_iter().zip(coverage(&promised));
+    let promised: Vec<String> = shares
+        .map(|(name, share)| format!("{name} {share:.1}"))
+        .collect();
+    let promised = promised.join(", ");
     format!(
         "{} random processes, bias up to {} h, noise {}{} of the amplitude, trim {}, {} cycle(s)\n\
          refused                 {refused}\n\
@@ -84,6 +89,7 @@ pub(crate) fn identification(campaign: &Campaign, cases: &[IdentificationCase]) 
          least phase margin      {} deg\n\
          90 % intervals hold (%) K {k:.1}, K/T_body {k_over_t_body:.1}, T_prop {t_prop:.1}, \
          T_body {t_body:.1}, tau {tau:.1}, bias {bias:.1}\n\
+         of the controller   (%) {promised}\n\
          error / Cramer-Rao      {bound}\n",
         cases.len(),
         campaign.bias,
@@ -99,6 +105,14 @@ pub(crate) fn identification(campaign: &Campaign, cases: &[IdentificationCase]) 
         percent(costs.worst, 2),
         or_dash(costs.least_phase_margin_deg, 1),
     )
+}
+
+/// Shares of the cases that hold (%).
+fn coverage<const N: usize>(held: &[[bool; N]]) -> [f64; N] {
+    std::array::from_fn(|k| {
+        let count = held.iter().filter(|held| held[k]).count();
+        100.0 * count as f64 / held.len().max(1) as f64
+    })
 }
 
 /// Root mean squares of the errors over their standard deviations.

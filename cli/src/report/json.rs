@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 use onecycle::{
     Assessment, Design, Excitation, Identification, Identified, Interval, Margins, Model,
-    Recording, StepMetrics, Style,
+    Recording, StepIntervals, StepMetrics, Style,
 };
 use onecycle_link::Column;
 use serde::{Serialize, Serializer};
@@ -246,6 +246,28 @@ struct Step {
     settling_time_s: f64,
     peak_time_s: Option<f64>,
     peak_input: f64,
+    #[serde(flatten)]
+    intervals: Option<StepRanges>,
+}
+
+/// 90 % intervals of a step.
+#[derive(Serialize)]
+struct StepRanges {
+    overshoot_interval: Range,
+    rise_time_s_interval: Range,
+    settling_time_s_interval: Range,
+    peak_input_interval: Range,
+}
+
+impl From<StepIntervals> for StepRanges {
+    fn from(found: StepIntervals) -> Self {
+        Self {
+            overshoot_interval: range(&found.overshoot),
+            rise_time_s_interval: range(&found.rise_time_s),
+            settling_time_s_interval: range(&found.settling_time_s),
+            peak_input_interval: range(&found.peak_input),
+        }
+    }
 }
 
 /// The report of an identification, one line at the end.
@@ -309,7 +331,7 @@ pub(crate) fn identification(
             let interval = i.phase_margin_rad.as_ref();
             margins(&design.margins, interval, choice.and_then(figures))
         }),
-        step: identified.and_then(|i| i.step.as_ref()).map(step),
+        step: identified.and_then(|i| Some(step(i.step.as_ref()?, i.step_intervals()))),
         robustness: design
             .and_then(|design| design.robustness.as_ref())
             .map(Into::into),
@@ -338,7 +360,7 @@ pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> St
         controller: of_style(design, choice.asked.style),
         ise: design.ise,
         margins: margins(&design.margins, None, figures(choice)),
-        step: metrics.map(step),
+        step: metrics.map(|metrics| step(metrics, None)),
         assumed: (&choice.asked).into(),
         controllers: controllers::proposed(choice),
         against: controllers::against(choice),
@@ -509,12 +531,13 @@ fn margins(
     }
 }
 
-fn step(metrics: &StepMetrics) -> Step {
+fn step(metrics: &StepMetrics, intervals: Option<StepIntervals>) -> Step {
     Step {
         overshoot: metrics.overshoot,
         rise_time_s: metrics.rise_time_s,
         settling_time_s: metrics.settling_time_s,
         peak_time_s: metrics.peak_time_s,
         peak_input: metrics.peak_input,
+        intervals: intervals.map(Into::into),
     }
 }

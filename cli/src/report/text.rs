@@ -4,12 +4,12 @@ use std::fmt::Write;
 
 use onecycle::{
     Design, Estimate, Excitation, Identification, Identified, Interval, Model, Oscillation,
-    Parameter, Recording, StepMetrics,
+    Parameter, Recording, StepIntervals, StepMetrics,
 };
 use onecycle_identify::Reading;
 
 use super::controllers;
-use super::number::{bounded, significant};
+use super::number::{bounded, short, significant};
 use super::record::{self, Fact};
 use super::units::Units;
 use super::wrap::wrapped;
@@ -115,7 +115,7 @@ pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> St
         significant(design.ise)
     );
     let step = choice.design().and_then(|(_, figures)| figures.step);
-    describe_step(&mut text, step.as_ref(), &units);
+    describe_step(&mut text, step.as_ref(), None, &units);
     text
 }
 
@@ -253,7 +253,8 @@ fn describe_own_controller(
     if is_left && bias.is_some_and(|bias| !bias.holds(0.0)) {
         text.push_str("  subtract the input bias from u: there is no integral action\n");
     }
-    describe_step(text, identified.step.as_ref(), units);
+    let intervals = identified.step_intervals();
+    describe_step(text, identified.step.as_ref(), intervals.as_ref(), units);
 }
 
 fn describe_controller(
@@ -283,27 +284,44 @@ fn describe_controller(
     }
 }
 
-fn describe_step(text: &mut String, step: Option<&StepMetrics>, units: &Units) {
+fn describe_step(
+    text: &mut String,
+    step: Option<&StepMetrics>,
+    intervals: Option<&StepIntervals>,
+    units: &Units,
+) {
     let _ = writeln!(
         text,
         "\n{}",
         painted(HEADING, "Predicted step of the reference")
     );
-    let _ = match step {
-        Some(step) => writeln!(
-            text,
-            "  overshoot {:.0} %   rise {} s   settling {} s   largest input {}{}",
-            100.0 * step.overshoot,
-            significant(step.rise_time_s),
-            significant(step.settling_time_s),
-            significant(step.peak_input),
-            match units.controller("") {
-                none if none.is_empty() => " per unit".to_owned(),
-                unit => unit,
-            }
-        ),
-        None => writeln!(text, "  too slow to simulate"),
+    let Some(step) = step else {
+        text.push_str("  too slow to simulate\n");
+        return;
     };
+    let ends = |of: fn(&StepIntervals) -> &Interval, scale: f64| {
+        intervals.map_or(String::new(), |intervals| {
+            let end = |end: Option<f64>| end.map_or("unbounded".to_owned(), |v| short(scale * v));
+            let interval = of(intervals);
+            format!(" ({} .. {})", end(interval.low), end(interval.high))
+        })
+    };
+    let unit = match units.controller("") {
+        none if none.is_empty() => " per unit".to_owned(),
+        unit => unit,
+    };
+    let facts = format!(
+        "overshoot {} %{}, rise {} s{}, settling {} s{}, largest input {}{}{unit}",
+        short(100.0 * step.overshoot),
+        ends(|step| &step.overshoot, 100.0),
+        significant(step.rise_time_s),
+        ends(|step| &step.rise_time_s, 1.0),
+        significant(step.settling_time_s),
+        ends(|step| &step.settling_time_s, 1.0),
+        significant(step.peak_input),
+        ends(|step| &step.peak_input, 1.0),
+    );
+    wrapped(text, "  ", &facts);
 }
 
 /// Writes names and values, wrapped.

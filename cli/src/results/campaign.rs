@@ -4,6 +4,7 @@ use onecycle::Model;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::judge::out_of_family::{CYCLES, Evaluated};
 use onecycle_lab::judge::outcome::{IdentificationOutcome, RelayOutcome, SHAPE_AND_GAIN};
+use onecycle_lab::judge::promises::PROMISES;
 use onecycle_onboard::classify::Familiarity;
 use serde::{Deserialize, Serialize};
 
@@ -42,6 +43,9 @@ pub(crate) struct IdentificationCase {
     /// Whether the 90 % intervals hold the truth: K, K/T_body, T_prop, T_body, tau, bias; `None` if no process was
     /// identified.
     pub(crate) held: Option<[bool; 6]>,
+    /// Whether the 90 % intervals of the [`PROMISES`] hold what the controller does on the true process; `None` without a
+    /// controller.
+    pub(crate) promises_held: Option<[bool; PROMISES.len()]>,
     /// Squared errors of the coordinates in standard deviations, at most [`MOST_SQUARED_ERROR`] each; `None` where the
     /// estimator gives no standard deviations.
     pub(crate) squared_errors: Option<[f64; SHAPE_AND_GAIN]>,
@@ -76,6 +80,7 @@ impl IdentificationCase {
                 Deterioration::Unstable => ControllerCost::Unstable,
             }),
             held: held(outcome),
+            promises_held: outcome.promises_held,
             squared_errors: outcome.errors.map(|errors| errors.map(squared)),
         }
     }

@@ -27,8 +27,10 @@ const AGREEMENT: f64 = 3e-9;
 /// Most halvings of the step.
 const MOST_HALVINGS: usize = 6;
 
-/// A recorded response has settled within this share of its peak.
+/// A recorded response has settled within this share of its peak: for its samples, and for its characteristics, of which the
+/// settling time is that to 2 %.
 const RESIDUE: f64 = 1e-5;
+const RESIDUE_OF_METRICS: f64 = 2e-3;
 
 /// Most steps of a recorded response, of 7 samples each.
 const MOST_STEPS: usize = (1 << 20) / (NODES - 1);
@@ -239,8 +241,12 @@ impl Loop {
         })
     }
 
-    /// Steps of a response until it settles at `goal`, and the time of the first one.
-    fn record(&self, excitation: Excitation, goal: f64) -> Result<Record, StepResponseError> {
+    /// Steps of a response until it settles at `goal` to `residue` of its peak, and the time of the first one.
+    fn record(
+        &self,
+        excitation: Excitation,
+        (goal, residue): (f64, f64),
+    ) -> Result<Record, StepResponseError> {
         if !self.is_stable() {
             return Err(StepResponseError::Unstable);
         }
@@ -255,7 +261,7 @@ impl Loop {
                 .iter()
                 .fold(0.0, |off: f64, y| off.max((y - goal).abs()));
             peak = peak.max(off);
-            quiet = if off <= RESIDUE * peak { quiet + 1 } else { 0 };
+            quiet = if off <= residue * peak { quiet + 1 } else { 0 };
             let quiet_s = 2.0 * PI / omega + 2.0 * self.process.tau;
             settled = f64::from(quiet) * h >= quiet_s;
             !settled && record.steps.len() < MOST_STEPS && off.is_finite()
@@ -295,7 +301,7 @@ impl Loop {
     /// See [`crate::step_response`].
     pub(crate) fn step_response(&self) -> Result<StepResponse, StepResponseError> {
         let goal = self.final_output();
-        let record = self.record(Excitation::Reference, goal)?;
+        let record = self.record(Excitation::Reference, (goal, RESIDUE))?;
         let unit_s = self.process.unit_s;
         let input_unit = 1.0 / self.process.gain;
         let start_s = self.process.tau * unit_s;
@@ -305,20 +311,33 @@ impl Loop {
             u: self.law.b * self.law.kp * input_unit,
         });
         let samples = self.samples(&record, 1.0, input_unit, start_s);
-        let metrics = reference_metrics(&record, goal);
         Ok(StepResponse {
             samples: first.into_iter().chain(samples).collect(),
-            metrics: StepMetrics {
-                overshoot: metrics.overshoot,
-                peak_time_s: metrics.peak_time_s.map(|time| time * unit_s),
-                rise_time_s: metrics.rise_time_s * unit_s,
-                settling_time_s: metrics.settling_time_s * unit_s,
-                peak_input: metrics.peak_input * input_unit.abs(),
-            },
+            metrics: self.metrics(&record, goal),
             ise: self
                 .reference_integrals()
                 .map_or(f64::INFINITY, |found| found.1),
         })
+    }
+
+    /// See [`crate::step_metrics`].
+    pub(crate) fn step_metrics(&self) -> Result<StepMetrics, StepResponseError> {
+        let goal = self.final_output();
+        let record = self.record(Excitation::Reference, (goal, RESIDUE_OF_METRICS))?;
+        Ok(self.metrics(&record, goal))
+    }
+
+    /// Characteristics of a recorded response to the reference, in the units of the user.
+    fn metrics(&self, record: &Record, goal: f64) -> StepMetrics {
+        let unit_s = self.process.unit_s;
+        let metrics = reference_metrics(record, goal);
+        StepMetrics {
+            overshoot: metrics.overshoot,
+            peak_time_s: metrics.peak_time_s.map(|time| time * unit_s),
+            rise_time_s: metrics.rise_time_s * unit_s,
+            settling_time_s: metrics.settling_time_s * unit_s,
+            peak_input: metrics.peak_input / self.process.gain.abs(),
+        }
     }
 
     /// See [`crate::load_response`].
@@ -329,7 +348,7 @@ impl Loop {
         } else {
             1.0 / (zero + self.law.kp)
         };
-        let record = self.record(Excitation::Load, goal)?;
+        let record = self.record(Excitation::Load, (goal, RESIDUE))?;
         let k = self.process.gain;
         let first = Sample {
             t_s: 0.0,

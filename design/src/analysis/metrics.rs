@@ -65,24 +65,29 @@ pub(crate) fn reference_metrics(record: &Record, goal: f64) -> StepMetrics {
     };
     let beyond = |value: f64| (1.0 - value / goal).abs() - SETTLING_BAND;
     let unsettled = cells().rfind(|&(step, i)| beyond(y(step)[i]) > 0.0);
-    let (mut peak, mut peak_time) = (0.0, record.start);
-    let mut peak_input = 0.0_f64;
-    for (step, i) in cells() {
-        let here = y(step)[i + 1] / goal;
-        peak_input = peak_input
-            .max(record.steps[step][i].abs())
-            .max(record.steps[step][i + 1].abs());
-        if here > peak {
-            let low = node(i);
-            let high = node((i + 2).min(NODES - 1));
-            let (s, least) = minimum(|s| -at(y(step), s) / goal, low, high, TOLERANCE);
-            if -least > here {
-                (peak, peak_time) = (-least, time(step, s));
-            } else {
-                (peak, peak_time) = (here, time(step, node(i + 1)));
-            }
+    let inputs = cells().flat_map(|(step, i)| [record.steps[step][i], record.steps[step][i + 1]]);
+    let peak_input = inputs.fold(0.0, |most: f64, u| most.max(u.abs()));
+    // The highest node, then the highest point of the cells on both sides of it.
+    let highest = cells().fold(None, |best: Option<(usize, usize)>, cell| {
+        let end = |(step, i): (usize, usize)| y(step)[i + 1] / goal;
+        if best.is_none_or(|best| end(cell) > end(best)) {
+            Some(cell)
+        } else {
+            best
         }
-    }
+    });
+    let around = highest.into_iter().flat_map(|highest| {
+        let next = cells().skip_while(move |cell| *cell != highest);
+        next.take(2)
+    });
+    let peaks = around.map(|(step, i)| {
+        let below = |s: f64| -at(y(step), s) / goal;
+        let (s, least) = minimum(below, node(i), node(i + 1), TOLERANCE);
+        (-least, time(step, s))
+    });
+    let (peak, peak_time) = peaks.fold((0.0, record.start), |best, found| {
+        if found.0 > best.0 { found } else { best }
+    });
     StepMetrics {
         overshoot: (peak - 1.0).max(0.0),
         peak_time_s: (peak > 1.0).then_some(peak_time),

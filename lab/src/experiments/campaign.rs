@@ -10,6 +10,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::draw::stream;
 use super::experiment::{ExperimentError, PREROLL_SAMPLES, RelayExperiment, RelaySetup};
+use super::instruments::Instruments;
 use super::oscillation::Oscillation;
 use super::recipe::{Family, Recipe};
 use crate::space::{FieldError, Space, first_out_of_range};
@@ -52,6 +53,10 @@ pub struct Campaign {
     /// Parameter of the relay.
     #[serde(default = "distinguishing_beta")]
     pub beta: f64,
+    /// Whether the recordings have the errors of [`Instruments`] that intervals allow for: the true process then differs a
+    /// little from the simulated one, which the recording shows.
+    #[serde(default)]
+    pub instruments: bool,
 }
 
 /// Most cases of a campaign: a day's work.
@@ -90,6 +95,8 @@ pub enum Measure {
 
 /// Sample period of an unscaled experiment (s): the paper's.
 pub const SAMPLE_S: f64 = 1e-3;
+/// Changes the seed for the errors of the instruments: arbitrary.
+const INSTRUMENTS: u64 = 0x1257_0000_0000;
 /// Periods in which a perfect oscillation settles, with a few to spare.
 const SETTLING_PERIODS: f64 = 15.0;
 
@@ -109,6 +116,7 @@ impl Campaign {
         time_scale: 1.0,
         method: Method::Map,
         beta: Space::MULTIROTOR.beta,
+        instruments: false,
     };
 
     /// Checks every field.
@@ -198,6 +206,11 @@ impl Campaign {
         let mut experiment = self.quiet_experiment(process, self.seed.wrapping_add(n))?;
         experiment.input_bias = bias;
         experiment.noise_sigma = part * self.sigma * experiment.oscillation.amplitude;
+        if self.instruments {
+            // A stream of its own, so that the rest stays the same.
+            let mut rng = stream(self.seed ^ INSTRUMENTS, n);
+            experiment.instruments = Instruments::drawn(experiment.sample_s, &mut rng);
+        }
         Ok(experiment)
     }
 

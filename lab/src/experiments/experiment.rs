@@ -12,6 +12,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::defect::Defect;
 use super::defect::plant::DefectPlant;
+use super::instruments::Instruments;
 use super::oscillation::Oscillation;
 use super::recipe::RecipeError;
 
@@ -82,6 +83,8 @@ pub struct RelayExperiment {
     pub noise_sigma: f64,
     /// Output at the start (output unit); numerical simulation starts at rest.
     pub initial_output: f64,
+    /// Errors of the instruments of its recording.
+    pub instruments: Instruments,
     preroll_s: f64,
     noise: Pcg64Mcg,
 }
@@ -110,6 +113,7 @@ impl RelayExperiment {
             input_bias: 0.0,
             noise_sigma: 0.0,
             initial_output: 0.0,
+            instruments: Instruments::PERFECT,
             preroll_s: setup.preroll_s,
             noise,
         }

@@ -9,6 +9,7 @@ use onecycle_onboard::cycle::SteadyRun;
 use onecycle_onboard::refine::{Refined, coordinate};
 
 use super::evaluate::{Judge, PHASE_MARGIN_DEG, in_order};
+use super::promises::{PROMISES, promises};
 use crate::experiments::{
     Campaign, ExperimentError, IDENTIFICATION_PERIODS, RelayExperiment, cycles, signals_of,
 };
@@ -74,6 +75,9 @@ pub struct IdentificationOutcome {
     pub bias: f64,
     /// Cost of the identified process's controller on the true one.
     pub deterioration: Option<Deterioration>,
+    /// Whether the intervals of the [`PROMISES`] hold what the controller does on the true process. `None` without a
+    /// controller.
+    pub promises_held: Option<[bool; PROMISES.len()]>,
     /// Errors of the coordinates of the fit, without the bias, over the standard deviations that the
     /// estimator states: the Cramer-Rao bound of the window and the prior. `None` if there is no fit, or
     /// if the estimator found a model error.
@@ -121,14 +125,18 @@ pub fn identification_outcome(
         .specification(paper)
         .method(campaign.method);
     let found = identify(&signals, &options);
-    let truth = in_order(&experiment.process)?;
+    let truth = in_order(&experiment.instruments.behind(&experiment.process)?)?;
     let judge = Judge::new(&truth).ok();
     let deterioration = (found.outcome.as_ref().ok().zip(judge)).and_then(|(identified, judge)| {
         Some(judge.deterioration(identified.design?.controller.pd()?))
     });
     let errors = (found.outcome.as_ref().ok())
         .and_then(|identified| errors(identified.fit.refined()?, &truth));
+    let identified = found.outcome.as_ref().ok();
+    let promised = identified.and_then(|identified| promises(identified, &truth.into()));
     Ok(IdentificationOutcome {
+        promises_held: promised
+            .map(|promised| promised.map(|promise| promise.interval.holds(promise.truth))),
         errors,
         found,
         truth,

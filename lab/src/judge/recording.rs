@@ -4,11 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use onecycle_design::{Parameter, Structure};
 use onecycle_identify::{
-    Estimate, Hold, Identification, Interval, Options, Remark, Verdict, expected, identify,
+    Estimate, Hold, Identification, Identified, Interval, Options, Remark, Verdict, expected,
+    identify,
 };
 
 use crate::experiments::recording::SimulatedRecording;
 use crate::experiments::signals_of;
+use crate::judge::promises::{PROMISES, Promise, promises};
 
 /// Result of the general estimator on a recording, beside the truth.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -24,6 +26,9 @@ pub enum RecordingOutcome {
         structure: String,
         /// Parameters that both the truth and the result have, by their keys.
         parameters: BTreeMap<String, ParameterOutcome>,
+        /// The loop with the controller found, by the names of [`PROMISES`]. Empty without a controller.
+        #[serde(default)]
+        promises: BTreeMap<String, ParameterOutcome>,
     },
 }
 
@@ -60,6 +65,7 @@ pub fn recording_outcome(recording: &SimulatedRecording, options: &Options) -> R
                 .collect(),
             structure: identified.model.structure().name().to_owned(),
             parameters: parameters(&identified.estimate, recording),
+            promises: promised(&identified, recording),
         },
     }
 }
@@ -97,6 +103,27 @@ fn parameters(
     estimate.iter().filter_map(of).collect()
 }
 
+fn promised(
+    identified: &Identified,
+    recording: &SimulatedRecording,
+) -> BTreeMap<String, ParameterOutcome> {
+    let of = |(name, promise): (&str, Promise)| {
+        let Promise { interval, truth } = promise;
+        let error = interval.estimate.zip(half_width(&interval));
+        let outcome = ParameterOutcome {
+            held: interval.holds(truth),
+            error: error
+                .map(|(estimate, half)| (estimate - truth) / (half / HALF_WIDTH))
+                .filter(|error| error.is_finite()),
+            error_over_bound: None,
+        };
+        (name.to_owned(), outcome)
+    };
+    let found = promises(identified, &recording.model);
+    let named = found.map(|found| PROMISES.into_iter().zip(found));
+    named.into_iter().flatten().map(of).collect()
+}
+
 /// Intervals of an efficient estimator. `None` if samples are missing or a disturbance has no relative intensity.
 fn bound(recording: &SimulatedRecording) -> Option<Estimate> {
     // What acts on the process: the bias too, since it does not cancel the mean of the commanded input otherwise.
@@ -132,15 +159,20 @@ fn distance(parameter: Parameter, interval: &Interval, truth: f64) -> f64 {
 
 /// Standard deviation of a posterior in the unit of [`distance`]. `None` if the interval has no width.
 fn deviation(parameter: Parameter, interval: &Interval) -> Option<f64> {
-    let half = if is_inverse(parameter) {
-        let estimate = interval.estimate.unwrap_or(f64::INFINITY);
-        let near = [interval.low, interval.high].into_iter().flatten();
-        let near = near.min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
-        (1.0 / near - 1.0 / estimate).abs()
-    } else {
-        0.5 * (interval.high? - interval.low?)
-    };
+    if !is_inverse(parameter) {
+        return Some(half_width(interval)? / HALF_WIDTH);
+    }
+    let estimate = interval.estimate.unwrap_or(f64::INFINITY);
+    let near = [interval.low, interval.high].into_iter().flatten();
+    let near = near.min_by(|a, b| a.abs().total_cmp(&b.abs()))?;
+    let half = (1.0 / near - 1.0 / estimate).abs();
     (half > 0.0).then_some(half / HALF_WIDTH)
+}
+
+/// Half the width of an interval. `None` if it has none, or no end.
+fn half_width(interval: &Interval) -> Option<f64> {
+    let half = 0.5 * (interval.high? - interval.low?);
+    (half > 0.0).then_some(half)
 }
 
 /// Sums over recordings of one kind.
@@ -154,7 +186,7 @@ pub struct RecordingTally {
     pub confused: BTreeMap<(&'static str, String), usize>,
     /// Identified recordings with a remark, by its kind.
     pub remarks: BTreeMap<String, usize>,
-    /// Parameters by their keys.
+    /// Parameters by their keys, and the [`PROMISES`].
     pub parameters: BTreeMap<String, ParameterTally>,
 }
 
@@ -226,6 +258,7 @@ impl RecordingTally {
                 structure,
                 remarks,
                 parameters,
+                promises,
             } => {
                 // One of each kind: a remark that names a parameter may stand there for several.
                 for remark in remarks.iter().collect::<BTreeSet<_>>() {
@@ -235,7 +268,7 @@ impl RecordingTally {
                     let pair = (truth.name(), structure.clone());
                     *self.confused.entry(pair).or_default() += 1;
                 }
-                for (key, outcome) in parameters {
+                for (key, outcome) in parameters.iter().chain(promises) {
                     self.parameters.entry(key.clone()).or_default().add(outcome);
                 }
             }
@@ -297,6 +330,7 @@ mod tests {
                     error_over_bound: Some(2.0 * error),
                 },
             )]),
+            promises: BTreeMap::new(),
         };
         let mut tally = RecordingTally::default();
         tally.add(Structure::Soptd, &outcome(true, 1.0));

@@ -5,6 +5,7 @@ use onecycle_design::{Model, Parameter};
 use onecycle_identify::Method;
 use onecycle_lab::experiments::{Campaign, Measure};
 use onecycle_lab::judge::outcome::{IdentificationOutcome, identification_outcome, relay_outcome};
+use onecycle_lab::judge::promises::PROMISES;
 
 fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
     Campaign {
@@ -21,6 +22,7 @@ fn campaign(measure: Measure, cases: u64, sigma: f64, trim: bool) -> Campaign {
         time_scale: 1.0,
         cycles: 2,
         beta: -0.73,
+        instruments: false,
     }
 }
 
@@ -84,13 +86,22 @@ fn two_cycles_give_the_optimal_controller() {
     }
 }
 
-// Of 1,000 cases 90 to 92 % hold the truth (experiments/intervals.toml). A true share of 90 % varies by
-// 2.1 % among 200 cases; the limits are three of that on either side.
+// Of 1,000 cases 89 to 92 % hold the truth (experiments/intervals.toml), 84 % that of the settling time, which jumps by half a
+// period where an overshoot is 2 %. A true share of 90 % varies by 2.1 % among 200 cases; the limits are three of that on
+// either side, and the lower one of the settling time 79 %.
 #[test]
 fn intervals_hold_the_truth_nine_times_in_ten() {
-    let campaign = campaign(Measure::Identification, 200, 0.02, true);
+    let campaign = Campaign {
+        instruments: true,
+        ..campaign(Measure::Identification, 200, 0.02, true)
+    };
     let mut held = [0; 5];
+    let mut promised = [0; PROMISES.len()];
     for outcome in outcomes(&campaign) {
+        let promises = outcome.promises_held.unwrap();
+        for (count, held) in promised.iter_mut().zip(promises) {
+            *count += usize::from(held);
+        }
         let estimate = outcome.found.outcome.unwrap().estimate;
         let truth = Model::from(outcome.truth);
         for (count, parameter) in held.iter_mut().zip([
@@ -106,6 +117,10 @@ fn intervals_hold_the_truth_nine_times_in_ten() {
     }
     for count in held {
         assert!((167..=193).contains(&count), "{held:?}");
+    }
+    for (name, count) in PROMISES.iter().zip(promised) {
+        let least = if *name == "settling" { 158 } else { 167 };
+        assert!((least..=193).contains(&count), "{name} {count}");
     }
 }
 

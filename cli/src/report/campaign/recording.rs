@@ -8,6 +8,7 @@ use onecycle_lab::experiments::RecordingCampaign;
 use onecycle_lab::experiments::recording::{
     Combination, DisturbanceLevel, EntryName, ProcessRange, SensorDefects,
 };
+use onecycle_lab::judge::promises::PROMISES;
 use onecycle_lab::judge::recording::{ParameterTally, RecordingOutcome, RecordingTally};
 
 use super::or_dash;
@@ -208,7 +209,7 @@ fn remark_rows(text: &mut String, rows: &[(String, RecordingTally)]) {
     }
 }
 
-/// A figure of every parameter that was estimated in any row.
+/// A figure of every parameter that was estimated in any row, and of the promises about its loop.
 fn parameter_rows(
     text: &mut String,
     rows: &[(String, RecordingTally)],
@@ -217,18 +218,19 @@ fn parameter_rows(
     let Some((_, all)) = rows.first() else {
         return;
     };
-    let columns: Vec<_> = (PARAMETERS.iter())
-        .filter(|parameter| all.parameters.contains_key(parameter.key()))
-        .collect();
+    let parameters = PARAMETERS.map(|parameter| (parameter.key(), parameter.symbol()));
+    let columns = (parameters.into_iter()).chain(PROMISES.map(|name| (name, name)));
+    let has_figure = |key: &str| all.parameters.get(key).and_then(figure).is_some();
+    let columns: Vec<_> = columns.filter(|(key, _)| has_figure(key)).collect();
     let _ = write!(text, "\n{title}\n{:<28}", "");
-    for parameter in &columns {
-        let _ = write!(text, " {:>10}", parameter.symbol());
+    for (_, symbol) in &columns {
+        let _ = write!(text, " {symbol:>10}");
     }
     let _ = writeln!(text);
     for (name, tally) in rows {
         let _ = write!(text, "{name:<28}");
-        for parameter in &columns {
-            let value = tally.parameters.get(parameter.key()).and_then(figure);
+        for (key, _) in &columns {
+            let value = tally.parameters.get(*key).and_then(figure);
             let _ = write!(text, " {:>10}", or_dash(value.map(|v| scale * v), decimals));
         }
         let _ = writeln!(text);

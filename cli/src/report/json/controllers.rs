@@ -96,7 +96,9 @@ impl Figures {
         let finite = |value: f64| value.is_finite().then_some(value);
         Self {
             margins: figures.map(|of| margins(&of.margins, None, Some(of))),
-            step: figures.and_then(|of| of.step.as_ref()).map(step),
+            step: figures
+                .and_then(|of| of.step.as_ref())
+                .map(|of| step(of, None)),
             load_iae: figures.and_then(|of| of.load_iae).and_then(finite),
             load_peak: figures.and_then(|of| of.load_peak).and_then(finite),
             noise_share: figures.and_then(|of| of.noise_share).and_then(finite),
