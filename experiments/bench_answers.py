@@ -12,7 +12,8 @@ initial states are linear and solved for at each step; simulated by `scipy.signa
 delay of any part of a sample included; the best of several starts. `--step 1e-4` is the relative step of
 its finite differences: with SciPy's default (`--step 0`) rounding stops the search far from the optimum.
 multistart: the same model at 80 samples a period, from 18 starts over the benchmark's ranges.
-`--cycles N` fits the last N cycles, `--cycles 0` everything from the first rise of the input on.
+`--cycles N` fits the last N complete cycles, `--cycles 0` everything from the first rise of the input on.
+`--bounds published` limits the times to the ranges that the benchmark's README states.
 `--from-truth` starts at the true process as well, which no user could do: it shows whether the search
 finds its optimum.
 sippy: its output-error model of third order, 40 samples a cycle, for several dead times, the one of least
@@ -51,7 +52,11 @@ MANY_STARTS = np.log(
 BINS = 80
 # Dead times that SIPPY is given, in its samples: a relay's cycle hides up to a sixth of itself.
 DELAYS = [0, 2, 4, 6]
-BOUNDS = np.log([[1e-3, 1e-2, 1e-4], [5.0, 50.0, 0.5]])
+# T_prop, T_body, tau (s): wide, and what the benchmark's README states.
+BOUNDS = {
+    "wide": np.log([[1e-3, 1e-2, 1e-4], [5.0, 50.0, 0.5]]),
+    "published": np.log([[0.015, 0.2, 0.0005], [0.3, 2.0, 0.1]]),
+}
 
 
 def rises(u):
@@ -83,7 +88,9 @@ def by_scipy(u, y, settings, starts, bins=None):
     ups = rises(u)
     every = 1 if bins is None else max(round(np.diff(ups).mean() / bins), 1)
     first = ups[-1 - settings.cycles] if settings.cycles else ups[0]
-    at = np.arange(first, len(u) - every + 1, every)
+    # The recording goes on after the last complete cycle, for half a period in the mean.
+    end = ups[-1] if settings.cycles else len(u)
+    at = np.arange(first, end - every + 1, every)
     measured = y[at[:, None] + np.arange(every)].mean(axis=1)
     # The mean of `every` samples stands at the middle of them.
     centre = at + (every - 1) / 2
@@ -104,7 +111,10 @@ def by_scipy(u, y, settings, starts, bins=None):
 
     def fit(start):
         return least_squares(
-            lambda x: solve(x)[1], start, bounds=BOUNDS, diff_step=settings.step or None
+            lambda x: solve(x)[1],
+            start,
+            bounds=BOUNDS[settings.bounds],
+            diff_step=settings.step or None,
         )
 
     best = min(map(fit, starts), key=lambda found: found.cost)
@@ -143,7 +153,7 @@ def by_sippy(u, y):
         return np.concatenate([error.real, error.imag])
 
     starts = [np.concatenate([[0.0], start]) for start in STARTS]
-    bounds = np.concatenate([[[-20.0], [20.0]], BOUNDS], axis=1)
+    bounds = np.concatenate([[[-20.0], [20.0]], BOUNDS["wide"]], axis=1)
     fits = [least_squares(residual, start, bounds=bounds) for start in starts]
     return np.exp(min(fits, key=lambda found: found.cost).x)
 
@@ -163,6 +173,7 @@ def main():
     parser.add_argument("--method", choices=["scipy", "multistart", "sippy"], default="scipy")
     parser.add_argument("--cycles", type=int, default=2)
     parser.add_argument("--step", type=float, default=1e-4)
+    parser.add_argument("--bounds", choices=list(BOUNDS), default="wide")
     parser.add_argument("--from-truth", action="store_true")
     parser.add_argument("--experiments", type=int, default=None)
     parser.add_argument("-o", "--out", type=pathlib.Path, required=True)

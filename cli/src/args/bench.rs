@@ -90,10 +90,11 @@ pub(crate) struct MakeBench {
     "  onecycle bench run relay-benchmark -o results\n",
     "  onecycle bench run relay-benchmark --methods none --answers mine=answers.csv\n",
     "  onecycle bench run relay-benchmark --methods onecycle-2,pem-fair -o results\n\n",
-    "Methods on the recordings, all run by default: onecycle-1, onecycle-2, onecycle-4 (cycles), network,\n",
-    "pem, pem-fair, rules, rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc. The methods\n",
-    "pem-sweep and asymmetric use a relay test of their own, simulated on the true process with the same\n",
-    "bias, noise and seed. With 'none', only --answers are scored. Times are processor times.\n\n",
+    "Methods on the recordings, all run by default: onecycle-1, onecycle-2, onecycle-4 (cycles),\n",
+    "onecycle-whole (everything, by the general estimator), network, pem, pem-offset, pem-fair, rules,\n",
+    "rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc. The methods pem-sweep, pem-sweep-offset and\n",
+    "asymmetric use a relay test of their own, simulated on the true process with the same bias, noise and\n",
+    "seed. With 'none', only --answers are scored. Times are processor times.\n\n",
     "With --out, finished experiments are kept in the folder OUT.part until the results are written: the\n",
     "same command resumes an interrupted run, --restart starts over."
 ))]

@@ -13,8 +13,8 @@ pub(crate) fn leaderboard(results: &BenchResults<'_>) -> String {
         "{} experiments, seed {}: costs and errors in %, processor times in ms; a score of 100 % means \
          no answer\n\n\
          | method | score | mean abs J | median | 95 % | 99 % | worst | unstable | no answer \
-         | least margin (deg) | K/T_body | T_prop | tau (ms) | time (ms) |\n\
-         |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
+         | least margin (deg) | K/T_body | T_prop | tau (ms) | intervals hold | time (ms) |\n\
+         |---|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|--:|\n",
         of.experiments, of.seed
     );
     for row in &results.leaderboard {
@@ -36,6 +36,7 @@ pub(crate) fn leaderboard(results: &BenchResults<'_>) -> String {
             scaled(row.median_k_over_t_body_error, 100.0),
             scaled(row.median_t_prop_error, 100.0),
             scaled(row.median_tau_error_s, 1e3),
+            scaled(row.coverage, 100.0),
             scaled(row.median_seconds, 1e3),
         ];
         text += &format!("| {} |\n", cells.join(" | "));

@@ -175,11 +175,16 @@ impl<'a> Law<'a> {
     /// Whether the relay is high for about half of the time. Against a bias that is not trimmed a relay with protection
     /// against turning back early switches later on one side than its `beta` says.
     pub(crate) fn is_symmetric(&self) -> bool {
+        self.asymmetry() < MOST_ASYMMETRY
+    }
+
+    /// Distance of the share of time high from one half.
+    pub(crate) fn asymmetry(&self) -> f64 {
         let high_s: f64 = (self.cycles.iter())
             .map(|cycle| (cycle.to_low.time_s - cycle.to_high.time_s).rem_euclid(self.period_s()))
             .sum();
         let share = high_s / self.cycles.len() as f64 / self.period_s();
-        (share - 0.5).abs() < MOST_ASYMMETRY
+        (share - 0.5).abs()
     }
 
     /// Mean period of the cycles (s).

@@ -52,7 +52,8 @@ pub use self::summary::{Costs, Summary, quantile};
 use onecycle_design::cascade::Cascade;
 use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd};
-use onecycle_identify::Signals;
+use onecycle_design::{Model, Parameter};
+use onecycle_identify::{Estimate, Signals};
 
 use crate::experiments::{ExperimentError, Truth};
 
@@ -60,12 +61,14 @@ use crate::experiments::{ExperimentError, Truth};
 pub const PHASE_MARGIN_DEG: f64 = 20.0;
 
 /// Answer of a method to an experiment.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
     /// The identified process; `None` for a method that leads directly to gains.
     pub process: Option<Soiptd>,
     /// The resulting controller.
     pub feedback: Feedback,
+    /// 90 % intervals of the parameters, from a method that has them.
+    pub intervals: Option<Estimate>,
 }
 
 /// A controller as the method would fly it.
@@ -99,6 +102,7 @@ impl Answer {
         Ok(Self {
             process: Some(process),
             feedback: optimum.pd.into(),
+            intervals: None,
         })
     }
 
@@ -108,6 +112,7 @@ impl Answer {
         Self {
             process: None,
             feedback: gains.into(),
+            intervals: None,
         }
     }
 }
@@ -168,6 +173,7 @@ impl Judge {
             k_over_t_body_error: None,
             t_prop_error: None,
             tau_error_s: None,
+            intervals_held: None,
             reason: None,
             seconds: None,
         };
@@ -196,9 +202,23 @@ impl Judge {
                 record.tau_error_s,
             ] = errors.map(Some);
         }
+        record.intervals_held = answer.intervals.and_then(|found| self.held(&found));
         record
     }
+
+    /// Number of the 90 % intervals of [`JUDGED`] that hold the true value.
+    fn held(&self, intervals: &Estimate) -> Option<u8> {
+        let truth = Model::from(in_order(&self.truth).ok()?);
+        let held = |parameter| Some(intervals.get(parameter)?.holds(truth.parameter(parameter)?));
+        JUDGED
+            .into_iter()
+            .map(|parameter| held(parameter).map(u8::from))
+            .sum()
+    }
 }
+
+/// Parameters whose intervals are compared with the truth: those that decide the controller.
+pub const JUDGED: [Parameter; 3] = [Parameter::KOverTBody, Parameter::TProp, Parameter::Tau];
 
 /// Errors of `K/T_body` and `T_prop` over their true values, and of `tau` (s), lags in order.
 fn errors(found: &Soiptd, truth: &Soiptd) -> Option<[f64; 3]> {
@@ -241,6 +261,9 @@ pub struct Record {
     pub t_prop_error: Option<f64>,
     /// Error of `tau` (s).
     pub tau_error_s: Option<f64>,
+    /// Number of the 90 % intervals of [`JUDGED`] that hold the true value, if the method has intervals.
+    #[serde(default)]
+    pub intervals_held: Option<u8>,
     /// Why there is no answer.
     pub reason: Option<String>,
     /// Time that the method took (s), if it was measured; the only number that depends on more than the

@@ -21,6 +21,7 @@
 //! calculations", ACM Trans. Math. Softw. 20, 1994). The model is simulated exactly, the delay too.
 //!
 //! [`PemSettings::paper`] follows the paper: one start, the initial state estimated, no bias.
+//! [`PemSettings::with_offset`] is the default of MathWorks' `procest` today: the same with a bias.
 //! [`PemSettings::fair`] is what a careful user would do today: a bias, and starts all over the domain.
 
 mod output_error;
@@ -96,6 +97,11 @@ const FAIR_TIMES_S: [[f64; 3]; 3] = [
 /// either side.
 const LIMITS_S: [(f64, f64); 3] = [(1e-3, 100.0), (1e-3, 100.0), (1e-5, 2.0)];
 
+/// Longest dead time of a process under the paper's relay, over the period of the oscillation. A relay
+/// with `beta` leads by `asin(-beta)`, 46.9 degrees at -0.73, so it oscillates where the process lags by
+/// 226.9 degrees; the integrator takes 90 of them, dead time and lags the other 136.9, 0.38 of a turn.
+pub const LONGEST_DELAY: f64 = 0.38;
+
 /// Most evaluations of the cost for a start. Of 540 starts on random experiments half needed 60, none
 /// more than 159.
 const MOST_EVALUATIONS: usize = 400;
@@ -103,11 +109,13 @@ const MOST_EVALUATIONS: usize = 400;
 const TOLERANCE: f64 = 1e-12;
 
 impl PemSettings {
-    /// Settings of the paper: one start, the initial state estimated, the bias not modelled.
+    /// Settings that come nearest to the paper's results: one start, the initial state estimated, the mean
+    /// of the input removed and no offset estimated.
     ///
-    /// The mean of the input is removed, as the paper's toolbox does. Without that the method hardly
-    /// works: of 50 random processes under the paper's bias and noise, 3 controllers are unstable from
-    /// one cycle and 1 from the sweep; with the bias ignored 17 and 42 are (the paper: 5 and 1).
+    /// The paper does not say how its toolbox treated the input's offset; [`with_offset`](Self::with_offset)
+    /// is that toolbox's default. Without removing the mean the method hardly works: of 50 random
+    /// processes under the paper's bias and noise, 3 controllers are unstable from one cycle and 1 from the
+    /// sweep; with the bias ignored 17 and 42 are (the paper: 5 and 1).
     #[must_use]
     pub fn paper(data: Data) -> Self {
         Self {
@@ -119,16 +127,25 @@ impl PemSettings {
         }
     }
 
+    /// As [`paper`](Self::paper), with the offset of the input estimated: MathWorks' `procest` does so by
+    /// default (`InputOffset` `auto`) for a model with an integrator.
+    #[must_use]
+    pub fn with_offset(data: Data) -> Self {
+        Self {
+            input_bias: InputBias::Estimated,
+            ..Self::paper(data)
+        }
+    }
+
     /// Settings of a careful user: one cycle, the initial state and a bias estimated, 27 starts all
-    /// over the paper's domain, the dead time at most half the period.
+    /// over the paper's domain, the dead time at most 0.38 of the period.
     ///
     /// On 50 random experiments with the paper's bias and noise the cost is 0.31 % on average, 1.4 % at
     /// worst. With [`InputBias::MeanRemoved`] it is 0.20 and 1.5 %, but never exact, because the
     /// samples of a cycle are not exactly a whole period.
     ///
-    /// A dead time longer by one period explains a periodic recording equally well. It is excluded: if
-    /// a relay with `beta > -1` makes an integrator with lags oscillate, the dead time is less than
-    /// half a period.
+    /// A dead time longer by one period explains a periodic recording equally well. It is excluded: see
+    /// [`LONGEST_DELAY`].
     #[must_use]
     pub fn fair() -> Self {
         let [props, bodies, delays] = FAIR_TIMES_S;
@@ -141,7 +158,7 @@ impl PemSettings {
         });
         Self {
             input_bias: InputBias::Estimated,
-            longest_delay: 0.5,
+            longest_delay: LONGEST_DELAY,
             starts_s: starts.collect(),
             ..Self::paper(Data::LastCycle)
         }

@@ -7,21 +7,27 @@ use crate::experiments::{CYCLES_KEPT, Recorded, RelayTest};
 use crate::judge::baselines::rules::Rule;
 use crate::judge::baselines::{BaselineAnswer, BaselineError, arx, asymmetric, gmvc, pem, rules};
 use crate::space::Space;
-use onecycle_design::Specification;
 use onecycle_design::rules::Homogeneous;
-use onecycle_identify::{Method, Options, Signals, identify};
+use onecycle_design::{Specification, Structure};
+use onecycle_identify::{Method, Options, Road, Signals, identify};
 
 /// A method of the benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Contender {
-    /// Our method, from this number of cycles.
+    /// Our estimator of steady oscillations, from this number of cycles.
     OneCycle(usize),
+    /// Our general estimator, from the whole recording, structure given.
+    OneCycleWhole,
     /// The network of the pack alone, from the last cycle.
     Network,
     /// The prediction error method of the paper on its estimation set I, one steady cycle.
     Pem,
+    /// The same with the input's offset estimated, as a toolbox does for a model with an integrator.
+    PemOffset,
     /// The same method on the paper's estimation set II: 20 s of a relay with a swept phase.
     PemSweep,
+    /// The same on set II with the input's offset estimated.
+    PemSweepOffset,
     /// The same method on one cycle with a bias, an initial state and 27 starts.
     PemFair,
     /// The paper's tuning rule, from half the peak-to-peak output of a cycle.
@@ -84,12 +90,14 @@ static EXACT_RULE: LazyLock<Result<Homogeneous, BaselineError>> =
 
 impl Contender {
     /// All methods.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 17] = [
         Self::OneCycle(1),
         Self::OneCycle(2),
         Self::OneCycle(4),
+        Self::OneCycleWhole,
         Self::Network,
         Self::Pem,
+        Self::PemOffset,
         Self::PemFair,
         Self::Rules,
         Self::RulesExact,
@@ -98,6 +106,7 @@ impl Contender {
         Self::ArxScaled,
         Self::ArxGmvc,
         Self::PemSweep,
+        Self::PemSweepOffset,
         Self::Asymmetric,
     ];
 
@@ -106,9 +115,12 @@ impl Contender {
     pub fn name(self) -> String {
         let name = match self {
             Self::OneCycle(cycles) => return format!("onecycle-{cycles}"),
+            Self::OneCycleWhole => "onecycle-whole",
             Self::Network => "network",
             Self::Pem => "pem",
+            Self::PemOffset => "pem-offset",
             Self::PemSweep => "pem-sweep",
+            Self::PemSweepOffset => "pem-sweep-offset",
             Self::PemFair => "pem-fair",
             Self::Rules => "rules",
             Self::RulesExact => "rules-exact",
@@ -131,7 +143,7 @@ impl Contender {
     #[must_use]
     pub fn relay_test(self) -> RelayTest {
         match self {
-            Self::PemSweep => RelayTest::Swept,
+            Self::PemSweep | Self::PemSweepOffset => RelayTest::Swept,
             Self::Asymmetric => RelayTest::Asymmetric,
             _ => RelayTest::Recorded,
         }
@@ -146,10 +158,13 @@ impl Contender {
         let by_pem = |settings: &pem::PemSettings| pem::identify(signals, settings, margin_rad);
         let by_rule = |rule: &Rule| rules::identify(signals, rule, 1);
         let found = match self {
-            Self::OneCycle(cycles) => return ours(signals, cycles, Method::Map),
-            Self::Network => return ours(signals, 1, Method::Classify),
+            Self::OneCycle(cycles) => return ours(signals, steady(cycles, Method::Map)),
+            Self::OneCycleWhole => return ours(signals, whole()),
+            Self::Network => return ours(signals, steady(1, Method::Classify)),
             Self::Pem => by_pem(&pem::PemSettings::paper(pem::Data::LastCycle)),
+            Self::PemOffset => by_pem(&pem::PemSettings::with_offset(pem::Data::LastCycle)),
             Self::PemSweep => by_pem(&pem::PemSettings::paper(pem::Data::Whole)),
+            Self::PemSweepOffset => by_pem(&pem::PemSettings::with_offset(pem::Data::Whole)),
             Self::PemFair => by_pem(&pem::PemSettings::fair()),
             Self::Rules => by_rule(&Rule::of_relay(Space::MULTIROTOR.beta, margin_rad)),
             Self::RulesExact => EXACT_RULE
@@ -170,19 +185,31 @@ impl Contender {
     }
 }
 
-/// Our method, from a recording to a controller.
-fn ours(signals: &Signals<'_>, cycles: usize, method: Method) -> Result<Answer, String> {
-    let paper = Specification::paper().with_phase_margin_rad(PHASE_MARGIN_DEG.to_radians());
-    let options = Options::default()
+/// Our estimator of steady oscillations on the last cycles, and nothing else of the recording.
+fn steady(cycles: usize, method: Method) -> Options {
+    Options::default()
         .cycles(cycles)
-        .specification(paper)
-        .method(method);
-    let identified = identify(signals, &options).outcome;
+        .method(method)
+        .road(Road::Relay)
+}
+
+/// Our general estimator on the whole recording. Every method is told the structure.
+fn whole() -> Options {
+    Options::default()
+        .road(Road::General)
+        .structure(Some(Structure::Soiptd))
+}
+
+/// Our method, from a recording to a controller.
+fn ours(signals: &Signals<'_>, options: Options) -> Result<Answer, String> {
+    let paper = Specification::paper().with_phase_margin_rad(PHASE_MARGIN_DEG.to_radians());
+    let identified = identify(signals, &options.specification(paper)).outcome;
     let identified = identified.map_err(|verdict| verdict.to_string())?;
     let pd = identified.design.and_then(|design| design.controller.pd());
     Ok(Answer {
         process: identified.model.soiptd(),
         feedback: pd.ok_or("there is no PD controller")?.into(),
+        intervals: Some(identified.estimate),
     })
 }
 

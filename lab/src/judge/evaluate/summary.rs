@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{PHASE_MARGIN_DEG, Record};
+use super::{JUDGED, PHASE_MARGIN_DEG, Record};
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 
 /// Costs of controllers over many experiments. See the [module](super) for unstable loops, missing
@@ -102,6 +102,8 @@ pub struct Summary {
     pub median_t_prop_error: Option<f64>,
     /// Median size of the error of `tau` (s).
     pub median_tau_error_s: Option<f64>,
+    /// Share of the 90 % intervals of [`JUDGED`] that hold the true value, of a method with intervals.
+    pub coverage: Option<f64>,
     /// Median time (s) of the records that have one.
     pub median_seconds: Option<f64>,
 }
@@ -115,12 +117,16 @@ impl Summary {
             values.iter_mut().for_each(|value| *value = value.abs());
             quantile(&mut values, 0.5)
         };
+        let held: Vec<u8> = records.iter().filter_map(|r| r.intervals_held).collect();
+        let intervals = held.len() * JUDGED.len();
+        let holding: f64 = held.iter().map(|&count| f64::from(count)).sum();
         Self {
             method: method.to_owned(),
             costs: Costs::of(records.iter().map(|record| record.judged())),
             median_k_over_t_body_error: median(|record| record.k_over_t_body_error),
             median_t_prop_error: median(|record| record.t_prop_error),
             median_tau_error_s: median(|record| record.tau_error_s),
+            coverage: (intervals > 0).then(|| holding / intervals as f64),
             median_seconds: median(|record| record.seconds),
         }
     }
