@@ -140,7 +140,7 @@ pub(crate) fn unknown(campaign: &Campaign, rows: &[(DefectKind, Vec<OutsiderCase
     let mut text = format!(
         "{} random processes with each defect, bias up to {} h, noise up to {} of the amplitude, trim {}\n\
          refused: not identified from {} cycles; harmful: identified, but the controller costs over 10 % \
-         more\nthan predicted; silent: harmful with the most cycles, and the last cycle is not judged unknown\n",
+         more\nthan predicted; silent: harmful, and no remark is about the recording\n",
         campaign.cases,
         campaign.bias,
         campaign.sigma,
@@ -148,12 +148,12 @@ pub(crate) fn unknown(campaign: &Campaign, rows: &[(DefectKind, Vec<OutsiderCase
         CYCLES.map(|cycles| cycles.to_string()).join(", "),
     );
     let of_cycles: String = CYCLES
-        .map(|cycles| format!("  refused {cycles} harmful {cycles}"))
+        .map(|cycles| format!("  refused {cycles} harmful {cycles} silent {cycles}"))
         .concat();
     // Writing to a string cannot fail.
     let _ = writeln!(
         text,
-        "{:<13} cases unsteady  harmful unknown  harmless unknown{of_cycles} silent",
+        "{:<13} cases unsteady  harmful unknown  harmless unknown{of_cycles}",
         "kind"
     );
     for (kind, cases) in rows {
@@ -164,10 +164,10 @@ pub(crate) fn unknown(campaign: &Campaign, rows: &[(DefectKind, Vec<OutsiderCase
             let _ = write!(text, "  {all:8} {unknown:7}");
         }
         for k in 0..CYCLES.len() {
-            let [refused, harmful] = by_identification(cases, k);
-            let _ = write!(text, "  {refused:9} {harmful:9}");
+            let [refused, harmful, silent] = by_identification(cases, k);
+            let _ = write!(text, "  {refused:9} {harmful:9} {silent:8}");
         }
-        let _ = writeln!(text, " {:6}", silent(cases));
+        text += "\n";
     }
     text
 }
@@ -183,19 +183,14 @@ fn by_score(cases: &[OutsiderCase], harmful: bool) -> [usize; 2] {
     [scored().count(), unknown.count()]
 }
 
-/// Cases refused by the identification of a number of cycles, and those accepted but harmful.
-fn by_identification(cases: &[OutsiderCase], k: usize) -> [usize; 2] {
-    let accepted = || cases.iter().filter_map(move |case| case.is_harmful[k]);
-    let harmful = accepted().filter(|is_harmful| *is_harmful);
-    [cases.len() - accepted().count(), harmful.count()]
-}
-
-/// Harmful cases that the identification of most cycles accepted and that the score did not call unknown.
-fn silent(cases: &[OutsiderCase]) -> usize {
-    (cases.iter())
-        .filter(|case| {
-            let is_accepted = case.is_harmful.last() == Some(&Some(true));
-            is_accepted && case.scored.is_none_or(|scored| scored.is_known)
-        })
-        .count()
+/// Cases refused by the identification of a number of cycles, those accepted but harmful, and of these the silent ones.
+fn by_identification(cases: &[OutsiderCase], k: usize) -> [usize; 3] {
+    let accepted = || cases.iter().filter_map(move |case| case.accepted[k]);
+    let harmful = || accepted().filter(|accepted| accepted.is_harmful);
+    let silent = harmful().filter(|accepted| accepted.is_silent);
+    [
+        cases.len() - accepted().count(),
+        harmful().count(),
+        silent.count(),
+    ]
 }

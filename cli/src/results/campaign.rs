@@ -118,8 +118,16 @@ pub(crate) struct OutsiderCase {
     pub(crate) is_steady: bool,
     /// Score of the last cycle, if it has one.
     pub(crate) scored: Option<ScoredCycle>,
-    /// For each of [`CYCLES`]: whether the controller is harmful; `None` if no process was identified.
-    pub(crate) is_harmful: [Option<bool>; CYCLES.len()],
+    /// For each of [`CYCLES`]; `None` if no process was identified.
+    pub(crate) accepted: [Option<AcceptedCase>; CYCLES.len()],
+}
+
+/// An accepted identification.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct AcceptedCase {
+    pub(crate) is_harmful: bool,
+    /// Whether no remark is about the recording.
+    pub(crate) is_silent: bool,
 }
 
 /// The judgement of one cycle by its score.
@@ -137,9 +145,12 @@ impl From<Evaluated> for OutsiderCase {
                 is_harmful: scored.harm.is_harmful(),
                 is_known: scored.verdict == Familiarity::Known,
             }),
-            is_harmful: judgement
-                .identified
-                .map(|harm| harm.map(|harm| harm.is_harmful())),
+            accepted: judgement.identified.map(|accepted| {
+                accepted.map(|accepted| AcceptedCase {
+                    is_harmful: accepted.harm.is_harmful(),
+                    is_silent: accepted.is_silent,
+                })
+            }),
         }
     }
 }

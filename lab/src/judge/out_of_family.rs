@@ -2,7 +2,7 @@
 //! from one, two and eight cycles, refuse them, and what would the controller do?
 
 use onecycle_design::Specification;
-use onecycle_identify::{Options, identify};
+use onecycle_identify::{About, Identification, Options, identify};
 use onecycle_onboard::classify::{Calibration, Classification, Familiarity, OUTPUTS, classify};
 use onecycle_onboard::signature::Signature;
 use onecycle_plant::Trace;
@@ -51,9 +51,17 @@ pub struct Evaluated {
     /// Result of the classification; `None` without a network or a steady cycle, or if the outputs are no
     /// process.
     pub scored: Option<Scored>,
-    /// For each number of [`CYCLES`], the effect of the identified process's controller; `None` if the
-    /// identification refused.
-    pub identified: [Option<Harm>; CYCLES.len()],
+    /// For each number of [`CYCLES`], what the identification accepted; `None` if it refused.
+    pub identified: [Option<Accepted>; CYCLES.len()],
+}
+
+/// An accepted identification.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Accepted {
+    /// Effect of the identified process's controller.
+    pub harm: Harm,
+    /// Whether no remark is [about the recording](About::Recording).
+    pub is_silent: bool,
 }
 
 /// Runs and evaluates experiment `n` of a recipe with a defect; `None` if the relay does not make the
@@ -117,11 +125,16 @@ pub fn scored(
     })
 }
 
-fn identified(experiment: &RelayExperiment, trace: &Trace, cycles: usize) -> Option<Harm> {
+fn identified(experiment: &RelayExperiment, trace: &Trace, cycles: usize) -> Option<Accepted> {
     let signals = signals_of(trace, experiment.sample_s);
     let options = Options::default()
         .cycles(cycles)
         .specification(Specification::paper());
-    let found = identify(&signals, &options).outcome.ok()?;
-    Some(Harm::of(experiment, &found.model.soiptd()?))
+    let Identification {
+        outcome, remarks, ..
+    } = identify(&signals, &options);
+    Some(Accepted {
+        harm: Harm::of(experiment, &outcome.ok()?.model.soiptd()?),
+        is_silent: !(remarks.iter()).any(|remark| remark.about() == About::Recording),
+    })
 }

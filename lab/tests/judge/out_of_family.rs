@@ -421,8 +421,8 @@ fn the_identification_is_judged_without_a_network() {
     let of = |kind| evaluate(&recipe, kind, 5, None).unwrap().unwrap();
     let plain = of(DefectKind::InFamily);
     assert!(plain.is_steady && plain.scored.is_none());
-    for harm in plain.identified {
-        assert!(!harm.unwrap().is_harmful(), "{harm:?}");
+    for accepted in plain.identified {
+        assert!(!accepted.unwrap().harm.is_harmful(), "{accepted:?}");
     }
     assert_eq!(of(DefectKind::Clipping).identified, [None; 3]);
 }
