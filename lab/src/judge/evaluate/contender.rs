@@ -16,6 +16,10 @@ use onecycle_identify::{Method, Options, Road, Signals, identify};
 pub enum Contender {
     /// Our estimator of steady oscillations, from this number of cycles.
     OneCycle(usize),
+    /// The same from one cycle, with the controller of the most probable process in place of that of least expected cost.
+    OneCyclePoint,
+    /// The same from one cycle, by least squares without the prior of the pack.
+    OneCycleRefine,
     /// Our general estimator, from the whole recording, structure given.
     OneCycleWhole,
     /// The network of the pack alone, from the last cycle.
@@ -90,10 +94,12 @@ static EXACT_RULE: LazyLock<Result<Homogeneous, BaselineError>> =
 
 impl Contender {
     /// All methods.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::OneCycle(1),
         Self::OneCycle(2),
         Self::OneCycle(4),
+        Self::OneCyclePoint,
+        Self::OneCycleRefine,
         Self::OneCycleWhole,
         Self::Network,
         Self::Pem,
@@ -115,6 +121,8 @@ impl Contender {
     pub fn name(self) -> String {
         let name = match self {
             Self::OneCycle(cycles) => return format!("onecycle-{cycles}"),
+            Self::OneCyclePoint => "onecycle-1-point",
+            Self::OneCycleRefine => "onecycle-1-refine",
             Self::OneCycleWhole => "onecycle-whole",
             Self::Network => "network",
             Self::Pem => "pem",
@@ -159,6 +167,8 @@ impl Contender {
         let by_rule = |rule: &Rule| rules::identify(signals, rule, 1);
         let found = match self {
             Self::OneCycle(cycles) => return ours(signals, steady(cycles, Method::Map)),
+            Self::OneCyclePoint => return most_probable(signals, steady(1, Method::Map)),
+            Self::OneCycleRefine => return ours(signals, steady(1, Method::Refine)),
             Self::OneCycleWhole => return ours(signals, whole()),
             Self::Network => return ours(signals, steady(1, Method::Classify)),
             Self::Pem => by_pem(&pem::PemSettings::paper(pem::Data::LastCycle)),
@@ -210,6 +220,19 @@ fn ours(signals: &Signals<'_>, options: Options) -> Result<Answer, String> {
         process: identified.model.soiptd(),
         feedback: pd.ok_or("there is no PD controller")?.into(),
         intervals: Some(identified.estimate),
+    })
+}
+
+/// Our method, with the controller of the most probable process.
+fn most_probable(signals: &Signals<'_>, options: Options) -> Result<Answer, String> {
+    let found = ours(signals, options)?;
+    let process = found
+        .process
+        .ok_or("there is no process of this structure")?;
+    let best = Answer::of_process(process).map_err(|error| error.to_string())?;
+    Ok(Answer {
+        feedback: best.feedback,
+        ..found
     })
 }
 
