@@ -16,7 +16,7 @@ use super::MOST_THREADS;
     "  onecycle reproduce\n",
     "  onecycle reproduce --quick\n",
     "  onecycle reproduce table_4 table_5 -o out\n\n",
-    "Parts: phase, grid, figures, table_2_and_3, table_4, tuning_rules, table_5, table_6, table_7.\n",
+    "Parts: phase, grid, figures, table_2_and_3, table_4, tuning_rules, table_5, table_6, table_7, claims.\n",
     "Finished parts are kept in DIR/parts and not computed again, and an interrupted training is\n",
     "resumed after its last epoch; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable part, 5 output not written"
@@ -55,11 +55,12 @@ pub(crate) enum Name {
     Table5,
     Table6,
     Table7,
+    Claims,
 }
 
 impl Name {
     /// All of them, in the paper's order.
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 10] = [
         Self::Phase,
         Self::Grid,
         Self::Figures,
@@ -69,6 +70,7 @@ impl Name {
         Self::Table5,
         Self::Table6,
         Self::Table7,
+        Self::Claims,
     ];
 
     /// The name in arguments and file names.
@@ -83,6 +85,7 @@ impl Name {
             Self::Table5 => "table_5",
             Self::Table6 => "table_6",
             Self::Table7 => "table_7",
+            Self::Claims => "claims",
         }
     }
 }

@@ -21,7 +21,7 @@ use crate::failure::{Failure, exit};
 use crate::journal::Journal;
 use crate::output::{Waiting, print, tell, write_text};
 use crate::report::reproduction as report;
-use crate::results::reproduction::{Numbers, ReproducedPart};
+use crate::results::reproduction::{Numbers, ReproducedPart, Row};
 
 pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
     let out = &arguments.out;
@@ -48,6 +48,25 @@ pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
         print(&format!("{}\n", path.display()))?;
     }
     Ok(ExitCode::from(exit::DONE))
+}
+
+/// Rows that the sheet states: they sum up the other parts.
+#[derive(serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Stated {
+    /// Claim, and the cells of its row.
+    rows: Vec<Vec<String>>,
+}
+
+fn claims(stated: &Stated) -> Numbers {
+    let row = |cells: &Vec<String>| {
+        let mut cells = cells.iter().cloned();
+        Row::new(cells.next().unwrap_or_default(), cells)
+    };
+    Numbers {
+        tables: vec![stated.rows.iter().map(row).collect()],
+        figures: vec![],
+    }
 }
 
 /// A part, computed now or by an earlier run.
@@ -84,6 +103,7 @@ fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<ReproducedPa
         Name::Table5 => single::starts(&typed(&settings)?, &workers)?,
         Name::Table6 => single::biases(&typed(&settings)?, &workers)?,
         Name::Table7 => cycles::find(&typed(&settings)?)?,
+        Name::Claims => claims(&typed(&settings)?),
     };
     drop(waiting);
     workers.finish();

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::pages::page::{self, Section, page};
-use crate::results::reproduction::{ComparedCell, ReproducedPart};
+use crate::results::reproduction::{ComparedCell, ComparedTable, ReproducedPart};
 
 const TITLE: &str = "The paper's simulated results, reproduced";
 const LEAD: &str = "A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, \"Real-time system identification using deep \
@@ -49,7 +49,7 @@ pub(crate) fn markdown(parts: &[ReproducedPart], is_quick: bool) -> String {
                 "\n{}\n\n| {} |\n|---|{}",
                 table.caption,
                 cells.join(" | "),
-                "--:|".repeat(cells.len().saturating_sub(1))
+                alignment(table).repeat(cells.len().saturating_sub(1))
             );
             for (name, cells) in &table.rows {
                 let cells: Vec<String> = cells.iter().map(cell).collect();
@@ -62,6 +62,17 @@ pub(crate) fn markdown(parts: &[ReproducedPart], is_quick: bool) -> String {
         }
     }
     text
+}
+
+/// Numbers to the right, sentences to the left.
+fn alignment(table: &ComparedTable) -> &'static str {
+    const LONGEST_NUMBER: usize = 40;
+    let mut cells = table.rows.iter().flat_map(|(_, cells)| cells);
+    if cells.any(|cell| cell.ours.len() > LONGEST_NUMBER) {
+        "---|"
+    } else {
+        "--:|"
+    }
 }
 
 fn cell(cell: &ComparedCell) -> String {
@@ -117,7 +128,6 @@ fn beside(cell: &ComparedCell) -> page::Cell<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::results::reproduction::ComparedTable;
 
     fn part() -> ReproducedPart {
         let cell = |ours: &str, paper: Option<&str>| ComparedCell {

@@ -79,7 +79,7 @@ fn what_it_refuses() {
     let refused = run(&["reproduce", "table_8"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     let words = "there is no part 'table_8': choose from phase, grid, figures, table_2_and_3, table_4, \
-                 tuning_rules, table_5, table_6, table_7";
+                 tuning_rules, table_5, table_6, table_7, claims";
     assert!(refused.stderr.contains(words), "{refused:?}");
 
     let folder = Scratch::new();

@@ -73,6 +73,7 @@ impl Sheet {
             Name::Table5 => include_str!("../../../reproduction/table_5.toml"),
             Name::Table6 => include_str!("../../../reproduction/table_6.toml"),
             Name::Table7 => include_str!("../../../reproduction/table_7.toml"),
+            Name::Claims => include_str!("../../../reproduction/claims.toml"),
         };
         toml::from_str(text).map_err(Failure::usage)
     }
