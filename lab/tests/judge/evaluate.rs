@@ -10,8 +10,8 @@ use onecycle_lab::experiments::{Benchmark, RelayTest, Truth};
 use onecycle_lab::judge::baselines::rules;
 use onecycle_lab::judge::evaluate::files::{read_answers, read_truth, results_csv, truth_csv};
 use onecycle_lab::judge::evaluate::{
-    Answer, Contender, Costs, Judge, LoopOutcome, PHASE_MARGIN_DEG, Record, Summary, quantile,
-    records,
+    Answer, Contender, Costs, Judge, LoopOutcome, PHASE_MARGIN_DEG, Record, Seen, Summary,
+    quantile, records,
 };
 use onecycle_lab::space::Space;
 use onecycle_lab::workers::{OneThread, Workers};
@@ -279,6 +279,16 @@ fn the_same_bits_on_any_number_of_threads() {
         );
         assert_eq!(record.seconds, Some(0.0));
     }
+    // 18 intervals of four cycles: 16.2 are to hold, standard deviation 1.3 or more. A rule has none.
+    let of = |name: &str| {
+        let records = one.iter().filter(|record| record.method == name);
+        records
+            .map(|record| record.intervals_held)
+            .collect::<Vec<_>>()
+    };
+    let held: u32 = of(&ours).iter().map(|held| u32::from(held.unwrap())).sum();
+    assert!((13..=18).contains(&held), "{held}");
+    assert!(of("rules").iter().all(Option::is_none));
     let board = Summary::of_all(&one);
     assert_eq!(board.len(), QUICK.len());
     assert!(board.is_sorted_by(|a, b| a.costs.score <= b.costs.score));
@@ -298,12 +308,35 @@ fn every_method_answers_a_plain_experiment() {
     for (record, contender) in found.iter().zip(Contender::ALL) {
         assert_eq!(record.method, contender.name());
         assert_ne!(record.outcome, LoopOutcome::NoAnswer, "{record:?}");
-        if contender == Contender::PemFair {
-            assert!(
-                record.deterioration.is_some_and(|j| j.abs() < 0.1),
-                "{record:?}"
-            );
-        }
+        // 20 s of sweep give 0.1 % at worst over 300 experiments.
+        let most = match contender {
+            Contender::PemFair => 0.1,
+            Contender::PemSweepOffset => 0.002,
+            _ => f64::INFINITY,
+        };
+        assert!(
+            record.deterioration.is_none_or(|j| j.abs() < most),
+            "{record:?}"
+        );
+    }
+}
+
+// Against these biases the relay halved its ratio on one side: its cycles look as if the input had been logged 57 to 121 ms late,
+// for which they were refused.
+#[test]
+fn a_relay_that_halved_its_ratio_on_one_side_is_not_refused() {
+    for number in [136, 192, 232, 234] {
+        let (truth, recorded) = Benchmark::default().experiment(number).unwrap();
+        let answer = Contender::OneCycle(4)
+            .answer(&Seen::of(recorded.signals()))
+            .unwrap();
+        let judged = Judge::new(&truth.process)
+            .unwrap()
+            .deterioration(answer.feedback);
+        assert!(
+            judged.relative().is_some_and(|j| j.abs() < 0.02),
+            "{judged:?}"
+        );
     }
 }
 
