@@ -137,7 +137,10 @@ impl Session {
             let value = message[name].as_f64();
             value.ok_or_else(|| format!("{name} must be a number."))
         };
-        let pid = Pid::new(number("kp")?, number("ki")?, number("kd")?);
+        // The proposal's filters and sampling stay.
+        let proposed = identified.design.as_ref().map(|of| of.controller.pid());
+        let mut pid = proposed.unwrap_or(Pid::new(0.0, 0.0, 0.0));
+        (pid.kp, pid.ki, pid.kd) = (number("kp")?, number("ki")?, number("kd")?);
         let controller = Controller::from(pid.with_filter_s(number("filter_s")?));
         let model = &identified.model;
         let noise = identified.specification.noise;
