@@ -12,7 +12,7 @@ pub(crate) mod fly;
 pub(crate) mod grid;
 pub(crate) mod identify;
 pub(crate) mod log;
-mod log_gains;
+pub(crate) mod log_gains;
 mod log_overlay;
 pub(crate) mod man;
 pub(crate) mod pack;

@@ -2,6 +2,10 @@
 //!
 //! Options are those of the command line, such as `["--structure", "foptd"]`. An error is one sentence.
 
+mod studio;
+
+use std::sync::Arc;
+
 use anstream::adapter::strip_str;
 use clap::Parser;
 use onecycle::{Identification, Recording};
@@ -14,8 +18,20 @@ use crate::commands::campaign::{self, plan};
 use crate::commands::dataset::folder::Folder;
 use crate::commands::{dataset, flight, identify, tune};
 use crate::failure::Failure;
+#[cfg(target_family = "wasm")]
+pub use crate::output::place::{Listener, listen};
+use crate::reading;
+pub use crate::reading::Given;
 use crate::words::remark::sentences;
 use crate::words::verdict::advice;
+
+pub use studio::Studio;
+
+/// Gives a file that the system does not have a name, under which the functions here read it; the file that was given
+/// before is forgotten.
+pub fn give(name: &str, file: Arc<dyn Given>) {
+    reading::give(name, file);
+}
 
 /// What `onecycle identify` found.
 pub struct Found(identify::Found);

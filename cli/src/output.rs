@@ -1,21 +1,23 @@
 //! Output: the terminal, and files that are written whole or not at all. Nothing else in the program writes.
 
-use std::borrow::Cow;
+#[cfg(target_family = "wasm")]
+#[path = "output/page.rs"]
+pub(crate) mod place;
+#[cfg(not(target_family = "wasm"))]
+#[path = "output/terminal.rs"]
+mod place;
+
 use std::fmt::Display;
 use std::fs::File;
 use std::io::{self, IsTerminal, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::thread::JoinHandle;
-use std::time::Duration;
 
 use anstream::AutoStream;
 use anstyle::Style;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use terminal_size::{Width, terminal_size_of};
 
 use crate::failure::Failure;
 use crate::style::{HEADING, REFUSAL};
+pub(crate) use place::{ProgressBar, Waiting, columns, progress_bar};
 
 /// Prints a report to the standard output, with styles if that is a terminal.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
@@ -64,11 +66,6 @@ pub(crate) fn is_terminal() -> bool {
     io::stdout().is_terminal()
 }
 
-/// Width of the standard output in characters, if it is a terminal.
-pub(crate) fn columns() -> Option<usize> {
-    terminal_size_of(io::stdout()).map(|(Width(columns), _)| usize::from(columns))
-}
-
 /// Prints an error to the error output.
 pub(crate) fn complain(failure: &Failure) {
     say(REFUSAL, failure);
@@ -85,90 +82,6 @@ fn say(style: Style, line: impl Display) {
         AutoStream::auto(io::stderr().lock()),
         "{style}onecycle:{style:#} {line}"
     );
-}
-
-/// A progress bar on the error output for a number of pieces of work, with a message; hidden if that is not a terminal.
-pub(crate) fn progress_bar(pieces: u64) -> ProgressBar {
-    let bar = ProgressBar::new(pieces);
-    if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}  {msg}") {
-        bar.set_style(style);
-    }
-    bar
-}
-
-/// Time before a progress indicator appears.
-const QUICK: Duration = Duration::from_millis(500);
-/// Time between two updates of a progress indicator.
-const TURN: Duration = Duration::from_millis(100);
-
-/// A progress indicator on the error output. It appears on a terminal only, if the work takes longer than [`QUICK`], and
-/// disappears when it is dropped.
-pub(crate) struct Waiting {
-    bar: ProgressBar,
-    over: Option<Sender<()>>,
-    patience: Option<JoinHandle<()>>,
-}
-
-impl Waiting {
-    /// For work of unknown length, named for example `identifying`.
-    pub(crate) fn on(work: impl Into<Cow<'static, str>>) -> Self {
-        Self::shown_as("{spinner} {msg} {elapsed}", None, work)
-    }
-
-    /// For work on a known number of bytes.
-    pub(crate) fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
-        let template = "{wide_bar} {bytes}/{total_bytes} {eta}  {msg}";
-        Self::shown_as(template, Some(bytes), work)
-    }
-
-    fn shown_as(template: &str, length: Option<u64>, work: impl Into<Cow<'static, str>>) -> Self {
-        let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::hidden());
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            bar.set_style(style);
-        }
-        bar.set_message(work);
-        let (over, is_over) = channel();
-        let shown = bar.clone();
-        let patience = std::thread::Builder::new().spawn(move || {
-            if is_over.recv_timeout(QUICK) == Err(RecvTimeoutError::Timeout) {
-                shown.set_draw_target(ProgressDrawTarget::stderr());
-                shown.enable_steady_tick(TURN);
-            }
-        });
-        Self {
-            bar,
-            over: Some(over),
-            // Without a thread there is no indicator.
-            patience: patience.ok(),
-        }
-    }
-
-    /// Names the next step of the work.
-    pub(crate) fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
-        self.bar.set_message(work);
-    }
-
-    /// Counts bytes as done.
-    pub(crate) fn advance(&self, bytes: u64) {
-        self.bar.inc(bytes);
-    }
-
-    /// Bytes done, and bytes in all.
-    #[cfg(test)]
-    pub(crate) fn position(&self) -> (u64, Option<u64>) {
-        (self.bar.position(), self.bar.length())
-    }
-}
-
-impl Drop for Waiting {
-    fn drop(&mut self) {
-        drop(self.over.take());
-        if let Some(patience) = self.patience.take() {
-            // The thread cannot panic.
-            let _ = patience.join();
-        }
-        self.bar.finish_and_clear();
-    }
 }
 
 /// A path with `.ENDING` added to its name.
@@ -219,6 +132,6 @@ fn set_usual_permissions(file: &File) -> io::Result<()> {
 }
 
 #[cfg(not(unix))]
-fn set_usual_permissions(_: &std::fs::File) -> io::Result<()> {
+fn set_usual_permissions(_: &File) -> io::Result<()> {
     Ok(())
 }

@@ -2,7 +2,8 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::failure::Failure;
 use crate::output::Waiting;
@@ -41,24 +42,72 @@ pub(crate) fn text_at_most(path: &Path, most: u64) -> Result<String, Failure> {
 /// # Errors
 /// The error of opening. A folder is refused here, though systems open one.
 pub(crate) fn open_with_bar(path: &Path) -> io::Result<FileWithBar> {
+    let work = format!("reading {}", path.display());
+    if let Some(given) = given(path) {
+        return Ok(FileWithBar {
+            file: given.open(),
+            waiting: Waiting::on_bytes(work, given.length()),
+        });
+    }
     let file = File::open(path)?;
     let about = file.metadata()?;
     if about.is_dir() {
         return Err(io::Error::new(ErrorKind::IsADirectory, "Is a directory"));
     }
-    let work = format!("reading {}", path.display());
     // Pipes and devices do not tell their length.
     let waiting = if about.is_file() {
         Waiting::on_bytes(work, about.len())
     } else {
         Waiting::on(work)
     };
-    Ok(FileWithBar { file, waiting })
+    Ok(FileWithBar {
+        file: Box::new(file),
+        waiting,
+    })
+}
+
+/// The first bytes of a file. `None`: it cannot be read, or it is a pipe, which must not be read twice.
+pub(crate) fn head(path: &Path, most: u64) -> Option<Vec<u8>> {
+    let file: Box<dyn Read> = match given(path) {
+        Some(given) => given.open(),
+        None if path.is_file() => Box::new(File::open(path).ok()?),
+        None => return None,
+    };
+    let mut head = Vec::new();
+    file.take(most).read_to_end(&mut head).ok()?;
+    Some(head)
+}
+
+/// A file that the system does not have: a page has none.
+pub trait Given: Send + Sync {
+    /// Its bytes from the start.
+    fn open(&self) -> Box<dyn Read + Send>;
+
+    /// Number of its bytes.
+    fn length(&self) -> u64;
+}
+
+/// The file that was given last.
+static GIVEN: Mutex<Option<(PathBuf, Arc<dyn Given>)>> = Mutex::new(None);
+
+fn locked() -> MutexGuard<'static, Option<(PathBuf, Arc<dyn Given>)>> {
+    GIVEN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Gives a file a name, in place of the one that was given before.
+pub(crate) fn give(name: &str, file: Arc<dyn Given>) {
+    *locked() = Some((PathBuf::from(name), file));
+}
+
+fn given(path: &Path) -> Option<Arc<dyn Given>> {
+    let given = locked();
+    let (name, file) = given.as_ref()?;
+    (name == path).then(|| Arc::clone(file))
 }
 
 /// A file that counts the bytes read from it.
 pub(crate) struct FileWithBar {
-    file: File,
+    file: Box<dyn Read + Send>,
     waiting: Waiting,
 }
 

@@ -11,6 +11,7 @@ pub(crate) mod flight;
 pub(crate) mod fly;
 pub(crate) mod grid;
 pub(crate) mod identifier;
+pub(crate) mod hand;
 pub(crate) mod json;
 pub(crate) mod log;
 pub(crate) mod log_gains;

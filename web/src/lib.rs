@@ -1,45 +1,114 @@
-//! The library for a page: messages in JSON, files in chunks.
+//! The program for a page: messages in JSON, and one file that the page reads in pieces.
 //!
-//! The page writes into the transfer buffer ([`transfer`]), then calls [`append`] (bytes of the file) or [`ask`] (a
-//! message, see [`session`]); `ask` leaves its answer in the same buffer. Lengths are in bytes.
-
-pub mod session;
+//! The page writes a message into the buffer ([`buffer`]) and calls [`ask`], which leaves its answer there
+//! ([`answer`]). While it works, it calls three functions of the page: for bytes of the file, for news of its progress, and
+//! before it stops in a panic. Lengths are in bytes, texts are UTF-8.
 
 use std::cell::RefCell;
+use std::io::{self, BufReader, Read};
+use std::sync::Arc;
 
-use session::Session;
+use onecycle_cli::embed::{self, Given, Studio};
 
-thread_local! {
-    static SESSION: RefCell<(Session, Vec<u8>)> = RefCell::default();
+#[link(wasm_import_module = "page")]
+unsafe extern "C" {
+    /// Copies at most `length` bytes of the file from `offset` on to `target`. Returns their number, negative: failed.
+    fn read(offset: f64, target: *mut u8, length: usize) -> i32;
+    /// Hears what goes on: bytes done, and bytes in all, which are negative where nobody knows.
+    fn progress(work: *const u8, length: usize, done: f64, all: f64);
+    /// Hears why the program stops.
+    fn stopped(reason: *const u8, length: usize);
 }
 
-/// Makes the transfer buffer `length` bytes long and returns its address.
+/// Bytes asked for at once.
+const PIECE: usize = 1 << 20;
+
+/// The file of the page.
+struct File {
+    length: u64,
+}
+
+impl Given for File {
+    fn open(&self) -> Box<dyn Read + Send> {
+        Box::new(BufReader::with_capacity(PIECE, Reader { offset: 0 }))
+    }
+
+    fn length(&self) -> u64 {
+        self.length
+    }
+}
+
+struct Reader {
+    offset: u64,
+}
+
+impl Read for Reader {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        // SAFETY: the page writes at most `bytes.len()` bytes from `bytes` on.
+        let count = unsafe { read(self.offset as f64, bytes.as_mut_ptr(), bytes.len()) };
+        let count = usize::try_from(count)
+            .map_err(|_| io::Error::other("the browser cannot read the file any more"))?;
+        self.offset += count as u64;
+        Ok(count)
+    }
+}
+
+thread_local! {
+    static STUDIO: RefCell<Studio> = RefCell::default();
+    static BUFFER: RefCell<Vec<u8>> = const { RefCell::new(vec![]) };
+}
+
+/// To be called once, first.
 #[unsafe(no_mangle)]
-pub extern "C" fn transfer(length: usize) -> *mut u8 {
-    SESSION.with_borrow_mut(|(_, buffer)| {
+pub extern "C" fn start() {
+    embed::listen(|work, done, all| {
+        let all = all.map_or(-1.0, |all| all as f64);
+        // SAFETY: the page only reads the text.
+        unsafe { progress(work.as_ptr(), work.len(), done as f64, all) };
+    });
+    std::panic::set_hook(Box::new(|about| {
+        let reason = about.to_string();
+        // SAFETY: the page only reads the text.
+        unsafe { stopped(reason.as_ptr(), reason.len()) };
+    }));
+}
+
+/// Makes the buffer `length` bytes long and returns its address.
+#[unsafe(no_mangle)]
+pub extern "C" fn buffer(length: usize) -> *mut u8 {
+    BUFFER.with_borrow_mut(|buffer| {
         buffer.clear();
         buffer.resize(length, 0);
         buffer.as_mut_ptr()
     })
 }
 
-/// Address of the transfer buffer.
+/// Address of the buffer.
 #[unsafe(no_mangle)]
 pub extern "C" fn answer() -> *const u8 {
-    SESSION.with_borrow(|(_, buffer)| buffer.as_ptr())
+    BUFFER.with_borrow(|buffer| buffer.as_ptr())
 }
 
-/// Appends the transfer buffer to the file.
+fn text() -> String {
+    BUFFER.with_borrow(|buffer| String::from_utf8_lossy(buffer).into_owned())
+}
+
+/// The file of the page has the name in the buffer and this length.
 #[unsafe(no_mangle)]
-pub extern "C" fn append() {
-    SESSION.with_borrow_mut(|(session, buffer)| session.append(buffer));
+pub extern "C" fn file(length: f64) {
+    embed::give(
+        &text(),
+        Arc::new(File {
+            length: length as u64,
+        }),
+    );
 }
 
-/// Answers the message in the transfer buffer there. Returns the length of the answer.
+/// Answers the message in the buffer there. Returns the length of the answer.
 #[unsafe(no_mangle)]
 pub extern "C" fn ask() -> usize {
-    SESSION.with_borrow_mut(|(session, buffer)| {
-        *buffer = session.ask(buffer).to_string().into_bytes();
-        buffer.len()
-    })
+    let message = text();
+    let answer = STUDIO.with_borrow_mut(|studio| studio.ask(&message));
+    BUFFER.replace(answer.into_bytes());
+    BUFFER.with_borrow(Vec::len)
 }

@@ -49,10 +49,8 @@ impl Controllers {
         };
         let at = |peak: &f64| {
             let design = design(model, &base.with_peak(*peak)).ok()?;
-            Some((
-                *peak,
-                assess(model, &design.controller, base.noise.as_ref())?,
-            ))
+            let figures = assess(model, &design.controller, base.noise.as_ref())?;
+            Some((*peak, figures, design.controller))
         };
         Self {
             trade_off: PEAKS.par_iter().filter_map(at).collect(),

@@ -24,7 +24,8 @@ pub(crate) struct Found {
     name: String,
     pub(crate) recording: Recording,
     pub(crate) identification: Identification,
-    choice: Option<Controllers>,
+    pub(crate) choice: Option<Controllers>,
+    pub(crate) of_log: Option<LogLoop>,
     gains: Option<LogGains>,
 }
 
@@ -43,12 +44,7 @@ impl Found {
 
     /// The page, for which designs over limits of `Ms` are made on first use.
     pub(crate) fn page(&mut self) -> String {
-        self.choice = (self.choice.take()).map(|choice| match &self.identification.outcome {
-            Ok(identified) if choice.trade_off.is_empty() => {
-                choice.with_trade_off(&identified.for_design(0).0)
-            }
-            _ => choice,
-        });
+        self.make_trade_off();
         page::identification(
             &self.name,
             &self.recording,
@@ -56,6 +52,16 @@ impl Found {
             self.choice.as_ref(),
             self.gains.as_ref(),
         )
+    }
+
+    /// Makes the designs over limits of `Ms`, once.
+    pub(crate) fn make_trade_off(&mut self) {
+        self.choice = (self.choice.take()).map(|choice| match &self.identification.outcome {
+            Ok(identified) if choice.trade_off.is_empty() => {
+                choice.with_trade_off(&identified.for_design(0).0)
+            }
+            _ => choice,
+        });
     }
 
     pub(crate) fn text(&self) -> String {
@@ -138,7 +144,7 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
     let choice = identified
         .map(|identified| controllers::of_identified(identified, against))
         .map(|choice| choice.in_plant(arguments.design.plant()));
-    let gains = of_log
+    let gains = (of_log.as_ref())
         .map(|of_log| {
             of_log.report(
                 &arguments.write,
@@ -153,6 +159,7 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
         recording,
         identification,
         choice,
+        of_log,
         gains,
     })
 }
@@ -312,7 +319,7 @@ fn refuse_columns(arguments: &Identify) -> Result<(), Failure> {
 }
 
 /// `head`: the first bytes of the standard input, which have been read.
-fn read_table(arguments: &Identify, head: &[u8]) -> Result<Recording, Failure> {
+pub(crate) fn read_table(arguments: &Identify, head: &[u8]) -> Result<Recording, Failure> {
     let column = |name: &Option<String>| name.as_deref().map(ColumnRef::from);
     let mut options = CsvOptions::default();
     options.time_column = column(&arguments.time);

@@ -1,6 +1,5 @@
 //! `onecycle log`: what a flight log holds; and the recording of one of its control loops.
 
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 use std::process::ExitCode;
@@ -11,7 +10,7 @@ use onecycle_link::{ControlLoop, FlightLog, LogError, LogFormat, ReadBack, Signa
 use crate::args::{Log, LogArguments};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print};
-use crate::reading::open_with_bar;
+use crate::reading::{head, open_with_bar};
 use crate::report::log as report;
 use crate::words::log::refusal;
 
@@ -27,10 +26,10 @@ pub(super) enum Piped {
 }
 
 /// Where a flight log comes from.
-pub(super) struct Source<'a> {
-    pub(super) path: &'a Path,
+pub(crate) struct Source<'a> {
+    pub(crate) path: &'a Path,
     /// The log, if it came from the standard input.
-    pub(super) bytes: Option<&'a [u8]>,
+    pub(crate) bytes: Option<&'a [u8]>,
 }
 
 impl Source<'_> {
@@ -44,7 +43,7 @@ impl Source<'_> {
         }
     }
 
-    fn scan(&self) -> Result<FlightLog, Failure> {
+    pub(crate) fn scan(&self) -> Result<FlightLog, Failure> {
         FlightLog::scan(self.open()?).map_err(|error| unreadable(self.path, &error))
     }
 }
@@ -106,15 +105,9 @@ pub(crate) fn run(arguments: &Log) -> Result<ExitCode, Failure> {
 }
 
 /// Whether a file begins like a flight log.
-pub(super) fn is_log(path: &Path) -> bool {
-    // A pipe must not be read twice.
-    if !path.is_file() {
-        return false;
-    }
-    let mut head = Vec::new();
-    let most = LogFormat::HEAD_BYTES as u64;
-    let read = File::open(path).and_then(|file| file.take(most).read_to_end(&mut head));
-    read.is_ok() && LogFormat::detect(&head).is_some()
+pub(crate) fn is_log(path: &Path) -> bool {
+    let head = head(path, LogFormat::HEAD_BYTES as u64);
+    head.is_some_and(|head| LogFormat::detect(&head).is_some())
 }
 
 /// The recording of signals.
@@ -124,7 +117,7 @@ pub(super) fn recording(source: &Source<'_>, signals: &Signals) -> Result<Record
 }
 
 /// The signals of a loop of a flight (from 1).
-pub(super) fn signals(
+pub(crate) fn signals(
     source: &Source<'_>,
     log: &FlightLog,
     flight: usize,
@@ -135,17 +128,22 @@ pub(super) fn signals(
 }
 
 /// What a log holds, and which flight (from 1) is meant.
-pub(super) fn scan_flight(
+pub(crate) fn scan_flight(
     source: &Source<'_>,
     asked: &LogArguments,
 ) -> Result<(FlightLog, usize), Failure> {
     let log = source.scan()?;
+    let flight = longest(&log, asked);
+    Ok((log, flight))
+}
+
+/// The flight (from 1) that is meant: without a choice the longest.
+pub(crate) fn longest(log: &FlightLog, asked: &LogArguments) -> usize {
     let longest = log.flights.iter().enumerate().max_by(|(_, a), (_, b)| {
         let length_s = |flight: &onecycle_link::Flight| flight.span.to_s - flight.span.from_s;
         length_s(a).total_cmp(&length_s(b))
     });
-    let flight = asked.flight.unwrap_or(1 + longest.map_or(0, |(at, _)| at));
-    Ok((log, flight))
+    asked.flight.unwrap_or(1 + longest.map_or(0, |(at, _)| at))
 }
 
 fn unreadable(path: &Path, error: &LogError) -> Failure {

@@ -7,7 +7,7 @@ use onecycle::{
     Specification, Structure, Style, assess, least_margins,
 };
 use onecycle_link::{
-    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, RateLaw, ReadBack, Signals, changes,
+    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, ParameterFiles, RateLaw, ReadBack, Signals, changes,
     files,
 };
 
@@ -112,7 +112,7 @@ impl LogLoop {
 
     /// What the report says, after writing parameters if that was asked for.
     pub(super) fn report(
-        self,
+        &self,
         asked: &WriteArguments,
         recording: &Recording,
         found: &Identification,
@@ -135,7 +135,7 @@ impl LogLoop {
         };
         Ok(LogGains {
             control_loop: self.control_loop,
-            read_back: self.read_back,
+            read_back: self.read_back.clone(),
             overlay,
             written,
         })
@@ -151,21 +151,34 @@ impl LogLoop {
         let (Some(identified), Some(choice)) = (identified, choice) else {
             return Err(words::NOTHING_IDENTIFIED.to_owned());
         };
+        let Some((design, _)) = choice.design() else {
+            return Err(words::NO_DESIGN.to_owned());
+        };
+        if matches!(design.controller, Controller::Autopilot(_)) {
+            return Err(words::NOT_ITS_FORM.to_owned());
+        }
+        self.to_write(design.controller.pid(), asked.step, identified, choice)
+    }
+
+    /// The parameters for this share of the way to the proposed gains with their margins, or why there are none.
+    fn to_write(
+        &self,
+        proposed: Pid,
+        share: f64,
+        identified: &Identified,
+        choice: &Controllers,
+    ) -> Result<Written, String> {
         let read = self.read_back.as_ref().map(ReadBack::agreement);
         if read == Some(Agreement::Differs) {
             return Err(words::CONTRADICTED.to_owned());
         }
-        let Some((design, _)) = choice.design() else {
-            return Err(words::NO_DESIGN.to_owned());
-        };
         let no_gains = || words::no_gains(self.control_loop);
         let old = LoopGains::in_force(&self.flight, self.control_loop).ok_or_else(no_gains)?;
-        let proposed = design.controller.pid();
-        if proposed.filter_s > 0.0 || matches!(design.controller, Controller::Autopilot(_)) {
+        if proposed.filter_s > 0.0 {
             return Err(words::NOT_ITS_FORM.to_owned());
         }
         let proposed = LoopGains::new(proposed.kp, proposed.ki, proposed.kd);
-        let wanted = old.toward(proposed, asked.step);
+        let wanted = old.toward(proposed, share);
         let changes = changes(&self.flight, self.control_loop, wanted)
             .map_err(|error| words::unwritable(&error))?;
         if changes.is_empty() {
@@ -189,11 +202,23 @@ impl LogLoop {
             path: PathBuf::new(),
             restore: PathBuf::new(),
             changes,
-            share: asked.step,
+            share,
             overshoot: simulated,
             figures,
             least,
         })
+    }
+
+    /// The files that put gains in force which somebody chose by hand, and the old ones again; or why there are none.
+    pub(crate) fn files_of(
+        &self,
+        chosen: Pid,
+        identified: &Identified,
+        choice: &Controllers,
+    ) -> Result<ParameterFiles, String> {
+        let to_write = self.to_write(chosen, 1.0, identified, choice)?;
+        let files = files(&self.flight, &to_write.changes);
+        files.ok_or_else(|| words::no_gains(self.control_loop))
     }
 
     /// Writes both files or none.

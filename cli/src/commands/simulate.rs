@@ -6,6 +6,7 @@ mod plan;
 
 use std::io::{self, Write};
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle_link::CsvWriter;
@@ -25,23 +26,11 @@ pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
         print(&text)?;
         return Ok(ExitCode::from(exit::DONE));
     }
-    let head = head::head(arguments, &plan);
-    let comments: Vec<&str> = head.lines().collect();
     let mut end = Ok(());
     let mut simulate = |file: &mut dyn Write| {
-        let written = write(arguments, &plan, &comments, file);
-        match written {
-            Ok(result) => {
-                end = result;
-                // What follows must not replace a file by half a simulation.
-                if end.is_ok() {
-                    Ok(())
-                } else {
-                    Err(io::ErrorKind::Other.into())
-                }
-            }
-            Err(reason) => Err(reason),
-        }
+        let (result, written) = simulated(arguments, &plan, file);
+        end = result;
+        written
     };
     let path = arguments.out.as_ref();
     let written = match path.filter(|path| path.as_os_str() != "-") {
@@ -51,6 +40,36 @@ pub(crate) fn run(arguments: &Simulate) -> Result<ExitCode, Failure> {
     drop(waiting);
     end.and(written)?;
     Ok(ExitCode::from(exit::DONE))
+}
+
+/// The intervals to expect.
+pub(crate) fn expected(arguments: &Simulate) -> Result<String, Failure> {
+    expect::text(arguments, &Plan::new(arguments)?)
+}
+
+/// The recording as CSV.
+pub(crate) fn csv(arguments: &Simulate) -> Result<Vec<u8>, Failure> {
+    let plan = Plan::new(arguments)?;
+    let mut bytes = Vec::new();
+    let (end, written) = simulated(arguments, &plan, &mut bytes);
+    end?;
+    let failed = |reason| Failure::output(Path::new("the recording"), reason);
+    written.map_err(failed).map(|()| bytes)
+}
+
+/// Simulates and writes. The output has failed where the simulation has, so that half a simulation replaces no file.
+fn simulated(
+    arguments: &Simulate,
+    plan: &Plan,
+    file: &mut dyn Write,
+) -> (Result<(), Failure>, io::Result<()>) {
+    let head = head::head(arguments, plan);
+    let comments: Vec<&str> = head.lines().collect();
+    match write(arguments, plan, &comments, file) {
+        Ok(Ok(())) => (Ok(()), Ok(())),
+        Ok(Err(failure)) => (Err(failure), Err(io::ErrorKind::Other.into())),
+        Err(reason) => (Ok(()), Err(reason)),
+    }
 }
 
 /// Simulates and writes row by row. The inner error is one of the simulation: the output goes beyond all limits.

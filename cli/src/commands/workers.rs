@@ -1,12 +1,11 @@
 //! A pool of threads that work on pieces, with a progress bar.
 
-use indicatif::ProgressBar;
 use onecycle_lab::workers;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::failure::Failure;
-use crate::output::progress_bar;
+use crate::output::{ProgressBar, progress_bar};
 
 pub(crate) struct Workers {
     pool: ThreadPool,

@@ -4,7 +4,6 @@
 
 use std::fmt::Write;
 
-use super::bundle;
 use super::escape::escaped;
 use super::plot::Figure;
 
@@ -149,15 +148,16 @@ pub(crate) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-         <title>{title}</title>\n<style>\n{STYLE}</style>\n{}\n</head>\n<body>\n\
+         <title>{title}</title>\n<style>\n{STYLE}</style>\n<script>{PLOTLY}</script>\n</head>\n<body>\n\
          <header><h1>{title}</h1><button id=\"theme\" type=\"button\">light / dark</button></header>\n\
          {lead}<nav>{links}</nav>\n\
          <noscript><p class=\"note\">The plots need JavaScript; the tables work without.</p></noscript>\n\
-         <main>\n{body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n",
-        bundle::script()
+         <main>\n{body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
     )
 }
 
+/// plotly.js with the kinds of plots that pages have: build.rs.
+const PLOTLY: &str = include_str!(concat!(env!("OUT_DIR"), "/plotly.js"));
 const STYLE: &str = include_str!("page.css");
 const SCRIPT: &str = include_str!("page.js");
 

@@ -1,6 +1,6 @@
 //! The JSON reports; docs/identify-json.md is their description. Infinite values are null.
 
-mod controllers;
+pub(super) mod controllers;
 mod record;
 
 use std::borrow::Cow;
@@ -207,7 +207,7 @@ struct Response {
 }
 
 #[derive(Serialize)]
-struct Controller {
+pub(super) struct Controller {
     form: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
     style: Option<&'static str>,
@@ -483,7 +483,7 @@ fn of_style(design: &Design, style: Style) -> Controller {
     }
 }
 
-fn controller(controller: &onecycle::Controller) -> Controller {
+pub(super) fn controller(controller: &onecycle::Controller) -> Controller {
     let pid = controller.pid();
     let gains = match controller {
         onecycle::Controller::Autopilot(autopilot) => Some(autopilot.gains),

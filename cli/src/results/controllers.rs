@@ -11,7 +11,7 @@ pub(crate) struct Controllers {
     pub(crate) rows: Vec<Row>,
     pub(crate) against: Option<Against>,
     /// Designs for the most probable process over limits of `Ms`, in ascending order. Empty unless a page is drawn.
-    pub(crate) trade_off: Vec<(f64, Assessment)>,
+    pub(crate) trade_off: Vec<(f64, Assessment, Controller)>,
     /// Whether the model comes from a recording, whose noise and sample period complete the requirements.
     pub(crate) is_recorded: bool,
     /// The controller of a process control system in which the gains are typed, and its ranges.

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use indicatif::ProgressBar;
 use onecycle_lab::learn::onnx;
 use onecycle_lab::learn::train::{Dataset, Loss, Network, Trainer};
 use onecycle_lab::paper::classifier::{
@@ -18,7 +17,7 @@ use crate::args;
 use crate::commands::workers::{Quiet, Workers};
 use crate::failure::{Failure, exit};
 use crate::journal::Journal;
-use crate::output::{print, progress_bar, write_file, write_text};
+use crate::output::{ProgressBar, print, progress_bar, write_file, write_text};
 use crate::report::classifier as report;
 use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
 

@@ -37,8 +37,9 @@ pub(super) struct Proposed {
     error: Option<String>,
 }
 
+/// Figures of a controller.
 #[derive(Serialize)]
-struct Figures {
+pub(crate) struct Figures {
     margins: Option<MarginsReport>,
     step: Option<Step>,
     load_iae: Option<f64>,
@@ -58,7 +59,7 @@ pub(super) struct AgainstReport {
 
 /// Margins at the bad end of the central 90 % of the posterior.
 #[derive(Serialize)]
-struct Least {
+pub(crate) struct Least {
     stable: f64,
     ms: Option<f64>,
     phase_margin_deg: f64,
@@ -92,7 +93,7 @@ pub(super) fn against(choice: &Controllers) -> Option<AgainstReport> {
 }
 
 impl Figures {
-    fn of(figures: Option<&Assessment>) -> Self {
+    pub(crate) fn of(figures: Option<&Assessment>) -> Self {
         let finite = |value: f64| value.is_finite().then_some(value);
         Self {
             margins: figures.map(|of| margins(&of.margins, None, Some(of))),

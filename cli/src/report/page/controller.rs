@@ -1,6 +1,6 @@
 //! The answer of the page: the chosen controller in the forms to type in, the others beside it, the trade-off.
 
-use onecycle::{Assessment, Design, Interval};
+use onecycle::{Assessment, Controller, Design, Interval};
 
 use super::significant;
 use crate::pages::page::{self, Cell, Section};
@@ -114,7 +114,7 @@ fn table(choice: &Controllers) -> String {
 pub(super) fn trade_off(choice: &Controllers) -> Option<Section> {
     let (_, chosen) = choice.design()?;
     let curve = |value: fn(&Assessment) -> Option<f64>| -> Vec<(f64, f64)> {
-        let at = |(peak, figures): &(f64, Assessment)| {
+        let at = |(peak, figures, _): &(f64, Assessment, Controller)| {
             value(figures)
                 .filter(|value| value.is_finite())
                 .map(|value| (*peak, value))

@@ -17,10 +17,10 @@ use plotly::Plot;
 /// Positions in the list of the kinds that pages draw besides curves: bar, heatmap, contour.
 const KINDS: [usize; 3] = [0, 2, 6];
 
-/// The script element with plotly.js; the script for formulas that the crate adds is left out.
-pub(super) fn script() -> String {
+/// The script; the one for formulas that the crate adds is left out.
+pub(crate) fn script() -> String {
     let sources = Plot::offline_js_sources();
-    format!("<script>{}</script>", needed(plotly(&sources)))
+    needed(plotly(&sources))
 }
 
 /// The first script of the crate.

@@ -1,0 +1,318 @@
+//! What a page asks of the library, in JSON: one file, its signals, its process, and gains moved by hand.
+//!
+//! | message | answer |
+//! | --- | --- |
+//! | `{"do":"open","file"}` | `{log}`: the report of `onecycle log --json`, null for a table |
+//! | `{"do":"signals","options"}` | `{samples, span_s, names, units, parts, notes}`: the signals of a loop or a table |
+//! | `{"do":"view","from_s","to_s","points"}` | `{time_s, input, output, set_point}` of that time, thinned |
+//! | `{"do":"identify","options"}` | the report of `onecycle identify --json` |
+//! | `{"do":"survey","options"}` | that of `onecycle identify LOG --json`: every loop of a flight |
+//! | `{"do":"json"}`, `{"do":"page"}` | `{text}`: the report as the program writes it |
+//! | `{"do":"trade_off"}` | designs from calm to sharp: limit of `Ms`, gains, figures |
+//! | `{"do":"judge","gains","bands"}` | figures, least margins, curves of the gains; with bands if they are asked for |
+//! | `{"do":"parameters","gains"}` | `{apply, restore, ending}`: files for the firmware |
+//! | `{"do":"simulate","options"}` | `{text}`: a recording as CSV; with `--expect` the intervals to expect |
+//!
+//! Options are those of the command line. An answer with `error` has one sentence. Infinite numbers are null. Times are in
+//! seconds, signals in the units of the file.
+
+use std::path::Path;
+
+use onecycle::{Controller, Model, Pid};
+use onecycle_link::FlightLog;
+use serde_json::{Value, json};
+
+use super::{arguments_of_identify, parsed, plain};
+use crate::args::{Command, Identify};
+use crate::commands::log::{self, Source};
+use crate::commands::{flight, identify, simulate};
+use crate::failure::Failure;
+use crate::report::{hand, log as log_report};
+use crate::words;
+
+/// Processes of the posterior over which gains are judged at every move: a few milliseconds.
+const FEW_DRAWS: usize = 20;
+/// Those from which bands are drawn once the gains rest.
+const DRAWS: usize = 60;
+
+/// The work on one file.
+#[derive(Default)]
+pub struct Studio {
+    file: String,
+    log: Option<FlightLog>,
+    signals: Option<Signals>,
+    found: Option<identify::Found>,
+    draws: Vec<Model>,
+}
+
+/// The signals of a loop or a table.
+struct Signals {
+    time_s: Vec<f64>,
+    input: Vec<f64>,
+    output: Vec<f64>,
+    set_point: Option<Vec<f64>>,
+    about: Value,
+}
+
+impl Studio {
+    /// Answers a message.
+    pub fn ask(&mut self, message: &str) -> String {
+        let answer = match serde_json::from_str::<Value>(message) {
+            Err(error) => Err(format!("the message is not JSON: {error}")),
+            Ok(message) => self.answer(&message),
+        };
+        let answer = answer.unwrap_or_else(|error| json!({ "error": words::sentence(&error) }));
+        answer.to_string()
+    }
+
+    fn answer(&mut self, message: &Value) -> Result<Value, String> {
+        let failed = |failure: Failure| failure.to_string();
+        let options = options(message);
+        match message["do"].as_str().unwrap_or_default() {
+            "open" => self.open(message["file"].as_str().unwrap_or_default()),
+            "signals" => {
+                let arguments = arguments_of_identify(&self.file, &options)?;
+                let signals = self.read(&arguments).map_err(failed)?;
+                let about = signals.about.clone();
+                self.signals = Some(signals);
+                Ok(about)
+            }
+            "view" => self.view(message),
+            "identify" => {
+                let arguments = arguments_of_identify(&self.file, &options)?;
+                (self.found, self.draws) = (None, vec![]);
+                let found = identify::find(&arguments, None).map_err(failed)?;
+                let report = value(&found.json(false));
+                if let Ok(identified) = &found.identification.outcome {
+                    self.draws = identified.posterior.models(DRAWS);
+                }
+                self.found = Some(found);
+                Ok(report)
+            }
+            "survey" => {
+                let arguments = arguments_of_identify(&self.file, &options)?;
+                let asked = identify::checked(&arguments).map_err(failed)?;
+                let surveyed = flight::Surveyed::of(&arguments, &asked).map_err(failed)?;
+                Ok(value(&surveyed.json()))
+            }
+            "json" => Ok(json!({ "text": self.found()?.json(false) })),
+            "page" => {
+                let found = self.found.as_mut().ok_or(NOTHING)?;
+                Ok(json!({ "text": found.page() }))
+            }
+            "trade_off" => {
+                let found = self.found.as_mut().ok_or(NOTHING)?;
+                found.make_trade_off();
+                let choice = found.choice.as_ref().ok_or(NOTHING)?;
+                Ok(hand::trade_off(&choice.trade_off))
+            }
+            "judge" => self.judge(message),
+            "parameters" => self.parameters(message),
+            "simulate" => simulated(&options),
+            other => Err(format!("there is no message {other:?}")),
+        }
+    }
+
+    fn open(&mut self, file: &str) -> Result<Value, String> {
+        *self = Self {
+            file: file.to_owned(),
+            ..Self::default()
+        };
+        let path = Path::new(file);
+        if !log::is_log(path) {
+            return Ok(json!({ "log": null }));
+        }
+        let source = Source { path, bytes: None };
+        let log = source.scan().map_err(|failure| failure.to_string())?;
+        let report = value(&log_report::json(file, &log, None));
+        self.log = Some(log);
+        Ok(json!({ "log": report }))
+    }
+
+    /// The whole signals, of which a part is to be chosen.
+    fn read(&self, arguments: &Identify) -> Result<Signals, Failure> {
+        let Some(log) = &self.log else {
+            let recording = identify::read_table(arguments, &[])?;
+            let columns = recording.columns();
+            let named = [&columns.input, &columns.output];
+            let notes: Vec<String> = (recording.notes().iter())
+                .map(words::recording::note)
+                .collect();
+            return Ok(Signals::new(
+                recording.time_s().to_vec(),
+                [recording.input().to_vec(), recording.output().to_vec()],
+                recording.set_point().map(<[f64]>::to_vec),
+                json!({
+                    "names": named.map(|column| &column.name),
+                    "units": named.map(|column| &column.unit),
+                    "parts": [],
+                    "notes": notes,
+                }),
+            ));
+        };
+        let source = Source {
+            path: Path::new(&self.file),
+            bytes: None,
+        };
+        let number = log::longest(log, &arguments.log);
+        let signals = log::signals(&source, log, number, arguments.log.control_loop())?;
+        let flight = log.flights.get(number.saturating_sub(1));
+        let parts = flight.map_or(vec![], |flight| flight.stretches(&signals));
+        let parts: Vec<[f64; 2]> = parts.iter().map(|part| [part.from_s, part.to_s]).collect();
+        let about = json!({
+            "names": signals.names, "units": signals.units, "parts": parts, "notes": [],
+        });
+        Ok(Signals::new(
+            signals.time_s,
+            [signals.input, signals.output],
+            signals.set_point,
+            about,
+        ))
+    }
+
+    fn view(&self, message: &Value) -> Result<Value, String> {
+        let signals = self.signals.as_ref().ok_or("no signals are open")?;
+        let points = message["points"].as_u64().unwrap_or(1000).clamp(16, 8000) as usize;
+        let from_s = message["from_s"].as_f64().unwrap_or(f64::NEG_INFINITY);
+        let to_s = message["to_s"].as_f64().unwrap_or(f64::INFINITY);
+        Ok(signals.view(from_s, to_s, points))
+    }
+
+    fn found(&self) -> Result<&identify::Found, String> {
+        self.found.as_ref().ok_or_else(|| NOTHING.to_owned())
+    }
+
+    /// The controller with gains chosen by hand: filters and sampling are those of the proposal.
+    fn chosen(&self, message: &Value) -> Result<Pid, String> {
+        let choice = self.found()?.choice.as_ref().ok_or(NOTHING)?;
+        let gain = |name: &str| {
+            let given = message["gains"][name].as_f64();
+            given.ok_or_else(|| format!("{name} must be a number"))
+        };
+        let proposed = choice.design().map(|(design, _)| design.controller.pid());
+        let mut pid = proposed.unwrap_or(Pid::new(0.0, 0.0, 0.0));
+        (pid.kp, pid.ki, pid.kd) = (gain("kp")?, gain("ki")?, gain("kd")?);
+        Ok(pid
+            .with_filter_s(gain("filter_s")?)
+            .with_execution(choice.asked.execution))
+    }
+
+    fn judge(&self, message: &Value) -> Result<Value, String> {
+        let found = self.found()?;
+        let (Ok(identified), Some(choice)) = (&found.identification.outcome, &found.choice) else {
+            return Err(NOTHING.to_owned());
+        };
+        let (model, _) = identified.for_design(0);
+        let controller = Controller::from(self.chosen(message)?);
+        let noise = choice.asked.noise.as_ref();
+        let with_bands = message["bands"].as_bool().unwrap_or(false);
+        let count = if with_bands { DRAWS } else { FEW_DRAWS };
+        let draws = &self.draws[..self.draws.len().min(count)];
+        let end_s = message["end_s"].as_f64();
+        Ok(hand::judged(&hand::ByHand {
+            model: &model,
+            controller: &controller,
+            noise,
+            draws,
+            with_bands,
+            end_s,
+        }))
+    }
+
+    fn parameters(&self, message: &Value) -> Result<Value, String> {
+        let found = self.found()?;
+        let chosen = self.chosen(message)?;
+        let (Ok(identified), Some(choice)) = (&found.identification.outcome, &found.choice) else {
+            return Err(NOTHING.to_owned());
+        };
+        let no_log = || format!("{} is not a flight log: type the gains in", self.file);
+        let of_log = found.of_log.as_ref().ok_or_else(no_log)?;
+        let files = of_log.files_of(chosen, identified, choice)?;
+        Ok(json!({
+            "apply": files.apply, "restore": files.restore, "ending": files.ending,
+        }))
+    }
+}
+
+const NOTHING: &str = "nothing is identified yet";
+
+impl Signals {
+    fn new(
+        time_s: Vec<f64>,
+        [input, output]: [Vec<f64>; 2],
+        set_point: Option<Vec<f64>>,
+        mut about: Value,
+    ) -> Self {
+        about["samples"] = json!(time_s.len());
+        about["span_s"] = json!([time_s.first(), time_s.last()]);
+        about["has_set_point"] = json!(set_point.is_some());
+        Self {
+            time_s,
+            input,
+            output,
+            set_point,
+            about,
+        }
+    }
+
+    /// Of each of `points / 2` equal numbers of rows the least and the largest value, in their order.
+    fn view(&self, from_s: f64, to_s: f64, points: usize) -> Value {
+        let first = self.time_s.partition_point(|&time_s| time_s < from_s);
+        let end = self.time_s.partition_point(|&time_s| time_s <= to_s);
+        let rows = first..end.max(first);
+        let each = rows.len().div_ceil(points / 2).max(1);
+        let thin = |values: &[f64]| -> Vec<[f64; 2]> {
+            let times_s = self.time_s[rows.clone()].chunks(each);
+            let chunks = values[rows.clone()].chunks(each);
+            (times_s.zip(chunks))
+                .flat_map(|(times_s, chunk)| extremes(times_s, chunk))
+                .collect()
+        };
+        json!({
+            "input": thin(&self.input),
+            "output": thin(&self.output),
+            "set_point": self.set_point.as_deref().map(thin),
+        })
+    }
+}
+
+/// Times and values of the least and the largest value that is a number, in the order of time.
+fn extremes(times_s: &[f64], values: &[f64]) -> Vec<[f64; 2]> {
+    let known = times_s.iter().zip(values).filter(|(_, y)| y.is_finite());
+    let points: Vec<[f64; 2]> = known.map(|(&t_s, &y)| [t_s, y]).collect();
+    let by_value = |a: &&[f64; 2], b: &&[f64; 2]| a[1].total_cmp(&b[1]);
+    let (least, most) = (
+        points.iter().min_by(by_value),
+        points.iter().max_by(by_value),
+    );
+    let mut ends: Vec<[f64; 2]> = least.into_iter().chain(most).copied().collect();
+    ends.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    ends.dedup();
+    ends
+}
+
+/// The options of a message.
+fn options(message: &Value) -> Vec<String> {
+    let given = message["options"].as_array().into_iter().flatten();
+    given
+        .filter_map(|option| option.as_str().map(str::to_owned))
+        .collect()
+}
+
+fn simulated(options: &[String]) -> Result<Value, String> {
+    let Command::Simulate(arguments) = parsed("simulate", &[], options)? else {
+        return Err("not the command simulate".to_owned());
+    };
+    if arguments.expect {
+        let expected = simulate::expected(&arguments);
+        let text = expected.map_err(|failure| failure.to_string())?;
+        return Ok(json!({ "text": plain(&text) }));
+    }
+    let csv = simulate::csv(&arguments).map_err(|failure| failure.to_string())?;
+    Ok(json!({ "text": String::from_utf8_lossy(&csv) }))
+}
+
+/// A report that was written as JSON.
+fn value(json: &str) -> Value {
+    serde_json::from_str(json).unwrap_or_default()
+}

@@ -1,0 +1,93 @@
+//! In a page there is no terminal and no thread: progress becomes messages to the page.
+
+use std::borrow::Cow;
+use std::cell::Cell;
+
+/// A page has no terminal.
+pub(crate) fn columns() -> Option<usize> {
+    None
+}
+
+/// A bar that nobody sees: the commands with pieces of work do not run in a page.
+#[derive(Clone, Debug)]
+pub(crate) struct ProgressBar;
+
+/// A bar that nobody sees.
+pub(crate) fn progress_bar(_: u64) -> ProgressBar {
+    ProgressBar
+}
+
+impl ProgressBar {
+    pub(crate) fn set_length(&self, _: u64) {}
+    pub(crate) fn set_position(&self, _: u64) {}
+    pub(crate) fn set_message(&self, _: impl Into<Cow<'static, str>>) {}
+    pub(crate) fn inc(&self, _: u64) {}
+    pub(crate) fn reset(&self) {}
+    pub(crate) fn finish_and_clear(&self) {}
+}
+
+/// Takes the name of the work, the bytes done and, where it is known, the number of bytes in all.
+pub type Listener = fn(&str, u64, Option<u64>);
+
+thread_local! {
+    static LISTENER: Cell<Option<Listener>> = const { Cell::new(None) };
+}
+
+/// Sets who hears of progress.
+pub fn listen(listener: Listener) {
+    LISTENER.set(Some(listener));
+}
+
+/// Bytes between two messages.
+const STEP_BYTES: u64 = 1 << 21;
+
+/// Work that goes on.
+pub(crate) struct Waiting {
+    work: Cow<'static, str>,
+    done: Cell<u64>,
+    told: Cell<u64>,
+    bytes: Option<u64>,
+}
+
+impl Waiting {
+    /// For work of unknown length, named for example `identifying`.
+    pub(crate) fn on(work: impl Into<Cow<'static, str>>) -> Self {
+        Self::told(work.into(), None)
+    }
+
+    /// For work on a known number of bytes.
+    pub(crate) fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
+        Self::told(work.into(), Some(bytes))
+    }
+
+    fn told(work: Cow<'static, str>, bytes: Option<u64>) -> Self {
+        let waiting = Self {
+            work,
+            done: Cell::new(0),
+            told: Cell::new(0),
+            bytes,
+        };
+        waiting.tell(&waiting.work);
+        waiting
+    }
+
+    fn tell(&self, work: &str) {
+        self.told.set(self.done.get());
+        if let Some(listener) = LISTENER.get() {
+            listener(work, self.done.get(), self.bytes);
+        }
+    }
+
+    /// Names the next step of the work.
+    pub(crate) fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
+        self.tell(&work.into());
+    }
+
+    /// Counts bytes as done.
+    pub(crate) fn advance(&self, bytes: u64) {
+        self.done.set(self.done.get() + bytes);
+        if self.done.get() - self.told.get() >= STEP_BYTES {
+            self.tell(&self.work);
+        }
+    }
+}

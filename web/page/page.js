@@ -1,0 +1,521 @@
+"use strict";
+const at = (id) => document.getElementById(id);
+const root = document.documentElement;
+const make = (tag, text, more = {}) => Object.assign(document.createElement(tag), text == null ? {} : { textContent: text }, more);
+
+// Numbers as people read them; JSON has null for infinity.
+const shown = (value, digits = 4) => value == null ? "–" : plots.number(Number(Number(value).toPrecision(digits)));
+
+// ---- The library in its worker -------------------------------------------------------------------------------------
+
+let worker, module, next = 0;
+const asked = new Map();
+const unpacked = async (id) => {
+  const bytes = Uint8Array.from(atob(at(id).textContent), (c) => c.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
+};
+const send = (content) => new Promise((done) => { asked.set(++next, done); worker.postMessage({ id: next, ...content }); });
+const ask = (message) => send({ message });
+const start = async () => {
+  worker?.terminate();
+  asked.clear();
+  worker = new Worker(URL.createObjectURL(new Blob([at("worker").textContent], { type: "text/javascript" })));
+  worker.onmessage = ({ data }) => {
+    if (data.work) return progress(data);
+    const done = asked.get(data.id);
+    asked.delete(data.id);
+    done?.(data.answer);
+  };
+  const { error } = await send({ module });
+  if (error) throw new Error(error);
+};
+
+// ---- What is said --------------------------------------------------------------------------------------------------
+
+const say = (text, isBad = false) => { at("state").textContent = text; at("state").className = isBad ? "bad" : ""; };
+let began = 0, isBusy = false;
+const busy = (work) => {
+  isBusy = Boolean(work);
+  at("busy").hidden = !work;
+  for (const id of ["identify", "survey", "simulate", "expect", "loop", "flight"]) at(id).disabled = isBusy;
+  if (work) { began = performance.now(); at("progress").removeAttribute("value"); say(work); }
+};
+const progress = ({ work, done, all }) => {
+  if (!isBusy) return;
+  say(`${work[0].toUpperCase()}${work.slice(1)}.`);
+  if (all > 0) at("progress").value = done / all; else at("progress").removeAttribute("value");
+};
+// Asks for something that takes long. Undefined: it failed, and the page says why.
+const waited = async (work, content) => {
+  busy(work);
+  const answer = await send(content);
+  busy(null);
+  if (answer.stopped) await start();
+  if (answer.error) { say(answer.error, true); return undefined; }
+  return answer;
+};
+const took = () => `${((performance.now() - began) / 1000).toFixed(2)} s`;
+
+// ---- State in the fragment: choices, never data --------------------------------------------------------------------
+
+const kept = new URLSearchParams(location.hash.slice(1));
+const keep = (name, value) => {
+  if (value == null || value === "") kept.delete(name); else kept.set(name, value);
+  history.replaceState(null, "", kept.size ? `#${kept}` : location.pathname + location.search);
+};
+const choices = ["from", "to", "structure", "style", "more"];
+
+// ---- Opening -------------------------------------------------------------------------------------------------------
+
+let file, log, signals, report, view;
+const hideAfter = (id) => {
+  const all = ["recording", "result", "design"];
+  for (const later of all.slice(all.indexOf(id))) at(later).hidden = true;
+};
+const open = async (blob, name) => {
+  hideAfter("recording");
+  file = { blob, name };
+  const answer = await waited(`Reading ${name}.`, { file });
+  if (!answer) return;
+  log = answer.log;
+  at("loops").hidden = !log;
+  at("surveyed").hidden = true;
+  if (log) {
+    at("flight").replaceChildren(...log.flights.map((flight, k) => make("option", `${k + 1}: ${(flight.span_s[1] - flight.span_s[0]).toFixed(0)} s, ${flight.version || flight.firmware}`, { value: k + 1 })));
+    const lengths = log.flights.map(({ span_s: [from, to] }) => to - from);
+    at("flight").value = kept.get("flight") || 1 + lengths.indexOf(Math.max(...lengths));
+    if (!at("flight").value) at("flight").value = 1;
+    at("flight-label").hidden = log.flights.length < 2;
+    fillLoops();
+    if (!at("loop").options.length) return say("The log has no control loop with input and output. Its advice: " + (log.flights[0]?.advice ?? []).join(" "), true);
+  }
+  await readSignals();
+};
+const fillLoops = () => {
+  const flight = log.flights[at("flight").value - 1];
+  const loops = (flight?.loops ?? []).filter((one) => one.input && one.output);
+  at("loop").replaceChildren(...loops.map((one) => make("option", one.name)));
+  if (loops.some((one) => one.name === kept.get("loop"))) at("loop").value = kept.get("loop");
+};
+// The choice of a loop as options of the program.
+const loopOptions = () => {
+  if (!log) return [];
+  const [axis, kind] = at("loop").value.split(" ");
+  const of = kind ? ["--axis", axis, "--loop", kind] : ["--loop", axis];
+  return log.flights.length > 1 ? [...of, "--flight", at("flight").value] : of;
+};
+const words = (text) => (text.match(/"[^"]*"|\S+/g) ?? []).map((word) => word.replace(/^"|"$/g, ""));
+const options = () => {
+  const all = [...loopOptions(), ...words(at("more").value)];
+  for (const id of ["structure", "style", "from", "to"]) if (at(id).value !== "") all.push(`--${id}`, at(id).value);
+  return all;
+};
+const readSignals = async () => {
+  hideAfter("result");
+  for (const id of choices) at(id).value = kept.get(id) ?? "";
+  const answer = await waited("Reading the signals.", { message: { do: "signals", options: [...loopOptions(), ...words(at("more").value)] } });
+  // The names of columns can be given as options.
+  at("recording").hidden = !answer && Boolean(log) && !at("loop").options.length;
+  at("signals").hidden = !answer;
+  if (!answer) { signals = undefined; return; }
+  signals = answer;
+  say(`${file.name}: ${signals.samples.toLocaleString("en")} samples, ${shown(signals.span_s[1] - signals.span_s[0])} s.`);
+  at("notes").textContent = signals.notes.join(" ");
+  view = signals.span_s;
+  await drawSignals();
+};
+
+// ---- Signals, and a stretch chosen with the mouse ------------------------------------------------------------------
+
+let thinned, frame;
+const drawSignals = async () => {
+  const [from_s, to_s] = view;
+  const points = Math.max(200, 2 * at("signals").clientWidth);
+  thinned = await ask({ do: "view", from_s, to_s, points });
+  if (thinned.error) return say(thinned.error, true);
+  redrawSignals();
+};
+const redrawSignals = () => {
+  if (!thinned || !signals) return;
+  const unit = (k) => signals.names[k] + (signals.units[k] ? ` (${signals.units[k]})` : "");
+  const spans = signals.parts.map(([from, to]) => ({ from, to }));
+  const chosen = stretch();
+  if (chosen) spans.push({ from: chosen[0], to: chosen[1], chosen: true });
+  const set = thinned.set_point ?? [];
+  const panels = [
+    { title: "Output and set-point over time", y: unit(1), curves: [{ points: set, hue: "reference" }, { points: thinned.output, hue: "model" }] },
+    { title: "Input over time", y: unit(0), curves: [{ points: thinned.input, hue: "input" }] },
+  ];
+  if (at("signals").childElementCount !== 2) at("signals").replaceChildren(make("div", null, { id: "signals-0" }), make("div", null, { id: "signals-1" }));
+  panels.forEach((panel, k) => {
+    frame = plots.draw(at(`signals-${k}`), { ...panel, x: "time (s)", xs: view, ys: plots.range(panel.curves.map((c) => c.points)), spans, height: k ? 170 : 230 });
+  });
+};
+// The chosen stretch, or undefined.
+const stretch = () => {
+  const [from, to] = ["from", "to"].map((id) => at(id).value === "" ? null : Number(at(id).value));
+  return from == null && to == null ? undefined : [from ?? signals.span_s[0], to ?? signals.span_s[1]];
+};
+const choose = (from, to) => {
+  at("from").value = from ?? ""; at("to").value = to ?? "";
+  keep("from", from); keep("to", to);
+  redrawSignals();
+};
+let dragged = null;
+const time = (event) => {
+  const box = at("signals-0").getBoundingClientRect();
+  const share = (event.clientX - box.left - frame.left) / frame.width;
+  return view[0] + Math.min(Math.max(share, 0), 1) * (view[1] - view[0]);
+};
+at("signals").addEventListener("pointerdown", (event) => { if (frame && event.button === 0) { dragged = time(event); at("signals").setPointerCapture(event.pointerId); } });
+at("signals").addEventListener("pointermove", (event) => {
+  if (dragged == null) return;
+  const [a, b] = [dragged, time(event)].sort((x, y) => x - y);
+  if (b - a > 0.003 * (view[1] - view[0])) choose(Number(a.toPrecision(7)), Number(b.toPrecision(7)));
+});
+for (const end of ["pointerup", "pointercancel"]) at("signals").addEventListener(end, () => { dragged = null; });
+for (const id of ["from", "to"]) at(id).onchange = () => { keep(id, at(id).value); redrawSignals(); };
+at("whole").onclick = () => { choose(null, null); view = signals.span_s; drawSignals(); };
+at("zoom").onclick = () => { const chosen = stretch(); view = chosen && chosen[1] > chosen[0] ? chosen : signals.span_s; drawSignals(); };
+for (const id of ["structure", "style"]) at(id).onchange = () => keep(id, at(id).value);
+at("more").onchange = () => { keep("more", at("more").value); if (!log) readSignals(); };
+at("loop").onchange = () => { keep("loop", at("loop").value); keep("from"); keep("to"); readSignals(); };
+at("flight").onchange = () => { keep("flight", at("flight").value); fillLoops(); keep("from"); keep("to"); readSignals(); };
+
+// ---- Tables --------------------------------------------------------------------------------------------------------
+
+const row = (cells) => {
+  const line = make("tr");
+  cells.forEach((cell, k) => line.append(k ? make("td", cell) : make("th", cell, { scope: "row" })));
+  return line;
+};
+at("survey").onclick = async () => {
+  const flight = log.flights.length > 1 ? ["--flight", at("flight").value] : [];
+  const answer = await waited("Identifying every loop.", { message: { do: "survey", options: flight } });
+  if (!answer) return;
+  say(`Every loop in ${took()}.`);
+  const table = make("table"), body = make("tbody"), head = make("tr");
+  table.append(make("caption", "Loops of the flight; choose one above to see more"), make("thead"), body);
+  for (const name of ["loop", "gain of the process", "delay", "gains in force", "phase margin", "proposed gains", "phase margin"]) head.append(make("th", name, { scope: "col" }));
+  table.tHead.append(head);
+  const gainsOf = (of) => of ? [of.kp, of.ki, of.kd].map((gain) => shown(gain, 3)).join(", ") : "–";
+  const margin = (of) => degrees(of?.phase_margin_deg);
+  for (const one of answer.loops) {
+    const found = one.gain ? `${shown(one.gain[1], 3)} (${shown(one.gain[0], 3)} to ${shown(one.gain[2], 3)}) ${one.gain_unit ?? ""}` : one.parts[0]?.verdict.replaceAll("_", " ") ?? "not excited";
+    body.append(row([one.name, found, seconds(one.delay_s), gainsOf(one.in_force), margin(one.in_force), gainsOf(one.proposed), margin(one.proposed)]));
+  }
+  at("surveyed").replaceChildren(table);
+  at("surveyed").hidden = false;
+};
+
+// ---- Identification ------------------------------------------------------------------------------------------------
+
+at("identify").onclick = async () => {
+  hideAfter("result");
+  const answer = await waited("Identifying.", { message: { do: "identify", options: options() } });
+  if (!answer) return;
+  report = answer;
+  showResult();
+};
+const showResult = () => {
+  const isFound = report.verdict.kind === "identified";
+  say(`${isFound ? "Identified" : "No process identified"} in ${took()}.`);
+  const found = report.process ?? {};
+  at("verdict").className = isFound ? "verdict" : "verdict no";
+  at("verdict").textContent = isFound ? `Identified: ${report.structure}.` : `No process identified: ${report.verdict.message}.`;
+  at("advice").textContent = report.verdict.advice ?? "";
+  const rows = Object.entries(found).filter(([, value]) => value && typeof value === "object" && "low" in value);
+  at("parameters").hidden = !rows.length;
+  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([name, shown(value.estimate), shown(value.low), shown(value.high)])));
+  const groups = [["About the recording", report.remarks.filter((_, k) => report.remark_about[k] === "recording")], ["Other remarks", report.remarks.filter((_, k) => report.remark_about[k] !== "recording")], ["Reading the file", report.notes]];
+  at("remarks").replaceChildren(...groups.filter(([, all]) => all.length).flatMap(([title, all]) => {
+    const list = make("ul");
+    list.append(...all.map((one) => make("li", one)));
+    return [make("h3", title), list];
+  }));
+  at("report").open = false;
+  at("frame").removeAttribute("srcdoc");
+  at("result").hidden = false;
+  at("verdict").focus({ preventScroll: true });
+  showDesign();
+};
+const save = (text, name) => {
+  const link = make("a", null, { href: URL.createObjectURL(new Blob([text])), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+};
+const stem = () => file.name.replace(/\.[^.]*$/, "");
+at("save-json").onclick = async () => save((await ask({ do: "json" })).text, `${stem()}.json`);
+const page = () => waited("Drawing the report.", { message: { do: "page" } });
+at("save-report").onclick = async () => { const answer = await page(); if (answer) { say("The report is saved."); save(answer.text, `${stem()}.html`); } };
+at("report").ontoggle = async () => {
+  if (!at("report").open || at("frame").hasAttribute("srcdoc")) return;
+  const answer = await page();
+  if (!answer) return;
+  say("The report is drawn.");
+  at("frame").onload = () => {
+    const inside = at("frame").contentDocument;
+    themed();
+    const fit = () => { at("frame").style.height = `${inside.body.scrollHeight + 40}px`; };
+    new ResizeObserver(fit).observe(inside.body);
+    fit();
+  };
+  at("frame").srcdoc = answer.text;
+};
+
+// ---- Controller by hand --------------------------------------------------------------------------------------------
+
+const NAMES = ["kp", "ki", "kd", "filter_s"], LABELS = { kp: "Kp", ki: "Ki", kd: "Kd", filter_s: "filter (s)" };
+const STEPS = 1000, DECADES = 3;
+let gains, proposal, against, past = [], future = [], scale, designs = [];
+const only = (controller) => Object.fromEntries(NAMES.map((name) => [name, controller[name] ?? 0]));
+const showDesign = async () => {
+  at("design").hidden = !report.controllers;
+  if (!report.controllers) return;
+  const first = report.controller ?? report.controllers.find((one) => one.controller)?.controller ?? report.against?.controller ?? { kp: 0, ki: 0, kd: 0, filter_s: 0 };
+  proposal = only(first);
+  [past, future, designs] = [[], [], []];
+  const crossover = report.margins?.gain_crossover_rad_per_s ?? 1, kp = proposal.kp || 1;
+  // Middle of a slider whose proposed gain is zero.
+  scale = { kp, ki: proposal.ki || 0.1 * kp * crossover, kd: proposal.kd || 0.1 * kp / crossover, filter_s: proposal.filter_s || 0.05 / crossover };
+  buildSliders();
+  at("save-parameters").hidden = !log;
+  at("exported").textContent = "";
+  against = report.against ? { name: "gains in force", gains: only(report.against.controller) } : { name: "proposed gains", gains: proposal };
+  await judgeAgainst();
+  const from = NAMES.every((name) => kept.has(name)) ? Object.fromEntries(NAMES.map((name) => [name, Number(kept.get(name))])) : proposal;
+  use(Object.values(from).every(Number.isFinite) ? from : proposal);
+  at("calm").disabled = true;
+  const of = report;
+  const answer = await ask({ do: "trade_off" });
+  if (of !== report || answer.error || !answer.length) return;
+  designs = answer;
+  Object.assign(at("calm"), { max: designs.length - 1, disabled: false });
+  showCalm();
+};
+const judgeAgainst = async () => {
+  against.judged = await ask({ do: "judge", gains: against.gains });
+  at("against-name").textContent = at("against-head").textContent = against.name;
+};
+// A slider: zero on its left, else a logarithmic scale about the proposal.
+const position = (name, value) => value === 0 ? 0 : Math.min(Math.max(STEPS * (0.5 + Math.log10(Math.abs(value / scale[name])) / DECADES), 1), STEPS);
+const valueAt = (name, place) => place === 0 ? 0 : scale[name] * 10 ** (DECADES * (place / STEPS - 0.5));
+const buildSliders = () => at("gains").replaceChildren(...NAMES.map((name) => {
+  const line = make("div", null, { className: "gain" });
+  const slide = make("input", null, { type: "range", id: `slide-${name}`, min: 0, max: STEPS, step: 1 });
+  const exact = make("input", null, { type: "number", id: `exact-${name}`, step: "any" });
+  exact.setAttribute("aria-label", `${LABELS[name]}, exactly`);
+  slide.oninput = () => { remember(slide); use({ ...gains, [name]: Number(valueAt(name, Number(slide.value)).toPrecision(4)) }); };
+  slide.onchange = () => { slide.isMoving = false; };
+  exact.onchange = () => { if (exact.value !== "" && Number.isFinite(Number(exact.value))) { remember(exact); exact.isMoving = false; use({ ...gains, [name]: Number(exact.value) }); } };
+  line.append(make("label", LABELS[name], { htmlFor: slide.id }), slide, exact);
+  return line;
+}));
+// One step of undo for a whole move of a slider.
+const remember = (control) => { if (control.isMoving) return; control.isMoving = true; past.push(gains); future = []; };
+let isAsking = false, wanted = null, rest;
+const use = async (to) => {
+  gains = to;
+  at("undo").disabled = !past.length; at("redo").disabled = !future.length;
+  for (const name of NAMES) {
+    at(`slide-${name}`).value = position(name, gains[name]);
+    at(`slide-${name}`).setAttribute("aria-valuetext", shown(gains[name]));
+    if (document.activeElement !== at(`exact-${name}`)) at(`exact-${name}`).value = Number(gains[name].toPrecision(6));
+    keep(name, gains[name]);
+  }
+  showCalm();
+  clearTimeout(rest);
+  wanted = { do: "judge", gains };
+  if (isAsking) return;
+  isAsking = true;
+  while (wanted) {
+    const message = wanted;
+    wanted = null;
+    const from = performance.now();
+    const answer = await ask(message);
+    drawDesign(answer);
+    document.body.dataset.latencyMs = performance.now() - from;
+    if (!wanted && !message.bands) {
+      clearTimeout(rest);
+      rest = setTimeout(() => { wanted ??= { ...message, bands: true }; if (!isAsking) useWanted(); }, 150);
+    }
+  }
+  isAsking = false;
+};
+const useWanted = async () => {
+  isAsking = true;
+  while (wanted) { const message = wanted; wanted = null; drawDesign(await ask(message)); }
+  isAsking = false;
+};
+const same = (a, b) => NAMES.every((name) => Math.abs(a[name] - b[name]) <= 1e-4 * Math.abs(b[name]));
+const showCalm = () => {
+  if (!designs.length || !gains) return;
+  const now = designs.findIndex(({ controller }) => same(gains, only(controller)));
+  if (now >= 0) at("calm").value = now;
+  at("calm-text").textContent = now >= 0 ? `Ms at most ${designs[now].ms_limit}` : "by hand";
+};
+at("calm").oninput = () => { remember(at("calm")); use(only(designs[at("calm").value].controller)); };
+at("calm").onchange = () => { at("calm").isMoving = false; };
+const change = (to) => { past.push(gains); future = []; use(to); };
+at("proposed").onclick = () => change(proposal);
+const undo = () => { if (past.length) { future.push(gains); use(past.pop()); } };
+const redo = () => { if (future.length) { past.push(gains); use(future.pop()); } };
+at("undo").onclick = undo;
+at("redo").onclick = redo;
+document.addEventListener("keydown", (event) => {
+  if (!(event.ctrlKey || event.metaKey) || event.key.toLowerCase() !== "z" || at("design").hidden || /^(text|number)$/.test(event.target.type)) return;
+  event.preventDefault();
+  if (event.shiftKey) redo(); else undo();
+});
+at("compare").onclick = async () => { against = { name: "kept gains", gains }; await judgeAgainst(); use(gains); };
+const degrees = (value) => value == null ? "–" : `${value.toFixed(1)}°`;
+const percent = (value) => value == null ? "–" : `${(100 * value).toFixed(0)} %`;
+const seconds = (value) => value == null ? "–" : value < 0.1 ? `${shown(1000 * value, 3)} ms` : `${shown(value, 3)} s`;
+const FIGURES = [
+  ["stable", (of) => of.is_stable ? "yes" : "no"],
+  ["phase margin", (of) => degrees(of.figures.margins?.phase_margin_deg)],
+  ["gain margin", (of) => shown(of.figures.margins?.gain_margin, 3)],
+  ["delay margin", (of) => seconds(of.figures.margins?.delay_margin_s)],
+  ["Ms", (of) => shown(of.figures.margins?.ms, 3)],
+  ["Mt", (of) => shown(of.figures.margins?.mt, 3)],
+  ["overshoot", (of) => percent(of.figures.step?.overshoot)],
+  ["rise time", (of) => seconds(of.figures.step?.rise_time_s)],
+  ["settling time", (of) => seconds(of.figures.step?.settling_time_s)],
+  ["load: IAE", (of) => shown(of.figures.load_iae, 3)],
+  ["load: peak", (of) => shown(of.figures.load_peak, 3)],
+  ["noise at the actuator", (of) => percent(of.figures.noise_share)],
+  ["stable over the error bars", (of) => percent(of.least?.stable)],
+  ["least phase margin over them", (of) => degrees(of.least?.phase_margin_deg)],
+  ["largest Ms over them", (of) => of.least && of.least.ms == null ? "infinite" : shown(of.least?.ms, 3)],
+];
+let drawn;
+const drawDesign = (of) => {
+  drawn = of;
+  if (of.error) return say(of.error, true);
+  const other = against.judged;
+  at("figures").tBodies[0].replaceChildren(...FIGURES.map(([name, text]) => row([name, text(of), other.error ? "–" : text(other)])));
+  at("figures").tBodies[0].classList.toggle("bad", !of.is_stable);
+  at("summary").textContent = of.is_stable ? `Phase margin ${degrees(of.figures.margins?.phase_margin_deg)}, Ms ${shown(of.figures.margins?.ms, 3)}.` : "The loop is unstable.";
+  for (const id of ["step", "effort", "load", "nyquist"]) if (!of.is_stable) at(id).replaceChildren(make("p", "The loop is unstable with these gains.", { className: "bad" }));
+  if (!of.is_stable) return;
+  const band = (rows, low, times) => rows ? times.map(([t], k) => [t, rows[k][low], rows[k][low + 1]]) : [];
+  const responses = [["step", "step", 1, 0, "output", "model"], ["effort", "step", 2, 2, "controller's output", "input"], ["load", "load", 1, 0, "output", "model"]];
+  for (const [id, from, column, low, y, hue] of responses) {
+    const rows = of[from];
+    if (!rows) { at(id).replaceChildren(make("p", "The response is too slow to simulate.", { className: "faint" })); continue; }
+    const pick = (all) => (all ?? []).map((one) => [one[0], one[column]]);
+    const curves = [{ points: pick(other.error ? [] : other[from]), hue: "reference", dash: true }, { points: pick(rows), hue }];
+    const ends = band(of[`${from}_band`], low, rows);
+    const xs = [0, of.end_s ?? 1], include = id === "step" ? [0, 1] : [0];
+    const ys = plots.range([curves[1].points, ends, curves[0].points.filter(([x]) => x <= xs[1])], 1, include);
+    plots.draw(at(id), { title: `${y} over time`, x: "time (s)", y, xs, ys, curves, bands: [{ rows: ends, hue }] });
+  }
+  const locus = (all) => (all ?? []).map(([, re, im]) => [re, im]);
+  plots.draw(at("nyquist"), {
+    title: "Nyquist's plot", x: "real part", y: "imaginary part", square: true, xs: [-2.6, 0.8], ys: [-1.9, 0.9],
+    curves: [{ points: other.error ? [] : locus(other.open_loop), hue: "reference", dash: true }, { points: locus(of.open_loop), hue: "model" }],
+    circles: [{ at: [-1, 0], radius: 1 / of.figures.margins.ms }], marks: [{ at: [-1, 0] }],
+  });
+};
+at("save-gains").onclick = () => save(JSON.stringify({ file: file.name, structure: report.structure, process: report.process, gains, judged: { is_stable: drawn.is_stable, figures: drawn.figures, least: drawn.least } }, null, 2), `${stem()}.gains.json`);
+at("save-parameters").onclick = async () => {
+  const answer = await ask({ do: "parameters", gains });
+  at("exported").className = answer.error ? "bad" : "";
+  at("exported").textContent = answer.error ?? "Two files are saved: the new parameters, and one that sets the old values again. Fly gently first.";
+  if (answer.error) return;
+  save(answer.apply, `${stem()}.${answer.ending}`);
+  save(answer.restore, `${stem()}.restore.${answer.ending}`);
+};
+
+// ---- Simulation ----------------------------------------------------------------------------------------------------
+
+const PROCESSES = {
+  soiptd: "K=1, T_prop=0.0321, T_body=1.6886, tau=0.0237", foptd: "K=2, T_body=30, tau=5", soptd: "K=2, T_prop=5, T_body=30, tau=5",
+  toptd: "K=2, T_prop=5, T_prop2=2, T_body=30, tau=5", iptd: "K=1, tau=0.1", integrator_lag: "K=1, T_prop=0.1, tau=0.05", double_integrator_lag: "K/T_body=40, T_prop=0.05, tau=0.015",
+  toiptd: "K=1, T_prop=0.03, T_prop2=0.01, T_body=1.7, tau=0.02", resonant: "K=1, w0=10, zeta=0.3, tau=0.02", resonant_lag: "K=1, T_prop=0.05, w0=10, zeta=0.3, tau=0.02",
+};
+at("s-process").append(...Object.keys(PROCESSES).map((name) => make("option", name)));
+at("structure").append(...Object.keys(PROCESSES).map((name) => make("option", name)));
+const setProcess = () => {
+  const name = at("s-process").value, isSlow = /optd$/.test(name);
+  at("s-parameters").value = PROCESSES[name];
+  at("s-excitation").value = isSlow ? "step" : "relay";
+  at("s-duration").value = isSlow ? 200 : "";
+  at("s-rate").value = isSlow ? 2 : 1000;
+};
+at("s-process").onchange = setProcess;
+setProcess();
+const OPTION = { k: "--k", "k/t_body": "--k-over-t-body", w0: "--natural-frequency" };
+const simulation = () => {
+  const all = ["--process", at("s-process").value, "--excitation", at("s-excitation").value];
+  for (const part of at("s-parameters").value.split(",").filter((part) => part.trim())) {
+    const [name, value] = part.split("=").map((one) => one.trim());
+    all.push(`${OPTION[name.toLowerCase()] ?? `--${name.toLowerCase().replaceAll("_", "-")}`}=${value ?? ""}`);
+  }
+  for (const [id, option] of [["amplitude", "--amplitude"], ["duration", "--duration"], ["rate", "--sample-rate"], ["noise", "--noise"], ["seed", "--seed"]]) {
+    const { value } = at(`s-${id}`);
+    if (value !== "") all.push(`${option}=${value}`);
+  }
+  return [...all, ...words(at("s-more").value)];
+};
+at("simulate").onclick = async () => {
+  const answer = await waited("Simulating.", { message: { do: "simulate", options: simulation() } });
+  if (answer) open(new Blob([answer.text]), "simulated.csv");
+};
+at("expect").onclick = async () => {
+  const answer = await waited("Computing the bound.", { message: { do: "simulate", options: [...simulation(), "--expect"] } });
+  at("expected").hidden = !answer;
+  if (answer) { say("The intervals are those that an efficient estimator reaches."); at("expected").textContent = answer.text; }
+};
+
+// ---- Page ----------------------------------------------------------------------------------------------------------
+
+const themed = () => {
+  const inside = at("frame").contentDocument?.documentElement;
+  const isDark = (root.dataset.theme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
+  if (inside && (inside.dataset.theme === "dark") !== isDark) at("frame").contentDocument.getElementById("theme")?.click();
+};
+at("theme").onclick = () => {
+  const isDark = (root.dataset.theme || (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light")) === "dark";
+  root.dataset.theme = isDark ? "light" : "dark";
+  keep("theme", root.dataset.theme);
+  themed();
+};
+if (/^(light|dark)$/.test(kept.get("theme") ?? "")) root.dataset.theme = kept.get("theme");
+at("file").onchange = () => at("file").files[0] && open(at("file").files[0], at("file").files[0].name);
+at("example-hover").onclick = async () => open(new Blob([await unpacked("hover")]), "simulated_hover.csv");
+at("example-flight").onclick = async () => open(new Blob([await unpacked("chirps")]), "px4_chirps.ulg");
+at("cancel").onclick = async () => {
+  busy(null);
+  await start();
+  say("Cancelled.");
+  if (!file) return;
+  const answer = await send({ file });
+  if (answer.error || at("recording").hidden) return;
+  await ask({ do: "signals", options: [...loopOptions(), ...words(at("more").value)] });
+};
+document.addEventListener("dragover", (event) => { event.preventDefault(); at("drop").classList.add("over"); });
+document.addEventListener("dragleave", () => at("drop").classList.remove("over"));
+document.addEventListener("drop", (event) => {
+  event.preventDefault();
+  at("drop").classList.remove("over");
+  const [dropped] = event.dataTransfer.files;
+  if (dropped) open(dropped, dropped.name);
+});
+let widthDrawn = innerWidth;
+addEventListener("resize", () => {
+  if (innerWidth === widthDrawn) return;
+  widthDrawn = innerWidth;
+  if (signals) redrawSignals();
+  if (drawn && !at("design").hidden) drawDesign(drawn);
+});
+(async () => {
+  try {
+    module = await WebAssembly.compile(await unpacked("wasm"));
+    await start();
+    say("Ready.");
+    document.body.dataset.readyMs = performance.now();
+  } catch (error) {
+    say(`The studio cannot start in this browser: ${error.message}`, true);
+  }
+})();
