@@ -14,6 +14,7 @@ mod pack;
 mod reproduce;
 mod simulate;
 mod structure;
+mod studio;
 mod train;
 
 use std::path::PathBuf;
@@ -36,6 +37,7 @@ pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};
 pub(crate) use self::structure::StructureArguments;
+pub(crate) use self::studio::Studio;
 pub(crate) use self::train::Train;
 use crate::failure::Failure;
 
@@ -71,7 +73,7 @@ pub(crate) struct Arguments {
 }
 
 /// Commands in the order in which a new user needs them: recordings, simulated vehicles, spaces of processes, benchmarks,
-/// training.
+/// training, the page.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     Identify(Identify),
@@ -88,6 +90,7 @@ pub(crate) enum Command {
     Dataset(Dataset),
     Train(Train),
     Pack(Pack),
+    Studio(Studio),
     Completions(Completions),
     Man(Man),
 }

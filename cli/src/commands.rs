@@ -19,6 +19,7 @@ pub(crate) mod pack;
 pub(crate) mod phase;
 pub(crate) mod reproduce;
 pub(crate) mod simulate;
+pub(crate) mod studio;
 pub(crate) mod train;
 pub(crate) mod tune;
 mod workers;

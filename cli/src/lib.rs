@@ -44,6 +44,7 @@ pub fn run() -> ExitCode {
         Command::Dataset(dataset) => commands::dataset::run(dataset),
         Command::Train(train) => commands::train::run(train),
         Command::Pack(pack) => commands::pack::run(pack),
+        Command::Studio(studio) => commands::studio::run(studio),
         Command::Completions(completions) => commands::completions::run(completions),
         Command::Man(man) => commands::man::run(man),
     };

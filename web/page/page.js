@@ -120,7 +120,7 @@ const readSignals = async () => {
   if (!answer) { signals = undefined; return; }
   signals = answer;
   say(`${file.name}: ${signals.samples.toLocaleString("en")} samples, ${shown(signals.span_s[1] - signals.span_s[0])} s.`);
-  at("notes").textContent = signals.notes.join(" ");
+  at("notes").textContent = log ? `Input: ${signals.names[0]}. Output: ${signals.names[1]}.` : signals.notes.map((note) => `${note}.`).join(" ");
   view = signals.span_s;
   await drawSignals();
 };
@@ -137,7 +137,7 @@ const drawSignals = async () => {
 };
 const redrawSignals = () => {
   if (!thinned || !signals) return;
-  const unit = (k) => signals.names[k] + (signals.units[k] ? ` (${signals.units[k]})` : "");
+  const unit = (k) => (signals.names[k].length > 20 ? ["input", "output"][k] : signals.names[k]) + (signals.units[k] ? ` (${signals.units[k]})` : "");
   const spans = signals.parts.map(([from, to]) => ({ from, to }));
   const chosen = stretch();
   if (chosen) spans.push({ from: chosen[0], to: chosen[1], chosen: true });
@@ -217,6 +217,10 @@ at("identify").onclick = async () => {
   report = answer;
   showResult();
 };
+const SYMBOLS = {
+  k: "K", k_over_t_body: "K/T_body", t_prop_s: "T_prop (s)", t_prop2_s: "T_prop2 (s)", t_body_s: "T_body (s)", tau_s: "tau (s)",
+  natural_frequency_rad_per_s: "w0 (rad/s)", zeta: "zeta", input_bias: "input bias",
+};
 const showResult = () => {
   const isFound = report.verdict.kind === "identified";
   say(`${isFound ? "Identified" : "No process identified"} in ${took()}.`);
@@ -226,8 +230,8 @@ const showResult = () => {
   at("advice").textContent = report.verdict.advice ?? "";
   const rows = Object.entries(found).filter(([, value]) => value && typeof value === "object" && "low" in value);
   at("parameters").hidden = !rows.length;
-  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([name, shown(value.estimate), shown(value.low), shown(value.high)])));
-  const groups = [["About the recording", report.remarks.filter((_, k) => report.remark_about[k] === "recording")], ["Other remarks", report.remarks.filter((_, k) => report.remark_about[k] !== "recording")], ["Reading the file", report.notes]];
+  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([SYMBOLS[name] ?? name.replaceAll("_", " "), shown(value.estimate), shown(value.low), shown(value.high)])));
+  const groups = [["About the recording", report.remarks.filter((_, k) => report.remark_about[k] === "recording")], ["Other remarks", report.remarks.filter((_, k) => report.remark_about[k] !== "recording")]];
   at("remarks").replaceChildren(...groups.filter(([, all]) => all.length).flatMap(([title, all]) => {
     const list = make("ul");
     list.append(...all.map((one) => make("li", one)));
@@ -255,8 +259,9 @@ at("report").ontoggle = async () => {
   say("The report is drawn.");
   at("frame").onload = () => {
     const inside = at("frame").contentDocument;
+    if (!inside?.body || !at("frame").hasAttribute("srcdoc")) return;
     themed();
-    const fit = () => { at("frame").style.height = `${inside.body.scrollHeight + 40}px`; };
+    const fit = () => { if (inside.body) at("frame").style.height = `${inside.body.scrollHeight + 40}px`; };
     new ResizeObserver(fit).observe(inside.body);
     fit();
   };
@@ -267,6 +272,8 @@ at("report").ontoggle = async () => {
 
 const NAMES = ["kp", "ki", "kd", "filter_s"], LABELS = { kp: "Kp", ki: "Ki", kd: "Kd", filter_s: "filter (s)" };
 const STEPS = 1000, DECADES = 3;
+// Gains of the link that opened the page, for the first process.
+let linked = NAMES.every((name) => kept.has(name) && Number.isFinite(Number(kept.get(name)))) ? Object.fromEntries(NAMES.map((name) => [name, Number(kept.get(name))])) : undefined;
 let gains, proposal, against, past = [], future = [], scale, designs = [];
 const only = (controller) => Object.fromEntries(NAMES.map((name) => [name, controller[name] ?? 0]));
 const showDesign = async () => {
@@ -279,12 +286,12 @@ const showDesign = async () => {
   // Middle of a slider whose proposed gain is zero.
   scale = { kp, ki: proposal.ki || 0.1 * kp * crossover, kd: proposal.kd || 0.1 * kp / crossover, filter_s: proposal.filter_s || 0.05 / crossover };
   buildSliders();
-  at("save-parameters").hidden = !log;
+  at("save-parameters").hidden = at("save-restore").hidden = !log;
   at("exported").textContent = "";
   against = report.against ? { name: "gains in force", gains: only(report.against.controller) } : { name: "proposed gains", gains: proposal };
   await judgeAgainst();
-  const from = NAMES.every((name) => kept.has(name)) ? Object.fromEntries(NAMES.map((name) => [name, Number(kept.get(name))])) : proposal;
-  use(Object.values(from).every(Number.isFinite) ? from : proposal);
+  use(linked ?? proposal);
+  linked = undefined;
   at("calm").disabled = true;
   const of = report;
   const answer = await ask({ do: "trade_off" });
@@ -344,15 +351,23 @@ const use = async (to) => {
 };
 const useWanted = async () => {
   isAsking = true;
-  while (wanted) { const message = wanted; wanted = null; drawDesign(await ask(message)); }
+  while (wanted) {
+    const message = wanted;
+    wanted = null;
+    // The compared responses over the same time.
+    if (drawn?.end_s) against.judged = await ask({ do: "judge", gains: against.gains, end_s: drawn.end_s });
+    drawDesign(await ask(message));
+  }
   isAsking = false;
 };
 const same = (a, b) => NAMES.every((name) => Math.abs(a[name] - b[name]) <= 1e-4 * Math.abs(b[name]));
 const showCalm = () => {
   if (!designs.length || !gains) return;
   const now = designs.findIndex(({ controller }) => same(gains, only(controller)));
-  if (now >= 0) at("calm").value = now;
-  at("calm-text").textContent = now >= 0 ? `Ms at most ${designs[now].ms_limit}` : "by hand";
+  const isProposal = same(gains, proposal);
+  const nearest = designs.reduce((best, { ms_limit }, k) => Math.abs(ms_limit - report.margins?.ms) < Math.abs(designs[best].ms_limit - report.margins?.ms) ? k : best, 0);
+  if (now >= 0 || isProposal) at("calm").value = now >= 0 ? now : nearest;
+  at("calm-text").textContent = isProposal ? report.controller?.style ?? "proposed" : now >= 0 ? `Ms at most ${designs[now].ms_limit}` : "by hand";
 };
 at("calm").oninput = () => { remember(at("calm")); use(only(designs[at("calm").value].controller)); };
 at("calm").onchange = () => { at("calm").isMoving = false; };
@@ -418,14 +433,15 @@ const drawDesign = (of) => {
   });
 };
 at("save-gains").onclick = () => save(JSON.stringify({ file: file.name, structure: report.structure, process: report.process, gains, judged: { is_stable: drawn.is_stable, figures: drawn.figures, least: drawn.least } }, null, 2), `${stem()}.gains.json`);
-at("save-parameters").onclick = async () => {
+// Saves one of the two files of the firmware: browsers ask before they save two at once.
+const saveParameters = async (which, says) => {
   const answer = await ask({ do: "parameters", gains });
   at("exported").className = answer.error ? "bad" : "";
-  at("exported").textContent = answer.error ?? "Two files are saved: the new parameters, and one that sets the old values again. Fly gently first.";
-  if (answer.error) return;
-  save(answer.apply, `${stem()}.${answer.ending}`);
-  save(answer.restore, `${stem()}.restore.${answer.ending}`);
+  at("exported").textContent = answer.error ?? says;
+  if (!answer.error) save(answer[which], `${stem()}.${which === "apply" ? "" : "restore."}${answer.ending}`);
 };
+at("save-parameters").onclick = () => saveParameters("apply", "Saved. Save the file that sets the old values again as well, before you fly; then fly gently.");
+at("save-restore").onclick = () => saveParameters("restore", "Saved: this file sets the old values again.");
 
 // ---- Simulation ----------------------------------------------------------------------------------------------------
 
@@ -440,6 +456,7 @@ const setProcess = () => {
   const name = at("s-process").value, isSlow = /optd$/.test(name);
   at("s-parameters").value = PROCESSES[name];
   at("s-excitation").value = isSlow ? "step" : "relay";
+  at("s-more").value = isSlow ? "--preroll 10" : "";
   at("s-duration").value = isSlow ? 200 : "";
   at("s-rate").value = isSlow ? 2 : 1000;
 };
@@ -482,7 +499,12 @@ at("theme").onclick = () => {
   themed();
 };
 if (/^(light|dark)$/.test(kept.get("theme") ?? "")) root.dataset.theme = kept.get("theme");
-at("file").onchange = () => at("file").files[0] && open(at("file").files[0], at("file").files[0].name);
+at("file").onchange = () => {
+  const [chosen] = at("file").files;
+  if (chosen) open(chosen, chosen.name);
+  // The same file can be chosen again.
+  at("file").value = "";
+};
 at("example-hover").onclick = async () => open(new Blob([await unpacked("hover")]), "simulated_hover.csv");
 at("example-flight").onclick = async () => open(new Blob([await unpacked("chirps")]), "px4_chirps.ulg");
 at("cancel").onclick = async () => {

@@ -54,7 +54,7 @@ const plots = (() => {
     let svg = `<svg viewBox="0 0 ${width} ${height}" width="${width}" height="${height}" role="img" aria-label="${escaped(of.title)}">`;
     svg += `<clipPath id="${id}"><rect x="${left}" y="${top}" width="${w}" height="${h}"/></clipPath>`;
     for (const at of ticks(...xs, Math.max(2, w / 90))) svg += `<path class="grid" d="M${limit(X(at))} ${top}v${h}"/><text x="${limit(X(at))}" y="${top + h + 15}" text-anchor="middle">${number(at)}</text>`;
-    for (const at of ticks(...ys, Math.max(2, h / 45))) svg += `<path class="grid" d="M${left} ${limit(Y(at))}h${w}"/><text x="${left - 5}" y="${(Y(at) + 4).toFixed(1)}" text-anchor="end">${number(at)}</text>`;
+    for (const at of ticks(...ys, Math.max(3, h / 38))) svg += `<path class="grid" d="M${left} ${limit(Y(at))}h${w}"/><text x="${left - 5}" y="${(Y(at) + 4).toFixed(1)}" text-anchor="end">${number(at)}</text>`;
     svg += `<text x="${left + w / 2}" y="${height - 4}" text-anchor="middle">${escaped(of.x)}</text>`;
     svg += `<text transform="translate(11 ${top + h / 2}) rotate(-90)" text-anchor="middle">${escaped(of.y)}</text>`;
     svg += `<g clip-path="url(#${id})">`;

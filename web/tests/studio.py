@@ -1,0 +1,444 @@
+"""Tests of the studio in a real Chromium.
+
+python3 studio.py PAGE PROGRAM REPOSITORY SCRATCH [--screenshots DIR] [--measure]: works as a user does, from files dropped
+on the page to exported gains, and compares the numbers with those of the program. Prints a line for each part; ends with
+status 1 at the first fault. --measure prints times instead of testing.
+"""
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import statistics
+import subprocess
+import sys
+import time
+
+from playwright.sync_api import sync_playwright
+
+DESK = {"viewport": {"width": 1280, "height": 900}}
+PHONE = {"viewport": {"width": 360, "height": 780}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
+# Largest relative difference of a number from the program's. The page computes sines and exponentials in Rust, the program
+# with the system's library: they differ in the last bit, and the search for the optimum ends a few of its tolerances
+# elsewhere.
+CLOSE = 1e-3
+# Tests of the residuals, which are sums of small differences.
+LOOSE = 5e-2
+SIDE = (".innovations", ".refused", ".log")
+# File, loop, and the options of the program for it.
+FILES = [
+    ("examples/simulated_hover.csv", None, []),
+    ("examples/jsbsim_f450_roll_clean.csv", None, []),
+    ("examples/unsteady_ardupilot_alt.csv", None, []),
+    ("examples/logs/px4_chirps.ulg", "roll rate", ["--axis", "roll", "--loop", "rate"]),
+    ("examples/logs/ap_sysid_roll.bin", "roll rate", ["--axis", "roll", "--loop", "rate"]),
+    ("examples/logs/betaflight_acro.bfl", "roll rate", ["--axis", "roll", "--loop", "rate"]),
+    ("link/tests/data/px4_zstd.mcap", "roll rate", ["--axis", "roll", "--loop", "rate"]),
+]
+# Of a flight that is refused, the last bits decide which samples are outliers: only the verdict is compared.
+REFUSED = "betaflight_acro.bfl"
+
+
+class Wrong(Exception):
+    """A fault of the page."""
+
+
+def expect(is_so, what):
+    if not is_so:
+        raise Wrong(what)
+
+
+class Studio:
+    """The page in a browser, and what it did wrong."""
+
+    def __init__(self, browser, path, fragment="", **screen):
+        self.context = browser.new_context(accept_downloads=True, **screen)
+        self.context.set_offline(True)
+        self.faults = []
+        self.page = page = self.context.new_page()
+        page.on("console", lambda message: message.type in ("error", "warning") and self.faults.append(message.text))
+        page.on("pageerror", lambda error: self.faults.append(str(error)))
+        page.on("dialog", lambda dialog: self.faults.append(f"dialog {dialog.message}") or dialog.dismiss())
+        page.on("request", self.requested)
+        page.goto(path.as_uri() + fragment)
+        self.until("document.body.dataset.readyMs !== undefined || document.getElementById('state').className === 'bad'")
+        expect(self.state() == "Ready.", self.state())
+
+    def requested(self, request):
+        if not request.url.startswith(("file:", "blob:", "data:", "about:")):
+            self.faults.append(f"request for {request.url}")
+
+    def until(self, condition, limit_s=90):
+        # The page forbids eval, which the browser driver's own wait needs.
+        end = time.monotonic() + limit_s
+        while not self.page.evaluate(condition):
+            if time.monotonic() > end:
+                raise Wrong(f"{condition} does not come; the page says {self.state()!r}")
+            time.sleep(0.02)
+
+    def state(self):
+        return self.page.inner_text("#state")
+
+    def rest(self):
+        self.until("document.getElementById('busy').hidden")
+
+    def drop(self, name, content):
+        """Drops a file of these bytes, or the file of this path."""
+        self.page.evaluate("file = undefined")
+        if isinstance(content, bytes):
+            self.page.set_input_files("#file", {"name": name, "mimeType": "", "buffer": content})
+        else:
+            self.page.set_input_files("#file", content)
+        self.until("typeof file === 'object'")
+        self.rest()
+
+    def drop_with_mouse(self, name, content):
+        """The event of a real drop."""
+        self.page.evaluate(
+            """([name, text]) => {
+                const data = new DataTransfer();
+                data.items.add(new File([text], name));
+                document.dispatchEvent(new DragEvent("drop", { dataTransfer: data, bubbles: true, cancelable: true }));
+            }""",
+            [name, content],
+        )
+        self.until("typeof file === 'object'")
+        self.rest()
+
+    def identify(self):
+        self.page.click("#identify")
+        self.rest()
+        self.until("!document.getElementById('result').hidden || document.getElementById('state').className === 'bad'")
+
+    def designed(self):
+        self.until("!document.getElementById('calm').disabled && drawn?.step_band !== undefined")
+
+    def saved(self, button):
+        with self.page.expect_download() as download:
+            self.page.click(button)
+        return pathlib.Path(download.value.path()).read_text(encoding="utf-8"), download.value.suggested_filename
+
+    def close(self):
+        expect(not self.faults, "; ".join(self.faults))
+        self.context.close()
+
+
+def program(path, *arguments):
+    done = subprocess.run([path, *arguments], capture_output=True, text=True, check=False)
+    return json.loads(done.stdout)
+
+
+def differences(ours, theirs, at=""):
+    """Yields the relative difference of every pair of numbers."""
+    expect(type(ours) is type(theirs) or {type(ours), type(theirs)} == {int, float}, f"{at}: {ours} and {theirs}")
+    if isinstance(ours, dict):
+        expect(list(ours) == list(theirs), f"{at}: other keys")
+        for key in ours:
+            yield from differences(ours[key], theirs[key], f"{at}.{key}")
+    elif isinstance(ours, list):
+        expect(len(ours) == len(theirs), f"{at}: {len(ours)} and {len(theirs)} values")
+        for place, pair in enumerate(zip(ours, theirs)):
+            yield from differences(*pair, f"{at}[{place}]")
+    elif isinstance(ours, float):
+        size = max(abs(ours), abs(theirs))
+        yield at, 0.0 if size == 0.0 else abs(ours - theirs) / size
+
+
+def numbers(studio, told):
+    """Each format, against the program."""
+    for name, loop, options in FILES:
+        path = told.repository / name
+        studio.drop(path.name, str(path))
+        if loop:
+            studio.page.select_option("#loop", loop)
+            studio.rest()
+        studio.identify()
+        text, _ = studio.saved("#save-json")
+        ours, theirs = json.loads(text), program(told.program, "identify", str(path), "--json", *options)
+        ours["file"] = theirs["file"] = ""
+        if path.name == REFUSED:
+            expect(ours["verdict"]["kind"] == theirs["verdict"]["kind"] != "identified", f"{name}: {ours['verdict']}")
+            continue
+        # Sentences have numbers too, rounded.
+        for report in (ours, theirs):
+            for key in ("remarks", "notes"):
+                report[key] = len(report[key])
+        # A process that was not chosen may have parameters that the recording does not determine.
+        for report in (ours, theirs):
+            report["alternatives"] = [one["structure"] for one in report["alternatives"] or []]
+        found = list(differences(ours, theirs))
+        same = sum(1 for _, difference in found if difference == 0.0)
+        where, worst = max(found, key=lambda pair: pair[1])
+        print(f"{name}: {same} of {len(found)} numbers equal to the bit, largest difference {worst:.1e} ({where})")
+        for place, difference in found:
+            limit = LOOSE if place.startswith(SIDE) else CLOSE
+            expect(difference <= limit, f"{name}: {place} differs by {difference:.1e}")
+
+
+def by_hand(studio, told):
+    """Gains moved, undone, compared and exported; by mouse and keyboard."""
+    page = studio.page
+    studio.drop("log", str(told.repository / "examples/logs/px4_chirps.ulg"))
+    page.select_option("#loop", "roll rate")
+    studio.rest()
+    studio.identify()
+    studio.designed()
+    before = page.evaluate("({ ...gains })")
+    page.focus("#slide-kp")
+    for _ in range(20):
+        page.keyboard.press("ArrowRight")
+    studio.until("!isAsking && drawn?.step_band !== undefined")
+    moved = page.evaluate("({ ...gains })")
+    expect(moved["kp"] > 1.05 * before["kp"], f"the arrow keys move Kp from {before['kp']} to {moved['kp']}")
+    expect(page.evaluate("drawn.figures.margins.phase_margin_deg") < page.evaluate("report.margins.phase_margin_deg"),
+           "a larger gain has a smaller margin")
+    expect(page.locator("#step path.band").count() == 1 and page.locator("#nyquist circle").count() == 1, "band and circle")
+    expect(page.inner_text("#against-head") == "gains in force", "compared with the gains in force")
+    kept = page.evaluate("location.hash")
+    expect("kp=" in kept and "loop=roll" in kept and len(kept) < 300, kept)
+    while page.is_enabled("#undo"):
+        page.click("#undo")
+    expect(page.evaluate("gains.kp") == before["kp"], "undo")
+    page.click("#redo")
+    expect(page.evaluate("gains.kp") > before["kp"], "redo")
+    page.fill("#exact-kp", "1000")
+    page.press("#exact-kp", "Enter")
+    studio.until("drawn && !drawn.is_stable")
+    expect("unstable" in page.inner_text("#step"), "an unstable loop is named")
+    page.click("#save-parameters")
+    studio.until("document.getElementById('exported').className === 'bad'")
+    expect("range" in page.inner_text("#exported"), page.inner_text("#exported"))
+    page.click("#proposed")
+    studio.until("drawn?.is_stable && !isAsking")
+    new, name = studio.saved("#save-parameters")
+    expect(name == "px4_chirps.params", name)
+    old, name = studio.saved("#save-restore")
+    expect(name == "px4_chirps.restore.params", name)
+    options = ["--axis", "roll", "--loop", "rate", "--step", "1", "--write", str(told.scratch / "roll.params")]
+    program(told.program, "identify", str(told.repository / "examples/logs/px4_chirps.ulg"), "--json", *options)
+    written = (told.scratch / "roll.params").read_text(encoding="utf-8")
+    last = lambda text: [round(float(line.split("\t")[3]), 3) for line in text.splitlines() if "\t" in line]
+    expect(last(new) == last(written) != last(old), f"{new} and {written}")
+    judged, name = studio.saved("#save-gains")
+    expect(json.loads(judged)["judged"]["is_stable"] and name == "px4_chirps.gains.json", name)
+    calm = page.evaluate("designs[0].controller.kp")
+    page.evaluate("document.getElementById('calm').value = 0; document.getElementById('calm').oninput()")
+    studio.until("!isAsking && drawn.step_band !== undefined")
+    expect(page.evaluate("gains.kp") == calm, "the slider from calm to sharp")
+    html, name = studio.saved("#save-report")
+    expect(name == "px4_chirps.html" and "<h1>" in html and len(html) > 1_000_000, name)
+    page.click("#report summary")
+    studio.rest()
+    studio.until("document.getElementById('frame').contentDocument?.querySelectorAll('.plot svg').length > 4")
+    # A reload keeps the choices and has no data.
+    again = Studio(page.context.browser, told.page, fragment="#loop=pitch+rate&from=200&to=210&theme=dark", **DESK)
+    expect(again.page.evaluate("document.documentElement.dataset.theme") == "dark", "the theme is kept")
+    expect(again.page.is_hidden("#recording"), "there is no data in the fragment")
+    again.drop("log", str(told.repository / "examples/logs/px4_chirps.ulg"))
+    expect(again.page.input_value("#loop") == "pitch rate" and again.page.input_value("#from") == "200", "choices are kept")
+    again.close()
+    print("sliders, undo, comparison, export, report, fragment: as they should be")
+
+
+def stretch(studio, told):
+    """A stretch drawn with the mouse gives what --from and --to give; a survey; cancelling."""
+    page = studio.page
+    path = str(told.repository / "examples/logs/px4_chirps.ulg")
+    studio.drop("log", path)
+    page.select_option("#loop", "roll rate")
+    studio.rest()
+    box = page.locator("#signals-0 svg").bounding_box()
+    page.mouse.move(box["x"] + 0.38 * box["width"], box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.5 * box["width"], box["y"] + 60, steps=4)
+    page.mouse.move(box["x"] + 0.66 * box["width"], box["y"] + 60, steps=4)
+    page.mouse.up()
+    chosen = [page.input_value("#from"), page.input_value("#to")]
+    expect(all(chosen) and float(chosen[1]) - float(chosen[0]) > 3.0, str(chosen))
+    studio.identify()
+    ours = json.loads(studio.saved("#save-json")[0])
+    options = ["--axis", "roll", "--loop", "rate", "--from", chosen[0], "--to", chosen[1]]
+    theirs = program(told.program, "identify", path, "--json", *options)
+    expect(ours["verdict"]["kind"] == theirs["verdict"]["kind"] and ours["structure"] == theirs["structure"], "same stretch")
+    page.click("#whole")
+    page.click("#survey")
+    studio.until("!document.getElementById('surveyed').hidden")
+    survey = program(told.program, "identify", path, "--json")
+    rows = page.locator("#surveyed tbody tr").count()
+    expect(rows == len(survey["loops"]), f"{rows} rows")
+    page.click("#identify")
+    page.evaluate("document.getElementById('cancel').click()")
+    studio.until("document.getElementById('state').textContent === 'Cancelled.'")
+    page.wait_for_timeout(500)
+    studio.identify()
+    expect(page.inner_text("#verdict").startswith("Identified"), page.inner_text("#verdict"))
+    print("stretch, survey, cancel: as they should be")
+
+
+def simulated(studio):
+    """A relay test, a step and a chirp of processes of one's own."""
+    page = studio.page
+    page.evaluate("document.getElementById('simulate-panel').open = true")
+    for process, excitation, more in [("soiptd", "relay", ""), ("foptd", "step", None), ("soptd", "prbs", "--pulse 10"),
+                                      ("soiptd", "chirp", "--band 0.5,10 --loop 40,8")]:
+        page.select_option("#s-process", process)
+        page.select_option("#s-excitation", excitation)
+        if more is not None:
+            page.fill("#s-more", more)
+        if excitation == "chirp":
+            page.fill("#s-duration", "20")
+        page.evaluate("signals = undefined")
+        page.click("#simulate")
+        studio.until("signals !== undefined")
+        studio.rest()
+        studio.identify()
+        expect(page.inner_text("#verdict") == f"Identified: {process}.", f"{process}, {excitation}: {page.inner_text('#verdict')}")
+    page.select_option("#s-process", "soiptd")
+    page.click("#expect")
+    studio.until("!document.getElementById('expected').hidden")
+    expect("expected 90 % interval" in page.inner_text("#expected"), page.inner_text("#expected"))
+    page.fill("#s-parameters", "K=1, T_prop=-1")
+    page.click("#simulate")
+    studio.until("document.getElementById('state').className === 'bad'")
+    print("simulations: identified")
+
+
+def hostile(studio):
+    """Files that are nothing, lie, or carry tags; each has one sentence, and the page goes on."""
+    tags = "<img src=x onerror=alert(1)>"
+    header = b"ULog\x01\x12\x35\x01" + bytes(8)
+    cases = {
+        "empty.csv": b"",
+        "noise.bin": bytes((7 * k * k + k) % 256 for k in range(50_000)),
+        "cut.ulg": header + b"\xff" * 5_000,
+        "text.csv": b"time,input,output\n0,1,2\n1,x,3\n",
+        "tags.csv": f"time,{tags},</script>\n".encode() + b"".join(b"%d,%d,nan\n" % (k, k) for k in range(50)),
+        f"{tags}.csv": b"t,u,y\n" + b"".join(b"%g,1,1\n" % (0.01 * k) for k in range(500)),
+    }
+    for name, content in cases.items():
+        studio.drop(name, content)
+        if studio.page.is_visible("#signals"):
+            studio.identify()
+        said = studio.state() + studio.page.inner_text("#verdict")
+        expect(len(said) > 20, f"{name}: {said}")
+        expect(studio.page.locator("img").count() == 0, f"{name}: a tag of the file is on the page")
+    studio.drop_with_mouse("plain.csv", "time,input,output\n" + "".join(f"{0.01 * k},{(k // 100) % 2},{math.sin(k)}\n" for k in range(1000)))
+    expect("1,000 samples" in studio.state(), studio.state())
+    print("hostile files: refused, each with a sentence")
+
+
+def large(studio, told):
+    """200 MB are read while the page goes on turning."""
+    path = told.scratch / "large.csv"
+    with open(path, "w", encoding="utf-8") as file:
+        file.write("time_s,input,output\n")
+        block = 100_000
+        for start in range(0, 10**9, block):
+            rows = (f"{k * 0.001:.3f},{1.0 if (k // 500) % 2 else -1.0},{math.sin(k * 0.00628):.17f}\n" for k in range(start, start + block))
+            file.write("".join(rows))
+            if file.tell() > 200_000_000:
+                break
+    studio.page.evaluate("""() => { window.longest = 0; let last = performance.now();
+        window.turning = setInterval(() => { longest = Math.max(longest, performance.now() - last); last = performance.now(); }, 20); }""")
+    studio.drop("large.csv", str(path))
+    expect("samples" in studio.state(), studio.state())
+    longest = studio.page.evaluate("clearInterval(turning), longest")
+    expect(longest < 2000, f"the page stood still for {longest:.0f} ms")
+    print(f"{path.stat().st_size / 1e6:.0f} MB: {studio.state()}; the page stood still for at most {longest:.0f} ms")
+    path.unlink()
+
+
+def looks(browser, told):
+    """Two widths and two themes: nothing is wider than the screen, nothing has no name."""
+    for kind, screen in (("desk", DESK), ("phone", PHONE)):
+        for theme in ("light", "dark"):
+            studio = Studio(browser, told.page, color_scheme=theme, **screen)
+            page = studio.page
+            page.click("#example-flight")
+            studio.until("!document.getElementById('recording').hidden && document.querySelector('#signals-0 svg')")
+            studio.rest()
+            page.select_option("#loop", "roll rate")
+            studio.rest()
+            studio.identify()
+            studio.designed()
+            wide = page.evaluate("document.documentElement.scrollWidth - innerWidth")
+            expect(wide <= 0, f"{kind}: {wide} pixels wider than the screen")
+            nameless = page.evaluate("""[...document.querySelectorAll("button, input, select, [role=img], iframe")].filter((one) =>
+                !(one.textContent.trim() || one.ariaLabel || one.title || one.labels?.length)).map((one) => one.id)""")
+            expect(not nameless, f"without a name: {nameless}")
+            back = page.evaluate("getComputedStyle(document.body).backgroundColor")
+            expect((back == "rgb(255, 255, 255)") == (theme == "light"), f"{theme}: {back}")
+            page.click("#theme")
+            expect(page.evaluate("getComputedStyle(document.body).backgroundColor") != back, "the button changes the theme")
+            page.click("#theme")
+            if told.screenshots:
+                page.screenshot(path=told.screenshots / f"studio_{kind}_{theme}.png", full_page=True)
+            studio.close()
+    print("desk and phone, light and dark: as they should be")
+
+
+def measure(browser, told):
+    """Times on this machine; ratios to the program are taken side by side."""
+    ready = []
+    for _ in range(5):
+        studio = Studio(browser, told.page, **DESK)
+        ready.append(studio.page.evaluate("Number(document.body.dataset.readyMs)"))
+        studio.close()
+    print(f"ready after {statistics.median(ready):.0f} ms (median of 5); page of {told.page.stat().st_size / 1e6:.2f} MB")
+    studio = Studio(browser, told.page, **DESK)
+    for name, loop, options in FILES:
+        path = told.repository / name
+        studio.drop(path.name, str(path))
+        if loop:
+            studio.page.select_option("#loop", loop)
+            studio.rest()
+        pairs = []
+        for _ in range(5):
+            words = json.dumps(options)
+            ours = studio.page.evaluate(f"""(async () => {{ const from = performance.now();
+                await ask({{ do: "identify", options: {words} }}); return performance.now() - from; }})()""")
+            began = time.monotonic()
+            subprocess.run([told.program, "identify", str(path), "--json", *options], stdout=subprocess.DEVNULL, check=False)
+            pairs.append((ours, 1000 * (time.monotonic() - began)))
+        ours, theirs = (statistics.median(one) for one in zip(*pairs))
+        print(f"{name}: {ours:.0f} ms in the page, {theirs:.0f} ms by the program on {os.cpu_count()} cores: {ours / theirs:.2f} times")
+        if studio.page.evaluate("report = undefined, true") and name.endswith(("hover.csv", "chirps.ulg")):
+            studio.identify()
+            studio.designed()
+            moves = [studio.page.evaluate(f"""(async () => {{ const from = performance.now();
+                const answer = await ask({{ do: "judge", gains: {{ ...gains, kp: gains.kp * {1 + 0.01 * k} }} }});
+                drawDesign(answer); document.body.offsetHeight; return performance.now() - from; }})()""") for k in range(30)]
+            print(f"{name}: a slider's move is drawn after {statistics.median(moves):.0f} ms (largest of 30: {max(moves):.0f} ms)")
+    studio.close()
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    for name in ("page", "program", "repository", "scratch"):
+        parser.add_argument(name, type=pathlib.Path)
+    parser.add_argument("--screenshots", type=pathlib.Path)
+    parser.add_argument("--measure", action="store_true")
+    told = parser.parse_args()
+    told.page = told.page.resolve()
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(executable_path=os.environ.get("CHROMIUM", "/usr/bin/chromium"), args=["--no-sandbox"])
+        if told.measure:
+            measure(browser, told)
+            return
+        studio = Studio(browser, told.page, **DESK)
+        numbers(studio, told)
+        stretch(studio, told)
+        by_hand(studio, told)
+        simulated(studio)
+        hostile(studio)
+        large(studio, told)
+        studio.close()
+        looks(browser, told)
+
+
+if __name__ == "__main__":
+    try:
+        main()
+    except Wrong as wrong:
+        sys.exit(f"studio.py: {wrong}")
