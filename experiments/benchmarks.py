@@ -30,7 +30,7 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
-PROGRAMS = ("onecycle", "cargo", "python", "pip", "sh", "onboard/", "experiments/", "cli/tests/")
+PROGRAMS = ("onecycle", "cargo", "python", "pip", "sh", "onboard/", "experiments/", "cli/tests/", "web/")
 CAMPAIGNS = "onecycle campaign experiments/..."
 # Parts of commands that the full run leaves out, and why.
 LEFT_OUT = {
@@ -51,6 +51,7 @@ LEFT_OUT = {
     "--methods ": "an option, not a command",
     "pip install": "installs packages",
     "py/test.sh": "a step of .ci/run",
+    "web/test.sh": "a step of .ci/run",
     "run.sh": "a step of .ci/run",
     "callgrind.sh": "needs valgrind",
 }

@@ -8,12 +8,12 @@ cd "$(dirname "$0")"
 sysroot=$(rustc --print sysroot)
 triple=wasm32-unknown-unknown
 if [ -d "$sysroot/lib/rustlib/$triple/lib" ]; then
-    cargo build --release --lib --target $triple
+    cargo build --release --locked --lib --target $triple
 elif [ -d /usr/lib/rustlib/src/rust/library ] && [ -x /usr/bin/rustc ]; then
     linker=$(find "$sysroot/lib/rustlib" -path '*/bin/rust-lld' | head -n 1)
     [ -n "$linker" ] || { echo "build.sh: no rust-lld in $sysroot" >&2; exit 1; }
     RUSTC=/usr/bin/rustc RUSTC_BOOTSTRAP=1 CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER=$linker \
-        cargo build --release --lib --target $triple -Zbuild-std=std,panic_abort
+        cargo build --release --locked --lib --target $triple -Zbuild-std=std,panic_abort
 else
     echo "build.sh: no $triple: run \`rustup target add $triple\`, or install Debian's rustc-web and rust-web-src" >&2
     exit 1

@@ -11,7 +11,7 @@ pub(crate) mod verdict;
 
 /// With a capital letter at the start and a full stop at the end.
 pub(crate) fn sentence(clause: &str) -> String {
-    capital(clause) + "."
+    capital(clause.trim_end_matches('.')) + "."
 }
 
 /// With a capital letter at the start.

@@ -10,6 +10,7 @@ const shown = (value, digits = 4) => value == null ? "–" : plots.number(Number
 
 let worker, module, next = 0;
 const asked = new Map();
+let memoryBytes = 0;
 const unpacked = async (id) => {
   const bytes = Uint8Array.from(atob(at(id).textContent), (c) => c.charCodeAt(0));
   return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"))).arrayBuffer();
@@ -24,6 +25,7 @@ const start = async () => {
     if (data.work) return progress(data);
     const done = asked.get(data.id);
     asked.delete(data.id);
+    memoryBytes = data.memoryBytes;
     done?.(data.answer);
   };
   const { error } = await send({ module });
@@ -296,7 +298,8 @@ const showDesign = async () => {
   const of = report;
   const answer = await ask({ do: "trade_off" });
   if (of !== report || answer.error || !answer.length) return;
-  designs = answer;
+  // Where noise limits the gains, sharper designs repeat the last one.
+  designs = answer.filter((one, k) => !k || Math.abs(one.controller.kp / answer[k - 1].controller.kp - 1) > 1e-4 || Math.abs(one.controller.kd - answer[k - 1].controller.kd) > 1e-4 * Math.abs(one.controller.kd));
   Object.assign(at("calm"), { max: designs.length - 1, disabled: false });
   showCalm();
 };

@@ -1,6 +1,6 @@
 "use strict";
 // The library in a thread of its own. Messages have an `id` and one of `module`, `file` or `message`; answers have the same
-// `id` and `answer`. News of progress have `work`, `done` and `all` (bytes, negative: not known).
+// `id`, `answer` and the size of the memory. News of progress have `work`, `done` and `all` (bytes, negative: not known).
 let library, blob, reason;
 const reader = new FileReaderSync();
 const memory = () => new Uint8Array(library.memory.buffer);
@@ -47,5 +47,5 @@ onmessage = async ({ data: { id, module, file, message } }) => {
     const why = reason || error.message;
     answer = { stopped: true, error: `The library stopped (${why}). The file may need more memory than a page has: try the program.` };
   }
-  postMessage({ id, answer });
+  postMessage({ id, answer, memoryBytes: library?.memory.buffer.byteLength });
 };

@@ -345,7 +345,9 @@ def large(studio, told):
     expect("samples" in studio.state(), studio.state())
     longest = studio.page.evaluate("clearInterval(turning), longest")
     expect(longest < 2000, f"the page stood still for {longest:.0f} ms")
-    print(f"{path.stat().st_size / 1e6:.0f} MB: {studio.state()}; the page stood still for at most {longest:.0f} ms")
+    memory, size = studio.page.evaluate("memoryBytes") / 1e6, path.stat().st_size / 1e6
+    expect(memory < 3 * size, f"{memory:.0f} MB of memory")
+    print(f"{size:.0f} MB: {studio.state()}; memory of {memory:.0f} MB; the page stood still for at most {longest:.0f} ms")
     path.unlink()
 
 

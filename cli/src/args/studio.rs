@@ -17,7 +17,12 @@ use clap::Args;
 ))]
 pub(crate) struct Studio {
     /// File to write
-    #[arg(long, short, value_name = "FILE", default_value = "onecycle-studio.html")]
+    #[arg(
+        long,
+        short,
+        value_name = "FILE",
+        default_value = "onecycle-studio.html"
+    )]
     pub(crate) out: PathBuf,
     /// Do not open the browser
     #[arg(long)]

@@ -7,8 +7,8 @@ use onecycle::{
     Specification, Structure, Style, assess, least_margins,
 };
 use onecycle_link::{
-    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, ParameterFiles, RateLaw, ReadBack, Signals, changes,
-    files,
+    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, ParameterFiles, RateLaw, ReadBack,
+    Signals, changes, files,
 };
 
 use super::log::{self, Source};

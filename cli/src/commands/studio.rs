@@ -13,8 +13,8 @@ const PAGE: Option<&str> = Some(include_str!(concat!(env!("OUT_DIR"), "/studio.h
 #[cfg(not(feature = "studio"))]
 const PAGE: Option<&str> = None;
 
-const MISSING: &str = "this program was built without the studio: take onecycle-studio.html of the release, or build it in \
-    the sources with `web/build.sh`, which writes web/target/studio.html";
+const MISSING: &str = "this program was built without the studio: open onecycle-studio.html of the same release, or build the \
+    page in the sources with `web/build.sh`, which writes web/target/studio.html";
 
 pub(crate) fn run(arguments: &Studio) -> Result<ExitCode, Failure> {
     let page = PAGE.ok_or_else(|| Failure::usage(MISSING))?;

@@ -8,8 +8,8 @@ use onecycle_design::bands::{StepBands, load_bands, step_bands};
 use onecycle_design::loop_response;
 use serde_json::{Value, json};
 
-use super::json::controllers::{Figures, Least};
 use super::json::controller as controller_json;
+use super::json::controllers::{Figures, Least};
 
 /// Frequencies of the curves of the open loop, over three and a half decades about the gain crossover.
 const FREQUENCIES: u32 = 240;
@@ -74,7 +74,9 @@ fn rows(bands: &StepBands, count: usize) -> Vec<Vec<f64>> {
     let bands = [&bands.output, &bands.input];
     (0..bands[0].low.len())
         .map(|k| {
-            let ends = bands[..count].iter().map(|band| [band.low[k], band.high[k]]);
+            let ends = bands[..count]
+                .iter()
+                .map(|band| [band.low[k], band.high[k]]);
             ends.flatten().collect()
         })
         .collect()

@@ -24,7 +24,7 @@ pub(crate) fn no_gains(of: ControlLoop) -> String {
 /// Why gains are no parameters of the firmware, and what to do.
 pub(crate) fn unwritable(error: &GainsError) -> String {
     let advice = match error {
-        GainsError::Range { .. } => "take a smaller --step, or a calmer --style",
+        GainsError::Range { .. } => "take calmer gains: a smaller --step or a calmer --style",
         GainsError::Firmware(_) | GainsError::Version(_) => {
             "type the gains in by hand, in the scale of your firmware"
         }

@@ -31,6 +31,7 @@ mod phase;
 mod report;
 mod reproduce;
 mod simulate;
+mod studio;
 mod terminal;
 mod train;
 mod tune;
