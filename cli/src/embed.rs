@@ -19,7 +19,7 @@ use crate::commands::dataset::folder::Folder;
 use crate::commands::{dataset, flight, identify, tune};
 use crate::failure::Failure;
 #[cfg(target_family = "wasm")]
-pub use crate::output::place::{Listener, listen};
+pub use crate::output::page::{Listener, listen};
 use crate::reading;
 pub use crate::reading::Given;
 use crate::words::remark::sentences;

@@ -1,11 +1,9 @@
 //! Output: the terminal, and files that are written whole or not at all. Nothing else in the program writes.
 
 #[cfg(target_family = "wasm")]
-#[path = "output/page.rs"]
-pub(crate) mod place;
+pub(crate) mod page;
 #[cfg(not(target_family = "wasm"))]
-#[path = "output/terminal.rs"]
-mod place;
+mod terminal;
 
 use std::fmt::Display;
 use std::fs::File;
@@ -17,7 +15,10 @@ use anstyle::Style;
 
 use crate::failure::Failure;
 use crate::style::{HEADING, REFUSAL};
-pub(crate) use place::{ProgressBar, Waiting, columns, progress_bar};
+#[cfg(target_family = "wasm")]
+pub(crate) use page::{ProgressBar, Waiting, columns, progress_bar};
+#[cfg(not(target_family = "wasm"))]
+pub(crate) use terminal::{ProgressBar, Waiting, columns, progress_bar};
 
 /// Prints a report to the standard output, with styles if that is a terminal.
 pub(crate) fn print(text: &str) -> Result<(), Failure> {
