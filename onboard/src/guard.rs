@@ -34,6 +34,15 @@ impl Limits {
         stale_s: f32::INFINITY,
     };
 
+    /// Limits that are not set yet: a tuner with them is refused.
+    pub const UNSET: Self = Self {
+        excursion: f32::NAN,
+        rate: f32::NAN,
+        duration_s: f32::NAN,
+        no_switch_s: f32::NAN,
+        stale_s: f32::NAN,
+    };
+
     /// The first limit that is not positive: name and value.
     pub(crate) fn out_of_range(&self) -> Option<(&'static str, f32)> {
         [

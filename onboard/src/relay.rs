@@ -21,7 +21,7 @@
 //! A real process has noise, a bias and an initial offset. Therefore the relay adds to the rule:
 //!
 //! - **pre-roll**: the output is zero while sigma is measured;
-//! - **kick**: the output is high until the error exceeds 6 sigma;
+//! - **kick**: the output is high until the error exceeds 6 sigma, or what the output wanders at rest;
 //! - **ramp**: from a large offset the first switches are those of a plain relay (`beta = 0`), then `beta` grows
 //!   in steps, because a leading relay need not reach zero from there;
 //! - **smoothing**: the error is smoothed over a few per cent of the half period;
@@ -141,7 +141,8 @@ pub struct Relay {
     lead: [f32; 2],
     /// Target of the trim: the asymmetry, with the sign of the first cycle's.
     aim: Option<f32>,
-    /// Whether the error was within the noise when the relay began.
+    /// Error (output unit) within which the process is at rest, and whether it was there when the relay began.
+    rest_level: f32,
     from_rest: bool,
 }
 
@@ -183,8 +184,15 @@ impl Relay {
             undone: 0,
             lead: [1.0; 2],
             aim: None,
+            rest_level: 0.0,
             from_rest: false,
         })
+    }
+
+    /// Counts the process as at rest within this error (output unit), besides the noise: where the noise of a sample is much
+    /// smaller than what the output wanders, as behind a state estimator.
+    pub fn begin_within(&mut self, level: f32) {
+        self.rest_level = if level.is_finite() { level } else { 0.0 };
     }
 
     /// One tick. Takes the error `reference - measurement` (output unit) and the time since the last tick (s);
@@ -222,7 +230,8 @@ impl Relay {
     }
 
     fn kick(&mut self, error: f32) {
-        if error.is_finite() && error.abs() > CLEAR_OF_NOISE_SIGMA * self.noise_sigma {
+        let rest_level = (CLEAR_OF_NOISE_SIGMA * self.noise_sigma).max(self.rest_level);
+        if error.is_finite() && error.abs() > rest_level {
             self.sign = if error > 0.0 { 1.0 } else { -1.0 };
             self.smoothed = error;
             self.excursion.peak = error.abs();

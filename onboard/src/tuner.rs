@@ -3,12 +3,13 @@
 //!
 //! | phase    | output                            | leaves when                                       | to       |
 //! |----------|-----------------------------------|---------------------------------------------------|----------|
-//! | Idle     | safe controller                   | [`TunerCore::start`]                              | TakeOff if set, else Relay |
+//! | Idle     | safe controller, or another one   | [`TunerCore::start`]                              | TakeOff if set, else Relay |
 //! | TakeOff  | integrator and relay (eq. 17)     | the relay has switched twice about the reference  | Relay    |
 //! | Relay    | offset and relay                  | the cycles are complete and steady                | Identify |
-//! | Identify | offset and relay; some slices of work per tick | a controller has been found          | Control  |
+//! | Identify | offset and relay; some slices of work per tick | a controller has been found          | Proposed, or Control without consent |
 //! |          |                                   | the cycles were refused and attempts are left     | Relay    |
 //! |          |                                   | a second amplitude is set and not yet tried       | Relay, at that amplitude |
+//! | Proposed | safe controller, or another one   | [`TunerCore::accept`]; [`TunerCore::abort`] rejects it | Control; Aborted |
 //! | Control  | controller found                  | (stays; proven when the response was as predicted)|          |
 //! | Aborted  | safe controller                   | [`TunerCore::reset`]                              | Idle     |
 //!
@@ -18,6 +19,12 @@
 //! mean output under the safe controller, so that the relay begins at rest even if the safe controller has a
 //! steady-state error.
 //!
+//! [`Tuner`] does everything in one thread. For two, place a [`TunerCore`], an [`Analysis`], a
+//! [`Bench`](crate::identification::Bench) and a [`Desk`](crate::identification::Desk): the thread of the control loop calls
+//! [`TunerCore::tick`] and, while it has the desk, [`TunerCore::conclude`]; as soon as
+//! [`Desk::is_ordered`](crate::identification::Desk::is_ordered) the other thread gets the desk, calls [`Analysis::work`] until it
+//! returns false, and gives it back.
+//!
 //! The work per tick is bounded, there is no heap, and samples that are not finite are never used.
 
 mod core;
@@ -26,11 +33,11 @@ mod settings;
 use ::core::ops::{Deref, DerefMut};
 
 use crate::control::Measurement;
-use crate::identification::Workspace;
+use crate::identification::{Analysis, Bench, Desk, Stage};
 use crate::pack::Pack;
 
 pub use self::core::TunerCore;
-pub use self::settings::{CheckedSettings, TunerError, TunerSettings};
+pub use self::settings::{CheckedSettings, Consent, TunerError, TunerSettings};
 pub use crate::take_off::TakeOffSettings;
 
 /// Phase of a tuner. Exhaustive, because the C interface has a code for each phase.
@@ -44,6 +51,8 @@ pub enum TunerPhase {
     Relay,
     /// Process and controller are computed while the oscillation continues.
     Identify,
+    /// A controller has been found and waits for consent; the safe controller runs.
+    Proposed,
     /// The controller found runs.
     Control,
     /// The test has ended; the safe controller runs.
@@ -59,6 +68,7 @@ impl TunerPhase {
             Self::TakeOff => "takeoff",
             Self::Relay => "relay",
             Self::Identify => "identify",
+            Self::Proposed => "proposed",
             Self::Control => "control",
             Self::Aborted => "aborted",
         }
@@ -67,8 +77,11 @@ impl TunerPhase {
 
 /// Tuner of one axis. See the [module](self).
 pub struct Tuner<'a> {
-    core: TunerCore<'a>,
-    workspace: Workspace,
+    core: TunerCore,
+    analysis: Analysis<'a>,
+    desk: Desk,
+    bench: Bench,
+    slices: u16,
 }
 
 impl Tuner<'static> {
@@ -88,9 +101,15 @@ impl<'a> Tuner<'a> {
     /// # Errors
     /// The first setting that is out of range.
     pub fn with_pack(settings: &TunerSettings, pack: Pack<'a>) -> Result<Self, TunerError> {
+        if settings.slices == 0 {
+            return Err(TunerError::NoWork);
+        }
         Ok(Self {
-            core: TunerCore::of(&settings.checked()?, pack),
-            workspace: Workspace::NEW,
+            core: TunerCore::of(&settings.checked()?),
+            analysis: Analysis::new(pack),
+            desk: Desk::NEW,
+            bench: Bench::NEW,
+            slices: settings.slices,
         })
     }
 
@@ -98,21 +117,32 @@ impl<'a> Tuner<'a> {
     /// next tick (input unit), which is always finite and within the limits.
     #[inline]
     pub fn step(&mut self, time_s: f64, measurement: &Measurement, reference: f32) -> f32 {
-        self.core
-            .step(&mut self.workspace, time_s, measurement, reference)
+        (self.core).tick(Some(&mut self.desk), time_s, measurement, reference);
+        (self.analysis).work(&mut self.desk, &mut self.bench, self.slices);
+        self.core.conclude(&mut self.desk)
+    }
+
+    /// Next step of the identification.
+    #[must_use]
+    pub fn stage(&self) -> Stage {
+        if self.core.is_collecting() {
+            Stage::Collect
+        } else {
+            self.analysis.stage()
+        }
     }
 }
 
-impl<'a> Deref for Tuner<'a> {
-    type Target = TunerCore<'a>;
+impl Deref for Tuner<'_> {
+    type Target = TunerCore;
 
-    fn deref(&self) -> &TunerCore<'a> {
+    fn deref(&self) -> &TunerCore {
         &self.core
     }
 }
 
-impl<'a> DerefMut for Tuner<'a> {
-    fn deref_mut(&mut self) -> &mut TunerCore<'a> {
+impl DerefMut for Tuner<'_> {
+    fn deref_mut(&mut self) -> &mut TunerCore {
         &mut self.core
     }
 }

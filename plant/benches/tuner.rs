@@ -10,7 +10,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use onecycle_onboard::control::Measurement;
-use onecycle_onboard::tuner::{Tuner, TunerPhase, TunerSettings};
+use onecycle_onboard::tuner::{Consent, Tuner, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 use onecycle_plant::FixedStepProcess;
 
@@ -31,6 +31,7 @@ fn flight(slices: u16) -> Vec<Tick> {
         output_lowest: -1.0,
         output_highest: 1.0,
         slices,
+        consent: Consent::Automatic,
         ..new
     };
     let process = Soiptd::from_acceleration_gain(4.0, 0.0321, 1.0 / 1.6886, 0.024)
@@ -50,7 +51,7 @@ fn flight(slices: u16) -> Vec<Tick> {
             TunerPhase::Identify => "identify",
             TunerPhase::Control if tuner.is_proven() => "control",
             TunerPhase::Control => "control, checked",
-            TunerPhase::TakeOff | TunerPhase::Aborted => "other",
+            TunerPhase::TakeOff | TunerPhase::Proposed | TunerPhase::Aborted => "other",
         };
         let begin = Instant::now();
         let output = black_box(tuner.step(

@@ -7,16 +7,20 @@
 pub mod pid;
 mod settings;
 
+use core::ffi::{CStr, c_char};
 use core::mem::MaybeUninit;
 
+use onecycle_handover::{Handover, Side};
 use onecycle_onboard::control::Measurement;
 use onecycle_onboard::guard::Abort;
-use onecycle_onboard::identification::Refusal;
-use onecycle_onboard::identification::Workspace;
+use onecycle_onboard::identification::{Analysis, Bench, Desk, Refusal};
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::{TunerCore, TunerError, TunerPhase};
+use onecycle_onboard::tuner::{TunerCore, TunerPhase};
 
-pub use self::settings::{OnecycleSettings, OnecycleStatus};
+pub use self::settings::{
+    ONECYCLE_CONSENT_ASK, ONECYCLE_CONSENT_AUTOMATIC, ONECYCLE_CONSENT_NEVER,
+    ONECYCLE_SETTINGS_VERSION, OnecycleSettings, OnecycleStatus,
+};
 
 /// Size of a tuner in words of eight bytes, for 64-bit machines, where it is largest.
 pub const ONECYCLE_TUNER_WORDS: usize = 3700;
@@ -28,8 +32,18 @@ const ALIVE: u64 = u64::from_le_bytes(*b"ONECYCLE");
 #[repr(C)]
 struct Placed {
     alive: u64,
-    core: MaybeUninit<TunerCore<'static>>,
-    workspace: MaybeUninit<Workspace>,
+    /// Slices of the analysis in a tick; zero if onecycle_tuner_work does it.
+    slices: u16,
+    core: MaybeUninit<TunerCore>,
+    /// Passed to and fro by the two threads.
+    desk: MaybeUninit<Handover<Desk>>,
+    /// Used with the desk only.
+    analyst: MaybeUninit<Analyst>,
+}
+
+struct Analyst {
+    analysis: Analysis<'static>,
+    bench: Bench,
 }
 
 const _: () = assert!(
@@ -76,6 +90,8 @@ pub enum OnecyclePhase {
     Control,
     /// The test has ended; the safe controller runs.
     Aborted,
+    /// A controller has been found and waits for onecycle_tuner_accept; the safe controller runs.
+    Proposed,
 }
 
 /// Reason of an abort.
@@ -98,12 +114,26 @@ pub enum OnecycleReason {
     Duration,
     /// The relay has not switched for too long.
     NoOscillation,
-    /// None of the identification attempts led to a controller.
+    /// None of the identification attempts led to a controller, for another reason than those below.
     Refused,
     /// The response with the new gains differs from the prediction.
     Mismatch,
     /// The gain depends on the amplitude of the relay: dead zone, saturation or backlash of the actuator.
     AmplitudeDependent,
+    /// Refused: the last cycle is constant or lacks samples.
+    NoSignature,
+    /// Refused: no process of the pack's family explains the last cycle.
+    Unknown,
+    /// Refused: the output does not follow the input.
+    NoFit,
+    /// Refused: the best fit leaves part of the oscillation unexplained.
+    Misfit,
+    /// Refused: the best fit lies on a limit of the domain.
+    Edge,
+    /// Refused: the pack has no gains for the process.
+    NoGains,
+    /// Refused: the phase margin is too uncertain.
+    TooUncertain,
 }
 
 /// Result of a test.
@@ -152,45 +182,34 @@ pub struct OnecycleResult {
     pub setpoint_weight: f64,
 }
 
-impl OnecycleTuner {
-    fn placed(&self) -> &Placed {
-        // SAFETY: the size and alignment are asserted above, and any bits are a valid `Placed`.
-        unsafe { &*(&raw const *self).cast() }
-    }
-
-    fn placed_mut(&mut self) -> &mut Placed {
-        // SAFETY: as in `placed`.
-        unsafe { &mut *(&raw mut *self).cast() }
-    }
-
-    fn core(&self) -> Option<&TunerCore<'static>> {
-        let placed = self.placed();
-        // SAFETY: the first word shows that `onecycle_tuner_init` has written a tuner, and the caller of every
-        // function promises that nothing else has written to the memory since.
-        (placed.alive == ALIVE).then(|| unsafe { placed.core.assume_init_ref() })
-    }
-
-    fn parts(&mut self) -> Option<(&mut TunerCore<'static>, &mut Workspace)> {
-        let placed = self.placed_mut();
-        // SAFETY: as in `core`.
-        (placed.alive == ALIVE).then(|| unsafe {
-            (
-                placed.core.assume_init_mut(),
-                placed.workspace.assume_init_mut(),
-            )
-        })
-    }
-}
-
 /// The parts of a tuner behind a pointer from C, if there is one.
 ///
 /// # Safety
-/// The pointer is null, or what it points to is valid, aligned and not used by anybody else meanwhile.
-unsafe fn parts_at<'a>(
-    tuner: *mut OnecycleTuner,
-) -> Option<(&'a mut TunerCore<'static>, &'a mut Workspace)> {
-    // SAFETY: the caller's promise.
-    unsafe { tuner.as_mut() }.and_then(OnecycleTuner::parts)
+/// The pointer is null or points to memory of this size and alignment.
+unsafe fn placed_at(tuner: *const OnecycleTuner) -> Option<*mut Placed> {
+    let placed = tuner.cast_mut().cast::<Placed>();
+    // SAFETY: the caller's promise; the size and alignment are asserted above, and any bits are a number.
+    let is_alive = !placed.is_null() && unsafe { (*placed).alive } == ALIVE;
+    is_alive.then_some(placed)
+}
+
+/// The core of a tuner behind a pointer from C, if there is one.
+///
+/// # Safety
+/// The pointer is null, or what it points to is valid and aligned, and its core is not used by anybody else meanwhile.
+unsafe fn core_at<'a>(tuner: *mut OnecycleTuner) -> Option<&'a mut TunerCore> {
+    // SAFETY: the caller's promise; `alive` shows that `onecycle_tuner_init` has written a core, and the caller of every
+    // function promises that nothing else has written to the memory since.
+    unsafe { placed_at(tuner).map(|placed| (*placed).core.assume_init_mut()) }
+}
+
+/// Like [`core_at`], to read.
+///
+/// # Safety
+/// As for [`core_at`].
+unsafe fn read_at<'a>(tuner: *const OnecycleTuner) -> Option<&'a TunerCore> {
+    // SAFETY: as in `core_at`.
+    unsafe { placed_at(tuner).map(|placed| (*placed).core.assume_init_ref()) }
 }
 
 /// A missing measurement counts as one that is not finite.
@@ -203,8 +222,9 @@ fn measurement_of(measurement: Option<&OnecycleMeasurement>) -> Measurement {
 }
 
 /// Default settings: a relay of this amplitude (input unit) with noise protection and trim at the distinguishing
-/// phase, ticks every sample_s (s), two cycles, an integral beside the controller found; no take-off, no abort limits; the
-/// fallback output is zero.
+/// phase, ticks every sample_s (s), two cycles, an integral beside the controller found, which is put in force after
+/// onecycle_tuner_accept; no take-off; the fallback output is zero. The limits of the test and of the output have no default:
+/// set them.
 #[unsafe(no_mangle)]
 pub extern "C" fn onecycle_settings_default(amplitude: f32, sample_s: f32) -> OnecycleSettings {
     OnecycleSettings::new(amplitude, sample_s)
@@ -220,24 +240,59 @@ pub unsafe extern "C" fn onecycle_tuner_init(
     tuner: *mut OnecycleTuner,
     settings: *const OnecycleSettings,
 ) -> OnecycleStatus {
+    // SAFETY: the caller's promise; null and zero bytes stand for the embedded pack.
+    unsafe { onecycle_tuner_init_with_pack(tuner, settings, core::ptr::null(), 0) }
+}
+
+/// Like onecycle_tuner_init, with another pack than the embedded one: its bytes, which must stay where they are, and their
+/// number. A pack holds the family of processes, and the gains for the phase margin for which it was made. Null: the embedded
+/// pack.
+///
+/// # Safety
+/// The first two pointers are null or point to valid objects of their types, the third is null or points to `pack_bytes`
+/// bytes that live and do not change as long as the tuner.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn onecycle_tuner_init_with_pack(
+    tuner: *mut OnecycleTuner,
+    settings: *const OnecycleSettings,
+    pack: *const u8,
+    pack_bytes: usize,
+) -> OnecycleStatus {
     // SAFETY: the caller's promise.
-    let (Some(memory), Some(settings)) = (unsafe { tuner.as_mut() }, unsafe { settings.as_ref() })
-    else {
+    let Some(settings) = (unsafe { settings.as_ref() }) else {
         return OnecycleStatus::Null;
     };
-    let placed = memory.placed_mut();
-    placed.alive = 0;
-    let checked = settings.to_settings().checked();
-    let pack = Pack::embedded().map_err(|_| TunerError::Pack);
-    match checked.and_then(|checked| Ok((checked, pack?))) {
-        Ok((checked, pack)) => {
-            placed.core.write(TunerCore::of(&checked, pack));
-            placed.workspace.write(Workspace::NEW);
-            placed.alive = ALIVE;
-            OnecycleStatus::Ok
-        }
-        Err(error) => OnecycleStatus::from(error),
+    if tuner.is_null() {
+        return OnecycleStatus::Null;
     }
+    let placed = tuner.cast::<Placed>();
+    // SAFETY: the caller's promise; any bits are a number.
+    unsafe { (*placed).alive = 0 };
+    let checked = match settings.checked() {
+        Ok(checked) => checked,
+        Err(status) => return status,
+    };
+    let pack = if pack.is_null() {
+        Pack::embedded()
+    } else {
+        // SAFETY: the caller's promise.
+        Pack::read(unsafe { core::slice::from_raw_parts(pack, pack_bytes) })
+    };
+    let Ok(pack) = pack else {
+        return OnecycleStatus::Pack;
+    };
+    // SAFETY: the caller's promise; the parts are written before the mark says so.
+    unsafe {
+        (*placed).slices = settings.slices;
+        (*placed).core.write(TunerCore::of(&checked));
+        (*placed).desk.write(Handover::new(Desk::NEW));
+        (*placed).analyst.write(Analyst {
+            analysis: Analysis::new(pack),
+            bench: Bench::NEW,
+        });
+        (*placed).alive = ALIVE;
+    }
+    OnecycleStatus::Ok
 }
 
 /// One tick: time (s), measurement, reference (output unit). Returns the input to hold until the next tick
@@ -253,12 +308,98 @@ pub unsafe extern "C" fn onecycle_tuner_step(
     reference: f32,
 ) -> f32 {
     // SAFETY: the caller's promise.
-    let Some((core, workspace)) = (unsafe { parts_at(tuner) }) else {
-        return 0.0;
+    let (placed, core) = match unsafe { (placed_at(tuner), core_at(tuner)) } {
+        (Some(placed), Some(core)) => (placed, core),
+        _ => return 0.0,
     };
     // SAFETY: the caller's promise.
     let measurement = measurement_of(unsafe { measurement.as_ref() });
-    core.step(workspace, time_s, &measurement, reference)
+    // SAFETY: written by `onecycle_tuner_init`; the analyst is used with the desk only.
+    let (slices, desk) = unsafe { ((*placed).slices, (*placed).desk.assume_init_ref()) };
+    // SAFETY: the first side is the thread of this function, by the caller's promise.
+    let turn = unsafe {
+        desk.turn(Side::First, |desk| {
+            core.tick(Some(desk), time_s, &measurement, reference);
+            if slices > 0 {
+                let Analyst { analysis, bench } = (*placed).analyst.assume_init_mut();
+                analysis.work(desk, bench, slices);
+            }
+            let output = core.conclude(desk);
+            (output, slices == 0 && desk.is_ordered())
+        })
+    };
+    turn.unwrap_or_else(|| core.tick(None, time_s, &measurement, reference))
+}
+
+/// Does at most this number of slices of the identification, in another thread than onecycle_tuner_step, of lower priority.
+/// For tuners whose setting `slices` is zero. Returns whether work is left: call it again when there is time. An
+/// identification takes 2,000 to 9,000 slices.
+///
+/// # Safety
+/// The pointer is null or points to the memory of a tuner; one thread at a time calls this function.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn onecycle_tuner_work(tuner: *mut OnecycleTuner, slices: u16) -> bool {
+    // SAFETY: the caller's promise.
+    let Some(placed) = (unsafe { placed_at(tuner) }) else {
+        return false;
+    };
+    // SAFETY: written by `onecycle_tuner_init`.
+    let desk = unsafe { (*placed).desk.assume_init_ref() };
+    // SAFETY: the second side is the thread of this function, by the caller's promise; the analyst is used with the desk only.
+    let turn = unsafe {
+        desk.turn(Side::Second, |desk| {
+            let Analyst { analysis, bench } = (*placed).analyst.assume_init_mut();
+            let is_left = analysis.work(desk, bench, slices);
+            (is_left, !is_left)
+        })
+    };
+    turn.unwrap_or(false)
+}
+
+/// Gives the command (input unit) of another controller for the next tick, which holds the axis instead of the safe controller
+/// outside of a test. Call it before each onecycle_tuner_step. That controller must hold its integral while
+/// onecycle_tuner_is_in_charge, and go on from onecycle_tuner_usual.
+///
+/// # Safety
+/// The pointer is null or points to the memory of a tuner.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn onecycle_tuner_beside(tuner: *mut OnecycleTuner, command: f32) {
+    // SAFETY: the caller's promise.
+    if let Some(core) = unsafe { core_at(tuner) } {
+        core.beside(command);
+    }
+}
+
+/// Whether the last output was the tuner's own: that of the relay or of the controller found. If not, it was that of the safe
+/// controller, or the command given to onecycle_tuner_beside, unchanged.
+///
+/// # Safety
+/// The pointer is null or points to the memory of a tuner.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn onecycle_tuner_is_in_charge(tuner: *const OnecycleTuner) -> bool {
+    // SAFETY: the caller's promise.
+    unsafe { read_at(tuner) }.is_some_and(|core| core.is_in_charge())
+}
+
+/// Mean of the output before the test (input unit); needs the setting bias_filter_s.
+///
+/// # Safety
+/// The pointer is null or points to the memory of a tuner.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn onecycle_tuner_usual(tuner: *const OnecycleTuner) -> f32 {
+    // SAFETY: the caller's promise.
+    unsafe { read_at(tuner) }.map_or(0.0, |core| core.usual())
+}
+
+/// Puts the proposed controller in force from the next tick on. Only in the phase proposed, and with the setting consent
+/// ONECYCLE_CONSENT_ASK; returns whether it was so.
+///
+/// # Safety
+/// The pointer is null or points to the memory of a tuner.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn onecycle_tuner_accept(tuner: *mut OnecycleTuner) -> bool {
+    // SAFETY: the caller's promise.
+    unsafe { core_at(tuner) }.is_some_and(|core| core.accept())
 }
 
 /// Begins the test at the next tick. Only in the phase idle.
@@ -268,7 +409,7 @@ pub unsafe extern "C" fn onecycle_tuner_step(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_start(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
-    if let Some((core, _)) = unsafe { parts_at(tuner) } {
+    if let Some(core) = unsafe { core_at(tuner) } {
         core.start();
     }
 }
@@ -280,7 +421,7 @@ pub unsafe extern "C" fn onecycle_tuner_start(tuner: *mut OnecycleTuner) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_abort(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
-    if let Some((core, _)) = unsafe { parts_at(tuner) } {
+    if let Some(core) = unsafe { core_at(tuner) } {
         core.abort();
     }
 }
@@ -292,7 +433,7 @@ pub unsafe extern "C" fn onecycle_tuner_abort(tuner: *mut OnecycleTuner) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_reset(tuner: *mut OnecycleTuner) {
     // SAFETY: the caller's promise.
-    if let Some((core, _)) = unsafe { parts_at(tuner) } {
+    if let Some(core) = unsafe { core_at(tuner) } {
         core.reset();
     }
 }
@@ -304,12 +445,13 @@ pub unsafe extern "C" fn onecycle_tuner_reset(tuner: *mut OnecycleTuner) {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_phase(tuner: *const OnecycleTuner) -> OnecyclePhase {
     // SAFETY: the caller's promise.
-    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
+    let tuner = unsafe { read_at(tuner) };
     tuner.map_or(OnecyclePhase::None, |tuner| match tuner.phase() {
         TunerPhase::Idle => OnecyclePhase::Idle,
         TunerPhase::TakeOff => OnecyclePhase::TakeOff,
         TunerPhase::Relay => OnecyclePhase::Relay,
         TunerPhase::Identify => OnecyclePhase::Identify,
+        TunerPhase::Proposed => OnecyclePhase::Proposed,
         TunerPhase::Control => OnecyclePhase::Control,
         TunerPhase::Aborted => OnecyclePhase::Aborted,
     })
@@ -322,8 +464,46 @@ pub unsafe extern "C" fn onecycle_tuner_phase(tuner: *const OnecycleTuner) -> On
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn onecycle_tuner_reason(tuner: *const OnecycleTuner) -> OnecycleReason {
     // SAFETY: the caller's promise.
-    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
-    match tuner.and_then(TunerCore::reason) {
+    let tuner = unsafe { read_at(tuner) };
+    reason_of(tuner.and_then(|core| core.reason()))
+}
+
+/// A sentence about the reason of the abort, in English; empty if the test was not aborted.
+///
+/// # Safety
+/// The pointer is null or points to the memory of a tuner.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn onecycle_tuner_reason_text(tuner: *const OnecycleTuner) -> *const c_char {
+    // SAFETY: the caller's promise.
+    let reason = reason_of(unsafe { read_at(tuner) }.and_then(|core| core.reason()));
+    text_of(reason).as_ptr()
+}
+
+fn text_of(reason: OnecycleReason) -> &'static CStr {
+    match reason {
+        OnecycleReason::None => c"",
+        OnecycleReason::Operator => c"aborted by the operator",
+        OnecycleReason::NotFinite => c"a time, a reference or a measurement is not finite",
+        OnecycleReason::Stale => c"a sample is too old, or the timestamp did not increase",
+        OnecycleReason::Excursion => c"the output is too far from the reference",
+        OnecycleReason::Rate => c"the output moves too fast",
+        OnecycleReason::Duration => c"the test takes too long",
+        OnecycleReason::NoOscillation => c"the relay has not switched for too long",
+        OnecycleReason::Refused => c"no controller found",
+        OnecycleReason::Mismatch => c"the response with the new gains differs from the prediction",
+        OnecycleReason::AmplitudeDependent => c"the gain depends on the amplitude",
+        OnecycleReason::NoSignature => c"the last cycle is constant or lacks samples",
+        OnecycleReason::Unknown => c"no process of the pack's family explains the last cycle",
+        OnecycleReason::NoFit => c"the output does not follow the input",
+        OnecycleReason::Misfit => c"the best fit leaves part of the oscillation unexplained",
+        OnecycleReason::Edge => c"the best fit lies on a limit of the domain",
+        OnecycleReason::NoGains => c"the pack has no gains for the process",
+        OnecycleReason::TooUncertain => c"the phase margin is too uncertain",
+    }
+}
+
+fn reason_of(abort: Option<Abort>) -> OnecycleReason {
+    match abort {
         None => OnecycleReason::None,
         Some(Abort::Operator) => OnecycleReason::Operator,
         Some(Abort::NotFinite) => OnecycleReason::NotFinite,
@@ -332,8 +512,17 @@ pub unsafe extern "C" fn onecycle_tuner_reason(tuner: *const OnecycleTuner) -> O
         Some(Abort::Rate(_)) => OnecycleReason::Rate,
         Some(Abort::Duration(_)) => OnecycleReason::Duration,
         Some(Abort::NoOscillation(_)) => OnecycleReason::NoOscillation,
-        Some(Abort::Refused(Refusal::AmplitudeDependent(_))) => OnecycleReason::AmplitudeDependent,
-        Some(Abort::Refused(_)) => OnecycleReason::Refused,
+        Some(Abort::Refused(refusal)) => match refusal {
+            Refusal::AmplitudeDependent(_) => OnecycleReason::AmplitudeDependent,
+            Refusal::NoSignature => OnecycleReason::NoSignature,
+            Refusal::Unknown(_) => OnecycleReason::Unknown,
+            Refusal::NoFit => OnecycleReason::NoFit,
+            Refusal::Misfit(_) => OnecycleReason::Misfit,
+            Refusal::Edge(_) => OnecycleReason::Edge,
+            Refusal::NoGains => OnecycleReason::NoGains,
+            Refusal::TooUncertain(..) => OnecycleReason::TooUncertain,
+            _ => OnecycleReason::Refused,
+        },
         Some(Abort::Mismatch(_)) => OnecycleReason::Mismatch,
     }
 }
@@ -348,7 +537,7 @@ pub unsafe extern "C" fn onecycle_tuner_result(
     result: *mut OnecycleResult,
 ) -> bool {
     // SAFETY: the caller's promise.
-    let tuner = unsafe { tuner.as_ref() }.and_then(OnecycleTuner::core);
+    let tuner = unsafe { read_at(tuner) };
     // SAFETY: the caller's promise.
     let (Some(tuner), Some(result)) = (tuner, unsafe { result.as_mut() }) else {
         return false;

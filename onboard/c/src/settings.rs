@@ -3,12 +3,29 @@
 use onecycle_onboard::control::PdLaw;
 use onecycle_onboard::guard::Limits;
 use onecycle_onboard::relay::{RelayError, RelaySettings};
-use onecycle_onboard::tuner::{TakeOffSettings, TunerError, TunerSettings};
+use onecycle_onboard::tuner::{
+    CheckedSettings, Consent, TakeOffSettings, TunerError, TunerSettings,
+};
+
+/// Version of these settings. It changes with every change of their meaning.
+pub const ONECYCLE_SETTINGS_VERSION: u32 = 1;
+
+/// A controller that was found is put in force when onecycle_tuner_accept says so.
+pub const ONECYCLE_CONSENT_ASK: u8 = 0;
+/// It is only proposed.
+pub const ONECYCLE_CONSENT_NEVER: u8 = 1;
+/// It is put in force at once.
+pub const ONECYCLE_CONSENT_AUTOMATIC: u8 = 2;
 
 /// Settings of a tuner. Start from onecycle_settings_default.
 #[repr(C)]
 #[derive(Clone, Copy)]
 pub struct OnecycleSettings {
+    /// Size of this structure (bytes) and version, set by onecycle_settings_default: a library with other settings refuses
+    /// them.
+    pub size: u32,
+    /// ONECYCLE_SETTINGS_VERSION of the header.
+    pub version: u32,
     /// Half the jump of the relay's output (input unit), above zero.
     pub amplitude: f32,
     /// Sine of the phase of the oscillation, between -1 and 1.
@@ -29,7 +46,7 @@ pub struct OnecycleSettings {
     /// Maximum number of identification attempts.
     pub attempts: u8,
     /// Slices of the identification per tick, each of up to 2,700 operations in double precision. Use 1 where
-    /// double precision is emulated.
+    /// double precision is emulated, 0 if onecycle_tuner_work does them in another thread.
     pub slices: u16,
     /// Whether the test begins with a take-off from the ground.
     pub take_off: bool,
@@ -68,6 +85,8 @@ pub struct OnecycleSettings {
     /// Second amplitude of the relay as a part of the first, 0.3 to 0.8, usually 0.6: the test goes on with one cycle there
     /// and ends with the reason amplitude_dependent if the gain changes with the amplitude. 0, the default, switches it off.
     pub second_amplitude: f32,
+    /// What happens with a controller that was found: ONECYCLE_CONSENT_ASK, the default, _NEVER or _AUTOMATIC.
+    pub consent: u8,
 }
 
 /// Status of an initialisation.
@@ -86,17 +105,17 @@ pub enum OnecycleStatus {
     RelayAsymmetry,
     /// Another setting of the relay is negative or not finite.
     RelaySetting,
-    /// A time, a gain or a limit is not positive.
+    /// A time or a gain is not positive.
     Setting,
     /// The number of cycles is not 1 to 4.
     Cycles,
-    /// The number of attempts or of slices is zero.
+    /// The number of attempts is zero.
     NoWork,
-    /// The lower output limit is not below the upper one.
+    /// The output limits are not set, or the lower one is not below the upper one.
     OutputLimits,
     /// A gain or the offset of the safe controller is not finite.
     Safe,
-    /// The embedded data cannot be read: the build is broken.
+    /// The pack cannot be read; if it is the embedded one, the build is broken.
     Pack,
     /// The phase of the integral is larger than 0.349 rad.
     IntegralPhase,
@@ -110,6 +129,12 @@ pub enum OnecycleStatus {
     SetpointWeight,
     /// The second amplitude of the relay is not 0 or 0.3 to 0.8.
     SecondAmplitude,
+    /// A limit of the test is not set or not positive.
+    Limit,
+    /// Size or version of the settings are those of another header, or they were not begun with onecycle_settings_default.
+    Version,
+    /// The consent is not one of the constants.
+    Consent,
 }
 
 impl From<TunerError> for OnecycleStatus {
@@ -120,6 +145,7 @@ impl From<TunerError> for OnecycleStatus {
             TunerError::Relay(RelayError::Asymmetry(_)) => Self::RelayAsymmetry,
             TunerError::Relay(RelayError::Setting(..)) => Self::RelaySetting,
             TunerError::Setting(..) => Self::Setting,
+            TunerError::Limit(..) => Self::Limit,
             TunerError::IntegralPhase(_) => Self::IntegralPhase,
             TunerError::SecondAmplitude(_) => Self::SecondAmplitude,
             TunerError::Cycles(_) => Self::Cycles,
@@ -135,6 +161,8 @@ impl OnecycleSettings {
     pub(crate) fn new(amplitude: f32, sample_s: f32) -> Self {
         let new = TunerSettings::new(amplitude, sample_s);
         Self {
+            size: size_of::<Self>() as u32,
+            version: ONECYCLE_SETTINGS_VERSION,
             amplitude,
             beta: new.relay.beta,
             preroll_s: new.relay.preroll_s,
@@ -162,10 +190,28 @@ impl OnecycleSettings {
             rate_lag_s: new.rate_lag_s,
             integral_phase_rad: new.integral_phase_rad,
             second_amplitude: new.second_amplitude,
+            consent: ONECYCLE_CONSENT_ASK,
         }
     }
 
-    pub(crate) fn to_settings(self) -> TunerSettings {
+    pub(crate) fn checked(&self) -> Result<CheckedSettings, OnecycleStatus> {
+        if (self.size, self.version) != (size_of::<Self>() as u32, ONECYCLE_SETTINGS_VERSION) {
+            return Err(OnecycleStatus::Version);
+        }
+        let consent = match self.consent {
+            ONECYCLE_CONSENT_ASK => Consent::Ask,
+            ONECYCLE_CONSENT_NEVER => Consent::Never,
+            ONECYCLE_CONSENT_AUTOMATIC => Consent::Automatic,
+            _ => return Err(OnecycleStatus::Consent),
+        };
+        let settings = TunerSettings {
+            consent,
+            ..self.to_settings()
+        };
+        settings.checked().map_err(OnecycleStatus::from)
+    }
+
+    fn to_settings(self) -> TunerSettings {
         let new = TunerSettings::new(self.amplitude, self.sample_s);
         TunerSettings {
             relay: RelaySettings {

@@ -145,6 +145,24 @@ fn kick_ends_outside_the_noise() {
     }
 }
 
+// An output that wanders by 0.2 at rest, behind a filter that leaves no noise from sample to sample: the kick goes on to
+// there, and the lead of 130.2 samples (see below) is complete from the first switch on.
+#[test]
+fn a_wandering_output_is_at_rest() {
+    for (level, phase) in [(0.0, RelayPhase::Oscillate), (0.2, RelayPhase::Kick)] {
+        let mut relay = relay(RelaySettings::bare(1.0, -0.73));
+        relay.begin_within(level);
+        relay.step(0.19, DT_S);
+        assert_eq!(relay.phase(), phase);
+        let levels = levels(&mut relay, sine(3, 1.0, 0.2));
+        // The first maximum is at 250 samples less those of 0.2 rad, the crossing 250 later.
+        let crossing = 500.0 - 1000.0 * 0.2 / TAU;
+        let lead = crossing - switches(&levels)[0] as f32;
+        let expected = if level > 0.0 { 130.2 } else { 0.0 };
+        assert!((lead - expected).abs() <= 1.5, "{level}: {lead}");
+    }
+}
+
 // Under A sin(wt) the fall is due when the sine has fallen to -beta: wt = pi + asin(beta); the rise follows half
 // a period later. Sample 500 + 1000 asin(beta) / 2 pi, rounded up.
 #[test]

@@ -1,18 +1,18 @@
-//! Tuner without its work memory: phases, guard, control laws.
+//! Tuner without its identification's analysis: phases, guard, control laws.
 
 use super::TunerPhase;
-use super::settings::{CheckedSettings, TunerSettings};
+use super::settings::{CheckedSettings, Consent, TunerSettings};
 use crate::control::{Measurement, RateEstimate};
 use crate::guard::{Abort, Guard, Motion};
-use crate::identification::{
-    Refusal, Stage, StagedIdentification, TestSample, TuningResult, Workspace,
-};
+use libm::sqrtf;
+
+use crate::identification::{Collector, Desk, PAST_EDGES, Refusal, TestSample, TuningResult};
 use crate::integral::Integral;
-use crate::pack::Pack;
 use crate::pid::{PidLaw, PidSettings};
 use crate::prediction::{Beginning, Prediction};
 use crate::relay::Relay;
 use crate::take_off;
+use crate::window::Edge;
 
 /// Switches of the relay that end a take-off: the vehicle has been above the reference and has returned.
 const AIRBORNE_SWITCHES: u32 = 2;
@@ -21,10 +21,14 @@ const CHECKED_PERIODS: f64 = 4.0;
 /// Tolerance of that comparison, in amplitudes of the oscillation: the prediction begins within the oscillation
 /// with an approximate force, and noise and gusts continue.
 const MOST_MISMATCH: f32 = 1.5;
+/// Standard deviations of the wander under the safe controller within which the process counts as at rest, and the part of
+/// the limit of the excursion that it may be: usually an amplitude of the oscillation.
+const REST_DEVIATIONS: f32 = 3.0;
+const MOST_REST: f32 = 0.1;
 
-/// Tuner of one axis without its [`Workspace`], so that firmware can place both where they stay. Every call must
-/// be given the same workspace. See [`tuner`](super).
-pub struct TunerCore<'a> {
+/// Tuner of one axis without the analysis of its identification, which may run in another thread. Each tick is
+/// [`TunerCore::tick`], then [`TunerCore::conclude`] if the desk is there. See [`tuner`](super).
+pub struct TunerCore {
     settings: TunerSettings,
     phase: TunerPhase,
     reason: Option<Abort>,
@@ -38,12 +42,20 @@ pub struct TunerCore<'a> {
     /// Means under the safe controller: of its output (input unit), of the process's output (output unit).
     usual: f32,
     usual_value: f32,
+    /// Mean square of the output's distance from that mean (output unit^2).
+    wander_squared: f32,
+    /// Command of another controller for the next tick and for this one, and the last output (input unit).
+    given: Option<f32>,
+    other: Option<f32>,
+    output: f32,
     test_s: f32,
     /// Offset of the relay, then of the new controller (input unit).
     offset: f32,
     relay: Relay,
     since_switch_s: f32,
-    identification: StagedIdentification<'a>,
+    collector: Collector,
+    /// Whether an order for the analysis is out whose outcome is wanted.
+    is_waiting: bool,
     attempts_left: u8,
     identified: Option<TuningResult>,
     /// The integral beside the PD found.
@@ -56,11 +68,11 @@ pub struct TunerCore<'a> {
     is_second: bool,
 }
 
-impl<'a> TunerCore<'a> {
+impl TunerCore {
     /// A tuner with checked settings.
     #[must_use]
     #[inline]
-    pub fn of(checked: &CheckedSettings, pack: Pack<'a>) -> Self {
+    pub fn of(checked: &CheckedSettings) -> Self {
         let CheckedSettings { settings, relay } = checked;
         Self {
             phase: TunerPhase::Idle,
@@ -72,15 +84,16 @@ impl<'a> TunerCore<'a> {
             reference: 0.0,
             usual: settings.safe.offset,
             usual_value: 0.0,
+            wander_squared: 0.0,
+            given: None,
+            other: None,
+            output: settings.safe.offset,
             test_s: 0.0,
             offset: 0.0,
             relay: relay.clone(),
             since_switch_s: 0.0,
-            identification: StagedIdentification::new(
-                pack,
-                f64::from(settings.sample_s),
-                settings.cycles,
-            ),
+            collector: Collector::new(f64::from(settings.sample_s), settings.cycles),
+            is_waiting: false,
             attempts_left: settings.attempts,
             identified: None,
             integral: Integral::NONE,
@@ -104,12 +117,69 @@ impl<'a> TunerCore<'a> {
             if self.settings.bias_filter_s > 0.0 {
                 self.offset = self.usual;
                 self.reference = self.usual_value;
+                self.relay.begin_within(self.rest_level());
+            } else if self.other.is_some() {
+                self.offset = self.output;
             }
         }
         self.guard.begin((self.value - self.reference).abs());
     }
 
-    /// Aborts the test, or stops the controller found. The output of the next tick is that of the safe
+    /// Distance from the reference within which the process counts as at rest (output unit): what it wanders under the
+    /// safe controller. An oscillation much smaller than the limit of the excursion is not expected.
+    fn rest_level(&self) -> f32 {
+        let wander = REST_DEVIATIONS * sqrtf(self.wander_squared);
+        wander.min(MOST_REST * self.settings.limits.excursion)
+    }
+
+    /// Puts the proposed controller in force from the next tick on. Only in [`TunerPhase::Proposed`] with
+    /// [`Consent::Ask`]; returns whether it was so.
+    pub fn accept(&mut self) -> bool {
+        let (Some(identified), Some(time_s)) = (self.identified, self.last_time_s) else {
+            return false;
+        };
+        if self.phase != TunerPhase::Proposed || self.settings.consent != Consent::Ask {
+            return false;
+        }
+        let held = [Edge {
+            time_s,
+            input: f64::from(self.output),
+        }];
+        let measurement = Measurement::of(self.value).with_rate(self.rate.rate());
+        let (reference, command) = (self.reference, self.output);
+        if let Some(mut law) = self.law_of(&identified) {
+            law.take_over(reference, &measurement, command);
+            self.fly(law, &identified, &held, time_s);
+        } else {
+            self.end(Abort::NotFinite);
+        }
+        true
+    }
+
+    /// Takes the command (input unit) of another controller, which holds the axis instead of the safe controller outside of a
+    /// test. It counts for the next tick only: give it before each. See [`TunerCore::is_in_charge`].
+    pub fn beside(&mut self, command: f32) {
+        self.given = Some(command);
+    }
+
+    /// Whether the last output was the tuner's own: that of the relay or of the controller found. If not, it was that of the
+    /// safe controller, or the command given to [`TunerCore::beside`], unchanged.
+    #[must_use]
+    pub fn is_in_charge(&self) -> bool {
+        matches!(
+            self.phase,
+            TunerPhase::TakeOff | TunerPhase::Relay | TunerPhase::Identify | TunerPhase::Control
+        )
+    }
+
+    /// Mean of the output while the safe controller or another one held the axis (input unit); needs a bias filter. Another
+    /// controller that takes the axis back begins there.
+    #[must_use]
+    pub fn usual(&self) -> f32 {
+        self.usual
+    }
+
+    /// Aborts the test, rejects a proposal, or stops the controller found. The output of the next tick is that of the safe
     /// controller.
     pub fn abort(&mut self) {
         if self.phase != TunerPhase::Idle {
@@ -117,10 +187,11 @@ impl<'a> TunerCore<'a> {
         }
     }
 
-    /// Resets the tuner for another test; results are forgotten. Only in [`TunerPhase::Aborted`] and
-    /// [`TunerPhase::Control`].
+    /// Resets the tuner for another test; results are forgotten. Only in [`TunerPhase::Aborted`],
+    /// [`TunerPhase::Proposed`] and [`TunerPhase::Control`].
     pub fn reset(&mut self) {
-        if !matches!(self.phase, TunerPhase::Aborted | TunerPhase::Control) {
+        use TunerPhase::{Aborted, Control, Proposed};
+        if !matches!(self.phase, Aborted | Proposed | Control) {
             return;
         }
         let Ok(relay) = Relay::new(self.settings.relay) else {
@@ -134,7 +205,8 @@ impl<'a> TunerCore<'a> {
         self.offset = 0.0;
         self.relay = relay;
         self.since_switch_s = 0.0;
-        self.identification.restart();
+        self.collector.restart();
+        self.is_waiting = false;
         self.attempts_left = self.settings.attempts;
         self.identified = None;
         self.integral = Integral::NONE;
@@ -143,38 +215,34 @@ impl<'a> TunerCore<'a> {
         self.is_second = false;
     }
 
-    /// One tick. Takes time (s), measurement and reference (output unit); returns the input to hold until the
-    /// next tick (input unit), which is always finite and within the limits.
+    /// One tick of guard, relay and control. Takes time (s), measurement and reference (output unit); returns the input to
+    /// hold until the next tick (input unit), which is always finite, and within the limits if it is the tuner's own. Without
+    /// the desk, which another thread may have, everything but the collection of cycles goes on.
     #[inline]
-    pub fn step(
+    pub fn tick(
         &mut self,
-        workspace: &mut Workspace,
+        desk: Option<&mut Desk>,
         time_s: f64,
         measurement: &Measurement,
         reference: f32,
     ) -> f32 {
         let dt_s = self.tick_s(time_s);
+        self.other = self.given.take();
         if let Err(reason) = self.watch(dt_s, measurement, reference) {
             self.end(reason);
         }
-        let output = match self.phase {
-            TunerPhase::Idle => self.idle(dt_s),
+        self.output = match self.phase {
+            TunerPhase::Idle | TunerPhase::Proposed => self.idle(dt_s),
             TunerPhase::TakeOff => self.take_off(dt_s),
             TunerPhase::Relay | TunerPhase::Identify => self.offset + self.excite(dt_s),
             TunerPhase::Control => self.control(dt_s),
             TunerPhase::Aborted => self.safe(),
         };
-        let output = self.within_limits(output);
-        if matches!(
-            self.phase,
-            TunerPhase::TakeOff | TunerPhase::Relay | TunerPhase::Identify
-        ) {
-            self.identify(workspace, time_s, output);
-            if self.phase == TunerPhase::Aborted {
-                return self.within_limits(self.safe());
-            }
+        if self.is_in_charge() {
+            self.output = self.within_limits(self.output);
         }
-        output
+        self.collect(desk, time_s);
+        self.output
     }
 
     fn tick_s(&mut self, time_s: f64) -> f32 {
@@ -195,9 +263,12 @@ impl<'a> TunerCore<'a> {
 
     /// Takes the sample after the guard has checked it.
     fn watch(&mut self, dt_s: f32, measurement: &Measurement, reference: f32) -> Result<(), Abort> {
-        let is_test =
-            !matches!(self.phase, TunerPhase::Idle | TunerPhase::Aborted) && !self.is_proven();
+        let is_test = self.is_in_charge() && !self.is_proven();
         self.guard.check_data(measurement, reference, dt_s)?;
+        if self.other.is_some_and(|command| !command.is_finite()) {
+            self.other = None;
+            return Err(Abort::NotFinite);
+        }
         self.value = measurement.value;
         let rate = self.rate.step(measurement, dt_s, self.settings.rate_lag_s);
         if !is_test {
@@ -205,7 +276,7 @@ impl<'a> TunerCore<'a> {
             return Ok(());
         }
         self.test_s += dt_s;
-        let has_relay = matches!(self.phase, TunerPhase::Relay | TunerPhase::Identify);
+        let has_relay = self.has_relay();
         self.guard.check_motion(&Motion {
             distance: self.value - self.reference,
             rate,
@@ -220,21 +291,27 @@ impl<'a> TunerCore<'a> {
             self.reason = Some(reason);
             self.law = None;
             self.prediction = None;
+            self.is_waiting = false;
         }
     }
 
+    /// Command of the other controller, or of the safe one.
     fn safe(&self) -> f32 {
-        let safe = &self.settings.safe;
-        safe.output(self.reference, self.value, self.rate.rate())
+        self.other.unwrap_or_else(|| {
+            let safe = &self.settings.safe;
+            self.within_limits(safe.output(self.reference, self.value, self.rate.rate()))
+        })
     }
 
     fn idle(&mut self, dt_s: f32) -> f32 {
-        let output = self.within_limits(self.safe());
+        let output = self.safe();
         let filter_s = self.settings.bias_filter_s;
         if dt_s > 0.0 && filter_s > 0.0 {
             let share = dt_s / (dt_s + filter_s);
             self.usual += share * (output - self.usual);
             self.usual_value += share * (self.value - self.usual_value);
+            let off = self.value - self.usual_value;
+            self.wander_squared += share * (off * off - self.wander_squared);
         }
         output
     }
@@ -263,39 +340,64 @@ impl<'a> TunerCore<'a> {
         output
     }
 
-    /// Passes the sample of this tick to the identification and lets it do its slices of work.
-    fn identify(&mut self, workspace: &mut Workspace, time_s: f64, output: f32) {
+    /// Passes the sample of this tick to the identification.
+    fn collect(&mut self, mut desk: Option<&mut Desk>, time_s: f64) {
+        if !self.is_waiting
+            && let Some(desk) = desk.as_deref_mut()
+        {
+            desk.clear();
+        }
+        if !self.has_relay() && self.phase != TunerPhase::TakeOff {
+            return;
+        }
         let observed = TestSample {
             time_s,
-            input: f64::from(output),
+            input: f64::from(self.output),
             output: f64::from(self.value),
             is_high: self.relay.is_high(),
             undone: self.relay.undone(),
         };
-        self.identification.observe(workspace, &observed);
-        if self.phase == TunerPhase::TakeOff {
-            return;
+        self.collector.observe(desk.as_deref_mut(), &observed);
+        if desk.is_some_and(|desk| desk.is_ordered()) {
+            self.is_waiting = true;
+            if self.phase == TunerPhase::Relay {
+                self.phase = TunerPhase::Identify;
+            }
         }
-        let outcome =
-            (0..self.settings.slices).find_map(|_| self.identification.advance(workspace));
+    }
+
+    /// Ends a tick with the desk: takes the outcome of the analysis, if there is one. Returns the input to hold until the next
+    /// tick.
+    pub fn conclude(&mut self, desk: &mut Desk) -> f32 {
+        if !self.has_relay() || !self.is_waiting {
+            return self.output;
+        }
+        let Some(outcome) = desk.take_outcome() else {
+            return self.output;
+        };
+        self.is_waiting = false;
         match outcome {
-            Some(Ok(identified)) if self.is_second || self.settings.second_amplitude == 0.0 => {
-                self.enter_control(time_s, &identified);
+            Ok(identified) if self.is_second || self.settings.second_amplitude == 0.0 => {
+                self.enter_control(&identified);
             }
-            Some(Ok(_)) => self.enter_second(),
-            Some(Err(refusal @ Refusal::AmplitudeDependent(_))) => {
-                self.end(Abort::Refused(refusal));
-            }
-            Some(Err(refusal)) => {
+            Ok(_) => self.enter_second(),
+            Err(refusal @ Refusal::AmplitudeDependent(_)) => self.end(Abort::Refused(refusal)),
+            Err(refusal) => {
                 self.attempts_left -= 1;
                 self.phase = TunerPhase::Relay;
                 if self.attempts_left == 0 {
                     self.end(Abort::Refused(refusal));
                 }
             }
-            None if self.identification.has_work() => self.phase = TunerPhase::Identify,
-            None => {}
         }
+        if !self.is_in_charge() {
+            self.output = self.safe();
+        }
+        self.output
+    }
+
+    fn has_relay(&self) -> bool {
+        matches!(self.phase, TunerPhase::Relay | TunerPhase::Identify)
     }
 
     /// Goes on with the second amplitude of the relay from the next tick on.
@@ -305,32 +407,47 @@ impl<'a> TunerCore<'a> {
             self.end(Abort::NotFinite);
             return;
         }
-        self.identification.confirm();
+        self.collector.confirm();
         self.is_second = true;
         self.phase = TunerPhase::Relay;
     }
 
-    /// Switches to the new controller from the next tick on. Its offset holds the process at rest and stays
+    /// Switches to the new controller from the next tick on, or proposes it. Its offset holds the process at rest and stays
     /// within an amplitude of the relay's centre, because the relay cannot hold a larger bias.
-    fn enter_control(&mut self, time_s: f64, identified: &TuningResult) {
+    fn enter_control(&mut self, identified: &TuningResult) {
         let centre = self.offset + self.relay.trim();
         let h = self.settings.relay.amplitude;
         let at_rest = -identified.input_bias as f32;
         self.offset = at_rest.max(centre - h).min(centre + h);
         let phase_rad = f64::from(self.settings.integral_phase_rad);
         self.integral = Integral::beside(identified.pd, &identified.process, phase_rad);
-        let Some(law) = self.law_of(identified) else {
+        self.identified = Some(*identified);
+        let (Some(law), Some(time_s)) = (self.law_of(identified), self.last_time_s) else {
+            self.identified = None;
             self.end(Abort::NotFinite);
             return;
         };
+        if self.settings.consent == Consent::Automatic {
+            let law = law.started_at(self.reference, self.offset);
+            let edges = self.collector.past_edges();
+            let mut latest = [Edge::default(); PAST_EDGES];
+            let latest = &mut latest[..edges.len()];
+            latest.copy_from_slice(edges);
+            self.fly(law, identified, latest, time_s);
+        } else {
+            self.phase = TunerPhase::Proposed;
+        }
+    }
+
+    /// Flies with a law from the next tick on, and checks the response. `edges` are the latest inputs.
+    fn fly(&mut self, law: PidLaw, identified: &TuningResult, edges: &[Edge], time_s: f64) {
         self.law = Some(law);
-        self.identified = Some(*identified);
         self.prediction = Some(Prediction::new(
             &identified.process,
             law,
             f64::from(self.settings.sample_s),
             &Beginning {
-                edges: self.identification.past_edges(),
+                edges,
                 time_s: time_s + f64::from(self.settings.sample_s),
                 value: self.value,
                 rate: self.rate.rate(),
@@ -342,7 +459,7 @@ impl<'a> TunerCore<'a> {
         self.phase = TunerPhase::Control;
     }
 
-    /// The PD found with the integral beside it, starting with the offset at the reference of the test.
+    /// The PD found with the integral beside it.
     fn law_of(&self, identified: &TuningResult) -> Option<PidLaw> {
         let settings = PidSettings {
             ki: self.integral.ki as f32,
@@ -352,8 +469,7 @@ impl<'a> TunerCore<'a> {
             .with_setpoint_weight(self.integral.setpoint_weight as f32)
             .with_limits(self.settings.output_lowest, self.settings.output_highest);
         let law = PidLaw::new(settings).ok()?;
-        let is_finite = self.offset.is_finite();
-        is_finite.then(|| law.started_at(self.reference, self.offset))
+        self.offset.is_finite().then_some(law)
     }
 
     fn control(&mut self, dt_s: f32) -> f32 {
@@ -418,10 +534,10 @@ impl<'a> TunerCore<'a> {
         self.phase == TunerPhase::Control && self.prediction.is_none()
     }
 
-    /// Next step of the identification.
+    /// Whether cycles are being collected.
     #[must_use]
-    pub fn stage(&self) -> Stage {
-        self.identification.stage()
+    pub fn is_collecting(&self) -> bool {
+        self.collector.is_collecting()
     }
 
     /// The relay of the test.

@@ -2,6 +2,8 @@
 
 use core::fmt;
 
+use libm::roundf;
+
 use crate::control::PdLaw;
 use crate::guard::Limits;
 use crate::identification::MOST_CYCLES;
@@ -25,15 +27,16 @@ pub struct TunerSettings {
     /// Maximum number of identification attempts.
     pub attempts: u8,
     /// Slices of the identification per tick; each takes up to 2,700 operations in double precision, and an
-    /// identification takes 2,000 to 9,000 slices. Use 1 where double precision is emulated.
+    /// identification takes 2,000 to 9,000 slices. Use 1 where double precision is emulated. A [`TunerCore`](super::TunerCore)
+    /// with its analysis elsewhere does not need them.
     pub slices: u16,
     /// Take-off from the ground; `None` if the test begins in the air.
     pub take_off: Option<TakeOffSettings>,
-    /// Abort limits.
+    /// Abort limits, to be set.
     pub limits: Limits,
-    /// Lower limit of the output (input unit).
+    /// Lower limit of the output (input unit), to be set.
     pub output_lowest: f32,
-    /// Upper limit of the output (input unit).
+    /// Upper limit of the output (input unit), to be set.
     pub output_highest: f32,
     /// Controller before a test and after an abort; [`PdLaw::ZERO`] for zero output.
     pub safe: PdLaw,
@@ -50,6 +53,19 @@ pub struct TunerSettings {
     /// [`SECOND_AMPLITUDE`](Self::SECOND_AMPLITUDE). The test goes on with one cycle there and is refused if the gain
     /// changes with the amplitude ([`amplitude`](crate::amplitude)). Zero, the default, ends the test after the first.
     pub second_amplitude: f32,
+    /// What happens with a controller that has been found.
+    pub consent: Consent,
+}
+
+/// What happens with a controller that has been found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Consent {
+    /// It is only proposed; the safe controller goes on.
+    Never,
+    /// It is put in force when [`TunerCore::accept`](super::TunerCore::accept) says so.
+    Ask,
+    /// It is put in force at once.
+    Automatic,
 }
 
 impl TunerSettings {
@@ -57,8 +73,9 @@ impl TunerSettings {
     pub const SECOND_AMPLITUDE: f32 = 0.6;
 
     /// A relay of this amplitude with noise protection and trim at the distinguishing phase, two cycles; an integral
-    /// beside the controller found; no take-off, no abort limits; the fallback output is zero. Set limits and a safe
-    /// controller for a real vehicle.
+    /// beside the controller found, which is put in force after consent; no take-off; the fallback output is zero. The abort
+    /// limits and those of the output have no default: they must be set. Set a safe controller for a real vehicle. The slices
+    /// per tick make ten thousand a second, with which an identification takes 0.2 to 0.9 s.
     #[must_use]
     pub fn new(amplitude: f32, sample_s: f32) -> Self {
         Self {
@@ -69,16 +86,17 @@ impl TunerSettings {
             sample_s,
             cycles: 2,
             attempts: 4,
-            slices: 10,
+            slices: slices_per_tick(sample_s),
             take_off: None,
-            limits: Limits::NONE,
-            output_lowest: f32::MIN,
-            output_highest: f32::MAX,
+            limits: Limits::UNSET,
+            output_lowest: f32::NAN,
+            output_highest: f32::NAN,
             safe: PdLaw::ZERO,
             bias_filter_s: 0.0,
             rate_lag_s: 0.0,
             integral_phase_rad: USUAL_PHASE_RAD,
             second_amplitude: 0.0,
+            consent: Consent::Ask,
         }
     }
 
@@ -99,10 +117,12 @@ impl TunerSettings {
         .or(not_negative
             .into_iter()
             .find(|(_, v)| !(v.is_finite() && *v >= 0.0)))
-        .or(self.limits.out_of_range())
         .or(self.take_off.and_then(|take_off| take_off.out_of_range()));
         if let Some((name, value)) = wrong {
             return Err(TunerError::Setting(name, value));
+        }
+        if let Some((name, value)) = self.limits.out_of_range() {
+            return Err(TunerError::Limit(name, value));
         }
         if self.integral_phase_rad > MOST_PHASE_RAD {
             return Err(TunerError::IntegralPhase(self.integral_phase_rad));
@@ -114,7 +134,7 @@ impl TunerSettings {
         if !(1..=MOST_CYCLES).contains(&self.cycles) {
             return Err(TunerError::Cycles(self.cycles));
         }
-        if self.attempts == 0 || self.slices == 0 {
+        if self.attempts == 0 {
             return Err(TunerError::NoWork);
         }
         let (lowest, highest) = (self.output_lowest, self.output_highest);
@@ -131,6 +151,13 @@ impl TunerSettings {
     }
 }
 
+/// Slices in a tick for ten thousand a second.
+fn slices_per_tick(sample_s: f32) -> u16 {
+    const PER_S: f32 = 10_000.0;
+    // A sample period out of range is found by the check.
+    roundf(PER_S * sample_s).clamp(1.0, 500.0) as u16
+}
+
 /// Settings that have been checked.
 #[derive(Clone, Debug)]
 pub struct CheckedSettings {
@@ -145,6 +172,8 @@ pub enum TunerError {
     Relay(RelayError),
     /// A time, a gain or a limit: name and value.
     Setting(&'static str, f32),
+    /// An abort limit is not set or not positive: name and value.
+    Limit(&'static str, f32),
     /// The phase of the integral exceeds [`MOST_PHASE_RAD`]: its value (rad).
     IntegralPhase(f32),
     /// The second amplitude of the relay: its part of the first.
@@ -166,6 +195,10 @@ impl fmt::Display for TunerError {
         match self {
             Self::Relay(error) => error.fmt(f),
             Self::Setting(name, value) => write!(f, "{name} must be positive, but is {value}"),
+            Self::Limit(name, value) => write!(
+                f,
+                "{name} must be set to a positive number (infinity switches it off), but is {value}"
+            ),
             Self::IntegralPhase(value) => write!(
                 f,
                 "the integral's phase must be 0 to {MOST_PHASE_RAD} rad, but is {value}"
@@ -186,7 +219,7 @@ impl fmt::Display for TunerError {
             ),
             Self::OutputLimits(lowest, highest) => write!(
                 f,
-                "the lower output limit must be below the upper one, but they are {lowest} and {highest}"
+                "the output limits must be set, the lower one below the upper one, but they are {lowest} and {highest}"
             ),
             Self::Safe => write!(
                 f,

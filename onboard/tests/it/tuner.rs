@@ -2,11 +2,12 @@
 
 mod amplitude;
 mod axis;
+mod consent;
 mod faults;
 
 use onecycle_onboard::control::PdLaw;
-use onecycle_onboard::guard::Abort;
-use onecycle_onboard::tuner::{TakeOffSettings, Tuner, TunerPhase, TunerSettings};
+use onecycle_onboard::guard::{Abort, Limits};
+use onecycle_onboard::tuner::{Consent, TakeOffSettings, Tuner, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 
 use self::axis::Axis;
@@ -23,6 +24,8 @@ fn settings() -> TunerSettings {
     TunerSettings {
         output_lowest: -1.0,
         output_highest: 1.0,
+        limits: Limits::NONE,
+        consent: Consent::Automatic,
         ..TunerSettings::new(0.1, SAMPLE_S as f32)
     }
 }
@@ -65,7 +68,7 @@ fn a_test_from_rest_ends_in_the_controller_of_the_process() {
 // a metre.
 #[test]
 fn from_the_ground_without_a_controller() {
-    let settings = TunerSettings::new(0.1, SAMPLE_S as f32);
+    let settings = settings();
     let settings = TunerSettings {
         relay: RelaySettings {
             preroll_s: 0.3,
@@ -253,7 +256,7 @@ fn after_a_reset_all_begins_anew() {
 
 type Change = fn(&mut TunerSettings);
 
-const OUT_OF_RANGE: [(Change, &str); 14] = [
+const OUT_OF_RANGE: [(Change, &str); 16] = [
     (|s| s.sample_s = 0.0, "the sample period must be positive"),
     (
         |s| s.bias_filter_s = -1.0,
@@ -273,6 +276,14 @@ const OUT_OF_RANGE: [(Change, &str); 14] = [
     ),
     (|s| s.limits.rate = 0.0, "the limit of the rate must be"),
     (
+        |s| s.limits = Limits::UNSET,
+        "the limit of the excursion must be set",
+    ),
+    (
+        |s| s.output_lowest = f32::NAN,
+        "the output limits must be set",
+    ),
+    (
         |s| s.limits.stale_s = f32::NAN,
         "the limit of a sample's age",
     ),
@@ -291,7 +302,7 @@ const OUT_OF_RANGE: [(Change, &str); 14] = [
     (|s| s.slices = 0, "at least one attempt and one slice"),
     (
         |s| s.output_lowest = 1.0,
-        "the lower output limit must be below",
+        "the lower one below the upper one",
     ),
     (|s| s.safe.kp = f32::NAN, "must be finite"),
     (|s| s.relay.amplitude = -1.0, "amplitude must be positive"),

@@ -8,7 +8,9 @@ use std::fmt;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::{Abort, Limits};
 use onecycle_onboard::identification::TuningResult;
-use onecycle_onboard::tuner::{TakeOffSettings, Tuner, TunerError, TunerPhase, TunerSettings};
+use onecycle_onboard::tuner::{
+    Consent, TakeOffSettings, Tuner, TunerError, TunerPhase, TunerSettings,
+};
 use onecycle_onboard::{RelaySettings, Soiptd};
 
 use super::body::GRAVITY_M_PER_S2;
@@ -109,6 +111,7 @@ impl Axis {
                 offset: 0.0,
             },
             bias_filter_s: 0.5,
+            consent: Consent::Automatic,
             ..new
         }
     }

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::{Abort, Limits};
-use onecycle_onboard::tuner::{Tuner, TunerPhase, TunerSettings};
+use onecycle_onboard::tuner::{Consent, Tuner, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 
 use super::axis::{Axis, Noise};
@@ -191,6 +191,7 @@ impl Run {
             safe,
             cycles: 1 + (seed % 2) as u8,
             slices: 1 + (seed % 50) as u16,
+            consent: Consent::Automatic,
             ..new
         };
         Self {
