@@ -47,6 +47,10 @@ fn main() -> Result<(), Box<dyn Error>> {
             phase = tuner.phase();
             println!("{:6.3} s  {}", f64::from(tick) * TICK_S, phase.name());
         }
+        // A pilot would look at the result first. Until then the safe controller holds the axis.
+        if phase == TunerPhase::Proposed {
+            tuner.accept();
+        }
         // From this tick on the output is that of the safe controller. The pilot lands and reads the reason.
         if let (TunerPhase::Aborted, Some(reason)) = (phase, tuner.reason()) {
             return Err(reason.to_string().into());

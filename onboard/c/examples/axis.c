@@ -68,6 +68,7 @@ int main(int count, char **arguments)
     settings.safe_kd = 0.3f;
     settings.slices = 1;
     settings.bias_filter_s = 1.0f;
+    settings.consent = ONECYCLE_CONSENT_AUTOMATIC; /* nobody is there to accept */
     onecycle_status status = onecycle_tuner_init(&tuner, &settings);
     if (status != ONECYCLE_STATUS_OK) {
         fprintf(stderr, "settings rejected: status %d\n", (int)status);
@@ -93,8 +94,8 @@ int main(int count, char **arguments)
 
     onecycle_result result;
     if (!onecycle_tuner_result(&tuner, &result) || !result.is_proven) {
-        fprintf(stderr, "no controller found: phase %d, reason %d\n", (int)onecycle_tuner_phase(&tuner),
-                (int)onecycle_tuner_reason(&tuner));
+        fprintf(stderr, "no controller found: phase %d, %s\n", (int)onecycle_tuner_phase(&tuner),
+                onecycle_tuner_reason_text(&tuner));
         return 1;
     }
     fprintf(stderr, "K/T_body %.3f (true %.3f), T_prop %.1f ms (%.1f), dead time %.1f ms (%.1f)\n",

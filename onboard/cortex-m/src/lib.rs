@@ -19,8 +19,9 @@ use core::hint::black_box;
 use onecycle_onboard::RelaySettings;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::Limits;
-use onecycle_onboard::identification::{TuningResult, Workspace};
-use onecycle_onboard::tuner::{TunerCore, TunerSettings};
+use onecycle_onboard::identification::{Analysis, Bench, Desk, Stage, TuningResult};
+use onecycle_onboard::pack::Pack;
+use onecycle_onboard::tuner::{Consent, TunerCore, TunerSettings};
 
 use crate::axis::{Axis, K_OVER_T_BODY, TICK_S};
 pub use crate::line::Line;
@@ -35,10 +36,43 @@ const START_TICK: u32 = 5000;
 const STEP_AT_S: f64 = 18.0;
 const STEP: f32 = 0.1;
 
+/// Slices of the analysis in a tick.
+const SLICES: u16 = 1;
+
 /// Largest relative error of `K/T_body`: four standard deviations, each 1.3 % as the tuner reports. Largest
 /// distance from the reference 2 s after its step (m): a tenth of the step, which has settled by then.
 const GAIN_TOLERANCE: f64 = 0.05;
 const STEP_TOLERANCE: f64 = 0.01;
+
+/// What a tuner needs beside its core, in memory of the caller.
+pub struct Analyst<'a> {
+    /// The analysis.
+    pub analysis: Analysis<'a>,
+    /// What it shares with the core.
+    pub desk: Desk,
+    /// Its own memory.
+    pub bench: Bench,
+}
+
+impl<'a> Analyst<'a> {
+    /// An analyst with this pack.
+    #[must_use]
+    pub fn new(pack: Pack<'a>) -> Self {
+        Self {
+            analysis: Analysis::new(pack),
+            desk: Desk::NEW,
+            bench: Bench::NEW,
+        }
+    }
+
+    fn stage(&self, tuner: &TunerCore) -> Stage {
+        if tuner.is_collecting() {
+            Stage::Collect
+        } else {
+            self.analysis.stage()
+        }
+    }
+}
 
 /// Settings of the tuner, the same as in `c/examples/axis.c`.
 #[must_use]
@@ -63,8 +97,9 @@ pub fn settings() -> TunerSettings {
             kd: 0.3,
             offset: 0.0,
         },
-        slices: 1,
+        slices: SLICES,
         bias_filter_s: 1.0,
+        consent: Consent::Automatic,
         ..new
     }
 }
@@ -74,8 +109,8 @@ pub fn settings() -> TunerSettings {
 /// follows the reference.
 /// the reference.
 pub fn fly(
-    tuner: &mut TunerCore<'_>,
-    workspace: &mut Workspace,
+    tuner: &mut TunerCore,
+    analyst: &mut Analyst<'_>,
     mut lap: impl FnMut() -> u64,
     mut say: impl FnMut(&mut Line),
 ) -> bool {
@@ -90,9 +125,9 @@ pub fn fly(
         if tick == START_TICK {
             tuner.start();
         }
-        let (before, stage) = (tuner.phase(), tuner.stage());
+        let (before, stage) = (tuner.phase(), analyst.stage(tuner));
         lap();
-        let output = step(tuner, workspace, time_s, &measurement, reference);
+        let output = step(tuner, analyst, time_s, &measurement, reference);
         let instructions = lap().saturating_sub(idle);
         let mut line = Line::default();
         line.word("tick")
@@ -123,13 +158,20 @@ pub fn fly(
 /// Not inlined, so that no part of a tick is moved out of the count.
 #[inline(never)]
 fn step(
-    tuner: &mut TunerCore<'_>,
-    workspace: &mut Workspace,
+    tuner: &mut TunerCore,
+    analyst: &mut Analyst<'_>,
     time_s: f64,
     measurement: &Measurement,
     reference: f32,
 ) -> f32 {
-    black_box(tuner.step(workspace, black_box(time_s), measurement, reference))
+    let Analyst {
+        analysis,
+        desk,
+        bench,
+    } = analyst;
+    tuner.tick(Some(desk), black_box(time_s), measurement, reference);
+    analysis.work(desk, bench, SLICES);
+    black_box(tuner.conclude(desk))
 }
 
 /// All numbers found, by name.

@@ -17,8 +17,7 @@ use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr;
 
-use onecycle_flight::{Line, fly, settings};
-use onecycle_onboard::identification::Workspace;
+use onecycle_flight::{Analyst, Line, fly, settings};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::TunerCore;
 
@@ -101,8 +100,8 @@ static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
     vectors
 };
 
-static mut CORE: MaybeUninit<TunerCore<'static>> = MaybeUninit::uninit();
-static mut WORKSPACE: Workspace = Workspace::NEW;
+static mut CORE: MaybeUninit<TunerCore> = MaybeUninit::uninit();
+static mut ANALYST: MaybeUninit<Analyst<'static>> = MaybeUninit::uninit();
 
 extern "C" fn run() -> ! {
     start_timer();
@@ -116,15 +115,16 @@ extern "C" fn run() -> ! {
         leave("settings rejected", 1)
     };
     // SAFETY: nothing else uses these statics, and this function runs once.
-    let (core, workspace) = unsafe { (&mut *(&raw mut CORE), &mut *(&raw mut WORKSPACE)) };
-    let core = core.write(TunerCore::of(&checked, pack));
+    let (core, analyst) = unsafe { (&mut *(&raw mut CORE), &mut *(&raw mut ANALYST)) };
+    let core = core.write(TunerCore::of(&checked));
+    let analyst = analyst.write(Analyst::new(pack));
     let beginning = stack();
-    let is_tuned = fly(core, workspace, laps(), say);
+    let is_tuned = fly(core, analyst, laps(), say);
     for (name, bytes) in [
         ("flash", (&raw const __flash_end).addr()),
         (
             "tuner",
-            size_of::<TunerCore<'static>>() + size_of::<Workspace>(),
+            size_of::<TunerCore>() + size_of::<Analyst<'static>>(),
         ),
         (
             "static",

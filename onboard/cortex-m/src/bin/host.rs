@@ -3,8 +3,7 @@
 use std::io::Write;
 use std::process::ExitCode;
 
-use onecycle_flight::{fly, numbers, settings};
-use onecycle_onboard::identification::Workspace;
+use onecycle_flight::{Analyst, fly, numbers, settings};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::TunerCore;
 
@@ -12,12 +11,12 @@ fn main() -> ExitCode {
     let (Ok(checked), Ok(pack)) = (settings().checked(), Pack::embedded()) else {
         return ExitCode::FAILURE;
     };
-    let (mut tuner, mut workspace) = (TunerCore::of(&checked, pack), Workspace::NEW);
+    let (mut tuner, mut analyst) = (TunerCore::of(&checked), Analyst::new(pack));
     let mut lines = Vec::new();
     // Instructions are not counted on the host.
     let is_tuned = fly(
         &mut tuner,
-        &mut workspace,
+        &mut analyst,
         || 0,
         |line| {
             let ended = line.ended();
