@@ -94,6 +94,7 @@ def fly(interface, vehicle, axis, disturbance):
         safe_kp=axis.safe_kp,
         safe_kd=axis.safe_kd,
         bias_filter_s=0.5,
+        consent=interface.constants["ONECYCLE_CONSENT_AUTOMATIC"],
     )
     late = collections.deque([0.0] * axis.delay_ticks)
     bias = disturbance.bias * axis.amplitude

@@ -30,6 +30,7 @@ class Interface:
             text = text.replace(name, value)
         self.ffi = cffi.FFI()
         self.ffi.cdef(text)
+        self.constants = {name: int(value) for name, value in constants.items()}
         shared = pathlib.Path(scratch) / "libonecycle.so"
         functions = sorted(set(re.findall(r"\b(onecycle_\w+)\(", text)))
         wanted = [f"-Wl,--undefined={function}" for function in functions]

@@ -44,27 +44,17 @@ const SLICES: u16 = 1;
 const GAIN_TOLERANCE: f64 = 0.05;
 const STEP_TOLERANCE: f64 = 0.01;
 
-/// What a tuner needs beside its core, in memory of the caller.
+/// What a tuner needs beside its core. The caller places desk and bench: they are nearly all of its memory.
 pub struct Analyst<'a> {
     /// The analysis.
     pub analysis: Analysis<'a>,
     /// What it shares with the core.
-    pub desk: Desk,
+    pub desk: &'a mut Desk,
     /// Its own memory.
-    pub bench: Bench,
+    pub bench: &'a mut Bench,
 }
 
-impl<'a> Analyst<'a> {
-    /// An analyst with this pack.
-    #[must_use]
-    pub fn new(pack: Pack<'a>) -> Self {
-        Self {
-            analysis: Analysis::new(pack),
-            desk: Desk::NEW,
-            bench: Bench::NEW,
-        }
-    }
-
+impl Analyst<'_> {
     fn stage(&self, tuner: &TunerCore) -> Stage {
         if tuner.is_collecting() {
             Stage::Collect
@@ -107,7 +97,6 @@ pub fn settings() -> TunerSettings {
 /// Flies the axis with a tuner of these [`settings`]. `lap` returns the instructions since its last call; `say`
 /// receives every line. Returns whether the controller has proven itself, belongs to the right process and
 /// follows the reference.
-/// the reference.
 pub fn fly(
     tuner: &mut TunerCore,
     analyst: &mut Analyst<'_>,

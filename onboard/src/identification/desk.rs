@@ -14,7 +14,9 @@ pub struct Desk {
     pub(super) orders: u32,
 }
 
-/// What lies on the desk beside the windows.
+/// What lies on the desk beside the windows. Its first tag is zero, and with it an empty desk is all zeros: no copy of it
+/// in read-only memory.
+#[repr(u8)]
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Note {
     Empty,
@@ -33,7 +35,7 @@ pub(super) struct Order {
 }
 
 impl Desk {
-    /// An empty desk.
+    /// An empty desk, all zeros.
     pub const NEW: Self = Self {
         coarse: Window::NONE,
         fine: Window::NONE,

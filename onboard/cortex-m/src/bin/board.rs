@@ -18,6 +18,7 @@ use core::panic::PanicInfo;
 use core::ptr;
 
 use onecycle_flight::{Analyst, Line, fly, settings};
+use onecycle_onboard::identification::{Analysis, Bench, Desk};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::TunerCore;
 
@@ -101,7 +102,8 @@ static VECTORS: [unsafe extern "C" fn() -> !; 15] = {
 };
 
 static mut CORE: MaybeUninit<TunerCore> = MaybeUninit::uninit();
-static mut ANALYST: MaybeUninit<Analyst<'static>> = MaybeUninit::uninit();
+static mut DESK: Desk = Desk::NEW;
+static mut BENCH: Bench = Bench::NEW;
 
 extern "C" fn run() -> ! {
     start_timer();
@@ -115,16 +117,29 @@ extern "C" fn run() -> ! {
         leave("settings rejected", 1)
     };
     // SAFETY: nothing else uses these statics, and this function runs once.
-    let (core, analyst) = unsafe { (&mut *(&raw mut CORE), &mut *(&raw mut ANALYST)) };
+    let (core, desk, bench) = unsafe {
+        (
+            &mut *(&raw mut CORE),
+            &mut *(&raw mut DESK),
+            &mut *(&raw mut BENCH),
+        )
+    };
     let core = core.write(TunerCore::of(&checked));
-    let analyst = analyst.write(Analyst::new(pack));
+    let mut analyst = Analyst {
+        analysis: Analysis::new(pack),
+        desk,
+        bench,
+    };
     let beginning = stack();
-    let is_tuned = fly(core, analyst, laps(), say);
+    let is_tuned = fly(core, &mut analyst, laps(), say);
     for (name, bytes) in [
         ("flash", (&raw const __flash_end).addr()),
         (
             "tuner",
-            size_of::<TunerCore>() + size_of::<Analyst<'static>>(),
+            size_of::<TunerCore>()
+                + size_of::<Analysis<'static>>()
+                + size_of::<Desk>()
+                + size_of::<Bench>(),
         ),
         (
             "static",

@@ -4,6 +4,7 @@ use std::io::Write;
 use std::process::ExitCode;
 
 use onecycle_flight::{Analyst, fly, numbers, settings};
+use onecycle_onboard::identification::{Analysis, Bench, Desk};
 use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::TunerCore;
 
@@ -11,7 +12,12 @@ fn main() -> ExitCode {
     let (Ok(checked), Ok(pack)) = (settings().checked(), Pack::embedded()) else {
         return ExitCode::FAILURE;
     };
-    let (mut tuner, mut analyst) = (TunerCore::of(&checked), Analyst::new(pack));
+    let mut tuner = TunerCore::of(&checked);
+    let mut analyst = Analyst {
+        analysis: Analysis::new(pack),
+        desk: &mut Desk::NEW,
+        bench: &mut Bench::NEW,
+    };
     let mut lines = Vec::new();
     // Instructions are not counted on the host.
     let is_tuned = fly(

@@ -160,7 +160,7 @@ fn another_controller_holds_the_axis_outside_of_the_test() {
 #[test]
 fn a_command_counts_once() {
     let mut tuner = tuner(&with(Consent::Ask));
-    let mut step = |tuner: &mut Tuner<'_>, tick: f64| {
+    let step = |tuner: &mut Tuner<'_>, tick: f64| {
         tuner.step(SAMPLE_S * tick, &Measurement::of(0.0).with_rate(0.0), 0.0)
     };
     tuner.beside(7.0);
