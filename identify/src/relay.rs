@@ -227,7 +227,11 @@ impl Search<'_> {
             .filter(|_| known.is_some())
             .and_then(ShapePrior::of_pack);
         let fit = |prior| {
-            let beforehand = PriorKnowledge { starts, prior };
+            let beforehand = PriorKnowledge {
+                starts,
+                prior,
+                may_walk: false,
+            };
             refine_with(window, period_s, &beforehand)
         };
         let refined = fit(prior).map_err(|error| match error {

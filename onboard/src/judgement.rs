@@ -47,7 +47,11 @@ pub fn largest_response_error(phase_margin_rad: f64) -> f64 {
 /// Standard deviations to either side that contain 90 % of a Gaussian; 95 % lie above the lower end.
 pub const HALF_90_PERCENT: f64 = 1.645;
 
-/// Misfit: residual beyond the noise over the oscillation, both as root mean squares of the bins.
+/// Ratio of two estimates of the same variance from some fifty differences that chance exceeds in 1 of 100.
+const CHANCE: f64 = 2.1;
+
+/// Misfit: residual beyond the noise over the oscillation, both as root mean squares of the bins, or of their differences where
+/// those were fitted.
 #[must_use]
 #[inline(never)]
 pub fn misfit<const BINS: usize, const EDGES: usize>(
@@ -59,6 +63,12 @@ pub fn misfit<const BINS: usize, const EDGES: usize>(
         bins.map(|bin| bin.output_sum / f64::from(bin.count))
     };
     let count = means().count() as f64;
+    if let Some(sigma) = refined.walk_sigma {
+        let steps = means().zip(means().skip(1));
+        let variance = steps.map(|(a, b)| (b - a) * (b - a)).sum::<f64>() / (count - 1.0);
+        let noise = CHANCE * sigma * sigma;
+        return sqrt((refined.residual_rms * refined.residual_rms - noise).max(0.0) / variance);
+    }
     let mean = means().sum::<f64>() / count;
     let variance = means()
         .map(|value| (value - mean) * (value - mean))

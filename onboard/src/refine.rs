@@ -118,6 +118,9 @@ pub struct Refined {
     pub noise_sigma: f64,
     /// Root mean square of the residual in the bins (output unit).
     pub residual_rms: f64,
+    /// Standard deviation of the noise in a difference of neighbouring bins (output unit), where such differences were fitted
+    /// because the noise is a random walk. The residual is then that of a difference.
+    pub walk_sigma: Option<f64>,
     /// The limit of the domain on which the fit lies, if any.
     pub edge: Option<DomainEdge>,
     /// Number of steps of the search from all starts.
@@ -157,6 +160,9 @@ pub struct PriorKnowledge<'a> {
     pub starts: &'a [Shape],
     /// Distribution of the shapes.
     pub prior: Option<ShapePrior>,
+    /// Whether the noise may be a random walk, as that of an angle that an estimator integrates. Where the residual of the fit
+    /// looks like it, first differences are fitted instead.
+    pub may_walk: bool,
 }
 
 /// Like [`refine`], with prior knowledge.

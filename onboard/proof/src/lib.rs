@@ -154,6 +154,7 @@ fn identify() -> Result<Found, &'static CStr> {
     let test = measure(&mut coarse)?;
     let read = read(&test, &pack)?;
     let prior_knowledge = PriorKnowledge {
+        may_walk: true,
         starts: &read.starts(test.period_s),
         prior: ShapePrior::of_pack(&pack),
     };

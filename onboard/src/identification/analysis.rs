@@ -43,6 +43,8 @@ pub struct Analysis<'a> {
     /// The order in work.
     order: Option<Order>,
     score: f64,
+    /// Whether the pack knows the last cycle.
+    is_known: bool,
     refined: Option<Refined>,
     design: Option<Design>,
     gain_deviation: f64,
@@ -57,6 +59,7 @@ impl<'a> Analysis<'a> {
             pack,
             order: None,
             score: f64::INFINITY,
+            is_known: false,
             refined: None,
             design: None,
             gain_deviation: 0.0,
@@ -129,13 +132,12 @@ impl<'a> Analysis<'a> {
             return Ok(());
         };
         let read = read.map_err(|_| Refusal::Unknown(f64::INFINITY))?;
-        if read.familiarity == Familiarity::Unknown {
-            return Err(Refusal::Unknown(read.score));
-        }
+        self.is_known = read.familiarity != Familiarity::Unknown;
         self.score = read.score;
         let prior_knowledge = PriorKnowledge {
             starts: &read.starts(cycle.period_s),
             prior: ShapePrior::of_pack(&self.pack),
+            may_walk: true,
         };
         bench
             .refiner
@@ -152,6 +154,11 @@ impl<'a> Analysis<'a> {
         let refined = refined.map_err(|_| Refusal::NoFit)?;
         if order.is_confirming {
             return self.compare((desk, bench), &refined);
+        }
+        // The score supposes white noise, so a cycle under another noise is unknown to the pack; what is found there is judged
+        // by its fit alone.
+        if !self.is_known && refined.walk_sigma.is_none() {
+            return Err(Refusal::Unknown(self.score));
         }
         self.refined = Some(refined);
         self.gain_deviation = bench.refiner.gain_deviation();

@@ -120,9 +120,7 @@ impl Model {
             }
             (_, None) => {}
         }
-        for (mean, weight) in rows.iter_mut().zip(&problem.weight) {
-            *mean *= weight;
-        }
+        problem.weigh(&mut rows[..bins]);
         rows[bins] = problem.acceleration_row * w;
         rows[bins + 1] = problem.distortion_row * distortion;
         true

@@ -21,7 +21,6 @@ use libm::{hypot, log, sqrt};
 use super::ALL;
 use super::problem::Problem;
 use super::tried::TRIED;
-use crate::least_squares::dot;
 
 /// Number of harmonics used; beyond them a relay oscillation has less than 1/1000 of its amplitude.
 pub(super) const HARMONICS: usize = 9;
@@ -46,6 +45,8 @@ pub(super) struct Wave {
     pub(super) residual: f64,
     /// Root mean square of its amplitude under a relative error of one (output unit).
     pub(super) scale: f64,
+    /// Samples that count for its noise.
+    pub(super) samples: f64,
 }
 
 pub(super) struct ModelError {
@@ -65,6 +66,7 @@ impl Wave {
         output: 0.0,
         residual: 0.0,
         scale: 0.0,
+        samples: 0.0,
     };
 }
 
@@ -112,6 +114,11 @@ impl ModelError {
         self.next == TRIED.len()
     }
 
+    /// Number of waves.
+    pub(super) fn count(&self) -> usize {
+        self.count
+    }
+
     /// Relative error of the response; zero if noise explains the harmonics in the residual.
     pub(super) fn found(&self) -> f64 {
         self.best.map_or(0.0, |(_, error)| error)
@@ -124,15 +131,14 @@ impl ModelError {
     }
 
     fn log_likelihood<const BINS: usize>(&self, error: f64, problem: &Problem<BINS>) -> f64 {
-        let weight = &problem.weight[..problem.bins()];
-        let samples = dot(weight, weight);
-        let noise = problem.noise_sigma * problem.noise_sigma;
+        let noise = problem.row_sigma() * problem.row_sigma();
         let mut sum = 0.0;
         for wave in self.waves() {
             if wave.left > LEAST_LEFT {
                 let size = wave.scale * wave.scale;
                 let error_variance = wave.left * error * error * size;
-                let variance = wave.left * (error_variance + 2.0 * noise / samples + FLOOR * size);
+                let variance =
+                    wave.left * (error_variance + 2.0 * noise / wave.samples + FLOOR * size);
                 sum -= 0.5 * (log(variance) + wave.residual * wave.residual / variance);
             }
         }

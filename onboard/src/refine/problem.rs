@@ -5,6 +5,7 @@ use libm::{exp, sqrt};
 use super::domain::{HIGHEST, SHAPE, Shape};
 use super::fundamental::Fundamental;
 use super::{RefineError, ShapePrior};
+use crate::least_squares::dot;
 use crate::process::Soiptd;
 use crate::response::Grid;
 use crate::window::{KNOWN_ROWS, Window};
@@ -16,6 +17,8 @@ pub(super) const KNOWN: usize = KNOWN_ROWS;
 const DISTORTION: f64 = 0.02;
 /// Minimum number of bins: nine unknowns and a residual to judge them by.
 const FEWEST_BINS: usize = 16;
+/// Weight of the first bin among differences.
+const LEVEL: f64 = 1e-3;
 
 pub(super) struct Problem<const BINS: usize> {
     pub(super) grid: Grid,
@@ -35,6 +38,9 @@ pub(super) struct Problem<const BINS: usize> {
     pub(super) sigma: f64,
     pub(super) prior: Option<ShapePrior>,
     pub(super) fundamental: Fundamental,
+    /// Noise of a difference of neighbouring bins, if the rows are such differences: white where the noise is a random walk
+    /// (output unit).
+    pub(super) walk_sigma: Option<f64>,
 }
 
 impl<const BINS: usize> Problem<BINS> {
@@ -52,6 +58,7 @@ impl<const BINS: usize> Problem<BINS> {
         sigma: 0.0,
         prior: None,
         fundamental: Fundamental::NONE,
+        walk_sigma: None,
     };
 
     /// Sets the rows of this window. [`settle`](Self::settle) sets what depends on the oscillation.
@@ -75,6 +82,7 @@ impl<const BINS: usize> Problem<BINS> {
         };
         self.period_s = period_s;
         self.prior = prior;
+        self.walk_sigma = None;
         self.noise_sigma = window.noise_sigma();
         self.rows = window.bins().len() + KNOWN;
         self.used = 0;
@@ -100,15 +108,71 @@ impl<const BINS: usize> Problem<BINS> {
 
     /// Sets the prior of acceleration and distortion from the fundamental of the oscillation.
     pub(super) fn settle(&mut self, fundamental: Fundamental) {
+        self.fundamental = fundamental;
+        self.settle_prior();
+    }
+
+    /// Goes on with differences of neighbouring bins, in which the noise has a standard deviation of `sigma`.
+    pub(super) fn difference(&mut self, sigma: f64) {
+        self.walk_sigma = Some(sigma);
+        self.settle_prior();
+    }
+
+    fn settle_prior(&mut self) {
         // A perfect recording has rounding errors of about a millionth.
-        self.sigma = self.noise_sigma.max(1e-6 * fundamental.rms);
-        self.acceleration_row = if fundamental.acceleration > 0.0 {
-            self.sigma / fundamental.acceleration
+        self.sigma = self.row_sigma().max(1e-6 * self.fundamental.rms);
+        self.acceleration_row = if self.fundamental.acceleration > 0.0 {
+            self.sigma / self.fundamental.acceleration
         } else {
             0.0
         };
         self.distortion_row = self.sigma / DISTORTION;
-        self.fundamental = fundamental;
+    }
+
+    /// Rows from the means of the bins: weighted, or their weighted differences.
+    pub(super) fn weigh(&self, means: &mut [f64]) {
+        if self.walk_sigma.is_some() {
+            self.take_differences(means);
+        } else {
+            for (mean, weight) in means.iter_mut().zip(&self.weight) {
+                *mean *= weight;
+            }
+        }
+    }
+
+    /// Differences of neighbouring bins, per square root of their distance. The first bin only sets the level, which a random
+    /// walk leaves open.
+    fn take_differences(&self, means: &mut [f64]) {
+        let mut last: Option<(usize, f64)> = None;
+        for (k, (row, weight)) in means.iter_mut().zip(&self.weight).enumerate() {
+            let mean = *row;
+            *row = match last {
+                _ if *weight == 0.0 => 0.0,
+                None => LEVEL * mean,
+                Some((before, value)) => (mean - value) / sqrt((k - before) as f64),
+            };
+            if *weight > 0.0 {
+                last = Some((k, mean));
+            }
+        }
+    }
+
+    /// Samples that count for the noise of a row of waves with this energy: the variance of a wave's amplitude is twice that
+    /// of the noise over this number.
+    pub(super) fn samples(&self, energy: f64) -> f64 {
+        if self.walk_sigma.is_some() {
+            return 2.0 * energy;
+        }
+        let weight = &self.weight[..self.bins()];
+        dot(weight, weight)
+    }
+
+    /// Mean of the squared weights of the rows in use.
+    pub(super) fn mean_weight_2(&self) -> f64 {
+        if self.walk_sigma.is_some() {
+            return 1.0;
+        }
+        self.weight.iter().map(|w| w * w).sum::<f64>() / self.used as f64
     }
 
     /// Number of bins.
@@ -118,7 +182,12 @@ impl<const BINS: usize> Problem<BINS> {
 
     /// Sum of squares that white noise of the samples' size would leave, plus a quarter.
     pub(super) fn cost_of_noise(&self) -> f64 {
-        1.25 * self.noise_sigma * self.noise_sigma * self.used as f64
+        1.25 * self.row_sigma() * self.row_sigma() * self.used as f64
+    }
+
+    /// Standard deviation of the noise of a row (output unit).
+    pub(super) fn row_sigma(&self) -> f64 {
+        self.walk_sigma.unwrap_or(self.noise_sigma)
     }
 
     /// Process of a shape with unit acceleration gain, if there is one.
@@ -128,11 +197,10 @@ impl<const BINS: usize> Problem<BINS> {
         Soiptd::from_pole_sum(1.0, sum_per_s, ratio, delay * self.period_s).ok()
     }
 
-    /// Weighted outputs, and the rows of the prior at a shape.
-    pub(super) fn measured<const EDGES: usize>(
+    /// Weighted outputs; zero in rows that are not in use.
+    pub(super) fn outputs<const EDGES: usize>(
         &self,
         window: &Window<BINS, EDGES>,
-        shape: &Shape,
         rows: &mut [f64; BINS],
     ) {
         rows.fill(0.0);
@@ -141,6 +209,24 @@ impl<const BINS: usize> Problem<BINS> {
                 rows[k] = bin.output_sum / self.weight[k];
             }
         }
+        if self.walk_sigma.is_some() {
+            for (row, weight) in rows.iter_mut().zip(&self.weight) {
+                if *weight > 0.0 {
+                    *row /= weight;
+                }
+            }
+            self.take_differences(&mut rows[..self.rows - KNOWN]);
+        }
+    }
+
+    /// Weighted outputs, and the rows of the prior at a shape.
+    pub(super) fn measured<const EDGES: usize>(
+        &self,
+        window: &Window<BINS, EDGES>,
+        shape: &Shape,
+        rows: &mut [f64; BINS],
+    ) {
+        self.outputs(window, rows);
         if let Some(prior) = &self.prior {
             let rows = &mut rows[self.rows - SHAPE..self.rows];
             for (row, deviation) in rows.iter_mut().zip(prior.deviations(shape)) {

@@ -49,6 +49,7 @@ pub struct Refiner<const BINS: usize> {
     problem: Problem<BINS>,
     given: [Shape; GIVEN],
     given_count: usize,
+    may_walk: bool,
     /// The only shape to fit, without a search.
     only: Option<Shape>,
     fit: LinearFit<BINS>,
@@ -96,6 +97,7 @@ impl<const BINS: usize> Refiner<BINS> {
             problem: Problem::NONE,
             given: [[0.0; SHAPE]; GIVEN],
             given_count: 0,
+            may_walk: false,
             only: None,
             fit: LinearFit::NONE,
             bench: Bench::NONE,
@@ -117,6 +119,7 @@ impl<const BINS: usize> Refiner<BINS> {
     ) -> Result<(), RefineError> {
         self.stage = Stage::Idle;
         self.problem.set(window, period_s, prior_knowledge.prior)?;
+        self.may_walk = prior_knowledge.may_walk;
         self.only = None;
         self.given_count = 0;
         for (place, given) in self.given.iter_mut().zip(prior_knowledge.starts) {
@@ -238,7 +241,15 @@ impl<const BINS: usize> Refiner<BINS> {
             Stage::Uncertainty => {
                 let fit = &mut self.fit;
                 if let Poll::Ready(known) = self.uncertainty.advance(problem, window, fit, bench) {
-                    return self.refined(known).map(Poll::Ready);
+                    let walk = (self.may_walk && problem.walk_sigma.is_none())
+                        .then(|| self.uncertainty.walk(problem, fit, bench))
+                        .flatten();
+                    let Some(sigma) = walk else {
+                        return self.refined(known).map(Poll::Ready);
+                    };
+                    self.problem.difference(sigma);
+                    self.search = Search::NONE;
+                    self.first_fit()?;
                 }
             }
         }
@@ -333,7 +344,6 @@ impl<const BINS: usize> Refiner<BINS> {
             .ok_or(RefineError::NoFit)?;
         let freedom = (problem.used - ALL) as f64;
         let variance = fit.cost / freedom;
-        let mean_weight_2 = problem.weight.iter().map(|w| w * w).sum::<f64>() / problem.used as f64;
         Ok(Refined {
             process,
             input_bias: bias_gain / gain,
@@ -341,7 +351,8 @@ impl<const BINS: usize> Refiner<BINS> {
             response_error: known.map_or(0.0, |(_, error)| error),
             residual_sigma: sqrt(variance),
             noise_sigma: problem.noise_sigma,
-            residual_rms: sqrt(variance / mean_weight_2),
+            walk_sigma: problem.walk_sigma,
+            residual_rms: sqrt(variance / problem.mean_weight_2()),
             edge: domain_edge(&fit.shape),
             steps: self.search.steps,
         })

@@ -26,6 +26,8 @@ use crate::window::Window;
 const WAVE_BINS: usize = 32;
 /// Lags of the residual's autocorrelation per slice.
 const LAGS: usize = 8;
+/// Residual beyond which the noise of the samples does not explain it: its mean square over theirs.
+const MOST_WHITE: f64 = 2.0;
 /// Squares added to the covariance per slice.
 const SQUARES: usize = 5;
 
@@ -183,6 +185,43 @@ impl Uncertainty {
         &rows[..problem.bins()]
     }
 
+    /// Standard deviation of the noise in a difference of neighbouring bins, where the residual of the fit is rather a random
+    /// walk than white: then its differences are the smaller ones, and the likelihood of the fit to differences is larger.
+    /// `None` where the noise of the samples explains the residual.
+    pub(super) fn walk<const BINS: usize>(
+        &self,
+        problem: &Problem<BINS>,
+        fit: &LinearFit<BINS>,
+        bench: &Bench<BINS>,
+    ) -> Option<f64> {
+        let noise = problem.row_sigma() * problem.row_sigma();
+        let (mut squares, mut differences, mut noises) = (0.0, 0.0, 0.0);
+        let mut last = None;
+        for (row, weight) in self
+            .residual(problem, fit, bench)
+            .iter()
+            .zip(&problem.weight)
+        {
+            if *weight > 0.0 {
+                let value = row / weight;
+                squares += value * value;
+                noises += noise / (weight * weight);
+                if let Some(last) = last {
+                    differences += (value - last) * (value - last);
+                }
+                last = Some(value);
+            }
+        }
+        let waves = if self.error.found() > 0.0 {
+            self.error.count()
+        } else {
+            0
+        };
+        let freedom = problem.used.checked_sub(ALL + waves + 1)?;
+        let is_walk = squares > MOST_WHITE * noises && differences < squares;
+        is_walk.then(|| sqrt(differences / freedom.max(1) as f64))
+    }
+
     /// Adds the squares of the unknowns' shifts from number `from` on: those by noise of `sigma` along each
     /// basis vector, then those by the error of each wave. False when there are none left.
     fn add_squares<const BINS: usize>(
@@ -261,6 +300,7 @@ impl Projection {
             output: self.output,
             residual: residual / self.energy,
             scale: 0.0,
+            samples: problem.samples(self.energy),
         }
     }
 }
@@ -278,14 +318,16 @@ fn make_wave<const BINS: usize>(
     let end = bins.min(*made + WAVE_BINS);
     for k in *made..end {
         let angle = step_rad * k as f64;
-        wave[k] = problem.weight[k]
-            * if n.is_multiple_of(2) {
-                cos(angle)
-            } else {
-                sin(angle)
-            };
+        wave[k] = if n.is_multiple_of(2) {
+            cos(angle)
+        } else {
+            sin(angle)
+        };
     }
     *made = end;
+    if end == bins {
+        problem.weigh(&mut wave[..bins]);
+    }
     end == bins
 }
 
@@ -297,11 +339,9 @@ fn set_output<const BINS: usize, const EDGES: usize>(
     bench: &mut Bench<BINS>,
 ) {
     let [_, output, rest] = &mut bench.rows;
-    output.fill(0.0);
-    for (k, bin) in window.bins().iter().enumerate() {
-        if problem.weight[k] > 0.0 {
-            output[k] = bin.output_sum / problem.weight[k] - fit.residual[k];
-        }
+    problem.outputs(window, output);
+    for (output, residual) in output[..problem.bins()].iter_mut().zip(&fit.residual) {
+        *output -= residual;
     }
     *rest = fit.residual;
 }
@@ -321,7 +361,7 @@ struct Redundancy {
 
 impl Redundancy {
     fn of<const BINS: usize>(problem: &Problem<BINS>, residual: &[f64]) -> Self {
-        let noise = problem.noise_sigma * problem.noise_sigma;
+        let noise = problem.row_sigma() * problem.row_sigma();
         let variance = dot(residual, residual) / (residual.len() - ALL) as f64;
         Self {
             variance,

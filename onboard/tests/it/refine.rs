@@ -250,6 +250,7 @@ fn a_prior_counts_for_what_it_is_worth() {
         let root =
             core::array::from_fn(|i| core::array::from_fn(|j| if i == j { size } else { 0.0 }));
         let prior_knowledge = PriorKnowledge {
+            may_walk: false,
             starts: &[off],
             prior: ShapePrior::new(off, &root),
         };

@@ -94,6 +94,7 @@ fn a_refiner_can_be_begun_anew_at_any_time() {
     let (other_window, _, other_cycle) = last_cycle(&other, 0.05);
     let starts = [[2.5, 0.1, 0.05], [4.0, 0.01, 0.1]];
     let prior_knowledge = PriorKnowledge {
+        may_walk: false,
         starts: &starts,
         prior: ShapePrior::of_pack(&pack),
     };

@@ -4,6 +4,7 @@ mod amplitude;
 mod axis;
 mod consent;
 mod faults;
+mod walk;
 
 use onecycle_onboard::control::PdLaw;
 use onecycle_onboard::guard::{Abort, Limits};

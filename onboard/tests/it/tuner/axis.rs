@@ -34,6 +34,9 @@ pub(crate) struct Axis {
     pub(crate) sample_s: f64,
     pub(crate) bias: f64,
     pub(crate) noise_sigma: f64,
+    /// Deviation of a step that the error of the value takes per tick: a random walk.
+    pub(crate) walk_sigma: f64,
+    walk: f64,
     /// Whether the output cannot fall below zero.
     pub(crate) has_ground: bool,
     pub(crate) tick: usize,
@@ -52,6 +55,8 @@ impl Axis {
             sample_s,
             bias: 0.0,
             noise_sigma: 0.0,
+            walk_sigma: 0.0,
+            walk: 0.0,
             has_ground: false,
             tick: 0,
             transition: Transition::over(&process, sample_s),
@@ -83,7 +88,11 @@ impl Axis {
     }
 
     pub(crate) fn measure(&mut self) -> Measurement {
-        let noise = self.noise_sigma * self.noise.normal();
+        let mut noise = self.noise_sigma * self.noise.normal();
+        if self.walk_sigma > 0.0 {
+            self.walk += self.walk_sigma * self.noise.normal();
+            noise += self.walk;
+        }
         Measurement::of((self.value() + noise) as f32).with_rate(self.rate() as f32)
     }
 
