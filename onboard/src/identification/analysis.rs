@@ -234,7 +234,7 @@ impl<'a> Analysis<'a> {
     fn begin_comparison(&mut self, (desk, bench): Parts<'_>, cycle: &Cycle) -> Result<(), Refusal> {
         let found = self.refined.as_ref().ok_or(Refusal::NoFit)?;
         (bench.refiner)
-            .begin_gain(&desk.coarse, cycle.period_s, &found.process)
+            .begin_gain(&desk.coarse, cycle.period_s, found)
             .map_err(|_| Refusal::NoFit)?;
         self.stage = Stage::Refine;
         Ok(())

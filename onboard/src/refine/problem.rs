@@ -190,6 +190,14 @@ impl<const BINS: usize> Problem<BINS> {
         self.walk_sigma.unwrap_or(self.noise_sigma)
     }
 
+    /// Variance of a difference of neighbouring bins if the noise of the samples is all a random walk: `q^2 (2 n^2 + 1) / (3 n)`
+    /// with `n` samples in a bin and steps of variance `q^2`, whose third differences look like white noise of `0.3 q^2`.
+    pub(super) fn walk_variance(&self) -> f64 {
+        let n = f64::from(self.grid.per_bin);
+        let step = self.noise_sigma * self.noise_sigma / 0.3;
+        step * (2.0 * n * n + 1.0) / (3.0 * n)
+    }
+
     /// Process of a shape with unit acceleration gain, if there is one.
     pub(super) fn process(&self, shape: &Shape) -> Option<Soiptd> {
         let [ln_sum, ratio, delay] = *shape;

@@ -131,7 +131,8 @@ impl<const BINS: usize> Refiner<BINS> {
         Ok(())
     }
 
-    /// Begins the fit of gain, bias and initial state alone: poles and dead time stay those of `process`.
+    /// Begins the fit of gain, bias and initial state alone: poles and dead time stay those found, and so does the kind of
+    /// noise.
     ///
     /// # Errors
     /// A [`RefineError`] if the window does not permit a fit.
@@ -139,10 +140,11 @@ impl<const BINS: usize> Refiner<BINS> {
         &mut self,
         window: &Window<BINS, EDGES>,
         period_s: f64,
-        process: &Soiptd,
+        found: &Refined,
     ) -> Result<(), RefineError> {
         self.begin(window, period_s, &PriorKnowledge::default())?;
-        self.only = Some(shape_of(process, period_s));
+        self.problem.walk_sigma = found.walk_sigma;
+        self.only = Some(shape_of(&found.process, period_s));
         Ok(())
     }
 
@@ -241,19 +243,25 @@ impl<const BINS: usize> Refiner<BINS> {
             Stage::Uncertainty => {
                 let fit = &mut self.fit;
                 if let Poll::Ready(known) = self.uncertainty.advance(problem, window, fit, bench) {
-                    let walk = (self.may_walk && problem.walk_sigma.is_none())
-                        .then(|| self.uncertainty.walk(problem, fit, bench))
-                        .flatten();
-                    let Some(sigma) = walk else {
-                        return self.refined(known).map(Poll::Ready);
-                    };
-                    self.problem.difference(sigma);
-                    self.search = Search::NONE;
-                    self.first_fit()?;
+                    return self.end(known);
                 }
             }
         }
         Ok(Poll::Pending)
+    }
+
+    /// Ends the fit, or begins it again with differences where the residual is a random walk.
+    fn end(&mut self, known: Option<([[f64; 5]; 5], f64)>) -> Result<Poll<Refined>, RefineError> {
+        let walk_sigma = self.uncertainty.walk_sigma;
+        match walk_sigma.filter(|_| self.may_walk && self.problem.walk_sigma.is_none()) {
+            None => self.refined(known).map(Poll::Ready),
+            Some(sigma) => {
+                self.problem.difference(sigma);
+                self.search = Search::NONE;
+                self.first_fit()?;
+                Ok(Poll::Pending)
+            }
+        }
     }
 
     /// Begins the first start, or the fit of the only shape.
@@ -406,11 +414,12 @@ impl<const BINS: usize> Refiner<BINS> {
         let step = derivatives + LINEAR * SHAPE / PARTS + 1 + 1;
         let searched = fit * (1 + MOST_TRIALS as usize) + step * MOST_STEPS as usize;
         let oscillation = (bins + 2 * edges) / super::fundamental::SLICE + 2;
-        oscillation
-            + fit * (self.given_count + STARTS)
+        let all = fit * (self.given_count + STARTS)
             + searched * SEARCHED
             + fit
             + derivatives
-            + Uncertainty::most_slices(bins)
+            + Uncertainty::most_slices(bins);
+        // Once more with differences.
+        oscillation + all * (1 + usize::from(self.may_walk))
     }
 }

@@ -28,6 +28,12 @@ const WAVE_BINS: usize = 32;
 const LAGS: usize = 8;
 /// Residual beyond which the noise of the samples does not explain it: its mean square over theirs.
 const MOST_WHITE: f64 = 2.0;
+/// Sum of the squared differences of the differences over that of the differences: 1.5 for a random walk averaged in bins.
+/// Below this the residual is smoother, as under a wind whose force is integrated twice.
+const LEAST_CURVED: f64 = 1.0;
+/// Variance of the differences over that of the random walk which the samples' third differences show. An estimator that
+/// filters its rate lies above one; white noise under a wind lies below a half, a wind alone above ten.
+const WALKS: core::ops::RangeInclusive<f64> = 0.5..=10.0;
 /// Squares added to the covariance per slice.
 const SQUARES: usize = 5;
 
@@ -36,6 +42,8 @@ pub(super) struct Uncertainty {
     error: ModelError,
     /// Covariance of all unknowns.
     all: [[f64; ALL]; ALL],
+    /// Noise of a difference of neighbouring bins, where the residual is rather a random walk than white (output unit).
+    pub(super) walk_sigma: Option<f64>,
     stage: Stage,
 }
 
@@ -51,6 +59,8 @@ enum Stage {
     Part(usize, Projection),
     /// Error of the model.
     Error,
+    /// Colour of the residual.
+    Walk,
     /// Redundancy of the residual.
     Redundancy(Redundancy),
     /// Covariance: squares added so far, standard deviation of a row.
@@ -71,12 +81,14 @@ impl Uncertainty {
     pub(super) const NONE: Self = Self {
         error: ModelError::NONE,
         all: [[0.0; ALL]; ALL],
+        walk_sigma: None,
         stage: Stage::Derivatives(Jacobian::BEGIN),
     };
 
     pub(super) fn begin(&mut self) {
         self.error.begin();
         self.all = [[0.0; ALL]; ALL];
+        self.walk_sigma = None;
         self.stage = Stage::Derivatives(Jacobian::BEGIN);
     }
 
@@ -88,6 +100,7 @@ impl Uncertainty {
             + 2 * HARMONICS * of_wave
             + 3
             + TRIED.len()
+            + 1
             + bins / (2 * LAGS)
             + 1
             + squares
@@ -144,9 +157,13 @@ impl Uncertainty {
             }
             Stage::Error => {
                 if self.error.advance(problem) {
-                    let residual = self.residual(problem, fit, bench);
-                    self.stage = Stage::Redundancy(Redundancy::of(problem, residual));
+                    self.stage = Stage::Walk;
                 }
+            }
+            Stage::Walk => {
+                self.walk_sigma = self.walk(problem, fit, bench);
+                let residual = self.residual(problem, fit, bench);
+                self.stage = Stage::Redundancy(Redundancy::of(problem, residual));
             }
             Stage::Redundancy(redundancy) => {
                 let mut found = *redundancy;
@@ -188,29 +205,30 @@ impl Uncertainty {
     /// Standard deviation of the noise in a difference of neighbouring bins, where the residual of the fit is rather a random
     /// walk than white: then its differences are the smaller ones, and the likelihood of the fit to differences is larger.
     /// `None` where the noise of the samples explains the residual.
-    pub(super) fn walk<const BINS: usize>(
+    fn walk<const BINS: usize>(
         &self,
         problem: &Problem<BINS>,
         fit: &LinearFit<BINS>,
         bench: &Bench<BINS>,
     ) -> Option<f64> {
         let noise = problem.row_sigma() * problem.row_sigma();
-        let (mut squares, mut differences, mut noises) = (0.0, 0.0, 0.0);
-        let mut last = None;
-        for (row, weight) in self
-            .residual(problem, fit, bench)
-            .iter()
+        let (mut squares, mut differences, mut curvatures, mut noises) = (0.0, 0.0, 0.0, 0.0);
+        let (mut last, mut last_difference) = (None, None);
+        let rows = self.residual(problem, fit, bench).iter();
+        for (row, weight) in rows
             .zip(&problem.weight)
+            .filter(|(_, weight)| **weight > 0.0)
         {
-            if *weight > 0.0 {
-                let value = row / weight;
-                squares += value * value;
-                noises += noise / (weight * weight);
-                if let Some(last) = last {
-                    differences += (value - last) * (value - last);
-                }
-                last = Some(value);
+            let value = row / weight;
+            squares += value * value;
+            noises += noise / (weight * weight);
+            let difference = last.map(|last| value - last);
+            if let Some(difference) = difference {
+                differences += difference * difference;
+                let curvature = last_difference.map_or(0.0, |last: f64| difference - last);
+                curvatures += curvature * curvature;
             }
+            (last, last_difference) = (Some(value), difference);
         }
         let waves = if self.error.found() > 0.0 {
             self.error.count()
@@ -218,8 +236,12 @@ impl Uncertainty {
             0
         };
         let freedom = problem.used.checked_sub(ALL + waves + 1)?;
-        let is_walk = squares > MOST_WHITE * noises && differences < squares;
-        is_walk.then(|| sqrt(differences / freedom.max(1) as f64))
+        let variance = differences / freedom.max(1) as f64;
+        let is_walk = squares > MOST_WHITE * noises
+            && differences < squares
+            && curvatures > LEAST_CURVED * differences
+            && WALKS.contains(&(variance / problem.walk_variance()));
+        is_walk.then(|| sqrt(variance))
     }
 
     /// Adds the squares of the unknowns' shifts from number `from` on: those by noise of `sigma` along each
@@ -361,7 +383,11 @@ struct Redundancy {
 
 impl Redundancy {
     fn of<const BINS: usize>(problem: &Problem<BINS>, residual: &[f64]) -> Self {
-        let noise = problem.row_sigma() * problem.row_sigma();
+        // The noise of differences is known from the residual alone.
+        let noise = match problem.walk_sigma {
+            Some(_) => 0.0,
+            None => problem.noise_sigma * problem.noise_sigma,
+        };
         let variance = dot(residual, residual) / (residual.len() - ALL) as f64;
         Self {
             variance,

@@ -8,7 +8,7 @@ use onecycle_onboard::identification::TuningResult;
 use onecycle_onboard::tuner::{Consent, Tuner, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 
-use super::axis::Axis;
+use super::axis::{Axis, Noise};
 
 /// Attitude loop of an autopilot.
 const SAMPLE_S: f64 = 0.004;
@@ -21,8 +21,8 @@ fn roll() -> Soiptd {
     Soiptd::from_acceleration_gain(113.0, 0.05, 1.0, 0.008).unwrap()
 }
 
-/// What a tuner with a relay of this amplitude finds.
-fn found(amplitude: f32, seed: u64) -> Option<TuningResult> {
+/// A tuner with a relay of this amplitude that only proposes.
+fn tuner(amplitude: f32) -> Tuner<'static> {
     let new = TunerSettings::new(amplitude, SAMPLE_S as f32);
     let settings = TunerSettings {
         relay: RelaySettings {
@@ -40,15 +40,35 @@ fn found(amplitude: f32, seed: u64) -> Option<TuningResult> {
         consent: Consent::Never,
         ..new
     };
-    let mut tuner = Tuner::new(&settings).unwrap();
+    Tuner::new(&settings).unwrap()
+}
+
+/// What a tuner finds on an axis whose input has the bias `wind` of each tick.
+fn found_in(mut axis: Axis, amplitude: f32, mut wind: impl FnMut() -> f64) -> Option<TuningResult> {
+    let mut tuner = tuner(amplitude);
+    for tick in 0..6000 {
+        if tick == 250 {
+            tuner.start();
+        }
+        axis.bias = wind();
+        let output = tuner.step(axis.time_s(), &axis.measure(), 0.0);
+        axis.push(output);
+        if tuner.identified().is_some() || tuner.reason().is_some() {
+            break;
+        }
+    }
+    tuner.identified().copied()
+}
+
+fn found(amplitude: f32, seed: u64) -> Option<TuningResult> {
     let mut axis = Axis::new(roll(), SAMPLE_S, seed);
     axis.walk_sigma = STEP_RAD;
-    axis.fly(&mut tuner, 0.0, 1.0, |_, _| false);
-    tuner.start();
-    axis.fly(&mut tuner, 0.0, 20.0, |tuner, _| {
-        tuner.identified().is_some() || tuner.reason().is_some()
-    });
-    tuner.identified().copied()
+    found_in(axis, amplitude, || 0.0)
+}
+
+/// Error of `ln K/T_body`.
+fn error(found: &TuningResult) -> f64 {
+    (found.process.k_over_t_body() / roll().k_over_t_body()).ln()
 }
 
 /// Phase margin of a PD with the true process, from its definition: the phase of `L` at the only frequency where `|L| = 1`.
@@ -78,8 +98,6 @@ fn differences_are_fitted_where_the_noise_is_a_random_walk() {
     for (amplitude, most) in [(0.1, 0.15), (0.2, 0.1), (0.4, 0.06)] {
         let all: Vec<_> = (0..SEEDS).filter_map(|s| found(amplitude, s)).collect();
         assert!(all.len() >= 16, "{amplitude}: {} of {SEEDS}", all.len());
-        let error =
-            |found: &TuningResult| (found.process.k_over_t_body() / roll().k_over_t_body()).ln();
         let mut errors: Vec<_> = all.iter().map(|found| error(found).abs()).collect();
         errors.sort_by(f64::total_cmp);
         let median = errors[errors.len() / 2];
@@ -98,4 +116,29 @@ fn differences_are_fitted_where_the_noise_is_a_random_walk() {
             assert!(margin > 0.0, "{amplitude}: unstable, {found:?}");
         }
     }
+}
+
+// The residual of a fit to white noise in gusts may look like a random walk as well, but the noise of the samples does not.
+#[test]
+fn gusts_are_not_taken_for_a_random_walk() {
+    let (amplitude, correlated_s) = (0.2, 0.3);
+    let mut accepted = 0;
+    for seed in 0..40 {
+        let mut noise = Noise(77 * seed + 5);
+        let mut gust = 0.0;
+        let mut axis = Axis::new(roll(), SAMPLE_S, seed);
+        axis.noise_sigma = 0.002;
+        let found = found_in(axis, amplitude, || {
+            gust += noise.normal() * f64::sqrt(2.0 * SAMPLE_S / correlated_s)
+                - gust * SAMPLE_S / correlated_s;
+            0.1 * f64::from(amplitude) * gust
+        });
+        if let Some(found) = found {
+            accepted += 1;
+            let deviations = error(&found) / found.deviations.ln_k_over_t_body;
+            assert!(deviations.abs() < 4.5, "{seed}: {deviations}");
+            assert!(margin_rad(&found.pd) > 0.0, "{seed}: unstable");
+        }
+    }
+    assert!((10..=30).contains(&accepted), "{accepted}");
 }
