@@ -13,6 +13,7 @@ set -euo pipefail
 # and tables, 24 kB of memory; in a tick what leaves a tenth of a 1 kHz loop at 168 MHz to the rest of the board.
 most_flash=114000 wanted_flash=96000
 most_memory=38500 wanted_memory=24000
+most_step_stack=1500
 most_relay_tick=33000 wanted_relay_tick=150000
 most_control_tick=3400 wanted_control_tick=150000
 most_first_tick=347000 wanted_first_tick=150000
@@ -161,6 +162,7 @@ stages() {
 flash=$(bytes flash) memory=$(($(bytes static) + $(bytes stack)))
 relay=$(instructions relay relay | tail -n 1) control=$(instructions control control | tail -n 1)
 within "bytes of flash" "$flash" "$most_flash"
+within "bytes of stack of a step without the analysis" "$(bytes step)" "$most_step_stack"
 within "bytes of memory" "$memory" "$most_memory"
 within "instructions of the worst tick of the relay" "$relay" "$most_relay_tick"
 within "instructions of the worst tick in control" "$control" "$most_control_tick"
@@ -174,7 +176,8 @@ the tuner on an emulated Cortex-M4F: ok; $ticks outputs and $found numbers found
 Kp $(number kp), Kd $(number kd)
   flash         $flash bytes of $most_flash (wanted: $wanted_flash): code, tables, pack, the axis
   memory        $memory bytes of $most_memory (wanted: $wanted_memory): static $(bytes static), \
-a tuner $(bytes tuner) of it; stack $(bytes stack), to make the tuner $(bytes beginning)
+a tuner $(bytes tuner) of it; stack $(bytes stack), to make the tuner $(bytes beginning); \
+of a step without the analysis $(bytes step) of $most_step_stack
   instructions  of a tick: median, worst
     safe        $(instructions idle idle | median), $(instructions idle idle | tail -n 1)
     relay       $(instructions relay relay | median), $relay of $most_relay_tick (wanted: $wanted_relay_tick)

@@ -144,6 +144,18 @@ pub fn fly(
         && (axis.value() - f64::from(STEP)).abs() < STEP_TOLERANCE
 }
 
+/// Flies the first seconds of the test with the core alone, whose analysis never comes.
+#[inline(never)]
+pub fn fly_core(tuner: &mut TunerCore, desk: &mut Desk) {
+    let mut axis = Axis::default();
+    tuner.start();
+    for tick in 0..START_TICK {
+        let time_s = f64::from(tick) * TICK_S;
+        tuner.tick(Some(desk), black_box(time_s), &axis.measure(), 0.0);
+        axis.push(tuner.conclude(desk).into());
+    }
+}
+
 /// Not inlined, so that no part of a tick is moved out of the count.
 #[inline(never)]
 fn step(

@@ -12,7 +12,6 @@ use super::problem::Problem;
 use super::search::{MOST_STEPS, MOST_TRIALS, Next, SEARCHED, Search};
 use super::uncertainty::Uncertainty;
 use super::{ALL, GIVEN, LINEAR, PriorKnowledge, RefineError, Refined, SHAPE};
-use crate::process::Soiptd;
 use crate::window::Window;
 use crate::{distortion, response};
 

@@ -3,12 +3,13 @@
 //! Lines and the exit status are written by semihosting. After the lines of the flight come
 //!
 //! ```text
-//! bytes <flash | tuner | static | stack | beginning> <number>
+//! bytes <step | flash | tuner | static | stack | beginning> <number>
 //! ```
 //!
 //! *flash* is the whole image: code, tables, pack, axis. *static* is all static memory, including the tuner's.
 //! *stack* is the high-water mark of the stack and *beginning* that before the first tick: the stack is painted
-//! at reset, and the lowest changed word is searched.
+//! at reset, and the lowest changed word is searched. *step* is the stack of the tuner's core with its axis alone, as in a
+//! control loop whose analysis runs in another thread.
 #![no_std]
 #![no_main]
 
@@ -17,10 +18,10 @@ use core::mem::MaybeUninit;
 use core::panic::PanicInfo;
 use core::ptr;
 
-use onecycle_flight::{Analyst, Line, fly, settings};
+use onecycle_flight::{Analyst, Line, fly, fly_core, settings};
 use onecycle_onboard::identification::{Analysis, Bench, Desk};
 use onecycle_onboard::pack::Pack;
-use onecycle_onboard::tuner::TunerCore;
+use onecycle_onboard::tuner::{CheckedSettings, TunerCore};
 
 /// Operations of semihosting, and the reason code of a normal exit (Arm, "Semihosting for AArch32 and AArch64",
 /// 2.0).
@@ -132,7 +133,11 @@ extern "C" fn run() -> ! {
     };
     let beginning = stack();
     let is_tuned = fly(core, &mut analyst, laps(), say);
+    let whole = stack();
+    let core = core_again(&checked);
+    let step = stack_under(|| fly_core(core, desk));
     for (name, bytes) in [
+        ("step", step),
         ("flash", (&raw const __flash_end).addr()),
         (
             "tuner",
@@ -145,7 +150,7 @@ extern "C" fn run() -> ! {
             "static",
             distance(&raw const __data_start, &raw const __bss_end),
         ),
-        ("stack", stack()),
+        ("stack", whole),
         ("beginning", beginning),
     ] {
         say(Line::default()
@@ -158,6 +163,28 @@ extern "C" fn run() -> ! {
     } else {
         leave("no controller found, or a wrong one", 1)
     }
+}
+
+/// A second core, in the place of the first.
+fn core_again(checked: &CheckedSettings) -> &'static mut TunerCore {
+    // SAFETY: the first core is no longer used.
+    unsafe { (*(&raw mut CORE)).write(TunerCore::of(checked)) }
+}
+
+/// Stack that `work` takes below this function's frame (bytes).
+#[inline(never)]
+fn stack_under(work: impl FnOnce()) -> usize {
+    let here: *const u32;
+    // SAFETY: reads the stack pointer.
+    unsafe { asm!("mov {0}, sp", out(reg) here, options(nomem, nostack)) };
+    let mut word = (&raw const __stack_bottom).cast_mut();
+    while word.cast_const() < here {
+        // SAFETY: below the stack pointer no frame lives.
+        unsafe { ptr::write_volatile(word, PAINT) };
+        word = word.wrapping_add(1);
+    }
+    work();
+    stack() - distance(here, &raw const __stack_top)
 }
 
 /// Largest use of the stack so far (bytes).

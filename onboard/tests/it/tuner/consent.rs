@@ -196,10 +196,10 @@ fn elsewhere(
             while analysis.work(&mut desk, &mut bench, 100) {}
         }
         if until(core) {
-            return;
+            break;
         }
     }
-    panic!("{:?} {:?}", core.phase(), core.reason());
+    assert!(until(core), "{:?} {:?}", core.phase(), core.reason());
 }
 
 // When the work is done does not change what is found: the same cycles lie on the desk.
