@@ -14,7 +14,8 @@ import random
 from tuner import Tuner
 
 TICK_S = 0.001
-# Tolerance between prediction and flight: relative, and for the overshoot also a hundredth of the step.
+# Tolerance between prediction and flight: relative, and for the overshoot also a hundredth of the step and the noise, which
+# the prediction comes from.
 TOLERANCE, LEAST = 0.2, 0.01
 # The response has settled when it stays within this part of the step.
 BAND = 0.05
@@ -133,7 +134,7 @@ def line_of(title, axis, label, flight):
     """One line about a flight, and whether its step was as predicted."""
     found, tuned_s, (overshoot, settling), (flown_overshoot, flown_settling) = flight
     is_right = math.isclose(
-        flown_overshoot, overshoot, rel_tol=TOLERANCE, abs_tol=LEAST
+        flown_overshoot, overshoot, rel_tol=TOLERANCE, abs_tol=LEAST + disturbance.noise
     ) and math.isclose(flown_settling, settling, rel_tol=TOLERANCE)
     line = (
         f"{title:22} {axis.name:8} {label:22} tuned in {tuned_s:4.1f} s  "
