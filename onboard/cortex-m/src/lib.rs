@@ -20,7 +20,6 @@ use onecycle_onboard::RelaySettings;
 use onecycle_onboard::control::{Measurement, PdLaw};
 use onecycle_onboard::guard::Limits;
 use onecycle_onboard::identification::{Analysis, Bench, Desk, Stage, TuningResult};
-use onecycle_onboard::pack::Pack;
 use onecycle_onboard::tuner::{Consent, TunerCore, TunerSettings};
 
 use crate::axis::{Axis, K_OVER_T_BODY, TICK_S};

@@ -13,10 +13,11 @@ fn main() -> ExitCode {
         return ExitCode::FAILURE;
     };
     let mut tuner = TunerCore::of(&checked);
+    let (mut desk, mut bench) = (Desk::NEW, Bench::NEW);
     let mut analyst = Analyst {
         analysis: Analysis::new(pack),
-        desk: &mut Desk::NEW,
-        bench: &mut Bench::NEW,
+        desk: &mut desk,
+        bench: &mut bench,
     };
     let mut lines = Vec::new();
     // Instructions are not counted on the host.
