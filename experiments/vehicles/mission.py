@@ -130,11 +130,11 @@ def fly(interface, vehicle, axis, disturbance):
     return found, tuned_s, metrics(predicted(found, step, rest_s), step), metrics(flown, step)
 
 
-def line_of(title, axis, label, flight):
-    """One line about a flight, and whether its step was as predicted."""
+def line_of(title, axis, label, noise, flight):
+    """One line about a flight with `noise` (fraction of the amplitude), and whether its step was as predicted."""
     found, tuned_s, (overshoot, settling), (flown_overshoot, flown_settling) = flight
     is_right = math.isclose(
-        flown_overshoot, overshoot, rel_tol=TOLERANCE, abs_tol=LEAST + disturbance.noise
+        flown_overshoot, overshoot, rel_tol=TOLERANCE, abs_tol=LEAST + noise
     ) and math.isclose(flown_settling, settling, rel_tol=TOLERANCE)
     line = (
         f"{title:22} {axis.name:8} {label:22} tuned in {tuned_s:4.1f} s  "
@@ -159,7 +159,8 @@ def report(title, vehicle, axes, interface):
         receivers.append(receiver)
 
         def flight():
-            sender.send(line_of(title, axis, label, fly(interface, vehicle, axis, disturbance)))
+            flown = fly(interface, vehicle, axis, disturbance)
+            sender.send(line_of(title, axis, label, disturbance.noise, flown))
 
         context.Process(target=flight).start()
         sender.close()

@@ -11,7 +11,7 @@ set -euo pipefail
 
 # Limits: what the tuner takes now and a little more, so that it does not grow. Beside them the goals: 96 kB of code
 # and tables, 24 kB of memory; in a tick what leaves a tenth of a 1 kHz loop at 168 MHz to the rest of the board.
-most_flash=114000 wanted_flash=96000
+most_flash=115000 wanted_flash=96000
 most_memory=38500 wanted_memory=24000
 most_step_stack=1500
 most_relay_tick=33000 wanted_relay_tick=150000

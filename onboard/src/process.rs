@@ -162,6 +162,19 @@ impl Soiptd {
         )
     }
 
+    /// The same process with `delay_s` added to its dead time (s).
+    ///
+    /// # Errors
+    /// [`SoiptdError`] if the sum is negative or not finite.
+    pub fn delayed(&self, delay_s: f64) -> Result<Self, SoiptdError> {
+        Self::from_acceleration_gain(
+            self.k_over_t_body,
+            self.t_prop_s,
+            self.inv_t_body_per_s,
+            self.tau_s + delay_s,
+        )
+    }
+
     /// Magnitude `|G(jw)|`.
     #[must_use]
     pub fn magnitude(&self, omega_rad_per_s: f64) -> f64 {

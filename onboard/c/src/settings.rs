@@ -79,6 +79,8 @@ pub struct OnecycleSettings {
     pub bias_filter_s: f32,
     /// Time constant of the filter for a rate that is computed from differences (s).
     pub rate_lag_s: f32,
+    /// Delay of the measured rate behind the value (s), as by the low-pass of a gyro beside an estimated angle.
+    pub rate_delay_s: f32,
     /// Phase of the integral beside the controller found (rad), 0 to 0.349; 0 switches the integral off. At 0.087, the
     /// default, the phase margin of a multirotor loses 0.3 degrees at most.
     pub integral_phase_rad: f32,
@@ -188,6 +190,7 @@ impl OnecycleSettings {
             safe_offset: new.safe.offset,
             bias_filter_s: new.bias_filter_s,
             rate_lag_s: new.rate_lag_s,
+            rate_delay_s: new.rate_delay_s,
             integral_phase_rad: new.integral_phase_rad,
             second_amplitude: new.second_amplitude,
             consent: ONECYCLE_CONSENT_ASK,
@@ -245,6 +248,7 @@ impl OnecycleSettings {
             },
             bias_filter_s: self.bias_filter_s,
             rate_lag_s: self.rate_lag_s,
+            rate_delay_s: self.rate_delay_s,
             integral_phase_rad: self.integral_phase_rad,
             second_amplitude: self.second_amplitude,
             ..new

@@ -10,12 +10,15 @@ use crate::judgement::{
     COORDINATES, HALF_90_PERCENT, MOST_MISFIT, Spread, largest_response_error, misfit,
 };
 use crate::pack::Pack;
+use crate::process::Soiptd;
 use crate::refine::{PriorKnowledge, Refined, Refiner, ShapePrior};
 use crate::signature::Signature;
 
 /// Controller whose uncertainty is being computed: number of coordinates already followed.
 #[derive(Clone, Copy, Debug)]
 struct Design {
+    /// The process with the delay of the rate added to its own.
+    process: Soiptd,
     pd: Pd,
     spread: Spread,
     followed: usize,
@@ -107,7 +110,7 @@ impl<'a> Analysis<'a> {
             Stage::Classify => self.classify(parts, cycle).map(|()| None),
             Stage::Refine => self.refine(parts, order).map(|()| None),
             Stage::Judge => self.judge(parts.0).map(|()| None),
-            Stage::Gains => self.gains().map(|()| None),
+            Stage::Gains => self.gains(order).map(|()| None),
             Stage::Design => self.design(cycle),
             Stage::Wait | Stage::Collect => Err(Refusal::NoFit),
         };
@@ -181,13 +184,17 @@ impl<'a> Analysis<'a> {
         Ok(())
     }
 
-    fn gains(&mut self) -> Result<(), Refusal> {
+    fn gains(&mut self, order: &Order) -> Result<(), Refusal> {
         let refined = self.refined.ok_or(Refusal::NoFit)?;
         let table = self.pack.gains_table().ok_or(Refusal::NoGains)?;
-        let pd = table.pd(&refined.process).map_err(|_| Refusal::NoGains)?;
+        let process = (refined.process)
+            .delayed(order.rate_delay_s)
+            .map_err(|_| Refusal::NoGains)?;
+        let pd = table.pd(&process).map_err(|_| Refusal::NoGains)?;
         self.design = Some(Design {
+            process,
             pd,
-            spread: Spread::new(&refined.process, &pd).ok_or(Refusal::NoGains)?,
+            spread: Spread::new(&process, &pd).ok_or(Refusal::NoGains)?,
             followed: 0,
         });
         self.stage = Stage::Design;
@@ -199,13 +206,14 @@ impl<'a> Analysis<'a> {
             return Ok(None);
         };
         let Design {
+            process,
             pd,
             spread,
             followed,
         } = design;
         if *followed < COORDINATES {
             spread
-                .follow(*followed, &refined.process, pd)
+                .follow(*followed, process, pd)
                 .ok_or(Refusal::NoGains)?;
             *followed += 1;
             return Ok(None);

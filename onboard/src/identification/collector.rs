@@ -23,6 +23,7 @@ pub struct Collector {
     past: Past,
     was_high: bool,
     sample_s: f64,
+    rate_delay_s: f64,
     collected: Collected,
     is_collecting: bool,
     /// The last cycle of the first order.
@@ -32,9 +33,10 @@ pub struct Collector {
 }
 
 impl Collector {
-    /// A collector of `cycles` cycles with samples every `sample_s`.
+    /// A collector of `cycles` cycles with samples every `sample_s`. The controller is designed for a rate that arrives
+    /// `rate_delay_s` after the value.
     #[must_use]
-    pub fn new(sample_s: f64, cycles: u8) -> Self {
+    pub fn new(sample_s: f64, cycles: u8, rate_delay_s: f64) -> Self {
         Self {
             cycles: cycles.clamp(1, MOST_CYCLES),
             detector: CycleDetector::new(),
@@ -42,6 +44,7 @@ impl Collector {
             past: Past::default(),
             was_high: true,
             sample_s,
+            rate_delay_s,
             collected: Collected::default(),
             is_collecting: false,
             last: None,
@@ -51,7 +54,7 @@ impl Collector {
 
     /// Resets the collector in place.
     pub fn restart(&mut self) {
-        *self = Self::new(self.sample_s, self.cycles);
+        *self = Self::new(self.sample_s, self.cycles, self.rate_delay_s);
     }
 
     /// After a result: goes on with one cycle at another amplitude of the relay, which changes with the next sample. The next
@@ -156,6 +159,7 @@ impl Collector {
         desk.note = Note::Order(Order {
             number: desk.orders,
             cycle: of_result.unwrap_or(cycle),
+            rate_delay_s: self.rate_delay_s,
             is_confirming: self.is_confirming,
         });
     }

@@ -30,6 +30,8 @@ pub(super) struct Order {
     pub(super) number: u32,
     /// The first order's last cycle.
     pub(super) cycle: Cycle,
+    /// Delay of the rate behind the value (s).
+    pub(super) rate_delay_s: f64,
     /// Whether a cycle at another amplitude is to confirm the result.
     pub(super) is_confirming: bool,
 }

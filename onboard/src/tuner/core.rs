@@ -92,7 +92,11 @@ impl TunerCore {
             offset: 0.0,
             relay: relay.clone(),
             since_switch_s: 0.0,
-            collector: Collector::new(f64::from(settings.sample_s), settings.cycles),
+            collector: Collector::new(
+                f64::from(settings.sample_s),
+                settings.cycles,
+                f64::from(settings.rate_delay_s),
+            ),
             is_waiting: false,
             attempts_left: settings.attempts,
             identified: None,

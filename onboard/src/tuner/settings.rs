@@ -46,6 +46,9 @@ pub struct TunerSettings {
     pub bias_filter_s: f32,
     /// Time constant of the filter for a rate that is computed from differences (s).
     pub rate_lag_s: f32,
+    /// Delay of the measured rate behind the value (s), as by the low-pass of a gyro beside an estimated angle. The controller
+    /// is designed as if both came that much later.
+    pub rate_delay_s: f32,
     /// Phase of the integral beside the controller found (rad), which sets its gain: see
     /// [`Integral`](crate::integral::Integral). Zero switches the integral off; at most [`MOST_PHASE_RAD`].
     pub integral_phase_rad: f32,
@@ -94,6 +97,7 @@ impl TunerSettings {
             safe: PdLaw::ZERO,
             bias_filter_s: 0.0,
             rate_lag_s: 0.0,
+            rate_delay_s: 0.0,
             integral_phase_rad: USUAL_PHASE_RAD,
             second_amplitude: 0.0,
             consent: Consent::Ask,
@@ -109,6 +113,7 @@ impl TunerSettings {
         let not_negative = [
             ("the bias filter's time constant", self.bias_filter_s),
             ("the rate's lag", self.rate_lag_s),
+            ("the rate's delay", self.rate_delay_s),
             ("the integral's phase", self.integral_phase_rad),
         ];
         let wrong = (positive

@@ -4,6 +4,7 @@ mod amplitude;
 mod axis;
 mod consent;
 mod faults;
+mod rate_delay;
 mod walk;
 
 use onecycle_onboard::control::PdLaw;
