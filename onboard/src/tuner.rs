@@ -20,7 +20,7 @@
 //! steady-state error.
 //!
 //! [`Tuner`] does everything in one thread. For two, place a [`TunerCore`], an [`Analysis`], a
-//! [`Bench`](crate::identification::Bench) and a [`Desk`](crate::identification::Desk): the thread of the control loop calls
+//! [`Bench`] and a [`Desk`]: the thread of the control loop calls
 //! [`TunerCore::tick`] and, while it has the desk, [`TunerCore::conclude`]; as soon as
 //! [`Desk::is_ordered`](crate::identification::Desk::is_ordered) the other thread gets the desk, calls [`Analysis::work`] until it
 //! returns false, and gives it back.
