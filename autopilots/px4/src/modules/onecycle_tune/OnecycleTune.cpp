@@ -1,0 +1,558 @@
+#include "OnecycleTune.hpp"
+
+#include <px4_platform_common/log.h>
+#include <px4_platform_common/tasks.h>
+#include <systemlib/mavlink_log.h>
+
+using namespace time_literals;
+
+namespace
+{
+// The mean of what holds the axis is taken this long before the relay begins.
+constexpr hrt_abstime BESIDE = 1500_ms;
+constexpr float BIAS_FILTER_S = 0.3f;
+// How long a proposal waits for the operator, and how long PX4 is watched with the new gains.
+constexpr hrt_abstime MOST_ASKED = 60_s;
+constexpr hrt_abstime WATCHED = 3_s;
+// With the new gains the torque may be at its limit for this part of the time.
+constexpr float MOST_LIMITED = 0.2f;
+constexpr int WORK_STACK = 14000;
+constexpr hrt_abstime POLL = 100_ms;
+// A second-order Butterworth filter delays by sqrt(2) / (2 pi f).
+constexpr float FILTER_DELAY = 0.225f;
+enum Apply { REPORT, ASK, AT_ONCE };
+}
+
+OnecycleTune::OnecycleTune() : ModuleParams(nullptr), WorkItem(MODULE_NAME, px4::wq_configurations::rate_ctrl)
+{
+}
+
+OnecycleTune::~OnecycleTune()
+{
+	_work_runs.store(false);
+
+	while (_work_task >= 0) {
+		px4_usleep(10000);
+	}
+}
+
+bool OnecycleTune::init()
+{
+	_torque_pub.advertise();
+	_thrust_pub.advertise();
+
+	if (!_torque_sub.registerCallback()) {
+		return false;
+	}
+
+	_work_runs.store(true);
+	_work_task = px4_task_spawn_cmd("onecycle_work", SCHED_DEFAULT, SCHED_PRIORITY_DEFAULT - 10, WORK_STACK, workTrampoline, nullptr);
+	return _work_task >= 0;
+}
+
+// ---------------------------------------------------------------------------------------------- in the control loop
+
+void OnecycleTune::Run()
+{
+	if (should_exit()) {
+		_torque_sub.unregisterCallback();
+		exit_and_cleanup();
+		return;
+	}
+
+	vehicle_torque_setpoint_s torque;
+
+	if (!_torque_sub.update(&torque)) {
+		return;
+	}
+
+	vehicle_thrust_setpoint_s thrust{};
+	_thrust_sub.copy(&thrust);
+	_axis.update();
+
+	const hrt_abstime now = torque.timestamp_sample;
+
+	if (_last > 0 && now > _last) {
+		const int tick_ns = 1000 * (int)math::min(now - _last, (hrt_abstime)100_ms);
+		const int mean_ns = _tick_ns.load();
+		_tick_ns.store(mean_ns > 0 ? mean_ns + (tick_ns - mean_ns) / 100 : tick_ns);
+	}
+
+	_last = now;
+
+	const State state = _state.load();
+
+	if (state == State::Begin || state == State::Test || state == State::Asked || state == State::Write || state == State::Found) {
+		test(_axis.measure(now), now, torque.xyz[_index]);
+
+	} else if (state == State::Watch) {
+		watch(now, torque.xyz[_index]);
+	}
+
+	// The allocator wakes on the torque, so the thrust goes first.
+	thrust.timestamp = hrt_absolute_time();
+	_thrust_pub.publish(thrust);
+	torque.timestamp = hrt_absolute_time();
+	_torque_pub.publish(torque);
+}
+
+void OnecycleTune::test(const onecycle_measurement &measurement, hrt_abstime now, float &torque)
+{
+	const State state = _state.load();
+	const bool is_over = onecycle_tuner_phase(&_tuner) == ONECYCLE_PHASE_ABORTED;
+	const char *why = _abort_wanted.load() ? "aborted by the operator" : _axis.mustStop();
+
+	if (why && !is_over) {
+		_why.store(why);
+		_is_outside.store(true);
+		onecycle_tuner_abort(&_tuner);
+	}
+
+	if (state == State::Asked && _accept_wanted.load()) {
+		_accept_wanted.store(false);
+
+		if (onecycle_tuner_accept(&_tuner)) {
+			_state.store(State::Test);
+		}
+	}
+
+	onecycle_tuner_beside(&_tuner, torque);
+	torque = onecycle_tuner_step(&_tuner, now * 1e-6, &measurement, 0.f);
+
+	const onecycle_phase phase = onecycle_tuner_phase(&_tuner);
+	_recorder.push({now * 1e-6, torque, measurement.value, measurement.rate, (int)phase});
+
+	if (state == State::Begin) {
+		if (_since == 0) {
+			_since = now;
+
+		} else if (now - _since >= BESIDE) {
+			onecycle_tuner_start(&_tuner);
+			_since = now;
+			_state.store(State::Test);
+		}
+
+	} else if (state == State::Test && onecycle_tuner_result(&_tuner, &_result)) {
+		if (phase == ONECYCLE_PHASE_PROPOSED) {
+			_state.store(State::Found);
+
+		} else if (phase == ONECYCLE_PHASE_CONTROL && _result.is_proven) {
+			_state.store(State::Write);
+		}
+	}
+
+	if (phase == ONECYCLE_PHASE_ABORTED && (state == State::Begin || state == State::Test || state == State::Asked)) {
+		if (!_why.load()) {
+			_why.store(onecycle_tuner_reason_text(&_tuner));
+		}
+
+		_state.store(State::Found);
+	}
+}
+
+void OnecycleTune::watch(hrt_abstime now, float torque)
+{
+	if (_since == 0) {
+		_since = now;
+		_limited = 0;
+	}
+
+	if (fabsf(torque) > 0.95f) {
+		_limited += (hrt_abstime)(1e6f * tickS());
+	}
+
+	const char *why = _axis.mustStop();
+
+	if (_limited > MOST_LIMITED * WATCHED) {
+		why = "the torque was at its limit with the new gains";
+	}
+
+	if (why || now - _since > WATCHED) {
+		_why.store(why);
+		_state.store(State::Watched);
+	}
+}
+
+// ---------------------------------------------------------------------------------------------- in the task
+
+int OnecycleTune::workTrampoline(int argc, char *argv[])
+{
+	// The object is stored before its task is spawned, and waits for the end of the task.
+	if (OnecycleTune *self = get_instance()) {
+		self->work();
+	}
+
+	return 0;
+}
+
+void OnecycleTune::work()
+{
+	while (_work_runs.load()) {
+		while (onecycle_tuner_work(&_tuner, 50) && _work_runs.load()) {
+			_recorder.flush();
+		}
+
+		_recorder.flush();
+
+		if (hrt_elapsed_time(&_polled_at) > POLL) {
+			_polled_at = hrt_absolute_time();
+			poll();
+		}
+
+		attend();
+		px4_usleep(4000);
+	}
+
+	_work_task = -1;
+}
+
+// Parameters are buttons for ground stations.
+void OnecycleTune::poll()
+{
+	updateParams();
+
+	if (_param_oc_start.get()) {
+		_param_oc_start.set(false);
+		_param_oc_start.commit();
+		_start_wanted.store(true);
+	}
+
+	if (_param_oc_accept.get()) {
+		_param_oc_accept.set(false);
+		_param_oc_accept.commit();
+		_accept_wanted.store(true);
+	}
+
+	if (_state.load() == State::Idle && !_axis.isArmed()) {
+		restoreAll();
+	}
+}
+
+void OnecycleTune::attend()
+{
+	switch (_state.load()) {
+	case State::Idle:
+		if (_accept_wanted.load()) {
+			_accept_wanted.store(false);
+			_is_kept = true;
+			mavlink_log_info(&_mavlink_log_pub, "onecycle: gains are kept");
+		}
+
+		if (_start_wanted.load()) {
+			_start_wanted.store(false);
+			begin();
+		}
+
+		break;
+
+	case State::Found:
+		found();
+		break;
+
+	case State::Asked:
+		if (hrt_elapsed_time(&_asked_at) > MOST_ASKED) {
+			_why.store("nobody accepted the gains");
+			found();
+		}
+
+		break;
+
+	case State::Write:
+		writeGains();
+		break;
+
+	case State::Watched:
+		conclude();
+		break;
+
+	default:
+		break;
+	}
+}
+
+void OnecycleTune::begin()
+{
+	const char *why = _axis.notReady();
+
+	if (!why && !(tickS() > 0.f)) {
+		why = "mc_rate_control was not started as vtol";
+	}
+
+	if (why) {
+		mavlink_log_critical(&_mavlink_log_pub, "onecycle: no test: %s", why);
+		return;
+	}
+
+	_left = _param_oc_axes.get();
+	_is_kept = _param_oc_apply.get() == ASK;
+	nextAxis();
+}
+
+// Takes the tuner out of the control loop, where a run of it may still be under way.
+void OnecycleTune::leave()
+{
+	_state.store(State::Idle);
+	px4_usleep(10000);
+}
+
+void OnecycleTune::nextAxis()
+{
+	leave();
+	_abort_wanted.store(false);
+	_accept_wanted.store(false);
+
+	for (_index = 0; _index < AXES; _index++) {
+		if (_left & (1 << _index)) {
+			_left &= ~(1 << _index);
+			beginAxis();
+			return;
+		}
+	}
+
+	finish();
+}
+
+void OnecycleTune::beginAxis()
+{
+	const char *name = Axis::name(_index);
+
+	if (!_gains[_index].remember(_index)) {
+		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: the firmware lacks one of its gains", name);
+		finish();
+		return;
+	}
+
+	_axis.begin(_index, _param_oc_stick.get());
+	_why.store(nullptr);
+	_is_outside.store(false);
+
+	if (!initTuner(_index)) {
+		finish();
+		return;
+	}
+
+	if (_param_oc_record.get()) {
+		char path[64];
+		snprintf(path, sizeof(path), PX4_STORAGEDIR "/onecycle_%s.csv", name);
+
+		if (!_recorder.open(path)) {
+			mavlink_log_critical(&_mavlink_log_pub, "onecycle: cannot write %s", path);
+		}
+	}
+
+	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: test begins, hands off", name);
+	_since = 0;
+	_state.store(State::Begin);
+}
+
+bool OnecycleTune::initTuner(int axis)
+{
+	const bool is_yaw = axis == 2;
+	const float rate_max[AXES] {_param_mc_rollrate_max.get(), _param_mc_pitchrate_max.get(), _param_mc_yawrate_max.get()};
+	const float amplitude = is_yaw ? _param_oc_amp_yaw.get() : _param_oc_amp.get();
+
+	onecycle_settings settings = onecycle_settings_default(amplitude, tickS());
+	settings.cycles = _param_oc_cycles.get();
+	settings.slices = 0;
+	settings.noise_sigma = _param_oc_noise.get();
+	settings.bias_filter_s = BIAS_FILTER_S;
+	settings.rate_delay_s = FILTER_DELAY / math::max(_param_imu_gyro_cutoff.get(), 5.f);
+	settings.output_lowest = -1.f;
+	settings.output_highest = 1.f;
+	// Beyond these PX4 itself would no longer hold the vehicle as it is told.
+	settings.limit_excursion = 0.8f * math::radians(_param_mpc_man_tilt_max.get());
+	settings.limit_rate = math::radians(rate_max[axis]);
+	settings.limit_duration_s = 30.f;
+	settings.limit_no_switch_s = 2.f;
+	settings.limit_stale_s = 0.05f;
+	settings.consent = _param_oc_apply.get() == AT_ONCE ? ONECYCLE_CONSENT_AUTOMATIC : ONECYCLE_CONSENT_ASK;
+	const onecycle_status status = onecycle_tuner_init(&_tuner, &settings);
+
+	if (status != ONECYCLE_STATUS_OK) {
+		mavlink_log_critical(&_mavlink_log_pub, "onecycle: settings refused, status %d of onecycle.h: check OC_* and limits", (int)status);
+	}
+
+	return status == ONECYCLE_STATUS_OK;
+}
+
+// Gains were found, or the test ended without them.
+void OnecycleTune::found()
+{
+	const char *name = Axis::name(_index);
+	const char *why = _why.load();
+
+	if (why) {
+		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
+
+		// What ended this test from outside would end the next one too.
+		if (_is_outside.load()) {
+			_left = 0;
+		}
+
+		nextAxis();
+		return;
+	}
+
+	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: gain %.1f (%.0f %%), lag %.0f ms, dead time %.1f ms", name,
+			 _result.k_over_t_body, 100 * _result.k_over_t_body_deviation, 1e3 * _result.t_prop_s, 1e3 * _result.tau_s);
+
+	if (!_gains[_index].convert(_result, _cascade, why)) {
+		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
+		nextAxis();
+		return;
+	}
+
+	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: proposes P %.2f, rate P %.3f I %.3f D 0", name, (double)_cascade.attitude_p,
+			 (double)_cascade.rate_p, (double)_cascade.rate_i);
+
+	if (_param_oc_apply.get() == REPORT) {
+		nextAxis();
+		return;
+	}
+
+	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: set OC_ACCEPT to 1 to fly these gains", name);
+	_asked_at = hrt_absolute_time();
+	_state.store(State::Asked);
+}
+
+void OnecycleTune::writeGains()
+{
+	const char *name = Axis::name(_index);
+	const char *why = nullptr;
+
+	if (!_gains[_index].convert(_result, _cascade, why)) {
+		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
+		nextAxis();
+		return;
+	}
+
+	if (!_gains[_index].write(_cascade)) {
+		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: a parameter could not be written; the old gains are in force", name);
+		nextAxis();
+		return;
+	}
+
+	_since = 0;
+	_state.store(State::Watch);
+}
+
+// PX4 flew with the new gains.
+void OnecycleTune::conclude()
+{
+	const char *name = Axis::name(_index);
+	const char *why = _why.load();
+
+	if (why) {
+		_gains[_index].restore();
+		_left = 0;
+		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
+
+	} else {
+		mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: tuned, P %.2f, rate P %.3f I %.3f D 0", name, (double)_cascade.attitude_p,
+				 (double)_cascade.rate_p, (double)_cascade.rate_i);
+	}
+
+	nextAxis();
+}
+
+void OnecycleTune::finish()
+{
+	_recorder.close();
+	_state.store(State::Idle);
+	mavlink_log_info(&_mavlink_log_pub, "onecycle: finished");
+}
+
+// Gains that were flown at once and not accepted do not outlive the flight.
+void OnecycleTune::restoreAll()
+{
+	for (int axis = 0; axis < AXES; axis++) {
+		if (_gains[axis].is_written() && !_is_kept) {
+			const bool is_restored = _gains[axis].restore();
+			mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: not accepted, %s", Axis::name(axis),
+					     is_restored ? "the old gains are in force" : "but the old gains could not be written");
+		}
+	}
+}
+
+// ---------------------------------------------------------------------------------------------- in the shell
+
+int OnecycleTune::task_spawn(int argc, char *argv[])
+{
+	OnecycleTune *instance = new OnecycleTune();
+
+	if (instance) {
+		_object.store(instance);
+		_task_id = task_id_is_work_queue;
+
+		if (instance->init()) {
+			return PX4_OK;
+		}
+	}
+
+	delete instance;
+	_object.store(nullptr);
+	_task_id = -1;
+	return PX4_ERROR;
+}
+
+int OnecycleTune::custom_command(int argc, char *argv[])
+{
+	OnecycleTune *self = get_instance();
+
+	if (!self || argc < 1) {
+		return print_usage("not running");
+	}
+
+	if (!strcmp(argv[0], "run")) {
+		self->_start_wanted.store(true);
+		return PX4_OK;
+	}
+
+	if (!strcmp(argv[0], "accept")) {
+		self->_accept_wanted.store(true);
+		return PX4_OK;
+	}
+
+	if (!strcmp(argv[0], "abort")) {
+		self->_abort_wanted.store(true);
+		return PX4_OK;
+	}
+
+	return print_usage("unknown command");
+}
+
+int OnecycleTune::print_status()
+{
+	static const char *const states[] {"idle", "begin", "test", "found", "asked", "write", "watch", "watched"};
+	const State state = _state.load();
+	PX4_INFO("%s, axis %s, tick %.2f ms", states[(int)state], Axis::name(math::min(_index, AXES - 1)), (double)(1e3f * tickS()));
+	return 0;
+}
+
+int OnecycleTune::print_usage(const char *reason)
+{
+	if (reason) {
+		PX4_WARN("%s", reason);
+	}
+
+	PRINT_MODULE_DESCRIPTION(
+		R"DESCR_STR(
+### Description
+Identifies roll, pitch and yaw by a relay test in a hover and tunes their gains. It sits between mc_rate_control and the allocator:
+	mc_rate_control stop
+	onecycle_tune start
+	mc_rate_control start vtol
+)DESCR_STR");
+	PRINT_MODULE_USAGE_NAME("onecycle_tune", "controller");
+	PRINT_MODULE_USAGE_COMMAND("start");
+	PRINT_MODULE_USAGE_COMMAND_DESCR("run", "Begin a test, as OC_START does");
+	PRINT_MODULE_USAGE_COMMAND_DESCR("accept", "Accept the gains, as OC_ACCEPT does");
+	PRINT_MODULE_USAGE_COMMAND_DESCR("abort", "End the test; the old gains stay in force");
+	PRINT_MODULE_USAGE_DEFAULT_COMMANDS();
+	return 0;
+}
+
+extern "C" __EXPORT int onecycle_tune_main(int argc, char *argv[])
+{
+	return OnecycleTune::main(argc, argv);
+}
