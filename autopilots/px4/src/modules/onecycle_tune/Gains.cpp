@@ -5,31 +5,27 @@
 
 namespace
 {
-// In the order of Cascade.
-const char *const NAMES[3][4] {
-	{"MC_ROLL_P", "MC_ROLLRATE_P", "MC_ROLLRATE_I", "MC_ROLLRATE_D"},
-	{"MC_PITCH_P", "MC_PITCHRATE_P", "MC_PITCHRATE_I", "MC_PITCHRATE_D"},
-	{"MC_YAW_P", "MC_YAWRATE_P", "MC_YAWRATE_I", "MC_YAWRATE_D"},
+// In the order of Cascade, and the filter of yaw.
+const char *const NAMES[3][6] {
+	{"MC_ROLL_P", "MC_ROLLRATE_K", "MC_ROLLRATE_P", "MC_ROLLRATE_I", "MC_ROLLRATE_D", nullptr},
+	{"MC_PITCH_P", "MC_PITCHRATE_K", "MC_PITCHRATE_P", "MC_PITCHRATE_I", "MC_PITCHRATE_D", nullptr},
+	{"MC_YAW_P", "MC_YAWRATE_K", "MC_YAWRATE_P", "MC_YAWRATE_I", "MC_YAWRATE_D", "MC_YAW_TQ_CUTOFF"},
 };
-const char *const RATE_K[3] {"MC_ROLLRATE_K", "MC_PITCHRATE_K", "MC_YAWRATE_K"};
 
 // Largest gains that the parameters' definitions allow.
 constexpr float MOST_ATTITUDE_P = 12.f;
 constexpr float MOST_YAW_P = 5.f;
-constexpr float MOST_RATE_P = 0.6f;
+constexpr float MOST_RATE_P = 0.5f;
+constexpr float MOST_RATE_K = 5.f;
 }
 
 bool Gains::remember(int axis)
 {
 	_is_yaw = axis == 2;
 	_is_written = false;
-	const param_t rate_k = param_find(RATE_K[axis]);
 
-	if (rate_k == PARAM_INVALID || param_get(rate_k, &_rate_k) != PX4_OK || _rate_k <= 0.f) {
-		return false;
-	}
-
-	for (int k = 0; k < COUNT; k++) {
+	for (_count = 0; _count < MOST && NAMES[axis][_count]; _count++) {
+		const int k = _count;
 		_params[k] = param_find(NAMES[axis][k]);
 
 		if (_params[k] == PARAM_INVALID || param_get(_params[k], &_old[k]) != PX4_OK) {
@@ -55,8 +51,9 @@ bool Gains::convert(const onecycle_result &found, Cascade &cascade, const char *
 
 	const float integral = 0.5f * (kp - sqrtf(root));
 	cascade.attitude_p = (kp - integral) / kd;
-	cascade.rate_p = kd / _rate_k;
-	cascade.rate_i = integral / _rate_k;
+	cascade.rate_k = math::max(kd / MOST_RATE_P, 1.f);
+	cascade.rate_p = kd / cascade.rate_k;
+	cascade.rate_i = integral / cascade.rate_k;
 	cascade.rate_d = 0.f;
 
 	const float most_attitude_p = _is_yaw ? MOST_YAW_P : MOST_ATTITUDE_P;
@@ -66,8 +63,8 @@ bool Gains::convert(const onecycle_result &found, Cascade &cascade, const char *
 		cascade.attitude_p = most_attitude_p;
 	}
 
-	if (cascade.rate_p > MOST_RATE_P) {
-		what = "the rate's gain is above its parameter's maximum: lower MC_*RATE_K's torque scale first";
+	if (cascade.rate_k > MOST_RATE_K) {
+		what = "the rate's gain is above the maximum of MC_*RATE_P and _K: the axis has too little torque";
 		return false;
 	}
 
@@ -77,7 +74,7 @@ bool Gains::convert(const onecycle_result &found, Cascade &cascade, const char *
 
 bool Gains::write(const Cascade &cascade)
 {
-	const float values[COUNT] {cascade.attitude_p, cascade.rate_p, cascade.rate_i, cascade.rate_d};
+	const float values[MOST] {cascade.attitude_p, cascade.rate_k, cascade.rate_p, cascade.rate_i, cascade.rate_d, 0.f};
 	_is_written = true;
 
 	if (set(values)) {
@@ -94,9 +91,9 @@ bool Gains::restore()
 	return !_is_written;
 }
 
-bool Gains::set(const float (&values)[COUNT])
+bool Gains::set(const float (&values)[MOST])
 {
-	for (int k = 0; k < COUNT; k++) {
+	for (int k = 0; k < _count; k++) {
 		float read_back = NAN;
 
 		if (param_set_no_notification(_params[k], &values[k]) != PX4_OK || param_get(_params[k], &read_back) != PX4_OK

@@ -402,8 +402,8 @@ void OnecycleTune::found()
 		return;
 	}
 
-	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: proposes P %.2f, rate P %.3f I %.3f D 0", name, (double)_cascade.attitude_p,
-			 (double)_cascade.rate_p, (double)_cascade.rate_i);
+	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: proposes P %.2f, rate K %.2f P %.3f I %.3f D 0", name, (double)_cascade.attitude_p,
+			 (double)_cascade.rate_k, (double)_cascade.rate_p, (double)_cascade.rate_i);
 
 	if (_param_oc_apply.get() == REPORT) {
 		nextAxis();
@@ -448,8 +448,8 @@ void OnecycleTune::conclude()
 		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
 
 	} else {
-		mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: tuned, P %.2f, rate P %.3f I %.3f D 0", name, (double)_cascade.attitude_p,
-				 (double)_cascade.rate_p, (double)_cascade.rate_i);
+		mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: tuned, P %.2f, rate K %.2f P %.3f I %.3f D 0", name, (double)_cascade.attitude_p,
+				 (double)_cascade.rate_k, (double)_cascade.rate_p, (double)_cascade.rate_i);
 	}
 
 	nextAxis();

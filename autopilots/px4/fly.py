@@ -1,0 +1,251 @@
+"""Flies PX4's simulated quadrotor (SIH) and tunes it: with onecycle, with PX4's own autotune, or not at all. Then it commands steps
+of the attitude and prints a line of JSON: what was tuned, how long it took, and what the steps were like.
+
+Run it by run.sh, which gives each flight a network of its own.
+"""
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import subprocess
+import time
+
+import numpy
+from pymavlink import mavutil
+from pyulog import ULog
+
+AXES = ("roll", "pitch", "yaw")
+SETTINGS = {
+    "NAV_DLL_ACT": 0,
+    "COM_RC_IN_MODE": 4,
+    "COM_OF_LOSS_T": 5,
+    "COM_DISARM_PRFLT": 60,
+    "MIS_TAKEOFF_ALT": 8,
+    # From arming on, with the attitude at full rate.
+    "SDLOG_MODE": 0,
+    "SDLOG_PROFILE": 5,
+    "OC_RECORD": 1,
+    "OC_AXES": 7,
+}
+STEP_RAD = {"roll": math.radians(10), "pitch": math.radians(10), "yaw": math.radians(20)}
+STEP_S = 1.5
+
+
+class Vehicle:
+    """PX4 in a folder of its own, until `close`."""
+
+    def __init__(self, build, folder):
+        self.build, self.folder = pathlib.Path(build), pathlib.Path(folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        environment = dict(os.environ, PX4_SIM_MODEL="sihsim_quadx", PATH=f"{self.build}/bin:{os.environ['PATH']}")
+        self.output = open(self.folder / "out.log", "w")
+        self.process = subprocess.Popen(
+            [f"{self.build}/bin/px4", "-d", "-w", self.folder, f"{self.build}/etc"],
+            cwd=self.folder, env=environment, stdout=self.output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
+        )
+        self.wait(lambda: "Ready for takeoff" in self.said(), 90, "PX4 does not become ready")
+        for name, value in SETTINGS.items():
+            self.run("param", "set", name, value)
+
+    def said(self):
+        return (self.folder / "out.log").read_text(errors="replace")
+
+    def run(self, command, *arguments):
+        result = subprocess.run(
+            [f"{self.build}/bin/px4-{command}", *map(str, arguments)], cwd=self.folder, capture_output=True, text=True,
+        )
+        return result.stdout + result.stderr
+
+    def parameter(self, name):
+        for line in self.run("param", "show", name).splitlines():
+            if f" {name} [" in line:
+                return float(line.rsplit(":", 1)[1])
+        return None
+
+    def wait(self, is_so, most_s, otherwise):
+        end = time.monotonic() + most_s
+        while not is_so():
+            if time.monotonic() > end or self.process.poll() is not None:
+                raise RuntimeError(otherwise)
+            time.sleep(0.2)
+
+    def hover(self):
+        self.run("commander", "takeoff")
+        time.sleep(14)
+        self.run("commander", "mode", "auto:loiter")
+        time.sleep(3)
+
+    def close(self):
+        self.run("shutdown")
+        try:
+            self.process.wait(10)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+        self.output.close()
+
+
+def tune_with_onecycle(vehicle, wind):
+    vehicle.run("param", "set", "OC_APPLY", 2)
+    began = time.monotonic()
+    vehicle.run("onecycle_tune", "run")
+    vehicle.wait(lambda: "onecycle: finished" in vehicle.said(), 200, "onecycle does not finish")
+    said = vehicle.said()
+    done = {axis: f"onecycle: {axis}: tuned" in said for axis in AXES}
+    vehicle.run("onecycle_tune", "accept")
+    return done, time.monotonic() - began
+
+
+def tune_with_autotune(vehicle, wind):
+    before = {axis: vehicle.parameter(f"MC_{axis.upper()}RATE_P") for axis in AXES}
+    vehicle.run("param", "set", "MC_AT_APPLY", 2)
+    vehicle.run("mc_autotune_attitude_control", "start")
+    began = time.monotonic()
+    vehicle.run("param", "set", "MC_AT_START", 1)
+
+    def state():
+        for line in vehicle.run("listener", "autotune_attitude_control_status", 1).splitlines():
+            if " state:" in line:
+                return int(line.split(":")[1].split()[0])
+        return 0
+
+    time.sleep(5)
+    vehicle.wait(lambda: state() == 0, 150, "autotune does not finish")
+    after = {axis: vehicle.parameter(f"MC_{axis.upper()}RATE_P") for axis in AXES}
+    return {axis: after[axis] != before[axis] for axis in AXES}, time.monotonic() - began
+
+
+def leave_alone(vehicle, wind):
+    return {}, 0.0
+
+
+TUNERS = {"stock": leave_alone, "autotune": tune_with_autotune, "onecycle": tune_with_onecycle}
+
+
+def command_steps(vehicle):
+    """Steps of each axis up and back in offboard mode, twice."""
+    link = mavutil.mavlink_connection("udpin:127.0.0.1:14540")
+    link.wait_heartbeat(timeout=10)
+    thrust = 0.49
+
+    def attitude(roll, pitch, yaw):
+        half = [0.5 * angle for angle in (roll, pitch, yaw)]
+        (a, b, c), (x, y, z) = map(math.cos, half), map(math.sin, half)
+        return [a * b * c + x * y * z, x * b * c - a * y * z, a * y * c + x * b * z, a * b * z - x * y * c]
+
+    def hold(angles, seconds):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            # The height is not controlled for these seconds.
+            link.mav.set_attitude_target_send(0, 1, 1, 0b111, attitude(*angles), 0, 0, 0, thrust)
+            time.sleep(0.02)
+
+    hold((0, 0, 0), 0.6)
+    vehicle.run("commander", "mode", "offboard")
+    hold((0, 0, 0), 2.5)
+    for index, axis in enumerate(AXES):
+        for sign in (1, -1):
+            angles = [0.0, 0.0, 0.0]
+            angles[index] = sign * STEP_RAD[axis]
+            hold(angles, STEP_S)
+            hold((0, 0, 0), STEP_S)
+    vehicle.run("commander", "mode", "auto:loiter")
+    link.close()
+
+
+def angles_of(data, prefix):
+    w, x, y, z = (data[f"{prefix}[{k}]"] for k in range(4))
+    roll = numpy.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = numpy.arcsin(numpy.clip(2 * (w * y - z * x), -1, 1))
+    yaw = numpy.unwrap(numpy.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+    return roll, pitch, yaw
+
+
+def topic(log, name):
+    return next(data.data for data in log.data_list if data.name == name)
+
+
+def measure(path):
+    """Rise (10 to 90 %), overshoot, ISE over a second, and largest deflection of the torque, of the steps of every axis."""
+    log = ULog(str(path), ["vehicle_attitude", "vehicle_attitude_setpoint", "vehicle_torque_setpoint"])
+    attitude, wanted, torque = (topic(log, name) for name in ("vehicle_attitude", "vehicle_attitude_setpoint", "vehicle_torque_setpoint"))
+    times, values = 1e-6 * attitude["timestamp"], angles_of(attitude, "q")
+    set_times, set_values = 1e-6 * wanted["timestamp"], angles_of(wanted, "q_d")
+    torque_times = 1e-6 * torque["timestamp"]
+    result = {}
+    for index, axis in enumerate(AXES):
+        steps = []
+        jumps = numpy.flatnonzero(abs(abs(numpy.diff(set_values[index])) - STEP_RAD[axis]) < 0.1 * STEP_RAD[axis]) + 1
+        for jump in jumps:
+            start, size = set_times[jump], set_values[index][jump] - set_values[index][jump - 1]
+            inside = (times >= start) & (times < start + 1.0)
+            if inside.sum() < 50:
+                continue
+            since, response = times[inside] - start, values[index][inside]
+            response = (response - response[:3].mean()) / size
+            if response.max() < 0.9:
+                steps.append((math.nan, response.max() - 1, 1.0, 0.0))
+                continue
+            rise = since[numpy.argmax(response >= 0.9)] - since[numpy.argmax(response >= 0.1)]
+            ise = numpy.sum((1 - response) ** 2 * numpy.gradient(since))
+            input_ = torque[f"xyz[{index}]"][(torque_times >= start) & (torque_times < start + 1.0)]
+            steps.append((rise, response.max() - 1, ise, abs(input_).max()))
+        if steps:
+            rise, overshoot, ise, largest = numpy.nanmean(numpy.array(steps, dtype=float), axis=0)
+            quiet = (torque_times > jumps_start(set_times, jumps) - 1.2) & (torque_times < jumps_start(set_times, jumps) - 0.1)
+            result[axis] = {
+                "steps": len(steps), "rise_s": round(rise, 4), "overshoot": round(overshoot, 4), "ise_s": round(ise, 4),
+                "largest_torque": round(largest, 3), "torque_noise": round(float(torque[f"xyz[{index}]"][quiet].std()), 4),
+            }
+    return result
+
+
+def jumps_start(times, jumps):
+    return times[jumps[0]]
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("build", help="PX4's build folder, with the module onecycle_tune in it")
+    parser.add_argument("folder", help="new folder for this flight")
+    parser.add_argument("tuner", choices=TUNERS)
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter, before the flight")
+    parser.add_argument("--wait", type=float, default=0.0, help="seconds to wait in the hover, so that each flight has other noise")
+    arguments = parser.parse_args()
+    vehicle = Vehicle(arguments.build, arguments.folder)
+    line = {"tuner": arguments.tuner, "folder": arguments.folder}
+    try:
+        for setting in arguments.set:
+            vehicle.run("param", "set", *setting.split("="))
+        if arguments.tuner == "onecycle":
+            vehicle.run("mc_rate_control", "stop")
+            time.sleep(0.3)
+            vehicle.run("onecycle_tune", "start")
+            vehicle.run("mc_rate_control", "start", "vtol")
+            time.sleep(2)
+        vehicle.hover()
+        time.sleep(arguments.wait)
+        line["tuned"], line["time_s"] = TUNERS[arguments.tuner](vehicle, None)
+        line["time_s"] = round(line["time_s"], 1)
+        line["gains"] = {
+            name: vehicle.parameter(name)
+            for axis in ("ROLL", "PITCH", "YAW")
+            for name in (f"MC_{axis}_P", f"MC_{axis}RATE_K", f"MC_{axis}RATE_P", f"MC_{axis}RATE_I", f"MC_{axis}RATE_D")
+        }
+        time.sleep(2)
+        command_steps(vehicle)
+        time.sleep(1)
+    except RuntimeError as error:
+        line["failed"] = str(error)
+    finally:
+        vehicle.close()
+    logs = sorted(pathlib.Path(arguments.folder).glob("log/*/*.ulg"))
+    if logs:
+        line["steps"] = measure(logs[-1])
+    line["messages"] = [text.split("] ", 1)[1] for text in vehicle.said().splitlines() if "[onecycle_tune]" in text]
+    print(json.dumps(line), flush=True)
+
+
+if __name__ == "__main__":
+    main()
