@@ -39,7 +39,18 @@ public:
 	bool isArmed() const { return _status.arming_state == vehicle_status_s::ARMING_STATE_ARMED; }
 
 private:
+	struct Sample {
+		hrt_abstime time;
+		float angle;
+	};
+
 	float angle() const;
+
+	/**
+	 * Angle of one attitude period ago. The estimator's attitude is sometimes a tick late: taken as it comes, it repeats
+	 * itself and then jumps, which is noise several times that of the estimate. The delay is part of the dead time found.
+	 */
+	float value(hrt_abstime now) const;
 
 	uORB::Subscription _attitude_sub{ORB_ID(vehicle_attitude)};
 	uORB::Subscription _rates_sub{ORB_ID(vehicle_angular_velocity)};
@@ -55,6 +66,9 @@ private:
 	vehicle_land_detected_s _land{};
 	manual_control_setpoint_s _sticks{};
 
+	Sample _before{};
+	Sample _latest{};
+	float _period_us{0.f};
 	int _index{0};
 	float _from{0.f};
 	float _most_stick{1.f};
