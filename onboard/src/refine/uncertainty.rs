@@ -28,6 +28,9 @@ const WAVE_BINS: usize = 32;
 const LAGS: usize = 8;
 /// Residual beyond which the noise of the samples does not explain it: its mean square over theirs.
 const MOST_WHITE: f64 = 2.0;
+/// Sum of the squared differences over that of the values: 2 for white noise. The fit follows a random walk with its unknowns
+/// and leaves 0.3 to 1.5 of it.
+const MOST_ALIKE: f64 = 1.6;
 /// Sum of the squared differences of the differences over that of the differences: 1.5 for a random walk averaged in bins.
 /// Below this the residual is smoother, as under a wind whose force is integrated twice.
 const LEAST_CURVED: f64 = 1.0;
@@ -238,7 +241,7 @@ impl Uncertainty {
         let freedom = problem.used.checked_sub(ALL + waves + 1)?;
         let variance = differences / freedom.max(1) as f64;
         let is_walk = squares > MOST_WHITE * noises
-            && differences < squares
+            && differences < MOST_ALIKE * squares
             && curvatures > LEAST_CURVED * differences
             && WALKS.contains(&(variance / problem.walk_variance()));
         is_walk.then(|| sqrt(variance))
