@@ -42,7 +42,7 @@ pub(crate) use self::train::Train;
 use crate::failure::Failure;
 
 pub(crate) use self::pack::{
-    ExportPack, ImportPack, Pack, PackAction, PackSource, ShowPack, VerifyPack,
+    ExportPack, ImportPack, MarginPack, Pack, PackAction, PackSource, ShowPack, VerifyPack,
 };
 
 const AFTER_HELP: &str = "\

@@ -7,6 +7,8 @@ use std::str::FromStr;
 
 use clap::{Args, Subcommand};
 
+use super::phase_margin;
+
 /// Show, check and exchange packs: files that hold all an identifier knows.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
@@ -14,7 +16,8 @@ use clap::{Args, Subcommand};
     "  onecycle pack show default\n",
     "  onecycle pack verify my.pack\n",
     "  onecycle pack export my.pack --onnx my.onnx\n",
-    "  onecycle pack import learnt.onnx --like default -o learnt.pack\n\n",
+    "  onecycle pack import learnt.onnx --like default -o learnt.pack\n",
+    "  onecycle pack margin default --phase-margin 45 -o calm.pack\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable file, 4 a pack does not give the outputs it ",
     "must, 5 output not written"
 ))]
@@ -29,6 +32,7 @@ pub(crate) enum PackAction {
     Verify(VerifyPack),
     Export(ExportPack),
     Import(ImportPack),
+    Margin(MarginPack),
 }
 
 /// Where a pack is.
@@ -122,6 +126,23 @@ pub(crate) struct ImportPack {
     /// The pack that gives everything but the network; default is the one built in
     #[arg(long, value_name = "PACK|default")]
     pub(crate) like: PackSource,
+    /// The pack to write
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+}
+
+/// Make a pack whose controllers have another phase margin; everything else is taken from this pack.
+///
+/// The identifier stays the same, so nothing is trained: only the table of gains is computed again.
+#[derive(Debug, Args)]
+#[command(after_help = "Example:\n  onecycle pack margin default --phase-margin 45 -o calm.pack\n")]
+pub(crate) struct MarginPack {
+    /// The pack; default is the one built in
+    #[arg(value_name = "FILE|default")]
+    pub(crate) pack: PackSource,
+    /// Phase margin of the controllers, in degrees
+    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = phase_margin)]
+    pub(crate) phase_margin: f64,
     /// The pack to write
     #[arg(long, short, value_name = "FILE")]
     pub(crate) out: PathBuf,

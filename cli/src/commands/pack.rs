@@ -1,4 +1,4 @@
-//! `onecycle pack`: show, verify, export and import the packs of identifiers.
+//! `onecycle pack`: show, verify, export and import the packs of identifiers, and change their margin.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -38,6 +38,7 @@ pub(crate) fn run(arguments: &args::Pack) -> Result<ExitCode, Failure> {
         PackAction::Verify(arguments) => verify(arguments),
         PackAction::Export(arguments) => export(arguments),
         PackAction::Import(arguments) => import(arguments),
+        PackAction::Margin(arguments) => margin(arguments),
     }
 }
 
@@ -169,6 +170,22 @@ fn import(arguments: &args::ImportPack) -> Result<ExitCode, Failure> {
         changed,
         samples: SAMPLES,
     }))?;
+    Ok(ExitCode::from(exit::DONE))
+}
+
+fn margin(arguments: &args::MarginPack) -> Result<ExitCode, Failure> {
+    let failed = |reason: String| Failure::unreadable(&path(&arguments.pack), reason);
+    let old = bytes(&arguments.pack)?;
+    let old = read(&arguments.pack, &old)?;
+    let contents = PackContents::read(&old)
+        .and_then(|contents| contents.with_phase_margin(arguments.phase_margin))
+        .map_err(|error| failed(error.to_string()))?;
+    let made = contents
+        .to_bytes()
+        .map_err(|error| failed(error.to_string()))?;
+    let pack = Pack::read(&made).map_err(|error| failed(error.to_string()))?;
+    write_file(&arguments.out, |file| file.write_all(&made))?;
+    print(&report::pack::margin(&arguments.out, &pack))?;
     Ok(ExitCode::from(exit::DONE))
 }
 

@@ -1,6 +1,7 @@
 //! Contents of a pack, its verification, and the import of a network.
 
 use std::fmt::Write;
+use std::path::Path;
 
 use onecycle_onboard::network::{Activation, Dense, Weights};
 use onecycle_onboard::pack::{
@@ -183,6 +184,17 @@ pub(crate) fn imported(imported: &ImportedPack<'_>) -> String {
         } else {
             like.clone()
         },
+    )
+}
+
+pub(crate) fn margin(out: &Path, pack: &Pack<'_>) -> String {
+    format!(
+        "Pack     {out}, {total} bytes, hash {hash:016x}\n\
+         Margin   {margin:.2} deg\n",
+        out = out.display(),
+        total = pack.sizes().total,
+        hash = pack.content_hash(),
+        margin = f64::from(pack.domain().phase_margin_rad).to_degrees(),
     )
 }
 

@@ -1,4 +1,4 @@
-//! `pack`: show, verify, export, import; and files that are damaged, truncated, newer, or not packs.
+//! `pack`: show, verify, export, import, margin; and files that are damaged, truncated, newer, or not packs.
 
 use onecycle_lab::learn::npz::{self, Column, Numbers};
 use onecycle_lab::learn::onnx;
@@ -361,4 +361,33 @@ fn networks_that_do_not_fit_are_refused() {
     let model = folder.write("g.onnx", &onnx_of(&network(9, OUTPUTS, 1)));
     run(&["pack", "import", &model, "--like", &path, "-o", &nowhere])
         .refused(NOT_WRITTEN, &["cannot write", "nosuch"]);
+}
+
+#[test]
+fn a_pack_of_another_margin_keeps_all_else() {
+    let folder = Scratch::new();
+    let out = folder.name("calm.pack");
+    let text = done(&["margin", "default", "--phase-margin", "45", "-o", &out]);
+    assert!(text.contains("Margin   45.00 deg"), "{text}");
+    done(&["verify", &out]);
+    let bytes = std::fs::read(&out).unwrap();
+    let calm = PackContents::read(&Pack::read(&bytes).unwrap()).unwrap();
+    let usual = PackContents::read(&Pack::embedded().unwrap()).unwrap();
+    assert_ne!(calm.lead_table, usual.lead_table);
+    // Back at 20 degrees it is the pack built in, to the bit.
+    let back = folder.name("back.pack");
+    done(&["margin", &out, "--phase-margin", "20", "-o", &back]);
+    assert_eq!(std::fs::read(&back).unwrap(), DEFAULT);
+
+    let nowhere = folder.name("nosuch/out.pack");
+    run(&[
+        "pack",
+        "margin",
+        "default",
+        "--phase-margin",
+        "30",
+        "-o",
+        &nowhere,
+    ])
+    .refused(NOT_WRITTEN, &["cannot write", "nosuch"]);
 }

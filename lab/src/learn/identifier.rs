@@ -275,16 +275,9 @@ impl IdentifierRecipe {
             Precision::Floats
         };
         let margin_rad = self.experiments.families[0].space.phase_margin_rad();
-        let numbers = lead_table::build(margin_rad, lead_table::POINTS)?;
-        let points = [lead_table::POINTS; 2];
         Ok(PackContents {
             layers: layers(network, precision)?,
-            lead_table: LeadTableContents::of_numbers(
-                points,
-                onecycle_onboard::gains::FIELDS,
-                &numbers,
-            )
-            .unwrap_or_default(),
+            lead_table: LeadTableContents::for_phase_margin(margin_rad)?,
             self_tests: learnt
                 .iter()
                 .take(SELF_TESTS)

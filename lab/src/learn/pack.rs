@@ -12,12 +12,14 @@
 mod layers;
 
 use onecycle_onboard::floats::Floats;
+use onecycle_onboard::gains::FIELDS;
 use onecycle_onboard::network::Activation;
 use onecycle_onboard::pack::{
     AXES, Domain, HEADER, MAGIC, OutputScaling, Pack, PackError, Prior, VERSION, content_hash,
 };
 use onecycle_onboard::signature::LENGTH;
 
+use crate::learn::lead_table::{self, LeadTableError};
 use crate::learn::train::{Network, TrainError};
 
 pub use layers::{PackedLayer, PackedWeights, Precision, Quantisation, layers, quantisation};
@@ -78,6 +80,16 @@ impl LeadTableContents {
             values: values.to_vec(),
         })
     }
+
+    /// The table of this phase margin (rad, 0 to pi/2).
+    ///
+    /// # Errors
+    /// [`LeadTableError`]: there is no table for this margin.
+    pub(super) fn for_phase_margin(phase_margin_rad: f64) -> Result<Self, LeadTableError> {
+        let numbers = lead_table::build(phase_margin_rad, lead_table::POINTS)?;
+        let table = Self::of_numbers([lead_table::POINTS; 2], FIELDS, &numbers);
+        Ok(table.unwrap_or_default())
+    }
 }
 
 /// Why a pack cannot be made or read.
@@ -100,6 +112,9 @@ pub enum PackContentsError {
     /// The card is not JSON.
     #[error("the card of the pack is not JSON: {0}")]
     Card(String),
+    /// There is no table for a phase margin.
+    #[error("{0}")]
+    Table(#[from] LeadTableError),
     /// Sizes or numbers that no network has.
     #[error("{0}")]
     Train(#[from] TrainError),
@@ -149,6 +164,22 @@ impl PackContents {
         let bytes = self.file(&self_tests);
         Pack::read(&bytes)?;
         Ok(bytes)
+    }
+
+    /// The same identifier with controllers of another phase margin (rad, 0 to pi/2): the table of leads is computed again,
+    /// nothing is trained.
+    ///
+    /// # Errors
+    /// [`PackContentsError::Table`]: there is no table for this margin.
+    pub fn with_phase_margin(self, phase_margin_rad: f64) -> Result<Self, PackContentsError> {
+        Ok(Self {
+            lead_table: LeadTableContents::for_phase_margin(phase_margin_rad)?,
+            domain: Domain {
+                phase_margin_rad: phase_margin_rad as f32,
+                ..self.domain
+            },
+            ..self
+        })
     }
 
     /// The network with the weights that the bytes stand for.
