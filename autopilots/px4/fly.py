@@ -16,7 +16,9 @@ import numpy
 from pymavlink import mavutil
 from pyulog import ULog
 
-AXES = ("roll", "pitch", "yaw")
+AXES = ("roll", "pitch", "yaw", "altitude")
+ANGLES = AXES[:3]
+INNER = {"roll": "MC_ROLLRATE", "pitch": "MC_PITCHRATE", "yaw": "MC_YAWRATE"}
 SETTINGS = {
     "NAV_DLL_ACT": 0,
     "COM_RC_IN_MODE": 4,
@@ -27,10 +29,13 @@ SETTINGS = {
     "SDLOG_MODE": 0,
     "SDLOG_PROFILE": 5,
     "OC_RECORD": 1,
-    "OC_AXES": 7,
+    "OC_AXES": 15,
 }
-STEP_RAD = {"roll": math.radians(10), "pitch": math.radians(10), "yaw": math.radians(20)}
+# Steps of the set-points (rad, m), and the time over which a response is judged (s).
+STEP = {"roll": math.radians(10), "pitch": math.radians(10), "yaw": math.radians(20), "altitude": 0.5}
+JUDGED_S = {"roll": 1.0, "pitch": 1.0, "yaw": 1.0, "altitude": 4.0}
 STEP_S = 1.5
+CLIMB_S = 5.0
 
 
 class Vehicle:
@@ -86,19 +91,24 @@ class Vehicle:
         self.output.close()
 
 
-def tune_with_onecycle(vehicle, wind):
+def tune_with_onecycle(vehicle):
     vehicle.run("param", "set", "OC_APPLY", 2)
-    began = time.monotonic()
     vehicle.run("onecycle_tune", "run")
-    vehicle.wait(lambda: "onecycle: finished" in vehicle.said(), 200, "onecycle does not finish")
-    said = vehicle.said()
-    done = {axis: f"onecycle: {axis}: tuned" in said for axis in AXES}
+    began, said, times = time.monotonic(), len(vehicle.said()), {}
+
+    def finished():
+        for axis in AXES:
+            if axis not in times and f"onecycle: {axis}: tuned" in vehicle.said()[said:]:
+                times[axis] = round(time.monotonic() - began - sum(times.values()), 1)
+        return "onecycle: finished" in vehicle.said()[said:]
+
+    vehicle.wait(finished, 250, "onecycle does not finish")
     vehicle.run("onecycle_tune", "accept")
-    return done, time.monotonic() - began
+    return times
 
 
-def tune_with_autotune(vehicle, wind):
-    before = {axis: vehicle.parameter(f"MC_{axis.upper()}RATE_P") for axis in AXES}
+def tune_with_autotune(vehicle):
+    before = {axis: vehicle.parameter(f"{INNER[axis]}_P") for axis in ANGLES}
     vehicle.run("param", "set", "MC_AT_APPLY", 2)
     vehicle.run("mc_autotune_attitude_control", "start")
     began = time.monotonic()
@@ -112,19 +122,19 @@ def tune_with_autotune(vehicle, wind):
 
     time.sleep(5)
     vehicle.wait(lambda: state() == 0, 150, "autotune does not finish")
-    after = {axis: vehicle.parameter(f"MC_{axis.upper()}RATE_P") for axis in AXES}
-    return {axis: after[axis] != before[axis] for axis in AXES}, time.monotonic() - began
+    each_s = round((time.monotonic() - began) / len(ANGLES), 1)
+    return {axis: each_s for axis in ANGLES if vehicle.parameter(f"{INNER[axis]}_P") != before[axis]}
 
 
-def leave_alone(vehicle, wind):
-    return {}, 0.0
+def leave_alone(_):
+    return {}
 
 
 TUNERS = {"stock": leave_alone, "autotune": tune_with_autotune, "onecycle": tune_with_onecycle}
 
 
 def command_steps(vehicle):
-    """Steps of each axis up and back in offboard mode, twice."""
+    """Steps of each angle to either side and back, and of the height, in offboard mode."""
     link = mavutil.mavlink_connection("udpin:127.0.0.1:14540")
     link.wait_heartbeat(timeout=10)
     thrust = 0.49
@@ -144,14 +154,40 @@ def command_steps(vehicle):
     hold((0, 0, 0), 0.6)
     vehicle.run("commander", "mode", "offboard")
     hold((0, 0, 0), 2.5)
-    for index, axis in enumerate(AXES):
+    for index, axis in enumerate(ANGLES):
         for sign in (1, -1):
             angles = [0.0, 0.0, 0.0]
-            angles[index] = sign * STEP_RAD[axis]
+            angles[index] = sign * STEP[axis]
             hold(angles, STEP_S)
             hold((0, 0, 0), STEP_S)
     vehicle.run("commander", "mode", "auto:loiter")
+    time.sleep(6)
+    command_heights(vehicle, link)
+    vehicle.run("commander", "mode", "auto:loiter")
     link.close()
+
+
+def command_heights(vehicle, link):
+    """Steps of the height up and down, twice."""
+    while link.recv_match(blocking=False):
+        pass
+    here = link.recv_match(type="LOCAL_POSITION_NED", blocking=True, timeout=5)
+    if here is None:
+        raise RuntimeError("PX4 sends no position")
+
+    def hold(climbed, seconds):
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            # The position counts, nothing else.
+            link.mav.set_position_target_local_ned_send(0, 1, 1, 1, 0b110111111000, here.x, here.y, here.z - climbed, 0, 0, 0, 0, 0, 0, 0, 0)
+            time.sleep(0.02)
+
+    hold(0, 0.6)
+    vehicle.run("commander", "mode", "offboard")
+    hold(0, 3)
+    for _ in range(2):
+        hold(STEP["altitude"], CLIMB_S)
+        hold(0, CLIMB_S)
 
 
 def angles_of(data, prefix):
@@ -166,43 +202,48 @@ def topic(log, name):
     return next(data.data for data in log.data_list if data.name == name)
 
 
+def signals(log):
+    """For each axis: set-point, output and input, each with its times (s)."""
+    attitude, wanted = topic(log, "vehicle_attitude"), topic(log, "vehicle_attitude_setpoint")
+    torque, thrust = topic(log, "vehicle_torque_setpoint"), topic(log, "vehicle_thrust_setpoint")
+    position, place = topic(log, "vehicle_local_position"), topic(log, "vehicle_local_position_setpoint")
+    seconds = lambda data: 1e-6 * data["timestamp"]
+    angles, set_points = angles_of(attitude, "q"), angles_of(wanted, "q_d")
+    for index, axis in enumerate(ANGLES):
+        yield axis, (seconds(wanted), set_points[index]), (seconds(attitude), angles[index]), (seconds(torque), torque[f"xyz[{index}]"])
+    yield "altitude", (seconds(place), -place["z"]), (seconds(position), -position["z"]), (seconds(thrust), -thrust["xyz[2]"])
+
+
 def measure(path):
-    """Rise (10 to 90 %), overshoot, ISE over a second, and largest deflection of the torque, of the steps of every axis."""
-    log = ULog(str(path), ["vehicle_attitude", "vehicle_attitude_setpoint", "vehicle_torque_setpoint"])
-    attitude, wanted, torque = (topic(log, name) for name in ("vehicle_attitude", "vehicle_attitude_setpoint", "vehicle_torque_setpoint"))
-    times, values = 1e-6 * attitude["timestamp"], angles_of(attitude, "q")
-    set_times, set_values = 1e-6 * wanted["timestamp"], angles_of(wanted, "q_d")
-    torque_times = 1e-6 * torque["timestamp"]
+    """Rise (10 to 90 %), overshoot, ISE, and largest input of the steps of every axis; noise of the input before the first."""
+    names = ["vehicle_attitude", "vehicle_torque_setpoint", "vehicle_thrust_setpoint", "vehicle_local_position"]
+    log = ULog(str(path), names + ["vehicle_attitude_setpoint", "vehicle_local_position_setpoint"])
     result = {}
-    for index, axis in enumerate(AXES):
+    for axis, (set_times, set_values), (times, values), (input_times, inputs) in signals(log):
         steps = []
-        jumps = numpy.flatnonzero(abs(abs(numpy.diff(set_values[index])) - STEP_RAD[axis]) < 0.1 * STEP_RAD[axis]) + 1
+        jumps = numpy.flatnonzero(abs(abs(numpy.diff(set_values)) - STEP[axis]) < 0.1 * STEP[axis]) + 1
         for jump in jumps:
-            start, size = set_times[jump], set_values[index][jump] - set_values[index][jump - 1]
-            inside = (times >= start) & (times < start + 1.0)
+            start, size = set_times[jump], set_values[jump] - set_values[jump - 1]
+            inside = (times >= start) & (times < start + JUDGED_S[axis])
             if inside.sum() < 50:
                 continue
-            since, response = times[inside] - start, values[index][inside]
+            since, response = times[inside] - start, values[inside]
             response = (response - response[:3].mean()) / size
-            if response.max() < 0.9:
-                steps.append((math.nan, response.max() - 1, 1.0, 0.0))
-                continue
-            rise = since[numpy.argmax(response >= 0.9)] - since[numpy.argmax(response >= 0.1)]
+            rise = math.nan
+            if response.max() >= 0.9:
+                rise = since[numpy.argmax(response >= 0.9)] - since[numpy.argmax(response >= 0.1)]
             ise = numpy.sum((1 - response) ** 2 * numpy.gradient(since))
-            input_ = torque[f"xyz[{index}]"][(torque_times >= start) & (torque_times < start + 1.0)]
-            steps.append((rise, response.max() - 1, ise, abs(input_).max()))
+            moved = inputs[(input_times >= start) & (input_times < start + JUDGED_S[axis])]
+            steps.append((rise, response.max() - 1, ise, abs(moved).max()))
         if steps:
             rise, overshoot, ise, largest = numpy.nanmean(numpy.array(steps, dtype=float), axis=0)
-            quiet = (torque_times > jumps_start(set_times, jumps) - 1.2) & (torque_times < jumps_start(set_times, jumps) - 0.1)
+            first = set_times[jumps[0]]
+            quiet = inputs[(input_times > first - 1.2) & (input_times < first - 0.1)]
             result[axis] = {
                 "steps": len(steps), "rise_s": round(rise, 4), "overshoot": round(overshoot, 4), "ise_s": round(ise, 4),
-                "largest_torque": round(largest, 3), "torque_noise": round(float(torque[f"xyz[{index}]"][quiet].std()), 4),
+                "largest_input": round(float(largest), 3), "input_noise": round(float(numpy.diff(quiet).std()), 4),
             }
     return result
-
-
-def jumps_start(times, jumps):
-    return times[jumps[0]]
 
 
 def main():
@@ -226,13 +267,10 @@ def main():
             time.sleep(2)
         vehicle.hover()
         time.sleep(arguments.wait)
-        line["tuned"], line["time_s"] = TUNERS[arguments.tuner](vehicle, None)
-        line["time_s"] = round(line["time_s"], 1)
-        line["gains"] = {
-            name: vehicle.parameter(name)
-            for axis in ("ROLL", "PITCH", "YAW")
-            for name in (f"MC_{axis}_P", f"MC_{axis}RATE_K", f"MC_{axis}RATE_P", f"MC_{axis}RATE_I", f"MC_{axis}RATE_D")
-        }
+        line["tuned_s"] = TUNERS[arguments.tuner](vehicle)
+        names = [f"{inner}_{gain}" for inner in INNER.values() for gain in "KPID"] + [f"MC_{axis.upper()}_P" for axis in ANGLES]
+        names += ["MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC", "MC_YAW_TQ_CUTOFF"]
+        line["gains"] = {name: vehicle.parameter(name) for name in names}
         time.sleep(2)
         command_steps(vehicle)
         time.sleep(1)

@@ -9,21 +9,22 @@ using namespace time_literals;
 
 const char *Axis::name(int index)
 {
-	static const char *const names[] {"roll", "pitch", "yaw"};
+	static const char *const names[COUNT] {"roll", "pitch", "yaw", "altitude"};
 	return names[index];
 }
 
 void Axis::update()
 {
-	if (_attitude_sub.update(&_attitude)) {
-		const hrt_abstime period = _attitude.timestamp_sample - _latest.time;
+	if (_attitude_sub.update(&_attitude) && _index != ALTITUDE) {
+		push(_attitude.timestamp_sample, matrix::wrap_pi(angle() - _from));
+	}
 
-		if (_latest.time > 0 && period > 0 && period < 100_ms) {
-			_period_us += (_period_us > 0.f ? 0.01f : 1.f) * ((float)period - _period_us);
-		}
-
-		_before = _latest;
-		_latest = {_attitude.timestamp_sample, matrix::wrap_pi(angle() - _from)};
+	if (_position_sub.update(&_position) && _index == ALTITUDE) {
+		// The estimated height wanders by many times the oscillation, the velocity does not.
+		const float interval_s = 1e-6f * (float)(_position.timestamp_sample - _latest.time);
+		const float climb = -_position.vz;
+		push(_position.timestamp_sample, _latest.value + 0.5f * (climb + _climb) * math::constrain(interval_s, 0.f, 0.1f));
+		_climb = climb;
 	}
 
 	_rates_sub.update(&_rates);
@@ -33,7 +34,19 @@ void Axis::update()
 	_sticks_sub.update(&_sticks);
 }
 
-const char *Axis::notReady() const
+void Axis::push(hrt_abstime time, float value)
+{
+	const hrt_abstime period = time - _latest.time;
+
+	if (_latest.time > 0 && period > 0 && period < 100_ms) {
+		_period_us += (_period_us > 0.f ? 0.01f : 1.f) * ((float)period - _period_us);
+	}
+
+	_before = _latest;
+	_latest = {time, value};
+}
+
+const char *Axis::notReady(bool wants_altitude) const
 {
 	if (!isArmed() || _land.landed || _land.maybe_landed) {
 		return "the vehicle is not flying: hover first";
@@ -47,6 +60,10 @@ const char *Axis::notReady() const
 		return "there is no attitude";
 	}
 
+	if (wants_altitude && !(_position.z_valid && _position.v_z_valid)) {
+		return "there is no height";
+	}
+
 	return nullptr;
 }
 
@@ -54,11 +71,26 @@ void Axis::begin(int index, float most_stick)
 {
 	_index = index;
 	_most_stick = most_stick;
-	_resets = _attitude.quat_reset_counter;
+	_resets = resets();
 	_nav_state = _status.nav_state;
-	_from = angle();
-	_latest = {_attitude.timestamp_sample, 0.f};
+	_throttle = _sticks.throttle;
+	_period_us = 0.f;
+	_climb = -_position.vz;
+
+	if (index == ALTITUDE) {
+		_latest = {_position.timestamp_sample, 0.f};
+
+	} else {
+		_from = angle();
+		_latest = {_attitude.timestamp_sample, 0.f};
+	}
+
 	_before = _latest;
+}
+
+int Axis::resets() const
+{
+	return _index == ALTITUDE ? _position.vz_reset_counter : _attitude.quat_reset_counter;
 }
 
 const char *Axis::mustStop() const
@@ -75,14 +107,14 @@ const char *Axis::mustStop() const
 		return "the failure detector reports a motor";
 	}
 
-	if (_attitude.quat_reset_counter != _resets) {
-		return "the estimator reset its attitude";
+	if (resets() != _resets) {
+		return "the estimator was reset";
 	}
 
 	if (_sticks.valid) {
-		const float moved = math::max(math::max(fabsf(_sticks.roll), fabsf(_sticks.pitch)), fabsf(_sticks.yaw));
+		const float turned = math::max(math::max(fabsf(_sticks.roll), fabsf(_sticks.pitch)), fabsf(_sticks.yaw));
 
-		if (moved > _most_stick) {
+		if (math::max(turned, fabsf(_sticks.throttle - _throttle)) > _most_stick) {
 			return "a stick was moved";
 		}
 	}
@@ -101,19 +133,21 @@ float Axis::value(hrt_abstime now) const
 	const float interval_us = (float)(_latest.time - _before.time);
 
 	if (interval_us <= 0.f || since_us >= interval_us) {
-		return _latest.angle;
+		return _latest.value;
 	}
 
 	const float part = math::max(since_us / interval_us, 0.f);
-	return _before.angle + part * matrix::wrap_pi(_latest.angle - _before.angle);
+	const float step = _latest.value - _before.value;
+	return _before.value + part * (_index == ALTITUDE ? step : matrix::wrap_pi(step));
 }
 
 onecycle_measurement Axis::measure(hrt_abstime now) const
 {
-	const hrt_abstime sampled = math::min(_attitude.timestamp_sample, _rates.timestamp_sample);
+	const bool is_altitude = _index == ALTITUDE;
+	const hrt_abstime sampled = is_altitude ? _latest.time : math::min(_attitude.timestamp_sample, _rates.timestamp_sample);
 	onecycle_measurement measurement{};
 	measurement.value = value(now);
-	measurement.rate = _rates.xyz[_index];
+	measurement.rate = is_altitude ? _climb : _rates.xyz[_index];
 	measurement.age_s = now > sampled ? (now - sampled) * 1e-6f : 0.f;
 	measurement.has_rate = true;
 	return measurement;

@@ -1,6 +1,6 @@
 /**
  * @file Axis.hpp
- * What a test of one axis sees of the vehicle: the angle and the rate of the axis, and reasons to stop at once.
+ * What a test of one axis sees of the vehicle: angle and rate, or height and climb rate, and reasons to stop at once.
  */
 
 #pragma once
@@ -12,6 +12,7 @@
 #include <uORB/topics/vehicle_angular_velocity.h>
 #include <uORB/topics/vehicle_attitude.h>
 #include <uORB/topics/vehicle_land_detected.h>
+#include <uORB/topics/vehicle_local_position.h>
 #include <uORB/topics/vehicle_status.h>
 
 #include "onecycle.h"
@@ -19,21 +20,25 @@
 class Axis
 {
 public:
+	static constexpr int COUNT = 4;
+	static constexpr int YAW = 2;
+	static constexpr int ALTITUDE = 3;
+
 	static const char *name(int index);
 
 	/** Takes the latest messages. */
 	void update();
 
 	/** Why no test can begin now, or null. */
-	const char *notReady() const;
+	const char *notReady(bool wants_altitude) const;
 
-	/** Begins a test of this axis: angles count from here on. */
+	/** Begins a test of this axis: angle or height count from here on. */
 	void begin(int index, float most_stick);
 
 	/** Why the test must end now, or null: something that the tuner's own guards do not see. */
 	const char *mustStop() const;
 
-	/** Angle since the beginning (rad), rate (rad/s), and the age of the older of the two. */
+	/** Angle (rad) or height (m) since the beginning, its rate, and the age of the older of the two. */
 	onecycle_measurement measure(hrt_abstime now) const;
 
 	bool isArmed() const { return _status.arming_state == vehicle_status_s::ARMING_STATE_ARMED; }
@@ -41,18 +46,21 @@ public:
 private:
 	struct Sample {
 		hrt_abstime time;
-		float angle;
+		float value;
 	};
 
 	float angle() const;
+	int resets() const;
+	void push(hrt_abstime time, float value);
 
 	/**
-	 * Angle of one attitude period ago. The estimator's attitude is sometimes a tick late: taken as it comes, it repeats
-	 * itself and then jumps, which is noise several times that of the estimate. The delay is part of the dead time found.
+	 * Value of one period of the estimator ago. Its estimate is sometimes a tick late: taken as it comes, it repeats itself
+	 * and then jumps, which is noise several times that of the estimate. The delay is part of the dead time found.
 	 */
 	float value(hrt_abstime now) const;
 
 	uORB::Subscription _attitude_sub{ORB_ID(vehicle_attitude)};
+	uORB::Subscription _position_sub{ORB_ID(vehicle_local_position)};
 	uORB::Subscription _rates_sub{ORB_ID(vehicle_angular_velocity)};
 	uORB::Subscription _status_sub{ORB_ID(vehicle_status)};
 	uORB::Subscription _failure_sub{ORB_ID(failure_detector_status)};
@@ -60,6 +68,7 @@ private:
 	uORB::Subscription _sticks_sub{ORB_ID(manual_control_setpoint)};
 
 	vehicle_attitude_s _attitude{};
+	vehicle_local_position_s _position{};
 	vehicle_angular_velocity_s _rates{};
 	vehicle_status_s _status{};
 	failure_detector_status_s _failure{};
@@ -71,7 +80,9 @@ private:
 	float _period_us{0.f};
 	int _index{0};
 	float _from{0.f};
+	float _climb{0.f};
 	float _most_stick{1.f};
-	uint8_t _resets{0};
+	float _throttle{0.f};
+	int _resets{0};
 	uint8_t _nav_state{0};
 };

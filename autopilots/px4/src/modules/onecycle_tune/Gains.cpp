@@ -5,30 +5,33 @@
 
 namespace
 {
-// In the order of Cascade, and the filter of yaw.
-const char *const NAMES[3][6] {
+// In the order of Cascade, and the filter of yaw's torque. Altitude has no overall gain.
+const char *const NAMES[4][6] {
 	{"MC_ROLL_P", "MC_ROLLRATE_K", "MC_ROLLRATE_P", "MC_ROLLRATE_I", "MC_ROLLRATE_D", nullptr},
 	{"MC_PITCH_P", "MC_PITCHRATE_K", "MC_PITCHRATE_P", "MC_PITCHRATE_I", "MC_PITCHRATE_D", nullptr},
 	{"MC_YAW_P", "MC_YAWRATE_K", "MC_YAWRATE_P", "MC_YAWRATE_I", "MC_YAWRATE_D", "MC_YAW_TQ_CUTOFF"},
+	{"MPC_Z_P", nullptr, "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC", nullptr},
 };
 
 // Largest gains that the parameters' definitions allow.
-constexpr float MOST_ATTITUDE_P = 12.f;
-constexpr float MOST_YAW_P = 5.f;
-constexpr float MOST_RATE_P = 0.5f;
-constexpr float MOST_RATE_K = 5.f;
+struct Most {
+	float outer_p;
+	float inner_k;
+	float inner_p;
+};
+
+const Most MOST_OF[4] {{12.f, 5.f, 0.5f}, {12.f, 5.f, 0.5f}, {5.f, 5.f, 0.5f}, {1.5f, 1.f, 15.f}};
 }
 
 bool Gains::remember(int axis)
 {
-	_is_yaw = axis == 2;
+	_axis = axis;
 	_is_written = false;
 
-	for (_count = 0; _count < MOST && NAMES[axis][_count]; _count++) {
-		const int k = _count;
-		_params[k] = param_find(NAMES[axis][k]);
+	for (int k = 0; k < COUNT; k++) {
+		_params[k] = NAMES[axis][k] ? param_find(NAMES[axis][k]) : PARAM_INVALID;
 
-		if (_params[k] == PARAM_INVALID || param_get(_params[k], &_old[k]) != PX4_OK) {
+		if (NAMES[axis][k] && (_params[k] == PARAM_INVALID || param_get(_params[k], &_old[k]) != PX4_OK)) {
 			return false;
 		}
 	}
@@ -36,12 +39,12 @@ bool Gains::remember(int axis)
 	return true;
 }
 
-bool Gains::convert(const onecycle_result &found, Cascade &cascade, const char *&what) const
+bool Gains::convert(const onecycle_result &found, float per_input, Cascade &cascade, const char *&what) const
 {
-	const float kp = found.kp;
-	const float ki = found.ki;
-	const float kd = found.kd;
-	// kp = R + ki kd / R' with R = K P A and the integral's part K I = kp - R: the smaller root is the integral's.
+	const float kp = found.kp * (double)per_input;
+	const float ki = found.ki * (double)per_input;
+	const float kd = found.kd * (double)per_input;
+	// kp = R + ki kd / R with R = K P A and the integral's part K I = kp - R: the smaller root is the integral's.
 	const float root = kp * kp - 4.f * ki * kd;
 
 	if (!(kd > 0.f) || !(root >= 0.f)) {
@@ -49,22 +52,17 @@ bool Gains::convert(const onecycle_result &found, Cascade &cascade, const char *
 		return false;
 	}
 
+	const Most &most = MOST_OF[_axis];
 	const float integral = 0.5f * (kp - sqrtf(root));
-	cascade.attitude_p = (kp - integral) / kd;
-	cascade.rate_k = math::max(kd / MOST_RATE_P, 1.f);
-	cascade.rate_p = kd / cascade.rate_k;
-	cascade.rate_i = integral / cascade.rate_k;
-	cascade.rate_d = 0.f;
+	// With less than the outer gain found the law is slower and has more margin.
+	cascade.outer_p = math::min((kp - integral) / kd, most.outer_p);
+	cascade.inner_k = math::max(kd / most.inner_p, 1.f);
+	cascade.inner_p = kd / cascade.inner_k;
+	cascade.inner_i = integral / cascade.inner_k;
+	cascade.inner_d = 0.f;
 
-	const float most_attitude_p = _is_yaw ? MOST_YAW_P : MOST_ATTITUDE_P;
-
-	if (cascade.attitude_p > most_attitude_p) {
-		// The law with the largest angle gain that PX4 allows, and the rate's gain found: slower, with more margin.
-		cascade.attitude_p = most_attitude_p;
-	}
-
-	if (cascade.rate_k > MOST_RATE_K) {
-		what = "the rate's gain is above the maximum of MC_*RATE_P and _K: the axis has too little torque";
+	if (cascade.inner_k > most.inner_k) {
+		what = "the gain of its rate is above the parameter's maximum: the axis has too little torque";
 		return false;
 	}
 
@@ -74,7 +72,7 @@ bool Gains::convert(const onecycle_result &found, Cascade &cascade, const char *
 
 bool Gains::write(const Cascade &cascade)
 {
-	const float values[MOST] {cascade.attitude_p, cascade.rate_k, cascade.rate_p, cascade.rate_i, cascade.rate_d, 0.f};
+	const float values[COUNT] {cascade.outer_p, cascade.inner_k, cascade.inner_p, cascade.inner_i, cascade.inner_d, 0.f};
 	_is_written = true;
 
 	if (set(values)) {
@@ -91,10 +89,14 @@ bool Gains::restore()
 	return !_is_written;
 }
 
-bool Gains::set(const float (&values)[MOST])
+bool Gains::set(const float (&values)[COUNT])
 {
-	for (int k = 0; k < _count; k++) {
+	for (int k = 0; k < COUNT; k++) {
 		float read_back = NAN;
+
+		if (_params[k] == PARAM_INVALID) {
+			continue;
+		}
 
 		if (param_set_no_notification(_params[k], &values[k]) != PX4_OK || param_get(_params[k], &read_back) != PX4_OK
 		    || fabsf(read_back - values[k]) > FLT_EPSILON * fabsf(values[k])) {

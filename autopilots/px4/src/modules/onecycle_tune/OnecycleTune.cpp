@@ -1,8 +1,11 @@
 #include "OnecycleTune.hpp"
 
+#include <lib/geo/geo.h>
 #include <px4_platform_common/log.h>
 #include <px4_platform_common/tasks.h>
 #include <systemlib/mavlink_log.h>
+
+#include "onecycle_pack.h"
 
 using namespace time_literals;
 
@@ -14,13 +17,20 @@ constexpr float BIAS_FILTER_S = 0.3f;
 // How long a proposal waits for the operator, and how long PX4 is watched with the new gains.
 constexpr hrt_abstime MOST_ASKED = 60_s;
 constexpr hrt_abstime WATCHED = 3_s;
-// With the new gains the torque may be at its limit for this part of the time.
+// With the new gains the output may be at its limit for this part of the time.
 constexpr float MOST_LIMITED = 0.2f;
+constexpr float LEAST_THRUST = 0.05f;
+// Altitude: limits of the test (m), (m/s).
+constexpr float MOST_CLIMB = 1.f;
+constexpr float MOST_CLIMB_RATE = 2.f;
+// The integral's part of the phase at the crossover. PX4 has another one around every loop that is tuned here.
+constexpr float INTEGRAL_PHASE = 0.035f;
 constexpr int WORK_STACK = 14000;
 constexpr hrt_abstime POLL = 100_ms;
 // A second-order Butterworth filter delays by sqrt(2) / (2 pi f).
 constexpr float FILTER_DELAY = 0.225f;
 enum Apply { REPORT, ASK, AT_ONCE };
+enum Style { MARGIN_35, PAPER };
 }
 
 OnecycleTune::OnecycleTune() : ModuleParams(nullptr), WorkItem(MODULE_NAME, px4::wq_configurations::rate_ctrl)
@@ -81,12 +91,20 @@ void OnecycleTune::Run()
 	_last = now;
 
 	const State state = _state.load();
+	float input = _index == Axis::ALTITUDE ? -thrust.xyz[2] : torque.xyz[_index];
 
 	if (state == State::Begin || state == State::Test || state == State::Asked || state == State::Write || state == State::Found) {
-		test(_axis.measure(now), now, torque.xyz[_index]);
+		test(_axis.measure(now), now, input);
 
 	} else if (state == State::Watch) {
-		watch(now, torque.xyz[_index]);
+		watch(now, input);
+	}
+
+	if (_index == Axis::ALTITUDE) {
+		thrust.xyz[2] = -input;
+
+	} else {
+		torque.xyz[_index] = input;
 	}
 
 	// The allocator wakes on the torque, so the thrust goes first.
@@ -96,7 +114,7 @@ void OnecycleTune::Run()
 	_torque_pub.publish(torque);
 }
 
-void OnecycleTune::test(const onecycle_measurement &measurement, hrt_abstime now, float &torque)
+void OnecycleTune::test(const onecycle_measurement &measurement, hrt_abstime now, float &input)
 {
 	const State state = _state.load();
 	const bool is_over = onecycle_tuner_phase(&_tuner) == ONECYCLE_PHASE_ABORTED;
@@ -116,11 +134,11 @@ void OnecycleTune::test(const onecycle_measurement &measurement, hrt_abstime now
 		}
 	}
 
-	onecycle_tuner_beside(&_tuner, torque);
-	torque = onecycle_tuner_step(&_tuner, now * 1e-6, &measurement, 0.f);
+	onecycle_tuner_beside(&_tuner, input);
+	input = onecycle_tuner_step(&_tuner, now * 1e-6, &measurement, 0.f);
 
 	const onecycle_phase phase = onecycle_tuner_phase(&_tuner);
-	_recorder.push({now * 1e-6, torque, measurement.value, measurement.rate, (int)phase});
+	_recorder.push({now * 1e-6, input, measurement.value, measurement.rate, (int)phase});
 
 	if (state == State::Begin) {
 		if (_since == 0) {
@@ -150,21 +168,23 @@ void OnecycleTune::test(const onecycle_measurement &measurement, hrt_abstime now
 	}
 }
 
-void OnecycleTune::watch(hrt_abstime now, float torque)
+void OnecycleTune::watch(hrt_abstime now, float input)
 {
 	if (_since == 0) {
 		_since = now;
 		_limited = 0;
 	}
 
-	if (fabsf(torque) > 0.95f) {
+	const bool is_high = fabsf(input) > 0.95f;
+
+	if (is_high || (_index == Axis::ALTITUDE && input < LEAST_THRUST)) {
 		_limited += (hrt_abstime)(1e6f * tickS());
 	}
 
 	const char *why = _axis.mustStop();
 
 	if (_limited > MOST_LIMITED * WATCHED) {
-		why = "the torque was at its limit with the new gains";
+		why = "the output was at its limit with the new gains";
 	}
 
 	if (why || now - _since > WATCHED) {
@@ -272,7 +292,10 @@ void OnecycleTune::attend()
 
 void OnecycleTune::begin()
 {
-	const char *why = _axis.notReady();
+	// What was set just before the start counts.
+	updateParams();
+	_left = _param_oc_axes.get();
+	const char *why = _axis.notReady(_left & (1 << Axis::ALTITUDE));
 
 	if (!why && !(tickS() > 0.f)) {
 		why = "mc_rate_control was not started as vtol";
@@ -283,7 +306,6 @@ void OnecycleTune::begin()
 		return;
 	}
 
-	_left = _param_oc_axes.get();
 	_is_kept = _param_oc_apply.get() == ASK;
 	nextAxis();
 }
@@ -301,9 +323,10 @@ void OnecycleTune::nextAxis()
 	_abort_wanted.store(false);
 	_accept_wanted.store(false);
 
-	for (_index = 0; _index < AXES; _index++) {
-		if (_left & (1 << _index)) {
-			_left &= ~(1 << _index);
+	for (int axis = 0; axis < Axis::COUNT; axis++) {
+		if (_left & (1 << axis)) {
+			_left &= ~(1 << axis);
+			_index = axis;
 			beginAxis();
 			return;
 		}
@@ -347,26 +370,32 @@ void OnecycleTune::beginAxis()
 
 bool OnecycleTune::initTuner(int axis)
 {
-	const bool is_yaw = axis == 2;
-	const float rate_max[AXES] {_param_mc_rollrate_max.get(), _param_mc_pitchrate_max.get(), _param_mc_yawrate_max.get()};
-	const float amplitude = is_yaw ? _param_oc_amp_yaw.get() : _param_oc_amp.get();
+	const bool is_altitude = axis == Axis::ALTITUDE;
+	const float amplitudes[Axis::COUNT] {_param_oc_amp.get(), _param_oc_amp.get(), _param_oc_amp_yaw.get(), _param_oc_amp_z.get()};
+	const float rates_max[Axis::COUNT] {
+		math::radians(_param_mc_rollrate_max.get()), math::radians(_param_mc_pitchrate_max.get()),
+		math::radians(_param_mc_yawrate_max.get()), MOST_CLIMB_RATE
+	};
 
-	onecycle_settings settings = onecycle_settings_default(amplitude, tickS());
+	onecycle_settings settings = onecycle_settings_default(amplitudes[axis], tickS());
 	settings.cycles = _param_oc_cycles.get();
 	settings.slices = 0;
-	settings.noise_sigma = _param_oc_noise.get();
+	settings.noise_sigma = is_altitude ? _param_oc_noise_z.get() : _param_oc_noise.get();
 	settings.bias_filter_s = BIAS_FILTER_S;
-	settings.rate_delay_s = FILTER_DELAY / math::max(_param_imu_gyro_cutoff.get(), 5.f);
-	settings.output_lowest = -1.f;
+	settings.integral_phase_rad = INTEGRAL_PHASE;
+	settings.rate_delay_s = is_altitude ? 0.f : FILTER_DELAY / math::max(_param_imu_gyro_cutoff.get(), 5.f);
+	settings.output_lowest = is_altitude ? LEAST_THRUST : -1.f;
 	settings.output_highest = 1.f;
 	// Beyond these PX4 itself would no longer hold the vehicle as it is told.
-	settings.limit_excursion = 0.8f * math::radians(_param_mpc_man_tilt_max.get());
-	settings.limit_rate = math::radians(rate_max[axis]);
+	settings.limit_excursion = is_altitude ? MOST_CLIMB : 0.8f * math::radians(_param_mpc_man_tilt_max.get());
+	settings.limit_rate = rates_max[axis];
 	settings.limit_duration_s = 30.f;
 	settings.limit_no_switch_s = 2.f;
 	settings.limit_stale_s = 0.05f;
 	settings.consent = _param_oc_apply.get() == AT_ONCE ? ONECYCLE_CONSENT_AUTOMATIC : ONECYCLE_CONSENT_ASK;
-	const onecycle_status status = onecycle_tuner_init(&_tuner, &settings);
+	const bool is_paper = _param_oc_style.get() == PAPER;
+	const onecycle_status status = onecycle_tuner_init_with_pack(&_tuner, &settings, is_paper ? nullptr : MARGIN_35_PACK,
+				       is_paper ? 0 : sizeof(MARGIN_35_PACK));
 
 	if (status != ONECYCLE_STATUS_OK) {
 		mavlink_log_critical(&_mavlink_log_pub, "onecycle: settings refused, status %d of onecycle.h: check OC_* and limits", (int)status);
@@ -396,14 +425,14 @@ void OnecycleTune::found()
 	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: gain %.1f (%.0f %%), lag %.0f ms, dead time %.1f ms", name,
 			 _result.k_over_t_body, 100 * _result.k_over_t_body_deviation, 1e3 * _result.t_prop_s, 1e3 * _result.tau_s);
 
-	if (!_gains[_index].convert(_result, _cascade, why)) {
+	if (!_gains[_index].convert(_result, perInput(), _cascade, why)) {
 		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
 		nextAxis();
 		return;
 	}
 
-	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: proposes P %.2f, rate K %.2f P %.3f I %.3f D 0", name, (double)_cascade.attitude_p,
-			 (double)_cascade.rate_k, (double)_cascade.rate_p, (double)_cascade.rate_i);
+	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: proposes P %.2f, inner K %.2f P %.3f I %.3f D 0", name, (double)_cascade.outer_p,
+			 (double)_cascade.inner_k, (double)_cascade.inner_p, (double)_cascade.inner_i);
 
 	if (_param_oc_apply.get() == REPORT) {
 		nextAxis();
@@ -415,12 +444,23 @@ void OnecycleTune::found()
 	_state.store(State::Asked);
 }
 
+float OnecycleTune::perInput()
+{
+	if (_index != Axis::ALTITUDE) {
+		return 1.f;
+	}
+
+	hover_thrust_estimate_s estimate{};
+	const bool is_known = _hover_sub.copy(&estimate) && estimate.valid;
+	return CONSTANTS_ONE_G / math::max(is_known ? estimate.hover_thrust : _param_mpc_thr_hover.get(), 0.1f);
+}
+
 void OnecycleTune::writeGains()
 {
 	const char *name = Axis::name(_index);
 	const char *why = nullptr;
 
-	if (!_gains[_index].convert(_result, _cascade, why)) {
+	if (!_gains[_index].convert(_result, perInput(), _cascade, why)) {
 		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
 		nextAxis();
 		return;
@@ -448,8 +488,8 @@ void OnecycleTune::conclude()
 		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
 
 	} else {
-		mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: tuned, P %.2f, rate K %.2f P %.3f I %.3f D 0", name, (double)_cascade.attitude_p,
-				 (double)_cascade.rate_k, (double)_cascade.rate_p, (double)_cascade.rate_i);
+		mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: tuned, P %.2f, inner K %.2f P %.3f I %.3f D 0", name, (double)_cascade.outer_p,
+				 (double)_cascade.inner_k, (double)_cascade.inner_p, (double)_cascade.inner_i);
 	}
 
 	nextAxis();
@@ -465,7 +505,7 @@ void OnecycleTune::finish()
 // Gains that were flown at once and not accepted do not outlive the flight.
 void OnecycleTune::restoreAll()
 {
-	for (int axis = 0; axis < AXES; axis++) {
+	for (int axis = 0; axis < Axis::COUNT; axis++) {
 		if (_gains[axis].is_written() && !_is_kept) {
 			const bool is_restored = _gains[axis].restore();
 			mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: not accepted, %s", Axis::name(axis),
@@ -525,7 +565,7 @@ int OnecycleTune::print_status()
 {
 	static const char *const states[] {"idle", "begin", "test", "found", "asked", "write", "watch", "watched"};
 	const State state = _state.load();
-	PX4_INFO("%s, axis %s, tick %.2f ms", states[(int)state], Axis::name(math::min(_index, AXES - 1)), (double)(1e3f * tickS()));
+	PX4_INFO("%s, axis %s, tick %.2f ms", states[(int)state], Axis::name(_index), (double)(1e3f * tickS()));
 	return 0;
 }
 
@@ -538,7 +578,7 @@ int OnecycleTune::print_usage(const char *reason)
 	PRINT_MODULE_DESCRIPTION(
 		R"DESCR_STR(
 ### Description
-Identifies roll, pitch and yaw by a relay test in a hover and tunes their gains. It sits between mc_rate_control and the allocator:
+Identifies roll, pitch, yaw and altitude by relay tests in a hover and tunes their gains. It sits between mc_rate_control and the allocator:
 	mc_rate_control stop
 	onecycle_tune start
 	mc_rate_control start vtol

@@ -19,6 +19,7 @@
 #include <uORB/Publication.hpp>
 #include <uORB/Subscription.hpp>
 #include <uORB/SubscriptionCallback.hpp>
+#include <uORB/topics/hover_thrust_estimate.h>
 #include <uORB/topics/vehicle_thrust_setpoint.h>
 #include <uORB/topics/vehicle_torque_setpoint.h>
 
@@ -39,8 +40,6 @@ public:
 	bool init();
 
 private:
-	static constexpr int AXES = 3;
-
 	/** Of the test of an axis. The control loop leaves Begin, Test and Watch, the task the others. */
 	enum class State : int {
 		Idle,    // no test
@@ -54,8 +53,8 @@ private:
 	};
 
 	void Run() override;
-	void test(const onecycle_measurement &measurement, hrt_abstime now, float &torque);
-	void watch(hrt_abstime now, float torque);
+	void test(const onecycle_measurement &measurement, hrt_abstime now, float &input);
+	void watch(hrt_abstime now, float input);
 
 	static int workTrampoline(int argc, char *argv[]);
 	void work();
@@ -68,6 +67,8 @@ private:
 	void leave();
 	void nextAxis();
 	void found();
+	/** PX4's input of the inner loop for a unit of the tuner's output. */
+	float perInput();
 	void writeGains();
 	void conclude();
 	void finish();
@@ -84,6 +85,7 @@ private:
 
 	uORB::SubscriptionCallbackWorkItem _torque_sub{this, ORB_ID(vehicle_torque_setpoint_virtual_mc)};
 	uORB::Subscription _thrust_sub{ORB_ID(vehicle_thrust_setpoint_virtual_mc)};
+	uORB::Subscription _hover_sub{ORB_ID(hover_thrust_estimate)};
 	uORB::Publication<vehicle_torque_setpoint_s> _torque_pub{ORB_ID(vehicle_torque_setpoint)};
 	uORB::Publication<vehicle_thrust_setpoint_s> _thrust_pub{ORB_ID(vehicle_thrust_setpoint)};
 
@@ -94,10 +96,9 @@ private:
 	hrt_abstime _last{0};
 	hrt_abstime _since{0};
 	hrt_abstime _limited{0};
-	bool _is_started{false};
 
 	// Of the task.
-	Gains _gains[AXES];
+	Gains _gains[Axis::COUNT];
 	Cascade _cascade{};
 	Recorder _recorder;
 	int _left{0};                              // axes left to tune, a bit each
@@ -114,14 +115,18 @@ private:
 		(ParamInt<px4::params::OC_APPLY>) _param_oc_apply,
 		(ParamFloat<px4::params::OC_AMP>) _param_oc_amp,
 		(ParamFloat<px4::params::OC_AMP_YAW>) _param_oc_amp_yaw,
+		(ParamFloat<px4::params::OC_AMP_Z>) _param_oc_amp_z,
+		(ParamInt<px4::params::OC_STYLE>) _param_oc_style,
 		(ParamInt<px4::params::OC_CYCLES>) _param_oc_cycles,
 		(ParamFloat<px4::params::OC_NOISE>) _param_oc_noise,
+		(ParamFloat<px4::params::OC_NOISE_Z>) _param_oc_noise_z,
 		(ParamFloat<px4::params::OC_STICK>) _param_oc_stick,
 		(ParamBool<px4::params::OC_RECORD>) _param_oc_record,
 		(ParamFloat<px4::params::MC_ROLLRATE_MAX>) _param_mc_rollrate_max,
 		(ParamFloat<px4::params::MC_PITCHRATE_MAX>) _param_mc_pitchrate_max,
 		(ParamFloat<px4::params::MC_YAWRATE_MAX>) _param_mc_yawrate_max,
 		(ParamFloat<px4::params::MPC_MAN_TILT_MAX>) _param_mpc_man_tilt_max,
+		(ParamFloat<px4::params::MPC_THR_HOVER>) _param_mpc_thr_hover,
 		(ParamFloat<px4::params::IMU_GYRO_CUTOFF>) _param_imu_gyro_cutoff
 	)
 };
