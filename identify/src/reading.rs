@@ -52,7 +52,7 @@ impl Reading {
             residual_sigma: rms * f64::from(window.per_bin()).sqrt(),
             noise_sigma: window.noise_sigma(),
             residual_rms: rms,
-            walk_sigma: None,
+            walk: None,
             edge: None,
             steps: 0,
         })

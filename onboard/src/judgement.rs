@@ -17,7 +17,7 @@ use libm::{atan2, exp, log, sin, sqrt};
 use crate::control::Pd;
 use crate::crossover;
 use crate::process::Soiptd;
-use crate::refine::{Refined, coordinate};
+use crate::refine::{Refined, Walk, coordinate};
 use crate::window::Window;
 
 /// Largest part of the oscillation that a process of this family leaves unexplained.
@@ -63,9 +63,15 @@ pub fn misfit<const BINS: usize, const EDGES: usize>(
         bins.map(|bin| bin.output_sum / f64::from(bin.count))
     };
     let count = means().count() as f64;
-    if let Some(sigma) = refined.walk_sigma {
-        let steps = means().zip(means().skip(1));
-        let variance = steps.map(|(a, b)| (b - a) * (b - a)).sum::<f64>() / (count - 1.0);
+    if let Some(Walk { differences, sigma }) = refined.walk {
+        let mut last = [f64::NAN; 2];
+        let variance = means().filter_map(|mut value| {
+            for last in &mut last[..usize::from(differences)] {
+                value -= core::mem::replace(last, value);
+            }
+            value.is_finite().then_some(value * value)
+        });
+        let variance = variance.sum::<f64>() / (count - f64::from(differences));
         let noise = CHANCE * sigma * sigma;
         return sqrt((refined.residual_rms * refined.residual_rms - noise).max(0.0) / variance);
     }

@@ -118,13 +118,23 @@ pub struct Refined {
     pub noise_sigma: f64,
     /// Root mean square of the residual in the bins (output unit).
     pub residual_rms: f64,
-    /// Standard deviation of the noise in a difference of neighbouring bins (output unit), where such differences were fitted
-    /// because the noise is a random walk. The residual is then that of a difference.
-    pub walk_sigma: Option<f64>,
+    /// Noise of the differences that were fitted because the noise is a random walk; `None` if the values themselves were. The
+    /// residual is that of what was fitted.
+    pub walk: Option<Walk>,
     /// The limit of the domain on which the fit lies, if any.
     pub edge: Option<DomainEdge>,
     /// Number of steps of the search from all starts.
     pub steps: u32,
+}
+
+/// Noise that is white in the differences of neighbouring bins only.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Walk {
+    /// Number of differences: one for an angle that an estimator integrates from a noisy rate, two for a height that it
+    /// integrates twice from a noisy acceleration.
+    pub differences: u8,
+    /// Standard deviation of a difference (output unit).
+    pub sigma: f64,
 }
 
 /// Why there is no fit.
@@ -160,8 +170,7 @@ pub struct PriorKnowledge<'a> {
     pub starts: &'a [Shape],
     /// Distribution of the shapes.
     pub prior: Option<ShapePrior>,
-    /// Whether the noise may be a random walk, as that of an angle that an estimator integrates. Where the residual of the fit
-    /// looks like it, first differences are fitted instead.
+    /// Whether the noise may be a random walk. Where the residual of the fit looks like a [`Walk`], differences are fitted.
     pub may_walk: bool,
 }
 

@@ -160,7 +160,7 @@ impl<'a> Analysis<'a> {
         }
         // The score supposes white noise, so a cycle under another noise is unknown to the pack; what is found there is judged
         // by its fit alone.
-        if !self.is_known && refined.walk_sigma.is_none() {
+        if !self.is_known && refined.walk.is_none() {
             return Err(Refusal::Unknown(self.score));
         }
         self.refined = Some(refined);

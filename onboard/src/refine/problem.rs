@@ -4,7 +4,7 @@ use libm::{exp, sqrt};
 
 use super::domain::{HIGHEST, SHAPE, Shape};
 use super::fundamental::Fundamental;
-use super::{RefineError, ShapePrior};
+use super::{RefineError, ShapePrior, Walk};
 use crate::least_squares::dot;
 use crate::process::Soiptd;
 use crate::response::Grid;
@@ -38,9 +38,8 @@ pub(super) struct Problem<const BINS: usize> {
     pub(super) sigma: f64,
     pub(super) prior: Option<ShapePrior>,
     pub(super) fundamental: Fundamental,
-    /// Noise of a difference of neighbouring bins, if the rows are such differences: white where the noise is a random walk
-    /// (output unit).
-    pub(super) walk_sigma: Option<f64>,
+    /// Noise of the rows, if they are differences of neighbouring bins.
+    pub(super) walk: Option<Walk>,
 }
 
 impl<const BINS: usize> Problem<BINS> {
@@ -58,7 +57,7 @@ impl<const BINS: usize> Problem<BINS> {
         sigma: 0.0,
         prior: None,
         fundamental: Fundamental::NONE,
-        walk_sigma: None,
+        walk: None,
     };
 
     /// Sets the rows of this window. [`settle`](Self::settle) sets what depends on the oscillation.
@@ -82,7 +81,7 @@ impl<const BINS: usize> Problem<BINS> {
         };
         self.period_s = period_s;
         self.prior = prior;
-        self.walk_sigma = None;
+        self.walk = None;
         self.noise_sigma = window.noise_sigma();
         self.rows = window.bins().len() + KNOWN;
         self.used = 0;
@@ -112,9 +111,9 @@ impl<const BINS: usize> Problem<BINS> {
         self.settle_prior();
     }
 
-    /// Goes on with differences of neighbouring bins, in which the noise has a standard deviation of `sigma`.
-    pub(super) fn difference(&mut self, sigma: f64) {
-        self.walk_sigma = Some(sigma);
+    /// Goes on with differences of neighbouring bins, which have this noise.
+    pub(super) fn difference(&mut self, walk: Walk) {
+        self.walk = Some(walk);
         self.settle_prior();
     }
 
@@ -131,8 +130,8 @@ impl<const BINS: usize> Problem<BINS> {
 
     /// Rows from the means of the bins: weighted, or their weighted differences.
     pub(super) fn weigh(&self, means: &mut [f64]) {
-        if self.walk_sigma.is_some() {
-            self.take_differences(means);
+        if let Some(walk) = self.walk {
+            self.take_differences(means, walk.differences);
         } else {
             for (mean, weight) in means.iter_mut().zip(&self.weight) {
                 *mean *= weight;
@@ -140,19 +139,28 @@ impl<const BINS: usize> Problem<BINS> {
         }
     }
 
-    /// Differences of neighbouring bins, per square root of their distance. The first bin only sets the level, which a random
-    /// walk leaves open.
-    fn take_differences(&self, means: &mut [f64]) {
-        let mut last: Option<(usize, f64)> = None;
-        for (k, (row, weight)) in means.iter_mut().zip(&self.weight).enumerate() {
-            let mean = *row;
-            *row = match last {
-                _ if *weight == 0.0 => 0.0,
-                None => LEVEL * mean,
-                Some((before, value)) => (mean - value) / sqrt((k - before) as f64),
-            };
-            if *weight > 0.0 {
-                last = Some((k, mean));
+    /// Differences of neighbouring bins, or the differences of these, per square root of their distance. The first bins only
+    /// set the level and the slope, which a random walk leaves open.
+    fn take_differences(&self, means: &mut [f64], differences: u8) {
+        for taken in 0..differences {
+            let mut last: Option<(usize, f64)> = None;
+            let mut open = taken;
+            for (k, (row, weight)) in means.iter_mut().zip(&self.weight).enumerate() {
+                if *weight == 0.0 {
+                    *row = 0.0;
+                    continue;
+                }
+                // What is open already stays as it is.
+                if open > 0 {
+                    open -= 1;
+                    continue;
+                }
+                let value = *row;
+                *row = match last {
+                    None => LEVEL * value,
+                    Some((before, last)) => (value - last) / sqrt((k - before) as f64),
+                };
+                last = Some((k, value));
             }
         }
     }
@@ -160,7 +168,7 @@ impl<const BINS: usize> Problem<BINS> {
     /// Samples that count for the noise of a row of waves with this energy: the variance of a wave's amplitude is twice that
     /// of the noise over this number.
     pub(super) fn samples(&self, energy: f64) -> f64 {
-        if self.walk_sigma.is_some() {
+        if self.walk.is_some() {
             return 2.0 * energy;
         }
         let weight = &self.weight[..self.bins()];
@@ -169,7 +177,7 @@ impl<const BINS: usize> Problem<BINS> {
 
     /// Mean of the squared weights of the rows in use.
     pub(super) fn mean_weight_2(&self) -> f64 {
-        if self.walk_sigma.is_some() {
+        if self.walk.is_some() {
             return 1.0;
         }
         self.weight.iter().map(|w| w * w).sum::<f64>() / self.used as f64
@@ -187,7 +195,7 @@ impl<const BINS: usize> Problem<BINS> {
 
     /// Standard deviation of the noise of a row (output unit).
     pub(super) fn row_sigma(&self) -> f64 {
-        self.walk_sigma.unwrap_or(self.noise_sigma)
+        self.walk.map_or(self.noise_sigma, |walk| walk.sigma)
     }
 
     /// Variance of a difference of neighbouring bins if the noise of the samples is all a random walk: `q^2 (2 n^2 + 1) / (3 n)`
@@ -217,13 +225,13 @@ impl<const BINS: usize> Problem<BINS> {
                 rows[k] = bin.output_sum / self.weight[k];
             }
         }
-        if self.walk_sigma.is_some() {
+        if let Some(walk) = self.walk {
             for (row, weight) in rows.iter_mut().zip(&self.weight) {
                 if *weight > 0.0 {
                     *row /= weight;
                 }
             }
-            self.take_differences(&mut rows[..self.rows - KNOWN]);
+            self.take_differences(&mut rows[..self.rows - KNOWN], walk.differences);
         }
     }
 

@@ -142,7 +142,7 @@ impl<const BINS: usize> Refiner<BINS> {
         found: &Refined,
     ) -> Result<(), RefineError> {
         self.begin(window, period_s, &PriorKnowledge::default())?;
-        self.problem.walk_sigma = found.walk_sigma;
+        self.problem.walk = found.walk;
         self.only = Some(shape_of(&found.process, period_s));
         Ok(())
     }
@@ -251,11 +251,11 @@ impl<const BINS: usize> Refiner<BINS> {
 
     /// Ends the fit, or begins it again with differences where the residual is a random walk.
     fn end(&mut self, known: Option<([[f64; 5]; 5], f64)>) -> Result<Poll<Refined>, RefineError> {
-        let walk_sigma = self.uncertainty.walk_sigma;
-        match walk_sigma.filter(|_| self.may_walk && self.problem.walk_sigma.is_none()) {
+        let walk = self.uncertainty.walk;
+        match walk.filter(|_| self.may_walk && self.problem.walk.is_none()) {
             None => self.refined(known).map(Poll::Ready),
-            Some(sigma) => {
-                self.problem.difference(sigma);
+            Some(walk) => {
+                self.problem.difference(walk);
                 self.search = Search::NONE;
                 self.first_fit()?;
                 Ok(Poll::Pending)
@@ -358,7 +358,7 @@ impl<const BINS: usize> Refiner<BINS> {
             response_error: known.map_or(0.0, |(_, error)| error),
             residual_sigma: sqrt(variance),
             noise_sigma: problem.noise_sigma,
-            walk_sigma: problem.walk_sigma,
+            walk: problem.walk,
             residual_rms: sqrt(variance / problem.mean_weight_2()),
             edge: domain_edge(&fit.shape),
             steps: self.search.steps,

@@ -18,7 +18,7 @@ use super::linear_fit::{Bench, Jacobian, LinearFit, Orthonormalisation, PARTS};
 use super::model_error::{HARMONICS, ModelError, Wave};
 use super::problem::Problem;
 use super::tried::TRIED;
-use super::{ALL, KNOWN, LINEAR, coordinate};
+use super::{ALL, KNOWN, LINEAR, Walk, coordinate};
 use crate::least_squares::{back_substitute, dot};
 use crate::window::Window;
 
@@ -31,9 +31,12 @@ const MOST_WHITE: f64 = 2.0;
 /// Sum of the squared differences over that of the values: 2 for white noise. The fit follows a random walk with its unknowns
 /// and leaves 0.3 to 1.5 of it.
 const MOST_ALIKE: f64 = 1.6;
-/// Sum of the squared differences of the differences over that of the differences: 1.5 for a random walk averaged in bins.
+/// Sum of the squared differences of what is to be white over that of itself: 1.5 for a random walk averaged in bins.
 /// Below this the residual is smoother, as under a wind whose force is integrated twice.
 const LEAST_CURVED: f64 = 1.0;
+/// Sum of the squared second differences over that of the noise of the samples: 6 for white noise, of which there must be
+/// little, because what it leaves in third differences would hide that those of the residual are smooth.
+const MOST_NOISY: f64 = 60.0;
 /// Variance of the differences over that of the random walk which the samples' third differences show. An estimator that
 /// filters its rate lies above one; white noise under a wind lies below a half, a wind alone above ten.
 const WALKS: core::ops::RangeInclusive<f64> = 0.5..=10.0;
@@ -45,8 +48,8 @@ pub(super) struct Uncertainty {
     error: ModelError,
     /// Covariance of all unknowns.
     all: [[f64; ALL]; ALL],
-    /// Noise of a difference of neighbouring bins, where the residual is rather a random walk than white (output unit).
-    pub(super) walk_sigma: Option<f64>,
+    /// Noise of differences of neighbouring bins, where the residual is rather a random walk than white.
+    pub(super) walk: Option<Walk>,
     stage: Stage,
 }
 
@@ -84,14 +87,14 @@ impl Uncertainty {
     pub(super) const NONE: Self = Self {
         error: ModelError::NONE,
         all: [[0.0; ALL]; ALL],
-        walk_sigma: None,
+        walk: None,
         stage: Stage::Derivatives(Jacobian::BEGIN),
     };
 
     pub(super) fn begin(&mut self) {
         self.error.begin();
         self.all = [[0.0; ALL]; ALL];
-        self.walk_sigma = None;
+        self.walk = None;
         self.stage = Stage::Derivatives(Jacobian::BEGIN);
     }
 
@@ -164,7 +167,7 @@ impl Uncertainty {
                 }
             }
             Stage::Walk => {
-                self.walk_sigma = self.walk(problem, fit, bench);
+                self.walk = self.walk(problem, fit, bench);
                 let residual = self.residual(problem, fit, bench);
                 self.stage = Stage::Redundancy(Redundancy::of(problem, residual));
             }
@@ -205,46 +208,60 @@ impl Uncertainty {
         &rows[..problem.bins()]
     }
 
-    /// Standard deviation of the noise in a difference of neighbouring bins, where the residual of the fit is rather a random
-    /// walk than white: then its differences are the smaller ones, and the likelihood of the fit to differences is larger.
-    /// `None` where the noise of the samples explains the residual.
+    /// Noise of the differences of neighbouring bins, where the residual of the fit is rather a random walk than white: then its
+    /// differences are the smaller ones, and the likelihood of the fit to differences is larger. `None` where the noise of the
+    /// samples explains the residual.
     fn walk<const BINS: usize>(
         &self,
         problem: &Problem<BINS>,
         fit: &LinearFit<BINS>,
         bench: &Bench<BINS>,
-    ) -> Option<f64> {
+    ) -> Option<Walk> {
         let noise = problem.row_sigma() * problem.row_sigma();
-        let (mut squares, mut differences, mut curvatures, mut noises) = (0.0, 0.0, 0.0, 0.0);
-        let (mut last, mut last_difference) = (None, None);
+        // Sums of the squares of the values, their differences, the differences of these, and once more.
+        let (mut squares, mut noises) = ([0.0; 4], 0.0);
+        let mut last = [f64::NAN; 4];
         let rows = self.residual(problem, fit, bench).iter();
         for (row, weight) in rows
             .zip(&problem.weight)
             .filter(|(_, weight)| **weight > 0.0)
         {
-            let value = row / weight;
-            squares += value * value;
             noises += noise / (weight * weight);
-            let difference = last.map(|last| value - last);
-            if let Some(difference) = difference {
-                differences += difference * difference;
-                let curvature = last_difference.map_or(0.0, |last: f64| difference - last);
-                curvatures += curvature * curvature;
+            let mut value = row / weight;
+            for (sum, last) in squares.iter_mut().zip(&mut last) {
+                // Not a number as long as there is no difference yet.
+                if value.is_finite() {
+                    *sum += value * value;
+                }
+                value -= core::mem::replace(last, value);
             }
-            (last, last_difference) = (Some(value), difference);
         }
         let waves = if self.error.found() > 0.0 {
             self.error.count()
         } else {
             0
         };
-        let freedom = problem.used.checked_sub(ALL + waves + 1)?;
-        let variance = differences / freedom.max(1) as f64;
-        let is_walk = squares > MOST_WHITE * noises
-            && differences < MOST_ALIKE * squares
-            && curvatures > LEAST_CURVED * differences
+        let freedom = problem.used.checked_sub(ALL + waves + 1)?.max(1) as f64;
+        let [values, once, twice, thrice] = squares;
+        let variance = once / freedom;
+        if values < MOST_WHITE * noises {
+            return None;
+        }
+        let is_walk = once < MOST_ALIKE * values
+            && twice > LEAST_CURVED * once
             && WALKS.contains(&(variance / problem.walk_variance()));
-        is_walk.then(|| sqrt(variance))
+        if is_walk {
+            return Some(Walk {
+                differences: 1,
+                sigma: sqrt(variance),
+            });
+        }
+        let is_smooth_walk =
+            once < values && thrice > LEAST_CURVED * twice && twice > MOST_NOISY * noises;
+        is_smooth_walk.then(|| Walk {
+            differences: 2,
+            sigma: sqrt(twice / freedom),
+        })
     }
 
     /// Adds the squares of the unknowns' shifts from number `from` on: those by noise of `sigma` along each
@@ -387,7 +404,7 @@ struct Redundancy {
 impl Redundancy {
     fn of<const BINS: usize>(problem: &Problem<BINS>, residual: &[f64]) -> Self {
         // The noise of differences is known from the residual alone.
-        let noise = match problem.walk_sigma {
+        let noise = match problem.walk {
             Some(_) => 0.0,
             None => problem.noise_sigma * problem.noise_sigma,
         };

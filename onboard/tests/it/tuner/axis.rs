@@ -37,6 +37,9 @@ pub(crate) struct Axis {
     /// Deviation of a step that the error of the value takes per tick: a random walk.
     pub(crate) walk_sigma: f64,
     walk: f64,
+    /// Deviation of a step that the error of the rate takes per tick; the value integrates the rate with its error.
+    pub(crate) rate_walk_sigma: f64,
+    rate_walk: f64,
     /// Whether the output cannot fall below zero.
     pub(crate) has_ground: bool,
     pub(crate) tick: usize,
@@ -57,6 +60,8 @@ impl Axis {
             noise_sigma: 0.0,
             walk_sigma: 0.0,
             walk: 0.0,
+            rate_walk_sigma: 0.0,
+            rate_walk: 0.0,
             has_ground: false,
             tick: 0,
             transition: Transition::over(&process, sample_s),
@@ -93,7 +98,15 @@ impl Axis {
             self.walk += self.walk_sigma * self.noise.normal();
             noise += self.walk;
         }
-        Measurement::of((self.value() + noise) as f32).with_rate(self.rate() as f32)
+        if self.rate_walk_sigma > 0.0 {
+            let half_s = 0.5 * self.sample_s;
+            self.walk += half_s * self.rate_walk;
+            self.rate_walk += self.rate_walk_sigma * self.noise.normal();
+            self.walk += half_s * self.rate_walk;
+            noise += self.walk;
+        }
+        let rate = self.rate() + self.rate_walk;
+        Measurement::of((self.value() + noise) as f32).with_rate(rate as f32)
     }
 
     pub(crate) fn push(&mut self, input: f32) {
