@@ -18,9 +18,11 @@ struct Most {
 	float outer_p;
 	float inner_k;
 	float inner_p;
+	float inner_i;
 };
 
-const Most MOST_OF[4] {{12.f, 5.f, 0.5f}, {12.f, 5.f, 0.5f}, {5.f, 5.f, 0.5f}, {1.5f, 1.f, 15.f}};
+// The integral gains of the rates have no limit.
+const Most MOST_OF[4] {{12.f, 5.f, 0.5f, INFINITY}, {12.f, 5.f, 0.5f, INFINITY}, {5.f, 5.f, 0.5f, INFINITY}, {1.5f, 1.f, 15.f, 3.f}};
 }
 
 bool Gains::remember(int axis)
@@ -54,11 +56,11 @@ bool Gains::convert(const onecycle_result &found, float per_input, Cascade &casc
 
 	const Most &most = MOST_OF[_axis];
 	const float integral = 0.5f * (kp - sqrtf(root));
-	// With less than the outer gain found the law is slower and has more margin.
+	// With less than the outer gain or the integral found the law is slower and has more margin.
 	cascade.outer_p = math::min((kp - integral) / kd, most.outer_p);
 	cascade.inner_k = math::max(kd / most.inner_p, 1.f);
 	cascade.inner_p = kd / cascade.inner_k;
-	cascade.inner_i = integral / cascade.inner_k;
+	cascade.inner_i = math::min(integral / cascade.inner_k, most.inner_i);
 	cascade.inner_d = 0.f;
 
 	if (cascade.inner_k > most.inner_k) {
