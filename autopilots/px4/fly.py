@@ -76,6 +76,14 @@ class Vehicle:
                 raise RuntimeError(otherwise)
             time.sleep(0.2)
 
+    def begin_module(self):
+        """Puts onecycle_tune between the rate controller and the allocator."""
+        self.run("mc_rate_control", "stop")
+        time.sleep(0.3)
+        self.run("onecycle_tune", "start")
+        self.run("mc_rate_control", "start", "vtol")
+        time.sleep(2)
+
     def hover(self):
         self.run("commander", "takeoff")
         time.sleep(14)
@@ -260,11 +268,7 @@ def main():
         for setting in arguments.set:
             vehicle.run("param", "set", *setting.split("="))
         if arguments.tuner == "onecycle":
-            vehicle.run("mc_rate_control", "stop")
-            time.sleep(0.3)
-            vehicle.run("onecycle_tune", "start")
-            vehicle.run("mc_rate_control", "start", "vtol")
-            time.sleep(2)
+            vehicle.begin_module()
         vehicle.hover()
         time.sleep(arguments.wait)
         line["tuned_s"] = TUNERS[arguments.tuner](vehicle)

@@ -56,18 +56,12 @@ bool Gains::convert(const onecycle_result &found, float per_input, Cascade &casc
 
 	const Most &most = MOST_OF[_axis];
 	const float integral = 0.5f * (kp - sqrtf(root));
-	// With less than the outer gain or the integral found the law is slower and has more margin.
+	// With less gain than was found the law is slower and has more margin.
 	cascade.outer_p = math::min((kp - integral) / kd, most.outer_p);
-	cascade.inner_k = math::max(kd / most.inner_p, 1.f);
-	cascade.inner_p = kd / cascade.inner_k;
+	cascade.inner_k = math::constrain(kd / most.inner_p, 1.f, most.inner_k);
+	cascade.inner_p = math::min(kd / cascade.inner_k, most.inner_p);
 	cascade.inner_i = math::min(integral / cascade.inner_k, most.inner_i);
 	cascade.inner_d = 0.f;
-
-	if (cascade.inner_k > most.inner_k) {
-		what = "the gain of its rate is above the parameter's maximum: the axis has too little torque";
-		return false;
-	}
-
 	what = nullptr;
 	return true;
 }

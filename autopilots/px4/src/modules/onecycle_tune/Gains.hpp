@@ -32,8 +32,8 @@ public:
 	bool remember(int axis);
 
 	/**
-	 * The law found, whose output times `per_input` is PX4's. False if it has no such form, or a gain is outside of its
-	 * parameter's range; `what` says so.
+	 * The law found, whose output times `per_input` is PX4's, with no gain above its parameter's maximum. False if it has no
+	 * such form; `what` says so.
 	 */
 	bool convert(const onecycle_result &found, float per_input, Cascade &cascade, const char *&what) const;
 
