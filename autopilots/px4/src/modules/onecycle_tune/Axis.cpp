@@ -7,6 +7,11 @@ using matrix::Eulerf;
 using matrix::Quatf;
 using namespace time_literals;
 
+namespace
+{
+constexpr hrt_abstime MOST_DELAY = 30_ms;
+}
+
 const char *Axis::name(int index)
 {
 	static const char *const names[COUNT] {"roll", "pitch", "yaw", "altitude"};
@@ -21,9 +26,9 @@ void Axis::update()
 
 	if (_position_sub.update(&_position) && _index == ALTITUDE) {
 		// The estimated height wanders by many times the oscillation, the velocity does not.
-		const float interval_s = 1e-6f * (float)(_position.timestamp_sample - _latest.time);
+		const float interval_s = 1e-6f * (float)(_position.timestamp_sample - newest().time);
 		const float climb = -_position.vz;
-		push(_position.timestamp_sample, _latest.value + 0.5f * (climb + _climb) * math::constrain(interval_s, 0.f, 0.1f));
+		push(_position.timestamp_sample, newest().value + 0.5f * (climb + _climb) * math::constrain(interval_s, 0.f, 0.1f));
 		_climb = climb;
 	}
 
@@ -36,14 +41,10 @@ void Axis::update()
 
 void Axis::push(hrt_abstime time, float value)
 {
-	const hrt_abstime period = time - _latest.time;
-
-	if (_latest.time > 0 && period > 0 && period < 100_ms) {
-		_period_us += (_period_us > 0.f ? 0.01f : 1.f) * ((float)period - _period_us);
+	if (time > newest().time) {
+		_newest = (_newest + 1) % SAMPLES;
+		_samples[_newest] = {time, value};
 	}
-
-	_before = _latest;
-	_latest = {time, value};
 }
 
 const char *Axis::notReady(bool wants_altitude) const
@@ -74,18 +75,19 @@ void Axis::begin(int index, float most_stick)
 	_resets = resets();
 	_nav_state = _status.nav_state;
 	_throttle = _sticks.throttle;
-	_period_us = 0.f;
 	_climb = -_position.vz;
+	_delay = 0;
+	_is_delay_known = false;
 
-	if (index == ALTITUDE) {
-		_latest = {_position.timestamp_sample, 0.f};
-
-	} else {
+	if (index != ALTITUDE) {
 		_from = angle();
-		_latest = {_attitude.timestamp_sample, 0.f};
 	}
 
-	_before = _latest;
+	const hrt_abstime now = index == ALTITUDE ? _position.timestamp_sample : _attitude.timestamp_sample;
+
+	for (Sample &sample : _samples) {
+		sample = {now, 0.f};
+	}
 }
 
 int Axis::resets() const
@@ -127,27 +129,43 @@ float Axis::angle() const
 	return Eulerf{Quatf{_attitude.q}}(_index);
 }
 
-float Axis::value(hrt_abstime now) const
+float Axis::value(hrt_abstime now, float rate) const
 {
-	const float since_us = (float)(int64_t)(now - _before.time) - _period_us;
-	const float interval_us = (float)(_latest.time - _before.time);
+	const hrt_abstime then = now - _delay;
+	const Sample *after = &newest();
 
-	if (interval_us <= 0.f || since_us >= interval_us) {
-		return _latest.value;
+	if (then >= after->time) {
+		// Later than ever before the test.
+		return after->value + rate * 1e-6f * (float)(then - after->time);
 	}
 
-	const float part = math::max(since_us / interval_us, 0.f);
-	const float step = _latest.value - _before.value;
-	return _before.value + part * (_index == ALTITUDE ? step : matrix::wrap_pi(step));
+	for (int back = 1; back < SAMPLES; back++) {
+		const Sample &before = _samples[(_newest + SAMPLES - back) % SAMPLES];
+
+		if (before.time <= then && before.time < after->time) {
+			const float part = (float)(then - before.time) / (float)(after->time - before.time);
+			const float step = after->value - before.value;
+			return before.value + part * (_index == ALTITUDE ? step : matrix::wrap_pi(step));
+		}
+
+		after = &before;
+	}
+
+	return after->value;
 }
 
-onecycle_measurement Axis::measure(hrt_abstime now) const
+onecycle_measurement Axis::measure(hrt_abstime now)
 {
 	const bool is_altitude = _index == ALTITUDE;
-	const hrt_abstime sampled = is_altitude ? _latest.time : math::min(_attitude.timestamp_sample, _rates.timestamp_sample);
+	const hrt_abstime sampled = is_altitude ? newest().time : math::min(newest().time, _rates.timestamp_sample);
+
+	if (!_is_delay_known && now > newest().time) {
+		_delay = math::constrain(now - newest().time, _delay, MOST_DELAY);
+	}
+
 	onecycle_measurement measurement{};
-	measurement.value = value(now);
 	measurement.rate = is_altitude ? _climb : _rates.xyz[_index];
+	measurement.value = value(now, measurement.rate);
 	measurement.age_s = now > sampled ? (now - sampled) * 1e-6f : 0.f;
 	measurement.has_rate = true;
 	return measurement;

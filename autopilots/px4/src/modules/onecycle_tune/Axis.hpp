@@ -39,7 +39,10 @@ public:
 	const char *mustStop() const;
 
 	/** Angle (rad) or height (m) since the beginning, its rate, and the age of the older of the two. */
-	onecycle_measurement measure(hrt_abstime now) const;
+	onecycle_measurement measure(hrt_abstime now);
+
+	/** Keeps the delay of the value as it is from here on: the relay begins. */
+	void beginRelay() { _is_delay_known = true; }
 
 	bool isArmed() const { return _status.arming_state == vehicle_status_s::ARMING_STATE_ARMED; }
 
@@ -53,11 +56,14 @@ private:
 	int resets() const;
 	void push(hrt_abstime time, float value);
 
+	const Sample &newest() const { return _samples[_newest]; }
+
 	/**
-	 * Value of one period of the estimator ago. Its estimate is sometimes a tick late: taken as it comes, it repeats itself
-	 * and then jumps, which is noise several times that of the estimate. The delay is part of the dead time found.
+	 * Value of a constant time ago, the largest age of the estimate before the test. The estimate does not come with every
+	 * tick: taken as it comes, it repeats itself and then jumps, which is noise several times that of the estimate. The delay
+	 * is part of the dead time found.
 	 */
-	float value(hrt_abstime now) const;
+	float value(hrt_abstime now, float rate) const;
 
 	uORB::Subscription _attitude_sub{ORB_ID(vehicle_attitude)};
 	uORB::Subscription _position_sub{ORB_ID(vehicle_local_position)};
@@ -75,9 +81,11 @@ private:
 	vehicle_land_detected_s _land{};
 	manual_control_setpoint_s _sticks{};
 
-	Sample _before{};
-	Sample _latest{};
-	float _period_us{0.f};
+	static constexpr int SAMPLES = 12;
+	Sample _samples[SAMPLES] {};
+	int _newest{0};
+	hrt_abstime _delay{0};
+	bool _is_delay_known{false};
 	int _index{0};
 	float _from{0.f};
 	float _climb{0.f};

@@ -93,6 +93,10 @@ void OnecycleTune::Run()
 	const State state = _state.load();
 	float input = _index == Axis::ALTITUDE ? -thrust.xyz[2] : torque.xyz[_index];
 
+	if (state == State::Begin && _since == 0) {
+		_axis.begin(_index, _param_oc_stick.get());
+	}
+
 	if (state == State::Begin || state == State::Test || state == State::Asked || state == State::Write || state == State::Found) {
 		test(_axis.measure(now), now, input);
 
@@ -145,6 +149,7 @@ void OnecycleTune::test(const onecycle_measurement &measurement, hrt_abstime now
 			_since = now;
 
 		} else if (now - _since >= BESIDE) {
+			_axis.beginRelay();
 			onecycle_tuner_start(&_tuner);
 			_since = now;
 			_state.store(State::Test);
@@ -345,7 +350,6 @@ void OnecycleTune::beginAxis()
 		return;
 	}
 
-	_axis.begin(_index, _param_oc_stick.get());
 	_why.store(nullptr);
 	_is_outside.store(false);
 
