@@ -95,6 +95,9 @@ def tune(method, axes, folder, options):
     parameters, script = settings(method, axes, options.ardupilot)
     with Vehicle(options.ardupilot, folder, options.port, options.speedup, parameters=parameters, lua=script) as vehicle:
         vehicle.take_off(20.0)
+        for change in options.set:
+            name, value = change.split("=")
+            vehicle.set(name, float(value))
         old = {name: vehicle.get(name) for name in names(axes)}
         try:
             took_s = {"onecycle": by_onecycle, "autotune": by_autotune, "quiktune": by_quiktune}[method](vehicle, axes)
@@ -127,6 +130,7 @@ def main():
     parser.add_argument("--ardupilot", required=True, help="checkout of ArduPilot with build/sitl/bin/arducopter")
     parser.add_argument("--method", choices=("onecycle", "autotune", "quiktune"), default="onecycle")
     parser.add_argument("--axes", default="roll,pitch,yaw", help="axes, separated by commas")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="parameter before the test")
     parser.add_argument("--out", help="folder for logs and parameter files; default: a temporary one")
     parser.add_argument("--port", type=int, default=14650)
     parser.add_argument("--speedup", type=float, default=5)

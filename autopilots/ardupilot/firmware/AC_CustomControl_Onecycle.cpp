@@ -27,7 +27,7 @@ static constexpr float ANGLE_P_MAX = 60.0f;
 static constexpr float RATE_P_MIN = 0.005f;
 static constexpr float RATE_P_MAX = 2.5f;
 // slices of the identification in one turn of the thread
-static constexpr uint16_t SLICES = 40;
+static constexpr uint16_t SLICES = 200;
 
 // table of user settable parameters
 const AP_Param::GroupInfo AC_CustomControl_Onecycle::var_info[] = {
@@ -197,7 +197,7 @@ void AC_CustomControl_Onecycle::next_axis()
     if (_consent == Consent::AUTOMATIC) {
         put_in_force();
     } else if (_consent == Consent::ASK) {
-        GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: switch high for the new gains, low to drop them");
+        GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: switch high: new gains, low: drop them");
     }
 }
 
@@ -388,7 +388,7 @@ void AC_CustomControl_Onecycle::put_in_force()
         return;
     }
     _stage = Stage::IN_FORCE;
-    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: new gains of %u axes in force, saved at disarm", unsigned(count));
+    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: new gains (%u axes), saved at disarm", unsigned(count));
 }
 
 void AC_CustomControl_Onecycle::restore()
