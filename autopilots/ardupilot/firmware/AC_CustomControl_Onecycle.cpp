@@ -1,0 +1,506 @@
+#include "AC_CustomControl_config.h"
+
+#if AP_CUSTOMCONTROL_ONECYCLE_ENABLED
+
+#include "AC_CustomControl_Onecycle.h"
+
+#include <AP_AHRS/AP_AHRS.h>
+#include <AP_Logger/AP_Logger.h>
+#include <AP_Vehicle/AP_Vehicle.h>
+#include <GCS_MAVLink/GCS.h>
+
+extern const AP_HAL::HAL& hal;
+
+// the main controller holds the axis for this time before the relay starts
+static constexpr uint32_t SETTLE_MS = 1500;
+// time constant of the means of command and angle during that time
+static constexpr float MEAN_TIME_S = 0.3f;
+// deflection of a stick at which the pilot takes over
+static constexpr float STICK_MAX = 0.1f;
+// noise of a sample of the integrated gyro, lower limit (rad)
+static constexpr float NOISE_RAD = 0.0002f;
+// ticks of a test at a limit of the motors, above which the relay is too large
+static constexpr uint16_t LIMITED_TICKS = 20;
+// gains outside of these bounds are not used
+static constexpr float ANGLE_P_MIN = 1.0f;
+static constexpr float ANGLE_P_MAX = 60.0f;
+static constexpr float RATE_P_MIN = 0.005f;
+static constexpr float RATE_P_MAX = 2.5f;
+// slices of the identification in one turn of the thread
+static constexpr uint16_t SLICES = 200;
+
+// table of user settable parameters
+const AP_Param::GroupInfo AC_CustomControl_Onecycle::var_info[] = {
+    // @Param: AMP_RP
+    // @DisplayName: Relay amplitude of roll and pitch
+    // @Description: Half the jump of the relay on the motors' roll and pitch input
+    // @Range: 0.01 0.3
+    // @User: Standard
+    AP_GROUPINFO("AMP_RP", 1, AC_CustomControl_Onecycle, _amplitude_rp, 0.05f),
+
+    // @Param: AMP_Y
+    // @DisplayName: Relay amplitude of yaw
+    // @Description: Half the jump of the relay on the motors' yaw input
+    // @Range: 0.01 0.3
+    // @User: Standard
+    AP_GROUPINFO("AMP_Y", 2, AC_CustomControl_Onecycle, _amplitude_yaw, 0.1f),
+
+    // @Param: ANG_MAX
+    // @DisplayName: Largest angle of the test
+    // @Description: The test ends if the angle is farther than this from that of the start
+    // @Range: 3 30
+    // @Units: deg
+    // @User: Standard
+    AP_GROUPINFO("ANG_MAX", 3, AC_CustomControl_Onecycle, _angle_max_deg, 15.0f),
+
+    // @Param: RAT_MAX
+    // @DisplayName: Largest rate of the test
+    // @Description: The test ends if the axis turns faster than this
+    // @Range: 20 400
+    // @Units: deg/s
+    // @User: Standard
+    AP_GROUPINFO("RAT_MAX", 4, AC_CustomControl_Onecycle, _rate_max_degs, 200.0f),
+
+    // @Param: TIME_MAX
+    // @DisplayName: Longest test of one axis
+    // @Description: The test ends after this time
+    // @Range: 5 60
+    // @Units: s
+    // @User: Standard
+    AP_GROUPINFO("TIME_MAX", 5, AC_CustomControl_Onecycle, _time_max_s, 20.0f),
+
+    // @Param: CONSENT
+    // @DisplayName: What happens with new gains
+    // @Description: Ask: the new controller flies for a few oscillations in the test; its gains are in force when the switch goes high. Never: gains are only reported. Automatic: gains are in force at the end of the test. Gains in force are saved at disarm with the switch not low, and the old ones restored when the switch goes low before.
+    // @Values: 0:Ask,1:Never,2:Automatic
+    // @User: Standard
+    AP_GROUPINFO("CONSENT", 6, AC_CustomControl_Onecycle, _consent, float(Consent::ASK)),
+
+    AP_GROUPEND
+};
+
+AC_CustomControl_Onecycle::AC_CustomControl_Onecycle(AC_CustomControl& frontend, AP_AHRS_View*& ahrs, AC_AttitudeControl*& att_control, AP_MotorsMulticopter*& motors, float dt) :
+    AC_CustomControl_Backend(frontend, ahrs, att_control, motors, dt),
+    _dt(dt)
+{
+    AP_Param::setup_object_defaults(this, var_info);
+}
+
+bool AC_CustomControl_Onecycle::aux_switch(RC_Channel::AuxSwitchPos position, uint8_t axis_mask)
+{
+    switch (position) {
+    case RC_Channel::AuxSwitchPos::LOW:
+        if (_stage == Stage::SETTLE || _stage == Stage::TEST) {
+            finish("stopped by the switch");
+        }
+        restore();
+        for (Axis &axis : _axes) {
+            axis.has_proposal = false;
+        }
+        _stage = Stage::IDLE;
+        return false;
+    case RC_Channel::AuxSwitchPos::MIDDLE:
+        if (_stage == Stage::IDLE) {
+            begin(axis_mask);
+        }
+        return true;
+    case RC_Channel::AuxSwitchPos::HIGH:
+        if (_stage == Stage::PROPOSED) {
+            put_in_force();
+        } else if (_stage != Stage::IN_FORCE) {
+            GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: no gains to put in force");
+        }
+        return true;
+    }
+    return true;
+}
+
+void AC_CustomControl_Onecycle::reset()
+{
+    if (_stage == Stage::SETTLE || _stage == Stage::TEST) {
+        finish("reset");
+    }
+}
+
+Vector3f AC_CustomControl_Onecycle::update()
+{
+    Vector3f output {_motors->get_roll(), _motors->get_pitch(), _motors->get_yaw()};
+
+    if (!_motors->armed()) {
+        if (_stage == Stage::IN_FORCE) {
+            save();
+        } else if (_stage != Stage::IDLE) {
+            finish("disarmed");
+            restore();
+        }
+        _stage = Stage::IDLE;
+        return output;
+    }
+    if (_stage != Stage::SETTLE && _stage != Stage::TEST) {
+        return output;
+    }
+    const char *reason = reason_to_stop();
+    if (reason != nullptr) {
+        finish(reason);
+        return output;
+    }
+    _angle_rad += _ahrs->get_gyro_latest()[_axis] * _dt;
+    output[_axis] = test(main_command(_axis));
+    return output;
+}
+
+// check what can be wrong before the first axis, and start
+void AC_CustomControl_Onecycle::begin(uint8_t axis_mask)
+{
+    if (!is_ready(axis_mask)) {
+        return;
+    }
+    _mode = AP::vehicle()->get_mode();
+    _axes_left = axis_mask;
+    for (Axis &axis : _axes) {
+        axis.has_proposal = false;
+    }
+    next_axis();
+}
+
+bool AC_CustomControl_Onecycle::is_ready(uint8_t axis_mask)
+{
+    const char *problem = nullptr;
+    if (axis_mask == 0) {
+        problem = "CC_AXIS_MASK is 0";
+    } else if (!_motors->armed() || !AP::vehicle()->get_likely_flying() || _motors->get_spool_state() != AP_Motors::SpoolState::THROTTLE_UNLIMITED) {
+        problem = "not flying";
+    } else if (!is_zero(float(rate_pid(0).ff())) || !is_zero(float(rate_pid(1).ff())) || !is_zero(float(rate_pid(2).ff()))) {
+        problem = "the rate loop has feed-forward (FF)";
+    } else if (!_has_thread && !start_thread()) {
+        problem = "no memory for the thread";
+    }
+    if (problem != nullptr) {
+        GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: %s; switch low and try again", problem);
+        return false;
+    }
+    return true;
+}
+
+// the next axis of the mask, or the end
+void AC_CustomControl_Onecycle::next_axis()
+{
+    for (uint8_t axis = 0; axis < NUM_AXES; axis++) {
+        if (_axes_left & (1U << axis)) {
+            _axes_left &= ~(1U << axis);
+            _axis = axis;
+            begin_axis();
+            return;
+        }
+    }
+    _stage = Stage::PROPOSED;
+    if (_consent == Consent::AUTOMATIC) {
+        put_in_force();
+    } else if (_consent == Consent::ASK) {
+        GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: switch high: new gains, low: drop them");
+    }
+}
+
+void AC_CustomControl_Onecycle::begin_axis()
+{
+    _settled_from_ms = AP_HAL::millis();
+    _limited = 0;
+    _angle_rad = 0;
+    _attitude_rad = {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
+    if (!initialise_tuner()) {
+        _stage = Stage::IDLE;
+        return;
+    }
+    _stage = Stage::SETTLE;
+    GCS_SEND_TEXT(MAV_SEVERITY_INFO, "onecycle: test of %s", axis_name());
+}
+
+bool AC_CustomControl_Onecycle::initialise_tuner()
+{
+    onecycle_settings settings = onecycle_settings_default(amplitude(), _dt);
+    settings.noise_sigma = NOISE_RAD;
+    settings.slices = 0;
+    settings.bias_filter_s = MEAN_TIME_S;
+    settings.limit_excursion = radians(_angle_max_deg);
+    settings.limit_rate = radians(_rate_max_degs);
+    settings.limit_duration_s = _time_max_s;
+    settings.limit_no_switch_s = _axis == 2 ? 3.0f : 1.5f;
+    settings.limit_stale_s = MAX(0.05f, 8.0f * _dt);
+    settings.output_lowest = -1.0f;
+    settings.output_highest = 1.0f;
+    settings.consent = _consent == Consent::NEVER ? ONECYCLE_CONSENT_NEVER : ONECYCLE_CONSENT_AUTOMATIC;
+
+    WITH_SEMAPHORE(_sem);
+    const onecycle_status status = onecycle_tuner_init(&_tuner, &settings);
+    if (status != ONECYCLE_STATUS_OK) {
+        GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: a CC3_ parameter is out of range (status %d)", int(status));
+        return false;
+    }
+    return true;
+}
+
+// one tick of the test; returns the motor input of the axis
+float AC_CustomControl_Onecycle::test(float command)
+{
+    if (_stage == Stage::SETTLE && AP_HAL::millis() - _settled_from_ms >= SETTLE_MS) {
+        _stage = Stage::TEST;
+        onecycle_tuner_start(&_tuner);
+    }
+    const float rate_rads = _ahrs->get_gyro_latest()[_axis];
+    const onecycle_measurement measurement {_angle_rad, rate_rads, 0.0f, true};
+    onecycle_tuner_beside(&_tuner, command);
+    const float output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _angle_rad);
+    const bool was_in_charge = _in_charge != 0;
+    _in_charge = onecycle_tuner_is_in_charge(&_tuner) ? 1U << _axis : 0;
+    const onecycle_phase phase = onecycle_tuner_phase(&_tuner);
+    _has_work = phase == ONECYCLE_PHASE_IDENTIFY;
+    if (was_in_charge && _in_charge == 0) {
+        hand_back();
+    }
+    log_tick(command, output);
+    if (_stage == Stage::TEST && is_finished(phase)) {
+        next_axis();
+    }
+    return output;
+}
+
+// whether the axis has gains; ends the test if there will be none
+bool AC_CustomControl_Onecycle::is_finished(enum onecycle_phase phase)
+{
+    onecycle_result result {};
+    switch (phase) {
+    case ONECYCLE_PHASE_ABORTED:
+        if (onecycle_tuner_reason(&_tuner) == ONECYCLE_REASON_NO_OSCILLATION) {
+            finish("no oscillation: relay too small or axis reversed");
+        } else {
+            finish(onecycle_tuner_reason_text(&_tuner));
+        }
+        return false;
+    case ONECYCLE_PHASE_PROPOSED:
+        break;
+    case ONECYCLE_PHASE_CONTROL:
+        if (!onecycle_tuner_result(&_tuner, &result) || !result.is_proven) {
+            return false;
+        }
+        break;
+    default:
+        return false;
+    }
+    const bool proposed = propose();
+    if (_in_charge != 0) {
+        _in_charge = 0;
+        hand_back();
+    }
+    if (!proposed) {
+        finish("gains out of range");
+    }
+    return proposed;
+}
+
+const char *AC_CustomControl_Onecycle::reason_to_stop()
+{
+    for (uint8_t axis = 0; axis < NUM_AXES; axis++) {
+        if (fabsf(stick(axis).norm_input_dz()) > STICK_MAX) {
+            return "stick moved";
+        }
+    }
+    if (AP::vehicle()->get_mode() != _mode) {
+        return "flight mode changed";
+    }
+    const Vector3f attitude_rad {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
+    if (fabsf(wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis])) > 1.5f * radians(_angle_max_deg)) {
+        return "attitude too far from the start";
+    }
+    const bool limited = _axis == 0 ? _motors->limit.roll : _axis == 1 ? _motors->limit.pitch : _motors->limit.yaw;
+    if (_in_charge != 0 && limited && ++_limited > LIMITED_TICKS) {
+        return _axis == 2 ? "motors at their limit: lower CC3_AMP_Y" : "motors at their limit: lower CC3_AMP_RP";
+    }
+    return nullptr;
+}
+
+// end the test: the main controller with its old gains holds the axis from the next tick on
+void AC_CustomControl_Onecycle::finish(const char *reason)
+{
+    if (_stage == Stage::SETTLE || _stage == Stage::TEST) {
+        onecycle_tuner_abort(&_tuner);
+        GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: %s: %s", axis_name(), reason);
+        GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: old gains in force");
+    }
+    _has_work = false;
+    if (_in_charge != 0) {
+        _in_charge = 0;
+        hand_back();
+    }
+    _axes_left = 0;
+    bool has_any = false;
+    for (const Axis &axis : _axes) {
+        has_any |= axis.has_proposal;
+    }
+    _stage = has_any ? Stage::PROPOSED : Stage::IDLE;
+}
+
+// the main controller goes on from the mean command before the test
+void AC_CustomControl_Onecycle::hand_back()
+{
+    rate_pid(_axis).set_integrator(onecycle_tuner_usual(&_tuner));
+    rate_pid(_axis).reset_filter();
+}
+
+// the tuner's PD and integral in the cascade of the main controller:
+//   u = P (A (r - y) - y') + I integral(A (r - y) - y'),  kp = A P + I,  ki = A I,  kd = P
+bool AC_CustomControl_Onecycle::propose()
+{
+    onecycle_result result {};
+    if (!onecycle_tuner_result(&_tuner, &result)) {
+        return false;
+    }
+    Axis &axis = _axes[_axis];
+    axis.old_gains = get_gains(_axis);
+    Gains &gains = axis.new_gains;
+    gains = axis.old_gains;
+    gains.rate_p = result.kd;
+    gains.rate_d = 0.0f;
+    const float root = sqrtf(MAX(0.0f, sq(result.kp) - 4.0 * result.ki * result.kd));
+    gains.angle_p = (result.kp + root) / (2.0 * result.kd);
+    gains.rate_i = result.ki / gains.angle_p;
+    gains.filter_error_hz = 0.0f;
+    gains.filter_target_hz = 0.0f;
+    const bool is_within = gains.angle_p >= ANGLE_P_MIN && gains.angle_p <= ANGLE_P_MAX && gains.rate_p >= RATE_P_MIN && gains.rate_p <= RATE_P_MAX;
+    AP::logger().Write("OCG", "TimeUS,Ax,K,Tp,Tau,Kp,Ki,Kd,PM,AngP,Proven", "QBfffffffff",
+                       AP_HAL::micros64(), _axis, result.k_over_t_body, result.t_prop_s, result.tau_s,
+                       result.kp, result.ki, result.kd, degrees(result.phase_margin_rad), gains.angle_p, float(result.is_proven));
+    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: %s angle P %.1f rate P %.3f I %.3f", axis_name(), gains.angle_p, gains.rate_p, gains.rate_i);
+    axis.has_proposal = is_within && _consent != Consent::NEVER;
+    return is_within;
+}
+
+void AC_CustomControl_Onecycle::put_in_force()
+{
+    uint8_t count = 0;
+    for (uint8_t axis = 0; axis < NUM_AXES; axis++) {
+        if (_axes[axis].has_proposal) {
+            set_gains(axis, _axes[axis].new_gains);
+            count++;
+        }
+    }
+    if (count == 0) {
+        GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: no gains to put in force");
+        return;
+    }
+    _stage = Stage::IN_FORCE;
+    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: new gains (%u axes), saved at disarm", unsigned(count));
+}
+
+void AC_CustomControl_Onecycle::restore()
+{
+    if (_stage != Stage::IN_FORCE) {
+        return;
+    }
+    for (uint8_t axis = 0; axis < NUM_AXES; axis++) {
+        if (_axes[axis].has_proposal) {
+            set_gains(axis, _axes[axis].old_gains);
+        }
+    }
+    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: old gains restored");
+}
+
+void AC_CustomControl_Onecycle::save()
+{
+    for (uint8_t axis = 0; axis < NUM_AXES; axis++) {
+        if (!_axes[axis].has_proposal) {
+            continue;
+        }
+        AC_PID &pid = rate_pid(axis);
+        angle_p(axis).kP().save();
+        pid.kP().save();
+        pid.kI().save();
+        pid.kD().save();
+        pid.filt_T_hz().save();
+        pid.filt_E_hz().save();
+        _axes[axis].has_proposal = false;
+    }
+    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: gains saved");
+}
+
+AC_CustomControl_Onecycle::Gains AC_CustomControl_Onecycle::get_gains(uint8_t axis)
+{
+    AC_PID &pid = rate_pid(axis);
+    return {angle_p(axis).kP(), pid.kP(), pid.kI(), pid.kD(), pid.filt_T_hz(), pid.filt_E_hz()};
+}
+
+void AC_CustomControl_Onecycle::set_gains(uint8_t axis, const Gains &gains)
+{
+    AC_PID &pid = rate_pid(axis);
+    angle_p(axis).kP().set(gains.angle_p);
+    pid.kP().set(gains.rate_p);
+    pid.kI().set(gains.rate_i);
+    pid.kD().set(gains.rate_d);
+    pid.filt_T_hz().set(gains.filter_target_hz);
+    pid.filt_E_hz().set(gains.filter_error_hz);
+}
+
+float AC_CustomControl_Onecycle::main_command(uint8_t axis) const
+{
+    return axis == 0 ? _motors->get_roll() : axis == 1 ? _motors->get_pitch() : _motors->get_yaw();
+}
+
+AC_PID &AC_CustomControl_Onecycle::rate_pid(uint8_t axis)
+{
+    return axis == 0 ? _att_control->get_rate_roll_pid() : axis == 1 ? _att_control->get_rate_pitch_pid() : _att_control->get_rate_yaw_pid();
+}
+
+AC_P &AC_CustomControl_Onecycle::angle_p(uint8_t axis)
+{
+    return axis == 0 ? _att_control->get_angle_roll_p() : axis == 1 ? _att_control->get_angle_pitch_p() : _att_control->get_angle_yaw_p();
+}
+
+RC_Channel &AC_CustomControl_Onecycle::stick(uint8_t axis) const
+{
+    return axis == 0 ? rc().get_roll_channel() : axis == 1 ? rc().get_pitch_channel() : rc().get_yaw_channel();
+}
+
+const char *AC_CustomControl_Onecycle::axis_name() const
+{
+    return _axis == 0 ? "roll" : _axis == 1 ? "pitch" : "yaw";
+}
+
+float AC_CustomControl_Onecycle::amplitude() const
+{
+    return _axis == 2 ? _amplitude_yaw : _amplitude_rp;
+}
+
+bool AC_CustomControl_Onecycle::start_thread()
+{
+    _has_thread = hal.scheduler->thread_create(FUNCTOR_BIND_MEMBER(&AC_CustomControl_Onecycle::work, void), "onecycle", 12288, AP_HAL::Scheduler::PRIORITY_IO, -1);
+    return _has_thread;
+}
+
+// the identification, in turns of some slices; asleep while there is nothing to do
+void AC_CustomControl_Onecycle::work()
+{
+    while (true) {
+        hal.scheduler->delay_microseconds(_has_work ? 500 : 5000);
+        if (_has_work) {
+            WITH_SEMAPHORE(_sem);
+            onecycle_tuner_work(&_tuner, SLICES);
+        }
+    }
+}
+
+void AC_CustomControl_Onecycle::log_tick(float command, float output) const
+{
+    // @LoggerMessage: OCT
+    // @Description: relay test of one axis
+    // @Field: TimeUS: Time since system startup
+    // @Field: Ax: axis, 0 roll, 1 pitch, 2 yaw
+    // @Field: Ph: phase of the tuner
+    // @Field: Cmd: motor input of the main controller
+    // @Field: U: motor input in force
+    // @Field: Y: integral of the filtered gyro
+    // @Field: R: filtered gyro
+    AP::logger().WriteStreaming("OCT", "TimeUS,Ax,Ph,Cmd,U,Y,R", "QBBffff",
+                                AP_HAL::micros64(), _axis, uint8_t(onecycle_tuner_phase(&_tuner)),
+                                command, output, _angle_rad, _ahrs->get_gyro_latest()[_axis]);
+}
+
+#endif  // AP_CUSTOMCONTROL_ONECYCLE_ENABLED

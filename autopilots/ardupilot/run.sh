@@ -1,0 +1,32 @@
+#!/usr/bin/env bash
+# Builds ArduCopter with the onecycle backend, flies the chirp and the relay tests in simulation and prints the tables.
+# ARDUPILOT_DIR is a checkout of ArduPilot with its submodules; without it there is nothing to fly.
+# PYTHON needs pymavlink, empy==3.3.4, pexpect, future, lxml and dronecan. ONECYCLE is the program.
+set -euo pipefail
+
+here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
+root=$(cd "$here/../.." && pwd)
+python=${PYTHON:-python3}
+program=${ONECYCLE:-$root/target/release/onecycle}
+
+if [[ ! -f ${ARDUPILOT_DIR:-}/ArduCopter/Copter.cpp ]]; then
+    echo "ArduPilot: skipped; set ARDUPILOT_DIR to a checkout of ArduPilot with its submodules."
+    exit
+fi
+"$python" -c "import pymavlink, em, pexpect, future, lxml" 2>/dev/null ||
+    { echo "ArduPilot: $python lacks pymavlink, empy==3.3.4, pexpect, future or lxml." >&2; exit 1; }
+[[ -x $program ]] || { echo "ArduPilot: $program is missing: cargo build --release, or set ONECYCLE." >&2; exit 1; }
+
+cargo build --quiet --release --locked --manifest-path "$root/onboard/c/Cargo.toml"
+library=${CARGO_TARGET_DIR:-$root/onboard/c/target}/release/libonecycle.a
+"$python" "$here/apply.py" "$ARDUPILOT_DIR"
+(
+    cd "$ARDUPILOT_DIR"
+    # libm first: otherwise the linker takes its functions from the library's compiler-builtins.
+    LDFLAGS="-lm $library" "$python" ./waf configure --board sitl --no-submodule-update >/dev/null
+    "$python" ./waf --targets bin/arducopter
+)
+"$python" "$here/chirp.py" --ardupilot "$ARDUPILOT_DIR" --onecycle "$program" --axis roll
+# A test that is refused is a result too: the old gains stay in force.
+"$python" "$here/tune.py" --ardupilot "$ARDUPILOT_DIR" --method onecycle --axes roll,pitch \
+    --set CC3_AMP_RP=0.15 || true
