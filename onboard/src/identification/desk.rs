@@ -52,7 +52,7 @@ impl Desk {
     }
 
     /// Takes the outcome, if there is one.
-    pub(crate) fn take_outcome(&mut self) -> Option<Result<TuningResult, Refusal>> {
+    pub fn take_outcome(&mut self) -> Option<Result<TuningResult, Refusal>> {
         let Note::Outcome(outcome) = self.note else {
             return None;
         };

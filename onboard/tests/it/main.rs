@@ -7,6 +7,7 @@ mod common;
 mod crossover;
 mod pack;
 mod pid;
+mod recorded;
 mod refine;
 mod relay;
 mod slices;
