@@ -12,6 +12,7 @@ import sys
 
 HERE = pathlib.Path(__file__).resolve().parent
 HEADER = HERE.parent.parent / "onboard/c/onecycle.h"
+PACK = HERE.parent / "margin_35.pack"
 LIBRARY = "libraries/AC_CustomControl/"
 
 # (file, text that is there once, text in its place)
@@ -93,6 +94,10 @@ def apply(root):
         target = root / LIBRARY / file.name
         if not target.exists() or target.read_bytes() != file.read_bytes():
             shutil.copyfile(file, target)
+    pack = "static const uint8_t MARGIN_35_PACK[] {" + ",".join(map(str, PACK.read_bytes())) + "};\n"
+    target = root / LIBRARY / "onecycle_pack.h"
+    if not target.exists() or target.read_text() != pack:
+        target.write_text(pack)
     return None
 
 

@@ -3,8 +3,10 @@
 #if AP_CUSTOMCONTROL_ONECYCLE_ENABLED
 
 #include "AC_CustomControl_Onecycle.h"
+#include "onecycle_pack.h"
 
 #include <AP_AHRS/AP_AHRS.h>
+#include <AP_InertialSensor/AP_InertialSensor.h>
 #include <AP_Logger/AP_Logger.h>
 #include <AP_Vehicle/AP_Vehicle.h>
 #include <GCS_MAVLink/GCS.h>
@@ -17,8 +19,12 @@ static constexpr uint32_t SETTLE_MS = 1500;
 static constexpr float MEAN_TIME_S = 0.3f;
 // deflection of a stick at which the pilot takes over
 static constexpr float STICK_MAX = 0.1f;
-// noise of a sample of the integrated gyro, lower limit (rad)
-static constexpr float NOISE_RAD = 0.0002f;
+// noise of the estimated angle, below which the relay does not switch (rad)
+static constexpr float NOISE_RAD = 0.001f;
+// phase of the integral: the loops around the axis have their own
+static constexpr float INTEGRAL_PHASE_RAD = 0.035f;
+// delay of a second-order Butterworth low-pass times its frequency
+static constexpr float FILTER_DELAY = 0.225f;
 // ticks of a test at a limit of the motors, above which the relay is too large
 static constexpr uint16_t LIMITED_TICKS = 20;
 // gains outside of these bounds are not used
@@ -75,6 +81,13 @@ const AP_Param::GroupInfo AC_CustomControl_Onecycle::var_info[] = {
     // @Values: 0:Ask,1:Never,2:Automatic
     // @User: Standard
     AP_GROUPINFO("CONSENT", 6, AC_CustomControl_Onecycle, _consent, float(Consent::ASK)),
+
+    // @Param: STYLE
+    // @DisplayName: Margin of the gains
+    // @Description: Phase margin for which the gains are designed
+    // @Values: 0:35 degrees,1:20 degrees as in the paper
+    // @User: Standard
+    AP_GROUPINFO("STYLE", 7, AC_CustomControl_Onecycle, _is_paper, 0),
 
     AP_GROUPEND
 };
@@ -144,7 +157,8 @@ Vector3f AC_CustomControl_Onecycle::update()
         finish(reason);
         return output;
     }
-    _angle_rad += _ahrs->get_gyro_latest()[_axis] * _dt;
+    const Vector3f attitude_rad {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
+    _angle_rad = wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis]);
     output[_axis] = test(main_command(_axis));
     return output;
 }
@@ -221,6 +235,9 @@ bool AC_CustomControl_Onecycle::initialise_tuner()
     settings.noise_sigma = NOISE_RAD;
     settings.slices = 0;
     settings.bias_filter_s = MEAN_TIME_S;
+    settings.integral_phase_rad = INTEGRAL_PHASE_RAD;
+    // the angle does not pass the filter of the gyro
+    settings.rate_delay_s = FILTER_DELAY / MAX(float(AP::ins().get_gyro_filter_hz()), 5.0f);
     settings.limit_excursion = radians(_angle_max_deg);
     settings.limit_rate = radians(_rate_max_degs);
     settings.limit_duration_s = _time_max_s;
@@ -231,7 +248,8 @@ bool AC_CustomControl_Onecycle::initialise_tuner()
     settings.consent = _consent == Consent::NEVER ? ONECYCLE_CONSENT_NEVER : ONECYCLE_CONSENT_AUTOMATIC;
 
     WITH_SEMAPHORE(_sem);
-    const onecycle_status status = onecycle_tuner_init(&_tuner, &settings);
+    const onecycle_status status = _is_paper ? onecycle_tuner_init(&_tuner, &settings)
+                                   : onecycle_tuner_init_with_pack(&_tuner, &settings, MARGIN_35_PACK, sizeof(MARGIN_35_PACK));
     if (status != ONECYCLE_STATUS_OK) {
         GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: a CC3_ parameter is out of range (status %d)", int(status));
         return false;

@@ -110,6 +110,7 @@ private:
     AP_Float _rate_max_degs;
     AP_Float _time_max_s;
     AP_Enum<Consent> _consent;
+    AP_Int8 _is_paper;
 
     float _dt;
     Stage _stage;
