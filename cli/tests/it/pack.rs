@@ -379,6 +379,11 @@ fn a_pack_of_another_margin_keeps_all_else() {
     done(&["margin", &out, "--phase-margin", "20", "-o", &back]);
     assert_eq!(std::fs::read(&back).unwrap(), DEFAULT);
 
+    // The pack of the autopilots.
+    let flown = concat!(env!("CARGO_MANIFEST_DIR"), "/../autopilots/margin_35.pack");
+    done(&["margin", "default", "--phase-margin", "35", "-o", &out]);
+    assert_eq!(std::fs::read(&out).unwrap(), std::fs::read(flown).unwrap());
+
     let nowhere = folder.name("nosuch/out.pack");
     run(&[
         "pack",
