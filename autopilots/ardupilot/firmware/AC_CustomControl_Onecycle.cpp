@@ -6,7 +6,6 @@
 #include "onecycle_pack.h"
 
 #include <AP_AHRS/AP_AHRS.h>
-#include <AP_InertialSensor/AP_InertialSensor.h>
 #include <AP_Logger/AP_Logger.h>
 #include <AP_Vehicle/AP_Vehicle.h>
 #include <GCS_MAVLink/GCS.h>
@@ -19,12 +18,10 @@ static constexpr uint32_t SETTLE_MS = 1500;
 static constexpr float MEAN_TIME_S = 0.3f;
 // deflection of a stick at which the pilot takes over
 static constexpr float STICK_MAX = 0.1f;
-// noise of the estimated angle, below which the relay does not switch (rad)
-static constexpr float NOISE_RAD = 0.001f;
+// noise of a sample of the integrated gyro, lower limit (rad)
+static constexpr float NOISE_RAD = 0.0002f;
 // phase of the integral: the loops around the axis have their own
 static constexpr float INTEGRAL_PHASE_RAD = 0.035f;
-// delay of a second-order Butterworth low-pass times its frequency
-static constexpr float FILTER_DELAY = 0.225f;
 // ticks of a test at a limit of the motors, above which the relay is too large
 static constexpr uint16_t LIMITED_TICKS = 20;
 // gains outside of these bounds are not used
@@ -157,8 +154,7 @@ Vector3f AC_CustomControl_Onecycle::update()
         finish(reason);
         return output;
     }
-    const Vector3f attitude_rad {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
-    _angle_rad = wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis]);
+    _angle_rad += _ahrs->get_gyro_latest()[_axis] * _dt;
     output[_axis] = test(main_command(_axis));
     return output;
 }
@@ -236,8 +232,6 @@ bool AC_CustomControl_Onecycle::initialise_tuner()
     settings.slices = 0;
     settings.bias_filter_s = MEAN_TIME_S;
     settings.integral_phase_rad = INTEGRAL_PHASE_RAD;
-    // the angle does not pass the filter of the gyro
-    settings.rate_delay_s = FILTER_DELAY / MAX(float(AP::ins().get_gyro_filter_hz()), 5.0f);
     settings.limit_excursion = radians(_angle_max_deg);
     settings.limit_rate = radians(_rate_max_degs);
     settings.limit_duration_s = _time_max_s;
