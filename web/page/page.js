@@ -336,30 +336,22 @@ const use = async (to) => {
   showCalm();
   clearTimeout(rest);
   wanted = { do: "judge", gains };
-  if (isAsking) return;
+  if (!isAsking) await answerWanted();
+};
+// Answers what was asked for last, and draws its bands when the gains have been at rest.
+const answerWanted = async () => {
   isAsking = true;
   while (wanted) {
     const message = wanted;
     wanted = null;
     const from = performance.now();
-    const answer = await ask(message);
-    drawDesign(answer);
-    document.body.dataset.latencyMs = performance.now() - from;
-    if (!wanted && !message.bands) {
-      clearTimeout(rest);
-      rest = setTimeout(() => { wanted ??= { ...message, bands: true }; if (!isAsking) useWanted(); }, 150);
-    }
-  }
-  isAsking = false;
-};
-const useWanted = async () => {
-  isAsking = true;
-  while (wanted) {
-    const message = wanted;
-    wanted = null;
     // The compared responses over the same time.
-    if (drawn?.end_s) against.judged = await ask({ do: "judge", gains: against.gains, end_s: drawn.end_s });
+    if (message.bands && drawn?.end_s) against.judged = await ask({ do: "judge", gains: against.gains, end_s: drawn.end_s });
     drawDesign(await ask(message));
+    if (message.bands) continue;
+    document.body.dataset.latencyMs = performance.now() - from;
+    clearTimeout(rest);
+    if (!wanted) rest = setTimeout(() => { wanted ??= { ...message, bands: true }; if (!isAsking) answerWanted(); }, 150);
   }
   isAsking = false;
 };
