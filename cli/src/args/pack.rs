@@ -135,7 +135,9 @@ pub(crate) struct ImportPack {
 ///
 /// The identifier stays the same, so nothing is trained: only the table of gains is computed again.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  onecycle pack margin default --phase-margin 45 -o calm.pack\n")]
+#[command(
+    after_help = "Examples:\n  onecycle pack margin default --phase-margin 45 -o calm.pack\n"
+)]
 pub(crate) struct MarginPack {
     /// The pack; default is the one built in
     #[arg(value_name = "FILE|default")]

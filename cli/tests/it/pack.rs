@@ -220,7 +220,14 @@ fn bad_arguments() {
         assert_eq!(outcome.code, Some(2), "{outcome:?}");
         assert!(outcome.stderr.contains(words), "{words}: {outcome:?}");
     }
-    for action in [&[][..], &["show"], &["verify"], &["export"], &["import"]] {
+    for action in [
+        &[][..],
+        &["show"],
+        &["verify"],
+        &["export"],
+        &["import"],
+        &["margin"],
+    ] {
         let text = done(&[action, &["--help"]].concat());
         assert!(text.contains("Example"), "{text}");
     }
