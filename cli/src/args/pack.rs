@@ -135,9 +135,11 @@ pub(crate) struct ImportPack {
 ///
 /// The identifier stays the same, so nothing is trained: only the table of gains is computed again.
 #[derive(Debug, Args)]
-#[command(
-    after_help = "Examples:\n  onecycle pack margin default --phase-margin 45 -o calm.pack\n"
-)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle pack margin default --phase-margin 35 -o calm.pack\n",
+    "  onecycle pack margin my.pack --phase-margin 45 -o calmer.pack\n"
+))]
 pub(crate) struct MarginPack {
     /// The pack; default is the one built in
     #[arg(value_name = "FILE|default")]
