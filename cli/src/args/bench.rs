@@ -74,6 +74,9 @@ pub(crate) struct MakeBench {
           allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(0..=u64::from(u32::MAX)))]
     pub(crate) seed: u64,
+    /// Largest standard deviation of the noise, as a fraction of the amplitude (up to 0.2)
+    #[arg(long, value_name = "FRACTION", default_value_t = Benchmark::default().sigma, allow_negative_numbers = true)]
+    pub(crate) sigma: f64,
     /// File format of the recordings
     #[arg(long, value_enum, default_value = "csv")]
     pub(crate) format: Format,

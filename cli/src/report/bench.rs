@@ -3,7 +3,7 @@
 use onecycle_lab::experiments::CYCLES_KEPT;
 use onecycle_lab::judge::evaluate::PHASE_MARGIN_DEG;
 
-use super::number::significant;
+use super::number::{percent, significant};
 use crate::results::bench::{BenchManifest, BenchResults, FORMAT, RecordingFormat};
 
 /// The leaderboard as Markdown: one row for each method, best score first.
@@ -47,6 +47,7 @@ pub(crate) fn leaderboard(results: &BenchResults<'_>) -> String {
 /// README of the folder: files, task and score.
 pub(crate) fn rules(manifest: &BenchManifest) -> String {
     let (experiments, seed) = (manifest.benchmark.experiments, manifest.benchmark.seed);
+    let most_noise = percent(manifest.benchmark.sigma);
     let recordings = match manifest.recordings {
         RecordingFormat::Csv => format!(
             "`recordings/0001.csv` to `recordings/{experiments:04}.csv`: `time_s`, `output`, `input`"
@@ -69,7 +70,7 @@ pub(crate) fn rules(manifest: &BenchManifest) -> String {
          - An input bias, which is not recorded: constant, uniform between -0.5 and 0.5. In odd experiments \
          the relay moves its centre until it cancels the bias (protocol `trimmed`); in even ones the bias \
          stays in the data (`biased`).\n\
-         - White measurement noise, in the loop: its standard deviation is uniform up to 3 % of the \
+         - White measurement noise, in the loop: its standard deviation is uniform up to {most_noise} of the \
          amplitude of the noise-free oscillation.\n\
          - A recording has the last {CYCLES_KEPT} complete cycles (they begin where the input rises), one and \
          a half periods before them, and the samples after them. Outputs are rounded to less than a \
@@ -78,7 +79,7 @@ pub(crate) fn rules(manifest: &BenchManifest) -> String {
          - {recordings}. SI units.\n\
          - `truth.csv`: the true process, bias and noise of each recording. For scoring only: a method must \
          not read it.\n\
-         - `benchmark.json`: format version, number of experiments and seed.\n\n\
+         - `benchmark.json`: format version, number of experiments, seed and largest noise.\n\n\
          ## Answers\n\n\
          A CSV file with a header and one row for each experiment: either the process, or the gains of \
          `u = kp (r - y) - kd dy/dt`:\n\n\

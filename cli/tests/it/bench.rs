@@ -107,6 +107,42 @@ fn the_same_seed_makes_the_same_bytes() {
     assert_eq!(folder.files().len(), 3, "no temporary folder is left");
 }
 
+// The same draw of the noise, ten times as large; its column is the sixth of the truth.
+#[test]
+fn the_largest_noise_can_be_set() {
+    let folder = Scratch::new();
+    let noise = |sigma: &str| -> Vec<f64> {
+        let path = folder.name(sigma);
+        let outcome = run(&[
+            "bench", "make", "-o", &path, "--cases", "2", "--sigma", sigma,
+        ]);
+        assert_eq!(outcome.code, Some(0), "{outcome:?}");
+        let rules = std::fs::read_to_string(Path::new(&path).join("README.md")).unwrap();
+        let most = format!("up to {:.2} % of", 100.0 * sigma.parse::<f64>().unwrap());
+        assert!(rules.contains(&most), "{rules}");
+        let truth = std::fs::read_to_string(Path::new(&path).join("truth.csv")).unwrap();
+        let mut lines = truth.lines();
+        let at = lines
+            .next()
+            .unwrap()
+            .split(',')
+            .position(|name| name == "noise_sigma")
+            .unwrap();
+        lines
+            .map(|line| line.split(',').nth(at).unwrap().parse().unwrap())
+            .collect()
+    };
+    let (small, large) = (noise("0.01"), noise("0.1"));
+    for (small, large) in small.iter().zip(&large) {
+        assert!((large / small - 10.0).abs() < 1e-6, "{small} {large}");
+    }
+    let nothing = folder.name("nothing");
+    for wrong in ["-0.1", "0.5", "nan"] {
+        run(&["bench", "make", "-o", &nothing, "--sigma", wrong]).refused(2, &["--sigma", "0.2"]);
+    }
+    assert!(!Path::new(&nothing).exists());
+}
+
 // `identify` reads the recordings.
 #[test]
 fn a_recording_is_like_any_other() {

@@ -5,7 +5,7 @@
 //! | process          | times uniform in the paper's domain; `K` from 0.1 to 10, uniform in logarithms |
 //! | relay            | amplitude 1, `beta` -0.73, 1 kHz, the relay of the board                  |
 //! | input bias       | uniform up to half the relay's amplitude, either sign                     |
-//! | noise            | uniform up to 3 % of the amplitude of the noise-free oscillation          |
+//! | noise            | uniform up to 3 % of the amplitude of the noise-free oscillation, or another limit |
 //! | protocol         | odd numbers: the relay trims the bias away; even numbers: it does not     |
 //! | kept             | the last four complete cycles, 1.5 periods before them, and the rest of the recording after them, at most another 1.5 periods |
 //!
@@ -49,12 +49,20 @@ const HYSTERESIS_SIGMAS: f64 = 5.0;
 const ASYMMETRIC_PERIODS: f64 = 150.0;
 
 /// The benchmark: a number of experiments from a seed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Benchmark {
     /// Number of experiments, which are numbered from one.
     pub experiments: u64,
     /// Seed of the first experiment, far enough below the limit of a `u64` for the numbers to be added.
     pub seed: u64,
+    /// Largest standard deviation of the noise, divided by the amplitude of the noise-free oscillation.
+    #[serde(default = "public_sigma")]
+    pub sigma: f64,
+}
+
+/// Largest noise of the public benchmark, also of folders that do not name it.
+fn public_sigma() -> f64 {
+    0.03
 }
 
 impl Default for Benchmark {
@@ -63,6 +71,7 @@ impl Default for Benchmark {
         Self {
             experiments: 1000,
             seed: 70_000,
+            sigma: public_sigma(),
         }
     }
 }
@@ -139,7 +148,7 @@ impl Benchmark {
             cases: self.experiments,
             seed: self.seed,
             bias: 0.5,
-            sigma: 0.03,
+            sigma: self.sigma,
             sigma_uniform: true,
             trim: is_trimmed,
             cycles: CYCLES_KEPT,

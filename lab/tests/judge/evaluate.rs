@@ -174,6 +174,7 @@ fn unstable_and_missing_answers_count_one() {
 const FEW: Benchmark = Benchmark {
     experiments: 6,
     seed: 123,
+    sigma: 0.03,
 };
 
 // The rules of the benchmark: odd experiments are trimmed, and their mean input is minus the bias to

@@ -1,7 +1,7 @@
 //! The folder of a benchmark: its files, and reading them.
 //!
 //! ```text
-//! benchmark.json             format version, number of experiments, seed, format of the recordings
+//! benchmark.json             format version, number of experiments, seed, largest noise, format of the recordings
 //! recordings/0001.csv ..     or recordings.parquet
 //! truth.csv                  true process, bias and noise of each, for scoring only
 //! README.md                  the rules

@@ -15,11 +15,20 @@ use crate::output::{print, write_file, write_text};
 use crate::report;
 use crate::results::bench::{BenchManifest, FORMAT};
 
+/// Largest noise, divided by the amplitude of the oscillation: above it hardly any relay settles.
+const MOST_SIGMA: f64 = 0.2;
+
 pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
     if arguments.format == Format::Parquet && !cfg!(feature = "parquet") {
         return Err(Failure::usage(
             "this build cannot write Parquet: build with cargo build --release --features parquet",
         ));
+    }
+    if !(0.0..=MOST_SIGMA).contains(&arguments.sigma) {
+        return Err(Failure::usage(format!(
+            "--sigma {} is not between 0 and {MOST_SIGMA}",
+            arguments.sigma
+        )));
     }
     let out = &arguments.out;
     folder::refuse_filled(out)?;
@@ -29,6 +38,7 @@ pub(super) fn run(arguments: &MakeBench) -> Result<ExitCode, Failure> {
         benchmark: Benchmark {
             experiments: arguments.cases,
             seed: arguments.seed,
+            sigma: arguments.sigma,
         },
         recordings: arguments.format.into(),
     };

@@ -33,6 +33,7 @@ pub(super) fn find(settings: &ComparisonSettings, workers: &Workers) -> Result<N
     let benchmark = Benchmark {
         experiments: 2 * settings.systems,
         seed: settings.seed,
+        ..Benchmark::default()
     };
     let judged = workers.map(benchmark.experiments as usize, |index| {
         let (truth, recorded) = benchmark.experiment(index as u64 + 1)?;
