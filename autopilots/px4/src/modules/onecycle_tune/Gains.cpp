@@ -41,7 +41,7 @@ bool Gains::remember(int axis)
 	return true;
 }
 
-bool Gains::convert(const onecycle_result &found, float per_input, Cascade &cascade, const char *&what) const
+bool Gains::convert(const onecycle_result &found, float per_input, Cascade &cascade) const
 {
 	const float kp = found.kp * (double)per_input;
 	const float ki = found.ki * (double)per_input;
@@ -50,7 +50,6 @@ bool Gains::convert(const onecycle_result &found, float per_input, Cascade &casc
 	const float root = kp * kp - 4.f * ki * kd;
 
 	if (!(kd > 0.f) || !(root >= 0.f)) {
-		what = "its integral does not fit into PX4's cascade";
 		return false;
 	}
 
@@ -62,7 +61,6 @@ bool Gains::convert(const onecycle_result &found, float per_input, Cascade &casc
 	cascade.inner_p = math::min(kd / cascade.inner_k, most.inner_p);
 	cascade.inner_i = math::min(integral / cascade.inner_k, most.inner_i);
 	cascade.inner_d = 0.f;
-	what = nullptr;
 	return true;
 }
 
