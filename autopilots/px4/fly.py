@@ -9,10 +9,14 @@ import json
 import math
 import os
 import pathlib
+import re
+import struct
 import subprocess
+import threading
 import time
 
 import numpy
+os.environ["MAVLINK20"] = "1"
 from pymavlink import mavutil
 from pyulog import ULog
 
@@ -37,6 +41,52 @@ STEP_S = 1.5
 CLIMB_S = 5.0
 
 
+# Message EVENT of MAVLink's common messages, which pymavlink does not know: identifier; number, time, sequence, receiver, log levels.
+EVENT = 410
+EVENT_HEAD = struct.Struct("<IIHBBB")
+EVENT_TYPES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i", "float": "f"}
+
+
+class Station:
+    """A ground station: hears PX4's events and translates them, as QGroundControl does, with the file that the firmware carries."""
+
+    def __init__(self, build):
+        groups = json.loads((build / "events/all_events.json").read_text())["components"]["1"]["event_groups"]
+        self.texts = {int(number): event for group in groups.values() for number, event in group["events"].items()}
+        self.link = mavutil.mavlink_connection("udpin:127.0.0.1:14550")
+        self.heard, self.last, self.runs = [], None, True
+        self.thread = threading.Thread(target=self.listen, daemon=True)
+        self.thread.start()
+
+    def listen(self):
+        while self.runs:
+            message = self.link.recv_match(blocking=True, timeout=0.2)
+            if message is not None and message.get_type() in ("EVENT", f"UNKNOWN_{EVENT}"):
+                self.hear(bytes(message.get_msgbuf())[10:-2])
+
+    def hear(self, payload):
+        payload = payload.ljust(EVENT_HEAD.size + 40, b"\0")
+        number, _, sequence, *_ = EVENT_HEAD.unpack_from(payload)
+        event = self.texts.get(number & 0xFFFFFF)
+        # An event that nobody confirmed in time comes again.
+        if event is None or sequence == self.last:
+            return
+        self.last = sequence
+        kinds = "<" + "".join(EVENT_TYPES[argument["type"]] for argument in event.get("arguments", []))
+        values = struct.unpack_from(kinds, payload, EVENT_HEAD.size)
+
+        def value(place):
+            found = values[int(place[1]) - 1]
+            return f"{found:.{place[2]}f}" if place[2] else str(found)
+
+        self.heard.append(re.sub(r"\{(\d)(?::\.(\d))?\}", value, event["message"]))
+
+    def close(self):
+        self.runs = False
+        self.thread.join(2)
+        self.link.close()
+
+
 class Vehicle:
     """PX4 in a folder of its own, until `close`."""
 
@@ -50,12 +100,17 @@ class Vehicle:
             [f"{self.build}/bin/px4", "-d", "-w", self.folder, f"{self.build}/etc"],
             cwd=self.folder, env=environment, stdout=self.output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
         )
+        self.station = Station(self.build)
         self.wait(lambda: "Ready for takeoff" in self.said(), 90, "PX4 does not become ready")
         for name, value in SETTINGS.items():
             self.run("param", "set", name, value)
 
     def said(self):
         return (self.folder / "out.log").read_text(errors="replace")
+
+    def messages(self):
+        """What onecycle said in status texts."""
+        return [line.split("onecycle: ", 1)[1].strip() for line in self.said().splitlines() if "] onecycle: " in line]
 
     def run(self, command, *arguments):
         result = subprocess.run(
@@ -91,6 +146,7 @@ class Vehicle:
         time.sleep(3)
 
     def close(self):
+        self.station.close()
         self.run("shutdown")
         try:
             self.process.wait(10)
@@ -110,7 +166,7 @@ def tune_with_onecycle(vehicle):
                 times[axis] = round(time.monotonic() - began - sum(times.values()), 1)
         return "onecycle: finished" in vehicle.said()[said:]
 
-    vehicle.wait(finished, 250, "onecycle does not finish")
+    vehicle.wait(finished, 300, "onecycle does not finish")
     vehicle.run("onecycle_tune", "accept")
     return times
 
@@ -263,6 +319,8 @@ def main():
     parser.add_argument("folder", help="new folder for this flight")
     parser.add_argument("tuner", choices=TUNERS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter, before the flight")
+    parser.add_argument("--hovering", action="append", default=[], metavar="NAME=VALUE", help="a parameter, in the hover")
+    parser.add_argument("--no-steps", action="store_true", help="land after the tuning")
     parser.add_argument("--wait", type=float, default=0.0, help="seconds to wait in the hover, so that each flight has other noise")
     arguments = parser.parse_args()
     vehicle = Vehicle(arguments.build, arguments.folder)
@@ -273,22 +331,25 @@ def main():
         if arguments.tuner == "onecycle":
             vehicle.begin_module()
         vehicle.hover()
+        for setting in arguments.hovering:
+            vehicle.run("param", "set", *setting.split("="))
         time.sleep(arguments.wait)
         line["tuned_s"] = TUNERS[arguments.tuner](vehicle)
         names = [f"{inner}_{gain}" for inner in INNER.values() for gain in "KPID"] + [f"MC_{axis.upper()}_P" for axis in ANGLES]
         names += ["MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC", "MC_YAW_TQ_CUTOFF"]
         line["gains"] = {name: vehicle.parameter(name) for name in names}
         time.sleep(2)
-        command_steps(vehicle)
+        if not arguments.no_steps:
+            command_steps(vehicle)
         time.sleep(1)
     except RuntimeError as error:
         line["failed"] = str(error)
     finally:
         vehicle.close()
     logs = sorted(pathlib.Path(arguments.folder).glob("log/*/*.ulg"))
-    if logs:
+    if logs and not arguments.no_steps:
         line["steps"] = measure(logs[-1])
-    line["messages"] = [text.split("] ", 1)[1] for text in vehicle.said().splitlines() if "[onecycle_tune]" in text]
+    line["messages"], line["events"] = vehicle.messages(), vehicle.station.heard
     print(json.dumps(line), flush=True)
 
 
