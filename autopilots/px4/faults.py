@@ -22,15 +22,15 @@ GAINS = (
 class Sticks:
     """A joystick over MAVLink, in its centre unless moved."""
 
-    def __init__(self, link):
+    def __init__(self, station):
         self.roll = 0
-        self.link = link
+        self.station = station
         self.runs = True
         self.thread = threading.Thread(target=self.send, daemon=True)
 
     def send(self):
         while self.runs:
-            self.link.mav.manual_control_send(1, 0, self.roll, 500, 0, 0)
+            self.station.send(self.station.pack.manual_control_encode(1, 0, self.roll, 500, 0, 0))
             time.sleep(0.05)
 
     def close(self):
@@ -144,7 +144,7 @@ CASES = {
     "stick": (stick_moved, {"OC_AXES": 1, "COM_RC_OVERRIDE": 0}, True, "a stick was moved", True),
     "satellites": (no_satellites, {"OC_AXES": 1, "OC_CYCLES": 4, "EKF2_NOAID_TOUT": 500000}, False, "the old gains are in force", True),
     "thrust": (less_thrust, {"OC_AXES": 8}, False, "the old gains are in force", True),
-    "motor": (changed("SIH_MOT_PART", lambda _: 0.7), {"OC_AXES": 1, "SIH_MOT_BAD": 1}, False, "the old gains are in force", True),
+    "motor": (changed("SIH_MOT_PART", lambda _: 0.55), {"OC_AXES": 1, "SIH_MOT_BAD": 1}, False, "the old gains are in force", True),
     "motor-off": (changed("SIH_MOT_PART", lambda _: 0.0), {"OC_AXES": 1, "SIH_MOT_BAD": 1}, False, "the old gains are in force", False),
     "gyro": (changed("SIH_GYRO_HELD", lambda _: 1, until_s=0.3), {"OC_AXES": 1}, False, "the old gains are in force", False),
     "sign": (changed("SIH_L_ROLL", lambda before: -before), {"OC_AXES": 1}, False, "the old gains are in force", False),
@@ -164,7 +164,7 @@ def fly(build, folder, name):
         os.environ["ONECYCLE_MISSING"] = "MC_ROLLRATE_K"
     vehicle = Vehicle(build, folder)
     os.environ.pop("ONECYCLE_MISSING", None)
-    vehicle.sticks = Sticks(vehicle.station.link) if has_sticks else None
+    vehicle.sticks = Sticks(vehicle.station) if has_sticks else None
     try:
         vehicle.run("param", "set", "OC_APPLY", 2)
         for setting, value in {**settings, **({"COM_RC_IN_MODE": 1} if has_sticks else {})}.items():

@@ -10,6 +10,7 @@ import math
 import os
 import pathlib
 import re
+import socket
 import struct
 import subprocess
 import threading
@@ -41,10 +42,13 @@ STEP_S = 1.5
 CLIMB_S = 5.0
 
 
-# Message EVENT of MAVLink's common messages, which pymavlink does not know: identifier; number, time, sequence, receiver, log levels.
+# Message EVENT of MAVLink's common messages, which pymavlink does not know: number, time, sequence, receiver, log levels, arguments.
 EVENT = 410
 EVENT_HEAD = struct.Struct("<IIHBBB")
+EVENT_BYTES = EVENT_HEAD.size + 40
 EVENT_TYPES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i", "float": "f"}
+# Bytes of a MAVLink 2 frame before and after its payload, which ends before its last zeros.
+HEAD, TAIL = 10, 2
 
 
 class Station:
@@ -52,20 +56,33 @@ class Station:
 
     def __init__(self, build):
         groups = json.loads((build / "events/all_events.json").read_text())["components"]["1"]["event_groups"]
-        self.texts = {int(number): event for group in groups.values() for number, event in group["events"].items()}
-        self.link = mavutil.mavlink_connection("udpin:127.0.0.1:14550")
-        self.heard, self.last, self.runs = [], None, True
+        events = [event for group in groups.values() for event in group["events"].items()]
+        self.texts = {int(number): event for number, event in events if event["name"].startswith("onecycle")}
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 14550))
+        self.socket.settimeout(0.2)
+        self.pack = mavutil.mavlink.MAVLink(None, srcSystem=255)
+        self.heard, self.last, self.vehicle, self.runs = [], None, None, True
         self.thread = threading.Thread(target=self.listen, daemon=True)
         self.thread.start()
 
     def listen(self):
         while self.runs:
-            message = self.link.recv_match(blocking=True, timeout=0.2)
-            if message is not None and message.get_type() in ("EVENT", f"UNKNOWN_{EVENT}"):
-                self.hear(bytes(message.get_msgbuf())[10:-2])
+            try:
+                frames, self.vehicle = self.socket.recvfrom(65536)
+            except TimeoutError:
+                continue
+            while len(frames) > HEAD and frames[0] == 0xFD:
+                end = HEAD + frames[1]
+                if int.from_bytes(frames[7:HEAD], "little") == EVENT:
+                    self.hear(frames[HEAD:end].ljust(EVENT_BYTES, b"\0"))
+                frames = frames[end + TAIL:]
+
+    def send(self, message):
+        if self.vehicle:
+            self.socket.sendto(message.pack(self.pack), self.vehicle)
 
     def hear(self, payload):
-        payload = payload.ljust(EVENT_HEAD.size + 40, b"\0")
         number, _, sequence, *_ = EVENT_HEAD.unpack_from(payload)
         event = self.texts.get(number & 0xFFFFFF)
         # An event that nobody confirmed in time comes again.
@@ -84,7 +101,7 @@ class Station:
     def close(self):
         self.runs = False
         self.thread.join(2)
-        self.link.close()
+        self.socket.close()
 
 
 class Vehicle:

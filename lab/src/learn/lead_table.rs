@@ -63,7 +63,11 @@ pub enum LeadTableError {
 ///
 /// # Errors
 /// [`LeadTableError::Points`]; [`LeadTableError::Optimum`] for a margin outside `(0, pi/2)`.
-pub fn build(phase_margin_rad: f64, excess: f64, points: usize) -> Result<Vec<f32>, LeadTableError> {
+pub fn build(
+    phase_margin_rad: f64,
+    excess: f64,
+    points: usize,
+) -> Result<Vec<f32>, LeadTableError> {
     if !(POINTS_RANGE.0..=POINTS_RANGE.1).contains(&points) {
         return Err(LeadTableError::Points(points));
     }

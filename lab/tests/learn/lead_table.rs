@@ -290,6 +290,9 @@ fn outside_the_table_is_an_error() {
          the optimum instead"
     );
     for (margin_rad, points) in [(0.0, POINTS), (PI / 2.0, POINTS), (0.3, 3), (0.3, 101)] {
-        assert!(build(margin_rad, 0.0, points).is_err(), "{margin_rad} {points}");
+        assert!(
+            build(margin_rad, 0.0, points).is_err(),
+            "{margin_rad} {points}"
+        );
     }
 }

@@ -23,7 +23,7 @@ pub use self::settings::{
 };
 
 /// Size of a tuner in words of eight bytes, for 64-bit machines, where it is largest.
-pub const ONECYCLE_TUNER_WORDS: usize = 3770;
+pub const ONECYCLE_TUNER_WORDS: usize = 3700;
 
 /// Mark of memory that holds a tuner: "ONECYCLE".
 const ALIVE: u64 = u64::from_le_bytes(*b"ONECYCLE");

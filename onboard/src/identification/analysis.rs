@@ -12,7 +12,6 @@ use crate::judgement::{
 use crate::pack::Pack;
 use crate::process::Soiptd;
 use crate::refine::{PriorKnowledge, Refined, Refiner, ShapePrior};
-use crate::signature::Signing;
 
 /// Controller whose uncertainty is being computed: number of coordinates already followed.
 #[derive(Clone, Copy, Debug)]
@@ -26,7 +25,6 @@ struct Design {
 
 /// Memory of the analysis beside the [`Desk`], nothing in it between two orders.
 pub struct Bench {
-    signing: Signing,
     classifier: Classifier,
     refiner: Refiner<BINS>,
 }
@@ -34,7 +32,6 @@ pub struct Bench {
 impl Bench {
     /// A bench for any axis, all zeros.
     pub const NEW: Self = Self {
-        signing: Signing::NONE,
         classifier: Classifier::new(),
         refiner: Refiner::new(),
     };
@@ -88,7 +85,7 @@ impl<'a> Analysis<'a> {
             };
             if self.order.is_none_or(|known| known.number != order.number) {
                 self.order = Some(order);
-                bench.signing = Signing::NONE;
+                bench.classifier.begin_signing();
                 self.stage = Stage::Sign;
             }
             if let Some(outcome) = self.advance(&order, (desk, bench)) {
@@ -123,7 +120,7 @@ impl<'a> Analysis<'a> {
     }
 
     fn sign(&mut self, (desk, bench): Parts<'_>, cycle: &Cycle) -> Result<(), Refusal> {
-        let Some(signature) = bench.signing.advance(&desk.fine, cycle) else {
+        let Some(signature) = bench.classifier.sign(&desk.fine, cycle) else {
             return Ok(());
         };
         let signature = signature.map_err(|_| Refusal::NoSignature)?;
