@@ -47,7 +47,9 @@ def main():
             flights = [flight for flight in flights if "gains" in flight]
             tuned = [flight for flight in flights if axis in flight["tuned_s"]]
             counted = tuned or flights
-            steps = [flight["steps"][axis] for flight in counted if axis in flight["steps"]]
+            steps = [flight["steps"][axis] for flight in counted if axis in flight.get("steps", {})]
+            if not (tuned or steps):
+                continue
             of_steps = lambda key: median(step[key] for step in steps)
             laws = [law(axis, flight["gains"]) for flight in counted]
             robust = [sih.margins(axis, gains) for gains in laws]

@@ -26,6 +26,8 @@ const char *text(Why why)
 
 	case Why::Reset: return "the estimator was reset";
 
+	case Why::Stalled: return "the control loop has stopped";
+
 	case Why::Stick: return "a stick was moved";
 
 	case Why::Form: return "its integral does not fit into PX4's cascade";
@@ -167,6 +169,11 @@ void sendEnded(uint8_t axis, Why why)
 	case Why::Reset:
 		events::send<uint8_t>(events::ID("onecycle_ended_reset"), CRITICAL,
 				      "onecycle: axis {1}: the estimator was reset; old gains in force", axis);
+		break;
+
+	case Why::Stalled:
+		events::send<uint8_t>(events::ID("onecycle_ended_stalled"), CRITICAL,
+				      "onecycle: axis {1}: the control loop has stopped; old gains in force", axis);
 		break;
 
 	case Why::Stick:

@@ -18,6 +18,7 @@ enum class Why : uint8_t {
 	Mode,
 	Motor,
 	Reset,
+	Stalled,
 	Stick,
 	Tuner,      // the tuner's own reason
 	Form,       // the integral does not fit into the cascade

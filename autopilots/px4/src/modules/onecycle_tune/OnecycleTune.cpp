@@ -26,6 +26,7 @@ constexpr float MOST_CLIMB_RATE = 2.f;
 constexpr float INTEGRAL_PHASE = 0.035f;
 constexpr int WORK_STACK = 14000;
 constexpr hrt_abstime POLL = 100_ms;
+constexpr hrt_abstime STALLED = 500_ms;
 // A second-order Butterworth filter delays by sqrt(2) / (2 pi f).
 constexpr float FILTER_DELAY = 0.225f;
 enum Apply { REPORT, ASK, AT_ONCE };
@@ -96,6 +97,7 @@ void OnecycleTune::Run()
 	}
 
 	_last = now;
+	_ticks.fetch_add(1);
 
 	const State state = _state.load();
 	float input = _index == Axis::ALTITUDE ? -thrust.xyz[2] : torque.xyz[_index];
@@ -260,8 +262,31 @@ void OnecycleTune::poll()
 	}
 }
 
+bool OnecycleTune::isStalled()
+{
+	const int ticks = _ticks.load();
+
+	if (ticks != _ticks_seen || _state.load() == State::Idle) {
+		_ticks_seen = ticks;
+		_ticked_at = hrt_absolute_time();
+	}
+
+	return hrt_elapsed_time(&_ticked_at) > STALLED;
+}
+
 void OnecycleTune::attend()
 {
+	if (isStalled()) {
+		// Nothing else would notice it, because the tuner runs in that loop.
+		if (_gains[_index].is_written()) {
+			_gains[_index].restore();
+		}
+
+		_is_outside.store(true);
+		ended(Why::Stalled);
+		return;
+	}
+
 	switch (_state.load()) {
 	case State::Idle:
 		if (_accept_wanted.load()) {

@@ -61,6 +61,8 @@ private:
 	void work();
 	void poll();
 	void attend();
+	/** Whether the control loop stands still, as without a gyro. */
+	bool isStalled();
 	void begin();
 	void beginAxis();
 	bool initTuner(int axis);
@@ -85,6 +87,7 @@ private:
 	px4::atomic_bool _abort_wanted{false};
 	px4::atomic_bool _work_runs{false};
 	px4::atomic<int> _tick_ns{0};              // mean time between two set-points
+	px4::atomic<int> _ticks{0};
 
 	uORB::SubscriptionCallbackWorkItem _torque_sub{this, ORB_ID(vehicle_torque_setpoint_virtual_mc)};
 	uORB::Subscription _thrust_sub{ORB_ID(vehicle_thrust_setpoint_virtual_mc)};
@@ -109,6 +112,8 @@ private:
 	bool _is_kept{false};
 	hrt_abstime _asked_at{0};
 	hrt_abstime _polled_at{0};
+	hrt_abstime _ticked_at{0};
+	int _ticks_seen{0};
 	px4_task_t _work_task{-1};
 
 	DEFINE_PARAMETERS(
