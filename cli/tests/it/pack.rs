@@ -404,18 +404,6 @@ fn a_pack_of_another_margin_keeps_all_else() {
             std::fs::read(format!("{flown}{name}")).unwrap()
         );
     }
-    run(&[
-        "pack",
-        "margin",
-        "default",
-        "--phase-margin",
-        "25",
-        "--extra-ise",
-        "60",
-        "-o",
-        &out,
-    ])
-    .refused(2, &["--extra-ise", "between 0 and 50 percent"]);
 
     let nowhere = folder.name("nosuch/out.pack");
     run(&[
