@@ -158,9 +158,15 @@ class Vehicle:
 
     def hover(self):
         self.run("commander", "takeoff")
-        time.sleep(14)
+        self.wait(lambda: self.height() > SETTINGS["MIS_TAKEOFF_ALT"] - 0.5, 120, "the vehicle does not take off")
         self.run("commander", "mode", "auto:loiter")
-        time.sleep(3)
+        time.sleep(5)
+
+    def height(self):
+        for line in self.run("listener", "vehicle_local_position", 1).splitlines():
+            if line.split(":")[0].strip() == "z":
+                return -float(line.split(":")[1])
+        return 0.0
 
     def close(self):
         self.station.close()

@@ -17,7 +17,7 @@ PARAMETERS = [
     ("SIH_GUST", "0.0f", "Float", "m/s", "Standard deviation of the gusts in each direction; correlation time 2 s"),
     ("SIH_MOT_BAD", "0", "Int", "", "Number of the motor that fails, 0 for none"),
     ("SIH_MOT_PART", "1.0f", "Float", "norm", "Part of its thrust and torque that the failing motor keeps"),
-    ("SIH_GYRO_HELD", "0", "Int", "", "1: the gyro repeats its last value"),
+    ("SIH_GYRO_HELD", "0", "Int", "", "1: the gyro stays at its last value, its noise goes on"),
 ]
 
 # (file, text that is there once, text in its place)
@@ -48,8 +48,8 @@ CHANGES = [
      "		_Fa_E = -_KDV * (_v_E - air_E);   // first order drag in moving air\n"
      "		_Ma_B = Vector3f(0.f, 0.f, -WIND_ARM).cross(_q_E.rotateVectorInverse(_KDV * air_E)) - _KDW * _w_B;\n"),
     ("sih.cpp", "	Vector3f gyro = _w_B + earth_spin_rate_B + gyro_noise;\n",
-     "	Vector3f gyro = _sih_gyro_held.get() ? _gyro_last : _w_B + earth_spin_rate_B + gyro_noise;\n"
-     "	_gyro_last = gyro;\n"),
+     "	_gyro_last = _sih_gyro_held.get() ? _gyro_last : _w_B + earth_spin_rate_B;\n"
+     "	Vector3f gyro = _gyro_last + gyro_noise;\n"),
 ]
 
 
