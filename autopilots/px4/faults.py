@@ -121,6 +121,12 @@ def finished_at_once(vehicle):
     finished(vehicle)
 
 
+def weak_motor(vehicle):
+    # The test takes place all the same; what it finds is checked in flight and does not outlive it.
+    changed("SIH_MOT_PART", lambda _: 0.55)(vehicle)
+    landed(vehicle)
+
+
 def nobody_accepts(vehicle):
     in_test(vehicle, "roll", 0)
     finished(vehicle)
@@ -131,6 +137,10 @@ def landed_without_acceptance(vehicle):
     finished(vehicle)
     if vehicle.gains() == vehicle.old:
         raise RuntimeError("no gains were found, so nothing can be restored")
+    landed(vehicle)
+
+
+def landed(vehicle):
     vehicle.run("commander", "land")
     vehicle.wait(lambda: "Disarmed" in vehicle.said(), 60, "the vehicle does not land")
     time.sleep(1)
@@ -144,11 +154,10 @@ CASES = {
     "stick": (stick_moved, {"OC_AXES": 1, "COM_RC_OVERRIDE": 0}, True, "a stick was moved", True),
     "satellites": (no_satellites, {"OC_AXES": 1, "OC_CYCLES": 4, "EKF2_NOAID_TOUT": 500000}, False, "the old gains are in force", True),
     "thrust": (less_thrust, {"OC_AXES": 8}, False, "the old gains are in force", True),
-    "motor": (changed("SIH_MOT_PART", lambda _: 0.55), {"OC_AXES": 1, "SIH_MOT_BAD": 1}, False, "the old gains are in force", True),
+    "motor": (weak_motor, {"OC_AXES": 1, "SIH_MOT_BAD": 1}, False, "the old gains are in force", False),
     "motor-off": (changed("SIH_MOT_PART", lambda _: 0.0), {"OC_AXES": 1, "SIH_MOT_BAD": 1}, False, "the old gains are in force", False),
     "gyro": (changed("SIH_GYRO_HELD", lambda _: 1, until_s=0.3), {"OC_AXES": 1}, False, "the old gains are in force", False),
     "sign": (changed("SIH_L_ROLL", lambda before: -before), {"OC_AXES": 1}, False, "the old gains are in force", False),
-    "gusts": (changed("SIH_GUST", lambda _: 6.0), {"OC_AXES": 1, "OC_CYCLES": 4}, False, "the old gains are in force", True),
     "heading": (heading_reset, {"OC_AXES": 1}, False, "the estimator was reset", True),
     "missing": (finished_at_once, {"OC_AXES": 1}, False, "the firmware lacks one of its gains", True),
     "small": (as_it_is, {"OC_AXES": 1, "OC_AMP": 0.02}, False, "the old gains are in force", True),
