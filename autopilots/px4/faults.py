@@ -5,11 +5,10 @@ Run it by run.sh, which gives each flight a network of its own.
 """
 
 import argparse
+import os
 import pathlib
 import threading
 import time
-
-from pymavlink import mavutil
 
 from fly import Vehicle
 
@@ -23,22 +22,20 @@ GAINS = (
 class Sticks:
     """A joystick over MAVLink, in its centre unless moved."""
 
-    def __init__(self):
+    def __init__(self, station):
         self.roll = 0
-        self.link = mavutil.mavlink_connection("udpin:127.0.0.1:14550")
+        self.station = station
         self.runs = True
         self.thread = threading.Thread(target=self.send, daemon=True)
 
     def send(self):
-        self.link.wait_heartbeat(timeout=10)
         while self.runs:
-            self.link.mav.manual_control_send(1, 0, self.roll, 500, 0, 0)
+            self.station.send(self.station.pack.manual_control_encode(1, 0, self.roll, 500, 0, 0))
             time.sleep(0.05)
 
     def close(self):
         self.runs = False
         self.thread.join(2)
-        self.link.close()
 
 
 def in_test(vehicle, axis, seconds):
@@ -91,9 +88,43 @@ def less_thrust(vehicle):
     finished(vehicle)
 
 
-def too_small(vehicle):
+def changed(parameter, value, axis="roll", seconds=1.0, until_s=None):
+    """A parameter of the simulator changes in the test, and changes back after some time or at its end."""
+
+    def case(vehicle):
+        before = vehicle.parameter(parameter)
+        in_test(vehicle, axis, seconds)
+        vehicle.run("param", "set", parameter, value(before))
+        if until_s is None:
+            finished(vehicle)
+        else:
+            time.sleep(until_s)
+        vehicle.run("param", "set", parameter, before)
+        finished(vehicle)
+
+    return case
+
+
+def heading_reset(vehicle):
+    in_test(vehicle, "roll", 1)
+    vehicle.run("commander", "set_heading", 15)
+    finished(vehicle)
+
+
+def as_it_is(vehicle):
     in_test(vehicle, "roll", 0)
     finished(vehicle)
+
+
+def finished_at_once(vehicle):
+    vehicle.run("onecycle_tune", "run")
+    finished(vehicle)
+
+
+def weak_motor(vehicle):
+    # The test takes place all the same; what it finds is checked in flight and does not outlive it.
+    changed("SIH_MOT_PART", lambda _: 0.55)(vehicle)
+    landed(vehicle)
 
 
 def nobody_accepts(vehicle):
@@ -106,6 +137,10 @@ def landed_without_acceptance(vehicle):
     finished(vehicle)
     if vehicle.gains() == vehicle.old:
         raise RuntimeError("no gains were found, so nothing can be restored")
+    landed(vehicle)
+
+
+def landed(vehicle):
     vehicle.run("commander", "land")
     vehicle.wait(lambda: "Disarmed" in vehicle.said(), 60, "the vehicle does not land")
     time.sleep(1)
@@ -119,8 +154,14 @@ CASES = {
     "stick": (stick_moved, {"OC_AXES": 1, "COM_RC_OVERRIDE": 0}, True, "a stick was moved", True),
     "satellites": (no_satellites, {"OC_AXES": 1, "OC_CYCLES": 4, "EKF2_NOAID_TOUT": 500000}, False, "the old gains are in force", True),
     "thrust": (less_thrust, {"OC_AXES": 8}, False, "the old gains are in force", True),
-    "small": (too_small, {"OC_AXES": 1, "OC_AMP": 0.02}, False, "the old gains are in force", True),
-    "large": (too_small, {"OC_AXES": 1, "OC_AMP": 0.5, "MC_ROLLRATE_MAX": 60}, False, "the old gains are in force", True),
+    "motor": (weak_motor, {"OC_AXES": 1, "SIH_MOT_BAD": 1}, False, "the old gains are in force", False),
+    "motor-off": (changed("SIH_MOT_PART", lambda _: 0.0), {"OC_AXES": 1, "SIH_MOT_BAD": 1}, False, "the old gains are in force", False),
+    "gyro": (changed("SIH_GYRO_HELD", lambda _: 1, until_s=0.3), {"OC_AXES": 1}, False, "the old gains are in force", False),
+    "sign": (changed("SIH_L_ROLL", lambda before: -before), {"OC_AXES": 1}, False, "the old gains are in force", False),
+    "heading": (heading_reset, {"OC_AXES": 1}, False, "the estimator was reset", True),
+    "missing": (finished_at_once, {"OC_AXES": 1}, False, "the firmware lacks one of its gains", True),
+    "small": (as_it_is, {"OC_AXES": 1, "OC_AMP": 0.02}, False, "the old gains are in force", True),
+    "large": (as_it_is, {"OC_AXES": 1, "OC_AMP": 0.5, "MC_ROLLRATE_MAX": 60}, False, "the old gains are in force", True),
     "unanswered": (nobody_accepts, {"OC_AXES": 1, "OC_APPLY": 1}, False, "nobody accepted", True),
     "landed": (landed_without_acceptance, {"OC_AXES": 1, "OC_APPLY": 2}, False, "not accepted", False),
 }
@@ -128,8 +169,11 @@ CASES = {
 
 def fly(build, folder, name):
     case, settings, has_sticks, words, flies = CASES[name]
+    if name == "missing":
+        os.environ["ONECYCLE_MISSING"] = "MC_ROLLRATE_K"
     vehicle = Vehicle(build, folder)
-    vehicle.sticks = Sticks() if has_sticks else None
+    os.environ.pop("ONECYCLE_MISSING", None)
+    vehicle.sticks = Sticks(vehicle.station) if has_sticks else None
     try:
         vehicle.run("param", "set", "OC_APPLY", 2)
         for setting, value in {**settings, **({"COM_RC_IN_MODE": 1} if has_sticks else {})}.items():
@@ -143,13 +187,15 @@ def fly(build, folder, name):
         vehicle.old = vehicle.gains()
         case(vehicle)
         new = vehicle.gains()
-        messages = [line.split("onecycle: ", 1)[1] for line in vehicle.said().splitlines() if "onecycle: " in line]
         time.sleep(3)
+        messages = vehicle.messages()
         faults = []
         if new != vehicle.old:
             faults.append("gains differ: " + ", ".join(gain for gain in GAINS if new[gain] != vehicle.old[gain]))
         if sum(words in message for message in messages) != 1:
             faults.append(f"not one message with '{words}'")
+        if len(vehicle.station.heard) != len(messages):
+            faults.append("events: " + " | ".join(vehicle.station.heard))
         if flies and "Disarmed" in vehicle.said():
             faults.append("the vehicle no longer flies")
         print(f"{name:11} {'; '.join(faults) or 'holds'}: {' | '.join(messages)}", flush=True)

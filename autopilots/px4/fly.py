@@ -9,10 +9,15 @@ import json
 import math
 import os
 import pathlib
+import re
+import socket
+import struct
 import subprocess
+import threading
 import time
 
 import numpy
+os.environ["MAVLINK20"] = "1"
 from pymavlink import mavutil
 from pyulog import ULog
 
@@ -25,17 +30,78 @@ SETTINGS = {
     "COM_OF_LOSS_T": 5,
     "COM_DISARM_PRFLT": 60,
     "MIS_TAKEOFF_ALT": 8,
-    # From arming on, with the attitude at full rate.
-    "SDLOG_MODE": 0,
-    "SDLOG_PROFILE": 5,
     "OC_RECORD": 1,
     "OC_AXES": 15,
 }
+# Read at the start only: the log begins at arming, with set-points and inputs at every tick.
+EARLY = {"SDLOG_MODE": 0, "SDLOG_PROFILE": 17}
 # Steps of the set-points (rad, m), and the time over which a response is judged (s).
 STEP = {"roll": math.radians(10), "pitch": math.radians(10), "yaw": math.radians(20), "altitude": 0.5}
 JUDGED_S = {"roll": 1.0, "pitch": 1.0, "yaw": 1.0, "altitude": 4.0}
 STEP_S = 1.5
 CLIMB_S = 5.0
+
+
+# Message EVENT of MAVLink's common messages, which pymavlink does not know: number, time, sequence, receiver, log levels, arguments.
+EVENT = 410
+EVENT_HEAD = struct.Struct("<IIHBBB")
+EVENT_BYTES = EVENT_HEAD.size + 40
+EVENT_TYPES = {"uint8_t": "B", "int8_t": "b", "uint16_t": "H", "int16_t": "h", "uint32_t": "I", "int32_t": "i", "float": "f"}
+# Bytes of a MAVLink 2 frame before and after its payload, which ends before its last zeros.
+HEAD, TAIL = 10, 2
+
+
+class Station:
+    """A ground station: hears PX4's events and translates them, as QGroundControl does, with the file that the firmware carries."""
+
+    def __init__(self, build):
+        groups = json.loads((build / "events/all_events.json").read_text())["components"]["1"]["event_groups"]
+        events = [event for group in groups.values() for event in group["events"].items()]
+        self.texts = {int(number): event for number, event in events if event["name"].startswith("onecycle")}
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind(("127.0.0.1", 14550))
+        self.socket.settimeout(0.2)
+        self.pack = mavutil.mavlink.MAVLink(None, srcSystem=255)
+        self.heard, self.last, self.vehicle, self.runs = [], None, None, True
+        self.thread = threading.Thread(target=self.listen, daemon=True)
+        self.thread.start()
+
+    def listen(self):
+        while self.runs:
+            try:
+                frames, self.vehicle = self.socket.recvfrom(65536)
+            except TimeoutError:
+                continue
+            while len(frames) > HEAD and frames[0] == 0xFD:
+                end = HEAD + frames[1]
+                if int.from_bytes(frames[7:HEAD], "little") == EVENT:
+                    self.hear(frames[HEAD:end].ljust(EVENT_BYTES, b"\0"))
+                frames = frames[end + TAIL:]
+
+    def send(self, message):
+        if self.vehicle:
+            self.socket.sendto(message.pack(self.pack), self.vehicle)
+
+    def hear(self, payload):
+        number, _, sequence, *_ = EVENT_HEAD.unpack_from(payload)
+        event = self.texts.get(number & 0xFFFFFF)
+        # An event that nobody confirmed in time comes again.
+        if event is None or sequence == self.last:
+            return
+        self.last = sequence
+        kinds = "<" + "".join(EVENT_TYPES[argument["type"]] for argument in event.get("arguments", []))
+        values = struct.unpack_from(kinds, payload, EVENT_HEAD.size)
+
+        def value(place):
+            found = values[int(place[1]) - 1]
+            return f"{found:.{place[2]}f}" if place[2] else str(found)
+
+        self.heard.append(re.sub(r"\{(\d)(?::\.(\d))?\}", value, event["message"]))
+
+    def close(self):
+        self.runs = False
+        self.thread.join(2)
+        self.socket.close()
 
 
 class Vehicle:
@@ -45,17 +111,23 @@ class Vehicle:
         self.build, self.folder = pathlib.Path(build), pathlib.Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         environment = dict(os.environ, PX4_SIM_MODEL="sihsim_quadx", PATH=f"{self.build}/bin:{os.environ['PATH']}")
+        environment |= {f"PX4_PARAM_{name}": str(value) for name, value in EARLY.items()}
         self.output = open(self.folder / "out.log", "w")
         self.process = subprocess.Popen(
             [f"{self.build}/bin/px4", "-d", "-w", self.folder, f"{self.build}/etc"],
             cwd=self.folder, env=environment, stdout=self.output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
         )
+        self.station = Station(self.build)
         self.wait(lambda: "Ready for takeoff" in self.said(), 90, "PX4 does not become ready")
         for name, value in SETTINGS.items():
             self.run("param", "set", name, value)
 
     def said(self):
         return (self.folder / "out.log").read_text(errors="replace")
+
+    def messages(self):
+        """What onecycle said in status texts."""
+        return [line.split("onecycle: ", 1)[1].strip() for line in self.said().splitlines() if "] onecycle: " in line]
 
     def run(self, command, *arguments):
         result = subprocess.run(
@@ -86,11 +158,18 @@ class Vehicle:
 
     def hover(self):
         self.run("commander", "takeoff")
-        time.sleep(14)
+        self.wait(lambda: self.height() > SETTINGS["MIS_TAKEOFF_ALT"] - 0.5, 120, "the vehicle does not take off")
         self.run("commander", "mode", "auto:loiter")
-        time.sleep(3)
+        time.sleep(5)
+
+    def height(self):
+        for line in self.run("listener", "vehicle_local_position", 1).splitlines():
+            if line.split(":")[0].strip() == "z":
+                return -float(line.split(":")[1])
+        return 0.0
 
     def close(self):
+        self.station.close()
         self.run("shutdown")
         try:
             self.process.wait(10)
@@ -110,7 +189,7 @@ def tune_with_onecycle(vehicle):
                 times[axis] = round(time.monotonic() - began - sum(times.values()), 1)
         return "onecycle: finished" in vehicle.said()[said:]
 
-    vehicle.wait(finished, 250, "onecycle does not finish")
+    vehicle.wait(finished, 300, "onecycle does not finish")
     vehicle.run("onecycle_tune", "accept")
     return times
 
@@ -230,8 +309,11 @@ def measure(path):
     for axis, (set_times, set_values), (times, values), (input_times, inputs) in signals(log):
         steps = []
         jumps = numpy.flatnonzero(abs(abs(numpy.diff(set_values)) - STEP[axis]) < 0.1 * STEP[axis]) + 1
-        for jump in jumps:
+        for jump, next_jump in zip(jumps, [*jumps[1:], len(set_times) - 1]):
             start, size = set_times[jump], set_values[jump] - set_values[jump - 1]
+            # On a slow machine the simulated time lags behind the clock by which the steps are sent.
+            if set_times[next_jump] - start < JUDGED_S[axis]:
+                continue
             inside = (times >= start) & (times < start + JUDGED_S[axis])
             if inside.sum() < 50:
                 continue
@@ -260,6 +342,8 @@ def main():
     parser.add_argument("folder", help="new folder for this flight")
     parser.add_argument("tuner", choices=TUNERS)
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a parameter, before the flight")
+    parser.add_argument("--hovering", action="append", default=[], metavar="NAME=VALUE", help="a parameter, in the hover")
+    parser.add_argument("--no-steps", action="store_true", help="land after the tuning")
     parser.add_argument("--wait", type=float, default=0.0, help="seconds to wait in the hover, so that each flight has other noise")
     arguments = parser.parse_args()
     vehicle = Vehicle(arguments.build, arguments.folder)
@@ -270,22 +354,25 @@ def main():
         if arguments.tuner == "onecycle":
             vehicle.begin_module()
         vehicle.hover()
+        for setting in arguments.hovering:
+            vehicle.run("param", "set", *setting.split("="))
         time.sleep(arguments.wait)
         line["tuned_s"] = TUNERS[arguments.tuner](vehicle)
         names = [f"{inner}_{gain}" for inner in INNER.values() for gain in "KPID"] + [f"MC_{axis.upper()}_P" for axis in ANGLES]
         names += ["MPC_Z_P", "MPC_Z_VEL_P_ACC", "MPC_Z_VEL_I_ACC", "MPC_Z_VEL_D_ACC", "MC_YAW_TQ_CUTOFF"]
         line["gains"] = {name: vehicle.parameter(name) for name in names}
         time.sleep(2)
-        command_steps(vehicle)
+        if not arguments.no_steps:
+            command_steps(vehicle)
         time.sleep(1)
     except RuntimeError as error:
         line["failed"] = str(error)
     finally:
         vehicle.close()
     logs = sorted(pathlib.Path(arguments.folder).glob("log/*/*.ulg"))
-    if logs:
+    if logs and not arguments.no_steps:
         line["steps"] = measure(logs[-1])
-    line["messages"] = [text.split("] ", 1)[1] for text in vehicle.said().splitlines() if "[onecycle_tune]" in text]
+    line["messages"], line["events"] = vehicle.messages(), vehicle.station.heard
     print(json.dumps(line), flush=True)
 
 

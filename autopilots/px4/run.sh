@@ -16,6 +16,8 @@ fi
 "$python" -c "import pymavlink, pyulog, numpy, kconfiglib" 2>/dev/null ||
     { echo "PX4: $python lacks pymavlink, pyulog, numpy or kconfiglib." >&2; exit 1; }
 
+# Wind and faults for the simulator, off by default.
+"$python" "$here/simulator.py" "$PX4_DIR"
 cargo build --quiet --release --locked --manifest-path "$root/onboard/c/Cargo.toml"
 library=${CARGO_TARGET_DIR:-$root/onboard/c/target}/release/libonecycle.a
 build=$PX4_DIR/build/onecycle
@@ -37,9 +39,15 @@ for ((i = 1; i <= flights; i++)); do
     alone "$here/fly.py" "$build" "$out/autotune$i" autotune --wait "$i" >"$out/autotune$i.json"
     alone "$here/fly.py" "$build" "$out/onecycle$i" onecycle --wait "$i" >"$out/onecycle$i.json"
     alone "$here/fly.py" "$build" "$out/paper$i" onecycle --wait "$i" --set OC_STYLE=1 >"$out/paper$i.json"
+    alone "$here/fly.py" "$build" "$out/calm$i" onecycle --wait "$i" --set OC_STYLE=2 >"$out/calm$i.json"
+    # Wind of 5 m/s with gusts of 1.5 m/s: roll alone, without steps.
+    alone "$here/fly.py" "$build" "$out/wind$i" onecycle --wait "$i" --set OC_AXES=1 --hovering SIH_WIND=5 --hovering SIH_GUST=1.5 \
+        --no-steps >"$out/wind$i.json"
     echo "flight $i of $flights"
 done
 cd "$here"
 "$python" compare.py "stock gains=$out/stock*.json" "PX4's autotune=$out/autotune*.json" \
-    "onecycle, 35 degrees=$out/onecycle*.json" "onecycle, 20 degrees=$out/paper*.json"
+    "onecycle, balanced=$out/onecycle*.json" "onecycle, fast=$out/paper*.json" "onecycle, calm=$out/calm*.json" \
+    "onecycle, balanced, in wind=$out/wind*.json"
+"$python" sih.py
 alone "$here/faults.py" "$build" "$out/faults"

@@ -308,6 +308,14 @@ fn phase_margin(text: &str) -> Result<f64, String> {
     }
 }
 
+/// How much more than the least a step may cost, in percent.
+fn extra_ise(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(percent) if (0.0..=50.0).contains(&percent) => Ok(percent),
+        _ => Err("the extra cost lies between 0 and 50 percent".to_owned()),
+    }
+}
+
 /// A sample rate in hertz, in the range of recordings.
 fn sample_rate(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {

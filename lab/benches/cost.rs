@@ -59,7 +59,7 @@ fn optimum_above_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
 /// From a table, as on the board.
 #[divan::bench(args = [HOVER, DELAYED])]
 fn tabled_at_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
-    let numbers = build(PHASE_MARGIN_RAD, POINTS).expect("20 deg is a margin");
+    let numbers = build(PHASE_MARGIN_RAD, 0.0, POINTS).expect("20 deg is a margin");
     let table = LeadTable::from_floats(&numbers).expect("what is built is a table");
     let process = process(times);
     bencher.bench(|| table.pd_at_phase_margin(black_box(&process)));
@@ -68,7 +68,7 @@ fn tabled_at_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
 /// From a table, as on the board.
 #[divan::bench(args = [HOVER, DELAYED])]
 fn tabled_above_phase_margin(bencher: Bencher, times: (f64, f64, f64)) {
-    let numbers = build(PHASE_MARGIN_RAD, POINTS).expect("20 deg is a margin");
+    let numbers = build(PHASE_MARGIN_RAD, 0.0, POINTS).expect("20 deg is a margin");
     let table = LeadTable::from_floats(&numbers).expect("what is built is a table");
     let process = process(times);
     bencher.bench(|| table.pd(black_box(&process)));

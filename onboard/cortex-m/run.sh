@@ -11,13 +11,13 @@ set -euo pipefail
 
 # Limits: what the tuner takes now and a little more, so that it does not grow. Beside them the goals: 96 kB of code
 # and tables, 24 kB of memory; in a tick what leaves a tenth of a 1 kHz loop at 168 MHz to the rest of the board.
-most_flash=115000 wanted_flash=96000
+most_flash=115500 wanted_flash=96000
 most_memory=38500 wanted_memory=24000
 most_step_stack=1500
 most_relay_tick=33000 wanted_relay_tick=150000
 most_control_tick=3400 wanted_control_tick=150000
-most_first_tick=347000 wanted_first_tick=150000
-most_identify_tick=215000 wanted_identify_tick=150000
+most_first_tick=90000 wanted_first_tick=150000
+most_identify_tick=180000 wanted_identify_tick=150000
 
 # The oldest compiler of Debian that builds this.
 oldest=1.95
@@ -145,7 +145,7 @@ instructions() { # BEFORE AFTER
 }
 median() { awk '{ all[NR] = $1 } END { print all[int((NR + 1) / 2)] }'; }
 
-# The tick that ends the collection already computes the signature. The ticks after it begin in identification: their
+# The tick that ends the collection already begins the signature. The ticks after it begin in identification: their
 # instructions with the name of the stage.
 first=$(instructions relay identify | tail -n 1)
 awk '$1 == "tick" && $3 == "identify" { print $6, $7 }' "$scratch/board" | sort -n >"$scratch/slices"

@@ -41,7 +41,8 @@
 //! |------------------------------------------------|------------|--------|
 //! | layer of the network, of `n` by `m` (f32)      | `3 n m`    | layers |
 //! | posterior                                      | 400        | 1      |
-//! | its longest axis and the candidates            | 2,700      | 1      |
+//! | its longest axis                               | 1,400      | 1      |
+//! | the candidates                                 | 1,300      | 1      |
 //! | eight harmonics of the cycle                   | 1,500      | 2      |
 //! | three harmonics of a process                   | 1,800      | 2 x 5  |
 //! | equations                                      | 1,900      | 2      |

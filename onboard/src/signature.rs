@@ -43,6 +43,9 @@ pub(crate) const PARTS: usize = 32;
 /// Length of a signature: shape, duty, samples in a period.
 pub const LENGTH: usize = PARTS + 2;
 
+/// Bins of a slice of a [`Signing`].
+const SLICE_BINS: usize = 32;
+
 /// Part of a part that samples must cover; less is the edge of a neighbour.
 const LEAST_COVER: f64 = 0.5;
 
@@ -124,17 +127,21 @@ impl Signature {
         window: &Window<BINS, EDGES>,
         cycle: &Cycle,
     ) -> Result<Self, SignatureError> {
-        validate(window, cycle)?;
-        let mut parts = [Part::default(); PARTS];
-        let part_s = cycle.period_s / PARTS as f64;
-        let since_s = window.start_s() - cycle.start_s;
-        for bin in window.bins().iter().filter(|bin| bin.count > 0) {
-            let count = f64::from(bin.count);
-            let middle = (since_s + bin.time_sum_s / count) / part_s;
-            let half = 0.5 * count * window.sample_s() / part_s;
-            share_out(&mut parts, middle - half, middle + half, mean(bin));
+        let mut signing = Signing::NONE;
+        loop {
+            if let Some(signature) = signing.advance(window, cycle) {
+                return signature;
+            }
         }
-        let means = means(&parts)?;
+    }
+
+    /// From the parts of a cycle in the window.
+    fn of_parts<const BINS: usize, const EDGES: usize>(
+        parts: &[Part; PARTS],
+        window: &Window<BINS, EDGES>,
+        cycle: &Cycle,
+    ) -> Result<Self, SignatureError> {
+        let means = means(parts)?;
 
         let centre = means.iter().sum::<f64>() / PARTS as f64;
         let lowest = means.iter().copied().fold(f64::INFINITY, f64::min);
@@ -156,6 +163,49 @@ impl Signature {
             centre: window.first_output() + centre,
             sign,
         })
+    }
+}
+
+/// A signature in slices of [`SLICE_BINS`] bins, each short enough for a control tick. [`Signature::new`] loops over them.
+#[derive(Clone, Debug)]
+pub struct Signing {
+    parts: [Part; PARTS],
+    next_bin: usize,
+}
+
+impl Signing {
+    /// A signature that has not begun, all zeros.
+    pub const NONE: Self = Self {
+        parts: [Part::NONE; PARTS],
+        next_bin: 0,
+    };
+
+    /// Does one slice; give it the same window and cycle each time. Returns the signature after the last slice, `None` before.
+    ///
+    /// # Errors
+    /// In the result: why there is no signature.
+    pub fn advance<const BINS: usize, const EDGES: usize>(
+        &mut self,
+        window: &Window<BINS, EDGES>,
+        cycle: &Cycle,
+    ) -> Option<Result<Signature, SignatureError>> {
+        if self.next_bin == 0
+            && let Err(error) = validate(window, cycle)
+        {
+            return Some(Err(error));
+        }
+        let part_s = cycle.period_s / PARTS as f64;
+        let since_s = window.start_s() - cycle.start_s;
+        let bins = window.bins();
+        let end = bins.len().min(self.next_bin + SLICE_BINS);
+        for bin in (bins[self.next_bin..end].iter()).filter(|bin| bin.count > 0) {
+            let count = f64::from(bin.count);
+            let middle = (since_s + bin.time_sum_s / count) / part_s;
+            let half = 0.5 * count * window.sample_s() / part_s;
+            share_out(&mut self.parts, middle - half, middle + half, mean(bin));
+        }
+        self.next_bin = end;
+        (end == bins.len()).then(|| Signature::of_parts(&self.parts, window, cycle))
     }
 }
 
@@ -190,12 +240,19 @@ fn mean(bin: &Bin) -> f64 {
 }
 
 /// Contribution of the window's bins to a part of the cycle.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy, Debug)]
 struct Part {
     /// Covered fraction of the part, 0 to 1.
     cover: f64,
     /// Sum of outputs times the fraction that each covers (output unit).
     sum: f64,
+}
+
+impl Part {
+    const NONE: Self = Self {
+        cover: 0.0,
+        sum: 0.0,
+    };
 }
 
 /// Adds an output over the interval `low` to `high`, in units of a part, to the parts that it overlaps.

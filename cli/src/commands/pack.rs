@@ -178,7 +178,9 @@ fn margin(arguments: &args::MarginPack) -> Result<ExitCode, Failure> {
     let old = bytes(&arguments.pack)?;
     let old = read(&arguments.pack, &old)?;
     let contents = PackContents::read(&old)
-        .and_then(|contents| contents.with_phase_margin(arguments.phase_margin))
+        .and_then(|contents| {
+            contents.with_phase_margin(arguments.phase_margin, 0.01 * arguments.extra_ise)
+        })
         .map_err(|error| failed(error.to_string()))?;
     let made = contents
         .to_bytes()

@@ -386,10 +386,24 @@ fn a_pack_of_another_margin_keeps_all_else() {
     done(&["margin", &out, "--phase-margin", "20", "-o", &back]);
     assert_eq!(std::fs::read(&back).unwrap(), DEFAULT);
 
-    // The pack of the autopilots.
-    let flown = concat!(env!("CARGO_MANIFEST_DIR"), "/../autopilots/margin_35.pack");
-    done(&["margin", "default", "--phase-margin", "35", "-o", &out]);
-    assert_eq!(std::fs::read(&out).unwrap(), std::fs::read(flown).unwrap());
+    // The packs of the autopilots.
+    let flown = concat!(env!("CARGO_MANIFEST_DIR"), "/../autopilots/");
+    for (margin, extra, name) in [("35", "0", "margin_35.pack"), ("25", "3", "margin_25.pack")] {
+        done(&[
+            "margin",
+            "default",
+            "--phase-margin",
+            margin,
+            "--extra-ise",
+            extra,
+            "-o",
+            &out,
+        ]);
+        assert_eq!(
+            std::fs::read(&out).unwrap(),
+            std::fs::read(format!("{flown}{name}")).unwrap()
+        );
+    }
 
     let nowhere = folder.name("nosuch/out.pack");
     run(&[

@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use onecycle_design::soiptd_pd::cost::ise;
 use onecycle_design::soiptd_pd::margins::margins;
-use onecycle_design::soiptd_pd::optimum::{pd, pd_at_phase_margin};
+use onecycle_design::soiptd_pd::optimum::{pd, pd_at_phase_margin, quieter};
 use onecycle_design::soiptd_pd::step_response::step_response;
 use onecycle_onboard::{Pd, Soiptd};
 use proptest::prelude::*;
@@ -18,6 +18,14 @@ fn config(seed: u64) -> Config {
         failure_persistence: None,
         ..Config::default()
     }
+}
+
+/// The paper's multirotors, with `K/T_body` of one: actuator lag 15 to 300 ms, body lag 0.2 to 6 s, dead time 0.5 to 100 ms.
+fn multirotors() -> impl Strategy<Value = Soiptd> {
+    let log = |from: f64, to: f64| decades(from.log10(), to.log10());
+    (log(0.015, 0.3), log(0.2, 6.0), log(0.0005, 0.1)).prop_map(|(lag_s, body_s, tau_s)| {
+        Soiptd::from_acceleration_gain(1.0, lag_s, 1.0 / body_s, tau_s).expect("all in range")
+    })
 }
 
 /// Ten to the power of a uniform number in this range.
@@ -138,6 +146,27 @@ proptest! {
 
         let same = Pd { kp: best.pd.kp / (alpha * alpha), kd: best.pd.kd / alpha };
         prop_assert!(close(ise(&slow, same).unwrap(), alpha * best.ise, 1e-10));
+    }
+
+    // Documented in `quieter` and in docs/guide/px4.md.
+    #[test]
+    fn two_percent_of_the_cost_save_a_tenth_of_the_derivative_gain(process in multirotors()) {
+        let best = pd_at_phase_margin(&process, 27_f64.to_radians()).unwrap();
+        let saved = 1.0 - quieter(&process, &best, 0.02).unwrap().pd.kd / best.pd.kd;
+        prop_assert!(saved > 0.10 && saved < 0.21, "{}", saved);
+    }
+
+    // Exactly the cost that is allowed, at the same margin, with less derivative gain.
+    #[test]
+    fn quieter_takes_the_cost_that_it_may(
+        process in processes(), margin in phase_margins(), excess in decades(-3.0, -1.0),
+    ) {
+        let best = pd_at_phase_margin(&process, margin).unwrap();
+        let quiet = quieter(&process, &best, excess).unwrap();
+        prop_assert!(close(quiet.ise, (1.0 + excess) * best.ise, 1e-9));
+        prop_assert!(close(quiet.margins.phase_margin_rad, margin, 1e-9));
+        prop_assert!(quiet.pd.kd.abs() < best.pd.kd.abs());
+        prop_assert_eq!(quieter(&process, &best, 0.0).unwrap(), best);
     }
 
     #[test]

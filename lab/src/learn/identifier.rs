@@ -277,7 +277,7 @@ impl IdentifierRecipe {
         let margin_rad = self.experiments.families[0].space.phase_margin_rad();
         Ok(PackContents {
             layers: layers(network, precision)?,
-            lead_table: LeadTableContents::for_phase_margin(margin_rad)?,
+            lead_table: LeadTableContents::for_phase_margin(margin_rad, 0.0)?,
             self_tests: learnt
                 .iter()
                 .take(SELF_TESTS)

@@ -26,7 +26,7 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use onecycle_design::soiptd_pd::optimum::{OptimumError, pd, pd_at_phase_margin};
+use onecycle_design::soiptd_pd::optimum::{OptimumError, pd, pd_at_phase_margin, quieter};
 use onecycle_onboard::gains::Nodes;
 
 /// Points along an axis: 81 nodes, 247 numbers. At 20 deg no cost is more than 0.05 % above the optimum.
@@ -58,11 +58,16 @@ pub enum LeadTableError {
     Optimum(#[from] OptimumError),
 }
 
-/// The numbers of the table of a phase margin, with this number of points along either axis.
+/// The numbers of the table of a phase margin, with this number of points along either axis. Its controllers cost the fraction
+/// `excess` more than the optimum and are as quiet as that allows ([`quieter`]).
 ///
 /// # Errors
 /// [`LeadTableError::Points`]; [`LeadTableError::Optimum`] for a margin outside `(0, pi/2)`.
-pub fn build(phase_margin_rad: f64, points: usize) -> Result<Vec<f32>, LeadTableError> {
+pub fn build(
+    phase_margin_rad: f64,
+    excess: f64,
+    points: usize,
+) -> Result<Vec<f32>, LeadTableError> {
     if !(POINTS_RANGE.0..=POINTS_RANGE.1).contains(&points) {
         return Err(LeadTableError::Points(points));
     }
@@ -81,6 +86,8 @@ pub fn build(phase_margin_rad: f64, points: usize) -> Result<Vec<f32>, LeadTable
             let process = process.ok_or(OptimumError::PhaseMargin(phase_margin_rad))?;
             let bound = pd_at_phase_margin(&process, margin_rad)?;
             let free = pd(&process, LEAST_FREE_PART * margin_rad)?;
+            let bound = quieter(&process, &bound, excess)?;
+            let free = quieter(&process, &free, excess)?;
             let angles = [bound.lead_rad, free.margins.phase_margin_rad, free.lead_rad];
             numbers.extend(angles.map(|angle_rad| angle_rad as f32));
         }

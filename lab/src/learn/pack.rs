@@ -81,12 +81,15 @@ impl LeadTableContents {
         })
     }
 
-    /// The table of this phase margin (rad, 0 to pi/2).
+    /// The table of this phase margin (rad, 0 to pi/2), whose controllers cost the fraction `excess` more than the optimum.
     ///
     /// # Errors
     /// [`LeadTableError`]: there is no table for this margin.
-    pub(super) fn for_phase_margin(phase_margin_rad: f64) -> Result<Self, LeadTableError> {
-        let numbers = lead_table::build(phase_margin_rad, lead_table::POINTS)?;
+    pub(super) fn for_phase_margin(
+        phase_margin_rad: f64,
+        excess: f64,
+    ) -> Result<Self, LeadTableError> {
+        let numbers = lead_table::build(phase_margin_rad, excess, lead_table::POINTS)?;
         let table = Self::of_numbers([lead_table::POINTS; 2], FIELDS, &numbers);
         Ok(table.unwrap_or_default())
     }
@@ -167,13 +170,17 @@ impl PackContents {
     }
 
     /// The same identifier with controllers of another phase margin (rad, 0 to pi/2): the table of leads is computed again,
-    /// nothing is trained.
+    /// nothing is trained. The controllers cost the fraction `excess` more than the optimum and are quieter for it.
     ///
     /// # Errors
     /// [`PackContentsError::Table`]: there is no table for this margin.
-    pub fn with_phase_margin(self, phase_margin_rad: f64) -> Result<Self, PackContentsError> {
+    pub fn with_phase_margin(
+        self,
+        phase_margin_rad: f64,
+        excess: f64,
+    ) -> Result<Self, PackContentsError> {
         Ok(Self {
-            lead_table: LeadTableContents::for_phase_margin(phase_margin_rad)?,
+            lead_table: LeadTableContents::for_phase_margin(phase_margin_rad, excess)?,
             domain: Domain {
                 phase_margin_rad: phase_margin_rad as f32,
                 ..self.domain

@@ -18,7 +18,7 @@ const PHASE_MARGIN_RAD: f64 = PI / 9.0;
 const EXCESS: f64 = 1e-3;
 
 fn numbers(phase_margin_rad: f64) -> Vec<f32> {
-    build(phase_margin_rad, POINTS).expect("the margin is in range")
+    build(phase_margin_rad, 0.0, POINTS).expect("the margin is in range")
 }
 
 fn close(a: f64, b: f64, tolerance: f64) -> bool {
@@ -172,7 +172,7 @@ fn other_margins_have_tables_as_good() {
         (60.0, POINTS),
         (80.0, POINTS),
     ] {
-        let numbers = build(margin_deg.to_radians(), points).unwrap();
+        let numbers = build(margin_deg.to_radians(), 0.0, points).unwrap();
         let table = LeadTable::from_floats(&numbers).unwrap();
         let processes = processes(3, 500);
         let (worst, _) = worst_and_mean(&table, Constraint::AtLeast, &processes);
@@ -290,6 +290,9 @@ fn outside_the_table_is_an_error() {
          the optimum instead"
     );
     for (margin_rad, points) in [(0.0, POINTS), (PI / 2.0, POINTS), (0.3, 3), (0.3, 101)] {
-        assert!(build(margin_rad, points).is_err(), "{margin_rad} {points}");
+        assert!(
+            build(margin_rad, 0.0, points).is_err(),
+            "{margin_rad} {points}"
+        );
     }
 }

@@ -6,10 +6,12 @@ use super::{
     CANDIDATES, Calibration, CandidateProcess, Classification, ClassifyError, CyclePosterior,
     Familiarity, OUTPUTS, process_of,
 };
+use crate::cycle::Cycle;
 use crate::fit_score::{Doubt, ScoredCycle, Statistic};
 use crate::pack::{Forward, Pack, VALUES};
 use crate::process::SoiptdError;
-use crate::signature::{PARTS, Signature};
+use crate::signature::{PARTS, Signature, SignatureError, Signing};
+use crate::window::Window;
 
 /// Nodes, in standard deviations, and weights of the Gauss-Hermite rule of five points (Abramowitz and Stegun,
 /// table 25.10, nodes times the square root of two, weights over that of pi).
@@ -43,14 +45,20 @@ pub struct Classifier {
 enum Stage {
     /// Not begun, or finished.
     Idle,
+    /// Signature of the cycle, before the classification begins.
+    Sign(Signing),
     /// A layer of the network.
     Network,
     /// Posterior from the outputs of the network.
     Posterior,
-    /// Processes along the longest axis of the posterior.
-    Candidates(CyclePosterior),
+    /// Longest axis of the posterior.
+    Axis(CyclePosterior),
+    /// Processes along it.
+    Candidates(CyclePosterior, [f64; VALUES]),
     /// Misfit score of its mean.
     Score(CyclePosterior, [CandidateProcess; CANDIDATES]),
+    /// The result is there; what follows it gets a slice of its own.
+    Done(Classification),
 }
 
 impl Default for Classifier {
@@ -72,6 +80,23 @@ impl Classifier {
             outputs: [0.0; OUTPUTS],
             statistic: Statistic::NONE,
             stage: Stage::Idle,
+        }
+    }
+
+    /// Lends its memory to the signature of the cycle that it is going to classify.
+    pub(crate) fn begin_signing(&mut self) {
+        self.stage = Stage::Sign(Signing::NONE);
+    }
+
+    /// One slice of that signature: see [`Signing::advance`].
+    pub(crate) fn sign<const BINS: usize, const EDGES: usize>(
+        &mut self,
+        window: &Window<BINS, EDGES>,
+        cycle: &Cycle,
+    ) -> Option<Result<Signature, SignatureError>> {
+        match &mut self.stage {
+            Stage::Sign(signing) => signing.advance(window, cycle),
+            _ => Some(Err(SignatureError::Period(f64::NAN))),
         }
     }
 
@@ -149,14 +174,21 @@ impl Classifier {
     /// A slice after the network.
     pub(super) fn read(&mut self) -> Option<Result<Classification, ClassifyError>> {
         match &mut self.stage {
-            Stage::Idle | Stage::Network => Some(Err(ClassifyError::Output(0, f32::NAN))),
+            Stage::Idle | Stage::Sign(_) | Stage::Network => {
+                Some(Err(ClassifyError::Output(0, f32::NAN)))
+            }
             Stage::Posterior => {
-                self.stage = Stage::Candidates(self.posterior());
+                self.stage = Stage::Axis(self.posterior());
                 None
             }
-            Stage::Candidates(posterior) => {
-                let posterior = *posterior;
-                match self.candidates(&posterior) {
+            Stage::Axis(posterior) => {
+                let axis = posterior.longest_axis(&self.calibration.scale);
+                self.stage = Stage::Candidates(*posterior, axis);
+                None
+            }
+            Stage::Candidates(posterior, axis) => {
+                let (posterior, axis) = (*posterior, *axis);
+                match self.candidates(&posterior, &axis) {
                     Ok(candidates) => {
                         self.statistic.begin(self.cycle(&posterior));
                         self.stage = Stage::Score(posterior, candidates);
@@ -169,7 +201,7 @@ impl Classifier {
                 let statistic = self.statistic.advance()?;
                 let (posterior, candidates) = (*posterior, *candidates);
                 let score = self.score(statistic);
-                Some(Ok(Classification {
+                self.stage = Stage::Done(Classification {
                     posterior,
                     candidates,
                     score,
@@ -178,8 +210,10 @@ impl Classifier {
                     } else {
                         Familiarity::Unknown
                     },
-                }))
+                });
+                None
             }
+            Stage::Done(classification) => Some(Ok(*classification)),
         }
     }
 
@@ -199,8 +233,8 @@ impl Classifier {
     fn candidates(
         &self,
         posterior: &CyclePosterior,
+        axis: &[f64; VALUES],
     ) -> Result<[CandidateProcess; CANDIDATES], SoiptdError> {
-        let axis = posterior.longest_axis(&self.calibration.scale);
         let at = |deviations: f64| -> [f64; VALUES] {
             core::array::from_fn(|k| posterior.mean[k] + deviations * axis[k])
         };

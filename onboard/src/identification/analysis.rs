@@ -12,7 +12,6 @@ use crate::judgement::{
 use crate::pack::Pack;
 use crate::process::Soiptd;
 use crate::refine::{PriorKnowledge, Refined, Refiner, ShapePrior};
-use crate::signature::Signature;
 
 /// Controller whose uncertainty is being computed: number of coordinates already followed.
 #[derive(Clone, Copy, Debug)]
@@ -86,6 +85,7 @@ impl<'a> Analysis<'a> {
             };
             if self.order.is_none_or(|known| known.number != order.number) {
                 self.order = Some(order);
+                bench.classifier.begin_signing();
                 self.stage = Stage::Sign;
             }
             if let Some(outcome) = self.advance(&order, (desk, bench)) {
@@ -120,7 +120,10 @@ impl<'a> Analysis<'a> {
     }
 
     fn sign(&mut self, (desk, bench): Parts<'_>, cycle: &Cycle) -> Result<(), Refusal> {
-        let signature = Signature::new(&desk.fine, cycle).map_err(|_| Refusal::NoSignature)?;
+        let Some(signature) = bench.classifier.sign(&desk.fine, cycle) else {
+            return Ok(());
+        };
+        let signature = signature.map_err(|_| Refusal::NoSignature)?;
         let noise_sigma = desk.fine.noise_sigma();
         bench
             .classifier

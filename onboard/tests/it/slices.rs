@@ -7,7 +7,7 @@ use onecycle_onboard::pack::Pack;
 use onecycle_onboard::refine::{
     PriorKnowledge, RefineError, Refined, Refiner, ShapePrior, refine, refine_with, residuals,
 };
-use onecycle_onboard::signature::Signature;
+use onecycle_onboard::signature::{Signature, Signing};
 use onecycle_onboard::window::Window;
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
 
@@ -164,12 +164,24 @@ fn residuals_are_those_of_the_refinement() {
     );
 }
 
-// One slice per layer, the posterior, the candidates, 15 harmonics 8 at a time, and twice: the response 3
-// harmonics at a time, the equations, and 7 rows of the factor in two.
+// 32 bins a slice: the last cycle has 125 to 128.
+#[test]
+fn a_signature_takes_four_slices() {
+    let (_, window, cycle) = last_cycle(&process(), 0.02);
+    let mut signing = Signing::NONE;
+    for slice in 1..=4 {
+        let found = signing.advance(&window, &cycle);
+        let expected = (slice == 4).then(|| Signature::new(&window, &cycle));
+        assert_eq!(found, expected, "{slice}, {} bins", window.bins().len());
+    }
+}
+
+// One slice per layer, the posterior, its axis, the candidates, 15 harmonics 8 at a time, twice the response 3
+// harmonics at a time, the equations, and 7 rows of the factor in two, and one for the result.
 #[test]
 fn a_classification_takes_as_many_slices_as_it_says() {
     let pack = Pack::embedded().unwrap();
-    let slices = pack.layers().count() + 1 + 1 + 2 + 2 * (5 + 1 + 2);
+    let slices = pack.layers().count() + 1 + 1 + 1 + 2 + 2 * (5 + 1 + 2) + 1;
     let mut classifier = Classifier::new();
     for noise in [0.0, 0.02] {
         let (_, window, cycle) = last_cycle(&process(), noise);

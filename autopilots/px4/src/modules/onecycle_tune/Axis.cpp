@@ -47,25 +47,25 @@ void Axis::push(hrt_abstime time, float value)
 	}
 }
 
-const char *Axis::notReady(bool wants_altitude) const
+Why Axis::notReady(bool wants_altitude) const
 {
 	if (!isArmed() || _land.landed || _land.maybe_landed) {
-		return "the vehicle is not flying: hover first";
+		return Why::Ground;
 	}
 
 	if (_status.failsafe) {
-		return "a failsafe is active";
+		return Why::Failsafe;
 	}
 
 	if (_attitude.timestamp == 0 || _rates.timestamp == 0) {
-		return "there is no attitude";
+		return Why::NoAttitude;
 	}
 
 	if (wants_altitude && !(_position.z_valid && _position.v_z_valid)) {
-		return "there is no height";
+		return Why::NoHeight;
 	}
 
-	return nullptr;
+	return Why::None;
 }
 
 void Axis::begin(int index, float most_stick)
@@ -95,33 +95,33 @@ int Axis::resets() const
 	return _index == ALTITUDE ? _position.vz_reset_counter : _attitude.quat_reset_counter;
 }
 
-const char *Axis::mustStop() const
+Why Axis::mustStop() const
 {
 	if (!isArmed()) {
-		return "disarmed";
+		return Why::Disarmed;
 	}
 
 	if (_status.failsafe || _status.nav_state != _nav_state) {
-		return "the flight mode changed, or a failsafe began";
+		return Why::Mode;
 	}
 
 	if (_failure.fd_motor || _failure.fd_imbalanced_prop) {
-		return "the failure detector reports a motor";
+		return Why::Motor;
 	}
 
 	if (resets() != _resets) {
-		return "the estimator was reset";
+		return Why::Reset;
 	}
 
 	if (_sticks.valid) {
 		const float turned = math::max(math::max(fabsf(_sticks.roll), fabsf(_sticks.pitch)), fabsf(_sticks.yaw));
 
 		if (math::max(turned, fabsf(_sticks.throttle - _throttle)) > _most_stick) {
-			return "a stick was moved";
+			return Why::Stick;
 		}
 	}
 
-	return nullptr;
+	return Why::None;
 }
 
 float Axis::angle() const

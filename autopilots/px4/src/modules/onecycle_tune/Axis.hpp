@@ -15,6 +15,7 @@
 #include <uORB/topics/vehicle_local_position.h>
 #include <uORB/topics/vehicle_status.h>
 
+#include "Notes.hpp"
 #include "onecycle.h"
 
 class Axis
@@ -29,14 +30,14 @@ public:
 	/** Takes the latest messages. */
 	void update();
 
-	/** Why no test can begin now, or null. */
-	const char *notReady(bool wants_altitude) const;
+	/** Why no test can begin now. */
+	Why notReady(bool wants_altitude) const;
 
 	/** Begins a test of this axis: angle or height count from here on. */
 	void begin(int index, float most_stick);
 
-	/** Why the test must end now, or null: something that the tuner's own guards do not see. */
-	const char *mustStop() const;
+	/** Why the test must end now: something that the tuner's own guards do not see. */
+	Why mustStop() const;
 
 	/** Angle (rad) or height (m) since the beginning, its rate, and the age of the older of the two. */
 	onecycle_measurement measure(hrt_abstime now);

@@ -32,10 +32,10 @@ public:
 	bool remember(int axis);
 
 	/**
-	 * The law found, whose output times `per_input` is PX4's, with no gain above its parameter's maximum. False if it has no
-	 * such form; `what` says so.
+	 * The law found, whose output times `per_input` is PX4's, with no gain above its parameter's maximum. False if its integral
+	 * does not fit into this form.
 	 */
-	bool convert(const onecycle_result &found, float per_input, Cascade &cascade, const char *&what) const;
+	bool convert(const onecycle_result &found, float per_input, Cascade &cascade) const;
 
 	/** Writes the gains and reads them back; after a failure the old ones are in force. Not for a realtime thread. */
 	bool write(const Cascade &cascade);

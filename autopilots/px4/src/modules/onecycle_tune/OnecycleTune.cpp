@@ -3,7 +3,6 @@
 #include <lib/geo/geo.h>
 #include <px4_platform_common/log.h>
 #include <px4_platform_common/tasks.h>
-#include <systemlib/mavlink_log.h>
 
 #include "onecycle_pack.h"
 
@@ -27,10 +26,19 @@ constexpr float MOST_CLIMB_RATE = 2.f;
 constexpr float INTEGRAL_PHASE = 0.035f;
 constexpr int WORK_STACK = 14000;
 constexpr hrt_abstime POLL = 100_ms;
+constexpr hrt_abstime STALLED = 500_ms;
 // A second-order Butterworth filter delays by sqrt(2) / (2 pi f).
 constexpr float FILTER_DELAY = 0.225f;
 enum Apply { REPORT, ASK, AT_ONCE };
-enum Style { MARGIN_35, PAPER };
+enum Style { BALANCED, PAPER, CALM };
+
+struct Pack {
+	const uint8_t *bytes;
+	size_t size;
+};
+
+// In the order of Style; the paper's is built in.
+const Pack PACKS[] {{BALANCED_PACK, sizeof(BALANCED_PACK)}, {nullptr, 0}, {CALM_PACK, sizeof(CALM_PACK)}};
 }
 
 OnecycleTune::OnecycleTune() : ModuleParams(nullptr), WorkItem(MODULE_NAME, px4::wq_configurations::rate_ctrl)
@@ -89,6 +97,7 @@ void OnecycleTune::Run()
 	}
 
 	_last = now;
+	_ticks.fetch_add(1);
 
 	const State state = _state.load();
 	float input = _index == Axis::ALTITUDE ? -thrust.xyz[2] : torque.xyz[_index];
@@ -122,9 +131,9 @@ void OnecycleTune::test(const onecycle_measurement &measurement, hrt_abstime now
 {
 	const State state = _state.load();
 	const bool is_over = onecycle_tuner_phase(&_tuner) == ONECYCLE_PHASE_ABORTED;
-	const char *why = _abort_wanted.load() ? "aborted by the operator" : _axis.mustStop();
+	const Why why = _abort_wanted.load() ? Why::Operator : _axis.mustStop();
 
-	if (why && !is_over) {
+	if (why != Why::None && !is_over) {
 		_why.store(why);
 		_is_outside.store(true);
 		onecycle_tuner_abort(&_tuner);
@@ -165,8 +174,8 @@ void OnecycleTune::test(const onecycle_measurement &measurement, hrt_abstime now
 	}
 
 	if (phase == ONECYCLE_PHASE_ABORTED && (state == State::Begin || state == State::Test || state == State::Asked)) {
-		if (!_why.load()) {
-			_why.store(onecycle_tuner_reason_text(&_tuner));
+		if (_why.load() == Why::None) {
+			_why.store(Why::Tuner);
 		}
 
 		_state.store(State::Found);
@@ -186,13 +195,13 @@ void OnecycleTune::watch(hrt_abstime now, float input)
 		_limited += (hrt_abstime)(1e6f * tickS());
 	}
 
-	const char *why = _axis.mustStop();
+	Why why = _axis.mustStop();
 
 	if (_limited > MOST_LIMITED * WATCHED) {
-		why = "the output was at its limit with the new gains";
+		why = Why::Limit;
 	}
 
-	if (why || now - _since > WATCHED) {
+	if (why != Why::None || now - _since > WATCHED) {
 		_why.store(why);
 		_state.store(State::Watched);
 	}
@@ -253,14 +262,37 @@ void OnecycleTune::poll()
 	}
 }
 
+bool OnecycleTune::isStalled()
+{
+	const int ticks = _ticks.load();
+
+	if (ticks != _ticks_seen || _state.load() == State::Idle) {
+		_ticks_seen = ticks;
+		_ticked_at = hrt_absolute_time();
+	}
+
+	return hrt_elapsed_time(&_ticked_at) > STALLED;
+}
+
 void OnecycleTune::attend()
 {
+	if (isStalled()) {
+		// Nothing else would notice it, because the tuner runs in that loop.
+		if (_gains[_index].is_written()) {
+			_gains[_index].restore();
+		}
+
+		_is_outside.store(true);
+		ended(Why::Stalled);
+		return;
+	}
+
 	switch (_state.load()) {
 	case State::Idle:
 		if (_accept_wanted.load()) {
 			_accept_wanted.store(false);
 			_is_kept = true;
-			mavlink_log_info(&_mavlink_log_pub, "onecycle: gains are kept");
+			_notes.kept();
 		}
 
 		if (_start_wanted.load()) {
@@ -276,7 +308,7 @@ void OnecycleTune::attend()
 
 	case State::Asked:
 		if (hrt_elapsed_time(&_asked_at) > MOST_ASKED) {
-			_why.store("nobody accepted the gains");
+			_why.store(Why::Unanswered);
 			found();
 		}
 
@@ -300,14 +332,14 @@ void OnecycleTune::begin()
 	// What was set just before the start counts.
 	updateParams();
 	_left = _param_oc_axes.get();
-	const char *why = _axis.notReady(_left & (1 << Axis::ALTITUDE));
+	Why why = _axis.notReady(_left & (1 << Axis::ALTITUDE));
 
-	if (!why && !(tickS() > 0.f)) {
-		why = "mc_rate_control was not started as vtol";
+	if (why == Why::None && !(tickS() > 0.f)) {
+		why = Why::NotVtol;
 	}
 
-	if (why) {
-		mavlink_log_critical(&_mavlink_log_pub, "onecycle: no test: %s", why);
+	if (why != Why::None) {
+		_notes.noTest(why);
 		return;
 	}
 
@@ -342,32 +374,29 @@ void OnecycleTune::nextAxis()
 
 void OnecycleTune::beginAxis()
 {
-	const char *name = Axis::name(_index);
+	_why.store(Why::None);
+	_is_outside.store(false);
 
 	if (!_gains[_index].remember(_index)) {
-		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: the firmware lacks one of its gains", name);
-		finish();
+		ended(Why::Lacks);
 		return;
 	}
 
-	_why.store(nullptr);
-	_is_outside.store(false);
-
 	if (!initTuner(_index)) {
-		finish();
+		ended(Why::Settings);
 		return;
 	}
 
 	if (_param_oc_record.get()) {
 		char path[64];
-		snprintf(path, sizeof(path), PX4_STORAGEDIR "/onecycle_%s.csv", name);
+		snprintf(path, sizeof(path), PX4_STORAGEDIR "/onecycle_%s.csv", Axis::name(_index));
 
 		if (!_recorder.open(path)) {
-			mavlink_log_critical(&_mavlink_log_pub, "onecycle: cannot write %s", path);
+			_notes.cannotRecord(path);
 		}
 	}
 
-	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: test begins, hands off", name);
+	_notes.begins(_index);
 	_since = 0;
 	_state.store(State::Begin);
 }
@@ -397,53 +426,53 @@ bool OnecycleTune::initTuner(int axis)
 	settings.limit_no_switch_s = 2.f;
 	settings.limit_stale_s = 0.05f;
 	settings.consent = _param_oc_apply.get() == AT_ONCE ? ONECYCLE_CONSENT_AUTOMATIC : ONECYCLE_CONSENT_ASK;
-	const bool is_paper = _param_oc_style.get() == PAPER;
-	const onecycle_status status = onecycle_tuner_init_with_pack(&_tuner, &settings, is_paper ? nullptr : MARGIN_35_PACK,
-				       is_paper ? 0 : sizeof(MARGIN_35_PACK));
+	const Pack &pack = PACKS[math::constrain((int)_param_oc_style.get(), (int)BALANCED, (int)CALM)];
+	const onecycle_status status = onecycle_tuner_init_with_pack(&_tuner, &settings, pack.bytes, pack.size);
 
 	if (status != ONECYCLE_STATUS_OK) {
-		mavlink_log_critical(&_mavlink_log_pub, "onecycle: settings refused, status %d of onecycle.h: check OC_* and limits", (int)status);
+		PX4_ERR("settings refused, status %d of onecycle.h", (int)status);
 	}
 
 	return status == ONECYCLE_STATUS_OK;
 }
 
+void OnecycleTune::ended(Why why)
+{
+	_notes.ended(_index, why, onecycle_tuner_reason(&_tuner), onecycle_tuner_reason_text(&_tuner));
+
+	// What ended this test from outside would end the next one too.
+	if (_is_outside.load()) {
+		_left = 0;
+	}
+
+	nextAxis();
+}
+
 // Gains were found, or the test ended without them.
 void OnecycleTune::found()
 {
-	const char *name = Axis::name(_index);
-	const char *why = _why.load();
+	const Why why = _why.load();
 
-	if (why) {
-		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
-
-		// What ended this test from outside would end the next one too.
-		if (_is_outside.load()) {
-			_left = 0;
-		}
-
-		nextAxis();
+	if (why != Why::None) {
+		ended(why);
 		return;
 	}
 
-	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: gain %.1f (%.0f %%), lag %.0f ms, dead time %.1f ms", name,
-			 _result.k_over_t_body, 100 * _result.k_over_t_body_deviation, 1e3 * _result.t_prop_s, 1e3 * _result.tau_s);
+	_notes.found(_index, _result);
 
-	if (!_gains[_index].convert(_result, perInput(), _cascade, why)) {
-		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
-		nextAxis();
+	if (!_gains[_index].convert(_result, perInput(), _cascade)) {
+		ended(Why::Form);
 		return;
 	}
 
-	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: proposes P %.2f, inner K %.2f P %.3f I %.3f D 0", name, (double)_cascade.outer_p,
-			 (double)_cascade.inner_k, (double)_cascade.inner_p, (double)_cascade.inner_i);
+	_notes.proposes(_index, _cascade);
 
 	if (_param_oc_apply.get() == REPORT) {
 		nextAxis();
 		return;
 	}
 
-	mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: set OC_ACCEPT to 1 to fly these gains", name);
+	_notes.waits(_index);
 	_asked_at = hrt_absolute_time();
 	_state.store(State::Asked);
 }
@@ -461,18 +490,13 @@ float OnecycleTune::perInput()
 
 void OnecycleTune::writeGains()
 {
-	const char *name = Axis::name(_index);
-	const char *why = nullptr;
-
-	if (!_gains[_index].convert(_result, perInput(), _cascade, why)) {
-		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
-		nextAxis();
+	if (!_gains[_index].convert(_result, perInput(), _cascade)) {
+		ended(Why::Form);
 		return;
 	}
 
 	if (!_gains[_index].write(_cascade)) {
-		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: a parameter could not be written; the old gains are in force", name);
-		nextAxis();
+		ended(Why::Write);
 		return;
 	}
 
@@ -483,19 +507,16 @@ void OnecycleTune::writeGains()
 // PX4 flew with the new gains.
 void OnecycleTune::conclude()
 {
-	const char *name = Axis::name(_index);
-	const char *why = _why.load();
+	const Why why = _why.load();
 
-	if (why) {
+	if (why != Why::None) {
 		_gains[_index].restore();
-		_left = 0;
-		mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: %s; the old gains are in force", name, why);
-
-	} else {
-		mavlink_log_info(&_mavlink_log_pub, "onecycle: %s: tuned, P %.2f, inner K %.2f P %.3f I %.3f D 0", name, (double)_cascade.outer_p,
-				 (double)_cascade.inner_k, (double)_cascade.inner_p, (double)_cascade.inner_i);
+		_is_outside.store(true);
+		ended(why);
+		return;
 	}
 
+	_notes.tuned(_index, _cascade);
 	nextAxis();
 }
 
@@ -503,7 +524,7 @@ void OnecycleTune::finish()
 {
 	_recorder.close();
 	_state.store(State::Idle);
-	mavlink_log_info(&_mavlink_log_pub, "onecycle: finished");
+	_notes.finished();
 }
 
 // Gains that were flown at once and not accepted do not outlive the flight.
@@ -511,9 +532,7 @@ void OnecycleTune::restoreAll()
 {
 	for (int axis = 0; axis < Axis::COUNT; axis++) {
 		if (_gains[axis].is_written() && !_is_kept) {
-			const bool is_restored = _gains[axis].restore();
-			mavlink_log_critical(&_mavlink_log_pub, "onecycle: %s: not accepted, %s", Axis::name(axis),
-					     is_restored ? "the old gains are in force" : "but the old gains could not be written");
+			_notes.restored(axis, _gains[axis].restore());
 		}
 	}
 }

@@ -25,6 +25,7 @@
 
 #include "Axis.hpp"
 #include "Gains.hpp"
+#include "Notes.hpp"
 #include "Recorder.hpp"
 
 class OnecycleTune : public ModuleBase<OnecycleTune>, public ModuleParams, public px4::WorkItem
@@ -60,6 +61,8 @@ private:
 	void work();
 	void poll();
 	void attend();
+	/** Whether the control loop stands still, as without a gyro. */
+	bool isStalled();
 	void begin();
 	void beginAxis();
 	bool initTuner(int axis);
@@ -67,6 +70,8 @@ private:
 	void leave();
 	void nextAxis();
 	void found();
+	/** The test of this axis ended: the old gains are in force. */
+	void ended(Why why);
 	/** PX4's input of the inner loop for a unit of the tuner's output. */
 	float perInput();
 	void writeGains();
@@ -75,13 +80,14 @@ private:
 	void restoreAll();
 
 	px4::atomic<State> _state{State::Idle};
-	px4::atomic<const char *> _why{nullptr};   // why the test ended early
+	px4::atomic<Why> _why{Why::None};          // why the test ended early
 	px4::atomic_bool _is_outside{false};       // ended by something that would end any test
 	px4::atomic_bool _start_wanted{false};
 	px4::atomic_bool _accept_wanted{false};
 	px4::atomic_bool _abort_wanted{false};
 	px4::atomic_bool _work_runs{false};
 	px4::atomic<int> _tick_ns{0};              // mean time between two set-points
+	px4::atomic<int> _ticks{0};
 
 	uORB::SubscriptionCallbackWorkItem _torque_sub{this, ORB_ID(vehicle_torque_setpoint_virtual_mc)};
 	uORB::Subscription _thrust_sub{ORB_ID(vehicle_thrust_setpoint_virtual_mc)};
@@ -101,11 +107,13 @@ private:
 	Gains _gains[Axis::COUNT];
 	Cascade _cascade{};
 	Recorder _recorder;
+	Notes _notes;
 	int _left{0};                              // axes left to tune, a bit each
 	bool _is_kept{false};
 	hrt_abstime _asked_at{0};
 	hrt_abstime _polled_at{0};
-	orb_advert_t _mavlink_log_pub{nullptr};
+	hrt_abstime _ticked_at{0};
+	int _ticks_seen{0};
 	px4_task_t _work_task{-1};
 
 	DEFINE_PARAMETERS(
