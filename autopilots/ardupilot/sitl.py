@@ -35,21 +35,21 @@ class FlightError(Exception):
 class Vehicle:
     """One simulated copter. Use as a context manager: the simulation ends with it."""
 
-    def __init__(self, ardupilot, folder, port=14650, speedup=5, parameters=None, lua=None):
+    def __init__(self, ardupilot, folder, port=14650, speedup=5, parameters=None, lua=()):
         self.folder = pathlib.Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.messages = []
         self.time_s = 0.0
         self.attitude = None
         self.position = None
+        self.roll = 1500
         self.throttle = 1000
+        self.is_armed = False
         self._said = 0
         defaults = self.folder / "extra.parm"
         wanted = {**PARAMETERS, **(parameters or {})}
-        if lua is not None:
-            scripts = self.folder / "scripts"
-            scripts.mkdir(exist_ok=True)
-            (scripts / pathlib.Path(lua).name).write_bytes(pathlib.Path(lua).read_bytes())
+        for script in lua:
+            self.give(script)
             wanted.update(SCR_ENABLE=1, SCR_HEAP_SIZE=400000, SCR_VM_I_COUNT=1000000)
         defaults.write_text("".join(f"{name} {value}\n" for name, value in wanted.items()))
         ardupilot = pathlib.Path(ardupilot)
@@ -100,6 +100,12 @@ class Vehicle:
             number = getattr(mavutil.mavlink, "MAVLINK_MSG_ID_" + stream)
             self.command(mavutil.mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / rate_hz)
 
+    def give(self, file, name=None):
+        """Copies a file into the vehicle's folder of scripts."""
+        scripts = self.folder / "scripts"
+        scripts.mkdir(exist_ok=True)
+        (scripts / (name or pathlib.Path(file).name)).write_bytes(pathlib.Path(file).read_bytes())
+
     # Messages and time
 
     def poll(self, timeout_s=1.0):
@@ -109,7 +115,7 @@ class Vehicle:
             self._said = now
             self.link.mav.heartbeat_send(6, 8, 0, 0, 0)
             self.link.mav.rc_channels_override_send(
-                self.link.target_system, 1, 1500, 1500, self.throttle, 1500, *[0] * 4)
+                self.link.target_system, 1, self.roll, 1500, self.throttle, 1500, *[0] * 4)
         message = self.link.recv_match(blocking=True, timeout=timeout_s)
         if message is None:
             if self.process.poll() is not None:
@@ -122,6 +128,8 @@ class Vehicle:
             self.attitude, self.time_s = message, 1e-3 * message.time_boot_ms
         elif kind == "LOCAL_POSITION_NED":
             self.position = message
+        elif kind == "HEARTBEAT" and message.get_srcComponent() == 1:
+            self.is_armed = bool(message.base_mode & mavutil.mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         return message
 
     def wait(self, condition, limit_s, what):
@@ -176,11 +184,15 @@ class Vehicle:
                     return message.param_value
         raise FlightError(f"the firmware has no parameter {name}")
 
+    def send(self, name, value):
+        """Writes a parameter without reading it back."""
+        self.link.mav.param_set_send(self.link.target_system, 1, name.encode(), value, 9)
+
     def set(self, name, value):
         """Writes a parameter and reads it back."""
         old = self.get(name)
         for _ in range(5):
-            self.link.mav.param_set_send(self.link.target_system, 1, name.encode(), value, 9)
+            self.send(name, value)
             if math.isclose(self.get(name), value, rel_tol=1e-5, abs_tol=1e-9):
                 return old
         raise FlightError(f"{name} does not take {value}")

@@ -31,6 +31,8 @@ static constexpr float RATE_P_MIN = 0.005f;
 static constexpr float RATE_P_MAX = 2.5f;
 // slices of the identification in one turn of the thread
 static constexpr uint16_t SLICES = 200;
+// the simulator's threads run in real time: there the loop does the work, so that a flight does not depend on the computer's load
+static constexpr uint16_t SLICES_IN_LOOP = CONFIG_HAL_BOARD == HAL_BOARD_SITL ? 25 : 0;
 
 // table of user settable parameters
 const AP_Param::GroupInfo AC_CustomControl_Onecycle::var_info[] = {
@@ -139,9 +141,10 @@ Vector3f AC_CustomControl_Onecycle::update()
     if (!_motors->armed()) {
         if (_stage == Stage::IN_FORCE) {
             save();
+        } else if (_stage == Stage::PROPOSED) {
+            GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: disarmed, not accepted: old gains in force");
         } else if (_stage != Stage::IDLE) {
             finish("disarmed");
-            restore();
         }
         _stage = Stage::IDLE;
         return output;
@@ -154,7 +157,11 @@ Vector3f AC_CustomControl_Onecycle::update()
         finish(reason);
         return output;
     }
-    _angle_rad += _ahrs->get_gyro_latest()[_axis] * _dt;
+    // the rate loop's own filter of the error is part of the process: yaw is tuned with it
+    AC_PID &pid = rate_pid(_axis);
+    const float gyro_rads = _ahrs->get_gyro_latest()[_axis];
+    _rate_rads += (is_positive(pid.filt_E_hz()) ? pid.get_filt_E_alpha(_dt) : 1.0f) * (gyro_rads - _rate_rads);
+    _angle_rad += _rate_rads * _dt;
     output[_axis] = test(main_command(_axis));
     return output;
 }
@@ -182,7 +189,9 @@ bool AC_CustomControl_Onecycle::is_ready(uint8_t axis_mask)
         problem = "not flying";
     } else if (!is_zero(float(rate_pid(0).ff())) || !is_zero(float(rate_pid(1).ff())) || !is_zero(float(rate_pid(2).ff()))) {
         problem = "the rate loop has feed-forward (FF)";
-    } else if (!_has_thread && !start_thread()) {
+    } else if (!is_positive(_amplitude_rp) || !is_positive(_amplitude_yaw)) {
+        problem = "CC3_AMP_RP and CC3_AMP_Y must be positive";
+    } else if (SLICES_IN_LOOP == 0 && !_has_thread && !start_thread()) {
         problem = "no memory for the thread";
     }
     if (problem != nullptr) {
@@ -216,7 +225,9 @@ void AC_CustomControl_Onecycle::begin_axis()
     _settled_from_ms = AP_HAL::millis();
     _limited = 0;
     _angle_rad = 0;
+    _rate_rads = 0;
     _attitude_rad = {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
+    _resets = estimator_resets();
     if (!initialise_tuner()) {
         _stage = Stage::IDLE;
         return;
@@ -229,7 +240,7 @@ bool AC_CustomControl_Onecycle::initialise_tuner()
 {
     onecycle_settings settings = onecycle_settings_default(amplitude(), _dt);
     settings.noise_sigma = NOISE_RAD;
-    settings.slices = 0;
+    settings.slices = SLICES_IN_LOOP;
     settings.bias_filter_s = MEAN_TIME_S;
     settings.integral_phase_rad = INTEGRAL_PHASE_RAD;
     settings.limit_excursion = radians(_angle_max_deg);
@@ -258,8 +269,7 @@ float AC_CustomControl_Onecycle::test(float command)
         _stage = Stage::TEST;
         onecycle_tuner_start(&_tuner);
     }
-    const float rate_rads = _ahrs->get_gyro_latest()[_axis];
-    const onecycle_measurement measurement {_angle_rad, rate_rads, 0.0f, true};
+    const onecycle_measurement measurement {_angle_rad, _rate_rads, 0.0f, true};
     onecycle_tuner_beside(&_tuner, command);
     const float output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _angle_rad);
     const bool was_in_charge = _in_charge != 0;
@@ -319,6 +329,9 @@ const char *AC_CustomControl_Onecycle::reason_to_stop()
     if (AP::vehicle()->get_mode() != _mode) {
         return "flight mode changed";
     }
+    if (estimator_resets() != _resets) {
+        return "the estimator was reset";
+    }
     const Vector3f attitude_rad {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
     if (fabsf(wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis])) > 1.5f * radians(_angle_max_deg)) {
         return "attitude too far from the start";
@@ -375,7 +388,6 @@ bool AC_CustomControl_Onecycle::propose()
     const float root = sqrtf(MAX(0.0f, sq(result.kp) - 4.0 * result.ki * result.kd));
     gains.angle_p = (result.kp + root) / (2.0 * result.kd);
     gains.rate_i = result.ki / gains.angle_p;
-    gains.filter_error_hz = 0.0f;
     gains.filter_target_hz = 0.0f;
     const bool is_within = gains.angle_p >= ANGLE_P_MIN && gains.angle_p <= ANGLE_P_MAX && gains.rate_p >= RATE_P_MIN && gains.rate_p <= RATE_P_MAX;
     AP::logger().Write("OCG", "TimeUS,Ax,K,Tp,Tau,Kp,Ki,Kd,PM,AngP,Proven", "QBfffffffff",
@@ -428,7 +440,6 @@ void AC_CustomControl_Onecycle::save()
         pid.kI().save();
         pid.kD().save();
         pid.filt_T_hz().save();
-        pid.filt_E_hz().save();
         _axes[axis].has_proposal = false;
     }
     GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: gains saved");
@@ -437,7 +448,7 @@ void AC_CustomControl_Onecycle::save()
 AC_CustomControl_Onecycle::Gains AC_CustomControl_Onecycle::get_gains(uint8_t axis)
 {
     AC_PID &pid = rate_pid(axis);
-    return {angle_p(axis).kP(), pid.kP(), pid.kI(), pid.kD(), pid.filt_T_hz(), pid.filt_E_hz()};
+    return {angle_p(axis).kP(), pid.kP(), pid.kI(), pid.kD(), pid.filt_T_hz()};
 }
 
 void AC_CustomControl_Onecycle::set_gains(uint8_t axis, const Gains &gains)
@@ -448,12 +459,18 @@ void AC_CustomControl_Onecycle::set_gains(uint8_t axis, const Gains &gains)
     pid.kI().set(gains.rate_i);
     pid.kD().set(gains.rate_d);
     pid.filt_T_hz().set(gains.filter_target_hz);
-    pid.filt_E_hz().set(gains.filter_error_hz);
 }
 
 float AC_CustomControl_Onecycle::main_command(uint8_t axis) const
 {
     return axis == 0 ? _motors->get_roll() : axis == 1 ? _motors->get_pitch() : _motors->get_yaw();
+}
+
+// changes with each reset of the attitude: another lane, or a jump of the heading
+uint32_t AC_CustomControl_Onecycle::estimator_resets() const
+{
+    float jump_rad;
+    return AP::ahrs().getLastYawResetAngle(jump_rad) + uint32_t(AP::ahrs().get_primary_core_index());
 }
 
 AC_PID &AC_CustomControl_Onecycle::rate_pid(uint8_t axis)
@@ -510,9 +527,11 @@ void AC_CustomControl_Onecycle::log_tick(float command, float output) const
     // @Field: U: motor input in force
     // @Field: Y: integral of the filtered gyro
     // @Field: R: filtered gyro
-    AP::logger().WriteStreaming("OCT", "TimeUS,Ax,Ph,Cmd,U,Y,R", "QBBffff",
+    // @Field: E: estimated angle less that of the start
+    const Vector3f attitude_rad {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
+    AP::logger().WriteStreaming("OCT", "TimeUS,Ax,Ph,Cmd,U,Y,R,E", "QBBfffff",
                                 AP_HAL::micros64(), _axis, uint8_t(onecycle_tuner_phase(&_tuner)),
-                                command, output, _angle_rad, _ahrs->get_gyro_latest()[_axis]);
+                                command, output, _angle_rad, _rate_rads, wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis]));
 }
 
 #endif  // AP_CUSTOMCONTROL_ONECYCLE_ENABLED

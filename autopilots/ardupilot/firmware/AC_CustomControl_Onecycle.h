@@ -57,7 +57,6 @@ private:
         float rate_i;
         float rate_d;
         float filter_target_hz;
-        float filter_error_hz;
     };
 
     struct Axis {
@@ -90,6 +89,7 @@ private:
 
     // access to one axis
     float main_command(uint8_t axis) const;
+    uint32_t estimator_resets() const;
     void hand_back();
     AC_PID &rate_pid(uint8_t axis);
     AC_P &angle_p(uint8_t axis);
@@ -120,7 +120,9 @@ private:
     uint8_t _mode;              // flight mode at the start
     uint32_t _settled_from_ms;
     uint16_t _limited;          // ticks of the relay with saturated motors
-    float _angle_rad;           // integral of the filtered gyro: the rate loop sees this signal
+    float _rate_rads;           // gyro as the rate loop sees it
+    float _angle_rad;           // its integral
+    uint32_t _resets;           // of the estimator, at the start
     Vector3f _attitude_rad;     // attitude at the start
     Axis _axes[NUM_AXES];
 
