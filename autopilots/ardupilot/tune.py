@@ -91,19 +91,19 @@ METHODS = {"onecycle": by_onecycle, "autotune": by_autotune, "quiktune": by_quik
 
 
 def settings(method, axes, ardupilot):
-    """Parameters at the start and the Lua scripts of a method."""
+    """Parameters at the start, Lua scripts of a method, and parameters in the air: those of a script are not there before."""
     if method == "onecycle":
-        return {"CC_TYPE": 3, "CC_AXIS_MASK": mask(axes)}, []
+        return {"CC_TYPE": 3, "CC_AXIS_MASK": mask(axes)}, [], {}
     if method == "autotune":
-        return {"AUTOTUNE_AXES": mask(axes), "AUTOTUNE_AGGR": 0.1}, []
+        return {"AUTOTUNE_AXES": mask(axes), "AUTOTUNE_AGGR": 0.1}, [], {}
     script = pathlib.Path(ardupilot) / "libraries/AP_Scripting/applets/VTOL-quicktune.lua"
-    return {"QUIK_ENABLE": 1, "QUIK_AXES": mask(axes), "QUIK_RC_FUNC": SCRIPTING_1}, [script]
+    return {}, [script], {"QUIK_ENABLE": 1, "QUIK_AXES": mask(axes), "QUIK_RC_FUNC": SCRIPTING_1}
 
 
 def tune(folder, wait_s, options):
     """One flight; returns the time (s) of each axis tuned, and writes the changed parameters of these axes into a file."""
-    parameters, scripts = settings(options.method, options.axes, options.ardupilot)
-    changes = {name: float(value) for name, value in (change.split("=") for change in options.set)}
+    parameters, scripts, changes = settings(options.method, options.axes, options.ardupilot)
+    changes |= {name: float(value) for name, value in (change.split("=") for change in options.set)}
     with Vehicle(options.ardupilot, folder, options.port, options.speedup, parameters=parameters, lua=scripts) as vehicle:
         vehicle.take_off(20.0)
         for name, value in changes.items():

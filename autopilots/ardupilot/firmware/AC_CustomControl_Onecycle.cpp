@@ -24,6 +24,13 @@ static constexpr float NOISE_RAD = 0.0002f;
 static constexpr float INTEGRAL_PHASE_RAD = 0.035f;
 // ticks of a test at a limit of the motors, above which the relay is too large
 static constexpr uint16_t LIMITED_TICKS = 20;
+// time constant with which the gyro's clock follows the loop's
+static constexpr float CLOCK_TIME_S = 1.0f;
+// least delay of the angle, beyond the jitter of the gyro's samples
+static constexpr float LEAST_DELAY_TICKS = 2.0f;
+// uncertainty of the angle's time, either way, and time constant of the mean rate for it
+static constexpr float DITHER_TICKS = 0.25f;
+static constexpr float RATE_TIME_S = 0.2f;
 // gains outside of these bounds are not used
 static constexpr float ANGLE_P_MIN = 1.0f;
 static constexpr float ANGLE_P_MAX = 60.0f;
@@ -41,14 +48,14 @@ const AP_Param::GroupInfo AC_CustomControl_Onecycle::var_info[] = {
     // @Description: Half the jump of the relay on the motors' roll and pitch input
     // @Range: 0.01 0.3
     // @User: Standard
-    AP_GROUPINFO("AMP_RP", 1, AC_CustomControl_Onecycle, _amplitude_rp, 0.05f),
+    AP_GROUPINFO("AMP_RP", 1, AC_CustomControl_Onecycle, _amplitude_rp, 0.15f),
 
     // @Param: AMP_Y
     // @DisplayName: Relay amplitude of yaw
     // @Description: Half the jump of the relay on the motors' yaw input
     // @Range: 0.01 0.3
     // @User: Standard
-    AP_GROUPINFO("AMP_Y", 2, AC_CustomControl_Onecycle, _amplitude_yaw, 0.1f),
+    AP_GROUPINFO("AMP_Y", 2, AC_CustomControl_Onecycle, _amplitude_yaw, 0.2f),
 
     // @Param: ANG_MAX
     // @DisplayName: Largest angle of the test
@@ -157,11 +164,7 @@ Vector3f AC_CustomControl_Onecycle::update()
         finish(reason);
         return output;
     }
-    // the rate loop's own filter of the error is part of the process: yaw is tuned with it
-    AC_PID &pid = rate_pid(_axis);
-    const float gyro_rads = _ahrs->get_gyro_latest()[_axis];
-    _rate_rads += (is_positive(pid.filt_E_hz()) ? pid.get_filt_E_alpha(_dt) : 1.0f) * (gyro_rads - _rate_rads);
-    _angle_rad += _rate_rads * _dt;
+    measure();
     output[_axis] = test(main_command(_axis));
     return output;
 }
@@ -224,8 +227,11 @@ void AC_CustomControl_Onecycle::begin_axis()
 {
     _settled_from_ms = AP_HAL::millis();
     _limited = 0;
+    memset(_samples, 0, sizeof(_samples));
+    _started_us = AP_HAL::micros64();
     _angle_rad = 0;
     _rate_rads = 0;
+    _rate_square = 0;
     _attitude_rad = {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
     _resets = estimator_resets();
     if (!initialise_tuner()) {
@@ -262,6 +268,54 @@ bool AC_CustomControl_Onecycle::initialise_tuner()
     return true;
 }
 
+// Angle and rate as the rate loop sees them. Integrated from the filtered gyro, the angle would have an error that is neither white
+// nor a random walk. So the gyro is integrated before its filter, and the angle delayed by as much as the filter delays the rate.
+// The samples in a tick are not always as many: the angle is interpolated at their time.
+void AC_CustomControl_Onecycle::measure()
+{
+    const float now_s = (AP_HAL::micros64() - _started_us) * 1.0e-6f;
+    Sample next = _samples[_newest];
+    Vector3f turn_rad;
+    float interval_s;
+    if (AP::ins().get_delta_angle(turn_rad, interval_s)) {
+        next.angle_rad += turn_rad[_axis] + AP::ahrs().get_gyro_drift()[_axis] * interval_s;
+        next.time_s += interval_s;
+    }
+    // the clock of the gyro may run a little slow
+    next.time_s += _dt / CLOCK_TIME_S * (now_s - next.time_s);
+    _newest = (_newest + 1) % NUM_SAMPLES;
+    _samples[_newest] = next;
+
+    // a Butterworth filter of second order delays slow signals by sqrt(2) over its corner
+    const float corner_hz = AP::ins().get_gyro_filter_hz();
+    const float delay_s = is_positive(corner_hz) ? M_SQRT2 / (M_2PI * corner_hz) : 0.0f;
+    const float delayed_rad = angle_at(now_s - constrain_float(delay_s, LEAST_DELAY_TICKS * _dt, (NUM_SAMPLES - 4) * _dt));
+
+    // the rate loop's own filter of the error is part of the process: yaw is tuned with it
+    AC_PID &pid = rate_pid(_axis);
+    const float share = is_positive(pid.filt_E_hz()) ? pid.get_filt_E_alpha(_dt) : 1.0f;
+    _angle_rad += share * (delayed_rad - _angle_rad);
+    _rate_rads += share * (_ahrs->get_gyro_latest()[_axis] - _rate_rads);
+
+    // The relay switches at ticks, so that no two cycles are alike, by more than the noise of the gyro. The pack takes a cycle as
+    // periodic within its noise: the value is as uncertain as its time.
+    _rate_square += _dt / RATE_TIME_S * (sq(_rate_rads) - _rate_square);
+    _value_rad = _angle_rad + DITHER_TICKS * _dt * sqrtf(_rate_square) * rand_float();
+}
+
+float AC_CustomControl_Onecycle::angle_at(float time_s) const
+{
+    Sample after = _samples[_newest];
+    for (uint8_t back = 1; back < NUM_SAMPLES; back++) {
+        const Sample &before = _samples[(_newest + NUM_SAMPLES - back) % NUM_SAMPLES];
+        if (before.time_s <= time_s && before.time_s < after.time_s) {
+            return before.angle_rad + (time_s - before.time_s) / (after.time_s - before.time_s) * (after.angle_rad - before.angle_rad);
+        }
+        after = before;
+    }
+    return after.angle_rad;
+}
+
 // one tick of the test; returns the motor input of the axis
 float AC_CustomControl_Onecycle::test(float command)
 {
@@ -269,9 +323,9 @@ float AC_CustomControl_Onecycle::test(float command)
         _stage = Stage::TEST;
         onecycle_tuner_start(&_tuner);
     }
-    const onecycle_measurement measurement {_angle_rad, _rate_rads, 0.0f, true};
+    const onecycle_measurement measurement {_value_rad, _rate_rads, 0.0f, true};
     onecycle_tuner_beside(&_tuner, command);
-    const float output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _angle_rad);
+    const float output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _value_rad);
     const bool was_in_charge = _in_charge != 0;
     _in_charge = onecycle_tuner_is_in_charge(&_tuner) ? 1U << _axis : 0;
     const onecycle_phase phase = onecycle_tuner_phase(&_tuner);
@@ -293,7 +347,7 @@ bool AC_CustomControl_Onecycle::is_finished(enum onecycle_phase phase)
     switch (phase) {
     case ONECYCLE_PHASE_ABORTED:
         if (onecycle_tuner_reason(&_tuner) == ONECYCLE_REASON_NO_OSCILLATION) {
-            finish("no oscillation: relay too small or axis reversed");
+            finish("no oscillation: relay too small");
         } else {
             finish(onecycle_tuner_reason_text(&_tuner));
         }
@@ -525,13 +579,13 @@ void AC_CustomControl_Onecycle::log_tick(float command, float output) const
     // @Field: Ph: phase of the tuner
     // @Field: Cmd: motor input of the main controller
     // @Field: U: motor input in force
-    // @Field: Y: integral of the filtered gyro
-    // @Field: R: filtered gyro
+    // @Field: Y: angle of the tuner, delayed
+    // @Field: R: rate of the tuner
     // @Field: E: estimated angle less that of the start
     const Vector3f attitude_rad {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
     AP::logger().WriteStreaming("OCT", "TimeUS,Ax,Ph,Cmd,U,Y,R,E", "QBBfffff",
                                 AP_HAL::micros64(), _axis, uint8_t(onecycle_tuner_phase(&_tuner)),
-                                command, output, _angle_rad, _rate_rads, wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis]));
+                                command, output, _value_rad, _rate_rads, wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis]));
 }
 
 #endif  // AP_CUSTOMCONTROL_ONECYCLE_ENABLED

@@ -7,7 +7,7 @@
 --
 -- The relay switches at 0.73 of the last peak, before zero (e: height of the start less a filtered height). OCA_LAG is the time
 -- constant of that filter: a longer one makes the oscillation slower and larger. It is not part of what is recorded.
--- Columns: time (s), throttle, height (m). The height is the integral of the estimated climb rate, because the barometer pulls
+-- Columns: time (s), input: throttle, output: height (m). The height is the integral of the estimated climb rate, because the barometer pulls
 -- the estimated height about.
 
 local GUIDED, LOITER = 4, 5
@@ -16,8 +16,10 @@ local WARNING, NOTICE = 4, 5
 local PERIOD_MS = 5
 local BETA = -0.73
 local SETTLE_S = 2.0
-local LEAST_PEAK_M = 0.01
+local KICK_M = 0.01           -- the relay starts when the height has moved by this
+local LEAST_PEAK_M = 0.002
 local NO_SWITCH_S = 2.0
+local LEAST_TICK_S = 0.002
 local LATE_S = 0.1            -- a tick that is later ends the test
 local STICK_MAX = 0.1
 local TILT_MAX_RAD = math.rad(20)
@@ -41,7 +43,7 @@ local test = nil              -- the test that runs
 local last_position = nil
 
 local function say(severity, ...)
-   gcs:send_text(severity, "onecycle: altitude: " .. string.format(...))
+   gcs:send_text(severity, "onecycle: altitude " .. string.format(...))
 end
 
 local function now_s()
@@ -87,7 +89,7 @@ end
 local function begin()
    local problem = not_ready()
    if problem ~= nil then
-      say(WARNING, "%s; no test", problem)
+      say(WARNING, "refused: %s", problem)
       return
    end
    local height, climb = motion()
@@ -95,10 +97,10 @@ local function begin()
       began_s = now_s(), last_s = now_s(), height = height, climb = climb, sticks = sticks(), place = ahrs:get_location(),
       yaw = ahrs:get_yaw_rad(), sum = 0, count = 0, y = 0, filtered = 0, rows = {},
    }
-   say(NOTICE, "test")
+   say(NOTICE, "test begins")
 end
 
--- The relay begins: about the mean throttle, as soon as the height has moved by LEAST_PEAK_M.
+-- The relay begins: about the mean throttle, as soon as the height has moved by KICK_M.
 local function begin_relay()
    test.offset = test.sum / test.count
    test.timeout = param:get("GUID_TIMEOUT")
@@ -114,7 +116,7 @@ local function relay(now, dt)
    test.filtered = test.filtered + dt / (dt + lag:get()) * (test.y - test.filtered)
    test.cycle_sum = test.cycle_sum + test.sign * dt
    if test.peak == nil then
-      if math.abs(test.filtered) < LEAST_PEAK_M then
+      if math.abs(test.filtered) < KICK_M then
          return test.offset + h * test.sign
       end
       test.sign = test.filtered > 0 and -1 or 1
@@ -144,11 +146,11 @@ local function reason_to_stop(now, dt, height, forward, right)
    if not arming:is_armed() then
       return "disarmed"
    elseif vehicle:get_mode() ~= GUIDED then
-      return "flight mode changed"
+      return "mode changed"
    elseif height == nil then
-      return "estimate of height lost"
+      return "no estimate"
    elseif math.abs(height - test.height) > height_max:get() then
-      return "height too far from the start"
+      return "height out of OCA_H_MAX"
    elseif math.max(math.abs(forward), math.abs(right)) > SPEED_MAX_MS then
       return "too fast sideways"
    elseif math.max(math.abs(ahrs:get_roll_rad()), math.abs(ahrs:get_pitch_rad())) > TILT_MAX_RAD then
@@ -156,7 +158,7 @@ local function reason_to_stop(now, dt, height, forward, right)
    elseif dt > LATE_S then
       return string.format("script late by %.0f ms", 1000 * dt)
    elseif test.offset ~= nil and now - test.switched_s > NO_SWITCH_S then
-      return "no oscillation: OCA_AMP too small"
+      return "OCA_AMP too small"
    end
    for i, value in ipairs(sticks()) do
       if math.abs(value - test.sticks[i]) > STICK_MAX then
@@ -176,7 +178,7 @@ local function write()
          if file == nil then
             return nil
          end
-         file:write("time_s,throttle,height_m\n")
+         file:write("time_s,input,output\n")
          for _, row in ipairs(test.rows) do
             file:write(row)
          end
@@ -198,11 +200,11 @@ local function finish(reason)
    elseif vehicle:get_mode() == GUIDED then
       vehicle:set_target_location(test.place)
    end
+   local name = #test.rows > 0 and write() or "no file"
    if reason ~= nil then
-      say(WARNING, "%s; test ended", reason)
+      say(WARNING, "stopped: %s", reason)
    else
-      local name = write()
-      say(name and NOTICE or WARNING, "%s", name and string.format("%d switches, %s", test.switches, name) or "no file written")
+      say(NOTICE, "done: %s", name)
    end
    test = nil
 end
@@ -221,6 +223,9 @@ end
 local function tick()
    local now = now_s()
    local dt = now - test.last_s
+   if dt < LEAST_TICK_S then
+      return
+   end
    local height, climb, forward, right = motion()
    local reason = reason_to_stop(now, dt, height, forward, right)
    if reason ~= nil then
@@ -239,7 +244,7 @@ local function tick()
    local throttle = relay(now, dt)
    local roll, pitch, yaw = rates(forward, right)
    if not vehicle:set_target_rate_and_throttle(roll, pitch, yaw, throttle) then
-      finish("Guided takes no throttle")
+      finish("throttle refused")
       return
    end
    test.rows[#test.rows + 1] = string.format("%.4f,%.4f,%.5f\n", now - test.relay_s, throttle, test.y)
@@ -267,7 +272,7 @@ end
 local function protected()
    local is_well, problem = pcall(update)
    if not is_well then
-      say(WARNING, "%s", problem)
+      say(WARNING, "error: %s", problem)
       if test ~= nil then
          pcall(finish, "error in the script")
          test = nil
