@@ -20,7 +20,7 @@ GAINS = [*names(["roll", "pitch", "yaw"]), "PSC_ACCZ_P", "PSC_ACCZ_I", "PSC_VELZ
 GOOD = "ATC_RAT_RLL_P,0.2\nATC_RAT_RLL_I,0.2\nPSC_VELZ_P,6\n"
 
 
-def in_test(vehicle, delay_s=0.5):
+def in_test(vehicle, delay_s=0.3):
     """Begins the test of roll and waits until the relay has run for some time."""
     vehicle.switch(CUSTOM_CONTROLLER, MIDDLE)
     vehicle.wait(lambda: vehicle.said("test of"), 10, "test")
@@ -30,6 +30,7 @@ def in_test(vehicle, delay_s=0.5):
 def ended(vehicle, limit_s=40):
     """Waits for the end of a test, with gains or without."""
     vehicle.wait(lambda: vehicle.said("switch high") or vehicle.said("old gains") or vehicle.said("try again"), limit_s, "end of the test")
+    vehicle.move_stick(1500)
     vehicle.sleep(2.0)
 
 
@@ -46,9 +47,7 @@ def switched_off(vehicle):
 
 def stick(vehicle):
     in_test(vehicle)
-    vehicle.roll = 1700
-    vehicle.sleep(1.0)
-    vehicle.roll = 1500
+    vehicle.move_stick(1700)
     ended(vehicle)
 
 
@@ -59,7 +58,7 @@ def mode(vehicle):
 
 
 def whole(vehicle):
-    in_test(vehicle, 0.0)
+    vehicle.switch(CUSTOM_CONTROLLER, MIDDLE)
     ended(vehicle)
 
 
@@ -77,7 +76,12 @@ def reversed_axis(vehicle):
 
 
 def estimator(vehicle):
-    in_test(vehicle)
+    """The heading is reset to the one that follows from the motion, which must be known: so some motion before the test."""
+    north_m, east_m = vehicle.position.x, vehicle.position.y
+    for away_m in (20.0, 0.0):
+        vehicle.go(north_m + away_m, east_m, 20.0)
+        vehicle.sleep(8.0)
+    in_test(vehicle, 0.0)
     vehicle.switch(EKF_YAW_RESET, HIGH)
     ended(vehicle)
 
@@ -131,16 +135,13 @@ def altitude(what):
         vehicle.switch(ALTITUDE, HIGH)
         vehicle.sleep(4.0)
         what(vehicle)
-        vehicle.wait(lambda: vehicle.said("test ended") or vehicle.said("no test"), 40, "end of the test")
+        vehicle.wait(lambda: any(vehicle.said("altitude " + word) for word in ("stopped", "refused", "done")), 40, "end of the test")
+        vehicle.move_stick(1500)
         vehicle.sleep(2.0)
 
     return case
 
 
-def move_stick(vehicle):
-    vehicle.roll = 1700
-    vehicle.sleep(0.5)
-    vehicle.roll = 1500
 
 
 # Name: what happens, its settings, words of the message, whether it still flies at the end.
@@ -155,7 +156,7 @@ CASES = {
     "large": (whole, ROLL | {"CC3_AMP_RP": 0.9}, "onecycle: roll:", True),
     "estimator": (estimator, ROLL, "the estimator was reset", True),
     "thrust": (simulated("SIM_ENGINE_FAIL", 1), ROLL | {"SIM_ENGINE_MUL": 0.75}, "onecycle: roll:", True),
-    "gyro": (simulated("SIM_GYR_FAIL_MSK", 1), ROLL, "onecycle: roll:", True),
+    "gyro": (simulated("SIM_GYR_FAIL_MSK", 1), ROLL, "roll angle P", True),  # the second gyro takes over
     "unanswered": (not_accepted, ROLL, "not accepted", False),
     "dropped": (dropped, ROLL, "old gains restored", True),
     "file-unknown": (with_file(GOOD + "ATC_RAT_RLL_X,0.1\n", MIDDLE), {}, "no parameter ATC_RAT_RLL_X", True),
@@ -163,11 +164,11 @@ CASES = {
     "file-broken": (with_file(GOOD + "ATC_RAT_PIT_P;0.1\n", MIDDLE), {}, "not NAME,VALUE", True),
     "file-dropped": (with_file(GOOD, MIDDLE, LOW), {}, "old values", True),
     "file-not-saved": (not_saved, {}, "disarmed before they were saved", False),
-    "altitude-stick": (altitude(move_stick), {}, "stick moved", True),
+    "altitude-stick": (altitude(lambda vehicle: vehicle.move_stick(1700)), {}, "stick moved", True),
     "altitude-mode": (altitude(lambda vehicle: vehicle.mode(ALT_HOLD)), {}, "flight mode changed", True),
     "altitude-switch": (altitude(lambda vehicle: vehicle.switch(ALTITUDE, LOW)), {}, "switch low", True),
     "altitude-small": (altitude(lambda vehicle: None), {"OCA_AMP": 0.001}, "no oscillation", True),
-    "altitude-large": (altitude(lambda vehicle: None), {"OCA_AMP": 0.3, "OCA_LAG": 0.4}, "altitude:", True),
+    "altitude-large": (altitude(lambda vehicle: None), {"OCA_AMP": 0.3, "OCA_LAG": 0.4}, "out of OCA_H_MAX", True),
 }
 
 
@@ -178,7 +179,7 @@ def fly(name, folder, options):
     scripts = list(SCRIPTS.glob("*.lua")) if uses_scripts else []
     own = {key: value for key, value in settings.items() if key.startswith("OCA_")}
     first = {key: value for key, value in settings.items() if key not in own}
-    speedup = 2 if uses_scripts else options.speedup
+    speedup = 1 if uses_scripts else options.speedup
     with Vehicle(options.ardupilot, folder, options.port, speedup, parameters=first, lua=scripts) as vehicle:
         for function in (ALTITUDE, PARAMETERS) if uses_scripts else ():
             vehicle.switch(function, LOW)
@@ -212,7 +213,7 @@ def main():
     parser.add_argument("--ardupilot", required=True, help="checkout of ArduPilot with build/sitl/bin/arducopter")
     parser.add_argument("--out", help="folder for the flights; default: a temporary one")
     parser.add_argument("--port", type=int, default=14650)
-    parser.add_argument("--speedup", type=float, default=5)
+    parser.add_argument("--speedup", type=float, default=3)
     parser.add_argument("cases", nargs="*", choices=[[], *CASES], help="cases to fly [default: all]")
     options = parser.parse_args()
     out = pathlib.Path(options.out or tempfile.mkdtemp(prefix="onecycle-"))

@@ -123,7 +123,7 @@ class Vehicle:
             return None
         kind = message.get_type()
         if kind == "STATUSTEXT":
-            self.messages.append((self.time_s, message.text))
+            self._take_text(message)
         elif kind == "ATTITUDE":
             self.attitude, self.time_s = message, 1e-3 * message.time_boot_ms
         elif kind == "LOCAL_POSITION_NED":
@@ -131,6 +131,19 @@ class Vehicle:
         elif kind == "HEARTBEAT" and message.get_srcComponent() == 1:
             self.is_armed = bool(message.base_mode & mavutil.mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         return message
+
+    def _take_text(self, message):
+        """A text, or the next 50 characters of a long one."""
+        if message.id != 0 and message.chunk_seq > 0 and self.messages:
+            at_s, text = self.messages.pop()
+            self.messages.append((at_s, text + message.text))
+        else:
+            self.messages.append((self.time_s, message.text))
+
+    def move_stick(self, roll):
+        """Moves the stick of roll, at once (1000 to 2000, middle 1500)."""
+        self.roll, self._said = roll, 0
+        self.poll()
 
     def wait(self, condition, limit_s, what):
         """Takes in messages until the condition holds, for at most limit_s of simulated time."""
@@ -230,14 +243,12 @@ class Vehicle:
 
     def take_off(self, height_m=20.0):
         """Arms in GUIDED, once the position is estimated, and climbs."""
-        self.wait(lambda: self.said("is using GPS"), 120, "position estimate")
-        self.sleep(5.0)
-        self.mode(GUIDED)
-        until = time.monotonic() + 120
-        while not self.command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1):
+        began_s = self.time_s
+        while not (self.command(mavutil.mavlink.MAV_CMD_DO_SET_MODE, 1, GUIDED)
+                   and self.command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)):
             self.sleep(1.0)
-            if time.monotonic() > until:
-                raise FlightError(f"does not arm: {self.last_messages()}")
+            if self.time_s - began_s > 180.0:
+                raise FlightError(f"does not arm in GUIDED: {self.last_messages()}")
         self.throttle = 1500
         if not self.command(mavutil.mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height_m):
             raise FlightError(f"does not take off: {self.last_messages()}")
@@ -262,6 +273,11 @@ class Vehicle:
         ]
         self.link.mav.set_attitude_target_send(
             int(1e3 * self.time_s), self.link.target_system, 1, 7, quaternion, 0, 0, 0, 0.5)
+
+    def go(self, north_m, east_m, height_m):
+        """Flies to a place in GUIDED (m from the origin)."""
+        self.link.mav.set_position_target_local_ned_send(
+            int(1e3 * self.time_s), self.link.target_system, 1, 1, 0b110111111000, north_m, east_m, -height_m, *[0] * 8)
 
     def log(self):
         """The newest log of the vehicle's card."""

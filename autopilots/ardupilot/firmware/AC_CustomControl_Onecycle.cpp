@@ -10,7 +10,24 @@
 #include <AP_Vehicle/AP_Vehicle.h>
 #include <GCS_MAVLink/GCS.h>
 
+#if CONFIG_HAL_BOARD == HAL_BOARD_SITL
+#include <fenv.h>
+#endif
+
 extern const AP_HAL::HAL& hal;
+
+// The simulator ends at a division by zero or an invalid operation. The identification rejects the infinite and undefined numbers
+// of a bad start of its search by comparing them: no trap while it works.
+class WithoutTraps
+{
+public:
+#if CONFIG_HAL_BOARD == HAL_BOARD_SITL
+    WithoutTraps() { feholdexcept(&_environment); }
+    ~WithoutTraps() { fesetenv(&_environment); }
+private:
+    fenv_t _environment;
+#endif
+};
 
 // the main controller holds the axis for this time before the relay starts
 static constexpr uint32_t SETTLE_MS = 1500;
@@ -193,7 +210,7 @@ bool AC_CustomControl_Onecycle::is_ready(uint8_t axis_mask)
     } else if (!is_zero(float(rate_pid(0).ff())) || !is_zero(float(rate_pid(1).ff())) || !is_zero(float(rate_pid(2).ff()))) {
         problem = "the rate loop has feed-forward (FF)";
     } else if (!is_positive(_amplitude_rp) || !is_positive(_amplitude_yaw)) {
-        problem = "CC3_AMP_RP and CC3_AMP_Y must be positive";
+        problem = "CC3_AMP_RP, CC3_AMP_Y must be positive";
     } else if (SLICES_IN_LOOP == 0 && !_has_thread && !start_thread()) {
         problem = "no memory for the thread";
     }
@@ -325,7 +342,11 @@ float AC_CustomControl_Onecycle::test(float command)
     }
     const onecycle_measurement measurement {_value_rad, _rate_rads, 0.0f, true};
     onecycle_tuner_beside(&_tuner, command);
-    const float output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _value_rad);
+    float output;
+    {
+        const WithoutTraps without_traps;
+        output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _value_rad);
+    }
     const bool was_in_charge = _in_charge != 0;
     _in_charge = onecycle_tuner_is_in_charge(&_tuner) ? 1U << _axis : 0;
     const onecycle_phase phase = onecycle_tuner_phase(&_tuner);

@@ -35,7 +35,7 @@ local function own(number, name, value)
 end
 local switch_function = own(1, "FUNC", 300)
 local amplitude = own(2, "AMP", 0.1)
-local lag = own(3, "LAG", 0.05)
+local lag = own(3, "LAG", 0.1)
 local duration = own(4, "TIME", 10)
 local height_max = own(5, "H_MAX", 1.5)
 
@@ -113,7 +113,7 @@ end
 -- One tick of the relay; returns the throttle.
 local function relay(now, dt)
    local h = amplitude:get()
-   test.filtered = test.filtered + dt / (dt + lag:get()) * (test.y - test.filtered)
+   test.filtered = test.filtered + dt / (dt + lag:get()) * (test.y_now - test.filtered)
    test.cycle_sum = test.cycle_sum + test.sign * dt
    if test.peak == nil then
       if math.abs(test.filtered) < KICK_M then
@@ -232,22 +232,31 @@ local function tick()
       finish(reason)
       return
    end
-   test.y = test.y + 0.5 * (climb + test.climb) * dt
-   test.last_s, test.climb = now, climb
    if test.offset == nil then
+      test.last_s, test.climb = now, climb
       test.sum, test.count = test.sum + motors:get_throttle(), test.count + 1
       if now - test.began_s > SETTLE_S then
          begin_relay()
       end
       return
    end
+   test.y_now = test.y + 0.5 * (climb + test.climb) * dt
    local throttle = relay(now, dt)
    local roll, pitch, yaw = rates(forward, right)
    if not vehicle:set_target_rate_and_throttle(roll, pitch, yaw, throttle) then
       finish("throttle refused")
       return
    end
-   test.rows[#test.rows + 1] = string.format("%.4f,%.4f,%.5f\n", now - test.relay_s, throttle, test.y)
+   -- Other threads may have run meanwhile: what is recorded is of the moment in which the throttle is in force.
+   local after = now_s()
+   _, climb = motion()
+   if climb == nil then
+      finish("no estimate")
+      return
+   end
+   test.y = test.y + 0.5 * (climb + test.climb) * (after - test.last_s)
+   test.last_s, test.climb = after, climb
+   test.rows[#test.rows + 1] = string.format("%.4f,%.4f,%.5f\n", after - test.relay_s, throttle, test.y)
    if now - test.relay_s > duration:get() then
       finish(nil)
    end
