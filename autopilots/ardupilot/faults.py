@@ -9,6 +9,7 @@ import pathlib
 import sys
 import tempfile
 
+from altitude import SLOW
 from sitl import ALT_HOLD, LAND, FlightError, Vehicle
 from tune import CUSTOM_CONTROLLER, HIGH, LOW, MIDDLE, names
 
@@ -63,15 +64,16 @@ def whole(vehicle):
 
 
 def reversed_axis(vehicle):
-    """The left and the right motors change places, for as long as the test runs."""
+    """The left and the right motor change places, for as long as the test runs."""
+    vehicle.set("SIM_SPEEDUP", SLOW)
     in_test(vehicle, 0.0)
-    order = {"SERVO1_FUNCTION": 35, "SERVO3_FUNCTION": 33, "SERVO2_FUNCTION": 36, "SERVO4_FUNCTION": 34}
-    old = {name: vehicle.get(name) for name in order}
-    for name, value in order.items():
+    for name, value in (("SERVO1_FUNCTION", 34), ("SERVO2_FUNCTION", 33)):
         vehicle.send(name, value)
     vehicle.wait(lambda: vehicle.said("old gains"), 10, "end of the test")
-    for name, value in old.items():
+    for name, value in (("SERVO1_FUNCTION", 33), ("SERVO2_FUNCTION", 34)):
         vehicle.send(name, value)
+    vehicle.sleep(1.0)
+    vehicle.set("SIM_SPEEDUP", 1)
     vehicle.sleep(5.0)
 
 
@@ -132,11 +134,13 @@ def not_saved(vehicle):
 def altitude(what):
     """A case of the altitude test: something happens in its middle."""
     def case(vehicle):
+        vehicle.set("SIM_SPEEDUP", SLOW)
         vehicle.switch(ALTITUDE, HIGH)
         vehicle.sleep(4.0)
         what(vehicle)
         vehicle.wait(lambda: any(vehicle.said("altitude " + word) for word in ("stopped", "refused", "done")), 40, "end of the test")
         vehicle.move_stick(1500)
+        vehicle.set("SIM_SPEEDUP", 1)
         vehicle.sleep(2.0)
 
     return case

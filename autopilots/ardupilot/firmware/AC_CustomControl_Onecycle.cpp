@@ -16,8 +16,8 @@
 
 extern const AP_HAL::HAL& hal;
 
-// The simulator ends at a division by zero or an invalid operation. The identification rejects the infinite and undefined numbers
-// of a bad start of its search by comparing them: no trap while it works.
+// The simulator ends at a division by zero or an invalid operation. The identification's search passes such points in some windows
+// and returns finite numbers: no trap while it works.
 class WithoutTraps
 {
 public:
