@@ -156,8 +156,8 @@ CASES = {
     "mode": (mode, ROLL, "flight mode changed", True),
     "sign": (whole, ROLL | {"CC3_AMP_RP": -0.15}, "must be positive", True),
     "reversed": (reversed_axis, ROLL, "onecycle: roll:", True),
-    "small": (whole, ROLL | {"CC3_AMP_RP": 0.0002}, "onecycle: roll:", True),
-    "large": (whole, ROLL | {"CC3_AMP_RP": 0.9}, "onecycle: roll:", True),
+    "small": (whole, ROLL | {"CC3_AMP_RP": 0.0002}, "raise CC3_AMP_RP", True),
+    "large": (whole, ROLL | {"CC3_AMP_RP": 0.9}, "lower CC3_AMP_RP", True),
     "estimator": (estimator, ROLL, "the estimator was reset", True),
     "thrust": (simulated("SIM_ENGINE_FAIL", 1), ROLL | {"SIM_ENGINE_MUL": 0.75}, "onecycle: roll:", True),
     "gyro": (simulated("SIM_GYR_FAIL_MSK", 1), ROLL, "roll angle P", True),  # the second gyro takes over
@@ -169,9 +169,9 @@ CASES = {
     "file-dropped": (with_file(GOOD, MIDDLE, LOW), {}, "old values", True),
     "file-not-saved": (not_saved, {}, "disarmed before they were saved", False),
     "altitude-stick": (altitude(lambda vehicle: vehicle.move_stick(1700)), {}, "stick moved", True),
-    "altitude-mode": (altitude(lambda vehicle: vehicle.mode(ALT_HOLD)), {}, "flight mode changed", True),
+    "altitude-mode": (altitude(lambda vehicle: vehicle.mode(ALT_HOLD)), {}, "mode changed", True),
     "altitude-switch": (altitude(lambda vehicle: vehicle.switch(ALTITUDE, LOW)), {}, "switch low", True),
-    "altitude-small": (altitude(lambda vehicle: None), {"OCA_AMP": 0.001}, "no oscillation", True),
+    "altitude-small": (altitude(lambda vehicle: None), {"OCA_AMP": 0.001}, "OCA_AMP too small", True),
     "altitude-large": (altitude(lambda vehicle: None), {"OCA_AMP": 0.3, "OCA_LAG": 0.4}, "out of OCA_H_MAX", True),
 }
 

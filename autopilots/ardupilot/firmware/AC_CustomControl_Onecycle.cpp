@@ -367,9 +367,12 @@ bool AC_CustomControl_Onecycle::is_finished(enum onecycle_phase phase)
     onecycle_result result {};
     switch (phase) {
     case ONECYCLE_PHASE_ABORTED:
-        if (onecycle_tuner_reason(&_tuner) == ONECYCLE_REASON_NO_OSCILLATION) {
-            finish("no oscillation: relay too small");
-        } else {
+        switch (onecycle_tuner_reason(&_tuner)) {
+        case ONECYCLE_REASON_NO_OSCILLATION:
+        case ONECYCLE_REASON_DURATION:
+            finish(_axis == 2 ? "no steady oscillation: raise CC3_AMP_Y" : "no steady oscillation: raise CC3_AMP_RP");
+            break;
+        default:
             finish(onecycle_tuner_reason_text(&_tuner));
         }
         return false;
