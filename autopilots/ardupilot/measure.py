@@ -35,7 +35,10 @@ def response(rows, axis, window):
     rows = [row for row in rows if window[0] <= row["t"] <= window[1]]
     starts = [i for i in range(1, len(rows)) if abs(turn(rows[i][wanted_name] - rows[i - 1][wanted_name])) > 5.0]
     found = []
-    for i in starts:
+    for i, following in zip(starts, [*starts[1:], None]):
+        # On a busy computer a command may come late, and the next one too soon after it.
+        if following is not None and rows[following]["t"] - rows[i]["t"] < 0.95 * HOLD_S:
+            continue
         first, size = rows[i - 1][wanted_name], turn(rows[i][wanted_name] - rows[i - 1][wanted_name])
         part = [row for row in rows[i:] if row["t"] < rows[i]["t"] + 0.95 * HOLD_S]
         if part[-1]["t"] - part[0]["t"] > 0.9 * HOLD_S:

@@ -1,13 +1,15 @@
 #!/usr/bin/env bash
-# Builds ArduCopter with the onecycle backend, flies the chirp and the relay tests in simulation and prints the tables.
+# Builds ArduCopter with the onecycle backend, flies the chirp, the relay tests, AUTOTUNE, QuikTune, the scripts and the faults in
+# simulation, and prints the tables.
 # ARDUPILOT_DIR is a checkout of ArduPilot with its submodules; without it there is nothing to fly.
-# PYTHON needs pymavlink, empy==3.3.4, pexpect, future, lxml and dronecan. ONECYCLE is the program.
+# PYTHON needs pymavlink, empy==3.3.4, pexpect, future, lxml and dronecan. ONECYCLE is the program. FLIGHTS: of the relay tests (10).
 set -euo pipefail
 
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
 root=$(cd "$here/../.." && pwd)
 python=${PYTHON:-python3}
 program=${ONECYCLE:-$root/target/release/onecycle}
+flights=${FLIGHTS:-10}
 
 if [[ ! -f ${ARDUPILOT_DIR:-}/ArduCopter/Copter.cpp ]]; then
     echo "ArduPilot: skipped; set ARDUPILOT_DIR to a checkout of ArduPilot with its submodules."
@@ -26,7 +28,15 @@ library=${CARGO_TARGET_DIR:-$root/onboard/c/target}/release/libonecycle.a
     LDFLAGS="-lm $library" "$python" ./waf configure --board sitl --no-submodule-update >/dev/null
     "$python" ./waf --targets bin/arducopter
 )
-"$python" "$here/chirp.py" --ardupilot "$ARDUPILOT_DIR" --onecycle "$program" --axis roll
-# A test that is refused is a result too: the old gains stay in force.
-"$python" "$here/tune.py" --ardupilot "$ARDUPILOT_DIR" --method onecycle --axes roll,pitch \
-    --set CC3_AMP_RP=0.15 || true
+out=$ARDUPILOT_DIR/build/sitl/onecycle
+rm -rf "$out"
+mkdir -p "$out"
+fly() {
+    "$python" "$here/$1" --ardupilot "$ARDUPILOT_DIR" --out "$out/$2" "${@:3}"
+}
+fly chirp.py chirp --onecycle "$program" --axis roll
+fly tune.py onecycle --method onecycle --flights "$flights"
+fly tune.py autotune --method autotune
+fly tune.py quiktune --method quiktune
+fly altitude.py altitude --onecycle "$program"
+fly faults.py faults

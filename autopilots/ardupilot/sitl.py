@@ -35,21 +35,21 @@ class FlightError(Exception):
 class Vehicle:
     """One simulated copter. Use as a context manager: the simulation ends with it."""
 
-    def __init__(self, ardupilot, folder, port=14650, speedup=5, parameters=None, lua=None):
+    def __init__(self, ardupilot, folder, port=14650, speedup=5, parameters=None, lua=()):
         self.folder = pathlib.Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.messages = []
         self.time_s = 0.0
         self.attitude = None
         self.position = None
+        self.roll = 1500
         self.throttle = 1000
+        self.is_armed = False
         self._said = 0
         defaults = self.folder / "extra.parm"
         wanted = {**PARAMETERS, **(parameters or {})}
-        if lua is not None:
-            scripts = self.folder / "scripts"
-            scripts.mkdir(exist_ok=True)
-            (scripts / pathlib.Path(lua).name).write_bytes(pathlib.Path(lua).read_bytes())
+        for script in lua:
+            self.give(script)
             wanted.update(SCR_ENABLE=1, SCR_HEAP_SIZE=400000, SCR_VM_I_COUNT=1000000)
         defaults.write_text("".join(f"{name} {value}\n" for name, value in wanted.items()))
         ardupilot = pathlib.Path(ardupilot)
@@ -100,6 +100,12 @@ class Vehicle:
             number = getattr(mavutil.mavlink, "MAVLINK_MSG_ID_" + stream)
             self.command(mavutil.mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, 1e6 / rate_hz)
 
+    def give(self, file, name=None):
+        """Copies a file into the vehicle's folder of scripts."""
+        scripts = self.folder / "scripts"
+        scripts.mkdir(exist_ok=True)
+        (scripts / (name or pathlib.Path(file).name)).write_bytes(pathlib.Path(file).read_bytes())
+
     # Messages and time
 
     def poll(self, timeout_s=1.0):
@@ -109,7 +115,7 @@ class Vehicle:
             self._said = now
             self.link.mav.heartbeat_send(6, 8, 0, 0, 0)
             self.link.mav.rc_channels_override_send(
-                self.link.target_system, 1, 1500, 1500, self.throttle, 1500, *[0] * 4)
+                self.link.target_system, 1, self.roll, 1500, self.throttle, 1500, *[0] * 4)
         message = self.link.recv_match(blocking=True, timeout=timeout_s)
         if message is None:
             if self.process.poll() is not None:
@@ -117,12 +123,27 @@ class Vehicle:
             return None
         kind = message.get_type()
         if kind == "STATUSTEXT":
-            self.messages.append((self.time_s, message.text))
+            self._take_text(message)
         elif kind == "ATTITUDE":
             self.attitude, self.time_s = message, 1e-3 * message.time_boot_ms
         elif kind == "LOCAL_POSITION_NED":
             self.position = message
+        elif kind == "HEARTBEAT" and message.get_srcComponent() == 1:
+            self.is_armed = bool(message.base_mode & mavutil.mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         return message
+
+    def _take_text(self, message):
+        """A text, or the next 50 characters of a long one."""
+        if message.id != 0 and message.chunk_seq > 0 and self.messages:
+            at_s, text = self.messages.pop()
+            self.messages.append((at_s, text + message.text))
+        else:
+            self.messages.append((self.time_s, message.text))
+
+    def move_stick(self, roll):
+        """Moves the stick of roll, at once (1000 to 2000, middle 1500)."""
+        self.roll, self._said = roll, 0
+        self.poll()
 
     def wait(self, condition, limit_s, what):
         """Takes in messages until the condition holds, for at most limit_s of simulated time."""
@@ -176,11 +197,15 @@ class Vehicle:
                     return message.param_value
         raise FlightError(f"the firmware has no parameter {name}")
 
+    def send(self, name, value):
+        """Writes a parameter without reading it back."""
+        self.link.mav.param_set_send(self.link.target_system, 1, name.encode(), value, 9)
+
     def set(self, name, value):
         """Writes a parameter and reads it back."""
         old = self.get(name)
         for _ in range(5):
-            self.link.mav.param_set_send(self.link.target_system, 1, name.encode(), value, 9)
+            self.send(name, value)
             if math.isclose(self.get(name), value, rel_tol=1e-5, abs_tol=1e-9):
                 return old
         raise FlightError(f"{name} does not take {value}")
@@ -218,14 +243,12 @@ class Vehicle:
 
     def take_off(self, height_m=20.0):
         """Arms in GUIDED, once the position is estimated, and climbs."""
-        self.wait(lambda: self.said("is using GPS"), 120, "position estimate")
-        self.sleep(5.0)
-        self.mode(GUIDED)
-        until = time.monotonic() + 120
-        while not self.command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1):
+        began_s = self.time_s
+        while not (self.command(mavutil.mavlink.MAV_CMD_DO_SET_MODE, 1, GUIDED)
+                   and self.command(mavutil.mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1)):
             self.sleep(1.0)
-            if time.monotonic() > until:
-                raise FlightError(f"does not arm: {self.last_messages()}")
+            if self.time_s - began_s > 180.0:
+                raise FlightError(f"does not arm in GUIDED: {self.last_messages()}")
         self.throttle = 1500
         if not self.command(mavutil.mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, height_m):
             raise FlightError(f"does not take off: {self.last_messages()}")
@@ -250,6 +273,11 @@ class Vehicle:
         ]
         self.link.mav.set_attitude_target_send(
             int(1e3 * self.time_s), self.link.target_system, 1, 7, quaternion, 0, 0, 0, 0.5)
+
+    def go(self, north_m, east_m, height_m):
+        """Flies to a place in GUIDED (m from the origin)."""
+        self.link.mav.set_position_target_local_ned_send(
+            int(1e3 * self.time_s), self.link.target_system, 1, 1, 0b110111111000, north_m, east_m, -height_m, *[0] * 8)
 
     def log(self):
         """The newest log of the vehicle's card."""

@@ -10,7 +10,24 @@
 #include <AP_Vehicle/AP_Vehicle.h>
 #include <GCS_MAVLink/GCS.h>
 
+#if CONFIG_HAL_BOARD == HAL_BOARD_SITL
+#include <fenv.h>
+#endif
+
 extern const AP_HAL::HAL& hal;
+
+// The simulator ends at a division by zero or an invalid operation. The identification's search passes such points in some windows
+// and returns finite numbers: no trap while it works.
+class WithoutTraps
+{
+public:
+#if CONFIG_HAL_BOARD == HAL_BOARD_SITL
+    WithoutTraps() { feholdexcept(&_environment); }
+    ~WithoutTraps() { fesetenv(&_environment); }
+private:
+    fenv_t _environment;
+#endif
+};
 
 // the main controller holds the axis for this time before the relay starts
 static constexpr uint32_t SETTLE_MS = 1500;
@@ -24,13 +41,17 @@ static constexpr float NOISE_RAD = 0.0002f;
 static constexpr float INTEGRAL_PHASE_RAD = 0.035f;
 // ticks of a test at a limit of the motors, above which the relay is too large
 static constexpr uint16_t LIMITED_TICKS = 20;
-// gains outside of these bounds are not used
-static constexpr float ANGLE_P_MIN = 1.0f;
-static constexpr float ANGLE_P_MAX = 60.0f;
-static constexpr float RATE_P_MIN = 0.005f;
-static constexpr float RATE_P_MAX = 2.5f;
+// time constant with which the gyro's clock follows the loop's
+static constexpr float CLOCK_TIME_S = 1.0f;
+// least delay of the angle, beyond the jitter of the gyro's samples
+static constexpr float LEAST_DELAY_TICKS = 2.0f;
+// uncertainty of the angle's time, either way, and time constant of the mean rate for it
+static constexpr float DITHER_TICKS = 0.25f;
+static constexpr float RATE_TIME_S = 0.2f;
 // slices of the identification in one turn of the thread
 static constexpr uint16_t SLICES = 200;
+// the simulator's threads run in real time: there the loop does the work, so that a flight does not depend on the computer's load
+static constexpr uint16_t SLICES_IN_LOOP = CONFIG_HAL_BOARD == HAL_BOARD_SITL ? 25 : 0;
 
 // table of user settable parameters
 const AP_Param::GroupInfo AC_CustomControl_Onecycle::var_info[] = {
@@ -39,14 +60,14 @@ const AP_Param::GroupInfo AC_CustomControl_Onecycle::var_info[] = {
     // @Description: Half the jump of the relay on the motors' roll and pitch input
     // @Range: 0.01 0.3
     // @User: Standard
-    AP_GROUPINFO("AMP_RP", 1, AC_CustomControl_Onecycle, _amplitude_rp, 0.05f),
+    AP_GROUPINFO("AMP_RP", 1, AC_CustomControl_Onecycle, _amplitude_rp, 0.15f),
 
     // @Param: AMP_Y
     // @DisplayName: Relay amplitude of yaw
     // @Description: Half the jump of the relay on the motors' yaw input
     // @Range: 0.01 0.3
     // @User: Standard
-    AP_GROUPINFO("AMP_Y", 2, AC_CustomControl_Onecycle, _amplitude_yaw, 0.1f),
+    AP_GROUPINFO("AMP_Y", 2, AC_CustomControl_Onecycle, _amplitude_yaw, 0.2f),
 
     // @Param: ANG_MAX
     // @DisplayName: Largest angle of the test
@@ -139,9 +160,10 @@ Vector3f AC_CustomControl_Onecycle::update()
     if (!_motors->armed()) {
         if (_stage == Stage::IN_FORCE) {
             save();
+        } else if (_stage == Stage::PROPOSED) {
+            GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: disarmed, not accepted: old gains in force");
         } else if (_stage != Stage::IDLE) {
             finish("disarmed");
-            restore();
         }
         _stage = Stage::IDLE;
         return output;
@@ -154,7 +176,7 @@ Vector3f AC_CustomControl_Onecycle::update()
         finish(reason);
         return output;
     }
-    _angle_rad += _ahrs->get_gyro_latest()[_axis] * _dt;
+    measure();
     output[_axis] = test(main_command(_axis));
     return output;
 }
@@ -182,7 +204,9 @@ bool AC_CustomControl_Onecycle::is_ready(uint8_t axis_mask)
         problem = "not flying";
     } else if (!is_zero(float(rate_pid(0).ff())) || !is_zero(float(rate_pid(1).ff())) || !is_zero(float(rate_pid(2).ff()))) {
         problem = "the rate loop has feed-forward (FF)";
-    } else if (!_has_thread && !start_thread()) {
+    } else if (!is_positive(_amplitude_rp) || !is_positive(_amplitude_yaw)) {
+        problem = "CC3_AMP_RP, CC3_AMP_Y must be positive";
+    } else if (SLICES_IN_LOOP == 0 && !_has_thread && !start_thread()) {
         problem = "no memory for the thread";
     }
     if (problem != nullptr) {
@@ -215,8 +239,13 @@ void AC_CustomControl_Onecycle::begin_axis()
 {
     _settled_from_ms = AP_HAL::millis();
     _limited = 0;
+    memset(_samples, 0, sizeof(_samples));
+    _started_us = AP_HAL::micros64();
     _angle_rad = 0;
+    _rate_rads = 0;
+    _rate_square = 0;
     _attitude_rad = {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
+    _resets = estimator_resets();
     if (!initialise_tuner()) {
         _stage = Stage::IDLE;
         return;
@@ -229,7 +258,7 @@ bool AC_CustomControl_Onecycle::initialise_tuner()
 {
     onecycle_settings settings = onecycle_settings_default(amplitude(), _dt);
     settings.noise_sigma = NOISE_RAD;
-    settings.slices = 0;
+    settings.slices = SLICES_IN_LOOP;
     settings.bias_filter_s = MEAN_TIME_S;
     settings.integral_phase_rad = INTEGRAL_PHASE_RAD;
     settings.limit_excursion = radians(_angle_max_deg);
@@ -251,6 +280,54 @@ bool AC_CustomControl_Onecycle::initialise_tuner()
     return true;
 }
 
+// Angle and rate as the rate loop sees them. Integrated from the filtered gyro, the angle would have an error that is neither white
+// nor a random walk. So the gyro is integrated before its filter, and the angle delayed by as much as the filter delays the rate.
+// The samples in a tick are not always as many: the angle is interpolated at their time.
+void AC_CustomControl_Onecycle::measure()
+{
+    const float now_s = (AP_HAL::micros64() - _started_us) * 1.0e-6f;
+    Sample next = _samples[_newest];
+    Vector3f turn_rad;
+    float interval_s;
+    if (AP::ins().get_delta_angle(turn_rad, interval_s)) {
+        next.angle_rad += turn_rad[_axis] + AP::ahrs().get_gyro_drift()[_axis] * interval_s;
+        next.time_s += interval_s;
+    }
+    // the clock of the gyro may run a little slow
+    next.time_s += _dt / CLOCK_TIME_S * (now_s - next.time_s);
+    _newest = (_newest + 1) % NUM_SAMPLES;
+    _samples[_newest] = next;
+
+    // a Butterworth filter of second order delays slow signals by sqrt(2) over its corner
+    const float corner_hz = AP::ins().get_gyro_filter_hz();
+    const float delay_s = is_positive(corner_hz) ? M_SQRT2 / (M_2PI * corner_hz) : 0.0f;
+    const float delayed_rad = angle_at(now_s - constrain_float(delay_s, LEAST_DELAY_TICKS * _dt, (NUM_SAMPLES - 4) * _dt));
+
+    // the rate loop's own filter of the error is part of the process: yaw is tuned with it
+    AC_PID &pid = rate_pid(_axis);
+    const float share = is_positive(pid.filt_E_hz()) ? pid.get_filt_E_alpha(_dt) : 1.0f;
+    _angle_rad += share * (delayed_rad - _angle_rad);
+    _rate_rads += share * (_ahrs->get_gyro_latest()[_axis] - _rate_rads);
+
+    // The relay switches at ticks, so that no two cycles are alike, by more than the noise of the gyro. The pack takes a cycle as
+    // periodic within its noise: the value is as uncertain as its time.
+    _rate_square += _dt / RATE_TIME_S * (sq(_rate_rads) - _rate_square);
+    _value_rad = _angle_rad + DITHER_TICKS * _dt * sqrtf(_rate_square) * rand_float();
+}
+
+float AC_CustomControl_Onecycle::angle_at(float time_s) const
+{
+    Sample after = _samples[_newest];
+    for (uint8_t back = 1; back < NUM_SAMPLES; back++) {
+        const Sample &before = _samples[(_newest + NUM_SAMPLES - back) % NUM_SAMPLES];
+        if (before.time_s <= time_s && before.time_s < after.time_s) {
+            return before.angle_rad + (time_s - before.time_s) / (after.time_s - before.time_s) * (after.angle_rad - before.angle_rad);
+        }
+        after = before;
+    }
+    return after.angle_rad;
+}
+
 // one tick of the test; returns the motor input of the axis
 float AC_CustomControl_Onecycle::test(float command)
 {
@@ -258,10 +335,13 @@ float AC_CustomControl_Onecycle::test(float command)
         _stage = Stage::TEST;
         onecycle_tuner_start(&_tuner);
     }
-    const float rate_rads = _ahrs->get_gyro_latest()[_axis];
-    const onecycle_measurement measurement {_angle_rad, rate_rads, 0.0f, true};
+    const onecycle_measurement measurement {_value_rad, _rate_rads, 0.0f, true};
     onecycle_tuner_beside(&_tuner, command);
-    const float output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _angle_rad);
+    float output;
+    {
+        const WithoutTraps without_traps;
+        output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _value_rad);
+    }
     const bool was_in_charge = _in_charge != 0;
     _in_charge = onecycle_tuner_is_in_charge(&_tuner) ? 1U << _axis : 0;
     const onecycle_phase phase = onecycle_tuner_phase(&_tuner);
@@ -282,9 +362,12 @@ bool AC_CustomControl_Onecycle::is_finished(enum onecycle_phase phase)
     onecycle_result result {};
     switch (phase) {
     case ONECYCLE_PHASE_ABORTED:
-        if (onecycle_tuner_reason(&_tuner) == ONECYCLE_REASON_NO_OSCILLATION) {
-            finish("no oscillation: relay too small or axis reversed");
-        } else {
+        switch (onecycle_tuner_reason(&_tuner)) {
+        case ONECYCLE_REASON_NO_OSCILLATION:
+        case ONECYCLE_REASON_DURATION:
+            finish(_axis == 2 ? "no steady oscillation: raise CC3_AMP_Y" : "no steady oscillation: raise CC3_AMP_RP");
+            break;
+        default:
             finish(onecycle_tuner_reason_text(&_tuner));
         }
         return false;
@@ -318,6 +401,9 @@ const char *AC_CustomControl_Onecycle::reason_to_stop()
     }
     if (AP::vehicle()->get_mode() != _mode) {
         return "flight mode changed";
+    }
+    if (estimator_resets() != _resets) {
+        return "the estimator was reset";
     }
     const Vector3f attitude_rad {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
     if (fabsf(wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis])) > 1.5f * radians(_angle_max_deg)) {
@@ -358,102 +444,16 @@ void AC_CustomControl_Onecycle::hand_back()
     rate_pid(_axis).reset_filter();
 }
 
-// the tuner's PD and integral in the cascade of the main controller:
-//   u = P (A (r - y) - y') + I integral(A (r - y) - y'),  kp = A P + I,  ki = A I,  kd = P
-bool AC_CustomControl_Onecycle::propose()
-{
-    onecycle_result result {};
-    if (!onecycle_tuner_result(&_tuner, &result)) {
-        return false;
-    }
-    Axis &axis = _axes[_axis];
-    axis.old_gains = get_gains(_axis);
-    Gains &gains = axis.new_gains;
-    gains = axis.old_gains;
-    gains.rate_p = result.kd;
-    gains.rate_d = 0.0f;
-    const float root = sqrtf(MAX(0.0f, sq(result.kp) - 4.0 * result.ki * result.kd));
-    gains.angle_p = (result.kp + root) / (2.0 * result.kd);
-    gains.rate_i = result.ki / gains.angle_p;
-    gains.filter_error_hz = 0.0f;
-    gains.filter_target_hz = 0.0f;
-    const bool is_within = gains.angle_p >= ANGLE_P_MIN && gains.angle_p <= ANGLE_P_MAX && gains.rate_p >= RATE_P_MIN && gains.rate_p <= RATE_P_MAX;
-    AP::logger().Write("OCG", "TimeUS,Ax,K,Tp,Tau,Kp,Ki,Kd,PM,AngP,Proven", "QBfffffffff",
-                       AP_HAL::micros64(), _axis, result.k_over_t_body, result.t_prop_s, result.tau_s,
-                       result.kp, result.ki, result.kd, degrees(result.phase_margin_rad), gains.angle_p, float(result.is_proven));
-    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: %s angle P %.1f rate P %.3f I %.3f", axis_name(), gains.angle_p, gains.rate_p, gains.rate_i);
-    axis.has_proposal = is_within && _consent != Consent::NEVER;
-    return is_within;
-}
-
-void AC_CustomControl_Onecycle::put_in_force()
-{
-    uint8_t count = 0;
-    for (uint8_t axis = 0; axis < NUM_AXES; axis++) {
-        if (_axes[axis].has_proposal) {
-            set_gains(axis, _axes[axis].new_gains);
-            count++;
-        }
-    }
-    if (count == 0) {
-        GCS_SEND_TEXT(MAV_SEVERITY_WARNING, "onecycle: no gains to put in force");
-        return;
-    }
-    _stage = Stage::IN_FORCE;
-    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: new gains (%u axes), saved at disarm", unsigned(count));
-}
-
-void AC_CustomControl_Onecycle::restore()
-{
-    if (_stage != Stage::IN_FORCE) {
-        return;
-    }
-    for (uint8_t axis = 0; axis < NUM_AXES; axis++) {
-        if (_axes[axis].has_proposal) {
-            set_gains(axis, _axes[axis].old_gains);
-        }
-    }
-    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: old gains restored");
-}
-
-void AC_CustomControl_Onecycle::save()
-{
-    for (uint8_t axis = 0; axis < NUM_AXES; axis++) {
-        if (!_axes[axis].has_proposal) {
-            continue;
-        }
-        AC_PID &pid = rate_pid(axis);
-        angle_p(axis).kP().save();
-        pid.kP().save();
-        pid.kI().save();
-        pid.kD().save();
-        pid.filt_T_hz().save();
-        pid.filt_E_hz().save();
-        _axes[axis].has_proposal = false;
-    }
-    GCS_SEND_TEXT(MAV_SEVERITY_NOTICE, "onecycle: gains saved");
-}
-
-AC_CustomControl_Onecycle::Gains AC_CustomControl_Onecycle::get_gains(uint8_t axis)
-{
-    AC_PID &pid = rate_pid(axis);
-    return {angle_p(axis).kP(), pid.kP(), pid.kI(), pid.kD(), pid.filt_T_hz(), pid.filt_E_hz()};
-}
-
-void AC_CustomControl_Onecycle::set_gains(uint8_t axis, const Gains &gains)
-{
-    AC_PID &pid = rate_pid(axis);
-    angle_p(axis).kP().set(gains.angle_p);
-    pid.kP().set(gains.rate_p);
-    pid.kI().set(gains.rate_i);
-    pid.kD().set(gains.rate_d);
-    pid.filt_T_hz().set(gains.filter_target_hz);
-    pid.filt_E_hz().set(gains.filter_error_hz);
-}
-
 float AC_CustomControl_Onecycle::main_command(uint8_t axis) const
 {
     return axis == 0 ? _motors->get_roll() : axis == 1 ? _motors->get_pitch() : _motors->get_yaw();
+}
+
+// changes with each reset of the attitude: another lane, or a jump of the heading
+uint32_t AC_CustomControl_Onecycle::estimator_resets() const
+{
+    float jump_rad;
+    return AP::ahrs().getLastYawResetAngle(jump_rad) + uint32_t(AP::ahrs().get_primary_core_index());
 }
 
 AC_PID &AC_CustomControl_Onecycle::rate_pid(uint8_t axis)
@@ -508,11 +508,13 @@ void AC_CustomControl_Onecycle::log_tick(float command, float output) const
     // @Field: Ph: phase of the tuner
     // @Field: Cmd: motor input of the main controller
     // @Field: U: motor input in force
-    // @Field: Y: integral of the filtered gyro
-    // @Field: R: filtered gyro
-    AP::logger().WriteStreaming("OCT", "TimeUS,Ax,Ph,Cmd,U,Y,R", "QBBffff",
+    // @Field: Y: angle of the tuner, delayed
+    // @Field: R: rate of the tuner
+    // @Field: E: estimated angle less that of the start
+    const Vector3f attitude_rad {_ahrs->roll, _ahrs->pitch, _ahrs->yaw};
+    AP::logger().WriteStreaming("OCT", "TimeUS,Ax,Ph,Cmd,U,Y,R,E", "QBBfffff",
                                 AP_HAL::micros64(), _axis, uint8_t(onecycle_tuner_phase(&_tuner)),
-                                command, output, _angle_rad, _ahrs->get_gyro_latest()[_axis]);
+                                command, output, _value_rad, _rate_rads, wrap_PI(attitude_rad[_axis] - _attitude_rad[_axis]));
 }
 
 #endif  // AP_CUSTOMCONTROL_ONECYCLE_ENABLED

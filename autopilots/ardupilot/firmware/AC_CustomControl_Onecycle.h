@@ -35,6 +35,7 @@ public:
 
 private:
     static constexpr uint8_t NUM_AXES = 3;
+    static constexpr uint8_t NUM_SAMPLES = 32;
 
     enum class Stage : uint8_t {
         IDLE = 0,       // nothing runs
@@ -57,7 +58,11 @@ private:
         float rate_i;
         float rate_d;
         float filter_target_hz;
-        float filter_error_hz;
+    };
+
+    struct Sample {
+        float time_s;
+        float angle_rad;
     };
 
     struct Axis {
@@ -89,7 +94,10 @@ private:
     void set_gains(uint8_t axis, const Gains &gains);
 
     // access to one axis
+    void measure();
+    float angle_at(float time_s) const;
     float main_command(uint8_t axis) const;
+    uint32_t estimator_resets() const;
     void hand_back();
     AC_PID &rate_pid(uint8_t axis);
     AC_P &angle_p(uint8_t axis);
@@ -120,7 +128,14 @@ private:
     uint8_t _mode;              // flight mode at the start
     uint32_t _settled_from_ms;
     uint16_t _limited;          // ticks of the relay with saturated motors
-    float _angle_rad;           // integral of the filtered gyro: the rate loop sees this signal
+    Sample _samples[NUM_SAMPLES];  // the last integrals of the gyro
+    uint8_t _newest;            // index of the last
+    uint64_t _started_us;       // their time is zero here
+    float _angle_rad;           // angle and rate as the rate loop sees them
+    float _rate_rads;
+    float _rate_square;         // its mean square
+    float _value_rad;           // the angle, as uncertain as its time
+    uint32_t _resets;           // of the estimator, at the start
     Vector3f _attitude_rad;     // attitude at the start
     Axis _axes[NUM_AXES];
 

@@ -1,18 +1,25 @@
-//! Relay tests recorded in PX4's simulator, identified again. The truth is the simulator's own model.
+//! Relay tests recorded in PX4's and ArduPilot's simulators, identified again. The truth is the simulator's own model.
 
 use onecycle_onboard::identification::{
     Analysis, Bench, Collector, Desk, TestSample, TuningResult,
 };
 use onecycle_onboard::pack::Pack;
 
-const SAMPLE_S: f64 = 0.004;
-
-/// Lag of the simulated motors (s).
-const MOTOR_S: f64 = 0.05;
+/// A recorded flight and the truth about it.
+struct Flight {
+    recording: &'static str,
+    sample_s: f64,
+    /// Acceleration of a full input (output unit per s^2), and its relative error.
+    acceleration: f64,
+    acceleration_error: f64,
+    /// Lags and delays that are known: motors, filters (s).
+    late_s: f64,
+}
 
 /// Results of the windows of this many cycles, and the number of windows.
-fn identify(recording: &str, cycles: u8) -> (Vec<TuningResult>, usize) {
-    let rows: Vec<[f64; 3]> = recording
+fn identify(flight: &Flight, cycles: u8) -> (Vec<TuningResult>, usize) {
+    let rows: Vec<[f64; 3]> = flight
+        .recording
         .lines()
         .skip(1)
         .map(|line| {
@@ -25,7 +32,7 @@ fn identify(recording: &str, cycles: u8) -> (Vec<TuningResult>, usize) {
     let mut desk = Box::new(Desk::NEW);
     let mut bench = Box::new(Bench::NEW);
     let mut analysis = Analysis::new(Pack::embedded().unwrap());
-    let mut collector = Collector::new(SAMPLE_S, cycles, 0.0);
+    let mut collector = Collector::new(flight.sample_s, cycles, 0.0);
     let (mut found, mut windows) = (Vec::new(), 0);
     for [time_s, input, output] in rows {
         let sample = TestSample {
@@ -47,23 +54,23 @@ fn identify(recording: &str, cycles: u8) -> (Vec<TuningResult>, usize) {
     (found, windows)
 }
 
-fn holds(recording: &str, acceleration: f64) {
+fn holds(flight: &Flight) {
     let mut all = 0;
     for cycles in [2, 3] {
-        let (found, windows) = identify(recording, cycles);
+        let (found, windows) = identify(flight, cycles);
         assert!(
             windows > 0,
             "{cycles} cycles: the oscillation is not steady"
         );
         all += found.len();
         for found in found {
-            let error = (found.process.k_over_t_body() / acceleration).ln();
-            let allowed = 3.0 * found.deviations.ln_k_over_t_body;
+            let error = (found.process.k_over_t_body() / flight.acceleration).ln();
+            let allowed = 3.0 * found.deviations.ln_k_over_t_body + flight.acceleration_error;
             assert!(
                 error.abs() < allowed.min(0.25),
                 "{cycles} cycles: {error}, {allowed}"
             );
-            let late_s = found.process.t_prop_s() + found.process.tau_s() - MOTOR_S;
+            let late_s = found.process.t_prop_s() + found.process.tau_s() - flight.late_s;
             assert!(
                 (-0.01..0.025).contains(&late_s),
                 "{cycles} cycles: {late_s}"
@@ -73,27 +80,99 @@ fn holds(recording: &str, acceleration: f64) {
     assert!(all >= 1, "nothing identified");
 }
 
+/// A flight in PX4's simulator, whose motors have a lag of 50 ms.
+fn in_px4(recording: &'static str, acceleration: f64) -> Flight {
+    Flight {
+        recording,
+        sample_s: 0.004,
+        acceleration,
+        acceleration_error: 0.0,
+        late_s: 0.05,
+    }
+}
+
 // 4 motors of 5 N, arms of 0.2 m at 45 degrees, 0.025 kg m^2.
 const ROLL: f64 = 4.0 * 5.0 * 0.2 * std::f64::consts::FRAC_1_SQRT_2 / 0.025;
 
 #[test]
 fn roll_in_flight() {
-    holds(include_str!("../data/px4_roll.csv"), ROLL);
+    holds(&in_px4(include_str!("../data/px4_roll.csv"), ROLL));
 }
 
 #[test]
 fn pitch_in_flight() {
-    holds(include_str!("../data/px4_pitch.csv"), ROLL);
+    holds(&in_px4(include_str!("../data/px4_pitch.csv"), ROLL));
 }
 
 // 4 motors of 0.1 N m, 0.03 kg m^2.
 #[test]
 fn yaw_in_flight() {
-    holds(include_str!("../data/px4_yaw.csv"), 4.0 * 0.1 / 0.03);
+    holds(&in_px4(
+        include_str!("../data/px4_yaw.csv"),
+        4.0 * 0.1 / 0.03,
+    ));
 }
 
 // 4 motors of 5 N, 1 kg.
 #[test]
 fn altitude_in_flight() {
-    holds(include_str!("../data/px4_altitude.csv"), 4.0 * 5.0);
+    holds(&in_px4(include_str!("../data/px4_altitude.csv"), 4.0 * 5.0));
+}
+
+/// A flight in ArduPilot's simulator, whose motors have no lag. The angle is delayed like the gyro behind its filter of 20 Hz,
+/// `sqrt(2)/(2 pi 20 Hz)`; `filter_s` is the lag of the rate loop's own filter.
+fn in_ardupilot(recording: &'static str, acceleration: f64, filter_s: f64) -> Flight {
+    Flight {
+        recording,
+        sample_s: 0.0025,
+        acceleration,
+        // The voltage of the battery is not constant.
+        acceleration_error: 0.02,
+        late_s: 0.01125 + filter_s,
+    }
+}
+
+// In hover, 3 kg at 36.3 % of the thrust: 20.3 N from a full motor. A full input moves two of them by half, on arms of 0.35 m;
+// 3 kg 0.25 (0.175 m)^2.
+const PLUS: f64 = 2.0 * 0.5 * (3.0 * 9.81 / 4.0 / 0.363) * 0.35 / (3.0 * 0.25 * 0.175 * 0.175);
+
+#[test]
+fn ardupilot_roll_in_flight() {
+    holds(&in_ardupilot(
+        include_str!("../data/ardupilot_roll.csv"),
+        PLUS,
+        0.0,
+    ));
+}
+
+#[test]
+fn ardupilot_pitch_in_flight() {
+    holds(&in_ardupilot(
+        include_str!("../data/ardupilot_pitch.csv"),
+        PLUS,
+        0.0,
+    ));
+}
+
+// The torque of a motor is 0.0175 m times thrust times command c, the thrust 20.3 N (0.35 c + 0.65 c^2): at c = 0.525 in hover, 0.31 N m
+// for a full change of the thrust. A full input changes four motors by half; 3 kg 0.5 (0.175 m)^2. ATC_RAT_YAW_FLTE is 2.5 Hz.
+#[test]
+fn ardupilot_yaw_in_flight() {
+    let inertia = 3.0 * 0.5 * 0.175 * 0.175;
+    holds(&in_ardupilot(
+        include_str!("../data/ardupilot_yaw.csv"),
+        4.0 * 0.5 * 0.311 / inertia,
+        1.0 / (2.0 * std::f64::consts::PI * 2.5),
+    ));
+}
+
+// A relay of 0.006 instead of 0.15, in gusts: nothing may be found.
+#[test]
+fn ardupilot_roll_in_gusts_is_refused() {
+    let flight = in_ardupilot(include_str!("../data/ardupilot_roll_gusts.csv"), PLUS, 0.0);
+    let (found, windows) = identify(&flight, 1);
+    assert!(
+        windows > 0 && found.is_empty(),
+        "{windows} windows: {found:?}"
+    );
 }
