@@ -8,6 +8,8 @@ mod dataset;
 mod design;
 mod fly;
 mod identify;
+#[cfg(not(target_family = "wasm"))]
+mod live;
 mod log;
 mod man;
 mod pack;
@@ -32,6 +34,8 @@ pub(crate) use self::dataset::Dataset;
 pub(crate) use self::design::{DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
 pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Between, Estimator, Identify, Method, When};
+#[cfg(not(target_family = "wasm"))]
+pub(crate) use self::live::{ConnectionArguments, Live, LiveAction, LiveState, LiveWrite};
 pub(crate) use self::log::{Log, LogArguments, WriteArguments};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
@@ -78,6 +82,8 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     Identify(Identify),
     Log(Log),
+    #[cfg(not(target_family = "wasm"))]
+    Live(Live),
     Simulate(Box<Simulate>),
     Tune(Tune),
     Fly(Fly),

@@ -15,9 +15,12 @@ pub use log::{
     Agreement, Axis, ControlLoop, Firmware, FirmwareKind, Flight, FlightLog, FlightTables, Gain,
     LogError, LogFormat, LogParameter, LogTables, LoggedLoop, LoggedSignal, Loss, LowPassSetting,
     Mark, MarkKind, RateLaw, ReadBack, ReadTerm, Setting, Signals, Span, Term, Topic, Wanted,
-    read_tables,
+    gain_names, read_tables,
 };
-pub use parameter_files::{ParameterFiles, files};
+pub use parameter_files::{
+    ParameterFile, ParameterFileError, ParameterFiles, ParameterLine, files, parameter_text,
+    read_parameters,
+};
 pub use recording::{
     Cell, ChosenBy, Column, ColumnLabel, Columns, GAP_PERIODS, Gap, MAX_POINTS, Note, Position,
     Recording, RecordingBuilder, RecordingError, Role,
