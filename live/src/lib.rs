@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod altitude;
 mod channel;
 mod error;
 mod log;
@@ -11,6 +12,9 @@ mod vehicle;
 mod wire;
 mod write;
 
+pub use altitude::{
+    AltitudeAbort, AltitudeFlight, AltitudeRefusal, AltitudeTest, HandBack, Sample, ThrustSource,
+};
 pub use error::LiveError;
 pub use log::{LogEntry, LogError};
 pub use parameters::Parameter;

@@ -26,6 +26,11 @@ impl Px4Mode {
         Self { main, sub }
     }
 
+    /// The number that a heartbeat has.
+    pub(crate) const fn number(self) -> u32 {
+        u32::from_le_bytes([0, 0, self.main, self.sub])
+    }
+
     fn name(self) -> Option<&'static str> {
         Some(match (self.main, self.sub) {
             (1, _) => "Manual",

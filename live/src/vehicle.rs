@@ -213,7 +213,7 @@ impl Vehicle {
     /// Asks for one message of a kind.
     pub(crate) fn request(&mut self, message: u32) {
         let command = MavCmd::MAV_CMD_REQUEST_MESSAGE;
-        self.send(&self.command_long(command, [message as f32, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]));
+        self.send_command(command, [message as f32, 0.0, 0.0]);
     }
 
     fn command_long(&self, command: MavCmd, parameters: [f32; 7]) -> MavMessage {
@@ -234,6 +234,11 @@ impl Vehicle {
         })
     }
 
+    /// Sends a command once, with its first parameters.
+    pub(crate) fn send_command(&mut self, command: MavCmd, [a, b, c]: [f32; 3]) {
+        self.send(&self.command_long(command, [a, b, c, 0.0, 0.0, 0.0, 0.0]));
+    }
+
     /// Sends a command until it is answered. `name`: for the error.
     pub(crate) fn command(
         &mut self,
@@ -241,9 +246,8 @@ impl Vehicle {
         command: MavCmd,
         first: [f32; 3],
     ) -> Result<(), LiveError> {
-        let [a, b, c] = first;
         for _ in 0..TRIES {
-            self.send(&self.command_long(command, [a, b, c, 0.0, 0.0, 0.0, 0.0]));
+            self.send_command(command, first);
             let until = self.now() + ANSWER;
             while let Some(message) = self.receive(until) {
                 let MavMessage::COMMAND_ACK(answer) = message else {

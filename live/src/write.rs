@@ -159,6 +159,20 @@ impl Plan {
         })
     }
 
+    /// The plan that writes the old values.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let turned = |step: &Step| Step {
+            old: step.new,
+            new: step.old,
+            ..step.clone()
+        };
+        Self {
+            steps: self.steps.iter().map(turned).collect(),
+            may_be_armed: self.may_be_armed,
+        }
+    }
+
     /// Every parameter, with its old value.
     pub fn steps(&self) -> &[Step] {
         &self.steps

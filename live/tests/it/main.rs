@@ -6,7 +6,9 @@
     reason = "helpers of tests are tests too, which the lint does not see"
 )]
 
+mod altitude;
 mod connection;
+mod hovering;
 mod log;
 mod state;
 mod vehicle;

@@ -11,7 +11,14 @@ use mavlink::{
 };
 use onecycle_live::Key;
 
+use crate::hovering::Hovering;
+
 pub const SYSTEM: u32 = 7;
+/// Modes: Hold and Offboard of PX4, Guided and Loiter of ArduCopter.
+pub const HOLD: u32 = u32::from_le_bytes([0, 0, 4, 3]);
+pub const OFFBOARD: u32 = u32::from_le_bytes([0, 0, 6, 0]);
+pub const GUIDED: u32 = 4;
+pub const LOITER: u32 = 5;
 /// Time between two rounds of the vehicle: it sends its streams, and a heartbeat every second.
 pub const ROUND: Duration = Duration::from_millis(20);
 
@@ -42,10 +49,14 @@ pub struct Scripted {
     pub tells_missing: bool,
     pub is_armed: bool,
     pub custom_mode: u32,
+    /// Whether PX4 changes its mode on command.
+    pub takes_modes: bool,
     /// Whether it is there at all.
     pub is_on: bool,
     /// Values that a restart brings back.
     pub stored: BTreeMap<String, Value>,
+    /// Its flight; `None`: it stays on the ground.
+    pub hovering: Option<Hovering>,
     /// Flight logs, by number from 1.
     pub logs: Vec<Vec<u8>>,
     signing: Option<SigningData>,
@@ -68,7 +79,9 @@ impl Scripted {
             tells_missing: false,
             is_armed: false,
             custom_mode: 0,
+            takes_modes: true,
             is_on: true,
+            hovering: None,
             logs: vec![],
             signing: None,
             received: Vec::new(),
@@ -111,6 +124,30 @@ impl Scripted {
         self
     }
 
+    /// Armed and in the air, with the mode of the hover and the parameter that the test needs.
+    pub fn hovering(mut self, hovering: Hovering) -> Self {
+        self.is_armed = true;
+        self.hovering = Some(hovering);
+        self.custom_mode = match self.is_px4() {
+            true => HOLD,
+            false => GUIDED,
+        };
+        let options = (MavParamType::MAV_PARAM_TYPE_INT32, 1.0);
+        self.parameters.insert("GUID_OPTIONS".to_owned(), options);
+        self
+    }
+
+    /// Lets time pass.
+    pub fn advance(&mut self, now: Duration) {
+        if let Some(hovering) = &mut self.hovering {
+            let is_testing = match self.autopilot {
+                MavAutopilot::MAV_AUTOPILOT_PX4 => self.custom_mode == OFFBOARD,
+                _ => self.custom_mode == GUIDED && hovering.has_attitude_target,
+            };
+            hovering.advance(now, is_testing);
+        }
+    }
+
     /// Takes bytes in, and returns the frames of its answers.
     pub fn handle(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         self.reader.get_mut().0.extend_from_slice(bytes);
@@ -143,6 +180,9 @@ impl Scripted {
         let mut messages = Vec::new();
         if self.rounds % 50 == 1 {
             messages.push(self.heartbeat());
+        }
+        if let Some(hovering) = &self.hovering {
+            messages.extend(hovering.streams(self.rounds));
         }
         messages.iter().map(|message| self.frame(message)).collect()
     }
@@ -218,6 +258,19 @@ impl Scripted {
                 self.about(name)
             }
             MavMessage::COMMAND_LONG(of) => self.obey(of),
+            MavMessage::SET_ATTITUDE_TARGET(of) => {
+                let is_thrust = self.is_px4() || self.value("GUID_OPTIONS") as u32 & 8 != 0;
+                if let Some(hovering) = self.hovering.as_mut().filter(|_| is_thrust) {
+                    hovering.set_thrust(of.thrust.into());
+                }
+                vec![]
+            }
+            MavMessage::SET_POSITION_TARGET_LOCAL_NED(of) => {
+                if let Some(hovering) = self.hovering.as_mut() {
+                    hovering.set_place((-of.z).into());
+                }
+                vec![]
+            }
             MavMessage::LOG_REQUEST_LIST(_) => self.list_logs(),
             MavMessage::LOG_REQUEST_DATA(of) => self.log_data(of),
             _ => vec![],
@@ -308,9 +361,21 @@ impl Scripted {
                     AUTOPILOT_VERSION_DATA::ID => MavMessage::AUTOPILOT_VERSION(self.version()),
                     SYS_STATUS_DATA::ID => self.sys_status(),
                     LOCAL_POSITION_NED_DATA::ID => self.position(),
+                    EXTENDED_SYS_STATE_DATA::ID if self.hovering.is_some() => {
+                        MavMessage::EXTENDED_SYS_STATE(EXTENDED_SYS_STATE_DATA {
+                            vtol_state: MavVtolState::MAV_VTOL_STATE_UNDEFINED,
+                            landed_state: MavLandedState::MAV_LANDED_STATE_IN_AIR,
+                        })
+                    }
                     _ => return vec![ack(MavResult::MAV_RESULT_DENIED)],
                 };
                 vec![ack(MavResult::MAV_RESULT_ACCEPTED), message]
+            }
+            MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => vec![ack(MavResult::MAV_RESULT_ACCEPTED)],
+            MavCmd::MAV_CMD_DO_SET_MODE if self.is_px4() && self.takes_modes => {
+                let [main, sub] = [command.param2 as u8, command.param3 as u8];
+                self.custom_mode = u32::from_le_bytes([0, 0, main, sub]);
+                vec![ack(MavResult::MAV_RESULT_ACCEPTED), self.heartbeat()]
             }
             _ => vec![ack(MavResult::MAV_RESULT_UNSUPPORTED)],
         }
@@ -330,10 +395,13 @@ impl Scripted {
     }
 
     fn position(&self) -> MavMessage {
-        MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
-            z: -10.0,
-            ..LOCAL_POSITION_NED_DATA::DEFAULT
-        })
+        match &self.hovering {
+            Some(hovering) => hovering.position(),
+            None => MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
+                z: -10.0,
+                ..LOCAL_POSITION_NED_DATA::DEFAULT
+            }),
+        }
     }
 
     fn version(&self) -> AUTOPILOT_VERSION_DATA {

@@ -101,6 +101,7 @@ impl World {
                 match way {
                     Way::ToUs => return Some(bytes),
                     Way::ToVehicle => {
+                        self.vehicle.advance(self.now);
                         for answer in self.vehicle.handle(&bytes) {
                             self.post(Way::ToUs, &answer);
                         }
@@ -108,6 +109,7 @@ impl World {
                 }
             } else {
                 self.next_round += ROUND;
+                self.vehicle.advance(self.now);
                 for message in self.vehicle.round() {
                     self.post(Way::ToUs, &message);
                 }
