@@ -1,5 +1,6 @@
 #![doc = include_str!("../README.md")]
 
+mod altitude_gains;
 mod csv;
 mod gains;
 mod log;
@@ -7,6 +8,7 @@ mod parameter_files;
 mod recording;
 mod time_unit;
 
+pub use altitude_gains::AltitudeCascade;
 pub use csv::{
     ColumnRef, CsvOptions, CsvWriter, ReadError, SAMPLE_RATES_HZ, read, read_from, write_csv,
 };

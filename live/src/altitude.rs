@@ -215,4 +215,4 @@ pub struct AltitudeFlight {
 }
 
 /// Time without a position after which the test ends.
-const STALE: Duration = Duration::from_millis(300);
+const STALE: Duration = Duration::from_millis(500);

@@ -35,6 +35,17 @@ pub struct LogEntry {
     pub utc_s: Option<u32>,
 }
 
+impl LogEntry {
+    /// The log up to a place, as if it ended there.
+    #[must_use]
+    pub fn up_to(self, size: u32) -> Self {
+        Self {
+            size: size.min(self.size),
+            ..self
+        }
+    }
+}
+
 /// Why a log did not come whole. What came before is in order.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]

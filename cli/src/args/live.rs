@@ -1,19 +1,25 @@
 //! Arguments of `onecycle live`.
 
+use std::ffi::OsString;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use clap::{Args, Subcommand};
+use clap::{Args, Subcommand, ValueEnum};
 use onecycle_live::Address;
 
-/// Talk to a vehicle over MAVLink (PX4, ArduPilot): its state, its parameters.
+use super::log::LogAxis;
+use super::{Share, WriteArguments};
+
+/// Talk to a vehicle over MAVLink (PX4, ArduPilot): state, flight logs, parameters, a relay test of the altitude.
 ///
 /// CONNECTION is udp:PORT (listen), udp:HOST:PORT (send) or serial:DEVICE:BAUD, as ground stations write it.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle live state udp:14550\n",
-    "  onecycle live write serial:/dev/ttyACM0:57600 roll.params\n\n",
+    "  onecycle live log udp:14550 -o flight.ulg --identify roll --write roll.params\n",
+    "  onecycle live write serial:/dev/ttyACM0:57600 roll.params\n",
+    "  onecycle live relay udp:14550 --axis altitude -o altitude.csv\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 the vehicle is not heard or an input file cannot be read, 4 refused or ",
     "rolled back: the old values are in force, 5 output not written, or parameters left uncertain"
 ))]
@@ -25,7 +31,9 @@ pub(crate) struct Live {
 #[derive(Debug, Subcommand)]
 pub(crate) enum LiveAction {
     State(LiveState),
+    Log(LiveLog),
     Write(LiveWrite),
+    Relay(LiveRelay),
 }
 
 /// How the vehicle is reached.
@@ -104,4 +112,128 @@ pub(crate) struct LiveWrite {
     /// Time to wait for a lost link before the old values are given up, in seconds
     #[arg(long, value_name = "S", default_value = "60", allow_negative_numbers = true, value_parser = wait)]
     pub(crate) patience: Duration,
+}
+
+/// List the flight logs of a vehicle, or download one.
+///
+/// Blocks that are lost are asked for again. An interrupted download leaves FILE.part, and the same command goes on from
+/// there. With --identify the log is identified at once.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle live log udp:14550\n",
+    "  onecycle live log udp:14550 -o flight.ulg\n",
+    "  onecycle live log udp:14550 --id 12 -o flight.bin --identify pitch --report pitch.html --write pitch.param\n",
+    "  onecycle live log udp:14550 -o flight.ulg --identify roll -- --style calm --from 20\n\n",
+    "Exit codes: 0 done, 2 bad arguments, 3 the vehicle is not heard or the link was lost (FILE.part stays), 4 no such ",
+    "log, or no process identified, 5 output not written"
+))]
+pub(crate) struct LiveLog {
+    #[command(flatten)]
+    pub(crate) connection: ConnectionArguments,
+    /// Number of the log in the list, or latest
+    #[arg(long, value_name = "N|latest", default_value = "latest", value_parser = log_id)]
+    pub(crate) id: LogId,
+    /// Download to this file [default: list the logs]
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
+    /// Identify the rate loop of this axis from the log
+    #[arg(long, value_name = "AXIS", requires = "out")]
+    pub(crate) identify: Option<LogAxis>,
+    /// With --identify: write a report with figures to this file
+    #[arg(long, value_name = "OUT.html", requires = "identify")]
+    pub(crate) report: Option<PathBuf>,
+    /// With --identify: write the changed parameters to this file, as identify does
+    #[arg(long, value_name = "NAME.EXT", requires = "identify")]
+    pub(crate) write: Option<PathBuf>,
+    /// Further options of identify, after --
+    #[arg(last = true, value_name = "OPTIONS", requires = "identify")]
+    pub(crate) options: Vec<OsString>,
+}
+
+/// Which log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum LogId {
+    Latest,
+    Number(u16),
+}
+
+fn log_id(text: &str) -> Result<LogId, String> {
+    match text {
+        "latest" => Ok(LogId::Latest),
+        number => (number.parse().map(LogId::Number))
+            .map_err(|_| "a log is its number in the list, or latest".to_owned()),
+    }
+}
+
+/// Fly a relay test of the altitude from this computer, record it and identify the process.
+///
+/// The vehicle hovers: PX4 in Hold, ArduCopter in Guided. This program then sets its thrust in Offboard or Guided, with the
+/// attitude and the heading held. The test ends after its cycles, at a limit, when a stick or the mode is moved, when
+/// messages are lost, and on Ctrl-C; then the vehicle holds its position. No gain is changed: --write makes a file for
+/// `onecycle live write`.
+#[derive(Debug, Args)]
+#[command(after_help = concat!(
+    "Examples:\n",
+    "  onecycle live relay udp:14550 --axis altitude -o altitude.csv\n",
+    "  onecycle live relay udp:14550 --axis altitude -o altitude.csv --amplitude 5% --write altitude.params\n",
+    "  onecycle live relay udp:14550 --axis altitude -o altitude.csv -- --style calm --report altitude.html\n\n",
+    "Exit codes: 0 identified, 2 bad arguments, 3 the vehicle is not heard, 4 the test did not begin or ended early, or no ",
+    "process was identified, 5 output not written"
+))]
+pub(crate) struct LiveRelay {
+    #[command(flatten)]
+    pub(crate) connection: ConnectionArguments,
+    /// Loop to test
+    #[arg(long, value_enum)]
+    pub(crate) axis: RelayAxis,
+    /// Recording to write (CSV)
+    #[arg(long, short, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// Half the jump of the thrust, as a part of the full thrust, 1 to 30 %
+    #[arg(long, value_name = "PART", default_value = "10%", allow_hyphen_values = true, value_parser = amplitude)]
+    pub(crate) amplitude: f64,
+    /// Cycles to record, 2 to 100
+    #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true,
+          value_parser = clap::value_parser!(u32).range(2..=100))]
+    pub(crate) cycles: u32,
+    /// Largest distance from the height at the start, in metres
+    #[arg(long, value_name = "M", default_value_t = 1.0, allow_negative_numbers = true, value_parser = limit)]
+    pub(crate) band: f64,
+    /// Largest climb or sink rate, in m/s
+    #[arg(long, value_name = "M/S", default_value_t = 2.0, allow_negative_numbers = true, value_parser = limit)]
+    pub(crate) climb: f64,
+    /// Largest horizontal distance from the start, in metres: the position is not held during the test
+    #[arg(long, value_name = "M", default_value_t = 10.0, allow_negative_numbers = true, value_parser = limit)]
+    pub(crate) drift: f64,
+    /// Longest test, in seconds
+    #[arg(long, value_name = "S", default_value_t = 60.0, allow_negative_numbers = true, value_parser = limit)]
+    pub(crate) duration: f64,
+    #[command(flatten)]
+    pub(crate) write: WriteArguments,
+    /// Further options of identify, after --
+    #[arg(last = true, value_name = "OPTIONS")]
+    pub(crate) options: Vec<OsString>,
+}
+
+/// Loops that a relay test over a link can identify.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum RelayAxis {
+    Altitude,
+}
+
+fn amplitude(text: &str) -> Result<f64, String> {
+    let part = text.parse::<Share>()?.of(1.0);
+    match (0.01..=0.3).contains(&part) {
+        true => Ok(part),
+        false => Err("an amplitude lies between 1 and 30 % of the full thrust".to_owned()),
+    }
+}
+
+fn limit(text: &str) -> Result<f64, String> {
+    let limit = text
+        .parse()
+        .ok()
+        .filter(|limit: &f64| *limit > 0.0 && limit.is_finite());
+    limit.ok_or_else(|| "a limit is a positive number".to_owned())
 }

@@ -1,5 +1,7 @@
 //! `onecycle live`: a vehicle over MAVLink.
 
+mod log;
+mod relay;
 mod state;
 mod write;
 
@@ -16,7 +18,9 @@ use crate::words::live as words;
 pub(crate) fn run(arguments: &Live) -> Result<ExitCode, Failure> {
     match &arguments.action {
         LiveAction::State(state) => state::run(state),
+        LiveAction::Log(log) => log::run(log),
         LiveAction::Write(write) => write::run(write),
+        LiveAction::Relay(relay) => relay::run(relay),
     }
 }
 
@@ -37,6 +41,14 @@ fn connect(arguments: &ConnectionArguments) -> Result<Vehicle, Failure> {
     let wire = wire.map_err(|error| unheard(arguments, &words::unopened(&error)))?;
     Vehicle::connect(wire, key.as_ref(), arguments.system, arguments.wait)
         .map_err(|error| failed(arguments, &error))
+}
+
+/// Finished, with a negative result.
+fn refused(reason: String) -> Failure {
+    Failure::Vehicle {
+        code: exit::NO_PROCESS,
+        reason,
+    }
 }
 
 /// The vehicle cannot be asked.

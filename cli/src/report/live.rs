@@ -3,12 +3,13 @@
 use std::fmt::Write;
 use std::path::Path;
 
-use onecycle_live::{State, Step};
+use onecycle_live::{AltitudeFlight, LogEntry, State, Step};
 use serde_json::{Value, json};
 
 use super::number::short;
 use super::wrap::wrapped;
-use crate::style::{HEADING, REMARK, headed, painted};
+use crate::results::live::AltitudeGains;
+use crate::style::{HEADING, REFUSAL, REMARK, headed, painted};
 use crate::words::live as words;
 
 /// The state as text.
@@ -162,4 +163,126 @@ pub(crate) fn written(steps: &[Step], old: &Path) -> String {
     );
     wrapped(&mut text, "  ", &all);
     text
+}
+
+/// The logs of a vehicle.
+pub(crate) fn logs(logs: &[LogEntry]) -> String {
+    if logs.is_empty() {
+        return "The vehicle has no log.\n".to_owned();
+    }
+    let mut text = headed("Logs\n");
+    for log in logs {
+        let at = log
+            .utc_s
+            .map_or("unknown time".to_owned(), |utc_s| date(utc_s.into()));
+        let _ = writeln!(text, "  {:>5}{:>12} bytes  {at}", log.id, log.size);
+    }
+    text
+}
+
+/// Date and time of seconds since 1970, in UTC. Source: days to a date by the 400 years of the calendar.
+fn date(utc_s: i64) -> String {
+    let (days, second) = (utc_s.div_euclid(86_400), utc_s.rem_euclid(86_400));
+    // Days since 1 March of the year 0.
+    let days = days + 719_468;
+    let (era, day_of_era) = (days.div_euclid(146_097), days.rem_euclid(146_097));
+    let year_of_era =
+        (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month + 2) / 5 + 1;
+    let month = if month < 10 { month + 3 } else { month - 9 };
+    let year = 400 * era + year_of_era + i64::from(month <= 2);
+    let (hour, minute) = (second / 3600, second / 60 % 60);
+    format!("{year}-{month:02}-{day:02} {hour:02}:{minute:02} UTC")
+}
+
+/// What was flown.
+pub(crate) fn flight(flight: &AltitudeFlight) -> String {
+    let seconds = flight.samples.last().map_or(0.0, |last| last.time_s);
+    let count = flight.samples.len();
+    let rate_hz = count.saturating_sub(1) as f64 / seconds.max(1e-9);
+    let mut text = headed("Relay test of the altitude\n");
+    let _ = writeln!(
+        text,
+        "  {count} samples in {seconds:.1} s ({rate_hz:.0} Hz), hover thrust {:.3}",
+        flight.hover_thrust
+    );
+    let _ = writeln!(text, "  thrust {}", words::source(flight.source));
+    let _ = writeln!(text, "  {}", words::hand_back(flight));
+    if flight.is_restored == Some(false) {
+        let warning =
+            "WARNING: GUID_OPTIONS could not be restored: set its bit 3 (value 8) back by hand";
+        let _ = writeln!(text, "  {}", painted(REFUSAL, warning));
+    }
+    text
+}
+
+/// Comments at the head of the recording.
+pub(crate) fn comments(flight: &AltitudeFlight) -> Vec<String> {
+    let test = &flight.test;
+    vec![
+        format!(
+            "relay test of the altitude over MAVLink: onecycle {}, {}",
+            env!("CARGO_PKG_VERSION"),
+            words::firmware(Some(flight.firmware))
+        ),
+        format!(
+            "relay: amplitude {}, beta {:.2}, trim on",
+            test.amplitude, flight.beta
+        ),
+        format!(
+            "output: height in m, integral of the climb rate; input: part of the full thrust less that of the hover, {:.4}",
+            flight.hover_thrust
+        ),
+        format!("thrust {}", words::source(flight.source)),
+    ]
+}
+
+/// Parameters of the altitude that were written to a file, or why not.
+pub(crate) fn altitude_gains(path: &Path, proposed: &Result<AltitudeGains, String>) -> String {
+    let mut text = headed("\nParameters\n");
+    let gains = match proposed {
+        Ok(gains) => gains,
+        Err(reason) => {
+            let refusal = format!("Nothing was written: {reason}");
+            wrapped(&mut text, "  ", &painted(REFUSAL, &refusal));
+            return text;
+        }
+    };
+    for change in &gains.changes {
+        let (old, new) = (short(change.old), short(change.new));
+        let _ = writeln!(text, "  {:18}{old:>9} -> {new}", change.name);
+    }
+    let margins = &gains.figures.margins;
+    let least = gains.least.map_or(String::new(), |least| {
+        format!(
+            "; over the posterior at least {:.1} deg (90 %)",
+            least.phase_margin_rad.to_degrees()
+        )
+    });
+    let figures = format!(
+        "With these values the loop has a phase margin of {:.1} deg, Ms {:.2}{least}. This is {:.0} % of the way to the \
+         proposed gains. Write them with: onecycle live write CONNECTION {}",
+        margins.phase_margin_rad.to_degrees(),
+        gains.figures.ms,
+        100.0 * gains.share,
+        path.display()
+    );
+    wrapped(&mut text, "  ", &figures);
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::date;
+
+    // By the calendar: the epoch, a leap day, the turn of the century, and a time of day.
+    #[test]
+    fn dates() {
+        assert_eq!(date(0), "1970-01-01 00:00 UTC");
+        assert_eq!(date(951_782_400), "2000-02-29 00:00 UTC");
+        assert_eq!(date(1_709_210_100), "2024-02-29 12:35 UTC");
+        assert_eq!(date(1_735_689_599), "2024-12-31 23:59 UTC");
+    }
 }

@@ -4,8 +4,12 @@ use std::io;
 use std::path::Path;
 
 use onecycle_link::{FirmwareKind, ParameterFile};
-use onecycle_live::{Cause, InForce, LiveError, Refusal};
+use onecycle_live::{
+    AltitudeAbort, AltitudeFlight, AltitudeRefusal, Cause, HandBack, InForce, LiveError, LogEntry,
+    LogError, Refusal, ThrustSource,
+};
 
+use crate::args::LogId;
 use crate::report::number::short;
 
 pub(crate) const NO_PASSPHRASE: &str = "the file has no passphrase: write it into its first line";
@@ -119,5 +123,87 @@ fn because(cause: &Cause) -> String {
             short(*wanted)
         ),
         cause => cause.to_string(),
+    }
+}
+
+pub(crate) const ONLY_PX4: &str = "--write is for PX4: ArduCopter controls the acceleration inside its altitude loop, and the \
+    gains of a PID have no place there. Leave out --write, and take the process from the report";
+pub(crate) const NO_CASCADE: &str = "the integral of the proposed controller does not fit into PX4's cascade; choose --style calm, after --.";
+
+pub(crate) fn no_log(id: LogId, logs: &[LogEntry]) -> String {
+    match (id, logs.len()) {
+        (_, 0) => "the vehicle has no log".to_owned(),
+        (LogId::Number(id), count) => {
+            format!("the vehicle has no log {id}; it lists {count}: leave out -o to see them")
+        }
+        (LogId::Latest, _) => "the vehicle has no log with a number".to_owned(),
+    }
+}
+
+/// A download that the link ended.
+pub(crate) fn interrupted(error: &LiveError, part: &Path) -> String {
+    format!("{error}; the same command goes on from {}", part.display())
+}
+
+pub(crate) fn short_log(error: &LogError, part: &Path) -> String {
+    format!("{error}; what came is in {}", part.display())
+}
+
+pub(crate) fn file_exists(path: &Path) -> String {
+    format!(
+        "{} exists: name another file, or add --force to replace it",
+        path.display()
+    )
+}
+
+/// A test that did not begin.
+pub(crate) fn not_begun(refusal: &AltitudeRefusal) -> String {
+    let advice = match refusal {
+        AltitudeRefusal::NotFlying => "take off and hover first",
+        AltitudeRefusal::Mode { .. } => "change the mode, and let it hover",
+        AltitudeRefusal::Rate(_) => "use a faster link, or let other programs ask for less",
+        AltitudeRefusal::Moving(_) => "wait until it hovers, in calm air",
+        AltitudeRefusal::Thrust(_) => {
+            "take a smaller --amplitude; the firmware must send ATTITUDE_TARGET"
+        }
+        AltitudeRefusal::NoMode(_) => "check the messages of the vehicle and the mode switch",
+        _ => "nothing was changed",
+    };
+    format!("no test: {refusal}; {advice}")
+}
+
+/// A test that ended early.
+pub(crate) fn aborted(abort: &AltitudeAbort, flight: &AltitudeFlight, out: &Path) -> String {
+    let advice = match abort {
+        AltitudeAbort::Height(_) | AltitudeAbort::Climb(_) => {
+            "take a smaller --amplitude, or a larger --band or --climb"
+        }
+        AltitudeAbort::Drift(_) => "fly in calm air, or allow a larger --drift",
+        AltitudeAbort::Duration(_) => "take fewer --cycles, or a longer --duration",
+        AltitudeAbort::NoOscillation(_) => "take a larger --amplitude",
+        AltitudeAbort::Stale(_) => "use a better link",
+        _ => "begin again when the vehicle hovers",
+    };
+    let count = flight.samples.len();
+    format!(
+        "the test ended early: {abort}; {advice}. {} has the {count} samples until then",
+        out.display()
+    )
+}
+
+/// What the vehicle does after the test.
+pub(crate) fn hand_back(flight: &AltitudeFlight) -> &'static str {
+    match flight.hand_back {
+        HandBack::Holds => "the vehicle holds its position",
+        HandBack::NotOurs => "the pilot has the vehicle; nothing more was sent",
+        _ => "WARNING: the vehicle was told to hold its position and did not confirm it: take over",
+    }
+}
+
+/// Where the recorded thrust comes from.
+pub(crate) fn source(source: ThrustSource) -> &'static str {
+    match source {
+        ThrustSource::Reported => "as the vehicle reports it (ATTITUDE_TARGET)",
+        ThrustSource::Commanded => "as it was sent: the dead time contains the delay of the link",
     }
 }

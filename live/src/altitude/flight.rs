@@ -33,9 +33,9 @@ const HOLDS_M_PER_S: f32 = 0.3;
 const MOST_HOVER_M_PER_S: f64 = 0.5;
 /// Deflection of a stick that ends the test (us of the pulse, of 500).
 const STICK_US: u16 = 100;
-/// Rates that are asked for (Hz), by message.
+/// Rates that are asked for (Hz), by message. A slow link carries less.
 const STREAMS: [(u32, f32); 4] = [
-    (LOCAL_POSITION_NED_DATA::ID, 50.0),
+    (LOCAL_POSITION_NED_DATA::ID, 100.0),
     (ATTITUDE_TARGET_DATA::ID, 100.0),
     (ATTITUDE_DATA::ID, 10.0),
     (RC_CHANNELS_DATA::ID, 10.0),
@@ -162,7 +162,7 @@ impl Vehicle {
         let abort = self.oscillate(pilot, hover, &mut run, is_over).err();
         let hand_back = self.hand_back(pilot, hover);
         let beta = run.beta();
-        let (samples, source) = run.recorded();
+        let (samples, source) = run.recorded(pilot == Pilot::Px4);
         Ok(AltitudeFlight {
             test,
             firmware: pilot.firmware(),

@@ -18,7 +18,7 @@ const NO_SWITCH_S: f64 = 5.0;
 /// A height that differs by more from its integrated rate has jumped (m in one sample).
 const JUMP_M: f64 = 0.3;
 /// A longer time between two samples (s) is no time for a relay.
-const GAP_S: f64 = 0.3;
+const GAP_S: f64 = 0.5;
 
 /// A sample of the recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -166,24 +166,28 @@ impl Run {
         RelaySettings::DISTINGUISHING_BETA.into()
     }
 
-    /// The recording. The thrust is the one that the vehicle reported, if there is a report for nearly every sample; a switch
-    /// belongs to the sample that is nearest in time.
-    pub(super) fn recorded(self) -> (Vec<Sample>, ThrustSource) {
+    /// The recording. The thrust is the one that the vehicle reported, if there are enough reports; a switch belongs to the
+    /// sample that is nearest in time. `reports_when_set`: the stamp of a report is that of the set-point (PX4), and not that
+    /// of the report itself (ArduPilot), before which the switch was by half the time between two reports in the mean.
+    pub(super) fn recorded(self, reports_when_set: bool) -> (Vec<Sample>, ThrustSource) {
         let mut samples = self.samples;
         if self.reports.len() * 10 < samples.len() * 9 || samples.len() < 2 {
             return (samples, ThrustSource::Commanded);
         }
+        let begin_s = |at: usize| {
+            let (time_s, _) = self.reports[at];
+            match at.checked_sub(1).filter(|_| !reports_when_set) {
+                Some(before) => 0.5 * (self.reports[before].0 + time_s),
+                None => time_s,
+            }
+        };
         let ends_s: Vec<f64> = (samples.windows(2))
             .map(|pair| 0.5 * (pair[0].time_s + pair[1].time_s))
             .chain([f64::INFINITY])
             .collect();
         let mut at = 0;
         for (sample, end_s) in samples.iter_mut().zip(ends_s) {
-            while self
-                .reports
-                .get(at + 1)
-                .is_some_and(|(time_s, _)| *time_s < end_s)
-            {
+            while at + 1 < self.reports.len() && begin_s(at + 1) < end_s {
                 at += 1;
             }
             sample.thrust = self.reports[at].1;

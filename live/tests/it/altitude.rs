@@ -255,7 +255,7 @@ fn the_thrust_is_lost() {
     assert_eq!(world.borrow().vehicle.custom_mode, HOLD);
 }
 
-// No position for 0.3 s: the link is gone for 1 s, and back.
+// No position for 0.5 s.
 #[test]
 fn the_link_is_lost() {
     let world = world(PX4, |_| {});

@@ -28,6 +28,9 @@ pub struct Hovering {
     pub reports: bool,
     /// Every how many rounds of 20 ms the position is sent.
     pub every: u64,
+    /// Whether a report has the time of the set-point, as that of PX4, or its own.
+    pub reports_when_set: bool,
+    set_ms: u32,
     /// Factor of the thrust in the air, such as 0.7 after a motor has failed.
     pub lift: f64,
 }
@@ -45,6 +48,8 @@ impl Hovering {
             wind_m_per_s: 0.0,
             reports: true,
             every: 1,
+            reports_when_set: false,
+            set_ms: ON_FOR.as_millis() as u32,
             lift: 1.0,
         }
     }
@@ -55,6 +60,7 @@ impl Hovering {
 
     pub fn set_thrust(&mut self, thrust: f64) {
         self.command = thrust;
+        self.set_ms = self.boot_ms();
         self.has_attitude_target = true;
     }
 
@@ -98,8 +104,12 @@ impl Hovering {
             messages.push(self.position());
         }
         if self.reports {
+            let time_boot_ms = match self.reports_when_set && self.has_attitude_target {
+                true => self.set_ms,
+                false => self.boot_ms(),
+            };
             messages.push(MavMessage::ATTITUDE_TARGET(ATTITUDE_TARGET_DATA {
-                time_boot_ms: self.boot_ms(),
+                time_boot_ms,
                 thrust: self.thrust as f32,
                 ..ATTITUDE_TARGET_DATA::DEFAULT
             }));

@@ -125,7 +125,8 @@ impl Scripted {
     }
 
     /// Armed and in the air, with the mode of the hover and the parameter that the test needs.
-    pub fn hovering(mut self, hovering: Hovering) -> Self {
+    pub fn hovering(mut self, mut hovering: Hovering) -> Self {
+        hovering.reports_when_set = self.is_px4();
         self.is_armed = true;
         self.hovering = Some(hovering);
         self.custom_mode = match self.is_px4() {

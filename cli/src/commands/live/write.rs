@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use onecycle_link::{ParameterFile, ParameterLine, parameter_text, read_parameters};
 use onecycle_live::{Assignment, Outcome, Plan, Refusal, Vehicle};
 
-use super::{connect, failed};
+use super::{connect, failed, refused};
 use crate::args::LiveWrite;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, with_ending, write_text};
@@ -47,13 +47,6 @@ pub(crate) fn run(arguments: &LiveWrite) -> Result<ExitCode, Failure> {
             reason: words::uncertain(&cause, &left, &old),
         }),
         other => Err(refused(format!("{other:?}"))),
-    }
-}
-
-fn refused(reason: String) -> Failure {
-    Failure::Vehicle {
-        code: exit::NO_PROCESS,
-        reason,
     }
 }
 
