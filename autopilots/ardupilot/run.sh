@@ -27,6 +27,7 @@ library=${CARGO_TARGET_DIR:-$root/onboard/c/target}/release/libonecycle.a
     "$python" ./waf --targets bin/arducopter
 )
 "$python" "$here/chirp.py" --ardupilot "$ARDUPILOT_DIR" --onecycle "$program" --axis roll
+"$python" "$here/../live.py" ardupilot "$ARDUPILOT_DIR" "$(mktemp -d)" --onecycle "$program"
 # A test that is refused is a result too: the old gains stay in force.
 "$python" "$here/tune.py" --ardupilot "$ARDUPILOT_DIR" --method onecycle --axes roll,pitch \
     --set CC3_AMP_RP=0.15 || true

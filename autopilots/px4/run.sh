@@ -43,3 +43,9 @@ cd "$here"
 "$python" compare.py "stock gains=$out/stock*.json" "PX4's autotune=$out/autotune*.json" \
     "onecycle, 35 degrees=$out/onecycle*.json" "onecycle, 20 degrees=$out/paper*.json"
 alone "$here/faults.py" "$build" "$out/faults"
+program=${ONECYCLE:-$root/target/release/onecycle}
+if [[ -x $program ]]; then
+    alone "$here/../live.py" px4 "$build" "$out/live" --onecycle "$program"
+else
+    echo "PX4: onecycle live skipped; $program is missing: cargo build --release, or set ONECYCLE."
+fi

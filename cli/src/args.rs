@@ -37,6 +37,7 @@ pub(crate) use self::identify::{Between, Estimator, Identify, Method, When};
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use self::live::{
     ConnectionArguments, Live, LiveAction, LiveLog, LiveRelay, LiveState, LiveWrite, LogId,
+    identify_of,
 };
 pub(crate) use self::log::{Log, LogArguments, WriteArguments};
 pub(crate) use self::man::Man;

@@ -40,6 +40,7 @@ pub(crate) enum Failure {
     #[error("{file}: {reason}", file = path.display())]
     Unreadable { path: PathBuf, reason: String },
     /// A vehicle that is not heard, refuses, or has changed by half, with the exit code.
+    #[cfg(not(target_family = "wasm"))]
     #[error("{reason}")]
     Vehicle { code: u8, reason: String },
     /// A file or the terminal that cannot be written.
@@ -100,6 +101,7 @@ impl Failure {
                 }
                 _ => exit::INPUT,
             },
+            #[cfg(not(target_family = "wasm"))]
             Self::Vehicle { code, .. } => *code,
             Self::Unreadable { .. } => exit::INPUT,
             Self::Output { .. } => exit::OUTPUT,

@@ -214,5 +214,15 @@ pub struct AltitudeFlight {
     pub is_restored: Option<bool>,
 }
 
+impl AltitudeFlight {
+    /// Mean time between two samples (s); 0 without samples.
+    pub fn sample_period_s(&self) -> f64 {
+        match &self.samples[..] {
+            [first, .., last] => (last.time_s - first.time_s) / (self.samples.len() - 1) as f64,
+            _ => 0.0,
+        }
+    }
+}
+
 /// Time without a position after which the test ends.
 const STALE: Duration = Duration::from_millis(500);

@@ -5,10 +5,10 @@
 #[non_exhaustive]
 pub enum LiveError {
     /// No message at all.
-    #[error("no vehicle was heard within {0:.0} s")]
+    #[error("no vehicle was heard within {0} s")]
     Silent(f64),
     /// Messages came, but no heartbeat of an autopilot.
-    #[error("messages come, but no heartbeat of an autopilot within {0:.0} s")]
+    #[error("messages come, but no heartbeat of an autopilot within {0} s")]
     NoAutopilot(f64),
     /// With a key: the messages have no signature.
     #[error("the messages of the vehicle are not signed, so none was accepted")]

@@ -1,7 +1,5 @@
 //! State of a vehicle in words and numbers.
 
-use std::time::Duration;
-
 use mavlink::MessageData;
 use mavlink::dialects::common::{
     AUTOPILOT_VERSION_DATA, ESTIMATOR_STATUS_DATA, EXTENDED_SYS_STATE_DATA, EstimatorStatusFlags,
@@ -11,10 +9,7 @@ use onecycle_link::{ControlLoop, FirmwareKind, gain_names};
 
 use crate::error::LiveError;
 use crate::mode;
-use crate::vehicle::Vehicle;
-
-/// How long the messages of the state are awaited.
-const MESSAGES: Duration = Duration::from_secs(2);
+use crate::vehicle::{ANSWER, TRIES, Vehicle};
 
 /// What a vehicle tells about itself.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,27 +97,30 @@ impl Vehicle {
         })
     }
 
-    /// Asks for the messages of the state until they have come or the time is over: no firmware sends all of them.
+    /// Asks for the messages of the state, a few times: no firmware sends all of them, and a busy one forgets some.
     fn gather(&mut self) {
-        for message in [
-            SYS_STATUS_DATA::ID,
-            ESTIMATOR_STATUS_DATA::ID,
-            LOCAL_POSITION_NED_DATA::ID,
-            EXTENDED_SYS_STATE_DATA::ID,
-        ] {
-            self.request(message);
-        }
-        let until = self.now() + MESSAGES;
-        while self.receive(until).is_some() {
+        for _ in 0..TRIES {
             let seen = &self.seen;
-            let is_told = seen.estimator.is_some() || self.firmware() != Some(FirmwareKind::Px4);
-            if seen.sys_status.is_some()
-                && seen.position.is_some()
-                && seen.extended.is_some()
-                && is_told
-            {
-                break;
+            let is_px4 = self.firmware() == Some(FirmwareKind::Px4);
+            let wanted = [
+                (SYS_STATUS_DATA::ID, seen.sys_status.is_some()),
+                (
+                    ESTIMATOR_STATUS_DATA::ID,
+                    seen.estimator.is_some() || !is_px4,
+                ),
+                (LOCAL_POSITION_NED_DATA::ID, seen.position.is_some()),
+                (EXTENDED_SYS_STATE_DATA::ID, seen.extended.is_some()),
+            ];
+            let missing = wanted.into_iter().filter(|(_, is_there)| !is_there);
+            let missing: Vec<u32> = missing.map(|(message, _)| message).collect();
+            if missing.is_empty() {
+                return;
             }
+            for message in missing {
+                self.request(message);
+            }
+            let until = self.now() + ANSWER;
+            while self.receive(until).is_some() {}
         }
     }
 

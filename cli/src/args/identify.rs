@@ -1,17 +1,14 @@
 //! Arguments of `identify`.
 
-use std::ffi::OsString;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, FromArgMatches, ValueEnum};
+use clap::{Args, ValueEnum};
 use onecycle::{Hold, Road, Structure};
 use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
 use super::design::noise;
-use crate::failure::Failure;
-
 use super::{DesignArguments, LogArguments, PackSource, WriteArguments, sample_rate, time_unit};
 
 /// Identify the process from a recording and design its controller.
@@ -126,23 +123,6 @@ pub(crate) struct Identify {
     /// Unit of the time column: d, h, min, s, ms, us or ns [default: from its header]
     #[arg(long, value_name = "UNIT", value_parser = time_unit)]
     pub(crate) time_unit: Option<TimeUnit>,
-}
-
-impl Identify {
-    /// The arguments for a file that another command makes, with further options.
-    pub(crate) fn of(file: &Path, options: &[OsString]) -> Result<Self, Failure> {
-        let command = Self::augment_args(clap::Command::new("identify").no_binary_name(true));
-        let end = [OsString::from("--"), file.into()];
-        let all = options.iter().cloned().chain(end);
-        let parsed = command.try_get_matches_from(all);
-        let parsed = parsed.and_then(|matches| Self::from_arg_matches(&matches));
-        parsed.map_err(|error| {
-            let text = error.to_string();
-            let first = text.lines().next().unwrap_or_default();
-            let reason = first.trim_start_matches("error: ");
-            Failure::usage(format!("options of identify: {reason}"))
-        })
-    }
 }
 
 /// Names of structures.

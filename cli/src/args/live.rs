@@ -1,14 +1,15 @@
 //! Arguments of `onecycle live`.
 
 use std::ffi::OsString;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::{Args, Subcommand, ValueEnum};
+use clap::{Args, FromArgMatches, Subcommand, ValueEnum};
 use onecycle_live::Address;
 
 use super::log::LogAxis;
-use super::{Share, WriteArguments};
+use super::{Identify, Share, WriteArguments};
+use crate::failure::Failure;
 
 /// Talk to a vehicle over MAVLink (PX4, ArduPilot): state, flight logs, parameters, a relay test of the altitude.
 ///
@@ -149,6 +150,20 @@ pub(crate) struct LiveLog {
     /// Further options of identify, after --
     #[arg(last = true, value_name = "OPTIONS", requires = "identify")]
     pub(crate) options: Vec<OsString>,
+}
+
+/// The arguments of `identify` for a file that a command makes, with further options.
+pub(crate) fn identify_of(file: &Path, options: &[OsString]) -> Result<Identify, Failure> {
+    let command = Identify::augment_args(clap::Command::new("identify").no_binary_name(true));
+    let end = [OsString::from("--"), file.into()];
+    let parsed = command.try_get_matches_from(options.iter().cloned().chain(end));
+    let parsed = parsed.and_then(|matches| Identify::from_arg_matches(&matches));
+    parsed.map_err(|error| {
+        let text = error.to_string();
+        let first = text.lines().next().unwrap_or_default();
+        let reason = first.trim_start_matches("error: ");
+        Failure::usage(format!("options of identify: {reason}"))
+    })
 }
 
 /// Which log.

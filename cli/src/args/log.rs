@@ -105,17 +105,6 @@ fn step(text: &str) -> Result<f64, String> {
     step.ok_or_else(|| "a step is a share above 0, at most 1; 1 goes all the way".to_owned())
 }
 
-impl LogAxis {
-    /// Its value on the command line.
-    pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Roll => "roll",
-            Self::Pitch => "pitch",
-            Self::Yaw => "yaw",
-        }
-    }
-}
-
 /// Axis of the body.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(crate) enum LogAxis {

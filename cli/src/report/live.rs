@@ -200,14 +200,13 @@ fn date(utc_s: i64) -> String {
 /// What was flown.
 pub(crate) fn flight(flight: &AltitudeFlight) -> String {
     let seconds = flight.samples.last().map_or(0.0, |last| last.time_s);
-    let count = flight.samples.len();
-    let rate_hz = count.saturating_sub(1) as f64 / seconds.max(1e-9);
+    let (count, period_ms) = (flight.samples.len(), 1e3 * flight.sample_period_s());
     let mut text = headed("Relay test of the altitude\n");
     let _ = writeln!(
         text,
-        "  {count} samples in {seconds:.1} s ({rate_hz:.0} Hz), hover thrust {:.3}",
-        flight.hover_thrust
+        "  {count} samples in {seconds:.1} s, one every {period_ms:.0} ms: shorter lags are not resolved"
     );
+    let _ = writeln!(text, "  hover thrust {:.3}", flight.hover_thrust);
     let _ = writeln!(text, "  thrust {}", words::source(flight.source));
     let _ = writeln!(text, "  {}", words::hand_back(flight));
     if flight.is_restored == Some(false) {
@@ -262,7 +261,7 @@ pub(crate) fn altitude_gains(path: &Path, proposed: &Result<AltitudeGains, Strin
         )
     });
     let figures = format!(
-        "With these values the loop has a phase margin of {:.1} deg, Ms {:.2}{least}. This is {:.0} % of the way to the \
+        "With these values, and one message interval more of delay, the loop has a phase margin of {:.1} deg, Ms {:.2}{least}. This is {:.0} % of the way to the \
          proposed gains. Write them with: onecycle live write CONNECTION {}",
         margins.phase_margin_rad.to_degrees(),
         gains.figures.ms,

@@ -32,7 +32,7 @@ fn no_connection() {
 #[test]
 fn nobody_is_heard() {
     let at = connection();
-    let wanted = [&at, "no vehicle was heard within 0 s", "--wait"];
+    let wanted = [&at, "no vehicle was heard within 0.2 s", "--wait"];
     run(&["live", "state", &at, "--wait", "0.2"]).refused(UNREADABLE, &wanted);
     run(&["live", "log", &at, "--wait", "0.2"]).refused(UNREADABLE, &wanted);
 }

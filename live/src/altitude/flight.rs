@@ -74,7 +74,11 @@ impl Vehicle {
         let restoring = pilot.prepare(self)?;
         let flown = self.fly(pilot, &hover, test, is_over);
         let is_restored = restoring.map(|plan| Pilot::restore(self, &plan));
-        let mut flight = flown?;
+        let not_restored = || AltitudeRefusal::Options("its bit 3 is left set".to_owned());
+        let mut flight = match is_restored {
+            Some(false) => flown.map_err(|_| not_restored())?,
+            _ => flown?,
+        };
         flight.is_restored = is_restored;
         Ok(flight)
     }

@@ -7,10 +7,11 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
+use clap::ValueEnum;
 use onecycle_live::{LogEntry, LogError, Vehicle};
 
 use super::{connect, failed, refused, unheard};
-use crate::args::{Identify, LiveLog, LogId};
+use crate::args::{Identify, LiveLog, LogId, identify_of};
 use crate::commands::identify;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, with_ending};
@@ -52,7 +53,8 @@ pub(crate) fn run(arguments: &LiveLog) -> Result<ExitCode, Failure> {
 
 /// The arguments of `identify`, which are checked before anything is downloaded. `None`: it was not asked for.
 fn identify_arguments(arguments: &LiveLog, out: &Path) -> Option<Result<Identify, Failure>> {
-    let mut options: Vec<OsString> = vec!["--axis".into(), arguments.identify?.name().into()];
+    let axis = arguments.identify?.to_possible_value()?;
+    let mut options: Vec<OsString> = vec!["--axis".into(), axis.get_name().into()];
     for (option, path) in [
         ("--report", &arguments.report),
         ("--write", &arguments.write),
@@ -62,7 +64,7 @@ fn identify_arguments(arguments: &LiveLog, out: &Path) -> Option<Result<Identify
         }
     }
     options.extend(arguments.options.iter().cloned());
-    let parsed = Identify::of(out, &options);
+    let parsed = identify_of(out, &options);
     Some(parsed.and_then(|parsed| identify::checked(&parsed).map(|_| parsed)))
 }
 

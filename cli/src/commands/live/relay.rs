@@ -7,14 +7,14 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use onecycle::Controller;
+use onecycle::{Controller, Execution};
 use onecycle_link::{
     AltitudeCascade, CsvWriter, FirmwareKind, LoopGains, ParameterLine, parameter_text,
 };
 use onecycle_live::{AltitudeFlight, AltitudeRefusal, AltitudeTest, Vehicle};
 
 use super::{connect, failed, refused};
-use crate::args::{Identify, LiveRelay};
+use crate::args::{LiveRelay, identify_of};
 use crate::commands::identify::{self, Found};
 use crate::commands::log_gains::{judged_gains, pid, restore_path};
 use crate::failure::{Failure, exit};
@@ -26,7 +26,7 @@ use crate::words::log_gains as gain_words;
 
 pub(crate) fn run(arguments: &LiveRelay) -> Result<ExitCode, Failure> {
     // Everything that can be wrong with the arguments is found before the vehicle moves.
-    let further = Identify::of(&arguments.out, &options(arguments))?;
+    let further = identify_of(&arguments.out, &options(arguments))?;
     identify::checked(&further)?;
     check_files(arguments)?;
     let mut vehicle = connect(&arguments.connection)?;
@@ -151,7 +151,9 @@ fn proposed(
     let hover = flight.hover_thrust;
     let wanted = AltitudeCascade::of_pid(own, hover).ok_or(words::NO_CASCADE)?;
     let gains = AltitudeCascade::new(old).toward(wanted, share);
-    let controller = Controller::from(pid(gains.pid(hover)));
+    // The messages resolve no lag below the time between two of them: the vehicle may have that much more.
+    let execution = Execution::sampled(flight.sample_period_s());
+    let controller = Controller::from(pid(gains.pid(hover)).with_execution(execution));
     let (figures, least) = judged_gains(&controller, identified, choice)?;
     let change = |at: usize| ProposedChange {
         name: AltitudeCascade::NAMES[at],
