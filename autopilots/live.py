@@ -38,7 +38,13 @@ class Px4:
         return process.communicate()[0]
 
     def hover(self):
-        self.vehicle.hover()
+        """Takes off, again if a check before arming fails on a busy machine."""
+        flies = lambda: "landed: False" in self.vehicle.run("listener", "vehicle_land_detected", 1)
+        for _ in range(5):
+            self.vehicle.hover()
+            if flies():
+                return
+        raise RuntimeError("PX4 does not take off")
 
     def land(self):
         self.vehicle.run("commander", "land")

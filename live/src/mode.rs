@@ -109,3 +109,9 @@ fn copter(number: u32) -> Option<&'static str> {
         _ => return None,
     })
 }
+
+/// `MAV_TYPE_QUADROTOR` as `quadrotor`.
+pub(crate) fn word(name: &str, prefix: &str) -> String {
+    let name = name.strip_prefix(prefix).unwrap_or(name);
+    name.to_lowercase().replace('_', " ")
+}

@@ -81,13 +81,13 @@ impl Vehicle {
         Ok(State {
             firmware: self.firmware(),
             version: self.version.as_ref().and_then(version),
-            kind: word(&format!("{:?}", heartbeat.mavtype), "MAV_TYPE_"),
+            kind: mode::word(&format!("{:?}", heartbeat.mavtype), "MAV_TYPE_"),
             system: self.system(),
             is_signed: self.channel.is_signed(),
             is_armed: self.is_armed(),
             is_in_air: landed.and_then(is_in_air),
             mode: mode::name(heartbeat),
-            status: word(&format!("{:?}", heartbeat.system_status), "MAV_STATE_"),
+            status: mode::word(&format!("{:?}", heartbeat.system_status), "MAV_STATE_"),
             battery: status.and_then(battery),
             position_m: (self.seen.position.as_ref()).map(|of| [of.x, of.y, -of.z].map(f64::from)),
             not_estimated: self.not_estimated(),
@@ -172,12 +172,6 @@ impl Vehicle {
         }
         Some(missing)
     }
-}
-
-/// `MAV_TYPE_QUADROTOR` as `quadrotor`.
-fn word(name: &str, prefix: &str) -> String {
-    let name = name.strip_prefix(prefix).unwrap_or(name);
-    name.to_lowercase().replace('_', " ")
 }
 
 /// One byte each of major, minor and patch version, and of the kind of release.

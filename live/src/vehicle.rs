@@ -12,6 +12,7 @@ use onecycle_link::FirmwareKind;
 
 use crate::channel::Channel;
 use crate::error::LiveError;
+use crate::mode::word;
 use crate::signing::Key;
 use crate::wire::Wire;
 
@@ -261,7 +262,7 @@ impl Vehicle {
                 }
                 let said = self.seen.texts.last().cloned();
                 let said = said.map_or(String::new(), |text| format!(" ({text})"));
-                let result = format!("{:?}{said}", answer.result);
+                let result = word(&format!("{:?}", answer.result), "MAV_RESULT_") + &said;
                 return Err(LiveError::Refused {
                     command: name,
                     result,

@@ -9,34 +9,34 @@ use onecycle_plant::FixedStepProcess;
 /// Step of the simulation.
 const STEP: Duration = Duration::from_millis(1);
 /// Height of the origin of the process (m), and thrust of the hover.
-pub const HEIGHT_M: f64 = 10.0;
-pub const HOVER: f64 = 0.5;
+pub(crate) const HEIGHT_M: f64 = 10.0;
+pub(crate) const HOVER: f64 = 0.5;
 /// Time since the vehicle was switched on, when the test begins.
 const ON_FOR: Duration = Duration::from_secs(100);
 
-pub struct Hovering {
+pub(crate) struct Hovering {
     process: FixedStepProcess,
     now: Duration,
     thrust: f64,
     command: f64,
     place_m: f64,
-    pub has_attitude_target: bool,
-    pub stick_us: u16,
+    pub(crate) has_attitude_target: bool,
+    pub(crate) stick_us: u16,
     /// Speed of a wind that carries the vehicle away (m/s).
-    pub wind_m_per_s: f32,
+    pub(crate) wind_m_per_s: f32,
     /// Whether it reports the thrust that it sets.
-    pub reports: bool,
+    pub(crate) reports: bool,
     /// Every how many rounds of 20 ms the position is sent.
-    pub every: u64,
+    pub(crate) every: u64,
     /// Whether a report has the time of the set-point, as that of PX4, or its own.
-    pub reports_when_set: bool,
+    pub(crate) reports_when_set: bool,
     set_ms: u32,
     /// Factor of the thrust in the air, such as 0.7 after a motor has failed.
-    pub lift: f64,
+    pub(crate) lift: f64,
 }
 
 impl Hovering {
-    pub fn new(process: &Soiptd) -> Self {
+    pub(crate) fn new(process: &Soiptd) -> Self {
         Self {
             process: FixedStepProcess::new(process, STEP.as_secs_f64()),
             now: Duration::ZERO,
@@ -54,22 +54,22 @@ impl Hovering {
         }
     }
 
-    pub fn height_m(&self) -> f64 {
+    pub(crate) fn height_m(&self) -> f64 {
         HEIGHT_M + self.process.output()
     }
 
-    pub fn set_thrust(&mut self, thrust: f64) {
+    pub(crate) fn set_thrust(&mut self, thrust: f64) {
         self.command = thrust;
         self.set_ms = self.boot_ms();
         self.has_attitude_target = true;
     }
 
-    pub fn set_place(&mut self, height_m: f64) {
+    pub(crate) fn set_place(&mut self, height_m: f64) {
         self.place_m = height_m;
         self.has_attitude_target = false;
     }
 
-    pub fn advance(&mut self, to: Duration, is_testing: bool) {
+    pub(crate) fn advance(&mut self, to: Duration, is_testing: bool) {
         while self.now + STEP <= to {
             self.thrust = match is_testing {
                 true => self.command,
@@ -87,7 +87,7 @@ impl Hovering {
         (ON_FOR + self.now).as_millis() as u32
     }
 
-    pub fn position(&self) -> MavMessage {
+    pub(crate) fn position(&self) -> MavMessage {
         MavMessage::LOCAL_POSITION_NED(LOCAL_POSITION_NED_DATA {
             time_boot_ms: self.boot_ms(),
             x: self.wind_m_per_s * self.now.as_secs_f32(),
@@ -98,7 +98,7 @@ impl Hovering {
     }
 
     /// Messages that it sends by itself every 20 ms.
-    pub fn streams(&self, round: u64) -> Vec<MavMessage> {
+    pub(crate) fn streams(&self, round: u64) -> Vec<MavMessage> {
         let mut messages = Vec::new();
         if round % self.every == 0 {
             messages.push(self.position());

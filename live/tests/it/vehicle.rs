@@ -13,17 +13,17 @@ use onecycle_live::Key;
 
 use crate::hovering::Hovering;
 
-pub const SYSTEM: u32 = 7;
+pub(crate) const SYSTEM: u32 = 7;
 /// Modes: Hold and Offboard of PX4, Guided and Loiter of ArduCopter.
-pub const HOLD: u32 = u32::from_le_bytes([0, 0, 4, 3]);
-pub const OFFBOARD: u32 = u32::from_le_bytes([0, 0, 6, 0]);
-pub const GUIDED: u32 = 4;
-pub const LOITER: u32 = 5;
+pub(crate) const HOLD: u32 = u32::from_le_bytes([0, 0, 4, 3]);
+pub(crate) const OFFBOARD: u32 = u32::from_le_bytes([0, 0, 6, 0]);
+pub(crate) const GUIDED: u32 = 4;
+pub(crate) const LOITER: u32 = 5;
 /// Time between two rounds of the vehicle: it sends its streams, and a heartbeat every second.
-pub const ROUND: Duration = Duration::from_millis(20);
+pub(crate) const ROUND: Duration = Duration::from_millis(20);
 
 /// A parameter with its type.
-pub type Value = (MavParamType, f64);
+pub(crate) type Value = (MavParamType, f64);
 
 #[derive(Default)]
 struct Bytes(Vec<u8>);
@@ -40,35 +40,35 @@ impl Read for Bytes {
     }
 }
 
-pub struct Scripted {
-    pub autopilot: MavAutopilot,
-    pub parameters: BTreeMap<String, Value>,
+pub(crate) struct Scripted {
+    pub(crate) autopilot: MavAutopilot,
+    pub(crate) parameters: BTreeMap<String, Value>,
     /// Largest values: larger ones are clipped.
-    pub most: BTreeMap<String, f64>,
+    pub(crate) most: BTreeMap<String, f64>,
     /// Whether it answers about parameters that it does not have.
-    pub tells_missing: bool,
-    pub is_armed: bool,
-    pub custom_mode: u32,
+    pub(crate) tells_missing: bool,
+    pub(crate) is_armed: bool,
+    pub(crate) custom_mode: u32,
     /// Whether PX4 changes its mode on command.
-    pub takes_modes: bool,
+    pub(crate) takes_modes: bool,
     /// Whether it is there at all.
-    pub is_on: bool,
+    pub(crate) is_on: bool,
     /// Values that a restart brings back.
-    pub stored: BTreeMap<String, Value>,
+    pub(crate) stored: BTreeMap<String, Value>,
     /// Its flight; `None`: it stays on the ground.
-    pub hovering: Option<Hovering>,
+    pub(crate) hovering: Option<Hovering>,
     /// Flight logs, by number from 1.
-    pub logs: Vec<Vec<u8>>,
+    pub(crate) logs: Vec<Vec<u8>>,
     signing: Option<SigningData>,
     /// Messages that it has received.
-    pub received: Vec<MavMessage>,
+    pub(crate) received: Vec<MavMessage>,
     reader: MavlinkReader<Bytes>,
     sequence: u8,
     rounds: u64,
 }
 
 impl Scripted {
-    pub fn new(autopilot: MavAutopilot, parameters: &[(&str, MavParamType, f64)]) -> Self {
+    pub(crate) fn new(autopilot: MavAutopilot, parameters: &[(&str, MavParamType, f64)]) -> Self {
         let owned = |&(name, kind, value): &(&str, _, _)| (name.to_owned(), (kind, value));
         let parameters: BTreeMap<String, Value> = parameters.iter().map(owned).collect();
         Self {
@@ -91,7 +91,7 @@ impl Scripted {
         }
     }
 
-    pub fn px4() -> Self {
+    pub(crate) fn px4() -> Self {
         use MavParamType::*;
         Self::new(
             MavAutopilot::MAV_AUTOPILOT_PX4,
@@ -104,7 +104,7 @@ impl Scripted {
         )
     }
 
-    pub fn ardupilot() -> Self {
+    pub(crate) fn ardupilot() -> Self {
         use MavParamType::*;
         Self::new(
             MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
@@ -118,14 +118,14 @@ impl Scripted {
     }
 
     /// Signs its messages and accepts only signed ones.
-    pub fn with_key(mut self, key: &Key) -> Self {
+    pub(crate) fn with_key(mut self, key: &Key) -> Self {
         let config = SigningConfig::new(key.bytes(), 2, true, false);
         self.signing = Some(SigningData::from_config(config));
         self
     }
 
     /// Armed and in the air, with the mode of the hover and the parameter that the test needs.
-    pub fn hovering(mut self, mut hovering: Hovering) -> Self {
+    pub(crate) fn hovering(mut self, mut hovering: Hovering) -> Self {
         hovering.reports_when_set = self.is_px4();
         self.is_armed = true;
         self.hovering = Some(hovering);
@@ -139,7 +139,7 @@ impl Scripted {
     }
 
     /// Lets time pass.
-    pub fn advance(&mut self, now: Duration) {
+    pub(crate) fn advance(&mut self, now: Duration) {
         if let Some(hovering) = &mut self.hovering {
             let is_testing = match self.autopilot {
                 MavAutopilot::MAV_AUTOPILOT_PX4 => self.custom_mode == OFFBOARD,
@@ -150,7 +150,7 @@ impl Scripted {
     }
 
     /// Takes bytes in, and returns the frames of its answers.
-    pub fn handle(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
+    pub(crate) fn handle(&mut self, bytes: &[u8]) -> Vec<Vec<u8>> {
         self.reader.get_mut().0.extend_from_slice(bytes);
         let mut answers = Vec::new();
         while let Ok(raw) = self.reader.read_any_raw_message::<MavMessage>() {
@@ -173,7 +173,7 @@ impl Scripted {
     }
 
     /// What it sends by itself in this round.
-    pub fn round(&mut self) -> Vec<Vec<u8>> {
+    pub(crate) fn round(&mut self) -> Vec<Vec<u8>> {
         self.rounds += 1;
         if !self.is_on {
             return vec![];
@@ -189,16 +189,16 @@ impl Scripted {
     }
 
     /// Restarts: what was not stored is lost.
-    pub fn restart(&mut self) {
+    pub(crate) fn restart(&mut self) {
         self.parameters.clone_from(&self.stored);
         self.is_armed = false;
     }
 
-    pub fn value(&self, name: &str) -> f64 {
+    pub(crate) fn value(&self, name: &str) -> f64 {
         self.parameters[name].1
     }
 
-    pub fn frame(&mut self, message: &MavMessage) -> Vec<u8> {
+    pub(crate) fn frame(&mut self, message: &MavMessage) -> Vec<u8> {
         self.sequence = self.sequence.wrapping_add(1);
         let header = MavHeader {
             system_id: SYSTEM,

@@ -14,38 +14,38 @@ const LATENCY: Duration = Duration::from_millis(10);
 
 /// Where a message goes.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Way {
+pub(crate) enum Way {
     ToVehicle,
     ToUs,
 }
 
 /// How often a message arrives: 0 it is lost, 1, 2 it is doubled. Told the way and the number of the message on it, from 0.
-pub type Fate = Box<dyn FnMut(Way, usize) -> usize>;
+pub(crate) type Fate = Box<dyn FnMut(Way, usize) -> usize>;
 
 /// What happens when this many messages were sent to the vehicle.
-pub type Event = Box<dyn FnMut(&mut Scripted, usize)>;
+pub(crate) type Event = Box<dyn FnMut(&mut Scripted, usize)>;
 
-pub struct World {
-    pub vehicle: Scripted,
-    pub now: Duration,
+pub(crate) struct World {
+    pub(crate) vehicle: Scripted,
+    pub(crate) now: Duration,
     /// Messages under way, by time of arrival and number.
     under_way: BTreeMap<(Duration, usize), (Way, Vec<u8>)>,
     next_round: Duration,
-    pub counts: [usize; 2],
+    pub(crate) counts: [usize; 2],
     total: usize,
-    pub fate: Fate,
+    pub(crate) fate: Fate,
     /// Largest delay of a message beside the latency (ms): messages overtake each other.
-    pub jitter_ms: u32,
-    pub event: Event,
+    pub(crate) jitter_ms: u32,
+    pub(crate) event: Event,
     /// The link is down from this number of messages to the vehicle on, for this long.
-    pub cut: Option<(usize, Duration)>,
+    pub(crate) cut: Option<(usize, Duration)>,
     down_until: Option<Duration>,
 }
 
-pub type Shared = Rc<RefCell<World>>;
+pub(crate) type Shared = Rc<RefCell<World>>;
 
 impl World {
-    pub fn of(vehicle: Scripted) -> Shared {
+    pub(crate) fn of(vehicle: Scripted) -> Shared {
         Rc::new(RefCell::new(Self {
             vehicle,
             now: Duration::ZERO,
@@ -142,8 +142,8 @@ impl Wire for Simulated {
     }
 }
 
-pub const PATIENCE: Duration = Duration::from_secs(10);
+pub(crate) const PATIENCE: Duration = Duration::from_secs(10);
 
-pub fn connect(world: &Shared, key: Option<&Key>) -> Result<Vehicle, LiveError> {
+pub(crate) fn connect(world: &Shared, key: Option<&Key>) -> Result<Vehicle, LiveError> {
     Vehicle::connect(Box::new(Simulated(Rc::clone(world))), key, None, PATIENCE)
 }
