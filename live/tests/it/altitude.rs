@@ -284,7 +284,7 @@ fn the_vehicle_restarts() {
     let flight = fly(&world, |since_s, vehicle| {
         if since_s > 3.0 {
             // Its clock begins anew.
-            vehicle.hovering = Some(Hovering::new(&process()));
+            vehicle.hovering.as_mut().unwrap().on_for = Duration::ZERO;
         }
         false
     });
@@ -294,8 +294,8 @@ fn the_vehicle_restarts() {
 
 #[test]
 fn refusals_before_anything_is_sent() {
-    type Edit = fn(&mut Scripted);
-    let cases: [(Edit, fn(&AltitudeRefusal) -> bool); 5] = [
+    type Case = (fn(&mut Scripted), fn(&AltitudeRefusal) -> bool);
+    let cases: [Case; 5] = [
         (
             |vehicle| vehicle.is_armed = false,
             |refusal| matches!(refusal, AltitudeRefusal::NotFlying),
@@ -314,7 +314,7 @@ fn refusals_before_anything_is_sent() {
                     .hovering
                     .as_mut()
                     .unwrap()
-                    .set_place(HEIGHT_M + 20.0)
+                    .set_place(HEIGHT_M + 20.0);
             },
             |refusal| matches!(refusal, AltitudeRefusal::Moving(_)),
         ),

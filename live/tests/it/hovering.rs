@@ -11,7 +11,7 @@ const STEP: Duration = Duration::from_millis(1);
 /// Height of the origin of the process (m), and thrust of the hover.
 pub(crate) const HEIGHT_M: f64 = 10.0;
 pub(crate) const HOVER: f64 = 0.5;
-/// Time since the vehicle was switched on, when the test begins.
+/// Time for which the vehicle is on, when the connection is opened.
 const ON_FOR: Duration = Duration::from_secs(100);
 
 pub(crate) struct Hovering {
@@ -33,6 +33,8 @@ pub(crate) struct Hovering {
     set_ms: u32,
     /// Factor of the thrust in the air, such as 0.7 after a motor has failed.
     pub(crate) lift: f64,
+    /// What its clock is ahead of the time.
+    pub(crate) on_for: Duration,
 }
 
 impl Hovering {
@@ -51,6 +53,7 @@ impl Hovering {
             reports_when_set: false,
             set_ms: ON_FOR.as_millis() as u32,
             lift: 1.0,
+            on_for: ON_FOR,
         }
     }
 
@@ -84,7 +87,7 @@ impl Hovering {
     }
 
     fn boot_ms(&self) -> u32 {
-        (ON_FOR + self.now).as_millis() as u32
+        (self.on_for + self.now).as_millis() as u32
     }
 
     pub(crate) fn position(&self) -> MavMessage {
@@ -100,7 +103,7 @@ impl Hovering {
     /// Messages that it sends by itself every 20 ms.
     pub(crate) fn streams(&self, round: u64) -> Vec<MavMessage> {
         let mut messages = Vec::new();
-        if round % self.every == 0 {
+        if round.is_multiple_of(self.every) {
             messages.push(self.position());
         }
         if self.reports {
@@ -114,7 +117,7 @@ impl Hovering {
                 ..ATTITUDE_TARGET_DATA::DEFAULT
             }));
         }
-        if round % 5 == 0 {
+        if round.is_multiple_of(5) {
             messages.push(MavMessage::ATTITUDE(ATTITUDE_DATA {
                 time_boot_ms: self.boot_ms(),
                 yaw: 1.0,
