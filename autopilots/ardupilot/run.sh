@@ -40,3 +40,4 @@ fly tune.py autotune --method autotune
 fly tune.py quiktune --method quiktune
 fly altitude.py altitude --onecycle "$program"
 fly faults.py faults
+"$python" "$here/../live.py" ardupilot "$ARDUPILOT_DIR" "$out/live" --onecycle "$program"

@@ -35,7 +35,7 @@ class FlightError(Exception):
 class Vehicle:
     """One simulated copter. Use as a context manager: the simulation ends with it."""
 
-    def __init__(self, ardupilot, folder, port=14650, speedup=5, parameters=None, lua=()):
+    def __init__(self, ardupilot, folder, port=14650, speedup=5, parameters=None, lua=(), serial1=None):
         self.folder = pathlib.Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.messages = []
@@ -62,6 +62,7 @@ class Vehicle:
                 *("--base-port", str(port + 100)),
                 *("--defaults", f"{ardupilot}/Tools/autotest/default_params/copter.parm,{defaults.resolve()}"),
                 *("--serial0", f"udpclient:127.0.0.1:{port}"),
+                *(["--serial1", serial1] if serial1 else []),
             ],
             cwd=self.folder,
             stdout=self._out,

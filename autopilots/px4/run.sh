@@ -51,3 +51,9 @@ cd "$here"
     "onecycle, balanced, in wind=$out/wind*.json"
 "$python" sih.py
 alone "$here/faults.py" "$build" "$out/faults"
+program=${ONECYCLE:-$root/target/release/onecycle}
+if [[ -x $program ]]; then
+    alone "$here/../live.py" px4 "$build" "$out/live" --onecycle "$program"
+else
+    echo "PX4: onecycle live skipped; $program is missing: cargo build --release, or set ONECYCLE."
+fi

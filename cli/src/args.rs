@@ -8,6 +8,8 @@ mod dataset;
 mod design;
 mod fly;
 mod identify;
+#[cfg(not(target_family = "wasm"))]
+mod live;
 mod log;
 mod man;
 mod pack;
@@ -32,6 +34,11 @@ pub(crate) use self::dataset::Dataset;
 pub(crate) use self::design::{DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
 pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::{Between, Estimator, Identify, Method, When};
+#[cfg(not(target_family = "wasm"))]
+pub(crate) use self::live::{
+    ConnectionArguments, Live, LiveAction, LiveLog, LiveRelay, LiveState, LiveWrite, LogId,
+    identify_of,
+};
 pub(crate) use self::log::{Log, LogArguments, WriteArguments};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
@@ -57,11 +64,11 @@ onecycle COMMAND --help explains each command and has examples.
 Exit codes:
   0  done (identify: a process was identified)
   2  bad arguments
-  3  an input file cannot be read; the message says where and what to do
+  3  an input file cannot be read, or a vehicle is not heard; the message says where and what to do
   4  finished, with a negative result: no process could be identified (the verdict says why and what
      to do), a space is not certified, a grid leaves holes, a mission ended early, a pack fails
-     its self-test, or a trained pack is of little use
-  5  the output cannot be written
+     its self-test, a trained pack is of little use, or a vehicle keeps its old parameters
+  5  the output cannot be written, or parameters of a vehicle are left uncertain
   6  identify: the time stamps can be read in more than one way; --time-unit settles it";
 
 /// Identify a process from a recording and design its optimal controller.
@@ -78,6 +85,8 @@ pub(crate) struct Arguments {
 pub(crate) enum Command {
     Identify(Identify),
     Log(Log),
+    #[cfg(not(target_family = "wasm"))]
+    Live(Box<Live>),
     Simulate(Box<Simulate>),
     Tune(Tune),
     Fly(Fly),

@@ -39,6 +39,10 @@ pub(crate) enum Failure {
     /// Any other file that cannot be read or has the wrong content.
     #[error("{file}: {reason}", file = path.display())]
     Unreadable { path: PathBuf, reason: String },
+    /// A vehicle that is not heard, refuses, or has changed by half, with the exit code.
+    #[cfg(not(target_family = "wasm"))]
+    #[error("{reason}")]
+    Vehicle { code: u8, reason: String },
     /// A file or the terminal that cannot be written.
     #[error("cannot write {target}: {reason}")]
     Output {
@@ -97,6 +101,8 @@ impl Failure {
                 }
                 _ => exit::INPUT,
             },
+            #[cfg(not(target_family = "wasm"))]
+            Self::Vehicle { code, .. } => *code,
             Self::Unreadable { .. } => exit::INPUT,
             Self::Output { .. } => exit::OUTPUT,
         }

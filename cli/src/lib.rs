@@ -32,6 +32,8 @@ pub fn run() -> ExitCode {
     let result = match &arguments.command {
         Command::Identify(identify) => commands::identify::run(identify),
         Command::Log(log) => commands::log::run(log),
+        #[cfg(not(target_family = "wasm"))]
+        Command::Live(live) => commands::live::run(live),
         Command::Simulate(simulate) => commands::simulate::run(simulate),
         Command::Tune(tune) => commands::tune::run(tune),
         Command::Fly(fly) => commands::fly::run(fly),

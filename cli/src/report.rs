@@ -13,6 +13,8 @@ pub(crate) mod grid;
 pub(crate) mod hand;
 pub(crate) mod identifier;
 pub(crate) mod json;
+#[cfg(not(target_family = "wasm"))]
+pub(crate) mod live;
 pub(crate) mod log;
 pub(crate) mod log_gains;
 pub(crate) mod number;

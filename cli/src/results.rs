@@ -11,6 +11,8 @@ pub(crate) mod flight;
 pub(crate) mod fly;
 pub(crate) mod grid;
 pub(crate) mod identifier;
+#[cfg(not(target_family = "wasm"))]
+pub(crate) mod live;
 pub(crate) mod log_gains;
 pub(crate) mod pack;
 pub(crate) mod phase;

@@ -3,6 +3,8 @@
 mod caution;
 pub(crate) mod controllers;
 pub(crate) mod flight;
+#[cfg(not(target_family = "wasm"))]
+pub(crate) mod live;
 pub(crate) mod log;
 pub(crate) mod log_gains;
 pub(crate) mod recording;

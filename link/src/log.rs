@@ -27,6 +27,7 @@ mod ulog;
 use std::io::Read;
 
 pub use error::LogError;
+pub use firmware::gain_names;
 pub use flight::{
     Firmware, FirmwareKind, Flight, Gain, LoggedLoop, LoggedSignal, Mark, MarkKind, Setting, Span,
     Term,

@@ -1,4 +1,4 @@
-//! The files that set parameters.
+//! The files that set parameters: written and read.
 //!
 //! | firmware | line | comment | reference |
 //! |---|---|---|---|
@@ -6,8 +6,11 @@
 //! | ArduPilot | `name,value` | the same | MAVProxy, Mission Planner |
 //! | Betaflight | commands `set name = value`, at the end `save` | the same | Betaflight CLI |
 
+mod read;
+
 use std::fmt::Write;
 
+pub use self::read::{ParameterFile, ParameterFileError, read_parameters};
 use crate::log::{FirmwareKind, Flight};
 
 use crate::gains::{Change, version_numbers};
@@ -52,14 +55,13 @@ fn file(flight: &Flight, changes: &[Change], is_restore: bool) -> String {
         let _ = writeln!(text, "# {name}: {} -> {}", shown(*old), shown(*new));
     }
     match flight.firmware.kind {
-        FirmwareKind::Px4 => px4(&mut text, flight, changes),
+        FirmwareKind::Px4 | FirmwareKind::ArduPilot => {
+            let system = flight.tables.parameter("MAV_SYS_ID").unwrap_or(1.0);
+            let lines: Vec<ParameterLine> = changes.iter().map(|of| line(flight, of)).collect();
+            text += &parameter_text(flight.firmware.kind, system as u8, &lines);
+        }
         FirmwareKind::Betaflight | FirmwareKind::Inav => {
             betaflight(&mut text, flight, changes, is_restore);
-        }
-        FirmwareKind::ArduPilot => {
-            for Change { name, new, .. } in changes {
-                let _ = writeln!(text, "{name},{}", shown(*new));
-            }
         }
     }
     text
@@ -70,17 +72,55 @@ fn shown(value: f64) -> String {
     format!("{}", value as f32)
 }
 
-fn px4(text: &mut String, flight: &Flight, changes: &[Change]) {
-    let system = flight.tables.parameter("MAV_SYS_ID").unwrap_or(1.0);
-    text.push_str("# Vehicle-Id Component-Id Name Value Type\n");
-    for Change { name, new, .. } in changes {
-        let is_integer = flight
-            .tables
-            .parameters
-            .get(name)
-            .is_some_and(|of| of.is_integer);
-        let kind = if is_integer { 6 } else { 9 };
-        let _ = writeln!(text, "{system}\t1\t{name}\t{}\t{kind}", shown(*new));
+/// A parameter with its value, as a line of a file has it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParameterLine {
+    /// Name in the firmware.
+    pub name: String,
+    /// Value.
+    pub value: f64,
+    /// Whether the firmware stores it as an integer.
+    pub is_integer: bool,
+}
+
+fn line(flight: &Flight, change: &Change) -> ParameterLine {
+    let of = flight.tables.parameters.get(&change.name);
+    ParameterLine {
+        name: change.name.clone(),
+        value: change.new,
+        is_integer: of.is_some_and(|of| of.is_integer),
+    }
+}
+
+/// The lines of a file that sets parameters of PX4 (of the vehicle with the number `system`) or of ArduPilot. Empty for
+/// firmware without such a file.
+pub fn parameter_text(firmware: FirmwareKind, system: u8, lines: &[ParameterLine]) -> String {
+    let mut text = String::new();
+    match firmware {
+        FirmwareKind::Px4 => {
+            text.push_str("# Vehicle-Id Component-Id Name Value Type\n");
+            for line in lines {
+                let kind = if line.is_integer { 6 } else { 9 };
+                let _ = writeln!(text, "{system}\t1\t{}\t{}\t{kind}", line.name, line.shown());
+            }
+        }
+        FirmwareKind::ArduPilot => {
+            for line in lines {
+                let _ = writeln!(text, "{},{}", line.name, line.shown());
+            }
+        }
+        FirmwareKind::Betaflight | FirmwareKind::Inav => {}
+    }
+    text
+}
+
+impl ParameterLine {
+    /// The value in decimals. Single precision has no room for large integers.
+    fn shown(&self) -> String {
+        match self.is_integer {
+            true => format!("{}", self.value),
+            false => shown(self.value),
+        }
     }
 }
 

@@ -64,6 +64,15 @@ impl Found {
         });
     }
 
+    /// Whether a process was identified, and the parameters were written if that was asked for.
+    fn exit_code(&self) -> u8 {
+        let is_refused = |gains: &LogGains| matches!(gains.written, Some(Err(_)));
+        match self.identification.outcome.is_ok() && !self.gains.as_ref().is_some_and(is_refused) {
+            true => exit::DONE,
+            false => exit::NO_PROCESS,
+        }
+    }
+
     pub(crate) fn text(&self) -> String {
         text::identification(
             &self.name,
@@ -88,6 +97,12 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         return flight::run(arguments, &asked);
     }
     let mut found = find(arguments, None)?;
+    show(arguments, &mut found)?;
+    Ok(ExitCode::from(found.exit_code()))
+}
+
+/// Prints the report, and writes the page.
+pub(crate) fn show(arguments: &Identify, found: &mut Found) -> Result<(), Failure> {
     if let Some(path) = &arguments.report {
         let _waiting = Waiting::on("drawing");
         write_text(path, &found.page())?;
@@ -98,16 +113,7 @@ pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
         let draw = || plot::end(&found.recording, &found.identification, columns());
         let plotted = is_plotted(arguments.plot).then(draw).flatten();
         found.text() + &plotted.unwrap_or_default()
-    })?;
-    let is_written =
-        !(found.gains.as_ref()).is_some_and(|gains| matches!(gains.written, Some(Err(_))));
-    Ok(ExitCode::from(
-        if found.identification.outcome.is_ok() && is_written {
-            exit::DONE
-        } else {
-            exit::NO_PROCESS
-        },
-    ))
+    })
 }
 
 /// Refuses arguments that contradict each other; the requirements on the controller.

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use onecycle::{
-    Controller, Execution, Form, Identification, Identified, LowPass, Pid, Recording,
-    Specification, Structure, Style, assess, least_margins,
+    Assessment, Controller, Execution, Form, Identification, Identified, LeastMargins, LowPass,
+    Pid, Recording, Specification, Structure, Style, assess, least_margins,
 };
 use onecycle_link::{
     Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, ParameterFiles, RateLaw, ReadBack,
@@ -188,12 +188,7 @@ impl LogLoop {
         let new = pid(old.changed(&changes)).with_execution(execution);
         let controller = Controller::from(new);
         let (model, _) = identified.for_design(0);
-        let least = least_margins(&identified.posterior.models(DRAWS), &controller);
-        let figures = assess(&model, &controller, choice.asked.noise.as_ref());
-        let is_stable = least.is_none_or(|least| least.stable >= LEAST_STABLE);
-        let Some(figures) = figures.filter(|_| is_stable) else {
-            return Err(words::unstable(least.map(|least| least.stable)));
-        };
+        let (figures, least) = judged_gains(&controller, identified, choice)?;
         let simulated = match self.control_loop {
             ControlLoop::Rate(axis) => overshoot(&self.flight, axis, new, &model, &figures),
             _ => figures.step.map(|step| step.overshoot),
@@ -241,6 +236,22 @@ impl LogLoop {
     }
 }
 
+/// Figures of gains to write, on the most probable process and over the posterior; or why they must not be written.
+pub(super) fn judged_gains(
+    controller: &Controller,
+    identified: &Identified,
+    choice: &Controllers,
+) -> Result<(Assessment, Option<LeastMargins>), String> {
+    let (model, _) = identified.for_design(0);
+    let least = least_margins(&identified.posterior.models(DRAWS), controller);
+    let figures = assess(&model, controller, choice.asked.noise.as_ref());
+    let is_stable = least.is_none_or(|least| least.stable >= LEAST_STABLE);
+    match figures.filter(|_| is_stable) {
+        Some(figures) => Ok((figures, least)),
+        None => Err(words::unstable(least.map(|least| least.stable))),
+    }
+}
+
 /// Structure of the process of a loop. `None`: the recording decides.
 ///
 /// An angle integrates the rate, a climb rate the thrust, behind a loop or motors with a lag.
@@ -285,7 +296,7 @@ pub(super) fn check(arguments: &Identify) -> Result<(), Failure> {
 }
 
 /// `NAME.restore.EXT` beside `NAME.EXT`.
-fn restore_path(path: &Path, ending: &str) -> PathBuf {
+pub(super) fn restore_path(path: &Path, ending: &str) -> PathBuf {
     let own = path
         .extension()
         .map(|own| own.to_string_lossy().into_owned());
@@ -297,7 +308,7 @@ fn restore_path(path: &Path, ending: &str) -> PathBuf {
     with_ending(&stem, &format!("restore.{ending}"))
 }
 
-fn pid(gains: LoopGains) -> Pid {
+pub(super) fn pid(gains: LoopGains) -> Pid {
     Pid::new(gains.proportional, gains.integral, gains.derivative)
 }
 

@@ -26,6 +26,7 @@ mod identifier;
 mod imports;
 mod json_schema;
 mod library;
+mod live;
 mod pack;
 mod phase;
 mod report;

@@ -85,6 +85,15 @@ pub(super) fn logged_loop(
     }
 }
 
+/// Names of the parameters that hold the gains of a loop, with their terms. Empty for a firmware without named parameters.
+pub fn gain_names(kind: FirmwareKind, of: ControlLoop) -> Vec<(Term, String)> {
+    match kind {
+        FirmwareKind::Px4 => px4::gain_names(of),
+        FirmwareKind::ArduPilot => ardupilot::gain_names(of),
+        FirmwareKind::Betaflight | FirmwareKind::Inav => Vec::new(),
+    }
+}
+
 /// Filters in force, and the geometry of the motors.
 pub(super) fn settings(kind: FirmwareKind, flight: &FlightTables) -> [Vec<Setting>; 2] {
     let [filters, mixer]: [&[&str]; 2] = match kind {

@@ -151,7 +151,8 @@ pub(super) fn plans(of: ControlLoop) -> Vec<Plan> {
     }
 }
 
-pub(super) fn gains(flight: &FlightTables, of: ControlLoop) -> Vec<Gain> {
+/// Parameters of the gains of a loop.
+pub(super) fn gain_names(of: ControlLoop) -> Vec<(Term, String)> {
     let short = |axis| ["RLL", "PIT", "YAW"][Axis::index(axis)];
     match of {
         ControlLoop::Rate(axis) => [
@@ -160,17 +161,10 @@ pub(super) fn gains(flight: &FlightTables, of: ControlLoop) -> Vec<Gain> {
             (Term::Derivative, "D"),
             (Term::FeedForward, "FF"),
         ]
-        .into_iter()
-        .filter_map(|(term, letter)| {
-            let name = format!("ATC_RAT_{}_{letter}", short(axis));
-            gain(flight, term, name, Some(1.0))
-        })
-        .collect(),
+        .map(|(term, letter)| (term, format!("ATC_RAT_{}_{letter}", short(axis))))
+        .to_vec(),
         ControlLoop::Attitude(axis) => {
-            let name = format!("ATC_ANG_{}_P", short(axis));
-            gain(flight, Term::Proportional, name, Some(1.0))
-                .into_iter()
-                .collect()
+            vec![(Term::Proportional, format!("ATC_ANG_{}_P", short(axis)))]
         }
         ControlLoop::Altitude => [
             (Term::Factor, "PSC_VELZ_P"),
@@ -178,10 +172,16 @@ pub(super) fn gains(flight: &FlightTables, of: ControlLoop) -> Vec<Gain> {
             (Term::Integral, "PSC_ACCZ_I"),
             (Term::Derivative, "PSC_ACCZ_D"),
         ]
-        .into_iter()
-        .filter_map(|(term, name)| gain(flight, term, name.to_owned(), None))
-        .collect(),
+        .map(|(term, name)| (term, name.to_owned()))
+        .to_vec(),
     }
+}
+
+pub(super) fn gains(flight: &FlightTables, of: ControlLoop) -> Vec<Gain> {
+    let si_per_unit = (of != ControlLoop::Altitude).then_some(1.0);
+    (gain_names(of).into_iter())
+        .filter_map(|(term, name)| gain(flight, term, name, si_per_unit))
+        .collect()
 }
 
 /// Axes 1 to 3, 4 to 6, 7 to 9 and 10 to 12 of SYSTEMID are roll, pitch and yaw of angle, angle, rate and mixer.

@@ -126,29 +126,21 @@ fn altitude() -> Vec<Plan> {
     inputs.into_iter().map(plan).collect()
 }
 
-/// The gains of the rate are those of the parallel form: `MC_ROLLRATE_K` times each.
-pub(super) fn gains(flight: &FlightTables, of: ControlLoop) -> Vec<Gain> {
+/// Parameters of the gains of a loop.
+pub(super) fn gain_names(of: ControlLoop) -> Vec<(Term, String)> {
     let named = |axis: Axis| axis.name().to_uppercase();
     match of {
-        ControlLoop::Rate(axis) => {
-            let name = |term: &str| format!("MC_{}RATE_{term}", named(axis));
-            let factor = flight.parameter(&name("K")).unwrap_or(1.0);
-            [
-                (Term::Factor, "K", None),
-                (Term::Proportional, "P", Some(factor)),
-                (Term::Integral, "I", Some(factor)),
-                (Term::Derivative, "D", Some(factor)),
-                (Term::FeedForward, "FF", Some(1.0)),
-            ]
-            .into_iter()
-            .filter_map(|(term, short, si)| gain(flight, term, name(short), si))
-            .collect()
-        }
+        ControlLoop::Rate(axis) => [
+            (Term::Factor, "K"),
+            (Term::Proportional, "P"),
+            (Term::Integral, "I"),
+            (Term::Derivative, "D"),
+            (Term::FeedForward, "FF"),
+        ]
+        .map(|(term, short)| (term, format!("MC_{}RATE_{short}", named(axis))))
+        .to_vec(),
         ControlLoop::Attitude(axis) => {
-            let name = format!("MC_{}_P", named(axis));
-            gain(flight, Term::Proportional, name, Some(1.0))
-                .into_iter()
-                .collect()
+            vec![(Term::Proportional, format!("MC_{}_P", named(axis)))]
         }
         ControlLoop::Altitude => [
             (Term::Factor, "MPC_Z_P"),
@@ -156,10 +148,24 @@ pub(super) fn gains(flight: &FlightTables, of: ControlLoop) -> Vec<Gain> {
             (Term::Integral, "MPC_Z_VEL_I_ACC"),
             (Term::Derivative, "MPC_Z_VEL_D_ACC"),
         ]
-        .into_iter()
-        .filter_map(|(term, name)| gain(flight, term, name.to_owned(), None))
-        .collect(),
+        .map(|(term, name)| (term, name.to_owned()))
+        .to_vec(),
     }
+}
+
+/// The gains of the rate are those of the parallel form: `MC_ROLLRATE_K` times each.
+pub(super) fn gains(flight: &FlightTables, of: ControlLoop) -> Vec<Gain> {
+    let names = gain_names(of);
+    let factor = names.iter().find(|(term, _)| *term == Term::Factor);
+    let factor = factor.and_then(|(_, name)| flight.parameter(name));
+    let si_per_unit = |term| match (of, term) {
+        (_, Term::Factor) | (ControlLoop::Altitude, _) => None,
+        (_, Term::FeedForward) | (ControlLoop::Attitude(_), _) => Some(1.0),
+        _ => Some(factor.unwrap_or(1.0)),
+    };
+    (names.into_iter())
+        .filter_map(|(term, name)| gain(flight, term, name, si_per_unit(term)))
+        .collect()
 }
 
 /// States 2 to 10 of the autotune excite the axes and pause between them. Their numbers differ between versions, so the
