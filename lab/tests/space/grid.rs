@@ -4,6 +4,7 @@ mod files;
 
 use std::sync::OnceLock;
 
+use onecycle_design::soiptd_pd::criterion::Criterion;
 use onecycle_lab::space::Space;
 use onecycle_lab::space::candidate::{Candidate, Gains};
 use onecycle_lab::space::grid::{Grid, GridFile, GridSettings, Index, Layout, check, step, write};
@@ -374,6 +375,55 @@ fn equal_gains_take_many_more() {
     };
     let equal = Grid::build(&equal, &Threads(2)).unwrap().members.len();
     assert!(equal > 2 * by_amplitude, "{equal} {by_amplitude}");
+}
+
+// By the IAE and the ITAE the grid covers the space as well; their controllers keep far more than 20 degrees of margin, so
+// processes are nearer to each other. A file names a criterion other than the ISE only.
+#[test]
+fn other_costs() {
+    let space = Space {
+        t_prop_s: (0.05, 0.05),
+        tau_s: (0.01, 0.03),
+        ..Space::MULTIROTOR
+    };
+    let of = |criterion| {
+        let settings = GridSettings {
+            space,
+            criterion,
+            deterioration: 0.3,
+            ..GridSettings::default()
+        };
+        let grid = Grid::build(&settings, &Threads(2)).unwrap();
+        let found = check(&grid, 40, 1, &Threads(2)).unwrap();
+        assert_eq!(found.beyond, 0, "{criterion:?} {found:?}");
+        let margins = grid
+            .members
+            .iter()
+            .map(|member| member.candidate.optimum.margins.phase_margin_rad);
+        (
+            grid.members.len(),
+            margins.fold(f64::INFINITY, f64::min).to_degrees(),
+        )
+    };
+    let (count, margin_deg) = of(Criterion::Ise);
+    assert!((margin_deg - 20.0).abs() < 1e-6, "{margin_deg}");
+    for criterion in [Criterion::Iae, Criterion::Itae] {
+        let (other, margin_deg) = of(criterion);
+        assert!(
+            other <= count && margin_deg > 35.0,
+            "{criterion:?} {other} {count} {margin_deg}"
+        );
+    }
+    let settings = GridSettings::default();
+    let text = serde_json::to_string(&settings).unwrap();
+    assert!(!text.contains("criterion"), "{text}");
+    let by_iae = GridSettings {
+        criterion: Criterion::Iae,
+        ..settings
+    };
+    let text = serde_json::to_string(&by_iae).unwrap();
+    assert!(text.contains(r#""criterion":"iae""#), "{text}");
+    assert_eq!(serde_json::from_str::<GridSettings>(&text).unwrap(), by_iae);
 }
 
 #[test]
