@@ -152,9 +152,10 @@ pub fn pd_by(
             .and_then(|point| cost(&point))
             .unwrap_or(f64::INFINITY)
     };
+    let first_rad = FIRST_EXCESS_RAD.min(0.5 * (LARGEST_MARGIN_RAD - phase_margin_floor_rad));
     let start = vec![
         at_floor.coordinate(process).ok_or(OptimumError::Overflow)?,
-        FIRST_EXCESS_RAD.sqrt(),
+        first_rad.sqrt(),
     ];
     let start = Best {
         value: value(&start),

@@ -365,10 +365,12 @@ fn scores_between_classes() {
     assert!(on_true.mean.unwrap() > 1e-4, "{on_true:?}");
     let first = vec![0; classes.len()];
     let wrong = Score::between_classes(&first, &examples, &classes).unwrap();
-    let costs = own
-        .iter()
-        .map(|&class| classes.between(0, class).unwrap().relative().unwrap().abs());
-    let mean = costs.sum::<f64>() / classes.len() as f64;
+    let costs = own.iter().map(|&class| classes.between(0, class).unwrap());
+    let costs: Vec<f64> = costs
+        .filter_map(|cost| Some(cost.relative()?.abs()))
+        .collect();
+    let mean = costs.iter().sum::<f64>() / costs.len() as f64;
+    assert_eq!(wrong.unstable, classes.len() - costs.len());
     assert!((wrong.mean.unwrap() - mean).abs() < 1e-12);
     let random = make(Processes::Random);
     let none = Score::between_classes(&own, &random, &classes).unwrap();
@@ -401,7 +403,7 @@ fn coordinates_of_a_regression() {
     examples.fill(&[0, 1, 2, 3, 4], &mut batch);
     for i in 0..5 {
         let own = examples.judge_regressed(i, &classes, batch.values.row(i));
-        assert!(own.relative().unwrap().abs() < 5e-3, "{own:?}");
+        assert!(own.relative().unwrap().abs() < 2e-2, "{own:?}");
         let far = examples.judge_regressed(i, &classes, &[1.0, 1.0, -1.0]);
         let far = far.relative().map_or(f64::INFINITY, f64::abs);
         assert!(far > own.relative().unwrap().abs(), "{far} {own:?}");

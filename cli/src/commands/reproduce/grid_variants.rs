@@ -23,7 +23,7 @@ use crate::results::reproduction::{Numbers, Row};
 #[serde(deny_unknown_fields)]
 pub(super) struct GridVariantSettings {
     deterioration: f64,
-    /// Names of the costs; one grid and one row each.
+    /// Names of the costs; one row each.
     costs: Vec<String>,
     /// Phase margins (degrees); one grid and one row each.
     margins_deg: Vec<f64>,
@@ -50,9 +50,8 @@ pub(super) fn find(settings: &GridVariantSettings, workers: &Workers) -> Result<
     };
     let costs = settings.costs.iter().map(|name| {
         let Cost(criterion) = name.parse().map_err(Failure::usage)?;
-        let (grid, check) = checked(GridSettings { criterion, ..base })?;
-        let controllers = controllers(&grid.settings, settings, workers).map_err(Failure::usage)?;
-        let cells = facts(&grid, &check).into_iter().chain(controllers);
+        let grid = GridSettings { criterion, ..base };
+        let cells = controllers(&grid, settings, workers).map_err(Failure::usage)?;
         Ok(Row::new(criterion.name().to_uppercase(), cells))
     });
     let costs: Vec<Row> = costs.collect::<Result<_, Failure>>()?;
