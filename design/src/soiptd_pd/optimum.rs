@@ -15,8 +15,8 @@
 //! The paper's constraint is an equality. [`pd_at_phase_margin`] keeps it. [`pd`] also tries larger margins, which cost
 //! less only if the dead time dominates the lags.
 //!
-//! The IAE and the ITAE have no closed form and are least at margins far above 20 degrees. [`pd_by`] searches for their
-//! optimum over crossover and margin at once.
+//! The IAE and the ITAE have no closed form, and the ITAE is often least above the floor of the margin. [`pd_by`] searches
+//! for their optimum over crossover and margin at once.
 //!
 //! Reference: the paper's equations 11 to 13 (Ayyad, Chehadeh, Awad, Zweiri 2020).
 
