@@ -23,6 +23,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::{Args, Parser, Subcommand};
+use onecycle_design::soiptd_pd::criterion::Criterion;
 use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
 use onecycle_onboard::{Soiptd, SoiptdError};
 
@@ -256,6 +257,10 @@ pub(crate) struct Grid {
     /// Use as few members as possible
     #[arg(long)]
     pub(crate) fewest: bool,
+    /// Cost that the controllers minimise: ise (squared error), iae (absolute error), itae (absolute error times time);
+    /// iae and itae take some minutes
+    #[arg(long, value_name = "COST", default_value = "ise")]
+    pub(crate) cost: Cost,
     /// Compare processes at equal velocity gains instead of equal oscillation amplitudes
     #[arg(long)]
     pub(crate) equal_gains: bool,
@@ -280,7 +285,7 @@ pub(crate) struct Grid {
     pub(crate) seed: u64,
     /// Read the grid from this file instead of computing it
     #[arg(long, value_name = "GRID.json",
-          conflicts_with_all = ["space", "deterioration", "fewest", "equal_gains", "out"])]
+          conflicts_with_all = ["space", "deterioration", "fewest", "equal_gains", "cost", "out"])]
     pub(crate) from: Option<PathBuf>,
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
@@ -292,6 +297,22 @@ pub(crate) struct Grid {
     /// Print the summary as JSON
     #[arg(long)]
     pub(crate) json: bool,
+}
+
+/// A criterion of controllers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cost(pub(crate) Criterion);
+
+impl FromStr for Cost {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Criterion::ALL.into_iter().find(|one| one.name() == text);
+        found.map(Self).ok_or_else(|| {
+            let names = Criterion::ALL.map(Criterion::name).join(", ");
+            format!("there is no cost '{text}': choose from {names}")
+        })
+    }
 }
 
 /// Largest number of random processes of a check; all of them are kept in memory.

@@ -9,12 +9,14 @@
 //! | [`open_loop`] | open loop, gain crossover, phase crossover |
 //! | [`mod@margins`] | phase, gain and delay margin |
 //! | [`cost`] | integral of the squared error (ISE) of a unit step, in closed form |
-//! | [`optimum`] | PD of least ISE at a phase margin |
+//! | [`criterion`] | the other integrals of the error: IAE and ITAE |
+//! | [`optimum`] | PD of least ISE, IAE or ITAE at a phase margin |
 //! | [`mod@deterioration`] | cost of a controller on a process, relative to the optimum of that process |
 //! | [`mod@loop_response`] | open loop at a frequency |
 //! | [`mod@step_response`], [`step_metrics`] | response to a unit step, with its overshoot, rise time and settling time |
 
 pub mod cost;
+pub mod criterion;
 pub mod deterioration;
 mod feedback;
 pub mod loop_response;
@@ -26,9 +28,10 @@ pub mod step_metrics;
 pub mod step_response;
 
 pub use cost::ise;
+pub use criterion::Criterion;
 pub use deterioration::{Deterioration, deterioration};
 pub use loop_response::{LoopResponse, loop_response};
 pub use margins::{Margins, margins};
-pub use optimum::{Optimum, OptimumError, pd, pd_at_phase_margin};
+pub use optimum::{Optimum, OptimumError, pd, pd_at_phase_margin, pd_by};
 pub use step_metrics::StepMetrics;
 pub use step_response::{Sample, StepResponse, StepResponseError, step_response};

@@ -15,8 +15,13 @@ use super::MOST_THREADS;
     "Examples:\n",
     "  onecycle reproduce\n",
     "  onecycle reproduce --quick\n",
-    "  onecycle reproduce table_4 table_5 -o out\n\n",
-    "Parts: phase, grid, figures, table_2_and_3, table_4, tuning_rules, table_5, table_6, table_7, claims.\n",
+    "  onecycle reproduce table_4 table_5 -o out\n",
+    "  onecycle train --recipe cli/reproduction/paper_network_untrimmed.toml -o paper.onnx\n",
+    "  onecycle reproduce table_4 table_6 table_7 --network paper.onnx\n\n",
+    "Parts: phase, grid, grid_variants, figures, table_2_and_3, table_2_variants, table_4, tuning_rules,\n",
+    "rule_variants, table_5, table_6, table_7, modes, claims.\n",
+    "Without --network, table_4, table_6 and table_7 train the paper's network first, in 75 minutes on two\n",
+    "cores (--quick: a small one, in seconds), and keep it in DIR/parts/paper_network.onnx for the next run.\n",
     "Finished parts are kept in DIR/parts and not computed again, and an interrupted training is\n",
     "resumed after its last epoch; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable part, 5 output not written"
@@ -28,6 +33,9 @@ pub(crate) struct Reproduce {
     /// Use small sizes, to test that everything runs; takes at most two minutes
     #[arg(long)]
     pub(crate) quick: bool,
+    /// Network of table_4, table_6 and table_7: an ONNX file that `onecycle train` wrote from a classifier's recipe
+    #[arg(long, value_name = "FILE.onnx")]
+    pub(crate) network: Option<PathBuf>,
     /// Folder to write to
     #[arg(long, short, value_name = "DIR", default_value = "reproduction")]
     pub(crate) out: PathBuf,
@@ -48,43 +56,60 @@ pub(crate) struct Reproduce {
 pub(crate) enum Name {
     Phase,
     Grid,
+    GridVariants,
     Figures,
     Table2And3,
+    Table2Variants,
     Table4,
     TuningRules,
+    RuleVariants,
     Table5,
     Table6,
     Table7,
+    Modes,
     Claims,
 }
 
 impl Name {
     /// All of them, in the paper's order.
-    pub(crate) const ALL: [Self; 10] = [
+    pub(crate) const ALL: [Self; 14] = [
         Self::Phase,
         Self::Grid,
+        Self::GridVariants,
         Self::Figures,
         Self::Table2And3,
+        Self::Table2Variants,
         Self::Table4,
         Self::TuningRules,
+        Self::RuleVariants,
         Self::Table5,
         Self::Table6,
         Self::Table7,
+        Self::Modes,
         Self::Claims,
     ];
+
+    /// Whether the part compares the paper's network.
+    pub(crate) fn reads_network(self) -> bool {
+        matches!(self, Self::Table4 | Self::Table6 | Self::Table7)
+    }
 
     /// The name in arguments and file names.
     pub(crate) fn as_str(self) -> &'static str {
         match self {
             Self::Phase => "phase",
             Self::Grid => "grid",
+            Self::GridVariants => "grid_variants",
             Self::Figures => "figures",
             Self::Table2And3 => "table_2_and_3",
+            Self::Table2Variants => "table_2_variants",
             Self::Table4 => "table_4",
             Self::TuningRules => "tuning_rules",
+            Self::RuleVariants => "rule_variants",
             Self::Table5 => "table_5",
             Self::Table6 => "table_6",
             Self::Table7 => "table_7",
+            Self::Modes => "modes",
             Self::Claims => "claims",
         }
     }

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
-use onecycle_lab::space::candidate::{Candidate, CandidateError, Gains};
+use onecycle_lab::space::candidate::{CandidateError, Gains};
 use onecycle_lab::space::grid;
 use onecycle_lab::space::grid::{Check, Grid, GridFile, GridSettings, Layout, check};
 
@@ -86,6 +86,7 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<GridRun, Failure> {
         } else {
             Gains::SameAmplitude
         },
+        criterion: arguments.cost.0,
     };
     // With --fewest there are only a few members, which are computed quickly.
     let mut kept = match (&arguments.out, settings.layout) {
@@ -182,7 +183,7 @@ fn rays(settings: &GridSettings) -> Result<Vec<CostsAlongRay>, CandidateError> {
     ]
     .into_iter()
     .map(|(name, times_s)| {
-        let own = Candidate::new(&settings.space, settings.gains, times_s)?;
+        let own = settings.candidate(times_s)?;
         let step = grid::step(&own, settings.deterioration);
         let mut ray = CostsAlongRay {
             name,

@@ -4,15 +4,23 @@ mod comparison;
 mod cycles;
 mod figures;
 mod grid;
+mod grid_variants;
+mod modes;
 mod network;
+mod paper;
 mod phase;
+mod rules;
 mod sheet;
 mod single;
 
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
+
+use onecycle_lab::paper::classifier::ClassifierRecipe;
+use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 use self::sheet::{Sheet, typed};
 use super::workers::Workers;
@@ -51,7 +59,7 @@ pub(crate) fn run(arguments: &Reproduce) -> Result<ExitCode, Failure> {
 }
 
 /// Rows that the sheet states: they sum up the other parts.
-#[derive(serde::Deserialize)]
+#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Stated {
     /// Claim, and the cells of its row.
@@ -69,45 +77,103 @@ fn claims(stated: &Stated) -> Numbers {
     }
 }
 
+/// What belongs to a journal: the settings of a part, and the recipe of the network that it compares.
+#[derive(Serialize)]
+struct Settings<'a> {
+    #[serde(flatten)]
+    of_sheet: &'a toml::Table,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    network: Option<&'a ClassifierRecipe>,
+}
+
+/// Work that is kept in a folder once it is done.
+struct Kept<'a> {
+    folder: PathBuf,
+    name: &'a str,
+    restart: bool,
+}
+
+impl Kept<'_> {
+    /// The result of an earlier run with these settings, or a new one.
+    fn result<T: Serialize + DeserializeOwned>(
+        &self,
+        settings: &impl Serialize,
+        compute: impl FnOnce(&Journal) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let begin = Instant::now();
+        let mut kept = None;
+        let command = format!("reproduce {}", self.name);
+        let take = |found: T| match kept.replace(found) {
+            None => Ok(()),
+            Some(_) => Err("is out of order".to_owned()),
+        };
+        let mut journal = Journal::open(&self.folder, &command, settings, self.restart, take)?;
+        if let Some(found) = kept {
+            tell("  as an earlier run has found it (use --restart to start over)");
+            return Ok(found);
+        }
+        let found = compute(&journal)?;
+        journal.add(&found)?;
+        tell(&format!("  {:.0} s", begin.elapsed().as_secs_f64()));
+        Ok(found)
+    }
+
+    /// A step of the work, kept by itself.
+    fn step(&self, number: usize) -> Kept<'_> {
+        let mut folder = self.folder.clone().into_os_string();
+        folder.push(format!("_{number}"));
+        Kept {
+            folder: folder.into(),
+            ..*self
+        }
+    }
+}
+
 /// A part, computed now or by an earlier run.
 fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<ReproducedPart, Failure> {
-    let begin = Instant::now();
     let sheet = Sheet::of(name)?;
     let settings = sheet.settings(arguments.quick);
     let size = if arguments.quick { "_quick" } else { "" };
-    let mut kept = None;
-    let mut journal = Journal::open(
-        &folder.join(format!("{}{size}", name.as_str())),
-        &format!("reproduce {}", name.as_str()),
-        &settings,
-        arguments.restart,
-        |numbers: Numbers| match kept.replace(numbers) {
-            None => Ok(()),
-            Some(_) => Err("is out of order".to_owned()),
-        },
-    )?;
-    if let Some(numbers) = kept {
-        tell("  as an earlier run has found it (use --restart to start over)");
-        return Ok(sheet.part(name, numbers));
-    }
     let workers = Workers::new(arguments.threads)?;
-    // The other parts have a progress bar.
-    let waiting = matches!(name, Name::Phase | Name::Figures | Name::Table7)
-        .then(|| Waiting::on("computing"));
-    let numbers = match name {
-        Name::Phase => phase::find(&typed(&settings)?)?,
-        Name::Grid => grid::find(&typed(&settings)?, &workers)?,
-        Name::Figures => figures::find(&typed(&settings)?)?,
-        Name::Table2And3 => network::find(&typed(&settings)?, &journal, &workers)?,
-        Name::Table4 | Name::TuningRules => comparison::find(&typed(&settings)?, &workers)?,
-        Name::Table5 => single::starts(&typed(&settings)?, &workers)?,
-        Name::Table6 => single::biases(&typed(&settings)?, &workers)?,
-        Name::Table7 => cycles::find(&typed(&settings)?)?,
-        Name::Claims => claims(&typed(&settings)?),
+    let network = name
+        .reads_network()
+        .then(|| paper::network(arguments, folder, &workers));
+    let network = network.transpose()?;
+    let kept = Kept {
+        folder: folder.join(format!("{}{size}", name.as_str())),
+        name: name.as_str(),
+        restart: arguments.restart,
     };
-    drop(waiting);
-    workers.finish();
-    journal.add(&numbers)?;
-    tell(&format!("  {:.0} s", begin.elapsed().as_secs_f64()));
+    let keys = Settings {
+        of_sheet: &settings,
+        network: network.as_ref().map(|network| &network.card.recipe),
+    };
+    let numbers = kept.result(&keys, |journal| {
+        // The other parts have a progress bar.
+        let waiting = matches!(name, Name::Phase | Name::Figures | Name::Table7)
+            .then(|| Waiting::on("computing"));
+        let numbers = match (name, &network) {
+            (Name::Phase, _) => phase::find(&typed(&settings)?)?,
+            (Name::Grid, _) => grid::find(&typed(&settings)?, &workers)?,
+            (Name::GridVariants, _) => grid_variants::find(&typed(&settings)?, &workers)?,
+            (Name::Figures, _) => figures::find(&typed(&settings)?)?,
+            (Name::Table2And3, _) => network::find(&typed(&settings)?, journal, &workers)?,
+            (Name::Table2Variants, _) => network::variants(&typed(&settings)?, &kept, &workers)?,
+            (Name::TuningRules, _) => comparison::find(&typed(&settings)?, None, &workers)?,
+            (Name::RuleVariants, _) => rules::find(&typed(&settings)?, &workers)?,
+            (Name::Table5, _) => single::starts(&typed(&settings)?, &workers)?,
+            (Name::Modes, _) => modes::find(&typed(&settings)?, &workers)?,
+            (Name::Claims, _) => claims(&typed(&settings)?),
+            (Name::Table4, network) => {
+                comparison::find(&typed(&settings)?, network.as_ref(), &workers)?
+            }
+            (Name::Table6, Some(network)) => single::biases(&typed(&settings)?, network, &workers)?,
+            (Name::Table7, Some(network)) => cycles::find(&typed(&settings)?, network)?,
+            (Name::Table6 | Name::Table7, None) => Numbers::default(),
+        };
+        drop(waiting);
+        workers.finish();
+        Ok(numbers)
+    })?;
     Ok(sheet.part(name, numbers))
 }

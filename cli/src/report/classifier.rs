@@ -36,6 +36,7 @@ pub(crate) fn name(loss: &Loss) -> &'static str {
         Loss::ShiftedSoftmax { .. } => "modified softmax, shifted",
         Loss::CostAugmented { .. } => "cost-augmented softmax",
         Loss::ExpectedCost { .. } => "expected cost",
+        Loss::SquaredError { .. } => "regression",
         Loss::Gaussian { .. } | Loss::CostAwareGaussian { .. } => "density",
     }
 }

@@ -133,7 +133,8 @@ fn kind(settings: &GridSettings) -> String {
         Gains::SameAmplitude => "gains by the amplitude",
         Gains::Equal => "equal velocity gains",
     };
-    format!("{layout}, {gains}")
+    let criterion = settings.criterion.name().to_uppercase();
+    format!("{layout}, {gains}, least {criterion}")
 }
 
 /// Number and arrangement of the members, one line for each fact.

@@ -53,4 +53,7 @@ pub(crate) struct TrainedNetwork {
     pub(crate) seconds: f64,
     /// For every set, the score by each of [`onecycle_lab::paper::classifier::PickRule::ALL`].
     pub(crate) scores: Vec<[Score; 2]>,
+    /// The verification set as the paper counts: see [`Score::between_classes`]. `None` for a regression.
+    #[serde(skip)]
+    pub(crate) between: Option<Score>,
 }

@@ -78,12 +78,26 @@ fn quick_run_of_the_fast_parts() {
 fn what_it_refuses() {
     let refused = run(&["reproduce", "table_8"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
-    let words = "there is no part 'table_8': choose from phase, grid, figures, table_2_and_3, table_4, \
-                 tuning_rules, table_5, table_6, table_7, claims";
+    let words = "there is no part 'table_8': choose from phase, grid, grid_variants, figures, table_2_and_3, \
+                 table_2_variants, table_4, tuning_rules, rule_variants, table_5, table_6, table_7, modes, claims";
     assert!(refused.stderr.contains(words), "{refused:?}");
 
     let folder = Scratch::new();
     let out = folder.name("out");
+    let network = folder.write("paper.onnx", b"no network");
+    let arguments = [
+        "reproduce",
+        "table_7",
+        "--quick",
+        "--network",
+        &network,
+        "-o",
+        &out,
+    ];
+    let refused = run(&arguments);
+    assert_eq!(refused.code, Some(UNREADABLE), "{refused:?}");
+    assert!(refused.stderr.contains("paper.onnx"), "{refused:?}");
+
     fs::create_dir_all(format!("{out}/parts/phase_quick")).unwrap();
     fs::write(format!("{out}/parts/phase_quick/journal.jsonl"), "{\n{\n").unwrap();
     let refused = run(&["reproduce", "phase", "--quick", "--resume", "-o", &out]);

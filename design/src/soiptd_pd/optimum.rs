@@ -15,6 +15,9 @@
 //! The paper's constraint is an equality. [`pd_at_phase_margin`] keeps it. [`pd`] also tries larger margins, which cost
 //! less only if the dead time dominates the lags.
 //!
+//! The IAE and the ITAE have no closed form, and the ITAE is often least above the floor of the margin. [`pd_by`] searches
+//! for their optimum over crossover and margin at once.
+//!
 //! Reference: the paper's equations 11 to 13 (Ayyad, Chehadeh, Awad, Zweiri 2020).
 
 use std::f64::consts::FRAC_PI_2;
@@ -23,8 +26,10 @@ use onecycle_onboard::{Pd, Soiptd};
 
 use crate::roots::{falling_root, root};
 use crate::soiptd_pd::cost::ise_at_crossover;
+use crate::soiptd_pd::criterion::Criterion;
 use crate::soiptd_pd::margins::{Margins, margins};
 use crate::soiptd_pd::open_loop::{OpenLoop, lead_for_margin};
+use crate::synthesis::simplex::{Best, Extent, minimise};
 
 /// Points of the scan per unit of the search coordinate. The minimum of the cost is about one unit wide.
 const SCAN_POINTS_PER_UNIT: f64 = 3.0;
@@ -137,6 +142,61 @@ pub fn quieter(process: &Soiptd, best: &Optimum, excess: f64) -> Result<Optimum,
     point(root(too_much, low, high, TOLERANCE)).optimum(process)
 }
 
+/// The search for the least IAE or ITAE: first steps of its coordinates, where it ends (the gains to some 1e-4, the cost
+/// to 1e-7), and most evaluations.
+const SEARCH: Extent = Extent {
+    size: 0.3,
+    tolerance: 1e-4,
+    evaluations: 200,
+};
+
+/// First excess of the phase margin over its floor (rad), and the largest margin of the search (rad).
+const FIRST_EXCESS_RAD: f64 = 0.36;
+const LARGEST_MARGIN_RAD: f64 = 1.55;
+
+/// PD of least cost by a criterion among those with at least this phase margin.
+///
+/// # Errors
+/// The errors of [`pd_at_phase_margin`].
+pub fn pd_by(
+    criterion: Criterion,
+    process: &Soiptd,
+    phase_margin_floor_rad: f64,
+) -> Result<Optimum, OptimumError> {
+    if criterion == Criterion::Ise {
+        return pd(process, phase_margin_floor_rad);
+    }
+    let at_floor = at_margin(process, phase_margin_floor_rad)?;
+    // Coordinates: that of the gain crossover, and the root of the excess of the margin, which is zero at the floor.
+    let point =
+        |at: &[f64]| SearchPoint::at(process, at[0], phase_margin_floor_rad + at[1] * at[1]);
+    let cost = |point: &SearchPoint| {
+        let open_loop = point.open_loop(process);
+        let is_allowed = open_loop.kp > 0.0 && open_loop.kd >= 0.0;
+        is_allowed
+            .then(|| criterion.cost(process, open_loop.pd(process)))
+            .flatten()
+    };
+    let mut value = |at: &[f64]| {
+        let point = point(at).filter(|point| point.phase_margin_rad < LARGEST_MARGIN_RAD);
+        point
+            .and_then(|point| cost(&point))
+            .unwrap_or(f64::INFINITY)
+    };
+    let first_rad = FIRST_EXCESS_RAD.min(0.5 * (LARGEST_MARGIN_RAD - phase_margin_floor_rad));
+    let start = vec![
+        at_floor.coordinate(process).ok_or(OptimumError::Overflow)?,
+        first_rad.sqrt(),
+    ];
+    let start = Best {
+        value: value(&start),
+        point: start,
+    };
+    let found = minimise(&mut value, &start, SEARCH);
+    let best = point(&found.point).filter(|_| found.value.is_finite());
+    best.ok_or(OptimumError::Overflow)?.optimum(process)
+}
+
 /// PD given by its gain crossover and phase margin, the coordinates of the search.
 #[derive(Clone, Copy, Debug)]
 struct SearchPoint {
@@ -150,7 +210,6 @@ fn at_margin(process: &Soiptd, phase_margin_rad: f64) -> Result<SearchPoint, Opt
         return Err(OptimumError::PhaseMargin(phase_margin_rad));
     }
     let highest = highest_crossover(process, phase_margin_rad).ok_or(OptimumError::Overflow)?;
-    // The search coordinate z = ln(highest/w - 1) resolves optima near either end of the range of crossovers.
     let point = |z: f64| SearchPoint {
         crossover_rad_per_s: highest / (1.0 + z.exp()),
         phase_margin_rad,
@@ -179,6 +238,22 @@ fn highest_crossover(process: &Soiptd, phase_margin_rad: f64) -> Option<f64> {
 }
 
 impl SearchPoint {
+    /// The point with the search coordinate `z = ln(highest/w - 1)`, which resolves optima near either end of the range
+    /// of crossovers.
+    fn at(process: &Soiptd, z: f64, phase_margin_rad: f64) -> Option<Self> {
+        let highest = highest_crossover(process, phase_margin_rad)?;
+        Some(Self {
+            crossover_rad_per_s: highest / (1.0 + z.exp()),
+            phase_margin_rad,
+        })
+    }
+
+    /// Its search coordinate.
+    fn coordinate(&self, process: &Soiptd) -> Option<f64> {
+        let highest = highest_crossover(process, self.phase_margin_rad)?;
+        Some((highest / self.crossover_rad_per_s - 1.0).ln())
+    }
+
     fn open_loop(&self, process: &Soiptd) -> OpenLoop {
         let lead_rad = lead_for_margin(process, self.crossover_rad_per_s, self.phase_margin_rad);
         OpenLoop::crossing_at(process, self.crossover_rad_per_s, lead_rad)

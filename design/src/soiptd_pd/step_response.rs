@@ -127,7 +127,7 @@ pub fn step_response(process: &Soiptd, pd: Pd) -> Result<StepResponse, StepRespo
     if phase_margin_rad.is_nan() || phase_margin_rad <= 0.0 {
         return Err(StepResponseError::Unstable);
     }
-    let grid = Grid::of(&open_loop, crossover);
+    let grid = Grid::of(&open_loop, crossover, STEPS_PER_RADIAN);
     let states = simulate(&open_loop, crossover, grid)?;
 
     let feedback = Feedback::of(&open_loop, grid.step_s);
@@ -157,17 +157,17 @@ pub fn step_response(process: &Soiptd, pd: Pd) -> Result<StepResponse, StepRespo
 
 /// Time grid of the simulation.
 #[derive(Clone, Copy, Debug)]
-struct Grid {
+pub(super) struct Grid {
     /// Simulation step (s).
-    step_s: f64,
+    pub(super) step_s: f64,
     /// Dead time in whole steps. Zero if the dead time is shorter than a step.
     delay_steps: usize,
 }
 
 impl Grid {
-    fn of(open_loop: &OpenLoop, crossover: f64) -> Self {
+    pub(super) fn of(open_loop: &OpenLoop, crossover: f64, steps_per_radian: f64) -> Self {
         let radian_s = 1.0 / crossover;
-        let step_s = (radian_s / STEPS_PER_RADIAN)
+        let step_s = (radian_s / steps_per_radian)
             .min(open_loop.lag_s / STEPS_PER_LAG)
             .max(radian_s / MOST_STEPS_PER_RADIAN);
         if open_loop.tau_s < step_s {
@@ -185,7 +185,7 @@ impl Grid {
 }
 
 /// States at the nodes of the grid, the first at `t = tau`, until the loop has settled.
-fn simulate(
+pub(super) fn simulate(
     open_loop: &OpenLoop,
     crossover: f64,
     grid: Grid,

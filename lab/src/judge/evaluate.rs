@@ -206,6 +206,24 @@ impl Judge {
         record
     }
 
+    /// As [`Self::record`], with the time that the answer takes. `clock` returns seconds.
+    #[must_use]
+    pub fn timed(
+        &self,
+        experiment: u64,
+        method: &str,
+        answer: impl FnOnce() -> Result<Answer, String>,
+        clock: &dyn Fn() -> f64,
+    ) -> Record {
+        let begin_s = clock();
+        let answer = answer();
+        let seconds = clock() - begin_s;
+        Record {
+            seconds: Some(seconds),
+            ..self.record(experiment, method, answer)
+        }
+    }
+
     /// Number of the 90 % intervals of [`JUDGED`] that hold the true value.
     fn held(&self, intervals: &Estimate) -> Option<u8> {
         let truth = Model::from(in_order(&self.truth).ok()?);
@@ -316,13 +334,8 @@ pub fn records(
     for contender in contenders {
         let own = truth.recorded_by(contender.relay_test())?;
         let seen = own.as_ref().map_or(Seen::of(*recorded), Seen::of_recorded);
-        let begin_s = clock();
-        let answer = contender.answer(&seen);
-        let seconds = clock() - begin_s;
-        records.push(Record {
-            seconds: Some(seconds),
-            ..judge.record(truth.number, &contender.name(), answer)
-        });
+        let answer = || contender.answer(&seen);
+        records.push(judge.timed(truth.number, &contender.name(), answer, clock));
     }
     Ok(records)
 }

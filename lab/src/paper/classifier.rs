@@ -37,13 +37,14 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 pub use classes::{Class, Classes, Gain, Measured, TrueProcess, label};
-pub use examples::{Examples, Processes};
+pub use examples::{Examples, Processes, coordinates, times_at};
 pub use experiment::{Protocol, Trial, Trials};
 pub use harmonic::{Harmonics, Response};
 pub use input::{Fit, INPUTS, Prepared, SAMPLES};
 pub use scoring::{PickRule, Score, least_expected_cost, most_likely, picks};
 pub use standard::{Standard, Standardised};
 
+use self::examples::TIMES;
 use crate::experiments::ExperimentError;
 use crate::learn::train::{
     Layer, Loss, Network, OptimizerMethod, Schedule, TrainError, TrainingSettings,
@@ -81,7 +82,10 @@ pub enum ClassifierError {
     #[error("{0}")]
     Train(#[from] TrainError),
     /// The loss reads something other than classes and their costs.
-    #[error("losses: a classifier needs a loss over classes, such as cross_entropy")]
+    #[error(
+        "losses: a classifier needs a loss over classes, such as cross_entropy, or a regression of the three times, \
+         squared_error with dimension 3"
+    )]
     Loss,
 }
 
@@ -238,8 +242,10 @@ impl ClassifierRecipe {
         self.trials(Purpose::Training, 0, self.protocol)
             .validate()?;
         for (number, choice) in self.losses.iter().enumerate() {
-            if choice.loss.outputs().is_some() {
-                return Err(ClassifierError::Loss);
+            match choice.loss {
+                Loss::SquaredError { dimension: TIMES } => {}
+                loss if loss.outputs().is_some() => return Err(ClassifierError::Loss),
+                _ => {}
             }
             self.settings(number).validate()?;
         }
@@ -332,7 +338,7 @@ impl ClassifierRecipe {
         )
     }
 
-    fn layers(&self, classes: usize) -> Vec<Layer> {
+    fn layers(&self, outputs: usize) -> Vec<Layer> {
         let hidden = (self.hidden.iter()).flat_map(|&outputs| {
             let probability = self.dropout;
             [
@@ -342,16 +348,18 @@ impl ClassifierRecipe {
                 Layer::Dropout { probability },
             ]
         });
-        hidden.chain([Layer::Dense { outputs: classes }]).collect()
+        hidden.chain([Layer::Dense { outputs }]).collect()
     }
 
-    /// The network before training, the same for every loss.
+    /// The network before training with loss `number`, the same for every loss over classes; panics if there is no such
+    /// loss.
     ///
     /// # Errors
     /// Names the first size or probability that is out of its range.
-    pub fn network(&self, classes: usize) -> Result<Network, ClassifierError> {
+    pub fn network(&self, number: usize, classes: usize) -> Result<Network, ClassifierError> {
         let mut rng = Pcg64Mcg::seed_from_u64(self.seed);
-        Ok(Network::new(INPUTS, &self.layers(classes), &mut rng)?)
+        let outputs = self.losses[number].loss.outputs().unwrap_or(classes);
+        Ok(Network::new(INPUTS, &self.layers(outputs), &mut rng)?)
     }
 
     /// Settings of the training with loss `number`; panics if there is none.

@@ -14,9 +14,10 @@ use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 
 use crate::space::Space;
 use crate::space::limit_cycle::symmetric;
-use onecycle_design::soiptd_pd::cost::ise;
-use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
-use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd};
+use onecycle_design::soiptd_pd::criterion::Criterion;
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_design::soiptd_pd::margins::margins;
+use onecycle_design::soiptd_pd::optimum::{Optimum, OptimumError, pd_by};
 
 /// Gains at which candidates are compared.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
@@ -29,6 +30,25 @@ pub enum Gains {
     Equal,
 }
 
+/// How candidates are compared.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Comparison {
+    /// Gains of the processes.
+    pub gains: Gains,
+    /// Cost of a controller.
+    pub criterion: Criterion,
+}
+
+impl From<Gains> for Comparison {
+    /// By the paper's cost, the ISE.
+    fn from(gains: Gains) -> Self {
+        Self {
+            gains,
+            criterion: Criterion::Ise,
+        }
+    }
+}
+
 /// A process with a gain according to [`Gains`], and its optimal controller.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Candidate {
@@ -36,7 +56,9 @@ pub struct Candidate {
     pub process: Soiptd,
     /// The optimum with at least the margin of the space.
     pub optimum: Optimum,
-    gains: Gains,
+    /// Cost of the optimum by the criterion of the comparison.
+    pub cost: f64,
+    comparison: Comparison,
 }
 
 /// Why a process is no candidate.
@@ -72,11 +94,12 @@ impl Candidate {
     /// See [`CandidateError`].
     pub fn new(
         space: &Space,
-        gains: Gains,
+        comparison: impl Into<Comparison>,
         [t_prop_s, t_body_s, tau_s]: [f64; 3],
     ) -> Result<Self, CandidateError> {
+        let comparison = comparison.into();
         let unit = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s)?;
-        let process = match gains {
+        let process = match comparison.gains {
             Gains::Equal => unit,
             Gains::SameAmplitude => {
                 let cycle = symmetric(&unit, space.beta).ok_or(CandidateError::NoOscillation {
@@ -88,10 +111,14 @@ impl Candidate {
                 unit.with_gain_scaled(1.0 / cycle.amplitude)?
             }
         };
+        let criterion = comparison.criterion;
+        let optimum = pd_by(criterion, &process, space.phase_margin_rad())?;
+        let cost = criterion.cost(&process, optimum.pd);
         Ok(Self {
             process,
-            optimum: pd(&process, space.phase_margin_rad())?,
-            gains,
+            optimum,
+            cost: cost.ok_or(OptimumError::Overflow)?,
+            comparison,
         })
     }
 
@@ -102,7 +129,7 @@ impl Candidate {
     pub fn scaled(&self, alpha: f64) -> Result<Self, CandidateError> {
         // Factor on the acceleration gain; a change other than 1/alpha^2 divides the controller's
         // gains.
-        let gain = match self.gains {
+        let gain = match self.comparison.gains {
             Gains::SameAmplitude => alpha.powi(-2),
             Gains::Equal => alpha.recip(),
         };
@@ -126,14 +153,22 @@ impl Candidate {
         Ok(Self {
             process,
             optimum,
-            gains: self.gains,
+            cost: alpha.powi(self.comparison.criterion.power_of_time()) * self.cost,
+            comparison: self.comparison,
         })
     }
 
     /// `J_ij`: cost of this candidate's controller on `other`, with the margin there.
     #[must_use]
     pub fn on(&self, other: &Self) -> Deterioration {
-        deterioration(self.optimum.pd, &other.process, &other.optimum)
+        let relative = self.cost_on(other);
+        match margins(&other.process, self.optimum.pd) {
+            Some(margins) if relative.is_finite() => Deterioration::Stable {
+                relative,
+                phase_margin_rad: margins.phase_margin_rad,
+            },
+            _ => Deterioration::Unstable,
+        }
     }
 
     /// `J_(ij) = max(J_ij, J_ji)`: distance of two candidates; infinite if either controller is
@@ -161,9 +196,11 @@ impl Candidate {
     /// `J_ij` alone; infinite if unstable.
     #[must_use]
     pub fn cost_on(&self, other: &Self) -> f64 {
-        ise(&other.process, self.optimum.pd).map_or(f64::INFINITY, |cost| {
-            (cost - other.optimum.ise) / other.optimum.ise
-        })
+        let cost = self
+            .comparison
+            .criterion
+            .cost(&other.process, self.optimum.pd);
+        cost.map_or(f64::INFINITY, |cost| (cost - other.cost) / other.cost)
     }
 
     /// `T_prop`, `T_body`, `tau` (s).
@@ -199,6 +236,23 @@ mod tests {
             assert_eq!(b.ise, 2.0 * a.ise);
             assert_eq!(b.margins.phase_margin_rad, a.margins.phase_margin_rad);
         }
+    }
+
+    // By the ITAE the cost grows with the square of the times, and distances stay: its criterion is smooth enough for 1e-6.
+    #[test]
+    fn twice_as_slow_by_the_itae() {
+        let comparison = Comparison {
+            criterion: Criterion::Itae,
+            ..Comparison::default()
+        };
+        let new = |times_s| Candidate::new(&Space::MULTIROTOR, comparison, times_s).unwrap();
+        let (one, other) = (new([0.05, 1.0, 0.02]), new([0.06, 1.0, 0.03]));
+        let [two, two_other] = [one, other].map(|candidate| candidate.scaled(2.0).unwrap());
+        assert_eq!(two.cost, 4.0 * one.cost);
+        let fresh = new([0.1, 2.0, 0.04]);
+        assert!((fresh.cost / two.cost - 1.0).abs() < 1e-6);
+        assert!((two.distance(&two_other) / one.distance(&other) - 1.0).abs() < 1e-6);
+        assert!(one.cost_on(&one).abs() < 1e-12);
     }
 
     // A distance is the larger of both costs, below any bound above it and below none under it. The

@@ -28,10 +28,11 @@
 //! # }
 //! ```
 
-use crate::space::candidate::{Candidate, CandidateError, Gains};
+use crate::space::candidate::{Candidate, CandidateError, Comparison, Gains};
 use crate::space::surface::Direction;
 use crate::space::{FieldError, Space};
 use crate::workers::Workers;
+use onecycle_design::soiptd_pd::criterion::Criterion;
 
 mod chain;
 mod coverage;
@@ -70,6 +71,23 @@ pub struct GridSettings {
     pub layout: Layout,
     /// Gains at which processes are compared.
     pub gains: Gains,
+    /// Cost of a controller; the ISE if left out.
+    #[serde(default, with = "CriterionName", skip_serializing_if = "is_ise")]
+    pub criterion: Criterion,
+}
+
+/// Names of [`Criterion`] in files.
+#[derive(serde::Serialize, serde::Deserialize)]
+#[serde(remote = "Criterion", rename_all = "snake_case")]
+enum CriterionName {
+    Ise,
+    Iae,
+    Itae,
+}
+
+/// Files of the default criterion do not name it, as those of older programs.
+fn is_ise(criterion: &Criterion) -> bool {
+    *criterion == Criterion::Ise
 }
 
 impl Default for GridSettings {
@@ -80,6 +98,7 @@ impl Default for GridSettings {
             deterioration: 0.1,
             layout: Layout::Rays,
             gains: Gains::SameAmplitude,
+            criterion: Criterion::Ise,
         }
     }
 }
@@ -101,8 +120,16 @@ impl GridSettings {
         Ok(())
     }
 
-    fn candidate(&self, times_s: [f64; 3]) -> Result<Candidate, CandidateError> {
-        Candidate::new(&self.space, self.gains, times_s)
+    /// The process with these times, `T_prop`, `T_body`, `tau` (s), with its optimal controller.
+    ///
+    /// # Errors
+    /// [`CandidateError`]: the process has no controller or no oscillation.
+    pub fn candidate(&self, times_s: [f64; 3]) -> Result<Candidate, CandidateError> {
+        let comparison = Comparison {
+            gains: self.gains,
+            criterion: self.criterion,
+        };
+        Candidate::new(&self.space, comparison, times_s)
     }
 }
 

@@ -8,7 +8,8 @@ use onecycle_lab::experiments::{SAMPLE_S, SampledCycle};
 use onecycle_lab::learn::train::{Batch, Dataset, Matrix};
 use onecycle_lab::paper::classifier::{
     Classes, Examples, Fit, Gain, Harmonics, INPUTS, Measured, Prepared, Processes, Protocol,
-    Response, SAMPLES, Score, Trials, label, least_expected_cost, most_likely,
+    Response, SAMPLES, Score, Trials, coordinates, label, least_expected_cost, most_likely,
+    times_at,
 };
 use onecycle_lab::space::Space;
 use onecycle_lab::space::grid::{Grid, GridSettings};
@@ -342,4 +343,69 @@ fn scores_of_the_best_picks() {
     assert!(wrong.mean > best.mean && wrong.worst > best.worst);
     // Within the 20 % of the grid.
     assert!(best.worst.unwrap() < 0.2, "{best:?}");
+}
+
+// As the paper counts, the simulated class is right and costs nothing, whatever noise has done to the gain; another class
+// costs what its controller costs on it.
+#[test]
+fn scores_between_classes() {
+    let classes = classes();
+    let trials = trials(SPACE, 0.03, Protocol::Trimmed);
+    let count = classes.len() as u64;
+    let make = |processes| {
+        let with = (&classes, Gain::Harmonics, Fit::Padded);
+        Examples::make((&trials, count), processes, with, &OneThread).unwrap()
+    };
+    let examples = make(Processes::Classes);
+    let own: Vec<usize> = (0..classes.len()).collect();
+    let right = Score::between_classes(&own, &examples, &classes).unwrap();
+    assert_eq!((right.accuracy, right.examples), (1.0, classes.len()));
+    assert!(right.worst.unwrap() < 1e-12, "{right:?}");
+    let on_true = Score::of_picks(&own, &examples, &classes);
+    assert!(on_true.mean.unwrap() > 1e-4, "{on_true:?}");
+    let first = vec![0; classes.len()];
+    let wrong = Score::between_classes(&first, &examples, &classes).unwrap();
+    let costs = own.iter().map(|&class| classes.between(0, class).unwrap());
+    let costs: Vec<f64> = costs
+        .filter_map(|cost| Some(cost.relative()?.abs()))
+        .collect();
+    let mean = costs.iter().sum::<f64>() / costs.len() as f64;
+    assert_eq!(wrong.unstable, classes.len() - costs.len());
+    assert!((wrong.mean.unwrap() - mean).abs() < 1e-12);
+    let random = make(Processes::Random);
+    let none = Score::between_classes(&own, &random, &classes).unwrap();
+    assert_eq!(none.examples, 0);
+}
+
+// The middle of a logarithmic range is its geometric mean, the ends are -1 and 1; a time without a range has no coordinate.
+// The true coordinates of an example give its true process: only noise in the gain is left.
+#[test]
+fn coordinates_of_a_regression() {
+    let middle = [0.03_f64 * 0.1, 0.5 * 1.0, 0.005 * 0.05].map(f64::sqrt);
+    assert!(coordinates(&SPACE, middle).iter().all(|at| at.abs() < 1e-6));
+    assert_eq!(coordinates(&SPACE, [0.03, 1.0, 0.005]), [-1.0, 1.0, -1.0]);
+    let back = times_at(&SPACE, &coordinates(&SPACE, [0.07, 0.6, 0.01]));
+    for (time_s, expected) in back.into_iter().zip([0.07, 0.6, 0.01]) {
+        assert!((time_s / expected - 1.0).abs() < 1e-6);
+    }
+    let known = Space {
+        tau_s: (0.02, 0.02),
+        ..SPACE
+    };
+    assert_eq!(coordinates(&known, [0.03, 0.5, 0.02])[2], 0.0);
+    assert_eq!(times_at(&known, &[0.0, 0.0, 3.0])[2], 0.02);
+
+    let classes = classes();
+    let trials = trials(SPACE, 0.0, Protocol::Trimmed);
+    let with = (&classes, Gain::Harmonics, Fit::Padded);
+    let examples = Examples::make((&trials, 5), Processes::Random, with, &OneThread).unwrap();
+    let mut batch = Batch::default();
+    examples.fill(&[0, 1, 2, 3, 4], &mut batch);
+    for i in 0..5 {
+        let own = examples.judge_regressed(i, &classes, batch.values.row(i));
+        assert!(own.relative().unwrap().abs() < 2e-2, "{own:?}");
+        let far = examples.judge_regressed(i, &classes, &[1.0, 1.0, -1.0]);
+        let far = far.relative().map_or(f64::INFINITY, f64::abs);
+        assert!(far > own.relative().unwrap().abs(), "{far} {own:?}");
+    }
 }

@@ -4,6 +4,8 @@ mod files;
 
 use std::sync::OnceLock;
 
+use onecycle_design::soiptd_pd::criterion::Criterion;
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::space::Space;
 use onecycle_lab::space::candidate::{Candidate, Gains};
 use onecycle_lab::space::grid::{Grid, GridFile, GridSettings, Index, Layout, check, step, write};
@@ -374,6 +376,52 @@ fn equal_gains_take_many_more() {
     };
     let equal = Grid::build(&equal, &Threads(2)).unwrap().members.len();
     assert!(equal > 2 * by_amplitude, "{equal} {by_amplitude}");
+}
+
+// By the IAE and the ITAE no controller that keeps the margin on a process costs less there than its own, within the
+// precision of the integrals. A file names a criterion other than the ISE only.
+#[test]
+fn other_costs() {
+    let times_s = [
+        [0.05, 0.8, 0.02],
+        [0.06, 0.8, 0.03],
+        [0.015, 2.0, 0.0005],
+        [0.3, 0.2, 0.1],
+    ];
+    let floor_rad = 20_f64.to_radians() - 1e-6;
+    for criterion in [Criterion::Iae, Criterion::Itae] {
+        let settings = GridSettings {
+            criterion,
+            ..GridSettings::default()
+        };
+        let candidates = times_s.map(|times_s| settings.candidate(times_s).unwrap());
+        for one in &candidates {
+            assert!(one.optimum.margins.phase_margin_rad > floor_rad);
+            for other in &candidates {
+                if let Deterioration::Stable {
+                    relative,
+                    phase_margin_rad,
+                } = one.on(other)
+                {
+                    let is_fair = phase_margin_rad > floor_rad;
+                    assert!(
+                        !is_fair || relative > -1e-3,
+                        "{criterion:?} {one:?} {other:?}"
+                    );
+                }
+            }
+        }
+    }
+    let settings = GridSettings::default();
+    let text = serde_json::to_string(&settings).unwrap();
+    assert!(!text.contains("criterion"), "{text}");
+    let by_iae = GridSettings {
+        criterion: Criterion::Iae,
+        ..settings
+    };
+    let text = serde_json::to_string(&by_iae).unwrap();
+    assert!(text.contains(r#""criterion":"iae""#), "{text}");
+    assert_eq!(serde_json::from_str::<GridSettings>(&text).unwrap(), by_iae);
 }
 
 #[test]

@@ -1,7 +1,9 @@
 //! Table IV and the tuning rules: several methods on the same random processes, with both protocols.
 
 use onecycle_lab::experiments::Benchmark;
-use onecycle_lab::judge::evaluate::{Contender, EvaluationError, Record, Summary, records};
+use onecycle_lab::judge::evaluate::{Contender, EvaluationError, Judge, Record, Summary, records};
+use onecycle_lab::paper::classifier::Protocol;
+use onecycle_lab::paper::network::{Card, PaperNetwork};
 use serde::Deserialize;
 
 use crate::commands::clock::thread_seconds;
@@ -20,6 +22,9 @@ pub(super) struct ComparisonSettings {
     seed: u64,
     /// Names of methods, and their names in the table.
     methods: Vec<(String, String)>,
+    /// Name of the paper's network in the table, where it comes first.
+    #[serde(default)]
+    network: Option<String>,
 }
 
 /// The method with this name.
@@ -27,9 +32,14 @@ fn contender(name: &str) -> Result<Contender, Failure> {
     Contender::from_name(name).ok_or_else(|| Failure::usage(format!("there is no method '{name}'")))
 }
 
-pub(super) fn find(settings: &ComparisonSettings, workers: &Workers) -> Result<Numbers, Failure> {
+pub(super) fn find(
+    settings: &ComparisonSettings,
+    network: Option<&PaperNetwork>,
+    workers: &Workers,
+) -> Result<Numbers, Failure> {
     let contenders = settings.methods.iter().map(|(name, _)| contender(name));
     let contenders: Vec<Contender> = contenders.collect::<Result<_, _>>()?;
+    let network = network.zip(settings.network.as_ref());
     let benchmark = Benchmark {
         experiments: 2 * settings.systems,
         seed: settings.seed,
@@ -38,10 +48,14 @@ pub(super) fn find(settings: &ComparisonSettings, workers: &Workers) -> Result<N
     let judged = workers.map(benchmark.experiments as usize, |index| {
         let (truth, recorded) = benchmark.experiment(index as u64 + 1)?;
         let signals = recorded.signals();
-        Ok((
-            truth.is_trimmed,
-            records(&truth, &signals, &contenders, &thread_seconds)?,
-        ))
+        let mut found = Vec::with_capacity(contenders.len() + 1);
+        if let Some((network, name)) = network {
+            let answer = || network.answer(&signals).map_err(|error| error.to_string());
+            let judge = Judge::new(&truth.process)?;
+            found.push(judge.timed(truth.number, name, answer, &thread_seconds));
+        }
+        found.extend(records(&truth, &signals, &contenders, &thread_seconds)?);
+        Ok((truth.is_trimmed, found))
     });
     let judged: Result<Vec<(bool, Vec<Record>)>, EvaluationError> = judged.into_iter().collect();
     let judged = judged.map_err(Failure::usage)?;
@@ -52,7 +66,12 @@ pub(super) fn find(settings: &ComparisonSettings, workers: &Workers) -> Result<N
         let of_method = |number: usize| -> Vec<&Record> {
             records.iter().map(|records| &records[number]).collect()
         };
-        let labels = settings.methods.iter().map(|(_, label)| label).enumerate();
+        let methods = settings.methods.iter().map(|(_, label)| label);
+        let labels = network
+            .iter()
+            .map(|&(_, label)| label)
+            .chain(methods)
+            .enumerate();
         found.tables.push(
             labels
                 .clone()
@@ -65,7 +84,32 @@ pub(super) fn find(settings: &ComparisonSettings, workers: &Workers) -> Result<N
                 .collect(),
         );
     }
+    found
+        .tables
+        .extend(network.map(|(network, _)| training(&network.card)));
     Ok(found)
+}
+
+/// How the network was trained.
+fn training(card: &Card) -> Vec<Row> {
+    let recipe = &card.recipe;
+    let widths = recipe.hidden.iter().map(ToString::to_string);
+    let row = |name, cell: String| Row::new(name, [cell]);
+    vec![
+        row("hidden layers", widths.collect::<Vec<_>>().join(", ")),
+        row("classes", card.classes_s.len().to_string()),
+        row("experiments learnt from", recipe.examples.to_string()),
+        row("epochs", recipe.epochs.to_string()),
+        row(
+            "bias",
+            match recipe.protocol {
+                Protocol::Trimmed => "trimmed away",
+                Protocol::Untrimmed => "left in",
+                Protocol::Both => "left in and trimmed away, in turn",
+            }
+            .to_owned(),
+        ),
+    ]
 }
 
 fn row(label: &str, summary: &Summary) -> Row {

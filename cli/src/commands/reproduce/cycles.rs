@@ -1,6 +1,7 @@
 //! Table VII: cycles of one run, each identified alone, and the cost of each controller on the processes of the others.
 
 use onecycle_lab::judge::evaluate::{Cycles, Judge};
+use onecycle_lab::paper::network::PaperNetwork;
 use onecycle_plant::Trace;
 use serde::Deserialize;
 
@@ -22,23 +23,29 @@ pub(super) struct CyclesSettings {
     cycles: usize,
 }
 
-pub(super) fn find(settings: &CyclesSettings) -> Result<Numbers, Failure> {
+pub(super) fn find(settings: &CyclesSettings, network: &PaperNetwork) -> Result<Numbers, Failure> {
     let (truth, trace) = settings.setup.run(settings.input_bias)?;
+    let by_network = Cycles::by(&trace, SAMPLE_S, settings.cycles, |signals| {
+        network.answer(signals).map_err(|error| error.to_string())
+    });
+    let by_network = by_network.map_err(Failure::usage)?;
     let cycles = Cycles::of(&trace, SAMPLE_S, settings.cycles).map_err(Failure::usage)?;
     let judge = Judge::new(&truth.process).map_err(Failure::usage)?;
-    let mut rows = cross_table(&cycles);
-    for (row, (answer, _)) in rows.iter_mut().zip(&cycles.answers) {
-        row.cells
-            .push(cost_cell(Some(judge.deterioration(answer.feedback))));
-    }
+    let rows = |cycles: &Cycles| {
+        let mut rows = cross_table(cycles);
+        for (row, (answer, _)) in rows.iter_mut().zip(&cycles.answers) {
+            row.cells
+                .push(cost_cell(Some(judge.deterioration(answer.feedback))));
+        }
+        rows
+    };
     let signal = |name, values| relative(name, &trace, values, cycles.range_s);
+    let largest = [&by_network, &cycles].map(|cycles| percent(cycles.largest()));
     Ok(Numbers {
         tables: vec![
-            rows,
-            vec![Row::new(
-                "largest J_ij of two cycles",
-                [percent(cycles.largest())],
-            )],
+            rows(&by_network),
+            rows(&cycles),
+            vec![Row::new("largest J_ij of two cycles", largest)],
         ],
         figures: vec![vec![
             signal("output", &trace.output),

@@ -62,17 +62,17 @@ impl Sheet {
         let text = match name {
             Name::Phase => include_str!("../../../reproduction/phase.toml"),
             Name::Grid => include_str!("../../../reproduction/grid.toml"),
+            Name::GridVariants => include_str!("../../../reproduction/grid_variants.toml"),
             Name::Figures => include_str!("../../../reproduction/figures.toml"),
-            Name::Table2And3 => {
-                include_str!("../../../reproduction/table_2_and_3.toml")
-            }
+            Name::Table2And3 => include_str!("../../../reproduction/table_2_and_3.toml"),
+            Name::Table2Variants => include_str!("../../../reproduction/table_2_variants.toml"),
             Name::Table4 => include_str!("../../../reproduction/table_4.toml"),
-            Name::TuningRules => {
-                include_str!("../../../reproduction/tuning_rules.toml")
-            }
+            Name::TuningRules => include_str!("../../../reproduction/tuning_rules.toml"),
+            Name::RuleVariants => include_str!("../../../reproduction/rule_variants.toml"),
             Name::Table5 => include_str!("../../../reproduction/table_5.toml"),
             Name::Table6 => include_str!("../../../reproduction/table_6.toml"),
             Name::Table7 => include_str!("../../../reproduction/table_7.toml"),
+            Name::Modes => include_str!("../../../reproduction/modes.toml"),
             Name::Claims => include_str!("../../../reproduction/claims.toml"),
         };
         toml::from_str(text).map_err(Failure::usage)

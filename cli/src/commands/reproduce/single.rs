@@ -6,6 +6,7 @@ use onecycle_lab::experiments::{Campaign, Recorded, RelayTest, Truth, signals_of
 use onecycle_lab::judge::baselines::pem;
 use onecycle_lab::judge::baselines::pem::Data;
 use onecycle_lab::judge::evaluate::{Contender, Judge, PHASE_MARGIN_DEG, Seen};
+use onecycle_lab::paper::network::PaperNetwork;
 use onecycle_onboard::Soiptd;
 use onecycle_plant::Trace;
 use serde::Deserialize;
@@ -122,6 +123,11 @@ impl Bench {
         let answer = contender.answer(&Seen::of(self.one())).ok()?;
         Some(self.judge.deterioration(answer.feedback))
     }
+
+    fn by_network(&self, network: &PaperNetwork) -> Option<Deterioration> {
+        let answer = network.answer(&self.one()).ok()?;
+        Some(self.judge.deterioration(answer.feedback))
+    }
 }
 
 /// Table V: one row for each start value; set I, set II, set I with the bias in the model, and onecycle without start.
@@ -156,24 +162,30 @@ pub(super) struct Biases {
 }
 
 /// Names of the columns of Table VI in its figure.
-const METHODS: [&str; 5] = [
+const METHODS: [&str; 6] = [
     "PEM, set I",
     "PEM, set II",
+    "the paper's network",
     "onecycle, one cycle",
     "PEM, set I, bias in the model",
     "PEM, set I, done with care",
 ];
 
 /// Table VI: one row for each bias, one column for each method.
-pub(super) fn biases(settings: &Biases, workers: &Workers) -> Result<Numbers, Failure> {
+pub(super) fn biases(
+    settings: &Biases,
+    network: &PaperNetwork,
+    workers: &Workers,
+) -> Result<Numbers, Failure> {
     let judged = workers.map(settings.input_biases.len(), |index| {
         let bench = Bench::new(&settings.setup, settings.input_biases[index])?;
         let [one, two, with_bias] = bench.by_pem(settings.start_s);
+        let papers = bench.by_network(network);
         let ours = bench.by(Contender::OneCycle(1));
         let careful = bench.by(Contender::PemFair);
-        Ok([one, two, ours, with_bias, careful])
+        Ok([one, two, papers, ours, with_bias, careful])
     });
-    let judged: Vec<[Option<Deterioration>; 5]> =
+    let judged: Vec<[Option<Deterioration>; 6]> =
         judged.into_iter().collect::<Result<_, Failure>>()?;
     let both = || settings.input_biases.iter().zip(&judged);
     let rows = both().map(|(bias, judged)| Row::new(format!("{bias:.1} h"), judged.map(cost_cell)));

@@ -10,7 +10,7 @@ use onecycle_lab::paper::classifier::{
     Classes, ClassifierError, ClassifierRecipe, Examples, Gain, PickRule, Score, Standard,
     Standardised, picks,
 };
-use serde::Serialize;
+use onecycle_lab::paper::network::{Card, FORMAT};
 
 use super::Kept;
 use crate::args;
@@ -20,19 +20,6 @@ use crate::journal::Journal;
 use crate::output::{ProgressBar, print, progress_bar, write_file, write_text};
 use crate::report::classifier as report;
 use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
-
-/// Key and version of the metadata beside the weights.
-const FORMAT: &str = "onecycle.classifier/1";
-
-/// Metadata of the best network.
-#[derive(Serialize)]
-struct Card<'a> {
-    recipe: &'a ClassifierRecipe,
-    loss: Loss,
-    rule: PickRule,
-    /// `T_prop`, `T_body`, `tau` of every class (s).
-    classes_s: Vec<[f64; 3]>,
-}
 
 /// Data that all losses share.
 struct Lesson<'a> {
@@ -50,27 +37,39 @@ pub(crate) struct Learnt<'a> {
     pub(crate) run: ClassifierRun<'a>,
     /// The best network.
     network: Network,
-    card: Card<'a>,
+    card: Card,
 }
 
 pub(super) fn run(arguments: &args::Train, recipe: &ClassifierRecipe) -> Result<ExitCode, Failure> {
     let failed = |error| Failure::unreadable(&arguments.recipe, error);
     recipe.validate().map_err(failed)?;
     let workers = Workers::new(arguments.threads)?;
-    let journal = (arguments.out.as_deref())
-        .map(|out| super::journal(out, recipe, arguments.restart))
-        .transpose()?;
-    let learnt = learn(recipe, journal.as_ref(), &workers, failed)?;
-    if let Some(out) = &arguments.out {
-        write(out, &learnt.network, &learnt.card)?;
-    }
+    let learnt = match &arguments.out {
+        Some(out) => make(recipe, out, arguments.restart, &workers, failed)?,
+        None => learn(recipe, None, &workers, failed)?,
+    };
     if let Some(path) = &arguments.json {
         let text = report::json(&learnt.run);
         write_text(path, &text)?;
     }
     print(&report::text(&learnt.run))?;
-    journal.map_or(Ok(()), Journal::remove)?;
     Ok(ExitCode::from(exit::DONE))
+}
+
+/// Trains a valid recipe and writes the best network to this ONNX file. An interrupted run is resumed. `failed` makes errors
+/// of the recipe.
+pub(crate) fn make<'a>(
+    recipe: &'a ClassifierRecipe,
+    out: &Path,
+    restart: bool,
+    workers: &'a Workers,
+    failed: impl Fn(ClassifierError) -> Failure,
+) -> Result<Learnt<'a>, Failure> {
+    let journal = super::journal(out, recipe, restart)?;
+    let learnt = learn(recipe, Some(&journal), workers, failed)?;
+    write(out, &learnt.network, &learnt.card)?;
+    journal.remove()?;
+    Ok(learnt)
 }
 
 /// Trains one network for each loss of a valid recipe and scores them. `failed` makes errors of the recipe.
@@ -129,7 +128,7 @@ fn better_rule(scores: &[Score; 2]) -> PickRule {
     }
 }
 
-fn write(path: &Path, network: &Network, card: &Card<'_>) -> Result<(), Failure> {
+fn write(path: &Path, network: &Network, card: &Card) -> Result<(), Failure> {
     let card = serde_json::to_string(card).map_err(Failure::usage)?;
     let bytes = onnx::export(network, None, &[(FORMAT, card)]).map_err(Failure::usage)?;
     write_file(path, |file| file.write_all(&bytes))
@@ -170,7 +169,7 @@ impl<'a> Lesson<'a> {
             number: number + 1,
         });
         let mut trainer = super::begun(kept.as_ref(), || {
-            let network = self.recipe.network(self.classes.len())?;
+            let network = self.recipe.network(number, self.classes.len())?;
             Ok::<_, ClassifierError>(Trainer::new(self.recipe.settings(number), network)?)
         })?;
         let loss = trainer.settings().loss;
@@ -199,24 +198,40 @@ impl<'a> Lesson<'a> {
             outcome: super::described(outcome),
             history: trainer.history().to_vec(),
             seconds: begin.elapsed().as_secs_f64(),
-            scores: self.scores(&network).map_err(Failure::usage)?,
+            scores: self.scores(&network, loss).map_err(Failure::usage)?,
+            between: self.between(&network, loss).map_err(Failure::usage)?,
         };
         Ok((trained, network))
     }
 
-    fn scores(&self, network: &Network) -> Result<Vec<[Score; 2]>, ClassifierError> {
+    fn scores(&self, network: &Network, loss: Loss) -> Result<Vec<[Score; 2]>, ClassifierError> {
         let network = network.folded();
+        let workers = Quiet(self.workers);
         let scores = self.sets.iter().map(|examples| {
-            let picks = picks(&network, examples, &self.classes, &Quiet(self.workers))?;
+            if loss.outputs().is_some() {
+                let score = Score::of_regression(&network, examples, &self.classes, &workers)?;
+                return Ok([score; 2]);
+            }
+            let picks = picks(&network, examples, &self.classes, &workers)?;
             Ok(picks.map(|picks| Score::of_picks(&picks, examples, &self.classes)))
         });
         scores.collect()
     }
 
-    fn card(&self, best: usize, rule: PickRule) -> Card<'a> {
+    /// The most likely classes of the verification set, as the paper counts. `None` for a regression.
+    fn between(&self, network: &Network, loss: Loss) -> Result<Option<Score>, ClassifierError> {
+        if loss.outputs().is_some() {
+            return Ok(None);
+        }
+        let workers = Quiet(self.workers);
+        let [picks, _] = picks(&network.folded(), &self.sets[0], &self.classes, &workers)?;
+        Score::between_classes(&picks, &self.sets[0], &self.classes).map(Some)
+    }
+
+    fn card(&self, best: usize, rule: PickRule) -> Card {
         let classes = 0..self.classes.len();
         Card {
-            recipe: self.recipe,
+            recipe: self.recipe.clone(),
             loss: self.recipe.losses[best].loss,
             rule,
             classes_s: classes.map(|class| self.classes.times_s(class)).collect(),

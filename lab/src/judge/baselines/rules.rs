@@ -43,6 +43,8 @@ use onecycle_identify::Signals;
 pub enum Rule {
     /// A rule for the relay of the recording, from half the peak-to-peak output.
     Amplitude(Homogeneous),
+    /// The same from the amplitude of the first harmonic of the output.
+    OutputHarmonic(Homogeneous),
     /// The rule for the measured phase, from the first harmonics of output and input.
     FirstHarmonic {
         /// Phase margin of the controller (rad).
@@ -115,13 +117,20 @@ pub fn identify(
     cycles: usize,
 ) -> Result<BaselineAnswer, BaselineError> {
     let (found, window) = steady_cycles(signals, cycles)?;
+    let harmonic = |signal: &[f64]| harmonic(&signal[window.clone()], found.cycles_used);
     let (rule, ratio) = match *rule {
         Rule::Amplitude(rule) => (
             rule,
             describing_function_ratio(found.amplitude, found.relay_amplitude),
         ),
+        Rule::OutputHarmonic(rule) => {
+            let amplitude = 2.0 * harmonic(signals.output).norm() / window.len() as f64;
+            (
+                rule,
+                describing_function_ratio(amplitude, found.relay_amplitude),
+            )
+        }
         Rule::FirstHarmonic { phase_margin_rad } => {
-            let harmonic = |signal: &[f64]| harmonic(&signal[window.clone()], found.cycles_used);
             let response = harmonic(signals.output) / harmonic(signals.input);
             // The input is held after its sample: half a sample of delay and a little less amplitude.
             let hold_rad = PI * signals.sample_period_s / found.period_s;

@@ -42,6 +42,21 @@ impl Cycles {
     /// # Errors
     /// [`CyclesError`]: the cycles are not steady, or no process could be identified from one of them.
     pub fn of(trace: &Trace, sample_s: f64, count: usize) -> Result<Self, CyclesError> {
+        Self::by(trace, sample_s, count, |signals| {
+            Contender::OneCycle(1).answer(&Seen::of(*signals))
+        })
+    }
+
+    /// The same by another method.
+    ///
+    /// # Errors
+    /// [`CyclesError`]: the cycles are not steady, or the method identifies no process from one of them.
+    pub fn by(
+        trace: &Trace,
+        sample_s: f64,
+        count: usize,
+        method: impl Fn(&Signals<'_>) -> Result<Answer, String>,
+    ) -> Result<Self, CyclesError> {
         let signals = signals_of(trace, sample_s);
         let found = find_oscillation(&signals, count).map_err(CyclesError::Oscillation)?;
         let mut answers = Vec::with_capacity(count);
@@ -54,8 +69,7 @@ impl Cycles {
                 output: &trace.output[..points],
                 ..signals
             };
-            let answer = Contender::OneCycle(1).answer(&Seen::of(before));
-            let answer = answer.map_err(|error| CyclesError::Cycle(error.to_string()))?;
+            let answer = method(&before).map_err(CyclesError::Cycle)?;
             let process = answer
                 .process
                 .ok_or_else(|| CyclesError::Cycle("no fit".to_owned()))?;

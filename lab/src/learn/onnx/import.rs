@@ -19,6 +19,8 @@ pub struct Imported {
     pub normalisation: Option<Normalisation>,
     /// The network after the normalisation.
     pub network: Network,
+    /// Keys and values that the model carries along.
+    pub metadata: BTreeMap<String, String>,
 }
 
 /// Reads the bytes of a model.
@@ -63,9 +65,13 @@ pub fn import(bytes: &[u8]) -> Result<Imported, OnnxError> {
         )));
     }
     let (normalisation, network) = reader.chain.network()?;
+    let metadata = model.metadata_props.iter();
     Ok(Imported {
         normalisation,
         network,
+        metadata: metadata
+            .map(|one| (one.key.clone(), one.value.clone()))
+            .collect(),
     })
 }
 

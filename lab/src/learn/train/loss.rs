@@ -11,6 +11,7 @@
 //! | shifted softmax      | `-ln p_T`, `p_i ~ exp(gamma_iT (a_i - min_j a_j))`                    |
 //! | cost-augmented       | `-ln p_T`, `p_i ~ exp(a_i + m J_iT)`                                  |
 //! | expected cost        | `sum_i p_i J_iT + c (-ln p_T) - h H(p)`, `p_i ~ exp(a_i)`             |
+//! | squared error        | `|a - y|^2 / 2`: plain regression                                     |
 //! | Gaussian             | `-ln N(y)`, the outputs of the network give mean and precision        |
 //! | cost-aware Gaussian  | `-ln N(y) + w (sqrt(1 + (g . (mu - y) / c)^2) - 1)`                   |
 //!
@@ -74,6 +75,11 @@ pub enum Loss {
         /// optimum is then `p_i ~ exp(-J_iT / h)`.
         entropy: f64,
     },
+    /// `|a - y|^2 / 2`. Reads values.
+    SquaredError {
+        /// Length of `y`.
+        dimension: usize,
+    },
     /// `-ln N(y)` of a [`Gaussian`]. Reads values.
     Gaussian {
         /// Length of `y`.
@@ -136,7 +142,9 @@ impl Loss {
                 share("cross_entropy", cross_entropy),
                 share("entropy", entropy),
             ],
-            Self::Gaussian { dimension } => vec![number("dimension", dimension)],
+            Self::SquaredError { dimension } | Self::Gaussian { dimension } => {
+                vec![number("dimension", dimension)]
+            }
             Self::CostAwareGaussian {
                 dimension,
                 weight,
@@ -154,6 +162,7 @@ impl Loss {
     #[must_use]
     pub fn outputs(&self) -> Option<usize> {
         match *self {
+            Self::SquaredError { dimension } => Some(dimension),
             Self::Gaussian { dimension } | Self::CostAwareGaussian { dimension, .. } => {
                 Some(Gaussian::outputs(dimension))
             }
@@ -223,6 +232,14 @@ impl Loss {
                 };
                 softmax.expected_cost(truth(), shares, capped(cap), gradient)
             }
+            Self::SquaredError { .. } => {
+                let mut loss = 0.0;
+                for ((slope, a), y) in gradient.iter_mut().zip(outputs).zip(batch.values.row(i)) {
+                    *slope = f64::from(*a) - f64::from(*y);
+                    loss += 0.5 * *slope * *slope;
+                }
+                loss
+            }
             Self::Gaussian { .. } => gaussian(outputs, batch.values.row(i), gradient),
             Self::CostAwareGaussian {
                 dimension,
@@ -246,7 +263,9 @@ impl Loss {
             expect_size("the number of outputs", expected, outputs.columns())?;
         }
         match *self {
-            Self::Gaussian { dimension } => return expect_vectors(batch, dimension),
+            Self::SquaredError { dimension } | Self::Gaussian { dimension } => {
+                return expect_vectors(batch, dimension);
+            }
             Self::CostAwareGaussian { dimension, .. } => {
                 return expect_vectors(batch, 2 * dimension);
             }

@@ -15,6 +15,7 @@ use onecycle_onboard::{Pd, Soiptd};
 
 use super::ClassifierError;
 use super::harmonic::{Harmonics, Response};
+use crate::experiments::SampledCycle;
 use crate::learn::train::Matrix;
 use crate::space::grid::Grid;
 use crate::space::limit_cycle::symmetric;
@@ -50,6 +51,18 @@ pub enum Measured {
     Amplitude(f64),
 }
 
+impl Measured {
+    /// Half the peak-to-peak output of a cycle.
+    #[must_use]
+    pub fn amplitude_of(cycle: &SampledCycle) -> Self {
+        let (low, high) = (cycle.output.iter())
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &value| {
+                (low.min(value), high.max(value))
+            });
+        Self::Amplitude(0.5 * f64::from(high - low))
+    }
+}
+
 /// A class, with a velocity gain of one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Class {
@@ -82,7 +95,15 @@ pub struct TrueProcess {
 }
 
 impl Class {
-    fn new(times_s: [f64; 3], phase_margin_rad: f64, beta: f64) -> Result<Self, ClassifierError> {
+    /// The class with these times, `T_prop`, `T_body`, `tau` (s).
+    ///
+    /// # Errors
+    /// [`ClassifierError`]: it has no controller or does not oscillate.
+    pub fn new(
+        times_s: [f64; 3],
+        phase_margin_rad: f64,
+        beta: f64,
+    ) -> Result<Self, ClassifierError> {
         let [t_prop_s, t_body_s, tau_s] = times_s;
         let process = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s)?;
         let cycle = symmetric(&process, beta).ok_or(ClassifierError::NoOscillation(times_s))?;
@@ -91,6 +112,15 @@ impl Class {
             pd: pd_at_phase_margin(&process, phase_margin_rad)?.pd,
             amplitude: cycle.amplitude,
             period_s: cycle.period_s(),
+        })
+    }
+
+    /// What the class's own cycle without noise and bias says about its gain; exact.
+    fn quiet(&self) -> Measured {
+        let omega_rad_per_s = std::f64::consts::TAU / self.period_s;
+        Measured::Harmonics(Harmonics {
+            first: Response::of(&self.process, omega_rad_per_s),
+            second: None,
         })
     }
 
@@ -172,13 +202,7 @@ impl Classes {
         for k in 0..this.len() {
             let on = this.classes[k];
             let truth = this.truth(on.process)?;
-            // Exact for the class's own cycle without noise and bias.
-            let omega_rad_per_s = std::f64::consts::TAU / on.period_s;
-            let measured = Measured::Harmonics(Harmonics {
-                first: Response::of(&on.process, omega_rad_per_s),
-                second: None,
-            });
-            for (i, cost) in this.costs(&truth, &measured).into_iter().enumerate() {
+            for (i, cost) in this.costs(&truth, &on.quiet()).into_iter().enumerate() {
                 this.matrix.row_mut(i)[k] = cost;
             }
         }
@@ -226,6 +250,16 @@ impl Classes {
     /// [`ClassifierError`]: the process has no controller.
     pub fn truth(&self, process: Soiptd) -> Result<TrueProcess, ClassifierError> {
         TrueProcess::new(process, self.phase_margin_rad)
+    }
+
+    /// `J_ij`: what the controller of class `i` costs on class `j`, with the gain that follows from the cycle of `j` without
+    /// noise and bias; zero for `i = j`.
+    ///
+    /// # Errors
+    /// [`ClassifierError`]: class `j` has no controller.
+    pub fn between(&self, i: usize, j: usize) -> Result<Deterioration, ClassifierError> {
+        let truth = self.truth(self.classes[j].process)?;
+        Ok(truth.judge(self.classes[i].controller(&self.classes[j].quiet())))
     }
 
     /// Cost of the controller of every class on a process, at the gains that follow from a cycle.

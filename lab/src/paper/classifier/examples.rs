@@ -1,7 +1,7 @@
 //! Examples: trials with the inputs of the network, the class that fits best, and the costs of all
 //! others.
 
-use onecycle_onboard::Pd;
+use onecycle_onboard::{Pd, Soiptd};
 
 use super::ClassifierError;
 use super::classes::{Classes, Gain, Measured, TrueProcess, label};
@@ -9,7 +9,8 @@ use super::experiment::Trials;
 use super::harmonic::Harmonics;
 use super::input::{Fit, INPUTS, Prepared};
 use crate::experiments::SampledCycle;
-use crate::learn::train::{Batch, Dataset, Matrix};
+use crate::learn::train::{Batch, Dataset};
+use crate::space::Space;
 use crate::workers::Workers;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 
@@ -32,6 +33,10 @@ pub enum Processes {
 struct Example {
     prepared: Prepared,
     truth: TrueProcess,
+    /// The class that was simulated, if it was one.
+    class: Option<usize>,
+    /// What a regression learns: [`coordinates`] of the times.
+    coordinates: [f32; TIMES],
     /// Measured by harmonics, and by amplitude.
     measured: [Measured; 2],
     costs: Vec<f32>,
@@ -43,7 +48,46 @@ pub struct Examples {
     examples: Vec<Example>,
     labels: Vec<usize>,
     gain: Gain,
+    space: Space,
     unsteady: u64,
+}
+
+/// Number of times of a process.
+pub(super) const TIMES: usize = 3;
+
+fn times_s(process: &Soiptd) -> [f64; TIMES] {
+    let t_body_s = process.inv_t_body_per_s().recip();
+    [process.t_prop_s(), t_body_s, process.tau_s()]
+}
+
+/// The logarithms of `T_prop`, `T_body` and `tau` (s), from -1 to 1 over the space; zero for a time that the space does not
+/// spread over two positive values.
+#[must_use]
+pub fn coordinates(space: &Space, times_s: [f64; TIMES]) -> [f32; TIMES] {
+    let mut at = [0.0; TIMES];
+    for ((to, time_s), (low, high)) in at.iter_mut().zip(times_s).zip(space.ranges_s()) {
+        let spread = (high / low).ln();
+        if spread.is_finite() && spread > 0.0 {
+            *to = (2.0 * (time_s / low).ln() / spread - 1.0) as f32;
+        }
+    }
+    at
+}
+
+/// The times (s) at these [`coordinates`].
+#[must_use]
+pub fn times_at(space: &Space, at: &[f32]) -> [f64; TIMES] {
+    let mut times_s = [0.0; TIMES];
+    for ((time_s, at), (low, high)) in times_s.iter_mut().zip(at).zip(space.ranges_s()) {
+        let spread = (high / low).ln();
+        let is_spread = spread.is_finite() && spread > 0.0;
+        *time_s = if is_spread {
+            low * (0.5 * (f64::from(*at) + 1.0) * spread).exp()
+        } else {
+            low
+        };
+    }
+    times_s
 }
 
 impl Processes {
@@ -81,6 +125,8 @@ impl Examples {
                 .map(|(trial, measured)| {
                     let truth = classes.truth(trial.process)?;
                     Ok(Example {
+                        class,
+                        coordinates: coordinates(&trials.space, times_s(&trial.process)),
                         prepared: Prepared::of(&trial.cycle, fit),
                         costs: classes.costs(&truth, &measured[which(gain)]),
                         truth,
@@ -97,6 +143,7 @@ impl Examples {
             labels: examples.iter().map(|one| label(&one.costs)).collect(),
             examples,
             gain,
+            space: trials.space,
         })
     }
 
@@ -116,6 +163,35 @@ impl Examples {
     #[must_use]
     pub fn costs(&self, i: usize) -> &[f32] {
         &self.examples[i].costs
+    }
+
+    /// The class that example `i` simulates; `None` for a random process. Panics if there is no such example.
+    #[must_use]
+    pub fn class(&self, i: usize) -> Option<usize> {
+        self.examples[i].class
+    }
+
+    /// Cost of the controller of a process with these [`coordinates`] on example `i`, with its gain from the harmonics;
+    /// panics if there is none.
+    #[must_use]
+    pub fn judge_regressed(&self, i: usize, classes: &Classes, at: &[f32]) -> Deterioration {
+        let Example {
+            truth, measured, ..
+        } = &self.examples[i];
+        let Measured::Harmonics(harmonics) = &measured[which(Gain::Harmonics)] else {
+            return Deterioration::Unstable;
+        };
+        let [t_prop_s, t_body_s, tau_s] = times_at(&self.space, at);
+        let found = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s).ok();
+        let found = found.and_then(|process| classes.truth(process).ok());
+        found.map_or(Deterioration::Unstable, |found| {
+            let gain = harmonics.gain(&found.process, harmonics.first.omega_rad_per_s);
+            let Pd { kp, kd } = found.best.pd;
+            truth.judge(Pd {
+                kp: kp / gain,
+                kd: kd / gain,
+            })
+        })
     }
 
     /// Writes the inputs of example `i`.
@@ -156,13 +232,9 @@ fn which(gain: Gain) -> usize {
 }
 
 fn measured(cycle: &SampledCycle, beta: f64) -> Option<[Measured; 2]> {
-    let (low, high) = (cycle.output.iter())
-        .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), &value| {
-            (low.min(value), high.max(value))
-        });
     Some([
         Measured::Harmonics(Harmonics::of(cycle, beta)?),
-        Measured::Amplitude(0.5 * f64::from(high - low)),
+        Measured::amplitude_of(cycle),
     ])
 }
 
@@ -182,7 +254,11 @@ impl Dataset for Examples {
             batch.costs.row_mut(row).copy_from_slice(&example.costs);
             batch.classes.push(self.labels[sample]);
         }
-        batch.values = Matrix::default();
+        batch.values.reshape(samples.len(), TIMES);
+        for (row, &sample) in samples.iter().enumerate() {
+            let values = batch.values.row_mut(row);
+            values.copy_from_slice(&self.examples[sample].coordinates);
+        }
         batch.weights.clear();
     }
 }

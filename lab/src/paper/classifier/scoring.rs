@@ -67,6 +67,43 @@ impl Score {
         Self::of(judged, examples.labels())
     }
 
+    /// Score of picks on examples of classes as the paper counts: the true class is the simulated one, and a pick costs
+    /// [`Classes::between`]. Random processes are left out.
+    ///
+    /// # Errors
+    /// [`ClassifierError`]: a class has no controller.
+    pub fn between_classes(
+        picks: &[usize],
+        examples: &Examples,
+        classes: &Classes,
+    ) -> Result<Self, ClassifierError> {
+        let (mut judged, mut labels) = (Vec::new(), Vec::new());
+        for (i, &pick) in picks.iter().enumerate() {
+            if let Some(class) = examples.class(i) {
+                judged.push((pick, classes.between(pick, class)?));
+                labels.push(class);
+            }
+        }
+        Ok(Self::of(judged, &labels))
+    }
+
+    /// Score of a regression on examples: of the processes at the outputs of the network. Its accuracy is zero.
+    ///
+    /// # Errors
+    /// [`ClassifierError`]: the network has other inputs or outputs than the examples.
+    pub fn of_regression(
+        network: &Network,
+        examples: &Examples,
+        classes: &Classes,
+        workers: &dyn Workers,
+    ) -> Result<Self, ClassifierError> {
+        let mut judged = Vec::with_capacity(examples.len());
+        outputs(network, examples, workers, |i, row| {
+            judged.push((usize::MAX, examples.judge_regressed(i, classes, row)));
+        })?;
+        Ok(Self::of(judged, examples.labels()))
+    }
+
     /// Score of the best possible picks, with gains found in this way.
     #[must_use]
     pub fn of_best(examples: &Examples, classes: &Classes, gain: Gain) -> Self {
@@ -122,18 +159,31 @@ pub fn picks(
     classes: &Classes,
     workers: &dyn Workers,
 ) -> Result<[Vec<usize>; 2], ClassifierError> {
-    let mut batch = Batch::default();
     let mut picks = [const { Vec::new() }; 2];
+    outputs(network, examples, workers, |_, row| {
+        picks[0].push(most_likely(row));
+        picks[1].push(least_expected_cost(row, classes.matrix()));
+    })?;
+    Ok(picks)
+}
+
+/// Hands each example's number and outputs to `take`, in order.
+fn outputs(
+    network: &Network,
+    examples: &Examples,
+    workers: &dyn Workers,
+    mut take: impl FnMut(usize, &[f32]),
+) -> Result<(), ClassifierError> {
+    let mut batch = Batch::default();
     let order: Vec<usize> = (0..examples.len()).collect();
     for some in order.chunks(BATCH) {
         examples.fill(some, &mut batch);
         let outputs = network.evaluate(&batch.inputs, workers)?;
-        for row in outputs.iter_rows() {
-            picks[0].push(most_likely(row));
-            picks[1].push(least_expected_cost(row, classes.matrix()));
+        for (&i, row) in some.iter().zip(outputs.iter_rows()) {
+            take(i, row);
         }
     }
-    Ok(picks)
+    Ok(())
 }
 
 /// The class with the largest output, the first of equals.

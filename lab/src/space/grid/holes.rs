@@ -48,7 +48,7 @@ fn search(
     let index = Index::new(members.iter().map(|member| &member.candidate));
     let found = workers.map(SEARCHERS, |n| {
         let times_s = draws::times_s(&settings.space, SEED, (searched + n) as u64);
-        let candidate = Candidate::new(&settings.space, settings.gains, times_s)?;
+        let candidate = settings.candidate(times_s)?;
         let nearest = index.nearest(&candidate);
         let distance = nearest.map_or(f64::INFINITY, |(_, distance)| distance);
         Ok((candidate, distance))

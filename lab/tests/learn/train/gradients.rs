@@ -188,6 +188,25 @@ fn losses_of_densities() {
     assert!(error < 1e-6, "{error}");
 }
 
+// Half the square of the distance: (1, 2) from (0, 0) is 2.5, with the slopes 1 and 2.
+#[test]
+fn loss_of_a_regression() {
+    let (_, batch) = classified();
+    let loss = Loss::SquaredError { dimension: 3 };
+    let error = worst_error_of_loss(loss, &random(5, 3, 14), &batch);
+    assert!(error < 1e-6, "{error}");
+    let one = Batch {
+        inputs: Matrix::zeros(1, 1),
+        values: Matrix::zeros(1, 2),
+        ..Batch::default()
+    };
+    let outputs = Matrix::from_rows(1, 2, vec![1.0, 2.0]).unwrap();
+    let mut gradient = Matrix::default();
+    let loss = Loss::SquaredError { dimension: 2 };
+    assert_eq!(loss.evaluate(&outputs, &one, &mut gradient).unwrap(), 2.5);
+    assert_eq!(gradient.row(0), [1.0, 2.0]);
+}
+
 // The cost of the mean is above its scale for some samples and below it for others. With slopes of
 // zero, or a weight of zero, the Gaussian loss is left.
 #[test]
