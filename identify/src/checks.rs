@@ -133,7 +133,8 @@ pub(crate) fn check(
     found.remarks.push(Remark::OneAmplitude);
     let period_s = excitation.highest_rad_per_s().map(|omega| TAU / omega);
     let jitter = period_s.and_then(|period_s| sampling::jitter(signals, period_s));
-    found.remarks.extend(jitter.map(Remark::Jitter));
+    let is_known = (found.remarks.iter()).any(|remark| matches!(remark, Remark::Jitter(_)));
+    (found.remarks).extend(jitter.filter(|_| !is_known).map(Remark::Jitter));
     limits(excitation, identified, &mut found.remarks);
 }
 

@@ -5,6 +5,8 @@
 //! mapped to parameters, and the intervals are quantiles of the draws. Nothing is linearised. A time constant whose
 //! inverse may be zero is unbounded above.
 
+mod edges;
+
 use onecycle_design::bands::quantiles;
 use onecycle_design::{
     Controller, Linear, Model, Parameter, Specification, StepMetrics, Structure, design_over,
@@ -15,6 +17,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
+use self::edges::{is_process, with_jumps, with_real_poles};
 use crate::cholesky::cholesky;
 
 /// Number of draws. The standard error of the probability below the 5 % quantile is `sqrt(0.05 * 0.95 / 4000)`, 0.35 of
@@ -153,7 +156,7 @@ impl Draw {
             reported: Structure::Soiptd,
             own: Some((k_over_t_body / slow_per_s, t_body_s)),
             input_bias: at[coordinate::INPUT_BIAS],
-            is_process: (0.0..=0.25).contains(&ratio) && at[coordinate::TAU_S] >= 0.0,
+            is_process: is_process(at),
         }
     }
 
@@ -234,22 +237,26 @@ impl Posterior {
         let jerk_gain = process.jerk_gain();
         centre[coordinate::LN_JERK_GAIN] = jerk_gain.abs().ln();
         centre[coordinate::INPUT_BIAS] = refined.input_bias;
-        let root = refined.covariance.and_then(|mut covariance| {
+        let covariance = refined.covariance.map(|mut covariance| {
             covariance[coordinate::TAU_S][coordinate::TAU_S] += sample_s * sample_s / 12.0;
             for index in [coordinate::LN_POLE_SUM, coordinate::LN_JERK_GAIN] {
                 covariance[index][index] += INSTRUMENT * INSTRUMENT;
             }
-            cholesky(&covariance)
+            covariance
         });
+        let root = covariance.as_ref().and_then(cholesky);
         let mut rng = Pcg64Mcg::seed_from_u64(SEED);
         // Draws in pairs on opposite sides of the centre, so that the mean of any even number of draws is the centre.
         let mut pair = |root: &[[f64; 5]; 5]| {
             let normal: [f64; 5] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
             [1.0, -1.0].map(|side| {
-                let at = std::array::from_fn(|i| {
+                let at: [f64; 5] = std::array::from_fn(|i| {
                     centre[i] + side * (0..=i).map(|j| root[i][j] * normal[j]).sum::<f64>()
                 });
-                Draw::of(&at, sign)
+                Draw {
+                    is_process: is_process(&at),
+                    ..Draw::of(&with_real_poles(at, covariance.as_ref()), sign)
+                }
             })
         };
         let draws = root.map_or(vec![], |root| {
@@ -469,15 +476,17 @@ impl Posterior {
     pub fn step(&self, step: &StepMetrics, controller: &Controller) -> StepIntervals {
         let metrics = |model: &Model| step_metrics(model, controller).ok();
         let draws: Vec<Option<StepMetrics>> = self.models(STEPS).iter().map(metrics).collect();
-        let interval = |value: fn(&StepMetrics) -> f64| {
+        let values = |value: fn(&StepMetrics) -> f64| -> Vec<f64> {
             let draws = draws.iter();
-            let values = draws.map(|draw| draw.as_ref().map_or(f64::INFINITY, value));
-            Interval::new(value(step), quantiles(values.collect()))
+            (draws.map(|draw| draw.as_ref().map_or(f64::INFINITY, value))).collect()
         };
+        let interval =
+            |value: fn(&StepMetrics) -> f64| Interval::new(value(step), quantiles(values(value)));
+        let settling = values(|step| step.settling_time_s);
         StepIntervals {
             overshoot: interval(|step| step.overshoot),
             rise_time_s: interval(|step| step.rise_time_s),
-            settling_time_s: interval(|step| step.settling_time_s),
+            settling_time_s: Interval::new(step.settling_time_s, with_jumps(settling)),
             peak_input: interval(|step| step.peak_input),
         }
     }
