@@ -27,22 +27,27 @@ pub(super) struct NetworkSettings {
 
 /// A recipe of `cli/reproduction`.
 #[derive(Clone, Copy, Deserialize)]
-#[serde(rename_all = "snake_case")]
 pub(super) enum RecipeName {
-    PaperNetwork,
-    PaperNetworkSmall,
-    PaperNetworkUntrimmed,
+    /// The bias is trimmed away.
+    #[serde(rename = "paper_network")]
+    Trimmed,
+    /// Seconds of training.
+    #[serde(rename = "paper_network_small")]
+    Small,
+    /// The bias is left in, as in the paper.
+    #[serde(rename = "paper_network_untrimmed")]
+    Untrimmed,
 }
 
 impl RecipeName {
     /// The fields of the recipe.
     pub(super) fn table(self) -> Result<toml::Table, Failure> {
         let text = match self {
-            Self::PaperNetwork => include_str!("../../../reproduction/paper_network.toml"),
-            Self::PaperNetworkSmall => {
+            Self::Trimmed => include_str!("../../../reproduction/paper_network.toml"),
+            Self::Small => {
                 include_str!("../../../reproduction/paper_network_small.toml")
             }
-            Self::PaperNetworkUntrimmed => {
+            Self::Untrimmed => {
                 include_str!("../../../reproduction/paper_network_untrimmed.toml")
             }
         };

@@ -23,9 +23,9 @@ pub(super) fn network(
         return read(path);
     }
     let (recipe, name) = if arguments.quick {
-        (RecipeName::PaperNetworkSmall, "paper_network_quick.onnx")
+        (RecipeName::Small, "paper_network_quick.onnx")
     } else {
-        (RecipeName::PaperNetworkUntrimmed, "paper_network.onnx")
+        (RecipeName::Untrimmed, "paper_network.onnx")
     };
     let path = folder.join(name);
     if !path.exists() {
