@@ -172,7 +172,7 @@ CASES = {
     "altitude-mode": (altitude(lambda vehicle: vehicle.mode(ALT_HOLD)), {}, "mode changed", True),
     "altitude-switch": (altitude(lambda vehicle: vehicle.switch(ALTITUDE, LOW)), {}, "switch low", True),
     "altitude-small": (altitude(lambda vehicle: None), {"OCA_AMP": 0.001}, "OCA_AMP too small", True),
-    "altitude-large": (altitude(lambda vehicle: None), {"OCA_AMP": 0.3, "OCA_LAG": 0.4}, "out of OCA_H_MAX", True),
+    "altitude-large": (altitude(lambda vehicle: None), {"OCA_AMP": 0.3, "OCA_H_MAX": 0.1}, "out of OCA_H_MAX", True),
 }
 
 
