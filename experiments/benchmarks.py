@@ -39,7 +39,7 @@ LEFT_OUT = {
     "hundred_thousand": "hours in one thread",
     "--ignored": "minutes to hours; by hand",
     "onecycle train": "minutes to hours; by hand",
-    "onecycle reproduce": "a quarter of an hour; writes docs/reproduction.md",
+    "onecycle reproduce": "some twenty minutes, and 75 for the paper's network; writes docs/reproduction.md",
     "any_peers.py": "needs SIPPY and Octave",
     "--method sippy": "needs SIPPY",
     "cargo install": "installs the program",
