@@ -1,6 +1,7 @@
 //! Evaluation: every method runs on the same experiments and gets a score.
 
 pub mod baselines;
+pub mod bound;
 pub mod calibrate;
 pub mod evaluate;
 pub mod flights;

@@ -5,8 +5,10 @@ pub(crate) mod recording;
 
 use std::fmt::Write;
 
+use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::experiments::Campaign;
 use onecycle_lab::experiments::DefectKind;
+use onecycle_lab::judge::bound::BOUND_DRAWS;
 use onecycle_lab::judge::evaluate::{Costs, quantile};
 use onecycle_lab::judge::out_of_family::CYCLES;
 use onecycle_lab::judge::promises::PROMISES;
@@ -72,6 +74,7 @@ pub(crate) fn identification(campaign: &Campaign, cases: &[IdentificationCase]) 
     let costs = Costs::of(cases.iter().map(IdentificationCase::deterioration));
     let percent = |cost: Option<f64>, decimals| or_dash(cost.map(|cost| 100.0 * cost), decimals);
     let bound = error_over_bound(cases);
+    let at_bound = at_bound(cases);
     let [k, k_over_t_body, t_prop, t_body, tau, bias] = coverage(&held);
     let promised: Vec<_> = (cases.iter())
         .filter_map(|case| case.promises_held)
@@ -86,6 +89,7 @@ pub(crate) fn identification(campaign: &Campaign, cases: &[IdentificationCase]) 
          refused                 {refused}\n\
          unstable                {}\n\
          deterioration |J| (%)   mean {}, median {}, 95 % {}, 99 % {}, worst {}\n\
+         the same at the bound   {at_bound}\n\
          least phase margin      {} deg\n\
          90 % intervals hold (%) K {k:.1}, K/T_body {k_over_t_body:.1}, T_prop {t_prop:.1}, \
          T_body {t_body:.1}, tau {tau:.1}, bias {bias:.1}\n\
@@ -132,6 +136,31 @@ fn error_over_bound(cases: &[IdentificationCase]) -> String {
         rms(coordinate::TAU_S),
         rms(coordinate::LN_JERK_GAIN),
         errors.len()
+    )
+}
+
+/// Cost of the controllers of an ideal estimator: medians over as many campaigns as there are draws, and the range of the
+/// worst.
+fn at_bound(cases: &[IdentificationCase]) -> String {
+    let draws = |draw: usize| {
+        let costs = cases.iter().filter_map(|case| case.bound);
+        Costs::of(costs.map(|costs| costs[draw].map(Deterioration::from)))
+    };
+    let campaigns: [Costs; BOUND_DRAWS] = std::array::from_fn(draws);
+    let text = |of: fn(&Costs) -> Option<f64>, q: f64, decimals| {
+        let mut values: Vec<f64> = campaigns.iter().filter_map(of).map(|v| 100.0 * v).collect();
+        quantile_text(&mut values, q, decimals)
+    };
+    let worst = |costs: &Costs| costs.worst;
+    format!(
+        "mean {}, median {}, 95 % {}, 99 % {}, worst {} ({} to {})",
+        text(|costs| costs.mean, 0.5, 3),
+        text(|costs| costs.median, 0.5, 3),
+        text(|costs| costs.percentile_95, 0.5, 2),
+        text(|costs| costs.percentile_99, 0.5, 2),
+        text(worst, 0.5, 2),
+        text(worst, 0.0, 2),
+        text(worst, 1.0, 2),
     )
 }
 

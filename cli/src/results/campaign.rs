@@ -2,8 +2,9 @@
 
 use onecycle::Model;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
+use onecycle_lab::judge::bound::{BOUND_DRAWS, SHAPE_AND_GAIN};
 use onecycle_lab::judge::out_of_family::{CYCLES, Evaluated};
-use onecycle_lab::judge::outcome::{IdentificationOutcome, RelayOutcome, SHAPE_AND_GAIN};
+use onecycle_lab::judge::outcome::{IdentificationOutcome, RelayOutcome};
 use onecycle_lab::judge::promises::PROMISES;
 use onecycle_onboard::classify::Familiarity;
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,9 @@ pub(crate) struct IdentificationCase {
     /// Squared errors of the coordinates in standard deviations, at most [`MOST_SQUARED_ERROR`] each; `None` where the
     /// estimator gives no standard deviations.
     pub(crate) squared_errors: Option<[f64; SHAPE_AND_GAIN]>,
+    /// Costs of the controllers of an ideal estimator; `None` where the estimator gives no standard deviations.
+    #[serde(default)]
+    pub(crate) bound: Option<[Option<ControllerCost>; BOUND_DRAWS]>,
 }
 
 /// Five standard deviations: a larger error shows in the cost, and would alone determine the mean.
@@ -65,20 +69,42 @@ pub(crate) enum ControllerCost {
     Unstable,
 }
 
+impl From<Deterioration> for ControllerCost {
+    fn from(cost: Deterioration) -> Self {
+        match cost {
+            Deterioration::Stable {
+                relative,
+                phase_margin_rad,
+            } => Self::Stable {
+                relative,
+                phase_margin_rad,
+            },
+            Deterioration::Unstable => Self::Unstable,
+        }
+    }
+}
+
+impl From<ControllerCost> for Deterioration {
+    fn from(cost: ControllerCost) -> Self {
+        match cost {
+            ControllerCost::Stable {
+                relative,
+                phase_margin_rad,
+            } => Self::Stable {
+                relative,
+                phase_margin_rad,
+            },
+            ControllerCost::Unstable => Self::Unstable,
+        }
+    }
+}
+
 impl IdentificationCase {
     pub(crate) fn of(outcome: &IdentificationOutcome) -> Self {
         let squared = |error: f64| error.powi(2).min(MOST_SQUARED_ERROR);
         Self {
-            cost: outcome.deterioration.map(|cost| match cost {
-                Deterioration::Stable {
-                    relative,
-                    phase_margin_rad,
-                } => ControllerCost::Stable {
-                    relative,
-                    phase_margin_rad,
-                },
-                Deterioration::Unstable => ControllerCost::Unstable,
-            }),
+            cost: outcome.deterioration.map(ControllerCost::from),
+            bound: (outcome.bound).map(|costs| costs.map(|cost| cost.map(ControllerCost::from))),
             held: held(outcome),
             promises_held: outcome.promises_held,
             squared_errors: outcome.errors.map(|errors| errors.map(squared)),
@@ -87,16 +113,7 @@ impl IdentificationCase {
 
     /// The cost as the summary takes it.
     pub(crate) fn deterioration(&self) -> Option<Deterioration> {
-        self.cost.map(|cost| match cost {
-            ControllerCost::Stable {
-                relative,
-                phase_margin_rad,
-            } => Deterioration::Stable {
-                relative,
-                phase_margin_rad,
-            },
-            ControllerCost::Unstable => Deterioration::Unstable,
-        })
+        self.cost.map(Deterioration::from)
     }
 }
 

@@ -19,7 +19,7 @@
 //!
 //! `T` and `a` are period and amplitude of the oscillation that the describing function gives the process under the relay
 //! of the test (the distinguishing one for another test); `h`, the amplitude of the test signal, is one. Optional in a kind:
-//! `test` (default: the relay), `process`, `noise`, `bias`, `periods`, `wind`; `control = true` for right data. A value is a
+//! `test` (default: the relay), `process`, `noise`, `bias`, `periods`, `samples_per_period`, `wind`; `control = true` for right data. A value is a
 //! number, or two numbers between which it is uniform.
 //!
 //! Plant, noise and bias of case `n` of a kind depend on the seed and `n` only, so that every kind is tried on the same
@@ -144,6 +144,8 @@ pub struct FaultyRecording {
     pub strength: Option<f64>,
     /// Standard deviation of the noise of one sample (output unit).
     pub noise_sigma: f64,
+    /// Input bias (input unit).
+    pub input_bias: f64,
 }
 
 /// Most samples of a test.
@@ -155,7 +157,6 @@ impl HonestyCampaign {
     /// # Errors
     /// The first one that is missing or out of its range.
     pub fn validate(&self) -> Result<(), HonestyError> {
-        let (fewest, most) = self.samples_per_period.ends();
         first_out_of_range([
             (
                 "cases",
@@ -169,12 +170,6 @@ impl HonestyCampaign {
                 "a list of one entry or more",
                 0.0,
                 !self.kinds.is_empty(),
-            ),
-            (
-                "samples_per_period",
-                "10 to 10,000, the lower value first",
-                fewest,
-                within(10.0, most, fewest) && most <= 1e4,
             ),
         ])?;
         self.kinds.iter().try_for_each(|kind| self.check(kind))
@@ -190,13 +185,19 @@ impl HonestyCampaign {
         };
         let bias = kind.bias.unwrap_or(self.bias);
         let noise = kind.noise.unwrap_or(self.noise).ends();
+        let (fewest, most) = self.samples_per_period_of(kind).ends();
         first_out_of_range([
+            (
+                "samples_per_period",
+                "10 to 10,000, the lower value first",
+                fewest,
+                within(10.0, most, fewest) && most <= 1e4,
+            ),
             (
                 "periods",
                 "1 to 1000, and at most a million steps of the relay",
                 periods,
-                within(1.0, 1e3, periods)
-                    && periods * self.samples_per_period.ends().1 * steps <= MOST_SAMPLES,
+                within(1.0, 1e3, periods) && periods * most * steps <= MOST_SAMPLES,
             ),
             ("bias", "0 to 100", bias, within(0.0, 100.0, bias)),
             (
@@ -233,12 +234,15 @@ impl HonestyCampaign {
         }
         kind.wind.check().map_err(|error| part(error.into()))?;
         // In units of the period; the sample rate is the least.
-        let rate_hz = self.samples_per_period.ends().0;
         let excitation = kind.test.excitation(1.0);
-        excitation.check(periods, rate_hz).map_err(part)?;
+        excitation.check(periods, fewest).map_err(part)?;
         kind.test
             .controller(kind, periods, 1.0, (1.0, 0.0))
             .map(|_| ())
+    }
+
+    fn samples_per_period_of(&self, kind: &Kind) -> Span {
+        kind.samples_per_period.unwrap_or(self.samples_per_period)
     }
 
     /// Simulates case `n` of kind number `kind`. `None` if the output runs away.
@@ -269,7 +273,7 @@ impl HonestyCampaign {
         let amplitude = oscillation.amplitude;
         let noise_sigma = kind.noise.unwrap_or(self.noise).draw(&mut rng) * amplitude;
         let bias = kind.bias.unwrap_or(self.bias) * rng.random_range(-1.0..=1.0);
-        let sample_s = oscillation.period_s / self.samples_per_period.draw(&mut rng);
+        let sample_s = oscillation.period_s / self.samples_per_period_of(kind).draw(&mut rng);
         let fault = kind.fault.map(|fault| DrawnFault {
             fault,
             strength: kind
@@ -305,6 +309,7 @@ impl HonestyCampaign {
             truth,
             strength: fault.map(|fault| fault.strength),
             noise_sigma,
+            input_bias: bias,
         }))
     }
 }

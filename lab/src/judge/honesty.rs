@@ -10,6 +10,8 @@
 //! - a parameter lies outside its 90 % interval by more than half of the width of the interval, and by more than 1 % of its
 //!   value.
 
+use std::collections::BTreeMap;
+
 use onecycle_design::soiptd_pd::margins::margins;
 use onecycle_design::{Model, Parameter, Specification, Structure};
 use onecycle_identify::{
@@ -20,6 +22,7 @@ use onecycle_onboard::Pd;
 mod trial;
 
 use self::trial::{LoopEnd, Trial};
+use super::evaluate::Judge;
 use crate::experiments::honesty::{FaultyRecording, TruePlant};
 
 /// Result of one recording.
@@ -53,6 +56,13 @@ pub struct Accepted {
     /// Phase margin of the paper's PD, which promises 20 degrees, on the real plant (degrees). `None` where there is no such
     /// PD, and on a plant that is no integrator with two lags.
     pub paper_margin_deg: Option<f64>,
+    /// Absolute deterioration of cost of the paper's PD. `None` where it is not judged, or unstable.
+    #[serde(default)]
+    pub deterioration: Option<f64>,
+    /// Whether the 90 % intervals hold the true values, by the keys of the parameters. Empty where the plant has no
+    /// parameters of the same meaning.
+    #[serde(default)]
+    pub held: BTreeMap<String, bool>,
     /// Promises that do not hold.
     pub broken: Vec<Broken>,
 }
@@ -146,10 +156,14 @@ fn judge(recording: &FaultyRecording, identified: &Identified, remarks: &[Remark
     }
     let paper = paper_pd(identified);
     broken.extend(paper.and_then(|pd| final_value(&truth, identified, pd.kp)));
-    let paper_margin_deg = (paper.zip(Model::from(truth.process).soiptd()))
-        .filter(|_| truth.has_parameters())
-        .and_then(|(pd, process)| margins(&process, pd))
+    let judged =
+        (paper.zip(Model::from(truth.process).soiptd())).filter(|_| truth.has_parameters());
+    let paper_margin_deg = (judged.and_then(|(pd, process)| margins(&process, pd)))
         .map(|margins| margins.phase_margin_rad.to_degrees());
+    let deterioration = judged
+        .and_then(|(pd, process)| Some(Judge::new(&process).ok()?.deterioration(pd)))
+        .and_then(|cost| cost.relative())
+        .map(f64::abs);
     let margin = identified.phase_margin_rad;
     let promised_margin_deg = margin.and_then(|margin| Some(margin.low?.to_degrees()));
     let mut true_margin_deg = None;
@@ -184,8 +198,26 @@ fn judge(recording: &FaultyRecording, identified: &Identified, remarks: &[Remark
         promised_margin_deg,
         true_margin_deg,
         paper_margin_deg,
+        deterioration,
+        held: held(recording, identified),
         broken,
     }
+}
+
+/// Whether the intervals hold the true values.
+fn held(recording: &FaultyRecording, identified: &Identified) -> BTreeMap<String, bool> {
+    let truth = recording.truth.in_flight();
+    let model = Model::from(truth.process);
+    let is_comparable = is_comparable(model.structure(), identified.model.structure());
+    let of = |(parameter, interval): (Parameter, Interval)| {
+        let value = match parameter {
+            Parameter::InputBias => recording.input_bias,
+            _ => model.parameter(parameter)?,
+        };
+        Some((parameter.key().to_owned(), interval.holds(value)))
+    };
+    let judged = (identified.estimate.iter()).filter(|_| truth.has_parameters() && is_comparable);
+    judged.filter_map(of).collect()
 }
 
 /// The paper's PD for an identified integrator with two lags.

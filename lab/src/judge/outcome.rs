@@ -6,8 +6,9 @@ use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_identify::{Identification, Options, identify};
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::cycle::SteadyRun;
-use onecycle_onboard::refine::{Refined, coordinate};
+use onecycle_onboard::refine::Refined;
 
+use super::bound::{BOUND_DRAWS, SHAPE_AND_GAIN, coordinates, costs_at_bound};
 use super::evaluate::{Judge, PHASE_MARGIN_DEG, in_order};
 use super::promises::{PROMISES, promises};
 use crate::experiments::{
@@ -75,6 +76,8 @@ pub struct IdentificationOutcome {
     pub bias: f64,
     /// Cost of the identified process's controller on the true one.
     pub deterioration: Option<Deterioration>,
+    /// Costs of the controllers of an ideal estimator with the same window. `None` as for `errors`.
+    pub bound: Option<[Option<Deterioration>; BOUND_DRAWS]>,
     /// Whether the intervals of the [`PROMISES`] hold what the controller does on the true process. `None` without a
     /// controller.
     pub promises_held: Option<[bool; PROMISES.len()]>,
@@ -84,23 +87,11 @@ pub struct IdentificationOutcome {
     pub errors: Option<[f64; SHAPE_AND_GAIN]>,
 }
 
-/// Number of coordinates of a fit without the bias.
-pub const SHAPE_AND_GAIN: usize = 4;
-
 /// Errors of a fit over its standard deviations; `None` without a covariance or with a model error.
 fn errors(refined: &Refined, truth: &Soiptd) -> Option<[f64; SHAPE_AND_GAIN]> {
     let covariance = refined
         .covariance
         .filter(|_| refined.response_error == 0.0)?;
-    let coordinates = |process: &Soiptd| {
-        let (pole_sum_per_s, ratio) = process.pole_sum();
-        let mut at = [0.0; SHAPE_AND_GAIN];
-        at[coordinate::LN_POLE_SUM] = pole_sum_per_s.ln();
-        at[coordinate::POLE_RATIO] = ratio;
-        at[coordinate::TAU_S] = process.tau_s();
-        at[coordinate::LN_JERK_GAIN] = process.jerk_gain().abs().ln();
-        at
-    };
     let (found, truth) = (coordinates(&refined.process), coordinates(truth));
     Some(std::array::from_fn(|k| {
         (found[k] - truth[k]) / covariance[k][k].sqrt()
@@ -127,17 +118,20 @@ pub fn identification_outcome(
     let found = identify(&signals, &options);
     let truth = in_order(&experiment.instruments.behind(&experiment.process)?)?;
     let judge = Judge::new(&truth).ok();
-    let deterioration = (found.outcome.as_ref().ok().zip(judge)).and_then(|(identified, judge)| {
+    let identified = found.outcome.as_ref().ok();
+    let deterioration = (identified.zip(judge)).and_then(|(identified, judge)| {
         Some(judge.deterioration(identified.design?.controller.pd()?))
     });
-    let errors = (found.outcome.as_ref().ok())
-        .and_then(|identified| errors(identified.fit.refined()?, &truth));
-    let identified = found.outcome.as_ref().ok();
+    let refined = identified.and_then(|identified| identified.fit.refined());
+    let errors = refined.and_then(|refined| errors(refined, &truth));
+    let bound =
+        (refined.zip(judge)).and_then(|(refined, judge)| costs_at_bound(refined, &truth, &judge));
     let promised = identified.and_then(|identified| promises(identified, &truth.into()));
     Ok(IdentificationOutcome {
         promises_held: promised
             .map(|promised| promised.map(|promise| promise.interval.holds(promise.truth))),
         errors,
+        bound,
         found,
         truth,
         bias: experiment.input_bias,

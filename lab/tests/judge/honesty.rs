@@ -1,5 +1,6 @@
 //! Campaigns of wrong data: reproducibility, the plants, and the judge on cases known by hand.
 
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use onecycle_design::{Model, Structure};
@@ -30,6 +31,7 @@ fn kind(name: &str, fault: Option<Fault>, strength: Option<Span>) -> Kind {
         noise: None,
         bias: None,
         periods: None,
+        samples_per_period: None,
         wind: DisturbanceLevel::default(),
     }
 }
@@ -165,6 +167,8 @@ fn a_tally_by_hand() {
             promised_margin_deg: None,
             true_margin_deg: None,
             paper_margin_deg: None,
+            deterioration: None,
+            held: BTreeMap::new(),
             broken,
         })
     };

@@ -3,13 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 
+use onecycle_design::Parameter;
 use onecycle_lab::experiments::HonestyCampaign;
 use onecycle_lab::experiments::honesty::Kind;
 use onecycle_lab::judge::honesty::{Accepted, Broken, HonestyOutcome, HonestyTally};
 
 use serde::Serialize;
 
-use super::or_dash;
+use super::{or_dash, quantile_text};
 
 /// A case in JSON.
 #[derive(Serialize)]
@@ -73,6 +74,7 @@ pub(crate) fn table(campaign: &HonestyCampaign, outcomes: &[HonestyOutcome]) -> 
     row(&mut text, "all", &all);
     targets(&mut text, &control, &all);
     paper(&mut text, &kinds);
+    right(&mut text, &kinds);
     remarks(&mut text, &kinds);
     text.push_str("\nwrong and not named (kind, case, strength, promised margin, true margin, remarks, what broke)\n");
     for (kind, outcomes) in &kinds {
@@ -115,6 +117,68 @@ fn paper(text: &mut String, kinds: &[OfKind<'_>]) {
         below(17.0),
         below(0.0),
     );
+}
+
+/// Parameters whose intervals are counted.
+const COUNTED: [Parameter; 5] = [
+    Parameter::KOverTBody,
+    Parameter::TProp,
+    Parameter::TBody,
+    Parameter::Tau,
+    Parameter::InputBias,
+];
+
+/// Right data: how often each interval holds the truth, the cost of the paper's PD, and why recordings were refused.
+fn right(text: &mut String, kinds: &[OfKind<'_>]) {
+    let symbols = COUNTED.map(|parameter| format!(" {:>9}", parameter.symbol()));
+    let _ = writeln!(
+        text,
+        "\n{:<34} accepted  90 % intervals hold (%)\n{:<34}         {}  |J| (%): median worst  unstable  refused",
+        "right data",
+        "",
+        symbols.concat(),
+    );
+    for (kind, outcomes) in kinds.iter().filter(|(kind, _)| kind.control) {
+        let own = [(*kind, *outcomes)];
+        let accepted: Vec<&Accepted> = accepted(&own).map(|(_, accepted)| accepted).collect();
+        let shares = COUNTED.map(|parameter| {
+            let held = accepted
+                .iter()
+                .filter_map(|found| found.held.get(parameter.key()));
+            let (all, right) = held.fold((0, 0), |(all, right), &held| {
+                (all + 1, right + u32::from(held))
+            });
+            let share = (all > 0).then(|| 100.0 * f64::from(right) / f64::from(all));
+            format!(" {:>9}", or_dash(share, 1))
+        });
+        let costs = accepted.iter().filter_map(|found| found.deterioration);
+        let mut costs: Vec<f64> = costs.map(|cost| 100.0 * cost).collect();
+        let unstable = accepted.iter().filter(|found| found.is_unstable()).count();
+        let line = format!(
+            "{:<34} {:>8}{}  {:>15} {:>5}  {unstable:>8}  {}",
+            kind.name,
+            accepted.len(),
+            shares.concat(),
+            quantile_text(&mut costs, 0.5, 2),
+            quantile_text(&mut costs, 1.0, 1),
+            reasons(outcomes),
+        );
+        let _ = writeln!(text, "{}", line.trim_end());
+    }
+}
+
+/// Kinds of the verdicts, each with its number.
+fn reasons(outcomes: &[HonestyOutcome]) -> String {
+    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
+    for outcome in outcomes {
+        if let HonestyOutcome::Refused(reason) = outcome {
+            *counts.entry(reason).or_default() += 1;
+        }
+    }
+    let named = counts
+        .iter()
+        .map(|(reason, count)| format!("{reason} {count}"));
+    named.collect::<Vec<_>>().join(", ")
 }
 
 /// How often each remark stands on accepted right and wrong data: one that stands on both alike tells nothing.

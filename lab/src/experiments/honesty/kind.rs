@@ -42,6 +42,8 @@ pub struct Kind {
     pub bias: Option<f64>,
     /// Length of the test.
     pub periods: Option<f64>,
+    /// Samples in a period.
+    pub samples_per_period: Option<Span>,
     /// Disturbances; not beside a defect.
     #[serde(default)]
     pub wind: DisturbanceLevel,
