@@ -57,6 +57,13 @@ fn a_row_for_each_kind() {
     ] {
         assert!(table.stdout.contains(target), "{}", table.stdout);
     }
+    // Beside it, how often the intervals of right data hold: one case of one kind.
+    let right = (table.stdout.lines()).skip_while(|line| !line.contains("90 % intervals hold (%)"));
+    let right: Vec<&str> = right.take(4).collect();
+    assert!(
+        right[2].starts_with("right ") && right[3].is_empty(),
+        "{right:?}"
+    );
     assert_eq!(run(&["campaign", &path]).stdout, table.stdout);
 }
 

@@ -130,7 +130,7 @@ const COUNTED: [Parameter; 5] = [
 
 /// Right data: how often each interval holds the truth, the cost of the paper's PD, and why recordings were refused.
 fn right(text: &mut String, kinds: &[OfKind<'_>]) {
-    let symbols = COUNTED.map(|parameter| format!(" {:>9}", parameter.symbol()));
+    let symbols = COUNTED.map(|parameter| format!(" {:>10}", parameter.symbol()));
     let _ = writeln!(
         text,
         "\n{:<34} accepted  90 % intervals hold (%)\n{:<34}         {}  |J| (%): median worst  unstable  refused",
@@ -149,7 +149,7 @@ fn right(text: &mut String, kinds: &[OfKind<'_>]) {
                 (all + 1, right + u32::from(held))
             });
             let share = (all > 0).then(|| 100.0 * f64::from(right) / f64::from(all));
-            format!(" {:>9}", or_dash(share, 1))
+            format!(" {:>10}", or_dash(share, 1))
         });
         let costs = accepted.iter().filter_map(|found| found.deterioration);
         let mut costs: Vec<f64> = costs.map(|cost| 100.0 * cost).collect();
