@@ -133,8 +133,7 @@ pub(crate) fn check(
     found.remarks.push(Remark::OneAmplitude);
     let period_s = excitation.highest_rad_per_s().map(|omega| TAU / omega);
     let jitter = period_s.and_then(|period_s| sampling::jitter(signals, period_s));
-    let is_known = (found.remarks.iter()).any(|remark| matches!(remark, Remark::Jitter(_)));
-    (found.remarks).extend(jitter.filter(|_| !is_known).map(Remark::Jitter));
+    found.remarks.extend(jitter.map(Remark::Jitter));
     limits(excitation, identified, &mut found.remarks);
 }
 

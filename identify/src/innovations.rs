@@ -61,7 +61,6 @@ pub use self::record::Hold;
 pub(crate) use self::result::gain_of;
 use self::search::Candidate;
 use self::theta::{Bounds, Theta};
-use self::validate::Steep;
 use crate::assumed::recorded_filter;
 use crate::conclusion::conclude;
 use crate::excitation::{Excitation, Recorded};
@@ -105,7 +104,6 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
         options,
         excitation: None,
         refused: None,
-        steep: None,
         remarks: vec![],
     };
     let outcome = search.run(signals);
@@ -131,8 +129,6 @@ struct Search<'a> {
     options: &'a Options,
     excitation: Option<Recorded>,
     refused: Option<Refused>,
-    /// Innovations that grow with the slope of the output.
-    steep: Option<Steep>,
     remarks: Vec<Remark>,
 }
 
@@ -159,7 +155,6 @@ impl Search<'_> {
         let tests = validate::tests(&blocks, &fitted.best.found.at);
         let informative = validate::informative(&blocks, &fitted.best.found.theta);
         let horizon_s = validate::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
-        self.steep = validate::steepness(&blocks, &fitted.best.found.at, horizon_s);
         let theta = &fitted.best.found.theta;
         let prediction = validate::prediction(
             &fitted.record,
@@ -298,10 +293,6 @@ impl Search<'_> {
                 horizon_s: prediction.horizon_s,
             });
         }
-        let (found, sample_s) = (&fitted.best.found, fitted.record.dt_s);
-        let jitter =
-            (self.steep).and_then(|steep| steep.jitter(&found.theta, found.at.variance, sample_s));
-        self.remarks.extend(jitter.map(Remark::Jitter));
         let chosen = fitted.best.structure();
         let best = fitted
             .choice
@@ -328,15 +319,9 @@ impl Search<'_> {
         components: &[Component],
         (tests, prediction): (InnovationTests, Option<Prediction>),
     ) -> Result<Identified, Verdict> {
-        let mut is_wider = validate::is_coloured(&tests) || validate::is_left_to_the_input(&tests);
+        let is_wider = validate::is_coloured(&tests) || validate::is_left_to_the_input(&tests);
         // An error of the prediction that the noise does not explain is one of the model.
-        let mut least = prediction
-            .filter(|_| is_wider)
-            .map_or(1.0, |found| found.error_ratio.max(1.0).sqrt());
-        // The lags and the dead time are read where the output is steep, and there the noise is larger.
-        if let Some(steep) = self.steep {
-            (is_wider, least) = (true, least.max(steep.ratio.sqrt()));
-        }
+        let least = prediction.map_or(1.0, |found| found.error_ratio.max(1.0).sqrt());
         let (posterior, widened) = result::posterior_of(
             &fitted.best.found,
             components,

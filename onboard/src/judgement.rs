@@ -264,7 +264,7 @@ mod tests {
         let of_gain = GAIN_OF_THE_AMPLITUDE * (1.0 / 3.0 + 2.0 / 3.0 * 0.01 / lag_s);
         let found = spread.deviations(&covariance);
         assert!((found.tau_s - 1e-3).abs() < 1e-12, "{found:?}");
-        let expected = (1e-3 / lag_s).hypot(of_gain);
+        let expected = sqrt((1e-3 / lag_s) * (1e-3 / lag_s) + of_gain * of_gain);
         assert!(
             (found.phase_margin_rad - expected).abs() < 1e-5,
             "{found:?} {expected}"
@@ -274,7 +274,7 @@ mod tests {
         let mut covariance = [[0.0; 5]; 5];
         covariance[coordinate::LN_JERK_GAIN][coordinate::LN_JERK_GAIN] = 1e-4;
         let found = spread.deviations(&covariance);
-        let gain = 0.01_f64.hypot(GAIN_OF_THE_AMPLITUDE);
+        let gain = sqrt(1e-4 + GAIN_OF_THE_AMPLITUDE * GAIN_OF_THE_AMPLITUDE);
         assert!((found.ln_k_over_t_body - gain).abs() < 1e-12);
         let expected = gain * (1.0 / 3.0 + 2.0 / 3.0 * 0.01 / lag_s);
         assert!(

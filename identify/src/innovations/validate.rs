@@ -9,7 +9,7 @@ use super::orthogonal::Orthogonal;
 use super::prediction::{Filtering, predict};
 use super::record::{Blocks, Record};
 use super::search;
-use super::theta::{NoiseKind, Theta};
+use super::theta::Theta;
 use crate::outcome::{InnovationTests, Prediction};
 
 /// Lags of the tests.
@@ -56,62 +56,6 @@ pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
         input_share,
         input_f,
         rows: count,
-    }
-}
-
-/// Innovations that are larger where the output is steep: samples that were not taken at the times of their stamps.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Steep {
-    /// Mean square of the innovations weighted by the squared slope of the output, over the plain one: 1.5 for a sine with
-    /// jitter and no other noise.
-    pub(super) ratio: f64,
-    /// Root mean square of the change of the output in a sample period (output unit).
-    step: f64,
-}
-
-/// Half width of the difference that shows the slope, as a share of the period, and in rows at least: less of the
-/// innovation is in it.
-const SLOPE: (f64, usize) = (1.0 / 14.0, 3);
-/// Least ratio, and standard deviations of that of innovations that do not depend on the slope.
-const LEAST_STEEP: (f64, f64) = (1.1, 4.0);
-
-/// Whether the innovations grow with the slope of the output, whose highest frequency has this period (s). `None`: not more
-/// than chance explains.
-pub(super) fn steepness(blocks: &Blocks<'_>, at: &Evaluation, period_s: f64) -> Option<Steep> {
-    let half = ((SLOPE.0 * period_s / blocks.block_s()) as usize).max(SLOPE.1);
-    let rows: Vec<usize> = (0..blocks.len())
-        .filter(|row| blocks.present(*row) > 0)
-        .collect();
-    let value = |row: usize| blocks.sums[row] * blocks.scale / blocks.present(row) as f64;
-    let innovations = at.innovations();
-    let pairs: Vec<(f64, f64)> = (half..rows.len().min(innovations.len()).saturating_sub(half))
-        .map(|k| {
-            let (before, behind) = (rows[k - half], rows[k + half]);
-            let slope = (value(behind) - value(before)) / (behind - before) as f64;
-            (innovations[k] * innovations[k], slope * slope)
-        })
-        .collect();
-    let count = pairs.len() as f64;
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(of).sum::<f64>() / count;
-    let (square, slope) = (mean(&|pair| pair.0), mean(&|pair| pair.1));
-    let ratio = mean(&|pair| pair.0 * pair.1) / (square * slope);
-    // A squared normal number has twice the variance of its mean square.
-    let spread = mean(&|pair| (pair.1 / slope - 1.0).powi(2));
-    let deviation = (2.0 * spread / count).sqrt();
-    let is_steep = ratio > LEAST_STEEP.0.max(1.0 + LEAST_STEEP.1 * deviation);
-    let samples = (blocks.block_s() / blocks.record.dt_s).max(1.0);
-    is_steep.then_some(Steep {
-        ratio,
-        step: slope.sqrt() / samples,
-    })
-}
-
-impl Steep {
-    /// Standard deviation of the sample period, as a share of it, if jitter is what made the random walk of the output: the
-    /// time errors of a loop that waits too long or too short add up. `None` if the output has another noise.
-    pub(super) fn jitter(&self, theta: &Theta, variance: f64, sample_s: f64) -> Option<f64> {
-        let walk = theta.noise(NoiseKind::OutputWalk) * sample_s * variance.sqrt();
-        (walk > 0.0).then_some(walk / self.step)
     }
 }
 
