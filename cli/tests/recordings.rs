@@ -162,21 +162,3 @@ fn the_simulated_recording_gives_the_truth_in_its_head() {
         );
     }
 }
-
-// The script's relay test of the altitude, with the estimator that the guide names. A hover at a throttle of 0.363 makes an
-// acceleration of 9.81 / 0.363 = 27.0 m/s^2 of a full throttle; the simulated motors have no lag.
-#[test]
-fn the_altitude_of_the_script_gives_the_thrust() {
-    let options = [
-        "--estimator",
-        "general",
-        "--structure",
-        "double_integrator_lag",
-    ];
-    let (code, report) = identify("ardupilot_altitude", &options);
-    assert_eq!(code, Some(0), "{}", report["verdict"]["message"]);
-    let (gain, _) = read(&report, "k_over_t_body", 27.0);
-    assert!((gain / 27.0 - 1.0).abs() < 0.03, "{gain}");
-    let (_, lag_held) = read(&report, "tau_s", 0.005);
-    assert!(lag_held, "{}", report["process"]["tau_s"]);
-}
