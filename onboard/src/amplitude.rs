@@ -6,10 +6,10 @@
 
 use libm::{log, sqrt};
 
-use crate::judgement::HALF_90_PERCENT;
+use crate::judgement::{ALIKE_GAINS, HALF_90_PERCENT};
 
 /// Difference of the logarithms of the gains that does not matter to a controller, whatever the noise.
-pub const ALIKE: f64 = 0.03;
+pub const ALIKE: f64 = ALIKE_GAINS;
 
 /// Whether a ratio of two gains is 1 within [`ALIKE`] and the 90 % interval of both, given as relative standard deviations.
 #[must_use]

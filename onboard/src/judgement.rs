@@ -14,7 +14,6 @@ use core::f64::consts::PI;
 
 use libm::{atan2, exp, log, sin, sqrt};
 
-use crate::amplitude;
 use crate::control::Pd;
 use crate::crossover;
 use crate::process::Soiptd;
@@ -48,10 +47,9 @@ pub fn largest_response_error(phase_margin_rad: f64) -> f64 {
 /// Standard deviations to either side that contain 90 % of a Gaussian; 95 % lie above the lower end.
 pub const HALF_90_PERCENT: f64 = 1.645;
 
-/// Relative standard deviation of the gain of small signals about that at the relay's amplitude, which a test at one amplitude
-/// cannot show: as much as two amplitudes may differ and count as alike. Yaw of the simulated quadrotor: under a relay of 0.7
-/// of its hover thrust the motors take 19 % more power than at hover, the battery's voltage sags, and the gain is 2 % lower.
-const GAIN_OF_THE_AMPLITUDE: f64 = amplitude::ALIKE;
+/// Relative difference of the gains at two amplitudes that does not matter to a controller. It is also the standard deviation
+/// of the gain of small signals about that at the relay's amplitude, which a test at one amplitude cannot show.
+pub(crate) const ALIKE_GAINS: f64 = 0.03;
 
 /// Ratio of two estimates of the same variance from some fifty differences that chance exceeds in 1 of 100.
 const CHANCE: f64 = 2.1;
@@ -163,11 +161,9 @@ impl Spread {
         Some(())
     }
 
-    /// The deviations, once all coordinates have been followed, in which the gain may depend on the amplitude.
+    /// The deviations, once all coordinates have been followed. The parameters are those at the amplitude of the test; the phase
+    /// margin is that of small signals.
     pub(crate) fn deviations(&self, covariance: &[[f64; 5]; 5]) -> Deviations {
-        let mut covariance = *covariance;
-        covariance[coordinate::LN_JERK_GAIN][coordinate::LN_JERK_GAIN] +=
-            GAIN_OF_THE_AMPLITUDE * GAIN_OF_THE_AMPLITUDE;
         let of = |field: usize| {
             let mut variance = 0.0;
             for (i, row) in self.slopes.iter().enumerate() {
@@ -177,12 +173,16 @@ impl Spread {
             }
             sqrt(variance.max(0.0))
         };
+        let (margin_rad, amplitude_rad) = (
+            of(4),
+            self.slopes[coordinate::LN_JERK_GAIN][4] * ALIKE_GAINS,
+        );
         Deviations {
             ln_k_over_t_body: of(0),
             t_prop_s: of(1),
             inv_t_body_per_s: of(2),
             tau_s: of(3),
-            phase_margin_rad: of(4),
+            phase_margin_rad: sqrt(margin_rad * margin_rad + amplitude_rad * amplitude_rad),
         }
     }
 }
@@ -261,7 +261,7 @@ mod tests {
         }
         let mut covariance = [[0.0; 5]; 5];
         covariance[coordinate::TAU_S][coordinate::TAU_S] = 1e-6;
-        let of_gain = GAIN_OF_THE_AMPLITUDE * (1.0 / 3.0 + 2.0 / 3.0 * 0.01 / lag_s);
+        let of_gain = ALIKE_GAINS * (1.0 / 3.0 + 2.0 / 3.0 * 0.01 / lag_s);
         let found = spread.deviations(&covariance);
         assert!((found.tau_s - 1e-3).abs() < 1e-12, "{found:?}");
         let expected = sqrt((1e-3 / lag_s) * (1e-3 / lag_s) + of_gain * of_gain);
@@ -274,8 +274,8 @@ mod tests {
         let mut covariance = [[0.0; 5]; 5];
         covariance[coordinate::LN_JERK_GAIN][coordinate::LN_JERK_GAIN] = 1e-4;
         let found = spread.deviations(&covariance);
-        let gain = sqrt(1e-4 + GAIN_OF_THE_AMPLITUDE * GAIN_OF_THE_AMPLITUDE);
-        assert!((found.ln_k_over_t_body - gain).abs() < 1e-12);
+        assert!((found.ln_k_over_t_body - 0.01).abs() < 1e-12);
+        let gain = sqrt(1e-4 + ALIKE_GAINS * ALIKE_GAINS);
         let expected = gain * (1.0 / 3.0 + 2.0 / 3.0 * 0.01 / lag_s);
         assert!(
             (found.phase_margin_rad - expected).abs() < 1e-5,
