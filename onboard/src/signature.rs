@@ -166,7 +166,7 @@ impl Signature {
     }
 }
 
-/// A signature in slices of [`SLICE_BINS`] bins, each short enough for a control tick. [`Signature::new`] loops over them.
+/// A signature in slices of `SLICE_BINS` bins, each short enough for a control tick. [`Signature::new`] loops over them.
 #[derive(Clone, Debug)]
 pub struct Signing {
     parts: [Part; PARTS],
