@@ -105,9 +105,9 @@ class Station:
 
 
 class Vehicle:
-    """PX4 in a folder of its own, until `close`."""
+    """PX4 in a folder of its own, until `close`. Without `station` the ground station's port is free."""
 
-    def __init__(self, build, folder):
+    def __init__(self, build, folder, station=True):
         self.build, self.folder = pathlib.Path(build), pathlib.Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         environment = dict(os.environ, PX4_SIM_MODEL="sihsim_quadx", PATH=f"{self.build}/bin:{os.environ['PATH']}")
@@ -117,7 +117,7 @@ class Vehicle:
             [f"{self.build}/bin/px4", "-d", "-w", self.folder, f"{self.build}/etc"],
             cwd=self.folder, env=environment, stdout=self.output, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
         )
-        self.station = Station(self.build)
+        self.station = Station(self.build) if station else None
         self.wait(lambda: "Ready for takeoff" in self.said(), 90, "PX4 does not become ready")
         for name, value in SETTINGS.items():
             self.run("param", "set", name, value)
@@ -169,7 +169,8 @@ class Vehicle:
         return 0.0
 
     def close(self):
-        self.station.close()
+        if self.station:
+            self.station.close()
         self.run("shutdown")
         try:
             self.process.wait(10)
