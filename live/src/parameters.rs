@@ -46,7 +46,7 @@ impl Parameter {
         Self { value, ..self }
     }
 
-    /// The value as the vehicle can store it: of single precision. `None`: it stores an integer, and this is none.
+    /// The value as the vehicle can store it: in single precision. `None` if the vehicle stores an integer and the value is a fraction.
     pub(crate) fn stored(&self, value: f64) -> Option<f64> {
         match self.is_integer() {
             true => (value.fract() == 0.0 && value.abs() <= f64::from(u32::MAX)).then_some(value),

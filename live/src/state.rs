@@ -197,7 +197,7 @@ fn is_in_air(state: MavLandedState) -> Option<bool> {
     }
 }
 
-/// The message has mV and per cent; the largest number and -1 say that there is none.
+/// The message has mV and per cent; 65535 mV and -1 % stand for an unknown value.
 fn battery(status: &SYS_STATUS_DATA) -> Option<Battery> {
     let voltage_v = (status.voltage_battery != u16::MAX && status.voltage_battery > 0)
         .then(|| 1e-3 * f64::from(status.voltage_battery));

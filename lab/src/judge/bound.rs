@@ -14,7 +14,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::evaluate::{Answer, Judge};
 
-/// Number of draws for each window: so many ideal campaigns.
+/// Number of draws for each window, and so the number of ideal campaigns.
 pub const BOUND_DRAWS: usize = 8;
 
 /// Number of coordinates of a fit without the bias.

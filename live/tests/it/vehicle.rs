@@ -294,7 +294,7 @@ impl Scripted {
             .map(entry)
             .map(MavMessage::LOG_ENTRY);
         match number {
-            // One entry says that there is none.
+            // An empty list is sent as one entry with the number 0.
             0 => vec![MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::DEFAULT)],
             _ => entries.collect(),
         }

@@ -111,7 +111,7 @@ fn fly(arguments: &LiveRelay, vehicle: &mut Vehicle) -> Result<AltitudeFlight, F
     test.duration_s = arguments.duration;
     let is_over = Arc::new(AtomicBool::new(false));
     let pressed = Arc::clone(&is_over);
-    // A second handler cannot be set; there is none before.
+    // Fails only if a handler was set before, and this is the only place that sets one.
     ctrlc::set_handler(move || pressed.store(true, Ordering::Relaxed)).map_err(|error| {
         Failure::output(Path::new("a handler for Ctrl-C"), io::Error::other(error))
     })?;
@@ -135,7 +135,7 @@ fn record(flight: &AltitudeFlight, file: &mut dyn io::Write) -> io::Result<()> {
     writer.finish()
 }
 
-/// The gains for this share of the way to the proposed ones, or why there are none.
+/// The gains for this share of the way to the proposed ones, or the reason why no gains are proposed.
 fn proposed(
     found: &Found,
     flight: &AltitudeFlight,
