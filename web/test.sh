@@ -10,7 +10,7 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
 "$here/build.sh"
-cargo build --quiet --release --locked --manifest-path "$root/Cargo.toml" --package onecycle-cli --target-dir "$target"
+cargo build --quiet --release --locked --manifest-path "$root/Cargo.toml" --bin onecycle --target-dir "$target"
 if [[ -z ${PYTHON:-} ]]; then
     python3 -m venv "$scratch/venv"
     PYTHON=$scratch/venv/bin/python

@@ -24,8 +24,9 @@ library=${CARGO_TARGET_DIR:-$root/onboard/c/target}/release/libonecycle.a
 "$python" "$here/apply.py" "$ARDUPILOT_DIR"
 (
     cd "$ARDUPILOT_DIR"
-    # libm first: otherwise the linker takes its functions from the library's compiler-builtins.
-    LDFLAGS="-lm $library" "$python" ./waf configure --board sitl --no-submodule-update >/dev/null
+    # The system's libm before the library, or the linker takes sqrt and others from the library's compiler-builtins. As -Wl,-lm:
+    # g++ moves a plain -lm to the end.
+    LDFLAGS="-Wl,-lm $library" "$python" ./waf configure --board sitl --no-submodule-update >/dev/null
     "$python" ./waf --targets bin/arducopter
 )
 out=$ARDUPILOT_DIR/build/sitl/onecycle

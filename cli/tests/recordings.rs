@@ -162,3 +162,21 @@ fn the_simulated_recording_gives_the_truth_in_its_head() {
         );
     }
 }
+
+// A relay test that scripts/onecycle_altitude.lua flew in ArduPilot's simulator: hover takes 0.363 of the throttle, so
+// K/T_body is 9.81 / 0.363 = 27.0. The simulated motors have no lag; the estimator's and the loop's is 5 ms.
+#[test]
+fn the_altitude_of_the_script_gives_the_thrust() {
+    let options = [
+        "--estimator",
+        "general",
+        "--structure",
+        "double_integrator_lag",
+    ];
+    let (code, report) = identify("ardupilot_altitude", &options);
+    assert_eq!(code, Some(0), "{}", report["verdict"]["message"]);
+    let (gain, _) = read(&report, "k_over_t_body", 27.0);
+    assert!((gain / 27.0 - 1.0).abs() < 0.03, "{gain}");
+    let (_, lag_held) = read(&report, "tau_s", 0.005);
+    assert!(lag_held, "{}", report["process"]["tau_s"]);
+}

@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Checks the tuner for firmware in C: builds the static library, compares onecycle.h with the source, compiles the
-# examples with gcc, tunes a simulated axis, and compares every output with the tuner in Rust, bit by bit.
+# examples with gcc, tunes a simulated axis with floating-point traps set, and compares every output with the tuner in Rust, bit by bit.
 # Prints the memory of a tuner. On failure it prints one sentence and exits with status 1.
 # `run.sh header` writes onecycle.h (with the version of cbindgen below).
 set -euo pipefail
@@ -35,7 +35,7 @@ cmp -s onecycle.h "$scratch/onecycle.h" ||
 cargo build --release --locked --target-dir "$target" >"$scratch/log" 2>&1 ||
     fail "it does not build." "$scratch/log"
 for example in axis pid; do
-    gcc -std=c99 -O2 -Wall -Wextra -Werror -pedantic -ffp-contract=off "examples/$example.c" "$library" -lm \
+    gcc -std=c99 -O2 -Wall -Wextra -Werror -pedantic -ffp-contract=off "examples/$example.c" traps.c "$library" -lm \
         -o "$scratch/$example" >"$scratch/log" 2>&1 || fail "examples/$example.c does not compile." "$scratch/log"
 done
 "$scratch/axis" trace >"$scratch/trace" 2>"$scratch/said" ||

@@ -258,7 +258,8 @@ fn crossover(process: &Soiptd, lag_rad: f64) -> Option<f64> {
     let (lag_s, tau_s) = (process.t_prop_s(), process.tau_s());
     let damping = process.inv_t_body_per_s();
     let reach_s = lag_s + tau_s;
-    let mut omega = (lag_rad / reach_s).max((lag_rad + FRAC_PI_2) / (reach_s + 1.0 / damping));
+    let undamped_s = reach_s + process.t_body_s().unwrap_or(f64::MAX);
+    let mut omega = (lag_rad / reach_s).max((lag_rad + FRAC_PI_2) / undamped_s);
     for _ in 0..MAX_NEWTON_STEPS {
         let phase = omega * lag_s;
         let value = atan(phase) + omega * tau_s - atan2(damping, omega) - lag_rad;

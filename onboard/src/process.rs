@@ -139,8 +139,8 @@ impl Soiptd {
     /// Time constant of the body (s); `None` without damping.
     #[must_use]
     pub fn t_body_s(&self) -> Option<f64> {
-        let t_body_s = 1.0 / self.inv_t_body_per_s;
-        t_body_s.is_finite().then_some(t_body_s)
+        // Not divided to infinity and then refused: firmware may trap a division by zero.
+        (self.inv_t_body_per_s >= f64::MIN_POSITIVE).then(|| 1.0 / self.inv_t_body_per_s)
     }
 
     /// Dead time (s).

@@ -10,24 +10,7 @@
 #include <AP_Vehicle/AP_Vehicle.h>
 #include <GCS_MAVLink/GCS.h>
 
-#if CONFIG_HAL_BOARD == HAL_BOARD_SITL
-#include <fenv.h>
-#endif
-
 extern const AP_HAL::HAL& hal;
-
-// The simulator ends at a division by zero or an invalid operation. The identification's search passes such points in some windows
-// and returns finite numbers: no trap while it works.
-class WithoutTraps
-{
-public:
-#if CONFIG_HAL_BOARD == HAL_BOARD_SITL
-    WithoutTraps() { feholdexcept(&_environment); }
-    ~WithoutTraps() { fesetenv(&_environment); }
-private:
-    fenv_t _environment;
-#endif
-};
 
 // the main controller holds the axis for this time before the relay starts
 static constexpr uint32_t SETTLE_MS = 1500;
@@ -337,11 +320,7 @@ float AC_CustomControl_Onecycle::test(float command)
     }
     const onecycle_measurement measurement {_value_rad, _rate_rads, 0.0f, true};
     onecycle_tuner_beside(&_tuner, command);
-    float output;
-    {
-        const WithoutTraps without_traps;
-        output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _value_rad);
-    }
+    const float output = onecycle_tuner_step(&_tuner, AP_HAL::micros64() * 1.0e-6, &measurement, _value_rad);
     const bool was_in_charge = _in_charge != 0;
     _in_charge = onecycle_tuner_is_in_charge(&_tuner) ? 1U << _axis : 0;
     const onecycle_phase phase = onecycle_tuner_phase(&_tuner);

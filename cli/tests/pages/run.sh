@@ -13,7 +13,7 @@ target=$(realpath -m "${CARGO_TARGET_DIR:-$root/target}")
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
-cargo build --quiet --release --locked --manifest-path "$root/Cargo.toml" --package onecycle-cli --target-dir "$target"
+cargo build --quiet --release --locked --manifest-path "$root/Cargo.toml" --bin onecycle --target-dir "$target"
 if [[ -z ${PYTHON:-} ]]; then
     python3 -m venv "$scratch/venv"
     PYTHON=$scratch/venv/bin/python

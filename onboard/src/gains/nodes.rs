@@ -159,7 +159,8 @@ impl Nodes {
 
     /// Position of a process, in cells from the first node.
     pub(super) fn position(&self, process: &Soiptd) -> Result<[f64; 2], GainsError> {
-        let (prop_s, body_s) = (process.t_prop_s(), 1.0 / process.inv_t_body_per_s());
+        let prop_s = process.t_prop_s();
+        let body_s = process.t_body_s().unwrap_or(f64::MAX);
         let (short_s, long_s) = (prop_s.min(body_s), prop_s.max(body_s));
         let tau_s = process.tau_s();
         if tau_s > LARGEST_DELAY_IN_LAGS * (1.0 + ROUNDING) * short_s {
