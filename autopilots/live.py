@@ -146,10 +146,11 @@ class Trial:
         self.run("armed", ["write", self.file("armed", GAINS[self.firmware])], codes=(4,))
         amplitudes = ("10%", "20%")
         for number, amplitude in enumerate(amplitudes):
+            time.sleep(10)  # until it hovers again
             recording = self.folder / f"altitude{number}.csv"
             relay = ["relay", "--axis", "altitude", "-o", recording, "--amplitude", amplitude]
             if self.firmware == "px4":
-                relay += ["--write", self.folder / f"altitude{number}.params"]
+                relay += ["--write", self.folder / f"altitude{number}.params", "--", "--style", "calm"]
             # 4: the test ended early, or no process was identified.
             self.run(f"relay {amplitude}", relay, codes=(0, 4))
         self.vehicle.land()
