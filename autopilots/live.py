@@ -108,7 +108,7 @@ class Trial:
         action, *others = arguments
         signed = ["--key", str(key)] if key else []
         process = subprocess.Popen(
-            [self.program, "live", action, self.vehicle.connection, *map(str, others), *signed, "--wait", "30"],
+            [self.program, "live", action, self.vehicle.connection, "--wait", "30", *signed, *map(str, others)],
             cwd=self.folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL,
         )
         said = self.vehicle.wait_for(process)
@@ -150,7 +150,9 @@ class Trial:
             recording = self.folder / f"altitude{number}.csv"
             relay = ["relay", "--axis", "altitude", "-o", recording, "--amplitude", amplitude]
             if self.firmware == "px4":
-                relay += ["--write", self.folder / f"altitude{number}.params", "--", "--style", "calm"]
+                # A test of ten cycles does not resolve the slow lag.
+                relay += ["--band", "3", "--write", self.folder / f"altitude{number}.params"]
+                relay += ["--", "--structure", "double_integrator_lag", "--style", "calm"]
             # 4: the test ended early, or no process was identified.
             self.run(f"relay {amplitude}", relay, codes=(0, 4))
         self.vehicle.land()

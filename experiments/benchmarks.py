@@ -129,6 +129,12 @@ def quick(command, environment, scratch):
         return "there is no " + ", ".join(gone)
     if words[:2] == ["cargo", "test"]:
         words = [word for word in words if word not in ("--release", "--ignored", "--nocapture")]
+        if "-p" in words and "--features" not in words:
+            # As the README's test command has built it: a crate by itself is compiled with other features.
+            at = words.index("-p")
+            words[at : at + 2] = ["--workspace"]
+            if not {"--test", "--lib", "--bench", "--doc"}.intersection(words):
+                words.insert(at, "--tests")
         listed = words + ([] if "--" in words else ["--"]) + ["--list"]
         made = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True)
         return None if re.search(r": test$", made.stdout, re.M) else "no test has this name"

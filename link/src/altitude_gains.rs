@@ -48,13 +48,15 @@ impl AltitudeCascade {
     }
 
     /// The gains of a PID of the height (thrust per m, m s and m/s) at a thrust of the hover, none above its parameter's
-    /// maximum: with less gain the loop is slower and has more margin. `None`: the integral does not fit into the cascade.
+    /// maximum: with less gain the loop is slower and has more margin. The cascade has no complex zeros: an integral that would
+    /// need them is lowered to the largest one without, so the margins must be computed of the result. `None`: without
+    /// proportional or derivative gain there is no cascade.
     pub fn of_pid(pid: LoopGains, hover: f64) -> Option<Self> {
         let scale = GRAVITY / hover;
         let [kp, ki, kd] = [pid.proportional, pid.integral, pid.derivative].map(|k| scale * k);
         // kp = R + ki kd / R with R = P A, and I = kp - R: the smaller root is the integral's.
-        let root = kp * kp - 4.0 * ki * kd;
-        if !(kd > 0.0 && root >= 0.0 && kp > 0.0 && scale.is_finite()) {
+        let root = (kp * kp - 4.0 * ki * kd).max(0.0);
+        if !(kd > 0.0 && kp > 0.0 && scale.is_finite() && ki.is_finite()) {
             return None;
         }
         let integral = 0.5 * (kp - root.sqrt());
@@ -118,12 +120,27 @@ mod tests {
         }
     }
 
+    // Double root: kp^2 = 4 ki kd at ki = 1 / 4, where I = kp / 2 and P = kp / (2 kd).
+    #[test]
+    fn an_integral_that_does_not_fit_is_lowered() {
+        let of = |ki| AltitudeCascade::of_pid(LoopGains::new(0.1, ki, 0.1), 0.5).unwrap();
+        let back = of(1.0).pid(0.5);
+        assert!((back.integral - 0.025).abs() < 1e-12, "{back:?}");
+        assert!((back.proportional - 0.1).abs() < 1e-12, "{back:?}");
+        assert_eq!(of(1.0), of(0.025));
+    }
+
     #[test]
     fn limits_and_no_form() {
         let fast = AltitudeCascade::of_pid(LoopGains::new(20.0, 0.0, 4.0), 0.5).unwrap();
         assert_eq!(fast.values, [1.5, 15.0, 0.0, 0.0]);
-        // 4 ki kd > kp^2; no derivative; not a number.
-        for (kp, ki, kd) in [(1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (f64::NAN, 0.0, 1.0)] {
+        // No derivative; no proportional gain; not a number.
+        for (kp, ki, kd) in [
+            (1.0, 0.0, 0.0),
+            (0.0, 1.0, 1.0),
+            (f64::NAN, 0.0, 1.0),
+            (1.0, f64::NAN, 1.0),
+        ] {
             assert_eq!(
                 AltitudeCascade::of_pid(LoopGains::new(kp, ki, kd), 0.5),
                 None

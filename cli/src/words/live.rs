@@ -128,7 +128,7 @@ fn because(cause: &Cause) -> String {
 
 pub(crate) const ONLY_PX4: &str = "--write is for PX4: ArduCopter controls the acceleration inside its altitude loop, and the \
     gains of a PID have no place there. Leave out --write, and take the process from the report";
-pub(crate) const NO_CASCADE: &str = "the integral of the proposed controller does not fit into PX4's cascade; choose --style calm, after --.";
+pub(crate) const NO_CASCADE: &str = "PX4's cascade needs a controller with proportional and derivative gain, which the proposed one does not have; choose another --style, after --.";
 
 pub(crate) fn no_log(id: LogId, logs: &[LogEntry]) -> String {
     match (id, logs.len()) {
