@@ -1,6 +1,7 @@
 """Runs the commands of docs/benchmarks.md, which is the list: nothing is named twice.
 
-    cargo build --release -p onecycle-cli
+    cargo build --release
+    pip install scipy control                   # of other people, in the comparisons
     python experiments/benchmarks.py            # about an hour on two cores
     python experiments/benchmarks.py d_test     # those that contain this text
     python experiments/benchmarks.py --quick    # seconds each: every command exists and starts
@@ -49,7 +50,7 @@ LEFT_OUT = {
     "peers/Cargo.toml": "needs onnxruntime",
     "valgrind": "needs valgrind",
     "experiments/benchmarks.py": "this program",
-    "~/ardupilot": "needs ArduPilot",
+    "ardupilot/altitude.py": "needs ArduPilot",
     "pip install": "installs packages",
     "py/test.sh": "a step of .ci/run",
     "web/test.sh": "a step of .ci/run",
@@ -214,7 +215,10 @@ def main():
         scratch = pathlib.Path(folder)
         (scratch / "bin").mkdir()
         (scratch / "bin" / "onecycle").symlink_to(program)
-        (scratch / "bin" / "python").symlink_to(sys.executable)
+        # A link would leave a virtual environment, and its packages, behind.
+        python = scratch / "bin" / "python"
+        python.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} "$@"\n')
+        python.chmod(0o755)
         for name in ("experiments", "examples", "cli", "py"):
             (scratch / name).symlink_to(ROOT / name)
         path = f"{scratch / 'bin'}{os.pathsep}{os.environ['PATH']}"
