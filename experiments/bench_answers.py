@@ -21,7 +21,9 @@ error; the process with the frequency response nearest to it from the oscillatio
 """
 
 import argparse
+import concurrent.futures
 import csv
+import functools
 import os
 import pathlib
 import time
@@ -167,6 +169,15 @@ def identify(u, y, arguments, more):
     return by_scipy(u, y, arguments, np.concatenate([STARTS, more]))
 
 
+def answered(file, arguments, truth):
+    """The row of a recording: its number, the process, and the processor time (s)."""
+    _, y, u = np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
+    begin = time.process_time()
+    more = truth.get(int(file.stem), np.empty((0, 3)))
+    process = identify(u, y, arguments, more)
+    return [int(file.stem), *map(float, process), round(time.process_time() - begin, 3)]
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=pathlib.Path)
@@ -188,13 +199,10 @@ def main():
     with arguments.out.open("w", newline="", buffering=1) as out:
         table = csv.writer(out)
         table.writerow(["experiment", "K", "T_prop_s", "T_body_s", "tau_s", "seconds"])
-        for file in files:
-            _, y, u = np.loadtxt(file, delimiter=",", skiprows=1, unpack=True)
-            begin = time.perf_counter()
-            more = truth.get(int(file.stem), np.empty((0, 3)))
-            process = identify(u, y, arguments, more)
-            seconds = time.perf_counter() - begin
-            table.writerow([int(file.stem), *map(float, process), round(seconds, 3)])
+        answer = functools.partial(answered, arguments=arguments, truth=truth)
+        with concurrent.futures.ProcessPoolExecutor() as workers:
+            for row in workers.map(answer, files):
+                table.writerow(row)
 
 
 if __name__ == "__main__":

@@ -120,6 +120,17 @@ def missing(words):
     return gone
 
 
+def of_workspace(words):
+    """The words of a command of cargo, for the workspace. A crate by itself is compiled with other features: every crate of the
+    list would be compiled once more."""
+    if words[0] != "cargo" or "-p" not in words or "--features" in words:
+        return words
+    at = words.index("-p")
+    named = {"--test", "--lib", "--bench", "--doc", "--example"}.intersection(words)
+    whole = [] if words[1] == "run" else ["--workspace"]
+    return words[:at] + ([] if named else ["--tests"]) + whole + words[at + 2 :]
+
+
 def quick(command, environment, scratch):
     """Why a command would not run; `None` if it does."""
     if command.startswith("for "):
@@ -129,13 +140,7 @@ def quick(command, environment, scratch):
     if gone := missing(words):
         return "there is no " + ", ".join(gone)
     if words[:2] == ["cargo", "test"]:
-        words = [word for word in words if word not in ("--release", "--ignored", "--nocapture")]
-        if "-p" in words and "--features" not in words:
-            # As the README's test command has built it: a crate by itself is compiled with other features.
-            at = words.index("-p")
-            words[at : at + 2] = ["--workspace"]
-            if not {"--test", "--lib", "--bench", "--doc"}.intersection(words):
-                words.insert(at, "--tests")
+        words = of_workspace([word for word in words if word not in ("--release", "--ignored", "--nocapture")])
         listed = words + ([] if "--" in words else ["--"]) + ["--list"]
         made = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True)
         return None if re.search(r": test$", made.stdout, re.M) else "no test has this name"
@@ -191,6 +196,8 @@ def full(command, environment, scratch):
     if found := seeds(command):
         print(f"seed {', '.join(found)}", flush=True)
     where = scratch if command.startswith(("onecycle", "python", "for ")) else ROOT
+    if command.startswith("cargo "):
+        command = shlex.join(of_workspace(shlex.split(command)))
     begin = time.perf_counter()
     status = subprocess.run(["bash", "-c", command], cwd=where, env=environment).returncode
     print(f"{time.perf_counter() - begin:.0f} s, status {status}", flush=True)

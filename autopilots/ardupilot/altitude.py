@@ -10,7 +10,6 @@
 In the simulator scripts run in a thread that sleeps in real time: the relay test is flown slower than that.
 """
 
-import argparse
 import json
 import math
 import pathlib
@@ -21,7 +20,7 @@ import sys
 import tempfile
 
 import altitude_gains
-from sitl import GUIDED, FlightError, Vehicle, read_log
+from sitl import GUIDED, FlightError, Vehicle, options, read_log
 
 SCRIPTS = pathlib.Path(__file__).resolve().parent / "scripts"
 ALTITUDE, PARAMETERS = 300, 301
@@ -144,13 +143,7 @@ def tune(out, options):
 
 def main():
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--ardupilot", required=True, help="checkout of ArduPilot with build/sitl/bin/arducopter")
-    parser.add_argument("--onecycle", default="onecycle", help="the program")
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="parameter before the test")
-    parser.add_argument("--out", help="folder for logs and parameter files; default: a temporary one")
-    parser.add_argument("--port", type=int, default=14650)
-    parser.add_argument("--speedup", type=float, default=5)
+    parser = options(__doc__.splitlines()[0], program=True, settings=True)
     options = parser.parse_args()
     out = pathlib.Path(options.out or tempfile.mkdtemp(prefix="onecycle-"))
     try:

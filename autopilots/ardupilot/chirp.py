@@ -7,7 +7,6 @@
 3. Second flight: steps of 10 degrees with the gains of the firmware, with the new rate gains, and with all new gains.
 """
 
-import argparse
 import json
 import pathlib
 import subprocess
@@ -16,7 +15,7 @@ import tempfile
 
 import angle
 import measure
-from sitl import GUIDED, STABILIZE, SYSTEMID, FlightError, Vehicle
+from sitl import GUIDED, STABILIZE, SYSTEMID, FlightError, Vehicle, options
 
 SHORT = {"roll": "RLL", "pitch": "PIT", "yaw": "YAW"}
 SID_AXIS = {"roll": 10, "pitch": 11, "yaw": 12}
@@ -99,13 +98,8 @@ def tune(out, options):
 
 def main():
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--ardupilot", required=True, help="checkout of ArduPilot with build/sitl/bin/arducopter")
-    parser.add_argument("--onecycle", default="onecycle", help="the program")
+    parser = options(__doc__.splitlines()[0], program=True)
     parser.add_argument("--axis", choices=SID_AXIS, default="roll")
-    parser.add_argument("--out", help="folder for logs and parameter files; default: a temporary one")
-    parser.add_argument("--port", type=int, default=14650)
-    parser.add_argument("--speedup", type=float, default=5)
     options = parser.parse_args()
     out = pathlib.Path(options.out or tempfile.mkdtemp(prefix="onecycle-"))
     try:

@@ -4,13 +4,12 @@ old gains in force, and, where it can, the vehicle flying on. Prints a row for e
     python faults.py --ardupilot DIR [--out FOLDER] [CASE ...]
 """
 
-import argparse
 import pathlib
 import sys
 import tempfile
 
 from altitude import SLOW
-from sitl import ALT_HOLD, LAND, FlightError, Vehicle
+from sitl import ALT_HOLD, LAND, FlightError, Vehicle, options
 from tune import CUSTOM_CONTROLLER, HIGH, LOW, MIDDLE, names
 
 SCRIPTS = pathlib.Path(__file__).resolve().parent / "scripts"
@@ -213,11 +212,7 @@ def fly(name, folder, options):
 
 def main():
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--ardupilot", required=True, help="checkout of ArduPilot with build/sitl/bin/arducopter")
-    parser.add_argument("--out", help="folder for the flights; default: a temporary one")
-    parser.add_argument("--port", type=int, default=14650)
-    parser.add_argument("--speedup", type=float, default=3)
+    parser = options(__doc__.splitlines()[0], speedup=3)
     parser.add_argument("cases", nargs="*", choices=[[], *CASES], help="cases to fly [default: all]")
     options = parser.parse_args()
     out = pathlib.Path(options.out or tempfile.mkdtemp(prefix="onecycle-"))

@@ -3,6 +3,7 @@
 A vehicle runs in its own folder on its own UDP port, so that several can fly side by side. Nothing leaves the machine.
 """
 
+import argparse
 import math
 import os
 import pathlib
@@ -26,6 +27,20 @@ PARAMETERS = {
     "SIM_GYR1_RND": 3,
     "SIM_GYR2_RND": 3,
 }
+
+
+def options(description, speedup=5, program=False, settings=False):
+    """Parser of a script's command line, with the options that all scripts have; `program` and `settings` add one each."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--ardupilot", required=True, help="checkout of ArduPilot with build/sitl/bin/arducopter")
+    parser.add_argument("--out", help="folder for logs and parameter files; default: a temporary one")
+    parser.add_argument("--port", type=int, default=14650, help="UDP port of the vehicle [default: 14650]")
+    parser.add_argument("--speedup", type=float, default=speedup, help=f"simulated seconds a second [default: {speedup}]")
+    if program:
+        parser.add_argument("--onecycle", default="onecycle", help="the program")
+    if settings:
+        parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="parameter before the test")
+    return parser
 
 
 class FlightError(Exception):

@@ -6,14 +6,13 @@ onecycle is the backend of AC_CustomControl (see apply.py), autotune the flight 
 A test that is refused is a result too: the old gains stay in force. The table has the medians of the axes that were tuned.
 """
 
-import argparse
 import pathlib
 import statistics
 import sys
 import tempfile
 
 import measure
-from sitl import AUTOTUNE, LOITER, FlightError, Vehicle
+from sitl import AUTOTUNE, LOITER, FlightError, Vehicle, options
 
 BIT = {"roll": 1, "pitch": 2, "yaw": 4}
 SHORT = {"roll": "RLL", "pitch": "PIT", "yaw": "YAW"}
@@ -180,15 +179,10 @@ def shown(rows):
 
 def main():
     """Command line."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--ardupilot", required=True, help="checkout of ArduPilot with build/sitl/bin/arducopter")
+    parser = options(__doc__.splitlines()[0], settings=True)
     parser.add_argument("--method", choices=METHODS, default="onecycle")
     parser.add_argument("--axes", default="roll,pitch,yaw", help="axes, separated by commas")
     parser.add_argument("--flights", type=int, default=1)
-    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="parameter before the test")
-    parser.add_argument("--out", help="folder for logs and parameter files; default: a temporary one")
-    parser.add_argument("--port", type=int, default=14650)
-    parser.add_argument("--speedup", type=float, default=5)
     options = parser.parse_args()
     options.axes = options.axes.split(",")
     if unknown := set(options.axes) - set(BIT):

@@ -200,6 +200,10 @@ def fly(build, folder, name):
             faults.append("the vehicle no longer flies")
         print(f"{name:11} {'; '.join(faults) or 'holds'}: {' | '.join(messages)}", flush=True)
         return not faults
+    except RuntimeError as error:
+        # The other cases still tell something.
+        print(f"{name:11} {error}", flush=True)
+        return False
     finally:
         if vehicle.sticks:
             vehicle.sticks.close()

@@ -17,7 +17,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
-use self::edges::{is_process, with_jumps, with_real_poles};
+use self::edges::{is_process, with_equal_lags, with_jumps, with_real_poles};
 use crate::cholesky::cholesky;
 
 /// Number of draws. The standard error of the probability below the 5 % quantile is `sqrt(0.05 * 0.95 / 4000)`, 0.35 of
@@ -138,8 +138,10 @@ pub struct Draw {
 }
 
 impl Draw {
-    /// Draw at these coordinates of the relay's estimator. `sign` is the sign of the gain.
-    fn of(at: &[f64; 5], sign: f64) -> Self {
+    /// Draw at these coordinates of the relay's estimator, whose `covariance` gives complex poles their nearest process.
+    /// `sign` is the sign of the gain.
+    fn of(drawn: [f64; 5], covariance: Option<&[[f64; 5]; 5]>, sign: f64) -> Self {
+        let at = with_real_poles(drawn, covariance);
         let sum_per_s = at[coordinate::LN_POLE_SUM].exp();
         let ratio = at[coordinate::POLE_RATIO];
         let fast_per_s = 0.5 * sum_per_s * (1.0 + (1.0 - 4.0 * ratio).max(0.0).sqrt());
@@ -156,7 +158,7 @@ impl Draw {
             reported: Structure::Soiptd,
             own: Some((k_over_t_body / slow_per_s, t_body_s)),
             input_bias: at[coordinate::INPUT_BIAS],
-            is_process: is_process(at),
+            is_process: is_process(&drawn),
         }
     }
 
@@ -175,6 +177,13 @@ impl Draw {
             input_bias,
             is_process,
         }
+    }
+
+    /// Whether the lags of the relay's model are equal, as those of a draw with complex poles become.
+    fn has_equal_lags(&self) -> bool {
+        let t_prop_s = self.value(Parameter::TProp);
+        self.own
+            .is_some_and(|(_, t_body_s)| t_prop_s == Some(t_body_s))
     }
 
     /// Phase margin (rad) that a controller leaves on this draw. `None` if the loop has no margins.
@@ -253,10 +262,7 @@ impl Posterior {
                 let at: [f64; 5] = std::array::from_fn(|i| {
                     centre[i] + side * (0..=i).map(|j| root[i][j] * normal[j]).sum::<f64>()
                 });
-                Draw {
-                    is_process: is_process(&at),
-                    ..Draw::of(&with_real_poles(at, covariance.as_ref()), sign)
-                }
+                Draw::of(at, covariance.as_ref(), sign)
             })
         };
         let draws = root.map_or(vec![], |root| {
@@ -264,7 +270,7 @@ impl Posterior {
         });
         Self {
             structure: Structure::Soiptd,
-            best: Draw::of(&centre, sign),
+            best: Draw::of(centre, None, sign),
             has_bias: true,
             draws,
         }
@@ -330,10 +336,11 @@ impl Posterior {
     /// Parameters of the model and the input bias, with their 90 % intervals.
     #[must_use]
     pub fn estimate(&self) -> Estimate {
+        let equal: Vec<bool> = self.draws.iter().map(Draw::has_equal_lags).collect();
         let interval = |parameter: Parameter| {
             let best = self.best.value(parameter)?;
-            let interval = Interval::new(best, quantiles(self.values(parameter)));
-            Some((parameter, interval))
+            let ends = with_equal_lags(&self.values(parameter), &equal);
+            Some((parameter, Interval::new(best, ends)))
         };
         let bias = self.has_bias.then_some(Parameter::InputBias);
         let reported = self.structure.parameters().iter().copied();

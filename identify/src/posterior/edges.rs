@@ -47,6 +47,23 @@ pub(super) fn with_real_poles(mut at: [f64; 5], covariance: Option<&[[f64; 5]; 5
     at
 }
 
+/// Part of the draws below which equal lags are ruled out: what the central 90 % leave out at one end.
+const RULED_OUT: f64 = 0.05;
+
+/// Ends of the central 90 % interval of the values of a parameter, widened to those of the draws with `equal` lags unless equal
+/// lags are ruled out. All draws with complex poles become one line of processes, at the end of the interval of a lag. Where
+/// these are a tenth of the draws, the central 90 % hold one half of the line, and a process on it would lie outside of them
+/// every second time.
+pub(super) fn with_equal_lags(values: &[f64], equal: &[bool]) -> Option<(f64, f64)> {
+    let (low, high) = quantiles(values.to_vec())?;
+    let on_line = values.iter().zip(equal).filter(|(_, equal)| **equal);
+    let on_line: Vec<f64> = on_line.map(|(value, _)| *value).collect();
+    if (on_line.len() as f64) < RULED_OUT * values.len() as f64 {
+        return Some((low, high));
+    }
+    quantiles(on_line).map(|(least, most)| (low.min(least), high.max(most)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,6 +86,17 @@ mod tests {
             same == low && (beyond - (1.5 + 0.0179)).abs() < 1e-12,
             "{beyond}"
         );
+    }
+
+    // Values 0 to 99: the central 90 % are 5 to 94, and the last ten of them alone are 90 to 99. Four of 100 are ruled out.
+    #[test]
+    fn an_interval_holds_equal_lags_unless_they_are_ruled_out() {
+        let values: Vec<f64> = (0..100).map(f64::from).collect();
+        let last = |count: usize| -> Vec<bool> { (0..100).map(|k| k >= 100 - count).collect() };
+        assert_eq!(with_equal_lags(&values, &last(10)), Some((5.0, 99.0)));
+        assert_eq!(with_equal_lags(&values, &last(4)), Some((5.0, 94.0)));
+        assert_eq!(with_equal_lags(&values, &last(0)), Some((5.0, 94.0)));
+        assert_eq!(with_equal_lags(&[], &[]), None);
     }
 
     // Variances of 0.01 and 0.04 with a covariance of 0.02: a ratio 0.05 above 1/4 lowers its neighbour by 0.05 * 0.5.
