@@ -20,7 +20,7 @@ import sys
 import tempfile
 
 import altitude_gains
-from sitl import GUIDED, FlightError, Vehicle, options, read_log
+from sitl import GUIDED, FlightError, Vehicle, command_line, read_log
 
 SCRIPTS = pathlib.Path(__file__).resolve().parent / "scripts"
 ALTITUDE, PARAMETERS = 300, 301
@@ -143,7 +143,7 @@ def tune(out, options):
 
 def main():
     """Command line."""
-    parser = options(__doc__.splitlines()[0], program=True, settings=True)
+    parser = command_line(__doc__.splitlines()[0], program=True, settings=True)
     options = parser.parse_args()
     out = pathlib.Path(options.out or tempfile.mkdtemp(prefix="onecycle-"))
     try:

@@ -15,7 +15,7 @@ import tempfile
 
 import angle
 import measure
-from sitl import GUIDED, STABILIZE, SYSTEMID, FlightError, Vehicle, options
+from sitl import GUIDED, STABILIZE, SYSTEMID, FlightError, Vehicle, command_line
 
 SHORT = {"roll": "RLL", "pitch": "PIT", "yaw": "YAW"}
 SID_AXIS = {"roll": 10, "pitch": 11, "yaw": 12}
@@ -98,7 +98,7 @@ def tune(out, options):
 
 def main():
     """Command line."""
-    parser = options(__doc__.splitlines()[0], program=True)
+    parser = command_line(__doc__.splitlines()[0], program=True)
     parser.add_argument("--axis", choices=SID_AXIS, default="roll")
     options = parser.parse_args()
     out = pathlib.Path(options.out or tempfile.mkdtemp(prefix="onecycle-"))

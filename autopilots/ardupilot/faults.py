@@ -9,7 +9,7 @@ import sys
 import tempfile
 
 from altitude import SLOW
-from sitl import ALT_HOLD, LAND, FlightError, Vehicle, options
+from sitl import ALT_HOLD, LAND, FlightError, Vehicle, command_line
 from tune import CUSTOM_CONTROLLER, HIGH, LOW, MIDDLE, names
 
 SCRIPTS = pathlib.Path(__file__).resolve().parent / "scripts"
@@ -212,7 +212,7 @@ def fly(name, folder, options):
 
 def main():
     """Command line."""
-    parser = options(__doc__.splitlines()[0], speedup=3)
+    parser = command_line(__doc__.splitlines()[0], speedup=3)
     parser.add_argument("cases", nargs="*", choices=[[], *CASES], help="cases to fly [default: all]")
     options = parser.parse_args()
     out = pathlib.Path(options.out or tempfile.mkdtemp(prefix="onecycle-"))

@@ -29,7 +29,7 @@ PARAMETERS = {
 }
 
 
-def options(description, speedup=5, program=False, settings=False):
+def command_line(description, speedup=5, program=False, settings=False):
     """Parser of a script's command line, with the options that all scripts have; `program` and `settings` add one each."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--ardupilot", required=True, help="checkout of ArduPilot with build/sitl/bin/arducopter")

@@ -12,7 +12,7 @@ import sys
 import tempfile
 
 import measure
-from sitl import AUTOTUNE, LOITER, FlightError, Vehicle, options
+from sitl import AUTOTUNE, LOITER, FlightError, Vehicle, command_line
 
 BIT = {"roll": 1, "pitch": 2, "yaw": 4}
 SHORT = {"roll": "RLL", "pitch": "PIT", "yaw": "YAW"}
@@ -179,7 +179,7 @@ def shown(rows):
 
 def main():
     """Command line."""
-    parser = options(__doc__.splitlines()[0], settings=True)
+    parser = command_line(__doc__.splitlines()[0], settings=True)
     parser.add_argument("--method", choices=METHODS, default="onecycle")
     parser.add_argument("--axes", default="roll,pitch,yaw", help="axes, separated by commas")
     parser.add_argument("--flights", type=int, default=1)
