@@ -192,7 +192,10 @@ fn log_id(text: &str) -> Result<LogId, String> {
     "Examples:\n",
     "  onecycle live relay udp:14550 --axis altitude -o altitude.csv\n",
     "  onecycle live relay udp:14550 --axis altitude -o altitude.csv --amplitude 5% --write altitude.params\n",
-    "  onecycle live relay udp:14550 --axis altitude -o altitude.csv -- --style calm --report altitude.html\n\n",
+    "  onecycle live relay udp:14550 --axis altitude -o altitude.csv -- --style calm --report altitude.html\n",
+    "  onecycle live relay udp:14550 --axis altitude -o altitude.csv -- --structure double_integrator_lag\n\n",
+    "Ten cycles show little of the drag of a multirotor that rises and sinks. Where identify refuses such a test because a ",
+    "parameter lies at its bound, the last example leaves the drag out.\n\n",
     "Exit codes: 0 identified, 2 bad arguments, 3 the vehicle is not heard, 4 the test did not begin or ended early, or no ",
     "process was identified, 5 output not written"
 ))]
