@@ -38,13 +38,7 @@ class Px4:
         return process.communicate()[0]
 
     def hover(self):
-        """Takes off, again if a check before arming fails on a busy machine."""
-        for left in reversed(range(5)):
-            try:
-                return self.vehicle.hover()
-            except RuntimeError:
-                if not left:
-                    raise
+        self.vehicle.hover()
 
     def land(self):
         self.vehicle.run("commander", "land")

@@ -4,6 +4,7 @@ own equations (`sih.py`), not on a model that any tuner identified.
     python compare.py stock=flights/stock*.json autotune=flights/autotune*.json onecycle=flights/onecycle*.json
 """
 
+import collections
 import glob
 import json
 import math
@@ -61,6 +62,10 @@ def main():
                 f"| {name} | {share} | {time_s:.1f} | {of_steps('rise_s'):.3f} | {100 * of_steps('overshoot'):.0f} % | {of_steps('ise_s'):.3f} "
                 f"| {of_steps('input_noise'):.4f} | {median(m for m, _ in robust):.0f} | {median(s for _, s in robust):.2f} | {loads:.2f} |"
             )
+    for name, flights in groups.items():
+        reasons = collections.Counter(flight["failed"] for flight in flights if "failed" in flight)
+        for reason, count in reasons.items():
+            print(f"\n{name}: {count} of {len(flights)} flights not counted: {reason}")
 
 
 if __name__ == "__main__":
