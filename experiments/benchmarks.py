@@ -2,7 +2,7 @@
 
     cargo build --release
     pip install scipy control                   # of other people, in the comparisons
-    python experiments/benchmarks.py            # about an hour on two cores
+    python experiments/benchmarks.py            # one to two hours on two cores
     python experiments/benchmarks.py d_test     # those that contain this text
     python experiments/benchmarks.py --quick    # seconds each: every command exists and starts
 
