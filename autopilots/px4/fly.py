@@ -158,16 +158,16 @@ class Vehicle:
 
     def hover(self):
         """Takes off, again if a simulated sensor falls silent on a busy machine: PX4 then lands."""
-        for _ in range(5):
+        for left in reversed(range(5)):
             self.run("commander", "takeoff")
-            end = time.monotonic() + 30
-            while time.monotonic() < end and self.process.poll() is None:
-                if self.height() > SETTINGS["MIS_TAKEOFF_ALT"] - 0.5:
-                    self.run("commander", "mode", "auto:loiter")
-                    time.sleep(5)
-                    return
-                time.sleep(0.2)
-        raise RuntimeError("the vehicle does not take off")
+            try:
+                self.wait(lambda: self.height() > SETTINGS["MIS_TAKEOFF_ALT"] - 0.5, 30, "the vehicle does not take off")
+                break
+            except RuntimeError:
+                if not left:
+                    raise
+        self.run("commander", "mode", "auto:loiter")
+        time.sleep(5)
 
     def height(self):
         for line in self.run("listener", "vehicle_local_position", 1).splitlines():

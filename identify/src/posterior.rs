@@ -2,8 +2,8 @@
 //!
 //! The error of the estimator is Gaussian in its own coordinates (`onecycle_onboard::refine::coordinate`). The physical
 //! parameters are nonlinear in these, most of all near equal lags and near zero damping. So draws from the Gaussian are
-//! mapped to parameters, and the intervals are quantiles of the draws. Nothing is linearised. A time constant whose
-//! inverse may be zero is unbounded above.
+//! mapped to parameters, and the intervals are quantiles of the draws, widened at equal lags ([`edges`]). Nothing is
+//! linearised. A time constant whose inverse may be zero is unbounded above.
 
 mod edges;
 
