@@ -1,6 +1,7 @@
 """Flies `onecycle live` against a simulated vehicle, PX4 (SIH) or ArduCopter (SITL): state, parameters written and read back, a
-missing parameter, an armed vehicle, a signed link (ArduPilot), the relay test of the altitude, and the log of the flight. Prints a
-line of JSON for each case and fails if one is not as it must be.
+missing parameter, an armed vehicle, a signed link (ArduPilot), the relay test of the altitude, the log of the flight, and steps of the
+height with the gains of the test (PX4; those of ArduCopter are flown by ardupilot/altitude.py). Prints a line of JSON for each case and
+fails if one is not as it must be.
 
 The relay test may be refused: the line says why. Run it by run.sh of px4 and ardupilot; PX4 needs a network of its own.
 """
@@ -29,9 +30,10 @@ class Px4:
 
     def __init__(self, build, folder):
         sys.path.insert(0, str(HERE / "px4"))
-        from fly import Vehicle
+        import fly
 
-        self.vehicle = Vehicle(build, folder, station=False)
+        self.fly = fly
+        self.vehicle = fly.Vehicle(build, folder, station=False)
         self.parameter = self.vehicle.parameter
 
     def wait_for(self, process):
@@ -42,7 +44,17 @@ class Px4:
 
     def land(self):
         self.vehicle.run("commander", "land")
-        time.sleep(30)
+        self.vehicle.wait(lambda: "Disarmed" in self.vehicle.run("commander", "status"), 90, "the vehicle does not land")
+        time.sleep(2)  # the log of the flight is closed
+
+    def step(self):
+        """Takes off, commands steps of the height, lands. Returns their figures."""
+        self.hover()
+        link = self.fly.offboard_link()
+        self.fly.command_heights(self.vehicle, link)
+        link.close()
+        self.land()
+        return self.fly.measure(max(self.vehicle.folder.glob("log/*/*.ulg")))["altitude"]
 
     def close(self):
         self.vehicle.close()
@@ -154,6 +166,19 @@ class Trial:
         self.run("log", ["log", "-o", log])
         self.tell("log file", log.exists() and log.stat().st_size > 100_000, bytes=log.stat().st_size if log.exists() else 0)
 
+    def gains_of_the_test(self):
+        """Steps of the height with the old gains and with those that a relay test wrote."""
+        files = sorted(self.folder.glob("altitude?.params"))
+        self.tell("gains of a relay test", bool(files), files=[file.name for file in files])
+        if not files:
+            return
+        before = self.vehicle.step()
+        self.run("write the gains of the test", ["write", files[-1]])
+        after = self.vehicle.step()
+        # Noise of the estimated height alone changes the figures of a flight by a third.
+        is_right = after["steps"] == 4 and bool(after["ise_s"] < 1.5 * before["ise_s"])
+        self.tell("steps of the height", is_right, before=before, after=after)
+
     def signing(self):
         key, other = self.folder / "key.txt", self.folder / "other.txt"
         key.write_text(PASSPHRASE + "\n")
@@ -180,7 +205,9 @@ def main():
     try:
         trial.ground()
         trial.flight()
-        if arguments.firmware == "ardupilot":
+        if arguments.firmware == "px4":
+            trial.gains_of_the_test()
+        else:
             trial.signing()
     finally:
         vehicle.close()

@@ -8,8 +8,8 @@ Needs `pip install numpy scipy`, and `sippy_unipi` for `--method sippy`. Nothing
 
 scipy: an output-error fit over the last cycles (two), as a careful user would write it. `least_squares`
 searches for the logarithms of T_prop, T_body and tau; the gain, a constant input bias and the three
-initial states are linear and solved for at each step; simulated by `scipy.signal` as zero-order hold, a
-delay of any part of a sample included; the best of several starts. `--step 1e-4` is the relative step of
+initial states are linear and solved for at each step; the input is held between samples, a delay of any
+part of a sample included; the best of several starts. `--step 1e-4` is the relative step of
 its finite differences: with SciPy's default (`--step 0`) rounding stops the search far from the optimum.
 multistart: the same model at 80 samples a period, from 18 starts over the benchmark's ranges.
 `--cycles N` fits the last N complete cycles, `--cycles 0` everything from the first rise of the input on.
@@ -34,7 +34,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import lfilter
 
 SAMPLE_S = 1e-3
 # T_prop, T_body, tau (s): spread over what the benchmark's README allows.
@@ -98,15 +98,22 @@ def by_scipy(u, y, settings, starts, bins=None):
     centre = at + (every - 1) / 2
     integrated = integrals(u)
 
+    step_s = SAMPLE_S * every
+    index = np.arange(len(measured))
+
     def solve(x):
         """The gain, and what the model leaves of the output."""
         t_prop, t_body, tau = np.exp(x)
-        process = ([1.0], np.polymul([1.0, 0.0], np.polymul([t_prop, 1.0], [t_body, 1.0])))
-        b, a, _ = cont2discrete(process, SAMPLE_S * every)
-        none = np.zeros(len(measured))
-        columns = [lfilter(b[0], a, one) for one in (delayed(integrated, tau, centre, every), none + 1.0)]
-        columns += [lfilter(b[0], a, none, zi=state)[0] for state in np.eye(3)]
-        columns = np.stack(columns, axis=1)
+        held = delayed(integrated, tau, centre, every)
+        # 1/(s (T_prop s + 1) (T_body s + 1)) in partial fractions: an integrator and two lags.
+        moved = step_s * np.concatenate([[0.0], np.cumsum(held[:-1])])
+        columns = [index, np.ones(len(index))]
+        for lag_s, other_s in ((t_prop, t_body), (t_body, t_prop)):
+            kept = np.exp(-step_s / lag_s)
+            moved += lag_s**2 / (other_s - lag_s) * lfilter([0.0, 1.0 - kept], [1.0, -kept], held)
+            columns.append(kept**index)
+        # The response to the input, the ramp of its bias, and those of the three initial states.
+        columns = np.stack([moved, *columns], axis=1)
         sizes = np.linalg.norm(columns, axis=0)
         factors = np.linalg.lstsq(columns / sizes, measured, rcond=None)[0] / sizes
         return factors[0], (measured - columns @ factors) / measured.std()

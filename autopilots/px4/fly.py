@@ -228,10 +228,16 @@ def leave_alone(_):
 TUNERS = {"stock": leave_alone, "autotune": tune_with_autotune, "onecycle": tune_with_onecycle}
 
 
-def command_steps(vehicle):
-    """Steps of each angle to either side and back, and of the height, in offboard mode."""
+def offboard_link():
+    """The link of an offboard computer."""
     link = mavutil.mavlink_connection("udpin:127.0.0.1:14540")
     link.wait_heartbeat(timeout=10)
+    return link
+
+
+def command_steps(vehicle):
+    """Steps of each angle to either side and back, and of the height, in offboard mode."""
+    link = offboard_link()
     thrust = 0.49
 
     def attitude(roll, pitch, yaw):
@@ -258,12 +264,11 @@ def command_steps(vehicle):
     vehicle.run("commander", "mode", "auto:loiter")
     time.sleep(6)
     command_heights(vehicle, link)
-    vehicle.run("commander", "mode", "auto:loiter")
     link.close()
 
 
 def command_heights(vehicle, link):
-    """Steps of the height up and down, twice."""
+    """Steps of the height up and down, twice, in offboard mode; then it hovers."""
     while link.recv_match(blocking=False):
         pass
     here = link.recv_match(type="LOCAL_POSITION_NED", blocking=True, timeout=5)
@@ -283,6 +288,7 @@ def command_heights(vehicle, link):
     for _ in range(2):
         hold(STEP["altitude"], CLIMB_S)
         hold(0, CLIMB_S)
+    vehicle.run("commander", "mode", "auto:loiter")
 
 
 def angles_of(data, prefix):

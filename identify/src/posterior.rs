@@ -6,6 +6,7 @@
 //! linearised. A time constant whose inverse may be zero is unbounded above.
 
 mod edges;
+mod intervals;
 
 use onecycle_design::bands::quantiles;
 use onecycle_design::{
@@ -18,6 +19,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 use self::edges::{is_process, with_equal_lags, with_jumps, with_real_poles};
+pub use self::intervals::{Estimate, Interval, StepIntervals};
 use crate::cholesky::cholesky;
 
 /// Number of draws. The standard error of the probability below the 5 % quantile is `sqrt(0.05 * 0.95 / 4000)`, 0.35 of
@@ -37,89 +39,6 @@ const SEARCHED_MARGINS: usize = 1000;
 /// Draws whose step responses are simulated. The ends of their central 90 % have a standard error of 15 % of the standard
 /// deviation.
 const STEPS: usize = 200;
-
-/// Estimate with its 90 % interval. `None` stands for infinite or unbounded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Interval {
-    /// Most probable value. `None` if it is infinite.
-    pub estimate: Option<f64>,
-    /// Lower end. `None` if the interval is unbounded below.
-    pub low: Option<f64>,
-    /// Upper end. `None` if the interval is unbounded above.
-    pub high: Option<f64>,
-}
-
-impl Interval {
-    /// Interval with these ends, widened to hold the estimate.
-    fn new(estimate: f64, ends: Option<(f64, f64)>) -> Self {
-        let finite = |value: f64| value.is_finite().then_some(value);
-        let (low, high) = ends.map_or((None, None), |(low, high)| {
-            (finite(low.min(estimate)), finite(high.max(estimate)))
-        });
-        Self {
-            estimate: finite(estimate),
-            low,
-            high,
-        }
-    }
-
-    /// Whether `value` lies within the interval. Infinity does if the interval is unbounded above.
-    #[must_use]
-    pub fn holds(&self, value: f64) -> bool {
-        self.low.is_none_or(|low| low <= value) && self.high.is_none_or(|high| value <= high)
-    }
-
-    /// Half width of the interval as a fraction of the magnitude of the estimate. `None` if the interval is unbounded
-    /// or the estimate infinite.
-    #[must_use]
-    pub fn relative_half_width(&self) -> Option<f64> {
-        Some((self.high? - self.low?) / (2.0 * self.estimate?.abs()))
-    }
-}
-
-/// Characteristics of the response to a unit step of the reference, each with its 90 % interval. A loop that is unstable or
-/// too slow to simulate counts with infinite values.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct StepIntervals {
-    /// Overshoot as a fraction of the step.
-    pub overshoot: Interval,
-    /// Rise time from 10 % to 90 % of the step (s).
-    pub rise_time_s: Interval,
-    /// Time after which the output stays within 2 % of the reference (s).
-    pub settling_time_s: Interval,
-    /// Largest magnitude of the controller output (input unit).
-    pub peak_input: Interval,
-}
-
-/// Parameters of a model and the input bias, each with its 90 % interval.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Estimate {
-    structure: Structure,
-    intervals: Vec<(Parameter, Interval)>,
-}
-
-impl Estimate {
-    /// Structure of the model.
-    #[must_use]
-    pub fn structure(&self) -> Structure {
-        self.structure
-    }
-
-    /// Interval of a parameter. `None` if the structure does not report the parameter.
-    #[must_use]
-    pub fn get(&self, parameter: Parameter) -> Option<Interval> {
-        (self.intervals.iter())
-            .find(|(of, _)| *of == parameter)
-            .map(|(_, interval)| *interval)
-    }
-
-    /// All parameters with their intervals: first those of the structure in the order of [`Structure::parameters`],
-    /// then the input bias.
-    pub fn iter(&self) -> impl Iterator<Item = (Parameter, Interval)> + '_ {
-        self.intervals.iter().copied()
-    }
-}
 
 /// Draw from the posterior, in physical parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]

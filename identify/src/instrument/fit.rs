@@ -5,6 +5,8 @@
 //! for a set-point that hardly moves the input, where the ratio of the spectra is biased towards the controller.
 //! References: T. W. Anderson, H. Rubin, Ann. Math. Stat. 20 (1949); L. P. Hansen, J. Heaton, A. Yaron, J. Bus. Econ. Stat.
 //! 14 (1996); J. H. Stock, J. H. Wright, Econometrica 68 (2000).
+//!
+//! [`Bin::errors`]: super::spectra::Bin::errors
 
 use num_complex::Complex64;
 use onecycle_design::{Linear, Structure};

@@ -29,6 +29,8 @@ const AGAIN: Duration = Duration::from_millis(400);
 const HOLD: Duration = Duration::from_secs(8);
 /// Speed below which it holds (m/s).
 const HOLDS_M_PER_S: f32 = 0.3;
+/// How long it is awaited that the vehicle hovers.
+const SETTLE: Duration = Duration::from_secs(20);
 /// A vehicle that moves faster does not hover (m/s).
 const MOST_HOVER_M_PER_S: f64 = 0.5;
 /// Deflection of a stick that ends the test (us of the pulse, of 500).
@@ -66,7 +68,7 @@ impl Vehicle {
                 Err(error) => return Err(error.into()),
             }
         }
-        let hover = self.measure_hover()?;
+        let hover = self.await_hover(is_over)?;
         let room = test.amplitude..=1.0 - test.amplitude;
         if !room.contains(&hover.thrust) {
             return Err(AltitudeRefusal::Thrust(hover.thrust));
@@ -92,6 +94,17 @@ impl Vehicle {
         match self.is_armed() && !is_on_ground {
             true => Ok(()),
             false => Err(AltitudeRefusal::NotFlying),
+        }
+    }
+
+    /// Averages of the hover, as soon as the vehicle has come to rest.
+    fn await_hover(&mut self, is_over: &dyn Fn() -> bool) -> Result<Hover, AltitudeRefusal> {
+        let end = self.now() + SETTLE;
+        loop {
+            match self.measure_hover() {
+                Err(AltitudeRefusal::Moving(_)) if self.now() < end && !is_over() => {}
+                measured => return measured,
+            }
         }
     }
 

@@ -309,13 +309,7 @@ fn refusals_before_anything_is_sent() {
             |refusal| matches!(refusal, AltitudeRefusal::Rate(rate_hz) if *rate_hz < 6.0),
         ),
         (
-            |vehicle| {
-                vehicle
-                    .hovering
-                    .as_mut()
-                    .unwrap()
-                    .set_place(HEIGHT_M + 20.0);
-            },
+            |vehicle| vehicle.hovering.as_mut().unwrap().wind_m_per_s = 1.0,
             |refusal| matches!(refusal, AltitudeRefusal::Moving(_)),
         ),
         (
@@ -330,6 +324,16 @@ fn refusals_before_anything_is_sent() {
         assert!(is_right(&refusal), "case {number}: {refusal:?}");
         assert_eq!(set_points(&world.borrow().vehicle), 0, "case {number}");
     }
+}
+
+// On its way to another height when the test is asked for.
+#[test]
+fn the_test_waits_for_the_hover() {
+    let world = world(PX4, |hovering| hovering.set_place(HEIGHT_M + 20.0));
+    let flight = fly(&world, |_, _| false).unwrap();
+    assert_eq!(flight.abort, None);
+    let end_m = height_m(&world);
+    assert!((end_m - HEIGHT_M - 20.0).abs() < 0.5, "{end_m}");
 }
 
 // PX4 does not change into Offboard, for example because a switch of the transmitter forbids it.

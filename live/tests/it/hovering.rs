@@ -95,6 +95,7 @@ impl Hovering {
             time_boot_ms: self.boot_ms(),
             x: self.wind_m_per_s * self.now.as_secs_f32(),
             z: -self.height_m() as f32,
+            vx: self.wind_m_per_s,
             vz: -self.process.rate() as f32,
             ..LOCAL_POSITION_NED_DATA::DEFAULT
         })
