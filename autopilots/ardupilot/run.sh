@@ -32,8 +32,11 @@ library=${CARGO_TARGET_DIR:-$root/onboard/c/target}/release/libonecycle.a
 out=$ARDUPILOT_DIR/build/sitl/onecycle
 rm -rf "$out"
 mkdir -p "$out"
+# On a busy machine the simulator's gyro is late and the log has gaps: with real-time priority, where it is allowed.
+prompt=()
+! chrt -r 5 true 2>/dev/null || prompt=(chrt -r 5)
 fly() {
-    "$python" "$here/$1" --ardupilot "$ARDUPILOT_DIR" --out "$out/$2" "${@:3}"
+    "${prompt[@]}" "$python" "$here/$1" --ardupilot "$ARDUPILOT_DIR" --out "$out/$2" "${@:3}"
 }
 fly chirp.py chirp --onecycle "$program" --axis roll
 fly tune.py onecycle --method onecycle --flights "$flights"
@@ -41,4 +44,4 @@ fly tune.py autotune --method autotune
 fly tune.py quiktune --method quiktune
 fly altitude.py altitude --onecycle "$program"
 fly faults.py faults
-"$python" "$here/../live.py" ardupilot "$ARDUPILOT_DIR" "$out/live" --onecycle "$program"
+"${prompt[@]}" "$python" "$here/../live.py" ardupilot "$ARDUPILOT_DIR" "$out/live" --onecycle "$program"

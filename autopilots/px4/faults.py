@@ -160,7 +160,7 @@ CASES = {
     "sign": (changed("SIH_L_ROLL", lambda before: -before), {"OC_AXES": 1}, False, "the old gains are in force", False),
     "heading": (heading_reset, {"OC_AXES": 1}, False, "the estimator was reset", True),
     "missing": (finished_at_once, {"OC_AXES": 1}, False, "the firmware lacks one of its gains", True),
-    "small": (as_it_is, {"OC_AXES": 1, "OC_AMP": 0.02}, False, "the old gains are in force", True),
+    "small": (as_it_is, {"OC_AXES": 1, "OC_AMP": 0.005}, False, "the old gains are in force", True),
     "large": (as_it_is, {"OC_AXES": 1, "OC_AMP": 0.5, "MC_ROLLRATE_MAX": 60}, False, "the old gains are in force", True),
     "unanswered": (nobody_accepts, {"OC_AXES": 1, "OC_APPLY": 1}, False, "nobody accepted", True),
     "landed": (landed_without_acceptance, {"OC_AXES": 1, "OC_APPLY": 2}, False, "not accepted", False),

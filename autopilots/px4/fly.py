@@ -38,6 +38,7 @@ EARLY = {"SDLOG_MODE": 0, "SDLOG_PROFILE": 17}
 # Steps of the set-points (rad, m), and the time over which a response is judged (s).
 STEP = {"roll": math.radians(10), "pitch": math.radians(10), "yaw": math.radians(20), "altitude": 0.5}
 JUDGED_S = {"roll": 1.0, "pitch": 1.0, "yaw": 1.0, "altitude": 4.0}
+STEPS = 4
 STEP_S = 1.5
 CLIMB_S = 5.0
 
@@ -323,10 +324,12 @@ def measure(path):
     for axis, (set_times, set_values), (times, values), (input_times, inputs) in signals(log):
         steps = []
         jumps = numpy.flatnonzero(abs(abs(numpy.diff(set_values)) - STEP[axis]) < 0.1 * STEP[axis]) + 1
-        for jump, next_jump in zip(jumps, [*jumps[1:], len(set_times) - 1]):
+        # The last ones are the commanded ones: a change of the mode before them may look like a step.
+        jumps = jumps[-STEPS:]
+        for before, jump, after in zip([0, *jumps[:-1]], jumps, [*jumps[1:], len(set_times) - 1]):
             start, size = set_times[jump], set_values[jump] - set_values[jump - 1]
             # On a slow machine the simulated time lags behind the clock by which the steps are sent.
-            if set_times[next_jump] - start < JUDGED_S[axis]:
+            if min(start - set_times[before], set_times[after] - start) < JUDGED_S[axis]:
                 continue
             inside = (times >= start) & (times < start + JUDGED_S[axis])
             if inside.sum() < 50:
