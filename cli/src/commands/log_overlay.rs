@@ -4,7 +4,7 @@ use onecycle::{
     Assessment, Excitation, FollowedLoop, Identification, Identified, LowPass, Model, Pid,
     Recording,
 };
-use onecycle_link::{Axis, ControlLoop, FirmwareKind, Flight, MarkKind, Term};
+use onecycle_link::{Axis, ControlLoop, FirmwareKind, Flight, LoggedLoop, MarkKind, Term};
 
 use crate::results::log_gains::Overlay;
 
@@ -19,7 +19,7 @@ const SETTLING_TIMES: f64 = 2.0;
 const LEAST_SAMPLES: usize = 50;
 
 /// The overlay of a rate loop over the part of the recording that was used. `None`: no set-point is logged, the excitation
-/// entered elsewhere (SYSTEMID), or the loop is unstable.
+/// entered elsewhere (SYSTEMID), other gains were in force, or the loop is unstable.
 pub(super) fn overlay(
     flight: &Flight,
     axis: Axis,
@@ -38,7 +38,11 @@ pub(super) fn overlay(
         let overlaps = mark.span.from_s < to_s && mark.span.to_s > from_s;
         mark.kind == MarkKind::ArduPilotSystemId && mark.axis == Some(axis) && overlaps
     });
-    if entered_elsewhere {
+    let logged = flight.logged_loop(ControlLoop::Rate(axis));
+    let has_other_gains = logged
+        .and_then(LoggedLoop::gains_changed_s)
+        .is_some_and(|changed_s| changed_s > from_s);
+    if entered_elsewhere || has_other_gains {
         return None;
     }
     let rows: Vec<usize> = (0..times_s.len())

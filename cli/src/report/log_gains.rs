@@ -97,6 +97,7 @@ pub(crate) fn table(read: &ReadBack) -> String {
 pub(crate) struct ReadBackReport {
     axis: &'static str,
     agreement: &'static str,
+    since_s: Option<f64>,
     rows: usize,
     explained: Option<f64>,
     terms: Vec<TermReport>,
@@ -132,6 +133,7 @@ impl From<&ReadBack> for ReadBackReport {
         Self {
             axis: read.axis.name(),
             agreement: key(read.agreement()),
+            since_s: read.since_s,
             rows: read.rows,
             explained: read.explained,
             terms: read.terms.iter().map(term).collect(),

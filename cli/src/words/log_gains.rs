@@ -8,7 +8,7 @@ use crate::results::log_gains::Written;
 pub(crate) const NOTHING_IDENTIFIED: &str =
     "no process was identified, so no gains can be justified.";
 pub(crate) const CONTRADICTED: &str = "the gains read back from the signals contradict the parameters of the log. Check \
-    that no parameter was changed in flight, and that the axes are not exchanged or mounted the other way round.";
+    that no gain was moved in flight by a knob, and that the axes are not exchanged or mounted the other way round.";
 pub(crate) const NO_DESIGN: &str =
     "no controller keeps the limits; choose a calmer --style or another stretch of the log.";
 pub(crate) const NOT_ITS_FORM: &str = "the proposed controller has a form that the firmware does not have: leave out \
@@ -46,24 +46,26 @@ pub(crate) fn unstable(stable: Option<f64>) -> String {
 
 /// What a read-back tells about the log.
 pub(crate) fn read_back(read: &ReadBack) -> String {
+    let since = read.since_s.map_or(String::new(), |since_s| {
+        format!("Gains were changed in flight: the last ones are in force, and the signals after {since_s:.1} s count. ")
+    });
     let explained = read.explained.map_or(String::new(), |share| {
         format!(
             " The recovered law explains {:.1} % of the output of the controller.",
             100.0 * share
         )
     });
-    match read.agreement() {
-        Agreement::Agrees => {
-            format!("The signals agree with the parameters of the log.{explained}")
-        }
-        Agreement::Differs => format!(
+    let verdict = match read.agreement() {
+        Agreement::Agrees => "The signals agree with the parameters of the log.",
+        Agreement::Differs => {
             "The signals contradict the parameters of the log: an axis, a sign, a unit or the version is not what it seems, \
-             or a gain was changed in flight.{explained}"
-        ),
-        _ => format!(
-            "The signals cannot confirm the parameters: the axis moved too little, or the log is too slow.{explained}"
-        ),
-    }
+             or a gain was moved in flight by a knob."
+        }
+        _ => {
+            "The signals cannot confirm the parameters: the axis moved too little, or the log is too slow."
+        }
+    };
+    format!("{since}{verdict}{explained}")
 }
 
 /// A term that was read back, as the value of its name.

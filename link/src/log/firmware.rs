@@ -182,13 +182,15 @@ fn spans_of(states: impl Iterator<Item = (f64, bool)>, end_s: f64) -> Vec<Span> 
     spans
 }
 
-/// A gain, if the log has its parameter.
+/// A gain as it is at the end of the flight, if the log has its parameter.
 fn gain(flight: &FlightTables, term: Term, name: String, si_per_unit: Option<f64>) -> Option<Gain> {
-    let value = flight.parameter(&name)?;
+    let parameter = flight.parameters.get(&name)?;
+    let value = parameter.last();
     Some(Gain {
         term,
         name,
         value,
+        changed_s: parameter.changes.last().map(|&(time_s, _)| time_s),
         si: si_per_unit.map(|factor| factor * value),
         si_per_unit,
     })

@@ -104,8 +104,10 @@ pub struct Gain {
     pub term: Term,
     /// Name of the parameter.
     pub name: String,
-    /// Value of the parameter at the start of the flight.
+    /// Value of the parameter at the end of the flight.
     pub value: f64,
+    /// Time (s) of its last change in flight. `None`: it was not changed.
+    pub changed_s: Option<f64>,
     /// The gain in SI units: input of the process per rad/s, rad, rad/s^2 (P, I, D of a rate) or 1/s (attitude).
     /// `None`: the conversion is not known.
     pub si: Option<f64>,
@@ -145,11 +147,17 @@ pub struct LoggedLoop {
     pub output: Option<LoggedSignal>,
     /// Set-point. `None`: not logged.
     pub set_point: Option<LoggedSignal>,
-    /// Gains in force at the start.
+    /// Gains in force at the end.
     pub gains: Vec<Gain>,
 }
 
 impl LoggedLoop {
+    /// Time (s) of the last change of a gain in flight. `None`: none was changed.
+    pub fn gains_changed_s(&self) -> Option<f64> {
+        let changes = self.gains.iter().filter_map(|gain| gain.changed_s);
+        changes.max_by(f64::total_cmp)
+    }
+
     /// Whether input and output are there, so that a process can be identified.
     pub fn is_complete(&self) -> bool {
         self.input.is_some() && self.output.is_some()

@@ -11,7 +11,7 @@ mod motors;
 use std::io::Read;
 
 use super::error::LogError;
-use super::flight::{FirmwareKind, Flight, Term};
+use super::flight::{FirmwareKind, Flight, LoggedLoop, Term};
 use super::loops::{Axis, ControlLoop};
 use super::plan::{Plan, Signals};
 use super::tables::{FlightTables, Wanted};
@@ -67,6 +67,8 @@ impl ReadTerm {
 pub struct ReadBack {
     /// The axis.
     pub axis: Axis,
+    /// Time (s) of the last change of a gain in flight: the rows after it count. `None`: no gain was changed.
+    pub since_s: Option<f64>,
     /// Rows used; 0 if there are too few.
     pub rows: usize,
     /// Share of the variance of the controller's output that the recovered law explains, the least over its equations.
@@ -159,13 +161,17 @@ fn read_axis(
     let law = about.rate_law(axis);
     let has = |term: Term| terms.iter().any(|own| own.term == term);
     let equations = equations(about, tables, axis, signals, &law, &has);
-    let counts = counts(about, &signals.time_s, signals.throttle.as_deref());
+    let since_s = about
+        .logged_loop(ControlLoop::Rate(axis))
+        .and_then(LoggedLoop::gains_changed_s);
+    let counts = counts(about, &signals.time_s, signals.throttle.as_deref(), since_s);
     let rows = Rows {
         time_s: &signals.time_s,
         counts: &counts,
     };
     let mut read = ReadBack {
         axis,
+        since_s,
         rows: 0,
         explained: None,
         terms: Vec::new(),
@@ -205,8 +211,15 @@ fn read_axis(
                 ..mixer()
             }),
     );
+    judge(about, axis, &mut terms);
+    read.terms = terms;
+    Some(read)
+}
+
+/// The verdict on each term.
+fn judge(about: &Flight, axis: Axis, terms: &mut [ReadTerm]) {
     let rate_hz = slowest_hz(about, axis);
-    for term in &mut terms {
+    for term in terms {
         let tolerance = tolerance(about.firmware.kind, term.term);
         term.agreement = match agreement(term, tolerance) {
             Agreement::Differs if rate_hz < least_rate_hz(term.term) => Agreement::Unknown,
@@ -214,8 +227,6 @@ fn read_axis(
             agreement => agreement,
         };
     }
-    read.terms = terms;
-    Some(read)
 }
 
 /// Rate (Hz) below which a difference proves nothing: the logged samples no longer follow the signals.
@@ -315,7 +326,7 @@ fn mixed(about: &Flight, tables: &FlightTables, axis: Axis) -> Option<Fit> {
         .chain(others)
         .filter_map(asked)
         .collect();
-    let in_air = counts(about, &times_s, None);
+    let in_air = counts(about, &times_s, None, None);
     let counts: Vec<bool> = (0..times_s.len())
         .map(|row| {
             let is_known = columns.iter().all(|column| column[row].is_some());
@@ -360,8 +371,14 @@ fn agreement(term: &ReadTerm, tolerance: f64) -> Agreement {
     }
 }
 
-/// Rows in the air and armed, as far as the log tells, and below the throttle at which the firmware lowers its gains.
-fn counts(about: &Flight, times_s: &[f64], throttle: Option<&[f64]>) -> Vec<bool> {
+/// Rows in the air and armed, as far as the log tells, below the throttle at which the firmware lowers its gains, and after the
+/// last change of a gain.
+fn counts(
+    about: &Flight,
+    times_s: &[f64],
+    throttle: Option<&[f64]>,
+    since_s: Option<f64>,
+) -> Vec<bool> {
     let spans = [&about.armed, &about.airborne];
     let breakpoint = match about.firmware.kind {
         FirmwareKind::Betaflight => (about.tables.parameter("tpa_breakpoint"))
@@ -378,7 +395,7 @@ fn counts(about: &Flight, times_s: &[f64], throttle: Option<&[f64]>) -> Vec<bool
         });
         let throttle = throttle.map(|throttle| throttle[row]);
         let is_full = breakpoint.is_none_or(|breakpoint| throttle.is_none_or(|t| t < breakpoint));
-        is_in && is_full
+        is_in && is_full && since_s.is_none_or(|since_s| *time_s > since_s)
     };
     times_s.iter().enumerate().map(counts).collect()
 }

@@ -111,13 +111,9 @@ pub struct LogParameter {
 }
 
 impl LogParameter {
-    /// Value in force at this time (s).
-    pub fn at(&self, time_s: f64) -> f64 {
-        let later = self
-            .changes
-            .iter()
-            .take_while(|(from_s, _)| *from_s <= time_s);
-        later.last().map_or(self.value, |&(_, value)| value)
+    /// Value at the end.
+    pub fn last(&self) -> f64 {
+        self.changes.last().map_or(self.value, |&(_, value)| value)
     }
 }
 

@@ -6,7 +6,7 @@ use super::{gain, spans};
 use crate::log::flight::{Firmware, FirmwareKind, Gain, Mark, MarkKind, Span, Term};
 use crate::log::loops::{Axis, ControlLoop};
 use crate::log::plan::{Plan, Quantity};
-use crate::log::tables::FlightTables;
+use crate::log::tables::{FlightTables, LogParameter};
 
 pub(super) const WANTED: &[(&str, &str)] = &[
     ("vehicle_status", "arming_state"),
@@ -157,7 +157,8 @@ pub(super) fn gain_names(of: ControlLoop) -> Vec<(Term, String)> {
 pub(super) fn gains(flight: &FlightTables, of: ControlLoop) -> Vec<Gain> {
     let names = gain_names(of);
     let factor = names.iter().find(|(term, _)| *term == Term::Factor);
-    let factor = factor.and_then(|(_, name)| flight.parameter(name));
+    let factor = factor.and_then(|(_, name)| flight.parameters.get(name));
+    let factor = factor.map(LogParameter::last);
     let si_per_unit = |term| match (of, term) {
         (_, Term::Factor) | (ControlLoop::Altitude, _) => None,
         (_, Term::FeedForward) | (ControlLoop::Attitude(_), _) => Some(1.0),

@@ -63,6 +63,53 @@ fn wrong_gains_differ() {
     }
 }
 
+/// A ULog with messages of a parameter after these shares of its messages.
+fn with_changes(bytes: &[u8], name: &str, changes: &[(f64, f32)]) -> Vec<u8> {
+    let size = |at: usize| 3 + usize::from(u16::from_le_bytes([bytes[at], bytes[at + 1]]));
+    let next = |&at: &usize| Some(at + size(at)).filter(|next| next + 3 < bytes.len());
+    let starts: Vec<usize> = std::iter::successors(Some(16), next).collect();
+    let mut changed = Vec::new();
+    let mut copied = 0;
+    for &(share, value) in changes {
+        let at = starts[(share * starts.len() as f64) as usize];
+        changed.extend(&bytes[copied..at]);
+        copied = at;
+        let key = format!("float {name}");
+        changed.extend(((1 + key.len() + 4) as u16).to_le_bytes());
+        changed.extend([b'P', key.len() as u8]);
+        changed.extend(key.bytes());
+        changed.extend(value.to_le_bytes());
+    }
+    changed.extend(&bytes[copied..]);
+    changed
+}
+
+// The gain is given another value, and its own again: only the signals after that are read. Then another value for good, with
+// which the vehicle did not fly.
+#[test]
+fn gains_changed_in_flight() {
+    let (bytes, log) = log("px4_chirps.ulg");
+    let name = "MC_ROLLRATE_P";
+    let own = log.flights[0].tables.parameter(name).unwrap() as f32;
+    let before = log.read_back(&bytes[..], 1).unwrap();
+    assert_eq!(before[0].since_s, None);
+    let read = |changes: &[(f64, f32)]| {
+        let bytes = with_changes(&bytes, name, changes);
+        let log = FlightLog::scan(&bytes[..]).unwrap();
+        log.read_back(&bytes[..], 1).unwrap()
+    };
+    let there_and_back = read(&[(0.2, 2.0 * own), (0.4, own)]);
+    assert_eq!(there_and_back[0].agreement(), Agreement::Agrees);
+    assert!(there_and_back[0].since_s.is_some());
+    assert!(there_and_back[0].rows < before[0].rows);
+    assert_eq!(there_and_back[1], before[1]);
+    let other = read(&[(0.2, 2.0 * own)]);
+    assert_eq!(other[0].agreement(), Agreement::Differs);
+    let stated = other[0].terms.iter().find(|term| term.name == name);
+    let ratio = stated.unwrap().stated[0] / f64::from(2.0 * own);
+    assert!((ratio - 1.0).abs() < 1e-6, "{ratio}");
+}
+
 // The controller's output of roll against the signals of pitch, and against the gyro with the wrong sign.
 #[test]
 fn wrong_signals_differ() {
