@@ -363,7 +363,11 @@ impl Loop {
         Ok(LoadResponse {
             samples: dead_time.into_iter().chain(after).collect(),
             peak,
-            iae: self.load_integrals().map_or(f64::INFINITY, |found| found.0),
+            iae: match self.load_integrals() {
+                Some((iae, _)) => iae,
+                None if self.law.ki == 0.0 => f64::INFINITY,
+                None => return Err(StepResponseError::TooSlow),
+            },
         })
     }
 }
@@ -372,7 +376,8 @@ impl Loop {
 mod tests {
     use super::*;
     use crate::analysis::vectors::VECTORS;
-    use crate::controller::Form;
+    use crate::controller::{Form, Pid};
+    use crate::model::{Linear, Structure};
 
     // Figures of the given gains: IAE, ISE, Ms, Mt, phase margin, gain margin and delay margin to 1e-8.
     #[test]
@@ -407,6 +412,28 @@ mod tests {
                     off < 1e-8,
                     "vector {i}, figure {figure}: {found} {expected} {off:e}"
                 );
+            }
+        }
+    }
+
+    // A slow and a slower exponential together look like one for a moment: there the ISE has no end. The output keeps its sign, so
+    // the IAE is 1/Ki.
+    #[test]
+    fn slow_ends_have_integrals() {
+        for t_prop_s in [0.03, 0.0419, 0.06] {
+            let process = Linear::new(Structure::Soptd)
+                .with_gain(114.49 / 1.03)
+                .with_pole_per_s(1.0 / 1.03)
+                .with_lags_s([t_prop_s, 0.0])
+                .with_tau_s(0.0148);
+            let model = Model::from(process);
+            for kp in [0.12, 0.135, 0.15] {
+                for ki in (0..20).map(|i| 0.05 + 0.01 * f64::from(i)) {
+                    let controller = Controller::from(Pid::new(kp, ki, 0.000_144));
+                    let found = Loop::new(&model, &controller).unwrap().load_integrals();
+                    let (iae, _) = found.unwrap_or_else(|| panic!("{t_prop_s} {kp} {ki}"));
+                    assert!((iae * ki - 1.0).abs() < 1e-6, "{t_prop_s} {kp} {ki}: {iae}");
+                }
             }
         }
     }

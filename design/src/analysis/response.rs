@@ -150,6 +150,8 @@ struct Accumulator {
     steps: usize,
     quiet: usize,
     one_sign: usize,
+    /// Steps for which the rest has been that of an exponential.
+    exponential: usize,
     ended: bool,
 }
 
@@ -170,6 +172,7 @@ impl Accumulator {
             steps: 0,
             quiet: 0,
             one_sign: 0,
+            exponential: 0,
             ended: false,
         }
     }
@@ -217,7 +220,11 @@ impl Accumulator {
             let (first, last) = (error[0], error[NODES - 1]);
             let time = -h / (last / first).ln();
             let rest = total - self.ie;
-            if time > 0.0 && (last * time - rest).abs() <= self.ending.rest * rest.abs() {
+            let is_one = time > 0.0 && (last * time - rest).abs() <= self.ending.rest * rest.abs();
+            self.exponential = if is_one { self.exponential + 1 } else { 0 };
+            // Two exponentials together look like one for a moment. The rest of the IAE is known even so, that of the ISE is not.
+            let enough = if self.ending.squares { 1.0 } else { 0.0 };
+            if is_one && self.exponential as f64 > steps_of(enough) - steps_of(0.0) {
                 self.added = rest.abs();
                 self.added_square = 0.5 * last * rest;
                 self.ended = true;
