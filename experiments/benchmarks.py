@@ -2,7 +2,7 @@
 
     cargo build --release
     pip install scipy control                   # of other people, in the comparisons
-    python experiments/benchmarks.py            # one to two hours on two cores
+    python experiments/benchmarks.py            # an hour on two cores
     python experiments/benchmarks.py d_test     # those that contain this text
     python experiments/benchmarks.py --quick    # seconds each: every command exists and starts
 
@@ -226,7 +226,7 @@ def main():
         python = scratch / "bin" / "python"
         python.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} "$@"\n')
         python.chmod(0o755)
-        for name in ("experiments", "examples", "cli", "py"):
+        for name in ("autopilots", "experiments", "examples", "cli", "py"):
             (scratch / name).symlink_to(ROOT / name)
         path = f"{scratch / 'bin'}{os.pathsep}{os.environ['PATH']}"
         environment = {**os.environ, "PATH": path}

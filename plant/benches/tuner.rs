@@ -10,6 +10,7 @@ use std::io::Write;
 use std::time::Instant;
 
 use onecycle_onboard::control::Measurement;
+use onecycle_onboard::guard::Limits;
 use onecycle_onboard::tuner::{Consent, Tuner, TunerPhase, TunerSettings};
 use onecycle_onboard::{RelaySettings, Soiptd};
 use onecycle_plant::FixedStepProcess;
@@ -32,6 +33,7 @@ fn flight(slices: u16) -> Vec<Tick> {
         output_highest: 1.0,
         slices,
         consent: Consent::Automatic,
+        limits: Limits::NONE,
         ..new
     };
     let process = Soiptd::from_acceleration_gain(4.0, 0.0321, 1.0 / 1.6886, 0.024)
