@@ -33,10 +33,10 @@ out=$ARDUPILOT_DIR/build/sitl/onecycle
 rm -rf "$out"
 mkdir -p "$out"
 # On a busy machine the simulator's gyro is late and the log has gaps: with real-time priority, where it is allowed.
-prompt=()
-! chrt -r 5 true 2>/dev/null || prompt=(chrt -r 5)
+realtime=()
+! chrt -r 5 true 2>/dev/null || realtime=(chrt -r 5)
 fly() {
-    "${prompt[@]}" "$python" "$here/$1" --ardupilot "$ARDUPILOT_DIR" --out "$out/$2" "${@:3}"
+    "${realtime[@]}" "$python" "$here/$1" --ardupilot "$ARDUPILOT_DIR" --out "$out/$2" "${@:3}"
 }
 fly chirp.py chirp --onecycle "$program" --axis roll
 fly tune.py onecycle --method onecycle --flights "$flights"
@@ -44,4 +44,4 @@ fly tune.py autotune --method autotune
 fly tune.py quiktune --method quiktune
 fly altitude.py altitude --onecycle "$program"
 fly faults.py faults
-"${prompt[@]}" "$python" "$here/../live.py" ardupilot "$ARDUPILOT_DIR" "$out/live" --onecycle "$program"
+"${realtime[@]}" "$python" "$here/../live.py" ardupilot "$ARDUPILOT_DIR" "$out/live" --onecycle "$program"

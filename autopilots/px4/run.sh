@@ -26,12 +26,12 @@ cmake -S "$PX4_DIR" -B "$build" -G Ninja -DCONFIG=px4_sitl_default -DPYTHON_EXEC
 ninja -C "$build" px4
 
 # On a busy machine the simulated sensors fall silent, and PX4 lands: with real-time priority, where it is allowed.
-prompt=()
-! chrt -r 5 true 2>/dev/null || prompt=(chrt -r 5)
+realtime=()
+! chrt -r 5 true 2>/dev/null || realtime=(chrt -r 5)
 
 # Each flight has a network and a /tmp of its own, because PX4's ports and files are always the same.
 alone() {
-    "${prompt[@]}" unshare --net --mount --map-root-user bash -c 'ip link set lo up; mount -t tmpfs tmpfs /tmp; exec "$@"' alone "$python" "$@"
+    "${realtime[@]}" unshare --net --mount --map-root-user bash -c 'ip link set lo up; mount -t tmpfs tmpfs /tmp; exec "$@"' alone "$python" "$@"
 }
 
 out=$build/flights

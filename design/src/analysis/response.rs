@@ -223,8 +223,9 @@ impl Accumulator {
             let is_one = time > 0.0 && (last * time - rest).abs() <= self.ending.rest * rest.abs();
             self.exponential = if is_one { self.exponential + 1 } else { 0 };
             // Two exponentials together look like one for a moment. The rest of the IAE is known even so, that of the ISE is not.
-            let enough = if self.ending.squares { 1.0 } else { 0.0 };
-            if is_one && self.exponential as f64 > steps_of(enough) - steps_of(0.0) {
+            let radian = (1.0 / (omega * h)).ceil();
+            let enough = if self.ending.squares { radian } else { 0.0 };
+            if is_one && self.exponential as f64 > enough {
                 self.added = rest.abs();
                 self.added_square = 0.5 * last * rest;
                 self.ended = true;
