@@ -20,8 +20,8 @@ use super::MOST_THREADS;
     "  onecycle reproduce table_4 table_6 table_7 --network paper.onnx\n\n",
     "Parts: phase, grid, grid_variants, figures, table_2_and_3, table_2_variants, table_4, tuning_rules,\n",
     "rule_variants, table_5, table_6, table_7, modes, claims.\n",
-    "Without --network, table_4, table_6 and table_7 train the paper's network first, in 75 minutes on two\n",
-    "cores (--quick: a small one, in seconds), and keep it in DIR/parts/paper_network.onnx for the next run.\n",
+    "Without --network, table_4, table_6 and table_7 train a network of the paper's size first, in 75 minutes\n",
+    "on two cores (--quick: a small one, in seconds), and keep it in DIR/parts/paper_network.onnx.\n",
     "Finished parts are kept in DIR/parts and not computed again, and an interrupted training is\n",
     "resumed after its last epoch; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable part, 5 output not written"
@@ -89,7 +89,7 @@ impl Name {
         Self::Claims,
     ];
 
-    /// Whether the part compares the paper's network.
+    /// Whether the part compares the network of the paper's size.
     pub(crate) fn reads_network(self) -> bool {
         matches!(self, Self::Table4 | Self::Table6 | Self::Table7)
     }

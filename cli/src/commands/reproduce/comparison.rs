@@ -22,7 +22,7 @@ pub(super) struct ComparisonSettings {
     seed: u64,
     /// Names of methods, and their names in the table.
     methods: Vec<(String, String)>,
-    /// Name of the paper's network in the table, where it comes first.
+    /// Name of the network of the paper's size in the table, where it comes first.
     #[serde(default)]
     network: Option<String>,
 }

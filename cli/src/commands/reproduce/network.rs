@@ -1,4 +1,4 @@
-//! Tables II and III: the paper's network with both softmax functions, and what its figures depend on.
+//! Tables II and III: our network of the paper's size with both softmax functions, and what its figures depend on.
 
 use onecycle_lab::paper::classifier::{Choice, ClassifierRecipe, PickRule, Score, Test};
 use serde::Deserialize;

@@ -1,4 +1,4 @@
-//! The paper's network for the parts that compare it: read from a file, or trained once and kept beside the parts.
+//! Our network of the paper's size for the parts that compare it: read from a file, or trained once and kept beside the parts.
 
 use std::path::Path;
 
@@ -31,7 +31,7 @@ pub(super) fn network(
     if !path.exists() {
         let recipe: ClassifierRecipe = recipe.table()?.try_into().map_err(Failure::usage)?;
         tell(&format!(
-            "  training the paper's network into {}",
+            "  training a network of the paper's size into {}",
             path.display()
         ));
         make(&recipe, &path, false, workers, Failure::usage)?;

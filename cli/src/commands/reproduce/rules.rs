@@ -1,5 +1,8 @@
 //! What the tuning rules cost depends on how the amplitude is measured, and at which noise and bias.
 
+use std::f64::consts::{PI, TAU};
+
+use onecycle_design::Pid;
 use onecycle_design::rules::Homogeneous;
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
 use onecycle_lab::experiments::{Campaign, IDENTIFICATION_PERIODS, SAMPLE_S, signals_of};
@@ -7,7 +10,7 @@ use onecycle_lab::judge::baselines::rules::{Rule, calibrated, identify};
 use onecycle_lab::judge::evaluate::{Judge, PHASE_MARGIN_DEG, quantile};
 use onecycle_lab::space::Space;
 use onecycle_lab::space::grid::{Grid, GridSettings};
-use onecycle_onboard::Soiptd;
+use onecycle_onboard::{Pd, Soiptd};
 use serde::Deserialize;
 
 use crate::commands::workers::Workers;
@@ -54,27 +57,43 @@ enum RuleName {
     Exact,
     /// From the first harmonics of output and input.
     BothHarmonics,
+    /// The paper's, from the exact magnitude and frequency of the process at the rule's phase. Nothing is measured.
+    OnProcess,
 }
 
 /// Shapes from which the exact rule takes its numbers, rows and columns.
 const RULE_SHAPES: usize = 8;
 
 impl RuleName {
-    fn rule(self) -> Result<Rule, Failure> {
-        let (beta, margin_rad) = (Space::MULTIROTOR.beta, PHASE_MARGIN_DEG.to_radians());
-        let papers = Homogeneous::from_lead(margin_rad - beta.asin(), margin_rad);
-        Ok(match self {
-            Self::PeakToPeak => Rule::Amplitude(papers),
-            Self::OutputHarmonic => Rule::OutputHarmonic(papers),
+    /// The rule for a recorded cycle. `None` if nothing is measured.
+    fn rule(self) -> Result<Option<Rule>, Failure> {
+        Ok(Some(match self {
+            Self::PeakToPeak => Rule::Amplitude(of_the_paper()),
+            Self::OutputHarmonic => Rule::OutputHarmonic(of_the_paper()),
             Self::Exact => {
                 let rule = calibrated(&Space::MULTIROTOR, RULE_SHAPES, RULE_SHAPES);
                 Rule::Amplitude(rule.map_err(Failure::usage)?)
             }
             Self::BothHarmonics => Rule::FirstHarmonic {
-                phase_margin_rad: margin_rad,
+                phase_margin_rad: PHASE_MARGIN_DEG.to_radians(),
             },
-        })
+            Self::OnProcess => return Ok(None),
+        }))
     }
+}
+
+/// The paper's rule: that of a relay with beta -0.73, by the describing function.
+fn of_the_paper() -> Homogeneous {
+    let (beta, margin_rad) = (Space::MULTIROTOR.beta, PHASE_MARGIN_DEG.to_radians());
+    Homogeneous::from_lead(margin_rad - beta.asin(), margin_rad)
+}
+
+/// The PD of the paper's rule from the exact magnitude and frequency of the process at the rule's phase.
+fn on_process(process: &Soiptd) -> Option<Pd> {
+    let rule = of_the_paper();
+    let omega_rad_per_s = process.frequency_at_phase(rule.beta.asin() - PI)?;
+    let Pid { kp, kd, .. } = rule.pid(process.magnitude(omega_rad_per_s), TAU / omega_rad_per_s);
+    Some(Pd { kp, kd })
 }
 
 pub(super) fn find(settings: &RuleSettings, workers: &Workers) -> Result<Numbers, Failure> {
@@ -87,7 +106,7 @@ pub(super) fn find(settings: &RuleSettings, workers: &Workers) -> Result<Numbers
         let members = variant.members.then_some(&members[..]);
         let count = members.map_or(settings.systems as usize, <[Soiptd]>::len);
         let judged = workers.map(count, |k| {
-            judged(settings, variant, members, &rule, k as u64)
+            judged(settings, variant, members, rule.as_ref(), k as u64)
         });
         let judged: Vec<Option<Deterioration>> = judged.into_iter().collect::<Result<_, _>>()?;
         Ok(row(&variant.name, &judged))
@@ -103,7 +122,7 @@ fn judged(
     settings: &RuleSettings,
     variant: &Variant,
     members: Option<&[Soiptd]>,
-    rule: &Rule,
+    rule: Option<&Rule>,
     number: u64,
 ) -> Result<Option<Deterioration>, Failure> {
     let campaign = Campaign {
@@ -126,10 +145,13 @@ fn judged(
         own.noise_sigma = part * own.oscillation.amplitude;
         experiment = own;
     }
+    let judge = Judge::new(&experiment.process).map_err(Failure::usage)?;
+    let Some(rule) = rule else {
+        return Ok(on_process(&experiment.process).map(|pd| judge.deterioration(pd)));
+    };
     let (trace, _) = experiment
         .run(IDENTIFICATION_PERIODS)
         .map_err(Failure::usage)?;
-    let judge = Judge::new(&experiment.process).map_err(Failure::usage)?;
     let answer = identify(&signals_of(&trace, SAMPLE_S), rule, 1);
     Ok(answer.ok().map(|answer| judge.deterioration(answer.pd)))
 }

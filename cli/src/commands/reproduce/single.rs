@@ -165,7 +165,7 @@ pub(super) struct Biases {
 const METHODS: [&str; 6] = [
     "PEM, set I",
     "PEM, set II",
-    "the paper's network",
+    "our network of the paper's size",
     "onecycle, one cycle",
     "PEM, set I, bias in the model",
     "PEM, set I, done with care",
