@@ -17,6 +17,7 @@ mod certify;
 mod commands;
 mod common;
 mod dataset;
+mod documentation;
 mod flight_log_gains;
 mod flight_logs;
 mod fly;
