@@ -32,6 +32,7 @@ mod mixture;
 mod normal;
 mod orthogonal;
 mod outliers;
+mod output_error;
 mod plan;
 mod prediction;
 mod prepare;
@@ -145,6 +146,10 @@ impl Search<'_> {
         if let Some(filter) = prepared.filter {
             let delay_s = filter.time_s();
             self.remarks.push(Remark::OutputFilter { delay_s });
+        }
+        let is_constant = |input: &[f64]| input.iter().all(|v| *v == input[0]);
+        if self.options.input_before.is_none() && is_constant(&prepared.record.input) {
+            self.remarks.push(Remark::AssumedRest);
         }
         if prepared.part_used < 0.999 {
             self.remarks.push(Remark::PartUsed(prepared.part_used));

@@ -107,6 +107,11 @@ pub enum Remark {
         /// Time ahead (s).
         horizon_s: f64,
     },
+    /// A fit without disturbances explains what the fit with them leaves to a slow disturbance, and the input does not follow
+    /// the output. The intervals hold both.
+    DriftOrGain,
+    /// The input never changes: it is assumed to have been zero before the first row, with the process at rest.
+    AssumedRest,
     /// Outputs were left out: lost, stale or outliers. The value is their share.
     Absent(f64),
     /// Only the longest part without a gap was used. The value is its share of the recording.
@@ -250,6 +255,8 @@ impl Remark {
             Self::Coloured(_) => "coloured",
             Self::InputLeft(_) => "input_left",
             Self::WeakPrediction { .. } => "weak_prediction",
+            Self::DriftOrGain => "drift_or_gain",
+            Self::AssumedRest => "assumed_rest",
             Self::Absent(_) => "absent",
             Self::PartUsed(_) => "part_used",
             Self::Interpolated(_) => "interpolated",

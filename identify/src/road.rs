@@ -2,13 +2,13 @@
 //!
 //! ```text
 //! a steady relay oscillation                     that of the board (relay); a short fit by the general one checks it
-//! the same, but with an error of the model,      both; the general one replaces it if its innovations are white and no
+//! the same, but with an error of the model,      both; the general one replaces it if its innovations owe nothing to the input and no
 //! with a stretch refused, or contradicted        controller is lost
 //! by the check
 //! anything else                                  the general one (innovations)
 //! ```
 
-use onecycle_design::{Structure, margins};
+use onecycle_design::{Model, Parameter, Structure, margins};
 use onecycle_onboard::pack::Pack;
 
 use crate::amplitude::{self, Parts};
@@ -21,10 +21,8 @@ use crate::settings::{Method, Options, Road};
 use crate::signals::Signals;
 use crate::verdict::Verdict;
 
-/// Largest autocorrelation of the innovations of a fit that may replace that of a steady oscillation.
-const WHITE: f64 = 0.1;
-/// Misfit of a fit that leaves nothing worth mentioning.
-const EXACT: f64 = 0.003;
+/// F statistic of the past input in the innovations up to which a fit owes nothing to the input.
+const MOST_INPUT_F: f64 = 1.5;
 /// Distance (rad) of a phase margin from its interval beyond which the general estimator has found another process. In
 /// 34 recordings of relay tests without disturbances the distance is zero.
 const ANOTHER_MARGIN_RAD: f64 = 0.0175;
@@ -125,19 +123,14 @@ fn automatic(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) 
             Some(doubt) => settle(steady, innovations::identify(signals, options), doubt),
             None => steady,
         },
-        Err(verdict) if is_final(verdict) => steady,
+        Err(Verdict::NoController(_) | Verdict::Units | Verdict::ConstantOutput) => steady,
         Err(verdict) => {
             let mut general = innovations::identify(signals, options);
-            if steady.excitation.is_some() && !is_beyond_doubt(&general) {
+            if steady.excitation.is_some() && !owes_nothing_to_the_input(&general) {
                 // There is a relay oscillation: its verdict tells more.
                 return steady;
             }
-            let is_relay = verdict.kind() != "no_relay";
-            if is_relay && is_resonant(&general) && (is_left(&general) || !is_white(&general)) {
-                // Complex poles explain a limit cycle that the input does not drive.
-                general.refuse(verdict.clone());
-            }
-            if general.outcome.is_ok() {
+            if general.outcome.is_ok() && verdict.kind() != "no_relay" {
                 let verdict = Box::new(verdict.clone());
                 general.remarks.push(Remark::NotASteadyOscillation(verdict));
             }
@@ -153,6 +146,8 @@ enum Doubt {
     Disturbed(f64),
     /// Some of the oscillation is left unexplained.
     Misfit,
+    /// A process that comes to rest by itself explains the whole recording better.
+    Structure,
     /// The same structure, fitted to the whole recording, leaves the controller this phase margin (rad; `None` if
     /// unstable), which is not the one expected.
     Margin(Option<f64>),
@@ -176,9 +171,12 @@ fn doubt(
         return unexplained;
     }
     let period_s = steady.oscillation()?.period_s;
+    let whole = innovations::check(signals, options, &found.model.linear(), period_s)?;
+    if whole.is_another {
+        return Some(Doubt::Structure);
+    }
     let controller = found.design?.controller;
     let expected = found.phase_margin_rad?;
-    let whole = innovations::check(signals, options, &found.model.linear(), period_s)?;
     let margin_of = |model| margins(model, &controller).map(|margins| margins.phase_margin_rad);
     let is_expected = |margin: Option<f64>| {
         margin.is_some_and(|margin| {
@@ -198,17 +196,23 @@ fn doubt(
 /// the steady oscillation.
 fn settle(mut steady: Identification, mut general: Identification, doubt: Doubt) -> Identification {
     let is_better = match doubt {
-        Doubt::Disturbed(_) => general.outcome.is_ok() && !is_resonant(&general),
-        Doubt::Misfit | Doubt::Margin(_) => is_white(&general) && !is_resonant(&general),
         Doubt::Nonlinear => is_nonlinear(&general),
+        Doubt::Structure => owes_nothing_to_the_input(&general) && !is_of_the_family(&general),
+        Doubt::Disturbed(_) | Doubt::Misfit | Doubt::Margin(_) => {
+            owes_nothing_to_the_input(&general)
+        }
     };
     let is_replaced = is_better && has_controller(&general) >= has_controller(&steady);
     let remark = match doubt {
-        Doubt::Misfit | Doubt::Disturbed(_) | Doubt::Nonlinear if !is_replaced => return steady,
+        Doubt::Misfit | Doubt::Disturbed(_) | Doubt::Nonlinear | Doubt::Structure
+            if !is_replaced =>
+        {
+            return steady;
+        }
         Doubt::Disturbed(misfit) => {
             Remark::NotASteadyOscillation(Box::new(Verdict::NotThisProcess { misfit }))
         }
-        Doubt::Misfit | Doubt::Nonlinear => {
+        Doubt::Misfit | Doubt::Nonlinear | Doubt::Structure => {
             let found = steady.outcome.as_ref();
             Remark::RelayReplaced(found.map_or(0.0, |found| found.fit.misfit))
         }
@@ -226,33 +230,29 @@ fn settle(mut steady: Identification, mut general: Identification, doubt: Doubt)
     if is_replaced { general } else { steady }
 }
 
-/// Whether the general estimator explains a steady oscillation that the other one refuses, and not by chance: at hardly more
-/// than one frequency a pair of complex poles explains a limit cycle that the input does not even drive.
-fn is_beyond_doubt(general: &Identification) -> bool {
+/// Whether the general estimator explains a steady oscillation up to what the past input does not explain either, by a process
+/// that does not oscillate on its own: at hardly more than one frequency a pair of complex poles explains a limit cycle that
+/// the input does not even drive. Of 270 relay recordings of 47 kinds, this tells those of a wrong kind from right ones with
+/// an area under the ROC curve of 0.97; whiteness and prediction do with 0.45 to 0.6.
+fn owes_nothing_to_the_input(general: &Identification) -> bool {
     let Ok(found) = &general.outcome else {
         return false;
     };
-    let is_left = is_left(general);
-    // Without noise nothing is white: what is left are the digits of the file.
-    let is_exact = found.fit.misfit < EXACT;
-    // A disturbance large enough to make up the oscillation predicts it worse than its mean would.
-    let prediction = found.fit.innovations().and_then(|found| found.prediction);
-    let predicts = prediction.is_none_or(|prediction| prediction.explained > 0.0);
-    !is_resonant(general) && predicts && (is_exact || is_white(general) && !is_left)
+    let innovations = found.fit.innovations();
+    innovations.is_some_and(|found| found.whiteness.input_f < MOST_INPUT_F)
+        && !is_oscillating(&found.model)
 }
 
 /// Whether the process has complex poles.
-fn is_resonant(found: &Identification) -> bool {
-    let structure = (found.outcome.as_ref().ok()).map(|identified| identified.model.structure());
-    matches!(
-        structure,
-        Some(Structure::Resonant | Structure::ResonantLag)
-    )
+fn is_oscillating(model: &Model) -> bool {
+    let zeta = model.parameter(Parameter::Zeta);
+    zeta.is_some_and(|zeta| zeta < 1.0)
 }
 
-/// Whether the past input explains a part of the innovations.
-fn is_left(found: &Identification) -> bool {
-    (found.remarks.iter()).any(|remark| matches!(remark, Remark::InputLeft(_)))
+/// Whether the structure is that of the relay's estimator or a limit of it.
+fn is_of_the_family(general: &Identification) -> bool {
+    let structure = (general.outcome.as_ref().ok()).map(|found| found.model.structure());
+    structure.is_some_and(|structure| structure.stages().integrators > 0)
 }
 
 /// Whether the model has a nonlinear force.
@@ -261,31 +261,6 @@ fn is_nonlinear(found: &Identification) -> bool {
     found.outcome.is_ok() && found.remarks.iter().any(is_force)
 }
 
-/// Whether the general estimator explains the recording up to white innovations.
-fn is_white(found: &Identification) -> bool {
-    let innovations = found
-        .outcome
-        .as_ref()
-        .ok()
-        .and_then(|found| found.fit.innovations());
-    innovations.is_some_and(|innovations| innovations.whiteness.autocorrelation < WHITE)
-}
-
 fn has_controller(found: &Identification) -> bool {
     (found.outcome.as_ref()).is_ok_and(|identified| identified.design.is_some())
-}
-
-/// Whether no estimator can do better: the columns hold no experiment, or the request cannot be met.
-fn is_final(verdict: &Verdict) -> bool {
-    matches!(
-        verdict,
-        Verdict::ConstantInput
-            | Verdict::ConstantOutput
-            | Verdict::Units
-            | Verdict::NoRelay {
-                output_is_relay: true
-            }
-            | Verdict::NoController(_)
-            | Verdict::Saturated { .. }
-    )
 }

@@ -33,6 +33,9 @@ pub struct Options {
     /// Time (s) by which the input was logged after it acted, negative if before; the recording is corrected by it. With a
     /// value, zero too, the clocks are not judged by the relay's law.
     pub input_late_s: Option<f64>,
+    /// Input before the first row, under which the process was at rest: for a step in the first row. `None`: the likelihood
+    /// decides whether the process was at rest under the input of the first row, or under zero if the input never changes.
+    pub input_before: Option<f64>,
     /// Cutoff (Hz) of a second-order Butterworth low-pass through which the output was recorded, as that of a gyro. The
     /// general estimator takes it out of the output and adds its delay to the dead time.
     pub output_filter_hz: Option<f64>,
@@ -50,6 +53,7 @@ impl Default for Options {
             hold: None,
             beta: None,
             input_late_s: None,
+            input_before: None,
             output_filter_hz: None,
         }
     }
@@ -123,6 +127,15 @@ impl Options {
     pub fn input_late_s(self, input_late_s: Option<f64>) -> Self {
         Self {
             input_late_s,
+            ..self
+        }
+    }
+
+    /// Takes the process as at rest under this input before the first row, or lets the likelihood decide if `None`.
+    #[must_use]
+    pub fn input_before(self, input_before: Option<f64>) -> Self {
+        Self {
+            input_before,
             ..self
         }
     }

@@ -138,6 +138,14 @@ fn of_record(remark: &Remark) -> Option<String> {
              Possible causes: strong disturbances, a process that changes, a saturated actuator.",
             100.0 * explained.max(0.0)
         ),
+        Remark::DriftOrGain => "Slow drift and gain cannot be told apart: a fit without drift explains more of the \
+             recording than drift that has nothing to do with the input can hide. Gain and lags are those of that fit, and the \
+             intervals hold both. A recording with several levels of the input, each held until the output settles, \
+             tells them apart."
+            .to_owned(),
+        Remark::AssumedRest => "The input never changes. The fit assumes that it was 0 before the first row, with the process \
+             at rest: state another value with --input-before."
+            .to_owned(),
         Remark::Coloured(autocorrelation) => format!(
             "What the model did not predict is not white noise (largest autocorrelation {autocorrelation:.2}): the \
              intervals are widened for it."
@@ -353,6 +361,8 @@ mod tests {
                 explained: -0.2,
                 horizon_s: 0.5,
             },
+            Remark::DriftOrGain,
+            Remark::AssumedRest,
             Remark::Absent(0.013),
             Remark::PartUsed(0.61),
             Remark::Interpolated(12.0),

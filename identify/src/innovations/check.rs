@@ -1,12 +1,14 @@
 //! A steady oscillation seen by the general estimator: the same structure fitted to the whole recording.
 
+use std::f64::consts::TAU;
+
 use onecycle_design::{Linear, Model, Structure};
 
 use super::prepare::prepare;
 use super::record::Blocks;
 use super::search;
 use super::theta::{NoiseKind, Theta};
-use super::{LONGEST_TAU, ROWS, forces, outliers, result};
+use super::{LONGEST_TAU, NEARLY, ROWS, forces, outliers, result};
 use crate::settings::Options;
 use crate::signals::Signals;
 
@@ -22,8 +24,30 @@ const MOST: usize = 100_000;
 pub(crate) struct Checked {
     /// The process.
     pub(crate) model: Model,
+    /// Whether a structure that contains this one, and comes to rest by itself, explains the recording better.
+    pub(crate) is_another: bool,
     /// The linear part of the process with the nonlinear forces that the recording asks for, if it asks for any.
     pub(crate) with_forces: Option<Model>,
+}
+
+/// Starts for a process that comes to rest by itself and responds like `theta` near the frequency of the oscillation: the lag
+/// of the body stays, the integrator becomes a lag that is slow, or as fast as the oscillation, and the dead time takes up the
+/// actuator's lag.
+fn resting(theta: &Theta, omega_rad_per_s: f64) -> [Theta; 3] {
+    const POLES: [f64; 3] = [0.03, 0.2, 1.0];
+    let (tau_s, lag_s) = theta.delay_and_lag_s();
+    let body_per_s = theta.process(1.0).pole_per_s().max(0.2 * omega_rad_per_s);
+    POLES.map(|part| {
+        let mut start = Theta::new(Structure::Soptd);
+        let layout = start.layout();
+        start.values[0] = -body_per_s.ln();
+        start.values[1] = part * omega_rad_per_s;
+        start.values[layout.tau()] = tau_s + lag_s;
+        for kind in NoiseKind::ALL {
+            start.set_noise(kind, theta.noise(kind));
+        }
+        start
+    })
 }
 
 /// The process that the whole recording shows, transient and disturbances included, in the structure of `found`, which
@@ -59,17 +83,20 @@ pub(crate) fn check(
     start.values[layout.tau()] = found.tau_s() - prepared.early_s;
     let candidates = NoiseKind::ALL.into_iter().filter_map(|kind| {
         let mut start = start;
-        start.set_noise(
-            kind,
-            NOISE_OVER_OSCILLATION * std::f64::consts::TAU / period_s,
-        );
+        start.set_noise(kind, NOISE_OVER_OSCILLATION * TAU / period_s);
         search::fit(&blocks, &start, longest_s)
     });
     let best = search::best(candidates)?;
     let theta = &best.found.theta;
+    let resting = resting(theta, TAU / period_s);
+    let resting = resting
+        .iter()
+        .filter_map(|start| search::fit(&blocks, start, longest_s));
+    let is_another = search::best(resting).is_some_and(|resting| resting.bic < best.bic - NEARLY);
     let asked = forces::forces(record, &best, theta, (samples, skip_s, longest_s));
     Some(Checked {
         model: result::model(&best.found, prepared.early_s),
+        is_another,
         with_forces: asked.map(|(_, with)| result::model(&with.found, prepared.early_s)),
     })
 }

@@ -90,13 +90,13 @@ pub(super) struct Limits {
 
 /// Fits the structures to a record.
 pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
-    let rows = record.len() - record.index_at(limits.skip_s);
+    let rows = record.len() - record.skipped(limits.skip_s);
     let samples = (rows / ROWS).max(limits.fewest_samples);
     let blocks = Blocks::new(record, samples, limits.skip_s);
     let tau_s = limits.longest_tau_s;
     let heads = heads(limits.structure);
     let screened: Vec<Vec<Theta>> = (heads.iter())
-        .map(|head| search::screen(record, *head, limits.skip_s, tau_s))
+        .flat_map(|head| search::screen(record, *head, limits.skip_s, tau_s))
         .collect();
     let starts: Vec<Theta> = screened
         .iter()
@@ -109,6 +109,7 @@ pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
     }
     derive(&blocks, &mut all, limits);
     lift(&blocks, &mut all, limits);
+    quieten(&blocks, &mut all, limits);
     if limits.structure.is_none() {
         all.retain(|candidate| !has_hidden_lag(&candidate.found.theta, record.dt_s));
     }
@@ -205,6 +206,36 @@ fn lift(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
         let starts = search::derive(&inner.found.theta, structure, blocks.record.dt_s);
         all.extend(search::race(blocks, &starts, None, limits.longest_tau_s));
     }
+}
+
+/// Fits the best of each structure again without disturbances. Those of the lead may make up for what it lacks, as a walk does
+/// for the damping of a process that is taken for an integrator; the structure that has it needs none.
+fn quieten(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
+    let Some(lead) = search::best(all.clone()) else {
+        return;
+    };
+    let mut starts: Vec<Theta> = Vec::new();
+    for structure in Structure::ALL {
+        let own = all
+            .iter()
+            .filter(|candidate| candidate.structure() == structure);
+        let best = own.min_by(|a, b| a.bic.total_cmp(&b.bic));
+        let hopeful = best.filter(|best| best.bic < lead.bic + HOPELESS);
+        starts.extend(hopeful.and_then(|best| {
+            let mut quiet = best.found.theta;
+            quiet.noises().next()?;
+            NoiseKind::ALL
+                .into_iter()
+                .for_each(|kind| quiet.set_noise(kind, 0.0));
+            Some(quiet)
+        }));
+    }
+    all.extend(search::race(
+        blocks,
+        &starts,
+        Some(&lead),
+        limits.longest_tau_s,
+    ));
 }
 
 /// Whether a second lag is shorter than a sample: no output shows it, it stands for an error of the samples' times.

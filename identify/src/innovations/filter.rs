@@ -9,7 +9,7 @@
 //! columns of an unknown initial state, which have no data: the filter forgets the initial state, and their rows end
 //! where nothing of it is left.
 
-use onecycle_design::state_space::{Matrix, identity};
+use onecycle_design::state_space::Matrix;
 
 use super::lifted::Lifted;
 use super::normal::Normal;
@@ -149,10 +149,36 @@ pub(super) fn of_data<'a, const N: usize, const D: usize>(
     rows
 }
 
-/// Innovations of the columns of the initial state, until it is forgotten.
-pub(super) fn of_start<const N: usize>(runs: &[Run<N>]) -> Vec<[f64; N]> {
+/// Data that a filter turns into `white` innovations, from an initial state of zero: one for each block that has samples.
+pub(super) fn coloured<const N: usize>(
+    runs: &[Run<N>],
+    mut white: impl FnMut() -> f64,
+) -> Vec<f64> {
+    let mut data = Vec::new();
+    let mut state = [[0.0; 1]; N];
+    for run in runs {
+        for _ in 0..run.blocks {
+            if !run.has_samples {
+                state = run.moved(&state, &[0.0]);
+                continue;
+            }
+            let predicted: f64 = (0..N).map(|i| run.row[i] * state[i][0]).sum();
+            let z = (white() + predicted) / run.inverse_deviation;
+            state = run.moved(&state, &[z]);
+            data.push(z);
+        }
+    }
+    data
+}
+
+/// Innovations of the first `count` columns of the initial state, which are those of `basis`, until they are forgotten.
+pub(super) fn of_start<const N: usize>(
+    runs: &[Run<N>],
+    basis: &Matrix<N>,
+    count: usize,
+) -> Vec<[f64; N]> {
     let mut rows = Vec::new();
-    let mut state = identity::<N>();
+    let mut state = *basis;
     let mut squares = [0.0; N];
     let mut looked = 0;
     for run in runs {
@@ -179,7 +205,7 @@ pub(super) fn of_start<const N: usize>(runs: &[Run<N>]) -> Vec<[f64; N]> {
             }));
             if rows.len() >= looked + LOOK {
                 looked = rows.len();
-                if is_forgotten(run, &state, &squares) {
+                if is_forgotten(run, &state, &squares[..count]) {
                     return rows;
                 }
             }
@@ -189,18 +215,19 @@ pub(super) fn of_start<const N: usize>(runs: &[Run<N>]) -> Vec<[f64; N]> {
 }
 
 /// Whether the next row is negligible in every column.
-fn is_forgotten<const N: usize>(run: &Run<N>, state: &Matrix<N>, squares: &[f64; N]) -> bool {
-    (0..N).all(|lane| {
+fn is_forgotten<const N: usize>(run: &Run<N>, state: &Matrix<N>, squares: &[f64]) -> bool {
+    (0..squares.len()).all(|lane| {
         let size: f64 = (0..N).map(|i| (run.row[i] * state[i][lane]).abs()).sum();
         size < FORGOTTEN * squares[lane].sqrt()
     })
 }
 
-/// Products of the regressors: the data columns but the first, then those of the initial state; and their products with
-/// the first data column.
+/// Products of the regressors: the data columns but the first, then the first `count` of the initial state; and their
+/// products with the first data column.
 pub(super) fn products<const N: usize, const D: usize>(
     data: &[[f64; D]],
     start: &[[f64; N]],
+    count: usize,
 ) -> (Normal, [f64; super::normal::MOST]) {
     let mut of_data = [[0.0; D]; D];
     for row in data {
@@ -223,13 +250,13 @@ pub(super) fn products<const N: usize, const D: usize>(
         }
     }
     let responses = D - 1;
-    let mut normal = Normal::new(responses + N);
+    let mut normal = Normal::new(responses + count);
     let mut right = [0.0; super::normal::MOST];
     for i in 0..responses {
         right[i] = of_data[i + 1][0];
         normal.products[i][..=i].copy_from_slice(&of_data[i + 1][1..i + 2]);
     }
-    for i in 0..N {
+    for i in 0..count {
         let row = &mut normal.products[responses + i];
         right[responses + i] = mixed[i][0];
         row[..responses].copy_from_slice(&mixed[i][1..]);

@@ -5,12 +5,12 @@ use std::ops::Range;
 use onecycle_design::{LowPass, Structure};
 
 use super::choose::{Choice, Limits, choose};
-use super::mixture::{Component, mixture};
+use super::mixture::{self, Component};
 use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, NoiseKind, Theta};
-use super::{LONGEST_TAU, ROWS, forces, outliers, validate};
+use super::{LONGEST_TAU, ROWS, forces, outliers, output_error, validate};
 use crate::assumed::RecordedLoop;
 use crate::remark::Remark;
 use crate::settings::Options;
@@ -27,6 +27,8 @@ const CHOOSING: usize = 20_000;
 /// Samples between the outputs of a second difference that shows how much such a part moves: several periods of what moves
 /// it, and less of its noise than between neighbours.
 const CURVED: usize = CHOOSING / 100;
+/// Fewest samples of a part that chooses.
+const LEAST_PART: usize = 300;
 /// Rounds of outliers.
 const ROUNDS: usize = 3;
 /// Rows that are tried where the innovations of shorter rows are coloured, in lengths of these.
@@ -51,6 +53,9 @@ pub(super) struct Fitted {
     /// Fit of the structure that contains the best one and has its damping as a further unknown. The posterior is that
     /// of this structure: damping that a record does not show may be there.
     pub(super) wider: Candidate,
+    /// Fit without disturbances, if it explains what that with disturbances wrongly leaves to these. It is the best one then,
+    /// and the posterior has both.
+    pub(super) output_error: Option<Candidate>,
     pub(super) outliers: usize,
 }
 
@@ -71,7 +76,7 @@ impl Fitted {
             structure: options.structure,
             fewest_samples: 1,
         };
-        let choice = choose_on_parts(&mut record, &limits, options, remarks);
+        let choice = choose_start(&mut record, &limits, options, remarks);
         let (mut part, mut choice) = choice.ok_or(Verdict::NoFit)?;
         let theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
         let (mut samples, skip_s) = rows_for(&record, &theta);
@@ -106,11 +111,18 @@ impl Fitted {
             samples,
             wider: wider.unwrap_or_else(|| best.clone()),
             best,
+            output_error: None,
             outliers: outliers + found,
             record,
         };
         if let Some(remark) = fitted.add_forces() {
             remarks.push(remark);
+        }
+        let blocks = fitted.blocks();
+        fitted.output_error = output_error::instead(&blocks, &fitted.best, longest);
+        if let Some(found) = &fitted.output_error {
+            remarks.push(Remark::DriftOrGain);
+            fitted.best = found.clone();
         }
         Ok(fitted)
     }
@@ -155,7 +167,22 @@ impl Fitted {
     pub(super) fn posterior(&self, blocks: &Blocks<'_>) -> Vec<Component> {
         let structure = self.wider.structure();
         let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
-        mixture(blocks, &self.wider.found, &bounds)
+        let mut components = mixture::mixture(blocks, &self.wider.found, &bounds);
+        if let Some(other) = &self.output_error {
+            let bounds = Bounds::new(other.structure(), blocks, self.limits.longest_tau_s);
+            let without = mixture::of_one(blocks, &other.found, &bounds);
+            components
+                .iter_mut()
+                .for_each(|component| component.weight *= 0.5);
+            components.splice(
+                0..0,
+                without.map(|component| Component {
+                    weight: 0.5,
+                    ..component
+                }),
+            );
+        }
+        components
     }
 
     /// What the record says about the loop of a controller, with the known filter of its output.
@@ -178,6 +205,52 @@ impl Fitted {
     }
 }
 
+/// Step 2, with the state at the start unknown and at rest: the start that explains the whole record better is kept in the
+/// record, unless it is known.
+fn choose_start(
+    record: &mut Record,
+    limits: &Limits,
+    options: &Options,
+    remarks: &mut Vec<Remark>,
+) -> Option<(Range<usize>, Choice)> {
+    let mut at_rest = Record {
+        rest: Some(record.input[0]),
+        ..record.clone()
+    };
+    let [mut of_free, mut of_rest] = [vec![], vec![]];
+    let free = choose_on_parts(record, limits, options, &mut of_free);
+    if record.rest.is_some() {
+        remarks.append(&mut of_free);
+        return free;
+    }
+    let resting = choose_on_parts(&mut at_rest, limits, options, &mut of_rest);
+    let thetas = [&free, &resting].map(|found| Some(found.as_ref()?.1.chosen()?.found.theta));
+    // On the same rows: those whose outputs do not depend on an input before the record.
+    let (samples, skip_s) = (thetas.iter().flatten())
+        .map(|theta| rows_for(record, theta))
+        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+    let first = record.index_at(skip_s);
+    let bic = |of: &Record, theta: &Theta| {
+        let blocks = Blocks::from(of, samples, first);
+        let found = search::warm(&blocks, theta, limits.longest_tau_s, search::FINE);
+        found.map_or(f64::INFINITY, |found| {
+            let rows = found.at.residual.len() as f64;
+            found.at.profile_bic + found.theta.free().len() as f64 * rows.ln()
+        })
+    };
+    let bics = |of: &Record| {
+        let each = thetas.iter().flatten().map(|theta| bic(of, theta));
+        each.fold(f64::INFINITY, f64::min)
+    };
+    if bics(&at_rest) < bics(record) {
+        *record = at_rest;
+        remarks.append(&mut of_rest);
+        return resting.or(free);
+    }
+    remarks.append(&mut of_free);
+    free.or(resting)
+}
+
 /// Step 2: the choice on the part of a record that tells most, and this part.
 fn choose_on_parts(
     record: &mut Record,
@@ -186,15 +259,24 @@ fn choose_on_parts(
     remarks: &mut Vec<Remark>,
 ) -> Option<(Range<usize>, Choice)> {
     let mut choices = Vec::new();
-    for part in excited_parts(record) {
-        let choice = choose_on(
-            record,
-            part.clone(),
-            limits.fewest_samples,
-            options,
-            remarks,
-        );
-        choices.extend(choice.map(|choice| (part, choice)));
+    let mut parts = excited_parts(record);
+    while let Some(part) = parts.pop() {
+        let fewest = limits.fewest_samples;
+        let Some(choice) = choose_on(record, part.clone(), fewest, options, remarks) else {
+            continue;
+        };
+        // Rows longer than the shortest lag do not show it: a shorter part has shorter rows.
+        let row_s = choice.samples as f64 * record.dt_s;
+        let shortest_s = (choice.chosen()).map(|found| found.found.theta.shortest_lag_s());
+        let length = part.len() / search::ZOOM;
+        if choice.samples > fewest
+            && length > LEAST_PART
+            && shortest_s.is_some_and(|lag_s| lag_s < 2.0 * row_s)
+        {
+            let inside = search::liveliest(&record.part(part.clone()), length);
+            parts.push(part.start + inside.start..part.start + inside.end);
+        }
+        choices.push((part, choice));
     }
     most_likely(choices, record, limits.longest_tau_s)
 }
@@ -208,6 +290,8 @@ fn choose_on(
     remarks: &mut Vec<Remark>,
 ) -> Option<Choice> {
     let mut part = record.part(part);
+    // At rest before the record, at rest where a part begins: the input moves where the part tells most.
+    part.rest = part.rest.or(record.rest.map(|_| part.input[0]));
     let length_s = part.time_s(part.len() - 1);
     let limits = Limits {
         skip_s: SKIPPED * length_s,
@@ -286,7 +370,7 @@ fn rows_for(record: &Record, theta: &Theta) -> (usize, f64) {
     let length_s = record.time_s(record.len() - 1);
     let tau_s = theta.tau_s().max(0.0);
     let skip_s = (1.5 * tau_s + 2.0 * record.dt_s).min(LONGEST_TAU * length_s);
-    let rows = record.len() - record.index_at(skip_s);
+    let rows = record.len() - record.skipped(skip_s);
     let fastest_noise = NoiseKind::ALL.map(|kind| theta.noise(kind));
     let noise_s = 1.0 / fastest_noise.into_iter().fold(0.0, f64::max);
     let fast_s = theta.shortest_lag_s().min(noise_s).min(length_s) + tau_s;
@@ -308,7 +392,8 @@ fn whiter(record: &Record, best: &Candidate, limits: &Limits, samples: usize) ->
     if !validate::is_coloured(&validate::tests(&blocks, &best.found.at)) {
         return None;
     }
-    let longest_s = LONGEST_ROW * validate::shortest_period_s(&blocks)?;
+    let fast_s = theta.shortest_lag_s() + theta.tau_s().max(0.0);
+    let longest_s = fast_s.min(LONGEST_ROW * validate::shortest_period_s(&blocks)?);
     let is_short = |count: &usize| {
         *count as f64 * record.dt_s < longest_s && record.len() / count >= FEWEST_LONG_ROWS
     };

@@ -24,6 +24,9 @@
 
 use std::f64::consts::TAU as TWO_PI;
 
+use rand_distr::{Distribution, StandardNormal};
+use rand_pcg::Pcg64Mcg;
+
 use onecycle_design::state_space::{Matrix, StateSpace, add, congruent, identity, product, times};
 
 use super::filter::{self, Run, runs};
@@ -34,10 +37,26 @@ use super::record::Blocks;
 use super::response;
 use super::theta::{NoiseKind, Theta};
 
+/// Calls a function of the number of states for a process.
+macro_rules! by_size {
+    ($theta:expr, $call:ident($($argument:expr),*)) => {
+        match $theta.structure.stages().states() + 1 {
+            2 => $call::<2>($($argument),*),
+            3 => $call::<3>($($argument),*),
+            4 => $call::<4>($($argument),*),
+            5 => $call::<5>($($argument),*),
+            _ => None,
+        }
+    };
+}
+
 /// Likelihood at one point, with the linear unknowns at their best.
 #[derive(Clone, Debug)]
 pub(super) struct Evaluation {
     pub(super) log_likelihood: f64,
+    /// Bayesian information criterion of the linear unknowns alone, these at their best: comparable between starts with
+    /// another number of unknown states on the same rows.
+    pub(super) profile_bic: f64,
     /// Residual of each block that has samples, scaled so that least squares of it is maximum likelihood, the noise
     /// included.
     pub(super) residual: Vec<f64>,
@@ -75,19 +94,131 @@ impl Evaluation {
     }
 }
 
+/// States that the start may have: the sum of the first `count` columns of `basis`, each times an unknown.
+struct Start<const N: usize> {
+    /// By rows: the state of a column is `basis[0..N][column]`.
+    basis: Matrix<N>,
+    count: usize,
+}
+
+impl<const N: usize> Start<N> {
+    /// Any state.
+    fn free() -> Self {
+        Self {
+            basis: identity(),
+            count: N,
+        }
+    }
+
+    /// The states at rest under a constant input, which the response to the input leaves out: a constant output, and with an
+    /// integrator a constant rate too. The disturbance is the one that keeps that state.
+    fn at_rest(theta: &Theta, system: &System<N>) -> Self {
+        let stages = theta.structure.stages();
+        let [_, c0] = theta.process(1.0).pair();
+        let pole = theta.process(1.0).pole_per_s();
+        let walks = system.c[N - 1] != 0.0;
+        let entry = stages.lags;
+        let mut columns: Vec<[f64; N]> = Vec::with_capacity(2);
+        let mut column = |state: usize, disturbance: f64| {
+            let mut at = [0.0; N];
+            at[state] = 1.0;
+            at[N - 1] += disturbance;
+            columns.push(at);
+        };
+        match (walks, stages.integrators) {
+            (true, _) => column(N - 1, 0.0),
+            (false, 0) if stages.pairs > 0 => column(entry, c0),
+            (false, 0) => column(entry, pole),
+            (false, integrators) => {
+                column(system.model.output, 0.0);
+                match (stages.poles, integrators) {
+                    (0, 1) => column(N - 1, 0.0),
+                    (0, _) => column(entry, 0.0),
+                    _ => column(entry, pole),
+                }
+            }
+        }
+        let mut basis = [[0.0; N]; N];
+        for (j, column) in columns.iter().enumerate() {
+            for i in 0..N {
+                basis[i][j] = column[i];
+            }
+        }
+        Self {
+            basis,
+            count: columns.len(),
+        }
+    }
+
+    /// Covariance of the gain, the first linear unknown, and of the disturbance at the start, from that of any two unknowns.
+    fn with_disturbance(
+        &self,
+        responses: usize,
+        covariance: impl Fn(usize, usize) -> f64,
+    ) -> [[f64; 2]; 2] {
+        let row = &self.basis[N - 1][..self.count];
+        let weighted = |i: usize| -> f64 {
+            let columns = row.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+            columns
+                .map(|(j, weight)| weight * covariance(i, responses + j))
+                .sum()
+        };
+        let columns = row.iter().enumerate().filter(|(_, weight)| **weight != 0.0);
+        let own = columns
+            .map(|(j, weight)| weight * weighted(responses + j))
+            .sum();
+        let mixed = weighted(0);
+        [[covariance(0, 0), mixed], [mixed, own]]
+    }
+}
+
 /// Evaluates the likelihood at `theta`. `None` if the filter does not converge or the columns are degenerate.
 pub(super) fn evaluate(
     blocks: &Blocks<'_>,
     theta: &Theta,
     memory: &mut Memory,
 ) -> Option<Evaluation> {
-    match theta.structure.stages().states() + 1 {
-        2 => evaluate_sized::<2>(blocks, theta, memory),
-        3 => evaluate_sized::<3>(blocks, theta, memory),
-        4 => evaluate_sized::<4>(blocks, theta, memory),
-        5 => evaluate_sized::<5>(blocks, theta, memory),
-        _ => None,
-    }
+    by_size!(theta, evaluate_sized(blocks, theta, memory))
+}
+
+/// The response to the input at unit gain and the columns of the initial state, as sums over the blocks that have samples.
+pub(super) fn regressors(blocks: &Blocks<'_>, theta: &Theta) -> Option<Vec<Vec<f64>>> {
+    by_size!(theta, regressors_sized(blocks, theta))
+}
+
+fn regressors_sized<const N: usize>(blocks: &Blocks<'_>, theta: &Theta) -> Option<Vec<Vec<f64>>> {
+    let system = System::<N>::new(theta, blocks.record.dt_s);
+    let lifted = system.lifted(blocks);
+    let start = system.start_of(blocks, theta);
+    let response = response::sums(&system.model, blocks, theta.tau_s());
+    Some(columns(&lifted, blocks, &[response], &start))
+}
+
+/// Sums over the blocks that have samples of a random disturbance with its noise, from an initial state of zero, where the
+/// white noise of a sample has this `deviation`. `None` if the filter does not converge.
+pub(super) fn simulated_disturbance(
+    blocks: &Blocks<'_>,
+    theta: &Theta,
+    deviation: f64,
+    random: &mut Pcg64Mcg,
+) -> Option<Vec<f64>> {
+    by_size!(theta, disturbance_sized(blocks, theta, deviation, random))
+}
+
+fn disturbance_sized<const N: usize>(
+    blocks: &Blocks<'_>,
+    theta: &Theta,
+    deviation: f64,
+    random: &mut Pcg64Mcg,
+) -> Option<Vec<f64>> {
+    let system = System::<N>::new(theta, blocks.record.dt_s);
+    let lifted = system.lifted(blocks);
+    let (runs, _) = runs(system.start(blocks, &lifted)?, &lifted, blocks);
+    let white = || {
+        let normal: f64 = StandardNormal.sample(random);
+        deviation * normal
+    };
+    Some(filter::coloured(&runs, white))
 }
 
 /// What the last evaluation computed from the process alone, which steps in the noise find here, and its rows.
@@ -177,6 +308,14 @@ impl<const N: usize> System<N> {
         }
     }
 
+    /// States that the start may have.
+    fn start_of(&self, blocks: &Blocks<'_>, theta: &Theta) -> Start<N> {
+        match blocks.record.rest {
+            Some(_) => Start::at_rest(theta, self),
+            None => Start::free(),
+        }
+    }
+
     fn is_quiet(&self) -> bool {
         self.intensity.iter().flatten().all(|v| *v == 0.0)
     }
@@ -219,12 +358,13 @@ fn evaluate_sized<const N: usize>(
 ) -> Option<Evaluation> {
     let system = System::<N>::new(theta, blocks.record.dt_s);
     let lifted = system.lifted(blocks);
-    remember(&system, &lifted, blocks, theta, memory)?;
-    let (runs, log_variances) = runs(system.start(blocks, &lifted)?, &lifted, blocks);
+    let start = system.start_of(blocks, theta);
+    remember(&system, &lifted, blocks, (theta, &start), memory)?;
+    let filter = runs(system.start(blocks, &lifted)?, &lifted, blocks);
     match memory.responses.len() {
-        1 => filtered::<N, 2>(blocks, &runs, log_variances, memory),
-        2 => filtered::<N, 3>(blocks, &runs, log_variances, memory),
-        3 => filtered::<N, 4>(blocks, &runs, log_variances, memory),
+        1 => filtered::<N, 2>(blocks, &filter, &start, memory),
+        2 => filtered::<N, 3>(blocks, &filter, &start, memory),
+        3 => filtered::<N, 4>(blocks, &filter, &start, memory),
         _ => None,
     }
 }
@@ -232,8 +372,8 @@ fn evaluate_sized<const N: usize>(
 /// Likelihood of the responses in `memory` under a filter.
 fn filtered<const N: usize, const D: usize>(
     blocks: &Blocks<'_>,
-    runs: &[Run<N>],
-    log_variances: f64,
+    (runs, log_variances): &(Vec<Run<N>>, f64),
+    start: &Start<N>,
     memory: &mut Memory,
 ) -> Option<Evaluation> {
     let columns = std::array::from_fn(|column| match column.checked_sub(1) {
@@ -243,11 +383,12 @@ fn filtered<const N: usize, const D: usize>(
     let rows = filter::of_data::<N, D>(runs, columns, &mut memory.rows);
     let responses = D - 1;
     let count = rows.len();
-    let freedom = count as f64 - (responses + N) as f64;
+    let freedom = count as f64 - (responses + start.count) as f64;
     if freedom < 1.0 {
         return None;
     }
-    let mut fit = least_squares(rows, &filter::of_start(runs))?;
+    let of_start = filter::of_start(runs, &start.basis, start.count);
+    let mut fit = least_squares(rows, &of_start, start)?;
     let sum: f64 = fit.residual.iter().map(|r| r * r).sum();
     let variance = sum / freedom;
     let log_x = 2.0 * (fit.log_determinant - memory.log_determinant);
@@ -255,6 +396,10 @@ fn filtered<const N: usize, const D: usize>(
     let scale = blocks.scale;
     let likelihood = -0.5 * (freedom * (TWO_PI * variance).ln() + freedom + logs);
     let log_likelihood = likelihood - freedom * scale.ln();
+    // With all linear unknowns at their best instead of integrated out.
+    let all = count as f64;
+    let profile = -0.5 * (all * (TWO_PI * sum / all).ln() + all + log_variances);
+    let profile_bic = (responses + start.count) as f64 * all.ln() - 2.0 * profile;
     if !log_likelihood.is_finite() {
         return None;
     }
@@ -263,13 +408,13 @@ fn filtered<const N: usize, const D: usize>(
     fit.residual.iter_mut().for_each(|r| *r *= stretch);
     Some(Evaluation {
         log_likelihood,
+        profile_bic,
         residual: fit.residual,
         stretch: stretch / scale,
         gain: fit.coefficients[0] * scale,
         gain_factor: fit.covariance[0][0],
-        state: fit.coefficients[responses..]
-            .iter()
-            .map(|x| x * scale)
+        state: (start.basis.iter())
+            .map(|row| scale * inner(&row[..start.count], &fit.coefficients[responses..]))
             .collect(),
         forces: (1..responses)
             .map(|i| {
@@ -282,7 +427,7 @@ fn filtered<const N: usize, const D: usize>(
         disturbance_factors: (fit.covariance[1][1], fit.covariance[0][1]),
         variance: squared,
         #[cfg(test)]
-        determinants: (log_variances, log_x),
+        determinants: (*log_variances, log_x),
     })
 }
 
@@ -302,11 +447,12 @@ struct LeastSquares {
 /// their end.
 fn least_squares<const N: usize, const D: usize>(
     data: &[[f64; D]],
-    start: &[[f64; N]],
+    of_start: &[[f64; N]],
+    start: &Start<N>,
 ) -> Option<LeastSquares> {
-    let (normal, right) = filter::products(data, start);
+    let (normal, right) = filter::products(data, of_start, start.count);
     let Some(root) = normal.root() else {
-        return by_orthogonal_columns(data, start);
+        return by_orthogonal_columns(data, of_start, start);
     };
     let coefficients = root.solve(&right);
     let responses = D - 1;
@@ -317,16 +463,16 @@ fn least_squares<const N: usize, const D: usize>(
             row[0] - explained.sum::<f64>()
         })
         .collect();
-    for (residual, row) in residual.iter_mut().zip(start) {
-        for i in 0..N {
+    for (residual, row) in residual.iter_mut().zip(of_start) {
+        for i in 0..start.count {
             *residual -= coefficients[responses + i] * row[i];
         }
     }
     Some(LeastSquares {
         residual,
-        coefficients: coefficients[..responses + N].to_vec(),
+        coefficients: coefficients[..responses + start.count].to_vec(),
         log_determinant: root.log_determinant(),
-        covariance: root.covariance(&[0, responses + N - 1]),
+        covariance: start.with_disturbance(responses, |i, j| root.covariance(&[i, j])[0][1]),
         factors: (0..responses)
             .map(|i| root.covariance(&[i])[0][0])
             .collect(),
@@ -336,13 +482,14 @@ fn least_squares<const N: usize, const D: usize>(
 /// The same for columns that the normal equations do not tell apart.
 fn by_orthogonal_columns<const N: usize, const D: usize>(
     data: &[[f64; D]],
-    start: &[[f64; N]],
+    of_start: &[[f64; N]],
+    start: &Start<N>,
 ) -> Option<LeastSquares> {
     let responses = D - 1;
     let of_data = |lane: usize| data.iter().map(|row| row[lane]).collect::<Vec<f64>>();
     let mut columns: Vec<Vec<f64>> = (1..D).map(of_data).collect();
-    for i in 0..N {
-        let mut column: Vec<f64> = start.iter().map(|row| row[i]).collect();
+    for i in 0..start.count {
+        let mut column: Vec<f64> = of_start.iter().map(|row| row[i]).collect();
         column.resize(data.len(), 0.0);
         columns.push(column);
     }
@@ -352,7 +499,7 @@ fn by_orthogonal_columns<const N: usize, const D: usize>(
         residual,
         coefficients,
         log_determinant: columns.log_determinant(),
-        covariance: columns.covariance(&[0, responses + N - 1]),
+        covariance: start.with_disturbance(responses, |i, j| columns.covariance(&[i, j])[0][1]),
         factors: (0..responses)
             .map(|i| columns.covariance(&[i])[0][0])
             .collect(),
@@ -364,7 +511,7 @@ fn remember<const N: usize>(
     system: &System<N>,
     lifted: &[Lifted<N>],
     blocks: &Blocks<'_>,
-    theta: &Theta,
+    (theta, start): (&Theta, &Start<N>),
     memory: &mut Memory,
 ) -> Option<()> {
     let walks = system.c[N - 1] != 0.0;
@@ -376,9 +523,11 @@ fn remember<const N: usize>(
     memory.responses = vec![response::sums(&system.model, blocks, theta.tau_s())];
     let forces = response::of_forces(&system.model, blocks, theta.delay_and_lag_s());
     memory.responses.extend(forces);
-    memory.log_determinant = match products(lifted, blocks, &memory.responses).root() {
+    memory.log_determinant = match products(lifted, blocks, &memory.responses, start).root() {
         Some(root) => root.log_determinant(),
-        None => Orthogonal::new(&columns(lifted, blocks, &memory.responses))?.log_determinant(),
+        None => {
+            Orthogonal::new(&columns(lifted, blocks, &memory.responses, start))?.log_determinant()
+        }
     };
     memory.key = Some(key);
     Some(())
@@ -389,22 +538,22 @@ fn products<const N: usize>(
     lifted: &[Lifted<N>],
     blocks: &Blocks<'_>,
     responses: &[Vec<f64>],
+    start: &Start<N>,
 ) -> Normal {
     let count = responses.len();
-    let mut normal = Normal::new(count + N);
+    let mut normal = Normal::new(count + start.count);
     for (i, response) in responses.iter().enumerate() {
         for (j, other) in responses[..=i].iter().enumerate() {
             normal.products[i][j] = inner(response, other);
         }
         let with_start = with_start(lifted, blocks, response);
-        for k in 0..N {
-            normal.products[count + k][i] = with_start[k];
+        for k in 0..start.count {
+            let column = (0..N).map(|i| start.basis[i][k] * with_start[i]);
+            normal.products[count + k][i] = column.sum();
         }
     }
-    for (row, of_start) in normal.products[count..]
-        .iter_mut()
-        .zip(of_start(lifted, blocks))
-    {
+    let of_start = congruent(&transpose(&start.basis), &of_start(lifted, blocks));
+    for (row, of_start) in normal.products[count..].iter_mut().zip(of_start) {
         row[count..count + N].copy_from_slice(&of_start);
     }
     normal
@@ -451,10 +600,11 @@ fn columns<const N: usize>(
     lifted: &[Lifted<N>],
     blocks: &Blocks<'_>,
     responses: &[Vec<f64>],
+    start: &Start<N>,
 ) -> Vec<Vec<f64>> {
-    let mut of_start = vec![Vec::with_capacity(blocks.len()); N];
+    let mut of_start = vec![Vec::with_capacity(blocks.len()); start.count];
     let mut of_responses = vec![Vec::with_capacity(blocks.len()); responses.len()];
-    let mut state = identity::<N>();
+    let mut state = start.basis;
     for (row, &kind) in blocks.kind_of.iter().enumerate() {
         let block = &lifted[kind as usize];
         if block.r > 0.0 {

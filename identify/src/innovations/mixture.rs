@@ -57,6 +57,16 @@ impl Point {
     }
 }
 
+/// The one component of a fit. `None` if the unknowns have no joint maximum.
+pub(super) fn of_one(blocks: &Blocks<'_>, found: &Found, bounds: &Bounds) -> Option<Component> {
+    let point = Point::of(blocks, found.clone(), bounds)?;
+    Some(Component {
+        weight: 1.0,
+        found: point.found,
+        laplace: point.laplace,
+    })
+}
+
 /// Components about the best fit. Empty if the unknowns have no joint maximum.
 pub(super) fn mixture(blocks: &Blocks<'_>, best: &Found, bounds: &Bounds) -> Vec<Component> {
     let Some(centre) = Point::of(blocks, best.clone(), bounds) else {

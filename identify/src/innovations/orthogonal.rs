@@ -17,6 +17,12 @@ pub(crate) struct Orthogonal {
 impl Orthogonal {
     /// Decomposes columns of equal length. `None` if one is zero, not finite, or a combination of those before it.
     pub(crate) fn new(columns: &[Vec<f64>]) -> Option<Self> {
+        let found = Self::independent(columns);
+        (found.q.len() == columns.len()).then_some(found)
+    }
+
+    /// Decomposes those of the columns that are not zero, not finite, or a combination of those before them.
+    pub(crate) fn independent(columns: &[Vec<f64>]) -> Self {
         let mut found = Self {
             q: Vec::with_capacity(columns.len()),
             r: Vec::with_capacity(columns.len()),
@@ -25,13 +31,13 @@ impl Orthogonal {
         for column in columns {
             let length = dot(column, column).sqrt();
             if !(length.is_finite() && length > 0.0) {
-                return None;
+                continue;
             }
             let mut rest: Vec<f64> = column.iter().map(|v| v / length).collect();
             let mut r = found.project(&mut rest);
             let left = dot(&rest, &rest).sqrt();
             if left < LEAST {
-                return None;
+                continue;
             }
             rest.iter_mut().for_each(|v| *v /= left);
             r.push(left);
@@ -39,7 +45,19 @@ impl Orthogonal {
             found.r.push(r);
             found.scale.push(length);
         }
-        Some(found)
+        found
+    }
+
+    /// Number of columns.
+    pub(crate) fn len(&self) -> usize {
+        self.q.len()
+    }
+
+    /// Sum of squares of the part of `y` that no combination of the columns explains.
+    pub(crate) fn left(&self, y: &[f64]) -> f64 {
+        let mut rest = y.to_vec();
+        self.project(&mut rest);
+        dot(&rest, &rest)
     }
 
     /// Takes the components along the columns found so far out of `rest`, and returns them.

@@ -45,6 +45,7 @@ pub fn expected(
         output: vec![0.0; input.len()],
         present: vec![true; input.len()],
         hold,
+        rest: None,
     };
     let state_space = StateSpace::<6>::new(&theta.process(1.0));
     let whole = Blocks::new(&record, 1, 0.0);

@@ -61,6 +61,7 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
         &signals.output[range.clone()],
     );
     check(input, output)?;
+    let rest = before(input, options.input_before)?;
     let part_used = range.len() as f64 / asked.len() as f64;
     let times_s = &signals.time_s[range];
     let unfiltered = (options.output_filter_hz)
@@ -71,6 +72,7 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
     };
     mark_stale(&mut record);
     record.hold = options.hold.unwrap_or(Hold::Held);
+    record.rest = rest;
     let points = f64::from(signals.samples_per_point.saturating_sub(1));
     Ok(Prepared {
         record,
@@ -98,11 +100,19 @@ fn longest_part(asked: &Range<usize>, breaks: &[usize]) -> Range<usize> {
     longest
 }
 
-fn check(input: &[f64], output: &[f64]) -> Result<(), Verdict> {
-    let constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
-    if constant(input) {
+/// Input before the record under which the process was at rest: that which the user has `stated`; for an input that never
+/// changes zero, as before a step in the first row. `None`: not known.
+fn before(input: &[f64], stated: Option<f64>) -> Result<Option<f64>, Verdict> {
+    let is_constant = input.iter().all(|v| *v == input[0]);
+    let rest = stated.or(is_constant.then_some(0.0));
+    if is_constant && rest == Some(input[0]) {
         return Err(Verdict::ConstantInput);
     }
+    Ok(rest)
+}
+
+fn check(input: &[f64], output: &[f64]) -> Result<(), Verdict> {
+    let constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
     if constant(output) {
         return Err(Verdict::ConstantOutput);
     }
@@ -130,6 +140,7 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64], usable: &[bool]) -> R
         output: output.to_vec(),
         present: usable.to_vec(),
         hold: Hold::Held,
+        rest: None,
         forces: Forces::default(),
     };
     if is_even {
@@ -218,6 +229,7 @@ fn spread(
         output: Vec::with_capacity(count),
         present: Vec::with_capacity(count),
         hold: Hold::Held,
+        rest: None,
         forces: Forces::default(),
     };
     let mut sample = 0;

@@ -42,6 +42,9 @@ pub(crate) struct Record {
     pub(crate) present: Vec<bool>,
     /// Input between the samples.
     pub(crate) hold: Hold,
+    /// Input before the record, under which the process was at rest when the record began. `None`: the state at the start
+    /// is not known.
+    pub(crate) rest: Option<f64>,
     /// Nonlinear terms of the model.
     pub(crate) forces: Forces,
 }
@@ -82,6 +85,7 @@ impl Record {
             input,
             output,
             hold: Hold::Held,
+            rest: None,
             forces: Forces::default(),
         }
     }
@@ -120,6 +124,11 @@ impl Record {
         }
     }
 
+    /// Samples at the start whose outputs are not used: those of `skip_s`, unless the process was at rest.
+    pub(crate) fn skipped(&self, skip_s: f64) -> usize {
+        self.rest.map_or_else(|| self.index_at(skip_s), |_| 0)
+    }
+
     /// The same record without the samples outside `range`.
     pub(crate) fn part(&self, range: std::ops::Range<usize>) -> Self {
         let start_s = self.time_s(range.start);
@@ -131,6 +140,7 @@ impl Record {
             output: self.output[range.clone()].to_vec(),
             present: self.present[range.clone()].to_vec(),
             hold: self.hold,
+            rest: self.rest.filter(|_| range.start == 0),
             forces: Forces {
                 drag: (self.forces.drag.get(range.clone()).unwrap_or(&[])).to_vec(),
                 friction: self.forces.friction.get(range).unwrap_or(&[]).to_vec(),
@@ -170,11 +180,16 @@ pub(crate) struct Blocks<'a> {
 
 impl<'a> Blocks<'a> {
     /// Blocks of `samples` samples (one for uneven samples), from the first output present `skip_s` after the first
-    /// sample on: outputs that come later tell nothing of a state that has faded by then.
+    /// sample on: the outputs before depend on an input before the record that is not known. If the process was at rest it
+    /// is known, and no output is skipped.
     pub(crate) fn new(record: &'a Record, samples: usize, skip_s: f64) -> Self {
+        Self::from(record, samples, record.skipped(skip_s))
+    }
+
+    /// Blocks from the first output present at or after the sample `start` on.
+    pub(crate) fn from(record: &'a Record, samples: usize, start: usize) -> Self {
         let even = record.uneven_s.is_empty();
         let samples = if even { samples.max(1) } else { 1 };
-        let start = record.index_at(skip_s);
         let first = (start..record.len()).find(|sample| record.present[*sample]);
         let first = first.unwrap_or(start);
         let count = record.len().saturating_sub(first) / samples;

@@ -2,7 +2,8 @@
 //!
 //! The dead time is `tau = (m + f) dt` with a whole `m` and `0 <= f < 1`. During one sample the delayed input is that of
 //! two samples: a part `f` of the older one, then the newer one. Before the record the input is that of the first
-//! sample. A negative dead time uses later input.
+//! sample, or the one under which the process was at rest; then the response is that to the change of the input from
+//! there. A negative dead time uses later input.
 //!
 //! Nonlinear forces are inputs too. They enter behind the actuator lags without a delay, and run straight from sample to
 //! sample.
@@ -17,16 +18,29 @@ use super::record::{BlockKind, Blocks, Hold, Record};
 #[derive(Clone, Copy)]
 struct Source<'a> {
     values: &'a [f64],
+    /// Value before the first sample.
+    before: f64,
     hold: Hold,
     tau_s: f64,
 }
 
-impl<'a> Source<'a> {
-    fn input(record: &'a Record, tau_s: f64) -> Self {
-        Self {
-            values: &record.input,
-            hold: record.hold,
-            tau_s,
+/// Calls `with` with the input of `record`, less the one before the record if the process was at rest under it.
+fn with_input<T>(record: &Record, tau_s: f64, with: impl FnOnce(Source<'_>) -> T) -> T {
+    let source = Source {
+        values: &record.input,
+        before: record.input[0],
+        hold: record.hold,
+        tau_s,
+    };
+    match record.rest {
+        None => with(source),
+        Some(rest) => {
+            let changes: Vec<f64> = record.input.iter().map(|input| input - rest).collect();
+            with(Source {
+                values: &changes,
+                before: 0.0,
+                ..source
+            })
         }
     }
 }
@@ -37,7 +51,9 @@ pub(super) fn sums<const N: usize>(
     blocks: &Blocks<'_>,
     tau_s: f64,
 ) -> Vec<f64> {
-    sums_of(model, blocks, Source::input(blocks.record, tau_s))
+    with_input(blocks.record, tau_s, |source| {
+        sums_of(model, blocks, source)
+    })
 }
 
 /// Responses to the nonlinear forces of the record in the order of their coefficients, as [`sums`]. `lag_s`: the actuator lag, whose
@@ -55,6 +71,7 @@ pub(super) fn of_forces<const N: usize>(
     let of_force = |values: &[f64]| {
         let source = Source {
             values,
+            before: values[0],
             hold: Hold::Interpolated,
             tau_s: 0.0,
         };
@@ -68,9 +85,11 @@ pub(super) fn of_forces<const N: usize>(
                 .with_gain(1.0)
                 .with_pole_per_s(1.0 / lag_s),
         );
-        let squares: Vec<f64> = outputs(&lag, record, Source::input(record, tau_s))
-            .iter()
-            .map(|lagged| (lagged / lag_s).powi(2))
+        let lagged = with_input(record, tau_s, |source| outputs(&lag, record, source));
+        // The square at rest is a constant, which the disturbance holds.
+        let rest = record.rest.unwrap_or(0.0);
+        let squares: Vec<f64> = (lagged.iter())
+            .map(|lagged| (rest + lagged / lag_s).powi(2) - rest * rest)
             .collect();
         sums.push(of_force(&squares));
     }
@@ -99,7 +118,7 @@ fn outputs<const N: usize>(model: &StateSpace<N>, record: &Record, source: Sourc
     let mut copy = Vec::new();
     let mut outputs = vec![0.0];
     for sample in 1..record.len() {
-        let inputs = delayed(source.values, injection.delay, (sample - 1, 1), &mut copy);
+        let inputs = delayed(source, injection.delay, (sample - 1, 1), &mut copy);
         state = injection.advance(&state, inputs);
         outputs.push(state[model.output]);
     }
@@ -224,20 +243,23 @@ impl<const N: usize> Weights<N> {
 /// Delayed inputs of `count` samples from `start` on, with one before and one after them. `copy` holds them where they
 /// reach beyond the record.
 fn delayed<'a>(
-    values: &'a [f64],
+    source: Source<'a>,
     delay: i64,
     (start, count): (usize, usize),
     copy: &'a mut Vec<f64>,
 ) -> &'a [f64] {
     let first = start as i64 - delay - 1;
     let inside = usize::try_from(first).ok();
-    if let Some(inputs) = inside.and_then(|first| values.get(first..first + count + 2)) {
+    if let Some(inputs) = inside.and_then(|first| source.values.get(first..first + count + 2)) {
         return inputs;
     }
-    let last = values.len() as i64 - 1;
+    let last = source.values.len() as i64 - 1;
     let window = first..first + count as i64 + 2;
     copy.clear();
-    copy.extend(window.map(|k| values[k.clamp(0, last) as usize]));
+    copy.extend(window.map(|k| match usize::try_from(k.min(last)) {
+        Ok(sample) => source.values[sample],
+        Err(_) => source.before,
+    }));
     copy
 }
 
@@ -250,16 +272,15 @@ fn even<const N: usize>(
     let samples = blocks.samples;
     let injection = Injection::new(model, blocks.record.dt_s, source);
     let delay = injection.delay;
-    let values = source.values;
     let weights = Weights::new(&injection, model.output, samples);
     let mut copy = Vec::new();
     let mut state = [0.0; N];
     let single = blocks.first % samples;
     for sample in 0..single {
-        state = injection.advance(&state, delayed(values, delay, (sample, 1), &mut copy));
+        state = injection.advance(&state, delayed(source, delay, (sample, 1), &mut copy));
     }
     for start in (single..blocks.first).step_by(samples) {
-        let inputs = delayed(values, delay, (start, samples), &mut copy);
+        let inputs = delayed(source, delay, (start, samples), &mut copy);
         (_, state) = weights.advance(&state, inputs);
     }
     let is_full = |kind: &BlockKind| kind.mask.iter().all(|present| *present);
@@ -269,14 +290,14 @@ fn even<const N: usize>(
         let start = blocks.range(block).start;
         let mut sum = 0.0;
         if full[kind as usize] {
-            let inputs = delayed(values, delay, (start, samples), &mut copy);
+            let inputs = delayed(source, delay, (start, samples), &mut copy);
             (sum, state) = weights.advance(&state, inputs);
         } else {
             for (sample, present) in (start..).zip(&blocks.kinds[kind as usize].mask) {
                 if *present {
                     sum += state[model.output];
                 }
-                state = injection.advance(&state, delayed(values, delay, (sample, 1), &mut copy));
+                state = injection.advance(&state, delayed(source, delay, (sample, 1), &mut copy));
             }
         }
         sums.push(sum);
@@ -318,7 +339,7 @@ fn uneven<const N: usize>(model: &StateSpace<N>, record: &Record, source: Source
 /// Value of a source and its slope at a time, where `acting` samples have passed.
 fn value_at(record: &Record, source: Source<'_>, acting: usize, time_s: f64) -> (f64, f64) {
     let Some(sample) = acting.checked_sub(1) else {
-        return (source.values[0], 0.0);
+        return (source.before, 0.0);
     };
     let value = source.values[sample];
     match (source.hold, source.values.get(sample + 1)) {

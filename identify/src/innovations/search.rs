@@ -1,8 +1,9 @@
 //! Search for the best process of a structure and the noise that goes with it.
 //!
 //! ```text
-//! 1. screen a grid of processes and noises on a coarse copy of the record       screen
-//! 2. descend from the best starts of each kind of noise, on the coarse copy      screen
+//! 1. screen a grid of processes and noises on coarse copies of the record, from the whole of it
+//!    to a short part at full resolution                                          screen
+//! 2. descend from the best starts of each kind of noise, on these copies         screen
 //! 3. descend from the best of these on the record, for each set of noises        heads
 //! 4. fit the other structures from the best of a structure that contains them    derive
 //! ```
@@ -33,10 +34,14 @@ const CHOOSING: Patience = Patience {
 };
 /// Distance in BIC from the best after a short descent beyond which a start is given up.
 const BEHIND: f64 = 40.0;
-/// Rows of the coarse copy.
+/// Rows of a coarse copy.
 const COARSE_BLOCKS: usize = 500;
-/// Number of different starts for each kind of noise.
-const STARTS: usize = 2;
+/// Ratio of the lengths of the parts that are screened. The grid of a part covers lags over a ratio of 20 at five points, so
+/// that neighbours overlap.
+pub(super) const ZOOM: usize = 6;
+/// Number of different starts for each kind of noise on a coarse copy, and of those that go on to the record.
+const STARTS: usize = 4;
+const RACED: usize = 2;
 
 /// Best point of a structure with a set of noises.
 #[derive(Clone, Debug)]
@@ -83,6 +88,7 @@ fn coarse(record: &Record, samples: usize) -> (Record, f64) {
         output: vec![],
         present: vec![],
         hold: record.hold,
+        rest: record.rest,
         forces: Forces::default(),
     };
     for start in (0..=record.len().saturating_sub(samples)).step_by(samples) {
@@ -103,15 +109,58 @@ fn coarse(record: &Record, samples: usize) -> (Record, f64) {
     (copy, 0.5 * (samples - 1) as f64 * record.dt_s)
 }
 
-/// Starts for a structure: the best points of a coarse grid, after a few steps of descent on a coarse copy of the record.
+/// Starts for a structure: those of the whole record, then of shorter and shorter parts at a finer and finer resolution. So
+/// the lags that can be found do not depend on the length of the record.
 pub(super) fn screen(
     record: &Record,
     structure: Structure,
     skip_s: f64,
     longest_tau_s: f64,
+) -> Vec<Vec<Theta>> {
+    let used = record.len() - record.skipped(skip_s);
+    let mut samples = (used / COARSE_BLOCKS).max(1);
+    let mut scales = vec![screen_at(
+        record,
+        structure,
+        samples,
+        (skip_s, longest_tau_s),
+    )];
+    while samples > 1 && record.uneven_s.is_empty() {
+        samples = (samples / ZOOM).max(1);
+        let length = (COARSE_BLOCKS * samples).min(record.len());
+        let part = record.part(liveliest(record, length));
+        let part_s = part.time_s(part.len() - 1);
+        let limits = (skip_s.min(part_s / 40.0), longest_tau_s.min(part_s / 4.0));
+        scales.push(screen_at(&part, structure, samples, limits));
+    }
+    scales
+}
+
+/// The part of `length` samples whose input changes most, relative to its own steps over a tenth of the part.
+pub(super) fn liveliest(record: &Record, length: usize) -> std::ops::Range<usize> {
+    let lag = (length / 10).max(1);
+    let change = |start: usize| -> f64 {
+        let input = &record.input[start..start + length];
+        let pairs = input.iter().zip(&input[lag..]);
+        pairs.map(|(a, b)| (b - a).powi(2)).sum()
+    };
+    let last = record.len() - length;
+    let starts = (0..=last).step_by((length / 2).max(1));
+    let best = starts.map(|start| (start, change(start)));
+    let best = best.reduce(|a, b| if b.1 > a.1 { b } else { a });
+    let start = best.map_or(0, |(start, _)| start);
+    start..start + length
+}
+
+/// Starts for a structure: the best points of a coarse grid, after a few steps of descent on a copy of the record in steps of
+/// `samples` samples.
+fn screen_at(
+    record: &Record,
+    structure: Structure,
+    samples: usize,
+    (skip_s, longest_tau_s): (f64, f64),
 ) -> Vec<Theta> {
-    let used = record.len() - record.index_at(skip_s);
-    let (copy, early_s) = coarse(record, (used / COARSE_BLOCKS).max(1));
+    let (copy, early_s) = coarse(record, samples);
     let blocks = Blocks::new(&copy, 1, skip_s);
     if blocks.len() < 30 {
         return vec![];
@@ -234,10 +283,17 @@ fn fit_within(
     let bounds = Bounds::new(start.structure, blocks, longest_tau_s);
     let free = start.free();
     let found = descend(blocks, start, &free, &bounds, patience)?;
-    let found = match ordered(&found.theta) {
+    let mut found = match ordered(&found.theta) {
         Some(theta) => descend(blocks, &theta, &free, &bounds, patience)?,
         None => found,
     };
+    // Without a lag the response has a kink where a delayed step of the input meets a sample, and a search may stop there.
+    let tau = start.layout().tau();
+    if start.layout().stages.lags + start.layout().stages.pairs == 0 {
+        let others: Vec<usize> = free.iter().copied().filter(|index| *index != tau).collect();
+        let along = descend(blocks, &found.theta, &others, &bounds, patience)?;
+        found = descend(blocks, &along.theta, &free, &bounds, patience)?;
+    }
     Some(Candidate::new(found))
 }
 
@@ -295,10 +351,13 @@ pub(super) fn race(
     candidates
 }
 
-/// The best start of each kind of noise.
+/// The best starts of each kind of noise.
 pub(super) fn best_of_each_noise(starts: &[Theta]) -> Vec<Theta> {
-    let of_kind = |kind: NoiseKind| starts.iter().find(|theta| theta.noise(kind) > 0.0).copied();
-    NoiseKind::ALL.into_iter().filter_map(of_kind).collect()
+    let of_kind = |kind: NoiseKind| {
+        let own = starts.iter().filter(move |theta| theta.noise(kind) > 0.0);
+        own.take(RACED).copied()
+    };
+    NoiseKind::ALL.into_iter().flat_map(of_kind).collect()
 }
 
 /// Starts from the fit `theta`, which has one noise, with another in its place, with a second one, and without any.

@@ -100,6 +100,43 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
     (share, f)
 }
 
+/// Whether the input follows the output: whether past outputs explain the changes of the input beyond what past inputs do.
+/// Reference: C. W. J. Granger, Econometrica 37 (1969).
+pub(super) fn is_fed_back(blocks: &Blocks<'_>) -> bool {
+    let inputs = blocks.mean_inputs();
+    let outputs: Vec<f64> = (0..blocks.len())
+        .map(|block| blocks.sums[block] / blocks.present(block).max(1) as f64)
+        .collect();
+    let rows = LAGS..blocks.len();
+    let count = rows.len() as f64;
+    let column = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
+        let values: Vec<f64> = rows.clone().map(value).collect();
+        let mean = values.iter().sum::<f64>() / count;
+        values.iter().map(|v| v - mean).collect()
+    };
+    if count < 4.0 * LAGS as f64 {
+        return false;
+    }
+    let target = column(&|row| inputs[row]);
+    let of_past = |values: &[f64]| -> Vec<Vec<f64>> {
+        (1..=LAGS)
+            .map(|lag| column(&|row| values[row - lag]))
+            .collect()
+    };
+    let mut columns = of_past(&inputs);
+    let own = Orthogonal::independent(&columns);
+    columns.extend(of_past(&outputs));
+    let both = Orthogonal::independent(&columns);
+    let (before, after) = (own.left(&target), both.left(&target));
+    let more = (both.len() - own.len()) as f64;
+    if before <= 0.0 || both.len() == own.len() {
+        return false;
+    }
+    let share = 1.0 - after / before;
+    let f = (share / more) / ((1.0 - share) / (count - both.len() as f64 - 1.0));
+    share > LEFT.0 && f > LEFT.1
+}
+
 /// Prediction of the last third of the record from a fit to the first two thirds. `None` if a third is too short.
 pub(super) fn prediction(
     record: &Record,
@@ -113,7 +150,7 @@ pub(super) fn prediction(
         decrease: 1e-5,
     };
     let skip_s = limits.skip_s;
-    let split = record.len() - (record.len() - record.index_at(skip_s)) / 3;
+    let split = record.len() - (record.len() - record.skipped(skip_s)) / 3;
     let early = record.part(0..split);
     let blocks = Blocks::new(&early, samples, skip_s);
     if blocks.len() < 40 {
@@ -142,8 +179,11 @@ pub(super) fn prediction(
     if count < 10.0 {
         return None;
     }
-    let mean = pairs.iter().map(|(value, _)| value).sum::<f64>() / count;
-    let variance: f64 = pairs.iter().map(|(value, _)| (value - mean).powi(2)).sum();
+    // Of the whole record: where the output has settled before the last third, there is nothing left to predict.
+    let every: Vec<f64> = (0..whole.len()).filter_map(measured).collect();
+    let mean = every.iter().sum::<f64>() / every.len() as f64;
+    let square: f64 = every.iter().map(|value| (value - mean).powi(2)).sum();
+    let variance = square * count / every.len() as f64;
     let error: f64 = pairs
         .iter()
         .map(|(value, predicted)| (value - predicted).powi(2))
@@ -232,8 +272,15 @@ fn lines(mut rows: Vec<f64>, row_s: f64) -> Vec<(f64, f64)> {
 }
 
 /// Share of the power of the input in a band of frequencies (rad/s), a quarter wider on both sides, over the first 2,000
-/// rows.
+/// rows. A step before the first row is not among these, and has power at all frequencies.
 pub(super) fn input_share(blocks: &Blocks<'_>, (low, high): (f64, f64)) -> f64 {
+    if blocks
+        .record
+        .rest
+        .is_some_and(|rest| rest != blocks.record.input[0])
+    {
+        return 1.0;
+    }
     let lines = lines(blocks.mean_inputs(), blocks.block_s());
     let line = lines.first().map_or(0.0, |(omega, _)| *omega);
     let (mut inside, mut total) = (0.0, 0.0);

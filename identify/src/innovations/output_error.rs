@@ -1,0 +1,173 @@
+//! Disturbance or process: what a fit with disturbances leaves to them although the input explains it.
+//!
+//! A slow disturbance behind the lags explains a slow response to the input as well as the process does, and the likelihood,
+//! which weighs the errors of one step, hardly minds. Then the gain is wrong and its interval narrow. Without feedback a true
+//! disturbance has nothing to do with the input, so a fit without disturbances (output error) can take no more out of the
+//! error of the simulation than chance allows. That much is known: the disturbances of the fit are simulated, and each is
+//! fitted by the same parameters.
+//!
+//! ```text
+//! R(theta) = |y - g(theta) kappa - X0 x0|^2      of the simulation, the initial state at its best
+//! share    = 1 - R(fit without disturbances) / R(fit with them)
+//! chance   = 1 - |z - P [g, dg/dtheta, X0] z|^2 / |z - P [X0] z|^2     of a simulated disturbance z, P: projection
+//! ```
+//!
+//! Reference: the test of two estimators of which one is efficient and both are consistent if the model is right, J. A.
+//! Hausman, Econometrica 46 (1978).
+
+use onecycle_design::Parameter;
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
+
+use super::descent::{Found, Patience};
+use super::likelihood::{regressors, simulated_disturbance};
+use super::mixture;
+use super::orthogonal::Orthogonal;
+use super::record::Blocks;
+use super::result;
+use super::search::{self, Candidate};
+use super::theta::{Bounds, NoiseKind, Theta};
+use super::validate;
+use crate::posterior::Estimate;
+
+/// Simulated disturbances: the test errs once in this number of records plus one.
+const SIMULATED: usize = 99;
+const SEED: u64 = 1;
+const PATIENCE: Patience = Patience {
+    steps: 40,
+    decrease: 1e-6,
+};
+
+/// The fit without disturbances, if gain or steady gain of each fit lies outside of the other's interval, or if it
+/// explains more than a disturbance that is independent of the input leaves to chance. `None` under feedback too, where the
+/// input follows the disturbance.
+pub(super) fn instead(
+    blocks: &Blocks<'_>,
+    best: &Candidate,
+    longest_tau_s: f64,
+) -> Option<Candidate> {
+    let with = &best.found;
+    with.theta.noises().next()?;
+    if blocks.record.forces.len() > 0 || validate::is_fed_back(blocks) {
+        return None;
+    }
+    let quiet = without_noise(&with.theta);
+    let found = search::warm(blocks, &quiet, longest_tau_s, PATIENCE)?;
+    let is_instead = is_another(blocks, with, &found, longest_tau_s)
+        || explains_more(blocks, with, &found, longest_tau_s)?;
+    is_instead.then(|| Candidate::new(found))
+}
+
+/// Whether the gain or the steady gain of each fit lies outside of the interval of the other.
+fn is_another(blocks: &Blocks<'_>, with: &Found, without: &Found, longest_tau_s: f64) -> bool {
+    let bounds = Bounds::new(with.theta.structure, blocks, longest_tau_s);
+    let [one, other] = [with, without].map(|found| {
+        let component = mixture::of_one(blocks, found, &bounds)?;
+        let (posterior, _) = result::posterior_of(found, &[component], 0.0, Some(1.0));
+        Some(posterior.estimate())
+    });
+    let (Some(one), Some(other)) = (one, other) else {
+        return false;
+    };
+    [Parameter::K, Parameter::KOverTBody]
+        .into_iter()
+        .any(|parameter| {
+            let lies_outside = |of: &Estimate, within: &Estimate| {
+                let value = of.get(parameter).and_then(|interval| interval.estimate);
+                let interval = within.get(parameter);
+                value
+                    .zip(interval)
+                    .is_some_and(|(value, interval)| !interval.holds(value))
+            };
+            lies_outside(&one, &other) && lies_outside(&other, &one)
+        })
+}
+
+/// Whether the fit without disturbances explains a larger share of what is left of the simulation of the other one than it
+/// would of any of the simulated disturbances.
+fn explains_more(
+    blocks: &Blocks<'_>,
+    with: &Found,
+    found: &Found,
+    longest_tau_s: f64,
+) -> Option<bool> {
+    let quiet = without_noise(&with.theta);
+    let y = present(blocks);
+    let before = Regressors::of(blocks, &quiet)?;
+    let kept = before
+        .start
+        .left(&before.less_response(&y, with.at.gain / blocks.scale));
+    let after = Regressors::of(blocks, &found.theta)?;
+    let share = 1.0 - after.all.left(&y) / kept;
+    let bounds = Bounds::new(quiet.structure, blocks, longest_tau_s);
+    let all = before.with_slopes(blocks, &quiet, with.at.gain / blocks.scale, &bounds)?;
+    let mut random = Pcg64Mcg::seed_from_u64(SEED);
+    let deviation = with.at.variance.sqrt() / blocks.scale;
+    for _ in 0..SIMULATED {
+        let disturbance = simulated_disturbance(blocks, &with.theta, deviation, &mut random)?;
+        let by_start = before.start.left(&disturbance);
+        if by_start - all.left(&disturbance) >= share * by_start {
+            return Some(false);
+        }
+    }
+    Some(true)
+}
+
+fn without_noise(theta: &Theta) -> Theta {
+    let mut quiet = *theta;
+    for kind in NoiseKind::ALL {
+        quiet.set_noise(kind, 0.0);
+    }
+    quiet
+}
+
+/// Sums of the outputs of the blocks that have samples.
+fn present(blocks: &Blocks<'_>) -> Vec<f64> {
+    let rows = (0..blocks.len()).filter(|block| blocks.present(*block) > 0);
+    rows.map(|block| blocks.sums[block]).collect()
+}
+
+/// Columns of a simulation: the response to the input, then those of the initial state.
+struct Regressors {
+    /// The response first.
+    columns: Vec<Vec<f64>>,
+    start: Orthogonal,
+    all: Orthogonal,
+}
+
+impl Regressors {
+    fn of(blocks: &Blocks<'_>, theta: &Theta) -> Option<Self> {
+        let columns = regressors(blocks, theta)?;
+        Some(Self {
+            start: Orthogonal::independent(&columns[1..]),
+            all: Orthogonal::independent(&columns),
+            columns,
+        })
+    }
+
+    /// The same with the derivatives of the response to the unknowns of `theta`, times the gain.
+    fn with_slopes(
+        &self,
+        blocks: &Blocks<'_>,
+        theta: &Theta,
+        gain: f64,
+        bounds: &Bounds,
+    ) -> Option<Orthogonal> {
+        let mut columns = self.columns.clone();
+        for index in theta.free() {
+            // Forward differences, with ten times the step of the search: the response is not projected.
+            let step = 10.0 * bounds.step[index];
+            let mut moved = *theta;
+            moved.values[index] += step;
+            let other = regressors(blocks, &moved)?;
+            let slope = other[0].iter().zip(&self.columns[0]);
+            columns.push(slope.map(|(a, b)| gain * (a - b) / step).collect());
+        }
+        Some(Orthogonal::independent(&columns))
+    }
+
+    fn less_response(&self, y: &[f64], gain: f64) -> Vec<f64> {
+        let pairs = y.iter().zip(&self.columns[0]);
+        pairs.map(|(y, g)| y - gain * g).collect()
+    }
+}
