@@ -18,6 +18,8 @@ const LAGS: usize = 20;
 const COLOURED: f64 = 0.1;
 /// Share of the innovations and its F statistic up to which the input explains nothing.
 const LEFT: (f64, f64) = (0.02, 3.0);
+/// F statistic of twenty past outputs in the input that chance exceeds once in a hundred records.
+const FED_BACK: f64 = 1.88;
 /// Most rows between which a correlation is computed exactly; frequencies of the information's spectrum.
 const FREQUENCIES: usize = 120;
 
@@ -134,7 +136,7 @@ pub(super) fn is_fed_back(blocks: &Blocks<'_>) -> bool {
     }
     let share = 1.0 - after / before;
     let f = (share / more) / ((1.0 - share) / (count - both.len() as f64 - 1.0));
-    share > LEFT.0 && f > LEFT.1
+    f > FED_BACK
 }
 
 /// Prediction of the last third of the record from a fit to the first two thirds. `None` if a third is too short.
