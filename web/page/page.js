@@ -390,7 +390,7 @@ const use = async (to) => {
     if (document.activeElement !== at(`exact-${name}`)) at(`exact-${name}`).value = Number(gains[name].toPrecision(6));
     keep(name, same(gains, proposal) ? null : gains[name]);
   }
-  at("origin").hidden = !fromAddress || !same(gains, fromAddress);
+  at("origin").hidden = !isFromAddress();
   showCalm();
   clearTimeout(rest);
   wanted = { do: "judge", gains };
@@ -417,13 +417,14 @@ const answerWanted = async () => {
   isAsking = false;
 };
 const same = (a, b) => NAMES.every((name) => Math.abs(a[name] - b[name]) <= 1e-4 * Math.abs(b[name]));
+const isFromAddress = () => Boolean(fromAddress) && same(gains, fromAddress);
 const showCalm = () => {
   if (!designs.length || !gains || !report) return;
   const now = designs.findIndex(({ controller }) => same(gains, only(controller)));
   const isProposal = same(gains, proposal);
   const nearest = designs.reduce((best, { ms_limit }, k) => Math.abs(ms_limit - report.margins?.ms) < Math.abs(designs[best].ms_limit - report.margins?.ms) ? k : best, 0);
   if (now >= 0 || isProposal) at("calm").value = now >= 0 ? now : nearest;
-  at("calm-text").textContent = isProposal ? report.controller?.style ?? "proposed" : now >= 0 ? `Ms at most ${designs[now].ms_limit}` : "by hand";
+  at("calm-text").textContent = isProposal ? report.controller?.style ?? "proposed" : now >= 0 ? `Ms at most ${designs[now].ms_limit}` : isFromAddress() ? "from the address" : "by hand";
 };
 at("calm").oninput = () => { remember(at("calm")); use(only(designs[at("calm").value].controller)); };
 at("calm").onchange = () => { at("calm").isMoving = false; };

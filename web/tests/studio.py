@@ -320,7 +320,8 @@ def belongings(browser, told):
     expect([page.input_value("#from"), page.input_value("#to")] == ["190", "209"], "the stretch is kept")
     studio.identify()
     studio.designed()
-    expect(page.evaluate("gains.kp") == kp and page.is_visible("#origin"), "gains from the address are called so")
+    expect(page.evaluate("gains.kp") == kp and page.is_visible("#origin")
+           and page.inner_text("#calm-text") == "from the address", "gains from the address are called so")
     page.click("#proposed")
     expect(page.is_hidden("#origin"), "proposed gains do not come from the address")
     # Another loop, and back.
