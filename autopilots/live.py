@@ -157,7 +157,7 @@ class Trial:
             if self.firmware == "px4":
                 time.sleep(10)  # until it hovers again
                 # A test of ten cycles does not resolve the slow lag.
-                relay += ["--band", "3", "--write", self.folder / f"altitude{number}.params"]
+                relay += ["--band", "3", "--below-limits", "--write", self.folder / f"altitude{number}.params"]
                 relay += ["--", "--structure", "double_integrator_lag", "--style", "calm"]
             # 4: the test ended early, or no process was identified.
             self.run(f"relay {amplitude}", relay, codes=(0, 4))

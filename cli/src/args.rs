@@ -40,7 +40,7 @@ pub(crate) use self::live::{
     ConnectionArguments, Live, LiveAction, LiveLog, LiveRelay, LiveState, LiveWrite, LogId,
     identify_of,
 };
-pub(crate) use self::log::{Log, LogArguments, WriteArguments};
+pub(crate) use self::log::{HALF_STEP, Log, LogArguments, WriteArguments};
 pub(crate) use self::man::Man;
 pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};

@@ -3,6 +3,7 @@
 mod caution;
 pub(crate) mod controllers;
 pub(crate) mod flight;
+pub(crate) mod limits;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) mod live;
 pub(crate) mod log;

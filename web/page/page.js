@@ -36,10 +36,10 @@ const start = async () => {
 
 const say = (text, isBad = false) => { at("state").textContent = text; at("state").className = isBad ? "bad" : ""; };
 let began = 0, isBusy = false;
-const busy = (work) => {
+const busy = (work, allowed) => {
   isBusy = Boolean(work);
   at("busy").hidden = !work;
-  for (const id of ["identify", "survey", "simulate", "expect", "loop", "flight"]) at(id).disabled = isBusy;
+  for (const id of ["identify", "survey", "simulate", "expect", "loop", "flight"]) at(id).disabled = isBusy && id !== allowed;
   if (work) { began = performance.now(); at("progress").removeAttribute("value"); say(work); }
 };
 const progress = ({ work, done, all }) => {
@@ -47,9 +47,9 @@ const progress = ({ work, done, all }) => {
   say(`${work[0].toUpperCase()}${work.slice(1)}.`);
   if (all > 0) at("progress").value = done / all; else at("progress").removeAttribute("value");
 };
-// Asks for something that takes long. Undefined: it failed, and the page says why.
-const waited = async (work, content) => {
-  busy(work);
+// Asks for something that takes long, while only `allowed` can be pressed. Undefined: it failed, and the page says why.
+const waited = async (work, content, allowed) => {
+  busy(work, allowed);
   const answer = await send(content);
   busy(null);
   if (answer.stopped) await start();
@@ -58,46 +58,73 @@ const waited = async (work, content) => {
 };
 const took = () => `${((performance.now() - began) / 1000).toFixed(2)} s`;
 
-// ---- State in the fragment: choices, never data --------------------------------------------------------------------
+// ---- State in the fragment: what was set for one loop of one recording, never data ---------------------------------
 
-const kept = new URLSearchParams(location.hash.slice(1));
+const NAMES = ["kp", "ki", "kd", "filter_s"], LABELS = { kp: "Kp", ki: "Ki", kd: "Kd", filter_s: "filter (s)" };
+const CHOICES = ["from", "to", "structure", "style", "more"];
+let kept, linked, fromAddress;
+const writeAddress = () => history.replaceState(null, "", kept.size ? `#${kept}` : location.pathname + location.search);
 const keep = (name, value) => {
+  if ((kept.get(name) ?? "") === String(value ?? "")) return;
   if (value == null || value === "") kept.delete(name); else kept.set(name, value);
-  history.replaceState(null, "", kept.size ? `#${kept}` : location.pathname + location.search);
+  writeAddress();
 };
-const choices = ["from", "to", "structure", "style", "more"];
+const readAddress = () => {
+  kept = new URLSearchParams(location.hash.slice(1));
+  // Gains of the link that opened the page, for its recording and loop.
+  linked = NAMES.every((name) => kept.has(name) && Number.isFinite(Number(kept.get(name)))) ? Object.fromEntries(NAMES.map((name) => [name, Number(kept.get(name))])) : undefined;
+};
+readAddress();
+const forget = (names) => { linked = fromAddress = undefined; for (const name of names) keep(name); };
+// Drops what was set for another loop or recording. Whether something was.
+const belongTo = (key, flight, loop) => {
+  const own = Object.entries({ file: key, flight, loop });
+  const all = [...CHOICES, ...NAMES];
+  const isOther = own.some(([name, value]) => (kept.get(name) ?? "") !== value) && all.some((name) => kept.has(name));
+  if (isOther) forget(all);
+  for (const [name, value] of own) keep(name, value);
+  return isOther;
+};
 
 // ---- Opening -------------------------------------------------------------------------------------------------------
 
 let file, log, signals, report, view;
+// Hides the section and those after it. What was identified goes with them.
 const hideAfter = (id) => {
   const all = ["recording", "result", "design"];
   for (const later of all.slice(all.indexOf(id))) at(later).hidden = true;
+  report = undefined;
 };
 const open = async (blob, name) => {
   hideAfter("recording");
-  file = { blob, name };
+  const opened = file = { blob, name };
   const answer = await waited(`Reading ${name}.`, { file });
-  if (!answer) return;
+  if (!answer || opened !== file) return;
+  file.key = answer.key;
+  const isKept = kept.get("file") === file.key;
   log = answer.log;
   at("loops").hidden = !log;
   at("surveyed").hidden = true;
   if (log) {
     at("flight").replaceChildren(...log.flights.map((flight, k) => make("option", `${k + 1}: ${(flight.span_s[1] - flight.span_s[0]).toFixed(0)} s, ${flight.version || flight.firmware}`, { value: k + 1 })));
     const lengths = log.flights.map(({ span_s: [from, to] }) => to - from);
-    at("flight").value = kept.get("flight") || 1 + lengths.indexOf(Math.max(...lengths));
+    at("flight").value = (isKept && kept.get("flight")) || 1 + lengths.indexOf(Math.max(...lengths));
     if (!at("flight").value) at("flight").value = 1;
     at("flight-label").hidden = log.flights.length < 2;
     fillLoops();
+    if (isKept && [...at("loop").options].some((one) => one.value === kept.get("loop"))) at("loop").value = kept.get("loop");
     if (!at("loop").options.length) return say("The log has no control loop with input and output. Its advice: " + (log.flights[0]?.advice ?? []).join(" "), true);
   }
+  const isOther = belongs();
   await readSignals();
+  if (isOther && signals) say(`${at("state").textContent} Settings of another recording or loop are not used.`);
 };
+// The settings belong to the loop that is chosen.
+const belongs = () => belongTo(file.key, log ? at("flight").value : "", log ? at("loop").value : "");
 const fillLoops = () => {
   const flight = log.flights[at("flight").value - 1];
   const loops = (flight?.loops ?? []).filter((one) => one.input && one.output);
   at("loop").replaceChildren(...loops.map((one) => make("option", one.name)));
-  if (loops.some((one) => one.name === kept.get("loop"))) at("loop").value = kept.get("loop");
 };
 // The choice of a loop as options of the program.
 const loopOptions = () => {
@@ -112,10 +139,13 @@ const options = () => {
   for (const id of ["structure", "style", "from", "to"]) if (at(id).value !== "") all.push(`--${id}`, at(id).value);
   return all;
 };
-const readSignals = async () => {
+let reading;
+const readSignals = () => (reading = readNow());
+const readNow = async () => {
+  isUnread = false;
   hideAfter("result");
-  for (const id of choices) at(id).value = kept.get(id) ?? "";
-  const answer = await waited("Reading the signals.", { message: { do: "signals", options: [...loopOptions(), ...words(at("more").value)] } });
+  for (const id of CHOICES) at(id).value = kept.get(id) ?? "";
+  const answer = await waited("Reading the signals.", { message: { do: "signals", options: [...loopOptions(), ...words(at("more").value)] } }, "identify");
   // The names of columns can be given as options.
   at("recording").hidden = !answer && Boolean(log) && !at("loop").options.length;
   at("signals").hidden = !answer;
@@ -161,6 +191,7 @@ const stretch = () => {
 const choose = (from, to) => {
   at("from").value = from ?? ""; at("to").value = to ?? "";
   keep("from", from); keep("to", to);
+  outdate();
   redrawSignals();
 };
 let dragged = null;
@@ -179,10 +210,29 @@ for (const end of ["pointerup", "pointercancel"]) at("signals").addEventListener
 for (const id of ["from", "to"]) at(id).onchange = () => { keep(id, at(id).value); redrawSignals(); };
 at("whole").onclick = () => { choose(null, null); view = signals.span_s; drawSignals(); };
 at("zoom").onclick = () => { const chosen = stretch(); view = chosen && chosen[1] > chosen[0] ? chosen : signals.span_s; drawSignals(); };
+// What was identified is not of these settings any more.
+const outdate = () => {
+  forget(NAMES);
+  if (report) say("The settings have changed: press Identify.");
+  hideAfter("result");
+};
+for (const id of CHOICES) at(id).addEventListener("input", outdate);
 for (const id of ["structure", "style"]) at(id).onchange = () => keep(id, at(id).value);
-at("more").onchange = () => { keep("more", at("more").value); if (!log) readSignals(); };
-at("loop").onchange = () => { keep("loop", at("loop").value); keep("from"); keep("to"); readSignals(); };
-at("flight").onchange = () => { keep("flight", at("flight").value); fillLoops(); keep("from"); keep("to"); readSignals(); };
+// Other columns are read after the press on a button that ended the typing: a button that is disabled or moves under a
+// press is not clicked.
+let isUnread = false, pressed = Promise.resolve();
+addEventListener("pointerdown", () => {
+  pressed = new Promise((done) => { for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(done), { once: true }); });
+}, true);
+at("more").onchange = async () => {
+  keep("more", at("more").value);
+  if (log) return;
+  isUnread = true;
+  await pressed;
+  if (isUnread) readSignals();
+};
+at("loop").onchange = () => { belongs(); readSignals(); };
+at("flight").onchange = () => { fillLoops(); belongs(); readSignals(); };
 
 // ---- Tables --------------------------------------------------------------------------------------------------------
 
@@ -213,9 +263,13 @@ at("survey").onclick = async () => {
 // ---- Identification ------------------------------------------------------------------------------------------------
 
 at("identify").onclick = async () => {
+  if (isUnread) readSignals();
+  await reading;
   hideAfter("result");
-  const answer = await waited("Identifying.", { message: { do: "identify", options: options() } });
-  if (!answer) return;
+  const of = file, asked = options();
+  const answer = await waited("Identifying.", { message: { do: "identify", options: asked } });
+  if (!answer || of !== file) return;
+  if (String(asked) !== String(options())) return say("The settings have changed: press Identify.");
   report = answer;
   showResult();
 };
@@ -250,14 +304,18 @@ const save = (text, name) => {
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 };
-const stem = () => file.name.replace(/\.[^.]*$/, "");
-at("save-json").onclick = async () => save((await ask({ do: "json" })).text, `${stem()}.json`);
+// Name of a file to save: that of the recording, and of a flight log its loop.
+const stem = () => {
+  const flight = log?.flights.length > 1 ? [`flight${at("flight").value}`] : [];
+  return [file.name.replace(/\.[^.]*$/, ""), ...flight, ...(log ? at("loop").value.split(" ") : [])].join("_");
+};
+at("save-json").onclick = async () => { const of = report, { text } = await ask({ do: "json" }); if (of === report) save(text, `${stem()}.json`); };
 const page = () => waited("Drawing the report.", { message: { do: "page" } });
-at("save-report").onclick = async () => { const answer = await page(); if (answer) { say("The report is saved."); save(answer.text, `${stem()}.html`); } };
+at("save-report").onclick = async () => { const of = report, answer = await page(); if (answer && of === report) { say("The report is saved."); save(answer.text, `${stem()}.html`); } };
 at("report").ontoggle = async () => {
   if (!at("report").open || at("frame").hasAttribute("srcdoc")) return;
-  const answer = await page();
-  if (!answer) return;
+  const of = report, answer = await page();
+  if (!answer || of !== report) return;
   say("The report is drawn.");
   at("frame").onload = () => {
     const inside = at("frame").contentDocument;
@@ -272,10 +330,7 @@ at("report").ontoggle = async () => {
 
 // ---- Controller by hand --------------------------------------------------------------------------------------------
 
-const NAMES = ["kp", "ki", "kd", "filter_s"], LABELS = { kp: "Kp", ki: "Ki", kd: "Kd", filter_s: "filter (s)" };
 const STEPS = 1000, DECADES = 3;
-// Gains of the link that opened the page, for the first process.
-let linked = NAMES.every((name) => kept.has(name) && Number.isFinite(Number(kept.get(name)))) ? Object.fromEntries(NAMES.map((name) => [name, Number(kept.get(name))])) : undefined;
 let gains, proposal, against, past = [], future = [], scale, designs = [];
 const only = (controller) => Object.fromEntries(NAMES.map((name) => [name, controller[name] ?? 0]));
 const showDesign = async () => {
@@ -288,14 +343,16 @@ const showDesign = async () => {
   // Middle of a slider whose proposed gain is zero.
   scale = { kp, ki: proposal.ki || 0.1 * kp * crossover, kd: proposal.kd || 0.1 * kp / crossover, filter_s: proposal.filter_s || 0.05 / crossover };
   buildSliders();
-  at("save-parameters").hidden = at("save-restore").hidden = !log;
-  at("exported").textContent = "";
+  for (const id of ["save-half", "save-whole", "save-restore", "steps"]) at(id).hidden = !log;
+  exported("");
+  isWhole = false;
   against = report.against ? { name: "gains in force", gains: only(report.against.controller) } : { name: "proposed gains", gains: proposal };
-  await judgeAgainst();
-  use(linked ?? proposal);
-  linked = undefined;
   at("calm").disabled = true;
   const of = report;
+  await judgeAgainst();
+  if (of !== report) return;
+  [fromAddress, linked] = [linked, undefined];
+  use(fromAddress ?? proposal);
   const answer = await ask({ do: "trade_off" });
   if (of !== report || answer.error || !answer.length) return;
   // Where noise limits the gains, sharper designs repeat the last one.
@@ -331,8 +388,9 @@ const use = async (to) => {
     at(`slide-${name}`).value = position(name, gains[name]);
     at(`slide-${name}`).setAttribute("aria-valuetext", shown(gains[name]));
     if (document.activeElement !== at(`exact-${name}`)) at(`exact-${name}`).value = Number(gains[name].toPrecision(6));
-    keep(name, gains[name]);
+    keep(name, same(gains, proposal) ? null : gains[name]);
   }
+  at("origin").hidden = !isFromAddress();
   showCalm();
   clearTimeout(rest);
   wanted = { do: "judge", gains };
@@ -346,8 +404,11 @@ const answerWanted = async () => {
     wanted = null;
     const from = performance.now();
     // The compared responses over the same time.
+    const of = report;
     if (message.bands && drawn?.end_s) against.judged = await ask({ do: "judge", gains: against.gains, end_s: drawn.end_s });
-    drawDesign(await ask(message));
+    const answer = await ask(message);
+    if (!of || of !== report) continue;
+    drawDesign(answer);
     if (message.bands) continue;
     document.body.dataset.latencyMs = performance.now() - from;
     clearTimeout(rest);
@@ -356,13 +417,14 @@ const answerWanted = async () => {
   isAsking = false;
 };
 const same = (a, b) => NAMES.every((name) => Math.abs(a[name] - b[name]) <= 1e-4 * Math.abs(b[name]));
+const isFromAddress = () => Boolean(fromAddress) && same(gains, fromAddress);
 const showCalm = () => {
-  if (!designs.length || !gains) return;
+  if (!designs.length || !gains || !report) return;
   const now = designs.findIndex(({ controller }) => same(gains, only(controller)));
   const isProposal = same(gains, proposal);
   const nearest = designs.reduce((best, { ms_limit }, k) => Math.abs(ms_limit - report.margins?.ms) < Math.abs(designs[best].ms_limit - report.margins?.ms) ? k : best, 0);
   if (now >= 0 || isProposal) at("calm").value = now >= 0 ? now : nearest;
-  at("calm-text").textContent = isProposal ? report.controller?.style ?? "proposed" : now >= 0 ? `Ms at most ${designs[now].ms_limit}` : "by hand";
+  at("calm-text").textContent = isProposal ? report.controller?.style ?? "proposed" : now >= 0 ? `Ms at most ${designs[now].ms_limit}` : isFromAddress() ? "from the address" : "by hand";
 };
 at("calm").oninput = () => { remember(at("calm")); use(only(designs[at("calm").value].controller)); };
 at("calm").onchange = () => { at("calm").isMoving = false; };
@@ -377,7 +439,7 @@ document.addEventListener("keydown", (event) => {
   event.preventDefault();
   if (event.shiftKey) redo(); else undo();
 });
-at("compare").onclick = async () => { against = { name: "kept gains", gains }; await judgeAgainst(); use(gains); };
+at("compare").onclick = async () => { const of = report; against = { name: "kept gains", gains }; await judgeAgainst(); if (of === report) use(gains); };
 const degrees = (value) => value == null ? "–" : `${value.toFixed(1)}°`;
 const percent = (value) => value == null ? "–" : `${(100 * value).toFixed(0)} %`;
 const seconds = (value) => value == null ? "–" : value < 0.1 ? `${shown(1000 * value, 3)} ms` : `${shown(value, 3)} s`;
@@ -405,6 +467,7 @@ const drawDesign = (of) => {
   const other = against.judged;
   at("figures").tBodies[0].replaceChildren(...FIGURES.map(([name, text]) => row([name, text(of), other.error ? "–" : text(other)])));
   at("figures").tBodies[0].classList.toggle("bad", !of.is_stable);
+  at("limits").textContent = of.asks ?? "";
   at("summary").textContent = of.is_stable ? `Phase margin ${degrees(of.figures.margins?.phase_margin_deg)}, Ms ${shown(of.figures.margins?.ms, 3)}.` : "The loop is unstable.";
   for (const id of ["step", "effort", "load", "nyquist"]) if (!of.is_stable) at(id).replaceChildren(make("p", "The loop is unstable with these gains.", { className: "bad" }));
   if (!of.is_stable) return;
@@ -427,16 +490,42 @@ const drawDesign = (of) => {
     circles: [{ at: [-1, 0], radius: 1 / of.figures.margins.ms }], marks: [{ at: [-1, 0] }],
   });
 };
-at("save-gains").onclick = () => save(JSON.stringify({ file: file.name, structure: report.structure, process: report.process, gains, judged: { is_stable: drawn.is_stable, figures: drawn.figures, least: drawn.least } }, null, 2), `${stem()}.gains.json`);
-// Saves one of the two files of the firmware: browsers ask before they save two at once.
-const saveParameters = async (which, says) => {
-  const answer = await ask({ do: "parameters", gains });
-  at("exported").className = answer.error ? "bad" : "";
-  at("exported").textContent = answer.error ?? says;
-  if (!answer.error) save(answer[which], `${stem()}.${which === "apply" ? "" : "restore."}${answer.ending}`);
+const exported = (text, isBad = false) => { at("exported").textContent = text; at("exported").className = isBad ? "bad" : ""; };
+// Whether gains that break limits are to be saved all the same.
+const agreed = (question) => new Promise((done) => {
+  at("ask-text").textContent = question;
+  at("ask").returnValue = "";
+  at("ask").onclose = () => { const isAgreed = at("ask").returnValue === "yes"; if (!isAgreed) exported("Not saved.", true); done(isAgreed); };
+  at("ask").showModal();
+});
+at("ask-no").onclick = () => at("ask").close();
+at("ask-yes").onclick = () => at("ask").close("yes");
+at("save-gains").onclick = async () => {
+  const of = report, chosen = gains;
+  const { is_stable, figures, least, asks } = await ask({ do: "judge", gains: chosen, bands: true });
+  if (of !== report || asks && !await agreed(asks)) return;
+  save(JSON.stringify({ file: file.name, structure: of.structure, process: of.process, gains: chosen, judged: { is_stable, figures, least } }, null, 2), `${stem()}.gains.json`);
+  exported("The gains are saved.");
 };
-at("save-parameters").onclick = () => saveParameters("apply", "Saved. Save the file that sets the old values again as well, before you fly; then fly gently.");
-at("save-restore").onclick = () => saveParameters("restore", "Saved: this file sets the old values again.");
+// Whether the file saved last goes the whole way.
+let isWhole = false;
+// Saves one of the two files of the firmware: browsers ask before they save two at once.
+const saveParameters = async (which, whole, says) => {
+  const of = report, message = { do: "parameters", gains, whole, below_limits: which === "restore" };
+  let answer = await ask(message);
+  if (of !== report) return;
+  if (answer.asks) {
+    if (!await agreed(answer.asks) || of !== report) return;
+    answer = await ask({ ...message, below_limits: true });
+  }
+  if (answer.error) return exported(answer.error, true);
+  isWhole = whole;
+  save(answer[which], `${stem()}.${which === "apply" ? "" : "restore."}${answer.ending}`);
+  exported(which === "apply" ? `${says} ${answer.says} ${answer.broken ?? ""} Save the file of the old parameters as well, before you fly.` : says);
+};
+at("save-half").onclick = () => saveParameters("apply", false, "The half step is saved.");
+at("save-whole").onclick = () => saveParameters("apply", true, "The whole step is saved.");
+at("save-restore").onclick = () => saveParameters("restore", isWhole, "Saved: this file sets the old values again.");
 
 // ---- Simulation ----------------------------------------------------------------------------------------------------
 
@@ -504,6 +593,7 @@ at("example-hover").onclick = async () => open(new Blob([await unpacked("hover")
 at("example-flight").onclick = async () => open(new Blob([await unpacked("chirps")]), "px4_chirps.ulg");
 at("cancel").onclick = async () => {
   busy(null);
+  hideAfter("result");
   await start();
   say("Cancelled.");
   if (!file) return;
@@ -511,6 +601,16 @@ at("cancel").onclick = async () => {
   if (answer.error || at("recording").hidden) return;
   await ask({ do: "signals", options: [...loopOptions(), ...words(at("more").value)] });
 };
+// Another address in the same tab: settings of the open recording, or of none that is open.
+addEventListener("hashchange", () => {
+  const own = kept;
+  readAddress();
+  if (!file) return;
+  if (kept.get("file") === file.key) return open(file.blob, file.name);
+  [kept, linked] = [own, undefined];
+  writeAddress();
+  say("The address is that of another recording: its settings are not used.");
+});
 document.addEventListener("dragover", (event) => { event.preventDefault(); at("drop").classList.add("over"); });
 document.addEventListener("dragleave", () => at("drop").classList.remove("over"));
 document.addEventListener("drop", (event) => {
@@ -524,7 +624,7 @@ addEventListener("resize", () => {
   if (innerWidth === widthDrawn) return;
   widthDrawn = innerWidth;
   if (signals) redrawSignals();
-  if (drawn && !at("design").hidden) drawDesign(drawn);
+  if (report && drawn && !at("design").hidden) drawDesign(drawn);
 });
 (async () => {
   try {

@@ -1,8 +1,8 @@
 """Tests of the studio in a real Chromium.
 
-python3 studio.py PAGE PROGRAM REPOSITORY SCRATCH [--screenshots DIR] [--measure]: works as a user does, from files dropped
-on the page to exported gains, and compares the numbers with those of the program. Prints a line for each part; ends with
-status 1 at the first fault. --measure prints times instead of testing.
+python3 studio.py PAGE PROGRAM REPOSITORY SCRATCH [--screenshots DIR] [--measure] [--only PART]: works as a user does, from
+files dropped on the page to exported gains, and compares the numbers with those of the program. Prints a line for each
+part; ends with status 1 at the first fault. --measure prints times instead of testing.
 """
 
 import argparse
@@ -61,7 +61,13 @@ class Studio:
         page.on("pageerror", lambda error: self.faults.append(str(error)))
         page.on("dialog", lambda dialog: self.faults.append(f"dialog {dialog.message}") or dialog.dismiss())
         page.on("request", self.requested)
-        page.goto(path.as_uri() + fragment)
+        self.path = path
+        self.load(fragment)
+
+    def load(self, fragment):
+        """Loads the page anew, as a reload does."""
+        self.page.goto("about:blank")
+        self.page.goto(self.path.as_uri() + fragment)
         self.until("document.body.dataset.readyMs !== undefined || document.getElementById('state').className === 'bad'")
         expect(self.state() == "Ready.", self.state())
 
@@ -206,39 +212,204 @@ def by_hand(studio, told):
     page.press("#exact-kp", "Enter")
     studio.until("drawn && !drawn.is_stable")
     expect("unstable" in page.inner_text("#step"), "an unstable loop is named")
-    page.click("#save-parameters")
+    page.click("#save-whole")
     studio.until("document.getElementById('exported').className === 'bad'")
     expect("range" in page.inner_text("#exported"), page.inner_text("#exported"))
     page.click("#proposed")
     studio.until("drawn?.is_stable && !isAsking")
-    new, name = studio.saved("#save-parameters")
-    expect(name == "px4_chirps.params", name)
+    # Each step is that of the program, whose default is the half.
+    log = str(told.repository / "examples/logs/px4_chirps.ulg")
+    new = {}
+    for button, options in (("#save-whole", ["--step", "1"]), ("#save-half", [])):
+        new[button], name = studio.saved(button)
+        expect(name == "px4_chirps_roll_rate.params", name)
+        expect(button.split("-")[1] in page.inner_text(button).lower(), "the button says which step it saves")
+        same_parameters(new[button], written(told, log, "roll", options))
     old, name = studio.saved("#save-restore")
-    expect(name == "px4_chirps.restore.params", name)
-    options = ["--axis", "roll", "--loop", "rate", "--step", "1", "--write", str(told.scratch / "roll.params")]
-    program(told.program, "identify", str(told.repository / "examples/logs/px4_chirps.ulg"), "--json", *options)
-    written = (told.scratch / "roll.params").read_text(encoding="utf-8")
-    last = lambda text: [round(float(line.split("\t")[3]), 3) for line in text.splitlines() if "\t" in line]
-    expect(last(new) == last(written) != last(old), f"{new} and {written}")
+    expect(name == "px4_chirps_roll_rate.restore.params", name)
+    expect(parameters(new["#save-whole"])["MC_ROLLRATE_P"] > parameters(new["#save-half"])["MC_ROLLRATE_P"]
+           > parameters(old)["MC_ROLLRATE_P"], f"{new} and {old}")
     judged, name = studio.saved("#save-gains")
-    expect(json.loads(judged)["judged"]["is_stable"] and name == "px4_chirps.gains.json", name)
+    expect(json.loads(judged)["judged"]["is_stable"] and name == "px4_chirps_roll_rate.gains.json", name)
     calm = page.evaluate("designs[0].controller.kp")
     page.evaluate("document.getElementById('calm').value = 0; document.getElementById('calm').oninput()")
     studio.until("!isAsking && drawn.step_band !== undefined")
     expect(page.evaluate("gains.kp") == calm, "the slider from calm to sharp")
     html, name = studio.saved("#save-report")
-    expect(name == "px4_chirps.html" and "<h1>" in html and len(html) > 1_000_000, name)
+    expect(name == "px4_chirps_roll_rate.html" and "<h1>" in html and len(html) > 1_000_000, name)
     page.click("#report summary")
     studio.rest()
     studio.until("document.getElementById('frame').contentDocument?.querySelectorAll('.plot svg').length > 4")
-    # A reload keeps the choices and has no data.
-    again = Studio(page.context.browser, told.page, fragment="#loop=pitch+rate&from=200&to=210&theme=dark", **DESK)
-    expect(again.page.evaluate("document.documentElement.dataset.theme") == "dark", "the theme is kept")
-    expect(again.page.is_hidden("#recording"), "there is no data in the fragment")
-    again.drop("log", str(told.repository / "examples/logs/px4_chirps.ulg"))
-    expect(again.page.input_value("#loop") == "pitch rate" and again.page.input_value("#from") == "200", "choices are kept")
-    again.close()
-    print("sliders, undo, comparison, export, report, fragment: as they should be")
+    print("sliders, undo, comparison, export, report: as they should be")
+
+
+def parameters(text):
+    """Values of a file of PX4 or ArduPilot."""
+    lines = [line.replace("\t", ",").split(",") for line in text.splitlines() if not line.startswith("#")]
+    return {line[2]: float(line[3]) for line in lines if len(line) == 5} or {line[0]: float(line[1]) for line in lines}
+
+
+def written(told, log, axis, options=()):
+    """The file that `onecycle identify --write` writes."""
+    path = told.scratch / f"{axis}.params"
+    program(told.program, "identify", log, "--axis", axis, "--loop", "rate", "--json", "--force", "--write", str(path), *options)
+    return path.read_text(encoding="utf-8")
+
+
+def same_parameters(ours, theirs):
+    ours, theirs = parameters(ours), parameters(theirs)
+    expect(list(ours) == list(theirs), f"{ours} and {theirs}")
+    expect(all(abs(value / theirs[name] - 1) < 2 * CLOSE for name, value in ours.items()), f"{ours} and {theirs}")
+
+
+def set_by_hand(studio):
+    """Every setting of a loop, then gains."""
+    page = studio.page
+    page.fill("#from", "190")
+    page.fill("#to", "209")
+    page.select_option("#style", "sharp")
+    page.fill("#more", "--ms 1.9")
+    studio.identify()
+    studio.designed()
+    page.fill("#exact-kp", str(0.9 * page.evaluate("gains.kp")))
+    page.press("#exact-kp", "Enter")
+    studio.until("!isAsking && drawn?.step_band !== undefined")
+
+
+def nothing_set(studio, what):
+    values = [studio.page.input_value(f"#{name}") for name in ("from", "to", "structure", "style", "more")]
+    expect(not any(values), f"{what}: {values}")
+
+
+def is_proposed(studio):
+    studio.identify()
+    studio.designed()
+    expect(studio.page.evaluate("gains.kp === report.controller.kp"), "the sliders show the proposed gains")
+    expect("kp=" not in studio.page.evaluate("location.hash"), "proposed gains are not kept as those of somebody")
+    expect(studio.page.is_hidden("#origin"), "proposed gains do not come from the address")
+
+
+def belongings(browser, told):
+    """What is set by hand belongs to one loop of one recording: a reload, another file, loop or address does not move it."""
+    studio = Studio(browser, told.page, **DESK)
+    page = studio.page
+    first, second = (str(told.repository / "examples/logs" / name) for name in ("px4_chirps.ulg", "ap_sysid_roll.bin"))
+    studio.drop("log", first)
+    page.select_option("#loop", "roll rate")
+    studio.rest()
+    set_by_hand(studio)
+    kp, address = page.evaluate("gains.kp"), page.evaluate("location.hash")
+    # Another recording in the same page, and after a reload.
+    for reload in (False, True):
+        if reload:
+            studio.load(address)
+        studio.drop("log", second)
+        page.select_option("#loop", "roll rate")
+        studio.rest()
+        nothing_set(studio, f"another file, reload {reload}")
+        is_proposed(studio)
+        for button, options in (("#save-half", []), ("#save-whole", ["--step", "1"])):
+            text, name = studio.saved(button)
+            expect(name == "ap_sysid_roll_roll_rate.param", name)
+            same_parameters(text, written(told, second, "roll", options))
+    # The recording of the address gets them again, and says where they come from.
+    studio.load(address)
+    expect(page.is_hidden("#recording"), "there is no data in the address")
+    studio.drop("log", first)
+    expect(page.input_value("#loop") == "roll rate" and page.input_value("#style") == "sharp", "choices are kept")
+    expect([page.input_value("#from"), page.input_value("#to")] == ["190", "209"], "the stretch is kept")
+    studio.identify()
+    studio.designed()
+    expect(page.evaluate("gains.kp") == kp and page.is_visible("#origin")
+           and page.inner_text("#calm-text") == "from the address", "gains from the address are called so")
+    page.click("#proposed")
+    expect(page.is_hidden("#origin"), "proposed gains do not come from the address")
+    # Another loop, and back.
+    for loop, axis in (("pitch rate", "pitch"), ("roll rate", "roll")):
+        page.select_option("#loop", loop)
+        studio.rest()
+        expect(page.is_hidden("#result"), "another loop has no result")
+        nothing_set(studio, loop)
+        is_proposed(studio)
+        text, name = studio.saved("#save-half")
+        expect(name == f"px4_chirps_{axis}_rate.params", name)
+        same_parameters(text, written(told, first, axis))
+    # Forward and back between addresses.
+    page.evaluate("location.hash = 'file=0&loop=roll+rate&flight=1&style=sharp&kp=9&ki=9&kd=9&filter_s=0'")
+    studio.until("document.getElementById('state').textContent.includes('another recording')")
+    page.go_back()
+    page.wait_for_timeout(200)
+    page.go_forward()
+    page.wait_for_timeout(200)
+    nothing_set(studio, "another address")
+    expect("kp=9" not in page.evaluate("location.hash"), page.evaluate("location.hash"))
+    studio.close()
+    print("settings and gains: of one loop of one recording")
+
+
+def outdated(browser, told):
+    """A changed setting takes the result away; gains below the limits are saved after a question; no click is lost."""
+    studio = Studio(browser, told.page, **DESK)
+    page = studio.page
+    studio.drop("log", str(told.repository / "examples/logs/px4_chirps.ulg"))
+    page.select_option("#loop", "roll rate")
+    studio.rest()
+    for change in (lambda: page.select_option("#style", "calm"), lambda: page.type("#more", "--ms 1.3"), lambda: page.type("#to", "209"),
+                   lambda: page.select_option("#structure", "toiptd"), lambda: page.click("#whole")):
+        studio.identify()
+        studio.designed()
+        change()
+        expect(page.is_hidden("#result") and page.is_hidden("#save-half") and page.is_hidden("#save-json"),
+               "the result of other settings cannot be saved")
+    page.select_option("#structure", "")
+    page.fill("#more", "")
+    # Changed while the library works.
+    page.click("#identify")
+    page.select_option("#style", "sharp")
+    studio.rest()
+    studio.until("document.getElementById('state').textContent.includes('press Identify')")
+    expect(page.is_hidden("#result"), "the result of other settings is not shown")
+    # Gains that break a limit of the style.
+    studio.drop("log", str(told.repository / "examples/logs/ap_sysid_roll.bin"))
+    page.select_option("#loop", "roll rate")
+    studio.rest()
+    studio.identify()
+    studio.designed()
+    proposed = page.evaluate("gains.kp")
+    page.fill("#exact-kp", str(1.6 * proposed))
+    page.press("#exact-kp", "Enter")
+    studio.until("!isAsking && drawn?.step_band !== undefined")
+    expect(page.evaluate("drawn.is_stable") and page.evaluate("drawn.figures.margins.ms") > 1.7, "sharp gains")
+    for button in ("#save-whole", "#save-gains"):
+        page.click(button)
+        studio.until("document.getElementById('ask').open")
+        question = page.inner_text("#ask-text")
+        expect("Ms " in question and "at most 1.60" in question and "balanced" in question, question)
+        if told.screenshots:
+            page.screenshot(path=told.screenshots / "studio_question.png")
+        page.click("#ask-no")
+        studio.until("document.getElementById('exported').textContent === 'Not saved.'")
+        page.click(button)
+        studio.until("document.getElementById('ask').open")
+        with page.expect_download():
+            page.click("#ask-yes")
+    # The old values are saved without a question.
+    studio.saved("#save-restore")
+    # A press on Identify straight from a field of a table: its columns are read anew.
+    studio.drop("hover", str(told.repository / "examples/simulated_hover.csv"))
+    studio.identify()
+    for pause_ms in (0, 150):
+        page.fill("#more", f"--cycles {7 + pause_ms // 100}")
+        page.focus("#more")
+        box = page.locator("#identify").bounding_box()
+        page.mouse.move(box["x"] + 20, box["y"] + 10)
+        page.mouse.down()
+        page.wait_for_timeout(pause_ms)
+        page.mouse.up()
+        studio.until("!document.getElementById('result').hidden", limit_s=20)
+        studio.rest()
+    studio.close()
+    print("changed settings, gains below the limits, the first click: as they should be")
 
 
 def stretch(studio, told):
@@ -421,6 +592,7 @@ def main():
         parser.add_argument(name, type=pathlib.Path)
     parser.add_argument("--screenshots", type=pathlib.Path)
     parser.add_argument("--measure", action="store_true")
+    parser.add_argument("--only", metavar="PART", help="runs one part of the tests, such as belongings")
     told = parser.parse_args()
     told.page = told.page.resolve()
     with sync_playwright() as playwright:
@@ -429,14 +601,14 @@ def main():
             measure(browser, told)
             return
         studio = Studio(browser, told.page, **DESK)
-        numbers(studio, told)
-        stretch(studio, told)
-        by_hand(studio, told)
-        simulated(studio)
-        hostile(studio)
-        large(studio, told)
+        parts = [
+            (numbers, studio, told), (stretch, studio, told), (by_hand, studio, told), (belongings, browser, told),
+            (outdated, browser, told), (simulated, studio), (hostile, studio), (large, studio, told), (looks, browser, told),
+        ]
+        for part, *given in parts:
+            if told.only in (None, part.__name__):
+                part(*given)
         studio.close()
-        looks(browser, told)
 
 
 if __name__ == "__main__":

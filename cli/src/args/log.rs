@@ -82,13 +82,19 @@ pub(crate) struct WriteArguments {
     #[arg(long, value_name = "NAME.EXT")]
     pub(crate) write: Option<PathBuf>,
     /// With --write: share of the way from the gains in force to the proposed ones, above 0 up to 1
-    #[arg(long, value_name = "SHARE", default_value_t = 0.5, requires = "write", allow_negative_numbers = true,
+    #[arg(long, value_name = "SHARE", default_value_t = HALF_STEP, requires = "write", allow_negative_numbers = true,
           value_parser = step)]
     pub(crate) step: f64,
     /// With --write: replace files that exist
     #[arg(long, requires = "write")]
     pub(crate) force: bool,
+    /// With --write: write gains that break a limit of the style too, such as its phase margin or Ms
+    #[arg(long, requires = "write")]
+    pub(crate) below_limits: bool,
 }
+
+/// Share of the way from the gains in force to the proposed ones that is written unless another one is asked for.
+pub(crate) const HALF_STEP: f64 = 0.5;
 
 impl WriteArguments {
     /// `--write`, if it was given.

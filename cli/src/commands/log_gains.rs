@@ -18,6 +18,7 @@ use crate::failure::Failure;
 use crate::output::{with_ending, write_text};
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::{LogGains, Written};
+use crate::words::limits::{broken, is_worse};
 use crate::words::log_gains as words;
 
 /// Draws over which the gains to write are judged.
@@ -157,13 +158,18 @@ impl LogLoop {
         if matches!(design.controller, Controller::Autopilot(_)) {
             return Err(words::NOT_ITS_FORM.to_owned());
         }
-        self.to_write(design.controller.pid(), asked.step, identified, choice)
+        let to_write = self.to_write(design.controller.pid(), asked.step, identified, choice)?;
+        match to_write.question() {
+            Some(broken) if !asked.below_limits => Err(words::below_limits(broken)),
+            _ => Ok(to_write),
+        }
     }
 
-    /// The parameters for this share of the way to the proposed gains with their margins, or why there are none.
-    fn to_write(
+    /// The parameters for this share of the way from the gains in force to those of `goal` with their margins, or why there
+    /// are none. Whoever exports them asks the [`Written::question`] first.
+    pub(crate) fn to_write(
         &self,
-        proposed: Pid,
+        goal: Pid,
         share: f64,
         identified: &Identified,
         choice: &Controllers,
@@ -174,11 +180,10 @@ impl LogLoop {
         }
         let no_gains = || words::no_gains(self.control_loop);
         let old = LoopGains::in_force(&self.flight, self.control_loop).ok_or_else(no_gains)?;
-        if proposed.filter_s > 0.0 {
+        if goal.filter_s > 0.0 {
             return Err(words::NOT_ITS_FORM.to_owned());
         }
-        let proposed = LoopGains::new(proposed.kp, proposed.ki, proposed.kd);
-        let wanted = old.toward(proposed, share);
+        let wanted = old.toward(LoopGains::new(goal.kp, goal.ki, goal.kd), share);
         let changes = changes(&self.flight, self.control_loop, wanted)
             .map_err(|error| words::unwritable(&error))?;
         if changes.is_empty() {
@@ -199,28 +204,22 @@ impl LogLoop {
             changes,
             share,
             overshoot: simulated,
+            broken: broken(&choice.asked, Some(&figures)),
+            needs_consent: needs_consent(&[pid(old), goal], &figures, identified, choice),
             figures,
             least,
         })
     }
 
-    /// The files that put gains in force which somebody chose by hand, and the old ones again; or why there are none.
-    pub(crate) fn files_of(
-        &self,
-        chosen: Pid,
-        identified: &Identified,
-        choice: &Controllers,
-    ) -> Result<ParameterFiles, String> {
-        let to_write = self.to_write(chosen, 1.0, identified, choice)?;
+    /// The files that put the new values in force, and the old ones again; or why there are none.
+    pub(crate) fn files(&self, to_write: &Written) -> Result<ParameterFiles, String> {
         let files = files(&self.flight, &to_write.changes);
         files.ok_or_else(|| words::no_gains(self.control_loop))
     }
 
     /// Writes both files or none.
     fn write(&self, path: &Path, to_write: Written) -> Result<Written, Failure> {
-        let Some(files) = files(&self.flight, &to_write.changes) else {
-            return Err(Failure::usage(words::no_gains(self.control_loop)));
-        };
+        let files = self.files(&to_write).map_err(Failure::usage)?;
         let restore = restore_path(path, files.ending);
         write_text(&restore, &files.restore)?;
         if let Err(failure) = write_text(path, &files.apply) {
@@ -249,6 +248,26 @@ pub(super) fn judged_gains(
     match figures.filter(|_| is_stable) {
         Some(figures) => Ok((figures, least)),
         None => Err(words::unstable(least.map(|least| least.stable))),
+    }
+}
+
+/// Whether gains with these figures are exported on demand only: they break limits of the style, and are not on the way from
+/// gains in force that break them more to a goal that keeps them.
+pub(super) fn needs_consent(
+    [before, goal]: &[Pid; 2],
+    figures: &Assessment,
+    identified: &Identified,
+    choice: &Controllers,
+) -> bool {
+    let asked = &choice.asked;
+    let (model, _) = identified.for_design(0);
+    let judged = |pid: &Pid| {
+        let controller = Controller::from(pid.with_execution(asked.execution));
+        assess(&model, &controller, asked.noise.as_ref())
+    };
+    match (judged(before), broken(asked, judged(goal).as_ref())) {
+        (Some(before), None) => is_worse(asked, figures, &before),
+        _ => broken(asked, Some(figures)).is_some(),
     }
 }
 

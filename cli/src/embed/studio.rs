@@ -9,9 +9,13 @@
 //! | `{"do":"survey","options"}` | that of `onecycle identify LOG --json`: every loop of a flight |
 //! | `{"do":"json"}`, `{"do":"page"}` | `{text}`: the report as the program writes it |
 //! | `{"do":"trade_off"}` | designs from calm to sharp: limit of `Ms`, gains, figures |
-//! | `{"do":"judge","gains","bands"}` | figures, least margins, curves of the gains; with bands if they are asked for |
-//! | `{"do":"parameters","gains"}` | `{apply, restore, ending}`: files for the firmware |
+//! | `{"do":"judge","gains","bands"}` | figures, least margins, curves of the gains, `asks`; with bands if they are asked for |
+//! | `{"do":"parameters","gains","whole","below_limits"}` | `{apply, restore, ending, says, broken}`: files for the firmware |
 //! | `{"do":"simulate","options"}` | `{text}`: a recording as CSV; with `--expect` the intervals to expect |
+//!
+//! Parameters go half of the way from the gains in force to the given ones unless `whole` is true. `asks` is a sentence that
+//! names the limits of the style that gains break. Such parameters are answered with `{asks}` unless `below_limits` is true or
+//! they are on the way to gains that keep the limits.
 //!
 //! Options are those of the command line. An answer with `error` has one sentence. Infinite numbers are null. Times are in
 //! seconds, signals in the units of the file.
@@ -23,7 +27,7 @@ use onecycle_link::FlightLog;
 use serde_json::{Value, json};
 
 use super::{arguments_of_identify, parsed, plain};
-use crate::args::{Command, Identify};
+use crate::args::{Command, HALF_STEP, Identify};
 use crate::commands::log::{self, Source};
 use crate::commands::{flight, identify, simulate};
 use crate::failure::Failure;
@@ -71,6 +75,7 @@ impl Studio {
         match message["do"].as_str().unwrap_or_default() {
             "open" => self.open(message["file"].as_str().unwrap_or_default()),
             "signals" => {
+                (self.found, self.draws) = (None, vec![]);
                 let arguments = arguments_of_identify(&self.file, &options)?;
                 let signals = self.read(&arguments).map_err(failed)?;
                 let about = signals.about.clone();
@@ -79,8 +84,8 @@ impl Studio {
             }
             "view" => self.view(message),
             "identify" => {
-                let arguments = arguments_of_identify(&self.file, &options)?;
                 (self.found, self.draws) = (None, vec![]);
+                let arguments = arguments_of_identify(&self.file, &options)?;
                 let found = identify::find(&arguments, None).map_err(failed)?;
                 let report = value(&found.json(false));
                 if let Ok(identified) = &found.identification.outcome {
@@ -204,7 +209,6 @@ impl Studio {
         };
         let (model, _) = identified.for_design(0);
         let controller = Controller::from(self.chosen(message)?);
-        let noise = choice.asked.noise.as_ref();
         let with_bands = message["bands"].as_bool().unwrap_or(false);
         let count = if with_bands { DRAWS } else { FEW_DRAWS };
         let draws = &self.draws[..self.draws.len().min(count)];
@@ -212,7 +216,7 @@ impl Studio {
         Ok(hand::judged(&hand::ByHand {
             model: &model,
             controller: &controller,
-            noise,
+            asked: &choice.asked,
             draws,
             with_bands,
             end_s,
@@ -227,9 +231,20 @@ impl Studio {
         };
         let no_log = || format!("{} is not a flight log: type the gains in", self.file);
         let of_log = found.of_log.as_ref().ok_or_else(no_log)?;
-        let files = of_log.files_of(chosen, identified, choice)?;
+        let is = |name: &str| message[name].as_bool().unwrap_or(false);
+        let share = if is("whole") { 1.0 } else { HALF_STEP };
+        let to_write = of_log.to_write(chosen, share, identified, choice)?;
+        let question = to_write.question().filter(|_| !is("below_limits"));
+        if let Some(question) = question {
+            return Ok(json!({ "asks": words::sentence(question) }));
+        }
+        let files = of_log.files(&to_write)?;
         Ok(json!({
-            "apply": files.apply, "restore": files.restore, "ending": files.ending,
+            "apply": files.apply,
+            "restore": files.restore,
+            "ending": files.ending,
+            "says": words::log_gains::margins(&to_write),
+            "broken": words::log_gains::broken(&to_write),
         }))
     }
 }

@@ -1,7 +1,7 @@
 //! Gains that somebody moves by hand, as JSON for a page that follows.
 
 use onecycle::{
-    Assessment, Controller, MeasurementNoise, Model, assess, least_margins, load_response,
+    Assessment, Controller, Model, Specification, assess, least_margins, load_response,
     step_response,
 };
 use onecycle_design::bands::{StepBands, load_bands, step_bands};
@@ -10,6 +10,8 @@ use serde_json::{Value, json};
 
 use super::json::controller as controller_json;
 use super::json::controllers::{Figures, Least};
+use crate::words::limits::broken;
+use crate::words::sentence;
 
 /// Frequencies of the curves of the open loop, over three and a half decades about the gain crossover.
 const FREQUENCIES: u32 = 240;
@@ -20,7 +22,7 @@ const TIMES: u32 = 240;
 pub(crate) struct ByHand<'a> {
     pub(crate) model: &'a Model,
     pub(crate) controller: &'a Controller,
-    pub(crate) noise: Option<&'a MeasurementNoise>,
+    pub(crate) asked: &'a Specification,
     pub(crate) draws: &'a [Model],
     pub(crate) with_bands: bool,
     /// End (s) of the responses; by default after the step has settled.
@@ -34,12 +36,13 @@ pub(crate) struct ByHand<'a> {
 /// each row of `load_band` the ends for the output, at the times of the rows.
 pub(crate) fn judged(of: &ByHand<'_>) -> Value {
     let (model, controller) = (of.model, of.controller);
-    let figures = assess(model, controller, of.noise);
+    let figures = assess(model, controller, of.asked.noise.as_ref());
     let least = least_margins(of.draws, controller).map(|least| Least::from(&least));
     let mut answer = json!({
         "is_stable": figures.is_some(),
         "figures": Figures::of(figures.as_ref()),
         "least": least,
+        "asks": broken(of.asked, figures.as_ref()).map(|question| sentence(&question)),
     });
     let Some(figures) = figures else {
         return answer;

@@ -171,6 +171,7 @@ struct WrittenReport {
     ms: f64,
     overshoot: Option<f64>,
     stable_share: Option<f64>,
+    broken: Option<String>,
 }
 
 #[derive(Serialize)]
@@ -211,6 +212,7 @@ impl From<&Written> for WrittenReport {
             ms: written.figures.ms,
             overshoot: written.overshoot,
             stable_share: written.least.map(|least| least.stable),
+            broken: words::broken(written),
         }
     }
 }

@@ -38,4 +38,15 @@ pub(crate) struct Written {
     /// Of the gains as written, on the most probable process and over the posterior.
     pub(crate) figures: Assessment,
     pub(crate) least: Option<LeastMargins>,
+    /// The limits of the style that they break.
+    pub(crate) broken: Option<String>,
+    /// Whether they are exported on demand only.
+    pub(crate) needs_consent: bool,
+}
+
+impl Written {
+    /// What to ask before these gains are exported. `None`: nothing.
+    pub(crate) fn question(&self) -> Option<&str> {
+        self.broken.as_deref().filter(|_| self.needs_consent)
+    }
 }

@@ -4,6 +4,7 @@ use onecycle_link::{Agreement, ControlLoop, GainsError, ReadBack, ReadTerm};
 
 use crate::report::number::short;
 use crate::results::log_gains::Written;
+use crate::words::sentence;
 
 pub(crate) const NOTHING_IDENTIFIED: &str =
     "no process was identified, so no gains can be justified.";
@@ -42,6 +43,11 @@ pub(crate) fn unstable(stable: Option<f64>) -> String {
         "the gains of this step are unstable on processes that the log allows{share}. Choose another --step, or record a \
          longer or stronger excitation."
     )
+}
+
+/// Why gains that break limits are not written, and how they are.
+pub(crate) fn below_limits(broken: &str) -> String {
+    format!("{broken}; choose another --step or --style, or add --below-limits to write them.")
 }
 
 /// What a read-back tells about the log.
@@ -105,8 +111,8 @@ pub(crate) fn overlay(explained: f64) -> String {
     )
 }
 
-/// Margins of the gains that were written, and how to go on.
-pub(crate) fn written(written: &Written) -> Vec<String> {
+/// Margins of the gains to write.
+pub(crate) fn margins(written: &Written) -> String {
     let margins = &written.figures.margins;
     let gain = margins
         .gain_margin
@@ -125,18 +131,31 @@ pub(crate) fn written(written: &Written) -> Vec<String> {
             100.0 * overshoot
         )
     });
-    let mut sentences = vec![
-        format!(
-            "With these values the loop has a phase margin of {:.1} deg{gain}, Ms {:.2}{overshoot}{least}.",
-            margins.phase_margin_rad.to_degrees(),
-            written.figures.ms
-        ),
-        format!(
-            "Written to {}; {} sets the old values again.",
-            written.path.display(),
-            written.restore.display()
-        ),
-    ];
+    format!(
+        "With these values the loop has a phase margin of {:.1} deg{gain}, Ms {:.2}{overshoot}{least}.",
+        margins.phase_margin_rad.to_degrees(),
+        written.figures.ms
+    )
+}
+
+/// The limits that the gains to write break.
+pub(crate) fn broken(written: &Written) -> Option<String> {
+    let in_force = match written.needs_consent {
+        true => "",
+        false => " The gains in force break them by more.",
+    };
+    Some(sentence(written.broken.as_ref()?) + in_force)
+}
+
+/// Margins of the gains that were written, and how to go on.
+pub(crate) fn written(written: &Written) -> Vec<String> {
+    let mut sentences = vec![margins(written)];
+    sentences.extend(broken(written));
+    sentences.push(format!(
+        "Written to {}; {} sets the old values again.",
+        written.path.display(),
+        written.restore.display()
+    ));
     if written.least.is_none() {
         sentences.push(
             "The margins are those of the most probable process only: the recording gives no distribution of it."

@@ -75,6 +75,23 @@ fn parameters_are_written_with_their_restore_file() {
     run(&ask).misused(&["pitch.params exists", "--force"]);
 }
 
+// The gains in force have Ms 2.40: half of the way to 1.6 is nearer, and its limit is named. A step that is too long, or to
+// gains that break the limits, would need --below-limits.
+#[test]
+fn half_of_the_way_to_the_limits_is_written_and_named() {
+    let folder = Scratch::new();
+    let path = folder.name("roll.param");
+    let log = example("ap_sysid_roll.bin");
+    let outcome = run(&["identify", &log, "--axis", "roll", "--write", &path]);
+    let words: Vec<&str> = outcome.stdout.split_whitespace().collect();
+    let text = words.join(" ");
+    assert!(
+        text.contains("style balanced: Ms 1.84 (at most 1.60)."),
+        "{text}"
+    );
+    assert_eq!(folder.files().len(), 2);
+}
+
 // Without a process there is nothing to write, and no file is left.
 #[test]
 fn a_refused_flight_writes_nothing() {

@@ -37,6 +37,13 @@ fn identified(file: &str, options: &[&str]) -> (Studio, Value) {
     (studio, report)
 }
 
+/// The proposed gains, the proportional one times a factor.
+fn proposed(report: &Value, factor: f64) -> Value {
+    let of = &report["controller"];
+    let kp = factor * of["kp"].as_f64().unwrap();
+    json!({ "kp": kp, "ki": of["ki"], "kd": of["kd"], "filter_s": of["filter_s"] })
+}
+
 // The same code on the same machine; in a browser only the elementary functions differ.
 #[test]
 fn its_report_is_that_of_the_program_to_the_bit() {
@@ -71,10 +78,7 @@ fn proposed_gains_are_judged_as_in_the_report() {
         gains.windows(2).all(rises) && gains[3] > 1.5 * gains[0],
         "{gains:?}"
     );
-    let proposed = &report["controller"];
-    let gains = json!({
-        "kp": proposed["kp"], "ki": proposed["ki"], "kd": proposed["kd"], "filter_s": proposed["filter_s"],
-    });
+    let gains = proposed(&report, 1.0);
     let judged = ask(
         &mut studio,
         &json!({ "do": "judge", "gains": gains, "bands": true }),
@@ -104,6 +108,62 @@ fn proposed_gains_are_judged_as_in_the_report() {
     assert!(apply.contains("MC_ROLLRATE_D"), "{apply}");
 }
 
+// Half of the way from the gains in force unless the whole is asked for.
+#[test]
+fn saved_steps_are_those_of_the_program() {
+    let folder = Scratch::new();
+    let file = of_repository("examples/logs/ap_sysid_roll.bin");
+    let (mut studio, report) = identified(&file, &["--axis", "roll"]);
+    let gains = proposed(&report, 1.0);
+    let half = json!({ "do": "parameters", "gains": gains });
+    let whole = json!({ "do": "parameters", "gains": gains, "whole": true });
+    let saved = [&half, &whole].map(|message| ask(&mut studio, message));
+    for (saved, step) in saved.iter().zip([&[][..], &["--step", "1"]]) {
+        let path = folder.name(&format!("roll{}.param", step.len()));
+        let asked = ["identify", &file, "--axis", "roll", "--write", &path];
+        run(&[&asked, step].concat());
+        let written = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(saved["apply"].as_str(), Some(&*written));
+        let margins = saved["says"].as_str().unwrap();
+        assert!(margins.contains("phase margin"), "{margins}");
+    }
+    assert_ne!(saved[0]["apply"], saved[1]["apply"]);
+}
+
+#[test]
+fn gains_that_break_limits_are_saved_after_a_question() {
+    let file = of_repository("examples/logs/ap_sysid_roll.bin");
+    let (mut studio, report) = identified(&file, &["--axis", "roll"]);
+    let mut message = json!({ "do": "parameters", "gains": proposed(&report, 1.6), "whole": true });
+    let asked = ask(&mut studio, &message);
+    assert!(asked.get("apply").is_none(), "{asked}");
+    let judge = json!({ "do": "judge", "gains": message["gains"] });
+    let judged = ask(&mut studio, &judge);
+    for question in [&asked["asks"], &judged["asks"]] {
+        let question = question.as_str().unwrap();
+        assert!(
+            question.contains("balanced") && question.contains("(at most 1.60)"),
+            "{question}"
+        );
+    }
+    message["below_limits"] = json!(true);
+    let files = ask(&mut studio, &message);
+    assert!(files["apply"].as_str().is_some(), "{files}");
+    let judge = json!({ "do": "judge", "gains": proposed(&report, 1.0) });
+    assert_eq!(ask(&mut studio, &judge)["asks"], Value::Null);
+}
+
+// The settings of the page have changed: what was identified before is not saved.
+#[test]
+fn a_failed_identification_leaves_nothing_to_save() {
+    let file = of_repository("examples/logs/px4_chirps.ulg");
+    let (mut studio, report) = identified(&file, &["--axis", "roll"]);
+    let options = json!({ "do": "identify", "options": ["--axis", "roll", "--style", "magic"] });
+    refused(&mut studio, &options, &["magic"]);
+    let gains = json!({ "do": "parameters", "gains": proposed(&report, 1.0) });
+    refused(&mut studio, &gains, &["Nothing is identified"]);
+}
+
 #[test]
 fn gains_that_would_not_hold_the_vehicle_are_not_saved() {
     let file = of_repository("examples/logs/px4_chirps.ulg");
@@ -114,7 +174,7 @@ fn gains_that_would_not_hold_the_vehicle_are_not_saved() {
         assert_eq!(judged["is_stable"], false, "{judged}");
         refused(
             &mut studio,
-            &json!({ "do": "parameters", "gains": gains }),
+            &json!({ "do": "parameters", "gains": gains, "whole": true, "below_limits": true }),
             words,
         );
     };

@@ -14,13 +14,14 @@ use onecycle_link::{
 use onecycle_live::{AltitudeFlight, AltitudeRefusal, AltitudeTest, Vehicle};
 
 use super::{connect, failed, refused};
-use crate::args::{LiveRelay, identify_of};
+use crate::args::{LiveRelay, WriteArguments, identify_of};
 use crate::commands::identify::{self, Found};
-use crate::commands::log_gains::{judged_gains, pid, restore_path};
+use crate::commands::log_gains::{judged_gains, needs_consent, pid, restore_path};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, write_file, write_text};
 use crate::report::live as report;
 use crate::results::live::{AltitudeGains, ProposedChange};
+use crate::words::limits::broken;
 use crate::words::live as words;
 use crate::words::log_gains as gain_words;
 
@@ -46,7 +47,7 @@ pub(crate) fn run(arguments: &LiveRelay) -> Result<ExitCode, Failure> {
         Err(_) => exit::NO_PROCESS,
     };
     if let (Some(path), Some(old)) = (&arguments.write.write, old) {
-        let proposed = proposed(&found, &flight, old, arguments.write.step);
+        let proposed = proposed(&found, &flight, old, &arguments.write);
         if let Ok(gains) = &proposed {
             write_gains(path, system, gains)?;
         } else {
@@ -135,12 +136,12 @@ fn record(flight: &AltitudeFlight, file: &mut dyn io::Write) -> io::Result<()> {
     writer.finish()
 }
 
-/// The gains for this share of the way to the proposed ones, or the reason why no gains are proposed.
+/// The gains for the asked share of the way to the proposed ones, or the reason why no gains are proposed.
 fn proposed(
     found: &Found,
     flight: &AltitudeFlight,
     old: [f64; 4],
-    share: f64,
+    asked: &WriteArguments,
 ) -> Result<AltitudeGains, String> {
     let identified = found.identification.outcome.as_ref();
     let identified = identified.map_err(|_| gain_words::NOTHING_IDENTIFIED)?;
@@ -150,11 +151,18 @@ fn proposed(
     let own = LoopGains::new(own.kp, own.ki, own.kd);
     let hover = flight.hover_thrust;
     let wanted = AltitudeCascade::of_pid(own, hover).ok_or(words::NO_CASCADE)?;
-    let gains = AltitudeCascade::new(old).toward(wanted, share);
+    let gains = AltitudeCascade::new(old).toward(wanted, asked.step);
     // The messages resolve no lag below the time between two of them: the vehicle may have that much more.
     let execution = Execution::sampled(flight.sample_period_s());
     let controller = Controller::from(pid(gains.pid(hover)).with_execution(execution));
     let (figures, least) = judged_gains(&controller, identified, choice)?;
+    let way = [AltitudeCascade::new(old), wanted].map(|gains| pid(gains.pid(hover)));
+    let broken = broken(&choice.asked, Some(&figures));
+    if let Some(broken) = broken.filter(|_| !asked.below_limits)
+        && needs_consent(&way, &figures, identified, choice)
+    {
+        return Err(gain_words::below_limits(&broken));
+    }
     let change = |at: usize| ProposedChange {
         name: AltitudeCascade::NAMES[at],
         old: old[at],
@@ -162,7 +170,7 @@ fn proposed(
     };
     Ok(AltitudeGains {
         changes: [0, 1, 2, 3].map(change).into(),
-        share,
+        share: asked.step,
         figures,
         least,
     })
