@@ -175,7 +175,7 @@ impl LogLoop {
         let no_gains = || words::no_gains(self.control_loop);
         let old = LoopGains::in_force(&self.flight, self.control_loop).ok_or_else(no_gains)?;
         if proposed.filter_s > 0.0 {
-            return Err(words::NOT_ITS_FORM.to_owned());
+            return Err(words::NOT_ITS_FILTER.to_owned());
         }
         let proposed = LoopGains::new(proposed.kp, proposed.ki, proposed.kd);
         let wanted = old.toward(proposed, share);

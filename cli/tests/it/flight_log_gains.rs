@@ -99,6 +99,6 @@ fn wrong_uses_of_write() {
     let path = folder.name("x.params");
     run(&["identify", &table, "--write", &path]).misused(&["--write", "not a flight log"]);
     let log = example("px4_chirps.ulg");
-    run(&["identify", &log, "--write", &path, "--step", "0"]).misused(&["above 0"]);
+    run(&["identify", &log, "--write", &path, "--step", "0"]).misused(&["above 0 %"]);
     run(&["identify", &log, "--write", "-"]).misused(&["--write needs the name of a file"]);
 }
