@@ -67,7 +67,7 @@ fn a_share_is_a_percentage_or_a_part_of_one() {
         simulate("--outliers"),
         vec!["certify", "--bias", "10"],
         vec!["grid", "--deterioration", "10"],
-        vec!["bench", "make", "x", "--sigma", "10"],
+        vec!["bench", "make", "-o", "x", "--sigma", "10"],
         vec![
             "pack",
             "margin",
