@@ -52,6 +52,15 @@ fn a_read_back_does_not_confirm_what_it_cannot_tell() {
     assert!(words.contains(part), "{text}");
 }
 
+// The roll rate of this flight is refused, whatever can be designed for the fit that was refused.
+#[test]
+fn a_refused_flight_has_no_valid_model() {
+    let log = example("px4_motor_failure.ulg");
+    let text = run(&["identify", &log, "--axis", "roll", "--controller", "pd"]).stdout;
+    assert!(text.contains("No process identified"), "{text}");
+    assert!(!text.contains("intervals are valid"), "{text}");
+}
+
 // Whatever the verdict, the report names loop, input and output.
 #[test]
 fn identify_takes_the_loop_asked_for() {
