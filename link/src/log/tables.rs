@@ -17,8 +17,8 @@ const MOST_MESSAGES: usize = 1000;
 /// A longer increment of time, in microseconds, is a pause of the log; it does not count for rates.
 const PAUSE_US: f64 = 5e6;
 
-/// A longer increment of time, in microseconds, is a damaged time stamp.
-const DAY_US: f64 = 86_400e6;
+/// A time farther from those before, in seconds, is a damaged stamp.
+const DAY_S: f64 = 86_400.0;
 
 /// Format of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -198,7 +198,7 @@ impl Topic {
                 self.increments += 1;
                 self.covered_us += increment_us;
             }
-            if increment_us.abs() < DAY_US {
+            if (time_s - self.end_s).abs() < DAY_S {
                 self.start_s = self.start_s.min(time_s);
                 self.end_s = self.end_s.max(time_s);
             }
