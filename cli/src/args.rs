@@ -60,7 +60,7 @@ First steps:
   onecycle fly altitude
   onecycle completions bash > ~/.local/share/bash-completion/completions/onecycle
 
-onecycle COMMAND --help explains each command and has examples.
+onecycle COMMAND --help explains each command and has examples. A SHARE is written as 5% or 0.05.
 
 Exit codes:
   0  done (identify: a process was identified)
@@ -166,6 +166,17 @@ impl FromStr for Share {
             .filter(|value: &f64| value.is_finite())
             .map(share)
             .ok_or_else(|| format!("'{text}' is neither a number nor a percentage such as 30%"))
+    }
+}
+
+/// A share of a whole: `5%` or `0.05`. A larger number than 1 without a percent sign may mean either, so it is refused.
+fn share(text: &str) -> Result<f64, String> {
+    match text.trim().parse::<Share>()? {
+        Share::Value(value) if value.abs() > 1.0 => Err(format!(
+            "a share is written as 5% or 0.05: write {value}% or {}",
+            value / 100.0
+        )),
+        share => Ok(share.of(1.0)),
     }
 }
 
@@ -322,7 +333,7 @@ const MOST_THREADS: u64 = 1024;
 
 /// A deterioration as a fraction, in the range of grids.
 fn deterioration(text: &str) -> Result<f64, String> {
-    let deterioration = text.trim().parse::<Share>()?.of(1.0);
+    let deterioration = share(text)?;
     if (0.001..=1.0).contains(&deterioration) {
         Ok(deterioration)
     } else {
@@ -338,11 +349,13 @@ fn phase_margin(text: &str) -> Result<f64, String> {
     }
 }
 
-/// How much more than the least a step may cost, in percent.
+/// How much more than the least a step may cost, a share.
 fn extra_ise(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(percent) if (0.0..=50.0).contains(&percent) => Ok(percent),
-        _ => Err("the extra cost lies between 0 and 50 percent".to_owned()),
+    let extra = share(text)?;
+    if (0.0..=0.5).contains(&extra) {
+        Ok(extra)
+    } else {
+        Err("the extra cost lies between 0 % and 50 %, such as 2% or 0.02".to_owned())
     }
 }
 

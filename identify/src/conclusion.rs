@@ -26,13 +26,8 @@ pub(crate) fn conclude(
 ) -> Result<Identified, Verdict> {
     let draws = posterior.models(specification.draws());
     let undamped = model.soiptd().map_or(model, Model::Soiptd);
-    let design = match Proposal::new(&undamped, &draws, &specification).outcome {
-        Ok(design) => Some(design),
-        Err(error) => {
-            remarks.push(Remark::NoController(error));
-            None
-        }
-    };
+    let proposed = Proposal::new(&undamped, &draws, &specification).outcome;
+    let design = proposed.ok();
     let phase_margin_rad = design.map(|design| posterior.phase_margin_rad(&design.controller));
     if !posterior.is_narrow_enough(&undamped, &draws, (&specification, phase_margin_rad)) {
         return Err(Verdict::TooUncertain);
@@ -43,6 +38,8 @@ pub(crate) fn conclude(
     if width.is_none_or(|width| width > MOST_WIDTH) {
         return Err(no_information(width.map(|width| width / HALF_WIDTH)));
     }
+    let fit = fit().ok_or(Verdict::NoFit)?;
+    remarks.extend(proposed.err().map(Remark::NoController));
     Ok(Identified {
         joint_probability: posterior.joint_probability(&estimate),
         step: design
@@ -55,6 +52,36 @@ pub(crate) fn conclude(
         design,
         phase_margin_rad,
         resonance: None,
-        fit: fit().ok_or(Verdict::NoFit)?,
+        fit,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use onecycle_design::{Form, Linear, Structure, Style};
+
+    use super::*;
+
+    // A PD cannot hold a self-regulating process, and the gain may be anything from 0.1 to 2: the refusal stands alone, without a
+    // remark on the model that was refused.
+    #[test]
+    fn a_refused_model_has_no_remark_on_its_controller() {
+        let process = |gain: f64| {
+            let lag = Linear::new(Structure::Foptd).with_pole_per_s(1.0);
+            lag.with_gain(gain).with_tau_s(0.1)
+        };
+        let draws: Vec<Linear> = (1..=40).map(|k| process(0.05 * f64::from(k))).collect();
+        let posterior = Posterior::of_draws(&process(1.0), &draws);
+        let asked = Specification::new(Form::Pd, Style::Balanced);
+        let mut remarks = vec![];
+        let found = conclude(
+            (process(1.0).into(), posterior),
+            asked,
+            &mut remarks,
+            |_| Verdict::TooUncertain,
+            || None,
+        );
+        assert_eq!(found.err(), Some(Verdict::TooUncertain));
+        assert_eq!(remarks, []);
+    }
 }

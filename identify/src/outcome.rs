@@ -115,11 +115,12 @@ impl Identified {
         (undamped, self.posterior.models(most))
     }
 
-    /// [`Identified::step`] with 90 % intervals over the posterior. `None` without a predicted step.
+    /// [`Identified::step`] with 90 % intervals over the posterior. `None` without a predicted step, or if the posterior tells
+    /// none: see [`Posterior::step`].
     #[must_use]
     pub fn step_intervals(&self) -> Option<StepIntervals> {
         let (step, design) = self.step.as_ref().zip(self.design.as_ref())?;
-        Some(self.posterior.step(step, &design.controller))
+        self.posterior.step(step, &design.controller)
     }
 
     /// Controllers to choose from, robust over the posterior: one for each of [`Proposal::choices`] for

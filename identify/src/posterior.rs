@@ -397,11 +397,14 @@ impl Posterior {
     }
 
     /// Characteristics of the step response `step` of the most probable model under `controller`, with their intervals over
-    /// the draws.
+    /// the draws. `None` if fewer than half of the draws are processes whose response can be simulated.
     #[must_use]
-    pub fn step(&self, step: &StepMetrics, controller: &Controller) -> StepIntervals {
+    pub fn step(&self, step: &StepMetrics, controller: &Controller) -> Option<StepIntervals> {
         let metrics = |model: &Model| step_metrics(model, controller).ok();
         let draws: Vec<Option<StepMetrics>> = self.models(STEPS).iter().map(metrics).collect();
+        if 2 * draws.iter().flatten().count() <= draws.len() {
+            return None;
+        }
         let values = |value: fn(&StepMetrics) -> f64| -> Vec<f64> {
             let draws = draws.iter();
             (draws.map(|draw| draw.as_ref().map_or(f64::INFINITY, value))).collect()
@@ -409,12 +412,12 @@ impl Posterior {
         let interval =
             |value: fn(&StepMetrics) -> f64| Interval::new(value(step), quantiles(values(value)));
         let settling = values(|step| step.settling_time_s);
-        StepIntervals {
+        Some(StepIntervals {
             overshoot: interval(|step| step.overshoot),
             rise_time_s: interval(|step| step.rise_time_s),
             settling_time_s: Interval::new(step.settling_time_s, with_jumps(settling)),
             peak_input: interval(|step| step.peak_input),
-        }
+        })
     }
 
     /// Phase margins (rad) that a controller leaves on the draws; on the first 1000 of them, unless it is a PD without
@@ -427,5 +430,30 @@ impl Posterior {
             _ => SEARCHED_MARGINS,
         };
         self.draws.iter().take(most).filter_map(margin).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use onecycle_design::{Pid, step_metrics};
+
+    use super::*;
+
+    // Draws with a negative dead time are no processes: without any other the step has no interval instead of an unbounded one.
+    #[test]
+    fn a_step_without_processes_has_no_intervals() {
+        let process = |tau_s: f64| {
+            let lag = Linear::new(Structure::Foptd).with_pole_per_s(1.0);
+            lag.with_gain(1.0).with_tau_s(tau_s)
+        };
+        let controller = Controller::from(Pid::new(2.0, 2.0, 0.0));
+        let best: Model = process(0.1).into();
+        let step = step_metrics(&best, &controller).unwrap();
+        let of =
+            |draws: &[Linear]| Posterior::of_draws(&process(0.1), draws).step(&step, &controller);
+        assert_eq!(of(&[process(-0.01); 20]), None);
+        assert_eq!(of(&[]), None);
+        let known = of(&[process(0.1); 20]).unwrap();
+        assert_eq!(known.overshoot.low, Some(step.overshoot));
     }
 }

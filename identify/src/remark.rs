@@ -74,8 +74,6 @@ pub enum Remark {
     Misfit(f64),
     /// The phase margin may be much smaller than specified. The value is the lower end of its interval (rad).
     MarginMayBeLess(f64),
-    /// The predicted step response overshoots by much. The value is the overshoot as a fraction of the step.
-    Overshoot(f64),
     /// No controller can be designed for the model.
     NoController(DesignError),
     /// The estimator of steady oscillations refused the recording, and the general one did not. The value is the
@@ -216,10 +214,9 @@ impl Remark {
             | Self::DampingNotSeen(_) => About::Test,
             // No fault: the input is another test signal.
             Self::NotASteadyOscillation(verdict) if verdict.kind() == "no_relay" => About::Test,
-            Self::LittleGainMargin(_)
-            | Self::NoiseAtActuator(_)
-            | Self::InputPeak { .. }
-            | Self::Overshoot(_) => About::Controller,
+            Self::LittleGainMargin(_) | Self::NoiseAtActuator(_) | Self::InputPeak { .. } => {
+                About::Controller
+            }
             _ => About::Recording,
         }
     }
@@ -245,7 +242,6 @@ impl Remark {
             Self::Coarse(_) => "coarse",
             Self::Misfit(_) => "misfit",
             Self::MarginMayBeLess(_) => "margin_may_be_less",
-            Self::Overshoot(_) => "overshoot",
             Self::NoController(_) => "no_controller",
             Self::NotASteadyOscillation(_) => "not_a_steady_oscillation",
             Self::RelayReplaced(_) => "relay_replaced",

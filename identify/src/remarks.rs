@@ -28,8 +28,6 @@ const MUCH_BIAS: f64 = 0.25;
 const MUCH_MISFIT: f64 = 0.01;
 /// Lower end of the phase margin over the specified phase margin below which the margin is in doubt.
 const LITTLE_MARGIN: f64 = 0.75;
-/// Overshoot above which a step response rings for long.
-const MUCH_OVERSHOOT: f64 = 0.4;
 
 /// Remarks on `found`, for which `cycles` cycles were requested.
 pub(crate) fn remarks(found: &Identification, has_pack: bool, cycles: usize) -> Vec<Remark> {
@@ -129,11 +127,5 @@ pub(crate) fn of_controller(identified: &Identified, remarks: &mut Vec<Remark>) 
         .filter(|&low| low < LITTLE_MARGIN * implied_rad)
     {
         remarks.push(Remark::MarginMayBeLess(low));
-    }
-    if let Some(step) = identified
-        .step
-        .filter(|step| step.overshoot > MUCH_OVERSHOOT)
-    {
-        remarks.push(Remark::Overshoot(step.overshoot));
     }
 }

@@ -215,9 +215,14 @@ fn describe(format: LogFormat, flight: FlightTables) -> Flight {
     }
 }
 
-/// Start and end of the topic with the most rows: others have stray rows long before or after the flight.
+/// Start and end of the topic with the most rows: others have stray rows long before or after the flight. Topics without a
+/// clock do not count.
 fn span_of(flight: &FlightTables) -> Span {
-    let longest = flight.topics.iter().max_by_key(|topic| topic.rows);
+    let clocked = flight
+        .topics
+        .iter()
+        .filter(|topic| topic.end_s > topic.start_s);
+    let longest = clocked.max_by_key(|topic| topic.rows);
     Span {
         from_s: longest.map_or(0.0, |topic| topic.start_s),
         to_s: longest.map_or(0.0, |topic| topic.end_s),

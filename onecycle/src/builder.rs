@@ -2,7 +2,7 @@
 
 use onecycle_design::{Specification, Structure};
 use onecycle_identify::{
-    Hold, Identification, Method, Options, Remark, Road, Signals, identify_by,
+    About, Hold, Identification, Method, Options, Remark, Road, Signals, identify_by,
 };
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
@@ -200,6 +200,13 @@ impl<'a> Identify<'a> {
                     let verdict = Box::new(verdict);
                     found.remarks.push(Remark::DefaultRefused(verdict));
                 }
+            }
+            if found.outcome.is_err() {
+                // Of a refused model nothing is proposed.
+                found.remarks.retain(|remark| {
+                    remark.about() != About::Controller
+                        && !matches!(remark, Remark::NoController(_))
+                });
             }
             found
         })

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand, ValueEnum};
 use onecycle_lab::experiments::{Benchmark, RelayTest};
 use onecycle_lab::judge::evaluate::Contender;
 
-use super::MOST_THREADS;
+use super::{MOST_THREADS, share};
 use crate::results::bench::RecordingFormat;
 
 /// Make a benchmark of relay experiments, and score identification methods on it.
@@ -74,8 +74,9 @@ pub(crate) struct MakeBench {
           allow_negative_numbers = true,
           value_parser = clap::value_parser!(u64).range(0..=u64::from(u32::MAX)))]
     pub(crate) seed: u64,
-    /// Largest standard deviation of the noise, as a fraction of the amplitude (up to 0.2)
-    #[arg(long, value_name = "FRACTION", default_value_t = Benchmark::default().sigma, allow_negative_numbers = true)]
+    /// Largest standard deviation of the noise, as a share of the amplitude, up to 20 %, such as 2% or 0.02
+    #[arg(long, value_name = "SHARE", default_value_t = Benchmark::default().sigma, allow_negative_numbers = true,
+          value_parser = share)]
     pub(crate) sigma: f64,
     /// File format of the recordings
     #[arg(long, value_enum, default_value = "csv")]

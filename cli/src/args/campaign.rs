@@ -6,7 +6,7 @@ use clap::Args;
 use onecycle_identify::MOST_CYCLES;
 use onecycle_lab::experiments::MOST_CASES;
 
-use super::Method;
+use super::{Method, share};
 
 /// Run many random experiments as a TOML file describes, and print a table of the outcomes.
 #[derive(Debug, Args)]
@@ -31,8 +31,8 @@ pub(crate) struct Campaign {
     /// Identification method [default: from the file]
     #[arg(long, value_enum)]
     pub(crate) method: Option<Method>,
-    /// Standard deviation of the noise, as a fraction of the amplitude [default: from the file]
-    #[arg(long, value_name = "FRACTION")]
+    /// Standard deviation of the noise, as a share of the amplitude, such as 2% or 0.02 [default: from the file]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]
     pub(crate) sigma: Option<f64>,
     /// Multiply all times by this factor, the sample period included [default: from the file]
     #[arg(long, value_name = "FACTOR")]

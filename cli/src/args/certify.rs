@@ -6,7 +6,7 @@ use std::str::FromStr;
 use clap::Args;
 use onecycle_onboard::Soiptd;
 
-use super::{Share, sample_rate};
+use super::{sample_rate, share};
 
 /// Certify that every process of a space has exactly one stable limit cycle under the relay.
 ///
@@ -28,7 +28,7 @@ pub(crate) struct Certify {
     /// Certify one process instead of a space, may be repeated: T_prop,T_body,tau in seconds
     #[arg(long, value_name = "T,T,T", conflicts_with_all = ["json", "report", "shapes"])]
     pub(crate) process: Vec<Times>,
-    /// Input biases in relay amplitudes or % of it [default: 0, 0.1 .. 0.9; with --process 0]
+    /// Input biases as shares of the relay's amplitude, such as 30% or 0.3 [default: 0, 0.1 .. 0.9; with --process 0]
     #[arg(long, value_name = "BIAS,...", value_delimiter = ',', allow_hyphen_values = true,
           value_parser = bias)]
     bias: Vec<f64>,
@@ -88,10 +88,13 @@ impl FromStr for Times {
 
 /// A bias as a fraction of the relay's amplitude, between -1 and 1.
 fn bias(text: &str) -> Result<f64, String> {
-    let bias = text.trim().parse::<Share>()?.of(1.0);
+    let bias = share(text)?;
     if bias.abs() < 1.0 {
         Ok(bias)
     } else {
-        Err("a bias lies between -1 and 1 amplitudes of the relay".to_owned())
+        Err(
+            "a bias lies between -100 % and 100 % of the relay's amplitude, such as 30% or 0.3"
+                .to_owned(),
+        )
     }
 }

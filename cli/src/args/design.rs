@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use onecycle::{Execution, Form, MeasurementNoise, Pid, Specification, Style};
 use onecycle_design::{Spans, Vendor};
 
-use super::{Share, phase_margin};
+use super::{phase_margin, share};
 use crate::failure::Failure;
 
 /// Why the paper's style takes no noise.
@@ -34,8 +34,9 @@ pub(crate) struct DesignArguments {
     /// Maximum output of the controller after a unit step of the reference, in the unit of the input
     #[arg(long, value_name = "INPUT", allow_negative_numbers = true, value_parser = positive)]
     input_peak: Option<f64>,
-    /// Largest overshoot after a step of the reference, such as 15% or 0.15. PI and PID keep it by the set-point weight; the
-    /// loops of a flight log, whose weight is 1, by less integral action [default: 5%; none with --style paper]
+    /// Largest overshoot after a step of the reference, such as 15% or 0.15. PI and PID keep it by the set-point weight b as
+    /// far as b = 0 can; the report says where it cannot. The loops of a flight log, whose weight is 1, keep it by less
+    /// integral action [default: 5%; none with --style paper]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = overshoot)]
     overshoot: Option<f64>,
     /// Sample period of the controller, in seconds; its output leaves one period after the sample [default: that of the
@@ -197,7 +198,7 @@ fn gain_margin(text: &str) -> Result<f64, String> {
 
 /// A share of a step, as a number or a percentage.
 fn overshoot(text: &str) -> Result<f64, String> {
-    let share = text.trim().parse::<Share>()?.of(1.0);
+    let share = share(text)?;
     if (0.0..=1.0).contains(&share) {
         Ok(share)
     } else {
@@ -207,11 +208,11 @@ fn overshoot(text: &str) -> Result<f64, String> {
 
 /// A share of noise, as a number or a percentage.
 pub(super) fn noise(text: &str) -> Result<f64, String> {
-    let share = text.trim().parse::<Share>()?.of(1.0);
+    let share = share(text)?;
     if (1e-6..=100.0).contains(&share) {
         Ok(share)
     } else {
-        Err("a share of noise lies between 0.0001 % and 10000 %, such as 25%".to_owned())
+        Err("a share of noise lies between 0.0001 % and 10000 %, such as 25% or 0.25".to_owned())
     }
 }
 

@@ -58,7 +58,7 @@ pub(crate) struct Identify {
     #[command(flatten)]
     pub(crate) design: DesignArguments,
     /// Maximum noise at the actuator: its standard deviation as a share of the relay's amplitude, or of half the range of
-    /// the input, such as 20% [default: that of the style]
+    /// the input, such as 20% or 0.2 [default: that of the style]
     #[arg(long, value_name = "SHARE", allow_hyphen_values = true, value_parser = noise)]
     pub(crate) noise: Option<f64>,
     /// Estimator: whole cycles of a steady relay oscillation (relay), the whole recording with its disturbances

@@ -8,7 +8,7 @@ use clap::{Args, FromArgMatches, Subcommand, ValueEnum};
 use onecycle_live::Address;
 
 use super::log::LogAxis;
-use super::{Identify, Share, WriteArguments};
+use super::{Identify, WriteArguments, share};
 use crate::failure::Failure;
 
 /// Talk to a vehicle over MAVLink (PX4, ArduPilot): state, flight logs, parameters, a relay test of the altitude.
@@ -208,8 +208,8 @@ pub(crate) struct LiveRelay {
     /// Recording to write (CSV)
     #[arg(long, short, value_name = "FILE")]
     pub(crate) out: PathBuf,
-    /// Half the jump of the thrust, as a part of the full thrust, 1 to 30 %
-    #[arg(long, value_name = "PART", default_value = "10%", allow_hyphen_values = true, value_parser = amplitude)]
+    /// Half the jump of the thrust, as a share of the full thrust, 1 to 30 %, such as 10% or 0.1
+    #[arg(long, value_name = "SHARE", default_value = "10%", allow_hyphen_values = true, value_parser = amplitude)]
     pub(crate) amplitude: f64,
     /// Cycles to record, 2 to 100
     #[arg(long, value_name = "N", default_value_t = 10, allow_negative_numbers = true,
@@ -241,7 +241,7 @@ pub(crate) enum RelayAxis {
 }
 
 fn amplitude(text: &str) -> Result<f64, String> {
-    let part = text.parse::<Share>()?.of(1.0);
+    let part = share(text)?;
     match (0.01..=0.3).contains(&part) {
         true => Ok(part),
         false => Err("an amplitude lies between 1 and 30 % of the full thrust".to_owned()),

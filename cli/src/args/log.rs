@@ -5,6 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use onecycle_link::{Axis, ControlLoop};
 
+use super::share;
+
 /// List what a flight log holds: flights, signals of each control loop, gains in force, excitation.
 ///
 /// PX4 ULog, ArduPilot DataFlash (binary or text), Betaflight and INAV blackbox, MCAP with messages of PX4
@@ -81,7 +83,8 @@ pub(crate) struct WriteArguments {
     /// CLI. A second file, NAME.restore.EXT, sets the old values again
     #[arg(long, value_name = "NAME.EXT")]
     pub(crate) write: Option<PathBuf>,
-    /// With --write: share of the way from the gains in force to the proposed ones, above 0 up to 1
+    /// With --write: share of the way from the gains in force to the proposed ones, such as 25% or 0.25; 100% goes
+    /// all the way
     #[arg(long, value_name = "SHARE", default_value_t = HALF_STEP, requires = "write", allow_negative_numbers = true,
           value_parser = step)]
     pub(crate) step: f64,
@@ -104,11 +107,15 @@ impl WriteArguments {
 }
 
 fn step(text: &str) -> Result<f64, String> {
-    let step = text
-        .parse()
-        .ok()
-        .filter(|step: &f64| *step > 0.0 && *step <= 1.0);
-    step.ok_or_else(|| "a step is a share above 0, at most 1; 1 goes all the way".to_owned())
+    let step = share(text)?;
+    if step > 0.0 && step <= 1.0 {
+        Ok(step)
+    } else {
+        Err(
+            "a step lies above 0 %, up to 100 %, such as 25% or 0.25; 100% goes all the way"
+                .to_owned(),
+        )
+    }
 }
 
 /// Axis of the body.

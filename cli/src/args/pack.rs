@@ -138,7 +138,7 @@ pub(crate) struct ImportPack {
 #[command(after_help = concat!(
     "Examples:\n",
     "  onecycle pack margin default --phase-margin 35 -o calm.pack\n",
-    "  onecycle pack margin default --phase-margin 27 --extra-ise 2 -o quieter.pack\n"
+    "  onecycle pack margin default --phase-margin 27 --extra-ise 2% -o quieter.pack\n"
 ))]
 pub(crate) struct MarginPack {
     /// The pack; default is the one built in
@@ -147,9 +147,9 @@ pub(crate) struct MarginPack {
     /// Phase margin of the controllers, in degrees
     #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = phase_margin)]
     pub(crate) phase_margin: f64,
-    /// How much more than the least a step may cost (ISE), in percent. The controllers are as quiet at the actuator as that
-    /// allows: 2 percent save 15 percent of the derivative gain
-    #[arg(long, value_name = "PERCENT", default_value_t = 0.0, value_parser = extra_ise)]
+    /// How much more than the least a step may cost (ISE), 0 to 50 %, such as 2% or 0.02. The controllers are as quiet at the
+    /// actuator as that allows: 2 % save 15 % of the derivative gain
+    #[arg(long, value_name = "SHARE", default_value = "0", allow_negative_numbers = true, value_parser = extra_ise)]
     pub(crate) extra_ise: f64,
     /// The pack to write
     #[arg(long, short, value_name = "FILE")]

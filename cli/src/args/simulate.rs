@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Share, StructureArguments};
+use super::{Share, StructureArguments, share};
 
 pub(crate) use values::NamedDisturbance;
 use values::{Band, Gust, LoopGains, Outliers};
@@ -96,9 +96,9 @@ pub(crate) struct Simulate {
     /// Keep the centre of the relay fixed: do not trim the input bias
     #[arg(long)]
     pub(crate) no_trim: bool,
-    /// Difference of the high and the low time that the trim leaves, as a fraction of the cycle (0 to 0.5);
-    /// 0.2 gives about twice the information of a symmetric cycle
-    #[arg(long, value_name = "FRACTION", default_value_t = 0.0, conflicts_with = "no_trim",
+    /// Difference of the high and the low time that the trim leaves, as a share of the cycle, 0 to 50 %, such
+    /// as 20% or 0.2, which gives about twice the information of a symmetric cycle
+    #[arg(long, value_name = "SHARE", default_value = "0", conflicts_with = "no_trim",
           allow_negative_numbers = true, value_parser = asymmetry)]
     pub(crate) asymmetry: f64,
     /// Plain relay, without smoothing of the error and minimum switching time
@@ -133,18 +133,14 @@ pub(crate) struct Simulate {
     /// Resolution of the sensor (output unit, or % of the noise-free amplitude)
     #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) quantum: Share,
-    /// Share of the samples with an outlier, such as 1%, and the size of an outlier (output unit, or % of the noise-free
+    /// Share of the samples with an outlier, such as 1% or 0.01, and the size of an outlier (output unit, or % of the noise-free
     /// amplitude) [default size: 100%]
     #[arg(long, value_name = "SHARE[,SIZE]", allow_hyphen_values = true)]
     pub(crate) outliers: Option<Outliers>,
-    /// Share of the samples that the sensor drops, such as 1%; their rows are missing
-    #[arg(
-        long,
-        value_name = "SHARE",
-        default_value = "0",
-        allow_hyphen_values = true
-    )]
-    pub(crate) drop_outs: Share,
+    /// Share of the samples that the sensor drops, such as 1% or 0.01; their rows are missing
+    #[arg(long, value_name = "SHARE", default_value = "0", allow_hyphen_values = true,
+          value_parser = drop_outs)]
+    pub(crate) drop_outs: f64,
     /// Standard deviation of the sample period (s, or % of it)
     #[arg(long, default_value = "0", allow_hyphen_values = true)]
     pub(crate) jitter: Share,
@@ -228,10 +224,22 @@ pub(crate) enum Inject {
     Setpoint,
 }
 
+/// Drop-outs of the sensor.
+fn drop_outs(text: &str) -> Result<f64, String> {
+    let lost = share(text)?;
+    if (0.0..1.0).contains(&lost) {
+        Ok(lost)
+    } else {
+        Err("drop-outs are a share from 0% to below 100%, such as 1% or 0.01".to_owned())
+    }
+}
+
 /// An asymmetry of the relay.
 fn asymmetry(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(part) if (0.0..=0.5).contains(&part) => Ok(part),
-        _ => Err("an asymmetry lies between 0 and 0.5".to_owned()),
+    let part = share(text)?;
+    if (0.0..=0.5).contains(&part) {
+        Ok(part)
+    } else {
+        Err("an asymmetry lies between 0 % and 50 %, such as 20% or 0.2".to_owned())
     }
 }

@@ -4,7 +4,7 @@ use onecycle::{
     Controller, Design, Execution, Identified, Model, Pid, Proposal, Specification, Style, assess,
     design, least_margins,
 };
-use onecycle_design::{Spans, Vendor};
+use onecycle_design::{Limit, Spans, Vendor, reference_filter_s};
 use rayon::prelude::*;
 
 use crate::results::controllers::{Against, Controllers, Row};
@@ -97,10 +97,17 @@ fn controllers(
             least: least_margins(draws, &controller),
         }
     });
+    let figures = chosen.and_then(|row| row.figures.as_ref());
+    let missed = figures.map_or(vec![], |figures| asked.missed(figures));
+    let overshoots = missed.iter().any(|missed| missed.limit == Limit::Overshoot);
+    let reference_filter_s = (design.filter(|_| overshoots))
+        .and_then(|design| reference_filter_s(model, &design.controller, asked.overshoot));
     Controllers {
         asked: *asked,
         rows,
         against,
+        missed,
+        reference_filter_s,
         trade_off: vec![],
         is_recorded: false,
         plant: None,

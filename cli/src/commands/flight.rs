@@ -2,7 +2,7 @@
 
 use std::process::ExitCode;
 
-use onecycle::{Controller, Identified, Parameter, Specification, Structure, Verdict};
+use onecycle::{Identified, Parameter, Specification, Structure, Verdict};
 use onecycle_link::{ControlLoop, Flight, FlightLog, Signals, Span};
 use rayon::prelude::*;
 
@@ -13,7 +13,7 @@ use crate::args::{Estimator, Identify};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print};
 use crate::report::flight as report;
-use crate::results::flight::{FlightLoop, Found, Judged, Part, Refusal};
+use crate::results::flight::{FlightLoop, Found, Part, Refusal};
 
 /// Whether the arguments ask for every loop of a flight log.
 pub(crate) fn is_asked(arguments: &Identify) -> bool {
@@ -109,19 +109,7 @@ fn survey(
     let asked = of_log.specification(*asked, false);
     let (mut one, mut processes) = parts(&signals, flight, &asked);
     if let Some(best) = one.best().and_then(|at| processes.swap_remove(at)) {
-        let choice = controllers::of_identified(&best, of_log.in_force());
-        one.in_force = choice.against.as_ref().and_then(|against| {
-            Some(Judged {
-                pid: pid(&against.controller)?,
-                figures: against.figures,
-            })
-        });
-        one.proposed = choice.design().and_then(|(design, figures)| {
-            Some(Judged {
-                pid: pid(&design.controller)?,
-                figures: Some(*figures),
-            })
-        });
+        one.choice = Some(controllers::of_identified(&best, of_log.in_force()));
     }
     Ok(one)
 }
@@ -183,8 +171,7 @@ fn parts(
         control_loop: signals.control_loop,
         units: signals.units,
         parts,
-        in_force: None,
-        proposed: None,
+        choice: None,
     };
     (one, processes)
 }
@@ -251,13 +238,6 @@ fn slow_pair_s(structure: Structure, value: &impl Fn(Parameter) -> Option<f64>) 
                 .map_or(0.0, |(zeta, w0)| 2.0 * zeta / w0)
         }
         _ => 0.0,
-    }
-}
-
-fn pid(controller: &Controller) -> Option<onecycle::Pid> {
-    match controller {
-        Controller::Pid(pid) => Some(*pid),
-        _ => None,
     }
 }
 

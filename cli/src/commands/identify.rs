@@ -5,8 +5,10 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::{
-    ColumnRef, CsvOptions, Hold, Identification, Recording, Road, Specification, Structure, Style,
+    ColumnRef, CsvOptions, Hold, Identification, ReadError, Recording, Road, Specification,
+    Structure, Style,
 };
+use onecycle_link::LogError;
 
 use super::log::{self, Piped, Source};
 use super::log_gains::{self, LogLoop};
@@ -18,6 +20,7 @@ use crate::reading::open_with_bar;
 use crate::report::{json, log_gains as log_report, page, plot, text};
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::LogGains;
+use crate::words;
 
 /// A recording, what was identified from it, and the controllers to choose from.
 pub(crate) struct Found {
@@ -289,6 +292,11 @@ pub(crate) fn read(
         let signals = part.map_or_else(|| signals.clone(), |part| signals.part(part));
         return Ok((log::recording(&source, &signals)?, of_log));
     }
+    let option = arguments.write.given().or(arguments.log.given());
+    if option.is_some() && path != Path::new("-") {
+        // A file that is not there is no table either.
+        open_with_bar(path).map_err(|error| Failure::unreadable(path, error))?;
+    }
     if let Some(option) = arguments.write.given() {
         return Err(Failure::usage(format!(
             "{option} writes parameters of an autopilot, and {} is not a flight log: leave out {option}",
@@ -301,7 +309,15 @@ pub(crate) fn read(
             path.display()
         )));
     }
-    Ok((read_table(arguments, &head)?, None))
+    match read_table(arguments, &head) {
+        Err(Failure::Recording { reason, .. })
+            if matches!(*reason, ReadError::NotText { .. }) && log::is_named_log(path) =>
+        {
+            let reason = words::log::refusal(&LogError::UnknownFormat);
+            Err(Failure::unreadable(path, reason))
+        }
+        table => Ok((table?, None)),
+    }
 }
 
 /// Refuses the names of columns, which a flight log does not have.

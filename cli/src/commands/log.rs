@@ -5,7 +5,7 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::Recording;
-use onecycle_link::{ControlLoop, FlightLog, LogError, LogFormat, ReadBack, Signals};
+use onecycle_link::{Axis, ControlLoop, Flight, FlightLog, LogError, LogFormat, ReadBack, Signals};
 
 use crate::args::{Log, LogArguments};
 use crate::failure::{Failure, exit};
@@ -96,18 +96,39 @@ pub(crate) fn run(arguments: &Log) -> Result<ExitCode, Failure> {
     } else {
         None
     };
+    let moved = movements(&source, &log);
     print(&if arguments.json {
-        report::json(&name, &log, checks.as_deref())
+        report::json(&name, &log, &moved, checks.as_deref())
     } else {
-        report::text(&name, &log, checks.as_deref())
+        report::text(&name, &log, &moved, checks.as_deref())
     })?;
     Ok(ExitCode::from(exit::DONE))
+}
+
+/// Largest movement (rad/s) of the rate loops of each flight. `None`: no rate loop can be read.
+pub(crate) fn movements(source: &Source<'_>, log: &FlightLog) -> Vec<Option<f64>> {
+    let of = |(at, flight): (usize, &Flight)| {
+        let loops = Axis::ALL.into_iter().filter_map(|axis| {
+            let signals = signals(source, log, at + 1, ControlLoop::Rate(axis)).ok()?;
+            flight.movement(&signals)
+        });
+        loops.max_by(f64::total_cmp)
+    };
+    log.flights.iter().enumerate().map(of).collect()
 }
 
 /// Whether a file begins like a flight log.
 pub(crate) fn is_log(path: &Path) -> bool {
     let head = head(path, LogFormat::HEAD_BYTES as u64);
     head.is_some_and(|head| LogFormat::detect(&head).is_some())
+}
+
+/// Whether a file has the name of a flight log.
+pub(super) fn is_named_log(path: &Path) -> bool {
+    let ending = path.extension().unwrap_or_default().to_ascii_lowercase();
+    ["ulg", "bin", "bbl", "bfl", "mcap"]
+        .iter()
+        .any(|own| ending == *own)
 }
 
 /// The recording of signals.
@@ -140,7 +161,7 @@ pub(crate) fn scan_flight(
 /// The flight (from 1) that is meant: without a choice the longest.
 pub(crate) fn longest(log: &FlightLog, asked: &LogArguments) -> usize {
     let longest = log.flights.iter().enumerate().max_by(|(_, a), (_, b)| {
-        let length_s = |flight: &onecycle_link::Flight| flight.span.to_s - flight.span.from_s;
+        let length_s = |flight: &Flight| flight.span.to_s - flight.span.from_s;
         length_s(a).total_cmp(&length_s(b))
     });
     asked.flight.unwrap_or(1 + longest.map_or(0, |(at, _)| at))

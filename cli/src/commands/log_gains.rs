@@ -181,7 +181,7 @@ impl LogLoop {
         let no_gains = || words::no_gains(self.control_loop);
         let old = LoopGains::in_force(&self.flight, self.control_loop).ok_or_else(no_gains)?;
         if goal.filter_s > 0.0 {
-            return Err(words::NOT_ITS_FORM.to_owned());
+            return Err(words::NOT_ITS_FILTER.to_owned());
         }
         let wanted = old.toward(LoopGains::new(goal.kp, goal.ki, goal.kd), share);
         let changes = changes(&self.flight, self.control_loop, wanted)

@@ -179,7 +179,7 @@ fn margin(arguments: &args::MarginPack) -> Result<ExitCode, Failure> {
     let old = read(&arguments.pack, &old)?;
     let contents = PackContents::read(&old)
         .and_then(|contents| {
-            contents.with_phase_margin(arguments.phase_margin, 0.01 * arguments.extra_ise)
+            contents.with_phase_margin(arguments.phase_margin, arguments.extra_ise)
         })
         .map_err(|error| failed(error.to_string()))?;
     let made = contents

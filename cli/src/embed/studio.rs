@@ -128,9 +128,10 @@ impl Studio {
             return Ok(json!({ "log": null }));
         }
         let source = Source { path, bytes: None };
-        let log = source.scan().map_err(|failure| failure.to_string())?;
-        let report = value(&log_report::json(file, &log, None));
-        self.log = Some(log);
+        let scanned = source.scan().map_err(|failure| failure.to_string())?;
+        let moved = log::movements(&source, &scanned);
+        let report = value(&log_report::json(file, &scanned, &moved, None));
+        self.log = Some(scanned);
         Ok(json!({ "log": report }))
     }
 

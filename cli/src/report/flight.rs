@@ -4,11 +4,13 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use super::json::controllers::{NotKept, not_kept};
 use super::json::to_text;
 use super::number::short;
 use super::wrap::wrapped;
 use crate::results::flight::{FlightLoop, Judged, Part, Refusal};
 use crate::style::{HEADING, headed, painted};
+use crate::words::controllers;
 use crate::words::flight as words;
 use crate::words::sentence;
 use crate::words::verdict::advice;
@@ -52,8 +54,10 @@ fn row(text: &mut String, one: &FlightLoop) {
     let gain = format!("{} ({} .. {})", short(estimate), short(low), short(high));
     let unit = words::gain_unit(one.units, first);
     let delay = format!("{:.0} ms", 1e3 * first.delay_s);
-    let margins = one.in_force.as_ref().map_or("-".to_owned(), margins);
-    let gains = one.proposed.as_ref().map_or("none".to_owned(), |judged| {
+    let margins = one
+        .in_force()
+        .map_or("-".to_owned(), |judged| margins(&judged));
+    let gains = one.proposed().map_or("none".to_owned(), |judged| {
         let pid = judged.pid;
         [pid.kp, pid.ki, pid.kd].map(short).join(", ")
     });
@@ -114,6 +118,9 @@ fn parts(text: &mut String, one: &FlightLoop) {
     } else if one.parts_disagree() {
         wrapped(text, "  ", words::DISAGREE);
     }
+    for sentence in one.choice.iter().flat_map(controllers::not_kept) {
+        wrapped(text, "  ", &sentence);
+    }
 }
 
 #[derive(Serialize)]
@@ -133,6 +140,7 @@ struct Loop {
     parts_disagree: bool,
     in_force: Option<Gains>,
     proposed: Option<Gains>,
+    limits_not_kept: Vec<NotKept>,
     parts: Vec<PartReport>,
 }
 
@@ -193,8 +201,9 @@ pub(crate) fn json(file: &str, flight: usize, loops: &[FlightLoop]) -> String {
             gain_unit: first.map(|found| words::gain_unit(one.units, *found)),
             delay_s: first.map(|found| found.delay_s),
             parts_disagree: one.parts_disagree(),
-            in_force: one.in_force.as_ref().map(gains),
-            proposed: one.proposed.as_ref().map(gains),
+            in_force: one.in_force().as_ref().map(gains),
+            proposed: one.proposed().as_ref().map(gains),
+            limits_not_kept: one.choice.as_ref().map(not_kept).unwrap_or_default(),
             parts: one.parts.iter().map(part).collect(),
         }
     };

@@ -12,7 +12,7 @@ use onecycle::{
 use onecycle_link::Column;
 use serde::{Serialize, Serializer};
 
-use self::controllers::{AgainstReport, Assumed, Proposed, Robust};
+use self::controllers::{AgainstReport, Assumed, NotKept, Proposed, Robust};
 use self::record::Record;
 use super::log_gains::LogGainsReport;
 use crate::results::controllers::Controllers;
@@ -54,6 +54,7 @@ struct IdentifyReport<'a> {
     excited_rad_per_s: Option<f64>,
     resonance_factor: Option<f64>,
     assumed: Option<Assumed>,
+    limits_not_kept: Option<Vec<NotKept>>,
     controllers: Option<Vec<Proposed>>,
     #[serde(skip_serializing_if = "Option::is_none")]
     against: Option<AgainstReport>,
@@ -92,6 +93,7 @@ struct TuneReport {
     margins: MarginsReport,
     step: Option<Step>,
     assumed: Assumed,
+    limits_not_kept: Vec<NotKept>,
     controllers: Vec<Proposed>,
     #[serde(skip_serializing_if = "Option::is_none")]
     against: Option<AgainstReport>,
@@ -338,6 +340,7 @@ pub(crate) fn identification(
         excited_rad_per_s: (found.excitation).and_then(|found| found.highest_rad_per_s()),
         resonance_factor: identified.and_then(|i| i.resonance),
         assumed: choice.map(|choice| (&choice.asked).into()),
+        limits_not_kept: choice.map(controllers::not_kept),
         controllers: choice.map(controllers::proposed),
         against: choice.and_then(controllers::against),
         log: gains.map(Into::into),
@@ -362,6 +365,7 @@ pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> St
         margins: margins(&design.margins, None, figures(choice)),
         step: metrics.map(|metrics| step(metrics, None)),
         assumed: (&choice.asked).into(),
+        limits_not_kept: controllers::not_kept(choice),
         controllers: controllers::proposed(choice),
         against: controllers::against(choice),
     })

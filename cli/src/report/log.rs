@@ -19,15 +19,20 @@ const SCHEMA: &str = "onecycle.log/1";
 
 /// The report for people.
 ///
-/// `checks`: read-back of the gains of each flight.
-pub(crate) fn text(file: &str, log: &FlightLog, checks: Option<&[Vec<ReadBack>]>) -> String {
+/// `moved`: movement of the rate loops of each flight; `checks`: read-back of the gains of each flight.
+pub(crate) fn text(
+    file: &str,
+    log: &FlightLog,
+    moved: &[Option<f64>],
+    checks: Option<&[Vec<ReadBack>]>,
+) -> String {
     let mut text = format!("{}\n", painted(HEADING, file));
     let _ = writeln!(text, "  {}", words::format(log.format));
     if let Some(lost) = words::loss(&log.loss) {
         wrapped(&mut text, "  ", &painted(REMARK, &format!("Lost: {lost}.")));
     }
     for (at, flight) in log.flights.iter().enumerate() {
-        describe(&mut text, at + 1, flight);
+        describe(&mut text, at + 1, flight, moved[at]);
         if let Some(checks) = checks.and_then(|checks| checks.get(at)) {
             text.push_str(&headed(
                 "\nRead-back of the gains in force from the logged signals\n",
@@ -40,7 +45,7 @@ pub(crate) fn text(file: &str, log: &FlightLog, checks: Option<&[Vec<ReadBack>]>
     text
 }
 
-fn describe(text: &mut String, number: usize, flight: &Flight) {
+fn describe(text: &mut String, number: usize, flight: &Flight, moved: Option<f64>) {
     text.push_str(&headed(&format!("\nFlight {number}\n")));
     let Span { from_s, to_s, .. } = flight.span;
     let about = &flight.firmware;
@@ -85,7 +90,7 @@ fn describe(text: &mut String, number: usize, flight: &Flight) {
         );
         wrapped(text, &lead, &gains.collect::<Vec<_>>().join(", "));
     }
-    let advice = words::advice(flight);
+    let advice = words::advice(flight, moved);
     if !advice.is_empty() {
         text.push_str(&headed("\nAdvice\n"));
         advice
@@ -196,8 +201,13 @@ struct TopicReport<'a> {
 
 /// The report for programs.
 ///
-/// `checks`: read-back of the gains of each flight.
-pub(crate) fn json(file: &str, log: &FlightLog, checks: Option<&[Vec<ReadBack>]>) -> String {
+/// `moved`: movement of the rate loops of each flight; `checks`: read-back of the gains of each flight.
+pub(crate) fn json(
+    file: &str,
+    log: &FlightLog,
+    moved: &[Option<f64>],
+    checks: Option<&[Vec<ReadBack>]>,
+) -> String {
     to_text(&LogReport {
         schema: SCHEMA,
         file,
@@ -214,13 +224,13 @@ pub(crate) fn json(file: &str, log: &FlightLog, checks: Option<&[Vec<ReadBack>]>
                 read_back: checks
                     .and_then(|checks| checks.get(at))
                     .map(|checks| checks.iter().map(Into::into).collect()),
-                ..flight_report(flight)
+                ..flight_report(flight, moved[at])
             })
             .collect(),
     })
 }
 
-fn flight_report(flight: &Flight) -> FlightReport<'_> {
+fn flight_report(flight: &Flight, moved: Option<f64>) -> FlightReport<'_> {
     let pair = |span: &Span| [span.from_s, span.to_s];
     let pairs = |spans: &Option<Vec<Span>>| {
         spans
@@ -260,7 +270,7 @@ fn flight_report(flight: &Flight) -> FlightReport<'_> {
                 rate_hz: topic.rate_hz(),
             })
             .collect(),
-        advice: words::advice(flight),
+        advice: words::advice(flight, moved),
         read_back: None,
     }
 }

@@ -18,6 +18,7 @@ use onecycle::{
 };
 use onecycle_design::bands::{load_bands, step_bands};
 use onecycle_identify::{Harmonic, harmonics};
+use onecycle_link::Agreement;
 
 use self::stability::Loop;
 use super::number::significant;
@@ -54,7 +55,10 @@ pub(crate) fn identification(
         .count();
     match &found.outcome {
         Ok(identified) => {
-            lead += &identified_lead(identified, choice, findings);
+            let read_back = gains.and_then(|gains| gains.read_back.as_ref());
+            let is_contradicted =
+                read_back.is_some_and(|read| read.agreement() == Agreement::Differs);
+            lead += &identified_lead(identified, choice, (findings, is_contradicted));
             let view = View {
                 units: &units,
                 identified,
@@ -271,13 +275,16 @@ fn predicted(step: Option<&StepMetrics>) -> String {
     })
 }
 
-/// What the page comes down to.
+/// What the page comes down to. `is_contradicted`: whether the signals of a flight log contradict its parameters.
 fn identified_lead(
     identified: &Identified,
     choice: Option<&Controllers>,
-    remarks: usize,
+    (remarks, is_contradicted): (usize, bool),
 ) -> String {
-    let mut text = "Identified. ".to_owned();
+    let mut text = match is_contradicted {
+        true => format!("Identified, but {} ", words::log_gains::CONTRADICTED),
+        false => "Identified. ".to_owned(),
+    };
     match choice.zip(identified.design.as_ref()) {
         Some((choice, design)) => {
             let margin_rad = identified.phase_margin_rad.as_ref();
@@ -293,7 +300,7 @@ fn identified_lead(
         1 => ". There is a remark below.",
         _ => ". There are remarks below.",
     };
-    page::verdict(true, &text)
+    page::verdict(!is_contradicted, &text)
 }
 
 fn remarks(found: &Identification) -> Option<Section> {

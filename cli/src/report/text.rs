@@ -282,6 +282,9 @@ fn describe_controller(
     if let Some(assumed) = words::controllers::assumed(&choice.asked, choice.is_recorded) {
         wrapped(text, "  assumed     ", &assumed);
     }
+    for sentence in words::controllers::not_kept(choice) {
+        remark(text, "  limits      ", &sentence);
+    }
 }
 
 fn describe_step(

@@ -1,7 +1,7 @@
 //! Controllers of a process to choose from, with the figures of each.
 
 use onecycle::{Assessment, Controller, Design, LeastMargins, Proposal, Specification};
-use onecycle_design::{Spans, Vendor};
+use onecycle_design::{Missed, Spans, Vendor};
 
 /// Controllers of a process, one for each style, and the gains in force.
 pub(crate) struct Controllers {
@@ -10,6 +10,10 @@ pub(crate) struct Controllers {
     /// One row for each style, the chosen one included.
     pub(crate) rows: Vec<Row>,
     pub(crate) against: Option<Against>,
+    /// The limits that the chosen controller does not keep.
+    pub(crate) missed: Vec<Missed>,
+    /// Time constant (s) of a filter of the reference with which the chosen controller keeps the overshoot, if it needs one.
+    pub(crate) reference_filter_s: Option<f64>,
     /// Designs for the most probable process over limits of `Ms`, in ascending order. Empty unless a page is drawn.
     pub(crate) trade_off: Vec<(f64, Assessment, Controller)>,
     /// Whether the model comes from a recording, whose noise and sample period complete the requirements.

@@ -1,7 +1,9 @@
 //! The control loops of a flight, each identified from several parts of it.
 
-use onecycle::{Assessment, Parameter, Pid, Structure, Verdict};
+use onecycle::{Assessment, Controller, Parameter, Pid, Structure, Verdict};
 use onecycle_link::{ControlLoop, Span};
+
+use super::controllers::Controllers;
 
 /// A loop with its parts.
 pub(crate) struct FlightLoop {
@@ -9,16 +11,24 @@ pub(crate) struct FlightLoop {
     /// Units of input and output.
     pub(crate) units: [&'static str; 2],
     pub(crate) parts: Vec<Part>,
-    /// Gains in force on the process of the best part. `None`: not known.
-    pub(crate) in_force: Option<Judged>,
-    /// Proposed controller for that process.
-    pub(crate) proposed: Option<Judged>,
+    /// Controllers for the process of the best part.
+    pub(crate) choice: Option<Controllers>,
 }
 
 /// A controller and its figures; without them the loop is unstable.
 pub(crate) struct Judged {
     pub(crate) pid: Pid,
     pub(crate) figures: Option<Assessment>,
+}
+
+impl Judged {
+    /// `None`: the controller is no PID.
+    fn of(controller: &Controller, figures: Option<Assessment>) -> Option<Self> {
+        match controller {
+            Controller::Pid(pid) => Some(Self { pid: *pid, figures }),
+            _ => None,
+        }
+    }
 }
 
 /// A part of the flight.
@@ -73,6 +83,18 @@ impl Found {
 }
 
 impl FlightLoop {
+    /// Gains in force on the process of the best part. `None`: not known.
+    pub(crate) fn in_force(&self) -> Option<Judged> {
+        let against = self.choice.as_ref()?.against.as_ref()?;
+        Judged::of(&against.controller, against.figures)
+    }
+
+    /// Proposed controller for that process.
+    pub(crate) fn proposed(&self) -> Option<Judged> {
+        let (design, figures) = self.choice.as_ref()?.design()?;
+        Judged::of(&design.controller, Some(*figures))
+    }
+
     /// Index of the part with the narrowest interval of the gain.
     pub(crate) fn best(&self) -> Option<usize> {
         let widths = self.parts.iter().enumerate().filter_map(|(at, part)| {

@@ -1,10 +1,10 @@
 //! Sentences about controllers: the reason why a design failed, the assumed noise and sampling, the cost of robustness, and
 //! the verdict on the gains that the user flies now.
 
-use onecycle::{DesignError, Robustness, Specification, Style};
-use onecycle_design::VendorError;
+use onecycle::{DesignError, Form, Robustness, Specification, Style};
+use onecycle_design::{Limit, Missed, VendorError};
 
-use crate::report::number::{frequency, seconds, significant};
+use crate::report::number::{frequency, seconds, short, significant};
 use crate::results::controllers::{Against, Controllers};
 
 /// Why the controller of a process control system cannot take the gains, and what to do.
@@ -98,6 +98,86 @@ pub(crate) fn assumed(asked: &Specification, is_recorded: bool) -> Option<String
         ),
     };
     (is_recorded || asked.execution.sample_period_s > 0.0).then(|| format!("{noise}; {controller}"))
+}
+
+/// The limits that the chosen controller does not keep, a sentence or two for each.
+pub(crate) fn not_kept(choice: &Controllers) -> Vec<String> {
+    let sentence = |missed: &Missed| match missed.limit {
+        Limit::Overshoot => overshoots(choice, missed),
+        _ => out_of_limit(missed),
+    };
+    choice.missed.iter().map(sentence).collect()
+}
+
+/// An overshoot above its limit: why, and the filter that keeps it.
+fn overshoots(choice: &Controllers, missed: &Missed) -> String {
+    let limit = percent(missed.asked);
+    let why = match (choice.asked.setpoint_weight, choice.asked.form) {
+        (Some(weight), _) => format!("the set-point weight of the firmware is {}", short(weight)),
+        (None, Form::Pi | Form::Pid) => {
+            "even the least set-point weight, b = 0, does not keep it".to_owned()
+        }
+        (None, _) => "this form of controller has no set-point weight".to_owned(),
+    };
+    let advice = choice.reference_filter_s.map_or_else(
+        || "Ramp the reference instead of stepping it".to_owned(),
+        |time_s| {
+            format!(
+                "Pass the reference through a first-order filter with a time constant of {}: that keeps {limit}",
+                seconds(up(time_s))
+            )
+        },
+    );
+    format!(
+        "The overshoot of {} is above its limit of {limit} (--overshoot): {why}. {advice}.",
+        percent(missed.reached)
+    )
+}
+
+/// A share in percent, with a decimal where it has one.
+fn percent(share: f64) -> String {
+    format!("{} %", (1e3 * share).round() / 10.0)
+}
+
+/// Rounded up to two significant digits, as a time is shown.
+fn up(time_s: f64) -> f64 {
+    let digit = 10_f64.powf(time_s.log10().floor() - 1.0);
+    (time_s / digit).ceil() * digit
+}
+
+/// Another limit that is not kept.
+fn out_of_limit(missed: &Missed) -> String {
+    let (name, option) = match missed.limit {
+        Limit::PhaseMargin => ("phase margin", " (--phase-margin)"),
+        Limit::GainMargin => ("gain margin", " (--gain-margin)"),
+        Limit::DelayMargin => ("delay margin", ""),
+        Limit::Ms => ("maximum sensitivity Ms", " (--ms)"),
+        Limit::Mt => ("maximum complementary sensitivity Mt", " (--ms)"),
+        Limit::Noise => ("noise at the actuator", " (--noise)"),
+        Limit::InputPeak => (
+            "largest input after a step of the reference",
+            " (--input-peak)",
+        ),
+        _ => ("gain crossover", ""),
+    };
+    let shown = |value: f64| match missed.limit {
+        Limit::PhaseMargin => format!("{:.1} deg", value.to_degrees()),
+        Limit::DelayMargin => seconds(value),
+        Limit::Noise => percent(value),
+        Limit::Crossover => frequency(value),
+        _ => short(value),
+    };
+    let side = if missed.reached < missed.asked {
+        "below"
+    } else {
+        "above"
+    };
+    format!(
+        "The {name} of {} is {side} its limit of {}{option}. Check the loop before you use these gains, or choose --style \
+         calm.",
+        shown(missed.reached),
+        shown(missed.asked)
+    )
 }
 
 /// What robustness costs.

@@ -6,14 +6,18 @@ use crate::report::number::short;
 use crate::results::log_gains::Written;
 use crate::words::sentence;
 
+use super::listed;
+
 pub(crate) const NOTHING_IDENTIFIED: &str =
     "no process was identified, so no gains can be justified.";
 pub(crate) const CONTRADICTED: &str = "the gains read back from the signals contradict the parameters of the log. Check \
     that no gain was moved in flight by a knob, and that the axes are not exchanged or mounted the other way round.";
 pub(crate) const NO_DESIGN: &str =
     "no controller keeps the limits; choose a calmer --style or another stretch of the log.";
-pub(crate) const NOT_ITS_FORM: &str = "the proposed controller has a form that the firmware does not have: leave out \
-    --controller, and choose --style sharp, balanced or calm.";
+pub(crate) const NOT_ITS_FORM: &str =
+    "the proposed controller has a form that the firmware does not have: leave out --controller.";
+pub(crate) const NOT_ITS_FILTER: &str = "the proposed controller needs a filter of the measurement, and the log shows no such \
+    filter of the firmware. Use a log that holds all parameters, with a filter of the derivative.";
 pub(crate) const NO_CHANGE: &str =
     "the step leaves every parameter as it is; the gains in force are near the proposed ones.";
 
@@ -61,14 +65,24 @@ pub(crate) fn read_back(read: &ReadBack) -> String {
             100.0 * share
         )
     });
-    let verdict = match read.agreement() {
-        Agreement::Agrees => "The signals agree with the parameters of the log.",
-        Agreement::Differs => {
+    let names = |agreement: Agreement| {
+        let of = read.terms.iter().filter(|term| term.agreement == agreement);
+        let names: Vec<&str> = of.map(|term| term.name.as_str()).collect();
+        (!names.is_empty()).then(|| listed(&names))
+    };
+    let parts = (names(Agreement::Agrees), names(Agreement::Unknown));
+    let verdict = match (read.agreement(), parts) {
+        (Agreement::Agrees, (Some(agreeing), Some(unknown))) => format!(
+            "The signals agree with {agreeing}, and show too little of {unknown} to compare."
+        ),
+        (Agreement::Agrees, _) => "The signals agree with the parameters of the log.".to_owned(),
+        (Agreement::Differs, _) => {
             "The signals contradict the parameters of the log: an axis, a sign, a unit or the version is not what it seems, \
              or a gain was moved in flight by a knob."
+                .to_owned()
         }
         _ => {
-            "The signals cannot confirm the parameters: the axis moved too little, or the log is too slow."
+            "The signals cannot confirm the parameters: the axis moved too little, or the log is too slow.".to_owned()
         }
     };
     format!("{since}{verdict}{explained}")

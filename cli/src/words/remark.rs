@@ -3,7 +3,7 @@
 use onecycle::{About, DesignError, Identification, Parameter, Remark};
 use onecycle_identify::Nonlinear;
 
-use super::{caution, controllers};
+use super::{caution, controllers, listed};
 use crate::report::number::{percent, significant};
 
 /// One or two sentences for each remark on a result, with the options of this program.
@@ -200,7 +200,6 @@ fn of_estimator(remark: &Remark) -> Option<String> {
     })
 }
 
-/// `a`, `a and b`, `a, b and c`.
 /// The general estimator finds another process; its result is given if `is_replaced`.
 fn disagreement(phase_margin_rad: Option<f64>, is_replaced: bool) -> String {
     let margin = phase_margin_rad.map_or("be unstable".to_owned(), |margin| {
@@ -240,14 +239,6 @@ fn nonlinear(forces: &Nonlinear) -> String {
         "Beside its linear parts the process has {}. The controller is designed for the linear parts. {advice}",
         found.join(" and ")
     )
-}
-
-fn listed(names: &[&str]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => (*one).to_owned(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
 }
 
 fn without_controller(error: &DesignError) -> String {
@@ -323,11 +314,6 @@ fn of_result(remark: &Remark) -> Option<String> {
              it.",
             100.0 * part
         ),
-        Remark::Overshoot(part) => format!(
-            "The step overshoots by {:.0} %. For less overshoot choose --style balanced or --style calm, or filter the \
-             reference.",
-            100.0 * part
-        ),
         _ => return None,
     })
 }
@@ -399,11 +385,5 @@ mod tests {
         let margin = Remark::MarginMayBeLess(0.1);
         assert!(sentence(&margin, true).contains("; use more cycles, or ask"));
         assert!(sentence(&margin, false).contains("; record longer, or ask"));
-    }
-
-    #[test]
-    fn names_are_listed_with_and() {
-        assert_eq!(listed(&["a"]), "a");
-        assert_eq!(listed(&["a", "b", "c"]), "a, b and c");
     }
 }

@@ -50,6 +50,64 @@ fn unusable_options_of_identify() {
     run(&["identify"]).misused(&["required"]);
 }
 
+// A bare number above 1 may be a percentage or a factor, so no share takes one; both spellings of the same share are one.
+#[test]
+fn a_share_is_a_percentage_or_a_part_of_one() {
+    let hover = [
+        "--k", "1", "--t-prop", "0.03", "--t-body", "1", "--tau", "0.02",
+    ];
+    let simulate = |option: &'static str| [&["simulate"], &hover[..], &[option, "10"]].concat();
+    let all: [Vec<&str>; 12] = [
+        vec!["identify", "x.csv", "--noise", "10"],
+        vec!["identify", "x.csv", "--overshoot", "10"],
+        vec!["identify", "x.ulg", "--write", "x.params", "--step", "10"],
+        [&["tune"], &hover[..], &["--overshoot", "10"]].concat(),
+        simulate("--asymmetry"),
+        simulate("--drop-outs"),
+        simulate("--outliers"),
+        vec!["certify", "--bias", "10"],
+        vec!["grid", "--deterioration", "10"],
+        vec!["bench", "make", "-o", "x", "--sigma", "10"],
+        vec![
+            "pack",
+            "margin",
+            "default",
+            "--phase-margin",
+            "27",
+            "--extra-ise",
+            "10",
+            "-o",
+            "x.pack",
+        ],
+        vec![
+            "live",
+            "relay",
+            "udp:14550",
+            "--axis",
+            "altitude",
+            "-o",
+            "x.csv",
+            "--amplitude",
+            "10",
+        ],
+    ];
+    for arguments in all {
+        run(&arguments).misused(&["written as 5% or 0.05: write 10% or 0.1"]);
+    }
+    let tuned = |share| {
+        let asked = [
+            "--process",
+            "FOPTD,K=2,T=10,tau=1",
+            "--controller",
+            "pi",
+            "--overshoot",
+            share,
+        ];
+        run(&[&["tune"], &asked[..]].concat()).stdout
+    };
+    assert_eq!(tuned("2%"), tuned("0.02"));
+}
+
 // The exit code is 2, and the sentence names the argument.
 #[test]
 fn a_sample_rate_out_of_range() {

@@ -137,9 +137,10 @@ fn the_largest_noise_can_be_set() {
         assert!((large / small - 10.0).abs() < 1e-6, "{small} {large}");
     }
     let nothing = folder.name("nothing");
-    for wrong in ["-0.1", "0.5", "nan"] {
+    for wrong in ["-0.1", "0.5"] {
         run(&["bench", "make", "-o", &nothing, "--sigma", wrong]).refused(2, &["--sigma", "0.2"]);
     }
+    run(&["bench", "make", "-o", &nothing, "--sigma", "nan"]).misused(&["--sigma", "percentage"]);
     assert!(!Path::new(&nothing).exists());
 }
 

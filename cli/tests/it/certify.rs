@@ -103,7 +103,7 @@ fn arguments_that_are_none() {
         ),
         (&["--process", "0.3,two,1"], &["--process", "three times"]),
         (&["--process", "0.3,-2,0.1"], &["--process", "T_body"]),
-        (&["--bias", "1"], &["--bias", "between -1 and 1"]),
+        (&["--bias", "1"], &["--bias", "between -100 % and 100 %"]),
         (&["--bias", "0,x"], &["--bias", "'x'"]),
         (&["--shapes", "1"], &["--shapes"]),
         (&["--sample-rate", "1000"], &["required arguments"]),

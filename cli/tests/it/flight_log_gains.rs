@@ -1,6 +1,6 @@
 //! Gains of flight logs: read back, laid over the log, written to parameter files.
 
-use crate::common::{NOT_IDENTIFIED, Scratch, run};
+use crate::common::{NOT_IDENTIFIED, Scratch, reported, run};
 
 fn example(name: &str) -> String {
     format!("{}/../examples/logs/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -92,6 +92,49 @@ fn half_of_the_way_to_the_limits_is_written_and_named() {
     assert_eq!(folder.files().len(), 2);
 }
 
+/// `px4_chirps.ulg` with `new` over the bytes that follow `name`.
+fn chirps_with(folder: &Scratch, name: &[u8], new: &[u8]) -> String {
+    let mut bytes = std::fs::read(example("px4_chirps.ulg")).unwrap();
+    let found = bytes.windows(name.len()).position(|part| part == name);
+    let at = found.unwrap() + name.len();
+    bytes[at..at + new.len()].copy_from_slice(new);
+    folder.write("flight.ulg", &bytes)
+}
+
+// With 0.6 for the P of 0.15 in the log, the signals contradict it: the headline of the page says so and is that of a refusal.
+#[test]
+fn a_contradicted_log_has_no_good_headline() {
+    let folder = Scratch::new();
+    let headline = |log: &str| {
+        let page = reported(&["identify", log, "--axis", "roll"]).1;
+        let start = page.find("class=\"verdict").unwrap();
+        page[start..start + 200].to_owned()
+    };
+    let good = headline(&example("px4_chirps.ulg"));
+    let log = chirps_with(&folder, b"float MC_ROLLRATE_P", &0.6_f32.to_le_bytes());
+    let contradicted = headline(&log);
+    assert!(
+        contradicted.contains("contradict") && !good.contains("contradict"),
+        "{contradicted}"
+    );
+    let class = |headline: &str| headline.split('>').next().unwrap().to_owned();
+    assert_ne!(class(&good), class(&contradicted));
+}
+
+// A log without the filter of the derivative: nothing is written, and no option is blamed that was not given.
+#[test]
+fn a_filter_that_the_log_does_not_show_is_not_written() {
+    let folder = Scratch::new();
+    let log = chirps_with(&folder, b"IMU_DGYRO_CUTO", b"XX");
+    let path = folder.name("roll.params");
+    let text = run(&["identify", &log, "--axis", "roll", "--write", &path]).stdout;
+    assert!(
+        text.contains("Nothing was written: the proposed controller needs a filter"),
+        "{text}"
+    );
+    assert!(!text.contains("--controller"), "{text}");
+}
+
 // Without a process there is nothing to write, and no file is left.
 #[test]
 fn a_refused_flight_writes_nothing() {
@@ -116,6 +159,6 @@ fn wrong_uses_of_write() {
     let path = folder.name("x.params");
     run(&["identify", &table, "--write", &path]).misused(&["--write", "not a flight log"]);
     let log = example("px4_chirps.ulg");
-    run(&["identify", &log, "--write", &path, "--step", "0"]).misused(&["above 0"]);
+    run(&["identify", &log, "--write", &path, "--step", "0"]).misused(&["above 0 %"]);
     run(&["identify", &log, "--write", "-"]).misused(&["--write needs the name of a file"]);
 }

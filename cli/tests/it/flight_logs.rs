@@ -26,6 +26,41 @@ fn a_log_is_listed_as_text_and_json() {
     );
 }
 
+// A log without marks of its firmware may be excited all the same: what its set-points did decides.
+#[test]
+fn excitation_is_advised_to_calm_flights_only() {
+    let advice = |name: &str, flight: usize| {
+        let json = run(&["log", &example(name), "--json"]).stdout;
+        let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+        report["flights"][flight]["advice"].to_string()
+    };
+    let chirps = advice("px4_chirps.ulg", 0);
+    assert!(!chirps.contains("Fly"), "{chirps}");
+    let calm = advice("betaflight_two_flights.bbl", 1);
+    assert!(
+        calm.contains("The flight is calm") && calm.contains("Fly the chirp mode"),
+        "{calm}"
+    );
+}
+
+// The signals agree with five terms, and show too little of the sixth.
+#[test]
+fn a_read_back_does_not_confirm_what_it_cannot_tell() {
+    let text = run(&["log", &example("betaflight_acro.bfl"), "--check"]).stdout;
+    let words = text.split_whitespace().collect::<Vec<_>>().join(" ");
+    let part = "and show too little of feedforward_weight[0] to compare.";
+    assert!(words.contains(part), "{text}");
+}
+
+// The roll rate of this flight is refused, whatever can be designed for the fit that was refused.
+#[test]
+fn a_refused_flight_has_no_valid_model() {
+    let log = example("px4_motor_failure.ulg");
+    let text = run(&["identify", &log, "--axis", "roll", "--controller", "pd"]).stdout;
+    assert!(text.contains("No process identified"), "{text}");
+    assert!(!text.contains("intervals are valid"), "{text}");
+}
+
 // Whatever the verdict, the report names loop, input and output.
 #[test]
 fn identify_takes_the_loop_asked_for() {
@@ -69,6 +104,13 @@ fn what_does_not_fit_is_refused_with_advice() {
     let table = folder.write("table.csv", b"t,u,y\n0,1,2\n1,2,3\n");
     run(&["identify", &table, "--axis", "roll"]).misused(&["--axis", "flight logs"]);
     run(&["log", &table]).refused(UNREADABLE, &["not a ULog, DataFlash, blackbox or MCAP log"]);
+    let noise = folder.write("noise.ulg", b"\x00\x9a\x01\x00\xfe\x00\x12\x00");
+    run(&["identify", &noise]).refused(UNREADABLE, &["expected a PX4 ULog"]);
+    let nothing = folder.name("nothing.csv");
+    for option in [&["--axis", "roll"][..], &["--write", "x.params"], &[]] {
+        let arguments = [&["identify", &nothing], option].concat();
+        run(&arguments).refused(UNREADABLE, &["nothing.csv", "No such file"]);
+    }
 }
 
 fn loops(log: &str) -> Vec<serde_json::Value> {

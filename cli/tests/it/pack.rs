@@ -388,7 +388,10 @@ fn a_pack_of_another_margin_keeps_all_else() {
 
     // The packs of the autopilots.
     let flown = concat!(env!("CARGO_MANIFEST_DIR"), "/../autopilots/");
-    for (margin, extra, name) in [("35", "0", "margin_35.pack"), ("25", "4", "margin_25.pack")] {
+    for (margin, extra, name) in [
+        ("35", "0", "margin_35.pack"),
+        ("25", "4%", "margin_25.pack"),
+    ] {
         done(&[
             "margin",
             "default",

@@ -55,6 +55,11 @@ fn an_identification_as_a_page() {
             .filter(|note| note.starts_with(margin.as_str()));
         assert_eq!(found.count(), 2, "{margin}: {notes:?}");
     }
+    let missed = report["limits_not_kept"][0]["message"].as_str().unwrap();
+    assert!(
+        missed.starts_with("The overshoot of 10.5 %") && page.contains(missed),
+        "{missed}"
+    );
     let overshoot = 100.0 * report["step"]["overshoot"].as_f64().unwrap();
     assert!(notes.contains(&format!("overshoot {overshoot:.0} %")));
     for trace in figures

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use crate::common::{
-    DOUBLE_INTEGRATOR, Outcome, RECORDINGS, Scratch, killed_when, onecycle, run, tune,
+    DOUBLE_INTEGRATOR, Outcome, RECORDINGS, Scratch, killed_when, onecycle, reported, run, tune,
 };
 
 // ---------------------------------------------------------------- tune
@@ -33,6 +33,31 @@ fn tune_gives_the_published_gains() {
         "{}",
         text.stdout
     );
+}
+
+// A PID whose set-point weight is zero overshoots by 17 % where the default limit is 5 %: text, JSON and page say so, and the filter of
+// the reference that they name is that of the library. A PI keeps the limit by its weight, and a limit of 20 % is kept.
+#[test]
+fn a_limit_that_is_not_kept_is_named() {
+    let process = ["tune", "--process", "FOPTD,K=2,T=10,tau=1"];
+    let (ran, page) = reported(&[&process[..], &["--json"]].concat());
+    let report: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let missed = report["limits_not_kept"].as_array().unwrap();
+    assert_eq!(
+        (missed.len(), &missed[0]["limit"]),
+        (1, &"overshoot".into())
+    );
+    assert_eq!(missed[0]["asked"], 0.05);
+    assert_eq!(missed[0]["reached"], report["step"]["overshoot"]);
+    let words = "The overshoot of 17 % is above its limit of 5 % (--overshoot)";
+    assert!(missed[0]["message"].as_str().unwrap().starts_with(words));
+    assert!(page.contains(words));
+    let text = run(&process).stdout;
+    assert!(text.contains(&format!("  limits      {words}")), "{text}");
+    for more in [["--controller", "pi"], ["--overshoot", "20%"]] {
+        let text = run(&[&process[..], &more].concat()).stdout;
+        assert!(!text.contains("  limits  "), "{text}");
+    }
 }
 
 #[test]

@@ -104,7 +104,6 @@ fn remarks_have_a_stable_unique_name() {
         (Remark::Coarse(20.0), "coarse"),
         (Remark::Misfit(0.02), "misfit"),
         (Remark::MarginMayBeLess(0.1), "margin_may_be_less"),
-        (Remark::Overshoot(0.5), "overshoot"),
     ];
     for (index, (remark, name)) in names.iter().enumerate() {
         assert_eq!(remark.kind(), *name);

@@ -29,6 +29,19 @@ pub struct Firmware {
     pub board: String,
 }
 
+impl Firmware {
+    /// Vehicle and release that ArduPilot names: `ArduCopter` and 4, 5 of `ArduCopter V4.5.7 (2a3dc4b7)`. `None`: the log does
+    /// not name them.
+    #[must_use]
+    pub fn release(&self) -> Option<(&str, [u32; 2])> {
+        let mut words = self.version.split_whitespace();
+        let (vehicle, release) = (words.next()?, words.next()?.strip_prefix('V')?);
+        let mut numbers = release.split(|c: char| !c.is_ascii_digit());
+        let mut number = || numbers.next()?.parse().ok();
+        Some((vehicle, [number()?, number()?]))
+    }
+}
+
 /// A stretch of time, in seconds of the log's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]

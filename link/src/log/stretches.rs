@@ -52,6 +52,22 @@ impl Flight {
         chosen
     }
 
+    /// Largest standard deviation (unit of the output) of the set-point of a loop within a part worth using, or of the output
+    /// where the set-point was not logged. `None`: there is no such part.
+    #[must_use]
+    pub fn movement(&self, signals: &Signals) -> Option<f64> {
+        let moved = |span: &Span| {
+            let part = signals.part(*span);
+            let values = part.set_point.unwrap_or(part.output);
+            let count = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / count;
+            let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+            (square / count).sqrt()
+        };
+        let spans = self.stretches(signals);
+        spans.iter().map(moved).max_by(f64::total_cmp)
+    }
+
     /// Armed and in the air, as far as the log tells.
     fn usable(&self, signals: &Signals) -> Vec<Span> {
         let whole = match (signals.time_s.first(), signals.time_s.last()) {

@@ -17,6 +17,9 @@ const MOST_MESSAGES: usize = 1000;
 /// A longer increment of time, in microseconds, is a pause of the log; it does not count for rates.
 const PAUSE_US: f64 = 5e6;
 
+/// A time farther from those before, in seconds, is a damaged stamp.
+const DAY_S: f64 = 86_400.0;
+
 /// Format of a log.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
@@ -129,9 +132,9 @@ pub struct Topic {
     pub fields: Vec<String>,
     /// Number of rows.
     pub rows: u64,
-    /// Time of the first row, in seconds.
+    /// Earliest time of a row, in seconds: that of the first one, unless the clock goes back.
     pub start_s: f64,
-    /// Time of the last row, in seconds.
+    /// Latest time of a row, in seconds.
     pub end_s: f64,
     /// Times of the rows that were kept, in seconds.
     pub time_s: Vec<f64>,
@@ -186,18 +189,22 @@ impl Topic {
     /// Counts a row of this time (us), and keeps the columns that were chosen: `value(index in the choice, field)`.
     #[inline]
     pub(super) fn push(&mut self, time_us: f64, mut value: impl FnMut(usize, usize) -> f64) {
+        let time_s = time_us * 1e-6;
         if self.rows == 0 {
-            self.start_s = time_us * 1e-6;
+            (self.start_s, self.end_s) = (time_s, time_s);
         } else {
             let increment_us = time_us - self.last_us;
             if increment_us > 0.0 && increment_us < PAUSE_US {
                 self.increments += 1;
                 self.covered_us += increment_us;
             }
+            if (time_s - self.end_s).abs() < DAY_S {
+                self.start_s = self.start_s.min(time_s);
+                self.end_s = self.end_s.max(time_s);
+            }
         }
         self.rows += 1;
         self.last_us = time_us;
-        self.end_s = time_us * 1e-6;
         if self.columns.is_empty() || self.time_s.len() >= MOST_ROWS {
             return;
         }
@@ -214,7 +221,7 @@ impl Topic {
                 return;
             }
         }
-        self.time_s.push(time_us * 1e-6);
+        self.time_s.push(time_s);
         for (at, (field, values)) in self.columns.iter_mut().enumerate() {
             values.push(value(at, *field));
         }

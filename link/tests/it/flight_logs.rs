@@ -256,6 +256,51 @@ fn the_text_form_of_dataflash() {
     assert_eq!(tables.loss.rows_dropped, 2);
 }
 
+/// The text form of DataFlash with this message and rows of `RATE` at these times (us).
+fn text_of(message: &str, times_us: &[u64]) -> String {
+    let mut text = format!(
+        "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns\n\
+         FMT, 2, 19, RATE, Qff, TimeUS,RDes,R\n\
+         FMT, 3, 75, MSG, QZ, TimeUS,Message\n\
+         FMT, 4, 19, STRT, ff, A,B\nMSG, 150, {message}\n"
+    );
+    for time_us in times_us {
+        text += &format!("RATE, {time_us}, 1, 2\n");
+    }
+    text
+}
+
+// Before release 3.6 the vehicle stood behind `APM:`.
+#[test]
+fn ardupilot_names_vehicle_and_release() {
+    let firmware = |message| {
+        let log = FlightLog::scan(text_of(message, &[1000, 2000]).as_bytes()).unwrap();
+        log.flights[0].firmware.clone()
+    };
+    let old = firmware("APM:Copter V3.4.6 (e707341b)");
+    assert_eq!(old.version, "ArduCopter V3.4.6 (e707341b)");
+    assert_eq!(old.release(), Some(("ArduCopter", [3, 4])));
+    let new = firmware("ArduPlane V4.7.0-dev (55685c43)");
+    assert_eq!(new.release(), Some(("ArduPlane", [4, 7])));
+    assert_eq!(firmware("Frame: QUAD").release(), None);
+}
+
+// The clock goes back by 3 ms, and a damaged stamp is years ahead: the flight lasts from the earliest to the latest row. More rows of
+// a topic without a clock do not count.
+#[test]
+fn a_flight_does_not_end_before_it_begins() {
+    let span = |times_us: &[u64]| {
+        let log = FlightLog::scan(text_of("ArduCopter V4.5.1", times_us).as_bytes()).unwrap();
+        let span = log.flights[0].span;
+        [span.from_s, span.to_s]
+    };
+    assert_eq!(span(&[5000, 6000, 3000, 4000]), [0.003, 0.006]);
+    assert_eq!(span(&[3000, 4000, 1 << 50, 5000]), [0.003, 0.005]);
+    let stopped = text_of("ArduCopter V4.5.1", &[3000, 4000]) + &"STRT, 1, 2\n".repeat(9);
+    let log = FlightLog::scan(stopped.as_bytes()).unwrap();
+    assert_eq!(log.flights[0].span.to_s, 0.004);
+}
+
 // A thousand bytes missing in the middle cost what they held, and at most some rows beside them.
 #[test]
 fn reading_goes_on_after_damage() {

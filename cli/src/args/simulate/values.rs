@@ -2,7 +2,7 @@
 
 use std::str::FromStr;
 
-use crate::args::Share;
+use crate::args::{self, Share};
 
 /// Lowest and highest frequency (Hz): `1,20`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -115,12 +115,12 @@ impl FromStr for Outliers {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let (share, size) = text.split_once(',').unwrap_or((text, "100%"));
-        let share = share.trim().parse::<Share>()?.of(1.0);
+        let part = args::share(share)?;
         let size = size.trim().parse::<Share>()?;
-        if (0.0..1.0).contains(&share) && size.of(1.0) >= 0.0 {
-            return Ok(Self { share, size });
+        if (0.0..1.0).contains(&part) && size.of(1.0) >= 0.0 {
+            return Ok(Self { share: part, size });
         }
-        Err("outliers are a share below 100% and a size, such as 1% or 1%,50%".to_owned())
+        Err("outliers are a share below 100% and a size, such as 1%, 0.01 or 1%,50%".to_owned())
     }
 }
 

@@ -88,7 +88,7 @@ impl Plan {
         experiment.input_bias = arguments.bias.of(arguments.amplitude);
         let mut sensor = Sensor::noisy(not_negative("--noise", arguments.noise.of(amplitude))?)
             .with_quantum(not_negative("--quantum", arguments.quantum.of(amplitude))?)
-            .with_drop_outs(share("--drop-outs", arguments.drop_outs)?);
+            .with_drop_outs(arguments.drop_outs);
         if let Some(outliers) = arguments.outliers {
             sensor = sensor.with_outliers(outliers.share, outliers.size.of(amplitude));
         }
@@ -459,16 +459,5 @@ fn not_negative(name: &str, value: f64) -> Result<f64, Failure> {
     }
     Err(Failure::usage(format!(
         "{name} must be zero or positive, but is {value}"
-    )))
-}
-
-fn share(name: &str, share: Share) -> Result<f64, Failure> {
-    let value = share.of(1.0);
-    if (0.0..1.0).contains(&value) {
-        return Ok(value);
-    }
-    Err(Failure::usage(format!(
-        "{name} must be a share from 0% to below 100%, but is {}%",
-        100.0 * value
     )))
 }

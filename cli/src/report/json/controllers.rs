@@ -1,10 +1,12 @@
 //! Controllers to choose from, in JSON.
 
 use onecycle::{Assessment, LeastMargins, Robustness, Specification};
+use onecycle_design::{Limit, Missed};
 use serde::Serialize;
 
 use super::{Controller, MarginsReport, Step, controller, margins, of_style, step};
 use crate::results::controllers::{Controllers, Row};
+use crate::words::controllers as words;
 
 #[derive(Serialize)]
 pub(super) struct Robust {
@@ -22,6 +24,15 @@ pub(super) struct Assumed {
     input_amplitude: Option<f64>,
     sample_period_s: f64,
     computation_delay_s: f64,
+}
+
+/// A limit that the chosen controller does not keep.
+#[derive(Serialize)]
+pub(crate) struct NotKept {
+    limit: &'static str,
+    asked: f64,
+    reached: f64,
+    message: String,
 }
 
 /// One style: its controller with margins and step, or the error that prevented a design.
@@ -65,6 +76,30 @@ pub(crate) struct Least {
     phase_margin_deg: f64,
     gain_margin: Option<f64>,
     delay_margin_s: f64,
+}
+
+pub(crate) fn not_kept(choice: &Controllers) -> Vec<NotKept> {
+    let of = |(missed, message): (&Missed, String)| {
+        let (limit, scale) = match missed.limit {
+            Limit::Overshoot => ("overshoot", 1.0),
+            Limit::PhaseMargin => ("phase_margin_deg", 1_f64.to_degrees()),
+            Limit::GainMargin => ("gain_margin", 1.0),
+            Limit::DelayMargin => ("delay_margin_s", 1.0),
+            Limit::Ms => ("ms", 1.0),
+            Limit::Mt => ("mt", 1.0),
+            Limit::Noise => ("noise_share", 1.0),
+            Limit::InputPeak => ("peak_input", 1.0),
+            _ => ("gain_crossover_rad_per_s", 1.0),
+        };
+        NotKept {
+            limit,
+            asked: scale * missed.asked,
+            reached: scale * missed.reached,
+            message,
+        }
+    };
+    let sentences = words::not_kept(choice);
+    choice.missed.iter().zip(sentences).map(of).collect()
 }
 
 pub(super) fn proposed(choice: &Controllers) -> Vec<Proposed> {

@@ -8,7 +8,7 @@ use crate::pages::plot::{Axis, Figure, Hue, Marks, Note, Panel, Series};
 use crate::report::controllers::{TITLES, cells, forms, in_plant, margins};
 use crate::report::units::Units;
 use crate::results::controllers::Controllers;
-use crate::words::controllers::{assumed, brief, change, judgement, price};
+use crate::words::controllers::{assumed, brief, change, judgement, not_kept, price};
 use crate::words::sentence;
 
 /// Gains, margins, assumptions, and the table of the styles.
@@ -35,6 +35,12 @@ pub(super) fn section(
     let assumed = assumed(&choice.asked, choice.is_recorded);
     facts.extend(assumed.map(|assumed| ("assumed", assumed)));
     let mut body = page::facts(&facts);
+    let not_kept = not_kept(choice);
+    body.extend(
+        not_kept
+            .iter()
+            .map(|sentence| page::paragraph("note", sentence)),
+    );
     if let Some(against) = &choice.against {
         body += &page::paragraph("note", &sentence(&judgement(against)));
         body += &change(choice).map_or(String::new(), |change| {

@@ -62,7 +62,12 @@ pub(super) fn firmware(flight: &FlightTables) -> Firmware {
             .find(is_it)
             .cloned()
     };
-    let named = said(&["Ardu", "Blimp", "Rover", "AntennaTracker"]);
+    // Before release 3.6: `APM:Copter V3.4.6`.
+    let old = |text: String| match text.strip_prefix("APM:") {
+        Some(vehicle) => format!("Ardu{vehicle}"),
+        None => text,
+    };
+    let named = said(&["Ardu", "APM:", "Blimp", "Rover", "AntennaTracker"]).map(old);
     let version = named.or_else(|| {
         let topic = flight.topic("VER")?;
         let part = |field| topic.column(field)?.first().copied();
