@@ -22,6 +22,7 @@ mod choose;
 #[cfg(test)]
 mod dense;
 mod descent;
+mod draws;
 mod filter;
 mod fitted;
 mod forces;
@@ -48,7 +49,7 @@ mod validate;
 #[cfg(test)]
 mod vectors;
 
-use onecycle_design::Structure;
+use onecycle_design::{Parameter, Structure};
 
 pub(crate) use self::check::check;
 use self::choose::NEARLY;
@@ -147,14 +148,17 @@ impl Search<'_> {
             let delay_s = filter.time_s();
             self.remarks.push(Remark::OutputFilter { delay_s });
         }
-        let is_constant = |input: &[f64]| input.iter().all(|v| *v == input[0]);
-        if self.options.input_before.is_none() && is_constant(&prepared.record.input) {
+        let is_assumed = self.options.input_before.is_none() && prepared.record.is_constant_input();
+        if is_assumed {
             self.remarks.push(Remark::AssumedRest);
         }
         if prepared.part_used < 0.999 {
             self.remarks.push(Remark::PartUsed(prepared.part_used));
         }
         let fitted = Fitted::new(&prepared, outliers, self.options, &mut self.remarks)?;
+        if is_assumed && !begins_at_rest(&fitted) {
+            return Err(Verdict::ConstantInput);
+        }
         let blocks = fitted.blocks();
         let components = fitted.posterior(&blocks);
         let tests = validate::tests(&blocks, &fitted.best.found.at);
@@ -256,7 +260,11 @@ impl Search<'_> {
             return Some(self.no_information(theta, deviation));
         }
         let bounds = Bounds::new(theta.structure, blocks, fitted.limits.longest_tau_s);
-        result::at_bound(theta, &bounds).map(Verdict::AtBound)
+        match result::at_bound(theta, &bounds)? {
+            // A resonance without damping explains an oscillation that the input does not drive.
+            Parameter::Zeta => Some(self.no_information(theta, None)),
+            parameter => Some(Verdict::AtBound(parameter)),
+        }
     }
 
     /// The gain is not known; `deviation` is its relative uncertainty.
@@ -327,7 +335,7 @@ impl Search<'_> {
         let is_wider = validate::is_coloured(&tests) || validate::is_left_to_the_input(&tests);
         // An error of the prediction that the noise does not explain is one of the model.
         let least = prediction.map_or(1.0, |found| found.error_ratio.max(1.0).sqrt());
-        let (posterior, widened) = result::posterior_of(
+        let (posterior, widened) = draws::posterior_of(
             &fitted.best.found,
             components,
             prepared.early_s,
@@ -350,6 +358,25 @@ impl Search<'_> {
         self.remarks = remarks;
         found
     }
+}
+
+/// Whether the response to a step before the first row begins as one from rest: with dead time or a second lag of at least
+/// three samples. A single exponential can begin anywhere, as after a step long ago.
+fn begins_at_rest(fitted: &Fitted) -> bool {
+    let theta = &fitted.best.found.theta;
+    let process = theta.process(1.0);
+    let lags_s: Vec<f64> = match theta.real_lags_s() {
+        Some((slow_s, fast_s)) => vec![slow_s, fast_s],
+        None => vec![1.0 / process.pole_per_s()],
+    };
+    let stages = theta.structure.stages();
+    let every = lags_s
+        .iter()
+        .chain(&process.lags_s()[..stages.lags])
+        .copied();
+    let slowest_s = every.clone().fold(0.0, f64::max);
+    let late_s = every.sum::<f64>() - slowest_s + theta.tau_s();
+    stages.integrators == 0 && late_s >= 3.0 * fitted.record.dt_s
 }
 
 /// The fit as a result. `None` if the filter does not converge.

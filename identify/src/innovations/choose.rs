@@ -82,6 +82,8 @@ pub(super) struct Limits {
     pub(super) skip_s: f64,
     /// Longest dead time (s).
     pub(super) longest_tau_s: f64,
+    /// Inverse of the lowest frequency of the excitation (s).
+    pub(super) slowest_s: f64,
     /// The only structure to fit.
     pub(super) structure: Option<Structure>,
     /// Fewest samples a row.
@@ -111,7 +113,10 @@ pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
     lift(&blocks, &mut all, limits);
     quieten(&blocks, &mut all, limits);
     if limits.structure.is_none() {
-        all.retain(|candidate| !has_hidden_lag(&candidate.found.theta, record.dt_s));
+        all.retain(|candidate| {
+            let theta = &candidate.found.theta;
+            !has_hidden_lag(theta, record.dt_s) && !is_of_a_force(theta, limits.slowest_s)
+        });
     }
     keep_best_of_each(&mut all, limits.structure);
     Choice {
@@ -238,9 +243,24 @@ fn quieten(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
     ));
 }
 
-/// Whether a second lag is shorter than a sample: no output shows it, it stands for an error of the samples' times.
+/// Whether a third lag is shorter than a sample: no output shows it, it stands for an error of the samples' times.
 fn has_hidden_lag(theta: &Theta, sample_s: f64) -> bool {
-    theta.structure.stages().lags > 1 && theta.shortest_lag_s() < sample_s
+    let stages = theta.structure.stages();
+    let lags = (0..stages.lags).map(|lag| theta.values[lag].exp());
+    stages.lags + stages.poles + 2 * stages.pairs > 2
+        && lags.fold(f64::INFINITY, f64::min) < sample_s
+}
+
+/// Whether all lags before an integrator, or before what cannot be told from one, turn the phase by more than 70 degrees at the
+/// lowest frequency of the excitation, which then shows `K/T` and not `K`: that is a body behind a force, with its actuator's
+/// lag in the dead time.
+fn is_of_a_force(theta: &Theta, slowest_s: f64) -> bool {
+    let is_integrating = match theta.structure {
+        Structure::IntegratorLag => true,
+        Structure::Soptd => theta.process(1.0).pole_per_s() * slowest_s < 0.1,
+        _ => false,
+    };
+    is_integrating && theta.delay_and_lag_s().1 > 3.0 * slowest_s
 }
 
 fn keep_best_of_each(all: &mut Vec<Candidate>, structure: Option<Structure>) {

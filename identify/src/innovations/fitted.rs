@@ -73,6 +73,7 @@ impl Fitted {
         let mut limits = Limits {
             skip_s: 0.0,
             longest_tau_s: longest,
+            slowest_s: f64::INFINITY,
             structure: options.structure,
             fewest_samples: 1,
         };
@@ -296,6 +297,7 @@ fn choose_on(
     let limits = Limits {
         skip_s: SKIPPED * length_s,
         longest_tau_s: LONGEST_TAU * length_s,
+        slowest_s: validate::slowest_s(&Blocks::new(&part, 1, 0.0)).unwrap_or(f64::INFINITY),
         structure: options.structure,
         fewest_samples,
     };

@@ -20,11 +20,11 @@ use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use super::descent::{Found, Patience};
+use super::draws;
 use super::likelihood::{regressors, simulated_disturbance};
 use super::mixture;
 use super::orthogonal::Orthogonal;
 use super::record::Blocks;
-use super::result;
 use super::search::{self, Candidate};
 use super::theta::{Bounds, NoiseKind, Theta};
 use super::validate;
@@ -63,7 +63,7 @@ fn is_another(blocks: &Blocks<'_>, with: &Found, without: &Found, longest_tau_s:
     let bounds = Bounds::new(with.theta.structure, blocks, longest_tau_s);
     let [one, other] = [with, without].map(|found| {
         let component = mixture::of_one(blocks, found, &bounds)?;
-        let (posterior, _) = result::posterior_of(found, &[component], 0.0, Some(1.0));
+        let (posterior, _) = draws::posterior_of(found, &[component], 0.0, Some(1.0));
         Some(posterior.estimate())
     });
     let (Some(one), Some(other)) = (one, other) else {

@@ -8,12 +8,12 @@ use onecycle_design::Model;
 use onecycle_design::state_space::StateSpace;
 
 use super::descent::Found;
+use super::draws;
 use super::laplace::Laplace;
 use super::likelihood::{Memory, evaluate};
 use super::mixture::Component;
 use super::record::{Blocks, Forces, Hold, Record};
 use super::response;
-use super::result;
 use super::theta::{Bounds, NoiseKind, Theta};
 use super::{LONGEST_TAU, ROWS};
 use crate::outcome::Noise;
@@ -70,7 +70,7 @@ pub fn expected(
         laplace,
     };
     let best = component.found.clone();
-    let (posterior, _) = result::posterior_of(&best, &[component], 0.0, None);
+    let (posterior, _) = draws::posterior_of(&best, &[component], 0.0, None);
     Some(posterior.estimate())
 }
 

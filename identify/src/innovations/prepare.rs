@@ -60,8 +60,8 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
         &signals.input[range.clone()],
         &signals.output[range.clone()],
     );
+    let rest = before(input, output, options.input_before)?;
     check(input, output)?;
-    let rest = before(input, options.input_before)?;
     let part_used = range.len() as f64 / asked.len() as f64;
     let times_s = &signals.time_s[range];
     let unfiltered = (options.output_filter_hz)
@@ -102,10 +102,10 @@ fn longest_part(asked: &Range<usize>, breaks: &[usize]) -> Range<usize> {
 
 /// Input before the record under which the process was at rest: that which the user has `stated`; for an input that never
 /// changes zero, as before a step in the first row. `None`: not known.
-fn before(input: &[f64], stated: Option<f64>) -> Result<Option<f64>, Verdict> {
-    let is_constant = input.iter().all(|v| *v == input[0]);
-    let rest = stated.or(is_constant.then_some(0.0));
-    if is_constant && rest == Some(input[0]) {
+fn before(input: &[f64], output: &[f64], stated: Option<f64>) -> Result<Option<f64>, Verdict> {
+    let is_constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
+    let rest = stated.or(is_constant(input).then_some(0.0));
+    if is_constant(input) && (rest == Some(input[0]) || is_constant(output)) {
         return Err(Verdict::ConstantInput);
     }
     Ok(rest)

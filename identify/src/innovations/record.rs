@@ -105,6 +105,11 @@ impl Record {
         if variance > 0.0 { variance.sqrt() } else { 1.0 }
     }
 
+    /// Whether the input never changes.
+    pub(crate) fn is_constant_input(&self) -> bool {
+        self.input.iter().all(|input| *input == self.input[0])
+    }
+
     /// Number of samples, absent ones included.
     pub(crate) fn len(&self) -> usize {
         self.output.len()

@@ -18,6 +18,8 @@ const LAGS: usize = 20;
 const COLOURED: f64 = 0.1;
 /// Share of the innovations and its F statistic up to which the input explains nothing.
 const LEFT: (f64, f64) = (0.02, 3.0);
+/// Share of the changes of the input in the last third, which has a third of them in a steady test, below which the end is calm.
+const CALM_END: f64 = 0.1;
 /// F statistic of twenty past outputs in the input that chance exceeds once in a hundred records.
 const FED_BACK: f64 = 1.88;
 /// Most rows between which a correlation is computed exactly; frequencies of the information's spectrum.
@@ -181,8 +183,12 @@ pub(super) fn prediction(
     if count < 10.0 {
         return None;
     }
-    // Of the whole record: where the output has settled before the last third, there is nothing left to predict.
-    let every: Vec<f64> = (0..whole.len()).filter_map(measured).collect();
+    // Where the input hardly changes any more the output may have settled, and nothing is left to predict: what the whole
+    // record moves by is the measure then.
+    let every: Vec<f64> = match changes_after(&whole, blocks.len()) < CALM_END {
+        true => (0..whole.len()).filter_map(measured).collect(),
+        false => pairs.iter().map(|(value, _)| *value).collect(),
+    };
     let mean = every.iter().sum::<f64>() / every.len() as f64;
     let square: f64 = every.iter().map(|value| (value - mean).powi(2)).sum();
     let variance = square * count / every.len() as f64;
@@ -195,6 +201,17 @@ pub(super) fn prediction(
         explained: 1.0 - error / variance,
         error_ratio: error / (count * found.ahead_variance),
     })
+}
+
+/// Share of the squared changes of the input that lie after a block.
+fn changes_after(blocks: &Blocks<'_>, block: usize) -> f64 {
+    let inputs = blocks.mean_inputs();
+    let changes: Vec<f64> = inputs
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).powi(2))
+        .collect();
+    let later: f64 = changes.iter().skip(block).sum();
+    later / changes.iter().sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
 /// Frequencies that a record tells about.
@@ -313,6 +330,12 @@ pub(super) fn period_s(blocks: &Blocks<'_>) -> Option<f64> {
     let inputs = blocks.mean_inputs();
     let [_, median, _] = quantiles(&inputs, blocks.block_s())?;
     Some(TAU / median)
+}
+
+/// Inverse of the frequency (s) below which the input has 5 % of its power.
+pub(super) fn slowest_s(blocks: &Blocks<'_>) -> Option<f64> {
+    let [low, _, _] = quantiles(&blocks.mean_inputs(), blocks.block_s())?;
+    Some(1.0 / low)
 }
 
 /// Period of the frequency (s) above which the input has 5 % of its power.
