@@ -45,6 +45,7 @@ mod search;
 mod starts;
 mod theta;
 mod unfilter;
+mod unstable;
 mod validate;
 #[cfg(test)]
 mod vectors;
@@ -216,6 +217,13 @@ impl Search<'_> {
         if let Some(verdict) = self.too_little(fitted, blocks, components) {
             return Err(verdict);
         }
+        let is_clean = !validate::is_coloured(tests) && !validate::is_left_to_the_input(tests);
+        if !is_clean
+            && validate::is_fed_back(blocks)
+            && let Some(growth_per_s) = unstable::growth_per_s(blocks)
+        {
+            return Err(Verdict::UnstableProcess { growth_per_s });
+        }
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
             (prediction.explained, prediction.error_ratio)
         });
@@ -338,7 +346,11 @@ impl Search<'_> {
         let (posterior, widened) = draws::posterior_of(
             &fitted.best.found,
             components,
-            prepared.early_s,
+            draws::Stamps {
+                sample_s: fitted.record.dt_s,
+                early_s: prepared.early_s,
+                rest: fitted.record.rest.unwrap_or(0.0),
+            },
             is_wider.then_some(least),
         );
         let model = result::model(&fitted.best.found, prepared.early_s);

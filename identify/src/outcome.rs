@@ -53,7 +53,7 @@ impl Identification {
     }
 
     /// Refuses what was identified.
-    pub(crate) fn refuse(&mut self, verdict: Verdict) {
+    pub fn refuse(&mut self, verdict: Verdict) {
         if let Ok(identified) = std::mem::replace(&mut self.outcome, Err(verdict)) {
             self.refused = Some(Refused {
                 model: identified.model,

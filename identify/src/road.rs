@@ -111,7 +111,8 @@ fn by_road(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) ->
 fn road(options: &Options) -> Road {
     let is_relays = matches!(options.structure, None | Some(Structure::Soiptd))
         && options.span_s == (None, None)
-        && options.hold != Some(Hold::Interpolated);
+        && options.hold != Some(Hold::Interpolated)
+        && options.input_before.is_none();
     match options.road {
         Road::Automatic if !is_relays => Road::General,
         Road::Automatic if options.method != Method::Map => Road::Relay,

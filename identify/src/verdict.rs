@@ -102,6 +102,13 @@ pub enum Verdict {
         /// Share of the innovations' variance.
         share: f64,
     },
+    /// The model calls the loop unstable under the gains that were in force while it was recorded.
+    UnstableInForce,
+    /// The process is unstable without the controller that ran: no structure has an unstable pole.
+    UnstableProcess {
+        /// Rate (1/s) at which the output grows by itself.
+        growth_per_s: f64,
+    },
     /// The input follows the output: noise came back through the controller, and the set-point hardly moved the input.
     NotExcited {
         /// Share of the output's variance that the set-point explains.
@@ -151,7 +158,9 @@ impl Verdict {
             | Self::NoFit
             | Self::NoPrediction { .. }
             | Self::InputLeft { .. }
-            | Self::SetPointLeft { .. } => "not_this_process",
+            | Self::SetPointLeft { .. }
+            | Self::UnstableInForce
+            | Self::UnstableProcess { .. } => "not_this_process",
             Self::NotExcited { .. } | Self::Calm { .. } => "not_excited",
             Self::Unknown { .. } => "unknown",
             Self::TooUncertain => "too_uncertain",
@@ -193,6 +202,8 @@ impl fmt::Display for Verdict {
             | Self::NotExcited { .. }
             | Self::Calm { .. }
             | Self::SetPointLeft { .. }
+            | Self::UnstableInForce
+            | Self::UnstableProcess { .. }
             | Self::InputLeft { .. } => self.write_record(f),
         }
     }
@@ -289,6 +300,14 @@ impl Verdict {
                 "not this kind of process: a model of the first two thirds predicts {:.0} % of the variance of the \
                  last third, {horizon_s:.3} s ahead",
                 100.0 * explained.max(0.0)
+            ),
+            Self::UnstableInForce => f.write_str(
+                "not this kind of process: with this model the gains that were in force would have been unstable",
+            ),
+            Self::UnstableProcess { growth_per_s } => write!(
+                f,
+                "unstable without its controller: the output grows by itself with a time constant of {:.3} s",
+                1.0 / growth_per_s
             ),
             Self::Calm { deviation, least } => write!(
                 f,

@@ -136,6 +136,15 @@ impl<'a> Identify<'a> {
         }
     }
 
+    /// Input before the first row, under which the process was at rest: for a step in the first row. Without it the likelihood
+    /// decides whether the process was at rest.
+    pub fn input_before(self, input_before: impl Into<Option<f64>>) -> Self {
+        Self {
+            options: self.options.input_before(input_before.into()),
+            ..self
+        }
+    }
+
     /// Cutoff (Hz) of a second-order Butterworth low-pass through which the output was recorded. Without it, the one that the
     /// recording states ([`Recording::output_filter_hz`]); 0 for none.
     pub fn output_filter_hz(self, output_filter_hz: impl Into<Option<f64>>) -> Self {
@@ -181,7 +190,8 @@ impl<'a> Identify<'a> {
             .output_filter_hz(options.output_filter_hz)
             .road(Self::new().road_of(recording))
             .span_s(usual_span_s.0, usual_span_s.1)
-            .input_late_s(options.input_late_s);
+            .input_late_s(options.input_late_s)
+            .input_before(options.input_before);
         with_signals(recording, |signals| {
             let calm = feedback::calm(recording, signals);
             let by = |options: &Options| match recording.set_point() {

@@ -86,6 +86,10 @@ pub(crate) struct Identify {
     /// come from one clock [default: judged by the switches of the relay]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
     pub(crate) input_late: Option<f64>,
+    /// Input before the first row, in its unit, under which the process was at rest: for a step in the first row [default: the
+    /// likelihood decides whether the process was at rest under the first input, or under 0 if the input never changes]
+    #[arg(long, value_name = "VALUE", allow_negative_numbers = true, value_parser = finite)]
+    pub(crate) input_before: Option<f64>,
     /// Cutoff (Hz) of a second-order low-pass (Butterworth) that the output passed before it was recorded: it is taken out
     /// for the fit, and its delay is part of tau. 0: none [default: of a flight log, the gyro's filter in its parameters]
     #[arg(long, value_name = "HZ", value_parser = cutoff_hz)]
@@ -134,6 +138,11 @@ fn structure() -> impl TypedValueParser<Value = Structure> {
 fn time_s(text: &str) -> Result<f64, String> {
     let time_s = text.parse().ok().filter(|time_s: &f64| time_s.is_finite());
     time_s.ok_or_else(|| "a time is a number of seconds".to_owned())
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|value: &f64| value.is_finite());
+    value.ok_or_else(|| "an input is a finite number".to_owned())
 }
 
 fn cutoff_hz(text: &str) -> Result<f64, String> {

@@ -108,8 +108,13 @@ fn survey(
     let of_log = LogLoop::new(flight.clone(), of);
     let asked = of_log.specification(*asked, false);
     let (mut one, mut processes) = parts(&signals, flight, &asked);
-    if let Some(best) = one.best().and_then(|at| processes.swap_remove(at)) {
-        one.choice = Some(controllers::of_identified(&best, of_log.in_force()));
+    while let Some((at, best)) = one.best().and_then(|at| Some((at, processes[at].take()?))) {
+        let choice = controllers::of_identified(&best, of_log.in_force());
+        if !of_log.contradicts(&choice) {
+            one.choice = Some(choice);
+            break;
+        }
+        one.parts[at].outcome = Err(Refusal::Verdict(Verdict::UnstableInForce));
     }
     Ok(one)
 }

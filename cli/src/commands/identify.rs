@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use onecycle::{
     ColumnRef, CsvOptions, Hold, Identification, ReadError, Recording, Road, Specification,
-    Structure, Style,
+    Structure, Style, Verdict,
 };
 use onecycle_link::LogError;
 
@@ -143,7 +143,7 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
     let structure = of_log
         .as_ref()
         .and_then(|of_log| log_gains::structure(of_log.control_loop()));
-    let identification = settings(arguments, asked)
+    let mut identification = settings(arguments, asked)
         .structure(arguments.structure.or(structure))
         .pack(pack)
         .run(&recording);
@@ -153,6 +153,13 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
     let choice = identified
         .map(|identified| controllers::of_identified(identified, against))
         .map(|choice| choice.in_plant(arguments.design.plant()));
+    let choice = match (&of_log, arguments.design.against(), choice) {
+        (Some(of_log), None, Some(choice)) if of_log.contradicts(&choice) => {
+            identification.refuse(Verdict::UnstableInForce);
+            None
+        }
+        (_, _, choice) => choice,
+    };
     let gains = (of_log.as_ref())
         .map(|of_log| {
             of_log.report(
@@ -185,6 +192,7 @@ fn settings<'a>(arguments: &Identify, asked: Specification) -> onecycle::Identif
         .hold(arguments.hold.map(Hold::from))
         .beta(arguments.beta)
         .input_late_s(arguments.input_late)
+        .input_before(arguments.input_before)
 }
 
 fn is_plotted(when: When) -> bool {

@@ -27,6 +27,10 @@ const DRAWS: usize = 200;
 /// Least share of the draws on which the gains to write must be stable.
 const LEAST_STABLE: f64 = 0.99;
 
+/// Share of the draws on which the gains in force are stable, below which the model is wrong: what the central 90 % leave out at
+/// one end.
+const MOST_STABLE_IF_WRONG: f64 = 0.05;
+
 /// The loop of a log that is identified.
 pub(crate) struct LogLoop {
     flight: Flight,
@@ -109,6 +113,18 @@ impl LogLoop {
     /// The gains in force. `None`: the log has none.
     pub(super) fn in_force(&self) -> Option<Pid> {
         LoopGains::in_force(&self.flight, self.control_loop).map(pid)
+    }
+
+    /// Whether a model is wrong because it calls the loop unstable under the gains that flew, on nearly every process of its
+    /// posterior. Gains that the signals contradict are not those that flew.
+    pub(super) fn contradicts(&self, choice: &Controllers) -> bool {
+        let differs = |read: &ReadBack| read.agreement() == Agreement::Differs;
+        let is_known = !self.read_back.as_ref().is_some_and(differs);
+        let against = choice.against.as_ref().filter(|_| is_known);
+        against.is_some_and(|against| {
+            let stable = against.least.map_or(0.0, |least| least.stable);
+            against.figures.is_none() && stable < MOST_STABLE_IF_WRONG
+        })
     }
 
     /// What the report says, after writing parameters if that was asked for.

@@ -18,9 +18,11 @@ pub(crate) fn advice(verdict: &Verdict) -> Cow<'static, str> {
         } => excite(*informative_rad_per_s, *needed_rad_per_s).into(),
         Verdict::AtBound(parameter) => at_bound(*parameter).into(),
         Verdict::NoController(error) => without_controller(error).into(),
-        Verdict::TooFewRows { .. } | Verdict::NoPrediction { .. } | Verdict::InputLeft { .. } => {
-            of_record(verdict).into()
-        }
+        Verdict::TooFewRows { .. }
+        | Verdict::NoPrediction { .. }
+        | Verdict::UnstableInForce
+        | Verdict::UnstableProcess { .. }
+        | Verdict::InputLeft { .. } => of_record(verdict).into(),
         Verdict::SetPointLeft { .. } => of_record(verdict).into(),
         Verdict::NotExcited { .. } | Verdict::Calm { .. } => NOT_EXCITED.into(),
         _ => of_relay(verdict).into(),
@@ -92,6 +94,13 @@ fn of_record(verdict: &Verdict) -> &'static str {
         Verdict::TooFewRows { .. } => {
             "Record longer or at a higher rate, or use more of the recording with --from and --to."
         }
+        Verdict::UnstableInForce => {
+            "Fly quick manoeuvres or a chirp on this axis: noise that goes round the loop can pass for a process."
+        }
+        Verdict::UnstableProcess { .. } => {
+            "No structure of this program has an unstable pole: keep the controller that runs, and design for this process \
+             by other means."
+        }
         Verdict::NoPrediction { .. } => {
             "Use a part of the recording in which the process stays the same, with --from and --to, and look for a \
              saturated actuator, friction, or a second input."
@@ -107,8 +116,8 @@ fn of_record(verdict: &Verdict) -> &'static str {
 fn of_relay(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::ConstantInput => {
-            "Choose the column that holds the input of the process with --input, or record a relay test, steps or a \
-             chirp."
+            "Choose the column that holds the input of the process with --input; if the step came before the first row, \
+             give the input before it with --input-before. Otherwise record a relay test, steps or a chirp."
         }
         Verdict::ConstantOutput => {
             "Choose the column that holds the measurement with --output, or check the sensor."
@@ -245,6 +254,8 @@ mod tests {
                 horizon_s: 0.5,
             },
             Verdict::InputLeft { share: 0.3 },
+            Verdict::UnstableInForce,
+            Verdict::UnstableProcess { growth_per_s: 56.0 },
             Verdict::NoController(DesignError::Structure(onecycle::Structure::Foptd)),
             Verdict::NoController(DesignError::PhaseMargin(2.0)),
         ];

@@ -243,12 +243,9 @@ fn quieten(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
     ));
 }
 
-/// Whether a third lag is shorter than a sample: no output shows it, it stands for an error of the samples' times.
+/// Whether a second lag is shorter than a sample: no output shows it, it stands for an error of the samples' times.
 fn has_hidden_lag(theta: &Theta, sample_s: f64) -> bool {
-    let stages = theta.structure.stages();
-    let lags = (0..stages.lags).map(|lag| theta.values[lag].exp());
-    stages.lags + stages.poles + 2 * stages.pairs > 2
-        && lags.fold(f64::INFINITY, f64::min) < sample_s
+    theta.structure.stages().lags > 1 && theta.shortest_lag_s() < sample_s
 }
 
 /// Whether all lags before an integrator, or before what cannot be told from one, turn the phase by more than 70 degrees at the

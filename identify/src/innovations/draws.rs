@@ -11,7 +11,22 @@ use crate::posterior::Posterior;
 /// Relative standard deviation of the scale and of the clock of the instruments: no fit makes the intervals narrower.
 const INSTRUMENT: f64 = 1e-3;
 
-/// The process with its second-order stage as two lags: the nearest double lag in place of complex poles.
+/// What the numbers of a record are counted from.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Stamps {
+    /// Sample period (s).
+    pub(super) sample_s: f64,
+    /// Delay from the stamp of an output to the time of its sample (s).
+    pub(super) early_s: f64,
+    /// Input at rest, which the response to the input leaves out; zero if the state at the start is not known.
+    pub(super) rest: f64,
+}
+
+/// Least rate (1/s) of a lag.
+const LEAST_RATE: f64 = 1e-12;
+
+/// The process with its second-order stage as two lags, the nearest double lag in place of complex poles. The slowest of all
+/// lags is the body's.
 fn with_lags(process: &Linear) -> Linear {
     let [c1, c0] = process.pair();
     let root = (0.25 * c1 * c1 - c0).max(0.0).sqrt();
@@ -20,17 +35,24 @@ fn with_lags(process: &Linear) -> Linear {
     } else {
         c0.sqrt()
     };
-    let slow = c0 / fast;
+    let fast = fast.max(LEAST_RATE);
+    let mut rates: Vec<f64> = process.lags_s().iter().map(|lag_s| 1.0 / lag_s).collect();
+    // The gain of the product of all 1/(s + rate).
+    let gain = process.gain() * rates.iter().product::<f64>();
+    rates.extend([fast, c0 / fast]);
+    rates.sort_by(f64::total_cmp);
     let structure = match process.structure() {
         Structure::Resonant => Structure::Soptd,
         _ => Structure::Toptd,
     };
-    let mut lags_s = [1.0 / fast; 2];
-    lags_s[..process.lags_s().len()].copy_from_slice(process.lags_s());
+    let mut lags_s = [1.0; 2];
+    for (lag_s, rate) in lags_s.iter_mut().zip(&rates[1..]) {
+        *lag_s = 1.0 / rate;
+    }
     Linear::new(structure)
-        .with_gain(process.gain() / fast)
+        .with_gain(gain / rates[1..].iter().product::<f64>())
         .with_lags_s(lags_s)
-        .with_pole_per_s(slow)
+        .with_pole_per_s(rates[0])
         .with_tau_s(process.tau_s())
 }
 
@@ -70,7 +92,7 @@ pub(super) fn clamped(process: &Linear) -> Linear {
 pub(super) fn posterior_of(
     best: &Found,
     components: &[Component],
-    early_s: f64,
+    stamps: Stamps,
     least_widening: Option<f64>,
 ) -> (Posterior, f64) {
     let factors: Vec<Vec<f64>> = (components.iter())
@@ -100,7 +122,7 @@ pub(super) fn posterior_of(
     let as_lags = has_real_lags(&best.theta);
     let draw = |index: usize, normal: &[f64]| {
         let (process, bias) =
-            roots[index].draw(&components[index], &factors[index], normal, early_s);
+            roots[index].draw(&components[index], &factors[index], normal, stamps);
         let has_pair = process.structure().stages().pairs > 0;
         (
             if as_lags && has_pair {
@@ -111,9 +133,9 @@ pub(super) fn posterior_of(
             bias,
         )
     };
-    let bias = has_bias(&best.theta).then(|| disturbance(best) / best.at.gain);
+    let bias = has_bias(&best.theta).then(|| disturbance(best) / best.at.gain - stamps.rest);
     let weights = if total > 0.0 { weights } else { vec![] };
-    let process = reported(&process(&best.theta, best.at.gain, early_s), as_lags);
+    let process = reported(&process(&best.theta, best.at.gain, stamps.early_s), as_lags);
     (
         Posterior::of_mixture(&process, bias, &weights, draw),
         widened,
@@ -171,7 +193,7 @@ impl Root {
         component: &Component,
         factors: &[f64],
         normal: &[f64],
-        early_s: f64,
+        stamps: Stamps,
     ) -> (Linear, f64) {
         let Component { found, laplace, .. } = component;
         let mut theta = found.theta;
@@ -191,6 +213,31 @@ impl Root {
         for lag in 0..theta.layout().stages.lags {
             theta.values[lag] += INSTRUMENT * z[3];
         }
-        (process(&theta, gain, early_s), bias / gain)
+        below_a_sample(&mut theta, component, stamps, normal[0]);
+        (
+            process(&theta, gain, stamps.early_s),
+            bias / gain - stamps.rest,
+        )
+    }
+}
+
+/// Puts what the fit has at a bound anywhere below a sample: a dead time that is not positive, and a lag at the least that the
+/// search allows. The samples show neither, and a value with an interval of no width would say that they do. `chance`: a normal
+/// number, whose third to sixth digits are even.
+fn below_a_sample(theta: &mut Theta, component: &Component, stamps: Stamps, chance: f64) {
+    let Stamps {
+        sample_s, early_s, ..
+    } = stamps;
+    let share = (1e3 * chance).rem_euclid(1.0).max(1e-3);
+    let best = &component.found.theta;
+    let tau = theta.layout().tau();
+    if best.tau_s() + early_s <= 0.0 && theta.tau_s() + early_s <= 0.0 {
+        theta.values[tau] = share * sample_s - early_s;
+    }
+    for lag in 0..theta.layout().stages.lags {
+        let is_held = !component.laplace.free.contains(&lag);
+        if is_held && best.values[lag].exp() < sample_s {
+            theta.values[lag] = (share * sample_s).ln();
+        }
     }
 }

@@ -61,9 +61,13 @@ pub(super) fn instead(
 /// Whether the gain or the steady gain of each fit lies outside of the interval of the other.
 fn is_another(blocks: &Blocks<'_>, with: &Found, without: &Found, longest_tau_s: f64) -> bool {
     let bounds = Bounds::new(with.theta.structure, blocks, longest_tau_s);
+    let stamps = draws::Stamps {
+        sample_s: blocks.record.dt_s,
+        ..draws::Stamps::default()
+    };
     let [one, other] = [with, without].map(|found| {
         let component = mixture::of_one(blocks, found, &bounds)?;
-        let (posterior, _) = draws::posterior_of(found, &[component], 0.0, Some(1.0));
+        let (posterior, _) = draws::posterior_of(found, &[component], stamps, Some(1.0));
         Some(posterior.estimate())
     });
     let (Some(one), Some(other)) = (one, other) else {

@@ -70,7 +70,11 @@ pub fn expected(
         laplace,
     };
     let best = component.found.clone();
-    let (posterior, _) = draws::posterior_of(&best, &[component], 0.0, None);
+    let stamps = draws::Stamps {
+        sample_s,
+        ..draws::Stamps::default()
+    };
+    let (posterior, _) = draws::posterior_of(&best, &[component], stamps, None);
     Some(posterior.estimate())
 }
 

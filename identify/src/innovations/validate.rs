@@ -11,6 +11,7 @@ use super::record::{Blocks, Record};
 use super::search;
 use super::theta::Theta;
 use crate::outcome::{InnovationTests, Prediction};
+use crate::signals::range;
 
 /// Lags of the tests.
 const LAGS: usize = 20;
@@ -104,9 +105,13 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
     (share, f)
 }
 
-/// Whether the input follows the output: whether past outputs explain the changes of the input beyond what past inputs do.
+/// Whether the input may follow the output: it switches between two levels, as that of a relay does, or past outputs explain it
+/// beyond what past inputs do.
 /// Reference: C. W. J. Granger, Econometrica 37 (1969).
 pub(super) fn is_fed_back(blocks: &Blocks<'_>) -> bool {
+    if switches(&blocks.record.input) {
+        return true;
+    }
     let inputs = blocks.mean_inputs();
     let outputs: Vec<f64> = (0..blocks.len())
         .map(|block| blocks.sums[block] / blocks.present(block).max(1) as f64)
@@ -139,6 +144,23 @@ pub(super) fn is_fed_back(blocks: &Blocks<'_>) -> bool {
     let share = 1.0 - after / before;
     let f = (share / more) / ((1.0 - share) / (count - both.len() as f64 - 1.0));
     f > FED_BACK
+}
+
+/// Whether an input switches between two levels at least four times: twice from each.
+fn switches(input: &[f64]) -> bool {
+    /// Distance from a level, as a share of that between the levels.
+    const NEAR: f64 = 0.1;
+    const FEWEST: usize = 4;
+    /// Share of the samples off both levels: a test may begin and end between them.
+    const MOST_BETWEEN: f64 = 0.05;
+    let (low, high) = range(input);
+    let share = |value: &f64| (value - low) / (high - low);
+    let is_level = |value: &f64| !(NEAR..=1.0 - NEAR).contains(&share(value));
+    let changes = input
+        .windows(2)
+        .filter(|pair| (share(&pair[0]) > 0.5) != (share(&pair[1]) > 0.5));
+    let between = input.iter().filter(|value| !is_level(value)).count();
+    high > low && between as f64 <= MOST_BETWEEN * input.len() as f64 && changes.count() >= FEWEST
 }
 
 /// Prediction of the last third of the record from a fit to the first two thirds. `None` if a third is too short.

@@ -10,3 +10,4 @@ mod forces;
 mod instrument;
 mod names;
 mod outcomes;
+mod steps;
