@@ -217,13 +217,6 @@ impl Search<'_> {
         if let Some(verdict) = self.too_little(fitted, blocks, components) {
             return Err(verdict);
         }
-        let is_clean = !validate::is_coloured(tests) && !validate::is_left_to_the_input(tests);
-        if !is_clean
-            && validate::is_fed_back(blocks)
-            && let Some(growth_per_s) = unstable::growth_per_s(blocks)
-        {
-            return Err(Verdict::UnstableProcess { growth_per_s });
-        }
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
             (prediction.explained, prediction.error_ratio)
         });
@@ -247,7 +240,19 @@ impl Search<'_> {
                     horizon_s: prediction.horizon_s,
                 })
             }
-            _ => Ok(()),
+            _ => Self::judge_stability(blocks, tests),
+        }
+    }
+
+    /// Refuses what nothing else does although the process is unstable without its controller.
+    fn judge_stability(blocks: &Blocks<'_>, tests: &InnovationTests) -> Result<(), Verdict> {
+        let is_clean = !validate::is_coloured(tests) && !validate::is_left_to_the_input(tests);
+        if is_clean || !validate::is_fed_back(blocks) {
+            return Ok(());
+        }
+        match unstable::growth_per_s(blocks) {
+            Some(growth_per_s) => Err(Verdict::UnstableProcess { growth_per_s }),
+            None => Ok(()),
         }
     }
 

@@ -15,20 +15,16 @@
 //! Reference: the test of two estimators of which one is efficient and both are consistent if the model is right, J. A.
 //! Hausman, Econometrica 46 (1978).
 
-use onecycle_design::Parameter;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
 use super::descent::{Found, Patience};
-use super::draws;
 use super::likelihood::{regressors, simulated_disturbance};
-use super::mixture;
 use super::orthogonal::Orthogonal;
 use super::record::Blocks;
 use super::search::{self, Candidate};
 use super::theta::{Bounds, NoiseKind, Theta};
 use super::validate;
-use crate::posterior::Estimate;
 
 /// Simulated disturbances: the test errs once in this number of records plus one.
 const SIMULATED: usize = 99;
@@ -38,8 +34,7 @@ const PATIENCE: Patience = Patience {
     decrease: 1e-6,
 };
 
-/// The fit without disturbances, if gain or steady gain of each fit lies outside of the other's interval, or if it
-/// explains more than a disturbance that is independent of the input leaves to chance. `None` under feedback too, where the
+/// The fit without disturbances, if it explains more than a disturbance that is independent of the input leaves to chance. `None` under feedback too, where the
 /// input follows the disturbance.
 pub(super) fn instead(
     blocks: &Blocks<'_>,
@@ -53,38 +48,8 @@ pub(super) fn instead(
     }
     let quiet = without_noise(&with.theta);
     let found = search::warm(blocks, &quiet, longest_tau_s, PATIENCE)?;
-    let is_instead = is_another(blocks, with, &found, longest_tau_s)
-        || explains_more(blocks, with, &found, longest_tau_s)?;
-    is_instead.then(|| Candidate::new(found))
-}
-
-/// Whether the gain or the steady gain of each fit lies outside of the interval of the other.
-fn is_another(blocks: &Blocks<'_>, with: &Found, without: &Found, longest_tau_s: f64) -> bool {
-    let bounds = Bounds::new(with.theta.structure, blocks, longest_tau_s);
-    let stamps = draws::Stamps {
-        sample_s: blocks.record.dt_s,
-        ..draws::Stamps::default()
-    };
-    let [one, other] = [with, without].map(|found| {
-        let component = mixture::of_one(blocks, found, &bounds)?;
-        let (posterior, _) = draws::posterior_of(found, &[component], stamps, Some(1.0));
-        Some(posterior.estimate())
-    });
-    let (Some(one), Some(other)) = (one, other) else {
-        return false;
-    };
-    [Parameter::K, Parameter::KOverTBody]
-        .into_iter()
-        .any(|parameter| {
-            let lies_outside = |of: &Estimate, within: &Estimate| {
-                let value = of.get(parameter).and_then(|interval| interval.estimate);
-                let interval = within.get(parameter);
-                value
-                    .zip(interval)
-                    .is_some_and(|(value, interval)| !interval.holds(value))
-            };
-            lies_outside(&one, &other) && lies_outside(&other, &one)
-        })
+    let is_more = explains_more(blocks, with, &found, longest_tau_s)?;
+    is_more.then(|| Candidate::new(found))
 }
 
 /// Whether the fit without disturbances explains a larger share of what is left of the simulation of the other one than it
