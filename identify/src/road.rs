@@ -49,7 +49,20 @@ pub(crate) fn identify(
     }
 }
 
+/// Least sample period (s): the clocks of a record are compared to the nanosecond.
+const LEAST_SAMPLE_S: f64 = 1e-9;
+
 fn checked(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) -> Identification {
+    if signals.sample_period_s < LEAST_SAMPLE_S {
+        return Identification {
+            excitation: None,
+            outcome: Err(Verdict::Units),
+            refused: None,
+            switching: None,
+            amplitudes: None,
+            remarks: vec![],
+        };
+    }
     let mut found = by_road(signals, options, pack);
     checks::check(signals, options, pack, &mut found);
     found

@@ -18,7 +18,8 @@ pub enum Verdict {
     ConstantInput,
     /// The output never changes.
     ConstantOutput,
-    /// The largest magnitude of the input or the output is outside 1e-100 to 1e100: squares would overflow or vanish.
+    /// The largest magnitude of the input or the output is outside 1e-100 to 1e100, where squares overflow or vanish, or the
+    /// sample period is below a nanosecond, to which times are compared.
     Units,
     /// The input changes, but not between two levels.
     NoRelay {
@@ -180,7 +181,7 @@ impl fmt::Display for Verdict {
             Self::ConstantInput => f.write_str("no relay in the input: it never changes"),
             Self::ConstantOutput => f.write_str("no response: the output never changes"),
             Self::Units => f.write_str(
-                "unusable units: the largest magnitude of the input or the output is outside 1e-100 to 1e100",
+                "unusable units: a largest magnitude outside 1e-100 to 1e100, or a sample period below 1 ns",
             ),
             Self::NoRelay { .. } | Self::FewSwitches { .. } => self.write_input(f),
             Self::TooShort { .. }

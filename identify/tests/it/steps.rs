@@ -178,3 +178,20 @@ fn an_unstable_process_under_control_is_refused_as_such() {
     let expected = 1.05_f64.ln();
     assert!((growth_per_s / expected - 1.0).abs() < 0.2, "{verdict:?}");
 }
+
+// Samples every 0.1 ps: a wrong unit of time. It ended in a panic.
+#[test]
+fn a_sample_period_below_a_nanosecond_is_refused() {
+    let mut test = Test::of(&[(20.0, 0.5)], 500);
+    test.time_s.iter_mut().for_each(|time_s| *time_s *= 1e-13);
+    let signals = Signals {
+        time_s: &test.time_s,
+        input: &test.input,
+        output: &test.output,
+        samples_per_point: 1,
+        sample_period_s: 1e-13,
+        breaks: &[],
+    };
+    let found = identify(&signals, &Options::default());
+    assert_eq!(found.outcome.unwrap_err(), Verdict::Units);
+}
