@@ -43,6 +43,7 @@ mod result;
 mod search;
 #[cfg(test)]
 mod starts;
+mod system;
 mod theta;
 mod unfilter;
 mod unstable;
@@ -73,7 +74,7 @@ use crate::outcome::{
 use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::Options;
-use crate::signals::Signals;
+use crate::signals::{Signals, is_constant};
 use crate::verdict::Verdict;
 
 /// Longest dead time as a share of the record.
@@ -149,7 +150,7 @@ impl Search<'_> {
             let delay_s = filter.time_s();
             self.remarks.push(Remark::OutputFilter { delay_s });
         }
-        let is_assumed = self.options.input_before.is_none() && prepared.record.is_constant_input();
+        let is_assumed = self.options.input_before.is_none() && is_constant(&prepared.record.input);
         if is_assumed {
             self.remarks.push(Remark::AssumedRest);
         }
@@ -320,13 +321,8 @@ impl Search<'_> {
             });
         }
         let chosen = fitted.best.structure();
-        let best = fitted
-            .choice
-            .candidates
-            .first()
-            .map_or(0.0, |best| best.bic);
-        let others: Vec<Structure> = (fitted.choice.candidates.iter())
-            .filter(|other| other.bic < best + NEARLY && other.structure() != chosen)
+        let others: Vec<Structure> = (fitted.choice.within(NEARLY))
+            .filter(|other| other.structure() != chosen)
             .map(Candidate::structure)
             .collect();
         // The fits of the others lack the nonlinear forces.

@@ -24,6 +24,11 @@ pub(crate) fn range(values: &[f64]) -> (f64, f64) {
     })
 }
 
+/// Whether all values are equal.
+pub(crate) fn is_constant(values: &[f64]) -> bool {
+    values.iter().all(|value| *value == values[0])
+}
+
 impl Signals<'_> {
     /// The input moved to `late_s` (s) before its time stamps: of each point the mean over its time. Before its first and
     /// after its last value the input is held.

@@ -158,7 +158,7 @@ impl LogLoop {
         })
     }
 
-    /// The parameters to write with their margins, or why there are none.
+    /// The parameters to write with their margins, or the reason why nothing is written.
     fn judged(
         &self,
         asked: &WriteArguments,
@@ -181,8 +181,8 @@ impl LogLoop {
         }
     }
 
-    /// The parameters for this share of the way from the gains in force to those of `goal` with their margins, or why there
-    /// are none. Whoever exports them asks the [`Written::question`] first.
+    /// The parameters for this share of the way from the gains in force to those of `goal` with their margins, or the reason why
+    /// they must not be written. Whoever exports them asks the [`Written::question`] first.
     pub(crate) fn to_write(
         &self,
         goal: Pid,
@@ -227,7 +227,7 @@ impl LogLoop {
         })
     }
 
-    /// The files that put the new values in force, and the old ones again; or why there are none.
+    /// The files that put the new values in force, and the old ones again; or the reason why the firmware has no such file.
     pub(crate) fn files(&self, to_write: &Written) -> Result<ParameterFiles, String> {
         let files = files(&self.flight, &to_write.changes);
         files.ok_or_else(|| words::no_gains(self.control_loop))

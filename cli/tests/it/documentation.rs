@@ -90,7 +90,7 @@ fn cut<'a>(text: &'a str, open: &str, close: &str) -> (Vec<&'a str>, String) {
     (inside, outside + rest)
 }
 
-/// The numbers of a text without their thousands separators; digits of names and exponents are none.
+/// The numbers of a text without their thousands separators; digits in names and exponents do not count.
 fn numbers(text: &str) -> BTreeSet<String> {
     let characters: Vec<char> = text.chars().collect();
     let is_digit = |at: usize| characters.get(at).is_some_and(char::is_ascii_digit);

@@ -24,7 +24,7 @@ const MOST: usize = 100_000;
 pub(crate) struct Checked {
     /// The process.
     pub(crate) model: Model,
-    /// Whether a structure that contains this one, and comes to rest by itself, explains the recording better.
+    /// Whether a process that comes to rest by itself, with two lags, explains the recording better.
     pub(crate) is_another: bool,
     /// The linear part of the process with the nonlinear forces that the recording asks for, if it asks for any.
     pub(crate) with_forces: Option<Model>,
@@ -38,14 +38,11 @@ fn resting(theta: &Theta, omega_rad_per_s: f64) -> [Theta; 3] {
     let (tau_s, lag_s) = theta.delay_and_lag_s();
     let body_per_s = theta.process(1.0).pole_per_s().max(0.2 * omega_rad_per_s);
     POLES.map(|part| {
-        let mut start = Theta::new(Structure::Soptd);
+        let mut start = Theta::new(Structure::Soptd).with_noises_of(theta);
         let layout = start.layout();
         start.values[0] = -body_per_s.ln();
         start.values[1] = part * omega_rad_per_s;
         start.values[layout.tau()] = tau_s + lag_s;
-        for kind in NoiseKind::ALL {
-            start.set_noise(kind, theta.noise(kind));
-        }
         start
     })
 }

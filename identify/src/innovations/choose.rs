@@ -7,7 +7,7 @@ use onecycle_design::Structure;
 
 use super::record::{Blocks, Record};
 use super::search::{self, Candidate, HEADS};
-use super::theta::{NoiseKind, Theta};
+use super::theta::Theta;
 
 /// Structures explain a record nearly as well up to this difference of the BIC: a likelihood ratio of `e^3`.
 pub(super) const NEARLY: f64 = 6.0;
@@ -17,8 +17,8 @@ const EQUAL: f64 = 2.0;
 /// Twice the gain of the log-likelihood from which damping shows: 5 % of undamped processes seem damped by as much.
 /// The BIC alone would hide damping of two standard deviations, and with it bias the gain.
 const SHOWN: f64 = 2.7;
-/// Structures whose best fit is worse than this are given up: no further noise makes up for it.
-const HOPELESS: f64 = 80.0;
+/// Structures whose best fit is worse than this are given up: no further noise makes up for it. Their fits are not finished.
+pub(super) const HOPELESS: f64 = 80.0;
 /// Log-likelihood by which a structure may fall behind its limit.
 const STUCK: f64 = 0.05;
 /// A structure as the limit of another that has one unknown more, inner ones first.
@@ -54,6 +54,13 @@ impl Choice {
             2.0 * gain > SHOWN && damped.found.theta.process(1.0).pole_per_s() > 0.0
         });
         Some(damped.unwrap_or(simplest))
+    }
+
+    /// Candidates up to `span` behind the best.
+    pub(super) fn within(&self, span: f64) -> impl Iterator<Item = &Candidate> {
+        let best = self.candidates.first().map_or(0.0, |best| best.bic);
+        let candidates = self.candidates.iter();
+        candidates.filter(move |candidate| candidate.bic < best + span)
     }
 
     /// Fit of the structure that has the damping which `structure` lacks.
@@ -163,9 +170,7 @@ fn derive(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
         // A head keeps its own fits and is tried with the noises of the lead.
         if HEADS.contains(&structure) {
             for start in &mut starts {
-                for kind in NoiseKind::ALL {
-                    start.set_noise(kind, lead.found.theta.noise(kind));
-                }
+                *start = start.with_noises_of(&lead.found.theta);
             }
         }
         let tau_s = limits.longest_tau_s;
@@ -227,12 +232,9 @@ fn quieten(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
         let best = own.min_by(|a, b| a.bic.total_cmp(&b.bic));
         let hopeful = best.filter(|best| best.bic < lead.bic + HOPELESS);
         starts.extend(hopeful.and_then(|best| {
-            let mut quiet = best.found.theta;
-            quiet.noises().next()?;
-            NoiseKind::ALL
-                .into_iter()
-                .for_each(|kind| quiet.set_noise(kind, 0.0));
-            Some(quiet)
+            let theta = best.found.theta;
+            theta.noises().next()?;
+            Some(theta.without_noises())
         }));
     }
     all.extend(search::race(

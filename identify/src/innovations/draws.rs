@@ -124,14 +124,10 @@ pub(super) fn posterior_of(
         let (process, bias) =
             roots[index].draw(&components[index], &factors[index], normal, stamps);
         let has_pair = process.structure().stages().pairs > 0;
-        (
-            if as_lags && has_pair {
-                with_lags(&process)
-            } else {
-                process
-            },
-            bias,
-        )
+        match as_lags && has_pair {
+            true => (with_lags(&process), bias),
+            false => (process, bias),
+        }
     };
     let bias = has_bias(&best.theta).then(|| disturbance(best) / best.at.gain - stamps.rest);
     let weights = if total > 0.0 { weights } else { vec![] };

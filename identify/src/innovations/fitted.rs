@@ -53,9 +53,9 @@ pub(super) struct Fitted {
     /// Fit of the structure that contains the best one and has its damping as a further unknown. The posterior is that
     /// of this structure: damping that a record does not show may be there.
     pub(super) wider: Candidate,
-    /// Fit without disturbances, if it explains what that with disturbances wrongly leaves to these. It is the best one then,
-    /// and the posterior has both.
-    pub(super) output_error: Option<Candidate>,
+    /// Whether the best fit is one without disturbances, because that with disturbances wrongly leaves to these what the input
+    /// explains. The posterior has both.
+    pub(super) is_output_error: bool,
     pub(super) outliers: usize,
 }
 
@@ -112,18 +112,17 @@ impl Fitted {
             samples,
             wider: wider.unwrap_or_else(|| best.clone()),
             best,
-            output_error: None,
+            is_output_error: false,
             outliers: outliers + found,
             record,
         };
         if let Some(remark) = fitted.add_forces() {
             remarks.push(remark);
         }
-        let blocks = fitted.blocks();
-        fitted.output_error = output_error::instead(&blocks, &fitted.best, longest);
-        if let Some(found) = &fitted.output_error {
+        if let Some(found) = output_error::instead(&fitted.blocks(), &fitted.best, longest) {
             remarks.push(Remark::DriftOrGain);
-            fitted.best = found.clone();
+            fitted.best = found;
+            fitted.is_output_error = true;
         }
         Ok(fitted)
     }
@@ -169,9 +168,10 @@ impl Fitted {
         let structure = self.wider.structure();
         let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
         let mut components = mixture::mixture(blocks, &self.wider.found, &bounds);
-        if let Some(other) = &self.output_error {
-            let bounds = Bounds::new(other.structure(), blocks, self.limits.longest_tau_s);
-            let without = mixture::of_one(blocks, &other.found, &bounds);
+        if self.is_output_error {
+            let found = &self.best.found;
+            let bounds = Bounds::new(found.theta.structure, blocks, self.limits.longest_tau_s);
+            let without = mixture::of_one(blocks, found, &bounds);
             components
                 .iter_mut()
                 .for_each(|component| component.weight *= 0.5);
@@ -214,16 +214,15 @@ fn choose_start(
     options: &Options,
     remarks: &mut Vec<Remark>,
 ) -> Option<(Range<usize>, Choice)> {
+    if record.rest.is_some() {
+        return choose_on_parts(record, limits, options, remarks);
+    }
     let mut at_rest = Record {
         rest: Some(record.input[0]),
         ..record.clone()
     };
     let [mut of_free, mut of_rest] = [vec![], vec![]];
     let free = choose_on_parts(record, limits, options, &mut of_free);
-    if record.rest.is_some() {
-        remarks.append(&mut of_free);
-        return free;
-    }
     let resting = choose_on_parts(&mut at_rest, limits, options, &mut of_rest);
     let thetas = [&free, &resting].map(|found| Some(found.as_ref()?.1.chosen()?.found.theta));
     // On the same rows: those whose outputs do not depend on an input before the record.

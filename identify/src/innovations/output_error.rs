@@ -16,14 +16,17 @@
 //! Hausman, Econometrica 46 (1978).
 
 use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 use super::descent::{Found, Patience};
-use super::likelihood::{regressors, simulated_disturbance};
+use super::filter;
+use super::likelihood::regressors;
 use super::orthogonal::Orthogonal;
 use super::record::Blocks;
 use super::search::{self, Candidate};
-use super::theta::{Bounds, NoiseKind, Theta};
+use super::system::{System, by_size};
+use super::theta::{Bounds, Theta};
 use super::validate;
 
 /// Simulated disturbances: the test errs once in this number of records plus one.
@@ -34,8 +37,8 @@ const PATIENCE: Patience = Patience {
     decrease: 1e-6,
 };
 
-/// The fit without disturbances, if it explains more than a disturbance that is independent of the input leaves to chance. `None` under feedback too, where the
-/// input follows the disturbance.
+/// The fit without disturbances, if it explains more than a disturbance that is independent of the input leaves to chance.
+/// `None` under feedback too, where the input follows the disturbance.
 pub(super) fn instead(
     blocks: &Blocks<'_>,
     best: &Candidate,
@@ -46,21 +49,21 @@ pub(super) fn instead(
     if blocks.record.forces.len() > 0 || validate::is_fed_back(blocks) {
         return None;
     }
-    let quiet = without_noise(&with.theta);
+    let quiet = with.theta.without_noises();
     let found = search::warm(blocks, &quiet, longest_tau_s, PATIENCE)?;
     let is_more = explains_more(blocks, with, &found, longest_tau_s)?;
     is_more.then(|| Candidate::new(found))
 }
 
-/// Whether the fit without disturbances explains a larger share of what is left of the simulation of the other one than it
-/// would of any of the simulated disturbances.
+/// Compares two shares of the simulation's error: the one that the fit without disturbances removes, and those that it would
+/// remove if the error were one of the simulated disturbances. Whether the first is larger than all of these.
 fn explains_more(
     blocks: &Blocks<'_>,
     with: &Found,
     found: &Found,
     longest_tau_s: f64,
 ) -> Option<bool> {
-    let quiet = without_noise(&with.theta);
+    let quiet = with.theta.without_noises();
     let y = present(blocks);
     let before = Regressors::of(blocks, &quiet)?;
     let kept = before
@@ -70,24 +73,36 @@ fn explains_more(
     let share = 1.0 - after.all.left(&y) / kept;
     let bounds = Bounds::new(quiet.structure, blocks, longest_tau_s);
     let all = before.with_slopes(blocks, &quiet, with.at.gain / blocks.scale, &bounds)?;
-    let mut random = Pcg64Mcg::seed_from_u64(SEED);
     let deviation = with.at.variance.sqrt() / blocks.scale;
-    for _ in 0..SIMULATED {
-        let disturbance = simulated_disturbance(blocks, &with.theta, deviation, &mut random)?;
-        let by_start = before.start.left(&disturbance);
-        if by_start - all.left(&disturbance) >= share * by_start {
-            return Some(false);
-        }
-    }
-    Some(true)
+    let reaches = |disturbance: &[f64]| {
+        let by_start = before.start.left(disturbance);
+        by_start - all.left(disturbance) >= share * by_start
+    };
+    by_size!(
+        with.theta,
+        any_disturbance(blocks, &with.theta, deviation, &reaches)
+    )
+    .map(|is_reached: bool| !is_reached)
 }
 
-fn without_noise(theta: &Theta) -> Theta {
-    let mut quiet = *theta;
-    for kind in NoiseKind::ALL {
-        quiet.set_noise(kind, 0.0);
-    }
-    quiet
+/// Whether any of the simulated disturbances `reaches` something. Each is random with the noise of `theta`, from an initial state
+/// of zero, as sums over the blocks that have samples; `deviation`: that of the white noise of a sample. `None` if the filter does
+/// not converge.
+fn any_disturbance<const N: usize>(
+    blocks: &Blocks<'_>,
+    theta: &Theta,
+    deviation: f64,
+    reaches: &dyn Fn(&[f64]) -> bool,
+) -> Option<bool> {
+    let system = System::<N>::new(theta, blocks.record.dt_s);
+    let lifted = system.lifted(blocks);
+    let (runs, _) = filter::runs(system.start(blocks, &lifted)?, &lifted, blocks);
+    let mut random = Pcg64Mcg::seed_from_u64(SEED);
+    let mut white = || {
+        let normal: f64 = StandardNormal.sample(&mut random);
+        deviation * normal
+    };
+    Some((0..SIMULATED).any(|_| reaches(&filter::coloured(&runs, &mut white))))
 }
 
 /// Sums of the outputs of the blocks that have samples.

@@ -4,9 +4,10 @@ use onecycle_design::state_space::times;
 
 use super::filter::Gains;
 use super::lifted::{dot, row_times};
-use super::likelihood::{Evaluation, System};
+use super::likelihood::Evaluation;
 use super::record::Blocks;
 use super::response;
+use super::system::{System, by_size};
 use super::theta::Theta;
 
 /// What a fit predicts, row by row.
@@ -44,13 +45,7 @@ pub(super) fn predict(
     evaluation: &Evaluation,
     filtering: Filtering,
 ) -> Option<Predictions> {
-    match theta.structure.stages().states() + 1 {
-        2 => predict_sized::<2>(blocks, theta, evaluation, filtering),
-        3 => predict_sized::<3>(blocks, theta, evaluation, filtering),
-        4 => predict_sized::<4>(blocks, theta, evaluation, filtering),
-        5 => predict_sized::<5>(blocks, theta, evaluation, filtering),
-        _ => None,
-    }
+    by_size!(theta, predict_sized(blocks, theta, evaluation, filtering))
 }
 
 fn predict_sized<const N: usize>(

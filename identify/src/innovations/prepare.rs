@@ -7,7 +7,7 @@ use onecycle_design::LowPass;
 use super::record::{Forces, Hold, Record};
 use super::unfilter::{alike_smooth, unfilter};
 use crate::settings::Options;
-use crate::signals::Signals;
+use crate::signals::{Signals, is_constant};
 use crate::verdict::Verdict;
 
 /// Fewest samples to fit.
@@ -103,7 +103,6 @@ fn longest_part(asked: &Range<usize>, breaks: &[usize]) -> Range<usize> {
 /// Input before the record under which the process was at rest: that which the user has `stated`; for an input that never
 /// changes zero, as before a step in the first row. `None`: not known.
 fn before(input: &[f64], output: &[f64], stated: Option<f64>) -> Result<Option<f64>, Verdict> {
-    let is_constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
     let rest = stated.or(is_constant(input).then_some(0.0));
     if is_constant(input) && (rest == Some(input[0]) || is_constant(output)) {
         return Err(Verdict::ConstantInput);
@@ -112,8 +111,7 @@ fn before(input: &[f64], output: &[f64], stated: Option<f64>) -> Result<Option<f
 }
 
 fn check(input: &[f64], output: &[f64]) -> Result<(), Verdict> {
-    let constant = |values: &[f64]| values.iter().all(|v| *v == values[0]);
-    if constant(output) {
+    if is_constant(output) {
         return Err(Verdict::ConstantOutput);
     }
     let size = |values: &[f64]| values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));

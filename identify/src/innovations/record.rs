@@ -105,11 +105,6 @@ impl Record {
         if variance > 0.0 { variance.sqrt() } else { 1.0 }
     }
 
-    /// Whether the input never changes.
-    pub(crate) fn is_constant_input(&self) -> bool {
-        self.input.iter().all(|input| *input == self.input[0])
-    }
-
     /// Number of samples, absent ones included.
     pub(crate) fn len(&self) -> usize {
         self.output.len()
@@ -266,6 +261,12 @@ impl<'a> Blocks<'a> {
     pub(crate) fn present(&self, block: usize) -> usize {
         let mask = &self.kinds[self.kind_of[block] as usize].mask;
         mask.iter().filter(|present| **present).count()
+    }
+
+    /// Mean of the outputs present in a block (output unit). `None` if none is.
+    pub(crate) fn mean_output(&self, block: usize) -> Option<f64> {
+        let count = self.present(block);
+        (count > 0).then(|| self.sums[block] * self.scale / count as f64)
     }
 
     /// Mean of the input over each block.

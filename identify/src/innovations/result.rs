@@ -2,6 +2,7 @@
 
 use onecycle_design::{Model, Parameter, Structure};
 
+use super::choose::HOPELESS;
 use super::descent::Found;
 use super::draws::{clamped, has_real_lags, process, reported};
 use super::fitted::Fitted;
@@ -78,13 +79,12 @@ pub(super) fn innovations(
         let middle =
             0.5 * (blocks.record.time_s(range.start) + blocks.record.time_s(range.end - 1));
         let time_s = start_s + middle;
-        let count = blocks.present(block);
-        let measured = (count > 0).then(|| blocks.sums[block] * blocks.scale / count as f64);
+        let measured = blocks.mean_output(block);
         rows.push(InnovationRow {
             time_s,
             measured,
             simulated: predicted.simulated[block],
-            innovation: if count > 0 { values.next() } else { None },
+            innovation: measured.and_then(|_| values.next()),
             predicted: predicted.predicted[block],
             disturbance: predicted.disturbance[block],
         });
@@ -94,7 +94,7 @@ pub(super) fn innovations(
             fitted: predicted.simulated[block],
         }));
     }
-    let alternatives = (fitted.choice.candidates.iter())
+    let alternatives = (fitted.choice.within(HOPELESS))
         .map(|candidate| Alternative {
             model: Model::from(clamped(&process(
                 &candidate.found.theta,

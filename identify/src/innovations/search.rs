@@ -380,11 +380,8 @@ pub(super) fn noise_sets(theta: Theta) -> Vec<Theta> {
 /// Starts for `structure` from the best point of a structure that contains it, is a limit of it or lacks one lag.
 pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta> {
     let old = from.layout();
-    let mut theta = Theta::new(structure);
+    let theta = Theta::new(structure).with_noises_of(from);
     let layout = theta.layout();
-    for kind in NoiseKind::ALL {
-        theta.set_noise(kind, from.noise(kind));
-    }
     let lag_s = |i: usize| from.values[i].exp();
     let lag = if old.stages.lags > 0 { lag_s(0) } else { dt_s };
     let body_s = match (old.pole(), old.pair()) {

@@ -78,14 +78,11 @@ impl Layout {
 impl Theta {
     /// Without dead time and noise.
     pub(super) fn new(structure: Structure) -> Self {
-        let mut theta = Self {
+        let theta = Self {
             structure,
             values: [0.0; MOST],
         };
-        for kind in NoiseKind::ALL {
-            theta.set_noise(kind, 0.0);
-        }
-        theta
+        theta.without_noises()
     }
 
     pub(super) fn layout(&self) -> Layout {
@@ -114,6 +111,22 @@ impl Theta {
     /// Sets the frequency of a noise (rad/s), zero for none.
     pub(super) fn set_noise(&mut self, kind: NoiseKind, rad_per_s: f64) {
         self.values[self.layout().noise(kind)] = rad_per_s.ln();
+    }
+
+    /// With the noises of another fit.
+    pub(super) fn with_noises_of(mut self, other: &Self) -> Self {
+        for kind in NoiseKind::ALL {
+            self.set_noise(kind, other.noise(kind));
+        }
+        self
+    }
+
+    /// Without any noise.
+    pub(super) fn without_noises(mut self) -> Self {
+        for kind in NoiseKind::ALL {
+            self.set_noise(kind, 0.0);
+        }
+        self
     }
 
     /// Noises that the fit has.

@@ -35,10 +35,9 @@ pub(super) fn growth_per_s(blocks: &Blocks<'_>) -> Option<f64> {
 
 fn growth_in(blocks: &Blocks<'_>, part: Range<usize>) -> Option<f64> {
     let inputs = blocks.mean_inputs();
-    let count = |block: usize| blocks.present(block);
-    let output = |block: usize| blocks.sums[block] / count(block) as f64;
+    let output = |block: usize| blocks.mean_output(block).unwrap_or(0.0);
     let rows: Vec<usize> = (part.start + INPUTS..part.end)
-        .filter(|row| (row - 2..=*row).all(|block| count(block) > 0))
+        .filter(|row| (row - 2..=*row).all(|block| blocks.present(block) > 0))
         .collect();
     let column = |value: &dyn Fn(usize) -> f64| rows.iter().map(|row| value(*row)).collect();
     let mut columns: Vec<Vec<f64>> = vec![

@@ -84,23 +84,15 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
         column
     };
     let target = centred(used.iter().map(|(_, e)| *e).collect());
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    for lag in 1..=LAGS {
-        columns.push(centred(
-            used.iter().map(|(row, _)| inputs[row - lag]).collect(),
-        ));
-        // A lag that repeats those before it (a slow input) tells nothing new.
-        if Orthogonal::new(&columns).is_none() {
-            columns.pop();
-        }
-    }
-    let Some(orthogonal) = Orthogonal::new(&columns) else {
-        return (0.0, 0.0);
-    };
+    let columns: Vec<Vec<f64>> = (1..=LAGS)
+        .map(|lag| centred(used.iter().map(|(row, _)| inputs[row - lag]).collect()))
+        .collect();
+    // A lag that repeats those before it (a slow input) tells nothing new.
+    let orthogonal = Orthogonal::independent(&columns);
     let size = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
     let (rest, _) = orthogonal.solve(&target);
     let share = 1.0 - size(&rest) / size(&target);
-    let number = columns.len() as f64;
+    let number = orthogonal.len() as f64;
     let f = (share / number) / ((1.0 - share) / (count - number - 1.0));
     (share, f)
 }
@@ -114,7 +106,7 @@ pub(super) fn is_fed_back(blocks: &Blocks<'_>) -> bool {
     }
     let inputs = blocks.mean_inputs();
     let outputs: Vec<f64> = (0..blocks.len())
-        .map(|block| blocks.sums[block] / blocks.present(block).max(1) as f64)
+        .map(|block| blocks.mean_output(block).unwrap_or(0.0))
         .collect();
     let rows = LAGS..blocks.len();
     let count = rows.len() as f64;
@@ -190,10 +182,7 @@ pub(super) fn prediction(
         ..Filtering::default()
     };
     let found = predict(&whole, &fitted.theta, &fitted.at, filtering)?;
-    let measured = |row: usize| {
-        let count = whole.present(row);
-        (count > 0).then(|| whole.sums[row] * whole.scale / count as f64)
-    };
+    let measured = |row: usize| whole.mean_output(row);
     let later = blocks.len()..whole.len().saturating_sub(ahead);
     let pairs: Vec<(f64, f64)> = later
         .filter_map(|row| {

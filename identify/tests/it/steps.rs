@@ -49,7 +49,7 @@ impl Test {
             input: &self.input,
             output: &self.output,
             samples_per_point: 1,
-            sample_period_s: SAMPLE_S,
+            sample_period_s: self.time_s[1] - self.time_s[0],
             breaks: &[],
         };
         identify(&signals, options)
@@ -184,14 +184,6 @@ fn an_unstable_process_under_control_is_refused_as_such() {
 fn a_sample_period_below_a_nanosecond_is_refused() {
     let mut test = Test::of(&[(20.0, 0.5)], 500);
     test.time_s.iter_mut().for_each(|time_s| *time_s *= 1e-13);
-    let signals = Signals {
-        time_s: &test.time_s,
-        input: &test.input,
-        output: &test.output,
-        samples_per_point: 1,
-        sample_period_s: 1e-13,
-        breaks: &[],
-    };
-    let found = identify(&signals, &Options::default());
+    let found = test.identify(&Options::default());
     assert_eq!(found.outcome.unwrap_err(), Verdict::Units);
 }
