@@ -63,6 +63,12 @@ impl Choice {
         candidates.filter(move |candidate| candidate.bic < best + span)
     }
 
+    /// The best fit of each structure.
+    pub(super) fn thetas(&self) -> Vec<Theta> {
+        let candidates = self.candidates.iter();
+        candidates.map(|candidate| candidate.found.theta).collect()
+    }
+
     /// Fit of the structure that has the damping which `structure` lacks.
     pub(super) fn damped(&self, structure: Structure) -> Option<&Candidate> {
         let damped = match structure {
@@ -97,20 +103,17 @@ pub(super) struct Limits {
     pub(super) fewest_samples: usize,
 }
 
-/// Fits the structures to a record.
-pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
+/// Fits the structures to a record, from `starts`; from those of a screening where there are none.
+pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choice {
     let rows = record.len() - record.skipped(limits.skip_s);
     let samples = (rows / ROWS).max(limits.fewest_samples);
     let blocks = Blocks::new(record, samples, limits.skip_s);
     let tau_s = limits.longest_tau_s;
-    let heads = heads(limits.structure);
-    let screened: Vec<Vec<Theta>> = (heads.iter())
-        .flat_map(|head| search::screen(record, *head, limits.skip_s, tau_s))
-        .collect();
-    let starts: Vec<Theta> = screened
-        .iter()
-        .flat_map(|starts| search::best_of_each_noise(starts))
-        .collect();
+    let starts = match starts {
+        [] => screened(record, limits),
+        _ => starts.to_vec(),
+    };
+    let starts = search::promising(&blocks, starts, tau_s);
     let mut all = search::race(&blocks, &starts, None, tau_s);
     if let Some(lead) = search::best(all.clone()) {
         let starts = search::noise_sets(lead.found.theta);
@@ -132,17 +135,12 @@ pub(super) fn choose(record: &Record, limits: &Limits) -> Choice {
     }
 }
 
-/// Structures to screen: all heads, or those that lead to the one asked for.
-fn heads(structure: Option<Structure>) -> Vec<Structure> {
-    let Some(structure) = structure else {
-        return HEADS.to_vec();
-    };
-    match structure {
-        Structure::Resonant | Structure::ResonantLag => vec![Structure::ResonantLag],
-        Structure::Foptd | Structure::Soptd | Structure::Toptd => vec![Structure::Soptd],
-        Structure::IntegratorLag | Structure::Iptd => vec![Structure::Soptd, Structure::Soiptd],
-        _ => vec![Structure::Soiptd],
-    }
+/// The best starts of each kind of noise and structure, on each part that is screened.
+fn screened(record: &Record, limits: &Limits) -> Vec<Theta> {
+    (search::heads(limits.structure).into_iter())
+        .flat_map(|head| search::screen(record, head, limits.skip_s, limits.longest_tau_s))
+        .flat_map(|starts| search::best_of_each_noise(&starts))
+        .collect()
 }
 
 /// Adds the structures that are not screened, from the best of those that contain them; and the screened ones with the

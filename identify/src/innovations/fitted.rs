@@ -24,6 +24,8 @@ const SKIPPED: f64 = 1.0 / 40.0;
 const MOST_ROWS: usize = 40_000;
 /// Most samples of the part that chooses the structure.
 const CHOOSING: usize = 20_000;
+/// Uneven time stamps are rounded to this part of the sample period while the structure is chosen.
+const CHOOSING_STAMP: f64 = 1.0 / 16.0;
 /// Samples between the outputs of a second difference that shows how much such a part moves: several periods of what moves
 /// it, and less of its noise than between neighbours.
 const CURVED: usize = CHOOSING / 100;
@@ -87,7 +89,7 @@ impl Fitted {
         if let Some(longer) = whiter(&record, &best, &limits, samples) {
             limits.fewest_samples = longer;
             let again = match longer > choice.samples {
-                true => choose_on_parts(&mut record, &limits, options, remarks),
+                true => choose_on_parts(&mut record, &limits, options, &choice.thetas(), remarks),
                 false => Some((part.clone(), choice.clone())),
             };
             let fit = again.and_then(|(part, choice)| {
@@ -153,11 +155,7 @@ impl Fitted {
         let (asked, found) = forces::forces(&part, &best, &start.found.theta, rows)?;
         self.record.forces = asked.of(&self.record);
         let blocks = Blocks::new(&self.record, self.samples, limits.skip_s);
-        self.best = if is_whole {
-            found
-        } else {
-            search::fit(&blocks, &found.found.theta, longest_s)?
-        };
+        self.best = search::fit(&blocks, &found.found.theta, longest_s)?;
         self.wider = self.best.clone();
         let found = forces::nonlinear(&self.best.found, &self.record.forces);
         Some(Remark::Nonlinear(found))
@@ -206,63 +204,69 @@ impl Fitted {
     }
 }
 
-/// Step 2, with the state at the start unknown and at rest: the start that explains the whole record better is kept in the
-/// record, unless it is known.
+/// Step 2, with the state at the start unknown, and at rest if that explains the whole record better, which the record then
+/// keeps; unless it is known.
 fn choose_start(
     record: &mut Record,
     limits: &Limits,
     options: &Options,
     remarks: &mut Vec<Remark>,
 ) -> Option<(Range<usize>, Choice)> {
-    if record.rest.is_some() {
-        return choose_on_parts(record, limits, options, remarks);
+    let mut of_free = vec![];
+    let free = choose_on_parts(record, limits, options, &[], &mut of_free);
+    if record.rest.is_none() {
+        let (_, choice) = free.as_ref()?;
+        let at_rest = record.at_rest().rounded(CHOOSING_STAMP);
+        let mut starts = search::screen_whole(&at_rest, limits.structure, limits.longest_tau_s);
+        starts.extend(choice.chosen().map(|found| found.found.theta));
+        if was_at_rest(record, limits, &starts) {
+            *record = record.at_rest();
+            starts.extend(choice.thetas());
+            return choose_on_parts(record, limits, options, &starts, remarks);
+        }
     }
-    let mut at_rest = Record {
-        rest: Some(record.input[0]),
-        ..record.clone()
+    remarks.append(&mut of_free);
+    free
+}
+
+/// Whether the process was at rest under the first input when the record began: whether that explains the record better than
+/// an unknown state, from each of `thetas`.
+fn was_at_rest(record: &Record, limits: &Limits, thetas: &[Theta]) -> bool {
+    let longest_tau_s = limits.longest_tau_s;
+    let rows = thetas.iter().map(|theta| rows_for(record, theta).0);
+    let Some(samples) = rows.min() else {
+        return false;
     };
-    let [mut of_free, mut of_rest] = [vec![], vec![]];
-    let free = choose_on_parts(record, limits, options, &mut of_free);
-    let resting = choose_on_parts(&mut at_rest, limits, options, &mut of_rest);
-    let thetas = [&free, &resting].map(|found| Some(found.as_ref()?.1.chosen()?.found.theta));
-    // On the same rows: those whose outputs do not depend on an input before the record.
-    let (samples, skip_s) = (thetas.iter().flatten())
-        .map(|theta| rows_for(record, theta))
-        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
-    let first = record.index_at(skip_s);
+    // On all rows, the first ones too, which were at rest or not: under the first input with an unknown state.
     let bic = |of: &Record, theta: &Theta| {
-        let blocks = Blocks::from(of, samples, first);
-        let found = search::warm(&blocks, theta, limits.longest_tau_s, search::FINE);
+        let blocks = Blocks::from(of, samples, 0);
+        let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING);
         found.map_or(f64::INFINITY, |found| {
             let rows = found.at.residual.len() as f64;
             found.at.profile_bic + found.theta.free().len() as f64 * rows.ln()
         })
     };
     let bics = |of: &Record| {
-        let each = thetas.iter().flatten().map(|theta| bic(of, theta));
+        let each = thetas.iter().map(|theta| bic(of, theta));
         each.fold(f64::INFINITY, f64::min)
     };
-    if bics(&at_rest) < bics(record) {
-        *record = at_rest;
-        remarks.append(&mut of_rest);
-        return resting.or(free);
-    }
-    remarks.append(&mut of_free);
-    free.or(resting)
+    bics(&record.at_rest()) < bics(record)
 }
 
-/// Step 2: the choice on the part of a record that tells most, and this part.
+/// Step 2: the choice on the part of a record that tells most, and this part. The searches begin at `starts`, or where a
+/// screening says.
 fn choose_on_parts(
     record: &mut Record,
     limits: &Limits,
     options: &Options,
+    starts: &[Theta],
     remarks: &mut Vec<Remark>,
 ) -> Option<(Range<usize>, Choice)> {
     let mut choices = Vec::new();
     let mut parts = excited_parts(record);
     while let Some(part) = parts.pop() {
         let fewest = limits.fewest_samples;
-        let Some(choice) = choose_on(record, part.clone(), fewest, options, remarks) else {
+        let Some(choice) = choose_on(record, part.clone(), fewest, options, starts, remarks) else {
             continue;
         };
         // Rows longer than the shortest lag do not show it: a shorter part has shorter rows.
@@ -287,9 +291,10 @@ fn choose_on(
     part: Range<usize>,
     fewest_samples: usize,
     options: &Options,
+    starts: &[Theta],
     remarks: &mut Vec<Remark>,
 ) -> Option<Choice> {
-    let mut part = record.part(part);
+    let mut part = record.part(part).rounded(CHOOSING_STAMP);
     // At rest before the record, at rest where a part begins: the input moves where the part tells most.
     part.rest = part.rest.or(record.rest.map(|_| part.input[0]));
     let length_s = part.time_s(part.len() - 1);
@@ -300,14 +305,14 @@ fn choose_on(
         structure: options.structure,
         fewest_samples,
     };
-    let mut choice = choose(&part, &limits);
+    let mut choice = choose(&part, &limits, starts);
     if record.hold == Hold::Held
         && let Some(gain) = straight(&part, &choice, &limits, options)
     {
         record.hold = Hold::Interpolated;
         part.hold = Hold::Interpolated;
         remarks.push(Remark::Interpolated(gain));
-        choice = choose(&part, &limits);
+        choice = choose(&part, &limits, starts);
     }
     choice.chosen().is_some().then_some(choice)
 }

@@ -81,9 +81,9 @@ pub(super) fn forces(
     let mut chosen: Option<(Asked, Candidate)> = None;
     // The best force alone; then another one beside it.
     for _ in 0..MOST {
-        let (known, bic) = match &chosen {
-            Some((asked, found)) => (asked.forces.clone(), found.bic),
-            None => (vec![], best.bic),
+        let (known, lead) = match &chosen {
+            Some((asked, found)) => (asked.forces.clone(), found),
+            None => (vec![], best),
         };
         let others = [Force::Drag, Force::Friction, Force::Thrust].into_iter();
         let mut next: Option<(Asked, Candidate)> = None;
@@ -93,10 +93,11 @@ pub(super) fn forces(
             let asked = Asked { forces, period_s };
             trial.forces = asked.of(record);
             let blocks = Blocks::new(&trial, samples, skip_s);
-            let Some(found) = search::fit(&blocks, start, longest_tau_s) else {
+            let mut raced = search::race(&blocks, &[*start], Some(lead), longest_tau_s);
+            let Some(found) = raced.pop() else {
                 continue;
             };
-            let least = next.as_ref().map_or(bic - ASKED, |(_, next)| next.bic);
+            let least = next.as_ref().map_or(lead.bic - ASKED, |(_, next)| next.bic);
             if found.bic < least && is_physical(&trial.forces, &found) {
                 next = Some((asked, found));
             }

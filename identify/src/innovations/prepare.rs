@@ -158,17 +158,8 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64], usable: &[bool]) -> R
         return record;
     }
     record.dt_s = median;
-    let unit = median * STAMP;
-    let rounded = times_s
-        .iter()
-        .map(|t| ((t - times_s[0]) / unit).round() * unit);
-    record.uneven_s = rounded.collect();
-    // Two stamps in one unit would be one sample.
-    let distinct = |pair: &[f64]| pair[1] > pair[0];
-    if !record.uneven_s.windows(2).all(distinct) {
-        record.uneven_s = times_s.iter().map(|t| t - times_s[0]).collect();
-    }
-    record
+    record.uneven_s = times_s.iter().map(|t| t - times_s[0]).collect();
+    record.rounded(STAMP)
 }
 
 /// Index of each time stamp on a grid of steps near `step_s`, and the step (s). `None` if the stamps do not fit one.

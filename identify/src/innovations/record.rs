@@ -129,6 +129,26 @@ impl Record {
         self.rest.map_or_else(|| self.index_at(skip_s), |_| 0)
     }
 
+    /// The same record with its uneven times rounded to a `part` of the sample period, so that few lengths of step occur: the
+    /// likelihood needs the matrices of each. As it is where two samples would meet.
+    pub(crate) fn rounded(mut self, part: f64) -> Self {
+        let unit_s = self.dt_s * part;
+        let times_s = self.uneven_s.iter();
+        let rounded: Vec<f64> = times_s.map(|t| (t / unit_s).round() * unit_s).collect();
+        if rounded.windows(2).all(|pair| pair[1] > pair[0]) {
+            self.uneven_s = rounded;
+        }
+        self
+    }
+
+    /// The same record of a process that was at rest under the first input.
+    pub(crate) fn at_rest(&self) -> Self {
+        Self {
+            rest: Some(self.input[0]),
+            ..self.clone()
+        }
+    }
+
     /// The same record without the samples outside `range`.
     pub(crate) fn part(&self, range: std::ops::Range<usize>) -> Self {
         let start_s = self.time_s(range.start);

@@ -8,6 +8,8 @@
 //! Nonlinear forces are inputs too. They enter behind the actuator lags without a delay, and run straight from sample to
 //! sample.
 
+use std::collections::HashMap;
+
 use onecycle_design::state_space::{Matrix, StateSpace, Step, identity, product, times};
 use onecycle_design::{Linear, Structure};
 
@@ -352,30 +354,21 @@ fn value_at(record: &Record, source: Source<'_>, acting: usize, time_s: f64) -> 
     }
 }
 
-/// Matrices of the lengths of step that occurred lately, to the nanosecond.
+/// Matrices of the lengths of step that have occurred, to the nanosecond.
 struct Steps<'a, const N: usize> {
     model: &'a StateSpace<N>,
-    known: Vec<(i64, Step<N>)>,
+    known: HashMap<i64, Step<N>>,
 }
 
 impl<'a, const N: usize> Steps<'a, N> {
-    /// Number of lengths to remember.
-    const SIZE: usize = 4096;
-
     fn new(model: &'a StateSpace<N>) -> Self {
-        let none = (-1, model.step(0.0));
-        Self {
-            model,
-            known: vec![none; Self::SIZE],
-        }
+        let known = HashMap::new();
+        Self { model, known }
     }
 
-    fn of(&mut self, length_s: f64) -> Step<N> {
+    fn of(&mut self, length_s: f64) -> &Step<N> {
         let key = (length_s * 1e9).round() as i64;
-        let slot = &mut self.known[key as usize % Self::SIZE];
-        if slot.0 != key {
-            *slot = (key, self.model.step(length_s));
-        }
-        slot.1
+        let step = self.known.entry(key);
+        step.or_insert_with(|| self.model.step(length_s))
     }
 }

@@ -28,7 +28,7 @@ pub(super) const FINE: Patience = Patience {
     decrease: 1e-7,
 };
 /// Of the fit that chooses: the last step gains less than 0.01 of the log-likelihood.
-const CHOOSING: Patience = Patience {
+pub(super) const CHOOSING: Patience = Patience {
     steps: 40,
     decrease: 1e-5,
 };
@@ -75,15 +75,16 @@ pub(super) fn best(candidates: impl IntoIterator<Item = Candidate>) -> Option<Ca
         .min_by(|a, b| a.bic.total_cmp(&b.bic))
 }
 
-/// Copy of an even record in steps of `samples` samples: means of input and output. The output of a step stands at its
+/// Copy of a record in even steps of `samples` samples: means of input and output. The output of a step stands at its
 /// middle, half a step after its stamp, so the dead time appears shorter by the second value (s).
 fn coarse(record: &Record, samples: usize) -> (Record, f64) {
-    if samples <= 1 || !record.uneven_s.is_empty() {
+    if samples <= 1 {
         return (record.clone(), 0.0);
     }
+    let dt_s = record.dt_s * samples as f64;
     let mut copy = Record {
         uneven_s: vec![],
-        dt_s: record.dt_s * samples as f64,
+        dt_s,
         input: vec![],
         output: vec![],
         present: vec![],
@@ -91,22 +92,31 @@ fn coarse(record: &Record, samples: usize) -> (Record, f64) {
         rest: record.rest,
         forces: Forces::default(),
     };
-    for start in (0..=record.len().saturating_sub(samples)).step_by(samples) {
-        let range = start..start + samples;
+    let length_s = record.time_s(record.len() - 1) + record.dt_s;
+    let steps = (length_s / dt_s + 1e-9) as usize;
+    let mut start = 0;
+    for step in 1..=steps {
+        let end = record.index_at(step as f64 * dt_s);
+        let range = start..end;
+        start = end;
+        let outputs = record.output[range.clone()].iter();
+        let present = outputs.zip(&record.present[range.clone()]);
+        let present = present.filter(|(_, present)| **present).map(|(y, _)| *y);
+        let output = mean(present);
+        copy.present.push(output.is_some());
+        copy.output.push(output.unwrap_or(0.0));
+        // A step between two uneven samples keeps the input.
+        let input = mean(record.input[range].iter().copied());
         copy.input
-            .push(record.input[range.clone()].iter().sum::<f64>() / samples as f64);
-        let outputs = record.output[range.clone()]
-            .iter()
-            .zip(&record.present[range]);
-        let present: Vec<f64> = outputs
-            .filter(|(_, present)| **present)
-            .map(|(y, _)| *y)
-            .collect();
-        copy.present.push(!present.is_empty());
-        copy.output
-            .push(present.iter().sum::<f64>() / present.len().max(1) as f64);
+            .push(input.unwrap_or(record.input[end.max(1) - 1]));
     }
     (copy, 0.5 * (samples - 1) as f64 * record.dt_s)
+}
+
+/// Mean of values. `None` of none.
+fn mean(values: impl Iterator<Item = f64>) -> Option<f64> {
+    let (count, sum) = values.fold((0, 0.0), |(count, sum), value| (count + 1, sum + value));
+    (count > 0).then(|| sum / f64::from(count))
 }
 
 /// Starts for a structure: those of the whole record, then of shorter and shorter parts at a finer and finer resolution. So
@@ -117,15 +127,14 @@ pub(super) fn screen(
     skip_s: f64,
     longest_tau_s: f64,
 ) -> Vec<Vec<Theta>> {
-    let used = record.len() - record.skipped(skip_s);
-    let mut samples = (used / COARSE_BLOCKS).max(1);
+    let mut samples = coarse_samples(record, skip_s);
     let mut scales = vec![screen_at(
         record,
         structure,
         samples,
         (skip_s, longest_tau_s),
     )];
-    while samples > 1 && record.uneven_s.is_empty() {
+    while samples > 1 {
         samples = (samples / ZOOM).max(1);
         let length = (COARSE_BLOCKS * samples).min(record.len());
         let part = record.part(liveliest(record, length));
@@ -134,6 +143,39 @@ pub(super) fn screen(
         scales.push(screen_at(&part, structure, samples, limits));
     }
     scales
+}
+
+/// Structures to screen: all heads, or those that lead to the one asked for.
+pub(super) fn heads(structure: Option<Structure>) -> Vec<Structure> {
+    let Some(structure) = structure else {
+        return HEADS.to_vec();
+    };
+    match structure {
+        Structure::Resonant | Structure::ResonantLag => vec![Structure::ResonantLag],
+        Structure::Foptd | Structure::Soptd | Structure::Toptd => vec![Structure::Soptd],
+        Structure::IntegratorLag | Structure::Iptd => vec![Structure::Soptd, Structure::Soiptd],
+        _ => vec![Structure::Soiptd],
+    }
+}
+
+/// The best start of each structure on a coarse copy of the whole record, whose start is at rest.
+pub(super) fn screen_whole(
+    record: &Record,
+    structure: Option<Structure>,
+    longest_tau_s: f64,
+) -> Vec<Theta> {
+    let samples = coarse_samples(record, 0.0);
+    (heads(structure).into_iter())
+        .filter_map(|head| {
+            let starts = screen_at(record, head, samples, (0.0, longest_tau_s));
+            starts.first().copied()
+        })
+        .collect()
+}
+
+/// Samples a row of a coarse copy of the whole record.
+fn coarse_samples(record: &Record, skip_s: f64) -> usize {
+    ((record.len() - record.skipped(skip_s)) / COARSE_BLOCKS).max(1)
 }
 
 /// The part of `length` samples whose input changes most, relative to its own steps over a tenth of the part.
@@ -349,6 +391,29 @@ pub(super) fn race(
         }
     }
     candidates
+}
+
+/// The starts of each structure that explain the record best as they are, those that lead to the same fit once.
+pub(super) fn promising(blocks: &Blocks<'_>, starts: Vec<Theta>, longest_tau_s: f64) -> Vec<Theta> {
+    let mut memory = Memory::default();
+    let mut found: Vec<(f64, Theta)> = (starts.into_iter())
+        .filter_map(|start| {
+            let theta = Bounds::new(start.structure, blocks, longest_tau_s).clamp(&start);
+            Some((evaluate(blocks, &theta, &mut memory)?.log_likelihood, theta))
+        })
+        .collect();
+    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut kept: Vec<Theta> = Vec::new();
+    for (_, theta) in found {
+        let alike = || {
+            kept.iter()
+                .filter(|other| other.structure == theta.structure)
+        };
+        if alike().count() < STARTS && alike().all(|other| differ(&theta, other, longest_tau_s)) {
+            kept.push(theta);
+        }
+    }
+    kept
 }
 
 /// The best starts of each kind of noise.
