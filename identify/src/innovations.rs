@@ -17,6 +17,7 @@
 //! The likelihood itself is in `likelihood`, on the matrices of `lifted` and the response of `response`. Method: L. Ljung,
 //! "System Identification" (1999), section 7.4, with unknown initial state (P. de Jong, Biometrika 75 (1988)).
 
+mod arx;
 mod check;
 mod choose;
 #[cfg(test)]
@@ -60,8 +61,8 @@ use self::mixture::Component;
 pub(crate) use self::orthogonal::Orthogonal;
 pub use self::plan::expected;
 use self::prepare::{FEWEST, Prepared, prepare};
-use self::record::Blocks;
 pub use self::record::Hold;
+use self::record::{Blocks, Record};
 pub(crate) use self::result::gain_of;
 use self::search::Candidate;
 use self::theta::{Bounds, Theta};
@@ -281,6 +282,16 @@ impl Search<'_> {
         }
     }
 
+    /// Time (s) by which the input may have changed before the sample that shows it. Zero for an input that moves all the time,
+    /// and where the user has said that it is held.
+    fn late_s(&self, record: &Record) -> f64 {
+        let is_known = self.options.hold.is_some() || record.hold == Hold::Interpolated;
+        match is_known || !record.keeps_its_input() {
+            true => 0.0,
+            false => record.dt_s,
+        }
+    }
+
     /// The gain is not known; `deviation` is its relative uncertainty.
     fn no_information(&self, theta: &Theta, deviation: Option<f64>) -> Verdict {
         let found = self.excitation;
@@ -350,6 +361,7 @@ impl Search<'_> {
             draws::Stamps {
                 sample_s: fitted.record.dt_s,
                 early_s: prepared.early_s,
+                late_s: self.late_s(&fitted.record),
                 rest: fitted.record.rest.unwrap_or(0.0),
             },
             is_wider.then_some(least),

@@ -18,6 +18,9 @@ pub(super) struct Stamps {
     pub(super) sample_s: f64,
     /// Delay from the stamp of an output to the time of its sample (s).
     pub(super) early_s: f64,
+    /// Time (s) by which the input may have changed before the sample that shows it: a sample, if it is constant between
+    /// changes and the recording may be slower than what makes it.
+    pub(super) late_s: f64,
     /// Input at rest, which the response to the input leaves out; zero if the state at the start is not known.
     pub(super) rest: f64,
 }
@@ -209,7 +212,11 @@ impl Root {
         for lag in 0..theta.layout().stages.lags {
             theta.values[lag] += INSTRUMENT * z[3];
         }
-        below_a_sample(&mut theta, component, stamps, normal[0]);
+        // With equal chances the recording has the rate of what makes the input, or another: then the changes come before their
+        // samples by any part of a sample, on average over them.
+        let tau = theta.layout().tau();
+        theta.values[tau] += stamps.late_s * (2.0 * uniform(z[1]) - 1.0).max(0.0);
+        below_a_sample(&mut theta, component, stamps, uniform(normal[0]));
         (
             process(&theta, gain, stamps.early_s),
             bias / gain - stamps.rest,
@@ -217,14 +224,19 @@ impl Root {
     }
 }
 
+/// A number from an even distribution from 0 to 1: the digits of a normal number from the fourth decimal on.
+fn uniform(normal: f64) -> f64 {
+    (1e3 * normal).rem_euclid(1.0)
+}
+
 /// Puts what the fit has at a bound anywhere below a sample: a dead time that is not positive, and a lag at the least that the
-/// search allows. The samples show neither, and a value with an interval of no width would say that they do. `chance`: a normal
-/// number, whose third to sixth digits are even.
-fn below_a_sample(theta: &mut Theta, component: &Component, stamps: Stamps, chance: f64) {
+/// search allows. The samples show neither, and a value with an interval of no width would say that they do. `share`: where, a
+/// number from an even distribution from 0 to 1.
+fn below_a_sample(theta: &mut Theta, component: &Component, stamps: Stamps, share: f64) {
     let Stamps {
         sample_s, early_s, ..
     } = stamps;
-    let share = (1e3 * chance).rem_euclid(1.0).max(1e-3);
+    let share = share.max(1e-3);
     let best = &component.found.theta;
     let tau = theta.layout().tau();
     if best.tau_s() + early_s <= 0.0 && theta.tau_s() + early_s <= 0.0 {

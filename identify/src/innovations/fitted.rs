@@ -441,12 +441,7 @@ fn refine(
 /// Gain of the log-likelihood if the input runs straight from sample to sample, where that explains the record better.
 /// `None` otherwise, and if the input is piecewise constant or the user has said what it does.
 fn straight(record: &Record, choice: &Choice, limits: &Limits, options: &Options) -> Option<f64> {
-    let held = record
-        .input
-        .windows(2)
-        .filter(|pair| pair[0] == pair[1])
-        .count();
-    if options.hold.is_some() || 2 * held > record.len() {
+    if options.hold.is_some() || record.keeps_its_input() {
         return None;
     }
     let lead = choice.candidates.first()?;

@@ -38,7 +38,7 @@ const PATIENCE: Patience = Patience {
 };
 
 /// The fit without disturbances, if it explains more than a disturbance that is independent of the input leaves to chance.
-/// `None` under feedback too, where the input follows the disturbance.
+/// `None` under feedback too, where the input follows the disturbance, unless the fit with them is at fault anyway.
 pub(super) fn instead(
     blocks: &Blocks<'_>,
     best: &Candidate,
@@ -46,7 +46,9 @@ pub(super) fn instead(
 ) -> Option<Candidate> {
     let with = &best.found;
     with.theta.noises().next()?;
-    if blocks.record.forces.len() > 0 || validate::is_fed_back(blocks) {
+    // Innovations that past inputs explain are a fault of the fit under feedback too.
+    let is_at_fault = || validate::is_left_to_the_input(&validate::tests(blocks, &with.at));
+    if blocks.record.forces.len() > 0 || validate::is_fed_back(blocks) && !is_at_fault() {
         return None;
     }
     let quiet = with.theta.without_noises();

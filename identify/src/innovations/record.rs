@@ -105,6 +105,12 @@ impl Record {
         if variance > 0.0 { variance.sqrt() } else { 1.0 }
     }
 
+    /// Whether most inputs are those of the sample before.
+    pub(crate) fn keeps_its_input(&self) -> bool {
+        let pairs = self.input.windows(2);
+        2 * pairs.filter(|pair| pair[0] == pair[1]).count() > self.len()
+    }
+
     /// Number of samples, absent ones included.
     pub(crate) fn len(&self) -> usize {
         self.output.len()

@@ -10,6 +10,7 @@
 
 use onecycle_design::Structure;
 
+use super::arx::Arx;
 use super::descent::{Found, Patience, descend};
 use super::likelihood::{Memory, evaluate};
 use super::record::{Blocks, Forces, Record};
@@ -294,6 +295,7 @@ fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: 
             processes.push(theta);
         }
     }
+    processes.extend(predicted(base, blocks));
     let mut starts = Vec::new();
     // Noise last: neighbours in the list share the response, which is the larger part of the work.
     for process in processes {
@@ -309,6 +311,26 @@ fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: 
         }
     }
     starts
+}
+
+/// The process `base` with the poles of the prediction from past outputs: the resonance of a light damping lies between the
+/// points of any grid.
+fn predicted(base: Theta, blocks: &Blocks<'_>) -> Option<Theta> {
+    let dt_s = blocks.block_s();
+    let [c1, c0] = Arx::of(blocks, 0..blocks.len())?.pair(dt_s)?;
+    let layout = base.layout();
+    let mut theta = base;
+    if let Some(pair) = layout.pair() {
+        theta.values[0] = dt_s.ln();
+        theta.values[pair] = c1;
+        theta.values[pair + 1] = c0;
+        return Some(theta);
+    }
+    let root = (0.25 * c1 * c1 - c0).sqrt();
+    let pole = layout.pole().filter(|_| root >= 0.0)?;
+    theta.values[0] = -(0.5 * c1 + root).ln();
+    theta.values[pole] = 0.5 * c1 - root;
+    Some(theta)
 }
 
 /// Descends on the record, and puts the lags in order.
