@@ -22,7 +22,7 @@ use crate::failure::Failure;
 pub use crate::output::page::{Listener, listen};
 use crate::reading;
 pub use crate::reading::Given;
-use crate::words::remark::sentences;
+use crate::words::remark::{details, reasons};
 use crate::words::verdict::advice;
 
 pub use studio::Studio;
@@ -91,16 +91,24 @@ impl Found {
         self.0.page()
     }
 
-    /// The report as text.
+    /// The report as text, with all details.
     #[must_use]
     pub fn text(&self) -> String {
-        plain(&self.0.text())
+        plain(&self.0.text(true))
     }
 
-    /// One sentence for each remark.
+    /// One or two sentences for each remark that is a reason to suspect the result.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
-        sentences(&self.0.identification)
+        let reasons = reasons(&self.0.identification).into_iter();
+        reasons.map(|(_, sentence)| sentence).collect()
+    }
+
+    /// One or two sentences for each other remark: how the result was found, what no such test shows, what the controller asks for.
+    #[must_use]
+    pub fn details(&self) -> Vec<String> {
+        let details = details(&self.0.identification).into_iter();
+        details.map(|(_, sentence)| sentence).collect()
     }
 
     /// Why no process was identified, and what to do. `None` if one was.

@@ -316,12 +316,15 @@ impl Search<'_> {
         if absent > 0.0 {
             self.remarks.push(Remark::Absent(absent));
         }
-        if validate::is_coloured(tests) {
-            self.remarks.push(Remark::Coloured(tests.autocorrelation));
-        }
-        if validate::is_left_to_the_input(tests) {
-            self.remarks.push(Remark::InputLeft(tests.input_share));
-        }
+        // One reason for one fault: without disturbances all of them are left, and what the input explains is not white.
+        let fault = if validate::is_left_to_the_input(tests) {
+            Some(Remark::InputLeft(tests.input_share))
+        } else if validate::is_coloured(tests) {
+            Some(Remark::Coloured(tests.autocorrelation))
+        } else {
+            None
+        };
+        (self.remarks).extend(fault.filter(|_| !fitted.is_output_error));
         let is_weak = |found: &&Prediction| {
             found.explained < WELL_PREDICTED && found.error_ratio > EXPECTED_ERROR_RATIO
         };

@@ -176,8 +176,10 @@ pub enum Remark {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum About {
-    /// Something in this recording is unusual or too little: it may be wrong.
+    /// Something in this recording is unusual or too little: the result may be wrong.
     Recording,
+    /// How the result was found, and what of it is known less well: its intervals say by how much.
+    Result,
     /// A test of this kind does not show it, in any recording.
     Test,
     /// The proposed controller asks for it.
@@ -186,13 +188,14 @@ pub enum About {
 
 impl About {
     /// All of them, in the order in which they are shown.
-    pub const ALL: [Self; 3] = [Self::Recording, Self::Test, Self::Controller];
+    pub const ALL: [Self; 4] = [Self::Recording, Self::Result, Self::Test, Self::Controller];
 
-    /// Name for programs: an entry of `remark_about` in JSON.
+    /// Name for programs: an entry of `detail_about` in JSON.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Recording => "recording",
+            Self::Result => "result",
             Self::Test => "test",
             Self::Controller => "controller",
         }
@@ -200,8 +203,8 @@ impl About {
 }
 
 impl Remark {
-    /// What the remark is about. Only one about the recording is a reason to suspect it: those about the test stand on every
-    /// recording of its kind.
+    /// What the remark is about. Only one about the recording is a reason to suspect the result: those about the test stand on
+    /// every recording of its kind.
     #[must_use]
     pub fn about(&self) -> About {
         match self {
@@ -209,11 +212,17 @@ impl Remark {
             | Self::JumpsOnly
             | Self::ClockUnchecked { .. }
             | Self::SwitchesBetweenSamples(_)
-            | Self::OutputFilter { .. }
-            | Self::Unread
-            | Self::DampingNotSeen(_) => About::Test,
-            // No fault: the input is another test signal.
-            Self::NotASteadyOscillation(verdict) if verdict.kind() == "no_relay" => About::Test,
+            | Self::Unread => About::Test,
+            Self::OutputFilter { .. }
+            | Self::TwoStage { .. }
+            | Self::DampingNotSeen(_)
+            | Self::Weak { .. }
+            | Self::WeakDelay { .. }
+            | Self::NotASteadyOscillation(_)
+            | Self::RelayReplaced(_)
+            | Self::OtherStructures(_)
+            | Self::Absent(_)
+            | Self::Interpolated(_) => About::Result,
             Self::LittleGainMargin(_) | Self::NoiseAtActuator(_) | Self::InputPeak { .. } => {
                 About::Controller
             }
@@ -221,7 +230,7 @@ impl Remark {
         }
     }
 
-    /// Name for programs: an entry of `remark_kinds` in JSON.
+    /// Name for programs: an entry of `remark_kinds` or `detail_kinds` in JSON.
     #[must_use]
     pub fn kind(&self) -> &'static str {
         match self {

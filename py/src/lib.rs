@@ -165,6 +165,10 @@ impl Found {
         self.0.remarks()
     }
 
+    fn details(&self) -> Vec<String> {
+        self.0.details()
+    }
+
     fn refusal(&self) -> Option<String> {
         self.0.refusal()
     }

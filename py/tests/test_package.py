@@ -48,6 +48,7 @@ def test_result_holds_truth():
     assert low == pytest.approx(tau["low"], abs=0.2 * (tau["high"] - tau["low"]))
     assert high == pytest.approx(tau["high"], abs=0.2 * (tau["high"] - tau["low"]))
     assert found.refusal is None and found.remarks == found.to_dict()["remarks"]
+    assert found.details == found.to_dict()["details"] != []
 
 
 def test_page(tmp_path):

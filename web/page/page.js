@@ -287,7 +287,7 @@ const showResult = () => {
   const rows = Object.entries(found).filter(([, value]) => value && typeof value === "object" && "low" in value);
   at("parameters").hidden = !rows.length;
   at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([SYMBOLS[name] ?? name.replaceAll("_", " "), shown(value.estimate), shown(value.low), shown(value.high)])));
-  const groups = [["About the recording", report.remarks.filter((_, k) => report.remark_about[k] === "recording")], ["Other remarks", report.remarks.filter((_, k) => report.remark_about[k] !== "recording")]];
+  const groups = [["Remarks", report.remarks], ["Details", report.details]];
   at("remarks").replaceChildren(...groups.filter(([, all]) => all.length).flatMap(([title, all]) => {
     const list = make("ul");
     list.append(...all.map((one) => make("li", one)));

@@ -90,6 +90,10 @@ pub(crate) struct Identify {
     /// likelihood decides whether the process was at rest under the first input, or under 0 if the input never changes]
     #[arg(long, value_name = "VALUE", allow_negative_numbers = true, value_parser = finite)]
     pub(crate) input_before: Option<f64>,
+    /// Print all remarks: how the result was found and what of it is known less well, what no such test shows, what the
+    /// controller asks for
+    #[arg(long)]
+    pub(crate) details: bool,
     /// Cutoff (Hz) of a second-order low-pass (Butterworth) that the output passed before it was recorded: it is taken out
     /// for the fit, and its delay is part of tau. 0: none [default: of a flight log, the gyro's filter in its parameters]
     #[arg(long, value_name = "HZ", value_parser = cutoff_hz)]

@@ -76,12 +76,13 @@ impl Found {
         }
     }
 
-    pub(crate) fn text(&self) -> String {
+    pub(crate) fn text(&self, has_details: bool) -> String {
         text::identification(
             &self.name,
             &self.recording,
             &self.identification,
             self.choice.as_ref(),
+            has_details,
         ) + &self
             .gains
             .as_ref()
@@ -115,7 +116,7 @@ pub(crate) fn show(arguments: &Identify, found: &mut Found) -> Result<(), Failur
     } else {
         let draw = || plot::end(&found.recording, &found.identification, columns());
         let plotted = is_plotted(arguments.plot).then(draw).flatten();
-        found.text() + &plotted.unwrap_or_default()
+        found.text(arguments.details) + &plotted.unwrap_or_default()
     })
 }
 

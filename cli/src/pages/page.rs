@@ -31,6 +31,14 @@ pub(crate) fn paragraph(class: &str, text: &str) -> String {
     format!("<p class=\"{}\">{}</p>\n", escaped(class), escaped(text))
 }
 
+/// Text that opens on a click on its heading.
+pub(crate) fn folded(heading: &str, body: &str) -> String {
+    format!(
+        "<details><summary>{}</summary>{body}</details>\n",
+        escaped(heading)
+    )
+}
+
 /// The main result of the page, good or bad.
 pub(crate) fn verdict(is_good: bool, text: &str) -> String {
     let kind = if is_good { "good" } else { "bad" };

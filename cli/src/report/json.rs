@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 use onecycle::{
     Assessment, Design, Excitation, Identification, Identified, Interval, Margins, Model,
-    Recording, StepIntervals, StepMetrics, Style,
+    Recording, Remark, StepIntervals, StepMetrics, Style,
 };
 use onecycle_link::Column;
 use serde::{Serialize, Serializer};
@@ -18,7 +18,7 @@ use super::log_gains::LogGainsReport;
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::LogGains;
 use crate::words::recording::note;
-use crate::words::remark::sentences;
+use crate::words::remark::{details, reasons};
 use crate::words::verdict::advice;
 
 /// Changes with every change that a reader of the report could notice, added keys excepted.
@@ -60,10 +60,33 @@ struct IdentifyReport<'a> {
     against: Option<AgainstReport>,
     #[serde(skip_serializing_if = "Option::is_none")]
     log: Option<LogGainsReport>,
+    #[serde(flatten)]
+    told: Told,
+    notes: Vec<String>,
+}
+
+/// What there is to say on a result.
+#[derive(Serialize)]
+struct Told {
     remarks: Vec<String>,
     remark_kinds: Vec<&'static str>,
-    remark_about: Vec<&'static str>,
-    notes: Vec<String>,
+    details: Vec<String>,
+    detail_kinds: Vec<&'static str>,
+    detail_about: Vec<&'static str>,
+}
+
+impl From<&Identification> for Told {
+    fn from(found: &Identification) -> Self {
+        let (reasons, details) = (reasons(found), details(found));
+        let kinds = |told: &[(&Remark, String)]| told.iter().map(|(one, _)| one.kind()).collect();
+        Self {
+            remark_kinds: kinds(&reasons),
+            remarks: reasons.into_iter().map(|(_, sentence)| sentence).collect(),
+            detail_kinds: kinds(&details),
+            detail_about: details.iter().map(|(one, _)| one.about().name()).collect(),
+            details: details.into_iter().map(|(_, sentence)| sentence).collect(),
+        }
+    }
 }
 
 /// Ratio at which the relay switched.
@@ -344,11 +367,7 @@ pub(crate) fn identification(
         controllers: choice.map(controllers::proposed),
         against: choice.and_then(controllers::against),
         log: gains.map(Into::into),
-        remarks: sentences(found),
-        remark_kinds: found.remarks.iter().map(onecycle::Remark::kind).collect(),
-        remark_about: (found.remarks.iter())
-            .map(|remark| remark.about().name())
-            .collect(),
+        told: found.into(),
         notes: recording.notes().iter().map(note).collect(),
     })
 }

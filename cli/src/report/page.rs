@@ -305,13 +305,13 @@ fn identified_lead(
 
 fn remarks(found: &Identification) -> Option<Section> {
     let groups = words::remark::grouped(found);
-    let body = |(heading, sentences): &(&str, Vec<String>)| {
-        let under = page::paragraph("lead", &format!("{heading}:"));
-        under + &page::list(sentences)
+    let body = |(heading, sentences): &(&str, Vec<String>)| match *heading {
+        words::remark::REASONS => page::list(sentences),
+        _ => page::folded(heading, &page::list(sentences)),
     };
     (!groups.is_empty()).then(|| Section {
         id: "remarks".to_owned(),
-        title: "Remarks".to_owned(),
+        title: words::remark::REASONS.to_owned(),
         body: groups.iter().map(body).collect(),
     })
 }

@@ -172,7 +172,7 @@ fn chosen_of(chosen: Structure, alternatives: &[(Structure, f64)]) -> String {
         found.map(|(_, bic)| *bic)
     };
     let Some(own) = of(chosen).filter(|_| alternatives.len() > 1) else {
-        return format!("{}, the only one fitted", chosen.name());
+        return format!("{}; no other was fitted or comes near", chosen.name());
     };
     let others: Vec<String> = (alternatives.iter())
         .filter(|(structure, _)| *structure != chosen)
@@ -185,9 +185,8 @@ fn chosen_of(chosen: Structure, alternatives: &[(Structure, f64)]) -> String {
         "is the simplest of those as good"
     };
     format!(
-        "{} {rank} ({} fitted); BIC of others: {}",
+        "{} {rank}; BIC of others: {}",
         chosen.name(),
-        alternatives.len(),
         others.join(", ")
     )
 }
@@ -258,15 +257,15 @@ mod test {
         ];
         assert_eq!(
             chosen_of(Structure::IntegratorLag, &all),
-            "integrator_lag is the simplest of those as good (5 fitted); BIC of others: soptd -2.5, foptd +117.5, iptd +127.5"
+            "integrator_lag is the simplest of those as good; BIC of others: soptd -2.5, foptd +117.5, iptd +127.5"
         );
         assert_eq!(
             chosen_of(Structure::Soptd, &all[..2]),
-            "soptd has the least BIC (2 fitted); BIC of others: integrator_lag +2.5"
+            "soptd has the least BIC; BIC of others: integrator_lag +2.5"
         );
         assert_eq!(
             chosen_of(Structure::Iptd, &[(Structure::Iptd, 1.0)]),
-            "iptd, the only one fitted"
+            "iptd; no other was fitted or comes near"
         );
     }
 }

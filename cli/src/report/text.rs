@@ -17,17 +17,18 @@ use crate::results::controllers::Controllers;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
 use crate::words;
 use crate::words::recording;
-use crate::words::remark::grouped;
+use crate::words::remark::{details, grouped, reasons};
 use crate::words::sentence;
 use crate::words::verdict::advice;
 
 /// The report of an identification.
-/// `choice`: the controllers of an identified process.
+/// `choice`: the controllers of an identified process. `has_details`: with the remarks that are no reason to suspect the result.
 pub(crate) fn identification(
     file: &str,
     recording: &Recording,
     found: &Identification,
     choice: Option<&Controllers>,
+    has_details: bool,
 ) -> String {
     let mut text = String::new();
     let units = Units::of(recording);
@@ -81,13 +82,31 @@ pub(crate) fn identification(
             }
         }
     }
-    for (heading, sentences) in grouped(found) {
+    describe_remarks(&mut text, found, has_details);
+    text
+}
+
+fn describe_remarks(text: &mut String, found: &Identification, has_details: bool) {
+    let groups = grouped(found);
+    let more = details(found).len();
+    let shown = match has_details {
+        true => groups.len(),
+        false => groups.len().min(usize::from(!reasons(found).is_empty())),
+    };
+    for (heading, sentences) in &groups[..shown] {
         text.push_str(&headed(&format!("\n{heading}\n")));
         for sentence in sentences {
-            remark(&mut text, "  - ", &sentence);
+            remark(text, "  - ", sentence);
         }
     }
-    text
+    if !has_details && more > 0 {
+        let remarks = if more == 1 { "remark" } else { "remarks" };
+        let line = format!(
+            "{more} more {remarks}, on how this was found and what no such test shows: --details."
+        );
+        text.push('\n');
+        wrapped(text, "", &line);
+    }
 }
 
 /// The report of a design.

@@ -6,27 +6,36 @@ use onecycle_identify::Nonlinear;
 use super::{caution, controllers, listed};
 use crate::report::number::{percent, significant};
 
-/// One or two sentences for each remark on a result, with the options of this program.
-pub(crate) fn sentences(found: &Identification) -> Vec<String> {
-    let is_relay = found.oscillation().is_some();
-    (found.remarks.iter())
-        .map(|remark| sentence(remark, is_relay))
-        .collect()
+/// Heading of the remarks that are reasons to suspect the result.
+pub(crate) const REASONS: &str = "Remarks";
+
+/// Remarks on a result that are reasons to suspect it, each with one or two sentences, with the options of this program.
+pub(crate) fn reasons(found: &Identification) -> Vec<(&Remark, String)> {
+    told(found, |about| about == About::Recording)
 }
 
-/// The same, with a heading for each thing that remarks are about.
-pub(crate) fn grouped(found: &Identification) -> Vec<(&'static str, Vec<String>)> {
+/// All other remarks, in the same form.
+pub(crate) fn details(found: &Identification) -> Vec<(&Remark, String)> {
+    told(found, |about| about != About::Recording)
+}
+
+fn told(found: &Identification, is_wanted: impl Fn(About) -> bool) -> Vec<(&Remark, String)> {
     let is_relay = found.oscillation().is_some();
+    let wanted = (found.remarks.iter()).filter(|remark| is_wanted(remark.about()));
+    let told = wanted.map(|remark| (remark, sentence(remark, is_relay)));
+    told.collect()
+}
+
+/// Sentences of all remarks, with a heading for each thing that they are about.
+pub(crate) fn grouped(found: &Identification) -> Vec<(&'static str, Vec<String>)> {
     let group = |about: About| {
-        let remarks = found
-            .remarks
-            .iter()
-            .filter(|remark| remark.about() == about);
-        let sentences: Vec<String> = remarks.map(|remark| sentence(remark, is_relay)).collect();
+        let of_group = told(found, |other| other == about).into_iter();
+        let sentences: Vec<String> = of_group.map(|(_, sentence)| sentence).collect();
         let heading = match about {
+            About::Result => "How this was found, and how well",
             About::Test => "What this test does not show",
             About::Controller => "What the controller asks for",
-            _ => "Remarks",
+            _ => REASONS,
         };
         (!sentences.is_empty()).then_some((heading, sentences))
     };

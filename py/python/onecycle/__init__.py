@@ -227,8 +227,13 @@ class Identification:
 
     @property
     def remarks(self) -> list:
-        """One sentence for each remark; their fixed names are `to_dict()["remark_kinds"]`."""
+        """Reasons to suspect the result, in sentences; their fixed names are `to_dict()["remark_kinds"]`."""
         return self._inner.remarks()
+
+    @property
+    def details(self) -> list:
+        """All other remarks, in sentences: how the result was found, what no such test shows, what the controller asks for."""
+        return self._inner.details()
 
     @property
     def took_s(self) -> float:
