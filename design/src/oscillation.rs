@@ -35,7 +35,6 @@ pub use relay_test::RelayTest;
 
 /// What is known of a process.
 #[derive(Clone, Copy, Debug, PartialEq)]
-#[non_exhaustive]
 pub enum Oscillation {
     /// Ultimate gain and period.
     Ultimate(Ultimate),

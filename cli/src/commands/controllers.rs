@@ -2,12 +2,13 @@
 
 use onecycle::{
     Controller, Design, Execution, Identified, Model, Pid, Proposal, Specification, Style, assess,
-    design, least_margins,
+    design, least_margins, proposals,
 };
+use onecycle_design::oscillation::Family;
 use onecycle_design::{Limit, Spans, Vendor, reference_filter_s};
 use rayon::prelude::*;
 
-use crate::results::controllers::{Against, Controllers, Row};
+use crate::results::controllers::{Against, Controllers, Row, Source};
 
 /// Draws over which the gains in force are judged.
 const DRAWS: usize = 200;
@@ -18,7 +19,7 @@ pub(super) fn of_identified(identified: &Identified, against: Option<Pid>) -> Co
     let (model, _) = identified.for_design(0);
     let asked = &identified.specification;
     Controllers {
-        is_recorded: true,
+        source: Source::Recording,
         ..controllers(&model, &draws, asked, against, identified.proposals())
     }
 }
@@ -30,6 +31,22 @@ pub(super) fn of_model(model: &Model, asked: &Specification, against: Option<Pid
         .map(|choice| Proposal::new(model, &[], choice))
         .collect();
     controllers(model, &[], asked, against, proposals)
+}
+
+/// Controllers that keep their limits on all members of a family.
+pub(super) fn of_family(
+    family: &Family,
+    asked: &Specification,
+    against: Option<Pid>,
+) -> Controllers {
+    let mut asked = *asked;
+    asked.coverage = 1.0;
+    let (middle, members) = (&family.middle, &family.members);
+    let proposals = proposals(middle, members, &asked, None);
+    Controllers {
+        source: Source::Oscillation,
+        ..controllers(middle, members, &asked, against, proposals)
+    }
 }
 
 /// Limits of `Ms` of a curve.
@@ -109,7 +126,7 @@ fn controllers(
         missed,
         reference_filter_s,
         trade_off: vec![],
-        is_recorded: false,
+        source: Source::Process,
         plant: None,
     }
 }
