@@ -211,11 +211,14 @@ impl<'a> Region<'a> {
             share,
             first: (SHORTEST, FRAC_PI_2),
         };
-        // Equal lags have the smallest first one, no second lag has the largest.
-        let is_reached = |first: f64| region.place([first, first]) != Place::Late;
-        let low = edge(FRAC_PI_2, SHORTEST, is_reached)?;
+        // No second lag leaves the longest first one, the longest second lag the shortest.
         let is_left = |first: f64| region.place([first, 0.0]) != Place::Slow;
-        let high = edge(low, FRAC_PI_2, is_left)?;
+        let high = edge(SHORTEST, FRAC_PI_2, is_left)?;
+        let is_reached = |first: f64| {
+            let second = region.longest(first);
+            second.is_some_and(|second| region.place([first, second]) != Place::Late)
+        };
+        let low = edge(high, SHORTEST, is_reached)?;
         region.first = (low, high);
         Some(region)
     }
@@ -244,13 +247,18 @@ impl<'a> Region<'a> {
         }
     }
 
+    /// The longest second phase lag beside this first one.
+    fn longest(&self, first: f64) -> Option<f64> {
+        edge(0.0, first, |second| {
+            self.place([first, second]) != Place::Slow
+        })
+    }
+
     /// The member at these shares of the ranges of the first and the second phase lag.
     fn member(&self, [u, v]: [f64; 2]) -> Option<Model> {
         let (low, high) = self.first;
         let first = low + u * (high - low);
-        let high = edge(0.0, first, |second| {
-            self.place([first, second]) != Place::Slow
-        })?;
+        let high = self.longest(first)?;
         let low = edge(high, 0.0, |second| {
             self.place([first, second]) != Place::Late
         })?;
@@ -403,17 +411,23 @@ mod tests {
     fn a_family_keeps_its_range() {
         let hysteresis = Oscillation::Relay(relay(3.0, 0.5));
         assert_eq!(hysteresis.process([f64::INFINITY, 20.0]), None);
-        for oscillation in [ULTIMATE, hysteresis] {
-            let family = oscillation.family((0.1, 0.4)).unwrap();
+        for (oscillation, asked) in [
+            (ULTIMATE, (0.1, 0.4)),
+            (hysteresis, (0.1, 0.4)),
+            (ULTIMATE, (0.002, 0.01)),
+            (ULTIMATE, (0.5, 0.95)),
+        ] {
+            let family = oscillation.family(asked).unwrap();
             let share = |member: &Model| {
                 let of = |parameter| member.parameter(parameter).unwrap_or(0.0);
                 let tau_s = of(Parameter::Tau);
                 tau_s / (tau_s + of(Parameter::TBody) + of(Parameter::TProp))
             };
             let (low, high) = ends(family.members.iter().map(share));
+            assert_eq!(family.members.len(), 200);
             assert!(
-                (low - 0.1).abs() < 1e-3 && (high - 0.4).abs() < 1e-3,
-                "{low} {high}"
+                (low - asked.0).abs() < 1e-3 && (high - asked.1).abs() < 1e-3,
+                "{low} {high} {asked:?}"
             );
         }
     }

@@ -2,8 +2,8 @@
 
 use std::f64::consts::FRAC_1_PI;
 
+use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{ArgGroup, Args};
 use onecycle::Pid;
 use onecycle_design::oscillation::{DEAD_TIME_SHARE, Oscillation, RelayTest};
 use onecycle_design::rules::Ultimate;
@@ -13,6 +13,7 @@ use super::share;
 use crate::failure::Failure;
 use crate::report::number::significant;
 use crate::results::family::{Known, Rule};
+use crate::words::oscillation::not_of_rule;
 
 /// `KU` that differs by more than this share from that of the relay contradicts it.
 const ROUNDING: f64 = 0.05;
@@ -39,47 +40,48 @@ const PROCESS: [&str; 9] = [
 
 /// What is known of a process that oscillates.
 #[derive(Clone, Copy, Debug, Args)]
-#[command(next_help_heading = "One oscillation instead of a process",
-          group = ArgGroup::new("oscillation").multiple(true).conflicts_with_all(PROCESS)
-              .args(["ultimate_gain", "ultimate_period", "relay", "amplitude", "hysteresis", "duty", "rule", "dead_time_share"]))]
+#[command(next_help_heading = "One oscillation instead of a process")]
 pub(crate) struct OscillationArguments {
     /// Ultimate gain KU, with which a P controller makes the process oscillate, in input unit / output unit. The design keeps its
     /// limits on all processes of first and second order with this KU and TU
-    #[arg(long, value_name = "KU", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, value_name = "KU", allow_negative_numbers = true, value_parser = positive, conflicts_with_all = PROCESS)]
     ultimate_gain: Option<f64>,
     /// Ultimate period TU, or period under the relay, in seconds
-    #[arg(long, value_name = "TU", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, value_name = "TU", allow_negative_numbers = true, value_parser = positive, conflicts_with_all = PROCESS)]
     ultimate_period: Option<f64>,
     /// Half of the distance between the two levels of the relay, in the unit of the input. The processes then oscillate exactly
     /// as in the relay test; --ultimate-gain may be left out if --amplitude is given
-    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, value_name = "H", allow_negative_numbers = true, value_parser = positive, conflicts_with_all = PROCESS)]
     relay: Option<f64>,
     /// With --relay: half of the peak-to-peak output, in the unit of the output [default: that of --ultimate-gain]
-    #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, value_name = "A", allow_negative_numbers = true, value_parser = positive, conflicts_with_all = PROCESS)]
     amplitude: Option<f64>,
     /// With --relay: half of the distance between the thresholds of the relay, in the unit of the output [default: 0]
-    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = zero_or_more)]
+    #[arg(long, value_name = "E", allow_negative_numbers = true, value_parser = zero_or_more, conflicts_with_all = PROCESS)]
     hysteresis: Option<f64>,
     /// With a relay: share of the period for which it was high, such as 35% or 0.35 [default: 50%]
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = duty)]
+    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = duty, conflicts_with_all = PROCESS)]
     duty: Option<f64>,
     /// The gains of --against come from this rule: marlin (hot end), marlin-bed, klipper, ziegler-nichols or tyreus-luyben. KU and
     /// TU are those behind the gains
-    #[arg(long, value_name = "NAME", value_parser = rule(), hide_possible_values = true, requires = "against",
-          conflicts_with_all = ["ultimate_gain", "ultimate_period", "amplitude"])]
+    #[arg(long, value_name = "NAME", value_parser = rule(), hide_possible_values = true,
+          conflicts_with_all = [&PROCESS[..], &["ultimate_gain", "ultimate_period", "amplitude"]].concat())]
     rule: Option<Rule>,
     /// Share of the dead time in the sum of dead time and lags of the processes, within 0 and 0.95; 0 is an integrator
     /// [default: 0..0.7]
-    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = dead_time_share)]
+    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = dead_time_share, conflicts_with_all = PROCESS)]
     dead_time_share: Option<(f64, f64)>,
 }
 
 impl OscillationArguments {
     /// What is known; `None` if no option says so. `against`: the gains in force.
     pub(crate) fn known(&self, against: Option<&Pid>) -> Result<Option<Known>, Failure> {
-        let oscillation = match self.rule.zip(against) {
-            Some((rule, gains)) => self.of_rule(rule, gains)?,
-            None => match self.of_test()? {
+        let oscillation = match (self.rule, against) {
+            (Some(rule), Some(gains)) => self.of_rule(rule, gains)?,
+            (Some(_), None) => {
+                return Err(Failure::usage("--rule needs the gains: --against KP,KI,KD"));
+            }
+            (None, _) => match self.of_test()? {
                 Some(oscillation) => oscillation,
                 None => return Ok(None),
             },
@@ -171,12 +173,10 @@ impl OscillationArguments {
 
     /// The oscillation from which a rule has computed these gains.
     fn of_rule(&self, rule: Rule, gains: &Pid) -> Result<Oscillation, Failure> {
-        let found = rule.formula().ultimate(gains).map_err(|error| {
-            Failure::usage(format!(
-                "the gains of --against are not those of --rule {}: {error}",
-                rule.name()
-            ))
-        })?;
+        let found = rule
+            .formula()
+            .ultimate(gains)
+            .map_err(|error| Failure::usage(not_of_rule(rule, &error)))?;
         let Ultimate { gain, period_s, .. } = found;
         let test = match rule {
             // Gain and output are in units of the power of 255; KU is twice that of the describing function.

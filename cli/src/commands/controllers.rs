@@ -102,7 +102,7 @@ fn controllers(
         .find(|row| row.proposal.specification.style == asked.style);
     let design = chosen.and_then(|row| row.proposal.outcome.as_ref().ok());
     let against = against.map(|pid| {
-        let filter_s = needed_filter_s(model, &pid, &asked.execution, design);
+        let filter_s = needed_filter_s((model, draws), &pid, &asked.execution, design);
         let pid = pid
             .with_filter_s(filter_s.unwrap_or(pid.filter_s))
             .with_execution(asked.execution);
@@ -131,10 +131,10 @@ fn controllers(
     }
 }
 
-/// Time (s) of a measurement filter for gains with a derivative and without filter, where neither the process nor a known
-/// filter attenuates the derivative: the filter of the chosen controller, or a tenth of the derivative time.
+/// Time (s) of a measurement filter for gains with a derivative and without filter, where neither the processes nor a known
+/// filter attenuate the derivative: the filter of the chosen controller, or a tenth of the derivative time.
 fn needed_filter_s(
-    model: &Model,
+    (model, draws): (&Model, &[Model]),
     pid: &Pid,
     execution: &Execution,
     chosen: Option<&Design>,
@@ -144,8 +144,9 @@ fn needed_filter_s(
         execution.recorded_filter,
         execution.derivative_filter,
     ];
+    let is_lagged = |model: &Model| model.structure().stages().states() > 1;
     let is_attenuated =
-        model.structure().stages().states() > 1 || filters.iter().any(Option::is_some);
+        is_lagged(model) && draws.iter().all(is_lagged) || filters.iter().any(Option::is_some);
     if pid.kd == 0.0 || pid.filter_s > 0.0 || is_attenuated {
         return None;
     }

@@ -200,16 +200,16 @@ pub(crate) fn price(robustness: &Robustness, source: Source) -> String {
     };
     let (all, one) = members(source);
     format!(
-        "the limits hold on {} of {all}; the design for {one} alone keeps them on {nominal}, {price}",
+        "the limits hold on {} of the {all}; the design for {one} one alone keeps them on {nominal}, {price}",
         percent(robustness.coverage)
     )
 }
 
-/// The processes over which a controller is judged, and the one for which its figures are given.
+/// Names of the processes over which a controller is judged, and of the one for which its figures are given.
 fn members(source: Source) -> (&'static str, &'static str) {
     match source {
-        Source::Oscillation => ("the processes that agree", "the middle process"),
-        _ => ("the likely processes", "the most probable process"),
+        Source::Oscillation => ("processes that agree", "the middle"),
+        _ => ("likely processes", "the most probable"),
     }
 }
 
@@ -217,7 +217,7 @@ fn members(source: Source) -> (&'static str, &'static str) {
 pub(crate) fn judgement(against: &Against, source: Source) -> String {
     let (all, one) = members(source);
     let Some(figures) = &against.figures else {
-        return format!("your gains are unstable on {one}");
+        return format!("your gains are unstable on {one} process");
     };
     let filter = match against.filter_s {
         Some(filter_s) => format!(
@@ -227,7 +227,7 @@ pub(crate) fn judgement(against: &Against, source: Source) -> String {
         None => String::new(),
     };
     let own = format!(
-        "your gains{filter} are stable on {one} with phase margin {:.1} deg and Ms {:.2}",
+        "your gains{filter} are stable on {one} process with phase margin {:.1} deg and Ms {:.2}",
         figures.margins.phase_margin_rad.to_degrees(),
         figures.ms
     );
@@ -235,8 +235,8 @@ pub(crate) fn judgement(against: &Against, source: Source) -> String {
         return own;
     };
     let stable = match 100.0 * least.stable {
-        100.0 => format!("on all of {all}"),
-        share => format!("on {share:.1} % of {all}"),
+        100.0 => format!("on all {all}"),
+        share => format!("on {share:.1} % of the {all}"),
     };
     if least.ms.is_finite() {
         format!(

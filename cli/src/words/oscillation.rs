@@ -2,6 +2,7 @@
 
 use onecycle::DesignError;
 use onecycle_design::oscillation::{Oscillation, RelayTest};
+use onecycle_design::rules::NotOfRule;
 
 use super::controllers::refusal;
 use crate::report::number::significant;
@@ -51,6 +52,22 @@ pub(crate) fn taken_as(known: &Known) -> String {
         ),
         None => exact,
     }
+}
+
+/// Why gains are not those of a rule.
+pub(crate) fn not_of_rule(rule: Rule, error: &NotOfRule) -> String {
+    let why = match error {
+        NotOfRule::Derivative { expected, given } => format!(
+            "with these Kp and Ki it gives Kd {}, but Kd is {}",
+            significant(*expected),
+            significant(*given)
+        ),
+        other => other.to_string(),
+    };
+    format!(
+        "the gains of --against are not those of --rule {}: {why}",
+        rule.name()
+    )
 }
 
 /// Which processes agree with the figures.

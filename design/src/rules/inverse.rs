@@ -31,7 +31,7 @@ pub enum NotOfRule {
     #[error("the rule gives no {}", .0.name())]
     Form(Form),
     /// The derivative gain contradicts the others.
-    #[error("with these Kp and Ki the rule gives Kd {expected:.4}, but Kd is {given}")]
+    #[error("with these Kp and Ki the rule gives Kd {expected}, but Kd is {given}")]
     Derivative {
         /// The derivative gain that follows from the others.
         expected: f64,
