@@ -162,38 +162,67 @@ fn the_family_is_reported() {
     assert!(narrow.number("/family/process/k/high") > 0.0);
 }
 
+fn misused(arguments: &[&str], words: &[&str]) {
+    run(&[&["tune"], arguments].concat()).misused(words);
+}
+
+const POINT: [&str; 4] = ["--ultimate-gain", "35", "--ultimate-period", "28"];
+const RELAY: [&str; 6] = [
+    "--ultimate-period",
+    "28",
+    "--relay",
+    "90",
+    "--amplitude",
+    "3.28",
+];
+
+fn point<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&POINT[..], more].concat()
+}
+
+fn relay<'a>(more: &[&'a str]) -> Vec<&'a str> {
+    [&RELAY[..], more].concat()
+}
+
 #[test]
-fn contradictions_are_refused() {
-    let misused =
-        |arguments: &[&str], words: &[&str]| run(&[&["tune"], arguments].concat()).misused(words);
-    let point = ["--ultimate-gain", "35", "--ultimate-period", "28"];
-    let relay = ["--relay", "90", "--ultimate-period", "28"];
+fn values_out_of_range_are_refused() {
     for value in ["-1", "0", "nan", "inf", "1e300", "x"] {
         misused(
-            &["--ultimate-gain", value, "--ultimate-period", "28"],
+            &["--ultimate-gain", value],
             &["--ultimate-gain", "positive"],
         );
         misused(
-            &["--ultimate-gain", "35", "--ultimate-period", value],
+            &["--ultimate-period", value],
             &["--ultimate-period", "positive"],
         );
+        misused(&["--relay", value], &["--relay", "positive"]);
+        misused(&["--amplitude", value], &["--amplitude", "positive"]);
+    }
+    misused(&relay(&["--hysteresis", "-1"]), &["zero, or a positive"]);
+    misused(
+        &relay(&["--hysteresis", "3.28"]),
+        &["hysteresis of 3.280", "less than the amplitude"],
+    );
+    misused(&relay(&["--duty", "0"]), &["between 5 % and 95 %"]);
+    for share in ["0.5..0.1", "-1..0.5", "0..1", "0.3", "nan..0.5"] {
         misused(
-            &[&relay[..], &["--amplitude", value]].concat(),
-            &["--amplitude", "positive"],
+            &point(&["--dead-time-share", share]),
+            &["--dead-time-share", "LOW..HIGH"],
         );
     }
-    misused(&point[..2], &["needs --ultimate-period"]);
+}
+
+#[test]
+fn contradictions_are_refused() {
+    misused(&POINT[..2], &["needs --ultimate-period"]);
     misused(
-        &point[2..],
+        &POINT[2..],
         &["needs --ultimate-gain, or --relay with --amplitude"],
     );
-    misused(&relay, &["--relay needs --amplitude"]);
+    misused(&RELAY[..4], &["--relay needs --amplitude"]);
+    misused(&RELAY[2..], &["--relay needs --ultimate-period"]);
     misused(
-        &["--relay", "90", "--amplitude", "3"],
-        &["--relay needs --ultimate-period"],
-    );
-    misused(
-        &[&point[..], &["--hysteresis", "1"]].concat(),
+        &point(&["--hysteresis", "1"]),
         &["--hysteresis", "add --relay"],
     );
     misused(&["--duty", "30%"], &["--duty", "add --relay"]);
@@ -201,62 +230,44 @@ fn contradictions_are_refused() {
         &["--dead-time-share", "0..0.5"],
         &["--dead-time-share needs"],
     );
-    let test = [&relay[..], &["--amplitude", "3.28"]].concat();
     misused(
-        &[&test[..], &["--hysteresis", "3.28"]].concat(),
-        &["hysteresis of 3.280", "less than the amplitude"],
-    );
-    misused(
-        &[&test[..], &["--hysteresis", "-1"]].concat(),
-        &["--hysteresis", "zero, or a positive"],
-    );
-    misused(
-        &[&test[..], &["--duty", "0"]].concat(),
-        &["--duty", "between 5 % and 95 %"],
-    );
-    misused(
-        &[&test[..], &["--ultimate-gain", "50"]].concat(),
+        &relay(&["--ultimate-gain", "50"]),
         &["4H/(pi A) = 34.94", "leave one out"],
     );
     misused(
-        &[&test[..], &["--ultimate-gain", "70"]].concat(),
+        &relay(&["--ultimate-gain", "70"]),
         &["twice as large, as in Klipper's log"],
     );
-    for share in ["0.5..0.1", "-1..0.5", "0..1", "0.3", "nan..0.5"] {
-        misused(
-            &[&point[..], &["--dead-time-share", share]].concat(),
-            &["--dead-time-share", "LOW..HIGH"],
-        );
-    }
+    misused(&point(&["--tau", "1"]), &["--tau", "cannot be used with"]);
     misused(
-        &[&point[..], &["--tau", "1"]].concat(),
-        &["--tau", "cannot be used with"],
-    );
-    misused(
-        &[&point[..], &["--process", "foptd"]].concat(),
+        &point(&["--process", "foptd"]),
         &["--process", "cannot be used with"],
     );
     misused(
-        &[&point[..], &["--style", "paper"]].concat(),
+        &point(&["--style", "paper"]),
         &["--style paper", "sharp, balanced or calm"],
     );
     misused(
-        &[&point[..], &["--controller", "pd"]].concat(),
+        &point(&["--controller", "pd"]),
         &["integral", "--controller pi"],
     );
-    misused(&["--rule", "marlin"], &["--against"]);
+}
+
+#[test]
+fn gains_of_no_rule_are_refused() {
+    misused(&["--rule", "marlin"], &["--against KP,KI,KD"]);
     misused(
         &["--rule", "bosch", "--against", "1,1,1"],
         &["--rule", "bosch"],
     );
-    let marlin =
-        |gains: &str, words: &[&str]| misused(&["--rule", "marlin", "--against", gains], words);
-    marlin(
+    let of = |rule, gains, words: &[&str]| misused(&["--rule", rule, "--against", gains], words);
+    of(
+        "marlin",
         "20.95,1.51,92",
         &["Kp and Ki it gives Kd 72.67, but Kd is 92.00"],
     );
-    marlin("20.95,0,72", &["positive gains"]);
-    misused(&["--rule", "marlin-bed", "--against", "20,1,0"], &["no pi"]);
+    of("marlin", "20.95,0,72", &["positive gains"]);
+    of("marlin-bed", "20,1,0", &["no pi"]);
     let hysteresis = [
         "--rule",
         "marlin",
@@ -267,8 +278,9 @@ fn contradictions_are_refused() {
     ];
     misused(&hysteresis, &["has no hysteresis"]);
     // Klipper's thresholds alone swing by 2.5 degrees; less is none of its tests.
-    misused(
-        &["--rule", "klipper", "--against", "100,7.2,347"],
+    of(
+        "klipper",
+        "100,7.2,347",
         &["hysteresis of 2.500", "amplitude of 1.948"],
     );
 }
