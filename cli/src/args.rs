@@ -12,6 +12,7 @@ mod identify;
 mod live;
 mod log;
 mod man;
+mod oscillation;
 mod pack;
 mod reproduce;
 mod simulate;
@@ -42,6 +43,7 @@ pub(crate) use self::live::{
 };
 pub(crate) use self::log::{HALF_STEP, Log, LogArguments, WriteArguments};
 pub(crate) use self::man::Man;
+pub(crate) use self::oscillation::OscillationArguments;
 pub(crate) use self::reproduce::{Name, Reproduce};
 pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};
 pub(crate) use self::structure::StructureArguments;
@@ -181,6 +183,9 @@ fn share(text: &str) -> Result<f64, String> {
 }
 
 /// Design the controller of a known process: gains, margins and the predicted step response.
+///
+/// Instead of the process, its ultimate gain and period, its oscillation under a relay, or gains that a rule computed from
+/// these are enough: the design then keeps its limits on all processes that agree with them.
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -188,7 +193,10 @@ fn share(text: &str) -> Result<f64, String> {
     "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --controller pi --style calm\n",
     "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --against 2.5,0.3,1\n",
     "  onecycle tune --process FOPTD,K=2,T=10,tau=1 --noise 0.05 --sample-period 0.1\n",
-    "  onecycle tune --k 1 --t-prop 0.3 --t-body 2 --tau 0.1 --style paper --phase-margin 45\n\n",
+    "  onecycle tune --k 1 --t-prop 0.3 --t-body 2 --tau 0.1 --style paper --phase-margin 45\n",
+    "  onecycle tune --ultimate-gain 35 --ultimate-period 28\n",
+    "  onecycle tune --relay 90 --amplitude 3.28 --ultimate-period 27.8\n",
+    "  onecycle tune --rule marlin --against 20.95,1.51,72.77\n\n",
     "A process is a structure with its parameters: K or K/T_body, T_prop, T_prop2, T_body (or T), w0, zeta, ",
     "tau.\nStructures: iptd, integrator_lag, double_integrator_lag, soiptd, toiptd, foptd, soptd, toptd, resonant, ",
     "resonant_lag."
@@ -206,6 +214,8 @@ pub(crate) struct Tune {
     /// Print the result as JSON
     #[arg(long)]
     pub(crate) json: bool,
+    #[command(flatten)]
+    pub(crate) oscillation: OscillationArguments,
 }
 
 /// Find the distinguishing phase of a space of processes: the phase of the relay test whose tuning rule

@@ -7,6 +7,7 @@ pub(crate) mod classifier;
 mod controllers;
 pub(crate) mod cycles;
 pub(crate) mod dataset;
+mod family;
 pub(crate) mod flight;
 pub(crate) mod fly;
 pub(crate) mod grid;

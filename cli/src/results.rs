@@ -7,6 +7,7 @@ pub(crate) mod certify;
 pub(crate) mod classifier;
 pub(crate) mod controllers;
 pub(crate) mod dataset;
+pub(crate) mod family;
 pub(crate) mod flight;
 pub(crate) mod fly;
 pub(crate) mod grid;

@@ -8,6 +8,7 @@ pub(crate) mod limits;
 pub(crate) mod live;
 pub(crate) mod log;
 pub(crate) mod log_gains;
+pub(crate) mod oscillation;
 pub(crate) mod recording;
 pub(crate) mod remark;
 pub(crate) mod verdict;

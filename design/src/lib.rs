@@ -16,6 +16,7 @@
 //! | the response to a unit step of the reference or the load | [`step_response()`], [`step_metrics()`], [`load_response()`] |
 //! | 90 % bands of step response and open loop for draws from a posterior | [`bands::step_bands()`], [`bands::load_bands()`], [`bands::loop_bands()`] |
 //! | the gains of SIMC, AMIGO, Ziegler-Nichols, Tyreus-Luyben | [`rules`] |
+//! | the processes that one oscillation leaves possible, at the ultimate gain or under a relay | [`oscillation`] |
 //! | cost and phase margin of a cascade with a PID rate loop | [`Cascade::cost()`] |
 //!
 //! The process is a [`Model`] of nine [`Structure`]s, the controller a [`Controller`] of six [`Form`]s with filters and
@@ -61,6 +62,7 @@ pub mod cascade;
 mod closed_loop;
 mod controller;
 mod model;
+pub mod oscillation;
 pub mod roots;
 pub mod rules;
 pub mod soiptd_pd;

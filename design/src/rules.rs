@@ -5,6 +5,7 @@
 //! | [`simc()`] | [`HalfRule`] | S. Skogestad, "Simple analytic rules for model reduction and PID controller tuning", J. Process Control 13 (2003) |
 //! | [`amigo()`] | [`StepFeatures`] | K. J. Astrom, T. Hagglund, J. Process Control 14 (2004), 635; "Advanced PID Control" (ISA, 2006), chapter 7 |
 //! | [`ziegler_nichols()`] | [`Ultimate`] | J. G. Ziegler, N. B. Nichols, Trans. ASME 64 (1942) |
+//! | [`no_overshoot()`] | [`Ultimate`] | in use for heated beds; [`UltimateRule`] finds the ultimate point behind such gains |
 //! | [`tyreus_luyben()`] | [`Ultimate`] | PI: B. D. Tyreus, W. L. Luyben, Ind. Eng. Chem. Res. 31 (1992), 2625; PID: W. L. Luyben, the same 35 (1996), 3480 |
 //! | [`Homogeneous`] | a relay oscillation | the paper, equations 11 to 13 |
 //!
@@ -13,6 +14,7 @@
 
 mod gmvc;
 mod homogeneous;
+mod inverse;
 
 use std::f64::consts::{PI, TAU};
 
@@ -24,6 +26,7 @@ use crate::roots::root;
 
 pub use gmvc::Gmvc;
 pub use homogeneous::Homogeneous;
+pub use inverse::{NotOfRule, UltimateRule};
 
 /// First- or second-order model by the half rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -291,6 +294,14 @@ pub fn ziegler_nichols(ultimate: &Ultimate, form: Form) -> Option<Pid> {
         _ => return None,
     };
     Some(ideal.pid())
+}
+
+/// Rule without overshoot from the ultimate gain: `Kp = 0.2 KU`, `Ti = TU/2`, `Td = TU/3`. `None` for another form than PID.
+#[must_use]
+pub fn no_overshoot(ultimate: &Ultimate, form: Form) -> Option<Pid> {
+    let Ultimate { gain, period_s } = *ultimate;
+    let ideal = Ideal::new(0.2 * gain, 0.5 * period_s, period_s / 3.0);
+    (form == Form::Pid).then(|| ideal.pid())
 }
 
 /// Tyreus-Luyben rule from the ultimate gain. `None` for another form than PI and PID.

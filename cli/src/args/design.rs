@@ -222,7 +222,7 @@ fn positive(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "this is a positive number".to_owned())
 }
 
-fn number(text: &str) -> Option<f64> {
+pub(super) fn number(text: &str) -> Option<f64> {
     text.trim()
         .parse()
         .ok()

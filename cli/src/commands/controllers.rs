@@ -2,12 +2,13 @@
 
 use onecycle::{
     Controller, Design, Execution, Identified, Model, Pid, Proposal, Specification, Style, assess,
-    design, least_margins,
+    design, least_margins, proposals,
 };
+use onecycle_design::oscillation::Family;
 use onecycle_design::{Limit, Spans, Vendor, reference_filter_s};
 use rayon::prelude::*;
 
-use crate::results::controllers::{Against, Controllers, Row};
+use crate::results::controllers::{Against, Controllers, Row, Source};
 
 /// Draws over which the gains in force are judged.
 const DRAWS: usize = 200;
@@ -18,7 +19,7 @@ pub(super) fn of_identified(identified: &Identified, against: Option<Pid>) -> Co
     let (model, _) = identified.for_design(0);
     let asked = &identified.specification;
     Controllers {
-        is_recorded: true,
+        source: Source::Recording,
         ..controllers(&model, &draws, asked, against, identified.proposals())
     }
 }
@@ -30,6 +31,22 @@ pub(super) fn of_model(model: &Model, asked: &Specification, against: Option<Pid
         .map(|choice| Proposal::new(model, &[], choice))
         .collect();
     controllers(model, &[], asked, against, proposals)
+}
+
+/// Controllers that keep their limits on all members of a family.
+pub(super) fn of_family(
+    family: &Family,
+    asked: &Specification,
+    against: Option<Pid>,
+) -> Controllers {
+    let mut asked = *asked;
+    asked.coverage = 1.0;
+    let (middle, members) = (&family.middle, &family.members);
+    let proposals = proposals(middle, members, &asked, None);
+    Controllers {
+        source: Source::Oscillation,
+        ..controllers(middle, members, &asked, against, proposals)
+    }
 }
 
 /// Limits of `Ms` of a curve.
@@ -85,7 +102,7 @@ fn controllers(
         .find(|row| row.proposal.specification.style == asked.style);
     let design = chosen.and_then(|row| row.proposal.outcome.as_ref().ok());
     let against = against.map(|pid| {
-        let filter_s = needed_filter_s(model, &pid, &asked.execution, design);
+        let filter_s = needed_filter_s((model, draws), &pid, &asked.execution, design);
         let pid = pid
             .with_filter_s(filter_s.unwrap_or(pid.filter_s))
             .with_execution(asked.execution);
@@ -109,15 +126,15 @@ fn controllers(
         missed,
         reference_filter_s,
         trade_off: vec![],
-        is_recorded: false,
+        source: Source::Process,
         plant: None,
     }
 }
 
-/// Time (s) of a measurement filter for gains with a derivative and without filter, where neither the process nor a known
-/// filter attenuates the derivative: the filter of the chosen controller, or a tenth of the derivative time.
+/// Time (s) of a measurement filter for gains with a derivative and without filter, where neither the processes nor a known
+/// filter attenuate the derivative: the filter of the chosen controller, or a tenth of the derivative time.
 fn needed_filter_s(
-    model: &Model,
+    (model, draws): (&Model, &[Model]),
     pid: &Pid,
     execution: &Execution,
     chosen: Option<&Design>,
@@ -127,8 +144,9 @@ fn needed_filter_s(
         execution.recorded_filter,
         execution.derivative_filter,
     ];
+    let is_lagged = |model: &Model| model.structure().stages().states() > 1;
     let is_attenuated =
-        model.structure().stages().states() > 1 || filters.iter().any(Option::is_some);
+        is_lagged(model) && draws.iter().all(is_lagged) || filters.iter().any(Option::is_some);
     if pid.kd == 0.0 || pid.filter_s > 0.0 || is_attenuated {
         return None;
     }

@@ -1,4 +1,4 @@
-//! `onecycle tune`: a process in, its controller out.
+//! `onecycle tune`: a process in, its controller out; or what an oscillation tells of it.
 
 use std::process::ExitCode;
 
@@ -9,43 +9,99 @@ use crate::args::Tune;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_text};
 use crate::report::{json, page, text};
-use crate::results::controllers::Controllers;
+use crate::results::controllers::{Controllers, Source};
+use crate::results::family::{Known, OfOscillation};
 use crate::words::controllers::refusal;
+use crate::words::oscillation::{none_agrees, refusal_of_family};
+
+/// A process with its controllers.
+struct Tuned {
+    model: Model,
+    choice: Controllers,
+    best: Design,
+    /// What is known of the process, if its parameters are not.
+    oscillation: Option<OfOscillation>,
+}
 
 /// The report of the command as JSON, for programs.
 pub(crate) fn json(arguments: &Tune) -> Result<String, Failure> {
-    let (model, choice, best) = choose(arguments)?;
-    Ok(json::design(&model, &choice, &best))
+    Ok(as_json(&tuned(arguments)?))
+}
+
+fn as_json(of: &Tuned) -> String {
+    json::design(&of.model, &of.choice, &of.best, of.oscillation.as_ref())
 }
 
 /// The process of the arguments, the controllers to choose from and the chosen one.
-fn choose(arguments: &Tune) -> Result<(Model, Controllers, Design), Failure> {
-    let model = arguments.process.model()?;
+fn tuned(arguments: &Tune) -> Result<Tuned, Failure> {
+    let against = arguments.design.against();
     let asked: Specification = (arguments.noise).complete(arguments.design.specification()?)?;
-    let choice = controllers::of_model(&model, &asked, arguments.design.against())
+    if let Some(known) = arguments.oscillation.known(against.as_ref())? {
+        return of_oscillation(arguments, known, &asked);
+    }
+    let model = arguments.process.model()?;
+    let choice = controllers::of_model(&model, &asked, against).in_plant(arguments.design.plant());
+    Ok(Tuned {
+        best: chosen(&choice)?,
+        model,
+        choice,
+        oscillation: None,
+    })
+}
+
+/// The processes that agree with an oscillation, and controllers that keep their limits on all of them.
+fn of_oscillation(arguments: &Tune, known: Known, asked: &Specification) -> Result<Tuned, Failure> {
+    let family = (known.oscillation)
+        .family(known.dead_time_share)
+        .ok_or_else(|| Failure::usage(none_agrees(&known)))?;
+    let choice = controllers::of_family(&family, asked, arguments.design.against())
         .in_plant(arguments.design.plant());
-    let chosen = choice.chosen().map(|row| row.proposal.outcome);
-    match chosen {
-        Some(Ok(design)) => Ok((model, choice, design)),
+    let best = chosen(&choice)?;
+    Ok(Tuned {
+        model: family.middle,
+        oscillation: Some(OfOscillation {
+            margins: family.margins(&best.controller),
+            known,
+            family,
+        }),
+        choice,
+        best,
+    })
+}
+
+fn chosen(choice: &Controllers) -> Result<Design, Failure> {
+    match choice.chosen().map(|row| row.proposal.outcome) {
+        Some(Ok(design)) => Ok(design),
+        Some(Err(error)) if choice.source == Source::Oscillation => {
+            Err(Failure::usage(refusal_of_family(&error)))
+        }
         Some(Err(error)) => Err(Failure::usage(refusal(&error))),
         None => Err(Failure::usage("there is no such controller")),
     }
 }
 
 pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
-    let (model, mut choice, best) = choose(arguments)?;
+    let mut of = tuned(arguments)?;
     if let Some(path) = &arguments.report {
-        choice = choice.with_trade_off(&model);
-        let response = step_response(&model, &best.controller).ok();
+        if of.oscillation.is_none() {
+            of.choice = of.choice.with_trade_off(&of.model);
+        }
+        let response = step_response(&of.model, &of.best.controller).ok();
+        let (model, oscillation) = (&of.model, of.oscillation.as_ref());
         write_text(
             path,
-            &page::design(&model, &choice, &best, response.as_ref()),
+            &page::design(
+                model,
+                (&of.choice, &of.best),
+                response.as_ref(),
+                oscillation,
+            ),
         )?;
     }
     print(&if arguments.json {
-        json::design(&model, &choice, &best)
+        as_json(&of)
     } else {
-        text::design(&model, &choice, &best)
+        text::design(&of.model, &of.choice, &of.best, of.oscillation.as_ref())
     })?;
     Ok(ExitCode::from(exit::DONE))
 }

@@ -73,7 +73,11 @@ pub(super) fn table(choice: &Controllers) -> String {
         };
     }
     if let Some(against) = &choice.against {
-        wrapped(&mut text, "  ", &sentence(&judgement(against)));
+        wrapped(
+            &mut text,
+            "  ",
+            &sentence(&judgement(against, choice.source)),
+        );
         if let Some(change) = change(choice) {
             wrapped(&mut text, "  ", &sentence(&change));
         }

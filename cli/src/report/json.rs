@@ -1,6 +1,7 @@
 //! The JSON reports; docs/identify-json.md is their description. Infinite values are null.
 
 pub(super) mod controllers;
+mod family;
 mod record;
 
 use std::borrow::Cow;
@@ -16,6 +17,7 @@ use self::controllers::{AgainstReport, Assumed, NotKept, Proposed, Robust};
 use self::record::Record;
 use super::log_gains::LogGainsReport;
 use crate::results::controllers::Controllers;
+use crate::results::family::OfOscillation;
 use crate::results::log_gains::LogGains;
 use crate::words::recording::note;
 use crate::words::remark::{details, reasons};
@@ -120,6 +122,8 @@ struct TuneReport {
     controllers: Vec<Proposed>,
     #[serde(skip_serializing_if = "Option::is_none")]
     against: Option<AgainstReport>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    family: Option<family::FamilyReport>,
 }
 
 #[derive(Serialize)]
@@ -372,8 +376,13 @@ pub(crate) fn identification(
     })
 }
 
-/// The report of a design.
-pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> String {
+/// The report of a design. `oscillation`: what is known of the process, if its parameters are not.
+pub(crate) fn design(
+    model: &Model,
+    choice: &Controllers,
+    design: &Design,
+    oscillation: Option<&OfOscillation>,
+) -> String {
     let metrics = figures(choice).and_then(|figures| figures.step.as_ref());
     to_text(&TuneReport {
         schema: TUNE_SCHEMA,
@@ -387,6 +396,7 @@ pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> St
         limits_not_kept: controllers::not_kept(choice),
         controllers: controllers::proposed(choice),
         against: controllers::against(choice),
+        family: oscillation.map(|of| family::family(model, of)),
     })
 }
 

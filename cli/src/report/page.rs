@@ -25,6 +25,7 @@ use super::number::significant;
 use super::units::Units;
 use crate::pages::page::{self, Section, page};
 use crate::results::controllers::Controllers;
+use crate::results::family::OfOscillation;
 use crate::results::log_gains::LogGains;
 use crate::words;
 
@@ -98,12 +99,12 @@ pub(crate) fn identification(
     page(&format!("{kind}: {file}"), &lead, &sections)
 }
 
-/// The page of a design.
+/// The page of a design. `oscillation`: what is known of the process, if its parameters are not.
 pub(crate) fn design(
     model: &Model,
-    choice: &Controllers,
-    design: &Design,
+    (choice, design): (&Controllers, &Design),
     response: Option<&StepResponse>,
+    oscillation: Option<&OfOscillation>,
 ) -> String {
     let mut lead = made_by("tune");
     let mut text = gains(choice, design);
@@ -119,7 +120,10 @@ pub(crate) fn design(
             .as_ref(),
     );
     lead += &page::verdict(true, &(text + "."));
-    lead += &page::facts(&parameters::of_model(model));
+    lead += &page::facts(&match oscillation {
+        Some(of) => parameters::of_family(model, of),
+        None => parameters::of_model(model),
+    });
     let own = Loop::new(*model, design.controller, design.margins).outside(peak(choice));
     let load = load_response(model, &design.controller).ok();
     let sections = [

@@ -9,11 +9,13 @@ use onecycle::{
 use onecycle_identify::Reading;
 
 use super::controllers;
+use super::family;
 use super::number::{bounded, short, significant};
 use super::record::{self, Fact};
 use super::units::Units;
 use super::wrap::wrapped;
-use crate::results::controllers::Controllers;
+use crate::results::controllers::{Controllers, Source};
+use crate::results::family::OfOscillation;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
 use crate::words;
 use crate::words::recording;
@@ -109,13 +111,48 @@ fn describe_remarks(text: &mut String, found: &Identification, has_details: bool
     }
 }
 
-/// The report of a design.
-pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> String {
+/// The report of a design. `oscillation`: what is known of the process, if its parameters are not.
+pub(crate) fn design(
+    model: &Model,
+    choice: &Controllers,
+    design: &Design,
+    oscillation: Option<&OfOscillation>,
+) -> String {
     let mut text = String::new();
     let structure = model.structure();
     let units = Units::default();
+    if let Some(of) = oscillation {
+        text.push_str(&headed("Oscillation\n"));
+        facts(&mut text, &family::known(of));
+        text.push('\n');
+    }
     let heading = headed(&format!("Process  {}", structure.transfer_function()));
     let _ = writeln!(text, "{heading}");
+    match oscillation {
+        Some(of) => describe_family(&mut text, model, of, &units),
+        None => describe_parameters(&mut text, model, &units),
+    }
+    text.push_str(&controllers::table(choice));
+    describe_controller(&mut text, (choice, design), None, &units);
+    if let Some(of) = oscillation {
+        wrapped(
+            &mut text,
+            "  family      ",
+            &family::margins(of.margins.as_ref()),
+        );
+    }
+    let _ = writeln!(
+        text,
+        "  squared error of a unit step {}",
+        significant(design.ise)
+    );
+    let step = choice.design().and_then(|(_, figures)| figures.step);
+    describe_step(&mut text, step.as_ref(), None, &units);
+    text
+}
+
+fn describe_parameters(text: &mut String, model: &Model, units: &Units) {
+    let structure = model.structure();
     for &parameter in structure.parameters() {
         let value = model.parameter(parameter).filter(|value| value.is_finite());
         let value = value.map_or("infinite".to_owned(), significant);
@@ -126,16 +163,21 @@ pub(crate) fn design(model: &Model, choice: &Controllers, design: &Design) -> St
             format!("  {name:<10}{value:>12} {unit}").trim_end()
         );
     }
-    text.push_str(&controllers::table(choice));
-    describe_controller(&mut text, (choice, design), None, &units);
-    let _ = writeln!(
-        text,
-        "  squared error of a unit step {}",
-        significant(design.ise)
-    );
-    let step = choice.design().and_then(|(_, figures)| figures.step);
-    describe_step(&mut text, step.as_ref(), None, &units);
-    text
+}
+
+/// A line for each parameter of the processes that agree with an oscillation.
+fn describe_family(text: &mut String, middle: &Model, of: &OfOscillation, units: &Units) {
+    let _ = writeln!(text, "  {:<10}{:>12}   all that agree", "", "middle");
+    for (parameter, value, range) in family::parameters(middle, of) {
+        let unit = units.parameter(middle.structure(), parameter);
+        text.push_str(&ranged(parameter.symbol(), &value, &range, &unit));
+    }
+}
+
+/// A line with a parameter, its value and its range.
+fn ranged(name: &str, value: &str, range: &str, unit: &str) -> String {
+    let line = format!("  {name:<10}{value:>12}   {range:<26} {unit}");
+    format!("{}\n", line.trim_end())
 }
 
 fn describe_last_cycle(text: &mut String, reading: &Reading) {
@@ -226,8 +268,7 @@ fn describe_estimate(
         } = interval;
         let estimate = estimate.map_or("infinite".to_owned(), significant);
         let range = format!("{} .. {}", bounded(low), bounded(high));
-        let line = format!("  {name:<10}{estimate:>12}   {range:<26} {unit}");
-        let _ = writeln!(text, "{}", line.trim_end());
+        text.push_str(&ranged(name, &estimate, &range, &unit));
     }
 }
 
@@ -295,10 +336,11 @@ fn describe_controller(
     let margins = controllers::margins(choice, design, phase_margin_rad);
     wrapped(text, "  margins     ", &margins);
     if let Some(robustness) = &design.robustness {
-        let price = words::controllers::price(robustness);
+        let price = words::controllers::price(robustness, choice.source);
         wrapped(text, "  robustness  ", &price);
     }
-    if let Some(assumed) = words::controllers::assumed(&choice.asked, choice.is_recorded) {
+    let is_recorded = choice.source == Source::Recording;
+    if let Some(assumed) = words::controllers::assumed(&choice.asked, is_recorded) {
         wrapped(text, "  assumed     ", &assumed);
     }
     for sentence in words::controllers::not_kept(choice) {

@@ -16,10 +16,20 @@ pub(crate) struct Controllers {
     pub(crate) reference_filter_s: Option<f64>,
     /// Designs for the most probable process over limits of `Ms`, in ascending order. Empty unless a page is drawn.
     pub(crate) trade_off: Vec<(f64, Assessment, Controller)>,
-    /// Whether the model comes from a recording, whose noise and sample period complete the requirements.
-    pub(crate) is_recorded: bool,
+    pub(crate) source: Source,
     /// The controller of a process control system in which the gains are typed, and its ranges.
     pub(crate) plant: Option<(Vendor, Spans)>,
+}
+
+/// Where the model comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Source {
+    /// It is known.
+    Process,
+    /// A recording, whose noise and sample period complete the requirements.
+    Recording,
+    /// The middle of the processes that agree with an oscillation.
+    Oscillation,
 }
 
 /// A proposal and its figures.

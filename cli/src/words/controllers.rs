@@ -5,7 +5,7 @@ use onecycle::{DesignError, Form, Robustness, Specification, Style};
 use onecycle_design::{Limit, Missed, VendorError};
 
 use crate::report::number::{frequency, seconds, short, significant};
-use crate::results::controllers::{Against, Controllers};
+use crate::results::controllers::{Against, Controllers, Source};
 
 /// Why the controller of a process control system cannot take the gains, and what to do.
 pub(crate) fn no_gains(error: VendorError) -> &'static str {
@@ -181,7 +181,7 @@ fn out_of_limit(missed: &Missed) -> String {
 }
 
 /// What robustness costs.
-pub(crate) fn price(robustness: &Robustness) -> String {
+pub(crate) fn price(robustness: &Robustness, source: Source) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let nominal = percent(robustness.nominal_coverage);
     let cost = robustness.mean_iae / robustness.nominal_mean_iae - 1.0;
@@ -198,17 +198,26 @@ pub(crate) fn price(robustness: &Robustness) -> String {
             percent(-cost / (1.0 + cost))
         )
     };
+    let (all, one) = members(source);
     format!(
-        "the limits hold on {} of the likely processes; the design for the most probable one alone keeps them on \
-         {nominal}, {price}",
+        "the limits hold on {} of the {all}; the design for {one} one alone keeps them on {nominal}, {price}",
         percent(robustness.coverage)
     )
 }
 
+/// Names of the processes over which a controller is judged, and of the one for which its figures are given.
+fn members(source: Source) -> (&'static str, &'static str) {
+    match source {
+        Source::Oscillation => ("processes that agree", "the middle"),
+        _ => ("likely processes", "the most probable"),
+    }
+}
+
 /// How the gains in force do.
-pub(crate) fn judgement(against: &Against) -> String {
+pub(crate) fn judgement(against: &Against, source: Source) -> String {
+    let (all, one) = members(source);
     let Some(figures) = &against.figures else {
-        return "your gains are unstable on the most probable process".to_owned();
+        return format!("your gains are unstable on {one} process");
     };
     let filter = match against.filter_s {
         Some(filter_s) => format!(
@@ -218,7 +227,7 @@ pub(crate) fn judgement(against: &Against) -> String {
         None => String::new(),
     };
     let own = format!(
-        "your gains{filter} are stable on the most probable process with phase margin {:.1} deg and Ms {:.2}",
+        "your gains{filter} are stable on {one} process with phase margin {:.1} deg and Ms {:.2}",
         figures.margins.phase_margin_rad.to_degrees(),
         figures.ms
     );
@@ -226,8 +235,8 @@ pub(crate) fn judgement(against: &Against) -> String {
         return own;
     };
     let stable = match 100.0 * least.stable {
-        100.0 => "on all likely processes".to_owned(),
-        share => format!("on {share:.1} % of the likely processes"),
+        100.0 => format!("on all {all}"),
+        share => format!("on {share:.1} % of the {all}"),
     };
     if least.ms.is_finite() {
         format!(

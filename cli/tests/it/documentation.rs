@@ -284,7 +284,7 @@ fn printed(page: &str) -> Vec<(String, Vec<String>)> {
     printed
 }
 
-// The commands that take less than a second: those of the tables in examples, and of one process.
+// The commands that take less than a second: those of the tables in examples, of one process, and designs.
 #[test]
 fn printed_lines_are_those_of_the_program() {
     let mut commands = 0;
@@ -295,7 +295,8 @@ fn printed_lines_are_those_of_the_program() {
             let is_quick = words
                 .iter()
                 .any(|word| word.starts_with("examples/") && word.ends_with(".csv"))
-                || words.starts_with(&["certify", "--process"]);
+                || words.starts_with(&["certify", "--process"])
+                || words.starts_with(&["tune"]);
             if !is_quick || !command.starts_with("$ onecycle ") {
                 continue;
             }

@@ -37,4 +37,5 @@ mod studio;
 mod terminal;
 mod train;
 mod tune;
+mod tune_oscillation;
 mod unknown;

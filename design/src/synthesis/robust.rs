@@ -62,6 +62,9 @@ const TRIES: usize = 3;
 /// Logarithms of the factors of the times of integral and angle loop that are tried first.
 const LONGER: [f64; 6] = [0.0, 0.15, 0.4, 0.8, 1.4, 2.2];
 
+/// The same where none of these is feasible.
+const MUCH_LONGER: [f64; 4] = [0.0, 1.5, 3.0, 4.5];
+
 /// Limits of `Ms` and `Mt`, less 1, as shares of those asked for: an optimum for one process at a lower peak keeps the
 /// higher one on many.
 const LOWER_PEAKS: [f64; 3] = [0.7, 0.45, 0.25];
@@ -427,6 +430,14 @@ impl Draws {
             problem.limits.mt = lower(problem.limits.mt);
             optimum(problem, Effort::Rough).ok().map(|found| found.z)
         }));
+        let longer = starts.iter().flat_map(|z| {
+            MUCH_LONGER.map(|longer| {
+                let mut point = z.clone();
+                point.iter_mut().take(slow).for_each(|z| *z += longer);
+                point
+            })
+        });
+        let starts = longer.collect();
         self.feasible_from(starts)
     }
 

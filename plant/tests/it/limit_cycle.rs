@@ -2,9 +2,11 @@
 
 use std::ops::ControlFlow;
 
+use onecycle_design::Linear;
+use onecycle_design::oscillation::{Oscillation, RelayTest};
 use onecycle_onboard::cycle::{Cycle, CycleDetector};
 use onecycle_onboard::{Relay, RelaySettings, Soiptd};
-use onecycle_plant::{Experiment, Noise};
+use onecycle_plant::{Disturbances, Experiment, FixedStepLinear, Noise};
 
 /// The last cycles of a run of the bare relay at 1 ms.
 fn steady_cycles(process: &Soiptd, amplitude: f32, periods_s: f64) -> Vec<Cycle> {
@@ -87,5 +89,70 @@ fn describing_function_is_a_scale() {
             "{}",
             period_s / predicted_s
         );
+    }
+}
+
+/// Period (s) and amplitude of the last cycle of a process from rest under a relay with these levels and hysteresis.
+fn simulated(
+    process: &Linear,
+    levels: [f64; 2],
+    hysteresis: f64,
+    (step_s, steps): (f64, u32),
+) -> (f64, f64) {
+    let noise = &mut Noise::from_seed(0);
+    let mut plant = FixedStepLinear::new(process, &Disturbances::default(), step_s, noise);
+    let (mut is_high, mut rises_s) = (true, vec![0.0]);
+    let (mut low, mut high, mut amplitude) = (0.0_f64, 0.0_f64, 0.0);
+    for step in 0..steps {
+        let output = plant.output();
+        (low, high) = (low.min(output), high.max(output));
+        if is_high && output >= hysteresis {
+            is_high = false;
+        } else if !is_high && output <= -hysteresis {
+            is_high = true;
+            rises_s.push(step_s * f64::from(step));
+            amplitude = 0.5 * (high - low);
+            (low, high) = (output, output);
+        }
+        plant.step(levels[usize::from(!is_high)], noise);
+    }
+    (
+        rises_s[rises_s.len() - 1] - rises_s[rises_s.len() - 2],
+        amplitude,
+    )
+}
+
+// Members of the family of a relay test, simulated: period and amplitude are those of the test, to the step of the simulation
+// (1/20000 of a period). The integrator is also loaded, so that the relay is high for 0.3 of the time.
+#[test]
+fn members_of_a_family_oscillate_as_the_test() {
+    let (relay, amplitude, period_s) = (90.0, 3.28, 28.0);
+    for hysteresis in [0.0, 1.2] {
+        let test = RelayTest::new(relay, amplitude, period_s).with_hysteresis(hysteresis);
+        let of =
+            |test: RelayTest, lags_s| Oscillation::Relay(test).process(lags_s).unwrap().linear();
+        let loaded = test.with_duty(0.3);
+        let lags = [
+            [3.0, 0.0],
+            [15.0, 0.0],
+            [15.0, 2.0],
+            [5.0, 5.0],
+            [40.0, 6.0],
+        ];
+        let cases = lags.map(|lags_s| (of(test, lags_s), 0.5));
+        let integrator = (of(loaded, [f64::INFINITY, 0.0]), 0.3);
+        for (process, duty) in cases.into_iter().chain([integrator]) {
+            let levels = [2.0 * relay * (1.0 - duty), -2.0 * relay * duty];
+            let steps = (period_s / 20_000.0, 800_000);
+            let (period, reached) = simulated(&process, levels, hysteresis, steps);
+            assert!(
+                (period / period_s - 1.0).abs() < 3e-4,
+                "{period} {process:?}"
+            );
+            assert!(
+                (reached / amplitude - 1.0).abs() < 3e-4,
+                "{reached} {process:?}"
+            );
+        }
     }
 }

@@ -7,7 +7,7 @@ use crate::pages::page::{self, Cell, Section};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Note, Panel, Series};
 use crate::report::controllers::{TITLES, cells, forms, in_plant, margins};
 use crate::report::units::Units;
-use crate::results::controllers::Controllers;
+use crate::results::controllers::{Controllers, Source};
 use crate::words::controllers::{assumed, brief, change, judgement, not_kept, price};
 use crate::words::sentence;
 
@@ -30,9 +30,9 @@ pub(super) fn section(
         design
             .robustness
             .as_ref()
-            .map(|robustness| ("robustness", price(robustness))),
+            .map(|robustness| ("robustness", price(robustness, choice.source))),
     );
-    let assumed = assumed(&choice.asked, choice.is_recorded);
+    let assumed = assumed(&choice.asked, choice.source == Source::Recording);
     facts.extend(assumed.map(|assumed| ("assumed", assumed)));
     let mut body = page::facts(&facts);
     let not_kept = not_kept(choice);
@@ -42,7 +42,7 @@ pub(super) fn section(
             .map(|sentence| page::paragraph("note", sentence)),
     );
     if let Some(against) = &choice.against {
-        body += &page::paragraph("note", &sentence(&judgement(against)));
+        body += &page::paragraph("note", &sentence(&judgement(against, choice.source)));
         body += &change(choice).map_or(String::new(), |change| {
             page::paragraph("note", &sentence(&change))
         });

@@ -8,8 +8,10 @@ use crate::pages::page::{self, Cell, Section};
 use crate::pages::plot::{
     Axis, Field, FieldKind, Figure, Hue, Marks, Panel, Places, Series, Shape,
 };
+use crate::report::family;
 use crate::report::number::bounded;
 use crate::report::units::Units;
+use crate::results::family::OfOscillation;
 
 /// Cells along either side of the contours.
 const CELLS: usize = 64;
@@ -35,6 +37,21 @@ pub(super) fn of_model(model: &Model) -> Vec<(&'static str, String)> {
     std::iter::once(formula)
         .chain(structure.parameters().iter().map(shown))
         .collect()
+}
+
+/// What is known of an oscillation, the parameters of the processes that agree with it, and the margins over them.
+pub(super) fn of_family(middle: &Model, of: &OfOscillation) -> Vec<(&'static str, String)> {
+    let (units, structure) = (Units::default(), middle.structure());
+    let shown = |(parameter, value, range): (Parameter, String, String)| {
+        let unit = units.parameter(structure, parameter);
+        let words = format!("{value} (all that agree: {range}) {unit}");
+        (parameter.symbol(), words.trim_end().to_owned())
+    };
+    let mut facts = family::known(of);
+    facts.push(("process", structure.transfer_function().to_owned()));
+    facts.extend(family::parameters(middle, of).into_iter().map(shown));
+    facts.push(("family", family::margins(of.margins.as_ref())));
+    facts
 }
 
 pub(super) fn section(identified: &Identified, units: &Units) -> Section {
