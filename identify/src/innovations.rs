@@ -219,6 +219,7 @@ impl Search<'_> {
         if let Some(verdict) = self.too_little(fitted, blocks, components) {
             return Err(verdict);
         }
+        Self::judge_stability(blocks, tests)?;
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
             (prediction.explained, prediction.error_ratio)
         });
@@ -242,11 +243,11 @@ impl Search<'_> {
                     horizon_s: prediction.horizon_s,
                 })
             }
-            _ => Self::judge_stability(blocks, tests),
+            _ => Ok(()),
         }
     }
 
-    /// Refuses what nothing else does although the process is unstable without its controller.
+    /// Refuses a process that is unstable without its controller: the reason why it is not predicted, or hardly.
     fn judge_stability(blocks: &Blocks<'_>, tests: &InnovationTests) -> Result<(), Verdict> {
         let is_clean = !validate::is_coloured(tests) && !validate::is_left_to_the_input(tests);
         if is_clean || !validate::is_fed_back(blocks) {
@@ -324,7 +325,7 @@ impl Search<'_> {
         } else {
             None
         };
-        (self.remarks).extend(fault.filter(|_| !fitted.is_output_error));
+        (self.remarks).extend(fault.filter(|_| !fitted.holds_both));
         let is_weak = |found: &&Prediction| {
             found.explained < WELL_PREDICTED && found.error_ratio > EXPECTED_ERROR_RATIO
         };

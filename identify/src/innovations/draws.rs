@@ -244,7 +244,9 @@ fn below_a_sample(theta: &mut Theta, component: &Component, stamps: Stamps, shar
     }
     for lag in 0..theta.layout().stages.lags {
         let is_held = !component.laplace.free.contains(&lag);
-        if is_held && best.values[lag].exp() < sample_s {
+        if is_held && best.is_lag_below(lag, sample_s) {
+            // The samples show the sum of lag and dead time.
+            theta.values[tau] += best.values[lag].exp() - share * sample_s;
             theta.values[lag] = (share * sample_s).ln();
         }
     }

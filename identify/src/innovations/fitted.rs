@@ -56,8 +56,10 @@ pub(super) struct Fitted {
     /// of this structure: damping that a record does not show may be there.
     pub(super) wider: Candidate,
     /// Whether the best fit is one without disturbances, because that with disturbances wrongly leaves to these what the input
-    /// explains. The posterior has both.
+    /// explains.
     pub(super) is_output_error: bool,
+    /// Whether the posterior holds the fit with disturbances beside the best one without: its innovations do not refute it.
+    pub(super) holds_both: bool,
     pub(super) outliers: usize,
 }
 
@@ -115,6 +117,7 @@ impl Fitted {
             wider: wider.unwrap_or_else(|| best.clone()),
             best,
             is_output_error: false,
+            holds_both: false,
             outliers: outliers + found,
             record,
         };
@@ -122,7 +125,11 @@ impl Fitted {
             remarks.push(remark);
         }
         if let Some(found) = output_error::instead(&fitted.blocks(), &fitted.best, longest) {
-            remarks.push(Remark::DriftOrGain);
+            let with = validate::tests(&fitted.blocks(), &fitted.best.found.at);
+            fitted.holds_both = !validate::is_left_to_the_input(&with);
+            if fitted.holds_both {
+                remarks.push(Remark::DriftOrGain);
+            }
             fitted.best = found;
             fitted.is_output_error = true;
         }
@@ -165,23 +172,22 @@ impl Fitted {
     pub(super) fn posterior(&self, blocks: &Blocks<'_>) -> Vec<Component> {
         let structure = self.wider.structure();
         let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
-        let mut components = mixture::mixture(blocks, &self.wider.found, &bounds);
-        if self.is_output_error {
-            let found = &self.best.found;
-            let bounds = Bounds::new(found.theta.structure, blocks, self.limits.longest_tau_s);
-            let without = mixture::of_one(blocks, found, &bounds);
-            components
-                .iter_mut()
-                .for_each(|component| component.weight *= 0.5);
-            components.splice(
-                0..0,
-                without.map(|component| Component {
-                    weight: 0.5,
-                    ..component
-                }),
-            );
+        let with = || mixture::mixture(blocks, &self.wider.found, &bounds);
+        if !self.is_output_error {
+            return with();
         }
-        components
+        let found = &self.best.found;
+        let bounds = Bounds::new(found.theta.structure, blocks, self.limits.longest_tau_s);
+        let without = mixture::of_one(blocks, found, &bounds);
+        if !self.holds_both {
+            return without.into_iter().collect();
+        }
+        let both = without.into_iter().chain(with());
+        both.map(|component| Component {
+            weight: 0.5 * component.weight,
+            ..component
+        })
+        .collect()
     }
 
     /// What the record says about the loop of a controller, with the known filter of its output.

@@ -4,13 +4,18 @@
 //! cov theta = (J'J)^-1 |rho|^2 / m,      var kappa = var(kappa | theta) + k' cov(theta) k,   k = d kappa / d theta
 //! ```
 //!
-//! with the residual `rho` and its Jacobian `J` by central differences. Unknowns at a bound are taken as known.
+//! with the residual `rho` and its Jacobian `J` by central differences. Unknowns at a bound, and lags that the samples do not show,
+//! are taken as known.
 
 use super::descent::{Found, inverse};
 use super::likelihood::{Evaluation, Memory, evaluate};
 use super::orthogonal::dot;
 use super::record::Blocks;
 use super::theta::{Bounds, MOST};
+
+/// Deviation of the logarithm of a lag below a sample from which the samples do not show the lag: it may be anything down to
+/// zero, and the likelihood is no parabola.
+const HIDDEN: f64 = 0.5;
 
 /// Covariance of the unknowns.
 #[derive(Clone, Debug)]
@@ -63,9 +68,18 @@ impl Laplace {
         let inverse = inverse(&information)?;
         // Of the innovations, at the scale of the residual.
         let factor = found.at.variance * found.at.stretch * found.at.stretch;
-        let covariance = (inverse.iter())
+        let covariance: Vec<Vec<f64>> = (inverse.iter())
             .map(|row| row.iter().map(|v| v * factor).collect())
             .collect();
+        let hidden = (0..free.len()).find(|&slot| {
+            let is_short = found.theta.is_lag_below(free[slot], blocks.record.dt_s);
+            is_short && inverse[slot][slot] * factor > HIDDEN * HIDDEN
+        });
+        if let Some(slot) = hidden {
+            let mut others = free;
+            others.remove(slot);
+            return Self::new(blocks, found, &others, bounds);
+        }
         let coloured = coloured(&columns, &found.at.residual, &inverse, factor);
         Some(Self {
             free,

@@ -170,6 +170,11 @@ impl Theta {
         (slow > 0.0).then(|| (1.0 / slow, 1.0 / (0.5 * c1 + root)))
     }
 
+    /// Whether an unknown is a lag shorter than `sample_s`.
+    pub(super) fn is_lag_below(&self, index: usize, sample_s: f64) -> bool {
+        index < self.layout().stages.lags && self.values[index].exp() < sample_s
+    }
+
     /// Shortest time constant of the process (s): the least of its lags and of the inverses of its poles. Infinite without
     /// any.
     pub(super) fn shortest_lag_s(&self) -> f64 {
