@@ -26,5 +26,5 @@ pub(crate) mod plot;
 mod record;
 pub(crate) mod reproduction;
 pub(crate) mod text;
-mod units;
+pub(crate) mod units;
 mod wrap;

@@ -1,6 +1,6 @@
 //! From a posterior to a result: controller, margins, and the refusals for want of information.
 
-use onecycle_design::{Model, Proposal, Specification, step_response};
+use onecycle_design::{Model, Parameter, Proposal, Specification, step_response};
 
 use crate::innovations::gain_of;
 use crate::outcome::{Fit, Identified};
@@ -33,8 +33,12 @@ pub(crate) fn conclude(
         return Err(Verdict::TooUncertain);
     }
     let estimate = posterior.estimate();
-    let width = (estimate.get(gain_of(model.structure())))
-        .and_then(|interval| interval.relative_half_width());
+    // A body that is faster than a sample has a gain K, and no acceleration that the samples show.
+    let gain = match estimate.is_below(Parameter::TBody) {
+        true => Parameter::K,
+        false => gain_of(model.structure()),
+    };
+    let width = (estimate.get(gain)).and_then(|interval| interval.relative_half_width());
     if width.is_none_or(|width| width > MOST_WIDTH) {
         return Err(no_information(width.map(|width| width / HALF_WIDTH)));
     }

@@ -31,6 +31,7 @@ mod laplace;
 mod lifted;
 mod likelihood;
 mod mixture;
+mod near_lags;
 mod normal;
 mod orthogonal;
 mod outliers;
@@ -267,10 +268,7 @@ impl Search<'_> {
         components: &[Component],
     ) -> Option<Verdict> {
         let theta = &fitted.best.found.theta;
-        let gain = |component: &Component| {
-            let deviation = component.laplace.gain_deviation(&component.found.at);
-            deviation / component.found.at.gain.abs()
-        };
+        let gain = |component: &Component| component.laplace.gain_deviation(&component.found);
         let deviation = components.first().map(gain).filter(|v| v.is_finite());
         if deviation.is_none_or(|deviation| deviation > MOST_DEVIATION) {
             return Some(self.no_information(theta, deviation));

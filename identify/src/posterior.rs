@@ -18,7 +18,8 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
-use self::edges::{is_process, with_equal_lags, with_jumps, with_real_poles};
+use self::edges::{RULED_OUT, is_process, with_equal_lags, with_jumps, with_real_poles};
+pub(crate) use self::intervals::Shortest;
 pub use self::intervals::{Estimate, Interval, StepIntervals};
 use crate::cholesky::cholesky;
 
@@ -40,6 +41,15 @@ const SEARCHED_MARGINS: usize = 1000;
 /// deviation.
 const STEPS: usize = 200;
 
+/// What the general estimator draws.
+pub(crate) struct Drawn {
+    pub(crate) process: Linear,
+    /// Constant disturbance at the process input (input unit).
+    pub(crate) input_bias: f64,
+    /// Whether the drawn coordinates have complex poles, of which `process` has equal lags.
+    pub(crate) has_complex_poles: bool,
+}
+
 /// Draw from the posterior, in physical parameters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Draw {
@@ -54,6 +64,8 @@ pub struct Draw {
     /// Whether the drawn coordinates belong to a process. If not (complex poles, negative damping or negative dead
     /// time), the parameters are those of the nearest process.
     is_process: bool,
+    /// Whether two lags are equal, as those of a draw with complex poles become.
+    has_equal_lags: bool,
 }
 
 impl Draw {
@@ -78,11 +90,13 @@ impl Draw {
             own: Some((k_over_t_body / slow_per_s, t_body_s)),
             input_bias: at[coordinate::INPUT_BIAS],
             is_process: is_process(&drawn),
+            has_equal_lags: fast_per_s == slow_per_s,
         }
     }
 
     /// Draw of the general estimator.
-    fn of_linear(process: &Linear, reported: Structure, input_bias: f64) -> Self {
+    fn of_linear(drawn: &Drawn, reported: Structure) -> Self {
+        let process = drawn.process;
         let [c1, c0] = process.pair();
         let is_process =
             process.tau_s() >= 0.0 && process.pole_per_s() >= 0.0 && c0 >= 0.0 && c1 >= 0.0;
@@ -93,16 +107,20 @@ impl Draw {
                 .with_tau_s(process.tau_s().max(0.0)),
             reported,
             own: None,
-            input_bias,
-            is_process,
+            input_bias: drawn.input_bias,
+            is_process: is_process && !drawn.has_complex_poles,
+            has_equal_lags: drawn.has_complex_poles,
         }
     }
 
-    /// Whether the lags of the relay's model are equal, as those of a draw with complex poles become.
-    fn has_equal_lags(&self) -> bool {
-        let t_prop_s = self.value(Parameter::TProp);
-        self.own
-            .is_some_and(|(_, t_body_s)| t_prop_s == Some(t_body_s))
+    /// The draw of a process that the estimator has found.
+    fn of_known(process: &Linear, reported: Structure, input_bias: f64) -> Self {
+        let drawn = Drawn {
+            process: *process,
+            input_bias,
+            has_complex_poles: false,
+        };
+        Self::of_linear(&drawn, reported)
     }
 
     /// Phase margin (rad) that a controller leaves on this draw. `None` if the loop has no margins.
@@ -145,6 +163,7 @@ pub struct Posterior {
     has_bias: bool,
     /// Empty if the estimator returned no covariance.
     draws: Vec<Draw>,
+    shortest: Shortest,
 }
 
 impl Posterior {
@@ -192,16 +211,17 @@ impl Posterior {
             best: Draw::of(centre, None, sign),
             has_bias: true,
             draws,
+            shortest: Shortest::default(),
         }
     }
 
     /// Posterior of the general estimator about `best`: draws from a mixture. `draw` turns a component, by its index, and
-    /// standard normal numbers into a process and its input bias.
+    /// standard normal numbers into a process.
     pub(crate) fn of_mixture(
         best: &Linear,
         input_bias: Option<f64>,
         weights: &[f64],
-        draw: impl Fn(usize, &[f64]) -> (Linear, f64),
+        draw: impl Fn(usize, &[f64]) -> Drawn,
     ) -> Self {
         let structure = best.structure();
         let mut rng = Pcg64Mcg::seed_from_u64(SEED);
@@ -215,8 +235,8 @@ impl Posterior {
             for _ in 0..count {
                 let normal: [f64; 10] = std::array::from_fn(|_| StandardNormal.sample(&mut rng));
                 for side in [1.0, -1.0] {
-                    let (process, bias) = draw(component, &normal.map(|z| side * z));
-                    draws.push(Draw::of_linear(&process, structure, bias));
+                    let drawn = draw(component, &normal.map(|z| side * z));
+                    draws.push(Draw::of_linear(&drawn, structure));
                 }
             }
         }
@@ -230,9 +250,10 @@ impl Posterior {
         let draws = shuffled.collect();
         Self {
             structure,
-            best: Draw::of_linear(best, structure, input_bias.unwrap_or(0.0)),
+            best: Draw::of_known(best, structure, input_bias.unwrap_or(0.0)),
             has_bias: input_bias.is_some(),
             draws,
+            shortest: Shortest::default(),
         }
     }
 
@@ -244,18 +265,24 @@ impl Posterior {
         let shuffled = (0..count).map(|k| &draws[617 * k % count]);
         Self {
             structure,
-            best: Draw::of_linear(best, structure, 0.0),
+            best: Draw::of_known(best, structure, 0.0),
             has_bias: false,
             draws: shuffled
-                .map(|draw| Draw::of_linear(draw, structure, 0.0))
+                .map(|draw| Draw::of_known(draw, structure, 0.0))
                 .collect(),
+            shortest: Shortest::default(),
         }
+    }
+
+    /// The same, from a search that went down to these times.
+    pub(crate) fn down_to(self, shortest: Shortest) -> Self {
+        Self { shortest, ..self }
     }
 
     /// Parameters of the model and the input bias, with their 90 % intervals.
     #[must_use]
     pub fn estimate(&self) -> Estimate {
-        let equal: Vec<bool> = self.draws.iter().map(Draw::has_equal_lags).collect();
+        let equal: Vec<bool> = self.draws.iter().map(|draw| draw.has_equal_lags).collect();
         let interval = |parameter: Parameter| {
             let best = self.best.value(parameter)?;
             let ends = with_equal_lags(&self.values(parameter), &equal);
@@ -265,6 +292,7 @@ impl Posterior {
         let reported = self.structure.parameters().iter().copied();
         Estimate {
             structure: self.structure,
+            shortest: self.shortest,
             intervals: reported.chain(bias).filter_map(interval).collect(),
         }
     }
@@ -274,6 +302,35 @@ impl Posterior {
     pub fn values(&self, parameter: Parameter) -> Vec<f64> {
         let values = self.draws.iter().filter_map(|draw| draw.value(parameter));
         values.collect()
+    }
+
+    /// Lags of the model that cannot be told from equal ones, longest first, and their mean (s) with its 90 % interval.
+    /// The mean is the geometric one. `None` if equal lags are ruled out.
+    #[must_use]
+    pub fn equal_lags(&self) -> Option<(Vec<Parameter>, Interval)> {
+        let equal = self.draws.iter().filter(|draw| draw.has_equal_lags).count();
+        if (equal as f64) < RULED_OUT * self.draws.len() as f64 || equal == 0 {
+            return None;
+        }
+        let estimate = self.estimate();
+        let lags = [Parameter::TBody, Parameter::TProp, Parameter::TProp2];
+        let of = |lag: &Parameter| Some((*lag, estimate.get(*lag)?));
+        let lags: Vec<(Parameter, Interval)> = lags.iter().filter_map(of).collect();
+        let meet = |pair: &[(Parameter, Interval)]| pair[0].1.low <= pair[1].1.high;
+        let is_first = |at: &usize| *at + 1 < lags.len() && meet(&lags[*at..*at + 2]);
+        let first = (0..lags.len()).find(is_first)?;
+        let next = lags[first..]
+            .windows(2)
+            .take_while(|pair| meet(pair))
+            .count();
+        let equal: Vec<Parameter> = lags[first..=first + next].iter().map(|lag| lag.0).collect();
+        let mean = |draw: &Draw| {
+            let logs = equal.iter().filter_map(|lag| draw.value(*lag)).map(f64::ln);
+            (logs.sum::<f64>() / equal.len() as f64).exp()
+        };
+        let ends = quantiles(self.draws.iter().map(mean).collect());
+        let mean = Interval::new(mean(&self.best), ends);
+        Some((equal, mean))
     }
 
     /// All draws. Empty if the estimator returned no covariance.

@@ -3,6 +3,7 @@
 use onecycle_design::{DesignError, Parameter, Structure};
 
 use crate::nonlinear::Nonlinear;
+use crate::posterior::Interval;
 use crate::verdict::Verdict;
 
 /// Something that limits a result or deserves attention, as facts. The program that shows it writes the sentence.
@@ -49,6 +50,13 @@ pub enum Remark {
     /// The recording does not show the damping: `T_body` and `K` have no upper bound. The value is the lower bound of
     /// `T_body` (s), if there is one.
     DampingNotSeen(Option<f64>),
+    /// Lags of the process cannot be told from equal ones.
+    EqualLags {
+        /// The lags, longest first.
+        lags: Vec<Parameter>,
+        /// Their geometric mean (s).
+        mean_s: Interval,
+    },
     /// The interval of a parameter is wide.
     Weak {
         /// The parameter.
@@ -216,6 +224,7 @@ impl Remark {
             Self::OutputFilter { .. }
             | Self::TwoStage { .. }
             | Self::DampingNotSeen(_)
+            | Self::EqualLags { .. }
             | Self::Weak { .. }
             | Self::WeakDelay { .. }
             | Self::NotASteadyOscillation(_)
@@ -244,6 +253,7 @@ impl Remark {
             Self::Unread => "unread",
             Self::NegativeGain => "negative_gain",
             Self::DampingNotSeen(_) => "damping_not_seen",
+            Self::EqualLags { .. } => "equal_lags",
             Self::Weak { .. } => "weak_parameter",
             Self::WeakDelay { .. } => "weak_delay",
             Self::Noisy(_) => "noisy",

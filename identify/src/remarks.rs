@@ -87,6 +87,9 @@ pub(crate) fn of_model(identified: &Identified, period_s: f64, remarks: &mut Vec
     {
         remarks.push(Remark::DampingNotSeen(t_body.low));
     }
+    if let Some((lags, mean_s)) = identified.posterior.equal_lags() {
+        remarks.push(Remark::EqualLags { lags, mean_s });
+    }
     for (parameter, most) in WIDE {
         let width = estimate
             .get(parameter)

@@ -43,7 +43,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn report(identified: &Identified) {
     println!("{}", identified.model.structure().transfer_function());
     for (parameter, interval) in identified.estimate.iter() {
-        println!("{:<11} {}", parameter.symbol(), with_ends(&interval));
+        let known = match interval
+            .high
+            .filter(|_| identified.estimate.is_below(parameter))
+        {
+            Some(high) => format!("below {high:.5}"),
+            None => with_ends(&interval),
+        };
+        println!("{:<11} {known}", parameter.symbol());
     }
     let Some(Design {
         controller,

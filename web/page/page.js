@@ -284,9 +284,10 @@ const showResult = () => {
   at("verdict").className = isFound ? "verdict" : "verdict no";
   at("verdict").textContent = isFound ? `Identified: ${report.structure}.` : `No process identified: ${report.verdict.message}.`;
   at("advice").textContent = report.verdict.advice ?? "";
+  const of = (name, value) => report.below?.includes(name) ? [`below ${shown(value.high)}`, "", ""] : [value.estimate, value.low, value.high].map((end) => shown(end));
   const rows = Object.entries(found).filter(([, value]) => value && typeof value === "object" && "low" in value);
   at("parameters").hidden = !rows.length;
-  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([SYMBOLS[name] ?? name.replaceAll("_", " "), shown(value.estimate), shown(value.low), shown(value.high)])));
+  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([SYMBOLS[name] ?? name.replaceAll("_", " "), ...of(name, value)])));
   const groups = [["Remarks", report.remarks], ["Details", report.details]];
   at("remarks").replaceChildren(...groups.filter(([, all]) => all.length).flatMap(([title, all]) => {
     const list = make("ul");

@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use onecycle::{Identified, Parameter, Specification, Structure, Verdict};
+use onecycle_design::bands::quantiles;
 use onecycle_link::{ControlLoop, Flight, FlightLog, Signals, Span};
 use rayon::prelude::*;
 
@@ -105,11 +106,14 @@ fn survey(
     asked: &Specification,
 ) -> Result<FlightLoop, Failure> {
     let signals = log::signals(source, log, number, of)?;
-    let of_log = LogLoop::new(flight.clone(), of);
+    let mut of_log = LogLoop::new(flight.clone(), of);
     let asked = of_log.specification(*asked, false);
     let (mut one, mut processes) = parts(&signals, flight, &asked);
     while let Some((at, best)) = one.best().and_then(|at| Some((at, processes[at].take()?))) {
         let choice = controllers::of_identified(&best, of_log.in_force());
+        if of_log.contradicts(&choice) {
+            of_log = of_log.with_read_back(source, log, number)?;
+        }
         if !of_log.contradicts(&choice) {
             one.choice = Some(choice);
             break;
@@ -193,21 +197,48 @@ fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified
 /// What is shown of a process. `None`: its gain has no interval.
 fn found(identified: &Identified) -> Option<Found> {
     let structure = identified.model.structure();
-    let is_body = structure.parameters().contains(&Parameter::KOverTBody);
-    let parameter = match is_body {
-        true => Parameter::KOverTBody,
-        false => Parameter::K,
-    };
     let value = |parameter: Parameter| identified.estimate.get(parameter)?.estimate;
-    let gain = identified.estimate.get(parameter)?;
-    let lags_s = [Parameter::TProp, Parameter::TProp2, Parameter::Tau]
-        .map(|parameter| value(parameter).unwrap_or(0.0));
+    let mut late = vec![Parameter::TProp, Parameter::TProp2, Parameter::Tau];
+    if structure.stages().integrators > 0 {
+        // Behind the integrator, the body is one lag more of the acceleration.
+        late.push(Parameter::TBody);
+    }
+    let lags_s = late.into_iter().filter_map(value);
     Some(Found {
         structure,
-        parameter,
-        gain: [gain.low?, gain.estimate?, gain.high?],
-        delay_s: lags_s.iter().sum::<f64>() + slow_pair_s(structure, &value),
+        gain: effectiveness(identified)?,
+        delay_s: lags_s.sum::<f64>() + slow_pair_s(structure, &value),
     })
+}
+
+/// Rate of change of the output per unit of input, with its 90 % interval: low, estimate, high. Of a rate loop it is the angular
+/// acceleration. An integrator has it in steady state, a damped body before it moves, and a resonance at its natural frequency,
+/// where `|s G|` has its peak `K w0 / (2 zeta)`. The high end may be infinite. `None`: there is no such rate, or no interval.
+fn effectiveness(identified: &Identified) -> Option<[f64; 3]> {
+    let stages = identified.model.structure().stages();
+    let gain = match (stages.integrators, stages.poles, stages.pairs) {
+        (1, _, _) => identified.estimate.get(Parameter::K)?,
+        (0, 1, _) => identified.estimate.get(Parameter::KOverTBody)?,
+        (0, _, 1) => return of_resonance(identified),
+        _ => return None,
+    };
+    Some([
+        gain.low?,
+        gain.estimate?,
+        gain.high.unwrap_or(f64::INFINITY),
+    ])
+}
+
+fn of_resonance(identified: &Identified) -> Option<[f64; 3]> {
+    let peak = |value: &dyn Fn(Parameter) -> Option<f64>| {
+        let frequency = value(Parameter::NaturalFrequency)?;
+        Some(value(Parameter::K)? * frequency / (2.0 * value(Parameter::Zeta)?))
+    };
+    let estimate = peak(&|parameter| identified.model.parameter(parameter))?;
+    let draws = identified.posterior.draws().iter();
+    let of_draws = draws.filter_map(|draw| peak(&|parameter| draw.value(parameter)));
+    let (low, high) = quantiles(of_draws.collect())?;
+    Some([low.min(estimate), estimate, high.max(estimate)])
 }
 
 /// Refuses a gain that the loop of a vehicle cannot have: the firmware's signs make every gain positive, an angle is the
@@ -248,7 +279,97 @@ fn slow_pair_s(structure: Structure, value: &impl Fn(Parameter) -> Option<f64>) 
 
 #[cfg(test)]
 mod tests {
+    use onecycle_design::Linear;
+    use onecycle_plant::{Disturbances, FixedStepLinear, Noise, NoiseSource};
+
     use super::*;
+
+    /// A rate loop of this structure: its input changes every 0.2 s for a minute.
+    fn identified(structure: Structure, values: &[(Parameter, f64)]) -> Identified {
+        const STEP_S: f64 = 0.004;
+        let value = |asked: Parameter| {
+            let given = values.iter().find(|(parameter, _)| *parameter == asked);
+            given.map(|(_, value)| *value)
+        };
+        let process = Linear::from_parameters(structure, value).unwrap();
+        let mut noise = Noise::from_seed(1);
+        let none = Disturbances::default();
+        let mut process = FixedStepLinear::new(&process, &none, STEP_S, &mut noise);
+        let (mut time_s, mut input, mut output) = (vec![], vec![], vec![]);
+        let mut u = 0.0;
+        for k in 0..15_000_u32 {
+            if k % 50 == 0 {
+                u = 0.1 * noise.standard_normal();
+            }
+            time_s.push(f64::from(k) * STEP_S);
+            input.push(u);
+            output.push(process.output() + 0.02 * noise.standard_normal());
+            process.step(u, &mut noise);
+        }
+        let signals = onecycle_identify::Signals {
+            time_s: &time_s,
+            input: &input,
+            output: &output,
+            samples_per_point: 1,
+            sample_period_s: STEP_S,
+            breaks: &[],
+        };
+        let options = onecycle_identify::Options::default().structure(Some(structure));
+        onecycle_identify::identify(&signals, &options)
+            .outcome
+            .unwrap()
+    }
+
+    // 100 rad/s^2 of full torque whatever the structure: K of an integrator, K/T_body of a damped body, and K w0 / (2 zeta) where the
+    // lags make a resonance. The table showed K/T_body of an integrator with two lags (rad/s^3) and K of a resonance (rad/s).
+    #[test]
+    fn gains_of_all_structures_are_angular_accelerations() {
+        use Parameter::{K, NaturalFrequency, TBody, TProp, TProp2, Tau, Zeta};
+        for (structure, values) in [
+            (Structure::Iptd, vec![(K, 100.0), (Tau, 0.02)]),
+            (
+                Structure::IntegratorLag,
+                vec![(K, 100.0), (TProp, 0.03), (Tau, 0.02)],
+            ),
+            (
+                Structure::Soiptd,
+                vec![(K, 100.0), (TProp, 0.03), (TBody, 0.1), (Tau, 0.02)],
+            ),
+            (
+                Structure::Toiptd,
+                vec![
+                    (K, 100.0),
+                    (TProp, 0.06),
+                    (TProp2, 0.02),
+                    (TBody, 0.15),
+                    (Tau, 0.02),
+                ],
+            ),
+            (Structure::Foptd, vec![(K, 80.0), (TBody, 0.8), (Tau, 0.02)]),
+            (
+                Structure::Soptd,
+                vec![(K, 80.0), (TProp, 0.03), (TBody, 0.8), (Tau, 0.02)],
+            ),
+            (
+                Structure::Resonant,
+                vec![
+                    (K, 10.0),
+                    (NaturalFrequency, 10.0),
+                    (Zeta, 0.5),
+                    (Tau, 0.02),
+                ],
+            ),
+        ] {
+            let found = found(&identified(structure, &values)).unwrap();
+            let [low, gain, high] = found.gain;
+            assert_eq!(found.structure, structure);
+            assert!((gain / 100.0 - 1.0).abs() < 0.05, "{structure:?} {gain}");
+            assert!(
+                low <= gain && gain <= high && high < 1.3 * low,
+                "{structure:?} {low} {high}"
+            );
+        }
+    }
 
     // A vehicle that hovers at 0.5 has 19.6 m/s^2 for all of the thrust if thrust is in proportion to the command.
     #[test]
@@ -256,7 +377,6 @@ mod tests {
         let is_taken = |gain: [f64; 3]| {
             let found = Found {
                 structure: Structure::IntegratorLag,
-                parameter: Parameter::K,
                 gain,
                 delay_s: 0.0,
             };

@@ -7,8 +7,8 @@ use onecycle::{
     Pid, Recording, Specification, Structure, Style, assess, least_margins,
 };
 use onecycle_link::{
-    Agreement, ControlLoop, Flight, LoopGains, LowPassSetting, ParameterFiles, RateLaw, ReadBack,
-    Signals, changes, files,
+    Agreement, ControlLoop, Flight, FlightLog, LoopGains, LowPassSetting, ParameterFiles, RateLaw,
+    ReadBack, Signals, changes, files,
 };
 
 use super::log::{self, Source};
@@ -56,19 +56,26 @@ impl LogLoop {
         let (log, number) = log::scan_flight(source, &arguments.log)?;
         let control_loop = arguments.log.control_loop();
         let signals = log::signals(source, &log, number, control_loop)?;
-        let read_back = match control_loop {
-            ControlLoop::Rate(axis) => log::read_back(source, &log, number)?
+        let flight = log.flights.get(number.saturating_sub(1)).cloned();
+        let of_log = flight.map(|flight| Self::new(flight, control_loop));
+        let of_log = of_log.map(|of_log| of_log.with_read_back(source, &log, number));
+        Ok((signals, of_log.transpose()?))
+    }
+
+    /// With the gains of a rate loop read back from the signals of a flight, by its number.
+    pub(super) fn with_read_back(
+        self,
+        source: &Source<'_>,
+        log: &FlightLog,
+        number: usize,
+    ) -> Result<Self, Failure> {
+        let read_back = match self.control_loop {
+            ControlLoop::Rate(axis) => log::read_back(source, log, number)?
                 .into_iter()
                 .find(|read| read.axis == axis),
             _ => None,
         };
-        let flight = log.flights.into_iter().nth(number.saturating_sub(1));
-        let of_log = flight.map(|flight| Self {
-            flight,
-            control_loop,
-            read_back,
-        });
-        Ok((signals, of_log))
+        Ok(Self { read_back, ..self })
     }
 
     /// The flight.

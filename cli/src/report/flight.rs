@@ -43,16 +43,15 @@ pub(crate) fn text(file: &str, flight: usize, loops: &[FlightLoop]) -> String {
 
 /// The line of a loop: what all its parts tell.
 fn row(text: &mut String, one: &FlightLoop) {
-    let used = one.alike().len();
+    let told = one.told();
+    let used = told.len();
     let name = one.control_loop.to_string();
     let _ = write!(text, "  {name:<14}  {used} of {:<2}", one.parts.len());
-    let (Some([low, estimate, high]), Some(first)) = (one.gain(), one.alike().first().copied())
-    else {
+    let (Some(gain), Some(first)) = (one.gain(), told.first()) else {
         let _ = writeln!(text, "  not identified");
         return;
     };
-    let gain = format!("{} ({} .. {})", short(estimate), short(low), short(high));
-    let unit = words::gain_unit(one.units, first);
+    let unit = words::gain_unit(one.units);
     let delay = format!("{:.0} ms", 1e3 * first.delay_s);
     let margins = one
         .in_force()
@@ -61,8 +60,17 @@ fn row(text: &mut String, one: &FlightLoop) {
         let pid = judged.pid;
         [pid.kp, pid.ki, pid.kd].map(short).join(", ")
     });
-    let gain = format!("{gain} {unit}");
+    let gain = format!("{} {unit}", with_ends(gain));
     let _ = writeln!(text, "  {gain:<33} {delay:>6}  {margins:<18}  {gains}");
+}
+
+/// An estimate with its interval.
+fn with_ends([low, estimate, high]: [f64; 3]) -> String {
+    let high = match high.is_finite() {
+        true => short(high),
+        false => "unbounded".to_owned(),
+    };
+    format!("{} ({} .. {high})", short(estimate), short(low))
 }
 
 fn margins(judged: &Judged) -> String {
@@ -86,11 +94,11 @@ fn parts(text: &mut String, one: &FlightLoop) {
         let span = format!("{:.1} to {:.1} s", part.span.from_s, part.span.to_s);
         match &part.outcome {
             Ok(found) => {
-                let [low, estimate, high] = found.gain.map(short);
                 let _ = writeln!(
                     text,
-                    "  {span:<20} {:<15} {estimate} ({low} .. {high}), delay {:.0} ms",
+                    "  {span:<20} {:<15} {}, delay {:.0} ms",
                     found.structure.name(),
+                    with_ends(found.gain),
                     1e3 * found.delay_s
                 );
             }
@@ -193,12 +201,12 @@ pub(crate) fn json(file: &str, flight: usize, loops: &[FlightLoop]) -> String {
         }
     };
     let one = |one: &FlightLoop| {
-        let alike = one.alike();
-        let first = alike.first();
+        let told = one.told();
+        let first = told.first();
         Loop {
             name: one.control_loop.to_string(),
             gain: one.gain(),
-            gain_unit: first.map(|found| words::gain_unit(one.units, *found)),
+            gain_unit: first.map(|_| words::gain_unit(one.units)),
             delay_s: first.map(|found| found.delay_s),
             parts_disagree: one.parts_disagree(),
             in_force: one.in_force().as_ref().map(gains),

@@ -7,7 +7,7 @@ mod record;
 use std::borrow::Cow;
 
 use onecycle::{
-    Assessment, Design, Excitation, Identification, Identified, Interval, Margins, Model,
+    Assessment, Design, Estimate, Excitation, Identification, Identified, Interval, Margins, Model,
     Recording, Remark, StepIntervals, StepMetrics, Style,
 };
 use onecycle_link::Column;
@@ -41,6 +41,7 @@ struct IdentifyReport<'a> {
     amplitudes: Option<Amplitudes>,
     structure: Option<&'static str>,
     process: Option<Process>,
+    below: Option<Vec<&'static str>>,
     joint_probability: Option<f64>,
     fit: Option<Fit>,
     refused: Option<RefusedFit>,
@@ -345,6 +346,7 @@ pub(crate) fn identification(
         }),
         structure: identified.map(|i| i.model.structure().name()),
         process: identified.map(process),
+        below: identified.map(|i| below(&i.estimate)),
         joint_probability: identified.and_then(|i| i.joint_probability),
         fit: identified.map(|i| fit(&i.fit)),
         refused: found.refused.as_ref().map(refused),
@@ -463,6 +465,13 @@ fn process(identified: &Identified) -> Process {
                 .collect(),
         ),
     }
+}
+
+/// Keys of the parameters that are below the upper end of their interval.
+fn below(estimate: &Estimate) -> Vec<&'static str> {
+    let parameters = estimate.iter().map(|(parameter, _)| parameter);
+    let below = parameters.filter(|parameter| estimate.is_below(*parameter));
+    below.map(onecycle::Parameter::key).collect()
 }
 
 fn refused(of: &onecycle::Refused) -> RefusedFit {

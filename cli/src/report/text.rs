@@ -261,14 +261,19 @@ fn describe_estimate(
     let structure = estimate.structure();
     for (parameter, interval) in estimate.iter() {
         let (name, unit) = (parameter.symbol(), units.parameter(structure, parameter));
+        let is_below = estimate.is_below(parameter);
         let Interval {
             estimate,
             low,
             high,
         } = interval;
-        let estimate = estimate.map_or("infinite".to_owned(), significant);
-        let range = format!("{} .. {}", bounded(low), bounded(high));
-        text.push_str(&ranged(name, &estimate, &range, &unit));
+        let (value, range) = if is_below {
+            (String::new(), format!("below {}", bounded(high)))
+        } else {
+            let value = estimate.map_or("infinite".to_owned(), significant);
+            (value, format!("{} .. {}", bounded(low), bounded(high)))
+        };
+        text.push_str(&ranged(name, &value, &range, &unit));
     }
 }
 

@@ -3,6 +3,30 @@
 use onecycle::{Parameter, Recording, Structure};
 use onecycle_design::Unit;
 
+/// Unit of a share.
+const ONE: &str = "1";
+
+/// Unit of an output over its input and a power of a second: one of `rad/s` over that of a share and a second is `rad/s^2`. Empty if
+/// the units cancel.
+pub(crate) fn ratio(output: &str, input: &str, seconds: usize) -> String {
+    let power = |of: &str, power: usize| match power {
+        0 => String::new(),
+        1 => of.to_owned(),
+        power => format!("{of}^{power}"),
+    };
+    match (input, output.strip_suffix("/s")) {
+        (ONE, Some(of)) => format!("{of}/{}", power("s", seconds + 1)),
+        (ONE, None) if seconds > 0 => format!("{output}/{}", power("s", seconds)),
+        (ONE, None) => output.to_owned(),
+        (input, _) if seconds == 1 && input.strip_suffix("/s") == Some(output) => String::new(),
+        (input, _) if seconds == 0 && !input.contains('/') => format!("{output}/{input}"),
+        (input, _) => {
+            let divisor = format!("{input} {}", power("s", seconds));
+            format!("{output}/({})", divisor.trim_end())
+        }
+    }
+}
+
 /// Units of input and output; empty where the recording gives none.
 #[derive(Default)]
 pub(super) struct Units {
@@ -22,26 +46,23 @@ impl Units {
     /// Unit of a parameter; empty where it needs units that the recording does not give.
     pub(super) fn parameter(&self, structure: Structure, parameter: Parameter) -> String {
         match structure.unit(parameter) {
-            Unit::OutputPerInput => self.gain(""),
+            Unit::OutputPerInput => self.gain(0),
             Unit::RadianPerSecond => "rad/s".to_owned(),
-            Unit::OutputPerInputSecond => self.gain("s"),
-            Unit::OutputPerInputSecondSquared => self.gain("s^2"),
+            Unit::OutputPerInputSecond => self.gain(1),
+            Unit::OutputPerInputSecondSquared => self.gain(2),
             Unit::Second => "s".to_owned(),
             Unit::PerSecond => "1/s".to_owned(),
+            Unit::Input if self.input == ONE => String::new(),
             Unit::Input => self.input.clone(),
             _ => String::new(),
         }
     }
 
-    /// `output/(input per)`, or `output/input` without `per`.
-    fn gain(&self, per: &str) -> String {
+    fn gain(&self, seconds: usize) -> String {
         if self.input.is_empty() || self.output.is_empty() {
             return String::new();
         }
-        if per.is_empty() {
-            return format!("{}/{}", self.output, self.input);
-        }
-        format!("{}/({} {per})", self.output, self.input)
+        ratio(&self.output, &self.input, seconds)
     }
 
     /// Unit of a controller's gain, with a blank before it: ` input/output`, or ` input times/output`.
@@ -66,6 +87,31 @@ impl Units {
             name.to_owned()
         } else {
             format!("{name} ({unit})")
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // Inputs of a vehicle are shares of full deflection or thrust. A set-point of a rate is one of an angle per second.
+    #[test]
+    fn units_of_gains() {
+        for (output, input, seconds, unit) in [
+            ("rad/s", "1", 0, "rad/s"),
+            ("rad/s", "1", 1, "rad/s^2"),
+            ("rad/s", "1", 2, "rad/s^3"),
+            ("m/s", "1", 1, "m/s^2"),
+            ("rad", "1", 1, "rad/s"),
+            ("K", "1", 0, "K"),
+            ("rad", "rad/s", 1, ""),
+            ("rad", "rad/s", 2, "rad/(rad/s s^2)"),
+            ("K", "W", 0, "K/W"),
+            ("K", "W", 1, "K/(W s)"),
+            ("rad", "rad/s", 0, "rad/(rad/s)"),
+        ] {
+            assert_eq!(ratio(output, input, seconds), unit);
         }
     }
 }

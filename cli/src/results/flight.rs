@@ -1,6 +1,6 @@
 //! The control loops of a flight, each identified from several parts of it.
 
-use onecycle::{Assessment, Controller, Parameter, Pid, Structure, Verdict};
+use onecycle::{Assessment, Controller, Pid, Structure, Verdict};
 use onecycle_link::{ControlLoop, Span};
 
 use super::controllers::Controllers;
@@ -63,9 +63,7 @@ impl Refusal {
 #[derive(Clone, Copy)]
 pub(crate) struct Found {
     pub(crate) structure: Structure,
-    /// The parameter that is the gain of the loop: `K/T_body`, or `K` of a structure without a body.
-    pub(crate) parameter: Parameter,
-    /// Gain with its 90 % interval: low, estimate, high.
+    /// Rate of change of the output per unit of input, of any structure, with its 90 % interval: low, estimate, high.
     pub(crate) gain: [f64; 3],
     /// Dead time and actuator lags together (s).
     pub(crate) delay_s: f64,
@@ -74,11 +72,6 @@ pub(crate) struct Found {
 impl Found {
     fn relative_width(&self) -> f64 {
         (self.gain[2] - self.gain[0]) / self.gain[1].abs()
-    }
-
-    /// Whether the gains of both are of one kind.
-    fn is_like(&self, other: &Self) -> bool {
-        self.structure.unit(self.parameter) == other.structure.unit(other.parameter)
     }
 }
 
@@ -104,37 +97,36 @@ impl FlightLoop {
         widths.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(at, _)| at)
     }
 
-    /// The parts whose gain is of the same kind as that of the best one, that one first.
-    pub(crate) fn alike(&self) -> Vec<Found> {
+    /// What the parts tell, the best one first.
+    pub(crate) fn told(&self) -> Vec<Found> {
         let found = |at: usize| self.parts[at].outcome.as_ref().ok().copied();
         let Some((best, first)) = self.best().and_then(|at| Some((at, found(at)?))) else {
             return vec![];
         };
         let others = (0..self.parts.len()).filter(|at| *at != best);
-        let like = others
-            .filter_map(found)
-            .filter(|other| other.is_like(&first));
-        std::iter::once(first).chain(like).collect()
+        std::iter::once(first)
+            .chain(others.filter_map(found))
+            .collect()
     }
 
     /// Gain of the best part, with an interval that holds those of all parts: its ends grow by what the parts differ.
     pub(crate) fn gain(&self) -> Option<[f64; 3]> {
-        let alike = self.alike();
-        let first = alike.first()?;
+        let told = self.told();
+        let first = told.first()?;
         let hold = |[low, estimate, high]: [f64; 3], other: &Found| {
             [low.min(other.gain[0]), estimate, high.max(other.gain[2])]
         };
-        Some(alike.iter().fold(first.gain, hold))
+        Some(told.iter().fold(first.gain, hold))
     }
 
     /// Whether the intervals of two parts have no value in common.
     pub(crate) fn parts_disagree(&self) -> bool {
-        let alike = self.alike();
-        let low = alike
+        let told = self.told();
+        let low = told
             .iter()
             .map(|found| found.gain[0])
             .fold(f64::NEG_INFINITY, f64::max);
-        let high = alike
+        let high = told
             .iter()
             .map(|found| found.gain[2])
             .fold(f64::INFINITY, f64::min);

@@ -1,10 +1,9 @@
 //! Sentences about the control loops of a flight.
 
-use onecycle_design::Unit;
 use onecycle_link::ControlLoop;
 
 use crate::report::number::short;
-use crate::results::flight::Found;
+use crate::report::units::ratio;
 
 pub(crate) const NOTHING_LOGGED: &str =
     "The log has input and output of no control loop. onecycle log FILE says what to log.";
@@ -45,20 +44,7 @@ pub(crate) fn title(of: ControlLoop) -> String {
     })
 }
 
-/// Unit of the gain of a process with these units of input and output.
-pub(crate) fn gain_unit([input, output]: [&str; 2], found: Found) -> String {
-    let per = match found.structure.unit(found.parameter) {
-        Unit::OutputPerInputSecond => " s",
-        Unit::OutputPerInputSecondSquared => " s^2",
-        _ => "",
-    };
-    match (input, per) {
-        ("1", "") => output.to_owned(),
-        ("1", " s") if output.ends_with("/s") => format!("{output}^2"),
-        ("1", per) => format!("{output}/{}", per.trim()),
-        // An angle over the integral of a rate.
-        ("rad/s", " s") if output == "rad" => String::new(),
-        (input, "") => format!("{output}/({input})"),
-        (input, per) => format!("{output}/({input}{per})"),
-    }
+/// Unit of the rate of change of an output per unit of input.
+pub(crate) fn gain_unit([input, output]: [&str; 2]) -> String {
+    ratio(output, input, 1)
 }

@@ -1,10 +1,10 @@
 //! What a remark means.
 
-use onecycle::{About, DesignError, Identification, Parameter, Remark};
+use onecycle::{About, DesignError, Identification, Interval, Parameter, Remark};
 use onecycle_identify::Nonlinear;
 
 use super::{caution, controllers, listed};
-use crate::report::number::{percent, significant};
+use crate::report::number::{bounded, percent, significant};
 
 /// Heading of the remarks that are reasons to suspect the result.
 pub(crate) const REASONS: &str = "Remarks";
@@ -310,6 +310,13 @@ fn of_result(remark: &Remark) -> Option<String> {
                  K/T_body, which is known."
             )
         }
+        Remark::EqualLags { ref lags, mean_s } => equal_lags(lags, mean_s),
+        Remark::WeakDelay { low_s, high_s } if low_s <= 0.0 => {
+            format!(
+                "The delay is only known to be below {} s.",
+                significant(high_s)
+            )
+        }
         Remark::WeakDelay { low_s, high_s } if high_s >= 1.0 => {
             format!("The delay is only known to lie between {low_s:.2} and {high_s:.2} s.")
         }
@@ -325,6 +332,18 @@ fn of_result(remark: &Remark) -> Option<String> {
         ),
         _ => return None,
     })
+}
+
+fn equal_lags(lags: &[Parameter], mean_s: Interval) -> String {
+    let names: Vec<&str> = lags.iter().map(|lag| lag.symbol()).collect();
+    let many = if lags.len() == 2 { "double" } else { "triple" };
+    format!(
+        "{} cannot be told from one {many} lag of {} s ({} .. {}).",
+        listed(&names),
+        mean_s.estimate.map_or("infinite".to_owned(), significant),
+        bounded(mean_s.low),
+        bounded(mean_s.high)
+    )
 }
 
 #[cfg(test)]

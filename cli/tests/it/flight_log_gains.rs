@@ -121,6 +121,48 @@ fn a_contradicted_log_has_no_good_headline() {
     assert_ne!(class(&good), class(&contradicted));
 }
 
+// Twelve times the gain that flew, of which the gain margin is 6: the model calls the loop unstable. Either the model is wrong or
+// the gains are others; the set-point tells which, and in a log without it nothing does.
+#[test]
+fn a_model_that_calls_unstable_what_flew_is_refused() {
+    let folder = Scratch::new();
+    let log = chirps_with(&folder, b"float MC_ROLLRATE_K", &12_f32.to_le_bytes());
+    let table = |log: &str| {
+        let json = run(&["identify", log, "--json"]).stdout;
+        let report: serde_json::Value = serde_json::from_str(&json).unwrap();
+        report["loops"][0].clone()
+    };
+    let roll = table(&log);
+    assert_eq!(roll["parts"][0]["verdict"], "identified");
+    assert_eq!(roll["in_force"]["ms"], serde_json::Value::Null);
+    run(&["identify", &log, "--axis", "roll", "--json"]).identified();
+    let mut bytes = std::fs::read(&log).unwrap();
+    let topic = b"vehicle_rates_setpoint";
+    for at in 0..bytes.len() - topic.len() {
+        if bytes[at..].starts_with(topic) {
+            bytes[at] = b'x';
+        }
+    }
+    let log = folder.write("without.ulg", &bytes);
+    let roll = table(&log);
+    assert_eq!(roll["name"], "roll rate");
+    assert_eq!(roll["parts"][0]["verdict"], "not_this_process");
+    assert_eq!(roll["proposed"], serde_json::Value::Null);
+    let path = folder.name("roll.params");
+    let one = run(&[
+        "identify", &log, "--axis", "roll", "--json", "--write", &path,
+    ]);
+    let message = one.no_process("not_this_process").0["verdict"]["message"].clone();
+    assert!(
+        message
+            .as_str()
+            .unwrap()
+            .ends_with("would have been unstable"),
+        "{message}"
+    );
+    assert!(!folder.files().contains(&"roll.params".to_owned()));
+}
+
 // A log without the filter of the derivative: nothing is written, and no option is blamed that was not given.
 #[test]
 fn a_filter_that_the_log_does_not_show_is_not_written() {

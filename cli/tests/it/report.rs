@@ -2,7 +2,10 @@
 
 use std::fs;
 
-use crate::common::{NOT_IDENTIFIED, NOT_WRITTEN, Scratch, figures, notes, reported, run};
+use crate::common::{
+    NOT_IDENTIFIED, NOT_WRITTEN, Scratch, figures, identify, identify_as_text, notes, reported,
+    run, simulate,
+};
 use serde_json::Value;
 
 const HOVER: &str = concat!(
@@ -71,6 +74,42 @@ fn an_identification_as_a_page() {
             assert!(!values.is_empty() && values.iter().all(|value| !value.is_null()));
         }
     }
+}
+
+// A process that is faster than its samples of 50 ms: its lag was one of half a sample, with an interval of no width, and its
+// dead time "0 (0 .. 0.047)".
+#[test]
+fn what_is_faster_than_a_sample_reads_below() {
+    let process = "--process foptd --k 2 --t-body 0.001 --tau 0";
+    let test = "--excitation prbs --pulse 2 --duration 200 --sample-rate 20 --noise 0.02";
+    let words = |text: &'static str| text.split(' ').collect::<Vec<_>>();
+    let recording = simulate(&words(process), &words(test));
+    let report = identify(&recording, &[]).report().0;
+    assert_eq!(report["below"], serde_json::json!(["t_body_s", "tau_s"]));
+    let lines = identify_as_text(&recording, &[]).stdout;
+    let folder = Scratch::new();
+    let (_, page) = reported(&["identify", &folder.write("fast.csv", recording.as_bytes())]);
+    for (name, key) in [("T_body", "t_body_s"), ("tau", "tau_s")] {
+        let high = report["process"][key]["high"].as_f64().unwrap();
+        assert!((0.04..0.05).contains(&high), "{high}");
+        let below = format!("below {high:.5}");
+        let line = lines
+            .lines()
+            .find(|line| line.trim().starts_with(name))
+            .unwrap();
+        let shown: Vec<&str> = line.split_whitespace().collect();
+        assert_eq!(shown.join(" "), format!("{name} {below} s"));
+        assert!(page.contains(&format!("<td data-column=\"estimate\">{below}</td>")));
+    }
+    // A time that the samples show has its interval.
+    let slow = simulate(
+        &words("--process foptd --k 2 --t-body 1 --tau 0.28"),
+        &words(test),
+    );
+    assert_eq!(
+        identify(slow, &[]).report().0["below"],
+        serde_json::json!([])
+    );
 }
 
 // The measured point at the oscillation lies on the curve of the identified process within 1 %: the noise of 2 % leaves

@@ -7,7 +7,7 @@ use onecycle_design::Structure;
 
 use super::record::{Blocks, Record};
 use super::search::{self, Candidate, HEADS};
-use super::theta::Theta;
+use super::theta::{Bounds, Theta};
 
 /// Structures explain a record nearly as well up to this difference of the BIC: a likelihood ratio of `e^3`.
 pub(super) const NEARLY: f64 = 6.0;
@@ -17,6 +17,8 @@ const EQUAL: f64 = 2.0;
 /// Twice the gain of the log-likelihood from which damping shows: 5 % of undamped processes seem damped by as much.
 /// The BIC alone would hide damping of two standard deviations, and with it bias the gain.
 const SHOWN: f64 = 2.7;
+/// Damping ratio from which a resonance may be two equal lags.
+const WELL_DAMPED: f64 = 0.9;
 /// Structures whose best fit is worse than this are given up: no further noise makes up for it. Their fits are not finished.
 pub(super) const HOPELESS: f64 = 80.0;
 /// Log-likelihood by which a structure may fall behind its limit.
@@ -49,6 +51,7 @@ impl Choice {
         let simplest = (self.candidates.iter())
             .filter(|candidate| candidate.bic <= best + EQUAL)
             .min_by_key(|candidate| simplicity(candidate.structure()))?;
+        let simplest = self.real(simplest).unwrap_or(simplest);
         let damped = self.damped(simplest.structure()).filter(|damped| {
             let gain = damped.found.at.log_likelihood - simplest.found.at.log_likelihood;
             2.0 * gain > SHOWN && damped.found.theta.process(1.0).pole_per_s() > 0.0
@@ -67,6 +70,22 @@ impl Choice {
     pub(super) fn thetas(&self) -> Vec<Theta> {
         let candidates = self.candidates.iter();
         candidates.map(|candidate| candidate.found.theta).collect()
+    }
+
+    /// Fit of real lags that explains a record nearly as well as a resonance without a peak: the poles of equal lags seem complex
+    /// every second time.
+    fn real(&self, resonance: &Candidate) -> Option<&Candidate> {
+        let structure = match resonance.structure() {
+            Structure::Resonant => Structure::Soptd,
+            Structure::ResonantLag => Structure::Toptd,
+            _ => return None,
+        };
+        let [c1, c0] = resonance.found.theta.process(1.0).pair();
+        let is_well_damped = c1 > 2.0 * WELL_DAMPED * c0.max(0.0).sqrt();
+        self.within(f64::INFINITY).find(|real| {
+            let is_as_good = real.bic <= resonance.bic + NEARLY;
+            is_well_damped && real.structure() == structure && is_as_good
+        })
     }
 
     /// Fit of the structure that has the damping which `structure` lacks.
@@ -125,7 +144,10 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
     if limits.structure.is_none() {
         all.retain(|candidate| {
             let theta = &candidate.found.theta;
-            !has_hidden_lag(theta, record.dt_s) && !is_of_a_force(theta, limits.slowest_s)
+            let bounds = Bounds::new(theta.structure, &blocks, tau_s);
+            !has_hidden_lag(theta, record.dt_s)
+                && !bounds.has_fastest_pair(theta)
+                && !is_of_a_force(theta, limits.slowest_s)
         });
     }
     keep_best_of_each(&mut all, limits.structure);
@@ -186,7 +208,7 @@ fn contains(outer: Structure, inner: Structure) -> bool {
         (outer, inner),
         (Soiptd, Iptd | IntegratorLag | DoubleIntegratorLag | Toiptd)
             | (Soptd, Iptd | Foptd | IntegratorLag | Toptd)
-            | (ResonantLag, Resonant | Soptd | Soiptd | Toptd)
+            | (ResonantLag, Resonant | Soptd | Soiptd | Toptd | Toiptd)
     )
 }
 

@@ -4,9 +4,9 @@ use onecycle_design::{Linear, Structure};
 
 use super::descent::Found;
 use super::mixture::Component;
-use super::theta::{NoiseKind, Theta};
+use super::theta::{BODIES_IN_A_SAMPLE, LAGS_IN_A_SAMPLE, NoiseKind, Theta};
 use crate::cholesky::cholesky;
-use crate::posterior::Posterior;
+use crate::posterior::{Drawn, Posterior, Shortest};
 
 /// Relative standard deviation of the scale and of the clock of the instruments: no fit makes the intervals narrower.
 const INSTRUMENT: f64 = 1e-3;
@@ -23,6 +23,15 @@ pub(super) struct Stamps {
     pub(super) late_s: f64,
     /// Input at rest, which the response to the input leaves out; zero if the state at the start is not known.
     pub(super) rest: f64,
+}
+
+impl Stamps {
+    fn shortest(&self) -> Shortest {
+        Shortest {
+            lag_s: self.sample_s / LAGS_IN_A_SAMPLE,
+            body_s: self.sample_s / BODIES_IN_A_SAMPLE,
+        }
+    }
 }
 
 /// Least rate (1/s) of a lag.
@@ -124,19 +133,23 @@ pub(super) fn posterior_of(
     let weights: Vec<f64> = weights.iter().map(|weight| weight / total).collect();
     let as_lags = has_real_lags(&best.theta);
     let draw = |index: usize, normal: &[f64]| {
-        let (process, bias) =
-            roots[index].draw(&components[index], &factors[index], normal, stamps);
-        let has_pair = process.structure().stages().pairs > 0;
-        match as_lags && has_pair {
-            true => (with_lags(&process), bias),
-            false => (process, bias),
+        let drawn = roots[index].draw(&components[index], &factors[index], normal, stamps);
+        let has_pair = drawn.process.structure().stages().pairs > 0;
+        if !(as_lags && has_pair) {
+            return drawn;
+        }
+        let [c1, c0] = drawn.process.pair();
+        Drawn {
+            process: with_lags(&drawn.process),
+            has_complex_poles: 0.25 * c1 * c1 < c0,
+            ..drawn
         }
     };
     let bias = has_bias(&best.theta).then(|| disturbance(best) / best.at.gain - stamps.rest);
     let weights = if total > 0.0 { weights } else { vec![] };
     let process = reported(&process(&best.theta, best.at.gain, stamps.early_s), as_lags);
     (
-        Posterior::of_mixture(&process, bias, &weights, draw),
+        Posterior::of_mixture(&process, bias, &weights, draw).down_to(stamps.shortest()),
         widened,
     )
 }
@@ -193,21 +206,27 @@ impl Root {
         factors: &[f64],
         normal: &[f64],
         stamps: Stamps,
-    ) -> (Linear, f64) {
+    ) -> Drawn {
         let Component { found, laplace, .. } = component;
-        let mut theta = found.theta;
         let most = factors.iter().fold(1.0, |most: f64, v| most.max(*v));
         let z = &normal[laplace.free.len()..];
         let mut gain = found.at.gain + most * self.linear[0][0] * z[0];
         let mut bias =
             disturbance(found) + most * (self.linear[1][0] * z[0] + self.linear[1][1] * z[1]);
-        for (slot, &index) in laplace.free.iter().enumerate() {
-            let sum: f64 = (0..=slot).map(|j| self.process[slot][j] * normal[j]).sum();
-            let change = factors[slot] * sum;
-            theta.values[index] += change;
-            gain += laplace.slopes[slot][0] * change;
-            bias += laplace.slopes[slot][1] * change;
+        let mut changes: Vec<f64> = (self.process.iter().zip(factors))
+            .map(|(row, factor)| factor * row.iter().zip(normal).map(|(l, z)| l * z).sum::<f64>())
+            .collect();
+        let covariance = |i: usize, j: usize| factors[i] * factors[j] * laplace.covariance[i][j];
+        let near = &laplace.near;
+        let (mut theta, has_complex_poles) =
+            near.moved(&found.theta, &laplace.free, &mut changes, covariance);
+        let symmetric = near.symmetric(&found.theta);
+        for (slope, change) in laplace.slopes.iter().zip(&changes) {
+            gain += slope[0] * change / symmetric;
+            bias += slope[1] * change / symmetric;
         }
+        let ratio = symmetric / near.symmetric(&theta);
+        (gain, bias) = (gain * ratio, bias * ratio);
         gain *= 1.0 + INSTRUMENT * z[2];
         for lag in 0..theta.layout().stages.lags {
             theta.values[lag] += INSTRUMENT * z[3];
@@ -215,39 +234,54 @@ impl Root {
         // With equal chances the recording has the rate of what makes the input, or another: then the changes come before their
         // samples by any part of a sample, on average over them.
         let tau = theta.layout().tau();
-        theta.values[tau] += stamps.late_s * (2.0 * uniform(z[1]) - 1.0).max(0.0);
-        below_a_sample(&mut theta, component, stamps, uniform(normal[0]));
-        (
-            process(&theta, gain, stamps.early_s),
-            bias / gain - stamps.rest,
-        )
+        theta.values[tau] += stamps.late_s * (2.0 * (1e3 * z[1]).rem_euclid(1.0) - 1.0).max(0.0);
+        let ratio = below_a_sample(&mut theta, component, stamps, normal[0]);
+        (gain, bias) = (gain * ratio, bias * ratio);
+        Drawn {
+            process: process(&theta, gain, stamps.early_s),
+            input_bias: bias / gain - stamps.rest,
+            has_complex_poles,
+        }
     }
 }
 
-/// A number from an even distribution from 0 to 1: the digits of a normal number from the fourth decimal on.
-fn uniform(normal: f64) -> f64 {
-    (1e3 * normal).rem_euclid(1.0)
-}
-
-/// Puts what the fit has at a bound anywhere below a sample: a dead time that is not positive, and a lag at the least that the
-/// search allows. The samples show neither, and a value with an interval of no width would say that they do. `share`: where, a
-/// number from an even distribution from 0 to 1.
-fn below_a_sample(theta: &mut Theta, component: &Component, stamps: Stamps, share: f64) {
+/// Puts what the fit has at a bound anywhere below a sample: a dead time that is not positive, and a time constant at the least
+/// that the search allows. The samples show neither, and a value with an interval of no width would say that they do. They show the
+/// sum, so a time constant takes from the dead time what it gains. Returns the factor for the gain in front of the stages.
+/// `chance`: a normal number, whose third to ninth digits are even.
+fn below_a_sample(theta: &mut Theta, component: &Component, stamps: Stamps, chance: f64) -> f64 {
     let Stamps {
         sample_s, early_s, ..
     } = stamps;
-    let share = share.max(1e-3);
+    let anywhere_s = |digits: f64| (digits * chance).rem_euclid(1.0).max(1e-3) * sample_s;
+    let time_s = anywhere_s(1e3);
     let best = &component.found.theta;
-    let tau = theta.layout().tau();
-    if best.tau_s() + early_s <= 0.0 && theta.tau_s() + early_s <= 0.0 {
-        theta.values[tau] = share * sample_s - early_s;
-    }
-    for lag in 0..theta.layout().stages.lags {
-        let is_held = !component.laplace.free.contains(&lag);
-        if is_held && best.is_lag_below(lag, sample_s) {
-            // The samples show the sum of lag and dead time.
-            theta.values[tau] += best.values[lag].exp() - share * sample_s;
-            theta.values[lag] = (share * sample_s).ln();
+    let layout = theta.layout();
+    let is_held = |index: usize| !component.laplace.free.contains(&index);
+    let (mut longer_s, mut ratio) = (0.0, 1.0);
+    for lag in 0..layout.stages.lags {
+        if is_held(lag) && best.is_lag_below(lag, sample_s) {
+            longer_s += time_s - theta.values[lag].exp();
+            theta.values[lag] = time_s.ln();
         }
     }
+    if let Some(pole) = layout.pole()
+        && is_held(pole)
+        && best.values[pole] * sample_s > 1.0
+    {
+        longer_s += time_s - 1.0 / theta.values[pole];
+        ratio = 1.0 / (time_s * theta.values[pole]);
+        theta.values[pole] = 1.0 / time_s;
+        // Nothing slower shows where between two samples the response begins.
+        if layout.stages.integrators == 0 {
+            longer_s += anywhere_s(1e6) - 0.5 * sample_s;
+        }
+    }
+    let tau = layout.tau();
+    if best.tau_s() + early_s <= 0.0 && theta.tau_s() + early_s <= 0.0 {
+        theta.values[tau] = time_s - early_s;
+    } else if longer_s != 0.0 && theta.tau_s() + early_s > 0.0 {
+        theta.values[tau] = (theta.values[tau] - longer_s).max(-early_s);
+    }
+    ratio
 }

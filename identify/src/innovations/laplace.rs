@@ -5,13 +5,14 @@
 //! ```
 //!
 //! with the residual `rho` and its Jacobian `J` by central differences. Unknowns at a bound, and lags that the samples do not show,
-//! are taken as known.
+//! are taken as known. Lags that are nearly equal have the coordinates of [`NearLags`].
 
 use super::descent::{Found, inverse};
-use super::likelihood::{Evaluation, Memory, evaluate};
+use super::likelihood::{Memory, evaluate};
+use super::near_lags::NearLags;
 use super::orthogonal::dot;
 use super::record::Blocks;
-use super::theta::{Bounds, MOST};
+use super::theta::{Bounds, MOST, Theta};
 
 /// Deviation of the logarithm of a lag below a sample from which the samples do not show the lag: it may be anything down to
 /// zero, and the likelihood is no parabola.
@@ -23,7 +24,9 @@ pub(super) struct Laplace {
     /// Indices of the unknowns, in the order of rows and columns.
     pub(super) free: Vec<usize>,
     pub(super) covariance: Vec<Vec<f64>>,
-    /// Derivatives of the gain and of the disturbance at the first block (both as [`Evaluation`] has them).
+    /// Unknowns that are not their own coordinates.
+    pub(super) near: NearLags,
+    /// Derivatives of the gain and of the disturbance at the first block, both times [`NearLags::symmetric`].
     pub(super) slopes: Vec<[f64; 2]>,
     /// Factor on the standard deviation of each unknown if the residual is not white: square root of the ratio of the
     /// sandwich estimator's variance (Newey and West's weights) to the plain one.
@@ -31,36 +34,32 @@ pub(super) struct Laplace {
 }
 
 impl Laplace {
-    /// At `found`. Unknowns of which `free` has no entry are fixed. `None` if the unknowns have no joint maximum.
+    /// At `found`. Unknowns of which `free` has no entry are fixed; `near`: those that are nearly equal lags. `None` if the
+    /// unknowns have no joint maximum.
     pub(super) fn new(
         blocks: &Blocks<'_>,
         found: &Found,
-        free: &[usize],
+        (free, near): (&[usize], &NearLags),
         bounds: &Bounds,
     ) -> Option<Self> {
         let inside = |index: &usize| !bounds.is_at_edge(&found.theta, *index);
         let free: Vec<usize> = free.iter().copied().filter(inside).collect();
+        let near = near.within(&free);
         let mut memory = Memory::default();
         let mut columns = Vec::with_capacity(free.len());
         let mut slopes = Vec::with_capacity(free.len());
         for &index in &free {
             // Forward differences use a tenth of this step.
-            let step = 10.0 * bounds.step[index];
-            let mut at = |sign: f64| {
-                let mut theta = found.theta;
-                theta.values[index] += sign * step;
-                evaluate(blocks, &theta, &mut memory)
-            };
-            let (above, below) = (at(1.0)?, at(-1.0)?);
+            let (ends, span) = near.ends(&found.theta, index, 10.0 * bounds.step[index]);
+            let mut at = |theta: &Theta| evaluate(blocks, theta, &mut memory);
+            let (below, above) = (at(&ends[0])?, at(&ends[1])?);
             let residuals = above.residual.iter().zip(&below.residual);
-            columns.push(
-                residuals
-                    .map(|(a, b)| (a - b) / (2.0 * step))
-                    .collect::<Vec<f64>>(),
-            );
-            let slope =
-                |value: fn(&Evaluation) -> f64| (value(&above) - value(&below)) / (2.0 * step);
-            slopes.push([slope(|e| e.gain), slope(|e| e.state[e.state.len() - 1])]);
+            columns.push(residuals.map(|(a, b)| (a - b) / span).collect::<Vec<f64>>());
+            let [after, before] = [(&above, &ends[1]), (&below, &ends[0])].map(|(at, theta)| {
+                let disturbance = at.state[at.state.len() - 1];
+                [at.gain, disturbance].map(|value| near.symmetric(theta) * value)
+            });
+            slopes.push([0, 1].map(|k| (after[k] - before[k]) / span));
         }
         let information: Vec<Vec<f64>> = (columns.iter())
             .map(|a| columns.iter().map(|b| dot(a, b)).collect())
@@ -78,25 +77,28 @@ impl Laplace {
         if let Some(slot) = hidden {
             let mut others = free;
             others.remove(slot);
-            return Self::new(blocks, found, &others, bounds);
+            return Self::new(blocks, found, (&others, &near), bounds);
         }
         let coloured = coloured(&columns, &found.at.residual, &inverse, factor);
         Some(Self {
             free,
             covariance,
+            near,
             slopes,
             coloured,
         })
     }
 
-    /// Standard deviation of the gain.
-    pub(super) fn gain_deviation(&self, at: &Evaluation) -> f64 {
+    /// Standard deviation of the gain, or of what is known in its place where lags are nearly equal, over its size.
+    pub(super) fn gain_deviation(&self, found: &Found) -> f64 {
+        let (at, symmetric) = (&found.at, self.near.symmetric(&found.theta));
         let n = self.free.len();
         let slope = |i: usize| self.slopes[i][0];
         let through: f64 = (0..n * n)
             .map(|k| slope(k / n) * self.covariance[k / n][k % n] * slope(k % n))
             .sum();
-        (at.gain_factor * at.variance + through).sqrt()
+        let own = at.gain_factor * at.variance;
+        (own + through / (symmetric * symmetric)).sqrt() / at.gain.abs()
     }
 
     /// `ln det(covariance) / 2`.

@@ -8,6 +8,7 @@
 
 use super::descent::{Found, Patience, descend};
 use super::laplace::Laplace;
+use super::near_lags::NearLags;
 use super::record::Blocks;
 use super::theta::{Bounds, NoiseKind, Theta};
 
@@ -46,9 +47,9 @@ struct Point {
 }
 
 impl Point {
-    fn of(blocks: &Blocks<'_>, found: Found, bounds: &Bounds) -> Option<Self> {
-        let process: Vec<usize> = (0..=found.theta.layout().tau()).collect();
-        let laplace = Laplace::new(blocks, &found, &process, bounds)?;
+    fn of(blocks: &Blocks<'_>, found: Found, near: &NearLags, bounds: &Bounds) -> Option<Self> {
+        let process = process(&found.theta);
+        let laplace = Laplace::new(blocks, &found, (&process, near), bounds)?;
         Some(Self {
             log_weight: found.at.log_likelihood + laplace.half_log_determinant(),
             found,
@@ -57,9 +58,20 @@ impl Point {
     }
 }
 
+/// Unknowns of the process.
+fn process(theta: &Theta) -> Vec<usize> {
+    (0..=theta.layout().tau()).collect()
+}
+
+/// The lags of a fit that are nearly equal. All components have the coordinates of the best one: volumes in others do not
+/// compare.
+fn near_lags(found: &Found) -> NearLags {
+    NearLags::of(&found.theta, &process(&found.theta))
+}
+
 /// The one component of a fit. `None` if the unknowns have no joint maximum.
 pub(super) fn of_one(blocks: &Blocks<'_>, found: &Found, bounds: &Bounds) -> Option<Component> {
-    let point = Point::of(blocks, found.clone(), bounds)?;
+    let point = Point::of(blocks, found.clone(), &near_lags(found), bounds)?;
     Some(Component {
         weight: 1.0,
         found: point.found,
@@ -69,7 +81,8 @@ pub(super) fn of_one(blocks: &Blocks<'_>, found: &Found, bounds: &Bounds) -> Opt
 
 /// Components about the best fit. Empty if the unknowns have no joint maximum.
 pub(super) fn mixture(blocks: &Blocks<'_>, best: &Found, bounds: &Bounds) -> Vec<Component> {
-    let Some(centre) = Point::of(blocks, best.clone(), bounds) else {
+    let near = near_lags(best);
+    let Some(centre) = Point::of(blocks, best.clone(), &near, bounds) else {
         return vec![];
     };
     let has_integrator = best.theta.structure.stages().integrators > 0;
@@ -81,13 +94,8 @@ pub(super) fn mixture(blocks: &Blocks<'_>, best: &Found, bounds: &Bounds) -> Vec
                 for step in [-SPACING, SPACING] {
                     let mut start = best.theta;
                     start.values[index] += step;
-                    walk(
-                        blocks,
-                        (start, kind),
-                        (step, POINTS, WARM),
-                        bounds,
-                        &mut points,
-                    );
+                    let grid = (step, POINTS, WARM);
+                    walk(blocks, (start, kind), grid, (&near, bounds), &mut points);
                 }
             }
         } else if has_integrator || kind != NoiseKind::OutputWalk {
@@ -95,7 +103,7 @@ pub(super) fn mixture(blocks: &Blocks<'_>, best: &Found, bounds: &Bounds) -> Vec
             let mut start = best.theta;
             start.set_noise(kind, 3.0 / blocks.length_s());
             let grid = (HIDDEN_SPACING, HIDDEN_POINTS, HIDDEN);
-            walk(blocks, (start, kind), grid, bounds, &mut points);
+            walk(blocks, (start, kind), grid, (&near, bounds), &mut points);
         }
     }
     let weights = points.iter().map(|point| point.log_weight);
@@ -116,7 +124,7 @@ fn walk(
     blocks: &Blocks<'_>,
     (start, kind): (Theta, NoiseKind),
     (step, most, patience): (f64, usize, Patience),
-    bounds: &Bounds,
+    (near, bounds): (&NearLags, &Bounds),
     points: &mut Vec<Point>,
 ) {
     let index = start.layout().noise(kind);
@@ -128,7 +136,7 @@ fn walk(
             break;
         }
         let fitted = descend(blocks, &theta, &others(&theta, kind), bounds, patience);
-        let Some(point) = fitted.and_then(|found| Point::of(blocks, found, bounds)) else {
+        let Some(point) = fitted.and_then(|found| Point::of(blocks, found, near, bounds)) else {
             break;
         };
         theta = point.found.theta;

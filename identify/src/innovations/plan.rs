@@ -9,9 +9,8 @@ use onecycle_design::state_space::StateSpace;
 
 use super::descent::Found;
 use super::draws;
-use super::laplace::Laplace;
 use super::likelihood::{Memory, evaluate};
-use super::mixture::Component;
+use super::mixture;
 use super::record::{Blocks, Forces, Hold, Record};
 use super::response;
 use super::theta::{Bounds, NoiseKind, Theta};
@@ -62,13 +61,7 @@ pub fn expected(
     let mut at = evaluate(&blocks, &theta, &mut Memory::default())?;
     at.variance = noise.sigma * noise.sigma;
     let found = Found { theta, at };
-    let process: Vec<usize> = (0..=theta.layout().tau()).collect();
-    let laplace = Laplace::new(&blocks, &found, &process, &bounds)?;
-    let component = Component {
-        weight: 1.0,
-        found,
-        laplace,
-    };
+    let component = mixture::of_one(&blocks, &found, &bounds)?;
     let best = component.found.clone();
     let stamps = draws::Stamps {
         sample_s,

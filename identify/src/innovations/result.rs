@@ -31,6 +31,9 @@ pub(crate) fn gain_of(structure: Structure) -> Parameter {
 pub(super) fn at_bound(theta: &Theta, bounds: &Bounds) -> Option<Parameter> {
     let layout = theta.layout();
     let above = |index: usize| theta.values[index] >= bounds.high[index] - 1e-9;
+    if bounds.has_fastest_pair(theta) {
+        return Some(Parameter::NaturalFrequency);
+    }
     if above(layout.tau()) {
         return Some(Parameter::Tau);
     }

@@ -501,8 +501,16 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
         }
         Structure::DoubleIntegratorLag => with(&[lag], 0.0, 0.0),
         Structure::Toptd if old.pair().is_some() => {
-            if let Some((slow_s, fast_s)) = from.real_lags_s() {
+            if let Some((slow_s, fast_s)) = from.real_lags_s().or_else(|| nearly_real_s(from)) {
                 with(&[lag, fast_s], slow_s, 0.0);
+            }
+        }
+        // A lag much longer than the others stands for the integrator.
+        Structure::Toiptd if old.pair().is_some() => {
+            if lag > INTEGRATING * body_s && body_s > 0.0 {
+                let third_s = body_s / 3.0;
+                let [short_s, long_s] = [1.0 - APART, 1.0 + APART].map(|part| part * third_s);
+                with(&[third_s, short_s], long_s, 0.0);
             }
         }
         Structure::Toiptd | Structure::Toptd => with(&[lag, 0.3 * lag], body_s, -0.3 * lag),
@@ -523,6 +531,20 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
         _ => {}
     }
     starts
+}
+
+/// Relative distance of the lags of a start from their mean: the slope is zero where they are equal.
+const APART: f64 = 0.1;
+/// Ratio of lags above which the longer one is as good as an integrator.
+const INTEGRATING: f64 = 10.0;
+
+/// Two lags (s) with the sum of those of a well damped second-order stage.
+fn nearly_real_s(theta: &Theta) -> Option<(f64, f64)> {
+    let pair = theta.layout().pair()?;
+    let (c1, c0) = (theta.values[pair], theta.values[pair + 1]);
+    let mean_s = 0.5 * c1 / c0;
+    let is_damped = c1 > 0.0 && c1 * c1 > 2.0 * c0;
+    is_damped.then_some((mean_s * (1.0 + APART), mean_s * (1.0 - APART)))
 }
 
 /// Fit from a point that is nearly right, without putting the lags in order.

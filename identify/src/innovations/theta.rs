@@ -186,6 +186,10 @@ impl Theta {
     }
 }
 
+/// Shortest lag and shortest time constant of a body of which a record has a fit, as parts of a sample: one over these.
+pub(super) const LAGS_IN_A_SAMPLE: f64 = 20.0;
+pub(super) const BODIES_IN_A_SAMPLE: f64 = 2.0;
+
 /// Box that holds the unknowns, and steps for differences.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bounds {
@@ -216,10 +220,10 @@ impl Bounds {
             bounds.step[index] = step;
         };
         for lag in 0..layout.stages.lags {
-            set(lag, (dt / 20.0).ln(), length.ln(), 1e-5);
+            set(lag, (dt / LAGS_IN_A_SAMPLE).ln(), length.ln(), 1e-5);
         }
         if let Some(pole) = layout.pole() {
-            set(pole, -3.0 / length, 2.0 / dt, 1e-4 / length);
+            set(pole, -3.0 / length, BODIES_IN_A_SAMPLE / dt, 1e-4 / length);
         }
         if let Some(pair) = layout.pair() {
             set(pair, -3.0 / length, 4.0 / dt, 1e-4 / length);
@@ -241,6 +245,13 @@ impl Bounds {
             inside.values[index] = theta.values[index].clamp(self.low[index], self.high[index]);
         }
         inside
+    }
+
+    /// Whether the second-order stage is as fast as the search allows.
+    pub(super) fn has_fastest_pair(&self, theta: &Theta) -> bool {
+        let is_highest = |index: usize| theta.values[index] >= self.high[index] - 1e-9;
+        let pair = theta.layout().pair();
+        pair.is_some_and(|pair| is_highest(pair) || is_highest(pair + 1))
     }
 
     /// Whether an unknown is on the boundary.

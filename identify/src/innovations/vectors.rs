@@ -415,6 +415,7 @@ fn check(record: &Record, samples: usize, theta: &Theta, expected: [f64; 5]) -> 
 fn best_points_with_their_covariance() {
     use super::descent::{Patience, descend};
     use super::laplace::Laplace;
+    use super::near_lags::NearLags;
     use super::theta::Bounds;
 
     // Samples a block, kind of noise; T, a, tau, w, gain, ln L, variance; deviations of ln T, a, tau, ln w, gain.
@@ -482,15 +483,16 @@ fn best_points_with_their_covariance() {
         close(found.at.gain, gain, 1e-5, "gain");
         close(found.at.variance, variance, 1e-5, "variance");
         assert!((found.at.log_likelihood - likelihood).abs() < 1e-6);
-        let laplace = Laplace::new(&blocks, &found, &free, &bounds).unwrap();
+        let laplace =
+            Laplace::new(&blocks, &found, (&free, &NearLags::default()), &bounds).unwrap();
         assert_eq!(laplace.free, free);
         for (slot, deviation) in deviations[..4].iter().enumerate() {
             let found = laplace.covariance[slot][slot].sqrt();
             close(found, *deviation, 1e-3, "deviation");
         }
         close(
-            laplace.gain_deviation(&found.at),
-            deviations[4],
+            laplace.gain_deviation(&found),
+            deviations[4] / gain,
             1e-3,
             "deviation of the gain",
         );

@@ -48,7 +48,7 @@ pub(super) fn with_real_poles(mut at: [f64; 5], covariance: Option<&[[f64; 5]; 5
 }
 
 /// Part of the draws below which equal lags are ruled out: what the central 90 % leave out at one end.
-const RULED_OUT: f64 = 0.05;
+pub(super) const RULED_OUT: f64 = 0.05;
 
 /// Ends of the central 90 % interval of the values of a parameter, widened to those of the draws with `equal` lags unless equal
 /// lags are ruled out. All draws with complex poles become one line of processes, at the end of the interval of a lag. Where

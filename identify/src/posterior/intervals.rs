@@ -56,11 +56,21 @@ pub struct StepIntervals {
     pub peak_input: Interval,
 }
 
+/// Shortest time constants (s) that a search went down to. Zero: all.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Shortest {
+    /// Of an actuator.
+    pub(crate) lag_s: f64,
+    /// Of a body.
+    pub(crate) body_s: f64,
+}
+
 /// Parameters of a model and the input bias, each with its 90 % interval.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
     pub(super) structure: Structure,
     pub(super) intervals: Vec<(Parameter, Interval)>,
+    pub(super) shortest: Shortest,
 }
 
 impl Estimate {
@@ -76,6 +86,22 @@ impl Estimate {
         (self.intervals.iter())
             .find(|(of, _)| *of == parameter)
             .map(|(_, interval)| *interval)
+    }
+
+    /// Whether a parameter is below the upper end of its interval, and no more is known of it: the lower end is where its search
+    /// begins. That is zero for a dead time and a damping ratio, and a part of a sample for a lag.
+    #[must_use]
+    pub fn is_below(&self, parameter: Parameter) -> bool {
+        let bound = match parameter {
+            Parameter::Tau | Parameter::Zeta => 0.0,
+            Parameter::TProp | Parameter::TProp2 => self.shortest.lag_s,
+            Parameter::TBody => self.shortest.body_s,
+            _ => return false,
+        };
+        self.get(parameter).is_some_and(|interval| {
+            let is_at_bound = |low: f64| low <= bound * (1.0 + 1e-9);
+            interval.low.is_some_and(is_at_bound) && interval.high.is_some()
+        })
     }
 
     /// All parameters with their intervals: first those of the structure in the order of [`Structure::parameters`],

@@ -8,6 +8,7 @@
 mod checks;
 mod forces;
 mod instrument;
+mod lags;
 mod names;
 mod outcomes;
 mod steps;

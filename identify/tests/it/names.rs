@@ -1,7 +1,7 @@
 //! Names and sentences of verdicts and remarks.
 
 use onecycle_design::{DesignError, Parameter};
-use onecycle_identify::{Remark, Verdict};
+use onecycle_identify::{Interval, Remark, Verdict};
 use onecycle_onboard::refine::DomainEdge;
 
 /// Every verdict with its name in JSON.
@@ -83,6 +83,11 @@ fn remarks_have_a_stable_unique_name() {
     let parameter = Parameter::TProp;
     let (low_s, high_s) = (0.01, 0.02);
     let relative_half_width = 0.4;
+    let mean_s = Interval {
+        estimate: Some(1.0),
+        low: Some(0.9),
+        high: Some(1.1),
+    };
     let names = [
         (Remark::Disturbed(0.1), "disturbed"),
         (Remark::OneCycle { is_known: true }, "one_cycle"),
@@ -91,6 +96,13 @@ fn remarks_have_a_stable_unique_name() {
         (Remark::Unread, "unread"),
         (Remark::NegativeGain, "negative_gain"),
         (Remark::DampingNotSeen(None), "damping_not_seen"),
+        (
+            Remark::EqualLags {
+                lags: vec![Parameter::TBody, Parameter::TProp],
+                mean_s,
+            },
+            "equal_lags",
+        ),
         (
             Remark::Weak {
                 parameter,

@@ -83,9 +83,13 @@ pub(super) fn section(identified: &Identified, units: &Units) -> Section {
 fn table(identified: &Identified, units: &Units) -> String {
     let cells: Vec<(&str, [String; 4])> = (identified.estimate.iter())
         .map(|(parameter, interval)| {
-            let estimate = interval.estimate.map_or("infinite".to_owned(), significant);
-            let (low, high) = (bounded(interval.low), bounded(interval.high));
             let unit = units.parameter(identified.model.structure(), parameter);
+            let (low, high) = (bounded(interval.low), bounded(interval.high));
+            if identified.estimate.is_below(parameter) {
+                let below = [format!("below {high}"), String::new(), String::new(), unit];
+                return (parameter.symbol(), below);
+            }
+            let estimate = interval.estimate.map_or("infinite".to_owned(), significant);
             (parameter.symbol(), [estimate, low, high, unit])
         })
         .collect();
