@@ -478,6 +478,7 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
     };
     // Lags that the structure lacks lengthen its dead time.
     let lost_s = if old.stages.lags > 0 { lag } else { 0.0 };
+    let is_integrating = body_s > 0.0 && lag > INTEGRATING * body_s;
     let mut starts = Vec::new();
     let mut with = |lags: &[f64], body: f64, lost_s: f64| {
         let mut start = theta;
@@ -506,13 +507,12 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
             }
         }
         // A lag much longer than the others stands for the integrator.
-        Structure::Toiptd if old.pair().is_some() => {
-            if lag > INTEGRATING * body_s && body_s > 0.0 {
-                let third_s = body_s / 3.0;
-                let [short_s, long_s] = [1.0 - APART, 1.0 + APART].map(|part| part * third_s);
-                with(&[third_s, short_s], long_s, 0.0);
-            }
+        Structure::Toiptd if old.pair().is_some() && is_integrating => {
+            let third_s = body_s / 3.0;
+            let [short_s, long_s] = [1.0 - APART, 1.0 + APART].map(|part| part * third_s);
+            with(&[third_s, short_s], long_s, 0.0);
         }
+        Structure::Toiptd if old.pair().is_some() => {}
         Structure::Toiptd | Structure::Toptd => with(&[lag, 0.3 * lag], body_s, -0.3 * lag),
         Structure::Resonant => {
             if let (Some(pair), Some(own)) = (layout.pair(), old.pair()) {
