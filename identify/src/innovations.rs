@@ -167,15 +167,7 @@ impl Search<'_> {
         let components = fitted.posterior(&blocks);
         let tests = validate::tests(&blocks, &fitted.best.found.at);
         let informative = validate::informative(&blocks, &fitted.best.found.theta);
-        let horizon_s = validate::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
-        let theta = &fitted.best.found.theta;
-        let prediction = validate::prediction(
-            &fitted.record,
-            theta,
-            &fitted.limits,
-            fitted.samples,
-            horizon_s,
-        );
+        let prediction = fitted.prediction(&fitted.best.found.theta);
         if let Some(excitation) = &mut self.excitation {
             excitation.outliers = fitted.outliers;
             excitation.samples_per_row = fitted.samples;
@@ -208,6 +200,11 @@ impl Search<'_> {
     ) -> Result<(), Verdict> {
         let informative = (self.excitation).and_then(|found| found.informative_rad_per_s);
         if informative.is_some_and(|band| validate::input_share(blocks, band) <= LEAST_POWER) {
+            return Err(self.no_information(&fitted.best.found.theta, None));
+        }
+        // Without disturbances a few sines fit a few others.
+        let unknowns = fitted.best.found.theta.free().len() + 1;
+        if fitted.is_output_error && validate::order_of_excitation(blocks, LEAST_POWER) < unknowns {
             return Err(self.no_information(&fitted.best.found.theta, None));
         }
         let rows = fitted.best.found.at.residual.len();

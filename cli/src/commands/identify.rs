@@ -8,7 +8,7 @@ use onecycle::{
     ColumnRef, CsvOptions, Hold, Identification, ReadError, Recording, Road, Specification,
     Structure, Style, Verdict,
 };
-use onecycle_link::LogError;
+use onecycle_link::{LogError, Span};
 
 use super::log::{self, Piped, Source};
 use super::log_gains::{self, LogLoop};
@@ -293,11 +293,18 @@ pub(crate) fn read(
         let source = Source { path, bytes };
         let (signals, of_log) = LogLoop::of(&source, arguments)?;
         let is_cut = arguments.from.is_some() || arguments.to.is_some();
-        let part = of_log.as_ref().filter(|_| !is_cut).and_then(|of_log| {
-            let _waiting = Waiting::on("comparing the parts of the flight");
-            let asked = of_log.specification(*asked, arguments.design.is_form_given());
-            flight::best_part(&signals, of_log.flight(), &asked)
-        });
+        let part = match is_cut {
+            // As the table of all loops cuts its parts: what is not asked for does not matter.
+            true => Some(Span::new(
+                arguments.from.unwrap_or(f64::NEG_INFINITY),
+                arguments.to.unwrap_or(f64::INFINITY),
+            )),
+            false => of_log.as_ref().and_then(|of_log| {
+                let _waiting = Waiting::on("comparing the parts of the flight");
+                let asked = of_log.specification(*asked, arguments.design.is_form_given());
+                flight::best_part(&signals, of_log.flight(), &asked)
+            }),
+        };
         let signals = part.map_or_else(|| signals.clone(), |part| signals.part(part));
         return Ok((log::recording(&source, &signals)?, of_log));
     }

@@ -188,7 +188,7 @@ fn a_double_integrator() {
     for name in ["k", "t_body_s"] {
         assert_eq!(report.0["process"][name]["high"], Value::Null, "{name}");
     }
-    report.remarked(&["T_body"]);
+    report.told("details", &["T_body"]);
     let text = identify_as_text(&recording, &[]);
     assert!(
         text.without_nan().stdout.contains("unbounded"),

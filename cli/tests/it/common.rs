@@ -323,7 +323,12 @@ impl Report {
 
     /// Asserts a remark on the result with each of `words`.
     pub(crate) fn remarked(&self, words: &[&str]) -> &Self {
-        let remarks = self.sentences("remarks");
+        self.told("remarks", words)
+    }
+
+    /// Asserts a sentence with each of `words` under a key.
+    pub(crate) fn told(&self, key: &str, words: &[&str]) -> &Self {
+        let remarks = self.sentences(key);
         let has_all = |remark: &&str| words.iter().all(|word| remark.contains(word));
         assert!(remarks.iter().any(has_all), "{words:?} not in {remarks:?}");
         self

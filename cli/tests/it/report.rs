@@ -84,11 +84,13 @@ fn what_is_faster_than_a_sample_reads_below() {
     let test = "--excitation prbs --pulse 2 --duration 200 --sample-rate 20 --noise 0.02";
     let words = |text: &'static str| text.split(' ').collect::<Vec<_>>();
     let recording = simulate(&words(process), &words(test));
-    let report = identify(&recording, &[]).report().0;
+    let held = ["--hold", "held"];
+    let report = identify(&recording, &held).report().0;
     assert_eq!(report["below"], serde_json::json!(["t_body_s", "tau_s"]));
-    let lines = identify_as_text(&recording, &[]).stdout;
+    let lines = identify_as_text(&recording, &held).stdout;
     let folder = Scratch::new();
-    let (_, page) = reported(&["identify", &folder.write("fast.csv", recording.as_bytes())]);
+    let path = folder.write("fast.csv", recording.as_bytes());
+    let (_, page) = reported(&["identify", &path, held[0], held[1]]);
     for (name, key) in [("T_body", "t_body_s"), ("tau", "tau_s")] {
         let high = report["process"][key]["high"].as_f64().unwrap();
         assert!((0.04..0.05).contains(&high), "{high}");

@@ -10,8 +10,11 @@ use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, NoiseKind, Theta};
-use super::{LONGEST_TAU, ROWS, forces, outliers, output_error, validate};
+use super::{
+    LEAST_PREDICTED, LONGEST_TAU, MOST_ERROR_RATIO, ROWS, forces, outliers, output_error, validate,
+};
 use crate::assumed::RecordedLoop;
+use crate::outcome::Prediction;
 use crate::remark::Remark;
 use crate::settings::Options;
 use crate::signals::range;
@@ -124,7 +127,8 @@ impl Fitted {
         if let Some(remark) = fitted.add_forces() {
             remarks.push(remark);
         }
-        if let Some(found) = output_error::instead(&fitted.blocks(), &fitted.best, longest) {
+        let without = output_error::instead(&fitted.blocks(), &fitted.best, longest);
+        if let Some(found) = without.filter(|found| !fitted.fails(&found.found.theta)) {
             let with = validate::tests(&fitted.blocks(), &fitted.best.found.at);
             fitted.holds_both = !validate::is_left_to_the_input(&with);
             if fitted.holds_both {
@@ -138,6 +142,20 @@ impl Fitted {
 
     pub(super) fn blocks(&self) -> Blocks<'_> {
         Blocks::new(&self.record, self.samples, self.limits.skip_s)
+    }
+
+    /// Prediction of the last third of the record.
+    pub(super) fn prediction(&self, theta: &Theta) -> Option<Prediction> {
+        let blocks = self.blocks();
+        let horizon_s = validate::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
+        validate::prediction(&self.record, theta, &self.limits, self.samples, horizon_s)
+    }
+
+    /// Whether a fit does not predict the last third of the record, and the disturbances do not excuse it.
+    fn fails(&self, theta: &Theta) -> bool {
+        self.prediction(theta).is_some_and(|found| {
+            found.explained < LEAST_PREDICTED && found.error_ratio > MOST_ERROR_RATIO
+        })
     }
 
     /// Adds the nonlinear forces that the record asks for, and fits again.

@@ -48,6 +48,12 @@ impl Orthogonal {
         found
     }
 
+    /// Number of columns of which at least a share `least` of the length is no combination of those before them.
+    pub(crate) fn rank(&self, least: f64) -> usize {
+        let own = self.r.iter().filter_map(|r| r.last());
+        own.filter(|own| **own >= least).count()
+    }
+
     /// Number of columns.
     pub(crate) fn len(&self) -> usize {
         self.q.len()

@@ -32,6 +32,9 @@ use super::validate;
 /// Simulated disturbances: the test errs once in this number of records plus one.
 const SIMULATED: usize = 99;
 const SEED: u64 = 1;
+/// Share of the output's square that may be left under feedback. An input that followed all of the disturbance would bias the
+/// response by the root of it, 20 %; it follows a part of it.
+const LEFT_UNDER_FEEDBACK: f64 = 0.04;
 const PATIENCE: Patience = Patience {
     steps: 40,
     decrease: 1e-6,
@@ -48,13 +51,24 @@ pub(super) fn instead(
     with.theta.noises().next()?;
     // Innovations that past inputs explain are a fault of the fit under feedback too.
     let is_at_fault = || validate::is_left_to_the_input(&validate::tests(blocks, &with.at));
-    if blocks.record.forces.len() > 0 || validate::is_fed_back(blocks) && !is_at_fault() {
+    let is_fed_back = validate::is_fed_back(blocks);
+    if blocks.record.forces.len() > 0 || is_fed_back && !is_at_fault() {
         return None;
     }
     let quiet = with.theta.without_noises();
     let found = search::warm(blocks, &quiet, longest_tau_s, PATIENCE)?;
+    if is_fed_back && left(blocks, &found)? > LEFT_UNDER_FEEDBACK {
+        return None;
+    }
     let is_more = explains_more(blocks, with, &found, longest_tau_s)?;
     is_more.then(|| Candidate::new(found))
+}
+
+/// Share of the output's square that the simulation does not explain.
+fn left(blocks: &Blocks<'_>, found: &Found) -> Option<f64> {
+    let y = present(blocks);
+    let of = Regressors::of(blocks, &found.theta)?;
+    Some(of.all.left(&y) / of.start.left(&y))
 }
 
 /// Compares two shares of the simulation's error: the one that the fit without disturbances removes, and those that it would

@@ -97,6 +97,24 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
     (share, f)
 }
 
+/// Order of persistent excitation of the input, at most [`LAGS`]: that of one sine is two. `least`: share of its power that
+/// counts. Reference: L. Ljung, "System Identification" (1999), section 13.2.
+pub(super) fn order_of_excitation(blocks: &Blocks<'_>, least: f64) -> usize {
+    /// Lags in a period of the excitation.
+    const IN_A_PERIOD: f64 = 8.0;
+    let inputs = blocks.mean_inputs();
+    let lag_s = period_s(blocks).unwrap_or(0.0) / IN_A_PERIOD;
+    let longest = inputs.len() / (2 * LAGS);
+    let rows = ((lag_s / blocks.block_s()).round() as usize).clamp(1, longest.max(1));
+    let count = inputs.len().saturating_sub(LAGS * rows);
+    let mean = inputs.iter().sum::<f64>() / inputs.len() as f64;
+    let lagged = |lag: usize| inputs[lag * rows..][..count].iter();
+    let columns: Vec<Vec<f64>> = (0..LAGS)
+        .map(|lag| lagged(lag).map(|v| v - mean).collect())
+        .collect();
+    Orthogonal::independent(&columns).rank(least.sqrt())
+}
+
 /// Whether the input may follow the output: it switches between two levels, as that of a relay does, or past outputs explain it
 /// beyond what past inputs do.
 /// Reference: C. W. J. Granger, Econometrica 37 (1969).

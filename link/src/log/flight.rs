@@ -53,6 +53,20 @@ pub struct Span {
 }
 
 impl Span {
+    /// A part of a flight between two times (s).
+    #[must_use]
+    pub fn new(from_s: f64, to_s: f64) -> Self {
+        Self { from_s, to_s }
+    }
+
+    /// The longest span within it from one tenth of a second to another: a span that is printed is one that can be typed in.
+    pub(super) fn in_tenths(self) -> Self {
+        Self {
+            from_s: (10.0 * self.from_s).ceil() / 10.0,
+            to_s: (10.0 * self.to_s).floor() / 10.0,
+        }
+    }
+
     /// The span from the earlier start to the later end of both.
     #[must_use]
     pub fn with(self, other: Self) -> Self {

@@ -78,6 +78,9 @@ impl Flight {
             .into_iter()
             .flatten()
             .fold(whole, |usable, spans| overlaps(&usable, spans))
+            .into_iter()
+            .map(Span::in_tenths)
+            .collect()
     }
 
     /// Deliberate excitation of the axis of a rate or attitude loop.
@@ -86,7 +89,7 @@ impl Flight {
             return vec![];
         };
         let own = self.marks.iter().filter(|mark| mark.axis == Some(axis));
-        let spans: Vec<Span> = own.map(|mark| mark.span).collect();
+        let spans: Vec<Span> = own.map(|mark| mark.span.in_tenths()).collect();
         let mut marked = overlaps(usable, &spans);
         marked.retain(|span| span.to_s - span.from_s >= LENGTH_S.1);
         marked.truncate(MOST);
