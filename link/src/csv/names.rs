@@ -27,7 +27,7 @@ const TIME: [&str; 18] = [
 ];
 
 /// Usual names of the input of the process.
-const INPUT: [&str; 39] = [
+const INPUT: [&str; 37] = [
     "u",
     "input",
     "relay",
@@ -62,15 +62,13 @@ const INPUT: [&str; 39] = [
     "torque_cmd",
     "thrust_cmd",
     "pwm",
-    "voltage",
-    "volts",
     "voltage_cmd",
     "drive",
     "excitation",
 ];
 
 /// Usual names of the output of the process.
-const OUTPUT: [&str; 29] = [
+const OUTPUT: [&str; 25] = [
     "y",
     "pv",
     "output",
@@ -94,10 +92,6 @@ const OUTPUT: [&str; 29] = [
     "reading",
     "state",
     "position",
-    "velocity",
-    "speed",
-    "temperature",
-    "temp",
     "controlled_variable",
     "pv_value",
 ];
