@@ -52,8 +52,8 @@ pub(crate) fn calm(recording: &Recording, signals: &Signals<'_>) -> Option<Verdi
 /// rather than of the process: it is refused, unless a fit predicts nearly everything, as with a test signal that is added
 /// to the input. Else the fit to the input as it is stands if its innovations are white and owe nothing to the past input.
 /// Otherwise noise came back through the controller, and the part of the input that the set-point caused takes its place.
-/// If that has no fit either, or one whose innovations are not clean or that the response to the set-point contradicts,
-/// the response itself is fitted.
+/// If that has no fit either, or one whose innovations are not clean, that predicts little or that the response to the set-point
+/// contradicts, the response itself is fitted.
 pub(crate) fn identify(
     signals: &Signals<'_>,
     set_point: &[f64],
@@ -86,7 +86,8 @@ pub(crate) fn identify(
     };
     let found = in_two_stages(signals, &caused, direct, (options, pack));
     let stands = found.outcome.is_ok() && !is_contradicted(&found);
-    if share < LEAST_OF_RESPONSE || stands && is_clean(&found) {
+    let is_sure = stands && is_clean(&found) && explained(&found) >= LEAST_PREDICTED;
+    if share < LEAST_OF_RESPONSE || is_sure {
         return found;
     }
     let by_spectra = identify_by_set_point(signals, set_point, options, recorded);

@@ -144,9 +144,13 @@ fn parts(
     let mut outcomes: Vec<_> = (spans.par_iter())
         .filter_map(|span| Some((*span, identified(&signals.part(*span), asked)?)))
         .collect();
-    // What no part tells alone, the response to the set-point over all of the flight may tell. A fit to the input that no part
-    // confirms is not taken.
-    if spans.len() > 1 && outcomes.iter().all(|(_, outcome)| outcome.is_err()) {
+    // What no part tells alone to a factor of two, the response to the set-point over all of the flight may tell. A fit to the
+    // input that no part confirms is not taken.
+    let tells = |outcome: &Result<Identified, Verdict>| {
+        let gain = outcome.as_ref().ok().and_then(effectiveness);
+        gain.is_some_and(|[low, _, high]| high < 2.0 * low)
+    };
+    if spans.len() > 1 && !outcomes.iter().any(|(_, outcome)| tells(outcome)) {
         let whole = spans.iter().fold(spans[0], |all, span| all.with(*span));
         let outcome = identified(&signals.part(whole), asked);
         let outcome = outcome.filter(|outcome| {
