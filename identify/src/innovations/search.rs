@@ -451,12 +451,12 @@ const APART: f64 = 0.1;
 /// Ratio of lags above which the longer one is as good as an integrator.
 const INTEGRATING: f64 = 10.0;
 
-/// Two lags (s) with the sum of those of a well damped second-order stage.
+/// Two lags (s) with the sum of those of a second-order stage with complex but well damped poles.
 fn nearly_real_s(theta: &Theta) -> Option<(f64, f64)> {
     let pair = theta.layout().pair()?;
     let (c1, c0) = (theta.values[pair], theta.values[pair + 1]);
     let mean_s = 0.5 * c1 / c0;
-    let is_damped = c1 > 0.0 && c1 * c1 > 2.0 * c0;
+    let is_damped = c1 > 0.0 && (2.0 * c0..4.0 * c0).contains(&(c1 * c1));
     is_damped.then_some((mean_s * (1.0 + APART), mean_s * (1.0 - APART)))
 }
 
