@@ -418,12 +418,9 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
                 with(&[lag, fast_s], slow_s, 0.0);
             }
         }
-        // A lag much longer than the others stands for the integrator.
         Structure::Toiptd if old.pair().is_some() => {
-            if lag > INTEGRATING * body_s && body_s > 0.0 {
-                let third_s = body_s / 3.0;
-                let [short_s, long_s] = [1.0 - APART, 1.0 + APART].map(|part| part * third_s);
-                with(&[third_s, short_s], long_s, 0.0);
+            if let Some([long_s, middle_s, short_s]) = thirds_s(lag, body_s) {
+                with(&[middle_s, short_s], long_s, 0.0);
             }
         }
         Structure::Toiptd | Structure::Toptd => with(&[lag, 0.3 * lag], body_s, -0.3 * lag),
@@ -450,6 +447,12 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
 const APART: f64 = 0.1;
 /// Ratio of lags above which the longer one is as good as an integrator.
 const INTEGRATING: f64 = 10.0;
+
+/// Three lags (s) with the sum of those of a second-order stage, beside a lag that stands for an integrator.
+fn thirds_s(lag_s: f64, sum_s: f64) -> Option<[f64; 3]> {
+    let is_integrating = sum_s > 0.0 && lag_s > INTEGRATING * sum_s;
+    is_integrating.then_some([1.0 + APART, 1.0, 1.0 - APART].map(|part| part * sum_s / 3.0))
+}
 
 /// Two lags (s) with the sum of those of a second-order stage with complex but well damped poles.
 fn nearly_real_s(theta: &Theta) -> Option<(f64, f64)> {
