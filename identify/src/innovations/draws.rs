@@ -37,8 +37,7 @@ impl Stamps {
 /// Least rate (1/s) of a lag.
 const LEAST_RATE: f64 = 1e-12;
 
-/// The process with its second-order stage as two lags, the nearest double lag in place of complex poles. The slowest of all
-/// lags is the body's.
+/// The process with its second-order stage as two lags, the nearest double lag in place of complex poles.
 fn with_lags(process: &Linear) -> Linear {
     let [c1, c0] = process.pair();
     let root = (0.25 * c1 * c1 - c0).max(0.0).sqrt();
@@ -48,15 +47,32 @@ fn with_lags(process: &Linear) -> Linear {
         c0.sqrt()
     };
     let fast = fast.max(LEAST_RATE);
-    let mut rates: Vec<f64> = process.lags_s().iter().map(|lag_s| 1.0 / lag_s).collect();
-    // The gain of the product of all 1/(s + rate).
-    let gain = process.gain() * rates.iter().product::<f64>();
-    rates.extend([fast, c0 / fast]);
-    rates.sort_by(f64::total_cmp);
     let structure = match process.structure() {
         Structure::Resonant => Structure::Soptd,
         _ => Structure::Toptd,
     };
+    of_rates(process, structure, [fast, c0 / fast])
+}
+
+/// The process with its lags in order: that of the body is the longest.
+fn in_order(process: &Linear) -> Linear {
+    let stages = process.structure().stages();
+    let lags_s = process.lags_s();
+    let pole = process.pole_per_s();
+    let is_ordered = lags_s.iter().all(|lag_s| lag_s * pole <= 1.0);
+    if stages.poles == 0 || is_ordered && lags_s.is_sorted_by(|a, b| a >= b) {
+        return *process;
+    }
+    of_rates(process, process.structure(), [pole])
+}
+
+/// The process in a structure of lags and a body, with these rates beside those of its lags. The slowest is the body's.
+fn of_rates<const N: usize>(process: &Linear, structure: Structure, others: [f64; N]) -> Linear {
+    let mut rates: Vec<f64> = process.lags_s().iter().map(|lag_s| 1.0 / lag_s).collect();
+    // The gain of the product of all 1/(s + rate).
+    let gain = process.gain() * rates.iter().product::<f64>();
+    rates.extend(others);
+    rates.sort_by(f64::total_cmp);
     let mut lags_s = [1.0; 2];
     for (lag_s, rate) in lags_s.iter_mut().zip(&rates[1..]) {
         *lag_s = 1.0 / rate;
@@ -85,8 +101,9 @@ pub(super) fn reported(process: &Linear, as_lags: bool) -> Linear {
     }
 }
 
+/// The process of a fit, whose output was recorded `early_s` after its time stamps.
 pub(super) fn process(theta: &Theta, gain: f64, early_s: f64) -> Linear {
-    let process = theta.process(gain);
+    let process = in_order(&theta.process(gain));
     process.with_tau_s(process.tau_s() + early_s)
 }
 

@@ -478,7 +478,6 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
     };
     // Lags that the structure lacks lengthen its dead time.
     let lost_s = if old.stages.lags > 0 { lag } else { 0.0 };
-    let is_integrating = body_s > 0.0 && lag > INTEGRATING * body_s;
     let mut starts = Vec::new();
     let mut with = |lags: &[f64], body: f64, lost_s: f64| {
         let mut start = theta;
@@ -506,13 +505,11 @@ pub(super) fn derive(from: &Theta, structure: Structure, dt_s: f64) -> Vec<Theta
                 with(&[lag, fast_s], slow_s, 0.0);
             }
         }
-        // A lag much longer than the others stands for the integrator.
-        Structure::Toiptd if old.pair().is_some() && is_integrating => {
-            let third_s = body_s / 3.0;
-            let [short_s, long_s] = [1.0 - APART, 1.0 + APART].map(|part| part * third_s);
-            with(&[third_s, short_s], long_s, 0.0);
+        Structure::Toiptd if old.pair().is_some() => {
+            if let Some([long_s, middle_s, short_s]) = thirds_s(lag, body_s) {
+                with(&[middle_s, short_s], long_s, 0.0);
+            }
         }
-        Structure::Toiptd if old.pair().is_some() => {}
         Structure::Toiptd | Structure::Toptd => with(&[lag, 0.3 * lag], body_s, -0.3 * lag),
         Structure::Resonant => {
             if let (Some(pair), Some(own)) = (layout.pair(), old.pair()) {
@@ -538,12 +535,18 @@ const APART: f64 = 0.1;
 /// Ratio of lags above which the longer one is as good as an integrator.
 const INTEGRATING: f64 = 10.0;
 
-/// Two lags (s) with the sum of those of a well damped second-order stage.
+/// Three lags (s) with the sum of those of a second-order stage, beside a lag that stands for an integrator.
+fn thirds_s(lag_s: f64, sum_s: f64) -> Option<[f64; 3]> {
+    let is_integrating = sum_s > 0.0 && lag_s > INTEGRATING * sum_s;
+    is_integrating.then_some([1.0 + APART, 1.0, 1.0 - APART].map(|part| part * sum_s / 3.0))
+}
+
+/// Two lags (s) with the sum of those of a second-order stage with complex but well damped poles.
 fn nearly_real_s(theta: &Theta) -> Option<(f64, f64)> {
     let pair = theta.layout().pair()?;
     let (c1, c0) = (theta.values[pair], theta.values[pair + 1]);
     let mean_s = 0.5 * c1 / c0;
-    let is_damped = c1 > 0.0 && c1 * c1 > 2.0 * c0;
+    let is_damped = c1 > 0.0 && (2.0 * c0..4.0 * c0).contains(&(c1 * c1));
     is_damped.then_some((mean_s * (1.0 + APART), mean_s * (1.0 - APART)))
 }
 
