@@ -1,7 +1,8 @@
 //! Result of an identification.
 
 use num_complex::Complex64;
-use onecycle_design::{Design, Model, Proposal, Specification, StepMetrics, proposals};
+use onecycle_design::bands::quantiles;
+use onecycle_design::{Design, Model, Parameter, Proposal, Specification, StepMetrics, proposals};
 use onecycle_onboard::refine::Refined;
 
 use crate::excitation::{Excitation, Oscillation, Switching};
@@ -105,6 +106,35 @@ pub struct Identified {
 }
 
 impl Identified {
+    /// Rate of change of the output per unit of input (output unit/(s input unit)), with its 90 % interval: low, estimate, high.
+    /// Of the loop of an angular rate it is the angular acceleration. An integrator has it in steady state, a damped body before it
+    /// moves, and a resonance at its natural frequency, where `|s G|` has its peak `K w0 / (2 zeta)`. The high end may be infinite.
+    /// `None`: there is no such rate, or no interval.
+    #[must_use]
+    pub fn effectiveness(&self) -> Option<[f64; 3]> {
+        let stages = self.model.structure().stages();
+        let gain = match (stages.integrators, stages.poles, stages.pairs) {
+            (1, _, _) => self.estimate.get(Parameter::K)?,
+            (0, 1, _) => self.estimate.get(Parameter::KOverTBody)?,
+            (0, _, 1) => return self.peak_rate(),
+            _ => return None,
+        };
+        let high = gain.high.unwrap_or(f64::INFINITY);
+        Some([gain.low?, gain.estimate?, high])
+    }
+
+    fn peak_rate(&self) -> Option<[f64; 3]> {
+        let peak = |value: &dyn Fn(Parameter) -> Option<f64>| {
+            let frequency = value(Parameter::NaturalFrequency)?;
+            Some(value(Parameter::K)? * frequency / (2.0 * value(Parameter::Zeta)?))
+        };
+        let estimate = peak(&|parameter| self.model.parameter(parameter))?;
+        let draws = self.posterior.draws().iter();
+        let of_draws = draws.filter_map(|draw| peak(&|parameter| draw.value(parameter)));
+        let (low, high) = quantiles(of_draws.collect())?;
+        Some([low.min(estimate), estimate, high.max(estimate)])
+    }
+
     /// Model to design a controller for, and the first `most` draws that it has to serve. There are no draws if the model
     /// leaves a part of the oscillation unexplained: the distribution of such an error is not known.
     #[must_use]

@@ -36,6 +36,8 @@ pub struct Options {
     /// Input before the first row, under which the process was at rest: for a step in the first row. `None`: the likelihood
     /// decides whether the process was at rest under the input of the first row, or under zero if the input never changes.
     pub input_before: Option<f64>,
+    /// Whether the input is known to follow the output, as in flight. Otherwise the recording is asked.
+    pub is_fed_back: bool,
     /// Cutoff (Hz) of a second-order Butterworth low-pass through which the output was recorded, as that of a gyro. The
     /// general estimator takes it out of the output and adds its delay to the dead time.
     pub output_filter_hz: Option<f64>,
@@ -54,6 +56,7 @@ impl Default for Options {
             beta: None,
             input_late_s: None,
             input_before: None,
+            is_fed_back: false,
             output_filter_hz: None,
         }
     }
@@ -127,6 +130,15 @@ impl Options {
     pub fn input_late_s(self, input_late_s: Option<f64>) -> Self {
         Self {
             input_late_s,
+            ..self
+        }
+    }
+
+    /// Takes the input as one that follows the output, whatever the recording shows of it.
+    #[must_use]
+    pub fn under_feedback(self) -> Self {
+        Self {
+            is_fed_back: true,
             ..self
         }
     }

@@ -2,8 +2,9 @@
 //! caused.
 
 use onecycle_identify::{
-    Caused, Evidence, Excitation, Identification, Innovations, Options, Remark, Signals, Verdict,
-    caused_by_set_point, contradicts_set_point, identify_by, identify_by_set_point,
+    Caused, Evidence, Excitation, Identification, Identified, Innovations, Options, Remark,
+    Signals, Verdict, caused_by_set_point, contradicts_set_point, identify_by,
+    identify_by_set_point,
 };
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
@@ -20,6 +21,8 @@ const LEAST_OF_RESPONSE: f64 = 0.8;
 /// Largest autocorrelation of the innovations, and share of them that the past input explains, up to which the fit to the
 /// input as it is stands.
 const CLEAN: (f64, f64) = (0.1, 0.02);
+/// F statistic of the past input in the innovations that chance exceeds once in a hundred recordings.
+const CHANCE_F: f64 = 1.88;
 /// Steady output for a unit set-point from which the output follows the set-point.
 const LEAST_GAIN: f64 = 0.5;
 /// Explained share of the prediction below which the fit to that part is refused, unless the fit to the input as it is
@@ -52,13 +55,14 @@ pub(crate) fn calm(recording: &Recording, signals: &Signals<'_>) -> Option<Verdi
 /// rather than of the process: it is refused, unless a fit predicts nearly everything, as with a test signal that is added
 /// to the input. Else the fit to the input as it is stands if its innovations are white and owe nothing to the past input.
 /// Otherwise noise came back through the controller, and the part of the input that the set-point caused takes its place.
-/// If that has no fit either, or one whose innovations are not clean, that predicts little or that the response to the set-point
-/// contradicts, the response itself is fitted.
+/// If that has no fit either, or one whose innovations are not clean or that the response to the set-point contradicts,
+/// the response itself is fitted.
 pub(crate) fn identify(
     signals: &Signals<'_>,
     set_point: &[f64],
     (options, pack): (&Options, Option<&Pack<'_>>),
 ) -> Identification {
+    let options = &options.under_feedback();
     let mut direct = identify_by(signals, options, pack);
     let caused = caused_by_set_point(signals, set_point);
     let follows = |caused: &Caused| caused.output_gain >= LEAST_GAIN;
@@ -86,8 +90,7 @@ pub(crate) fn identify(
     };
     let found = in_two_stages(signals, &caused, direct, (options, pack));
     let stands = found.outcome.is_ok() && !is_contradicted(&found);
-    let is_sure = stands && is_clean(&found) && explained(&found) >= LEAST_PREDICTED;
-    if share < LEAST_OF_RESPONSE || is_sure {
+    if share < LEAST_OF_RESPONSE || stands && is_clean(&found) {
         return found;
     }
     let by_spectra = identify_by_set_point(signals, set_point, options, recorded);
@@ -96,6 +99,7 @@ pub(crate) fn identify(
         (Err(_), Err(Verdict::NoInformation { .. } | Verdict::TooUncertain)) => by_spectra,
         (Err(_), Err(_)) => found,
         (Ok(_), Err(_)) if stands => found,
+        (Ok(one), Ok(other)) if stands && agree(one, other) => found,
         _ => by_spectra,
     }
 }
@@ -135,6 +139,12 @@ fn in_two_stages(
     found
 }
 
+/// Whether the intervals of both gains overlap.
+fn agree(one: &Identified, other: &Identified) -> bool {
+    let gains = one.effectiveness().zip(other.effectiveness());
+    gains.is_some_and(|(one, other)| one[0] <= other[2] && other[0] <= one[2])
+}
+
 /// Whether both found the same response in the middle of the frequencies that tell the second its gain.
 fn confirm(one: &Identification, other: &Identification) -> bool {
     let (Ok(one), Ok(model), Some(Excitation::Recorded(recorded))) =
@@ -162,7 +172,7 @@ fn is_clean(found: &Identification) -> bool {
         let tests = &evidence.whiteness;
         let chance = 3.5 / (tests.rows as f64).sqrt();
         tests.autocorrelation < CLEAN.0.max(chance)
-            && (tests.input_share < CLEAN.1 || tests.input_f < 3.0)
+            && (tests.input_share < CLEAN.1 || tests.input_f < CHANCE_F)
     })
 }
 

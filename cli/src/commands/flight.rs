@@ -3,7 +3,6 @@
 use std::process::ExitCode;
 
 use onecycle::{Identified, Parameter, Specification, Structure, Verdict};
-use onecycle_design::bands::quantiles;
 use onecycle_link::{ControlLoop, Flight, FlightLog, Signals, Span};
 use rayon::prelude::*;
 
@@ -147,7 +146,7 @@ fn parts(
     // What no part tells alone to a factor of two, the response to the set-point over all of the flight may tell. A fit to the
     // input that no part confirms is not taken.
     let tells = |outcome: &Result<Identified, Verdict>| {
-        let gain = outcome.as_ref().ok().and_then(effectiveness);
+        let gain = outcome.as_ref().ok().and_then(Identified::effectiveness);
         gain.is_some_and(|[low, _, high]| high < 2.0 * low)
     };
     if spans.len() > 1 && !outcomes.iter().any(|(_, outcome)| tells(outcome)) {
@@ -210,39 +209,9 @@ fn found(identified: &Identified) -> Option<Found> {
     let lags_s = late.into_iter().filter_map(value);
     Some(Found {
         structure,
-        gain: effectiveness(identified)?,
+        gain: identified.effectiveness()?,
         delay_s: lags_s.sum::<f64>() + slow_pair_s(structure, &value),
     })
-}
-
-/// Rate of change of the output per unit of input, with its 90 % interval: low, estimate, high. Of a rate loop it is the angular
-/// acceleration. An integrator has it in steady state, a damped body before it moves, and a resonance at its natural frequency,
-/// where `|s G|` has its peak `K w0 / (2 zeta)`. The high end may be infinite. `None`: there is no such rate, or no interval.
-fn effectiveness(identified: &Identified) -> Option<[f64; 3]> {
-    let stages = identified.model.structure().stages();
-    let gain = match (stages.integrators, stages.poles, stages.pairs) {
-        (1, _, _) => identified.estimate.get(Parameter::K)?,
-        (0, 1, _) => identified.estimate.get(Parameter::KOverTBody)?,
-        (0, _, 1) => return of_resonance(identified),
-        _ => return None,
-    };
-    Some([
-        gain.low?,
-        gain.estimate?,
-        gain.high.unwrap_or(f64::INFINITY),
-    ])
-}
-
-fn of_resonance(identified: &Identified) -> Option<[f64; 3]> {
-    let peak = |value: &dyn Fn(Parameter) -> Option<f64>| {
-        let frequency = value(Parameter::NaturalFrequency)?;
-        Some(value(Parameter::K)? * frequency / (2.0 * value(Parameter::Zeta)?))
-    };
-    let estimate = peak(&|parameter| identified.model.parameter(parameter))?;
-    let draws = identified.posterior.draws().iter();
-    let of_draws = draws.filter_map(|draw| peak(&|parameter| draw.value(parameter)));
-    let (low, high) = quantiles(of_draws.collect())?;
-    Some([low.min(estimate), estimate, high.max(estimate)])
 }
 
 /// Refuses a gain that the loop of a vehicle cannot have: the firmware's signs make every gain positive, an angle is the

@@ -127,7 +127,11 @@ impl Fitted {
         if let Some(remark) = fitted.add_forces() {
             remarks.push(remark);
         }
-        let without = output_error::instead(&fitted.blocks(), &fitted.best, longest);
+        let without = output_error::instead(
+            &fitted.blocks(),
+            &fitted.best,
+            (options.is_fed_back, longest),
+        );
         if let Some(found) = without.filter(|found| !fitted.fails(&found.found.theta)) {
             let with = validate::tests(&fitted.blocks(), &fitted.best.found.at);
             fitted.holds_both = !validate::is_left_to_the_input(&with);

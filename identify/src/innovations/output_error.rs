@@ -45,13 +45,13 @@ const PATIENCE: Patience = Patience {
 pub(super) fn instead(
     blocks: &Blocks<'_>,
     best: &Candidate,
-    longest_tau_s: f64,
+    (is_known_feedback, longest_tau_s): (bool, f64),
 ) -> Option<Candidate> {
     let with = &best.found;
     with.theta.noises().next()?;
     // Innovations that past inputs explain are a fault of the fit under feedback too.
     let is_at_fault = || validate::is_left_to_the_input(&validate::tests(blocks, &with.at));
-    let is_fed_back = validate::is_fed_back(blocks);
+    let is_fed_back = is_known_feedback || validate::is_fed_back(blocks);
     if blocks.record.forces.len() > 0 || is_fed_back && !is_at_fault() {
         return None;
     }
