@@ -172,7 +172,11 @@ def numbers(studio, told):
                 report[key] = len(report[key])
         # A process that was not chosen may have parameters that the recording does not determine.
         for report in (ours, theirs):
-            report["alternatives"] = [one["structure"] for one in report["alternatives"] or []]
+            # A fit far behind may come or go with the last bits.
+            report["alternatives"] = [one["structure"] for one in report["alternatives"] or []][:1]
+            # A design over draws keeps the limits on a number of them, which the last bits may change by one: that of the chosen
+            # style is compared.
+            report["controllers"] = [one for one in report["controllers"] or [] if one["is_chosen"]]
         found = list(differences(ours, theirs))
         same = sum(1 for _, difference in found if difference == 0.0)
         where, worst = max(found, key=lambda pair: pair[1])

@@ -143,13 +143,9 @@ fn parts(
     let mut outcomes: Vec<_> = (spans.par_iter())
         .filter_map(|span| Some((*span, identified(&signals.part(*span), asked)?)))
         .collect();
-    // What no part tells alone to a factor of two, the response to the set-point over all of the flight may tell. A fit to the
-    // input that no part confirms is not taken.
-    let tells = |outcome: &Result<Identified, Verdict>| {
-        let gain = outcome.as_ref().ok().and_then(Identified::effectiveness);
-        gain.is_some_and(|[low, _, high]| high < 2.0 * low)
-    };
-    if spans.len() > 1 && !outcomes.iter().any(|(_, outcome)| tells(outcome)) {
+    // What no part tells alone, the response to the set-point over all of the flight may tell. A fit to the input that no part
+    // confirms is not taken.
+    if spans.len() > 1 && outcomes.iter().all(|(_, outcome)| outcome.is_err()) {
         let whole = spans.iter().fold(spans[0], |all, span| all.with(*span));
         let outcome = identified(&signals.part(whole), asked);
         let outcome = outcome.filter(|outcome| {
@@ -194,8 +190,20 @@ fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified
     let identify = (onecycle::Identify::new())
         .specification(*asked)
         .structure(log_gains::structure(part.control_loop));
-    Some(identify.run(&recording).outcome)
+    let outcome = identify.run(&recording).outcome;
+    // Of several parts one that knows its gain to less than a factor of two tells nothing.
+    let tells = |found: &Identified| {
+        let gain = found.effectiveness();
+        gain.is_none_or(|[low, _, high]| high < MOST_RATIO * low)
+    };
+    Some(outcome.and_then(|found| match tells(&found) {
+        true => Ok(found),
+        false => Err(Verdict::TooUncertain),
+    }))
 }
+
+/// Largest ratio of the ends of the interval of a part's gain.
+const MOST_RATIO: f64 = 2.0;
 
 /// What is shown of a process. `None`: its gain has no interval.
 fn found(identified: &Identified) -> Option<Found> {
