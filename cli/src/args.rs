@@ -20,6 +20,7 @@ mod structure;
 mod studio;
 mod train;
 
+use std::ops::RangeBounds;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -169,6 +170,15 @@ impl FromStr for Share {
             .map(share)
             .ok_or_else(|| format!("'{text}' is neither a number nor a percentage such as 30%"))
     }
+}
+
+/// A share within a range; `otherwise` says which it is.
+fn share_within(text: &str, range: impl RangeBounds<f64>, otherwise: &str) -> Result<f64, String> {
+    let share = share(text)?;
+    range
+        .contains(&share)
+        .then_some(share)
+        .ok_or_else(|| otherwise.to_owned())
 }
 
 /// A share of a whole: `5%` or `0.05`. A larger number than 1 without a percent sign may mean either, so it is refused.
@@ -343,12 +353,8 @@ const MOST_THREADS: u64 = 1024;
 
 /// A deterioration as a fraction, in the range of grids.
 fn deterioration(text: &str) -> Result<f64, String> {
-    let deterioration = share(text)?;
-    if (0.001..=1.0).contains(&deterioration) {
-        Ok(deterioration)
-    } else {
-        Err("a deterioration lies between 0.1 % and 100 %, such as 10% or 0.1".to_owned())
-    }
+    let otherwise = "a deterioration lies between 0.1 % and 100 %, such as 10% or 0.1";
+    share_within(text, 0.001..=1.0, otherwise)
 }
 
 /// A phase margin in degrees, as radians.

@@ -29,6 +29,7 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use crate::closed_loop::{margins, sensitivity};
 use crate::controller::Controller;
 use crate::model::{Linear, Model, Parameter, Structure};
+use crate::roots::edge;
 use crate::rules::Ultimate;
 
 pub use relay_test::RelayTest;
@@ -168,7 +169,8 @@ impl Oscillation {
     }
 
     /// Processes that oscillate so and whose dead time is this share, between 0 and 1, of the sum of dead time and lags; 0 is
-    /// an integrator. The second lag is at most ten dead times. `None` if there are none.
+    /// an integrator. The second lag is at most ten dead times. `None` if no
+    /// process agrees.
     #[must_use]
     pub fn family(&self, dead_time_share: (f64, f64)) -> Option<Family> {
         let region = Region::new(self, dead_time_share)?;
@@ -213,12 +215,12 @@ impl<'a> Region<'a> {
         };
         // No second lag leaves the longest first one, the longest second lag the shortest.
         let is_left = |first: f64| region.place([first, 0.0]) != Place::Slow;
-        let high = edge(SHORTEST, FRAC_PI_2, is_left)?;
+        let high = edge(SHORTEST, FRAC_PI_2, HALVINGS, is_left)?;
         let is_reached = |first: f64| {
             let second = region.longest(first);
             second.is_some_and(|second| region.place([first, second]) != Place::Late)
         };
-        let low = edge(high, SHORTEST, is_reached)?;
+        let low = edge(high, SHORTEST, HALVINGS, is_reached)?;
         region.first = (low, high);
         Some(region)
     }
@@ -249,7 +251,7 @@ impl<'a> Region<'a> {
 
     /// The longest second phase lag beside this first one.
     fn longest(&self, first: f64) -> Option<f64> {
-        edge(0.0, first, |second| {
+        edge(0.0, first, HALVINGS, |second| {
             self.place([first, second]) != Place::Slow
         })
     }
@@ -259,31 +261,12 @@ impl<'a> Region<'a> {
         let (low, high) = self.first;
         let first = low + u * (high - low);
         let high = self.longest(first)?;
-        let low = edge(high, 0.0, |second| {
+        let low = edge(high, 0.0, HALVINGS, |second| {
             self.place([first, second]) != Place::Late
         })?;
         self.oscillation
             .process(self.lags_s([first, low + v * (high - low)]))
     }
-}
-
-/// The point nearest to `outside`, on the way from `inside`, at which a condition holds. `None` if it does not at `inside`.
-fn edge(mut inside: f64, mut outside: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
-    if holds(outside) {
-        return Some(outside);
-    }
-    if !holds(inside) {
-        return None;
-    }
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (inside + outside);
-        if holds(middle) {
-            inside = middle;
-        } else {
-            outside = middle;
-        }
-    }
-    Some(inside)
 }
 
 /// `process` with the slope and the dead time (s) by which its response is `-1/KU` at the ultimate frequency. `None` if its

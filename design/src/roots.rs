@@ -1,4 +1,4 @@
-//! Root of a function of one variable: hybrid of inverse quadratic interpolation and bisection.
+//! Root of a function of one variable, and edge of a condition. The root: hybrid of inverse quadratic interpolation and bisection.
 //!
 //! Reference: T. R. Chandrupatla, "A new hybrid quadratic/bisection algorithm for finding the zero
 //! of a nonlinear function without using derivatives", Advances in Engineering Software 28 (1997).
@@ -8,6 +8,31 @@ const MAX_STEPS: usize = 200;
 
 /// Maximum number of bracketing steps: 1,100 factors of four cross the whole range of `f64`, about `2^2100`.
 const MAX_BRACKETINGS: usize = 1100;
+
+/// The point nearest to `outside`, on the way from `inside`, at which a condition holds, by `halvings` of the way. `None` if it does
+/// not hold at `inside`.
+pub(crate) fn edge(
+    mut inside: f64,
+    mut outside: f64,
+    halvings: usize,
+    holds: impl Fn(f64) -> bool,
+) -> Option<f64> {
+    if holds(outside) {
+        return Some(outside);
+    }
+    if !holds(inside) {
+        return None;
+    }
+    for _ in 0..halvings {
+        let middle = 0.5 * (inside + outside);
+        if holds(middle) {
+            inside = middle;
+        } else {
+            outside = middle;
+        }
+    }
+    Some(inside)
+}
 
 /// Argument between `a` and `b` at which `f` changes sign, to `tolerance` plus one or two ulp.
 ///

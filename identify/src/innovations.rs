@@ -57,7 +57,7 @@ use onecycle_design::{Parameter, Structure};
 
 pub(crate) use self::check::check;
 use self::choose::NEARLY;
-use self::fitted::Fitted;
+use self::fitted::{Disturbances, Fitted};
 use self::mixture::Component;
 pub(crate) use self::orthogonal::Orthogonal;
 pub use self::plan::expected;
@@ -167,7 +167,7 @@ impl Search<'_> {
         let components = fitted.posterior(&blocks);
         let tests = validate::tests(&blocks, &fitted.best.found.at);
         let informative = validate::informative(&blocks, &fitted.best.found.theta);
-        let prediction = fitted.prediction(&fitted.best.found.theta);
+        let prediction = fitted.prediction;
         if let Some(excitation) = &mut self.excitation {
             excitation.outliers = fitted.outliers;
             excitation.samples_per_row = fitted.samples;
@@ -204,7 +204,9 @@ impl Search<'_> {
         }
         // Without disturbances a few sines fit a few others.
         let unknowns = fitted.best.found.theta.free().len() + 1;
-        if fitted.is_output_error && validate::order_of_excitation(blocks, LEAST_POWER) < unknowns {
+        if fitted.disturbances != Disturbances::Kept
+            && validate::order_of_excitation(blocks, LEAST_POWER) < unknowns
+        {
             return Err(self.no_information(&fitted.best.found.theta, None));
         }
         let rows = fitted.best.found.at.residual.len();
@@ -320,7 +322,7 @@ impl Search<'_> {
         } else {
             None
         };
-        (self.remarks).extend(fault.filter(|_| !fitted.holds_both));
+        (self.remarks).extend(fault.filter(|_| fitted.disturbances != Disturbances::Doubted));
         let is_weak = |found: &&Prediction| {
             found.explained < WELL_PREDICTED && found.error_ratio > EXPECTED_ERROR_RATIO
         };

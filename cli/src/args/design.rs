@@ -5,7 +5,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use onecycle::{Execution, Form, MeasurementNoise, Pid, Specification, Style};
 use onecycle_design::{Spans, Vendor};
 
-use super::{phase_margin, share};
+use super::{phase_margin, share_within};
 use crate::failure::Failure;
 
 /// Why the paper's style takes no noise.
@@ -198,22 +198,14 @@ fn gain_margin(text: &str) -> Result<f64, String> {
 
 /// A share of a step, as a number or a percentage.
 fn overshoot(text: &str) -> Result<f64, String> {
-    let share = share(text)?;
-    if (0.0..=1.0).contains(&share) {
-        Ok(share)
-    } else {
-        Err("an overshoot lies between 0 % and 100 %, such as 15% or 0.15".to_owned())
-    }
+    let otherwise = "an overshoot lies between 0 % and 100 %, such as 15% or 0.15";
+    share_within(text, 0.0..=1.0, otherwise)
 }
 
 /// A share of noise, as a number or a percentage.
 pub(super) fn noise(text: &str) -> Result<f64, String> {
-    let share = share(text)?;
-    if (1e-6..=100.0).contains(&share) {
-        Ok(share)
-    } else {
-        Err("a share of noise lies between 0.0001 % and 10000 %, such as 25% or 0.25".to_owned())
-    }
+    let otherwise = "a share of noise lies between 0.0001 % and 10000 %, such as 25% or 0.25";
+    share_within(text, 1e-6..=100.0, otherwise)
 }
 
 fn positive(text: &str) -> Result<f64, String> {

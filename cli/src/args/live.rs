@@ -8,7 +8,7 @@ use clap::{Args, FromArgMatches, Subcommand, ValueEnum};
 use onecycle_live::Address;
 
 use super::log::LogAxis;
-use super::{Identify, WriteArguments, share};
+use super::{Identify, WriteArguments, share_within};
 use crate::failure::Failure;
 
 /// Talk to a vehicle over MAVLink (PX4, ArduPilot): state, flight logs, parameters, a relay test of the altitude.
@@ -241,11 +241,8 @@ pub(crate) enum RelayAxis {
 }
 
 fn amplitude(text: &str) -> Result<f64, String> {
-    let part = share(text)?;
-    match (0.01..=0.3).contains(&part) {
-        true => Ok(part),
-        false => Err("an amplitude lies between 1 and 30 % of the full thrust".to_owned()),
-    }
+    let otherwise = "an amplitude lies between 1 and 30 % of the full thrust";
+    share_within(text, 0.01..=0.3, otherwise)
 }
 
 fn limit(text: &str) -> Result<f64, String> {

@@ -9,7 +9,7 @@ use onecycle_design::oscillation::{DEAD_TIME_SHARE, Oscillation, RelayTest};
 use onecycle_design::rules::Ultimate;
 
 use super::design::number;
-use super::share;
+use super::{share, share_within};
 use crate::failure::Failure;
 use crate::report::number::significant;
 use crate::results::family::{Known, Rule};
@@ -156,7 +156,7 @@ impl OscillationArguments {
         test.with_duty(self.duty.unwrap_or(test.duty))
     }
 
-    /// Refuses options of a relay where there is none.
+    /// Refuses options that describe a relay test if `--relay` is not given.
     fn without_a_relay(&self) -> Result<(), Failure> {
         let options = [
             ("--amplitude", self.amplitude.is_some()),
@@ -230,7 +230,7 @@ fn agree(relay: f64, amplitude: f64, hysteresis: f64, gain: f64) -> Result<(), F
         .describing_function()
         .gain;
     let is_near = |other: f64| (gain / other - 1.0).abs() <= ROUNDING;
-    // Above E = A there is none; the amplitude is refused then.
+    // Not a number where E is above A: that is refused with a sentence of its own.
     if is_near(without) || is_near(with) || with.is_nan() {
         return Ok(());
     }
@@ -264,12 +264,8 @@ fn zero_or_more(text: &str) -> Result<f64, String> {
 }
 
 fn duty(text: &str) -> Result<f64, String> {
-    let duty = share(text)?;
-    if (0.05..=0.95).contains(&duty) {
-        Ok(duty)
-    } else {
-        Err("a share of the period lies between 5 % and 95 %, such as 35% or 0.35".to_owned())
-    }
+    let otherwise = "a share of the period lies between 5 % and 95 %, such as 35% or 0.35";
+    share_within(text, 0.05..=0.95, otherwise)
 }
 
 fn dead_time_share(text: &str) -> Result<(f64, f64), String> {

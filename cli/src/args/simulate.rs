@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::{Share, StructureArguments, share};
+use super::{Share, StructureArguments, share_within};
 
 pub(crate) use values::NamedDisturbance;
 use values::{Band, Gust, LoopGains, Outliers};
@@ -226,20 +226,12 @@ pub(crate) enum Inject {
 
 /// Drop-outs of the sensor.
 fn drop_outs(text: &str) -> Result<f64, String> {
-    let lost = share(text)?;
-    if (0.0..1.0).contains(&lost) {
-        Ok(lost)
-    } else {
-        Err("drop-outs are a share from 0% to below 100%, such as 1% or 0.01".to_owned())
-    }
+    let otherwise = "drop-outs are a share from 0% to below 100%, such as 1% or 0.01";
+    share_within(text, 0.0..1.0, otherwise)
 }
 
 /// An asymmetry of the relay.
 fn asymmetry(text: &str) -> Result<f64, String> {
-    let part = share(text)?;
-    if (0.0..=0.5).contains(&part) {
-        Ok(part)
-    } else {
-        Err("an asymmetry lies between 0 % and 50 %, such as 20% or 0.2".to_owned())
-    }
+    let otherwise = "an asymmetry lies between 0 % and 50 %, such as 20% or 0.2";
+    share_within(text, 0.0..=0.5, otherwise)
 }

@@ -15,6 +15,9 @@ use crate::output::{Waiting, print};
 use crate::report::flight as report;
 use crate::results::flight::{FlightLoop, Found, Part, Refusal};
 
+/// Largest ratio of the ends of the interval of a part's gain.
+const MOST_RATIO: f64 = 2.0;
+
 /// Whether the arguments ask for every loop of a flight log.
 pub(crate) fn is_asked(arguments: &Identify) -> bool {
     let asked = &arguments.log;
@@ -201,9 +204,6 @@ fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified
         false => Err(Verdict::TooUncertain),
     }))
 }
-
-/// Largest ratio of the ends of the interval of a part's gain.
-const MOST_RATIO: f64 = 2.0;
 
 /// What is shown of a process. `None`: its gain has no interval.
 fn found(identified: &Identified) -> Option<Found> {

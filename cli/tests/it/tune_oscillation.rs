@@ -277,7 +277,7 @@ fn gains_of_no_rule_are_refused() {
         "1",
     ];
     misused(&hysteresis, &["has no hysteresis"]);
-    // Klipper's thresholds alone swing by 2.5 degrees; less is none of its tests.
+    // Klipper's thresholds alone swing by 2.5 degrees; a test of it cannot swing by less.
     of(
         "klipper",
         "100,7.2,347",

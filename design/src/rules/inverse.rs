@@ -4,8 +4,7 @@ use crate::controller::{Form, Pid};
 
 use super::{Ultimate, no_overshoot, tyreus_luyben, ziegler_nichols};
 
-/// A derivative gain that differs from the rule's by more than this share is not one of its rounded gains. Other rules differ by
-/// 20 % and more.
+/// Rounding changes a derivative gain that a rule computed by at most this share. The gains of other rules differ by 20 % and more.
 const ROUNDING: f64 = 0.1;
 
 /// A rule that computes gains from the ultimate gain and period.

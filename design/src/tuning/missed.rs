@@ -3,6 +3,7 @@
 use crate::closed_loop::step_response;
 use crate::controller::Controller;
 use crate::model::Model;
+use crate::roots::edge;
 use crate::soiptd_pd::step_response::Sample;
 
 use super::proposal::Assessment;
@@ -123,21 +124,7 @@ impl Specification {
 pub fn reference_filter_s(model: &Model, controller: &Controller, overshoot: f64) -> Option<f64> {
     let samples = step_response(model, controller).ok()?.samples;
     let is_kept = |time_s: f64| filtered_peak(&samples, time_s) <= 1.0 + overshoot;
-    let (mut low, mut high) = (0.0, samples.last()?.t_s);
-    if is_kept(low) {
-        return Some(low);
-    }
-    if !is_kept(high) {
-        return None;
-    }
-    for _ in 0..BISECTIONS {
-        let middle = 0.5 * (low + high);
-        match is_kept(middle) {
-            true => high = middle,
-            false => low = middle,
-        }
-    }
-    Some(high)
+    edge(samples.last()?.t_s, 0.0, BISECTIONS, is_kept)
 }
 
 /// Largest output where the reference passes a first-order filter first: filter and loop are linear, so the response itself is

@@ -122,7 +122,7 @@ pub(super) struct Limits {
     pub(super) fewest_samples: usize,
 }
 
-/// Fits the structures to a record, from `starts`; from those of a screening where there are none.
+/// Fits the structures to a record, from `starts`, or from those that a screening finds if the list is empty.
 pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choice {
     let rows = record.len() - record.skipped(limits.skip_s);
     let samples = (rows / ROWS).max(limits.fewest_samples);

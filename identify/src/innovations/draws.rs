@@ -251,7 +251,7 @@ impl Root {
         // With equal chances the recording has the rate of what makes the input, or another: then the changes come before their
         // samples by any part of a sample, on average over them.
         let tau = theta.layout().tau();
-        theta.values[tau] += stamps.late_s * (2.0 * (1e3 * z[1]).rem_euclid(1.0) - 1.0).max(0.0);
+        theta.values[tau] += stamps.late_s * (2.0 * even(z[1], 1e3) - 1.0).max(0.0);
         let ratio = below_a_sample(&mut theta, component, stamps, normal[0]);
         (gain, bias) = (gain * ratio, bias * ratio);
         Drawn {
@@ -262,6 +262,11 @@ impl Root {
     }
 }
 
+/// A number from an even distribution from 0 to 1: the digits of a normal number behind the place of `digits`.
+fn even(normal: f64, digits: f64) -> f64 {
+    (digits * normal).rem_euclid(1.0)
+}
+
 /// Puts what the fit has at a bound anywhere below a sample: a dead time that is not positive, and a time constant at the least
 /// that the search allows. The samples show neither, and a value with an interval of no width would say that they do. They show the
 /// sum, so a time constant takes from the dead time what it gains. Returns the factor for the gain in front of the stages.
@@ -270,7 +275,7 @@ fn below_a_sample(theta: &mut Theta, component: &Component, stamps: Stamps, chan
     let Stamps {
         sample_s, early_s, ..
     } = stamps;
-    let anywhere_s = |digits: f64| (digits * chance).rem_euclid(1.0).max(1e-3) * sample_s;
+    let anywhere_s = |digits: f64| even(chance, digits).max(1e-3) * sample_s;
     let time_s = anywhere_s(1e3);
     let best = &component.found.theta;
     let layout = theta.layout();

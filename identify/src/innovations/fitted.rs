@@ -45,6 +45,17 @@ const FEWEST_LONG_ROWS: usize = 300;
 /// Difference of the log-likelihood above which the input is taken as straight lines between the samples.
 const STRAIGHT: f64 = 3.0;
 
+/// What the disturbances are worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Disturbances {
+    /// They are part of the best fit, or it needs none.
+    Kept,
+    /// They wrongly take what the input explains: the best fit is one without. The posterior has both.
+    Doubted,
+    /// The same, and the innovations refute the fit with disturbances: the posterior has the other alone.
+    Refuted,
+}
+
 /// A fit and all that the result needs of it.
 pub(super) struct Fitted {
     /// Samples that chose the structure.
@@ -58,11 +69,9 @@ pub(super) struct Fitted {
     /// Fit of the structure that contains the best one and has its damping as a further unknown. The posterior is that
     /// of this structure: damping that a record does not show may be there.
     pub(super) wider: Candidate,
-    /// Whether the best fit is one without disturbances, because that with disturbances wrongly leaves to these what the input
-    /// explains.
-    pub(super) is_output_error: bool,
-    /// Whether the posterior holds the fit with disturbances beside the best one without: its innovations do not refute it.
-    pub(super) holds_both: bool,
+    pub(super) disturbances: Disturbances,
+    /// Prediction of the last third of the record by the best fit.
+    pub(super) prediction: Option<Prediction>,
     pub(super) outliers: usize,
 }
 
@@ -119,8 +128,8 @@ impl Fitted {
             samples,
             wider: wider.unwrap_or_else(|| best.clone()),
             best,
-            is_output_error: false,
-            holds_both: false,
+            disturbances: Disturbances::Kept,
+            prediction: None,
             outliers: outliers + found,
             record,
         };
@@ -132,14 +141,14 @@ impl Fitted {
             &fitted.best,
             (options.is_fed_back, longest),
         );
-        if let Some(found) = without.filter(|found| !fitted.fails(&found.found.theta)) {
-            let with = validate::tests(&fitted.blocks(), &fitted.best.found.at);
-            fitted.holds_both = !validate::is_left_to_the_input(&with);
-            if fitted.holds_both {
-                remarks.push(Remark::DriftOrGain);
-            }
-            fitted.best = found;
-            fitted.is_output_error = true;
+        if let Some((found, is_refuted)) = without {
+            fitted.replace_by(found, is_refuted);
+        }
+        if fitted.disturbances == Disturbances::Doubted {
+            remarks.push(Remark::DriftOrGain);
+        }
+        if fitted.disturbances == Disturbances::Kept {
+            fitted.prediction = fitted.prediction_by(&fitted.best.found.theta);
         }
         Ok(fitted)
     }
@@ -148,18 +157,27 @@ impl Fitted {
         Blocks::new(&self.record, self.samples, self.limits.skip_s)
     }
 
-    /// Prediction of the last third of the record.
-    pub(super) fn prediction(&self, theta: &Theta) -> Option<Prediction> {
+    /// Takes a fit without disturbances in the place of the best one, unless it does not predict the last third of the record.
+    fn replace_by(&mut self, found: Candidate, is_refuted: bool) {
+        let prediction = self.prediction_by(&found.found.theta);
+        let fails = |found: Prediction| {
+            found.explained < LEAST_PREDICTED && found.error_ratio > MOST_ERROR_RATIO
+        };
+        if prediction.is_some_and(fails) {
+            return;
+        }
+        self.best = found;
+        self.prediction = prediction;
+        self.disturbances = match is_refuted {
+            true => Disturbances::Refuted,
+            false => Disturbances::Doubted,
+        };
+    }
+
+    fn prediction_by(&self, theta: &Theta) -> Option<Prediction> {
         let blocks = self.blocks();
         let horizon_s = validate::period_s(&blocks).unwrap_or(blocks.length_s() / 10.0);
         validate::prediction(&self.record, theta, &self.limits, self.samples, horizon_s)
-    }
-
-    /// Whether a fit does not predict the last third of the record, and the disturbances do not excuse it.
-    fn fails(&self, theta: &Theta) -> bool {
-        self.prediction(theta).is_some_and(|found| {
-            found.explained < LEAST_PREDICTED && found.error_ratio > MOST_ERROR_RATIO
-        })
     }
 
     /// Adds the nonlinear forces that the record asks for, and fits again.
@@ -195,13 +213,13 @@ impl Fitted {
         let structure = self.wider.structure();
         let bounds = Bounds::new(structure, blocks, self.limits.longest_tau_s);
         let with = || mixture::mixture(blocks, &self.wider.found, &bounds);
-        if !self.is_output_error {
+        if self.disturbances == Disturbances::Kept {
             return with();
         }
         let found = &self.best.found;
         let bounds = Bounds::new(found.theta.structure, blocks, self.limits.longest_tau_s);
         let without = mixture::of_one(blocks, found, &bounds);
-        if !self.holds_both {
+        if self.disturbances == Disturbances::Refuted {
             return without.into_iter().collect();
         }
         let both = without.into_iter().chain(with());

@@ -89,7 +89,7 @@ impl Laplace {
         })
     }
 
-    /// Standard deviation of the gain, or of what is known in its place where lags are nearly equal, over its size.
+    /// Relative standard deviation of the gain; where lags are nearly equal, of the gain times [`NearLags::symmetric`].
     pub(super) fn gain_deviation(&self, found: &Found) -> f64 {
         let (at, symmetric) = (&found.at, self.near.symmetric(&found.theta));
         let n = self.free.len();

@@ -15,6 +15,8 @@
 //! Reference: the test of two estimators of which one is efficient and both are consistent if the model is right, J. A.
 //! Hausman, Econometrica 46 (1978).
 
+use std::cell::LazyCell;
+
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
@@ -40,53 +42,53 @@ const PATIENCE: Patience = Patience {
     decrease: 1e-6,
 };
 
-/// The fit without disturbances, if it explains more than a disturbance that is independent of the input leaves to chance.
-/// `None` under feedback too, where the input follows the disturbance, unless the fit with them is at fault anyway.
+/// The fit without disturbances, if it explains more than a disturbance that is independent of the input leaves to chance, and
+/// whether the innovations of that with disturbances refute it. `None` under feedback too, where the input follows the disturbance,
+/// unless they do.
 pub(super) fn instead(
     blocks: &Blocks<'_>,
     best: &Candidate,
     (is_known_feedback, longest_tau_s): (bool, f64),
-) -> Option<Candidate> {
+) -> Option<(Candidate, bool)> {
     let with = &best.found;
     with.theta.noises().next()?;
+    if blocks.record.forces.len() > 0 {
+        return None;
+    }
     // Innovations that past inputs explain are a fault of the fit under feedback too.
-    let is_at_fault = || validate::is_left_to_the_input(&validate::tests(blocks, &with.at));
+    let is_refuted =
+        LazyCell::new(|| validate::is_left_to_the_input(&validate::tests(blocks, &with.at)));
     let is_fed_back = is_known_feedback || validate::is_fed_back(blocks);
-    if blocks.record.forces.len() > 0 || is_fed_back && !is_at_fault() {
+    if is_fed_back && !*is_refuted {
         return None;
     }
     let quiet = with.theta.without_noises();
     let found = search::warm(blocks, &quiet, longest_tau_s, PATIENCE)?;
-    if is_fed_back && left(blocks, &found)? > LEFT_UNDER_FEEDBACK {
+    let y = present(blocks);
+    let simulation = Regressors::of(blocks, &found.theta)?;
+    let left = simulation.all.left(&y);
+    if is_fed_back && left / simulation.start.left(&y) > LEFT_UNDER_FEEDBACK {
         return None;
     }
-    let is_more = explains_more(blocks, with, &found, longest_tau_s)?;
-    is_more.then(|| Candidate::new(found))
-}
-
-/// Share of the output's square that the simulation does not explain.
-fn left(blocks: &Blocks<'_>, found: &Found) -> Option<f64> {
-    let y = present(blocks);
-    let of = Regressors::of(blocks, &found.theta)?;
-    Some(of.all.left(&y) / of.start.left(&y))
+    let is_more = explains_more(blocks, with, (&y, left), longest_tau_s)?;
+    is_more.then(|| (Candidate::new(found), *is_refuted))
 }
 
 /// Compares two shares of the simulation's error: the one that the fit without disturbances removes, and those that it would
-/// remove if the error were one of the simulated disturbances. Whether the first is larger than all of these.
+/// remove if the error were one of the simulated disturbances. Whether the first is larger than all of these. `left`: sum of
+/// squares that the fit without disturbances leaves of the outputs `y`.
 fn explains_more(
     blocks: &Blocks<'_>,
     with: &Found,
-    found: &Found,
+    (y, left): (&[f64], f64),
     longest_tau_s: f64,
 ) -> Option<bool> {
     let quiet = with.theta.without_noises();
-    let y = present(blocks);
     let before = Regressors::of(blocks, &quiet)?;
     let kept = before
         .start
-        .left(&before.less_response(&y, with.at.gain / blocks.scale));
-    let after = Regressors::of(blocks, &found.theta)?;
-    let share = 1.0 - after.all.left(&y) / kept;
+        .left(&before.less_response(y, with.at.gain / blocks.scale));
+    let share = 1.0 - left / kept;
     let bounds = Bounds::new(quiet.structure, blocks, longest_tau_s);
     let all = before.with_slopes(blocks, &quiet, with.at.gain / blocks.scale, &bounds)?;
     let deviation = with.at.variance.sqrt() / blocks.scale;

@@ -78,14 +78,9 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
     if count < 4.0 * LAGS as f64 {
         return (0.0, 0.0);
     }
-    let centred = |mut column: Vec<f64>| {
-        let mean = column.iter().sum::<f64>() / count;
-        column.iter_mut().for_each(|v| *v -= mean);
-        column
-    };
-    let target = centred(used.iter().map(|(_, e)| *e).collect());
+    let target = centred(used.iter().map(|(_, e)| *e));
     let columns: Vec<Vec<f64>> = (1..=LAGS)
-        .map(|lag| centred(used.iter().map(|(row, _)| inputs[row - lag]).collect()))
+        .map(|lag| centred(used.iter().map(|(row, _)| inputs[row - lag])))
         .collect();
     // A lag that repeats those before it (a slow input) tells nothing new.
     let orthogonal = Orthogonal::independent(&columns);
@@ -95,6 +90,14 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
     let number = orthogonal.len() as f64;
     let f = (share / number) / ((1.0 - share) / (count - number - 1.0));
     (share, f)
+}
+
+/// Values less their mean.
+fn centred(values: impl Iterator<Item = f64>) -> Vec<f64> {
+    let mut column: Vec<f64> = values.collect();
+    let mean = column.iter().sum::<f64>() / column.len() as f64;
+    column.iter_mut().for_each(|v| *v -= mean);
+    column
 }
 
 /// Order of persistent excitation of the input, at most [`LAGS`]: that of one sine is two. `least`: share of its power that
@@ -128,18 +131,13 @@ pub(super) fn is_fed_back(blocks: &Blocks<'_>) -> bool {
         .collect();
     let rows = LAGS..blocks.len();
     let count = rows.len() as f64;
-    let column = |value: &dyn Fn(usize) -> f64| -> Vec<f64> {
-        let values: Vec<f64> = rows.clone().map(value).collect();
-        let mean = values.iter().sum::<f64>() / count;
-        values.iter().map(|v| v - mean).collect()
-    };
     if count < 4.0 * LAGS as f64 {
         return false;
     }
-    let target = column(&|row| inputs[row]);
+    let target = centred(rows.clone().map(|row| inputs[row]));
     let of_past = |values: &[f64]| -> Vec<Vec<f64>> {
         (1..=LAGS)
-            .map(|lag| column(&|row| values[row - lag]))
+            .map(|lag| centred(rows.clone().map(|row| values[row - lag])))
             .collect()
     };
     let mut columns = of_past(&inputs);
