@@ -36,7 +36,7 @@ pub(crate) use self::completions::Completions;
 pub(crate) use self::dataset::Dataset;
 pub(crate) use self::design::{DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
 pub(crate) use self::fly::Fly;
-pub(crate) use self::identify::{Between, Estimator, Identify, Method, When};
+pub(crate) use self::identify::{Between, Estimator, Identify, Method};
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use self::live::{
     ConnectionArguments, Live, LiveAction, LiveLog, LiveRelay, LiveState, LiveWrite, LogId,

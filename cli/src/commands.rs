@@ -1,5 +1,6 @@
 //! One file for each command: takes the arguments, computes the result, prints the report.
 
+mod answer;
 pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certify;

@@ -22,6 +22,7 @@ use crate::failure::Failure;
 pub use crate::output::page::{Listener, listen};
 use crate::reading;
 pub use crate::reading::Given;
+use crate::report::flight as report;
 use crate::words::remark::{details, reasons};
 use crate::words::verdict::advice;
 
@@ -131,9 +132,10 @@ pub fn flight(file: &str, options: &[String]) -> Result<(String, String), String
             "{file} is no flight log, or an option chooses one of its loops"
         ));
     }
-    let survey = || flight::Surveyed::of(&arguments, &identify::checked(&arguments)?);
+    let survey = || flight::survey(&arguments, &identify::checked(&arguments)?);
     let surveyed = survey().map_err(|failure| failure.to_string())?;
-    Ok((plain(&surveyed.text()), surveyed.json()))
+    let text = report::text(&surveyed, arguments.details);
+    Ok((plain(&text), report::json(&surveyed)))
 }
 
 /// Reads a recording as `onecycle identify FILE` does: of a flight log the part that tells most, without a choice of the

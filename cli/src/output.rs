@@ -7,7 +7,7 @@ mod terminal;
 
 use std::fmt::Display;
 use std::fs::File;
-use std::io::{self, IsTerminal, Seek, Write};
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use anstream::AutoStream;
@@ -60,11 +60,6 @@ pub(crate) fn print_whole(
             target: "to the standard output".to_owned(),
             reason,
         })
-}
-
-/// Whether the standard output is a terminal.
-pub(crate) fn is_terminal() -> bool {
-    io::stdout().is_terminal()
 }
 
 /// Prints an error to the error output.

@@ -1,5 +1,6 @@
 //! Reports: results as text for people, as JSON for programs, and as HTML pages.
 
+mod answer;
 pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certificate;
@@ -22,7 +23,6 @@ pub(crate) mod number;
 pub(crate) mod pack;
 pub(crate) mod page;
 pub(crate) mod phase;
-pub(crate) mod plot;
 mod record;
 pub(crate) mod reproduction;
 pub(crate) mod text;

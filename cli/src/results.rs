@@ -1,6 +1,7 @@
 //! What commands compute, as plain data, one file for each command. Commands fill it, reports show it; nothing here
 //! reads arguments or prints.
 
+pub(crate) mod answer;
 pub(crate) mod bench;
 pub(crate) mod campaign;
 pub(crate) mod certify;

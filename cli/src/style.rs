@@ -14,8 +14,6 @@ pub(crate) const HOLDS: Style = AnsiColor::Green.on_default();
 pub(crate) const REMARK: Style = AnsiColor::Yellow.on_default();
 /// Negative results and errors.
 pub(crate) const REFUSAL: Style = AnsiColor::Red.on_default().bold();
-/// Curves of the model.
-pub(crate) const FIT: Style = AnsiColor::Cyan.on_default();
 /// Measured points and frames of plots: the default text style of the terminal.
 pub(crate) const PLAIN: Style = Style::new();
 

@@ -1,5 +1,6 @@
 //! Sentences of the program: what the facts of the libraries mean, and what to do about them.
 
+pub(crate) mod answer;
 mod caution;
 pub(crate) mod controllers;
 pub(crate) mod flight;

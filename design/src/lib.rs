@@ -85,9 +85,9 @@ pub use soiptd_pd::margins::Margins;
 pub use soiptd_pd::step_metrics::StepMetrics;
 pub use soiptd_pd::step_response::{Sample, StepResponse, StepResponseError};
 pub use tuning::{
-    Assessment, Design, DesignError, LeastMargins, Limit, MeasurementNoise, Missed, Proposal,
-    Robustness, Specification, Style, assess, design, design_over, forms, least_margins, proposals,
-    reference_filter_s,
+    Assessment, Comparison, Design, DesignError, Effect, FELT, Felt, LeastMargins, Limit,
+    MeasurementNoise, Missed, Proposal, Robustness, Specification, Style, assess, design,
+    design_over, forms, least_margins, proposals, reference_filter_s,
 };
 
 // Compiles and runs the code of the README.

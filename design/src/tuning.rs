@@ -23,6 +23,7 @@
 //! The candidates are the optima of the draws: each of them keeps the specified margin on a likely process. An
 //! unconstrained search over both gains finds controllers of the same expected loss with a third of the margin.
 
+mod comparison;
 mod missed;
 pub(crate) mod named;
 mod outcome;
@@ -34,6 +35,7 @@ use crate::controller::{Controller, Form};
 use crate::model::Model;
 use crate::soiptd_pd;
 
+pub use comparison::{Comparison, Effect, FELT, Felt};
 pub use missed::{Limit, Missed, reference_filter_s};
 pub use outcome::{Design, DesignError, Robustness};
 pub use proposal::{Assessment, LeastMargins, Proposal, assess, forms, least_margins, proposals};

@@ -178,7 +178,7 @@ fn is_final(verdict: &Verdict, signals: &Signals<'_>) -> bool {
 }
 
 /// Whether the output has settled where the input changes its level, as in a square wave of steps: it hardly moves there, and it
-/// came to rest slowly. That of a relay's oscillation moves at its fastest, and a clipped one stops at once.
+/// came to rest slowly, in three of four waves. That of a relay's oscillation moves at its fastest, and a clipped one stops at once.
 fn settles(signals: &Signals<'_>) -> bool {
     const PART: f64 = 1.0 / 15.0;
     const AT_REST: f64 = 0.03;
@@ -205,7 +205,7 @@ fn settles(signals: &Signals<'_>) -> bool {
         (part > 0).then_some(is_settled)
     };
     let settled: Vec<bool> = changes.windows(2).filter_map(settled).collect();
-    2 * settled.iter().filter(|settled| **settled).count() > settled.len()
+    4 * settled.iter().filter(|settled| **settled).count() > 3 * settled.len()
 }
 
 /// Whether a signal mostly repeats its value exactly, as a command does that is held and a measurement does not.
@@ -303,11 +303,19 @@ fn settle(mut steady: Identification, mut general: Identification, doubt: Doubt)
     if is_replaced { general } else { steady }
 }
 
-/// Whether the general estimator explains a steady oscillation, by a process that does not oscillate on its own: at hardly more
-/// than one frequency a pair of complex poles explains a limit cycle that the input does not even drive.
+/// Whether the general estimator explains a steady oscillation: its innovations owe nothing to the input, it predicts better than
+/// the mean of the output does, and its process does not oscillate on its own. At hardly more than one frequency a pair of complex
+/// poles explains a limit cycle that the input does not even drive; so does a disturbance, which predicts nothing.
 fn explains_a_relay(general: &Identification) -> bool {
     let model = general.outcome.as_ref().ok().map(|found| &found.model);
-    owes_nothing(general) && !model.is_some_and(is_oscillating)
+    owes_nothing(general) && predicts(general) && !model.is_some_and(is_oscillating)
+}
+
+fn predicts(general: &Identification) -> bool {
+    let found = general.outcome.as_ref().ok();
+    let innovations = found.and_then(|found| found.fit.innovations());
+    let prediction = innovations.and_then(|of| of.prediction.as_ref());
+    prediction.is_none_or(|prediction| prediction.explained > 0.0)
 }
 
 /// Whether the past input explains nothing of what a model leaves. Of 270 relay recordings of 47 kinds, this tells those of a

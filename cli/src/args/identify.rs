@@ -28,7 +28,7 @@ use super::{DesignArguments, LogArguments, PackSource, WriteArguments, sample_ra
     "  onecycle identify examples/logs/px4_chirps.ulg --axis pitch --write pitch.params\n",
     "  onecycle identify chirp.csv --structure soptd --from 12 --to 40\n",
     "  onecycle identify historian.csv --tag LIC101\n",
-    "  onecycle identify log.csv --plot always > report.txt\n",
+    "  onecycle identify log.csv --details > report.txt\n",
     "  onecycle identify samples.txt --sample-rate 500 --input 2 --output 1 --json\n\n",
     "Exit codes: 0 identified, 2 bad arguments, 3 unreadable file, 4 no process identified (see the ",
     "verdict), 5 output not written, 6 time stamps that can be read in more than one way (give --time-unit)"
@@ -46,10 +46,6 @@ pub(crate) struct Identify {
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
-    /// Draw the end of the recording and the fit: always, never, or only on a terminal (auto)
-    #[arg(long, value_name = "WHEN", value_enum, default_value_t = When::Auto, conflicts_with = "json",
-          hide_possible_values = true)]
-    pub(crate) plot: When,
     /// Fit the last N steady cycles of a relay test (1 to 50). More cycles narrow the intervals; fewer follow a
     /// process that drifts
     #[arg(long, value_name = "N", default_value_t = 8,
@@ -158,14 +154,6 @@ fn cutoff_hz(text: &str) -> Result<f64, String> {
 fn beta(text: &str) -> Result<f64, String> {
     let beta = text.parse().ok().filter(|beta: &f64| beta.abs() < 1.0);
     beta.ok_or_else(|| "beta is a number between -1 and 1".to_owned())
-}
-
-/// When a plot is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum When {
-    Auto,
-    Always,
-    Never,
 }
 
 /// Estimator of the process.

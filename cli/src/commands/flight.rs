@@ -3,9 +3,10 @@
 use std::process::ExitCode;
 
 use onecycle::{Identified, Parameter, Specification, Structure, Verdict};
-use onecycle_link::{ControlLoop, Flight, FlightLog, Signals, Span};
+use onecycle_link::{Change, ControlLoop, Flight, FlightLog, Signals, Span};
 use rayon::prelude::*;
 
+use super::answer;
 use super::controllers;
 use super::log::{self, Source};
 use super::log_gains::{self, LogLoop};
@@ -13,7 +14,10 @@ use crate::args::{Estimator, Identify};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print};
 use crate::report::flight as report;
-use crate::results::flight::{FlightLoop, Found, Part, Refusal};
+use crate::report::units::Units;
+use crate::results::answer::Advice;
+use crate::results::flight::{FlightLoop, Found, Part, Refusal, Survey};
+use crate::words::log::of_firmware;
 
 /// Largest ratio of the ends of the interval of a part's gain.
 const MOST_RATIO: f64 = 2.0;
@@ -32,80 +36,71 @@ pub(crate) fn is_asked(arguments: &Identify) -> bool {
         || arguments.output_filter.is_some()
         || arguments.estimator != Estimator::Auto
         || arguments.rows
-        || arguments.report.is_some()
-        || arguments.write.write.is_some();
+        || arguments.report.is_some();
     !is_one && log::is_log(&arguments.file)
 }
 
 pub(super) fn run(arguments: &Identify, asked: &Specification) -> Result<ExitCode, Failure> {
-    let surveyed = Surveyed::of(arguments, asked)?;
+    let surveyed = survey(arguments, asked)?;
     print(&if arguments.json {
-        surveyed.json()
+        report::json(&surveyed)
     } else {
-        surveyed.text()
+        report::text(&surveyed, arguments.details)
     })?;
     let is_any = surveyed.loops.iter().any(|one| one.best().is_some());
-    Ok(ExitCode::from(if is_any {
-        exit::DONE
-    } else {
-        exit::NO_PROCESS
+    let is_unwritten = arguments.write.write.is_some() && surveyed.files.is_none();
+    Ok(ExitCode::from(match is_any && !is_unwritten {
+        true => exit::DONE,
+        false => exit::NO_PROCESS,
     }))
 }
 
-/// Every loop of a flight.
-pub(crate) struct Surveyed {
-    name: String,
-    number: usize,
-    loops: Vec<FlightLoop>,
-}
-
-impl Surveyed {
-    pub(crate) fn of(arguments: &Identify, asked: &Specification) -> Result<Self, Failure> {
-        let source = Source {
-            path: &arguments.file,
-            bytes: None,
-        };
-        let (log, number) = log::scan_flight(&source, &arguments.log)?;
-        let name = arguments.file.display().to_string();
-        let Some(flight) = log.flights.get(number.saturating_sub(1)) else {
-            // The error names the flights that there are.
-            log::signals(&source, &log, number, ControlLoop::ALL[0])?;
-            let loops = vec![];
-            return Ok(Self {
-                name,
-                number,
-                loops,
-            });
-        };
-        let _waiting = Waiting::on("identifying");
-        let complete = flight.loops.iter().filter(|one| one.is_complete());
-        let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
-        let loops: Result<Vec<FlightLoop>, Failure> = (loops.into_par_iter())
-            .map(|of| survey(&source, &log, number, (flight, of), asked))
+/// Every loop of a flight, and the parameters of those to change if they are to be written.
+pub(crate) fn survey(arguments: &Identify, asked: &Specification) -> Result<Survey, Failure> {
+    let source = Source {
+        path: &arguments.file,
+        bytes: None,
+    };
+    let (log, number) = log::scan_flight(&source, &arguments.log)?;
+    let mut surveyed = Survey {
+        file: arguments.file.display().to_string(),
+        number,
+        firmware: String::new(),
+        loops: vec![],
+        files: None,
+    };
+    let Some(flight) = log.flights.get(number.saturating_sub(1)) else {
+        // The error names the flights that there are.
+        log::signals(&source, &log, number, ControlLoop::ALL[0])?;
+        return Ok(surveyed);
+    };
+    let _waiting = Waiting::on("identifying");
+    surveyed.firmware = of_firmware(&flight.firmware);
+    let complete = flight.loops.iter().filter(|one| one.is_complete());
+    let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
+    let loops: Result<Vec<FlightLoop>, Failure> = (loops.into_par_iter())
+        .map(|of| of_loop(&source, &log, number, (flight, of), (arguments, asked)))
+        .collect();
+    surveyed.loops = loops?;
+    if let Some(path) = &arguments.write.write {
+        let to_write = surveyed
+            .loops
+            .iter()
+            .filter_map(|one| one.to_write.as_ref());
+        let changes: Vec<Change> = (to_write.filter_map(|one| one.as_ref().ok()))
+            .flat_map(|written| written.changes.clone())
             .collect();
-        Ok(Self {
-            name,
-            number,
-            loops: loops?,
-        })
+        surveyed.files = log_gains::write(path, flight, &changes)?;
     }
-
-    /// The report `onecycle.flight/1` of docs/identify-json.md.
-    pub(crate) fn json(&self) -> String {
-        report::json(&self.name, self.number, &self.loops)
-    }
-
-    pub(crate) fn text(&self) -> String {
-        report::text(&self.name, self.number, &self.loops)
-    }
+    Ok(surveyed)
 }
 
-fn survey(
+fn of_loop(
     source: &Source<'_>,
     log: &FlightLog,
     number: usize,
     (flight, of): (&Flight, ControlLoop),
-    asked: &Specification,
+    (arguments, asked): (&Identify, &Specification),
 ) -> Result<FlightLoop, Failure> {
     let signals = log::signals(source, log, number, of)?;
     let mut of_log = LogLoop::new(flight.clone(), of);
@@ -117,6 +112,22 @@ fn survey(
             of_log = of_log.with_read_back(source, log, number)?;
         }
         if !of_log.contradicts(&choice) {
+            let answer = answer::of_identified(
+                &best,
+                &answer::Subject {
+                    file: &arguments.file.display().to_string(),
+                    units: &Units::default(),
+                    choice: Some(&choice),
+                    of_log: Some(&of_log),
+                    gains: None,
+                    share: arguments.write.step,
+                },
+            );
+            if arguments.write.write.is_some() && answer.verdict == Advice::Change {
+                let of_log = of_log.with_read_back(source, log, number)?;
+                one.to_write = Some(of_log.judged(&arguments.write, Some(&best), Some(&choice)));
+            }
+            one.answer = Some(answer);
             one.choice = Some(choice);
             break;
         }
@@ -183,6 +194,8 @@ fn parts(
         units: signals.units,
         parts,
         choice: None,
+        answer: None,
+        to_write: None,
     };
     (one, processes)
 }

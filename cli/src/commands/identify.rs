@@ -12,12 +12,14 @@ use onecycle_link::{LogError, Span};
 
 use super::log::{self, Piped, Source};
 use super::log_gains::{self, LogLoop};
-use super::{controllers, flight, pack};
-use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE, When};
+use super::{answer, controllers, flight, pack};
+use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE};
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, columns, is_terminal, print, write_text};
+use crate::output::{Waiting, print, write_text};
 use crate::reading::open_with_bar;
-use crate::report::{json, log_gains as log_report, page, plot, text};
+use crate::report::units::Units;
+use crate::report::{json, log_gains as log_report, page, text};
+use crate::results::answer::Answer;
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::LogGains;
 use crate::words;
@@ -30,6 +32,7 @@ pub(crate) struct Found {
     pub(crate) choice: Option<Controllers>,
     pub(crate) of_log: Option<LogLoop>,
     gains: Option<LogGains>,
+    answer: Answer,
 }
 
 impl Found {
@@ -39,7 +42,7 @@ impl Found {
             &self.name,
             &self.recording,
             &self.identification,
-            self.choice.as_ref(),
+            (self.choice.as_ref(), &self.answer),
             self.gains.as_ref(),
             has_rows,
         )
@@ -76,18 +79,23 @@ impl Found {
         }
     }
 
+    /// The answer, and with details all else.
     pub(crate) fn text(&self, has_details: bool) -> String {
-        text::identification(
-            &self.name,
-            &self.recording,
-            &self.identification,
-            self.choice.as_ref(),
-            has_details,
-        ) + &self
-            .gains
-            .as_ref()
-            .map(log_report::text)
-            .unwrap_or_default()
+        let (recording, found) = (&self.recording, &self.identification);
+        let card = text::card(&self.title(), recording, found, &self.answer, has_details);
+        if !has_details {
+            return card;
+        }
+        let choice = self.choice.as_ref();
+        let details = text::identification(&self.name, recording, found, choice);
+        let gains = self.gains.as_ref().map(log_report::text);
+        format!("{card}\n{details}{}", gains.unwrap_or_default())
+    }
+
+    /// The file, and the loop of a flight log.
+    fn title(&self) -> String {
+        let of_log = self.of_log.as_ref().map(LogLoop::title);
+        format!("{}{}", self.name, of_log.unwrap_or_default())
     }
 }
 
@@ -114,9 +122,7 @@ pub(crate) fn show(arguments: &Identify, found: &mut Found) -> Result<(), Failur
     print(&if arguments.json {
         found.json(arguments.rows)
     } else {
-        let draw = || plot::end(&found.recording, &found.identification, columns());
-        let plotted = is_plotted(arguments.plot).then(draw).flatten();
-        found.text(arguments.details) + &plotted.unwrap_or_default()
+        found.text(arguments.details)
     })
 }
 
@@ -171,8 +177,21 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
             )
         })
         .transpose()?;
+    let name = arguments.file.display().to_string();
+    let answer = answer::of(
+        &identification,
+        &answer::Subject {
+            file: &name,
+            units: &Units::of(&recording),
+            choice: choice.as_ref(),
+            of_log: of_log.as_ref(),
+            gains: gains.as_ref(),
+            share: arguments.write.step,
+        },
+    );
     Ok(Found {
-        name: arguments.file.display().to_string(),
+        name,
+        answer,
         recording,
         identification,
         choice,
@@ -194,14 +213,6 @@ fn settings<'a>(arguments: &Identify, asked: Specification) -> onecycle::Identif
         .beta(arguments.beta)
         .input_late_s(arguments.input_late)
         .input_before(arguments.input_before)
-}
-
-fn is_plotted(when: When) -> bool {
-    match when {
-        When::Auto => is_terminal(),
-        When::Always => true,
-        When::Never => false,
-    }
 }
 
 /// The requirements on the controller.

@@ -7,8 +7,8 @@ use onecycle::{
     Pid, Recording, Specification, Structure, Style, assess, least_margins,
 };
 use onecycle_link::{
-    Agreement, ControlLoop, Flight, FlightLog, LoopGains, LowPassSetting, ParameterFiles, RateLaw,
-    ReadBack, Signals, changes, files,
+    Agreement, Change, ControlLoop, Flight, FlightLog, LoopGains, LowPassSetting, ParameterFiles,
+    RateLaw, ReadBack, Signals, changes, files,
 };
 
 use super::log::{self, Source};
@@ -16,9 +16,11 @@ use super::log_overlay::{overlay, overshoot};
 use crate::args::{Identify, WriteArguments};
 use crate::failure::Failure;
 use crate::output::{with_ending, write_text};
+use crate::results::answer::Gain;
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::{LogGains, Written};
 use crate::words::limits::{broken, is_worse};
+use crate::words::log::of_firmware;
 use crate::words::log_gains as words;
 
 /// Draws over which the gains to write are judged.
@@ -81,6 +83,12 @@ impl LogLoop {
     /// The flight.
     pub(super) fn flight(&self) -> &Flight {
         &self.flight
+    }
+
+    /// Which loop of which flight it is, behind the name of the file.
+    pub(super) fn title(&self) -> String {
+        let firmware = of_firmware(&self.flight.firmware);
+        format!("  {} loop, {firmware}", self.control_loop)
     }
 
     /// Which loop it is.
@@ -166,7 +174,7 @@ impl LogLoop {
     }
 
     /// The parameters to write with their margins, or the reason why nothing is written.
-    fn judged(
+    pub(super) fn judged(
         &self,
         asked: &WriteArguments,
         identified: Option<&Identified>,
@@ -234,6 +242,39 @@ impl LogLoop {
         })
     }
 
+    /// The parameters that change on the way to `goal` with this share of the step and with all of it, and the controller of that
+    /// share; without those that the firmware cannot take. `None`: it cannot take that share either, or the log does not tell those in force.
+    pub(super) fn named(
+        &self,
+        goal: Pid,
+        share: f64,
+        choice: &Controllers,
+    ) -> Option<(Vec<Gain>, Controller)> {
+        if goal.filter_s > 0.0 {
+            return None;
+        }
+        let old = LoopGains::in_force(&self.flight, self.control_loop)?;
+        let goal = LoopGains::new(goal.kp, goal.ki, goal.kd);
+        let toward = |share| {
+            let wanted = old.toward(goal, share);
+            changes(&self.flight, self.control_loop, wanted).ok()
+        };
+        let (part, all) = (toward(share)?, toward(1.0));
+        let new = |of: &[Change], name: &str| {
+            let found = of.iter().find(|change| change.name == name);
+            found.map(|change| change.new)
+        };
+        let gains = all.as_ref().unwrap_or(&part).iter().map(|change| Gain {
+            name: change.name.clone(),
+            unit: String::new(),
+            now: Some(change.old),
+            half: Some(new(&part, &change.name).unwrap_or(change.old)),
+            full: all.as_ref().and_then(|all| new(all, &change.name)),
+        });
+        let half = pid(old.changed(&part)).with_execution(choice.asked.execution);
+        Some((gains.collect(), half.into()))
+    }
+
     /// The files that put the new values in force, and the old ones again; or the reason why the firmware has no such file.
     pub(crate) fn files(&self, to_write: &Written) -> Result<ParameterFiles, String> {
         let files = files(&self.flight, &to_write.changes);
@@ -242,20 +283,34 @@ impl LogLoop {
 
     /// Writes both files or none.
     fn write(&self, path: &Path, to_write: Written) -> Result<Written, Failure> {
-        let files = self.files(&to_write).map_err(Failure::usage)?;
-        let restore = restore_path(path, files.ending);
-        write_text(&restore, &files.restore)?;
-        if let Err(failure) = write_text(path, &files.apply) {
-            // A restore file alone would puzzle its reader.
-            let _ = std::fs::remove_file(&restore);
-            return Err(failure);
-        }
+        let files = write(path, &self.flight, &to_write.changes)?;
+        let [path, restore] =
+            files.ok_or_else(|| Failure::usage(words::no_gains(self.control_loop)))?;
         Ok(Written {
-            path: path.to_owned(),
+            path,
             restore,
             ..to_write
         })
     }
+}
+
+/// Writes a file with parameters and one with the old values, or none. `None`: the firmware has no such file, or nothing changes.
+pub(super) fn write(
+    path: &Path,
+    flight: &Flight,
+    changes: &[Change],
+) -> Result<Option<[PathBuf; 2]>, Failure> {
+    let Some(files) = files(flight, changes).filter(|_| !changes.is_empty()) else {
+        return Ok(None);
+    };
+    let restore = restore_path(path, files.ending);
+    write_text(&restore, &files.restore)?;
+    if let Err(failure) = write_text(path, &files.apply) {
+        // A restore file alone would puzzle its reader.
+        let _ = std::fs::remove_file(&restore);
+        return Err(failure);
+    }
+    Ok(Some([path.to_owned(), restore]))
 }
 
 /// Figures of gains to write, on the most probable process and over the posterior; or why they must not be written.

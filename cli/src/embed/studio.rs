@@ -31,7 +31,7 @@ use crate::args::{Command, HALF_STEP, Identify};
 use crate::commands::log::{self, Source};
 use crate::commands::{flight, identify, simulate};
 use crate::failure::Failure;
-use crate::report::{hand, log as log_report};
+use crate::report::{flight as flight_report, hand, log as log_report};
 use crate::words;
 
 /// Processes of the posterior over which gains are judged at every move: a few milliseconds.
@@ -97,8 +97,8 @@ impl Studio {
             "survey" => {
                 let arguments = arguments_of_identify(&self.file, &options)?;
                 let asked = identify::checked(&arguments).map_err(failed)?;
-                let surveyed = flight::Surveyed::of(&arguments, &asked).map_err(failed)?;
-                Ok(value(&surveyed.json()))
+                let surveyed = flight::survey(&arguments, &asked).map_err(failed)?;
+                Ok(value(&flight_report::json(&surveyed)))
             }
             "json" => Ok(json!({ "text": self.found()?.json(false) })),
             "page" => {

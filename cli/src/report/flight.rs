@@ -4,12 +4,15 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
+use super::answer;
 use super::json::controllers::{NotKept, not_kept};
 use super::json::to_text;
 use super::number::short;
 use super::wrap::wrapped;
-use crate::results::flight::{FlightLoop, Judged, Part, Refusal};
+use crate::results::answer::{Advice, Answer};
+use crate::results::flight::{FlightLoop, Judged, Part, Refusal, Survey};
 use crate::style::{HEADING, headed, painted};
+use crate::words::answer as answers;
 use crate::words::controllers;
 use crate::words::flight as words;
 use crate::words::sentence;
@@ -18,41 +21,94 @@ use crate::words::verdict::advice;
 /// Version of the JSON; raised with every change that a reader could notice, added keys excepted.
 const SCHEMA: &str = "onecycle.flight/1";
 
-/// The report for people.
-pub(crate) fn text(file: &str, flight: usize, loops: &[FlightLoop]) -> String {
-    let mut text = format!("{}\n", painted(HEADING, file));
-    text.push_str(&headed(&format!(
-        "\nFlight {flight}         parts  gain (90 %)                        delay  your margins        P, I, D proposed\n"
-    )));
-    for one in loops {
-        row(&mut text, one);
-    }
-    if loops.is_empty() {
-        wrapped(&mut text, "  ", words::NOTHING_LOGGED);
+/// The card of a flight, with details all that its parts tell.
+pub(crate) fn text(of: &Survey, has_details: bool) -> String {
+    let mut text = card(of);
+    if !has_details {
         return text;
     }
-    for one in loops {
+    text.push_str(&headed(&format!(
+        "\nFlight {}         parts  gain (90 %)                        delay  your margins        P, I, D proposed\n",
+        of.number
+    )));
+    for one in &of.loops {
+        row(&mut text, one);
+    }
+    for one in &of.loops {
         parts(&mut text, one);
     }
     text.push('\n');
-    if loops.iter().any(|one| one.best().is_some()) {
-        wrapped(&mut text, "", &words::next(file));
+    if of.loops.iter().any(|one| one.best().is_some()) {
+        wrapped(&mut text, "", &words::next(&of.file));
     }
     text
 }
 
+/// What to do about every loop: at most 40 lines.
+fn card(of: &Survey) -> String {
+    let told = of.loops.iter().filter(|one| one.answer.is_some()).count();
+    let title = format!("{}  {}, flight {}", of.file, of.firmware, of.number);
+    let mut text = format!("{}\n", painted(HEADING, &title));
+    if of.loops.is_empty() {
+        wrapped(&mut text, "", words::NOTHING_LOGGED);
+        return text;
+    }
+    let mut has_titles = false;
+    for one in &of.loops {
+        let name = format!("{:<15} ", one.control_loop.to_string());
+        let Some(answer) = &one.answer else {
+            answer::verdict(&mut text, &name, &refused(one));
+            continue;
+        };
+        answer::verdict(&mut text, &name, answer);
+        if answer.verdict != Advice::Keep {
+            answer::columns(&mut text, answer, !has_titles);
+            has_titles = true;
+        }
+        if let Some((gain, delay)) = process(one) {
+            let _ = writeln!(text, "  {:<20} {gain}, delay {delay}", "process");
+        }
+        if let Some(Err(reason)) = &one.to_write {
+            wrapped(&mut text, "  not written: ", reason);
+        }
+    }
+    let next = match (&of.files, told) {
+        (Some([path, restore]), _) => {
+            answers::written(&path.display().to_string(), &restore.display().to_string())
+        }
+        (None, 0) => words::NO_LOOP.to_owned(),
+        (None, _) if is_any(of, Advice::Change) => answers::write(&of.file, ""),
+        _ => answers::NOTHING.to_owned(),
+    };
+    answer::line(&mut text, "Next", &next);
+    answer::line(&mut text, "", words::MORE);
+    text
+}
+
+fn is_any(of: &Survey, advice: Advice) -> bool {
+    let answers = of.loops.iter().filter_map(|one| one.answer.as_ref());
+    answers.into_iter().any(|answer| answer.verdict == advice)
+}
+
+/// The answer of a loop that no part of the flight tells anything about.
+fn refused(one: &FlightLoop) -> Answer {
+    let refusals = one
+        .parts
+        .iter()
+        .filter_map(|part| part.outcome.as_ref().err());
+    let reason = refusals.map(words::brief).next();
+    Answer::not_yet(reason.unwrap_or_else(|| words::NO_PART_IN_BRIEF.to_owned()))
+}
+
 /// The line of a loop: what all its parts tell.
 fn row(text: &mut String, one: &FlightLoop) {
-    let told = one.told();
-    let used = told.len();
+    let used = one.told().len();
     let name = one.control_loop.to_string();
     let _ = write!(text, "  {name:<14}  {used} of {:<2}", one.parts.len());
-    let (Some(gain), Some(first)) = (one.gain(), told.first()) else {
+    let Some((gain, delay)) = process(one) else {
         let _ = writeln!(text, "  not identified");
         return;
     };
-    let unit = words::gain_unit(one.units);
-    let delay = format!("{:.0} ms", 1e3 * first.delay_s);
     let margins = one
         .in_force()
         .map_or("-".to_owned(), |judged| margins(&judged));
@@ -60,8 +116,15 @@ fn row(text: &mut String, one: &FlightLoop) {
         let pid = judged.pid;
         [pid.kp, pid.ki, pid.kd].map(short).join(", ")
     });
-    let gain = format!("{} {unit}", with_ends(gain));
     let _ = writeln!(text, "  {gain:<33} {delay:>6}  {margins:<18}  {gains}");
+}
+
+/// Gain of a loop with its interval, and delay.
+fn process(one: &FlightLoop) -> Option<(String, String)> {
+    let gain = with_ends(one.gain()?);
+    let delay_s = one.told().first()?.delay_s;
+    let unit = words::gain_unit(one.units);
+    Some((format!("{gain} {unit}"), format!("{:.0} ms", 1e3 * delay_s)))
 }
 
 /// An estimate with its interval.
@@ -136,12 +199,15 @@ struct Report<'a> {
     schema: &'static str,
     file: &'a str,
     flight: usize,
-    loops: Vec<Loop>,
+    loops: Vec<Loop<'a>>,
+    written: Option<[String; 2]>,
 }
 
 #[derive(Serialize)]
-struct Loop {
+struct Loop<'a> {
     name: String,
+    answer: Option<&'a Answer>,
+    not_written: Option<&'a str>,
     gain: Option<[f64; 3]>,
     gain_unit: Option<String>,
     delay_s: Option<f64>,
@@ -185,40 +251,48 @@ fn gains(judged: &Judged) -> Gains {
 }
 
 /// The report for programs.
-pub(crate) fn json(file: &str, flight: usize, loops: &[FlightLoop]) -> String {
-    let part = |part: &Part| {
-        let found = part.outcome.as_ref().ok();
-        PartReport {
-            from_s: part.span.from_s,
-            to_s: part.span.to_s,
-            verdict: match &part.outcome {
-                Ok(_) => "identified",
-                Err(refusal) => refusal.kind(),
-            },
-            structure: found.map(|found| found.structure.name()),
-            gain: found.map(|found| found.gain),
-            delay_s: found.map(|found| found.delay_s),
-        }
-    };
-    let one = |one: &FlightLoop| {
-        let told = one.told();
-        let first = told.first();
-        Loop {
-            name: one.control_loop.to_string(),
-            gain: one.gain(),
-            gain_unit: first.map(|_| words::gain_unit(one.units)),
-            delay_s: first.map(|found| found.delay_s),
-            parts_disagree: one.parts_disagree(),
-            in_force: one.in_force().as_ref().map(gains),
-            proposed: one.proposed().as_ref().map(gains),
-            limits_not_kept: one.choice.as_ref().map(not_kept).unwrap_or_default(),
-            parts: one.parts.iter().map(part).collect(),
-        }
-    };
+pub(crate) fn json(of: &Survey) -> String {
     to_text(&Report {
         schema: SCHEMA,
-        file,
-        flight,
-        loops: loops.iter().map(one).collect(),
+        file: &of.file,
+        flight: of.number,
+        loops: of.loops.iter().map(loop_report).collect(),
+        written: (of.files.as_ref())
+            .map(|paths| paths.each_ref().map(|path| path.display().to_string())),
     })
+}
+
+fn loop_report(one: &FlightLoop) -> Loop<'_> {
+    let told = one.told();
+    let first = told.first();
+    Loop {
+        name: one.control_loop.to_string(),
+        answer: one.answer.as_ref(),
+        not_written: (one.to_write.as_ref())
+            .and_then(|written| written.as_ref().err())
+            .map(String::as_str),
+        gain: one.gain(),
+        gain_unit: first.map(|_| words::gain_unit(one.units)),
+        delay_s: first.map(|found| found.delay_s),
+        parts_disagree: one.parts_disagree(),
+        in_force: one.in_force().as_ref().map(gains),
+        proposed: one.proposed().as_ref().map(gains),
+        limits_not_kept: one.choice.as_ref().map(not_kept).unwrap_or_default(),
+        parts: one.parts.iter().map(part).collect(),
+    }
+}
+
+fn part(part: &Part) -> PartReport {
+    let found = part.outcome.as_ref().ok();
+    PartReport {
+        from_s: part.span.from_s,
+        to_s: part.span.to_s,
+        verdict: match &part.outcome {
+            Ok(_) => "identified",
+            Err(refusal) => refusal.kind(),
+        },
+        structure: found.map(|found| found.structure.name()),
+        gain: found.map(|found| found.gain),
+        delay_s: found.map(|found| found.delay_s),
+    }
 }

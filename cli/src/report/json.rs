@@ -16,6 +16,7 @@ use serde::{Serialize, Serializer};
 use self::controllers::{AgainstReport, Assumed, NotKept, Proposed, Robust};
 use self::record::Record;
 use super::log_gains::LogGainsReport;
+use crate::results::answer::Answer;
 use crate::results::controllers::Controllers;
 use crate::results::family::OfOscillation;
 use crate::results::log_gains::LogGains;
@@ -31,6 +32,7 @@ const TUNE_SCHEMA: &str = "onecycle.tune/2";
 struct IdentifyReport<'a> {
     schema: &'static str,
     file: &'a str,
+    answer: &'a Answer,
     columns: Columns<'a>,
     verdict: Verdict,
     excitation: Option<&'static str>,
@@ -306,7 +308,7 @@ pub(crate) fn identification(
     file: &str,
     recording: &Recording,
     found: &Identification,
-    choice: Option<&Controllers>,
+    (choice, answer): (Option<&Controllers>, &Answer),
     gains: Option<&LogGains>,
     with_rows: bool,
 ) -> String {
@@ -317,6 +319,7 @@ pub(crate) fn identification(
     to_text(&IdentifyReport {
         schema: IDENTIFY_SCHEMA,
         file,
+        answer,
         columns: Columns {
             time: column(&columns.time),
             input: column(&columns.input),

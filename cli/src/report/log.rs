@@ -2,9 +2,7 @@
 
 use std::fmt::Write;
 
-use onecycle_link::{
-    Firmware, Flight, FlightLog, LoggedLoop, LoggedSignal, ReadBack, Setting, Span,
-};
+use onecycle_link::{Flight, FlightLog, LoggedLoop, LoggedSignal, ReadBack, Setting, Span};
 use serde::Serialize;
 
 use super::json::to_text;
@@ -50,7 +48,7 @@ fn describe(text: &mut String, number: usize, flight: &Flight, moved: Option<f64
     let Span { from_s, to_s, .. } = flight.span;
     let about = &flight.firmware;
     let mut facts = vec![
-        ("firmware", firmware(about)),
+        ("firmware", words::of_firmware(about)),
         ("board", about.board.clone()),
         (
             "time",
@@ -96,15 +94,6 @@ fn describe(text: &mut String, number: usize, flight: &Flight, moved: Option<f64
         advice
             .iter()
             .for_each(|sentence| wrapped(text, "  ", sentence));
-    }
-}
-
-/// Name and version; versions of some firmware begin with the name.
-fn firmware(about: &Firmware) -> String {
-    if about.version.starts_with(char::is_alphabetic) {
-        about.version.clone()
-    } else {
-        format!("{} {}", words::firmware(about.kind), about.version)
     }
 }
 

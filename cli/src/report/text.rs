@@ -8,12 +8,14 @@ use onecycle::{
 };
 use onecycle_identify::Reading;
 
+use super::answer;
 use super::controllers;
 use super::family;
 use super::number::{bounded, short, significant};
 use super::record::{self, Fact};
 use super::units::Units;
 use super::wrap::wrapped;
+use crate::results::answer::Answer;
 use crate::results::controllers::{Controllers, Source};
 use crate::results::family::OfOscillation;
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, headed, painted};
@@ -23,14 +25,33 @@ use crate::words::remark::{details, grouped, reasons};
 use crate::words::sentence;
 use crate::words::verdict::advice;
 
-/// The report of an identification.
-/// `choice`: the controllers of an identified process. `has_details`: with the remarks that are no reason to suspect the result.
+/// The card of an identification.
+pub(crate) fn card(
+    title: &str,
+    recording: &Recording,
+    found: &Identification,
+    answer: &Answer,
+    has_details: bool,
+) -> String {
+    let units = Units::of(recording);
+    let process = found.outcome.as_ref().ok();
+    let told = reasons(found).len() + details(found).len();
+    let on_card = usize::from(!reasons(found).is_empty());
+    let more = if has_details { 0 } else { told - on_card };
+    let read = (recording.notes().first())
+        .filter(|_| !has_details && !recording.is_of_a_flight_log())
+        .map(|note| sentence(&recording::note(note)));
+    let titles = (title, read.as_deref());
+    answer::card(titles, answer, process.map(|of| (of, &units)), more)
+}
+
+/// All that is known of an identification.
+/// `choice`: the controllers of an identified process.
 pub(crate) fn identification(
     file: &str,
     recording: &Recording,
     found: &Identification,
     choice: Option<&Controllers>,
-    has_details: bool,
 ) -> String {
     let mut text = String::new();
     let units = Units::of(recording);
@@ -84,30 +105,16 @@ pub(crate) fn identification(
             }
         }
     }
-    describe_remarks(&mut text, found, has_details);
+    describe_remarks(&mut text, found);
     text
 }
 
-fn describe_remarks(text: &mut String, found: &Identification, has_details: bool) {
-    let groups = grouped(found);
-    let more = details(found).len();
-    let shown = match has_details {
-        true => groups.len(),
-        false => groups.len().min(usize::from(!reasons(found).is_empty())),
-    };
-    for (heading, sentences) in &groups[..shown] {
+fn describe_remarks(text: &mut String, found: &Identification) {
+    for (heading, sentences) in grouped(found) {
         text.push_str(&headed(&format!("\n{heading}\n")));
         for sentence in sentences {
-            remark(text, "  - ", sentence);
+            remark(text, "  - ", &sentence);
         }
-    }
-    if !has_details && more > 0 {
-        let remarks = if more == 1 { "remark" } else { "remarks" };
-        let line = format!(
-            "{more} more {remarks}, on how this was found and what no such test shows: --details."
-        );
-        text.push('\n');
-        wrapped(text, "", &line);
     }
 }
 

@@ -29,13 +29,13 @@ pub(crate) fn ratio(output: &str, input: &str, seconds: usize) -> String {
 
 /// Units of input and output; empty where the recording gives none.
 #[derive(Default)]
-pub(super) struct Units {
+pub(crate) struct Units {
     pub(super) input: String,
     pub(super) output: String,
 }
 
 impl Units {
-    pub(super) fn of(recording: &Recording) -> Self {
+    pub(crate) fn of(recording: &Recording) -> Self {
         let unit = |column: &onecycle_link::Column| column.unit.clone().unwrap_or_default();
         Self {
             input: unit(&recording.columns().input),
@@ -66,7 +66,7 @@ impl Units {
     }
 
     /// Unit of a controller's gain, with a blank before it: ` input/output`, or ` input times/output`.
-    pub(super) fn controller(&self, times: &str) -> String {
+    pub(crate) fn controller(&self, times: &str) -> String {
         if self.input.is_empty() || self.output.is_empty() {
             return String::new();
         }
@@ -74,7 +74,7 @@ impl Units {
     }
 
     /// Unit of an integral gain, with a blank before it: ` input/(output s)`.
-    pub(super) fn integral(&self) -> String {
+    pub(crate) fn integral(&self) -> String {
         if self.input.is_empty() || self.output.is_empty() {
             return String::new();
         }

@@ -7,10 +7,15 @@ const WIDTH: usize = 96;
 
 /// Writes `words` behind `lead`, in lines as wide as a terminal, indented like the first.
 pub(super) fn wrapped(text: &mut String, lead: &str, words: &str) {
+    wrapped_to(text, lead, words, WIDTH);
+}
+
+/// As [`wrapped`], in lines of `width`.
+pub(super) fn wrapped_to(text: &mut String, lead: &str, words: &str, width: usize) {
     let mut line = lead.to_owned();
     let mut is_first = true;
-    for word in words.split_whitespace() {
-        if !is_first && line.len() + 1 + word.len() > WIDTH {
+    for word in words.split_ascii_whitespace() {
+        if !is_first && line.chars().count() + 1 + word.chars().count() > width {
             let _ = writeln!(text, "{line}");
             line = " ".repeat(lead.len());
             is_first = true;

@@ -1,9 +1,13 @@
 //! The control loops of a flight, each identified from several parts of it.
 
+use std::path::PathBuf;
+
 use onecycle::{Assessment, Controller, Pid, Structure, Verdict};
 use onecycle_link::{ControlLoop, Span};
 
+use super::answer::Answer;
 use super::controllers::Controllers;
+use super::log_gains::Written;
 
 /// A loop with its parts.
 pub(crate) struct FlightLoop {
@@ -13,6 +17,22 @@ pub(crate) struct FlightLoop {
     pub(crate) parts: Vec<Part>,
     /// Controllers for the process of the best part.
     pub(crate) choice: Option<Controllers>,
+    /// What to do about the gains. `None`: no part tells anything.
+    pub(crate) answer: Option<Answer>,
+    /// The parameters to write, or why there are none. `None`: not asked for, or no loop to change.
+    pub(crate) to_write: Option<Result<Written, String>>,
+}
+
+/// The loops of a flight.
+pub(crate) struct Survey {
+    pub(crate) file: String,
+    /// Number of the flight in the file, from 1.
+    pub(crate) number: usize,
+    /// Empty if the file has no such flight.
+    pub(crate) firmware: String,
+    pub(crate) loops: Vec<FlightLoop>,
+    /// The files with the parameters of all loops and with the old values. `None`: not asked for, or there is nothing to write.
+    pub(crate) files: Option<[PathBuf; 2]>,
 }
 
 /// A controller and its figures; without them the loop is unstable.

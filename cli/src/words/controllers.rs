@@ -140,7 +140,7 @@ fn percent(share: f64) -> String {
 }
 
 /// Rounded up to two significant digits, as a time is shown.
-fn up(time_s: f64) -> f64 {
+pub(super) fn up(time_s: f64) -> f64 {
     let digit = 10_f64.powf(time_s.log10().floor() - 1.0);
     (time_s / digit).ceil() * digit
 }

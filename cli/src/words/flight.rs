@@ -4,11 +4,16 @@ use onecycle_link::ControlLoop;
 
 use crate::report::number::short;
 use crate::report::units::ratio;
+use crate::results::flight::Refusal;
 
 pub(crate) const NOTHING_LOGGED: &str =
     "The log has input and output of no control loop. onecycle log FILE says what to log.";
 pub(crate) const NO_PART: &str = "No part of the flight can be used: the vehicle was not armed and in the air for 5 s, or \
                                   the actuator was at its limit.";
+pub(crate) const NO_PART_IN_BRIEF: &str = "no part of the flight can be used";
+pub(crate) const NO_LOOP: &str = "Fly a chirp, or 30 s of quick stick movements on each axis. What each part of this flight told: \
+                                  --details.";
+pub(crate) const MORE: &str = "Process, parts and other figures: --details; one loop: --axis AXIS";
 pub(crate) const DISAGREE: &str = "The parts disagree by more than their intervals: the process changed in flight (battery, \
                                    throttle, load). Design for the part in which the vehicle has to be stable first.";
 
@@ -19,6 +24,17 @@ pub(crate) fn next(file: &str) -> String {
          interval. The whole report of a loop: onecycle identify {file} --axis AXIS --loop LOOP --from S --to S; with \
          --write FILE it writes the parameters."
     )
+}
+
+/// Why a part tells nothing, in a few words.
+pub(crate) fn brief(refusal: &Refusal) -> String {
+    match refusal {
+        Refusal::Implausible { .. } => "the gain found is none that this loop can have".to_owned(),
+        Refusal::Verdict(verdict) => {
+            let clause = verdict.to_string();
+            clause.split(':').next().unwrap_or_default().to_owned()
+        }
+    }
 }
 
 /// A gain that the loop cannot have.

@@ -177,6 +177,15 @@ fn faster(flight: &Flight) -> Option<String> {
     }
 }
 
+/// Name and version; versions of some firmware begin with the name.
+pub(crate) fn of_firmware(about: &Firmware) -> String {
+    if about.version.starts_with(char::is_alphabetic) {
+        about.version.clone()
+    } else {
+        format!("{} {}", firmware(about.kind), about.version)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use onecycle_link::FlightLog;

@@ -128,7 +128,7 @@ pub(crate) fn identify(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> Outcome {
 pub(crate) fn identify_as_text(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> Outcome {
     let file = Scratch::new();
     let path = file.write("recording.csv", bytes.as_ref());
-    let mut all = vec!["identify", path.as_str()];
+    let mut all = vec!["identify", path.as_str(), "--details"];
     all.extend(arguments);
     run(&all)
 }

@@ -272,7 +272,7 @@ fn printed(page: &str) -> Vec<(String, Vec<String>)> {
         let command = if lines.peek().is_some_and(|line| line.starts_with("$ ")) {
             lines.next().unwrap()
         } else if is_whole_output {
-            "$ onecycle identify examples/simulated_hover.csv".to_owned()
+            "$ onecycle identify examples/simulated_hover.csv --details".to_owned()
         } else {
             continue;
         };

@@ -56,7 +56,16 @@ fn a_read_back_does_not_confirm_what_it_cannot_tell() {
 #[test]
 fn a_refused_flight_has_no_valid_model() {
     let log = example("px4_motor_failure.ulg");
-    let text = run(&["identify", &log, "--axis", "roll", "--controller", "pd"]).stdout;
+    let text = run(&[
+        "identify",
+        &log,
+        "--axis",
+        "roll",
+        "--controller",
+        "pd",
+        "--details",
+    ])
+    .stdout;
     assert!(text.contains("No process identified"), "{text}");
     assert!(!text.contains("intervals are valid"), "{text}");
 }
@@ -73,6 +82,7 @@ fn identify_takes_the_loop_asked_for() {
         "203",
         "--to",
         "207",
+        "--details",
     ]);
     let expected = "pitch rate loop of flight 1: input is vehicle_torque_setpoint.xyz[1]";
     assert!(outcome.stdout.contains(expected), "{outcome:?}");
@@ -89,7 +99,7 @@ fn a_bag_of_ros_2_is_a_flight_log_of_px4() {
     for fact in ["MCAP", "roll rate     245 Hz", "246 Hz", "parameters  0"] {
         assert!(listed.contains(fact), "{fact}: {listed}");
     }
-    let found = run(&["identify", &bag]).stdout;
+    let found = run(&["identify", &bag, "--details"]).stdout;
     assert!(found.contains("pitch rate      0 of"), "{found}");
 }
 
@@ -173,7 +183,7 @@ fn one_loop_has_the_process_of_the_table() {
 
 #[test]
 fn every_loop_of_a_flight_is_listed_with_its_parts() {
-    let text = run(&["identify", &example("px4_chirps.ulg")]).stdout;
+    let text = run(&["identify", &example("px4_chirps.ulg"), "--details"]).stdout;
     for fact in [
         "Flight 1         parts  gain (90 %)",
         "pitch rate      1 of 1",

@@ -92,6 +92,9 @@ fn the_documented_keys_are_those_of_the_report() {
     let by_response = run(&["identify", &acro, "--axis", "yaw", "--json"]).stdout;
     let by_response: Value = serde_json::from_str(&by_response).unwrap();
     keys(&by_response["fit"], "fit", &mut found);
+    // Those of the three columns of the answer are documented once.
+    let of_columns = ["answer.figures.now.", "answer.figures.half."];
+    found.retain(|key| !of_columns.iter().any(|part| key.starts_with(part)));
     // Those of a controller, its margins and its step are documented once.
     let of_against = |key: &String| {
         let parts = ["controller", "margins", "step"];

@@ -97,7 +97,7 @@ fn what_is_faster_than_a_sample_reads_below() {
         let below = format!("below {high:.5}");
         let line = lines
             .lines()
-            .find(|line| line.trim().starts_with(name))
+            .rfind(|line| line.trim().starts_with(name))
             .unwrap();
         let shown: Vec<&str> = line.split_whitespace().collect();
         assert_eq!(shown.join(" "), format!("{name} {below} s"));

@@ -1,4 +1,4 @@
-//! Output on a terminal: colours, plot, completions, manual.
+//! Output on a terminal: colours, widths, completions, manual.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -49,17 +49,6 @@ fn stripped(text: &str) -> String {
     plain
 }
 
-/// Whether a character is braille with a dot.
-fn is_braille(character: char) -> bool {
-    ('\u{2801}'..='\u{28ff}').contains(&character)
-}
-
-fn rows_of_braille(text: &str) -> usize {
-    text.lines()
-        .filter(|line| line.contains(is_braille))
-        .count()
-}
-
 /// All lines but that of the time.
 fn timeless(text: &str) -> Vec<&str> {
     text.lines()
@@ -88,7 +77,7 @@ fn colours_change_nothing_but_the_colours() {
     let [good, clipped] = recordings(&folder);
     let commands: [&[&str]; 9] = [
         &["identify", &good],
-        &["identify", &good, "--plot", "always"],
+        &["identify", &good, "--details"],
         &["identify", &clipped],
         &[
             "tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
@@ -114,13 +103,13 @@ fn colours_change_nothing_but_the_colours() {
 fn verdicts_have_their_colours() {
     let folder = Scratch::new();
     let [good, clipped] = recordings(&folder);
-    let [text, _] = coloured(&["identify", &good], Some("CLICOLOR_FORCE"));
+    let [text, _] = coloured(&["identify", &good, "--details"], Some("CLICOLOR_FORCE"));
     assert!(text.contains("\x1b[32min the pack"), "{text}");
     assert!(text.contains("\x1b[33m  note:"), "{text}");
     assert!(text.contains("\x1b[1mController\x1b[0m"), "{text}");
     let [text, _] = coloured(&["identify", &clipped], Some("CLICOLOR_FORCE"));
     assert!(
-        text.contains("\x1b[1m\x1b[31mNo process identified\x1b[0m"),
+        text.contains("\x1b[1m\x1b[31mNOT YET\x1b[0m: saturated"),
         "{text}"
     );
     let [text, _] = coloured(&["pack", "verify", "default"], Some("CLICOLOR_FORCE"));
@@ -158,59 +147,7 @@ fn data_have_no_colours() {
     }
 }
 
-// ---------------------------------------------------------------- the plot
-
-// Twelve rows, lines of at most 96 characters, a time axis of two periods of 0.44 s.
-#[test]
-fn a_pipe_has_the_plot_when_it_is_asked_for() {
-    let folder = Scratch::new();
-    let [good, clipped] = recordings(&folder);
-    assert_eq!(rows_of_braille(&run(&["identify", &good]).stdout), 0);
-    assert_eq!(
-        rows_of_braille(&run(&["identify", &good, "--plot", "never"]).stdout),
-        0
-    );
-    let text = run(&["identify", &good, "--plot", "always"]).stdout;
-    assert!(!text.contains(ESCAPE), "{text}");
-    assert_eq!(rows_of_braille(&text), 12, "{text}");
-    assert!(
-        text.contains("Last two cycles  pv in dots, the fit as a line"),
-        "{text}"
-    );
-    assert!(
-        text.lines().all(|line| line.chars().count() <= 96),
-        "{text}"
-    );
-    let axis = text.lines().last().unwrap();
-    let times: Vec<f64> = axis
-        .split(" s")
-        .filter_map(|time| time.trim().parse().ok())
-        .collect();
-    assert!((times[1] - times[0] - 0.88).abs() < 0.05, "{axis}");
-    // The relay switches twice in a cycle: four times in two cycles, or three times if the window begins with a switch.
-    let relay = text.lines().find(|line| line.contains("relay │")).unwrap();
-    let strokes: Vec<char> = relay.chars().filter(|c| ['▔', '▁'].contains(c)).collect();
-    let switches = strokes.windows(2).filter(|pair| pair[0] != pair[1]).count();
-    assert!((3..=4).contains(&switches), "{relay}");
-
-    // A refusal shows the recording without a fit.
-    let text = run(&["identify", &clipped, "--plot", "always"]).stdout;
-    assert!(text.contains("No process identified"), "{text}");
-    assert!(rows_of_braille(&text) >= 10, "{text}");
-    assert!(!text.contains("the fit"), "{text}");
-}
-
-// Without an oscillation there is no plot; --json has none either.
-#[test]
-fn there_is_no_plot_of_nothing() {
-    let folder = Scratch::new();
-    let still = Table::noisy().map(|_, sample| sample.output = 0.0);
-    let path = folder.write("still.csv", still.csv().as_bytes());
-    let outcome = run(&["identify", &path, "--plot", "always"]);
-    assert_eq!(outcome.code, Some(crate::common::NOT_IDENTIFIED));
-    assert_eq!(rows_of_braille(&outcome.stdout), 0);
-    run(&["identify", &path, "--json", "--plot", "always"]).misused(&["--plot", "--json"]);
-}
+// ---------------------------------------------------------------- a terminal
 
 /// Output of `onecycle identify FILE` on a terminal of this width; `None` if the program `script` is not installed.
 fn on_a_terminal(file: &str, columns: usize, variable: Option<&str>) -> Option<String> {
@@ -232,26 +169,31 @@ fn on_a_terminal(file: &str, columns: usize, variable: Option<&str>) -> Option<S
     Some(String::from_utf8(output.stdout).unwrap())
 }
 
-// On a terminal the plot is drawn by default, as wide as the terminal: 70 characters, 13 of them left of the plot.
+// The card is as wide as the terminal, from 60 to 100 columns, and has its colours where the terminal has some.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_terminal_has_plot_and_colours_where_script_makes_one() {
+fn a_card_fits_its_terminal() {
     let folder = Scratch::new();
     let [good, _] = recordings(&folder);
-    let Some(text) = on_a_terminal(&good, 70, None) else {
-        return;
-    };
-    assert!(text.contains("\x1b[36m"), "{text}");
-    assert!(text.contains("\x1b[1mController\x1b[0m"), "{text}");
-    assert_eq!(rows_of_braille(&text), 12, "{text}");
-    let axis = text.lines().find(|line| line.contains('└')).unwrap();
-    assert_eq!(axis.trim_end().chars().count(), 70, "{text}");
-
+    for (columns, widest) in [(60, 60), (80, 80), (200, 100)] {
+        let Some(text) = on_a_terminal(&good, columns, None) else {
+            return;
+        };
+        assert!(text.contains("\x1b[32mFIRST GAINS\x1b[0m: "), "{text}");
+        let text = stripped(&text);
+        let lines: Vec<&str> = text.lines().collect();
+        let longest = lines
+            .iter()
+            .map(|line| line.trim_end().chars().count())
+            .max();
+        assert!(
+            longest <= Some(widest) && longest > Some(widest - 20),
+            "{columns}: {text}"
+        );
+        assert!(lines.len() <= if columns < 80 { 30 } else { 24 }, "{text}");
+    }
     let text = on_a_terminal(&good, 200, Some("NO_COLOR")).unwrap();
     assert!(!text.contains(ESCAPE), "{text}");
-    assert_eq!(rows_of_braille(&text), 12, "{text}");
-    let axis = text.lines().find(|line| line.contains('└')).unwrap();
-    assert_eq!(axis.trim_end().chars().count(), 96, "{text}");
 }
 
 // ---------------------------------------------------------------- completions and the manual
@@ -281,8 +223,8 @@ fn bash_completes_a_command_an_option_and_a_value() {
     // The completion of bash after these words.
     for (words, expected) in [
         ("onecycle ide", "identify"),
-        ("onecycle identify --plo", "--plot"),
-        ("onecycle identify --plot al", "always"),
+        ("onecycle identify --deta", "--details"),
+        ("onecycle identify --hold he", "held"),
         ("onecycle pack ver", "verify"),
     ] {
         let [.., before, current] = words.split(' ').collect::<Vec<_>>()[..] else {
@@ -367,34 +309,6 @@ fn pages_that_cannot_be_written_are_refused() {
     let folder = Scratch::new();
     let path = folder.write("file", b"");
     run(&["man", "-o", &path]).refused(crate::common::NOT_WRITTEN, &["file"]);
-}
-
-// Any recording has a plot of its end: twelve rows of dots, the input in blocks below, and the heading says what the
-// line is.
-#[test]
-fn a_recording_of_any_kind_is_plotted() {
-    let folder = Scratch::new();
-    let [noisy, _] = recordings(&folder);
-    let general = [
-        "identify",
-        &noisy,
-        "--estimator",
-        "general",
-        "--plot",
-        "always",
-    ];
-    let [text, _] = coloured(&general, None);
-    let text = stripped(&text);
-    assert!(
-        text.contains("in dots, the model without disturbances as a line"),
-        "{text}"
-    );
-    assert_eq!(rows_of_braille(&text), 12, "{text}");
-    let input = text
-        .lines()
-        .find(|line| line.trim_start().starts_with("input │"))
-        .unwrap();
-    assert!(input.contains('▁') && input.contains('█'), "{input}");
 }
 
 // Structure, part and hold that were asked for are those of the report.

@@ -1,0 +1,250 @@
+//! The answer of a report, made of what was identified, the controllers to choose from and the gains of a log.
+
+use onecycle::{Comparison, Controller, Identification, Identified, Pid, assess};
+use onecycle_link::{ControlLoop, LoopGains};
+
+use super::log_gains::{LogLoop, pid};
+use crate::report::units::Units;
+use crate::results::answer::{Advice, Answer, Columns, Gain};
+use crate::results::controllers::Controllers;
+use crate::results::log_gains::LogGains;
+use crate::words::answer as words;
+use crate::words::controllers::advice;
+use crate::words::log_gains::broken;
+use crate::words::remark::reasons;
+use crate::words::sentence;
+
+/// Draws on which the gains in force and the proposed ones are compared.
+const DRAWS: usize = 24;
+
+/// Name of the share of the set-point in the proportional term.
+const WEIGHT: &str = "set-point weight b";
+
+/// What an answer is about.
+pub(super) struct Subject<'a> {
+    pub(super) file: &'a str,
+    pub(super) units: &'a Units,
+    pub(super) choice: Option<&'a Controllers>,
+    pub(super) of_log: Option<&'a LogLoop>,
+    pub(super) gains: Option<&'a LogGains>,
+    /// Share of the way to the proposed gains that is written.
+    pub(super) share: f64,
+}
+
+/// The answer to a recording.
+pub(super) fn of(found: &Identification, subject: &Subject<'_>) -> Answer {
+    let identified = match &found.outcome {
+        Ok(identified) => identified,
+        Err(verdict) => {
+            let (reason, next) = words::refused(verdict);
+            return not_yet(reason, next, None);
+        }
+    };
+    let watch = reasons(found).first().map(|(_, sentence)| sentence.clone());
+    let answer = of_identified(identified, subject);
+    Answer {
+        watch: watch.or(answer.watch),
+        ..answer
+    }
+}
+
+/// The answer to a process that was identified.
+pub(super) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> Answer {
+    let overlay = subject.gains.and_then(|gains| gains.overlay.as_ref());
+    let sure = words::sure(identified, overlay.map(|overlay| overlay.explained));
+    let Some(choice) = subject.choice.filter(|choice| choice.design().is_some()) else {
+        let row = subject.choice.and_then(Controllers::chosen);
+        let error = row.and_then(|row| row.proposal.outcome.as_ref().err());
+        let next = error.map_or(String::new(), |error| sentence(&advice(error)));
+        return not_yet(words::NO_DESIGN.to_owned(), next, Some(sure));
+    };
+    let (gains, half) = gains(choice, subject);
+    let verdict = verdict(identified, choice);
+    let figures = columns(identified, choice, half);
+    Answer {
+        verdict: verdict.0,
+        reason: verdict.1,
+        gains,
+        figures,
+        sure: Some(sure),
+        watch: words::not_kept(choice),
+        next: next(verdict.0, subject, choice),
+    }
+}
+
+fn not_yet(reason: String, next: String, sure: Option<String>) -> Answer {
+    Answer {
+        next,
+        sure,
+        ..Answer::not_yet(reason)
+    }
+}
+
+fn verdict(identified: &Identified, choice: &Controllers) -> (Advice, String) {
+    let compared = choice.against.as_ref().and_then(|now| {
+        let (design, _) = choice.design()?;
+        let (model, _) = identified.for_design(0);
+        let draws = identified.posterior.models(DRAWS);
+        let both = [&now.controller, &design.controller];
+        Comparison::new(&model, &draws, both, &choice.asked)
+    });
+    match compared {
+        Some(compared) => {
+            let advice = if compared.pays() {
+                Advice::Change
+            } else {
+                Advice::Keep
+            };
+            (advice, words::compared(choice, &compared))
+        }
+        None => (Advice::FirstGains, words::first(choice)),
+    }
+}
+
+/// The gains to type in, and the controller half of the way.
+fn gains(choice: &Controllers, subject: &Subject<'_>) -> (Vec<Gain>, Option<Controller>) {
+    let Some((design, _)) = choice.design() else {
+        return (vec![], None);
+    };
+    let goal = design.controller.pid();
+    if let Some((gains, half)) = subject
+        .of_log
+        .and_then(|of_log| of_log.named(goal, subject.share, choice))
+    {
+        return (gains, Some(half));
+    }
+    if let Controller::Autopilot(of) = &design.controller {
+        let of = of.gains;
+        let terms = [
+            ("angle P", "1/s", of.angle_p),
+            ("rate P", "", of.rate_p),
+            ("rate I", "1/s", of.rate_i),
+            ("rate D", "s", of.rate_d),
+        ];
+        let terms = terms.into_iter().filter(|term| term.2 != 0.0);
+        return (
+            terms
+                .map(|(name, unit, full)| gain(name, unit, [None, None, Some(full)]))
+                .collect(),
+            None,
+        );
+    }
+    let now = (choice.against.as_ref()).map(|against| against.controller.pid());
+    let half = now.map(|now| between(&now, &goal, subject.share));
+    let all = [now, half, Some(goal)];
+    let half = half.map(Controller::from);
+    if let Some(gains) = in_plant(choice, all) {
+        return (gains, half);
+    }
+    (parallel(&all, &goal, subject.units), half)
+}
+
+/// The gains of the parallel form, those that are used.
+fn parallel(all: &[Option<Pid>; 3], goal: &Pid, units: &Units) -> Vec<Gain> {
+    let of = |name: &str, unit: &str, value: &dyn Fn(&Pid) -> f64| {
+        let values = all.map(|pid| pid.as_ref().map(value));
+        let is_used = values.iter().flatten().any(|value| *value != 0.0);
+        (is_used || name == WEIGHT && goal.ki != 0.0).then(|| gain(name, unit.trim(), values))
+    };
+    let weight = |pid: &Pid| match pid.ki == 0.0 {
+        true => 0.0,
+        false => pid.setpoint_weight,
+    };
+    let gains = [
+        of("Kp", &units.controller(""), &|pid| pid.kp),
+        of("Ki", &units.integral(), &|pid| pid.ki),
+        of("Kd", &units.controller(" s"), &|pid| pid.kd),
+        of("filter Tf", "s", &|pid| pid.filter_s),
+        of(WEIGHT, "", &weight),
+    ];
+    gains.into_iter().flatten().collect()
+}
+
+/// The gains as a controller of a process control system takes them. `None`: none is named, or it cannot take them.
+fn in_plant(choice: &Controllers, all: [Option<Pid>; 3]) -> Option<Vec<Gain>> {
+    let (vendor, spans) = choice.plant?;
+    let typed = all.map(|pid| vendor.typed(&pid?, &spans).ok());
+    let value = |of: usize, name: &str| {
+        let gains = typed[of].as_ref()?;
+        let gain = gains.iter().find(|gain| gain.name == name)?;
+        Some(gain.value.abs()).filter(|value| value.is_finite() && *value != 0.0)
+    };
+    let full = typed[2].as_ref()?;
+    let named = full.iter().filter_map(|of| {
+        let values = [
+            value(0, of.name),
+            value(1, of.name),
+            Some(value(2, of.name)?),
+        ];
+        Some(gain(of.name, of.unit, values))
+    });
+    Some(named.collect())
+}
+
+fn gain(name: &str, unit: &str, [now, half, full]: [Option<f64>; 3]) -> Gain {
+    Gain {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        now,
+        half,
+        full,
+    }
+}
+
+/// A controller between two, with the filter and the execution of the second.
+fn between(now: &Pid, goal: &Pid, share: f64) -> Pid {
+    let of = |pid: &Pid| LoopGains::new(pid.kp, pid.ki, pid.kd);
+    let half = pid(of(now).toward(of(goal), share));
+    half.with_filter_s(goal.filter_s)
+        .with_setpoint_weight(goal.setpoint_weight)
+        .with_execution(goal.execution)
+}
+
+fn columns(
+    identified: &Identified,
+    choice: &Controllers,
+    half: Option<Controller>,
+) -> Option<Columns> {
+    let (_, full) = choice.design()?;
+    let (model, _) = identified.for_design(0);
+    let noise = choice.asked.noise.as_ref();
+    let now = choice.against.as_ref().and_then(|now| now.figures);
+    let half = half.and_then(|half| assess(&model, &half, noise));
+    Some(Columns {
+        now: now.as_ref().map(Into::into),
+        half: half.as_ref().map(Into::into),
+        full: full.into(),
+    })
+}
+
+fn next(of: Advice, subject: &Subject<'_>, choice: &Controllers) -> String {
+    let is_named = |of_log: &LogLoop| {
+        let (design, _) = choice.design()?;
+        of_log.named(design.controller.pid(), subject.share, choice)
+    };
+    let written = subject.gains.and_then(|gains| gains.written.as_ref());
+    match (written, of, subject.of_log) {
+        (Some(Ok(written)), _, _) => {
+            let [path, restore] =
+                [&written.path, &written.restore].map(|path| path.display().to_string());
+            let broken = broken(written).map_or(String::new(), |broken| format!(" {broken}"));
+            words::written(&path, &restore) + &broken
+        }
+        (Some(Err(reason)), _, _) => format!("Nothing is written: {reason}"),
+        (None, Advice::Keep, _) => words::NOTHING.to_owned(),
+        (None, Advice::Change, Some(of_log)) if is_named(of_log).is_some() => {
+            words::write(subject.file, &options(of_log.control_loop()))
+        }
+        (None, Advice::Change, _) => words::TYPE_IN.to_owned(),
+        _ => words::COMPARE.to_owned(),
+    }
+}
+
+/// Options that choose a loop.
+fn options(of: ControlLoop) -> String {
+    match of {
+        ControlLoop::Rate(axis) => format!(" --axis {}", axis.name()),
+        ControlLoop::Attitude(axis) => format!(" --axis {} --loop attitude", axis.name()),
+        _ => " --loop altitude".to_owned(),
+    }
+}

@@ -1,0 +1,237 @@
+//! The answer as text: a card of at most 24 lines of 80 columns, for any terminal of 60 columns or more.
+
+use std::fmt::Write;
+
+use onecycle::{Estimate, Identified, Interval, Parameter};
+
+use super::number::{seconds, short};
+use super::units::Units;
+use super::wrap::wrapped_to;
+use crate::output::columns as terminal_columns;
+use crate::results::answer::{Advice, Answer, Columns, Figures, Gain};
+use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, painted};
+use crate::words::answer as words;
+
+/// Width of a card without a terminal, and the narrowest and widest one in a terminal.
+const WIDTH: usize = 80;
+const WIDTHS: (usize, usize) = (60, 100);
+/// Columns of names and of values.
+const NAME: usize = 20;
+const VALUE: usize = 13;
+
+/// A blank at which no line ends.
+const TOGETHER: &str = "\u{a0}";
+
+/// Width of cards in this terminal.
+pub(super) fn width() -> usize {
+    terminal_columns().map_or(WIDTH, |columns| columns.clamp(WIDTHS.0, WIDTHS.1))
+}
+
+/// The card of a recording. `read`: what was taken for what. `more`: how many remarks are not on it.
+pub(super) fn card(
+    (title, read): (&str, Option<&str>),
+    answer: &Answer,
+    process: Option<(&Identified, &Units)>,
+    more: usize,
+) -> String {
+    let mut text = format!("{}\n", painted(HEADING, title));
+    verdict(&mut text, "", answer);
+    if !answer.gains.is_empty() {
+        text.push('\n');
+        table(&mut text, answer);
+        text.push('\n');
+    }
+    if let Some(read) = read {
+        line(&mut text, "Read", read);
+    }
+    if let Some((identified, units)) = process {
+        let formula = identified.model.structure().transfer_function();
+        line(&mut text, "Process", formula);
+        line(&mut text, "", &parameters(&identified.estimate, units));
+    }
+    if let Some(sure) = &answer.sure {
+        line(&mut text, "Sure?", sure);
+    }
+    if let Some(watch) = &answer.watch {
+        let mut lines = String::new();
+        line(&mut lines, "Watch", watch);
+        text.push_str(&painted(REMARK, &lines));
+    }
+    line(&mut text, "Next", &answer.next);
+    let remarks = match more {
+        0 => String::new(),
+        1 => ", and one more remark".to_owned(),
+        more => format!(", and {more} more remarks"),
+    };
+    line(
+        &mut text,
+        "",
+        &format!("All figures, other controllers{remarks}: --details"),
+    );
+    text
+}
+
+/// The verdict and its reason, wrapped.
+pub(super) fn verdict(text: &mut String, lead: &str, answer: &Answer) {
+    let style = match answer.verdict {
+        Advice::NotYet => REFUSAL,
+        _ => HOLDS,
+    };
+    let name = words::verdict(answer.verdict);
+    let mut lines = String::new();
+    wrapped_to(
+        &mut lines,
+        lead,
+        &format!("{name}: {}", words::clause(&answer.reason)),
+        width(),
+    );
+    let at = lead.len() + name.len();
+    let _ = write!(
+        text,
+        "{}{}{}",
+        &lines[..lead.len()],
+        painted(style, &lines[lead.len()..at]),
+        &lines[at..]
+    );
+}
+
+pub(super) fn line(text: &mut String, name: &str, words: &str) {
+    let mut lines = String::new();
+    wrapped_to(&mut lines, &format!("{name:<9}"), words, width());
+    text.push_str(&lines.replace(TOGETHER, " "));
+}
+
+/// Gains and figures, in columns if gains are in force.
+fn table(text: &mut String, answer: &Answer) {
+    let figures = answer.figures.as_ref();
+    let has_now = answer.gains.iter().any(|gain| gain.now.is_some());
+    if has_now {
+        titles(text);
+    }
+    for gain in &answer.gains {
+        gain_row(text, gain, has_now);
+    }
+    let rows = figures.map(rows).unwrap_or_default();
+    if has_now {
+        for (name, values) in rows {
+            row(text, name, values.into_iter(), "");
+        }
+    } else {
+        let of_load = |row: &&(&str, [String; 3])| row.0 != LOAD;
+        let facts = rows.iter().filter(of_load).flat_map(|(names, [.., full])| {
+            let pairs = names.split(", ").zip(full.split(", "));
+            pairs.map(|(name, value)| format!("{name} {value}").replace(' ', TOGETHER))
+        });
+        let facts: Vec<String> = facts.collect();
+        line(text, "  Loop", &facts.join(", "));
+    }
+}
+
+/// Gains and margins of a loop among others.
+pub(super) fn columns(text: &mut String, answer: &Answer, has_titles: bool) {
+    let has_now = answer.gains.iter().any(|gain| gain.now.is_some());
+    if has_titles && has_now {
+        titles(text);
+    }
+    for gain in &answer.gains {
+        gain_row(text, gain, has_now);
+    }
+    let margins = answer.figures.iter().flat_map(rows).next();
+    if let Some((name, values)) = margins {
+        row(text, name, shown(has_now, values), "");
+    }
+}
+
+fn titles(text: &mut String) {
+    row(
+        text,
+        "",
+        ["now", "half", "full"].map(str::to_owned).into_iter(),
+        "",
+    );
+}
+
+fn gain_row(text: &mut String, gain: &Gain, has_now: bool) {
+    let of = |value: Option<f64>, without: &str| value.map_or(without.to_owned(), number);
+    let full = of(gain.full, "out of range");
+    let values = shown(has_now, [of(gain.now, "-"), of(gain.half, "-"), full]);
+    row(text, &gain.name, values, &gain.unit);
+}
+
+/// All three columns, or the last alone.
+fn shown<T>(has_now: bool, values: [T; 3]) -> impl Iterator<Item = T> {
+    values.into_iter().skip(if has_now { 0 } else { 2 })
+}
+
+fn row(text: &mut String, name: &str, values: impl Iterator<Item = String>, unit: &str) {
+    let mut line = format!("  {name:<NAME$}");
+    for value in values {
+        let _ = write!(line, "{value:>VALUE$}");
+    }
+    let _ = writeln!(text, "{}", format!("{line}  {unit}").trim_end());
+}
+
+/// A gain: integers of a firmware as they are.
+pub(super) fn number(value: f64) -> String {
+    match value.fract() == 0.0 && value.abs() < 1e4 {
+        true => format!("{value:.0}"),
+        false => short(value),
+    }
+}
+
+/// Name of the row that compares the errors after a step of the load.
+const LOAD: &str = "load error";
+
+/// Rows of figures, those that there are. The load error is given as a multiple of that in the first column that has one.
+fn rows(of: &Columns) -> Vec<(&'static str, [String; 3])> {
+    let all = of.all();
+    let base = all.iter().flatten().find_map(|of| of.load_iae);
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let margins = |of: &Figures| Some(format!("{:.0} deg, {:.2}", of.phase_margin_deg, of.ms));
+    let load = |of: &Figures| {
+        let ratio = of.load_iae.map(|iae| iae / base.unwrap_or(iae));
+        Some(ratio.map_or("offset".to_owned(), |ratio| format!("{ratio:.2} x")))
+    };
+    let step = |of: &Figures| {
+        let (settling_s, overshoot) = of.settling_time_s.zip(of.overshoot)?;
+        Some(format!("{}, {}", seconds(settling_s), percent(overshoot)))
+    };
+    let noise = |of: &Figures| of.noise_share.map(percent);
+    let row = |name, value: &dyn Fn(&Figures) -> Option<String>| {
+        let cell = |of: Option<&Figures>| of.map_or(Some("unstable".to_owned()), value);
+        let values = all.map(cell);
+        let is_shown = values[2].is_some();
+        is_shown.then(|| (name, values.map(|value| value.unwrap_or("-".to_owned()))))
+    };
+    let rows = [
+        row("phase margin, Ms", &margins),
+        row(LOAD, &load).filter(|_| base.is_some()),
+        row("settling, overshoot", &step),
+        row("noise at actuator", &noise),
+    ];
+    rows.into_iter().flatten().collect()
+}
+
+/// `K 122 (109 .. 140) rad/s, tau below 8.0 ms`.
+fn parameters(estimate: &Estimate, units: &Units) -> String {
+    let structure = estimate.structure();
+    let one = |(parameter, of): (Parameter, Interval)| {
+        let (name, unit) = (parameter.symbol(), units.parameter(structure, parameter));
+        let end = |value: Option<f64>| value.map_or("unbounded".to_owned(), short);
+        let value = match estimate.is_below(parameter) {
+            true => format!("below {}", end(of.high)),
+            false => format!(
+                "{} ({} .. {})",
+                of.estimate.map_or("infinite".to_owned(), short),
+                end(of.low),
+                end(of.high)
+            ),
+        };
+        // What belongs together stays on a line.
+        let value = format!("{name} {value} {unit}").trim_end().to_owned();
+        value.replace(' ', TOGETHER)
+    };
+    let is_process = |of: &(Parameter, Interval)| of.0 != Parameter::InputBias;
+    let all: Vec<String> = estimate.iter().filter(is_process).map(one).collect();
+    all.join(", ")
+}

@@ -1,0 +1,176 @@
+//! Sentences of the answer.
+
+use onecycle::{Comparison, Effect, Felt, Identified, Parameter};
+use onecycle_design::Limit;
+
+use crate::report::number::{seconds, short};
+use crate::results::answer::Advice;
+use crate::results::controllers::Controllers;
+
+use super::verdict::advice;
+use super::{controllers, sentence};
+
+/// The verdict.
+pub(crate) fn verdict(of: Advice) -> &'static str {
+    match of {
+        Advice::Change => "CHANGE",
+        Advice::Keep => "KEEP YOURS",
+        Advice::FirstGains => "FIRST GAINS",
+        Advice::NotYet => "NOT YET",
+    }
+}
+
+/// A reason behind the verdict, with a full stop.
+pub(crate) fn clause(reason: &str) -> String {
+    format!("{}.", reason.trim_end_matches('.'))
+}
+
+/// Why gains are changed or kept.
+pub(crate) fn compared(choice: &Controllers, of: &Comparison) -> String {
+    let now = choice.against.as_ref();
+    let figures = now.and_then(|now| now.figures);
+    match (of.pays(), of.gain(), of.loss()) {
+        (true, gain, loss) if of.is_now_fragile => {
+            let fragile =
+                figures.map_or(
+                    "yours make the loop unstable".to_owned(),
+                    |figures| match now
+                        .and_then(|now| now.least)
+                        .filter(|least| least.stable < 1.0)
+                    {
+                        Some(least) => format!(
+                            "yours are stable on {:.0} % of the likely processes only",
+                            100.0 * least.stable
+                        ),
+                        None => format!("yours have little margin, Ms {:.2}", figures.ms),
+                    },
+                );
+            let gain = gain.filter(|_| figures.is_some());
+            joined(fragile, [gain, loss])
+        }
+        (true, Some(gain), loss) => match loss {
+            Some(loss) => format!("{}, at the price of {}", effect(gain), effect(loss)),
+            None => effect(gain),
+        },
+        (_, Some(gain), Some(loss)) => format!(
+            "the proposal would give {}, but {}",
+            effect(gain),
+            effect(loss)
+        ),
+        (_, _, Some(loss)) => format!("the proposal would only give {}", effect(loss)),
+        _ => "you would feel no difference with the proposed ones".to_owned(),
+    }
+}
+
+fn joined(first: String, effects: [Option<&Effect>; 2]) -> String {
+    let effects = effects.into_iter().flatten().map(effect);
+    (std::iter::once(first).chain(effects))
+        .collect::<Vec<_>>()
+        .join("; ")
+}
+
+/// What one would feel.
+fn effect(of: &Effect) -> String {
+    let times = match 1.0 / of.better[1] {
+        none if none < 0.002 => "none of".to_owned(),
+        all if all > 500.0 => "no end of".to_owned(),
+        times => format!("{times:.2} times"),
+    };
+    match of.figure {
+        Felt::LoadError if of.better[1] > 500.0 => "no steady error under a load".to_owned(),
+        Felt::LoadError if of.better[1] < 0.002 => "a steady error under a load".to_owned(),
+        Felt::LoadError => format!("{times} the load error"),
+        Felt::SetPointError => format!("{times} the set-point error"),
+        Felt::Overshoot => format!("{times} the peak of a step"),
+        Felt::Noise => format!("{times} the noise at the actuator"),
+        _ => format!("{times} Ms"),
+    }
+}
+
+/// The first limit that the proposal does not keep, and what helps.
+pub(crate) fn not_kept(choice: &Controllers) -> Option<String> {
+    let missed = choice.missed.first()?;
+    match (missed.limit, choice.reference_filter_s) {
+        (Limit::Overshoot, Some(time_s)) => Some(format!(
+            "A step of the set-point overshoots by {:.0} %. A first-order filter of the set-point, {}, keeps {:.0} %.",
+            100.0 * missed.reached,
+            seconds(controllers::up(time_s)),
+            100.0 * missed.asked
+        )),
+        _ => controllers::not_kept(choice).into_iter().next(),
+    }
+}
+
+/// Why first gains may be used.
+pub(crate) fn first(choice: &Controllers) -> String {
+    let robustness = choice.design().and_then(|(design, _)| design.robustness);
+    robustness.map_or("no gains in force are known".to_owned(), |robustness| {
+        format!(
+            "the limits hold on {:.0} % of the likely processes",
+            100.0 * robustness.coverage
+        )
+    })
+}
+
+/// How well the process is known. `explained`: share of the logged output that the loop with the model explains.
+pub(crate) fn sure(identified: &Identified, explained: Option<f64>) -> String {
+    let width = |low: f64, estimate: f64, high: f64| (high - low) / (2.0 * estimate.abs());
+    let rate = identified
+        .effectiveness()
+        .map(|[low, estimate, high]| width(low, estimate, high));
+    let steady = identified.estimate.get(Parameter::K).and_then(|gain| {
+        let [low, estimate, high] = [gain.low?, gain.estimate?, gain.high?];
+        Some(width(low, estimate, high))
+    });
+    let best = rate
+        .into_iter()
+        .chain(steady)
+        .filter(|width| width.is_finite());
+    let gain = best
+        .min_by(f64::total_cmp)
+        .map_or("the gain has no upper end".to_owned(), |width| {
+            format!("gain known to {} %", up(100.0 * width))
+        });
+    let prediction = (identified.fit.innovations()).and_then(|of| of.prediction.as_ref());
+    let misfit = short(100.0 * identified.fit.misfit);
+    let model = match (explained, prediction) {
+        (Some(share), _) => format!("the model explains {:.0} % of the flight", 100.0 * share),
+        (_, Some(of)) => format!(
+            "it predicts {:.0} % of the last third",
+            100.0 * of.explained
+        ),
+        _ if identified.fit.misfit < 5e-4 => "no misfit beyond the noise".to_owned(),
+        _ => format!("{misfit} % of the output is left unexplained"),
+    };
+    sentence(&format!("{gain}; {model}"))
+}
+
+/// A percentage of at least one, whole.
+fn up(percent: f64) -> f64 {
+    percent.ceil().max(1.0)
+}
+
+/// Why there is nothing to type in, and what to do.
+pub(crate) fn refused(of: &onecycle::Verdict) -> (String, String) {
+    (of.to_string(), advice(of).into_owned())
+}
+
+pub(crate) const NO_DESIGN: &str = "a process was found, and no controller keeps the limits on it";
+pub(crate) const COMPARE: &str =
+    "Type these gains in and watch a step of the set-point. Gains in force: --against KP,KI,KD.";
+pub(crate) const NOTHING: &str = "Leave the gains as they are.";
+pub(crate) const TYPE_IN: &str = "Type in half of the step, record again, and go on from there.";
+
+/// Where the parameters went.
+pub(crate) fn written(path: &str, restore: &str) -> String {
+    format!(
+        "{path} is written; {restore} restores the old values. Fly and log again before the next step."
+    )
+}
+
+/// How to write parameters.
+pub(crate) fn write(file: &str, options: &str) -> String {
+    format!(
+        "onecycle identify {file}{options} --write tune.txt writes half of the step, and a file that restores yours."
+    )
+}
