@@ -205,9 +205,12 @@ impl Head {
     /// Refuses the work of another run, with the first difference.
     fn check(&self, path: &Path, found: &Self) -> Result<(), Failure> {
         let there = if found.program != self.program {
-            format!("is from onecycle {}, not {}", found.program, self.program)
+            format!(
+                "is from onecycle-lab {}, not {}",
+                found.program, self.program
+            )
         } else if found.command != self.command {
-            format!("is of onecycle {}", found.command)
+            format!("is of onecycle-lab {}", found.command)
         } else if let Some(difference) = difference("", &found.settings, &self.settings) {
             format!("has other settings, {difference}")
         } else {
@@ -334,7 +337,7 @@ mod tests {
             (
                 whole.replace(env!("CARGO_PKG_VERSION"), "0.0.9"),
                 &settings,
-                "is from onecycle 0.0.9",
+                "is from onecycle-lab 0.0.9",
             ),
             (format!("{whole}x\n2\n"), &settings, "line 3 is damaged"),
             (format!("{whole}13\n2\n"), &settings, "line 3 is unlucky"),

@@ -19,7 +19,7 @@
 //! scoring = 8000         # experiments for the score
 //! # defaults of other fields: IdentifierRecipe::default()
 //!
-//! [experiments]          # a recipe as for `onecycle dataset`
+//! [experiments]          # a recipe as for `onecycle-lab dataset`
 //! ```
 
 mod calibration;

@@ -5,7 +5,7 @@
 //! Their combination, the best PD with at least the margin, has a crease where the margin stops to bind, and
 //! a cubic does not follow a crease.
 //!
-//! Largest cost above the exact optimum, by margin and points along an axis (`lab/tests/learn/lead_table.rs`).
+//! Largest cost above the exact optimum, by margin and points along an axis (`research/lab/tests/learn/lead_table.rs`).
 //! It exceeds 0.1 % at small margins: for exactly the margin, where two similar lags vanish beside the dead
 //! time:
 //!

@@ -1,6 +1,6 @@
 //! A trained classifier as a method: from a recording to the class of its last steady cycle, and that class's controller.
 //!
-//! `onecycle train` writes such a network as ONNX, with a [`Card`] that says how to read it.
+//! `onecycle-lab train` writes such a network as ONNX, with a [`Card`] that says how to read it.
 
 use onecycle_identify::Signals;
 use onecycle_plant::Trace;
@@ -39,7 +39,7 @@ pub enum PaperNetworkError {
     #[error("{0}")]
     Onnx(#[from] OnnxError),
     /// The model carries no card, or one of another version.
-    #[error("it was not written by onecycle train with network = \"classifier\" ({0})")]
+    #[error("it was not written by onecycle-lab train with network = \"classifier\" ({0})")]
     Card(String),
     /// The network does not fit its card.
     #[error(
@@ -85,7 +85,7 @@ pub struct PaperNetwork {
 }
 
 impl PaperNetwork {
-    /// Reads an ONNX file of `onecycle train`.
+    /// Reads an ONNX file of `onecycle-lab train`.
     ///
     /// # Errors
     /// [`PaperNetworkError`]: the file is no such network.

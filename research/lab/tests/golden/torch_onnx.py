@@ -4,7 +4,7 @@ Both exporters write the same network: inputs normalised, a dense layer without 
 normalisation that has been evaluated, dropout, tanh and ReLU.
 
     python3 -m venv .venv && .venv/bin/pip install torch==2.15.0 onnx==1.23.2 onnxscript==0.7.2
-    .venv/bin/python lab/tests/golden/torch_onnx.py
+    .venv/bin/python research/lab/tests/golden/torch_onnx.py
 
 writes torch_onnx.onnx, torch_onnx_script.onnx (the older exporter) and torch_onnx.json.
 """

@@ -4,7 +4,7 @@ Everything is computed in float64 from inputs and weights that are exact in floa
 differs from these numbers is the rounding of the program under test.
 
     python3 -m venv .venv && .venv/bin/pip install torch==2.15.0
-    .venv/bin/python lab/tests/golden/torch_steps.py
+    .venv/bin/python research/lab/tests/golden/torch_steps.py
 
 writes torch_steps.json.
 """
