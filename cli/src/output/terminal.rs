@@ -29,7 +29,7 @@ const QUICK: Duration = Duration::from_millis(500);
 /// Time between two updates of a progress indicator.
 const TURN: Duration = Duration::from_millis(100);
 
-/// A progress indicator on the error output. It appears on a terminal only, if the work takes longer than [`QUICK`], and
+/// A progress indicator on the error output. It appears on a terminal only, if the work takes longer than half a second, and
 /// disappears when it is dropped.
 pub struct Waiting {
     bar: ProgressBar,

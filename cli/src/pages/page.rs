@@ -1,6 +1,6 @@
 //! A page in one HTML file with its style, script and plots; light and dark, for screens and for print.
 //!
-//! The functions here make the components of a page. All text goes through [`escaped`].
+//! The functions here make the components of a page. All text goes through `escaped`.
 
 use std::fmt::Write;
 
