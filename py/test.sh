@@ -15,7 +15,7 @@ if [ -z "${ONECYCLE:-}" ]; then
     ONECYCLE="$target/debug/onecycle"
 fi
 if [ -z "${ONECYCLE_LAB:-}" ]; then
-    cargo build -q --manifest-path research/program/Cargo.toml
+    cargo build -q --manifest-path research/Cargo.toml --bin onecycle-lab
     ONECYCLE_LAB="$target/debug/onecycle-lab"
 fi
 ONECYCLE="$ONECYCLE" ONECYCLE_LAB="$ONECYCLE_LAB" "$python" -m pytest -q py/tests "$@"
