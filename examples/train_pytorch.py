@@ -1,8 +1,8 @@
 """Trains the identifier's network on a dataset, in PyTorch, and writes it as ONNX.
 
-    onecycle dataset --examples 45000 --into multirotors
+    onecycle-lab dataset --examples 45000 --into multirotors
     python examples/train_pytorch.py multirotors network.onnx
-    onecycle pack import network.onnx --like default -o network.pack
+    onecycle-lab pack import network.onnx --like default -o network.pack
 
 The dataset is a folder of npz files and a manifest.json; its last tenth validates. The network,
 34-H-H-14 with tanh, puts out a Gaussian of four scaled values: their mean, the logarithms of the

@@ -1,8 +1,8 @@
 """Answers to the relay benchmark by scipy and by SIPPY, for comparison.
 
-    onecycle bench make -o relay-benchmark
+    onecycle-lab bench make -o relay-benchmark
     python bench_answers.py relay-benchmark --method scipy -o scipy.csv
-    onecycle bench run relay-benchmark --methods onecycle-2 --answers scipy=scipy.csv
+    onecycle-lab bench run relay-benchmark --methods onecycle-2 --answers scipy=scipy.csv
 
 Needs `pip install numpy scipy`, and `sippy_unipi` for `--method sippy`. Nothing of truth.csv is read without `--from-truth`.
 

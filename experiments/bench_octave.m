@@ -1,8 +1,8 @@
 % Answers to the relay benchmark by Octave's control package, for comparison.
 %
-%     onecycle bench make -o relay-benchmark --cases 50
+%     onecycle-lab bench make -o relay-benchmark --cases 50
 %     octave -qf bench_octave.m relay-benchmark moen4 moen4.csv
-%     onecycle bench run relay-benchmark --methods onecycle-2 --answers moen4=moen4.csv
+%     onecycle-lab bench run relay-benchmark --methods onecycle-2 --answers moen4=moen4.csv
 %
 % Needs Debian's octave and octave-control (apt-get install octave octave-control). Nothing of truth.csv is
 % read. Its identification as it is: arx (least squares) or moen4, n4sid, moesp (subspaces), of third order

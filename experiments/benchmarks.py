@@ -1,17 +1,17 @@
 """Runs the commands of docs/benchmarks.md, which is the list: nothing is named twice.
 
-    cargo build --release
+    cargo build --release && (cd research && cargo build --release)
     pip install scipy control                   # of other people, in the comparisons
     python experiments/benchmarks.py            # an hour on two cores
     python experiments/benchmarks.py d_test     # those that contain this text
     python experiments/benchmarks.py --quick    # seconds each: every command exists and starts
 
 A command is a code span or a block `sh` that begins with one of PROGRAMS. In a table headed by
-`onecycle campaign experiments/...` the span of the first cell stands for the rest of the command. The
+`onecycle-lab campaign experiments/...` the span of the first cell stands for the rest of the command. The
 output has the date, the revision, the machine and its load, the seed of each campaign, and the time of
 each command; each table prints its own spread.
 
-With --quick the program of the development build runs campaigns and benchmarks of a few cases. Tests
+Commands of cargo on the research run in its folder. With --quick the programs of the development build run campaigns and benchmarks of a few cases. Tests
 are listed (at least one must carry the name); benches and examples must be targets of their crate;
 scripts, recipes and options must exist. The status is 1 if a command fails.
 """
@@ -31,16 +31,19 @@ import tempfile
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+RESEARCH = ROOT / "research"
 PROGRAMS = ("onecycle", "cargo", "python", "pip", "sh", "onboard/", "experiments/", "cli/tests/", "web/")
-CAMPAIGNS = "onecycle campaign experiments/..."
+# The programs of this repository.
+BUILT = ("onecycle", "onecycle-lab")
+CAMPAIGNS = "onecycle-lab campaign experiments/..."
 # Parts of commands that the full run leaves out, and why.
 LEFT_OUT = {
     "--cases=1000000": "half an hour",
     "--cases=17829": "minutes, and shows one case only",
     "hundred_thousand": "hours in one thread",
     "--ignored": "minutes to hours; by hand",
-    "onecycle train": "minutes to hours; by hand",
-    "onecycle reproduce": "some twenty minutes, and 75 for the paper's network; writes docs/reproduction.md",
+    "onecycle-lab train": "minutes to hours; by hand",
+    "onecycle-lab reproduce": "some twenty minutes, and 75 for the paper's network; writes docs/reproduction.md",
     "any_peers.py": "needs SIPPY and Octave",
     "--method sippy": "needs SIPPY",
     "cargo install": "installs the program",
@@ -94,14 +97,20 @@ def spans(text):
 @functools.cache
 def targets():
     """Names of the targets of each crate."""
-    made = subprocess.run(
-        ["cargo", "metadata", "--no-deps", "--format-version", "1"],
-        cwd=ROOT, check=True, capture_output=True, text=True,
-    )
-    return {
-        package["name"]: {target["name"] for target in package["targets"]}
-        for package in json.loads(made.stdout)["packages"]
-    }
+    found = {}
+    for workspace in (ROOT, RESEARCH):
+        made = subprocess.run(
+            ["cargo", "metadata", "--no-deps", "--format-version", "1"],
+            cwd=workspace, check=True, capture_output=True, text=True,
+        )
+        for package in json.loads(made.stdout)["packages"]:
+            found[package["name"]] = {target["name"] for target in package["targets"]}
+    return found
+
+
+def workspace(words):
+    """The folder in which a command of cargo runs."""
+    return RESEARCH if "onecycle-lab" in words else ROOT
 
 
 def missing(words):
@@ -140,21 +149,22 @@ def quick(command, environment, scratch):
     if gone := missing(words):
         return "there is no " + ", ".join(gone)
     if words[:2] == ["cargo", "test"]:
+        where = workspace(words)
         words = of_workspace([word for word in words if word not in ("--release", "--ignored", "--nocapture")])
         listed = words + ([] if "--" in words else ["--"]) + ["--list"]
-        made = subprocess.run(listed, cwd=ROOT, capture_output=True, text=True)
+        made = subprocess.run(listed, cwd=where, capture_output=True, text=True)
         return None if re.search(r": test$", made.stdout, re.M) else "no test has this name"
-    if words[0] != "onecycle":
+    if words[0] not in BUILT:
         return None
     name = words[1]
     if name in LOOKED_UP:
         shown = subprocess.run(
-            ["onecycle", name, "--help"], env=environment, capture_output=True, text=True
+            [words[0], name, "--help"], env=environment, capture_output=True, text=True
         ).stdout
         wrong = [word for word in words if word.startswith("--") and word not in shown]
         return f"no option {', '.join(wrong)}" if wrong else None
     for of, options in FEW.items():
-        if command.startswith(f"onecycle {of}"):
+        if " ".join(words[1:]).startswith(of):
             command = re.sub(f"{options[0]}[ =]\\d+", "", command) + " " + " ".join(options)
     # The answers of other programs are not there.
     command = re.sub(r"--answers \S+", "", command)
@@ -197,7 +207,8 @@ def full(command, environment, scratch):
         print(f"seed {', '.join(found)}", flush=True)
     where = scratch if command.startswith(("onecycle", "python", "for ")) else ROOT
     if command.startswith("cargo "):
-        command = shlex.join(of_workspace(shlex.split(command)))
+        words = shlex.split(command)
+        where, command = workspace(words), shlex.join(of_workspace(words))
     begin = time.perf_counter()
     status = subprocess.run(["bash", "-c", command], cwd=where, env=environment).returncode
     print(f"{time.perf_counter() - begin:.0f} s, status {status}", flush=True)
@@ -210,9 +221,10 @@ def main():
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-    program = target / ("debug" if arguments.quick else "release") / "onecycle"
-    if not program.exists():
-        sys.exit(f"there is no {program}: build it with cargo build -p onecycle-cli")
+    programs = [target / ("debug" if arguments.quick else "release") / name for name in BUILT]
+    for program in programs:
+        if not program.exists():
+            sys.exit(f"there is no {program}: build it as README.md says")
     page = (ROOT / "docs" / "benchmarks.md").read_text()
     commands = [one for one in spans(page) if arguments.containing in one]
     if not commands:
@@ -221,12 +233,13 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         scratch = pathlib.Path(folder)
         (scratch / "bin").mkdir()
-        (scratch / "bin" / "onecycle").symlink_to(program)
+        for program in programs:
+            (scratch / "bin" / program.name).symlink_to(program)
         # A link would leave a virtual environment, and its packages, behind.
         python = scratch / "bin" / "python"
         python.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} "$@"\n')
         python.chmod(0o755)
-        for name in ("autopilots", "experiments", "examples", "cli", "py"):
+        for name in ("autopilots", "experiments", "examples", "cli", "py", "research"):
             (scratch / name).symlink_to(ROOT / name)
         path = f"{scratch / 'bin'}{os.pathsep}{os.environ['PATH']}"
         environment = {**os.environ, "PATH": path}

@@ -1,7 +1,7 @@
 """Runs an ONNX model in onnxruntime and compares with the outputs written beside it.
 
     python3 -m venv .venv && .venv/bin/pip install onnxruntime==1.31.1 onnx==1.23.2 numpy
-    onecycle pack export my.pack --onnx my.onnx --samples samples.npz
+    onecycle-lab pack export my.pack --onnx my.onnx --samples samples.npz
     .venv/bin/python experiments/onnx_check.py my.onnx samples.npz
 
 The samples are an npz file with `inputs` and `outputs`, one row for each sample. The status is 1 if

@@ -1,6 +1,6 @@
 #!/bin/sh
 # Builds the package into an environment of its own and runs its tests. Needs Python 3.10 or later and the network.
-# ONECYCLE names the program whose results the package's are compared with; by default it is built here.
+# ONECYCLE and ONECYCLE_LAB name the programs whose results the package's are compared with; by default they are built here.
 set -eu
 cd "$(dirname "$0")/.."
 target="${CARGO_TARGET_DIR:-$PWD/target}"
@@ -14,4 +14,8 @@ if [ -z "${ONECYCLE:-}" ]; then
     cargo build -q -p onecycle-cli
     ONECYCLE="$target/debug/onecycle"
 fi
-ONECYCLE="$ONECYCLE" "$python" -m pytest -q py/tests "$@"
+if [ -z "${ONECYCLE_LAB:-}" ]; then
+    cargo build -q --manifest-path research/Cargo.toml --bin onecycle-lab
+    ONECYCLE_LAB="$target/debug/onecycle-lab"
+fi
+ONECYCLE="$ONECYCLE" ONECYCLE_LAB="$ONECYCLE_LAB" "$python" -m pytest -q py/tests "$@"

@@ -8,24 +8,24 @@ use onecycle_link::ReadError;
 use crate::words;
 
 /// Exit codes, as `--help` lists them.
-pub(crate) mod exit {
+pub mod exit {
     /// Done; `identify`: a process was identified.
-    pub(crate) const DONE: u8 = 0;
+    pub const DONE: u8 = 0;
     /// Bad arguments; the argument parser uses the same code.
-    pub(crate) const USAGE: u8 = 2;
+    pub const USAGE: u8 = 2;
     /// An input file cannot be read.
-    pub(crate) const INPUT: u8 = 3;
+    pub const INPUT: u8 = 3;
     /// Finished, with a negative result such as "no process identified".
-    pub(crate) const NO_PROCESS: u8 = 4;
+    pub const NO_PROCESS: u8 = 4;
     /// The output cannot be written.
-    pub(crate) const OUTPUT: u8 = 5;
+    pub const OUTPUT: u8 = 5;
     /// The time stamps of a recording can be read in more than one way.
-    pub(crate) const AMBIGUOUS: u8 = 6;
+    pub const AMBIGUOUS: u8 = 6;
 }
 
 /// The reason why a command did not finish.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum Failure {
+pub enum Failure {
     /// Arguments that contradict each other or describe no process.
     #[error("{0}")]
     Usage(String),
@@ -65,7 +65,7 @@ impl Failure {
         clippy::needless_pass_by_value,
         reason = "map_err hands errors over by value"
     )]
-    pub(crate) fn usage(reason: impl ToString) -> Self {
+    pub fn usage(reason: impl ToString) -> Self {
         Self::Usage(reason.to_string())
     }
 
@@ -73,14 +73,14 @@ impl Failure {
         clippy::needless_pass_by_value,
         reason = "map_err hands errors over by value"
     )]
-    pub(crate) fn unreadable(path: &Path, reason: impl ToString) -> Self {
+    pub fn unreadable(path: &Path, reason: impl ToString) -> Self {
         Self::Unreadable {
             path: path.to_owned(),
             reason: reason.to_string(),
         }
     }
 
-    pub(crate) fn output(target: &Path, reason: io::Error) -> Self {
+    pub fn output(target: &Path, reason: io::Error) -> Self {
         Self::Output {
             target: target.display().to_string(),
             reason,
@@ -88,11 +88,11 @@ impl Failure {
     }
 
     /// Whether the reader of the output has closed the pipe, as `head` does; this is not an error.
-    pub(crate) fn is_closed_pipe(&self) -> bool {
+    pub fn is_closed_pipe(&self) -> bool {
         matches!(self, Self::Output { reason, .. } if reason.kind() == io::ErrorKind::BrokenPipe)
     }
 
-    pub(crate) fn exit_code(&self) -> u8 {
+    pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => exit::USAGE,
             Self::Recording { reason, .. } => match **reason {

@@ -1,7 +1,7 @@
 //! Output: the terminal, and files that are written whole or not at all. Nothing else in the program writes.
 
 #[cfg(target_family = "wasm")]
-pub(crate) mod page;
+pub mod page;
 #[cfg(not(target_family = "wasm"))]
 mod terminal;
 
@@ -16,17 +16,17 @@ use anstyle::Style;
 use crate::failure::Failure;
 use crate::style::{HEADING, REFUSAL};
 #[cfg(target_family = "wasm")]
-pub(crate) use page::{ProgressBar, Waiting, columns, progress_bar};
+pub use page::{ProgressBar, Waiting, columns, progress_bar};
 #[cfg(not(target_family = "wasm"))]
-pub(crate) use terminal::{ProgressBar, Waiting, columns, progress_bar};
+pub use terminal::{ProgressBar, Waiting, columns, progress_bar};
 
 /// Prints a report to the standard output, with styles if that is a terminal.
-pub(crate) fn print(text: &str) -> Result<(), Failure> {
+pub fn print(text: &str) -> Result<(), Failure> {
     written(AutoStream::auto(io::stdout().lock()), text.as_bytes())
 }
 
 /// Prints bytes to the standard output unchanged.
-pub(crate) fn print_data(bytes: &[u8]) -> Result<(), Failure> {
+pub fn print_data(bytes: &[u8]) -> Result<(), Failure> {
     written(io::stdout().lock(), bytes)
 }
 
@@ -44,9 +44,7 @@ const WAITING_BYTES: usize = 1 << 24;
 
 /// Prints what `write` writes to the standard output unchanged, once it is complete: whole or not at all, in bounded
 /// memory.
-pub(crate) fn print_whole(
-    write: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-) -> Result<(), Failure> {
+pub fn print_whole(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), Failure> {
     let mut waiting = tempfile::spooled_tempfile(WAITING_BYTES);
     let kept = write(&mut waiting).and_then(|()| waiting.rewind());
     kept.map_err(|reason| Failure::Output {
@@ -62,26 +60,26 @@ pub(crate) fn print_whole(
         })
 }
 
-/// Prints an error to the error output.
-pub(crate) fn complain(failure: &Failure) {
-    say(REFUSAL, failure);
+/// Prints an error of a program to the error output.
+pub fn complain(program: &str, failure: &Failure) {
+    say(program, REFUSAL, failure);
 }
 
-/// Prints a message about progress to the error output.
-pub(crate) fn tell(news: &str) {
-    say(HEADING, news);
+/// Prints a message about the progress of a program to the error output.
+pub fn tell(program: &str, news: &str) {
+    say(program, HEADING, news);
 }
 
 /// Prints a line to the error output; a closed one is ignored.
-fn say(style: Style, line: impl Display) {
+fn say(program: &str, style: Style, line: impl Display) {
     let _ = writeln!(
         AutoStream::auto(io::stderr().lock()),
-        "{style}onecycle:{style:#} {line}"
+        "{style}{program}:{style:#} {line}"
     );
 }
 
 /// A path with `.ENDING` added to its name.
-pub(crate) fn with_ending(path: &Path, ending: &str) -> PathBuf {
+pub fn with_ending(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(".");
     name.push(ending);
@@ -90,7 +88,7 @@ pub(crate) fn with_ending(path: &Path, ending: &str) -> PathBuf {
 
 /// Writes a file whole or not at all, through a temporary file beside it. Links are followed; pipes and devices are written
 /// directly.
-pub(crate) fn write_file(
+pub fn write_file(
     path: &Path,
     write: impl FnOnce(&mut (dyn Write + Send)) -> io::Result<()>,
 ) -> Result<(), Failure> {
@@ -116,7 +114,7 @@ pub(crate) fn write_file(
 }
 
 /// Writes a text to a file, whole or not at all.
-pub(crate) fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
+pub fn write_text(path: &Path, text: &str) -> Result<(), Failure> {
     write_file(path, |file| file.write_all(text.as_bytes()))
 }
 

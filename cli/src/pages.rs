@@ -5,5 +5,5 @@
 #[path = "../build/bundle.rs"]
 mod bundle;
 mod escape;
-pub(crate) mod page;
-pub(crate) mod plot;
+pub mod page;
+pub mod plot;

@@ -9,12 +9,10 @@ use crate::failure::Failure;
 use crate::output::Waiting;
 
 /// Largest file of settings, in bytes: the longest of ours has 10 kB.
-pub(crate) const MOST_OF_SETTINGS: u64 = 1 << 20;
-/// Largest file of a table, such as the answers of a benchmark or a grid with its matrix, in bytes.
-pub(crate) const MOST_OF_A_TABLE: u64 = 1 << 28;
+pub const MOST_OF_SETTINGS: u64 = 1 << 20;
 
 /// The bytes of a file of at most this size.
-pub(crate) fn bytes_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
+pub fn bytes_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> {
     let file = open_with_bar(path).map_err(|error| Failure::unreadable(path, error))?;
     let mut bytes = Vec::new();
     let read = file.take(most + 1).read_to_end(&mut bytes);
@@ -31,7 +29,7 @@ pub(crate) fn bytes_at_most(path: &Path, most: u64) -> Result<Vec<u8>, Failure> 
 }
 
 /// The text of a file of at most this size.
-pub(crate) fn text_at_most(path: &Path, most: u64) -> Result<String, Failure> {
+pub fn text_at_most(path: &Path, most: u64) -> Result<String, Failure> {
     let bytes = bytes_at_most(path, most)?;
     String::from_utf8(bytes).map_err(|_| Failure::unreadable(path, "the file is not UTF-8 text"))
 }

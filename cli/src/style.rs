@@ -4,21 +4,22 @@
 
 use std::fmt::Write;
 
+use anstream::adapter::strip_str;
 use anstyle::{AnsiColor, Style};
 
 /// Headings.
-pub(crate) const HEADING: Style = Style::new().bold();
+pub const HEADING: Style = Style::new().bold();
 /// Positive results.
-pub(crate) const HOLDS: Style = AnsiColor::Green.on_default();
+pub const HOLDS: Style = AnsiColor::Green.on_default();
 /// Remarks.
-pub(crate) const REMARK: Style = AnsiColor::Yellow.on_default();
+pub const REMARK: Style = AnsiColor::Yellow.on_default();
 /// Negative results and errors.
-pub(crate) const REFUSAL: Style = AnsiColor::Red.on_default().bold();
+pub const REFUSAL: Style = AnsiColor::Red.on_default().bold();
 /// Measured points and frames of plots: the default text style of the terminal.
-pub(crate) const PLAIN: Style = Style::new();
+pub const PLAIN: Style = Style::new();
 
 /// The text in a style, applied line by line.
-pub(crate) fn painted(style: Style, text: &str) -> String {
+pub fn painted(style: Style, text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
         let words = line.trim_end_matches('\n');
@@ -32,13 +33,18 @@ pub(crate) fn painted(style: Style, text: &str) -> String {
     all
 }
 
+/// The text without styles.
+pub fn plain(text: &str) -> String {
+    strip_str(text).to_string()
+}
+
 /// The text in the style of a positive or a negative result.
-pub(crate) fn verdict(holds: bool, text: &str) -> String {
+pub fn verdict(holds: bool, text: &str) -> String {
     painted(if holds { HOLDS } else { REFUSAL }, text)
 }
 
 /// The text with the first word of each line that is not indented as a heading.
-pub(crate) fn headed(text: &str) -> String {
+pub fn headed(text: &str) -> String {
     let mut all = String::with_capacity(text.len());
     for line in text.split_inclusive('\n') {
         let end = line.find(char::is_whitespace).unwrap_or(line.len());
@@ -62,8 +68,7 @@ mod tests {
         );
         assert_eq!(painted(PLAIN, "as it is\n"), "as it is\n");
         let painted = painted(HOLDS, "one\n\ntwo");
-        let bare = anstream::adapter::strip_str(&painted).to_string();
-        assert_eq!(bare, "one\n\ntwo");
+        assert_eq!(plain(&painted), "one\n\ntwo");
     }
 
     #[test]

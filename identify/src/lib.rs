@@ -14,6 +14,7 @@
 //! | the frequency response at the harmonics of the oscillation, without a model | [`harmonics`](fn@harmonics) |
 //! | a test of the residuals for whiteness | [`whiteness`](fn@whiteness) |
 //! | the intervals to expect from a planned test | [`expected`] |
+//! | the last cycles of a run, each identified alone | [`cycles::Cycles`] |
 //! | contours of the posterior | [`density`](fn@density) |
 
 mod amplitude;
@@ -21,6 +22,7 @@ mod assumed;
 mod checks;
 pub mod cholesky;
 mod conclusion;
+pub mod cycles;
 pub mod diagnose;
 mod excitation;
 mod innovations;

@@ -29,7 +29,25 @@ pub(crate) fn is_constant(values: &[f64]) -> bool {
     values.iter().all(|value| *value == values[0])
 }
 
-impl Signals<'_> {
+impl<'a> Signals<'a> {
+    /// Samples at an even period (s), none missing.
+    #[must_use]
+    pub fn even(
+        time_s: &'a [f64],
+        input: &'a [f64],
+        output: &'a [f64],
+        sample_period_s: f64,
+    ) -> Self {
+        Self {
+            time_s,
+            input,
+            output,
+            samples_per_point: 1,
+            sample_period_s,
+            breaks: &[],
+        }
+    }
+
     /// The input moved to `late_s` (s) before its time stamps: of each point the mean over its time. Before its first and
     /// after its last value the input is held.
     pub(crate) fn input_earlier(&self, late_s: f64) -> Vec<f64> {

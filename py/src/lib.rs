@@ -16,6 +16,7 @@ use std::time::{Duration, Instant};
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
 use onecycle_cli::embed;
+use onecycle_lab_cli::embed as lab;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -228,13 +229,13 @@ fn design(py: Python<'_>, options: Vec<String>) -> PyResult<String> {
 
 /// A campaign, whose cases can be computed anywhere.
 #[pyclass(frozen, module = "onecycle")]
-struct Campaign(Arc<embed::Campaign>);
+struct Campaign(Arc<lab::Campaign>);
 
 #[pymethods]
 impl Campaign {
     #[new]
     fn new(file: &str, options: Vec<String>) -> PyResult<Self> {
-        let campaign = embed::Campaign::read(file, &options).map_err(refused)?;
+        let campaign = lab::Campaign::read(file, &options).map_err(refused)?;
         Ok(Self(Arc::new(campaign)))
     }
 
@@ -259,13 +260,13 @@ impl Campaign {
 
 /// A folder of experiments to train on.
 #[pyclass(module = "onecycle")]
-struct Dataset(embed::Dataset);
+struct Dataset(lab::Dataset);
 
 #[pymethods]
 impl Dataset {
     #[new]
     fn new(recipe: Option<&str>, options: Vec<String>) -> PyResult<Self> {
-        let dataset = embed::Dataset::open(recipe, &options).map_err(refused)?;
+        let dataset = lab::Dataset::open(recipe, &options).map_err(refused)?;
         Ok(Self(dataset))
     }
 
@@ -289,7 +290,7 @@ fn dataset_file<'py>(
     manifest: String,
     file: usize,
 ) -> PyResult<(Bound<'py, PyBytes>, usize)> {
-    let made = waited(py, move || embed::dataset_file(&manifest, file))?;
+    let made = waited(py, move || lab::dataset_file(&manifest, file))?;
     let (bytes, rows) = made.map_err(refused)?;
     Ok((PyBytes::new(py, &bytes), rows))
 }

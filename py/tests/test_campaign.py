@@ -42,7 +42,7 @@ def recipe(tmp_path):
 
 
 def program(*words):
-    run = subprocess.run([os.environ["ONECYCLE"], *map(str, words)], capture_output=True, text=True)
+    run = subprocess.run([os.environ["ONECYCLE_LAB"], *map(str, words)], capture_output=True, text=True)
     assert run.returncode == 0, run.stderr
     return run.stdout
 

@@ -9,7 +9,8 @@ use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
 use super::design::noise;
-use super::{DesignArguments, LogArguments, PackSource, WriteArguments, sample_rate, time_unit};
+use super::{DesignArguments, LogArguments, WriteArguments, sample_rate, time_unit};
+use crate::packs::PackSource;
 
 /// Identify the process from a recording and design its controller.
 ///
@@ -192,7 +193,7 @@ impl From<Between> for Hold {
 
 /// Identification method.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Method {
+pub enum Method {
     Classify,
     Refine,
     Map,

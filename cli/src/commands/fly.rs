@@ -4,18 +4,18 @@ use std::fs;
 use std::io::{self, Write};
 use std::process::ExitCode;
 
-use onecycle_lab::judge::evaluate::{Cycles, CyclesError};
-use onecycle_lab::judge::flights::{judged, trace};
+use onecycle_identify::Signals;
+use onecycle_identify::cycles::{Cycles, CyclesError};
 use onecycle_onboard::tuner::TunerPhase;
 use onecycle_plant::multirotor::pilot::TICK_S;
-use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, fly};
+use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, fly, judged, trace};
 
-use super::workers::Workers;
 use crate::args::Fly;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_file, write_text};
 use crate::report::fly as report;
 use crate::results::fly::{Flight, MissionFlights};
+use crate::workers::Workers;
 
 /// Number of cycles identified one by one: that of the paper's Table VII.
 const CYCLES: usize = 5;
@@ -101,7 +101,9 @@ fn cycles(flown: &Flown) -> Result<Cycles, CyclesError> {
         )
     };
     let records: Vec<FlightRecord> = flown.records.iter().filter(oscillates).copied().collect();
-    Cycles::of(&trace(&records, Axis::Altitude), TICK_S, CYCLES)
+    let trace = trace(&records, Axis::Altitude);
+    let signals = Signals::even(&trace.time_s, &trace.input, &trace.output, TICK_S);
+    Cycles::of(&signals, CYCLES)
 }
 
 /// One row for each tick: true state, measurements, commands and the phase of each tuner.

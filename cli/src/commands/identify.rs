@@ -12,7 +12,7 @@ use onecycle_link::{LogError, Span};
 
 use super::log::{self, Piped, Source};
 use super::log_gains::{self, LogLoop};
-use super::{answer, controllers, flight, pack};
+use super::{answer, controllers, flight};
 use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, write_text};
@@ -142,8 +142,8 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
     };
     check_span(arguments, &recording)?;
     let _waiting = Waiting::on("identifying");
-    let bytes = pack::bytes(&arguments.pack)?;
-    let pack = pack::usable(&arguments.pack, &bytes)?;
+    let bytes = arguments.pack.bytes()?;
+    let pack = arguments.pack.usable(&bytes)?;
     let asked = of_log.as_ref().map_or(asked, |of_log| {
         of_log.specification(asked, arguments.design.is_form_given())
     });

@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 
+use crate::PROGRAM;
 use crate::args::Studio;
 use crate::failure::{Failure, exit};
 use crate::output::{print, tell, write_text};
@@ -21,10 +22,11 @@ pub(crate) fn run(arguments: &Studio) -> Result<ExitCode, Failure> {
     write_text(&arguments.out, page)?;
     print(&format!("{}\n", arguments.out.display()))?;
     if !arguments.no_open && !opens(&arguments.out) {
-        tell(&format!(
+        let news = format!(
             "no browser was found: open {} in one",
             arguments.out.display()
-        ));
+        );
+        tell(PROGRAM, &news);
     }
     Ok(ExitCode::from(exit::DONE))
 }

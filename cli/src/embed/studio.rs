@@ -26,12 +26,13 @@ use onecycle::{Controller, Model, Pid};
 use onecycle_link::FlightLog;
 use serde_json::{Value, json};
 
-use super::{arguments_of_identify, parsed, plain};
+use super::{arguments_of_identify, parsed};
 use crate::args::{Command, HALF_STEP, Identify};
 use crate::commands::log::{self, Source};
 use crate::commands::{flight, identify, simulate};
 use crate::failure::Failure;
 use crate::report::{flight as flight_report, hand, log as log_report};
+use crate::style::plain;
 use crate::words;
 
 /// Processes of the posterior over which gains are judged at every move: a few milliseconds.

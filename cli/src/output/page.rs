@@ -4,26 +4,26 @@ use std::borrow::Cow;
 use std::cell::Cell;
 
 /// A page has no terminal.
-pub(crate) fn columns() -> Option<usize> {
+pub fn columns() -> Option<usize> {
     None
 }
 
 /// A bar that nobody sees: the commands with pieces of work do not run in a page.
 #[derive(Clone, Debug)]
-pub(crate) struct ProgressBar;
+pub struct ProgressBar;
 
 /// A bar that nobody sees.
-pub(crate) fn progress_bar(_: u64) -> ProgressBar {
+pub fn progress_bar(_: u64) -> ProgressBar {
     ProgressBar
 }
 
 impl ProgressBar {
-    pub(crate) fn set_length(&self, _: u64) {}
-    pub(crate) fn set_position(&self, _: u64) {}
-    pub(crate) fn set_message(&self, _: impl Into<Cow<'static, str>>) {}
-    pub(crate) fn inc(&self, _: u64) {}
-    pub(crate) fn reset(&self) {}
-    pub(crate) fn finish_and_clear(&self) {}
+    pub fn set_length(&self, _: u64) {}
+    pub fn set_position(&self, _: u64) {}
+    pub fn set_message(&self, _: impl Into<Cow<'static, str>>) {}
+    pub fn inc(&self, _: u64) {}
+    pub fn reset(&self) {}
+    pub fn finish_and_clear(&self) {}
 }
 
 /// Takes the name of the work, the bytes done and, where it is known, the number of bytes in all.
@@ -42,7 +42,7 @@ pub fn listen(listener: Listener) {
 const STEP_BYTES: u64 = 1 << 21;
 
 /// Work that goes on.
-pub(crate) struct Waiting {
+pub struct Waiting {
     work: Cow<'static, str>,
     done: Cell<u64>,
     told: Cell<u64>,
@@ -51,12 +51,12 @@ pub(crate) struct Waiting {
 
 impl Waiting {
     /// For work of unknown length, named for example `identifying`.
-    pub(crate) fn on(work: impl Into<Cow<'static, str>>) -> Self {
+    pub fn on(work: impl Into<Cow<'static, str>>) -> Self {
         Self::told(work.into(), None)
     }
 
     /// For work on a known number of bytes.
-    pub(crate) fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
+    pub fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
         Self::told(work.into(), Some(bytes))
     }
 
@@ -79,12 +79,12 @@ impl Waiting {
     }
 
     /// Names the next step of the work.
-    pub(crate) fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
+    pub fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
         self.tell(&work.into());
     }
 
     /// Counts bytes as done.
-    pub(crate) fn advance(&self, bytes: u64) {
+    pub fn advance(&self, bytes: u64) {
         self.done.set(self.done.get() + bytes);
         if self.done.get() - self.told.get() >= STEP_BYTES {
             self.tell(&self.work);

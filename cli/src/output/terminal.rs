@@ -6,17 +6,17 @@ use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-pub(crate) use indicatif::ProgressBar;
+pub use indicatif::ProgressBar;
 use indicatif::{ProgressDrawTarget, ProgressStyle};
 use terminal_size::{Width, terminal_size_of};
 
 /// Width of the standard output in characters, if it is a terminal.
-pub(crate) fn columns() -> Option<usize> {
+pub fn columns() -> Option<usize> {
     terminal_size_of(io::stdout()).map(|(Width(columns), _)| usize::from(columns))
 }
 
 /// A progress bar on the error output for a number of pieces of work, with a message; hidden if that is not a terminal.
-pub(crate) fn progress_bar(pieces: u64) -> ProgressBar {
+pub fn progress_bar(pieces: u64) -> ProgressBar {
     let bar = ProgressBar::new(pieces);
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} {eta}  {msg}") {
         bar.set_style(style);
@@ -29,9 +29,9 @@ const QUICK: Duration = Duration::from_millis(500);
 /// Time between two updates of a progress indicator.
 const TURN: Duration = Duration::from_millis(100);
 
-/// A progress indicator on the error output. It appears on a terminal only, if the work takes longer than [`QUICK`], and
+/// A progress indicator on the error output. It appears on a terminal only, if the work takes longer than half a second, and
 /// disappears when it is dropped.
-pub(crate) struct Waiting {
+pub struct Waiting {
     bar: ProgressBar,
     over: Option<Sender<()>>,
     patience: Option<JoinHandle<()>>,
@@ -39,12 +39,12 @@ pub(crate) struct Waiting {
 
 impl Waiting {
     /// For work of unknown length, named for example `identifying`.
-    pub(crate) fn on(work: impl Into<Cow<'static, str>>) -> Self {
+    pub fn on(work: impl Into<Cow<'static, str>>) -> Self {
         Self::shown_as("{spinner} {msg} {elapsed}", None, work)
     }
 
     /// For work on a known number of bytes.
-    pub(crate) fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
+    pub fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
         let template = "{wide_bar} {bytes}/{total_bytes} {eta}  {msg}";
         Self::shown_as(template, Some(bytes), work)
     }
@@ -72,18 +72,18 @@ impl Waiting {
     }
 
     /// Names the next step of the work.
-    pub(crate) fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
+    pub fn goes_on(&self, work: impl Into<Cow<'static, str>>) {
         self.bar.set_message(work);
     }
 
     /// Counts bytes as done.
-    pub(crate) fn advance(&self, bytes: u64) {
+    pub fn advance(&self, bytes: u64) {
         self.bar.inc(bytes);
     }
 
     /// Bytes done, and bytes in all.
     #[cfg(test)]
-    pub(crate) fn position(&self) -> (u64, Option<u64>) {
+    pub fn position(&self) -> (u64, Option<u64>) {
         (self.bar.position(), self.bar.length())
     }
 }

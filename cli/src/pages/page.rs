@@ -1,6 +1,6 @@
 //! A page in one HTML file with its style, script and plots; light and dark, for screens and for print.
 //!
-//! The functions here make the components of a page. All text goes through [`escaped`].
+//! The functions here make the components of a page. All text goes through `escaped`.
 
 use std::fmt::Write;
 
@@ -8,16 +8,16 @@ use super::escape::escaped;
 use super::plot::Figure;
 
 /// A section: a heading and the components below it.
-pub(crate) struct Section {
+pub struct Section {
     /// Identifier, for links.
-    pub(crate) id: String,
-    pub(crate) title: String,
+    pub id: String,
+    pub title: String,
     /// Components, as HTML.
-    pub(crate) body: String,
+    pub body: String,
 }
 
 impl Section {
-    pub(crate) fn new(id: &str, title: &str, body: String) -> Self {
+    pub fn new(id: &str, title: &str, body: String) -> Self {
         Self {
             id: id.to_owned(),
             title: title.to_owned(),
@@ -27,12 +27,12 @@ impl Section {
 }
 
 /// A paragraph with a CSS class.
-pub(crate) fn paragraph(class: &str, text: &str) -> String {
+pub fn paragraph(class: &str, text: &str) -> String {
     format!("<p class=\"{}\">{}</p>\n", escaped(class), escaped(text))
 }
 
 /// Text that opens on a click on its heading.
-pub(crate) fn folded(heading: &str, body: &str) -> String {
+pub fn folded(heading: &str, body: &str) -> String {
     format!(
         "<details><summary>{}</summary>{body}</details>\n",
         escaped(heading)
@@ -40,13 +40,13 @@ pub(crate) fn folded(heading: &str, body: &str) -> String {
 }
 
 /// The main result of the page, good or bad.
-pub(crate) fn verdict(is_good: bool, text: &str) -> String {
+pub fn verdict(is_good: bool, text: &str) -> String {
     let kind = if is_good { "good" } else { "bad" };
     format!("<p class=\"verdict {kind}\">{}</p>\n", escaped(text))
 }
 
 /// A list.
-pub(crate) fn list(items: &[String]) -> String {
+pub fn list(items: &[String]) -> String {
     let items = items
         .iter()
         .map(|item| format!("<li>{}</li>", escaped(item)));
@@ -54,7 +54,7 @@ pub(crate) fn list(items: &[String]) -> String {
 }
 
 /// A list of names with their values.
-pub(crate) fn facts(facts: &[(impl AsRef<str>, String)]) -> String {
+pub fn facts(facts: &[(impl AsRef<str>, String)]) -> String {
     let mut all = String::new();
     for (name, value) in facts {
         let (name, value) = (escaped(name.as_ref()), escaped(value));
@@ -64,16 +64,16 @@ pub(crate) fn facts(facts: &[(impl AsRef<str>, String)]) -> String {
 }
 
 /// A table cell: a value, and a smaller one below it.
-pub(crate) struct Cell<'a> {
-    pub(crate) value: &'a str,
-    pub(crate) below: Option<String>,
+pub struct Cell<'a> {
+    pub value: &'a str,
+    pub below: Option<String>,
 }
 
 /// Largest number of columns that a phone shows side by side; with more, each row becomes a list.
 const MOST_COLUMNS: usize = 5;
 
 /// A table; its first column has the names of the rows.
-pub(crate) fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'_>>)]) -> String {
+pub fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'_>>)]) -> String {
     let wide = if columns.len() > MOST_COLUMNS {
         " wide"
     } else {
@@ -104,7 +104,7 @@ pub(crate) fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'
 }
 
 /// A table of texts: the name of each row and its cells.
-pub(crate) fn plain_table<const N: usize>(
+pub fn plain_table<const N: usize>(
     caption: &str,
     columns: &[&str],
     rows: impl IntoIterator<Item = (String, [String; N])>,
@@ -122,7 +122,7 @@ pub(crate) fn plain_table<const N: usize>(
 }
 
 /// A plot with its caption.
-pub(crate) fn figure(figure: &Figure) -> String {
+pub fn figure(figure: &Figure) -> String {
     // A browser looks for the end tag only; without `<` there is none in the JSON.
     let json = figure.to_json().replace('<', "\\u003c");
     let shape = figure.shape.name();
@@ -134,13 +134,13 @@ pub(crate) fn figure(figure: &Figure) -> String {
 }
 
 /// Plots side by side, as many as fit.
-pub(crate) fn row(figures: &[Figure]) -> String {
+pub fn row(figures: &[Figure]) -> String {
     let figures = figures.iter().map(figure).collect::<String>();
     format!("<div class=\"row\">\n{figures}</div>\n")
 }
 
 /// The whole page.
-pub(crate) fn page(title: &str, lead: &str, sections: &[Section]) -> String {
+pub fn page(title: &str, lead: &str, sections: &[Section]) -> String {
     let title = escaped(title);
     let mut links = String::new();
     let mut body = String::new();

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Marks {
+pub enum Marks {
     Line,
     Dashes,
     /// Steps: each value is held until the next one.
@@ -27,7 +27,7 @@ pub(crate) enum Marks {
 /// Meaning of a series, which decides its colour.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Hue {
+pub enum Hue {
     /// One of several similar series: the next colour of the palette.
     #[default]
     Next,
@@ -40,13 +40,13 @@ pub(crate) enum Hue {
 
 /// A series of points. A series without a name is not in the legend.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Series {
-    pub(crate) name: String,
-    pub(crate) marks: Marks,
+pub struct Series {
+    pub name: String,
+    pub marks: Marks,
     #[serde(default)]
-    pub(crate) hue: Hue,
-    pub(crate) x: Vec<f64>,
-    pub(crate) y: Vec<f64>,
+    pub hue: Hue,
+    pub x: Vec<f64>,
+    pub y: Vec<f64>,
 }
 
 /// Significant digits of a coordinate, of its value and of the range of all values.
@@ -54,7 +54,7 @@ const DIGITS: usize = 5;
 
 impl Series {
     /// A series of points, rounded to what a screen can show.
-    pub(crate) fn of_points(
+    pub fn of_points(
         name: &str,
         marks: Marks,
         points: impl IntoIterator<Item = (f64, f64)>,
@@ -70,13 +70,13 @@ impl Series {
     }
 
     /// The area between two curves over the same abscissas.
-    pub(crate) fn between(name: &str, x: &[f64], low: &[f64], high: &[f64]) -> Self {
+    pub fn between(name: &str, x: &[f64], low: &[f64], high: &[f64]) -> Self {
         let there = x.iter().zip(low);
         let back = x.iter().zip(high).rev();
         Self::of_points(name, Marks::Area, there.chain(back).map(|(&x, &y)| (x, y)))
     }
 
-    pub(crate) fn hue(self, hue: Hue) -> Self {
+    pub fn hue(self, hue: Hue) -> Self {
         Self { hue, ..self }
     }
 }
@@ -106,47 +106,47 @@ fn shortened(mut values: Vec<f64>) -> Vec<f64> {
 /// An axis.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub(crate) struct Axis {
+pub struct Axis {
     /// Quantity and unit.
-    pub(crate) title: String,
+    pub title: String,
     /// Whether it is logarithmic.
     #[serde(default)]
-    pub(crate) is_logarithmic: bool,
+    pub is_logarithmic: bool,
     /// Range that is shown [default: that of the data].
     #[serde(default)]
-    pub(crate) range: Option<(f64, f64)>,
+    pub range: Option<(f64, f64)>,
     /// Whether labels and grid are hidden.
     #[serde(default)]
-    pub(crate) is_bare: bool,
+    pub is_bare: bool,
     /// Distance of labels on a linear axis [default: chosen by the plot].
     #[serde(default)]
-    pub(crate) tick: Option<f64>,
+    pub tick: Option<f64>,
 }
 
 impl Axis {
     /// A linear axis.
-    pub(crate) fn titled(title: impl Into<String>) -> Self {
+    pub fn titled(title: impl Into<String>) -> Self {
         Self {
             title: title.into(),
             ..Self::default()
         }
     }
 
-    pub(crate) fn logarithmic(self) -> Self {
+    pub fn logarithmic(self) -> Self {
         Self {
             is_logarithmic: true,
             ..self
         }
     }
 
-    pub(crate) fn every(self, tick: f64) -> Self {
+    pub fn every(self, tick: f64) -> Self {
         Self {
             tick: Some(tick),
             ..self
         }
     }
 
-    pub(crate) fn spanning(self, low: f64, high: f64) -> Self {
+    pub fn spanning(self, low: f64, high: f64) -> Self {
         Self {
             range: Some((low, high)),
             ..self
@@ -156,35 +156,35 @@ impl Axis {
 
 /// A note at a point of a panel, with an arrow.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Note {
-    pub(crate) text: String,
-    pub(crate) x: f64,
-    pub(crate) y: f64,
+pub struct Note {
+    pub text: String,
+    pub x: f64,
+    pub y: f64,
     /// Offset of the text from the point: right and down (pixels).
-    pub(crate) away: (f64, f64),
+    pub away: (f64, f64),
 }
 
 /// Values over a plane: `z[row][column]` at `y[row]`, `x[column]`. If `y` has one value more than there are rows, they are
 /// the edges of the rows; the same for `x` and columns. NaN is left blank.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Field {
-    pub(crate) kind: FieldKind,
-    pub(crate) x: Places,
-    pub(crate) y: Places,
-    pub(crate) z: Vec<Vec<f64>>,
+pub struct Field {
+    pub kind: FieldKind,
+    pub x: Places,
+    pub y: Places,
+    pub z: Vec<Vec<f64>>,
 }
 
 /// Coordinates of the values of a field.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
-pub(crate) enum Places {
+pub enum Places {
     Numbers(Vec<f64>),
     Names(Vec<String>),
 }
 
 /// Meaning of the values of a field.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum FieldKind {
+pub enum FieldKind {
     /// Probability content of highest-density regions, 0 to 1; contour lines at 50, 90 and 99 %.
     Regions,
     /// Correlations, -1 to 1; coloured squares with numbers.
@@ -195,15 +195,15 @@ pub(crate) enum FieldKind {
 
 /// One of several panels stacked over a common x axis.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Panel {
-    pub(crate) y: Axis,
-    pub(crate) series: Vec<Series>,
-    pub(crate) field: Option<Field>,
-    pub(crate) notes: Vec<Note>,
+pub struct Panel {
+    pub y: Axis,
+    pub series: Vec<Series>,
+    pub field: Option<Field>,
+    pub notes: Vec<Note>,
 }
 
 impl Panel {
-    pub(crate) fn new(y: Axis, series: Vec<Series>) -> Self {
+    pub fn new(y: Axis, series: Vec<Series>) -> Self {
         Self {
             y,
             series,
@@ -214,7 +214,7 @@ impl Panel {
 
 /// Size of a figure.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Shape {
+pub enum Shape {
     #[default]
     Wide,
     /// For two panels.
@@ -228,7 +228,7 @@ pub(crate) enum Shape {
 
 impl Shape {
     /// CSS class.
-    pub(crate) fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Wide => "wide",
             Self::Tall => "tall",
@@ -241,24 +241,24 @@ impl Shape {
 
 /// A figure: panels, stacked, and a caption.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Figure {
-    pub(crate) caption: String,
-    pub(crate) x: Axis,
+pub struct Figure {
+    pub caption: String,
+    pub x: Axis,
     /// From top to bottom.
-    pub(crate) panels: Vec<Panel>,
-    pub(crate) shape: Shape,
+    pub panels: Vec<Panel>,
+    pub shape: Shape,
     /// Shaded range of the x axis.
-    pub(crate) span: Option<(f64, f64)>,
+    pub span: Option<(f64, f64)>,
 }
 
 impl Figure {
     /// A figure with one panel.
-    pub(crate) fn single(caption: &str, x: Axis, panel: Panel) -> Self {
+    pub fn single(caption: &str, x: Axis, panel: Panel) -> Self {
         Self::stacked(caption, x, vec![panel])
     }
 
     /// A figure with several panels, from top to bottom.
-    pub(crate) fn stacked(caption: &str, x: Axis, panels: Vec<Panel>) -> Self {
+    pub fn stacked(caption: &str, x: Axis, panels: Vec<Panel>) -> Self {
         let shape = if panels.len() > 1 {
             Shape::Tall
         } else {
@@ -273,7 +273,7 @@ impl Figure {
         }
     }
 
-    pub(crate) fn shaped(self, shape: Shape) -> Self {
+    pub fn shaped(self, shape: Shape) -> Self {
         Self { shape, ..self }
     }
 }

@@ -1,13 +1,12 @@
 //! Cycles of one run, each identified alone: cost of each controller on the processes of the other cycles.
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
-use onecycle_lab::judge::evaluate::Cycles;
+use onecycle_identify::cycles::Cycles;
 
 use super::number::percent;
-use crate::results::reproduction::Row;
 
 /// One row for the controller of each cycle, one cell for the process of each cycle.
-pub(crate) fn cross_table(cycles: &Cycles) -> Vec<Row> {
+pub fn cross_table(cycles: &Cycles) -> Vec<Vec<String>> {
     let cells = |i: usize, row: &[Deterioration]| -> Vec<String> {
         (row.iter().enumerate())
             .map(|(j, cost)| {
@@ -20,12 +19,12 @@ pub(crate) fn cross_table(cycles: &Cycles) -> Vec<Row> {
             .collect()
     };
     (cycles.cross().iter().enumerate())
-        .map(|(i, row)| Row::new((i + 1).to_string(), cells(i, row)))
+        .map(|(i, row)| cells(i, row))
         .collect()
 }
 
 /// The deterioration `J` of a method as a cell of a table.
-pub(crate) fn cost_cell(judged: Option<Deterioration>) -> String {
+pub fn cost_cell(judged: Option<Deterioration>) -> String {
     match judged {
         Some(Deterioration::Stable { relative, .. }) => percent(relative),
         Some(Deterioration::Unstable) => "unstable".to_owned(),

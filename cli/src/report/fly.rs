@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use onecycle::{Controller, Model, margins};
-use onecycle_design::soiptd_pd::deterioration::Deterioration;
-use onecycle_lab::judge::evaluate::{Cycles, PHASE_MARGIN_DEG};
+use onecycle_design::soiptd_pd::deterioration::{Deterioration, PHASE_MARGIN_DEG};
+use onecycle_identify::cycles::Cycles;
 use onecycle_onboard::judgement::HALF_90_PERCENT;
 use onecycle_plant::multirotor::{Axis, FlightRecord, Flown, Mission, Tuned};
 
@@ -352,11 +352,10 @@ fn cycles_table(cycles: &Cycles) -> String {
         .chain((1..=rows.len()).map(|number| format!("on cycle {number}")))
         .collect();
     let cell = |value| Cell { value, below: None };
+    let names: Vec<String> = (1..=rows.len()).map(|number| number.to_string()).collect();
     let rows: Vec<_> = (rows.iter())
-        .map(|row| {
-            let cells = row.cells.iter().map(|value| cell(value.as_str())).collect();
-            (row.name.as_str(), cells)
-        })
+        .zip(&names)
+        .map(|(row, name)| (name.as_str(), row.iter().map(|value| cell(value)).collect()))
         .collect();
     page::table("J_ij", &columns, &rows)
 }

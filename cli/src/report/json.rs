@@ -405,7 +405,7 @@ pub(crate) fn design(
     })
 }
 
-pub(crate) fn to_text(report: &impl Serialize) -> String {
+pub fn to_text(report: &impl Serialize) -> String {
     // Plain structures of numbers and strings always serialise.
     let mut text = serde_json::to_string_pretty(report).unwrap_or_default();
     text.push('\n');

@@ -3,17 +3,17 @@
 use std::f64::consts::TAU;
 
 /// Four significant digits; a power of ten only for very small and very large numbers.
-pub(crate) fn significant(value: f64) -> String {
+pub fn significant(value: f64) -> String {
     digits(value, 4)
 }
 
 /// Three significant digits, for tables.
-pub(crate) fn short(value: f64) -> String {
+pub fn short(value: f64) -> String {
     digits(value, 3)
 }
 
 /// A frequency (rad/s) in Hz with two significant digits.
-pub(crate) fn frequency(omega_rad_per_s: f64) -> String {
+pub fn frequency(omega_rad_per_s: f64) -> String {
     format!("{} Hz", digits(omega_rad_per_s / TAU, 2))
 }
 
@@ -38,23 +38,23 @@ fn digits(value: f64, count: usize) -> String {
 }
 
 /// Four significant digits, or `unbounded`.
-pub(crate) fn bounded(value: Option<f64>) -> String {
+pub fn bounded(value: Option<f64>) -> String {
     value.map_or("unbounded".to_owned(), significant)
 }
 
 /// A fraction as a percentage with two decimals; never "-0.00".
-pub(crate) fn percent(part: f64) -> String {
+pub fn percent(part: f64) -> String {
     let rounded = (1e4 * part).round() / 100.0;
     format!("{:.2} %", rounded + 0.0)
 }
 
 /// An angle (rad) in degrees with two decimals.
-pub(crate) fn degrees(angle_rad: f64) -> String {
+pub fn degrees(angle_rad: f64) -> String {
     format!("{:.2} deg", angle_rad.to_degrees())
 }
 
 /// A time (s) in s, ms or us.
-pub(crate) fn seconds(time_s: f64) -> String {
+pub fn seconds(time_s: f64) -> String {
     match time_s {
         0.1.. => format!("{time_s:.2} s"),
         1e-3..0.1 => format!("{:.1} ms", 1e3 * time_s),

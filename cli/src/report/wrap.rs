@@ -6,7 +6,7 @@ use std::fmt::Write;
 const WIDTH: usize = 96;
 
 /// Writes `words` behind `lead`, in lines as wide as a terminal, indented like the first.
-pub(super) fn wrapped(text: &mut String, lead: &str, words: &str) {
+pub fn wrapped(text: &mut String, lead: &str, words: &str) {
     wrapped_to(text, lead, words, WIDTH);
 }
 

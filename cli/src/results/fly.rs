@@ -1,7 +1,7 @@
 //! Result of `onecycle fly`: simulated flights and how good their controllers are.
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
-use onecycle_lab::judge::evaluate::Cycles;
+use onecycle_identify::cycles::Cycles;
 use onecycle_plant::multirotor::{Flown, Mission, Tuned};
 
 /// One flight and its evaluation.

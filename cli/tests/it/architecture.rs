@@ -1,9 +1,10 @@
 //! The dependencies between crates, as ARCHITECTURE.md draws them, and between the files of each crate.
 //!
-//! Crates: read from `cargo metadata`, dependencies for tests and builds included. On-board code depends only on
-//! on-board code; nothing that ships depends on the research crate `lab`.
+//! Crates: read from `cargo metadata` of both workspaces, dependencies for tests and builds included. On-board code depends
+//! only on on-board code; nothing that ships depends on the research.
 //! Files: read from the sources. No file takes names from a file that, directly or not, takes names from it.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
@@ -11,8 +12,8 @@ use crate::imports::{Files, circles};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
-/// Each crate with the crates of this workspace that it may depend on, tests included.
-const ALLOWED: [(&str, &[&str]); 10] = [
+/// Each crate with the crates of both workspaces that it may depend on, tests included.
+const ALLOWED: [(&str, &[&str]); 11] = [
     ("onecycle-onboard", &[]),
     ("onecycle-plant", &["onecycle-design", "onecycle-onboard"]),
     ("onecycle-link", &[]),
@@ -36,7 +37,6 @@ const ALLOWED: [(&str, &[&str]); 10] = [
         "onecycle-cli",
         &[
             "onecycle",
-            "onecycle-lab",
             "onecycle-design",
             "onecycle-identify",
             "onecycle-link",
@@ -56,10 +56,31 @@ const ALLOWED: [(&str, &[&str]); 10] = [
         ],
     ),
     (
+        "onecycle-lab-cli",
+        &[
+            "onecycle",
+            "onecycle-cli",
+            "onecycle-lab",
+            "onecycle-design",
+            "onecycle-identify",
+            "onecycle-link",
+            "onecycle-onboard",
+            "onecycle-plant",
+        ],
+    ),
+    (
         "onecycle-py",
-        &["onecycle", "onecycle-cli", "onecycle-plant"],
+        &[
+            "onecycle",
+            "onecycle-cli",
+            "onecycle-lab-cli",
+            "onecycle-plant",
+        ],
     ),
 ];
+
+/// Crates of the workspace in `research/`.
+const RESEARCH: [&str; 3] = ["onecycle-lab", "onecycle-lab-cli", "onecycle-py"];
 
 /// What the library ships.
 const PARTS: [&str; 5] = [
@@ -101,7 +122,7 @@ impl Metadata {
         let mut offences = Vec::new();
         for (name, _) in ALLOWED {
             if self.package(name).is_none() {
-                offences.push(format!("{name} is not in the workspace"));
+                offences.push(format!("{name} is in no workspace"));
             }
         }
         for package in &self.packages {
@@ -134,13 +155,21 @@ fn names<'a>(dependencies: &[&'a Dependency]) -> Vec<&'a str> {
     dependencies.iter().map(name).collect()
 }
 
-/// The workspace as cargo reads it; without its dependencies it needs neither lock nor network.
-fn workspace() -> Metadata {
+/// Both workspaces.
+fn workspaces() -> Metadata {
+    let packages = ["", "research/"].map(|folder| workspace(folder).packages);
+    Metadata {
+        packages: packages.into_iter().flatten().collect(),
+    }
+}
+
+/// A workspace as cargo reads it; without its dependencies it needs neither lock nor network.
+fn workspace(folder: &str) -> Metadata {
     let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-    let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml");
+    let manifest = format!("{}/../{folder}Cargo.toml", env!("CARGO_MANIFEST_DIR"));
     let output = Command::new(cargo)
         .args(["metadata", "--no-deps", "--format-version", "1"])
-        .args(["--locked", "--offline", "--manifest-path", manifest])
+        .args(["--locked", "--offline", "--manifest-path", &manifest])
         .output()
         .expect("cargo runs");
     let complaint = String::from_utf8_lossy(&output.stderr);
@@ -164,30 +193,60 @@ fn offences_of(metadata: Value) -> Vec<String> {
 
 #[test]
 fn only_the_allowed_arrows() {
-    assert_eq!(workspace().offences(), Vec::<String>::new());
+    assert_eq!(workspaces().offences(), Vec::<String>::new());
 }
 
 // Firmware pays for every crate that comes along.
 #[test]
 fn onboard_ships_with_libm_alone() {
-    let metadata = workspace();
+    let metadata = workspace("");
     let shipped = metadata.shipped_dependencies("onecycle-onboard");
     assert_eq!(names(&shipped.unwrap()), ["libm"]);
 }
 
-// Nothing that ships depends on the research: neither the library nor its parts know `lab`.
+// Nothing that ships depends on the research, for its tests neither.
+#[test]
+fn the_research_is_next_door() {
+    let ships = workspace("").packages;
+    for package in &ships {
+        for dependency in &package.dependencies {
+            let on = dependency.name.as_str();
+            assert!(!RESEARCH.contains(&on), "{on} <- {}", package.name);
+        }
+        assert!(!RESEARCH.contains(&package.name.as_str()));
+    }
+    let research = workspace("research/").packages;
+    let names: Vec<&str> = research.iter().map(|one| one.name.as_str()).collect();
+    assert_eq!(names, RESEARCH);
+}
+
 #[test]
 fn the_library_ships_with_its_parts_alone() {
-    let metadata = workspace();
+    let metadata = workspace("");
     let shipped = metadata.shipped_dependencies("onecycle").unwrap();
     assert_eq!(names(&shipped), PARTS);
-    for part in PARTS {
-        let shipped = metadata.shipped_dependencies(part).unwrap();
-        let names = names(&shipped);
-        assert!(!names.contains(&"onecycle-lab"), "{part} {names:?}");
-    }
     let identify = metadata.shipped_dependencies("onecycle-identify").unwrap();
     assert!(!names(&identify).contains(&"onecycle-plant"));
+}
+
+// Lints and profiles: what comes after the dependencies, without comments and without profiles of crates that only one
+// workspace has.
+#[test]
+fn both_workspaces_are_built_alike() {
+    let settings = |folder: &str| -> BTreeSet<String> {
+        let path = format!("{}/../{folder}Cargo.toml", env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(path).unwrap();
+        let (_, settings) = text.split_once("[workspace.lints.rust]").unwrap();
+        let tables = settings.split("\n[").map(|table| {
+            let lines = table.lines().filter(|line| !line.starts_with('#'));
+            lines.collect::<Vec<_>>().join("\n").trim().to_owned()
+        });
+        tables.collect()
+    };
+    let (ships, research) = (settings(""), settings("research/"));
+    assert_eq!(ships.difference(&research).count(), 0, "{ships:?}");
+    let mut own = research.difference(&ships);
+    assert!(own.all(|table| table.starts_with("profile.dev.package.")));
 }
 
 #[test]
@@ -211,7 +270,7 @@ fn a_crate_without_a_row_is_named() {
     let mut metadata = made_up();
     metadata["packages"][2] = json!({"name": "onecycle-radio", "dependencies": []});
     let expected = [
-        "onecycle-link is not in the workspace",
+        "onecycle-link is in no workspace",
         "onecycle-radio has no row in ALLOWED",
     ];
     assert_eq!(offences_of(metadata), expected);
@@ -248,7 +307,7 @@ fn add_sources(folder: &Path, below: &str, files: &mut Files) {
 #[test]
 fn no_file_imports_in_a_circle() {
     let mut found = Vec::new();
-    for package in workspace().packages {
+    for package in workspaces().packages {
         let folder = Path::new(&package.manifest_path).parent().unwrap();
         let mut files = Files::new();
         add_sources(&folder.join("src"), "", &mut files);

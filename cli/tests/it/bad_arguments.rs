@@ -1,10 +1,10 @@
-//! Invalid arguments, campaigns and outputs: the exit code, and one sentence.
+//! Invalid arguments and outputs: the exit code, and one sentence.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::process::Stdio;
 
 use crate::common::{
-    HOVER, NOT_WRITTEN, Outcome, RECORDINGS, Scratch, Table, UNREADABLE, names_in, onecycle, run,
+    HOVER, NOT_WRITTEN, Outcome, Scratch, Table, UNREADABLE, names_in, program, run,
 };
 
 // ---------------------------------------------------------------- arguments
@@ -57,7 +57,7 @@ fn a_share_is_a_percentage_or_a_part_of_one() {
         "--k", "1", "--t-prop", "0.03", "--t-body", "1", "--tau", "0.02",
     ];
     let simulate = |option: &'static str| [&["simulate"], &hover[..], &[option, "10"]].concat();
-    let all: [Vec<&str>; 12] = [
+    let all: [Vec<&str>; 8] = [
         vec!["identify", "x.csv", "--noise", "10"],
         vec!["identify", "x.csv", "--overshoot", "10"],
         vec!["identify", "x.ulg", "--write", "x.params", "--step", "10"],
@@ -65,20 +65,6 @@ fn a_share_is_a_percentage_or_a_part_of_one() {
         simulate("--asymmetry"),
         simulate("--drop-outs"),
         simulate("--outliers"),
-        vec!["certify", "--bias", "10"],
-        vec!["grid", "--deterioration", "10"],
-        vec!["bench", "make", "-o", "x", "--sigma", "10"],
-        vec![
-            "pack",
-            "margin",
-            "default",
-            "--phase-margin",
-            "27",
-            "--extra-ise",
-            "10",
-            "-o",
-            "x.pack",
-        ],
         vec![
             "live",
             "relay",
@@ -297,6 +283,25 @@ fn impossible_processes_for_tune() {
     run(&[]).misused_without_command();
 }
 
+// What was a command of this program once, and is one of the other: one sentence, which says how it is built.
+#[test]
+fn a_command_of_the_lab_is_named() {
+    for command in [
+        "bench",
+        "campaign",
+        "certify",
+        "dataset",
+        "grid",
+        "pack",
+        "phase",
+        "reproduce",
+        "train",
+    ] {
+        run(&[command, "--json"]).refused(2, &[command, "onecycle-lab", "cargo install"]);
+    }
+    run(&["campain"]).misused(&["unrecognized subcommand"]);
+}
+
 impl Outcome {
     /// Asserts that the help is printed on the error output: a call without a command.
     fn misused_without_command(&self) {
@@ -304,198 +309,6 @@ impl Outcome {
         assert_eq!(self.stdout, "");
         assert!(self.stderr.contains("Usage: onecycle"), "{}", self.stderr);
     }
-}
-
-// ---------------------------------------------------------------- campaigns
-
-fn campaign(text: &str) -> Outcome {
-    let folder = Scratch::new();
-    run(&["campaign", &folder.write("campaign.toml", text.as_bytes())])
-}
-
-/// A campaign of one case, with these lines added.
-fn campaign_with(lines: &str) -> Outcome {
-    let head = "measure = \"identification\"\ncases = 1\nseed = 1\ntrim = true\n";
-    campaign(&format!("{head}{lines}\n"))
-}
-
-#[test]
-fn unreadable_campaigns() {
-    let folder = Scratch::new();
-    let missing = run(&["campaign", &folder.name("nosuch.toml")]);
-    missing.refused(UNREADABLE, &["nosuch.toml", "No such file"]);
-    run(&["campaign", &folder.name("")]).refused(UNREADABLE, &["directory"]);
-
-    let names = |outcome: &Outcome, words: &[&str]| {
-        assert_eq!(outcome.code, Some(UNREADABLE), "{outcome:?}");
-        assert_eq!(outcome.stdout, "");
-        for word in words {
-            assert!(outcome.stderr.contains(word), "{word}: {}", outcome.stderr);
-        }
-    };
-    names(&campaign("measure = \"relay\ncases = 1\n"), &["line 1"]);
-    names(
-        &campaign("measure = \"relay\"\n"),
-        &["missing field `cases`"],
-    );
-    names(
-        &campaign_with("bias = 0\nsigma = 0\nbogus = 3"),
-        &["line 7", "unknown field `bogus`"],
-    );
-    names(
-        &campaign_with("bias = \"much\"\nsigma = 0"),
-        &["line 5", "much"],
-    );
-    names(
-        &campaign("measure = \"luck\"\n"),
-        &["line 1", "luck", "relay"],
-    );
-    names(
-        &campaign_with("bias = 0\nsigma = 0\ncycles = -1"),
-        &["line 7", "-1"],
-    );
-    names(&campaign("\u{0}\u{1}\u{2}"), &["line 1"]);
-}
-
-// The refusal is one sentence, as for recordings.
-#[test]
-fn a_malformed_campaign_is_one_sentence() {
-    campaign_with("bias = 0\nsigma = 0\nbogus = 3").refused(UNREADABLE, &["line 7", "`bogus`"]);
-}
-
-#[test]
-fn a_campaign_without_cases() {
-    let text = "measure = \"relay\"\ncases = 0\nseed = 1\nbias = 0\nsigma = 0\ntrim = true\n";
-    campaign(text).refused(UNREADABLE, &["cases", "1 to"]);
-}
-
-// Numbers out of their range are refused, also those that TOML allows.
-#[test]
-fn campaigns_of_impossible_numbers() {
-    for (line, field) in [
-        ("bias = nan\nsigma = 0", "bias"),
-        ("bias = inf\nsigma = 0", "bias"),
-        ("bias = 0\nsigma = -1", "sigma"),
-        ("bias = 0\nsigma = nan", "sigma"),
-        ("bias = 0\nsigma = 0\noffset = nan", "offset"),
-        ("bias = 0\nsigma = 0\ncycles = 0", "cycles"),
-        ("bias = 0\nsigma = 0\ncycles = 100000", "cycles"),
-    ] {
-        let outcome = campaign_with(line);
-        let is_refusal = [Some(2), Some(UNREADABLE)].contains(&outcome.code);
-        assert!(
-            is_refusal && outcome.stderr.contains(field),
-            "{line}: {outcome:?}"
-        );
-    }
-}
-
-// A field of a campaign of recordings that is wrong, missing or one too many is named.
-#[test]
-fn a_malformed_campaign_of_recordings_is_one_sentence() {
-    for (good, bad, words) in [
-        ("noise = 0.01", "noise = -1", &["noise must be", "-1"][..]),
-        ("noise = 0.01", "nois = 1", &["unknown field `nois`"]),
-        ("durations_s = [6]", "durations_s = []", &["durations_s"]),
-        (
-            "durations_s = [6]",
-            "durations_s = [1e9]",
-            &["durations_s", "samples"],
-        ),
-        (
-            "\"prbs\"",
-            "\"noise\"",
-            &["unknown variant `noise`", "chirp"],
-        ),
-        (
-            "band_hz = [0.2, 5]",
-            "beta = 0",
-            &["signal chirp", "band_hz must be given"],
-        ),
-        (
-            "band_hz = [0.2, 5]",
-            "band_hz = [0.2, 80]",
-            &["band_hz", "half the sample rate"],
-        ),
-        (
-            "band_hz = [0.2, 5]",
-            "band_hz = [5, 5]",
-            &["signal chirp", "frequency"],
-        ),
-        ("tau_s = 0.02", "tau_s = -1", &["process soiptd", "tau"]),
-        (
-            "tau_s = 0.02",
-            "tau_s = [0.3, 0.2]",
-            &["tau_s", "lower value first"],
-        ),
-        ("tau_s = 0.02", "tau_s = [1, 2, 3]", &["expected a number"]),
-        ("tau_s = 0.02", "zeta = 0.02", &["process soiptd: zeta"]),
-        (
-            "tau_s = 0.02,",
-            "",
-            &["process soiptd: tau_s must be given"],
-        ),
-        (
-            "structure = \"soiptd\", k",
-            "structure = \"pid\", k",
-            &["no structure `pid`", "foptd"],
-        ),
-        (
-            "wy_rad_per_s = 2",
-            "gust_sigma = 1",
-            &["gust_correlation_s must be positive"],
-        ),
-        ("kp = 4", "kp = 1e10", &["kp", "1e9"]),
-    ] {
-        let text = RECORDINGS.replace(good, bad);
-        assert_ne!(text, RECORDINGS, "{good}");
-        campaign(&text).refused(UNREADABLE, words);
-    }
-    let folder = Scratch::new();
-    let path = folder.write("campaign.toml", RECORDINGS.as_bytes());
-    run(&["campaign", &path, "--sigma", "0.1"]).refused(2, &["--sigma has no effect"]);
-}
-
-// A wrong value is blamed on the argument, not on the file, which is right.
-#[test]
-fn wrong_values_beside_a_campaign_are_those_of_the_arguments() {
-    let folder = Scratch::new();
-    let text = "measure = \"relay\"\ncases = 2\nseed = 1\nbias = 0\nsigma = 0\ntrim = true\n";
-    let path = folder.write("right.toml", text.as_bytes());
-    for (option, name) in [("--sigma", "sigma"), ("--time-scale", "time_scale")] {
-        let outcome = run(&["campaign", &path, option, "nan"]);
-        assert!(!outcome.stderr.contains("right.toml"), "{outcome:?}");
-        outcome.misused(&[name]);
-    }
-}
-
-// Settings have a limit of size, and an endless file is refused at once.
-#[cfg(unix)]
-#[test]
-fn an_endless_file_is_refused() {
-    for arguments in [
-        &["campaign", "/dev/zero"][..],
-        &["phase", "/dev/zero"],
-        &["train", "--recipe", "/dev/zero", "-o", "never.pack"],
-        &["grid", "--from", "/dev/zero"],
-    ] {
-        run(arguments).refused(UNREADABLE, &["/dev/zero", "bytes", "check its name"]);
-    }
-}
-
-#[test]
-fn a_campaign_that_identifies_nothing_has_no_nan() {
-    let outcome = campaign_with("bias = 0.5\nsigma = 5");
-    assert_eq!(outcome.code, Some(0), "{outcome:?}");
-    outcome.without_nan();
-}
-
-#[test]
-fn a_campaign_without_a_steady_oscillation_has_no_nan() {
-    let text = "measure = \"relay\"\ncases = 2\nseed = 1\nbias = 50\nsigma = 0.5\ntrim = true\n";
-    let outcome = campaign(text);
-    assert_eq!(outcome.code, Some(0), "{outcome:?}");
-    outcome.without_nan();
 }
 
 // ---------------------------------------------------------------- outputs
@@ -541,7 +354,7 @@ fn a_full_disk() {
             .open("/dev/full")
             .unwrap()
     };
-    let output = onecycle()
+    let output = program("simulate")
         .arg("simulate")
         .args(HOVER)
         .stdout(full())
@@ -559,7 +372,7 @@ fn a_full_disk() {
 // As `onecycle simulate ... | head -1`.
 #[test]
 fn a_reader_that_stops_reading() {
-    let mut command = onecycle();
+    let mut command = program("");
     let simulate = command.arg("simulate").args(HOVER);
     let mut child = simulate
         .stdout(Stdio::piped())
@@ -580,7 +393,7 @@ fn a_reader_that_stops_reading() {
 #[test]
 fn a_reader_that_never_reads() {
     for arguments in [&["identify", "-"][..], &["identify", "-", "--json"]] {
-        let mut command = onecycle();
+        let mut command = program("");
         let identify = command.args(arguments).stdin(Stdio::piped());
         let mut child = identify
             .stdout(Stdio::piped())

@@ -5,7 +5,7 @@ use std::process::Stdio;
 
 use crate::common::{
     AMBIGUOUS, HOVER, HOVER_K_OVER_T_BODY, Report, Sample, Scratch, Table, UNREADABLE, identify,
-    identify_as_text, is_hover, onecycle, run, run_with_input, simulate,
+    identify_as_text, is_hover, program, run, run_with_input, simulate,
 };
 
 // ---------------------------------------------------------------- files that are no recording
@@ -360,7 +360,7 @@ fn ten_million_samples_in_bounded_memory() {
         limited.args(["-c", &script, env!("CARGO_BIN_EXE_onecycle")]);
         limited
     } else {
-        let mut plain = onecycle();
+        let mut plain = program("identify");
         plain.args(["identify", "-", "--json"]);
         plain
     };

@@ -1,4 +1,4 @@
-//! Helpers to run the program: arguments and files in; exit code, reports and messages out.
+//! Helpers to run the programs: arguments and files in; exit code, reports and messages out.
 //!
 //! Every run is checked for panics.
 
@@ -7,7 +7,6 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::sync::OnceLock;
-use std::time::{Duration, Instant};
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -41,6 +40,9 @@ pub(crate) const DOUBLE_INTEGRATOR: [&str; 8] = [
     "0.015",
 ];
 
+/// Names before messages.
+const PROGRAMS: [&str; 2] = ["onecycle", "onecycle-lab"];
+
 /// The outcome of a run.
 #[derive(Debug)]
 pub(crate) struct Outcome {
@@ -50,32 +52,24 @@ pub(crate) struct Outcome {
     pub(crate) stderr: String,
 }
 
-pub(crate) fn onecycle() -> Command {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_onecycle"));
+/// The program that has this command.
+pub(crate) fn program(command: &str) -> Command {
+    let mut command = Command::new(crate::path_of(command));
     // The developer's settings of backtraces and colours must not change the output.
     command.env("RUST_BACKTRACE", "0");
     command.env_remove("CLICOLOR_FORCE");
     command
 }
 
-/// A small campaign of recordings.
-pub(crate) const RECORDINGS: &str = "\
-measure = \"recording\"
-cases = 4
-seed = 1
-sample_rate_hz = 100
-durations_s = [6]
-noise = 0.01
-structure = \"soiptd\"
-disturbances = [{ wy_rad_per_s = 2 }]
-processes = [{ structure = \"soiptd\", k_over_t_body = [0.5, 2], tau_s = 0.02, t_prop_s = 0.05, t_body_s = 0.5 }]
-excitations = [{ signal = \"chirp\", amplitude = 1, band_hz = [0.2, 5] }, { signal = \"prbs\", amplitude = 1, pulse_s = 0.1 }]
-loops = [{ kp = 4, kd = 2.5, filter_s = 0.02, entry = \"setpoint\" }]
-";
+/// The program that has the command which the arguments begin with.
+pub(crate) fn called(arguments: &[&str]) -> Command {
+    let mut command = program(arguments.first().unwrap_or(&""));
+    command.args(arguments);
+    command
+}
 
 pub(crate) fn run(arguments: &[&str]) -> Outcome {
-    let output = onecycle()
-        .args(arguments)
+    let output = called(arguments)
         .stdin(Stdio::null())
         .output()
         .expect("the program starts");
@@ -84,8 +78,7 @@ pub(crate) fn run(arguments: &[&str]) -> Outcome {
 
 /// A run with `bytes` on its standard input.
 pub(crate) fn run_with_input(arguments: &[&str], bytes: &[u8]) -> Outcome {
-    let mut child = onecycle()
-        .args(arguments)
+    let mut child = called(arguments)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
@@ -94,25 +87,6 @@ pub(crate) fn run_with_input(arguments: &[&str], bytes: &[u8]) -> Outcome {
     // A program that has refused its input stops reading; this is no error.
     let _ = child.stdin.take().expect("stdin is piped").write_all(bytes);
     Outcome::of(&child.wait_with_output().expect("the program ends"))
-}
-
-/// Kills a run as soon as `is_time`.
-pub(crate) fn killed_when(arguments: &[&str], is_time: impl Fn() -> bool) {
-    let mut child = onecycle()
-        .args(arguments)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .expect("the program starts");
-    let begin = Instant::now();
-    while !is_time() {
-        let ended = child.try_wait().expect("its status is known");
-        assert!(ended.is_none(), "it was done before it was stopped");
-        assert!(begin.elapsed() < Duration::from_secs(600), "it never came");
-        std::thread::sleep(Duration::from_millis(1));
-    }
-    child.kill().expect("it can be stopped");
-    child.wait().expect("it ends");
 }
 
 /// Runs `identify FILE --json ARGUMENTS` on a file with these bytes.
@@ -181,7 +155,8 @@ impl Outcome {
         assert_eq!(self.code, Some(code), "{self:?}");
         assert_eq!(self.stdout, "");
         assert!(!sentence.contains('\n'), "more than one line: {sentence}");
-        let sentence = sentence.strip_prefix("onecycle: ").unwrap_or_default();
+        let (program, sentence) = sentence.split_once(": ").unwrap_or_default();
+        assert!(PROGRAMS.contains(&program), "{}", self.stderr);
         assert!(sentence.len() > 20, "no sentence: {}", self.stderr);
         assert!(sentence.len() < 500, "no clear sentence: {sentence}");
         for word in words {
@@ -194,7 +169,8 @@ impl Outcome {
         assert_eq!(self.code, Some(2), "{self:?}");
         assert_eq!(self.stdout, "");
         let first = self.stderr.lines().next().unwrap_or_default();
-        let is_sentence = first.starts_with("error: ") || first.starts_with("onecycle: ");
+        let (speaker, _) = first.split_once(": ").unwrap_or_default();
+        let is_sentence = speaker == "error" || PROGRAMS.contains(&speaker);
         assert!(is_sentence, "{}", self.stderr);
         for word in words {
             assert!(first.contains(word), "{word} is not in: {first}");

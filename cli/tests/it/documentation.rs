@@ -1,32 +1,12 @@
-//! README.md, the guide and docs/reproduction.md against what commands print.
+//! README.md and the guide against docs/benchmarks.md and what commands print.
 //!
 //! Figures: a comment `<!-- figures: "TEXT" "TEXT" -->` in a block of a page (paragraph, item of a list, table), or alone before
 //! it, names blocks of docs/benchmarks.md by a text that stands in one of them only. Every number of the page's block must stand
 //! in these. A row of a table is a block of docs/benchmarks.md, and a text of a table's head names the whole table.
 
 use std::collections::BTreeSet;
-use std::fs;
-use std::path::PathBuf;
 
-use crate::common::onecycle;
-
-fn root() -> PathBuf {
-    PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
-}
-
-fn read(name: &str) -> String {
-    fs::read_to_string(root().join(name)).unwrap()
-}
-
-/// README.md and the pages of the guide.
-fn pages() -> Vec<String> {
-    let guide = fs::read_dir(root().join("docs/guide")).unwrap();
-    let names = guide.map(|entry| entry.unwrap().file_name().into_string().unwrap());
-    let mut pages: Vec<String> = names.map(|name| format!("docs/guide/{name}")).collect();
-    pages.sort_unstable();
-    pages.insert(0, "README.md".to_owned());
-    pages
-}
+use crate::pages::{misprints, pages, read};
 
 /// A paragraph, an item of a list or a table, on one line each.
 #[derive(Debug)]
@@ -256,121 +236,13 @@ fn readme_is_one_page() {
     );
 }
 
-/// Printed lines of a page, each run with its command. A block of the section about the whole output has no command.
-fn printed(page: &str) -> Vec<(String, Vec<String>)> {
-    let mut printed = vec![];
-    let mut is_whole_output = false;
-    let mut rest = page;
-    while let Some((before, after)) = rest.split_once("```text\n") {
-        for line in before.lines().filter(|line| line.starts_with("## ")) {
-            is_whole_output = line == "## The output, line by line";
-        }
-        let (block, behind) = after.split_once("```").unwrap();
-        rest = behind;
-        let block = block.replace("\\\n", " ");
-        let mut lines = block.lines().map(str::to_owned).peekable();
-        let command = if lines.peek().is_some_and(|line| line.starts_with("$ ")) {
-            lines.next().unwrap()
-        } else if is_whole_output {
-            "$ onecycle identify examples/simulated_hover.csv --details".to_owned()
-        } else {
-            continue;
-        };
-        printed.push((
-            command,
-            lines.take_while(|line| !line.starts_with("$ ")).collect(),
-        ));
-    }
-    printed
-}
-
-// The commands that take less than a second: those of the tables in examples, of one process, and designs.
+// The commands that take less than a second: those of the tables in examples, and designs.
 #[test]
 fn printed_lines_are_those_of_the_program() {
-    let mut commands = 0;
-    let mut found = vec![];
-    for name in pages() {
-        for (command, lines) in printed(&read(&name)) {
-            let words: Vec<&str> = command.split_whitespace().skip(2).collect();
-            let is_quick = words
-                .iter()
-                .any(|word| word.starts_with("examples/") && word.ends_with(".csv"))
-                || words.starts_with(&["certify", "--process"])
-                || words.starts_with(&["tune"]);
-            if !is_quick || !command.starts_with("$ onecycle ") {
-                continue;
-            }
-            let output = onecycle()
-                .current_dir(root())
-                .args(&words)
-                .output()
-                .unwrap();
-            let text = String::from_utf8([output.stdout, output.stderr].concat()).unwrap();
-            let printed: BTreeSet<&str> = text.lines().map(str::trim_end).collect();
-            let missing = lines
-                .iter()
-                .map(|line| line.trim_end())
-                .filter(|line| !line.is_empty() && *line != "..." && !printed.contains(line));
-            found.extend(missing.map(|line| format!("{name}: {command}: {line}")));
-            commands += 1;
-        }
-    }
+    let (commands, found) = misprints("onecycle", |words| {
+        let is_table = |word: &&str| word.starts_with("examples/") && word.ends_with(".csv");
+        words.iter().any(is_table) || words.starts_with(&["tune"])
+    });
     assert!(commands > 10, "{commands}");
     assert!(found.is_empty(), "{}", found.join("\n"));
-}
-
-/// A cell as `onecycle reproduce` writes it.
-fn cell(text: &toml::Value) -> String {
-    text.as_str().unwrap().replace('|', "\\|")
-}
-
-fn texts<'a>(table: &'a toml::Table, key: &str) -> impl Iterator<Item = &'a toml::Value> {
-    let values = table.get(key).and_then(toml::Value::as_array);
-    values.into_iter().flatten()
-}
-
-// docs/reproduction.md is made by hours of work: titles, captions, remarks and claims must be those of the sheets all the same.
-#[test]
-fn the_reproduction_has_the_words_of_the_sheets() {
-    let page = read("docs/reproduction.md");
-    let mut expected = vec![];
-    let mut sheets = 0;
-    for entry in fs::read_dir(root().join("cli/reproduction")).unwrap() {
-        let sheet: toml::Table = (fs::read_to_string(entry.unwrap().path()).unwrap())
-            .parse()
-            .unwrap();
-        let Some(title) = sheet.get("title").and_then(toml::Value::as_str) else {
-            continue;
-        };
-        sheets += 1;
-        expected.push(format!("\n## {title}\n"));
-        expected.extend(
-            texts(&sheet, "remarks").map(|remark| format!("\n- {}\n", remark.as_str().unwrap())),
-        );
-        for table in texts(&sheet, "tables").map(|table| table.as_table().unwrap()) {
-            expected.push(format!("\n{}\n\n", table["caption"].as_str().unwrap()));
-            let columns: Vec<String> = texts(table, "columns").map(cell).collect();
-            expected.push(format!("| {} |\n", columns.join(" | ")));
-        }
-        let settings = sheet.get("settings").and_then(toml::Value::as_table);
-        for row in settings
-            .into_iter()
-            .flat_map(|settings| texts(settings, "rows"))
-        {
-            let cells: Vec<String> = row.as_array().unwrap().iter().map(cell).collect();
-            expected.push(format!("\n| {} |\n", cells.join(" | ")));
-        }
-        for name in settings
-            .into_iter()
-            .flat_map(|settings| texts(settings, "variants"))
-        {
-            expected.push(format!("\n| {} | ", cell(&name["name"])));
-        }
-    }
-    assert_eq!(sheets, 14);
-    let missing: Vec<&String> = expected
-        .iter()
-        .filter(|text| !page.contains(*text))
-        .collect();
-    assert!(missing.is_empty(), "{missing:#?}");
 }

@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-use crate::common::{Scratch, Table, names_in, onecycle, run};
-
-const ESCAPE: char = '\u{1b}';
+use crate::colours::{ESCAPE, coloured, only_colours_differ, stripped};
+use crate::common::{Scratch, Table, names_in, run};
 
 /// A recording with an identifiable process, and one with a clipped output.
 fn recordings(folder: &Scratch) -> [String; 2] {
@@ -14,46 +13,6 @@ fn recordings(folder: &Scratch) -> [String; 2] {
         folder.write("noisy.csv", Table::noisy().csv().as_bytes()),
         folder.write("clipped.csv", clipped.csv().as_bytes()),
     ]
-}
-
-/// Standard output and error output of a run with only this colour variable set.
-fn coloured(arguments: &[&str], variable: Option<&str>) -> [String; 2] {
-    let mut command = onecycle();
-    for other in ["NO_COLOR", "CLICOLOR", "CLICOLOR_FORCE"] {
-        command.env_remove(other);
-    }
-    let output = command
-        .args(arguments)
-        .envs(variable.map(|variable| (variable, "1")))
-        .stdin(Stdio::null())
-        .output()
-        .unwrap();
-    [output.stdout, output.stderr].map(|bytes| String::from_utf8(bytes).unwrap())
-}
-
-/// The text without colour codes: an escape, a bracket, numbers and an m. Asserts that there are no other codes.
-fn stripped(text: &str) -> String {
-    let mut parts = text.split(ESCAPE);
-    let mut plain = parts.next().unwrap().to_owned();
-    for part in parts {
-        let (code, rest) = part.split_once('m').expect("a code of colours ends in m");
-        let numbers = code
-            .strip_prefix('[')
-            .expect("a code begins with a bracket");
-        assert!(
-            numbers.chars().all(|c| c.is_ascii_digit() || c == ';'),
-            "{code}"
-        );
-        plain.push_str(rest);
-    }
-    plain
-}
-
-/// All lines but that of the time.
-fn timeless(text: &str) -> Vec<&str> {
-    text.lines()
-        .filter(|line| !line.starts_with("Time"))
-        .collect()
 }
 
 /// The path of a program, if it is installed.
@@ -75,26 +34,17 @@ fn program(name: &str) -> Option<PathBuf> {
 fn colours_change_nothing_but_the_colours() {
     let folder = Scratch::new();
     let [good, clipped] = recordings(&folder);
-    let commands: [&[&str]; 9] = [
+    let commands: [&[&str]; 5] = [
         &["identify", &good],
         &["identify", &good, "--details"],
         &["identify", &clipped],
         &[
             "tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1",
         ],
-        &["certify", "--process", "0.3,2,0.1", "--bias", "0,90%"],
-        &["grid", "--deterioration", "50%", "--check", "20"],
-        &["pack", "verify", "default"],
-        &["pack", "show", "default"],
         &["fly", "altitude"],
     ];
     for command in commands {
-        let [plain, _] = coloured(command, None);
-        let [forced, _] = coloured(command, Some("CLICOLOR_FORCE"));
-        assert!(!plain.contains(ESCAPE), "{plain}");
-        assert!(forced.contains(ESCAPE), "{forced}");
-        let forced = stripped(&forced);
-        assert_eq!(timeless(&forced), timeless(&plain), "{command:?}");
+        only_colours_differ(command);
     }
 }
 
@@ -112,8 +62,6 @@ fn verdicts_have_their_colours() {
         text.contains("\x1b[1m\x1b[31mNOT YET\x1b[0m: saturated"),
         "{text}"
     );
-    let [text, _] = coloured(&["pack", "verify", "default"], Some("CLICOLOR_FORCE"));
-    assert!(text.contains("\x1b[32m"), "{text}");
 }
 
 #[test]
@@ -225,7 +173,7 @@ fn bash_completes_a_command_an_option_and_a_value() {
         ("onecycle ide", "identify"),
         ("onecycle identify --deta", "--details"),
         ("onecycle identify --hold he", "held"),
-        ("onecycle pack ver", "verify"),
+        ("onecycle live rel", "relay"),
     ] {
         let [.., before, current] = words.split(' ').collect::<Vec<_>>()[..] else {
             unreachable!("there are two words");
@@ -271,8 +219,8 @@ fn every_command_has_a_page() {
     }
     for known in [
         "onecycle-identify.1",
-        "onecycle-pack-verify.1",
-        "onecycle-bench-run.1",
+        "onecycle-live-relay.1",
+        "onecycle-simulate.1",
     ] {
         assert!(expected.iter().any(|name| name == known), "{expected:?}");
     }

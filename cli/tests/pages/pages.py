@@ -1,6 +1,6 @@
 """Tests of the HTML pages in a real browser.
 
-python3 pages.py PROGRAM EXAMPLES SCRATCH [--screenshots DIR] [--picture FILE.png]: makes the pages, opens each at
+python3 pages.py PROGRAM LAB EXAMPLES SCRATCH [--screenshots DIR] [--picture FILE.png]: makes the pages, opens each at
 two widths and in both themes, and prints a line for each. Ends with status 1 at the first fault.
 """
 
@@ -33,6 +33,8 @@ TOUCHING = """() => [...document.querySelectorAll(".plot")].flatMap((plot) =>
         return all.flatMap(([text, box], at) =>
             all.slice(at + 1).filter(([, other]) => meet(box, other)).map(([other]) => `${text} and ${other}`));
     }))"""
+# Pages of onecycle-lab.
+OF_THE_LAB = {"grid", "phase", "certificate"}
 # Largest size of a page.
 MOST_BYTES = 6_000_000
 
@@ -46,7 +48,7 @@ def expect(is_so, what):
         raise Wrong(what)
 
 
-def made(program, examples, scratch):
+def made(program, lab, examples, scratch):
     """Yields for every page: name, path, sections, least number of plots, and the command for its margins, if it has
     some."""
     identified = {"recording", "fit", "process", "stability", "step", "controller"}
@@ -64,13 +66,13 @@ def made(program, examples, scratch):
     }
     for name, (arguments, sections, plots) in pages.items():
         path = scratch / f"{name}.html"
-        run(program, [*arguments, "--report", str(path)])
+        run(lab if name in OF_THE_LAB else program, [*arguments, "--report", str(path)])
         yield name, path, sections, plots, arguments if "controller" in sections else None
     folder = scratch / "flights"
     run(program, ["fly", "altitude", "vehicle", "-o", str(folder)])
     yield "flights", folder / "flights.html", {"altitude", "vehicle"}, 6, None
     folder = scratch / "reproduction"
-    run(program, ["reproduce", "phase", "--quick", "-o", str(folder)])
+    run(lab, ["reproduce", "phase", "--quick", "-o", str(folder)])
     yield "reproduction", next(folder.glob("*.html")), {"phase"}, 1, None
 
 
@@ -237,6 +239,7 @@ def picture(browser, page, path):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
+    parser.add_argument("lab")
     parser.add_argument("examples", type=pathlib.Path)
     parser.add_argument("scratch", type=pathlib.Path)
     parser.add_argument("--screenshots", type=pathlib.Path)
@@ -251,7 +254,7 @@ def main():
             executable_path=chromium,
             args=["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"],
         )
-        for name, path, sections, plots, tells in made(arguments.program, arguments.examples, arguments.scratch):
+        for name, path, sections, plots, tells in made(arguments.program, arguments.lab, arguments.examples, arguments.scratch):
             for screen in SCREENS:
                 page, faults, fetched = opened(browser, path, screen)
                 look(page, path, sections, plots)

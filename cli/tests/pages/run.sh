@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# Opens every page that onecycle writes in a real Chromium, on a desktop and on a phone of 360 pixels, and checks plots,
+# Opens every page that onecycle and onecycle-lab write in a real Chromium, on a desktop and on a phone of 360 pixels, and checks plots,
 # labels, margins, themes and print. Status 1 at the first fault.
 #   --screenshots DIR     also saves screenshots
 #   --picture FILE.png    also makes the README's picture
@@ -14,9 +14,10 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
 cargo build --quiet --release --locked --manifest-path "$root/Cargo.toml" --bin onecycle --target-dir "$target"
+cargo build --quiet --locked --manifest-path "$root/research/Cargo.toml" --bin onecycle-lab --target-dir "$target"
 if [[ -z ${PYTHON:-} ]]; then
     python3 -m venv "$scratch/venv"
     PYTHON=$scratch/venv/bin/python
     "$PYTHON" -m pip install --quiet --disable-pip-version-check -r "$here/requirements.txt"
 fi
-"$PYTHON" "$here/pages.py" "$target/release/onecycle" "$root/examples" "$scratch" "$@"
+"$PYTHON" "$here/pages.py" "$target/release/onecycle" "$target/debug/onecycle-lab" "$root/examples" "$scratch" "$@"

@@ -14,7 +14,10 @@ use onecycle_onboard::{Pd, Soiptd};
 
 use crate::soiptd_pd::cost::ise;
 use crate::soiptd_pd::margins::margins;
-use crate::soiptd_pd::optimum::Optimum;
+use crate::soiptd_pd::optimum::{Optimum, OptimumError, pd};
+
+/// Least phase margin of the controllers that are compared (degrees): the paper's.
+pub const PHASE_MARGIN_DEG: f64 = 20.0;
 
 /// Performance of a controller on a process that it was not designed for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,6 +54,34 @@ pub fn deterioration(controller: Pd, process: &Soiptd, optimum: &Optimum) -> Det
             phase_margin_rad: margins.phase_margin_rad,
         },
         _ => Deterioration::Unstable,
+    }
+}
+
+/// A process with its optimum at [`PHASE_MARGIN_DEG`]: what controllers on it are compared with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// The process.
+    pub process: Soiptd,
+    /// Its PD of least ISE.
+    pub optimum: Optimum,
+}
+
+impl Reference {
+    /// The reference for controllers on this process.
+    ///
+    /// # Errors
+    /// [`OptimumError`]: the process is too extreme to have an optimum.
+    pub fn new(process: &Soiptd) -> Result<Self, OptimumError> {
+        Ok(Self {
+            process: *process,
+            optimum: pd(process, PHASE_MARGIN_DEG.to_radians())?,
+        })
+    }
+
+    /// Deterioration of a controller on the process.
+    #[must_use]
+    pub fn deterioration(&self, controller: Pd) -> Deterioration {
+        deterioration(controller, &self.process, &self.optimum)
     }
 }
 

@@ -10,6 +10,7 @@ mod linear;
 mod multirotor_flight;
 mod multirotor_ground;
 mod multirotor_linearised;
+mod multirotor_missions;
 mod multirotor_relay;
 mod pid;
 mod propagation;

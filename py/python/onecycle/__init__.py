@@ -315,7 +315,7 @@ def campaign(recipe, client=None, out=None, shard=64, progress=None, **options):
 
     `client` is a `distributed.Client`; without one, workers are started on this machine. A task is `shard` cases. In the
     folder `out` every shard leaves a Parquet file, and finished shards found there are not computed again.
-    `progress(done, count)` is called after each shard. Options are those of `onecycle campaign`: `cases=1000`.
+    `progress(done, count)` is called after each shard. Options are those of `onecycle-lab campaign`: `cases=1000`.
     """
     from ._cluster import run
 
@@ -323,7 +323,7 @@ def campaign(recipe, client=None, out=None, shard=64, progress=None, **options):
 
 
 def dataset(recipe, examples, into, client=None, progress=None, restart=False):
-    """Makes a training set on Dask in the folder `into`: the files of `onecycle dataset`, to the bit.
+    """Makes a training set on Dask in the folder `into`: the files of `onecycle-lab dataset`, to the bit.
 
     `recipe` is a TOML file, or None for the paper's multirotors. The same call resumes an interrupted run.
     """

@@ -120,7 +120,7 @@ def _spread(client, keys, submit, keep):
 class Outcomes:
     """Outcomes of all cases of a campaign.
 
-    `len(outcomes)` is the number of cases; `print(outcomes)` shows the table of `onecycle campaign FILE`.
+    `len(outcomes)` is the number of cases; `print(outcomes)` shows the table of `onecycle-lab campaign FILE`.
     """
 
     def __init__(self, text, options, lines):
@@ -135,7 +135,7 @@ class Outcomes:
         return [json.loads(line) for line in self._lines]
 
     def to_json(self) -> str:
-        """The text that `onecycle campaign FILE --json` prints."""
+        """The text that `onecycle-lab campaign FILE --json` prints."""
         return _campaign(self._text, (*self._options, "--json")).text(self._lines)
 
     def to_pandas(self):

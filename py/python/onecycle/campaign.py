@@ -15,7 +15,7 @@ def main():
         prog="python -m onecycle.campaign",
         description="Runs a campaign, or with --examples a training set, on Dask workers. The same command resumes an "
         "interrupted run.",
-        epilog="Options that are not listed are those of `onecycle campaign`, such as --cases=1000.",
+        epilog="Options that are not listed are those of `onecycle-lab campaign`, such as --cases=1000.",
     )
     parser.add_argument("file", help="file of the campaign, or recipe of the training set (TOML)")
     parser.add_argument("--scheduler", help="address of a Dask scheduler (default: workers on this machine)")

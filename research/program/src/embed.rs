@@ -1,0 +1,144 @@
+//! Campaigns and datasets as functions, for programs in other languages: the same options, sentences and reports.
+//!
+//! Options are those of the command line, such as `["--cases", "100"]`. An error is one sentence.
+
+use onecycle_cli::args;
+use onecycle_cli::failure::Failure;
+use onecycle_cli::style::plain;
+use onecycle_lab::learn::dataset::shards::{Entry, Manifest};
+use onecycle_lab::workers::OneThread;
+use serde_json::Value;
+
+use crate::args::{Arguments, Command};
+use crate::commands::campaign::{self, plan};
+use crate::commands::dataset;
+use crate::commands::dataset::folder::Folder;
+
+/// A campaign, whose cases depend on the file, the options and their number only: they can be computed anywhere and in any
+/// order.
+pub struct Campaign {
+    plan: Box<dyn plan::Shared>,
+    /// Those of the JSON report. `None`: the table is asked for.
+    settings: Option<Value>,
+}
+
+impl Campaign {
+    /// Reads the file of a campaign. Options are those of `onecycle-lab campaign`, such as `["--cases", "100"]`.
+    ///
+    /// # Errors
+    /// One sentence: the file or an option cannot be used.
+    pub fn read(file: &str, options: &[String]) -> Result<Self, String> {
+        let Command::Campaign(arguments) = parsed("campaign", &[file], options)? else {
+            return Err("not the command campaign".to_owned());
+        };
+        let read = || {
+            let plan = plan::of(&arguments)?;
+            let settings = arguments.json.then(|| campaign::settings(&arguments));
+            Ok((plan, settings.transpose()?))
+        };
+        let (plan, settings) = read().map_err(|failure: Failure| failure.to_string())?;
+        Ok(Self { plan, settings })
+    }
+
+    /// Number of cases.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.plan.count()
+    }
+
+    /// The outcome of case `n`, as JSON on one line.
+    ///
+    /// # Errors
+    /// One sentence: there is no such case, or it cannot be simulated.
+    pub fn case(&self, n: u64) -> Result<String, String> {
+        if n >= self.count() {
+            return Err(format!("there is no case {n}: there are {}", self.count()));
+        }
+        self.plan.line(n).map_err(|failure| failure.to_string())
+    }
+
+    /// What `onecycle-lab campaign` prints for the outcomes of all cases, in the order of their numbers: with the option
+    /// `--json` the JSON report, else the table.
+    ///
+    /// # Errors
+    /// One sentence: these are not the outcomes of this campaign.
+    pub fn text(&self, cases: &[String]) -> Result<String, String> {
+        if cases.len() as u64 != self.count() {
+            return Err(format!(
+                "{} outcomes of {} cases",
+                cases.len(),
+                self.count()
+            ));
+        }
+        let text = self.plan.text(self.settings.as_ref(), cases);
+        text.map(|text| plain(&text))
+            .map_err(|failure| failure.to_string())
+    }
+}
+
+/// A folder of experiments to train on, whose files are made by others.
+pub struct Dataset(Folder);
+
+impl Dataset {
+    /// Opens or begins the folder. Options are those of `onecycle-lab dataset`, such as `["--examples", "40000", "--into",
+    /// "multirotors"]`.
+    ///
+    /// # Errors
+    /// One sentence: the recipe, the folder or an option cannot be used.
+    pub fn open(recipe: Option<&str>, options: &[String]) -> Result<Self, String> {
+        let files = recipe.as_slice();
+        let Command::Dataset(arguments) = parsed("dataset", files, options)? else {
+            return Err("not the command dataset".to_owned());
+        };
+        let open = || {
+            let recipe = dataset::recipe(arguments.recipe.as_deref())?;
+            let asked = (recipe, arguments.examples);
+            dataset::opened(&arguments.into, asked, arguments.restart)
+        };
+        open().map(Self).map_err(|failure| failure.to_string())
+    }
+
+    /// The manifest, from which [`dataset_file`] makes the files.
+    #[must_use]
+    pub fn manifest(&self) -> String {
+        self.0.manifest().text()
+    }
+
+    /// Numbers of the files that are not there yet.
+    #[must_use]
+    pub fn missing(&self) -> Vec<usize> {
+        self.0.missing()
+    }
+
+    /// Keeps a file: its bytes and its number of examples.
+    ///
+    /// # Errors
+    /// One sentence: it cannot be written, or there is no file of this number.
+    pub fn keep(&mut self, file: usize, bytes: &[u8], rows: usize) -> Result<(), String> {
+        let count = self.0.manifest().shards.len();
+        if file >= count {
+            return Err(format!("there is no file {file}: there are {count}"));
+        }
+        let kept = self.0.keep(file, bytes, Entry::of(rows, bytes));
+        kept.map_err(|failure| failure.to_string())
+    }
+}
+
+/// Makes a file of a dataset in this thread: its bytes and its number of examples.
+///
+/// # Errors
+/// One sentence: this is no manifest, or it has no file of this number.
+pub fn dataset_file(manifest: &str, file: usize) -> Result<(Vec<u8>, usize), String> {
+    let manifest = Manifest::read(manifest).map_err(|error| error.to_string())?;
+    let count = manifest.shards.len();
+    if file >= count {
+        return Err(format!("there is no file {file}: there are {count}"));
+    }
+    let made = manifest.make(file, &OneThread);
+    let (bytes, entry) = made.map_err(|error| error.to_string())?;
+    Ok((bytes, entry.rows))
+}
+
+fn parsed(command: &str, files: &[&str], options: &[String]) -> Result<Command, String> {
+    args::parsed::<Arguments>(command, files, options).map(|parsed| parsed.command)
+}
