@@ -1,7 +1,7 @@
 //! The answer of a report, made of what was identified, the controllers to choose from and the gains of a log.
 
 use onecycle::{Comparison, Controller, Identification, Identified, Pid, assess};
-use onecycle_link::{ControlLoop, LoopGains};
+use onecycle_link::{Agreement, ControlLoop, LoopGains};
 
 use super::log_gains::{LogLoop, pid};
 use crate::report::units::Units;
@@ -52,6 +52,11 @@ pub(super) fn of(found: &Identification, subject: &Subject<'_>) -> Answer {
 pub(super) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> Answer {
     let overlay = subject.gains.and_then(|gains| gains.overlay.as_ref());
     let sure = words::sure(identified, overlay.map(|overlay| overlay.explained));
+    let read_back = subject.gains.and_then(|gains| gains.read_back.as_ref());
+    if read_back.is_some_and(|read| read.agreement() == Agreement::Differs) {
+        let (reason, next) = words::contradicted();
+        return not_yet(reason, next, Some(sure));
+    }
     let Some(choice) = subject.choice.filter(|choice| choice.design().is_some()) else {
         let row = subject.choice.and_then(Controllers::chosen);
         let error = row.and_then(|row| row.proposal.outcome.as_ref().err());

@@ -52,10 +52,10 @@ impl Found {
     pub(crate) fn page(&mut self) -> String {
         self.make_trade_off();
         page::identification(
-            &self.name,
+            &self.title(),
             &self.recording,
             &self.identification,
-            self.choice.as_ref(),
+            (self.choice.as_ref(), &self.answer),
             self.gains.as_ref(),
         )
     }

@@ -133,6 +133,11 @@ pub fn figure(figure: &Figure) -> String {
     )
 }
 
+/// Text with a plot beside it, below it on a phone.
+pub fn beside(text: &str, plot: &str) -> String {
+    format!("<div class=\"beside\"><div>{text}</div>{plot}</div>\n")
+}
+
 /// Plots side by side, as many as fit.
 pub fn row(figures: &[Figure]) -> String {
     let figures = figures.iter().map(figure).collect::<String>();

@@ -180,10 +180,10 @@ pub(super) fn number(value: f64) -> String {
 }
 
 /// Name of the row that compares the errors after a step of the load.
-const LOAD: &str = "load error";
+pub(super) const LOAD: &str = "load error";
 
 /// Rows of figures, those that there are. The load error is given as a multiple of that in the first column that has one.
-fn rows(of: &Columns) -> Vec<(&'static str, [String; 3])> {
+pub(super) fn rows(of: &Columns) -> Vec<(&'static str, [String; 3])> {
     let all = of.all();
     let base = all.iter().flatten().find_map(|of| of.load_iae);
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);

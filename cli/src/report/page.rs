@@ -1,5 +1,6 @@
 //! Identifications and designs as pages: what was measured, what was found, what the controller will do.
 
+mod card;
 mod controller;
 mod fit;
 mod overlay;
@@ -13,17 +14,18 @@ mod thin;
 use std::fmt::Write;
 
 use onecycle::{
-    About, Design, Excitation, Identification, Identified, Model, Parameter, Recording,
-    StepMetrics, StepResponse, load_response, step_response, with_signals,
+    Design, Excitation, Identification, Identified, Model, Parameter, Recording, StepMetrics,
+    StepResponse, load_response, step_response, with_signals,
 };
 use onecycle_design::bands::{load_bands, step_bands};
 use onecycle_identify::{Harmonic, harmonics};
-use onecycle_link::Agreement;
 
 use self::stability::Loop;
 use super::number::significant;
 use super::units::Units;
 use crate::pages::page::{self, Section, page};
+use crate::pages::plot::Figure;
+use crate::results::answer::Answer;
 use crate::results::controllers::Controllers;
 use crate::results::family::OfOscillation;
 use crate::results::log_gains::LogGains;
@@ -41,25 +43,18 @@ const STEP_POINTS: usize = 400;
 /// The page of an identification.
 /// `choice`: the controllers of an identified process.
 pub(crate) fn identification(
-    file: &str,
+    title: &str,
     recording: &Recording,
     found: &Identification,
-    choice: Option<&Controllers>,
+    (choice, answer): (Option<&Controllers>, &Answer),
     gains: Option<&LogGains>,
 ) -> String {
     let units = Units::of(recording);
     let mut sections = vec![];
     let recorded = recorded::section(recording, found, &units);
     let mut lead = made_by("identify");
-    let findings = (found.remarks.iter())
-        .filter(|remark| remark.about() == About::Recording)
-        .count();
     match &found.outcome {
         Ok(identified) => {
-            let read_back = gains.and_then(|gains| gains.read_back.as_ref());
-            let is_contradicted =
-                read_back.is_some_and(|read| read.agreement() == Agreement::Differs);
-            lead += &identified_lead(identified, choice, (findings, is_contradicted));
             let view = View {
                 units: &units,
                 identified,
@@ -72,17 +67,14 @@ pub(crate) fn identification(
                     harmonics(signals, oscillation, HARMONICS)
                 })
             });
-            sections.extend(view.answer(&measured));
+            let (figure, answered) = view.answer(&measured);
+            lead += &card::card(answer, figure.as_ref());
+            sections.extend(answered);
             sections.push(recorded);
             sections.extend(view.evidence());
         }
-        Err(verdict) => {
-            let words = format!(
-                "No process identified. {}",
-                words::sentence(&verdict.to_string())
-            );
-            lead += &page::verdict(false, &words);
-            lead += &page::paragraph("lead", &words::verdict::advice(verdict));
+        Err(_) => {
+            lead += &card::card(answer, None);
             sections.push(recorded);
             sections.extend(found.refused.as_ref().map(|refused| {
                 let structure = refused.model.structure();
@@ -96,7 +88,7 @@ pub(crate) fn identification(
         Some(Excitation::Recorded(_)) => "Recording",
         _ => "Relay test",
     };
-    page(&format!("{kind}: {file}"), &lead, &sections)
+    page(&format!("{kind}: {title}"), &lead, &sections)
 }
 
 /// The page of a design. `oscillation`: what is known of the process, if its parameters are not.
@@ -158,11 +150,11 @@ struct View<'a> {
 
 impl View<'_> {
     /// The controller: what to type in, and what it will do.
-    fn answer(&self, measured: &[Harmonic]) -> Vec<Section> {
+    fn answer(&self, measured: &[Harmonic]) -> (Option<Figure>, Vec<Section>) {
         match (self.choice, &self.identified.design) {
             (Some(choice), Some(design)) => self.of_controller(choice, design, measured),
-            (Some(choice), None) => vec![controller::without(choice)],
-            _ => vec![],
+            (Some(choice), None) => (None, vec![controller::without(choice)]),
+            _ => (None, vec![]),
         }
     }
 
@@ -190,7 +182,7 @@ impl View<'_> {
         choice: &Controllers,
         design: &Design,
         measured: &[Harmonic],
-    ) -> Vec<Section> {
+    ) -> (Option<Figure>, Vec<Section>) {
         let identified = self.identified;
         let draws = identified.posterior.models(DRAWS);
         // Where the interval holds zero there is nothing to subtract.
@@ -209,10 +201,17 @@ impl View<'_> {
             let load = load_response(model, controller).ok();
             let around = load_bands(few, controller, &times_s);
             let load = load.as_ref().map(|load| (load, around.as_ref()));
-            step::section(&response, bands.as_ref(), &times_s, load)
+            let now = choice.against.as_ref().filter(|now| now.figures.is_some());
+            let both = (model, now.map(|now| &now.controller));
+            let first = step::compared(both, (&response, bands.as_ref()), load, &times_s);
+            (
+                first,
+                step::section(&response, bands.as_ref(), &times_s, load),
+            )
         });
+        let (first, step) = step.unzip();
         let margin = identified.phase_margin_rad.as_ref();
-        [
+        let sections = [
             Some(controller::section(
                 choice,
                 design,
@@ -222,10 +221,8 @@ impl View<'_> {
             step,
             controller::trade_off(choice),
             Some(own.section()),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        ];
+        (first, sections.into_iter().flatten().collect())
     }
 }
 
@@ -277,34 +274,6 @@ fn predicted(step: Option<&StepMetrics>) -> String {
         let (overshoot, settled) = (100.0 * step.overshoot, significant(step.settling_time_s));
         format!(", a step overshoots by {overshoot:.0} % and settles in {settled} s")
     })
-}
-
-/// What the page comes down to. `is_contradicted`: whether the signals of a flight log contradict its parameters.
-fn identified_lead(
-    identified: &Identified,
-    choice: Option<&Controllers>,
-    (remarks, is_contradicted): (usize, bool),
-) -> String {
-    let mut text = match is_contradicted {
-        true => format!("Identified, but {} ", words::log_gains::CONTRADICTED),
-        false => "Identified. ".to_owned(),
-    };
-    match choice.zip(identified.design.as_ref()) {
-        Some((choice, design)) => {
-            let margin_rad = identified.phase_margin_rad.as_ref();
-            let margin = stability::phase_margin(&design.margins, margin_rad);
-            text += &gains(choice, design);
-            let _ = write!(text, "phase margin {margin}");
-        }
-        None => text += "No controller was designed",
-    }
-    text += &predicted(identified.step.as_ref());
-    text += match remarks {
-        0 => ".",
-        1 => ". There is a remark below.",
-        _ => ". There are remarks below.",
-    };
-    page::verdict(!is_contradicted, &text)
 }
 
 fn remarks(found: &Identification) -> Option<Section> {

@@ -7,6 +7,7 @@ use crate::report::number::{seconds, short};
 use crate::results::answer::Advice;
 use crate::results::controllers::Controllers;
 
+use super::log_gains::CONTRADICTED;
 use super::verdict::advice;
 use super::{controllers, sentence};
 
@@ -153,6 +154,12 @@ fn up(percent: f64) -> f64 {
 /// Why there is nothing to type in, and what to do.
 pub(crate) fn refused(of: &onecycle::Verdict) -> (String, String) {
     (of.to_string(), advice(of).into_owned())
+}
+
+/// Why nothing is proposed where the signals contradict the gains of the log, and what to do.
+pub(crate) fn contradicted() -> (String, String) {
+    let (reason, next) = CONTRADICTED.split_once(". ").unwrap_or((CONTRADICTED, ""));
+    (reason.to_owned(), next.to_owned())
 }
 
 pub(crate) const NO_DESIGN: &str = "a process was found, and no controller keeps the limits on it";

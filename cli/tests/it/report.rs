@@ -150,7 +150,7 @@ fn the_measured_point_lies_on_the_locus() {
 fn a_refusal_as_a_page() {
     let (ran, page) = reported(&["identify", UNSTEADY, "--estimator", "relay"]);
     assert_eq!(ran.code, Some(NOT_IDENTIFIED));
-    assert!(page.contains("class=\"verdict bad\">No process identified."));
+    assert!(page.contains("class=\"verdict bad\">NOT YET: "));
     assert!(page.contains("Let the oscillation settle"));
     assert_eq!(figures(&page).len(), 1);
 }

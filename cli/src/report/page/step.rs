@@ -1,6 +1,6 @@
 //! The predicted step response.
 
-use onecycle::{LoadResponse, StepResponse};
+use onecycle::{Controller, LoadResponse, Model, StepResponse, load_response, step_response};
 use onecycle_design::bands::StepBands;
 
 use super::significant;
@@ -17,7 +17,10 @@ pub(super) fn section(
     let load = load.map_or(String::new(), |(load, bands)| {
         page::figure(&load_figure(load, bands, times_s))
     });
-    let mut upper = Panel::new(Axis::titled("output"), output(response, bands, times_s));
+    let mut upper = Panel::new(
+        Axis::titled("output"),
+        output("output", response, bands, times_s),
+    );
     upper.notes = notes(response);
     let lower = Panel::new(
         Axis::titled("controller's output"),
@@ -36,16 +39,50 @@ pub(super) fn section(
     }
 }
 
-fn load_figure(load: &LoadResponse, bands: Option<&StepBands>, times_s: &[f64]) -> Figure {
+/// Steps of the reference and of the load with the proposed controller and with that in force.
+pub(super) fn compared(
+    (model, now): (&Model, Option<&Controller>),
+    (response, bands): (&StepResponse, Option<&StepBands>),
+    load: Option<(&LoadResponse, Option<&StepBands>)>,
+    times_s: &[f64],
+) -> Figure {
+    let curve = |name: &str, value: &dyn Fn(f64) -> f64| {
+        let points = times_s.iter().map(|&time_s| (time_s, value(time_s)));
+        Series::of_points(name, Marks::Line, points)
+    };
+    let mut upper = output("proposed", response, bands, times_s);
+    let old = now.and_then(|now| step_response(model, now).ok());
+    upper.extend(old.map(|old| curve("now", &|time_s| old.at(time_s).0).hue(Hue::Measured)));
+    let mut panels = vec![Panel::new(Axis::titled("step of the set-point"), upper)];
+    if let Some((load, bands)) = load {
+        let mut lower = load_curves(load, bands, times_s);
+        let old = now.and_then(|now| load_response(model, now).ok());
+        let old = old.map(|old| curve("", &|time_s| old.at(time_s).0).hue(Hue::Measured));
+        lower.extend(old);
+        panels.push(Panel::new(Axis::titled("step of the load"), lower));
+    }
+    let now = if now.is_some() {
+        ", and with those of today"
+    } else {
+        ""
+    };
+    let caption = format!(
+        "Response to a unit step of the set-point and of the load with the proposed gains (90 % band){now}."
+    );
+    Figure::stacked(&caption, Axis::titled("time (s)"), panels)
+}
+
+fn load_curves(load: &LoadResponse, bands: Option<&StepBands>, times_s: &[f64]) -> Vec<Series> {
     let band = bands.map(|StepBands { output, .. }| {
-        Series::between("90 % band", times_s, &output.low, &output.high).hue(Hue::Model)
+        Series::between("", times_s, &output.low, &output.high).hue(Hue::Model)
     });
     let points = times_s.iter().map(|&time_s| (time_s, load.at(time_s).0));
-    let curve = Series::of_points("output", Marks::Line, points).hue(Hue::Model);
-    let panel = Panel::new(
-        Axis::titled("output"),
-        band.into_iter().chain([curve]).collect(),
-    );
+    let curve = Series::of_points("", Marks::Line, points).hue(Hue::Model);
+    band.into_iter().chain([curve]).collect()
+}
+
+fn load_figure(load: &LoadResponse, bands: Option<&StepBands>, times_s: &[f64]) -> Figure {
+    let panel = Panel::new(Axis::titled("output"), load_curves(load, bands, times_s));
     Figure::single(
         "Response to a unit step of the load at the input of the process, such as wind or payload.",
         Axis::titled("time (s)"),
@@ -53,7 +90,12 @@ fn load_figure(load: &LoadResponse, bands: Option<&StepBands>, times_s: &[f64]) 
     )
 }
 
-fn output(response: &StepResponse, bands: Option<&StepBands>, times_s: &[f64]) -> Vec<Series> {
+fn output(
+    name: &str,
+    response: &StepResponse,
+    bands: Option<&StepBands>,
+    times_s: &[f64],
+) -> Vec<Series> {
     let end_s = times_s.last().copied().unwrap_or(1.0);
     let reference = Series::of_points("reference", Marks::Dashes, [(0.0, 1.0), (end_s, 1.0)]);
     let band = bands.map(|StepBands { output, .. }| {
@@ -62,7 +104,7 @@ fn output(response: &StepResponse, bands: Option<&StepBands>, times_s: &[f64]) -
     let points = times_s
         .iter()
         .map(|&time_s| (time_s, response.at(time_s).0));
-    let curve = Series::of_points("output", Marks::Line, points).hue(Hue::Model);
+    let curve = Series::of_points(name, Marks::Line, points).hue(Hue::Model);
     [Some(reference.hue(Hue::Reference)), band, Some(curve)]
         .into_iter()
         .flatten()
