@@ -277,13 +277,16 @@ const SYMBOLS = {
   k: "K", k_over_t_body: "K/T_body", t_prop_s: "T_prop (s)", t_prop2_s: "T_prop2 (s)", t_body_s: "T_body (s)", tau_s: "tau (s)",
   natural_frequency_rad_per_s: "w0 (rad/s)", zeta: "zeta", input_bias: "input bias",
 };
+const VERDICTS = { change: "CHANGE", keep: "KEEP YOURS", first_gains: "FIRST GAINS", not_yet: "NOT YET" };
 const showResult = () => {
   const isFound = report.verdict.kind === "identified";
   say(`${isFound ? "Identified" : "No process identified"} in ${took()}.`);
   const found = report.process ?? {};
   at("verdict").className = isFound ? "verdict" : "verdict no";
-  at("verdict").textContent = isFound ? `Identified: ${report.structure}.` : `No process identified: ${report.verdict.message}.`;
-  at("advice").textContent = report.verdict.advice ?? "";
+  const answer = report.answer;
+  at("verdict").textContent = `${VERDICTS[answer.verdict]}: ${answer.reason.replace(/\.$/, "")}.`;
+  const known = isFound ? [`Identified: ${report.structure}.`, answer.sure, answer.watch] : [report.verdict.advice];
+  at("advice").textContent = known.filter(Boolean).join(" ");
   const of = (name, value) => report.below?.includes(name) ? [`below ${shown(value.high)}`, "", ""] : [value.estimate, value.low, value.high].map((end) => shown(end));
   const rows = Object.entries(found).filter(([, value]) => value && typeof value === "object" && "low" in value);
   at("parameters").hidden = !rows.length;
