@@ -58,16 +58,13 @@ pub(super) fn card(
         text.push_str(&painted(REMARK, &lines));
     }
     line(&mut text, "Next", &answer.next);
-    let remarks = match more {
-        0 => String::new(),
-        1 => ", and one more remark".to_owned(),
-        more => format!(", and {more} more remarks"),
+    let all = match (answer.verdict, more) {
+        (Advice::NotYet, _) => "All that is known: --details".to_owned(),
+        (_, 0) => "All figures, other controllers: --details".to_owned(),
+        (_, 1) => "All figures, other controllers, and one more remark: --details".to_owned(),
+        (_, more) => format!("All figures, other controllers, and {more} more remarks: --details"),
     };
-    line(
-        &mut text,
-        "",
-        &format!("All figures, other controllers{remarks}: --details"),
-    );
+    line(&mut text, "", &all);
     text
 }
 
