@@ -38,6 +38,9 @@ pub struct Options {
     pub input_before: Option<f64>,
     /// Whether the input is known to follow the output, as in flight. Otherwise the recording is asked.
     pub is_fed_back: bool,
+    /// Whether the recording is known to begin in the middle of a movement, as a part of a flight. Otherwise the likelihood decides
+    /// whether the process was at rest.
+    pub is_under_way: bool,
     /// Cutoff (Hz) of a second-order Butterworth low-pass through which the output was recorded, as that of a gyro. The
     /// general estimator takes it out of the output and adds its delay to the dead time.
     pub output_filter_hz: Option<f64>,
@@ -57,6 +60,7 @@ impl Default for Options {
             input_late_s: None,
             input_before: None,
             is_fed_back: false,
+            is_under_way: false,
             output_filter_hz: None,
         }
     }
@@ -139,6 +143,15 @@ impl Options {
     pub fn under_feedback(self) -> Self {
         Self {
             is_fed_back: true,
+            ..self
+        }
+    }
+
+    /// Takes the recording as one that begins in the middle of a movement, if so.
+    #[must_use]
+    pub fn under_way(self, is_under_way: bool) -> Self {
+        Self {
+            is_under_way,
             ..self
         }
     }

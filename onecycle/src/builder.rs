@@ -32,6 +32,7 @@ use crate::feedback;
 pub struct Identify<'a> {
     options: Options,
     pack: Option<Pack<'a>>,
+    is_alone: bool,
 }
 
 impl Default for Identify<'_> {
@@ -47,6 +48,7 @@ impl<'a> Identify<'a> {
         Self {
             options: Options::default(),
             pack: Pack::embedded().ok(),
+            is_alone: false,
         }
     }
 
@@ -168,6 +170,14 @@ impl<'a> Identify<'a> {
         Self { pack: None, ..self }
     }
 
+    /// Leaves out the run with the default settings that tells whether these refuse: half of the time where others are set.
+    pub fn alone(self) -> Self {
+        Self {
+            is_alone: true,
+            ..self
+        }
+    }
+
     /// Identifies the process from `recording`. Cycles with a gap are not used.
     ///
     /// If other settings than the default ones lead to a process, and the default ones do not, a remark says so
@@ -178,7 +188,8 @@ impl<'a> Identify<'a> {
         let options = (self.options)
             .beta(self.options.beta.or(recording.relay_beta()))
             .output_filter_hz(filter_hz.or(recording.output_filter_hz()))
-            .road(self.road_of(recording));
+            .road(self.road_of(recording))
+            .under_way(recording.is_of_a_flight_log());
         // The calm parts of a flight are not what is tried.
         let usual_span_s = match recording.is_of_a_flight_log() {
             true => options.span_s,
@@ -191,7 +202,8 @@ impl<'a> Identify<'a> {
             .road(Self::new().road_of(recording))
             .span_s(usual_span_s.0, usual_span_s.1)
             .input_late_s(options.input_late_s)
-            .input_before(options.input_before);
+            .input_before(options.input_before)
+            .under_way(options.is_under_way);
         with_signals(recording, |signals| {
             let calm = feedback::calm(recording, signals);
             let by = |options: &Options| match recording.set_point() {
@@ -204,7 +216,7 @@ impl<'a> Identify<'a> {
             if let Some(verdict) = calm.filter(|_| found.outcome.is_ok()) {
                 found.outcome = Err(verdict);
             }
-            if found.outcome.is_ok() && options != usual {
+            if found.outcome.is_ok() && options != usual && !self.is_alone {
                 let default = by(&usual);
                 if let Err(verdict) = default.outcome {
                     let verdict = Box::new(verdict);

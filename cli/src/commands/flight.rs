@@ -205,7 +205,8 @@ fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified
     let recording = part.recording().ok()?;
     let identify = (onecycle::Identify::new())
         .specification(*asked)
-        .structure(log_gains::structure(part.control_loop));
+        .structure(log_gains::structure(part.control_loop))
+        .alone();
     let outcome = identify.run(&recording).outcome;
     // Of several parts one that knows its gain to less than a factor of two tells nothing.
     let tells = |found: &Identified| {

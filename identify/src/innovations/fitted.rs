@@ -260,7 +260,7 @@ fn choose_start(
 ) -> Option<(Range<usize>, Choice)> {
     let mut of_free = vec![];
     let free = choose_on_parts(record, limits, options, &[], &mut of_free);
-    if record.rest.is_none() {
+    if record.rest.is_none() && !options.is_under_way {
         let (_, choice) = free.as_ref()?;
         let at_rest = record.at_rest().rounded(CHOOSING_STAMP);
         let mut starts = search::screen_whole(&at_rest, limits.structure, limits.longest_tau_s);
