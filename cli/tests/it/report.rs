@@ -39,9 +39,9 @@ fn an_identification_as_a_page() {
         );
     }
     let figures = figures(&page);
-    // Step, load, trade-off, Nyquist, Bode, gang of four, recording, fit, correlogram, seven marginals, contours,
+    // Both responses on the first screen, step, load, trade-off, Nyquist, Bode, gang of four, recording, fit, correlogram, seven marginals, contours,
     // correlations.
-    assert_eq!(figures.len(), 21);
+    assert_eq!(figures.len(), 22);
     let notes = notes(&figures);
     let margins = &report["margins"];
     let phase = format!(
@@ -160,7 +160,7 @@ fn a_refusal_as_a_page() {
 fn a_refused_fit_is_on_the_page() {
     let (ran, page) = reported(&["identify", HOVER, "--beta", "-0.3"]);
     assert_eq!(ran.code, Some(NOT_IDENTIFIED));
-    assert!(page.contains("Not on one clock"));
+    assert!(page.contains("not on one clock"));
     assert!(page.contains("Fit that was refused"));
     assert_eq!(figures(&page).len(), 3);
 }
@@ -195,9 +195,9 @@ fn a_recording_of_any_kind_as_a_page() {
         );
     }
     let figures = figures(&page);
-    // Step, load, trade-off, Nyquist, Bode, gang of four, recording, fit, correlogram, seven marginals, contours,
+    // Both responses on the first screen, step, load, trade-off, Nyquist, Bode, gang of four, recording, fit, correlogram, seven marginals, contours,
     // correlations.
-    assert_eq!(figures.len(), 21);
+    assert_eq!(figures.len(), 22);
     for trace in figures
         .iter()
         .flat_map(|figure| figure["data"].as_array().unwrap())
@@ -219,7 +219,7 @@ fn designs_as_pages() {
     let (ran, page) = reported(&tune);
     assert_eq!(ran.code, Some(0));
     let tuned = figures(&page);
-    // Step, load, trade-off, Nyquist, Bode, gang of four.
+    // Both responses on the first screen, step, load, trade-off, Nyquist, Bode, gang of four.
     assert_eq!(tuned.len(), 9);
     let found = notes(&tuned);
     let margins = found.iter().filter(|note| *note == "phase margin 20.0 deg");
