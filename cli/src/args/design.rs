@@ -12,6 +12,9 @@ use crate::failure::Failure;
 pub(crate) const PAPER_HAS_NO_NOISE: &str =
     "--style paper does not limit the noise: leave out --noise, or choose another style";
 
+/// Heading of the requirements on a controller.
+pub(super) const CONTROLLER: &str = "Controller";
+
 /// Requirements on a controller, and the gains to compare it with.
 #[derive(Clone, Debug, Args)]
 pub(crate) struct DesignArguments {
@@ -20,28 +23,28 @@ pub(crate) struct DesignArguments {
     #[arg(long, value_name = "STYLE", default_value = "balanced", value_parser = style())]
     style: Style,
     /// Form of the controller: p, pi, pd, pid, cascade-pi or cascade-pid [default: pid; pd with --style paper]
-    #[arg(long, value_name = "FORM", value_parser = form())]
+    #[arg(long, help_heading = CONTROLLER, value_name = "FORM", value_parser = form())]
     controller: Option<Form>,
     /// Maximum sensitivity Ms, and maximum complementary sensitivity Mt [default: that of the style]
-    #[arg(long, value_name = "MS", allow_negative_numbers = true, value_parser = peak)]
+    #[arg(long, help_heading = CONTROLLER, value_name = "MS", allow_negative_numbers = true, value_parser = peak)]
     ms: Option<f64>,
     /// Minimum phase margin, in degrees, beside the limits of the style [default: 20 with --style paper, else none]
-    #[arg(long, value_name = "DEG", allow_negative_numbers = true, value_parser = phase_margin)]
+    #[arg(long, help_heading = CONTROLLER, value_name = "DEG", allow_negative_numbers = true, value_parser = phase_margin)]
     phase_margin: Option<f64>,
     /// Minimum gain margin, as a factor, beside the limits of the style
-    #[arg(long, value_name = "FACTOR", allow_negative_numbers = true, value_parser = gain_margin)]
+    #[arg(long, help_heading = CONTROLLER, value_name = "FACTOR", allow_negative_numbers = true, value_parser = gain_margin)]
     gain_margin: Option<f64>,
     /// Maximum output of the controller after a unit step of the reference, in the unit of the input
-    #[arg(long, value_name = "INPUT", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, help_heading = CONTROLLER, value_name = "INPUT", allow_negative_numbers = true, value_parser = positive)]
     input_peak: Option<f64>,
     /// Largest overshoot after a step of the reference, such as 15% or 0.15. PI and PID keep it by the set-point weight b as
     /// far as b = 0 can; the report says where it cannot. The loops of a flight log, whose weight is 1, keep it by less
     /// integral action [default: 5%; none with --style paper]
-    #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = overshoot)]
+    #[arg(long, help_heading = CONTROLLER, value_name = "SHARE", allow_negative_numbers = true, value_parser = overshoot)]
     overshoot: Option<f64>,
     /// Sample period of the controller, in seconds; its output leaves one period after the sample [default: that of the
     /// recording, and the output leaves at once; continuous without a recording]
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
+    #[arg(long, help_heading = CONTROLLER, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     sample_period: Option<f64>,
     /// Judge these gains of a controller in parallel form too: Kp,Ki,Kd or Kp,Ki,Kd,Tf with the time Tf of the
     /// measurement filter in seconds
@@ -49,13 +52,13 @@ pub(crate) struct DesignArguments {
     against: Option<Pid>,
     /// Gains as a controller of a process control system takes them, in percent of the ranges: isa, proportional-band,
     /// interacting, deltav, deltav-series, tdc3000, centum, pide, pide-independent or control-expert
-    #[arg(long, value_name = "NAME", value_parser = vendor(), requires = "output_range", hide_possible_values = true)]
+    #[arg(long, help_heading = CONTROLLER, value_name = "NAME", value_parser = vendor(), requires = "output_range", hide_possible_values = true)]
     vendor: Option<Vendor>,
     /// With --vendor: range of the measurement in the controller, in the unit of the output, such as 0..200
-    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
+    #[arg(long, help_heading = CONTROLLER, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
     output_range: Option<f64>,
     /// With --vendor: range of the controller's output, in the unit of the input [default: 0..100]
-    #[arg(long, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
+    #[arg(long, help_heading = CONTROLLER, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
     input_range: Option<f64>,
 }
 

@@ -18,6 +18,9 @@ use crate::packs::PackSource;
 /// a table with the columns time, input (what acts on the process) and output (the measurement),
 /// separated by commas, semicolons, tabs or blanks, with or without a header; or a flight log (PX4 ULog, ArduPilot
 /// DataFlash, Betaflight or INAV blackbox, MCAP of ROS 2), of which one control loop is taken.
+/// Heading of the options of the estimators.
+const ESTIMATION: &str = "Estimation";
+
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",
@@ -42,28 +45,28 @@ pub(crate) struct Identify {
     pub(crate) json: bool,
     /// With --json: add the fit of the general estimator row by row (measured, simulated and predicted output,
     /// innovation, disturbance)
-    #[arg(long, requires = "json")]
+    #[arg(long, help_heading = ESTIMATION, requires = "json")]
     pub(crate) rows: bool,
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
     /// Fit the last N steady cycles of a relay test (1 to 50). More cycles narrow the intervals; fewer follow a
     /// process that drifts
-    #[arg(long, value_name = "N", default_value_t = 8,
+    #[arg(long, help_heading = ESTIMATION, value_name = "N", default_value_t = 8,
           value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
     pub(crate) cycles: u64,
     #[command(flatten)]
     pub(crate) design: DesignArguments,
     /// Maximum noise at the actuator: its standard deviation as a share of the relay's amplitude, or of half the range of
     /// the input, such as 20% or 0.2 [default: that of the style]
-    #[arg(long, value_name = "SHARE", allow_hyphen_values = true, value_parser = noise)]
+    #[arg(long, help_heading = super::design::CONTROLLER, value_name = "SHARE", allow_hyphen_values = true, value_parser = noise)]
     pub(crate) noise: Option<f64>,
     /// Estimator: whole cycles of a steady relay oscillation (relay), the whole recording with its disturbances
     /// (general), or relay where the recording is one and the general estimator agrees (auto)
-    #[arg(long, value_enum, default_value_t = Estimator::Auto)]
+    #[arg(long, help_heading = ESTIMATION, value_enum, default_value_t = Estimator::Auto)]
     pub(crate) estimator: Estimator,
     /// Structure of the process [default: the simplest that explains the recording]
-    #[arg(long, value_name = "NAME", value_parser = structure())]
+    #[arg(long, help_heading = ESTIMATION, value_name = "NAME", value_parser = structure())]
     pub(crate) structure: Option<Structure>,
     /// Use the recording from this time, in seconds of its time column [default: its start]
     #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
@@ -73,60 +76,59 @@ pub(crate) struct Identify {
     pub(crate) to: Option<f64>,
     /// Input between two samples: constant (held), if the recording has every sample of the loop, or a straight line
     /// (interpolated), if it has fewer [default: what explains the recording better]
-    #[arg(long, value_name = "KIND", value_enum)]
+    #[arg(long, help_heading = ESTIMATION, value_name = "KIND", value_enum)]
     pub(crate) hold: Option<Between>,
     /// beta of the relay that made the recording: a recording whose switches contradict it is refused [default: from a
     /// comment of the file]
-    #[arg(long, value_name = "BETA", allow_negative_numbers = true, value_parser = beta)]
+    #[arg(long, help_heading = ESTIMATION, value_name = "BETA", allow_negative_numbers = true, value_parser = beta)]
     pub(crate) beta: Option<f64>,
     /// Time by which the input was logged late, in seconds (negative: early): it is corrected. 0 says that both columns
     /// come from one clock [default: judged by the switches of the relay]
-    #[arg(long, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
+    #[arg(long, help_heading = ESTIMATION, value_name = "S", allow_negative_numbers = true, value_parser = time_s)]
     pub(crate) input_late: Option<f64>,
     /// Input before the first row, in its unit, under which the process was at rest: for a step in the first row [default: the
     /// likelihood decides whether the process was at rest under the first input, or under 0 if the input never changes]
-    #[arg(long, value_name = "VALUE", allow_negative_numbers = true, value_parser = finite)]
+    #[arg(long, help_heading = ESTIMATION, value_name = "VALUE", allow_negative_numbers = true, value_parser = finite)]
     pub(crate) input_before: Option<f64>,
-    /// Print all remarks: how the result was found and what of it is known less well, what no such test shows, what the
-    /// controller asks for
+    /// Print below the answer all that is known: recording, process, model, every controller, all remarks
     #[arg(long)]
     pub(crate) details: bool,
     /// Cutoff (Hz) of a second-order low-pass (Butterworth) that the output passed before it was recorded: it is taken out
     /// for the fit, and its delay is part of tau. 0: none [default: of a flight log, the gyro's filter in its parameters]
-    #[arg(long, value_name = "HZ", value_parser = cutoff_hz)]
+    #[arg(long, help_heading = ESTIMATION, value_name = "HZ", value_parser = cutoff_hz)]
     pub(crate) output_filter: Option<f64>,
     /// Method for a steady relay oscillation: the network of the pack alone (classify), least squares alone (refine),
     /// or least squares with the network's prior (map)
-    #[arg(long, value_enum, default_value_t = Method::Map)]
+    #[arg(long, help_heading = ESTIMATION, value_enum, default_value_t = Method::Map)]
     pub(crate) method: Method,
     /// Identifier pack; "default" is the built-in one
-    #[arg(long, value_name = "FILE", default_value = "default")]
+    #[arg(long, help_heading = ESTIMATION, value_name = "FILE", default_value = "default")]
     pub(crate) pack: PackSource,
     #[command(flatten)]
     pub(crate) log: LogArguments,
     #[command(flatten)]
     pub(crate) write: WriteArguments,
     /// Time column, by name or by number from 1
-    #[arg(long, value_name = "COLUMN")]
+    #[arg(long, help_heading = "Columns of a table", value_name = "COLUMN")]
     pub(crate) time: Option<String>,
     /// Input column, what acts on the process, by name or number
-    #[arg(long, value_name = "COLUMN")]
+    #[arg(long, help_heading = "Columns of a table", value_name = "COLUMN")]
     pub(crate) input: Option<String>,
     /// Output column, the measurement, by name or number
-    #[arg(long, value_name = "COLUMN")]
+    #[arg(long, help_heading = "Columns of a table", value_name = "COLUMN")]
     pub(crate) output: Option<String>,
     /// Set-point column, by name or number; it is kept beside the output [default: by name]
-    #[arg(long, value_name = "COLUMN")]
+    #[arg(long, help_heading = "Columns of a table", value_name = "COLUMN")]
     pub(crate) set_point: Option<String>,
     /// Control loop of a table with several: LIC101 takes the columns, or the tags, LIC101.PV, LIC101.OP and LIC101.SP
-    #[arg(long, value_name = "LOOP")]
+    #[arg(long, help_heading = "Columns of a table", value_name = "LOOP")]
     pub(crate) tag: Option<String>,
     /// Sample rate in hertz, for a table without a usable time column
-    #[arg(long, value_name = "HZ", conflicts_with_all = ["time", "time_unit"],
+    #[arg(long, help_heading = "Columns of a table", value_name = "HZ", conflicts_with_all = ["time", "time_unit"],
           allow_negative_numbers = true, value_parser = sample_rate)]
     pub(crate) sample_rate: Option<f64>,
     /// Unit of the time column: d, h, min, s, ms, us or ns [default: from its header]
-    #[arg(long, value_name = "UNIT", value_parser = time_unit)]
+    #[arg(long, help_heading = "Columns of a table", value_name = "UNIT", value_parser = time_unit)]
     pub(crate) time_unit: Option<TimeUnit>,
 }
 

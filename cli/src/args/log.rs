@@ -34,7 +34,7 @@ pub(crate) struct Log {
 #[derive(Clone, Copy, Debug, Args)]
 #[command(next_help_heading = "Flight logs")]
 pub(crate) struct LogArguments {
-    /// Axis [default: a table of all loops; roll with an option that needs one loop, such as --from or --write]
+    /// Axis [default: a card of all loops; roll with an option that needs one loop, such as --from or --report]
     #[arg(long, value_enum)]
     pub(crate) axis: Option<LogAxis>,
     /// Control loop: rate (torque to angular rate), attitude (set-point of the rate to angle) or altitude (thrust to
