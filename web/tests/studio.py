@@ -425,6 +425,7 @@ def stretch(studio, told):
     studio.drop("log", path)
     page.select_option("#loop", "roll rate")
     studio.rest()
+    studio.until("document.querySelector('#signals-0 svg')?.getBoundingClientRect().width > 0", limit_s=20)
     box = page.locator("#signals-0 svg").bounding_box()
     page.mouse.move(box["x"] + 0.38 * box["width"], box["y"] + 60)
     page.mouse.down()

@@ -69,6 +69,7 @@ pub(super) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> A
     Answer {
         verdict: verdict.0,
         reason: verdict.1,
+        step: Some(subject.share),
         gains,
         figures,
         sure: Some(sure),
@@ -238,9 +239,9 @@ fn next(of: Advice, subject: &Subject<'_>, choice: &Controllers) -> String {
         (Some(Err(reason)), _, _) => format!("Nothing is written: {reason}"),
         (None, Advice::Keep, _) => words::NOTHING.to_owned(),
         (None, Advice::Change, Some(of_log)) if is_named(of_log).is_some() => {
-            words::write(subject.file, &options(of_log.control_loop()))
+            words::write(subject.file, &options(of_log.control_loop()), subject.share)
         }
-        (None, Advice::Change, _) => words::TYPE_IN.to_owned(),
+        (None, Advice::Change, _) => words::type_in(subject.share),
         _ => words::COMPARE.to_owned(),
     }
 }

@@ -103,7 +103,7 @@ fn table(text: &mut String, answer: &Answer) {
     let figures = answer.figures.as_ref();
     let has_now = answer.gains.iter().any(|gain| gain.now.is_some());
     if has_now {
-        titles(text);
+        titles(text, answer);
     }
     for gain in &answer.gains {
         gain_row(text, gain, has_now);
@@ -128,7 +128,7 @@ fn table(text: &mut String, answer: &Answer) {
 pub(super) fn columns(text: &mut String, answer: &Answer, has_titles: bool) {
     let has_now = answer.gains.iter().any(|gain| gain.now.is_some());
     if has_titles && has_now {
-        titles(text);
+        titles(text, answer);
     }
     for gain in &answer.gains {
         gain_row(text, gain, has_now);
@@ -139,13 +139,13 @@ pub(super) fn columns(text: &mut String, answer: &Answer, has_titles: bool) {
     }
 }
 
-fn titles(text: &mut String) {
-    row(
-        text,
-        "",
-        ["now", "half", "full"].map(str::to_owned).into_iter(),
-        "",
-    );
+fn titles(text: &mut String, answer: &Answer) {
+    let titles = [
+        "now".to_owned(),
+        answer.step.map_or(String::new(), words::part),
+        "full".to_owned(),
+    ];
+    row(text, "", titles.into_iter(), "");
 }
 
 fn gain_row(text: &mut String, gain: &Gain, has_now: bool) {

@@ -77,17 +77,21 @@ fn card(of: &Survey) -> String {
             answers::written(&path.display().to_string(), &restore.display().to_string())
         }
         (None, 0) => words::NO_LOOP.to_owned(),
-        (None, _) if is_any(of, Advice::Change) => answers::write(&of.file, ""),
-        _ => answers::NOTHING.to_owned(),
+        _ => match step(of) {
+            Some(step) => answers::write(&of.file, "", step),
+            None => answers::NOTHING.to_owned(),
+        },
     };
     answer::line(&mut text, "Next", &next);
     answer::line(&mut text, "", words::MORE);
     text
 }
 
-fn is_any(of: &Survey, advice: Advice) -> bool {
+/// Share of the step to write of the loops to change. `None`: there are none.
+fn step(of: &Survey) -> Option<f64> {
     let answers = of.loops.iter().filter_map(|one| one.answer.as_ref());
-    answers.into_iter().any(|answer| answer.verdict == advice)
+    let mut changes = answers.filter(|answer| answer.verdict == Advice::Change);
+    changes.next()?.step
 }
 
 /// The answer of a loop that no part of the flight tells anything about.

@@ -23,6 +23,8 @@ pub(crate) struct Answer {
     pub(crate) verdict: Advice,
     /// Why, one clause.
     pub(crate) reason: String,
+    /// Share of the way to the proposed gains at which the middle column stands. `None`: nothing is proposed.
+    pub(crate) step: Option<f64>,
     /// Under the names and in the units in which they are typed in. Empty without a proposal.
     pub(crate) gains: Vec<Gain>,
     /// Figures of the loop with these gains.
@@ -41,6 +43,7 @@ impl Answer {
         Self {
             verdict: Advice::NotYet,
             reason,
+            step: None,
             gains: vec![],
             figures: None,
             sure: None,

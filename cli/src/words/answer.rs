@@ -166,7 +166,6 @@ pub(crate) const NO_DESIGN: &str = "a process was found, and no controller keeps
 pub(crate) const COMPARE: &str =
     "Type these gains in and watch a step of the set-point. Gains in force: --against KP,KI,KD.";
 pub(crate) const NOTHING: &str = "Leave the gains as they are.";
-pub(crate) const TYPE_IN: &str = "Type in half of the step, record again, and go on from there.";
 
 /// Where the parameters went.
 pub(crate) fn written(path: &str, restore: &str) -> String {
@@ -176,8 +175,26 @@ pub(crate) fn written(path: &str, restore: &str) -> String {
 }
 
 /// How to write parameters.
-pub(crate) fn write(file: &str, options: &str) -> String {
+pub(crate) fn write(file: &str, options: &str, share: f64) -> String {
     format!(
-        "onecycle identify {file}{options} --write tune.txt writes half of the step, and a file that restores yours."
+        "onecycle identify {file}{options} --write tune.txt writes {} of the step, and a file that restores yours.",
+        part(share)
     )
+}
+
+/// What to type in.
+pub(crate) fn type_in(share: f64) -> String {
+    format!(
+        "Type in {} of the step, record again, and go on from there.",
+        part(share)
+    )
+}
+
+/// A share of the way to the proposed gains.
+pub(crate) fn part(share: f64) -> String {
+    match share {
+        0.5 => "half".to_owned(),
+        1.0 => "all".to_owned(),
+        share => format!("{:.0} %", 100.0 * share),
+    }
 }

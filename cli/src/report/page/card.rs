@@ -42,7 +42,8 @@ fn gains(answer: &Answer) -> String {
     let figures = figures.filter(|(name, _)| has_now || *name != LOAD);
     let all = gains.chain(figures.map(|(name, values)| (name.to_owned(), values)));
     if has_now {
-        return page::plain_table("", &["", "now", "half", "proposed"], all);
+        let part = answer.step.map_or(String::new(), words::part);
+        return page::plain_table("", &["", "now", &part, "proposed"], all);
     }
     page::plain_table(
         "",
