@@ -27,12 +27,13 @@ pub(super) fn width() -> usize {
     terminal_columns().map_or(WIDTH, |columns| columns.clamp(WIDTHS.0, WIDTHS.1))
 }
 
-/// The card of a recording. `read`: what was taken for what. `more`: how many remarks are not on it.
+/// The card of a recording. `read`: what was taken for what. `more`: how many remarks are not on it; `None`: all that is
+/// known follows.
 pub(super) fn card(
     (title, read): (&str, Option<&str>),
     answer: &Answer,
     process: Option<(&Identified, &Units)>,
-    more: usize,
+    more: Option<usize>,
 ) -> String {
     let mut text = format!("{}\n", painted(HEADING, title));
     verdict(&mut text, "", answer);
@@ -58,13 +59,9 @@ pub(super) fn card(
         text.push_str(&painted(REMARK, &lines));
     }
     line(&mut text, "Next", &answer.next);
-    let all = match (answer.verdict, more) {
-        (Advice::NotYet, _) => "All that is known: --details".to_owned(),
-        (_, 0) => "All figures, other controllers: --details".to_owned(),
-        (_, 1) => "All figures, other controllers, and one more remark: --details".to_owned(),
-        (_, more) => format!("All figures, other controllers, and {more} more remarks: --details"),
-    };
-    line(&mut text, "", &all);
+    if let Some(more) = more {
+        line(&mut text, "", &words::more(answer.verdict, more));
+    }
     text
 }
 

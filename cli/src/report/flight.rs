@@ -23,7 +23,7 @@ const SCHEMA: &str = "onecycle.flight/1";
 
 /// The card of a flight, with details all that its parts tell.
 pub(crate) fn text(of: &Survey, has_details: bool) -> String {
-    let mut text = card(of);
+    let mut text = card(of, has_details);
     if !has_details {
         return text;
     }
@@ -45,7 +45,7 @@ pub(crate) fn text(of: &Survey, has_details: bool) -> String {
 }
 
 /// What to do about every loop: at most 40 lines.
-fn card(of: &Survey) -> String {
+fn card(of: &Survey, has_details: bool) -> String {
     let told = of.loops.iter().filter(|one| one.answer.is_some()).count();
     let title = format!("{}  {}, flight {}", of.file, of.firmware, of.number);
     let mut text = format!("{}\n", painted(HEADING, &title));
@@ -83,7 +83,9 @@ fn card(of: &Survey) -> String {
         },
     };
     answer::line(&mut text, "Next", &next);
-    answer::line(&mut text, "", words::MORE);
+    if !has_details {
+        answer::line(&mut text, "", words::MORE);
+    }
     text
 }
 
@@ -128,7 +130,8 @@ fn process(one: &FlightLoop) -> Option<(String, String)> {
     let gain = with_ends(one.gain()?);
     let delay_s = one.told().first()?.delay_s;
     let unit = words::gain_unit(one.units);
-    Some((format!("{gain} {unit}"), format!("{:.0} ms", 1e3 * delay_s)))
+    let gain = format!("{gain} {unit}").trim_end().to_owned();
+    Some((gain, format!("{:.0} ms", 1e3 * delay_s)))
 }
 
 /// An estimate with its interval.

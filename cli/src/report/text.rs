@@ -37,7 +37,7 @@ pub(crate) fn card(
     let process = found.outcome.as_ref().ok();
     let told = reasons(found).len() + details(found).len();
     let on_card = usize::from(!reasons(found).is_empty());
-    let more = if has_details { 0 } else { told - on_card };
+    let more = (!has_details).then_some(told - on_card);
     let read = (recording.notes().first())
         .filter(|_| !has_details && !recording.is_of_a_flight_log())
         .map(|note| sentence(&recording::note(note)));

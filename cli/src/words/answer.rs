@@ -167,6 +167,18 @@ pub(crate) const COMPARE: &str =
     "Type these gains in and watch a step of the set-point. Gains in force: --against KP,KI,KD.";
 pub(crate) const NOTHING: &str = "Leave the gains as they are.";
 
+/// Where all else stands. `remarks`: how many are not on the card.
+pub(crate) fn more(of: Advice, remarks: usize) -> String {
+    match (of, remarks) {
+        (Advice::NotYet, _) => "All that is known: --details".to_owned(),
+        (_, 0) => "All figures, other controllers: --details".to_owned(),
+        (_, 1) => "All figures, other controllers, and one more remark: --details".to_owned(),
+        (_, count) => {
+            format!("All figures, other controllers, and {count} more remarks: --details")
+        }
+    }
+}
+
 /// Where the parameters went.
 pub(crate) fn written(path: &str, restore: &str) -> String {
     format!(
