@@ -32,7 +32,7 @@ use crate::feedback;
 pub struct Identify<'a> {
     options: Options,
     pack: Option<Pack<'a>>,
-    is_alone: bool,
+    skips_default: bool,
 }
 
 impl Default for Identify<'_> {
@@ -48,7 +48,7 @@ impl<'a> Identify<'a> {
         Self {
             options: Options::default(),
             pack: Pack::embedded().ok(),
-            is_alone: false,
+            skips_default: false,
         }
     }
 
@@ -170,10 +170,10 @@ impl<'a> Identify<'a> {
         Self { pack: None, ..self }
     }
 
-    /// Leaves out the run with the default settings that tells whether these refuse: half of the time where others are set.
-    pub fn alone(self) -> Self {
+    /// Leaves out the second run, with default settings, which is made to say whether these refuse.
+    pub fn without_default_run(self) -> Self {
         Self {
-            is_alone: true,
+            skips_default: true,
             ..self
         }
     }
@@ -216,7 +216,7 @@ impl<'a> Identify<'a> {
             if let Some(verdict) = calm.filter(|_| found.outcome.is_ok()) {
                 found.outcome = Err(verdict);
             }
-            if found.outcome.is_ok() && options != usual && !self.is_alone {
+            if found.outcome.is_ok() && options != usual && !self.skips_default {
                 let default = by(&usual);
                 if let Err(verdict) = default.outcome {
                     let verdict = Box::new(verdict);

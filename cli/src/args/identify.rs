@@ -12,15 +12,15 @@ use super::design::noise;
 use super::{DesignArguments, LogArguments, WriteArguments, sample_rate, time_unit};
 use crate::packs::PackSource;
 
+/// Heading of the options of the estimators.
+const ESTIMATION: &str = "Estimation";
+
 /// Identify the process from a recording and design its controller.
 ///
 /// The recording may hold a relay test, a chirp, steps or any other input that excites the process. It is
 /// a table with the columns time, input (what acts on the process) and output (the measurement),
 /// separated by commas, semicolons, tabs or blanks, with or without a header; or a flight log (PX4 ULog, ArduPilot
 /// DataFlash, Betaflight or INAV blackbox, MCAP of ROS 2), of which one control loop is taken.
-/// Heading of the options of the estimators.
-const ESTIMATION: &str = "Estimation";
-
 #[derive(Debug, Args)]
 #[command(after_help = concat!(
     "Examples:\n",

@@ -1,6 +1,7 @@
 //! The answer of a report, made of what was identified, the controllers to choose from and the gains of a log.
 
-use onecycle::{Comparison, Controller, Identification, Identified, Pid, assess};
+use onecycle::{Assessment, Comparison, Controller, Identification, Identified, Pid, assess};
+use onecycle_design::cascade::Cascade;
 use onecycle_link::{Agreement, ControlLoop, LoopGains};
 
 use super::log_gains::{LogLoop, pid};
@@ -57,24 +58,26 @@ pub(super) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> A
         let (reason, next) = words::contradicted();
         return not_yet(reason, next, Some(sure));
     }
-    let Some(choice) = subject.choice.filter(|choice| choice.design().is_some()) else {
+    let Some((choice, design)) = subject
+        .choice
+        .and_then(|choice| Some((choice, choice.design()?)))
+    else {
         let row = subject.choice.and_then(Controllers::chosen);
         let error = row.and_then(|row| row.proposal.outcome.as_ref().err());
         let next = error.map_or(String::new(), |error| sentence(&advice(error)));
         return not_yet(words::NO_DESIGN.to_owned(), next, Some(sure));
     };
-    let (gains, half) = gains(choice, subject);
-    let verdict = verdict(identified, choice);
-    let figures = columns(identified, choice, half);
+    let to_type = ToType::of(choice, &design.0.controller, subject);
+    let (verdict, reason) = verdict(identified, choice, &design.0.controller);
     Answer {
-        verdict: verdict.0,
-        reason: verdict.1,
+        verdict,
+        reason,
         step: Some(subject.share),
-        gains,
-        figures,
+        figures: Some(columns(identified, choice, design.1, to_type.half.as_ref())),
         sure: Some(sure),
         watch: words::not_kept(choice),
-        next: next(verdict.0, subject, choice),
+        next: next(verdict, subject, to_type.is_of_firmware),
+        gains: to_type.gains,
     }
 }
 
@@ -86,63 +89,74 @@ fn not_yet(reason: String, next: String, sure: Option<String>) -> Answer {
     }
 }
 
-fn verdict(identified: &Identified, choice: &Controllers) -> (Advice, String) {
+fn verdict(
+    identified: &Identified,
+    choice: &Controllers,
+    proposed: &Controller,
+) -> (Advice, String) {
     let compared = choice.against.as_ref().and_then(|now| {
-        let (design, _) = choice.design()?;
         let (model, _) = identified.for_design(0);
         let draws = identified.posterior.models(DRAWS);
-        let both = [&now.controller, &design.controller];
-        Comparison::new(&model, &draws, both, &choice.asked)
+        Comparison::new(&model, &draws, [&now.controller, proposed], &choice.asked)
     });
     match compared {
-        Some(compared) => {
-            let advice = if compared.pays() {
-                Advice::Change
-            } else {
-                Advice::Keep
-            };
-            (advice, words::compared(choice, &compared))
-        }
+        Some(compared) if compared.pays() => (Advice::Change, words::compared(choice, &compared)),
+        Some(compared) => (Advice::Keep, words::compared(choice, &compared)),
         None => (Advice::FirstGains, words::first(choice)),
     }
 }
 
-/// The gains to type in, and the controller half of the way.
-fn gains(choice: &Controllers, subject: &Subject<'_>) -> (Vec<Gain>, Option<Controller>) {
-    let Some((design, _)) = choice.design() else {
-        return (vec![], None);
-    };
-    let goal = design.controller.pid();
-    if let Some((gains, half)) = subject
-        .of_log
-        .and_then(|of_log| of_log.named(goal, subject.share, choice))
-    {
-        return (gains, Some(half));
+/// What to type in.
+struct ToType {
+    gains: Vec<Gain>,
+    /// The controller half of the way. `None` without gains in force.
+    half: Option<Controller>,
+    /// Whether the gains are parameters of the firmware.
+    is_of_firmware: bool,
+}
+
+impl ToType {
+    fn of(choice: &Controllers, proposed: &Controller, subject: &Subject<'_>) -> Self {
+        let goal = proposed.pid();
+        let of_log = subject.of_log;
+        if let Some((gains, half)) =
+            of_log.and_then(|of_log| of_log.named(goal, subject.share, choice))
+        {
+            return Self {
+                gains,
+                half: Some(half),
+                is_of_firmware: true,
+            };
+        }
+        if let Controller::Autopilot(of) = proposed {
+            return Self {
+                gains: cascade(&of.gains),
+                half: None,
+                is_of_firmware: false,
+            };
+        }
+        let now = (choice.against.as_ref()).map(|against| against.controller.pid());
+        let half = now.map(|now| between(&now, &goal, subject.share));
+        let all = [now, half, Some(goal)];
+        Self {
+            gains: in_plant(choice, all).unwrap_or_else(|| parallel(&all, &goal, subject.units)),
+            half: half.map(Controller::from),
+            is_of_firmware: false,
+        }
     }
-    if let Controller::Autopilot(of) = &design.controller {
-        let of = of.gains;
-        let terms = [
-            ("angle P", "1/s", of.angle_p),
-            ("rate P", "", of.rate_p),
-            ("rate I", "1/s", of.rate_i),
-            ("rate D", "s", of.rate_d),
-        ];
-        let terms = terms.into_iter().filter(|term| term.2 != 0.0);
-        return (
-            terms
-                .map(|(name, unit, full)| gain(name, unit, [None, None, Some(full)]))
-                .collect(),
-            None,
-        );
-    }
-    let now = (choice.against.as_ref()).map(|against| against.controller.pid());
-    let half = now.map(|now| between(&now, &goal, subject.share));
-    let all = [now, half, Some(goal)];
-    let half = half.map(Controller::from);
-    if let Some(gains) = in_plant(choice, all) {
-        return (gains, half);
-    }
-    (parallel(&all, &goal, subject.units), half)
+}
+
+/// The gains of an autopilot's cascade, those that are used.
+fn cascade(of: &Cascade) -> Vec<Gain> {
+    let terms = [
+        ("angle P", "1/s", of.angle_p),
+        ("rate P", "", of.rate_p),
+        ("rate I", "1/s", of.rate_i),
+        ("rate D", "s", of.rate_d),
+    ];
+    let used = terms.into_iter().filter(|term| term.2 != 0.0);
+    used.map(|(name, unit, full)| gain(name, unit, [None, None, Some(full)]))
+        .collect()
 }
 
 /// The gains of the parallel form, those that are used.
@@ -209,36 +223,30 @@ fn between(now: &Pid, goal: &Pid, share: f64) -> Pid {
 fn columns(
     identified: &Identified,
     choice: &Controllers,
-    half: Option<Controller>,
-) -> Option<Columns> {
-    let (_, full) = choice.design()?;
+    full: &Assessment,
+    half: Option<&Controller>,
+) -> Columns {
     let (model, _) = identified.for_design(0);
     let noise = choice.asked.noise.as_ref();
     let now = choice.against.as_ref().and_then(|now| now.figures);
-    let half = half.and_then(|half| assess(&model, &half, noise));
-    Some(Columns {
+    let half = half.and_then(|half| assess(&model, half, noise));
+    Columns {
         now: now.as_ref().map(Into::into),
         half: half.as_ref().map(Into::into),
         full: full.into(),
-    })
+    }
 }
 
-fn next(of: Advice, subject: &Subject<'_>, choice: &Controllers) -> String {
-    let is_named = |of_log: &LogLoop| {
-        let (design, _) = choice.design()?;
-        of_log.named(design.controller.pid(), subject.share, choice)
-    };
+fn next(of: Advice, subject: &Subject<'_>, is_of_firmware: bool) -> String {
     let written = subject.gains.and_then(|gains| gains.written.as_ref());
     match (written, of, subject.of_log) {
         (Some(Ok(written)), _, _) => {
-            let [path, restore] =
-                [&written.path, &written.restore].map(|path| path.display().to_string());
             let broken = broken(written).map_or(String::new(), |broken| format!(" {broken}"));
-            words::written(&path, &restore) + &broken
+            words::written(&written.path, &written.restore) + &broken
         }
         (Some(Err(reason)), _, _) => format!("Nothing is written: {reason}"),
         (None, Advice::Keep, _) => words::NOTHING.to_owned(),
-        (None, Advice::Change, Some(of_log)) if is_named(of_log).is_some() => {
+        (None, Advice::Change, Some(of_log)) if is_of_firmware => {
             words::write(subject.file, &options(of_log.control_loop()), subject.share)
         }
         (None, Advice::Change, _) => words::type_in(subject.share),

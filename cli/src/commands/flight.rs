@@ -111,27 +111,28 @@ fn of_loop(
         if of_log.contradicts(&choice) {
             of_log = of_log.with_read_back(source, log, number)?;
         }
-        if !of_log.contradicts(&choice) {
-            let answer = answer::of_identified(
-                &best,
-                &answer::Subject {
-                    file: &arguments.file.display().to_string(),
-                    units: &Units::default(),
-                    choice: Some(&choice),
-                    of_log: Some(&of_log),
-                    gains: None,
-                    share: arguments.write.step,
-                },
-            );
-            if arguments.write.write.is_some() && answer.verdict == Advice::Change {
-                let of_log = of_log.with_read_back(source, log, number)?;
-                one.to_write = Some(of_log.judged(&arguments.write, Some(&best), Some(&choice)));
-            }
-            one.answer = Some(answer);
-            one.choice = Some(choice);
-            break;
+        if of_log.contradicts(&choice) {
+            one.parts[at].outcome = Err(Refusal::Verdict(Verdict::UnstableInForce));
+            continue;
         }
-        one.parts[at].outcome = Err(Refusal::Verdict(Verdict::UnstableInForce));
+        let answer = answer::of_identified(
+            &best,
+            &answer::Subject {
+                file: &arguments.file.display().to_string(),
+                units: &Units::default(),
+                choice: Some(&choice),
+                of_log: Some(&of_log),
+                gains: None,
+                share: arguments.write.step,
+            },
+        );
+        if arguments.write.write.is_some() && answer.verdict == Advice::Change {
+            of_log = of_log.with_read_back(source, log, number)?;
+            one.to_write = Some(of_log.judged(&arguments.write, Some(&best), Some(&choice)));
+        }
+        one.answer = Some(answer);
+        one.choice = Some(choice);
+        break;
     }
     Ok(one)
 }
@@ -206,7 +207,7 @@ fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified
     let identify = (onecycle::Identify::new())
         .specification(*asked)
         .structure(log_gains::structure(part.control_loop))
-        .alone();
+        .without_default_run();
     let outcome = identify.run(&recording).outcome;
     // Of several parts one that knows its gain to less than a factor of two tells nothing.
     let tells = |found: &Identified| {

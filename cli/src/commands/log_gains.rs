@@ -64,19 +64,21 @@ impl LogLoop {
         Ok((signals, of_log.transpose()?))
     }
 
-    /// With the gains of a rate loop read back from the signals of a flight, by its number.
+    /// With the gains of a rate loop read back from the signals of a flight, by its number; the log is read once.
     pub(super) fn with_read_back(
         self,
         source: &Source<'_>,
         log: &FlightLog,
         number: usize,
     ) -> Result<Self, Failure> {
-        let read_back = match self.control_loop {
-            ControlLoop::Rate(axis) => log::read_back(source, log, number)?
-                .into_iter()
-                .find(|read| read.axis == axis),
-            _ => None,
+        let ControlLoop::Rate(axis) = self.control_loop else {
+            return Ok(self);
         };
+        if self.read_back.is_some() {
+            return Ok(self);
+        }
+        let mut all = log::read_back(source, log, number)?.into_iter();
+        let read_back = all.find(|read| read.axis == axis);
         Ok(Self { read_back, ..self })
     }
 

@@ -7,7 +7,7 @@ use onecycle::{Estimate, Identified, Interval, Parameter};
 use super::number::{seconds, short};
 use super::units::Units;
 use super::wrap::wrapped_to;
-use crate::output::columns as terminal_columns;
+use crate::output::columns;
 use crate::results::answer::{Advice, Answer, Columns, Figures, Gain};
 use crate::style::{HEADING, HOLDS, REFUSAL, REMARK, painted};
 use crate::words::answer as words;
@@ -24,7 +24,7 @@ const TOGETHER: &str = "\u{a0}";
 
 /// Width of cards in this terminal.
 pub(super) fn width() -> usize {
-    terminal_columns().map_or(WIDTH, |columns| columns.clamp(WIDTHS.0, WIDTHS.1))
+    columns().map_or(WIDTH, |columns| columns.clamp(WIDTHS.0, WIDTHS.1))
 }
 
 /// The card of a recording. `read`: what was taken for what. `more`: how many remarks are not on it; `None`: all that is
@@ -36,7 +36,7 @@ pub(super) fn card(
     more: Option<usize>,
 ) -> String {
     let mut text = format!("{}\n", painted(HEADING, title));
-    verdict(&mut text, "", answer);
+    verdict(&mut text, "", answer.verdict, &answer.reason);
     if !answer.gains.is_empty() {
         text.push('\n');
         table(&mut text, answer);
@@ -66,27 +66,16 @@ pub(super) fn card(
 }
 
 /// The verdict and its reason, wrapped.
-pub(super) fn verdict(text: &mut String, lead: &str, answer: &Answer) {
-    let style = match answer.verdict {
+pub(super) fn verdict(text: &mut String, lead: &str, of: Advice, reason: &str) {
+    let style = match of {
         Advice::NotYet => REFUSAL,
         _ => HOLDS,
     };
-    let name = words::verdict(answer.verdict);
     let mut lines = String::new();
-    wrapped_to(
-        &mut lines,
-        lead,
-        &format!("{name}: {}", words::clause(&answer.reason)),
-        width(),
-    );
-    let at = lead.len() + name.len();
-    let _ = write!(
-        text,
-        "{}{}{}",
-        &lines[..lead.len()],
-        painted(style, &lines[lead.len()..at]),
-        &lines[at..]
-    );
+    wrapped_to(&mut lines, lead, &words::headline(of, reason), width());
+    let (before, rest) = lines.split_at(lead.len());
+    let (name, after) = rest.split_at(words::verdict(of).len());
+    let _ = write!(text, "{before}{}{after}", painted(style, name));
 }
 
 pub(super) fn line(text: &mut String, name: &str, words: &str) {
@@ -97,59 +86,49 @@ pub(super) fn line(text: &mut String, name: &str, words: &str) {
 
 /// Gains and figures, in columns if gains are in force.
 fn table(text: &mut String, answer: &Answer) {
-    let figures = answer.figures.as_ref();
-    let has_now = answer.gains.iter().any(|gain| gain.now.is_some());
-    if has_now {
-        titles(text, answer);
-    }
-    for gain in &answer.gains {
-        gain_row(text, gain, has_now);
-    }
-    let rows = figures.map(rows).unwrap_or_default();
-    if has_now {
+    gains(text, answer, true);
+    let rows = answer.figures.as_ref().map(rows).unwrap_or_default();
+    if answer.has_now() {
         for (name, values) in rows {
             row(text, name, values.into_iter(), "");
         }
-    } else {
-        let of_load = |row: &&(&str, [String; 3])| row.0 != LOAD;
-        let facts = rows.iter().filter(of_load).flat_map(|(names, [.., full])| {
-            let pairs = names.split(", ").zip(full.split(", "));
-            pairs.map(|(name, value)| format!("{name} {value}").replace(' ', TOGETHER))
-        });
-        let facts: Vec<String> = facts.collect();
-        line(text, "  Loop", &facts.join(", "));
+        return;
     }
+    let of_load = |row: &&(&str, [String; 3])| row.0 != LOAD;
+    let facts = rows.iter().filter(of_load).flat_map(|(names, [.., full])| {
+        let pairs = names.split(", ").zip(full.split(", "));
+        pairs.map(|(name, value)| format!("{name} {value}").replace(' ', TOGETHER))
+    });
+    line(text, "  Loop", &facts.collect::<Vec<_>>().join(", "));
 }
 
 /// Gains and margins of a loop among others.
-pub(super) fn columns(text: &mut String, answer: &Answer, has_titles: bool) {
-    let has_now = answer.gains.iter().any(|gain| gain.now.is_some());
-    if has_titles && has_now {
-        titles(text, answer);
-    }
-    for gain in &answer.gains {
-        gain_row(text, gain, has_now);
-    }
+pub(super) fn gains_and_margins(text: &mut String, answer: &Answer, has_titles: bool) {
+    gains(text, answer, has_titles);
     let margins = answer.figures.iter().flat_map(rows).next();
     if let Some((name, values)) = margins {
-        row(text, name, shown(has_now, values), "");
+        row(text, name, shown(answer.has_now(), values), "");
     }
 }
 
-fn titles(text: &mut String, answer: &Answer) {
-    let titles = [
-        "now".to_owned(),
-        answer.step.map_or(String::new(), words::part),
-        "full".to_owned(),
-    ];
-    row(text, "", titles.into_iter(), "");
+/// A line for each gain, below the titles of the columns.
+fn gains(text: &mut String, answer: &Answer, has_titles: bool) {
+    if has_titles && answer.has_now() {
+        let part = answer.step.map_or(String::new(), words::part);
+        let titles = ["now".to_owned(), part, "full".to_owned()];
+        row(text, "", titles.into_iter(), "");
+    }
+    for gain in &answer.gains {
+        let values = shown(answer.has_now(), cells(gain));
+        row(text, &gain.name, values, &gain.unit);
+    }
 }
 
-fn gain_row(text: &mut String, gain: &Gain, has_now: bool) {
+/// The values of a gain.
+pub(super) fn cells(gain: &Gain) -> [String; 3] {
     let of = |value: Option<f64>, without: &str| value.map_or(without.to_owned(), number);
     let full = of(gain.full, "out of range");
-    let values = shown(has_now, [of(gain.now, "-"), of(gain.half, "-"), full]);
-    row(text, &gain.name, values, &gain.unit);
+    [of(gain.now, "-"), of(gain.half, "-"), full]
 }
 
 /// All three columns, or the last alone.
@@ -166,7 +145,7 @@ fn row(text: &mut String, name: &str, values: impl Iterator<Item = String>, unit
 }
 
 /// A gain: integers of a firmware as they are.
-pub(super) fn number(value: f64) -> String {
+fn number(value: f64) -> String {
     match value.fract() == 0.0 && value.abs() < 1e4 {
         true => format!("{value:.0}"),
         false => short(value),

@@ -57,12 +57,12 @@ fn card(of: &Survey, has_details: bool) -> String {
     for one in &of.loops {
         let name = format!("{:<15} ", one.control_loop.to_string());
         let Some(answer) = &one.answer else {
-            answer::verdict(&mut text, &name, &refused(one));
+            answer::verdict(&mut text, &name, Advice::NotYet, &refused(one));
             continue;
         };
-        answer::verdict(&mut text, &name, answer);
+        answer::verdict(&mut text, &name, answer.verdict, &answer.reason);
         if answer.verdict != Advice::Keep {
-            answer::columns(&mut text, answer, !has_titles);
+            answer::gains_and_margins(&mut text, answer, !has_titles);
             has_titles = true;
         }
         if let Some((gain, delay)) = process(one) {
@@ -73,9 +73,7 @@ fn card(of: &Survey, has_details: bool) -> String {
         }
     }
     let next = match (&of.files, told) {
-        (Some([path, restore]), _) => {
-            answers::written(&path.display().to_string(), &restore.display().to_string())
-        }
+        (Some([path, restore]), _) => answers::written(path, restore),
         (None, 0) => words::NO_LOOP.to_owned(),
         _ => match step(of) {
             Some(step) => answers::write(&of.file, "", step),
@@ -89,21 +87,21 @@ fn card(of: &Survey, has_details: bool) -> String {
     text
 }
 
-/// Share of the step to write of the loops to change. `None`: there are none.
+/// Share of the way to the proposed gains that is written. `None` if every loop is kept.
 fn step(of: &Survey) -> Option<f64> {
     let answers = of.loops.iter().filter_map(|one| one.answer.as_ref());
     let mut changes = answers.filter(|answer| answer.verdict == Advice::Change);
     changes.next()?.step
 }
 
-/// The answer of a loop that no part of the flight tells anything about.
-fn refused(one: &FlightLoop) -> Answer {
-    let refusals = one
+/// Why no part of the flight tells anything about a loop.
+fn refused(one: &FlightLoop) -> String {
+    let mut refusals = one
         .parts
         .iter()
         .filter_map(|part| part.outcome.as_ref().err());
-    let reason = refusals.map(words::brief).next();
-    Answer::not_yet(reason.unwrap_or_else(|| words::NO_PART_IN_BRIEF.to_owned()))
+    let reason = refusals.next().map(words::brief);
+    reason.unwrap_or_else(|| words::NO_PART_IN_BRIEF.to_owned())
 }
 
 /// The line of a loop: what all its parts tell.

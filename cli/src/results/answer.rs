@@ -51,13 +51,18 @@ impl Answer {
             next: String::new(),
         }
     }
+
+    /// Whether gains in force are known.
+    pub(crate) fn has_now(&self) -> bool {
+        self.gains.iter().any(|gain| gain.now.is_some())
+    }
 }
 
 /// A gain in force, half of the way to the proposed one, and that one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Gain {
     pub(crate) name: String,
-    /// Empty where there is none.
+    /// Unit of the values; empty if they have none.
     pub(crate) unit: String,
     pub(crate) now: Option<f64>,
     pub(crate) half: Option<f64>,

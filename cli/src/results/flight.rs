@@ -19,7 +19,7 @@ pub(crate) struct FlightLoop {
     pub(crate) choice: Option<Controllers>,
     /// What to do about the gains. `None`: no part tells anything.
     pub(crate) answer: Option<Answer>,
-    /// The parameters to write, or why there are none. `None`: not asked for, or no loop to change.
+    /// The parameters to write, or the reason why they must not be written. `None` without `--write`, and for a loop that is kept.
     pub(crate) to_write: Option<Result<Written, String>>,
 }
 

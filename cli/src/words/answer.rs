@@ -1,11 +1,13 @@
 //! Sentences of the answer.
 
+use std::path::Path;
+
 use onecycle::{Comparison, Effect, Felt, Identified, Parameter};
 use onecycle_design::Limit;
 
 use crate::report::number::{seconds, short};
 use crate::results::answer::Advice;
-use crate::results::controllers::Controllers;
+use crate::results::controllers::{Against, Controllers};
 
 use super::log_gains::CONTRADICTED;
 use super::verdict::advice;
@@ -21,9 +23,9 @@ pub(crate) fn verdict(of: Advice) -> &'static str {
     }
 }
 
-/// A reason behind the verdict, with a full stop.
-pub(crate) fn clause(reason: &str) -> String {
-    format!("{}.", reason.trim_end_matches('.'))
+/// The verdict with its reason.
+pub(crate) fn headline(of: Advice, reason: &str) -> String {
+    format!("{}: {}.", verdict(of), reason.trim_end_matches('.'))
 }
 
 /// Why gains are changed or kept.
@@ -32,22 +34,8 @@ pub(crate) fn compared(choice: &Controllers, of: &Comparison) -> String {
     let figures = now.and_then(|now| now.figures);
     match (of.pays(), of.gain(), of.loss()) {
         (true, gain, loss) if of.is_now_fragile => {
-            let fragile =
-                figures.map_or(
-                    "yours make the loop unstable".to_owned(),
-                    |figures| match now
-                        .and_then(|now| now.least)
-                        .filter(|least| least.stable < 1.0)
-                    {
-                        Some(least) => format!(
-                            "yours are stable on {:.0} % of the likely processes only",
-                            100.0 * least.stable
-                        ),
-                        None => format!("yours have little margin, Ms {:.2}", figures.ms),
-                    },
-                );
             let gain = gain.filter(|_| figures.is_some());
-            joined(fragile, [gain, loss])
+            joined(fragile(now), [gain, loss])
         }
         (true, Some(gain), loss) => match loss {
             Some(loss) => format!("{}, at the price of {}", effect(gain), effect(loss)),
@@ -60,6 +48,21 @@ pub(crate) fn compared(choice: &Controllers, of: &Comparison) -> String {
         ),
         (_, _, Some(loss)) => format!("the proposal would only give {}", effect(loss)),
         _ => "you would feel no difference with the proposed ones".to_owned(),
+    }
+}
+
+/// Why gains in force are not to be kept.
+fn fragile(now: Option<&Against>) -> String {
+    let Some(figures) = now.and_then(|now| now.figures) else {
+        return "yours make the loop unstable".to_owned();
+    };
+    let stable = now.and_then(|now| now.least).map(|least| least.stable);
+    match stable.filter(|share| *share < 1.0) {
+        Some(share) => format!(
+            "yours are stable on {:.0} % of the likely processes only",
+            100.0 * share
+        ),
+        None => format!("yours have little margin, Ms {:.2}", figures.ms),
     }
 }
 
@@ -130,7 +133,7 @@ pub(crate) fn sure(identified: &Identified, explained: Option<f64>) -> String {
     let gain = best
         .min_by(f64::total_cmp)
         .map_or("the gain has no upper end".to_owned(), |width| {
-            format!("gain known to {} %", up(100.0 * width))
+            format!("gain known to {} %", (100.0 * width).ceil().max(1.0))
         });
     let prediction = (identified.fit.innovations()).and_then(|of| of.prediction.as_ref());
     let misfit = short(100.0 * identified.fit.misfit);
@@ -144,11 +147,6 @@ pub(crate) fn sure(identified: &Identified, explained: Option<f64>) -> String {
         _ => format!("{misfit} % of the output is left unexplained"),
     };
     sentence(&format!("{gain}; {model}"))
-}
-
-/// A percentage of at least one, whole.
-fn up(percent: f64) -> f64 {
-    percent.ceil().max(1.0)
 }
 
 /// Why there is nothing to type in, and what to do.
@@ -180,9 +178,11 @@ pub(crate) fn more(of: Advice, remarks: usize) -> String {
 }
 
 /// Where the parameters went.
-pub(crate) fn written(path: &str, restore: &str) -> String {
+pub(crate) fn written(path: &Path, restore: &Path) -> String {
     format!(
-        "{path} is written; {restore} restores the old values. Fly and log again before the next step."
+        "{} is written; {} restores the old values. Fly and log again before the next step.",
+        path.display(),
+        restore.display()
     )
 }
 

@@ -29,7 +29,9 @@ pub(crate) fn next(file: &str) -> String {
 /// Why a part tells nothing, in a few words.
 pub(crate) fn brief(refusal: &Refusal) -> String {
     match refusal {
-        Refusal::Implausible { .. } => "the gain found is none that this loop can have".to_owned(),
+        Refusal::Implausible { .. } => {
+            "the gain that was found is impossible for this loop".to_owned()
+        }
         Refusal::Verdict(verdict) => {
             let clause = verdict.to_string();
             clause.split(':').next().unwrap_or_default().to_owned()

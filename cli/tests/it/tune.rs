@@ -231,6 +231,11 @@ fn help_lists_commands_and_exit_codes() {
         assert!(codes.contains(code), "{code}: {all}");
     }
     let identify = help(&["identify", "--help"]).stdout;
+    // A constant between the comment and its command took the comment, and another one stood in the help.
+    assert!(
+        identify.starts_with("Identify the process from a recording"),
+        "{identify}"
+    );
     assert!(identify.contains("Exit codes: 0"), "{identify}");
     assert!(help(&["--version"]).stdout.starts_with("onecycle "));
 }

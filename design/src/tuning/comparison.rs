@@ -22,8 +22,6 @@ use super::specification::{Specification, Style};
 pub const FELT: f64 = 1.2;
 /// Ratio that stands for an infinite one: of a steady error that goes, or of a loop that becomes stable.
 const ALL: f64 = 1e3;
-/// Draws on which the two are compared.
-const DRAWS: usize = 24;
 /// Share of the draws on which gains in force have to be stable to be kept.
 const LEAST_STABLE: f64 = 0.95;
 
@@ -67,13 +65,13 @@ impl Effect {
 pub struct Comparison {
     /// Every figure that both have.
     pub effects: Vec<Effect>,
-    /// Whether the gains in force are not to be kept, however they feel: unstable on some of what is likely, or with `Ms`
-    /// felt to be beyond that of the style sharp.
+    /// Whether the gains in force are too risky to keep: the loop is unstable on 5 % of the draws, or its `Ms` is a fifth
+    /// above that of the style sharp.
     pub is_now_fragile: bool,
 }
 
 impl Comparison {
-    /// Compares on `model`, the most probable process, and on some of `draws`. `None` if the proposal is unstable on `model`.
+    /// Compares on `model`, the most probable process, and on `draws`. `None` if the proposal is unstable on `model`.
     #[must_use]
     pub fn new(
         model: &Model,
@@ -84,8 +82,7 @@ impl Comparison {
         let both = |model: &Model| [now, proposed].map(|of| Figures::of(model, of, asked));
         let [old, new] = both(model);
         let new = new?;
-        let step = draws.len().div_ceil(DRAWS).max(1);
-        let over: Vec<[Option<Figures>; 2]> = draws.iter().step_by(step).map(both).collect();
+        let over: Vec<[Option<Figures>; 2]> = draws.iter().map(both).collect();
         let stable = over.iter().filter(|[old, _]| old.is_some()).count();
         let most = FELT * Style::Sharp.peak();
         let is_now_fragile = old.is_none_or(|old| old.ms > most && old.ms > new.ms)

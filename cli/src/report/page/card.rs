@@ -2,15 +2,14 @@
 
 use crate::pages::page;
 use crate::pages::plot::Figure;
-use crate::report::answer::{LOAD, number, rows};
+use crate::report::answer::{LOAD, cells, rows};
 use crate::results::answer::{Advice, Answer};
 use crate::words::answer as words;
 
 /// The card, with the responses beside it.
 pub(super) fn card(answer: &Answer, figure: Option<&Figure>) -> String {
     let is_good = answer.verdict != Advice::NotYet;
-    let name = words::verdict(answer.verdict);
-    let verdict = format!("{name}: {}", words::clause(&answer.reason));
+    let verdict = words::headline(answer.verdict, &answer.reason);
     let next = ("next", answer.next.clone());
     let others = [
         answer.sure.clone().map(|sure| ("sure?", sure)),
@@ -29,15 +28,14 @@ fn gains(answer: &Answer) -> String {
     let Some(figures) = &answer.figures else {
         return String::new();
     };
-    let or_none = |value: Option<f64>| value.map_or("-".to_owned(), number);
     let gains = answer.gains.iter().map(|gain| {
         let name = match gain.unit.as_str() {
             "" => gain.name.clone(),
             unit => format!("{} ({unit})", gain.name),
         };
-        (name, [gain.now, gain.half, gain.full].map(or_none))
+        (name, cells(gain))
     });
-    let has_now = answer.gains.iter().any(|gain| gain.now.is_some());
+    let has_now = answer.has_now();
     let figures = rows(figures).into_iter();
     let figures = figures.filter(|(name, _)| has_now || *name != LOAD);
     let all = gains.chain(figures.map(|(name, values)| (name.to_owned(), values)));
