@@ -30,11 +30,15 @@ def rows_of(program, path):
     found = identified(program, path)
     if not found:
         return None
-    names = [found["columns"][kind]["name"] for kind in ("time", "input", "output")]
+    columns = [found["columns"][kind] for kind in ("time", "input", "output")]
     with open(path, newline="") as file:
         lines = [line for line in file if not line.startswith("#")]
+    table = csv.DictReader(lines)
+    # The program takes the unit out of a header such as time_s.
+    named = {header.removesuffix(f"_{column['unit']}"): header for header in table.fieldnames or [] for column in columns}
     try:
-        return [[float(row[name]) for name in names] for row in csv.DictReader(lines)]
+        headers = [column["name"] if column["name"] in table.fieldnames else named[column["name"]] for column in columns]
+        return [[float(row[header]) for header in headers] for row in table]
     except (KeyError, TypeError, ValueError):
         return None
 
