@@ -219,10 +219,10 @@ impl Search<'_> {
         if let Some(verdict) = self.too_little(fitted, blocks, components) {
             return Err(verdict);
         }
-        Self::judge_stability(blocks, tests)?;
         let (explained, ratio) = prediction.map_or((1.0, 0.0), |prediction| {
             (prediction.explained, prediction.error_ratio)
         });
+        Self::judge_stability(blocks, tests, explained)?;
         let is_another = tests.input_share > ANOTHER_KIND.0 && tests.input_f > ANOTHER_KIND.1;
         if is_another && explained < WELL_PREDICTED {
             return Err(Verdict::InputLeft {
@@ -247,10 +247,15 @@ impl Search<'_> {
         }
     }
 
-    /// Refuses a process that is unstable without its controller: the reason why it is not predicted, or hardly.
-    fn judge_stability(blocks: &Blocks<'_>, tests: &InnovationTests) -> Result<(), Verdict> {
+    /// Refuses a process that is unstable without its controller: the reason why it is not predicted, or hardly. A random walk
+    /// may take what grows, and leaves clean innovations, but predicts worse than the mean.
+    fn judge_stability(
+        blocks: &Blocks<'_>,
+        tests: &InnovationTests,
+        explained: f64,
+    ) -> Result<(), Verdict> {
         let is_clean = !validate::is_coloured(tests) && !validate::is_left_to_the_input(tests);
-        if is_clean || !validate::is_fed_back(blocks) {
+        if is_clean && explained >= 0.0 || !validate::is_fed_back(blocks) {
             return Ok(());
         }
         match unstable::growth_per_s(blocks) {

@@ -3,6 +3,8 @@
 //! BIC = -2 ln L + (number of unknowns, the gain included) ln(number of rows), always on the same rows. Reference: G.
 //! Schwarz, "Estimating the dimension of a model", Ann. Stat. 6 (1978).
 
+use std::f64::consts::PI;
+
 use onecycle_design::Structure;
 
 use super::record::{Blocks, Record};
@@ -147,6 +149,7 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
             let bounds = Bounds::new(theta.structure, &blocks, tau_s);
             !has_hidden_lag(theta, record.dt_s)
                 && !bounds.has_fastest_pair(theta)
+                && !(limits.fewest_samples > 1 && is_aliased(theta, blocks.block_s()))
                 && !is_of_a_force(theta, limits.slowest_s)
         });
     }
@@ -268,6 +271,17 @@ fn quieten(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
 /// Whether a second lag is shorter than a sample: no output shows it, it stands for an error of the samples' times.
 fn has_hidden_lag(theta: &Theta, sample_s: f64) -> bool {
     theta.structure.stages().lags > 1 && theta.shortest_lag_s() < sample_s
+}
+
+/// Whether a resonance is above the Nyquist frequency of rows of `row_s`, which show its alias. Rows that were made longer for the
+/// sake of their innovations must not show what shorter ones did not.
+fn is_aliased(theta: &Theta, row_s: f64) -> bool {
+    let Some(pair) = theta.layout().pair() else {
+        return false;
+    };
+    let (c1, c0) = (theta.values[pair], theta.values[pair + 1]);
+    let is_complex = c1 * c1 < 4.0 * c0;
+    is_complex && c0.sqrt() * row_s > PI
 }
 
 /// Whether all lags before an integrator, or before what cannot be told from one, turn the phase by more than 70 degrees at the

@@ -179,7 +179,7 @@ fn the_filter_gives_the_likelihood_of_the_full_covariance() {
                     _ => brute_force::<5>(&record, &theta, samples),
                 };
                 let case = format!("{} {noises:?} {samples}", structure.name());
-                let error = (found.log_likelihood - likelihood).abs();
+                let error = (found.log_likelihood_in_output_units - likelihood).abs();
                 assert!(error < 1e-6 * likelihood.abs(), "{case}: {error}");
                 assert!((found.gain / gain - 1.0).abs() < 1e-6, "{case}: {gain}");
             }

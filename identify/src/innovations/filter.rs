@@ -18,7 +18,7 @@ use super::record::Blocks;
 /// Relative change of the covariance below which the filter of a kind of block is steady.
 const STEADY: f64 = 1e-9;
 /// Part of the length of a column below which its next row does not count.
-const FORGOTTEN: f64 = 1e-18;
+const FORGOTTEN: f64 = 1e-12;
 /// Rows between two looks whether the initial state is forgotten.
 const LOOK: usize = 16;
 

@@ -5,6 +5,7 @@ use std::ops::Range;
 use onecycle_design::{LowPass, Structure};
 
 use super::choose::{Choice, Limits, choose};
+use super::likelihood::{Evaluation, Memory, evaluate};
 use super::mixture::{self, Component};
 use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
@@ -42,6 +43,8 @@ const LONGER: [usize; 8] = [2, 3, 4, 6, 8, 12, 16, 24];
 const LONGEST_ROW: f64 = 1.0 / 6.0;
 /// Fewest of them.
 const FEWEST_LONG_ROWS: usize = 300;
+/// Starts that are descended for each hypothesis about the state at the start.
+const DESCENDED: usize = 2;
 /// Difference of the log-likelihood above which the input is taken as straight lines between the samples.
 const STRAIGHT: f64 = 3.0;
 
@@ -284,19 +287,26 @@ fn was_at_rest(record: &Record, limits: &Limits, thetas: &[Theta]) -> bool {
         return false;
     };
     // On all rows, the first ones too, which were at rest or not: under the first input with an unknown state.
-    let bic = |of: &Record, theta: &Theta| {
+    let least_bic = |of: &Record| {
         let blocks = Blocks::from(of, samples, 0);
-        let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING);
-        found.map_or(f64::INFINITY, |found| {
-            let rows = found.at.residual.len() as f64;
-            found.at.profile_bic + found.theta.free().len() as f64 * rows.ln()
-        })
+        let bic = |theta: &Theta, at: &Evaluation| {
+            at.profile_bic + theta.free().len() as f64 * (at.residual.len() as f64).ln()
+        };
+        let mut memory = Memory::default();
+        let mut starts: Vec<(f64, Theta)> = (thetas.iter())
+            .filter_map(|theta| {
+                let theta = Bounds::new(theta.structure, &blocks, longest_tau_s).clamp(theta);
+                Some((bic(&theta, &evaluate(&blocks, &theta, &mut memory)?), theta))
+            })
+            .collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let fits = starts.iter().take(DESCENDED).filter_map(|(_, theta)| {
+            let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING)?;
+            Some(bic(&found.theta, &found.at))
+        });
+        fits.fold(f64::INFINITY, f64::min)
     };
-    let bics = |of: &Record| {
-        let each = thetas.iter().map(|theta| bic(of, theta));
-        each.fold(f64::INFINITY, f64::min)
-    };
-    bics(&record.at_rest()) < bics(record)
+    least_bic(&record.at_rest()) < least_bic(record)
 }
 
 /// Step 2: the choice on the part of a record that tells most, and this part. The searches begin at `starts`, or where a

@@ -105,6 +105,9 @@ impl<const N: usize> Lifted<N> {
         let mut power = self.phi;
         let mut of_power: Matrix<N> =
             std::array::from_fn(|i| std::array::from_fn(|j| self.c[i] * self.c[j]));
+        if count == 1 {
+            return (power, of_power);
+        }
         let mut left = count;
         loop {
             if left & 1 == 1 {

@@ -12,7 +12,8 @@
 //! ln L = -1/2 (m ln(2 pi s2) + m + sum ln S_k + ln|X'X| - ln|X0'X0|),   s2 = |r|^2 / m,   m = N - p
 //! ```
 //!
-//! where `r` is the residual, `X` the `p` filtered columns and `X0` the same columns before the filter. All states are
+//! where `r` is the residual, `X` the `p` filtered columns and `X0` the same columns before the filter, all over the deviation of
+//! the outputs: a prior that is flat in another unit would favour more states in one unit and fewer in another. All states are
 //! unknown, so any initial covariance gives the same likelihood, and the filter starts from its steady one: its gain is
 //! constant from the first block on. Reference: P. de Jong, "The likelihood for a state space model", Biometrika 75
 //! (1988); G. H. Golub, V. Pereyra, SIAM J. Numer. Anal. 10 (1973).
@@ -61,6 +62,9 @@ pub(super) struct Evaluation {
     pub(super) disturbance_factors: (f64, f64),
     /// Variance `s2` of the white noise of a sample (output unit^2).
     pub(super) variance: f64,
+    /// Log-likelihood with a prior that is flat in the unit of the output, as the oracles have it.
+    #[cfg(test)]
+    pub(super) log_likelihood_in_output_units: f64,
     /// `sum ln S_k` and `ln|X'X| - ln|X0'X0|`.
     #[cfg(test)]
     pub(super) determinants: (f64, f64),
@@ -172,7 +176,7 @@ fn filtered<const N: usize, const D: usize>(
     let logs = log_variances + log_x;
     let scale = blocks.scale;
     let likelihood = -0.5 * (freedom * (TWO_PI * variance).ln() + freedom + logs);
-    let log_likelihood = likelihood - freedom * scale.ln();
+    let log_likelihood = likelihood - count as f64 * scale.ln();
     // With all linear unknowns at their best instead of integrated out.
     let all = count as f64;
     let profile = -0.5 * (all * (TWO_PI * sum / all).ln() + all + log_variances);
@@ -203,6 +207,8 @@ fn filtered<const N: usize, const D: usize>(
             .collect(),
         disturbance_factors: (fit.covariance[1][1], fit.covariance[0][1]),
         variance: squared,
+        #[cfg(test)]
+        log_likelihood_in_output_units: likelihood - freedom * scale.ln(),
         #[cfg(test)]
         determinants: (*log_variances, log_x),
     })

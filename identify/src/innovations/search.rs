@@ -43,6 +43,10 @@ pub(super) const ZOOM: usize = 6;
 /// Number of different starts for each kind of noise on a coarse copy, and of those that go on to the record.
 const STARTS: usize = 4;
 const RACED: usize = 2;
+/// Frequencies of the noise that are screened, times the length of the record: the first one with every process of the grid,
+/// the others with this many of the best processes.
+const NOISES: [f64; 3] = [60.0, 8.0, 300.0];
+const REFINED: usize = 12;
 
 /// Best point of a structure with a set of noises.
 #[derive(Clone, Debug)]
@@ -209,12 +213,26 @@ fn screen_at(
         return vec![];
     }
     let bounds = Bounds::new(structure, &blocks, longest_tau_s);
-    let mut screened: Vec<(f64, Theta)> = Vec::new();
     let mut memory = Memory::default();
-    for theta in grid(structure, &blocks, early_s, longest_tau_s) {
+    let mut likely = |theta: Theta| {
         let theta = bounds.clamp(&theta);
-        if let Some(at) = evaluate(&blocks, &theta, &mut memory) {
-            screened.push((at.log_likelihood, theta));
+        evaluate(&blocks, &theta, &mut memory).map(|at| (at.log_likelihood, theta))
+    };
+    let length = blocks.length_s();
+    let mut screened = Vec::new();
+    for theta in grid(structure, &blocks, early_s, longest_tau_s) {
+        let of_kinds = NoiseKind::ALL.map(|kind| theta.with_noise(kind, NOISES[0] / length));
+        screened.extend(of_kinds.into_iter().filter_map(&mut likely));
+    }
+    // The frequency of the noise hardly changes which processes explain a record: the others for the best of them.
+    for kind in NoiseKind::ALL {
+        screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let of_kind = screened.iter().filter(|(_, theta)| theta.noise(kind) > 0.0);
+        let best: Vec<Theta> = of_kind.take(REFINED).map(|(_, theta)| *theta).collect();
+        for theta in best {
+            let others = NOISES[1..].iter();
+            let others = others.map(|over_length| theta.with_noise(kind, over_length / length));
+            screened.extend(others.filter_map(&mut likely));
         }
     }
     screened.sort_by(|a, b| b.0.total_cmp(&a.0));
@@ -259,8 +277,7 @@ fn differ(a: &Theta, b: &Theta, longest_tau_s: f64) -> bool {
     lag + 5.0 * (a.tau_s() - b.tau_s()).abs() / longest_tau_s > 0.9
 }
 
-/// Grid of starts: lags and poles from two steps to a twelfth of the record, dead times to 0.4 of the longest, noises
-/// below 8, 60 and 300 over the length of the record.
+/// Grid of processes: lags and poles from two steps to a twelfth of the record, dead times to 0.4 of the longest.
 fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: f64) -> Vec<Theta> {
     let (dt, length) = (blocks.record.dt_s, blocks.length_s());
     let (shortest, longest) = (2.0 * dt, length / 12.0);
@@ -296,21 +313,14 @@ fn grid(structure: Structure, blocks: &Blocks<'_>, early_s: f64, longest_tau_s: 
         }
     }
     processes.extend(predicted(base, blocks));
-    let mut starts = Vec::new();
-    // Noise last: neighbours in the list share the response, which is the larger part of the work.
-    for process in processes {
-        for part in [0.0, 0.05, 0.15, 0.4] {
-            for kind in NoiseKind::ALL {
-                for over_length in [8.0, 60.0, 300.0] {
-                    let mut theta = process;
-                    theta.values[layout.tau()] = part * longest_tau_s - early_s;
-                    theta.set_noise(kind, over_length / length);
-                    starts.push(theta);
-                }
-            }
-        }
-    }
-    starts
+    let with_tau = |process: Theta| {
+        [0.0, 0.05, 0.15, 0.4].map(|part| {
+            let mut theta = process;
+            theta.values[layout.tau()] = part * longest_tau_s - early_s;
+            theta
+        })
+    };
+    processes.into_iter().flat_map(with_tau).collect()
 }
 
 /// The process `base` with the poles of the prediction from past outputs: the resonance of a light damping lies between the

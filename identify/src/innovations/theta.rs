@@ -113,6 +113,12 @@ impl Theta {
         self.values[self.layout().noise(kind)] = rad_per_s.ln();
     }
 
+    /// With a noise of this frequency (rad/s).
+    pub(super) fn with_noise(mut self, kind: NoiseKind, rad_per_s: f64) -> Self {
+        self.set_noise(kind, rad_per_s);
+        self
+    }
+
     /// With the noises of another fit.
     pub(super) fn with_noises_of(mut self, other: &Self) -> Self {
         for kind in NoiseKind::ALL {

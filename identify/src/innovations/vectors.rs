@@ -403,9 +403,9 @@ fn check(record: &Record, samples: usize, theta: &Theta, expected: [f64; 5]) -> 
     close(found.gain, gain, 1e-9, name);
     close(found.variance, variance, 1e-9, name);
     assert!(
-        (found.log_likelihood - likelihood).abs() < 2e-7,
+        (found.log_likelihood_in_output_units - likelihood).abs() < 2e-7,
         "{name} {}",
-        found.log_likelihood
+        found.log_likelihood_in_output_units
     );
     found.determinants
 }
@@ -482,7 +482,7 @@ fn best_points_with_their_covariance() {
         close(found.theta.noise(kind), w, 1e-5, "w");
         close(found.at.gain, gain, 1e-5, "gain");
         close(found.at.variance, variance, 1e-5, "variance");
-        assert!((found.at.log_likelihood - likelihood).abs() < 1e-6);
+        assert!((found.at.log_likelihood_in_output_units - likelihood).abs() < 1e-6);
         let laplace =
             Laplace::new(&blocks, &found, (&free, &NearLags::default()), &bounds).unwrap();
         assert_eq!(laplace.free, free);
