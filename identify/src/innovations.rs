@@ -67,6 +67,7 @@ use self::record::{Blocks, Record};
 pub(crate) use self::result::gain_of;
 use self::search::Candidate;
 use self::theta::{Bounds, Theta};
+pub(crate) use self::validate::is_left_to_the_input;
 use crate::assumed::recorded_filter;
 use crate::conclusion::conclude;
 use crate::excitation::{Excitation, Recorded};
@@ -389,6 +390,11 @@ impl Search<'_> {
         self.remarks = remarks;
         found
     }
+}
+
+/// Whether a prediction is good, and as good as the disturbances allow.
+pub(crate) fn is_as_expected(prediction: &Prediction) -> bool {
+    prediction.explained >= WELL_PREDICTED && prediction.error_ratio <= EXPECTED_ERROR_RATIO
 }
 
 /// Whether the response to a step before the first row begins as one from rest: with dead time or a second lag of at least

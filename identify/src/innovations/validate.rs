@@ -33,7 +33,7 @@ pub(super) fn is_coloured(tests: &InnovationTests) -> bool {
 }
 
 /// Whether the input explains a part of the innovations that chance does not.
-pub(super) fn is_left_to_the_input(tests: &InnovationTests) -> bool {
+pub(crate) fn is_left_to_the_input(tests: &InnovationTests) -> bool {
     tests.input_share > LEFT.0 && tests.input_f > LEFT.1
 }
 
