@@ -359,9 +359,11 @@ impl Search<'_> {
         components: &[Component],
         (tests, prediction): (InnovationTests, Option<Prediction>),
     ) -> Result<Identified, Verdict> {
-        let is_wider = validate::is_coloured(&tests) || validate::is_left_to_the_input(&tests);
         // An error of the prediction that the noise does not explain is one of the model.
-        let least = prediction.map_or(1.0, |found| found.error_ratio.max(1.0).sqrt());
+        let ratio = prediction.map_or(1.0, |found| found.error_ratio.max(1.0));
+        let is_wider = validate::is_coloured(&tests)
+            || validate::is_left_to_the_input(&tests)
+            || ratio > EXPECTED_ERROR_RATIO;
         let (posterior, widened) = draws::posterior_of(
             &fitted.best.found,
             components,
@@ -371,7 +373,7 @@ impl Search<'_> {
                 late_s: self.late_s(&fitted.record),
                 rest: fitted.record.rest.unwrap_or(0.0),
             },
-            is_wider.then_some(least),
+            is_wider.then_some(ratio.sqrt()),
         );
         let model = result::model(&fitted.best.found, prepared.early_s);
         let excited = self.excitation.and_then(|found| found.excited_rad_per_s);
