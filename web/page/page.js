@@ -61,7 +61,7 @@ const took = () => `${((performance.now() - began) / 1000).toFixed(2)} s`;
 // ---- State in the fragment: what was set for one loop of one recording, never data ---------------------------------
 
 const NAMES = ["kp", "ki", "kd", "filter_s"], LABELS = { kp: "Kp", ki: "Ki", kd: "Kd", filter_s: "filter (s)" };
-const CHOICES = ["from", "to", "structure", "style", "more"];
+const CHOICES = ["from", "to", "structure", "style", "vendor", "output-range", "more"];
 let kept, linked, fromAddress;
 const writeAddress = () => history.replaceState(null, "", kept.size ? `#${kept}` : location.pathname + location.search);
 const keep = (name, value) => {
@@ -89,9 +89,11 @@ const belongTo = (key, flight, loop) => {
 // ---- Opening -------------------------------------------------------------------------------------------------------
 
 let file, log, signals, report, view;
+// Whether a file is answered as soon as it is open.
+let isAutomatic = true;
 // Hides the section and those after it. What was identified goes with them.
 const hideAfter = (id) => {
-  const all = ["recording", "result", "design"];
+  const all = ["recording", "settings", "result", "evidence", "design"];
   for (const later of all.slice(all.indexOf(id))) at(later).hidden = true;
   report = undefined;
 };
@@ -103,8 +105,11 @@ const open = async (blob, name) => {
   file.key = answer.key;
   const isKept = kept.get("file") === file.key;
   log = answer.log;
+  at("drop").classList.add("small");
+  at("drop-text").textContent = "Another recording:";
+  at("hint").hidden = true;
   at("loops").hidden = !log;
-  at("surveyed").hidden = true;
+  forgetSurvey();
   if (log) {
     at("flight").replaceChildren(...log.flights.map((flight, k) => make("option", `${k + 1}: ${(flight.span_s[1] - flight.span_s[0]).toFixed(0)} s, ${flight.version || flight.firmware}`, { value: k + 1 })));
     const lengths = log.flights.map(({ span_s: [from, to] }) => to - from);
@@ -115,9 +120,28 @@ const open = async (blob, name) => {
     if (isKept && [...at("loop").options].some((one) => one.value === kept.get("loop"))) at("loop").value = kept.get("loop");
     if (!at("loop").options.length) return say("The log has no control loop with input and output. Its advice: " + (log.flights[0]?.advice ?? []).join(" "), true);
   }
+  const isSet = isKept && [...CHOICES, ...NAMES].some((name) => kept.has(name));
   const isOther = belongs();
   await readSignals();
   if (isOther && signals) say(`${at("state").textContent} Settings of another recording or loop are not used.`);
+  if (isAutomatic && signals && opened === file) await answerAll(opened, isSet);
+};
+// The answer without a click: of a flight log all loops, then the first one to change; where settings are given, their loop.
+const answerAll = async (of, isSet) => {
+  if (log && at("loop").options.length > 1 && !isSet) {
+    const loops = await surveyAll();
+    if (!loops || of !== file) return;
+    const first = ["change", "first_gains", "keep"].map((verdict) => loops.find(({ answer }) => answer?.verdict === verdict)).find(Boolean);
+    if (!first) return say("No loop is told by this flight. What to fly stands beside each.");
+    return openLoop(first.name);
+  }
+  await identify();
+  at("settings-panel").open = !report || report.verdict.kind !== "identified";
+};
+const openLoop = async (name) => {
+  if (at("loop").value !== name) { at("loop").value = name; belongs(); await readSignals(); }
+  await identify();
+  at("settings-panel").open = !report || report.verdict.kind !== "identified";
 };
 // The settings belong to the loop that is chosen.
 const belongs = () => belongTo(file.key, log ? at("flight").value : "", log ? at("loop").value : "");
@@ -136,7 +160,7 @@ const loopOptions = () => {
 const words = (text) => (text.match(/"[^"]*"|\S+/g) ?? []).map((word) => word.replace(/^"|"$/g, ""));
 const options = () => {
   const all = [...loopOptions(), ...words(at("more").value)];
-  for (const id of ["structure", "style", "from", "to"]) if (at(id).value !== "") all.push(`--${id}`, at(id).value);
+  for (const id of CHOICES) if (id !== "more" && at(id).value !== "") all.push(`--${id}`, at(id).value);
   return all;
 };
 let reading;
@@ -147,7 +171,9 @@ const readNow = async () => {
   for (const id of CHOICES) at(id).value = kept.get(id) ?? "";
   const answer = await waited("Reading the signals.", { message: { do: "signals", options: [...loopOptions(), ...words(at("more").value)] } }, "identify");
   // The names of columns can be given as options.
-  at("recording").hidden = !answer && Boolean(log) && !at("loop").options.length;
+  at("recording").hidden = !log || !at("loop").options.length;
+  at("settings").hidden = !answer && Boolean(log) && !at("loop").options.length;
+  at("settings-panel").open = true;
   at("signals").hidden = !answer;
   if (!answer) { signals = undefined; return; }
   signals = answer;
@@ -217,7 +243,8 @@ const outdate = () => {
   hideAfter("result");
 };
 for (const id of CHOICES) at(id).addEventListener("input", outdate);
-for (const id of ["structure", "style"]) at(id).onchange = () => keep(id, at(id).value);
+for (const id of ["style", "more"]) at(id).addEventListener("input", () => forgetSurvey());
+for (const id of ["structure", "style", "vendor", "output-range"]) at(id).onchange = () => keep(id, at(id).value);
 // Other columns are read after the press on a button that ended the typing: a button that is disabled or moves under a
 // press is not clicked.
 let isUnread = false, pressed = Promise.resolve();
@@ -232,7 +259,8 @@ at("more").onchange = async () => {
   if (isUnread) readSignals();
 };
 at("loop").onchange = () => { belongs(); readSignals(); };
-at("flight").onchange = () => { fillLoops(); belongs(); readSignals(); };
+at("flight").onchange = () => { forgetSurvey(); fillLoops(); belongs(); readSignals(); };
+at("settings-panel").ontoggle = () => { if (at("settings-panel").open && signals) redrawSignals(); };
 
 // ---- Tables --------------------------------------------------------------------------------------------------------
 
@@ -241,28 +269,56 @@ const row = (cells) => {
   cells.forEach((cell, k) => line.append(k ? make("td", cell) : make("th", cell, { scope: "row" })));
   return line;
 };
-at("survey").onclick = async () => {
-  const flight = log.flights.length > 1 ? ["--flight", at("flight").value] : [];
-  const answer = await waited("Identifying every loop.", { message: { do: "survey", options: flight } });
-  if (!answer) return;
-  say(`Every loop in ${took()}.`);
+const VERDICTS = { change: "CHANGE", keep: "KEEP YOURS", first_gains: "FIRST GAINS", not_yet: "NOT YET" };
+let surveyed;
+const forgetSurvey = () => { surveyed = undefined; at("surveyed").hidden = at("all").hidden = true; };
+// What to do about a loop, as the program's card says it.
+const loopCard = ({ name, answer, parts }) => {
+  const card = make("div", null, { className: `card ${answer?.verdict ?? "not_yet"}` });
+  const title = make("h3"), button = make("button", name, { type: "button" });
+  button.onclick = () => openLoop(name);
+  title.append(button);
+  const why = answer ? answer.reason : parts[0]?.verdict.replaceAll("_", " ") ?? "no part of the flight can be used";
+  card.append(title, make("p", `${VERDICTS[answer?.verdict ?? "not_yet"]}: ${why.replace(/\.$/, "")}.`));
+  if (answer?.verdict !== "change" && answer?.verdict !== "first_gains") return card;
   const table = make("table"), body = make("tbody"), head = make("tr");
-  table.append(make("caption", "Loops of the flight; choose one above to see more"), make("thead"), body);
-  for (const name of ["loop", "gain of the process", "delay", "gains in force", "phase margin", "proposed gains", "phase margin"]) head.append(make("th", name, { scope: "col" }));
+  for (const title of ["gain", "now", "half", "full"]) head.append(make("th", title, { scope: "col" }));
+  table.append(make("thead"), body);
   table.tHead.append(head);
-  const gainsOf = (of) => of ? [of.kp, of.ki, of.kd].map((gain) => shown(gain, 3)).join(", ") : "–";
-  const margin = (of) => degrees(of?.phase_margin_deg);
-  for (const one of answer.loops) {
-    const found = one.gain ? `${shown(one.gain[1], 3)} (${shown(one.gain[0], 3)} to ${shown(one.gain[2], 3)}) ${one.gain_unit ?? ""}` : one.parts[0]?.verdict.replaceAll("_", " ") ?? "not excited";
-    body.append(row([one.name, found, seconds(one.delay_s), gainsOf(one.in_force), margin(one.in_force), gainsOf(one.proposed), margin(one.proposed)]));
-  }
-  at("surveyed").replaceChildren(table);
-  at("surveyed").hidden = false;
+  for (const gain of answer.gains) body.append(row([gain.unit ? `${gain.name} (${gain.unit})` : gain.name, ...[gain.now, gain.half, gain.full].map((value) => shown(value, 3))]));
+  const { now, half, full } = answer.figures ?? {};
+  body.append(row(["phase margin", ...[now, half, full].map((of) => degrees(of?.phase_margin_deg))]));
+  card.append(table);
+  return card;
 };
+// Every loop of the flight: the loops, or undefined if it failed.
+const surveyAll = async () => {
+  const flight = log.flights.length > 1 ? ["--flight", at("flight").value] : [];
+  const style = at("style").value ? ["--style", at("style").value] : [];
+  const of = file, options = [...flight, ...style, ...words(at("more").value)];
+  const answer = await waited("Identifying every loop.", { message: { do: "survey", options } });
+  if (!answer || of !== file) return undefined;
+  say(`Every loop in ${took()}.`);
+  surveyed = answer;
+  const cards = make("div", null, { className: "cards" });
+  cards.append(...answer.loops.map(loopCard));
+  at("surveyed").replaceChildren(cards);
+  at("surveyed").hidden = false;
+  at("all").hidden = !answer.parameters;
+  return answer.loops;
+};
+at("survey").onclick = surveyAll;
+const saveAll = (which) => {
+  const { parameters } = surveyed;
+  save(parameters[which], `${stem(false)}_all.${which === "apply" ? "" : "restore."}${parameters.ending}`);
+  say(which === "apply" ? "The half step of all loops to change is saved. Save the file of the old parameters as well, before you fly." : "Saved: this file sets the old values again.");
+};
+at("save-all").onclick = () => saveAll("apply");
+at("save-all-restore").onclick = () => saveAll("restore");
 
 // ---- Identification ------------------------------------------------------------------------------------------------
 
-at("identify").onclick = async () => {
+const identify = async () => {
   if (isUnread) readSignals();
   await reading;
   hideAfter("result");
@@ -273,11 +329,11 @@ at("identify").onclick = async () => {
   report = answer;
   showResult();
 };
+at("identify").onclick = identify;
 const SYMBOLS = {
   k: "K", k_over_t_body: "K/T_body", t_prop_s: "T_prop (s)", t_prop2_s: "T_prop2 (s)", t_body_s: "T_body (s)", tau_s: "tau (s)",
   natural_frequency_rad_per_s: "w0 (rad/s)", zeta: "zeta", input_bias: "input bias",
 };
-const VERDICTS = { change: "CHANGE", keep: "KEEP YOURS", first_gains: "FIRST GAINS", not_yet: "NOT YET" };
 const showResult = () => {
   const isFound = report.verdict.kind === "identified";
   say(`${isFound ? "Identified" : "No process identified"} in ${took()}.`);
@@ -299,7 +355,7 @@ const showResult = () => {
   }));
   at("report").open = false;
   at("frame").removeAttribute("srcdoc");
-  at("result").hidden = false;
+  at("result").hidden = at("evidence").hidden = false;
   at("verdict").focus({ preventScroll: true });
   showDesign();
 };
@@ -309,9 +365,9 @@ const save = (text, name) => {
   setTimeout(() => URL.revokeObjectURL(link.href), 1000);
 };
 // Name of a file to save: that of the recording, and of a flight log its loop.
-const stem = () => {
+const stem = (hasLoop = true) => {
   const flight = log?.flights.length > 1 ? [`flight${at("flight").value}`] : [];
-  return [file.name.replace(/\.[^.]*$/, ""), ...flight, ...(log ? at("loop").value.split(" ") : [])].join("_");
+  return [file.name.replace(/\.[^.]*$/, ""), ...flight, ...(log && hasLoop ? at("loop").value.split(" ") : [])].join("_");
 };
 at("save-json").onclick = async () => { const of = report, { text } = await ask({ do: "json" }); if (of === report) save(text, `${stem()}.json`); };
 const page = () => waited("Drawing the report.", { message: { do: "page" } });
@@ -469,6 +525,8 @@ const drawDesign = (of) => {
   drawn = of;
   if (of.error) return say(of.error, true);
   const other = against.judged;
+  at("named").tBodies[0].replaceChildren(...(of.named ?? []).map((gain) => row([gain.unit ? `${gain.name} (${gain.unit})` : gain.name, ...[gain.now, gain.half, gain.full].map((value) => shown(value))])));
+  at("named").hidden = !of.named?.length;
   at("figures").tBodies[0].replaceChildren(...FIGURES.map(([name, text]) => row([name, text(of), other.error ? "–" : text(other)])));
   at("figures").tBodies[0].classList.toggle("bad", !of.is_stable);
   at("limits").textContent = of.asks ?? "";
@@ -533,20 +591,25 @@ at("save-restore").onclick = () => saveParameters("restore", isWhole, "Saved: th
 
 // ---- Simulation ----------------------------------------------------------------------------------------------------
 
+// Parameters, and a test that tells the process: the test of the page lists and tries each of them.
 const PROCESSES = {
-  soiptd: "K=1, T_prop=0.0321, T_body=1.6886, tau=0.0237", foptd: "K=2, T_body=30, tau=5", soptd: "K=2, T_prop=5, T_body=30, tau=5",
-  toptd: "K=2, T_prop=5, T_prop2=2, T_body=30, tau=5", iptd: "K=1, tau=0.1", integrator_lag: "K=1, T_prop=0.1, tau=0.05", double_integrator_lag: "K/T_body=40, T_prop=0.05, tau=0.015",
-  toiptd: "K=1, T_prop=0.03, T_prop2=0.01, T_body=1.7, tau=0.02", resonant: "K=1, w0=10, zeta=0.3, tau=0.02", resonant_lag: "K=1, T_prop=0.05, w0=10, zeta=0.3, tau=0.02",
+  soiptd: ["K=1, T_prop=0.0321, T_body=1.6886, tau=0.0237", "relay", "", 1000, ""],
+  foptd: ["K=2, T_body=30, tau=5", "step", 200, 2, "--preroll 10"],
+  soptd: ["K=2, T_prop=5, T_body=30, tau=5", "step", 200, 2, "--preroll 10"],
+  toptd: ["K=2, T_prop=5, T_prop2=2, T_body=30, tau=5", "prbs", 600, 2, "--pulse 10"],
+  iptd: ["K=1, tau=0.1", "prbs", 60, 50, "--pulse 0.5"],
+  integrator_lag: ["K=1, T_prop=0.1, tau=0.05", "prbs", 60, 50, "--pulse 0.3"],
+  double_integrator_lag: ["K/T_body=40, T_prop=0.05, tau=0.015", "relay", 8, 1000, ""],
+  toiptd: ["K=1, T_prop=0.03, T_prop2=0.01, T_body=1.7, tau=0.02", "relay", 10, 1000, ""],
+  resonant: ["K=1, w0=10, zeta=0.3, tau=0.02", "prbs", 40, 100, "--pulse 0.2"],
+  resonant_lag: ["K=1, T_prop=0.05, w0=10, zeta=0.3, tau=0.02", "prbs", 40, 100, "--pulse 0.15"],
 };
 at("s-process").append(...Object.keys(PROCESSES).map((name) => make("option", name)));
+at("vendor").append(...["isa", "proportional-band", "interacting", "deltav", "deltav-series", "tdc3000", "centum", "pide", "pide-independent", "control-expert"].map((name) => make("option", name)));
 at("structure").append(...Object.keys(PROCESSES).map((name) => make("option", name)));
 const setProcess = () => {
-  const name = at("s-process").value, isSlow = /optd$/.test(name);
-  at("s-parameters").value = PROCESSES[name];
-  at("s-excitation").value = isSlow ? "step" : "relay";
-  at("s-more").value = isSlow ? "--preroll 10" : "";
-  at("s-duration").value = isSlow ? 200 : "";
-  at("s-rate").value = isSlow ? 2 : 1000;
+  const values = PROCESSES[at("s-process").value];
+  ["parameters", "excitation", "duration", "rate", "more"].forEach((name, k) => { at(`s-${name}`).value = values[k]; });
 };
 at("s-process").onchange = setProcess;
 setProcess();
@@ -623,6 +686,10 @@ document.addEventListener("drop", (event) => {
   const [dropped] = event.dataTransfer.files;
   if (dropped) open(dropped, dropped.name);
 });
+// What was set by hand is lost with the page, the file with it: the browser asks.
+addEventListener("beforeunload", (event) => {
+  if (file && [...CHOICES, ...NAMES].some((name) => kept.has(name))) event.preventDefault();
+});
 let widthDrawn = innerWidth;
 addEventListener("resize", () => {
   if (innerWidth === widthDrawn) return;
@@ -635,6 +702,7 @@ addEventListener("resize", () => {
     module = await WebAssembly.compile(await unpacked("wasm"));
     await start();
     say("Ready.");
+    at("hint").hidden = !kept.has("file");
     document.body.dataset.readyMs = performance.now();
   } catch (error) {
     say(`The studio cannot start in this browser: ${error.message}`, true);

@@ -28,8 +28,9 @@ const plots = (() => {
   // of: { title, x, y: labels, xs, ys: ranges, curves: [{ points, hue, dash }], bands: [{ rows: [[x, low, high]], hue }],
   // circles: [{ at, radius }], marks: [{ at, text }], square }
   const draw = (place, of) => {
-    const width = Math.max(place.clientWidth, 240), height = of.height ?? (of.square ? Math.min(width, 380) : 230);
-    const [left, right, top, bottom] = [54, 10, 8, 38];
+    const width = Math.max(place.clientWidth, 150), isSmall = width < 240;
+    const height = of.height ?? (of.square ? Math.min(width, 380) : isSmall ? 165 : 230);
+    const [left, right, top, bottom] = [isSmall ? 44 : 54, isSmall ? 2 : 10, 8, 38];
     const [w, h] = [width - left - right, height - top - bottom];
     let { xs, ys } = of;
     if (of.square) {

@@ -53,14 +53,16 @@ def expect(is_so, what):
 class Studio:
     """The page in a browser, and what it did wrong."""
 
-    def __init__(self, browser, path, fragment="", **screen):
+    def __init__(self, browser, path, fragment="", is_automatic=False, **screen):
+        self.is_automatic = is_automatic
         self.context = browser.new_context(accept_downloads=True, **screen)
         self.context.set_offline(True)
         self.faults = []
         self.page = page = self.context.new_page()
         page.on("console", lambda message: message.type in ("error", "warning") and self.faults.append(message.text))
         page.on("pageerror", lambda error: self.faults.append(str(error)))
-        page.on("dialog", lambda dialog: self.faults.append(f"dialog {dialog.message}") or dialog.dismiss())
+        self.questions = []
+        page.on("dialog", self.asked)
         page.on("request", self.requested)
         self.path = path
         self.load(fragment)
@@ -71,6 +73,15 @@ class Studio:
         self.page.goto(self.path.as_uri() + fragment)
         self.until("document.body.dataset.readyMs !== undefined || document.getElementById('state').className === 'bad'")
         expect(self.state() == "Ready.", self.state())
+        # Most tests press Identify themselves.
+        self.page.evaluate(f"isAutomatic = {str(self.is_automatic).lower()}")
+
+    def asked(self, dialog):
+        """Leaves the page when the browser asks; anything else is a fault."""
+        self.questions.append(dialog.type)
+        if dialog.type != "beforeunload":
+            self.faults.append(f"dialog {dialog.message}")
+        dialog.accept()
 
     def requested(self, request):
         if not request.url.startswith(("file:", "blob:", "data:", "about:")):
@@ -99,6 +110,8 @@ class Studio:
             self.page.set_input_files("#file", content)
         self.until("typeof file === 'object'")
         self.rest()
+        if self.is_automatic:
+            self.until("report !== undefined")
 
     def drop_with_mouse(self, name, content):
         """The event of a real drop."""
@@ -442,9 +455,6 @@ def stretch(studio, told):
     page.click("#whole")
     page.click("#survey")
     studio.until("!document.getElementById('surveyed').hidden")
-    survey = program(told.program, "identify", path, "--json")
-    rows = page.locator("#surveyed tbody tr").count()
-    expect(rows == len(survey["loops"]), f"{rows} rows")
     page.click("#identify")
     page.evaluate("document.getElementById('cancel').click()")
     studio.until("document.getElementById('state').textContent === 'Cancelled.'")
@@ -455,10 +465,119 @@ def stretch(studio, told):
     print("stretch, survey, cancel: as they should be")
 
 
+def answered(browser, told):
+    """A dropped file is answered without a click: a table, and all loops of a flight, whose gains are saved at once."""
+    studio = Studio(browser, told.page, is_automatic=True, viewport={"width": 1440, "height": 900})
+    page = studio.page
+    studio.drop("hover", str(told.repository / "examples/simulated_hover.csv"))
+    studio.designed()
+    expect(page.inner_text("#verdict").startswith("FIRST GAINS: "), page.inner_text("#verdict"))
+    named = lambda: [row.split("\t") for row in page.inner_text("#named tbody").splitlines()]
+    expect([row[0] for row in named()][:3] == ["Kp", "Ki", "Kd"], named())
+    expect(not page.evaluate("document.getElementById('settings-panel').open"), "the settings are folded")
+    in_sight(page, ("#verdict", "#named", "#calm", "#step svg", "#load svg"))
+    # A flight: the card of the program, and the share of the work that is done.
+    page.evaluate("""window.shares = []; new MutationObserver(() => { const { value } = document.getElementById("progress");
+        if (document.getElementById("progress").hasAttribute("value")) shares.push([value, document.getElementById("state").textContent]); })
+        .observe(document.getElementById("progress"), { attributes: true })""")
+    log = str(told.repository / "examples/logs/px4_chirps.ulg")
+    studio.drop("log", log)
+    studio.until("document.getElementById('busy').hidden && !document.getElementById('design').hidden")
+    studio.designed()
+    survey = program(told.program, "identify", log, "--json")
+    verdicts = {"change": "CHANGE", "keep": "KEEP YOURS", "first_gains": "FIRST GAINS", "not_yet": "NOT YET"}
+    cards = page.locator("#surveyed .card")
+    expect(cards.count() == len(survey["loops"]), f"{cards.count()} cards")
+    for place, one in enumerate(survey["loops"]):
+        text = cards.nth(place).inner_text()
+        expect(text.startswith(one["name"]) and verdicts[one["answer"]["verdict"]] in text, text)
+    shares = [share for share, work in page.evaluate("shares") if work.startswith("Identifying")]
+    expect(len(set(shares)) >= len(survey["loops"]) and max(shares) == 1, f"shares {shares}")
+    first = next(one for one in survey["loops"] if one["answer"]["verdict"] == "change")
+    expect(page.input_value("#loop") == first["name"], page.input_value("#loop"))
+    now = {gain["name"]: gain for gain in first["answer"]["gains"]}
+    for name, *values in named():
+        for value, column in zip(values, ("now", "half", "full")):
+            expect(abs(float(value) / now[name][column] - 1) < 2 * CLOSE, f"{name} {column} {value}, not {now[name][column]}")
+    # What moves by hand has its name too.
+    before = named()
+    page.fill("#exact-kp", str(0.9 * page.evaluate("gains.kp")))
+    page.press("#exact-kp", "Enter")
+    studio.until("!isAsking && drawn?.step_band !== undefined")
+    expect(named()[0][:2] == before[0][:2] and float(named()[0][3]) < float(before[0][3]), f"{before} and {named()}")
+    ours, name = studio.saved("#save-all")
+    path = told.scratch / "all.params"
+    program(told.program, "identify", log, "--json", "--force", "--write", str(path))
+    expect(name == "px4_chirps_all.params", name)
+    same_parameters(ours, path.read_text(encoding="utf-8"))
+    ours, name = studio.saved("#save-all-restore")
+    expect(name == "px4_chirps_all.restore.params", name)
+    same_parameters(ours, path.with_suffix(".restore.params").read_text(encoding="utf-8"))
+    # Another loop by its card; a reload asks before gains are lost, and the address keeps them.
+    page.locator("#surveyed button", has_text="pitch rate").click()
+    studio.rest()
+    studio.designed()
+    expect(page.input_value("#loop") == "pitch rate", "the card opens its loop")
+    expect(studio.questions == [], "no question without need")
+    page.fill("#exact-kp", str(0.9 * page.evaluate("gains.kp")))
+    page.press("#exact-kp", "Enter")
+    studio.until("!isAsking && drawn?.step_band !== undefined")
+    kp = page.evaluate("gains.kp")
+    page.reload()
+    studio.until("document.body.dataset.readyMs !== undefined")
+    expect(studio.questions == ["beforeunload"], f"a reload asks: {studio.questions}")
+    expect(page.is_visible("#hint"), "the page says what to do after a reload")
+    studio.drop("log", log)
+    studio.designed()
+    expect(page.evaluate("gains.kp") == kp and page.is_visible("#origin"), "the gains of the address")
+    studio.close()
+    # Gains as the controller of a plant takes them.
+    studio = Studio(browser, told.page, **DESK)
+    page, plant = studio.page, str(told.repository / "examples/plant/lic101_export.csv")
+    studio.drop("plant", plant)
+    page.fill("#more", "--controller pi")
+    page.select_option("#vendor", "deltav")
+    page.fill("#output-range", "0..100")
+    studio.identify()
+    studio.designed()
+    theirs = program(told.program, "identify", plant, "--json", "--controller", "pi", "--vendor", "deltav", "--output-range", "0..100")
+    gains = theirs["answer"]["gains"]
+    rows = [row.split("\t") for row in page.inner_text("#named tbody").splitlines()]
+    expect([row[0].split(" ")[0] for row in rows] == [gain["name"] for gain in gains], f"{rows} and {gains}")
+    expect(all(abs(float(row[3]) / gain["full"] - 1) < 2 * CLOSE for row, gain in zip(rows, gains)), f"{rows} and {gains}")
+    studio.close()
+    # On a phone the responses stay in sight while the gains move.
+    studio = Studio(browser, told.page, is_automatic=True, viewport={"width": 390, "height": 844}, is_mobile=True, has_touch=True)
+    studio.drop("hover", str(told.repository / "examples/simulated_hover.csv"))
+    studio.designed()
+    studio.page.locator("#slide-kd").scroll_into_view_if_needed()
+    studio.page.wait_for_timeout(600)
+    in_sight(studio.page, ("#slide-kd", "#step svg", "#load svg"))
+    studio.close()
+    print("answers without a click, all loops, questions before a loss: as they should be")
+
+
+def in_sight(page, names):
+    """Checks that these are on the screen as it is."""
+    width, height = page.evaluate("[innerWidth, innerHeight]")
+    for name in names:
+        box = page.locator(name).bounding_box()
+        expect(box and box["y"] >= 0 and box["y"] + box["height"] <= height and box["x"] + box["width"] <= width + 1, f"{name} is at {box}")
+
+
 def simulated(studio):
     """A relay test, a step and a chirp of processes of one's own."""
     page = studio.page
     page.evaluate("document.getElementById('simulate-panel').open = true")
+    # Every process with the test that the page gives it.
+    for process in page.locator("#s-process option").all_text_contents():
+        page.select_option("#s-process", process)
+        page.evaluate("signals = undefined")
+        page.click("#simulate")
+        studio.until("signals !== undefined || document.getElementById('state').className === 'bad'")
+        studio.rest()
+        studio.identify()
+        expect(page.inner_text("#advice").startswith("Identified: "), f"{process}: {studio.state()} {page.inner_text('#advice')}")
     for process, excitation, more in [("soiptd", "relay", ""), ("foptd", "step", None), ("soptd", "prbs", "--pulse 10"),
                                       ("soiptd", "chirp", "--band 0.5,10 --loop 40,8")]:
         page.select_option("#s-process", process)
@@ -610,7 +729,7 @@ def main():
             return
         studio = Studio(browser, told.page, **DESK)
         parts = [
-            (numbers, studio, told), (stretch, studio, told), (by_hand, studio, told), (belongings, browser, told),
+            (numbers, studio, told), (answered, browser, told), (stretch, studio, told), (by_hand, studio, told), (belongings, browser, told),
             (outdated, browser, told), (simulated, studio), (hostile, studio), (large, studio, told), (looks, browser, told),
         ]
         for part, *given in parts:

@@ -12,11 +12,11 @@ use super::log::{self, Source};
 use super::log_gains::{self, LogLoop};
 use crate::args::{Estimator, Identify};
 use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print};
-use crate::report::flight as report;
+use crate::output::{Waiting, print, write_text};
 use crate::report::units::Units;
+use crate::report::{flight as report, page};
 use crate::results::answer::Advice;
-use crate::results::flight::{FlightLoop, Found, Part, Refusal, Survey};
+use crate::results::flight::{FlightLoop, Found, Part, Refusal, Shown, Survey};
 use crate::words::log::of_firmware;
 
 /// Largest ratio of the ends of the interval of a part's gain.
@@ -35,13 +35,16 @@ pub(crate) fn is_asked(arguments: &Identify) -> bool {
         || arguments.input_late.is_some()
         || arguments.output_filter.is_some()
         || arguments.estimator != Estimator::Auto
-        || arguments.rows
-        || arguments.report.is_some();
+        || arguments.rows;
     !is_one && log::is_log(&arguments.file)
 }
 
 pub(super) fn run(arguments: &Identify, asked: &Specification) -> Result<ExitCode, Failure> {
     let surveyed = survey(arguments, asked)?;
+    if let Some(path) = &arguments.report {
+        let _waiting = Waiting::on("drawing");
+        write_text(path, &page::flight(&surveyed))?;
+    }
     print(&if arguments.json {
         report::json(&surveyed)
     } else {
@@ -105,18 +108,22 @@ fn of_loop(
     let signals = log::signals(source, log, number, of)?;
     let mut of_log = LogLoop::new(flight.clone(), of);
     let asked = of_log.specification(*asked, false);
-    let (mut one, mut processes) = parts(&signals, flight, &asked);
-    while let Some((at, best)) = one.best().and_then(|at| Some((at, processes[at].take()?))) {
-        let choice = controllers::of_identified(&best, of_log.in_force());
+    let (mut one, mut shown) = parts(&signals, flight, &asked);
+    while let Some((at, of)) = one.best().and_then(|at| Some((at, shown.get_mut(at)?))) {
+        let Ok(best) = &of.identification.outcome else {
+            break;
+        };
+        let mut choice = controllers::of_identified(best, of_log.in_force());
         if of_log.contradicts(&choice) {
             of_log = of_log.with_read_back(source, log, number)?;
         }
         if of_log.contradicts(&choice) {
             one.parts[at].outcome = Err(Refusal::Verdict(Verdict::UnstableInForce));
+            of.identification.refuse(Verdict::UnstableInForce);
             continue;
         }
         let answer = answer::of_identified(
-            &best,
+            best,
             &answer::Subject {
                 file: &arguments.file.display().to_string(),
                 units: &Units::default(),
@@ -128,12 +135,20 @@ fn of_loop(
         );
         if arguments.write.write.is_some() && answer.verdict == Advice::Change {
             of_log = of_log.with_read_back(source, log, number)?;
-            one.to_write = Some(of_log.judged(&arguments.write, Some(&best), Some(&choice)));
+            one.to_write = Some(of_log.judged(&arguments.write, Some(best), Some(&choice)));
+        }
+        if arguments.report.is_some() {
+            of_log = of_log.with_read_back(source, log, number)?;
+            let gains = of_log.gains(&of.recording, &of.identification, Some(&choice));
+            choice = choice.with_trade_off(&best.for_design(0).0);
+            of.gains = Some(gains);
         }
         one.answer = Some(answer);
         one.choice = Some(choice);
         break;
     }
+    let at = one.best().unwrap_or(0);
+    one.shown = shown.into_iter().nth(at);
     Ok(one)
 }
 
@@ -148,48 +163,39 @@ pub(super) fn best_part(signals: &Signals, flight: &Flight, asked: &Specificatio
     }
 }
 
-/// A loop with the parts of the flight worth using, and the process of each.
-fn parts(
-    signals: &Signals,
-    flight: &Flight,
-    asked: &Specification,
-) -> (FlightLoop, Vec<Option<Identified>>) {
+/// A loop with the parts of the flight worth using, and what was identified from each.
+fn parts(signals: &Signals, flight: &Flight, asked: &Specification) -> (FlightLoop, Vec<Shown>) {
     let spans = flight.stretches(signals);
-    let mut outcomes: Vec<_> = (spans.par_iter())
+    let mut all: Vec<(Span, Shown)> = (spans.par_iter())
         .filter_map(|span| Some((*span, identified(&signals.part(*span), asked)?)))
         .collect();
     // What no part tells alone, the response to the set-point over all of the flight may tell. A fit to the input that no part
     // confirms is not taken.
-    if spans.len() > 1 && outcomes.iter().all(|(_, outcome)| outcome.is_err()) {
+    let is_refused = |(_, shown): &(_, Shown)| shown.identification.outcome.is_err();
+    if spans.len() > 1 && all.iter().all(is_refused) {
         let whole = spans.iter().fold(spans[0], |all, span| all.with(*span));
-        let outcome = identified(&signals.part(whole), asked);
-        let outcome = outcome.filter(|outcome| {
-            let found = outcome.as_ref().ok();
+        let shown = identified(&signals.part(whole), asked).filter(|shown| {
+            let found = shown.identification.outcome.as_ref().ok();
             found.is_some_and(|found| found.fit.set_point_response().is_some())
         });
-        outcomes.extend(outcome.map(|outcome| (whole, outcome)));
+        all.extend(shown.map(|shown| (whole, shown)));
     }
-    let mut parts = Vec::new();
-    let mut processes = Vec::new();
-    for (span, outcome) in outcomes {
-        let found = match outcome {
+    let part = |(span, shown): &(Span, Shown)| {
+        let found = match &shown.identification.outcome {
             Ok(identified) => {
-                let found = found(&identified).ok_or(Refusal::Verdict(Verdict::TooUncertain));
-                processes.push(Some(identified));
-                let input = &signals.part(span).input;
+                let input = shown.recording.input();
                 let mean_input = input.iter().sum::<f64>() / input.len() as f64;
+                let found = found(identified).ok_or(Refusal::Verdict(Verdict::TooUncertain));
                 found.and_then(|found| plausible(found, signals.control_loop, mean_input))
             }
-            Err(verdict) => {
-                processes.push(None);
-                Err(Refusal::Verdict(verdict))
-            }
+            Err(verdict) => Err(Refusal::Verdict(verdict.clone())),
         };
-        parts.push(Part {
-            span,
+        Part {
+            span: *span,
             outcome: found,
-        });
-    }
+        }
+    };
+    let parts = all.iter().map(part).collect();
     let one = FlightLoop {
         control_loop: signals.control_loop,
         units: signals.units,
@@ -197,27 +203,36 @@ fn parts(
         choice: None,
         answer: None,
         to_write: None,
+        shown: None,
     };
-    (one, processes)
+    (one, all.into_iter().map(|(_, shown)| shown).collect())
 }
 
-/// The process of a part. `None`: its signals make no recording.
-fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified, Verdict>> {
+/// What was identified from a part. `None`: its signals make no recording.
+fn identified(part: &Signals, asked: &Specification) -> Option<Shown> {
     let recording = part.recording().ok()?;
     let identify = (onecycle::Identify::new())
         .specification(*asked)
         .structure(log_gains::structure(part.control_loop))
         .without_default_run();
-    let outcome = identify.run(&recording).outcome;
+    let mut identification = identify.run(&recording);
     // Of several parts one that knows its gain to less than a factor of two tells nothing.
     let tells = |found: &Identified| {
         let gain = found.effectiveness();
         gain.is_none_or(|[low, _, high]| high < MOST_RATIO * low)
     };
-    Some(outcome.and_then(|found| match tells(&found) {
-        true => Ok(found),
-        false => Err(Verdict::TooUncertain),
-    }))
+    if identification
+        .outcome
+        .as_ref()
+        .is_ok_and(|found| !tells(found))
+    {
+        identification.refuse(Verdict::TooUncertain);
+    }
+    Some(Shown {
+        recording,
+        identification,
+        gains: None,
+    })
 }
 
 /// What is shown of a process. `None`: its gain has no interval.

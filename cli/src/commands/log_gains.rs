@@ -160,6 +160,19 @@ impl LogLoop {
                 Ok(to_write) => Ok(self.write(path, to_write)?),
             }),
         };
+        Ok(LogGains {
+            written,
+            ..self.gains(recording, found, choice)
+        })
+    }
+
+    /// The gains in force, and what the loop with them and the model explains.
+    pub(super) fn gains(
+        &self,
+        recording: &Recording,
+        found: &Identification,
+        choice: Option<&Controllers>,
+    ) -> LogGains {
         let overlay = match (self.control_loop, self.in_force(), choice) {
             (ControlLoop::Rate(axis), Some(pid), Some(choice)) => {
                 let as_run = pid.with_execution(choice.asked.execution);
@@ -167,12 +180,12 @@ impl LogLoop {
             }
             _ => None,
         };
-        Ok(LogGains {
+        LogGains {
             control_loop: self.control_loop,
             read_back: self.read_back.clone(),
             overlay,
-            written,
-        })
+            written: None,
+        }
     }
 
     /// The parameters to write with their margins, or the reason why nothing is written.

@@ -38,6 +38,23 @@
     return { ...trace, line: { ...trace.line, color: colour }, marker: { ...trace.marker, color: colour } };
   };
 
+  const NARROW = 480;
+  // A note that leaves the axes goes back between them.
+  const between = ({ place, width, layout }) => {
+    const edges = place.getBoundingClientRect();
+    const [left, right] = [edges.left + layout.margin.l, edges.right - layout.margin.r];
+    const moved = {};
+    [...place.querySelectorAll(".annotation-text-g")].forEach((note, at) => {
+      const box = note.getBoundingClientRect();
+      const by = Math.max(left - box.left, 0) - Math.max(box.right - right, 0);
+      const { ax, ay } = place.layout.annotations[at];
+      if (by) moved[`annotations[${at}].ax`] = ax + by;
+      const low = edges.top - box.top;
+      if (low > 0) moved[`annotations[${at}].ay`] = ay + low;
+    });
+    if (width && Object.keys(moved).length) Plotly.relayout(place, moved);
+  };
+
   const draw = (plot, theme) => {
     const { place, data, layout } = plot;
     let used = 0;
@@ -52,7 +69,7 @@
       height,
       ...Object.fromEntries(axes.map(([name, one]) => [name, axis(one)])),
       annotations: layout.annotations.map((note) => ({
-        ...note, arrowcolor: theme.text, bgcolor: `${theme.back}cc`, font: { size: 12 },
+        ...note, text: width < NARROW ? note.text.replace(/ \(.*\)$/, "") : note.text, arrowcolor: theme.text, bgcolor: `${theme.back}cc`, font: { size: 12 },
       })),
       shapes: (layout.shapes ?? []).map((shape) => ({ ...shape, fillcolor: `${theme.model}1f` })),
       font: { color: theme.text, family: "system-ui, sans-serif" },
@@ -61,9 +78,10 @@
       hoverlabel: { bgcolor: theme.card, font: { color: theme.text } },
       modebar: { bgcolor: "rgba(0,0,0,0)", color: theme.line, activecolor: theme.text },
     }, { displaylogo: false, displayModeBar: hasButtons && !place.closest(".small") ? "hover" : false });
+    between(plot);
   };
 
-  // What is on the screen is drawn at once, the rest while there is nothing else to do.
+  // What is on the screen is drawn at once, the rest while there is nothing else to do; what is folded, once it opens.
   let waiting = [];
   const idle = window.requestIdleCallback ?? ((work) => setTimeout(work, 0));
   const drawNext = () => {
@@ -75,14 +93,17 @@
       root.dataset.drawn = root.dataset.theme;
     }
   };
+  const isUnfolded = ({ place }) => place.clientWidth > 0 && !place.closest("details:not([open])");
   const isSeen = ({ place }) => {
     const { top, bottom } = place.getBoundingClientRect();
     return bottom > 0 && top < innerHeight;
   };
   const show = (theme, isWhole) => {
     root.dataset.theme = theme;
-    const now = plots.filter((plot) => isWhole || isSeen(plot));
-    waiting = plots.filter((plot) => !now.includes(plot));
+    const unfolded = plots.filter(isUnfolded);
+    const now = unfolded.filter((plot) => isWhole || isSeen(plot));
+    waiting = unfolded.filter((plot) => !now.includes(plot));
+    plots.forEach((plot) => Object.assign(plot, { width: 0 }));
     now.forEach((plot) => draw(plot, colours()));
     idle(drawNext);
   };
@@ -94,22 +115,95 @@
     show(theme());
   });
   asks.addEventListener("change", () => show(theme()));
-  // As wide as paper is, before it is printed.
+  // As wide as paper is, and with what belongs on it unfolded, before it is printed.
+  let folded = [];
   addEventListener("beforeprint", () => {
     root.classList.add("paper");
+    folded = [...document.querySelectorAll("details.group:not([open])")];
+    folded.forEach((one) => { one.open = true; });
     show("light", true);
   });
   addEventListener("afterprint", () => {
     root.classList.remove("paper");
+    folded.forEach((one) => { one.open = false; });
     show(theme());
+  });
+
+  // Tabs: one panel at a time, by mouse, arrows and the address.
+  const list = document.querySelector("[role=tablist]");
+  const tabs = [...document.querySelectorAll("[role=tab]")];
+  const panel = (tab) => document.getElementById(tab.getAttribute("aria-controls"));
+  const choose = (tab, hasFocus) => {
+    tabs.forEach((one) => {
+      one.setAttribute("aria-selected", one === tab);
+      one.tabIndex = one === tab ? 0 : -1;
+      panel(one).hidden = one !== tab;
+    });
+    if (hasFocus) tab.focus();
+  };
+  const pick = (tab) => {
+    choose(tab, true);
+    history.replaceState(null, "", `#${panel(tab).id}`);
+  };
+  tabs.forEach((tab, at) => {
+    panel(tab).setAttribute("role", "tabpanel");
+    tab.addEventListener("click", () => pick(tab));
+    tab.addEventListener("keydown", (event) => {
+      const last = tabs.length - 1;
+      const to = { ArrowRight: at < last ? at + 1 : 0, ArrowLeft: at > 0 ? at - 1 : last, Home: 0, End: last }[event.key];
+      if (to === undefined) return;
+      event.preventDefault();
+      pick(tabs[to]);
+    });
+  });
+  // What the address names is shown: its panel, and the group around it.
+  const follow = () => {
+    const there = document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    const tab = tabs.find((one) => there && panel(one).contains(there)) ?? tabs[0];
+    if (tab) choose(tab, false);
+    const group = there?.closest("details.group");
+    if (group) group.open = true;
+    if (there && there.className !== "panel") there.scrollIntoView();
+    else if (there && tab) scrollTo(0, 0);
+  };
+  if (list) list.hidden = false;
+  addEventListener("hashchange", follow);
+  follow();
+
+  // The clipboard, or where a browser gives none to files, a selection.
+  const copied = async (text) => {
+    try {
+      await navigator.clipboard.writeText(text);
+      return true;
+    } catch {
+      const area = document.body.appendChild(document.createElement("textarea"));
+      area.value = text;
+      area.select();
+      const done = document.execCommand("copy");
+      area.remove();
+      return done;
+    }
+  };
+  document.querySelectorAll(".copy").forEach((place) => {
+    const [button, said] = place.children;
+    place.hidden = false;
+    button.addEventListener("click", async () => {
+      const done = await copied(button.dataset.text);
+      said.textContent = done ? "Copied." : "The browser does not allow it: select the values in the table.";
+    });
   });
   show(theme());
 
-  // A window, and a phone that is turned, change the width.
-  const follow = new ResizeObserver(() => {
-    const changed = plots.filter(({ place, width, height }) =>
-      width > 0 && (width !== place.clientWidth || height !== place.clientHeight));
+  // A window, a phone that is turned, and a click that unfolds change the width. What waits will be drawn anyway.
+  const redraw = () => {
+    const changed = plots.filter((plot) => {
+      const { place, width, height } = plot;
+      const isOther = width !== place.clientWidth || height !== place.clientHeight;
+      return isOther && isUnfolded(plot) && !waiting.includes(plot);
+    });
     changed.forEach((plot) => draw(plot, colours()));
-  });
-  plots.forEach(({ place }) => follow.observe(place));
+  };
+  const resized = new ResizeObserver(redraw);
+  plots.forEach(({ place }) => resized.observe(place));
+  document.querySelectorAll("details").forEach((one) => one.addEventListener("toggle", redraw));
 })();

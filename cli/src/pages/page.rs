@@ -39,6 +39,100 @@ pub fn folded(heading: &str, body: &str) -> String {
     )
 }
 
+/// Sections that open on a click on their common title.
+#[derive(Clone, Copy, Debug)]
+pub struct Group<'a> {
+    /// Stands before the identifiers of the sections too.
+    pub prefix: &'a str,
+    pub id: &'a str,
+    pub title: &'a str,
+    /// What it holds, beside the title.
+    pub about: &'a str,
+    pub is_open: bool,
+}
+
+/// A group with its sections; nothing without a section.
+pub fn group(group: Group<'_>, sections: &[Section]) -> String {
+    if sections.is_empty() {
+        return String::new();
+    }
+    let Group { prefix, id, .. } = group;
+    let mut body = String::new();
+    for section in sections {
+        let (class, name) = (escaped(&section.id), escaped(&section.title));
+        let _ = write!(
+            body,
+            "<section id=\"{prefix}{class}\" class=\"{class}\"><h3>{name}</h3>\n{}</section>\n",
+            section.body
+        );
+    }
+    let open = if group.is_open { " open" } else { "" };
+    format!(
+        "<details id=\"{prefix}{id}\" class=\"group\"{open}><summary><h2>{}</h2> <span>{}</span></summary>\n{body}</details>\n",
+        escaped(group.title),
+        escaped(group.about)
+    )
+}
+
+/// A part of the page of which one is seen at a time; without a script all are.
+pub struct Tab {
+    /// Identifier, for links.
+    pub id: String,
+    pub title: String,
+    /// Components, as HTML.
+    pub body: String,
+}
+
+/// Tabs; `name` says what they are.
+pub fn tabs(name: &str, tabs: &[Tab]) -> String {
+    let (mut buttons, mut panels) = (String::new(), String::new());
+    for (index, tab) in tabs.iter().enumerate() {
+        let (id, title) = (escaped(&tab.id), escaped(&tab.title));
+        let (is_first, order) = (index == 0, if index == 0 { 0 } else { -1 });
+        let _ = write!(
+            buttons,
+            "<button type=\"button\" role=\"tab\" id=\"tab-{id}\" aria-controls=\"{id}\" aria-selected=\"{is_first}\" \
+             tabindex=\"{order}\">{title}</button>"
+        );
+        let _ = write!(
+            panels,
+            "<section id=\"{id}\" class=\"panel\" aria-labelledby=\"tab-{id}\"><h2 class=\"name\">{title}</h2>\n{}</section>\n",
+            tab.body
+        );
+    }
+    format!(
+        "<div role=\"tablist\" aria-label=\"{}\" hidden>{buttons}</div>\n{panels}",
+        escaped(name)
+    )
+}
+
+/// A button that copies a text. Without a script there is none.
+pub fn copy(label: &str, text: &str) -> String {
+    format!(
+        "<p class=\"copy\" hidden><button type=\"button\" data-text=\"{}\">{}</button> <span role=\"status\"></span></p>\n",
+        escaped(text),
+        escaped(label)
+    )
+}
+
+/// A heading with the identifier to which it links.
+pub fn heading_to(id: &str, title: &str) -> String {
+    format!(
+        "<h2><a href=\"#{}\">{}</a></h2>\n",
+        escaped(id),
+        escaped(title)
+    )
+}
+
+/// Texts side by side, as many as fit.
+pub fn cards(cards: &[String]) -> String {
+    let cards = cards.iter().map(|card| format!("<div>{card}</div>\n"));
+    format!(
+        "<div class=\"cards\">\n{}</div>\n",
+        cards.collect::<String>()
+    )
+}
+
 /// The main result of the page, good or bad.
 pub fn verdict(is_good: bool, text: &str) -> String {
     let kind = if is_good { "good" } else { "bad" };
@@ -84,7 +178,10 @@ pub fn table(caption: &str, columns: &[String], rows: &[(&str, Vec<Cell<'_>>)]) 
         escaped(caption)
     );
     for column in columns {
-        let _ = write!(html, "<th scope=\"col\">{}</th>", escaped(column));
+        let _ = match column.as_str() {
+            "" => write!(html, "<td></td>"),
+            name => write!(html, "<th scope=\"col\">{}</th>", escaped(name)),
+        };
     }
     html.push_str("</tr></thead><tbody>\n");
     for (name, cells) in rows {
@@ -144,9 +241,8 @@ pub fn row(figures: &[Figure]) -> String {
     format!("<div class=\"row\">\n{figures}</div>\n")
 }
 
-/// The whole page.
+/// A page of sections, with links to them below the lead.
 pub fn page(title: &str, lead: &str, sections: &[Section]) -> String {
-    let title = escaped(title);
     let mut links = String::new();
     let mut body = String::new();
     for section in sections {
@@ -158,14 +254,19 @@ pub fn page(title: &str, lead: &str, sections: &[Section]) -> String {
             section.body
         );
     }
+    whole(title, &format!("{lead}<nav>{links}</nav>\n{body}"))
+}
+
+/// A page of components.
+pub fn whole(title: &str, body: &str) -> String {
+    let title = escaped(title);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
          <title>{title}</title>\n<style>\n{STYLE}</style>\n<script>{PLOTLY}</script>\n</head>\n<body>\n\
          <header><h1>{title}</h1><button id=\"theme\" type=\"button\">light / dark</button></header>\n\
-         {lead}<nav>{links}</nav>\n\
-         <noscript><p class=\"note\">The plots need JavaScript; the tables work without.</p></noscript>\n\
-         <main>\n{body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+         <main>\n<noscript><p class=\"note\">The plots need JavaScript; the tables work without.</p></noscript>\n\
+         {body}</main>\n<script>\n{SCRIPT}</script>\n</body>\n</html>\n"
     )
 }
 

@@ -46,7 +46,6 @@ pub(crate) fn text(of: &Survey, has_details: bool) -> String {
 
 /// What to do about every loop: at most 40 lines.
 fn card(of: &Survey, has_details: bool) -> String {
-    let told = of.loops.iter().filter(|one| one.answer.is_some()).count();
     let title = format!("{}  {}, flight {}", of.file, of.firmware, of.number);
     let mut text = format!("{}\n", painted(HEADING, &title));
     if of.loops.is_empty() {
@@ -72,19 +71,22 @@ fn card(of: &Survey, has_details: bool) -> String {
             wrapped(&mut text, "  not written: ", reason);
         }
     }
-    let next = match (&of.files, told) {
-        (Some([path, restore]), _) => answers::written(path, restore),
-        (None, 0) => words::NO_LOOP.to_owned(),
-        _ => match step(of) {
-            Some(step) => answers::write(&of.file, "", step),
-            None => answers::NOTHING.to_owned(),
-        },
-    };
-    answer::line(&mut text, "Next", &next);
+    answer::line(&mut text, "Next", &next(of));
     if !has_details {
         answer::line(&mut text, "", words::MORE);
     }
     text
+}
+
+/// What to do next.
+pub(super) fn next(of: &Survey) -> String {
+    let is_told = of.loops.iter().any(|one| one.answer.is_some());
+    match (&of.files, step(of)) {
+        (Some([path, restore]), _) => answers::written(path, restore),
+        _ if !is_told => words::NO_LOOP.to_owned(),
+        (None, Some(step)) => answers::write(&of.file, "", step),
+        (None, None) => answers::NOTHING.to_owned(),
+    }
 }
 
 /// Share of the way to the proposed gains that is written. `None` if every loop is kept.
@@ -95,7 +97,7 @@ fn step(of: &Survey) -> Option<f64> {
 }
 
 /// Why no part of the flight tells anything about a loop.
-fn refused(one: &FlightLoop) -> String {
+pub(super) fn refused(one: &FlightLoop) -> String {
     let mut refusals = one
         .parts
         .iter()

@@ -3,6 +3,7 @@
 mod card;
 mod controller;
 mod fit;
+mod flight;
 mod overlay;
 mod parameters;
 mod recorded;
@@ -20,6 +21,7 @@ use onecycle::{
 use onecycle_design::bands::{load_bands, step_bands};
 use onecycle_identify::{Harmonic, harmonics};
 
+pub(crate) use self::flight::flight;
 use self::stability::Loop;
 use super::number::significant;
 use super::units::Units;
@@ -49,46 +51,114 @@ pub(crate) fn identification(
     (choice, answer): (Option<&Controllers>, &Answer),
     gains: Option<&LogGains>,
 ) -> String {
-    let units = Units::of(recording);
-    let mut sections = vec![];
-    let recorded = recorded::section(recording, found, &units);
-    let mut lead = made_by("identify");
-    match &found.outcome {
-        Ok(identified) => {
-            let view = View {
-                units: &units,
-                identified,
-                choice,
-            };
-            // One cycle may be one of no steady oscillation, which has no harmonics.
-            let steady = (found.oscillation()).filter(|oscillation| oscillation.cycles_used > 1);
-            let measured = steady.map_or(vec![], |oscillation| {
-                with_signals(recording, |signals| {
-                    harmonics(signals, oscillation, HARMONICS)
-                })
-            });
-            let (figure, answered) = view.answer(&measured);
-            lead += &card::card(answer, figure.as_ref());
-            sections.extend(answered);
-            sections.push(recorded);
-            sections.extend(view.evidence());
-        }
-        Err(_) => {
-            lead += &card::card(answer, None);
-            sections.push(recorded);
-            sections.extend(found.refused.as_ref().map(|refused| {
-                let structure = refused.model.structure();
-                fit::section("Fit that was refused", structure, &refused.fit, &units)
-            }));
-        }
-    }
-    sections.extend(gains.and_then(overlay::section));
-    sections.extend(remarks(found));
     let kind = match found.excitation {
         Some(Excitation::Recorded(_)) => "Recording",
         _ => "Relay test",
     };
-    page(&format!("{kind}: {title}"), &lead, &sections)
+    let subject = Subject {
+        recording,
+        found,
+        choice,
+        answer,
+        gains,
+    };
+    page::whole(
+        &format!("{kind}: {title}"),
+        &(subject.body("") + &made_by("identify")),
+    )
+}
+
+/// What is told of a recording: the answer, and folded what it rests on, what else there is, and all figures.
+struct Subject<'a> {
+    recording: &'a Recording,
+    found: &'a Identification,
+    /// The controllers of an identified process.
+    choice: Option<&'a Controllers>,
+    answer: &'a Answer,
+    gains: Option<&'a LogGains>,
+}
+
+impl Subject<'_> {
+    /// Components of a page. `prefix` stands before all identifiers.
+    fn body(&self, prefix: &str) -> String {
+        let units = Units::of(self.recording);
+        let mut evidence = vec![recorded::section(self.recording, self.found, &units)];
+        let mut all = Found::default();
+        let refused = self.found.refused.as_ref();
+        match &self.found.outcome {
+            Ok(identified) => {
+                let view = View {
+                    units: &units,
+                    identified,
+                    choice: self.choice,
+                };
+                all = view.answer(&self.measured());
+                evidence.extend(view.evidence());
+            }
+            Err(_) => evidence.extend(refused.map(|refused| {
+                let structure = refused.model.structure();
+                fit::section("Fit that was refused", structure, &refused.fit, &units)
+            })),
+        }
+        evidence.extend(self.gains.and_then(overlay::section));
+        all.details.extend(remarks(self.found));
+        let group = |id, title, about, is_open| page::Group {
+            prefix,
+            id,
+            title,
+            about,
+            is_open,
+        };
+        // The picture of a refusal says more than its sentence.
+        let is_refused = self.found.outcome.is_err();
+        card::card(self.answer, all.figure.as_ref())
+            + &page::group(
+                group(
+                    "evidence",
+                    "Evidence",
+                    "what was recorded, and what the model explains of it",
+                    is_refused,
+                ),
+                &evidence,
+            )
+            + &page::group(
+                group(
+                    "alternatives",
+                    "Alternatives",
+                    "other styles, and what robustness costs",
+                    false,
+                ),
+                &all.alternatives,
+            )
+            + &page::group(
+                group(
+                    "details",
+                    "Details",
+                    "forms of the controller, responses, stability, remarks",
+                    false,
+                ),
+                &all.details,
+            )
+    }
+
+    /// Harmonics of a steady oscillation. One cycle may be one of no steady oscillation, which has none.
+    fn measured(&self) -> Vec<Harmonic> {
+        let steady = (self.found.oscillation()).filter(|oscillation| oscillation.cycles_used > 1);
+        steady.map_or(vec![], |oscillation| {
+            with_signals(self.recording, |signals| {
+                harmonics(signals, oscillation, HARMONICS)
+            })
+        })
+    }
+}
+
+/// What is told of a controller.
+#[derive(Default)]
+struct Found {
+    /// Responses beside the card.
+    figure: Option<Figure>,
+    alternatives: Vec<Section>,
+    details: Vec<Section>,
 }
 
 /// The page of a design. `oscillation`: what is known of the process, if its parameters are not.
@@ -125,6 +195,7 @@ pub(crate) fn design(
             None,
             (&Units::default(), None),
         )),
+        Some(controller::styles(choice)),
         response.map(|response| {
             let load = load.as_ref().map(|load| (load, None));
             step::section(response, None, &times_s(response), load)
@@ -150,11 +221,14 @@ struct View<'a> {
 
 impl View<'_> {
     /// The controller: what to type in, and what it will do.
-    fn answer(&self, measured: &[Harmonic]) -> (Option<Figure>, Vec<Section>) {
+    fn answer(&self, measured: &[Harmonic]) -> Found {
         match (self.choice, &self.identified.design) {
             (Some(choice), Some(design)) => self.of_controller(choice, design, measured),
-            (Some(choice), None) => (None, vec![controller::without(choice)]),
-            _ => (None, vec![]),
+            (Some(choice), None) => Found {
+                alternatives: vec![controller::styles(choice)],
+                ..Found::default()
+            },
+            _ => Found::default(),
         }
     }
 
@@ -177,12 +251,7 @@ impl View<'_> {
     }
 
     /// Gains, responses, trade-off and stability of the controller.
-    fn of_controller(
-        &self,
-        choice: &Controllers,
-        design: &Design,
-        measured: &[Harmonic],
-    ) -> (Option<Figure>, Vec<Section>) {
+    fn of_controller(&self, choice: &Controllers, design: &Design, measured: &[Harmonic]) -> Found {
         let identified = self.identified;
         let draws = identified.posterior.models(DRAWS);
         // Where the interval holds zero there is nothing to subtract.
@@ -211,18 +280,16 @@ impl View<'_> {
         });
         let (first, step) = step.unzip();
         let margin = identified.phase_margin_rad.as_ref();
-        let sections = [
-            Some(controller::section(
-                choice,
-                design,
-                margin,
-                (self.units, bias),
-            )),
-            step,
-            controller::trade_off(choice),
-            Some(own.section()),
-        ];
-        (first, sections.into_iter().flatten().collect())
+        let controller = controller::section(choice, design, margin, (self.units, bias));
+        let styles = std::iter::once(controller::styles(choice));
+        Found {
+            figure: first,
+            alternatives: styles.chain(controller::trade_off(choice)).collect(),
+            details: [Some(controller), step, Some(own.section())]
+                .into_iter()
+                .flatten()
+                .collect(),
+        }
     }
 }
 

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use onecycle::{Assessment, Controller, Pid, Structure, Verdict};
+use onecycle::{Assessment, Controller, Identification, Pid, Recording, Structure, Verdict};
 use onecycle_link::{ControlLoop, Span};
 
 use super::answer::Answer;
 use super::controllers::Controllers;
-use super::log_gains::Written;
+use super::log_gains::{LogGains, Written};
 
 /// A loop with its parts.
 pub(crate) struct FlightLoop {
@@ -21,6 +21,16 @@ pub(crate) struct FlightLoop {
     pub(crate) answer: Option<Answer>,
     /// The parameters to write, or the reason why they must not be written. `None` without `--write`, and for a loop that is kept.
     pub(crate) to_write: Option<Result<Written, String>>,
+    /// What the page shows of it. `None`: no part can be used.
+    pub(crate) shown: Option<Shown>,
+}
+
+/// The part that tells most, or the first one if none tells anything, with all that was identified from it.
+pub(crate) struct Shown {
+    pub(crate) recording: Recording,
+    pub(crate) identification: Identification,
+    /// `None` unless a page is drawn.
+    pub(crate) gains: Option<LogGains>,
 }
 
 /// The loops of a flight.

@@ -139,6 +139,9 @@ pub(crate) fn sure(identified: &Identified, explained: Option<f64>) -> String {
     let misfit = short(100.0 * identified.fit.misfit);
     let model = match (explained, prediction) {
         (Some(share), _) => format!("the model explains {:.0} % of the flight", 100.0 * share),
+        (_, Some(of)) if of.explained < 0.0 => {
+            "it does not predict the last third of the recording".to_owned()
+        }
         (_, Some(of)) => format!(
             "it predicts {:.0} % of the last third",
             100.0 * of.explained

@@ -243,6 +243,6 @@ fn printed_lines_are_those_of_the_program() {
         let is_table = |word: &&str| word.starts_with("examples/") && word.ends_with(".csv");
         words.iter().any(is_table) || words.starts_with(&["tune"])
     });
-    assert!(commands > 10, "{commands}");
+    assert!(commands >= 5, "{commands}");
     assert!(found.is_empty(), "{}", found.join("\n"));
 }

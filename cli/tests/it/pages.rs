@@ -28,23 +28,22 @@ pub(crate) fn pages() -> Vec<String> {
     pages
 }
 
-/// Printed lines of a page, each run with its command. A block of the section about the whole output has no command.
+/// Printed lines of a page, each run with its command.
 fn printed(page: &str) -> Vec<(String, Vec<String>)> {
     let mut printed = vec![];
-    let mut is_whole_output = false;
     let mut rest = page;
     while let Some((before, after)) = rest.split_once("```text\n") {
-        for line in before.lines().filter(|line| line.starts_with("## ")) {
-            is_whole_output = line == "## The output, line by line";
-        }
         let (block, behind) = after.split_once("```").unwrap();
         rest = behind;
+        // A block in an item of a list is indented as its fence is.
+        let indent = &before[before.trim_end_matches(' ').len()..];
         let block = block.replace("\\\n", " ");
-        let mut lines = block.lines().map(str::to_owned).peekable();
+        let lines = block
+            .lines()
+            .map(|line| line.strip_prefix(indent).unwrap_or(line));
+        let mut lines = lines.map(str::to_owned).peekable();
         let command = if lines.peek().is_some_and(|line| line.starts_with("$ ")) {
             lines.next().unwrap()
-        } else if is_whole_output {
-            "$ onecycle identify examples/simulated_hover.csv --details".to_owned()
         } else {
             continue;
         };

@@ -28,15 +28,20 @@ fn an_identification_as_a_page() {
         "recording",
         "fit",
         "process",
+        "styles",
         "trade-off",
         "stability",
         "step",
         "controller",
     ] {
-        assert!(
-            page.contains(&format!("<section id=\"{section}\">")),
-            "{section}"
-        );
+        let tag = format!("<section id=\"{section}\" class=\"{section}\">");
+        assert!(page.contains(&tag), "{section}");
+    }
+    // What can be copied are names, values and units of the card; all else is folded.
+    assert!(page.contains("data-text=\"Kp 44.7\nKi 83.4\nKd 13.7\nfilter Tf 0.00226 s"));
+    let groups = ["evidence", "alternatives", "details"];
+    for group in groups {
+        assert!(page.contains(&format!("<details id=\"{group}\" class=\"group\">")));
     }
     let figures = figures(&page);
     // Both responses on the first screen, step, load, trade-off, Nyquist, Bode, gang of four, recording, fit, correlogram, seven marginals, contours,
@@ -74,6 +79,50 @@ fn an_identification_as_a_page() {
             assert!(!values.is_empty() && values.iter().all(|value| !value.is_null()));
         }
     }
+}
+
+// A flight log without a choice of the loop is one page: the card of all loops, and a tab for each, whose sections have
+// identifiers of their own.
+#[test]
+fn a_flight_is_one_page_with_tabs() {
+    let log = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../examples/logs/betaflight_acro.bfl"
+    );
+    let (ran, page) = reported(&["identify", log, "--json"]);
+    assert_eq!(ran.code, Some(0));
+    let report: Value = serde_json::from_str(&ran.stdout).unwrap();
+    let loops = report["loops"].as_array().unwrap();
+    assert_eq!(page.matches("role=\"tab\" id=").count(), 1 + loops.len());
+    for (one, has_process) in [
+        ("roll-rate", false),
+        ("pitch-rate", false),
+        ("yaw-rate", true),
+    ] {
+        assert!(page.contains(&format!("<section id=\"{one}\" class=\"panel\"")));
+        assert!(page.contains(&format!("<a href=\"#{one}\">")));
+        assert!(
+            page.contains(&format!("<section id=\"{one}-recording\"")),
+            "{one}"
+        );
+        let stability = format!("<section id=\"{one}-stability\"");
+        assert_eq!(page.contains(&stability), has_process, "{one}");
+    }
+    // All gains to type in, once for the flight and once for its loop.
+    let gains = loops[2]["answer"]["gains"].as_array().unwrap();
+    let half = gains[0]["half"].as_f64().unwrap();
+    assert_eq!(
+        page.matches(&format!("data-text=\"p_yaw {half:.0}\n"))
+            .count(),
+        2
+    );
+    // Every identifier is there once.
+    let ids: Vec<&str> = page.split(" id=\"").skip(1).collect();
+    let ids: Vec<&str> = ids.iter().filter_map(|id| id.split('"').next()).collect();
+    let mut once = ids.clone();
+    once.sort_unstable();
+    once.dedup();
+    assert_eq!(once.len(), ids.len(), "{ids:?}");
 }
 
 // A process that is faster than its samples of 50 ms: its lag was one of half a sample, with an interval of no width, and its
@@ -180,7 +229,7 @@ fn a_recording_of_any_kind_as_a_page() {
         "step",
     ] {
         assert!(
-            page.contains(&format!("<section id=\"{section}\">")),
+            page.contains(&format!("<section id=\"{section}\"")),
             "{section}"
         );
     }

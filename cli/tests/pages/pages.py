@@ -51,7 +51,7 @@ def expect(is_so, what):
 def made(program, lab, examples, scratch):
     """Yields for every page: name, path, sections, least number of plots, and the command for its margins, if it has
     some."""
-    identified = {"recording", "fit", "process", "stability", "step", "controller"}
+    identified = {"recording", "fit", "process", "stability", "step", "controller", "styles"}
     recording = lambda name: ["identify", str(examples / name)]
     tune = ["tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1"]
     pages = {
@@ -59,7 +59,8 @@ def made(program, lab, examples, scratch):
         "roll": (recording("jsbsim_f450_roll_clean.csv"), identified | {"remarks"}, 12),
         "bias": (recording("rotorpy_sih_alt_bias30.csv"), identified | {"remarks"}, 12),
         "refused": (recording("unsteady_ardupilot_alt.csv"), {"recording"}, 1),
-        "tuned": (tune, {"stability", "step", "controller"}, 3),
+        "flight": (recording("logs/px4_chirps.ulg"), {"flight", "roll-rate", "roll-rate-fit", "yaw-rate"}, 20),
+        "tuned": (tune, {"stability", "step", "controller", "styles"}, 3),
         "grid": (["grid"], {"shapes", "times", "rays"}, 5),
         "phase": (["phase"], {"cost", "shapes"}, 2),
         "certificate": (["certify", "--shapes", "6"], {"corners", "bias"}, 2),
@@ -99,6 +100,62 @@ def opened(browser, path, screen):
 def drawn(page):
     """Waits until all plots are drawn in the theme of the page."""
     page.wait_for_function("(root => root.dataset.drawn === root.dataset.theme)(document.documentElement)")
+
+
+def pages_of(paper):
+    """The number of pages of a PDF of Chromium."""
+    return len(re.findall(rb"/Type\s*/Page\b(?!s)", paper))
+
+
+def first_screens(page):
+    """Checks that the card and both responses are on the first screen of a desk and the first two of a phone, and that all
+    else is folded."""
+    before = page.viewport_size
+    for (width, height), screens in (((1440, 900), 1), ((390, 844), 2)):
+        page.set_viewport_size({"width": width, "height": height})
+        ends = page.evaluate(
+            "[...document.querySelectorAll('.beside table, .beside .plot')].filter((one) => one.clientWidth)"
+            ".map((one) => one.getBoundingClientRect().bottom + scrollY)")
+        expect(len(ends) == 2 and max(ends) < screens * height, f"card and responses end at {ends} of {screens} x {height}")
+    page.set_viewport_size(before)
+    expect(page.locator("details.group[open]:visible").count() == 0, "a group is open")
+
+
+def copy(page):
+    """Checks that the button copies names and values of the card."""
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    place = page.locator(".copy:visible").first
+    place.locator("button").click()
+    place.locator("span", has_text="Copied.").wait_for()
+    copied = page.evaluate("navigator.clipboard.readText()")
+    rows = page.locator(".beside table:visible th").all_text_contents()
+    names = [line.split(" ")[0] for line in copied.split("\n")]
+    expect(all(any(row.startswith(name) for row in rows) for name in names), f"copied {names}, on the card {rows}")
+
+
+def turn_tabs(page):
+    """Checks the tabs of a flight by keyboard, mouse, links and the address."""
+    tabs = page.locator("[role=tab]")
+    shown = lambda: page.eval_on_selector_all("[role=tabpanel]", "all => all.filter((one) => !one.hidden).map((one) => one.id)")
+    expect(shown() == ["flight"], f"{shown()} is shown first")
+    tabs.first.focus()
+    for key, wanted in (("ArrowRight", "roll-rate"), ("End", "yaw-rate"), ("ArrowRight", "flight"), ("ArrowLeft", "yaw-rate"), ("Home", "flight")):
+        page.keyboard.press(key)
+        expect(shown() == [wanted], f"{key} shows {shown()}, not {wanted}")
+        focused = page.evaluate("document.activeElement.getAttribute('aria-controls')")
+        expect(focused == wanted, f"{key} leaves the focus on {focused}")
+    page.locator(".cards a", has_text="Pitch").click()
+    expect(shown() == ["pitch-rate"], f"the link shows {shown()}")
+    page.locator("[role=tab]", has_text="Roll").click()
+    expect(shown() == ["roll-rate"] and page.url.endswith("#roll-rate"), f"{shown()} at {page.url}")
+    drawn(page)
+
+
+def unfold(page):
+    """Shows all panels and opens all groups, which draws their plots."""
+    page.evaluate("""document.querySelectorAll("[role=tabpanel]").forEach((one) => { one.hidden = false; });
+                     document.querySelectorAll("details").forEach((one) => { one.open = true; })""")
+    page.wait_for_function("[...document.querySelectorAll('.plot')].every((one) => one.querySelector('.main-svg'))")
 
 
 def look(page, path, sections, least_plots):
@@ -162,6 +219,8 @@ def print_out(page):
     turn(page)
     paper = page.pdf(format="A4")
     expect(paper.startswith(b"%PDF") and len(paper) > 20_000, f"{len(paper)} bytes on paper")
+    if page.locator("details.group").count():
+        expect(pages_of(paper) <= 2, f"{pages_of(paper)} pages of paper")
     drawn(page)
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     on_paper = page.evaluate(
@@ -257,6 +316,14 @@ def main():
         for name, path, sections, plots, tells in made(arguments.program, arguments.lab, arguments.examples, arguments.scratch):
             for screen in SCREENS:
                 page, faults, fetched = opened(browser, path, screen)
+                if name == "flight":
+                    turn_tabs(page)
+                if screen == "desk" and {"controller", "recording"} <= sections or name == "flight":
+                    first_screens(page)
+                    copy(page)
+                if screen == "desk":
+                    print_out(page)
+                unfold(page)
                 look(page, path, sections, plots)
                 if arguments.picture and (name, screen) == ("hover", "desk"):
                     picture(browser, page, arguments.picture)
@@ -264,8 +331,6 @@ def main():
                 said = f"{len(annotations(page))} notes"
                 if tells:
                     said = margins(page, json.loads(run(arguments.program, [*tells, "--json"])))
-                if screen == "desk":
-                    print_out(page)
                 if screen == "desk" and "recording" in sections:
                     handle(page)
                 expect(not faults, f"the browser complains: {faults}")

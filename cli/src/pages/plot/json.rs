@@ -39,6 +39,9 @@ impl Figure {
         let field = self.panels.iter().find_map(|panel| panel.field.as_ref());
         let mut x = axis(&self.x, field.map(|field| &field.x));
         x["anchor"] = json!(format!("y{lowest}"));
+        if self.shape == Shape::Small {
+            x["nticks"] = json!(SMALL_LABELS);
+        }
         let series = self.panels.iter().flat_map(|panel| &panel.series);
         space_labels(&mut x, &self.x, series.flat_map(|series| &series.x));
         layout.insert("xaxis".to_owned(), x);
@@ -88,6 +91,9 @@ fn domain(index: usize, count: usize) -> [f64; 2] {
         }
     }
 }
+
+/// Labels of a linear axis in a small figure: more touch each other if they are long.
+const SMALL_LABELS: u8 = 4;
 
 fn axis(axis: &Axis, places: Option<&Places>) -> Value {
     let kind = match places {

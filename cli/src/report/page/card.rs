@@ -3,8 +3,10 @@
 use crate::pages::page;
 use crate::pages::plot::Figure;
 use crate::report::answer::{LOAD, cells, rows};
-use crate::results::answer::{Advice, Answer};
+use crate::results::answer::{Advice, Answer, Gain};
+use crate::results::flight::FlightLoop;
 use crate::words::answer as words;
+use crate::words::flight::title;
 
 /// The card, with the responses beside it.
 pub(super) fn card(answer: &Answer, figure: Option<&Figure>) -> String {
@@ -17,10 +19,48 @@ pub(super) fn card(answer: &Answer, figure: Option<&Figure>) -> String {
         (!answer.next.is_empty()).then_some(next),
     ];
     let facts: Vec<(&str, String)> = others.into_iter().flatten().collect();
-    let text = page::verdict(is_good, &verdict) + &gains(answer) + &page::facts(&facts);
+    let text =
+        page::verdict(is_good, &verdict) + &gains(answer) + &copy(&[answer]) + &page::facts(&facts);
     match figure {
         Some(figure) => page::beside(&text, &page::figure(figure)),
         None => text,
+    }
+}
+
+/// A loop on the card of its flight. `id`: where all else is told of it.
+pub(super) fn brief(id: &str, one: &FlightLoop, answer: &Answer) -> String {
+    let is_good = answer.verdict != Advice::NotYet;
+    let verdict = words::headline(answer.verdict, &answer.reason);
+    let mut text =
+        page::heading_to(id, &title(one.control_loop)) + &page::verdict(is_good, &verdict);
+    if matches!(answer.verdict, Advice::Change | Advice::FirstGains) {
+        text += &gains(answer);
+    }
+    text
+}
+
+/// A button that copies the gains to type in: this share of the step where some are in force.
+pub(super) fn copy(answers: &[&Answer]) -> String {
+    let to_change =
+        |answer: &&&Answer| matches!(answer.verdict, Advice::Change | Advice::FirstGains);
+    let to_change: Vec<&&Answer> = answers.iter().filter(to_change).collect();
+    let line = |gain: &Gain| {
+        let [_, half, full] = cells(gain);
+        let value = if gain.half.is_some() { half } else { full };
+        format!("{} {value} {}", gain.name, gain.unit)
+            .trim_end()
+            .to_owned()
+    };
+    let gains = to_change.iter().flat_map(|answer| &answer.gains);
+    let text: Vec<String> = gains.map(line).collect();
+    let part = to_change.iter().find(|answer| answer.has_now());
+    let label = match part.and_then(|answer| answer.step) {
+        Some(share) => format!("Copy the gains, {} of the step", words::part(share)),
+        None => "Copy the gains".to_owned(),
+    };
+    match text.is_empty() {
+        true => String::new(),
+        false => page::copy(&label, &text.join("\n")),
     }
 }
 
@@ -38,7 +78,10 @@ fn gains(answer: &Answer) -> String {
     let has_now = answer.has_now();
     let figures = rows(figures).into_iter();
     let figures = figures.filter(|(name, _)| has_now || *name != LOAD);
-    let all = gains.chain(figures.map(|(name, values)| (name.to_owned(), values)));
+    // A sign of per cent stays with its number.
+    let together = |values: [String; 3]| values.map(|value| value.replace(" %", "\u{a0}%"));
+    let figures = figures.map(|(name, values)| (name.to_owned(), together(values)));
+    let all = gains.chain(figures);
     if has_now {
         let part = answer.step.map_or(String::new(), words::part);
         return page::plain_table("", &["", "now", &part, "proposed"], all);

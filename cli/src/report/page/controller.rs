@@ -11,7 +11,7 @@ use crate::results::controllers::{Controllers, Source};
 use crate::words::controllers::{assumed, brief, change, judgement, not_kept, price};
 use crate::words::sentence;
 
-/// Gains, margins, assumptions, and the table of the styles.
+/// Gains, margins and assumptions.
 ///
 /// `input_bias`: constant that acts beside the recorded input (input unit).
 pub(super) fn section(
@@ -50,13 +50,12 @@ pub(super) fn section(
     if let Some(bias) = input_bias.filter(|_| !controller.form().has_integral()) {
         body += &offset(bias, controller.kp(), units);
     }
-    body += &table(choice);
     Section::new("controller", "Controller", body)
 }
 
-/// The styles where there is no chosen controller; a remark says why.
-pub(super) fn without(choice: &Controllers) -> Section {
-    Section::new("controller", "Controller", table(choice))
+/// The table of the styles, with the gains in force.
+pub(super) fn styles(choice: &Controllers) -> Section {
+    Section::new("styles", "Styles", table(choice))
 }
 
 fn offset(bias: f64, kp: f64, units: &Units) -> String {

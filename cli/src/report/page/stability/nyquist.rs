@@ -8,10 +8,10 @@ use onecycle_design::soiptd_pd::loop_response::LoopResponse;
 use super::{BAND, Loop, MEASURED, OWN, TRUTH};
 use crate::pages::plot::{Axis, Figure, Hue, Marks, Note, Panel, Series, Shape};
 
-/// What is shown at least: left, right, below, above.
-const PLANE: [f64; 4] = [-2.4, 1.2, -1.9, 1.3];
-/// The farthest that is shown to the left and below, so that the circle stays to be seen.
-const FARTHEST: f64 = -4.0;
+/// What is shown at least: left, right, below, above. The unit circle, and the circle of Ms about -1.
+const PLANE: [f64; 4] = [-2.1, 1.2, -1.5, 1.2];
+/// The farthest that is shown to the left and below, so that the circles stay to be seen.
+const FARTHEST: f64 = -2.5;
 /// Radius beyond which nothing is drawn.
 const FAR: f64 = 30.0;
 
