@@ -88,12 +88,13 @@ impl Vehicle {
                     continue;
                 };
                 is_answered = true;
-                until = self.now() + LIST;
+                // Only a new entry is worth waiting for the next: a vehicle may repeat a part of its list for ever.
                 if entry.num_logs > 0 && found.iter().all(|own| own.id != entry.id) {
                     found.push(log_entry(&entry));
+                    found.sort_by_key(|entry| entry.id);
+                    until = self.now() + LIST;
                 }
                 if found.len() >= usize::from(entry.num_logs) {
-                    found.sort_by_key(|entry| entry.id);
                     return Ok(found);
                 }
             }

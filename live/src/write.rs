@@ -47,6 +47,11 @@ pub enum Refusal {
     /// A value is not finite.
     #[error("the value of {0} is not a finite number")]
     NotFinite(String),
+    /// The old value is not finite, so that it could not be restored.
+    #[error(
+        "the vehicle reports {0} as not a finite number, which could not be restored: set it first"
+    )]
+    OldNotFinite(String),
     /// The vehicle stores an integer.
     #[error("{0} is an integer in the vehicle, but {1} is not one")]
     NotInteger(String, f64),
@@ -139,6 +144,10 @@ impl Plan {
             .collect();
         if !missing.is_empty() {
             return Err(Refusal::Missing(missing));
+        }
+        let is_bad = |name: &&String| there(name).is_some_and(|old| !old.value.is_finite());
+        if let Some(bad) = names.iter().find(is_bad) {
+            return Err(Refusal::OldNotFinite(bad.clone()));
         }
         let step = |one: &Assignment| {
             let kind = there(&one.name)?;

@@ -53,6 +53,17 @@ fn whole_logs() {
     }
 }
 
+// It once waited for as long as the vehicle did so.
+#[test]
+fn a_part_of_the_list_repeated_for_ever() {
+    let world = world();
+    world.borrow_mut().vehicle.repeats_a_log = true;
+    let mut vehicle = connect(&world, None).unwrap();
+    let logs = vehicle.logs().unwrap();
+    assert_eq!(logs.len(), 1);
+    assert!(world.borrow().now < Duration::from_secs(60));
+}
+
 #[test]
 fn the_rest_of_a_log() {
     let world = world();

@@ -45,6 +45,8 @@ pub(crate) struct Scripted {
     pub(crate) parameters: BTreeMap<String, Value>,
     /// Largest values: larger ones are clipped.
     pub(crate) most: BTreeMap<String, f64>,
+    /// Whether it sends the first entry of its list of logs again and again, and no other.
+    pub(crate) repeats_a_log: bool,
     /// Whether it answers about parameters that it does not have.
     pub(crate) tells_missing: bool,
     pub(crate) is_armed: bool,
@@ -76,6 +78,7 @@ impl Scripted {
             stored: parameters.clone(),
             parameters,
             most: BTreeMap::new(),
+            repeats_a_log: false,
             tells_missing: false,
             is_armed: false,
             custom_mode: 0,
@@ -184,6 +187,9 @@ impl Scripted {
         }
         if let Some(hovering) = &self.hovering {
             messages.extend(hovering.streams(self.rounds));
+        }
+        if self.repeats_a_log {
+            messages.extend(self.list_logs().into_iter().take(1));
         }
         messages.iter().map(|message| self.frame(message)).collect()
     }
@@ -294,6 +300,7 @@ impl Scripted {
             .map(entry)
             .map(MavMessage::LOG_ENTRY);
         match number {
+            _ if self.repeats_a_log => entries.take(1).collect(),
             // An empty list is sent as one entry with the number 0.
             0 => vec![MavMessage::LOG_ENTRY(LOG_ENTRY_DATA::DEFAULT)],
             _ => entries.collect(),

@@ -158,6 +158,21 @@ fn not_finite() {
     }
 }
 
+// A write that then fails could not restore it.
+#[test]
+fn the_old_value_is_not_finite() {
+    let mut scripted = Scripted::px4();
+    for (name, value) in &mut scripted.parameters {
+        if name == "MC_ROLLRATE_I" {
+            value.1 = f64::NAN;
+        }
+    }
+    match refusal(scripted, &gains(), false) {
+        Some(Refusal::OldNotFinite(name)) => assert_eq!(name, "MC_ROLLRATE_I"),
+        other => panic!("{other:?}"),
+    }
+}
+
 // The second of three is clipped: the first returns to its old value too.
 #[test]
 fn a_value_that_the_vehicle_clips() {
