@@ -255,7 +255,7 @@ impl Search<'_> {
         tests: &InnovationTests,
         explained: f64,
     ) -> Result<(), Verdict> {
-        let is_clean = !validate::is_coloured(tests) && !validate::is_left_to_the_input(tests);
+        let is_clean = !validate::is_coloured(tests) && !is_left_to_the_input(tests);
         if is_clean && explained >= 0.0 || !validate::is_fed_back(blocks) {
             return Ok(());
         }
@@ -321,7 +321,7 @@ impl Search<'_> {
             self.remarks.push(Remark::Absent(absent));
         }
         // One reason for one fault: without disturbances all of them are left, and what the input explains is not white.
-        let fault = if validate::is_left_to_the_input(tests) {
+        let fault = if is_left_to_the_input(tests) {
             Some(Remark::InputLeft(tests.input_share))
         } else if validate::is_coloured(tests) {
             Some(Remark::Coloured(tests.autocorrelation))
@@ -362,7 +362,7 @@ impl Search<'_> {
         // An error of the prediction that the noise does not explain is one of the model.
         let ratio = prediction.map_or(1.0, |found| found.error_ratio.max(1.0));
         let is_wider = validate::is_coloured(&tests)
-            || validate::is_left_to_the_input(&tests)
+            || is_left_to_the_input(&tests)
             || ratio > EXPECTED_ERROR_RATIO;
         let (posterior, widened) = draws::posterior_of(
             &fitted.best.found,

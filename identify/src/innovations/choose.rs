@@ -144,13 +144,14 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
     lift(&blocks, &mut all, limits);
     quieten(&blocks, &mut all, limits);
     if limits.structure.is_none() {
+        let are_longer = limits.fewest_samples > 1;
         all.retain(|candidate| {
             let theta = &candidate.found.theta;
             let bounds = Bounds::new(theta.structure, &blocks, tau_s);
-            !has_hidden_lag(theta, record.dt_s)
-                && !bounds.has_fastest_pair(theta)
-                && !(limits.fewest_samples > 1 && is_aliased(theta, blocks.block_s()))
-                && !is_of_a_force(theta, limits.slowest_s)
+            let is_hidden = has_hidden_lag(theta, record.dt_s)
+                || bounds.has_fastest_pair(theta)
+                || are_longer && is_aliased(theta, blocks.block_s());
+            !is_hidden && !is_of_a_force(theta, limits.slowest_s)
         });
     }
     keep_best_of_each(&mut all, limits.structure);
