@@ -125,7 +125,11 @@ pub fn flight(file: &str, options: &[String]) -> Result<(String, String), String
             "{file} is no flight log, or an option chooses one of its loops"
         ));
     }
-    let survey = || flight::survey(&arguments, &identify::checked(&arguments)?);
+    let survey = || {
+        let mut surveyed = flight::survey(&arguments, &identify::checked(&arguments)?)?;
+        flight::write(&arguments, &mut surveyed)?;
+        Ok::<_, crate::failure::Failure>(surveyed)
+    };
     let surveyed = survey().map_err(|failure| failure.to_string())?;
     let text = report::text(&surveyed, arguments.details);
     Ok((plain(&text), report::json(&surveyed)))

@@ -106,6 +106,12 @@ fn verdict(
     }
 }
 
+/// What to type in for a controller.
+pub(super) fn typed(controller: &Controller, subject: &Subject<'_>) -> Vec<Gain> {
+    let of = |choice| ToType::of(choice, controller, subject).gains;
+    subject.choice.map(of).unwrap_or_default()
+}
+
 /// What to type in.
 struct ToType {
     gains: Vec<Gain>,

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use onecycle::{Identified, Parameter, Specification, Structure, Verdict};
-use onecycle_link::{Change, ControlLoop, Flight, FlightLog, Signals, Span};
+use onecycle_link::{Change, ControlLoop, Flight, FlightLog, Signals, Span, files};
 use rayon::prelude::*;
 
 use super::answer;
@@ -40,7 +40,8 @@ pub(crate) fn is_asked(arguments: &Identify) -> bool {
 }
 
 pub(super) fn run(arguments: &Identify, asked: &Specification) -> Result<ExitCode, Failure> {
-    let surveyed = survey(arguments, asked)?;
+    let mut surveyed = survey(arguments, asked)?;
+    write(arguments, &mut surveyed)?;
     if let Some(path) = &arguments.report {
         let _waiting = Waiting::on("drawing");
         write_text(path, &page::flight(&surveyed))?;
@@ -58,6 +59,14 @@ pub(super) fn run(arguments: &Identify, asked: &Specification) -> Result<ExitCod
     }))
 }
 
+/// Writes the parameters of all loops to change, if that was asked for and there are some.
+pub(crate) fn write(arguments: &Identify, surveyed: &mut Survey) -> Result<(), Failure> {
+    if let (Some(path), Some(files)) = (&arguments.write.write, &surveyed.parameters) {
+        surveyed.files = Some(log_gains::write(path, files)?);
+    }
+    Ok(())
+}
+
 /// Every loop of a flight, and the parameters of those to change if they are to be written.
 pub(crate) fn survey(arguments: &Identify, asked: &Specification) -> Result<Survey, Failure> {
     let source = Source {
@@ -70,6 +79,7 @@ pub(crate) fn survey(arguments: &Identify, asked: &Specification) -> Result<Surv
         number,
         firmware: String::new(),
         loops: vec![],
+        parameters: None,
         files: None,
     };
     let Some(flight) = log.flights.get(number.saturating_sub(1)) else {
@@ -77,15 +87,19 @@ pub(crate) fn survey(arguments: &Identify, asked: &Specification) -> Result<Surv
         log::signals(&source, &log, number, ControlLoop::ALL[0])?;
         return Ok(surveyed);
     };
-    let _waiting = Waiting::on("identifying");
     surveyed.firmware = of_firmware(&flight.firmware);
     let complete = flight.loops.iter().filter(|one| one.is_complete());
     let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
+    let waiting = Waiting::on_pieces("identifying", loops.len() as u64);
     let loops: Result<Vec<FlightLoop>, Failure> = (loops.into_par_iter())
-        .map(|of| of_loop(&source, &log, number, (flight, of), (arguments, asked)))
+        .map(|of| {
+            let found = of_loop(&source, &log, number, (flight, of), (arguments, asked));
+            waiting.advance(1);
+            found
+        })
         .collect();
     surveyed.loops = loops?;
-    if let Some(path) = &arguments.write.write {
+    if arguments.write.write.is_some() {
         let to_write = surveyed
             .loops
             .iter()
@@ -93,7 +107,7 @@ pub(crate) fn survey(arguments: &Identify, asked: &Specification) -> Result<Surv
         let changes: Vec<Change> = (to_write.filter_map(|one| one.as_ref().ok()))
             .flat_map(|written| written.changes.clone())
             .collect();
-        surveyed.files = log_gains::write(path, flight, &changes)?;
+        surveyed.parameters = files(flight, &changes).filter(|_| !changes.is_empty());
     }
     Ok(surveyed)
 }

@@ -5,21 +5,21 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use onecycle::{
-    ColumnRef, CsvOptions, Hold, Identification, ReadError, Recording, Road, Specification,
-    Structure, Style, Verdict,
+    ColumnRef, Controller, CsvOptions, Hold, Identification, ReadError, Recording, Road,
+    Specification, Structure, Style, Verdict,
 };
 use onecycle_link::{LogError, Span};
 
 use super::log::{self, Piped, Source};
 use super::log_gains::{self, LogLoop};
 use super::{answer, controllers, flight};
-use crate::args::{Between, Estimator, Identify, PAPER_HAS_NO_NOISE};
+use crate::args::{Between, Estimator, HALF_STEP, Identify, PAPER_HAS_NO_NOISE};
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, write_text};
 use crate::reading::open_with_bar;
 use crate::report::units::Units;
 use crate::report::{json, log_gains as log_report, page, text};
-use crate::results::answer::Answer;
+use crate::results::answer::{Answer, Gain};
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::LogGains;
 use crate::words;
@@ -68,6 +68,19 @@ impl Found {
             }
             _ => choice,
         });
+    }
+
+    /// What to type in for a controller: now, half of the way, and all of it.
+    pub(crate) fn typed(&self, controller: &Controller) -> Vec<Gain> {
+        let subject = answer::Subject {
+            file: &self.name,
+            units: &Units::of(&self.recording),
+            choice: self.choice.as_ref(),
+            of_log: self.of_log.as_ref(),
+            gains: None,
+            share: HALF_STEP,
+        };
+        answer::typed(controller, &subject)
     }
 
     /// Whether a process was identified, and the parameters were written if that was asked for.

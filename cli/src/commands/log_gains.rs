@@ -298,9 +298,8 @@ impl LogLoop {
 
     /// Writes both files or none.
     fn write(&self, path: &Path, to_write: Written) -> Result<Written, Failure> {
-        let files = write(path, &self.flight, &to_write.changes)?;
-        let [path, restore] =
-            files.ok_or_else(|| Failure::usage(words::no_gains(self.control_loop)))?;
+        let files = self.files(&to_write).map_err(Failure::usage)?;
+        let [path, restore] = write(path, &files)?;
         Ok(Written {
             path,
             restore,
@@ -309,15 +308,8 @@ impl LogLoop {
     }
 }
 
-/// Writes a file with parameters and one with the old values, or none. `None`: the firmware has no such file, or nothing changes.
-pub(super) fn write(
-    path: &Path,
-    flight: &Flight,
-    changes: &[Change],
-) -> Result<Option<[PathBuf; 2]>, Failure> {
-    let Some(files) = files(flight, changes).filter(|_| !changes.is_empty()) else {
-        return Ok(None);
-    };
+/// Writes a file with parameters and one with the old values, or none.
+pub(super) fn write(path: &Path, files: &ParameterFiles) -> Result<[PathBuf; 2], Failure> {
     let restore = restore_path(path, files.ending);
     write_text(&restore, &files.restore)?;
     if let Err(failure) = write_text(path, &files.apply) {
@@ -325,7 +317,7 @@ pub(super) fn write(
         let _ = std::fs::remove_file(&restore);
         return Err(failure);
     }
-    Ok(Some([path.to_owned(), restore]))
+    Ok([path.to_owned(), restore])
 }
 
 /// Figures of gains to write, on the most probable process and over the posterior; or why they must not be written.

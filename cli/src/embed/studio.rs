@@ -6,10 +6,10 @@
 //! | `{"do":"signals","options"}` | `{samples, span_s, names, units, parts, notes}`: the signals of a loop or a table |
 //! | `{"do":"view","from_s","to_s","points"}` | `{time_s, input, output, set_point}` of that time, thinned |
 //! | `{"do":"identify","options"}` | the report of `onecycle identify --json` |
-//! | `{"do":"survey","options"}` | that of `onecycle identify LOG --json`: every loop of a flight |
+//! | `{"do":"survey","options"}` | that of `onecycle identify LOG --json`: every loop of a flight; with `parameters`: files for all to change, or null |
 //! | `{"do":"json"}`, `{"do":"page"}` | `{text}`: the report as the program writes it |
 //! | `{"do":"trade_off"}` | designs from calm to sharp: limit of `Ms`, gains, figures |
-//! | `{"do":"judge","gains","bands"}` | figures, least margins, curves of the gains, `asks`; with bands if they are asked for |
+//! | `{"do":"judge","gains","bands"}` | figures, least margins, curves of the gains, `asks`, `named` (what to type in); with bands if they are asked for |
 //! | `{"do":"parameters","gains","whole","below_limits"}` | `{apply, restore, ending, says, broken}`: files for the firmware |
 //! | `{"do":"simulate","options"}` | `{text}`: a recording as CSV; with `--expect` the intervals to expect |
 //!
@@ -20,10 +20,10 @@
 //! Options are those of the command line. An answer with `error` has one sentence. Infinite numbers are null. Times are in
 //! seconds, signals in the units of the file.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use onecycle::{Controller, Model, Pid};
-use onecycle_link::FlightLog;
+use onecycle_link::{FlightLog, ParameterFiles};
 use serde_json::{Value, json};
 
 use super::{arguments_of_identify, parsed};
@@ -96,10 +96,14 @@ impl Studio {
                 Ok(report)
             }
             "survey" => {
-                let arguments = arguments_of_identify(&self.file, &options)?;
+                let mut arguments = arguments_of_identify(&self.file, &options)?;
+                // The page saves what the program would write.
+                arguments.write.write = Some(PathBuf::from("tune"));
                 let asked = identify::checked(&arguments).map_err(failed)?;
                 let surveyed = flight::survey(&arguments, &asked).map_err(failed)?;
-                Ok(value(&flight_report::json(&surveyed)))
+                let mut report = value(&flight_report::json(&surveyed));
+                report["parameters"] = parameters(surveyed.parameters.as_ref());
+                Ok(report)
             }
             "json" => Ok(json!({ "text": self.found()?.json(false) })),
             "page" => {
@@ -215,14 +219,16 @@ impl Studio {
         let count = if with_bands { DRAWS } else { FEW_DRAWS };
         let draws = &self.draws[..self.draws.len().min(count)];
         let end_s = message["end_s"].as_f64();
-        Ok(hand::judged(&hand::ByHand {
+        let mut judged = hand::judged(&hand::ByHand {
             model: &model,
             controller: &controller,
             asked: &choice.asked,
             draws,
             with_bands,
             end_s,
-        }))
+        });
+        judged["named"] = json!(found.typed(&controller));
+        Ok(judged)
     }
 
     fn parameters(&self, message: &Value) -> Result<Value, String> {
@@ -240,18 +246,22 @@ impl Studio {
         if let Some(question) = question {
             return Ok(json!({ "asks": words::sentence(question) }));
         }
-        let files = of_log.files(&to_write)?;
-        Ok(json!({
-            "apply": files.apply,
-            "restore": files.restore,
-            "ending": files.ending,
-            "says": words::log_gains::margins(&to_write),
-            "broken": words::log_gains::broken(&to_write),
-        }))
+        let mut answer = parameters(Some(&of_log.files(&to_write)?));
+        answer["says"] = json!(words::log_gains::margins(&to_write));
+        answer["broken"] = json!(words::log_gains::broken(&to_write));
+        Ok(answer)
     }
 }
 
 const NOTHING: &str = "nothing is identified yet";
+
+/// Null without files.
+fn parameters(files: Option<&ParameterFiles>) -> Value {
+    files.map_or(
+        Value::Null,
+        |files| json!({ "apply": files.apply, "restore": files.restore, "ending": files.ending }),
+    )
+}
 
 impl Signals {
     fn new(

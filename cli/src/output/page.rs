@@ -2,6 +2,7 @@
 
 use std::borrow::Cow;
 use std::cell::Cell;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// A page has no terminal.
 pub fn columns() -> Option<usize> {
@@ -38,43 +39,51 @@ pub fn listen(listener: Listener) {
     LISTENER.set(Some(listener));
 }
 
-/// Bytes between two messages.
+/// Bytes between two messages; pieces are told one by one.
 const STEP_BYTES: u64 = 1 << 21;
 
 /// Work that goes on.
 pub struct Waiting {
     work: Cow<'static, str>,
-    done: Cell<u64>,
-    told: Cell<u64>,
+    done: AtomicU64,
+    told: AtomicU64,
     bytes: Option<u64>,
+    step: u64,
 }
 
 impl Waiting {
     /// For work of unknown length, named for example `identifying`.
     pub fn on(work: impl Into<Cow<'static, str>>) -> Self {
-        Self::told(work.into(), None)
+        Self::told(work.into(), None, STEP_BYTES)
     }
 
     /// For work on a known number of bytes.
     pub fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
-        Self::told(work.into(), Some(bytes))
+        Self::told(work.into(), Some(bytes), STEP_BYTES)
     }
 
-    fn told(work: Cow<'static, str>, bytes: Option<u64>) -> Self {
+    /// For work on a known number of pieces.
+    pub fn on_pieces(work: impl Into<Cow<'static, str>>, pieces: u64) -> Self {
+        Self::told(work.into(), Some(pieces), 1)
+    }
+
+    fn told(work: Cow<'static, str>, bytes: Option<u64>, step: u64) -> Self {
         let waiting = Self {
             work,
-            done: Cell::new(0),
-            told: Cell::new(0),
+            done: AtomicU64::new(0),
+            told: AtomicU64::new(0),
             bytes,
+            step,
         };
         waiting.tell(&waiting.work);
         waiting
     }
 
     fn tell(&self, work: &str) {
-        self.told.set(self.done.get());
+        let done = self.done.load(Relaxed);
+        self.told.store(done, Relaxed);
         if let Some(listener) = LISTENER.get() {
-            listener(work, self.done.get(), self.bytes);
+            listener(work, done, self.bytes);
         }
     }
 
@@ -83,10 +92,10 @@ impl Waiting {
         self.tell(&work.into());
     }
 
-    /// Counts bytes as done.
+    /// Counts bytes or pieces as done.
     pub fn advance(&self, bytes: u64) {
-        self.done.set(self.done.get() + bytes);
-        if self.done.get() - self.told.get() >= STEP_BYTES {
+        let done = self.done.fetch_add(bytes, Relaxed) + bytes;
+        if done - self.told.load(Relaxed) >= self.step {
             self.tell(&self.work);
         }
     }

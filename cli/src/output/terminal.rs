@@ -49,6 +49,15 @@ impl Waiting {
         Self::shown_as(template, Some(bytes), work)
     }
 
+    /// For work on a known number of pieces.
+    pub fn on_pieces(work: impl Into<Cow<'static, str>>, pieces: u64) -> Self {
+        Self::shown_as(
+            "{wide_bar} {pos}/{len} {elapsed}  {msg}",
+            Some(pieces),
+            work,
+        )
+    }
+
     fn shown_as(template: &str, length: Option<u64>, work: impl Into<Cow<'static, str>>) -> Self {
         let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -76,7 +85,7 @@ impl Waiting {
         self.bar.set_message(work);
     }
 
-    /// Counts bytes as done.
+    /// Counts bytes or pieces as done.
     pub fn advance(&self, bytes: u64) {
         self.bar.inc(bytes);
     }

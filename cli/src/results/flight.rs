@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use onecycle::{Assessment, Controller, Identification, Pid, Recording, Structure, Verdict};
-use onecycle_link::{ControlLoop, Span};
+use onecycle_link::{ControlLoop, ParameterFiles, Span};
 
 use super::answer::Answer;
 use super::controllers::Controllers;
@@ -41,7 +41,9 @@ pub(crate) struct Survey {
     /// Empty if the file has no such flight.
     pub(crate) firmware: String,
     pub(crate) loops: Vec<FlightLoop>,
-    /// The files with the parameters of all loops and with the old values. `None`: not asked for, or there is nothing to write.
+    /// What to write: the parameters of all loops to change, and the old values. `None`: not asked for, or nothing changes.
+    pub(crate) parameters: Option<ParameterFiles>,
+    /// The files that were written.
     pub(crate) files: Option<[PathBuf; 2]>,
 }
 

@@ -93,7 +93,7 @@ fn domain(index: usize, count: usize) -> [f64; 2] {
 }
 
 /// Labels of a linear axis in a small figure: more touch each other if they are long.
-const SMALL_LABELS: u8 = 4;
+const SMALL_LABELS: u8 = 3;
 
 fn axis(axis: &Axis, places: Option<&Places>) -> Value {
     let kind = match places {

@@ -30,7 +30,7 @@ pub(super) fn figure(of: &Loop) -> Figure {
     });
     panel.y = panel.y.spanning(below, above);
     let mut caption =
-        "Nyquist's plot of the open loop: the farther from -1 (grey ring), the better.".to_owned();
+        "Nyquist's plot of the open loop: the farther from -1 (ring), the better.".to_owned();
     if of.ms.is_some() {
         caption += " The circle about -1 is that of the maximum sensitivity Ms: the curve touches it and stays outside.";
     }
