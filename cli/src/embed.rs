@@ -6,18 +6,20 @@ mod studio;
 
 use std::sync::Arc;
 
-use onecycle::{Identification, Recording};
+use onecycle::{Identification, Recording, Report};
 
 use crate::args::{self, Arguments, Command, Identify};
-use crate::commands::{flight, identify, tune};
+use crate::commands::{identify, tune};
+use crate::failure::Failure;
 #[cfg(target_family = "wasm")]
 pub use crate::output::page::{Listener, listen};
-use crate::reading;
 pub use crate::reading::Given;
+use crate::reading::{self, Input};
 use crate::report::flight as report;
 use crate::style::plain;
 use crate::words::remark::{details, reasons};
 use crate::words::verdict::advice;
+use crate::words::with_options;
 
 pub use studio::Studio;
 
@@ -28,7 +30,7 @@ pub fn give(name: &str, file: Arc<dyn Given>) {
 }
 
 /// What `onecycle identify` found.
-pub struct Found(identify::Found);
+pub struct Found(Report);
 
 impl Found {
     /// Identifies from a file as `onecycle identify FILE` does; the gains of a flight log are part of the result.
@@ -36,7 +38,18 @@ impl Found {
     /// # Errors
     /// One sentence: an option or the file cannot be used.
     pub fn in_file(file: &str, options: &[String]) -> Result<Self, String> {
-        Self::of(file, None, options)
+        let arguments = arguments_of_identify(file, options)?;
+        let found = || {
+            let request = identify::checked(&arguments)?;
+            let source = Input::new(&arguments.file)?;
+            match identify::is_of_all_loops(&arguments, &request, &source) {
+                true => Err(Failure::usage(format!(
+                    "{file} is a flight log: choose one of its loops with --axis and --loop"
+                ))),
+                false => identify::found(&request, &source),
+            }
+        };
+        found().map(Self).map_err(|failure| told(&failure))
     }
 
     /// Identifies from a recording in memory; `name` stands in the reports.
@@ -48,18 +61,12 @@ impl Found {
         recording: Recording,
         options: &[String],
     ) -> Result<Self, String> {
-        Self::of(name, Some(recording), options)
-    }
-
-    fn of(name: &str, given: Option<Recording>, options: &[String]) -> Result<Self, String> {
         let arguments = arguments_of_identify(name, options)?;
-        if given.is_none() && flight::is_asked(&arguments) {
-            return Err(format!(
-                "{name} is a flight log: choose one of its loops with --axis and --loop"
-            ));
-        }
-        let found = identify::find(&arguments, given).map_err(|failure| failure.to_string())?;
-        Ok(Self(found))
+        let found = || {
+            let request = identify::checked(&arguments)?;
+            Ok(request.identify_recording(name, recording)?)
+        };
+        found().map(Self).map_err(|failure: Failure| told(&failure))
     }
 
     /// The recording.
@@ -77,39 +84,43 @@ impl Found {
     /// The JSON report: docs/identify-json.md.
     #[must_use]
     pub fn json(&self) -> String {
-        self.0.json(false)
+        identify::as_json(&self.0, false)
     }
 
     /// The HTML page of `--report`.
     pub fn page(&mut self) -> String {
-        self.0.page()
+        identify::as_page(&mut self.0)
     }
 
     /// The report as text, with all details.
     #[must_use]
     pub fn text(&self) -> String {
-        plain(&self.0.text(true))
+        plain(&identify::as_text(&self.0, true))
     }
 
     /// One or two sentences for each remark that is a reason to suspect the result.
     #[must_use]
     pub fn remarks(&self) -> Vec<String> {
         let reasons = reasons(&self.0.identification).into_iter();
-        reasons.map(|(_, sentence)| sentence).collect()
+        reasons
+            .map(|(_, sentence)| with_options(&sentence).into_owned())
+            .collect()
     }
 
     /// One or two sentences for each other remark: how the result was found, what no such test shows, what the controller asks for.
     #[must_use]
     pub fn details(&self) -> Vec<String> {
         let details = details(&self.0.identification).into_iter();
-        details.map(|(_, sentence)| sentence).collect()
+        details
+            .map(|(_, sentence)| with_options(&sentence).into_owned())
+            .collect()
     }
 
     /// Why no process was identified, and what to do. `None` if one was.
     #[must_use]
     pub fn refusal(&self) -> Option<String> {
         let verdict = self.0.identification.outcome.as_ref().err()?;
-        Some(format!("{verdict}: {}", advice(verdict)))
+        Some(format!("{verdict}: {}", with_options(&advice(verdict))))
     }
 }
 
@@ -120,14 +131,18 @@ impl Found {
 /// One sentence: an option or the file cannot be used.
 pub fn flight(file: &str, options: &[String]) -> Result<(String, String), String> {
     let arguments = arguments_of_identify(file, options)?;
-    if !flight::is_asked(&arguments) {
-        return Err(format!(
-            "{file} is no flight log, or an option chooses one of its loops"
-        ));
-    }
-    let survey = || flight::survey(&arguments, &identify::checked(&arguments)?);
-    let surveyed = survey().map_err(|failure| failure.to_string())?;
-    let text = report::text(&surveyed, arguments.details);
+    let surveyed = || {
+        let request = identify::checked(&arguments)?;
+        let source = Input::new(&arguments.file)?;
+        match identify::is_of_all_loops(&arguments, &request, &source) {
+            true => Ok(request.survey(&source)?),
+            false => Err(Failure::usage(format!(
+                "{file} is no flight log, or an option chooses one of its loops"
+            ))),
+        }
+    };
+    let surveyed = surveyed().map_err(|failure| told(&failure))?;
+    let text = with_options(&report::text(&surveyed, arguments.details)).into_owned();
     Ok((plain(&text), report::json(&surveyed)))
 }
 
@@ -138,9 +153,8 @@ pub fn flight(file: &str, options: &[String]) -> Result<(String, String), String
 /// One sentence: an option or the file cannot be used.
 pub fn read(file: &str, options: &[String]) -> Result<Recording, String> {
     let arguments = arguments_of_identify(file, options)?;
-    let read = || identify::read(&arguments, &identify::checked(&arguments)?);
-    let (recording, _) = read().map_err(|failure| failure.to_string())?;
-    Ok(recording)
+    let read = || Ok(identify::checked(&arguments)?.read(&Input::new(&arguments.file)?)?);
+    read().map_err(|failure: Failure| told(&failure))
 }
 
 /// The JSON report of `onecycle tune`.
@@ -149,9 +163,17 @@ pub fn read(file: &str, options: &[String]) -> Result<Recording, String> {
 /// One sentence: the process or an option cannot be used, or there is no controller.
 pub fn design(options: &[String]) -> Result<String, String> {
     match parsed("tune", &[], options)? {
-        Command::Tune(arguments) => tune::json(&arguments).map_err(|failure| failure.to_string()),
+        Command::Tune(arguments) => match tune::tuned(&arguments) {
+            Ok(found) => Ok(tune::as_json(&found)),
+            Err(failure) => Err(told(&failure)),
+        },
         _ => Err("not the command tune".to_owned()),
     }
+}
+
+/// The sentence of a failure.
+fn told(failure: &Failure) -> String {
+    with_options(&failure.to_string()).into_owned()
 }
 
 fn arguments_of_identify(file: &str, options: &[String]) -> Result<Identify, String> {

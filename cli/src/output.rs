@@ -15,6 +15,7 @@ use anstyle::Style;
 
 use crate::failure::Failure;
 use crate::style::{HEADING, REFUSAL};
+use crate::words::with_options;
 #[cfg(target_family = "wasm")]
 pub use page::{ProgressBar, Waiting, columns, progress_bar};
 #[cfg(not(target_family = "wasm"))]
@@ -22,6 +23,7 @@ pub use terminal::{ProgressBar, Waiting, columns, progress_bar};
 
 /// Prints a report to the standard output, with styles if that is a terminal.
 pub fn print(text: &str) -> Result<(), Failure> {
+    let text = with_options(text);
     written(AutoStream::auto(io::stdout().lock()), text.as_bytes())
 }
 
@@ -62,7 +64,7 @@ pub fn print_whole(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Resu
 
 /// Prints an error of a program to the error output.
 pub fn complain(program: &str, failure: &Failure) {
-    say(program, REFUSAL, failure);
+    say(program, REFUSAL, with_options(&failure.to_string()));
 }
 
 /// Prints a message about the progress of a program to the error output.

@@ -5,6 +5,9 @@ use std::io::{self, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use onecycle::Source;
+use onecycle_link::LogFormat;
+
 use crate::failure::Failure;
 use crate::output::Waiting;
 
@@ -64,16 +67,81 @@ pub(crate) fn open_with_bar(path: &Path) -> io::Result<FileWithBar> {
     })
 }
 
-/// The first bytes of a file. `None`: it cannot be read, or it is a pipe, which must not be read twice.
-pub(crate) fn head(path: &Path, most: u64) -> Option<Vec<u8>> {
-    let file: Box<dyn Read> = match given(path) {
-        Some(given) => given.open(),
-        None if path.is_file() => Box::new(File::open(path).ok()?),
-        None => return None,
-    };
+/// The source of a recording: a file, or the standard input.
+pub(crate) struct Input<'a> {
+    path: &'a Path,
+    /// What was read of the standard input: all of a flight log, of anything else the first bytes.
+    piped: Option<Vec<u8>>,
+}
+
+/// Largest flight log on the standard input, in bytes: it is read twice, so it is kept.
+const MOST_PIPED: u64 = 1 << 29;
+
+impl<'a> Input<'a> {
+    /// The file of this name; `-` is the standard input.
+    pub(crate) fn new(path: &'a Path) -> Result<Self, Failure> {
+        let piped = match path == Path::new("-") {
+            true => Some(piped()?),
+            false => None,
+        };
+        Ok(Self { path, piped })
+    }
+
+    pub(crate) fn is_piped(&self) -> bool {
+        self.piped.is_some()
+    }
+}
+
+/// The standard input if it is a flight log, or else its first bytes.
+fn piped() -> Result<Vec<u8>, Failure> {
+    let failed = |error: io::Error| Failure::unreadable(Path::new("-"), error);
+    let mut bytes = Vec::new();
+    let mut input = io::stdin().lock();
+    let most = LogFormat::HEAD_BYTES as u64;
+    let head = input.by_ref().take(most).read_to_end(&mut bytes);
+    head.map_err(failed)?;
+    if LogFormat::detect(&bytes).is_none() {
+        return Ok(bytes);
+    }
+    let _waiting = Waiting::on("reading the standard input");
+    let rest = input.take(MOST_PIPED).read_to_end(&mut bytes);
+    rest.map_err(failed)?;
+    if bytes.len() as u64 > MOST_PIPED {
+        let reason =
+            format!("the log has more than {MOST_PIPED} bytes: write it to a file and name that");
+        return Err(Failure::unreadable(Path::new("-"), reason));
+    }
+    Ok(bytes)
+}
+
+impl Source for Input<'_> {
+    fn name(&self) -> String {
+        self.path.display().to_string()
+    }
+
+    fn open(&self) -> io::Result<Box<dyn Read + '_>> {
+        match &self.piped {
+            // Of a flight log nothing is left there.
+            Some(bytes) => Ok(Box::new(bytes.chain(io::stdin()))),
+            None => Ok(Box::new(open_with_bar(self.path)?)),
+        }
+    }
+
+    fn head(&self, most: u64) -> Vec<u8> {
+        match (&self.piped, given(self.path)) {
+            (Some(bytes), _) => bytes.iter().take(most as usize).copied().collect(),
+            (None, Some(given)) => first(given.open(), most),
+            (None, None) => self.path.head(most),
+        }
+    }
+}
+
+fn first(file: impl Read, most: u64) -> Vec<u8> {
     let mut head = Vec::new();
-    file.take(most).read_to_end(&mut head).ok()?;
-    Some(head)
+    match file.take(most).read_to_end(&mut head) {
+        Ok(_) => head,
+        Err(_) => vec![],
+    }
 }
 
 /// A file that the system does not have: a page has none.

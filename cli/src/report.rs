@@ -12,9 +12,10 @@ pub mod json;
 pub(crate) mod live;
 pub(crate) mod log;
 pub(crate) mod log_gains;
-pub mod number;
 pub(crate) mod page;
 mod record;
 pub(crate) mod text;
-pub(crate) mod units;
 pub mod wrap;
+
+pub use onecycle::words::number;
+pub(crate) use onecycle::words::units;

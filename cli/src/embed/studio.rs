@@ -22,15 +22,18 @@
 
 use std::path::Path;
 
-use onecycle::{Controller, Model, Pid};
+use onecycle::request::HALF_STEP;
+use onecycle::source::is_flight_log;
+use onecycle::{Controller, LogFile, Model, Pid, Report};
 use onecycle_link::FlightLog;
 use serde_json::{Value, json};
 
-use super::{arguments_of_identify, parsed};
-use crate::args::{Command, HALF_STEP, Identify};
-use crate::commands::log::{self, Source};
-use crate::commands::{flight, identify, simulate};
+use super::{arguments_of_identify, parsed, told};
+use crate::args::{Command, Identify};
+use crate::commands::{identify, simulate};
 use crate::failure::Failure;
+use crate::output::Waiting;
+use crate::reading::Input;
 use crate::report::{flight as flight_report, hand, log as log_report};
 use crate::style::plain;
 use crate::words;
@@ -46,7 +49,7 @@ pub struct Studio {
     file: String,
     log: Option<FlightLog>,
     signals: Option<Signals>,
-    found: Option<identify::Found>,
+    found: Option<Report>,
     draws: Vec<Model>,
 }
 
@@ -67,11 +70,11 @@ impl Studio {
             Ok(message) => self.answer(&message),
         };
         let answer = answer.unwrap_or_else(|error| json!({ "error": words::sentence(&error) }));
-        answer.to_string()
+        words::with_options(&answer.to_string()).into_owned()
     }
 
     fn answer(&mut self, message: &Value) -> Result<Value, String> {
-        let failed = |failure: Failure| failure.to_string();
+        let failed = |failure: Failure| told(&failure);
         let options = options(message);
         match message["do"].as_str().unwrap_or_default() {
             "open" => self.open(message["file"].as_str().unwrap_or_default()),
@@ -87,8 +90,8 @@ impl Studio {
             "identify" => {
                 (self.found, self.draws) = (None, vec![]);
                 let arguments = arguments_of_identify(&self.file, &options)?;
-                let found = identify::find(&arguments, None).map_err(failed)?;
-                let report = value(&found.json(false));
+                let found = self.identified(&arguments).map_err(failed)?;
+                let report = value(&identify::as_json(&found, false));
                 if let Ok(identified) = &found.identification.outcome {
                     self.draws = identified.posterior.models(DRAWS);
                 }
@@ -97,14 +100,18 @@ impl Studio {
             }
             "survey" => {
                 let arguments = arguments_of_identify(&self.file, &options)?;
-                let asked = identify::checked(&arguments).map_err(failed)?;
-                let surveyed = flight::survey(&arguments, &asked).map_err(failed)?;
+                let survey = || {
+                    let request = identify::checked(&arguments)?;
+                    let _waiting = Waiting::on("identifying");
+                    Ok(request.survey(&self.source()?)?)
+                };
+                let surveyed = survey().map_err(failed)?;
                 Ok(value(&flight_report::json(&surveyed)))
             }
-            "json" => Ok(json!({ "text": self.found()?.json(false) })),
+            "json" => Ok(json!({ "text": identify::as_json(self.found()?, false) })),
             "page" => {
                 let found = self.found.as_mut().ok_or(NOTHING)?;
-                Ok(json!({ "text": found.page() }))
+                Ok(json!({ "text": identify::as_page(found) }))
             }
             "trade_off" => {
                 let found = self.found.as_mut().ok_or(NOTHING)?;
@@ -124,22 +131,21 @@ impl Studio {
             file: file.to_owned(),
             ..Self::default()
         };
-        let path = Path::new(file);
-        if !log::is_log(path) {
+        let source = Input::new(Path::new(file)).map_err(|failure| told(&failure))?;
+        if !is_flight_log(&source) {
             return Ok(json!({ "log": null }));
         }
-        let source = Source { path, bytes: None };
-        let scanned = source.scan().map_err(|failure| failure.to_string())?;
-        let moved = log::movements(&source, &scanned);
-        let report = value(&log_report::json(file, &scanned, &moved, None));
-        self.log = Some(scanned);
+        let scanned = LogFile::scan(&source).map_err(|error| told(&error.into()))?;
+        let moved = scanned.movements();
+        let report = value(&log_report::json(file, &scanned.log, &moved, None));
+        self.log = Some(scanned.log);
         Ok(json!({ "log": report }))
     }
 
     /// The whole signals, of which a part is to be chosen.
     fn read(&self, arguments: &Identify) -> Result<Signals, Failure> {
         let Some(log) = &self.log else {
-            let recording = identify::read_table(arguments, &[])?;
+            let recording = arguments.request()?.read(&self.source()?)?;
             let columns = recording.columns();
             let named = [&columns.input, &columns.output];
             let notes: Vec<String> = (recording.notes().iter())
@@ -157,12 +163,10 @@ impl Studio {
                 }),
             ));
         };
-        let source = Source {
-            path: Path::new(&self.file),
-            bytes: None,
-        };
-        let number = log::longest(log, &arguments.log);
-        let signals = log::signals(&source, log, number, arguments.log.control_loop())?;
+        let (request, source) = (arguments.request()?, self.source()?);
+        let file = LogFile::new(&source, log.clone());
+        let number = file.flight(request.flight);
+        let signals = file.signals(number, request.loop_of_log())?;
         let flight = log.flights.get(number.saturating_sub(1));
         let parts = flight.map_or(vec![], |flight| flight.stretches(&signals));
         let parts: Vec<[f64; 2]> = parts.iter().map(|part| [part.from_s, part.to_s]).collect();
@@ -185,7 +189,15 @@ impl Studio {
         Ok(signals.view(from_s, to_s, points))
     }
 
-    fn found(&self) -> Result<&identify::Found, String> {
+    fn source(&self) -> Result<Input<'_>, Failure> {
+        Input::new(Path::new(&self.file))
+    }
+
+    fn identified(&self, arguments: &Identify) -> Result<Report, Failure> {
+        identify::found(&identify::checked(arguments)?, &self.source()?)
+    }
+
+    fn found(&self) -> Result<&Report, String> {
         self.found.as_ref().ok_or_else(|| NOTHING.to_owned())
     }
 
@@ -322,10 +334,10 @@ fn simulated(options: &[String]) -> Result<Value, String> {
     };
     if arguments.expect {
         let expected = simulate::expected(&arguments);
-        let text = expected.map_err(|failure| failure.to_string())?;
+        let text = expected.map_err(|failure| told(&failure))?;
         return Ok(json!({ "text": plain(&text) }));
     }
-    let csv = simulate::csv(&arguments).map_err(|failure| failure.to_string())?;
+    let csv = simulate::csv(&arguments).map_err(|failure| told(&failure))?;
     Ok(json!({ "text": String::from_utf8_lossy(&csv) }))
 }
 

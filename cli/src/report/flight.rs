@@ -73,7 +73,7 @@ fn card(of: &Survey, has_details: bool) -> String {
         }
     }
     let next = match (&of.files, told) {
-        (Some([path, restore]), _) => answers::written(path, restore),
+        (Some(files), _) => answers::written(files),
         (None, 0) => words::NO_LOOP.to_owned(),
         _ => match step(of) {
             Some(step) => answers::write(&of.file, "", step),
@@ -263,7 +263,7 @@ pub(crate) fn json(of: &Survey) -> String {
         flight: of.number,
         loops: of.loops.iter().map(loop_report).collect(),
         written: (of.files.as_ref())
-            .map(|paths| paths.each_ref().map(|path| path.display().to_string())),
+            .map(|of| [&of.path, &of.restore].map(|path| path.display().to_string())),
     })
 }
 

@@ -23,6 +23,7 @@ use crate::results::log_gains::LogGains;
 use crate::words::recording::note;
 use crate::words::remark::{details, reasons};
 use crate::words::verdict::advice;
+use crate::words::with_options;
 
 /// Changes with every change that a reader of the report could notice, added keys excepted.
 const IDENTIFY_SCHEMA: &str = "onecycle.identify/2";
@@ -409,7 +410,7 @@ pub fn to_text(report: &impl Serialize) -> String {
     // Plain structures of numbers and strings always serialise.
     let mut text = serde_json::to_string_pretty(report).unwrap_or_default();
     text.push('\n');
-    text
+    with_options(&text).into_owned()
 }
 
 fn column(column: &Column) -> ColumnReport<'_> {

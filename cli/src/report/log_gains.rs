@@ -1,13 +1,14 @@
 //! Gains of a flight log, as text and as JSON: read back, laid over the log, written.
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
 use onecycle_link::{Agreement, ReadBack, Term};
 use serde::Serialize;
 
 use super::number::{short, significant};
 use super::wrap::wrapped;
-use crate::results::log_gains::{LogGains, Written};
+use crate::results::log_gains::{LogGains, NamedFiles, Written};
 use crate::style::{REFUSAL, REMARK, headed, painted};
 use crate::words::log_gains as words;
 
@@ -197,14 +198,18 @@ impl From<&LogGains> for LogGainsReport {
 impl From<&Written> for WrittenReport {
     fn from(written: &Written) -> Self {
         let margins = &written.figures.margins;
+        let name = |of: fn(&NamedFiles) -> &PathBuf| {
+            let path = written.files.as_ref().map(of);
+            path.map_or(String::new(), |path| path.display().to_string())
+        };
         let change = |change: &onecycle_link::Change| ChangeReport {
             name: change.name.clone(),
             old: change.old,
             new: change.new,
         };
         Self {
-            file: written.path.display().to_string(),
-            restore: written.restore.display().to_string(),
+            file: name(|files| &files.path),
+            restore: name(|files| &files.restore),
             step: written.share,
             changes: written.changes.iter().map(change).collect(),
             phase_margin_deg: margins.phase_margin_rad.to_degrees(),

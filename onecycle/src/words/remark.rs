@@ -1,21 +1,21 @@
 //! What a remark means.
 
-use onecycle::{About, DesignError, Identification, Interval, Parameter, Remark};
+use crate::{About, DesignError, Identification, Interval, Parameter, Remark};
 use onecycle_identify::Nonlinear;
 
 use super::{caution, controllers, listed};
-use crate::report::number::{bounded, percent, significant};
+use crate::words::number::{bounded, percent, significant};
 
 /// Heading of the remarks that are reasons to suspect the result.
-pub(crate) const REASONS: &str = "Remarks";
+pub const REASONS: &str = "Remarks";
 
 /// Remarks on a result that are reasons to suspect it, each with one or two sentences, with the options of this program.
-pub(crate) fn reasons(found: &Identification) -> Vec<(&Remark, String)> {
+pub fn reasons(found: &Identification) -> Vec<(&Remark, String)> {
     told(found, |about| about == About::Recording)
 }
 
 /// All other remarks, in the same form.
-pub(crate) fn details(found: &Identification) -> Vec<(&Remark, String)> {
+pub fn details(found: &Identification) -> Vec<(&Remark, String)> {
     told(found, |about| about != About::Recording)
 }
 
@@ -27,7 +27,7 @@ fn told(found: &Identification, is_wanted: impl Fn(About) -> bool) -> Vec<(&Rema
 }
 
 /// Sentences of all remarks, with a heading for each thing that they are about.
-pub(crate) fn grouped(found: &Identification) -> Vec<(&'static str, Vec<String>)> {
+pub fn grouped(found: &Identification) -> Vec<(&'static str, Vec<String>)> {
     let group = |about: About| {
         let of_group = told(found, |other| other == about).into_iter();
         let sentences: Vec<String> = of_group.map(|(_, sentence)| sentence).collect();
@@ -130,14 +130,13 @@ fn of_record(remark: &Remark) -> Option<String> {
             percent(part)
         ),
         Remark::PartUsed(part) => format!(
-            "Only the longest part without a gap was used, {:.0} % of the recording. Choose another part with --from \
-             and --to.",
+            "Only the longest part without a gap was used, {:.0} % of the recording. Choose another part with `from` \
+             and `to`.",
             100.0 * part
         ),
         Remark::Interpolated(difference) => format!(
             "The input runs in straight lines between the samples, which explains the recording better than a held \
-             input (log-likelihood higher by {difference:.1}). If the recording has every sample of the loop, use --hold \
-             held: the dead time changes by up to half a sample period."
+             input (log-likelihood higher by {difference:.1}). If the recording has every sample of the loop, use `hold=held`: the dead time changes by up to half a sample period."
         ),
         Remark::WeakPrediction {
             explained,
@@ -153,7 +152,7 @@ fn of_record(remark: &Remark) -> Option<String> {
              tells them apart."
             .to_owned(),
         Remark::AssumedRest => "The input never changes. The fit assumes that it was 0 before the first row, with the process \
-             at rest: state another value with --input-before."
+             at rest: state another value with `input_before`."
             .to_owned(),
         Remark::Coloured(autocorrelation) => format!(
             "What the model did not predict is not white noise (largest autocorrelation {autocorrelation:.2}): the \
@@ -161,7 +160,7 @@ fn of_record(remark: &Remark) -> Option<String> {
         ),
         Remark::InputLeft(share) => format!(
             "The past input explains {:.1} % of what the model did not predict: the process has more than the model, \
-             such as a resonance, friction or a saturation. Try another structure with --structure.",
+             such as a resonance, friction or a saturation. Try another structure with `structure`.",
             100.0 * share
         ),
         _ => return None,
@@ -176,7 +175,7 @@ fn of_estimator(remark: &Remark) -> Option<String> {
         ),
         Remark::RelayReplaced(part) => format!(
             "The general estimator was used. The one for steady relay oscillations leaves {:.1} % of the oscillation \
-             unexplained, the general one nothing but white noise. Compare with --estimator relay.",
+             unexplained, the general one nothing but white noise. Compare with `estimator=relay`.",
             100.0 * part
         ),
         Remark::GeneralDisagrees {
@@ -195,13 +194,13 @@ fn of_estimator(remark: &Remark) -> Option<String> {
             };
             format!(
                 "The {noun} {} {verb} the recording nearly as well. An input with more frequencies would tell; \
-                 --structure fixes the choice.",
+                 `structure` fixes the choice.",
                 listed(&names)
             )
         }
         Remark::PriorDropped(distance) => format!(
             "The recording contradicts the prior of the pack, which would move the fit by {:.1} standard deviations of \
-             the residual: the fit was made without it. Choose a pack for processes of this kind with --pack.",
+             the residual: the fit was made without it. Choose a pack for processes of this kind with `pack`.",
             distance.max(0.0).sqrt()
         ),
         Remark::NoController(error) => without_controller(error),
@@ -221,7 +220,7 @@ fn disagreement(phase_margin_rad: Option<f64>, is_replaced: bool) -> String {
         "Do not fly this controller before another test: on the process that the general estimator finds in the whole \
          recording it would"
     };
-    format!("{which} {margin} there. Compare with --estimator relay and --estimator general.")
+    format!("{which} {margin} there. Compare with `estimator=relay` and `estimator=general`.")
 }
 
 /// Nonlinear forces: what they mean for the controller.
@@ -286,7 +285,7 @@ fn of_interval(remark: &Remark, is_relay: bool) -> Option<String> {
         ),
         Remark::MarginMayBeLess(margin_rad) => format!(
             "Within the intervals the phase margin may be as low as {:.1} deg; {}, or ask for a larger margin with \
-             --phase-margin or --style calm.",
+             `phase_margin` or `style=calm`.",
             margin_rad.to_degrees(),
             longer
         ),
@@ -348,7 +347,7 @@ fn equal_lags(lags: &[Parameter], mean_s: Interval) -> String {
 
 #[cfg(test)]
 mod tests {
-    use onecycle::{Structure, Verdict};
+    use crate::{Structure, Verdict};
 
     use super::*;
 

@@ -1,10 +1,11 @@
 //! The closed loop with the gains in force, driven by the logged set-point, beside the logged output.
 
-use onecycle::{
-    Assessment, Excitation, FollowedLoop, Identification, Identified, LowPass, Model, Pid,
-    Recording,
+use onecycle_design::{Assessment, LowPass, Model, Pid};
+use onecycle_identify::{Excitation, Identification, Identified};
+use onecycle_link::{
+    Axis, ControlLoop, FirmwareKind, Flight, LoggedLoop, MarkKind, Recording, Term,
 };
-use onecycle_link::{Axis, ControlLoop, FirmwareKind, Flight, LoggedLoop, MarkKind, Term};
+use onecycle_plant::FollowedLoop;
 
 use crate::results::log_gains::Overlay;
 
@@ -20,7 +21,7 @@ const LEAST_SAMPLES: usize = 50;
 
 /// The overlay of a rate loop over the part of the recording that was used. `None`: no set-point is logged, the excitation
 /// entered elsewhere (SYSTEMID), other gains were in force, or the loop is unstable.
-pub(super) fn overlay(
+pub(crate) fn overlay(
     flight: &Flight,
     axis: Axis,
     in_force: Pid,
@@ -68,7 +69,7 @@ pub(super) fn overlay(
 /// Overshoot after a step of the set-point, in the law of the firmware: P and I on the error, its filters, and its derivative
 /// and feed-forward, but for one on the derivative of the set-point, which a step does not have. `None`: the response has no
 /// end, or is too long to simulate.
-pub(super) fn overshoot(
+pub(crate) fn overshoot(
     flight: &Flight,
     axis: Axis,
     pid: Pid,

@@ -1,76 +1,75 @@
 //! Controllers of a process to choose from: designs and figures, on the threads of the machine.
 
-use onecycle::{
-    Controller, Design, Execution, Identified, Model, Pid, Proposal, Specification, Style, assess,
-    design, least_margins, proposals,
-};
 use onecycle_design::oscillation::Family;
-use onecycle_design::{Limit, Spans, Vendor, reference_filter_s};
-use rayon::prelude::*;
+use onecycle_design::{
+    Controller, Design, Execution, Limit, Model, Pid, Proposal, Spans, Specification, Style,
+    Vendor, assess, design, least_margins, proposals, reference_filter_s,
+};
+use onecycle_identify::Identified;
 
 use crate::results::controllers::{Against, Controllers, Row, Source};
+use crate::threads::each;
 
 /// Draws over which the gains in force are judged.
 const DRAWS: usize = 200;
-
-/// Controllers of an identified process.
-pub(super) fn of_identified(identified: &Identified, against: Option<Pid>) -> Controllers {
-    let draws = identified.posterior.models(DRAWS);
-    let (model, _) = identified.for_design(0);
-    let asked = &identified.specification;
-    Controllers {
-        source: Source::Recording,
-        ..controllers(&model, &draws, asked, against, identified.proposals())
-    }
-}
-
-/// Controllers of a known process.
-pub(super) fn of_model(model: &Model, asked: &Specification, against: Option<Pid>) -> Controllers {
-    let choices = Proposal::choices(model.structure(), asked);
-    let proposals = (choices.par_iter())
-        .map(|choice| Proposal::new(model, &[], choice))
-        .collect();
-    controllers(model, &[], asked, against, proposals)
-}
-
-/// Controllers that keep their limits on all members of a family.
-pub(super) fn of_family(
-    family: &Family,
-    asked: &Specification,
-    against: Option<Pid>,
-) -> Controllers {
-    let mut asked = *asked;
-    asked.coverage = 1.0;
-    let (middle, members) = (&family.middle, &family.members);
-    let proposals = proposals(middle, members, &asked, None);
-    Controllers {
-        source: Source::Oscillation,
-        ..controllers(middle, members, &asked, against, proposals)
-    }
-}
 
 /// Limits of `Ms` of a curve.
 const PEAKS: [f64; 10] = [1.2, 1.25, 1.3, 1.4, 1.5, 1.6, 1.8, 2.0, 2.25, 2.5];
 
 impl Controllers {
+    /// Controllers of an identified process.
+    #[must_use]
+    pub fn of_identified(identified: &Identified, against: Option<Pid>) -> Self {
+        let draws = identified.posterior.models(DRAWS);
+        let (model, _) = identified.for_design(0);
+        let asked = &identified.specification;
+        Self {
+            source: Source::Recording,
+            ..controllers(&model, &draws, asked, against, identified.proposals())
+        }
+    }
+
+    /// Controllers of a known process.
+    #[must_use]
+    pub fn of_model(model: &Model, asked: &Specification, against: Option<Pid>) -> Self {
+        let choices = Proposal::choices(model.structure(), asked);
+        let proposals = each(choices, |choice| Proposal::new(model, &[], &choice));
+        controllers(model, &[], asked, against, proposals)
+    }
+
+    /// Controllers that keep their limits on all members of a family.
+    #[must_use]
+    pub fn of_family(family: &Family, asked: &Specification, against: Option<Pid>) -> Self {
+        let mut asked = *asked;
+        asked.coverage = 1.0;
+        let (middle, members) = (&family.middle, &family.members);
+        let proposals = proposals(middle, members, &asked, None);
+        Self {
+            source: Source::Oscillation,
+            ..controllers(middle, members, &asked, against, proposals)
+        }
+    }
+
     /// With the gains as this controller of a process control system takes them.
-    pub(super) fn in_plant(self, plant: Option<(Vendor, Spans)>) -> Self {
+    #[must_use]
+    pub fn in_plant(self, plant: Option<(Vendor, Spans)>) -> Self {
         Self { plant, ..self }
     }
 
     /// With the designs for `model` over limits of `Ms`; the other limits are those of the chosen controller.
-    pub(super) fn with_trade_off(self, model: &Model) -> Self {
+    #[must_use]
+    pub fn with_trade_off(self, model: &Model) -> Self {
         let base = match self.asked.style {
             Style::Paper => self.asked.in_style(Style::Balanced),
             _ => self.asked,
         };
-        let at = |peak: &f64| {
-            let design = design(model, &base.with_peak(*peak)).ok()?;
+        let at = |peak: f64| {
+            let design = design(model, &base.with_peak(peak)).ok()?;
             let figures = assess(model, &design.controller, base.noise.as_ref())?;
-            Some((*peak, figures, design.controller))
+            Some((peak, figures, design.controller))
         };
         Self {
-            trade_off: PEAKS.par_iter().filter_map(at).collect(),
+            trade_off: each(PEAKS.into(), at).into_iter().flatten().collect(),
             ..self
         }
     }
@@ -96,7 +95,7 @@ fn controllers(
             proposal,
         }
     };
-    let rows: Vec<Row> = proposals.into_par_iter().map(row).collect();
+    let rows = each(proposals, row);
     let chosen = rows
         .iter()
         .find(|row| row.proposal.specification.style == asked.style);

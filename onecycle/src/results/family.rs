@@ -4,37 +4,43 @@ use onecycle_design::oscillation::{Family, MarginRanges, Oscillation};
 use onecycle_design::rules::UltimateRule;
 
 /// What is known of a process.
-pub(crate) struct Known {
-    pub(crate) oscillation: Oscillation,
+pub struct Known {
+    /// An ultimate point, or a relay test.
+    pub oscillation: Oscillation,
     /// The rule whose gains told the oscillation.
-    pub(crate) rule: Option<Rule>,
+    pub rule: Option<Rule>,
     /// Least and largest share of the dead time in the sum of dead time and lags.
-    pub(crate) dead_time_share: (f64, f64),
+    pub dead_time_share: (f64, f64),
 }
 
 /// What is known of a process, the processes that agree with it, and the margins of the chosen controller over them.
-pub(crate) struct OfOscillation {
-    pub(crate) known: Known,
-    pub(crate) family: Family,
+pub struct OfOscillation {
+    /// What is known.
+    pub known: Known,
+    /// The processes that agree with it.
+    pub family: Family,
     /// `None` if the loop is unstable on one of them.
-    pub(crate) margins: Option<MarginRanges>,
+    pub margins: Option<MarginRanges>,
 }
 
 /// A rule by which firmware or a person computes gains from an oscillation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Rule {
+pub enum Rule {
     /// Ziegler-Nichols behind a relay without hysteresis, by `KU = 4H/(pi A)`.
     Marlin,
     /// The rule without overshoot behind the same relay.
     MarlinBed,
     /// Ziegler-Nichols behind a relay of 0 and full power with thresholds 5 degrees apart, by twice that `KU`.
     Klipper,
+    /// That of Ziegler and Nichols.
     ZieglerNichols,
+    /// That of Tyreus and Luyben.
     TyreusLuyben,
 }
 
 impl Rule {
-    pub(crate) const ALL: [Self; 5] = [
+    /// Every rule.
+    pub const ALL: [Self; 5] = [
         Self::Marlin,
         Self::MarlinBed,
         Self::Klipper,
@@ -42,7 +48,9 @@ impl Rule {
         Self::TyreusLuyben,
     ];
 
-    pub(crate) fn name(self) -> &'static str {
+    /// Name of the rule.
+    #[must_use]
+    pub fn name(self) -> &'static str {
         match self {
             Self::Marlin => "marlin",
             Self::MarlinBed => "marlin-bed",
@@ -52,11 +60,15 @@ impl Rule {
         }
     }
 
-    pub(crate) fn from_name(name: &str) -> Option<Self> {
+    /// Rule of this name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
         Self::ALL.into_iter().find(|rule| rule.name() == name)
     }
 
-    pub(crate) fn formula(self) -> UltimateRule {
+    /// Its formula.
+    #[must_use]
+    pub fn formula(self) -> UltimateRule {
         match self {
             Self::Marlin | Self::Klipper | Self::ZieglerNichols => UltimateRule::ZieglerNichols,
             Self::MarlinBed => UltimateRule::NoOvershoot,

@@ -1,11 +1,11 @@
 //! The answer of a report, made of what was identified, the controllers to choose from and the gains of a log.
 
-use onecycle::{Assessment, Comparison, Controller, Identification, Identified, Pid, assess};
 use onecycle_design::cascade::Cascade;
+use onecycle_design::{Assessment, Comparison, Controller, Pid, assess};
+use onecycle_identify::{Identification, Identified};
 use onecycle_link::{Agreement, ControlLoop, LoopGains};
 
-use super::log_gains::{LogLoop, pid};
-use crate::report::units::Units;
+use crate::log_gains::{LogLoop, pid};
 use crate::results::answer::{Advice, Answer, Columns, Gain};
 use crate::results::controllers::Controllers;
 use crate::results::log_gains::LogGains;
@@ -14,6 +14,7 @@ use crate::words::controllers::advice;
 use crate::words::log_gains::broken;
 use crate::words::remark::reasons;
 use crate::words::sentence;
+use crate::words::units::Units;
 
 /// Draws on which the gains in force and the proposed ones are compared.
 const DRAWS: usize = 24;
@@ -22,18 +23,18 @@ const DRAWS: usize = 24;
 const WEIGHT: &str = "set-point weight b";
 
 /// What an answer is about.
-pub(super) struct Subject<'a> {
-    pub(super) file: &'a str,
-    pub(super) units: &'a Units,
-    pub(super) choice: Option<&'a Controllers>,
-    pub(super) of_log: Option<&'a LogLoop>,
-    pub(super) gains: Option<&'a LogGains>,
+pub(crate) struct Subject<'a> {
+    pub(crate) file: &'a str,
+    pub(crate) units: &'a Units,
+    pub(crate) choice: Option<&'a Controllers>,
+    pub(crate) of_log: Option<&'a LogLoop>,
+    pub(crate) gains: Option<&'a LogGains>,
     /// Share of the way to the proposed gains that is written.
-    pub(super) share: f64,
+    pub(crate) share: f64,
 }
 
 /// The answer to a recording.
-pub(super) fn of(found: &Identification, subject: &Subject<'_>) -> Answer {
+pub(crate) fn of(found: &Identification, subject: &Subject<'_>) -> Answer {
     let identified = match &found.outcome {
         Ok(identified) => identified,
         Err(verdict) => {
@@ -50,7 +51,7 @@ pub(super) fn of(found: &Identification, subject: &Subject<'_>) -> Answer {
 }
 
 /// The answer to a process that was identified.
-pub(super) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> Answer {
+pub(crate) fn of_identified(identified: &Identified, subject: &Subject<'_>) -> Answer {
     let overlay = subject.gains.and_then(|gains| gains.overlay.as_ref());
     let sure = words::sure(identified, overlay.map(|overlay| overlay.explained));
     let read_back = subject.gains.and_then(|gains| gains.read_back.as_ref());
@@ -242,23 +243,26 @@ fn next(of: Advice, subject: &Subject<'_>, is_of_firmware: bool) -> String {
     match (written, of, subject.of_log) {
         (Some(Ok(written)), _, _) => {
             let broken = broken(written).map_or(String::new(), |broken| format!(" {broken}"));
-            words::written(&written.path, &written.restore) + &broken
+            let files = written.files.as_ref();
+            files.map_or(String::new(), words::written) + &broken
         }
         (Some(Err(reason)), _, _) => format!("Nothing is written: {reason}"),
         (None, Advice::Keep, _) => words::NOTHING.to_owned(),
-        (None, Advice::Change, Some(of_log)) if is_of_firmware => {
-            words::write(subject.file, &options(of_log.control_loop()), subject.share)
-        }
+        (None, Advice::Change, Some(of_log)) if is_of_firmware => words::write(
+            subject.file,
+            &settings(of_log.control_loop()),
+            subject.share,
+        ),
         (None, Advice::Change, _) => words::type_in(subject.share),
         _ => words::COMPARE.to_owned(),
     }
 }
 
-/// Options that choose a loop.
-fn options(of: ControlLoop) -> String {
+/// Settings that choose a loop.
+fn settings(of: ControlLoop) -> String {
     match of {
-        ControlLoop::Rate(axis) => format!(" --axis {}", axis.name()),
-        ControlLoop::Attitude(axis) => format!(" --axis {} --loop attitude", axis.name()),
-        _ => " --loop altitude".to_owned(),
+        ControlLoop::Rate(axis) => format!(" `axis={}`", axis.name()),
+        ControlLoop::Attitude(axis) => format!(" `axis={}` `loop=attitude`", axis.name()),
+        _ => " `loop=altitude`".to_owned(),
     }
 }

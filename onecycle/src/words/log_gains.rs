@@ -2,60 +2,59 @@
 
 use onecycle_link::{Agreement, ControlLoop, GainsError, ReadBack, ReadTerm};
 
-use crate::report::number::short;
 use crate::results::log_gains::Written;
+use crate::words::number::short;
 use crate::words::sentence;
 
 use super::listed;
 
-pub(crate) const NOTHING_IDENTIFIED: &str =
-    "no process was identified, so no gains can be justified.";
-pub(crate) const CONTRADICTED: &str = "the gains read back from the signals contradict the parameters of the log. Check \
+pub const NOTHING_IDENTIFIED: &str = "no process was identified, so no gains can be justified.";
+pub const CONTRADICTED: &str = "the gains read back from the signals contradict the parameters of the log. Check \
     that no gain was moved in flight by a knob, and that the axes are not exchanged or mounted the other way round.";
-pub(crate) const NO_DESIGN: &str =
-    "no controller keeps the limits; choose a calmer --style or another stretch of the log.";
-pub(crate) const NOT_ITS_FORM: &str =
-    "the proposed controller has a form that the firmware does not have: leave out --controller.";
-pub(crate) const NOT_ITS_FILTER: &str = "the proposed controller needs a filter of the measurement, and the log shows no such \
+pub const NO_DESIGN: &str =
+    "no controller keeps the limits; choose a calmer `style` or another stretch of the log.";
+pub const NOT_ITS_FORM: &str =
+    "the proposed controller has a form that the firmware does not have: leave out `controller`.";
+pub const NOT_ITS_FILTER: &str = "the proposed controller needs a filter of the measurement, and the log shows no such \
     filter of the firmware. Use a log that holds all parameters, with a filter of the derivative.";
-pub(crate) const NO_CHANGE: &str =
+pub const NO_CHANGE: &str =
     "the step leaves every parameter as it is; the gains in force are near the proposed ones.";
 
 /// The loop has no gains to write.
-pub(crate) fn no_gains(of: ControlLoop) -> String {
+pub fn no_gains(of: ControlLoop) -> String {
     format!("the log has no gains of the {of} loop whose scale is known; choose a rate loop.")
 }
 
 /// Why gains are no parameters of the firmware, and what to do.
-pub(crate) fn unwritable(error: &GainsError) -> String {
+pub fn unwritable(error: &GainsError) -> String {
     let advice = match error {
-        GainsError::Range { .. } => "take calmer gains: a smaller --step or a calmer --style",
+        GainsError::Range { .. } => "take calmer gains: a smaller `step` or a calmer `style`",
         GainsError::Firmware(_) | GainsError::Version(_) => {
             "type the gains in by hand, in the scale of your firmware"
         }
-        _ => "choose another loop with --axis and --loop",
+        _ => "choose another loop with `axis` and `loop`",
     };
     format!("{error}; {advice}.")
 }
 
 /// The gains to write are not stable, with the share of draws on which they are.
-pub(crate) fn unstable(stable: Option<f64>) -> String {
+pub fn unstable(stable: Option<f64>) -> String {
     let share = stable.map_or(String::new(), |share| {
         format!(" ({:.0} % of the draws are stable)", 100.0 * share)
     });
     format!(
-        "the gains of this step are unstable on processes that the log allows{share}. Choose another --step, or record a \
+        "the gains of this step are unstable on processes that the log allows{share}. Choose another `step`, or record a \
          longer or stronger excitation."
     )
 }
 
 /// Why gains that break limits are not written, and how they are.
-pub(crate) fn below_limits(broken: &str) -> String {
-    format!("{broken}; choose another --step or --style, or add --below-limits to write them.")
+pub fn below_limits(broken: &str) -> String {
+    format!("{broken}; choose another `step` or `style`, or add `below_limits` to write them.")
 }
 
 /// What a read-back tells about the log.
-pub(crate) fn read_back(read: &ReadBack) -> String {
+pub fn read_back(read: &ReadBack) -> String {
     let since = read.since_s.map_or(String::new(), |since_s| {
         format!("Gains were changed in flight: the last ones are in force, and the signals after {since_s:.1} s count. ")
     });
@@ -89,7 +88,7 @@ pub(crate) fn read_back(read: &ReadBack) -> String {
 }
 
 /// A term that was read back, as the value of its name.
-pub(crate) fn term(term: &ReadTerm) -> String {
+pub fn term(term: &ReadTerm) -> String {
     let [low, high] = term.stated;
     let stated = if low == high {
         short(low)
@@ -108,7 +107,7 @@ pub(crate) fn term(term: &ReadTerm) -> String {
 }
 
 /// The verdict on a term.
-pub(crate) fn agreement(agreement: Agreement) -> &'static str {
+pub fn agreement(agreement: Agreement) -> &'static str {
     match agreement {
         Agreement::Agrees => "agrees",
         Agreement::Differs => "differs",
@@ -117,7 +116,7 @@ pub(crate) fn agreement(agreement: Agreement) -> &'static str {
 }
 
 /// How far the simulated loop explains the log.
-pub(crate) fn overlay(explained: f64) -> String {
+pub fn overlay(explained: f64) -> String {
     format!(
         "The identified process under the gains in force, driven by the logged set-point, explains {:.1} % of the variance \
          of the logged output.",
@@ -126,7 +125,7 @@ pub(crate) fn overlay(explained: f64) -> String {
 }
 
 /// Margins of the gains to write.
-pub(crate) fn margins(written: &Written) -> String {
+pub fn margins(written: &Written) -> String {
     let margins = &written.figures.margins;
     let gain = margins
         .gain_margin
@@ -153,7 +152,7 @@ pub(crate) fn margins(written: &Written) -> String {
 }
 
 /// The limits that the gains to write break.
-pub(crate) fn broken(written: &Written) -> Option<String> {
+pub fn broken(written: &Written) -> Option<String> {
     let in_force = match written.needs_consent {
         true => "",
         false => " The gains in force break them by more.",
@@ -162,14 +161,16 @@ pub(crate) fn broken(written: &Written) -> Option<String> {
 }
 
 /// Margins of the gains that were written, and how to go on.
-pub(crate) fn written(written: &Written) -> Vec<String> {
+pub fn written(written: &Written) -> Vec<String> {
     let mut sentences = vec![margins(written)];
     sentences.extend(broken(written));
-    sentences.push(format!(
-        "Written to {}; {} sets the old values again.",
-        written.path.display(),
-        written.restore.display()
-    ));
+    if let Some(files) = &written.files {
+        sentences.push(format!(
+            "Written to {}; {} sets the old values again.",
+            files.path.display(),
+            files.restore.display()
+        ));
+    }
     if written.least.is_none() {
         sentences.push(
             "The margins are those of the most probable process only: the recording gives no distribution of it."
@@ -178,7 +179,7 @@ pub(crate) fn written(written: &Written) -> Vec<String> {
     }
     if written.share < 1.0 {
         sentences.push(format!(
-            "The step is {:.0} % of the way to the proposed gains. Fly and log again before the next one, or use --step 1.",
+            "The step is {:.0} % of the way to the proposed gains. Fly and log again before the next one, or use `step=1`.",
             100.0 * written.share
         ));
     }

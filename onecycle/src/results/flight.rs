@@ -1,44 +1,49 @@
 //! The control loops of a flight, each identified from several parts of it.
 
-use std::path::PathBuf;
-
-use onecycle::{Assessment, Controller, Pid, Structure, Verdict};
+use onecycle_design::{Assessment, Controller, Pid, Structure};
+use onecycle_identify::Verdict;
 use onecycle_link::{ControlLoop, Span};
 
 use super::answer::Answer;
 use super::controllers::Controllers;
-use super::log_gains::Written;
+use super::log_gains::{NamedFiles, Written};
 
 /// A loop with its parts.
-pub(crate) struct FlightLoop {
-    pub(crate) control_loop: ControlLoop,
+pub struct FlightLoop {
+    /// Which loop it is.
+    pub control_loop: ControlLoop,
     /// Units of input and output.
-    pub(crate) units: [&'static str; 2],
-    pub(crate) parts: Vec<Part>,
+    pub units: [&'static str; 2],
+    /// Parts of the flight worth using.
+    pub parts: Vec<Part>,
     /// Controllers for the process of the best part.
-    pub(crate) choice: Option<Controllers>,
+    pub choice: Option<Controllers>,
     /// What to do about the gains. `None`: no part tells anything.
-    pub(crate) answer: Option<Answer>,
+    pub answer: Option<Answer>,
     /// The parameters to write, or the reason why they must not be written. `None` without `--write`, and for a loop that is kept.
-    pub(crate) to_write: Option<Result<Written, String>>,
+    pub to_write: Option<Result<Written, String>>,
 }
 
 /// The loops of a flight.
-pub(crate) struct Survey {
-    pub(crate) file: String,
+pub struct Survey {
+    /// Name of the log.
+    pub file: String,
     /// Number of the flight in the file, from 1.
-    pub(crate) number: usize,
+    pub number: usize,
     /// Empty if the file has no such flight.
-    pub(crate) firmware: String,
-    pub(crate) loops: Vec<FlightLoop>,
+    pub firmware: String,
+    /// The loops that are logged.
+    pub loops: Vec<FlightLoop>,
     /// The files with the parameters of all loops and with the old values. `None`: not asked for, or there is nothing to write.
-    pub(crate) files: Option<[PathBuf; 2]>,
+    pub files: Option<NamedFiles>,
 }
 
 /// A controller and its figures; without them the loop is unstable.
-pub(crate) struct Judged {
-    pub(crate) pid: Pid,
-    pub(crate) figures: Option<Assessment>,
+pub struct Judged {
+    /// The controller.
+    pub pid: Pid,
+    /// Figures of the loop.
+    pub figures: Option<Assessment>,
 }
 
 impl Judged {
@@ -52,13 +57,16 @@ impl Judged {
 }
 
 /// A part of the flight.
-pub(crate) struct Part {
-    pub(crate) span: Span,
-    pub(crate) outcome: Result<Found, Refusal>,
+pub struct Part {
+    /// Its time.
+    pub span: Span,
+    /// What it tells, or why it tells nothing.
+    pub outcome: Result<Found, Refusal>,
 }
 
 /// Why a part tells nothing.
-pub(crate) enum Refusal {
+pub enum Refusal {
+    /// The verdict on the identification.
     Verdict(Verdict),
     /// The gain is none that this loop of a vehicle can have, so what was found is not the process.
     Implausible {
@@ -71,7 +79,8 @@ pub(crate) enum Refusal {
 
 impl Refusal {
     /// Name in JSON.
-    pub(crate) fn kind(&self) -> &'static str {
+    #[must_use]
+    pub fn kind(&self) -> &'static str {
         match self {
             Self::Verdict(verdict) => verdict.kind(),
             Self::Implausible { .. } => "implausible",
@@ -81,12 +90,13 @@ impl Refusal {
 
 /// What a part tells.
 #[derive(Clone, Copy)]
-pub(crate) struct Found {
-    pub(crate) structure: Structure,
+pub struct Found {
+    /// Structure of the process.
+    pub structure: Structure,
     /// Rate of change of the output per unit of input, of any structure, with its 90 % interval: low, estimate, high.
-    pub(crate) gain: [f64; 3],
+    pub gain: [f64; 3],
     /// Dead time and actuator lags together (s).
-    pub(crate) delay_s: f64,
+    pub delay_s: f64,
 }
 
 impl Found {
@@ -97,19 +107,22 @@ impl Found {
 
 impl FlightLoop {
     /// Gains in force on the process of the best part. `None`: not known.
-    pub(crate) fn in_force(&self) -> Option<Judged> {
+    #[must_use]
+    pub fn in_force(&self) -> Option<Judged> {
         let against = self.choice.as_ref()?.against.as_ref()?;
         Judged::of(&against.controller, against.figures)
     }
 
     /// Proposed controller for that process.
-    pub(crate) fn proposed(&self) -> Option<Judged> {
+    #[must_use]
+    pub fn proposed(&self) -> Option<Judged> {
         let (design, figures) = self.choice.as_ref()?.design()?;
         Judged::of(&design.controller, Some(*figures))
     }
 
     /// Index of the part with the narrowest interval of the gain.
-    pub(crate) fn best(&self) -> Option<usize> {
+    #[must_use]
+    pub fn best(&self) -> Option<usize> {
         let widths = self.parts.iter().enumerate().filter_map(|(at, part)| {
             let found = part.outcome.as_ref().ok()?;
             Some((at, found.relative_width()))
@@ -118,7 +131,8 @@ impl FlightLoop {
     }
 
     /// What the parts tell, the best one first.
-    pub(crate) fn told(&self) -> Vec<Found> {
+    #[must_use]
+    pub fn told(&self) -> Vec<Found> {
         let found = |at: usize| self.parts[at].outcome.as_ref().ok().copied();
         let Some((best, first)) = self.best().and_then(|at| Some((at, found(at)?))) else {
             return vec![];
@@ -130,7 +144,8 @@ impl FlightLoop {
     }
 
     /// Gain of the best part, with an interval that holds those of all parts: its ends grow by what the parts differ.
-    pub(crate) fn gain(&self) -> Option<[f64; 3]> {
+    #[must_use]
+    pub fn gain(&self) -> Option<[f64; 3]> {
         let told = self.told();
         let first = told.first()?;
         let hold = |[low, estimate, high]: [f64; 3], other: &Found| {
@@ -140,7 +155,8 @@ impl FlightLoop {
     }
 
     /// Whether the intervals of two parts have no value in common.
-    pub(crate) fn parts_disagree(&self) -> bool {
+    #[must_use]
+    pub fn parts_disagree(&self) -> bool {
         let told = self.told();
         let low = told
             .iter()

@@ -4,7 +4,7 @@ use onecycle_link::{
     Axis, ControlLoop, Firmware, FirmwareKind, Flight, LogError, LogFormat, Loss, Mark, MarkKind,
 };
 
-use crate::report::number::short;
+use crate::words::number::short;
 
 /// Least rate of input and output of a rate loop, in hertz: a small multirotor answers within 20 to 50 ms.
 const LEAST_RATE_HZ: f64 = 100.0;
@@ -16,25 +16,23 @@ const OF_A_PLANE: &str = "The rate loops of a plane are logged as PIDR, PIDP and
     one of them to a CSV file: the sum of P, I, D and FF is the input, Act the output, Tar the set-point.";
 
 /// What is wrong with a log, and what to do.
-pub(crate) fn refusal(error: &LogError) -> String {
+pub fn refusal(error: &LogError) -> String {
     let advice = match error {
         LogError::UnknownFormat => {
             "expected a PX4 ULog, an ArduPilot DataFlash log, a blackbox log or an MCAP file"
         }
         LogError::NotBuilt(_) => "build onecycle-link with its feature mcap",
         LogError::Empty => "download it from the vehicle again",
-        LogError::NoSuchFlight { .. } => "choose another one with --flight",
-        LogError::NotLogged { .. } => "choose another loop; `onecycle log FILE` lists them",
-        LogError::Recording(_) => {
-            "choose another loop or another flight; `onecycle log FILE` lists them"
-        }
+        LogError::NoSuchFlight { .. } => "choose another one with `flight`",
+        LogError::NotLogged { .. } => "choose another loop; `log FILE` lists them",
+        LogError::Recording(_) => "choose another loop or another flight; `log FILE` lists them",
         _ => return error.to_string(),
     };
     format!("{error}; {advice}")
 }
 
 /// Name of a format.
-pub(crate) fn format(format: LogFormat) -> &'static str {
+pub fn format(format: LogFormat) -> &'static str {
     match format {
         LogFormat::ULog => "PX4 ULog",
         LogFormat::DataFlash => "ArduPilot DataFlash",
@@ -46,7 +44,7 @@ pub(crate) fn format(format: LogFormat) -> &'static str {
 }
 
 /// Name of a firmware.
-pub(crate) fn firmware(kind: FirmwareKind) -> &'static str {
+pub fn firmware(kind: FirmwareKind) -> &'static str {
     match kind {
         FirmwareKind::Px4 => "PX4",
         FirmwareKind::ArduPilot => "ArduPilot",
@@ -57,7 +55,7 @@ pub(crate) fn firmware(kind: FirmwareKind) -> &'static str {
 }
 
 /// A stretch of deliberate excitation.
-pub(crate) fn mark(mark: &Mark) -> String {
+pub fn mark(mark: &Mark) -> String {
     let what = match mark.kind {
         MarkKind::Px4Autotune => "PX4 autotune",
         MarkKind::ArduPilotSystemId => "SYSTEMID",
@@ -75,7 +73,7 @@ pub(crate) fn mark(mark: &Mark) -> String {
 }
 
 /// What was lost; `None`: nothing.
-pub(crate) fn loss(loss: &Loss) -> Option<String> {
+pub fn loss(loss: &Loss) -> Option<String> {
     let mut facts = Vec::new();
     if loss.bytes_skipped > 0 {
         facts.push(format!("{} bytes skipped", loss.bytes_skipped));
@@ -99,7 +97,7 @@ pub(crate) fn loss(loss: &Loss) -> Option<String> {
 ///
 /// `moved`: standard deviation (rad/s) of the set-points of the rate loops in the liveliest part of the flight. `None`: they
 /// cannot be read.
-pub(crate) fn advice(flight: &Flight, moved: Option<f64>) -> Vec<String> {
+pub fn advice(flight: &Flight, moved: Option<f64>) -> Vec<String> {
     let rate = flight.logged_loop(ControlLoop::Rate(Axis::Roll));
     let rate_hz = rate.filter(|rate| rate.is_complete()).map(|rate| {
         let rates =
@@ -178,7 +176,7 @@ fn faster(flight: &Flight) -> Option<String> {
 }
 
 /// Name and version; versions of some firmware begin with the name.
-pub(crate) fn of_firmware(about: &Firmware) -> String {
+pub fn of_firmware(about: &Firmware) -> String {
     if about.version.starts_with(char::is_alphabetic) {
         about.version.clone()
     } else {

@@ -1,20 +1,19 @@
 //! Sentences of the answer.
 
-use std::path::Path;
-
-use onecycle::{Comparison, Effect, Felt, Identified, Parameter};
+use crate::{Comparison, Effect, Felt, Identified, Parameter};
 use onecycle_design::Limit;
 
-use crate::report::number::{seconds, short};
 use crate::results::answer::Advice;
 use crate::results::controllers::{Against, Controllers};
+use crate::results::log_gains::NamedFiles;
+use crate::words::number::{seconds, short};
 
 use super::log_gains::CONTRADICTED;
 use super::verdict::advice;
 use super::{controllers, sentence};
 
 /// The verdict.
-pub(crate) fn verdict(of: Advice) -> &'static str {
+pub fn verdict(of: Advice) -> &'static str {
     match of {
         Advice::Change => "CHANGE",
         Advice::Keep => "KEEP YOURS",
@@ -24,12 +23,12 @@ pub(crate) fn verdict(of: Advice) -> &'static str {
 }
 
 /// The verdict with its reason.
-pub(crate) fn headline(of: Advice, reason: &str) -> String {
+pub fn headline(of: Advice, reason: &str) -> String {
     format!("{}: {}.", verdict(of), reason.trim_end_matches('.'))
 }
 
 /// Why gains are changed or kept.
-pub(crate) fn compared(choice: &Controllers, of: &Comparison) -> String {
+pub fn compared(choice: &Controllers, of: &Comparison) -> String {
     let now = choice.against.as_ref();
     let figures = now.and_then(|now| now.figures);
     match (of.pays(), of.gain(), of.loss()) {
@@ -92,7 +91,7 @@ fn effect(of: &Effect) -> String {
 }
 
 /// The first limit that the proposal does not keep, and what helps.
-pub(crate) fn not_kept(choice: &Controllers) -> Option<String> {
+pub fn not_kept(choice: &Controllers) -> Option<String> {
     let missed = choice.missed.first()?;
     match (missed.limit, choice.reference_filter_s) {
         (Limit::Overshoot, Some(time_s)) => Some(format!(
@@ -106,7 +105,7 @@ pub(crate) fn not_kept(choice: &Controllers) -> Option<String> {
 }
 
 /// Why first gains may be used.
-pub(crate) fn first(choice: &Controllers) -> String {
+pub fn first(choice: &Controllers) -> String {
     let robustness = choice.design().and_then(|(design, _)| design.robustness);
     robustness.map_or("no gains in force are known".to_owned(), |robustness| {
         format!(
@@ -117,7 +116,7 @@ pub(crate) fn first(choice: &Controllers) -> String {
 }
 
 /// How well the process is known. `explained`: share of the logged output that the loop with the model explains.
-pub(crate) fn sure(identified: &Identified, explained: Option<f64>) -> String {
+pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
     let width = |low: f64, estimate: f64, high: f64| (high - low) / (2.0 * estimate.abs());
     let rate = identified
         .effectiveness()
@@ -150,52 +149,52 @@ pub(crate) fn sure(identified: &Identified, explained: Option<f64>) -> String {
 }
 
 /// Why there is nothing to type in, and what to do.
-pub(crate) fn refused(of: &onecycle::Verdict) -> (String, String) {
+pub fn refused(of: &crate::Verdict) -> (String, String) {
     (of.to_string(), advice(of).into_owned())
 }
 
 /// Why nothing is proposed where the signals contradict the gains of the log, and what to do.
-pub(crate) fn contradicted() -> (String, String) {
+pub fn contradicted() -> (String, String) {
     let (reason, next) = CONTRADICTED.split_once(". ").unwrap_or((CONTRADICTED, ""));
     (reason.to_owned(), next.to_owned())
 }
 
-pub(crate) const NO_DESIGN: &str = "a process was found, and no controller keeps the limits on it";
-pub(crate) const COMPARE: &str =
-    "Type these gains in and watch a step of the set-point. Gains in force: --against KP,KI,KD.";
-pub(crate) const NOTHING: &str = "Leave the gains as they are.";
+pub const NO_DESIGN: &str = "a process was found, and no controller keeps the limits on it";
+pub const COMPARE: &str =
+    "Type these gains in and watch a step of the set-point. Gains in force: `against=KP,KI,KD`.";
+pub const NOTHING: &str = "Leave the gains as they are.";
 
 /// Where all else stands. `remarks`: how many are not on the card.
-pub(crate) fn more(of: Advice, remarks: usize) -> String {
+pub fn more(of: Advice, remarks: usize) -> String {
     match (of, remarks) {
-        (Advice::NotYet, _) => "All that is known: --details".to_owned(),
-        (_, 0) => "All figures, other controllers: --details".to_owned(),
-        (_, 1) => "All figures, other controllers, and one more remark: --details".to_owned(),
+        (Advice::NotYet, _) => "All that is known: `details`".to_owned(),
+        (_, 0) => "All figures, other controllers: `details`".to_owned(),
+        (_, 1) => "All figures, other controllers, and one more remark: `details`".to_owned(),
         (_, count) => {
-            format!("All figures, other controllers, and {count} more remarks: --details")
+            format!("All figures, other controllers, and {count} more remarks: `details`")
         }
     }
 }
 
 /// Where the parameters went.
-pub(crate) fn written(path: &Path, restore: &Path) -> String {
+pub fn written(files: &NamedFiles) -> String {
     format!(
         "{} is written; {} restores the old values. Fly and log again before the next step.",
-        path.display(),
-        restore.display()
+        files.path.display(),
+        files.restore.display()
     )
 }
 
 /// How to write parameters.
-pub(crate) fn write(file: &str, options: &str, share: f64) -> String {
+pub fn write(file: &str, options: &str, share: f64) -> String {
     format!(
-        "onecycle identify {file}{options} --write tune.txt writes {} of the step, and a file that restores yours.",
+        "`identify {file}`{options} `write=tune.txt` writes {} of the step, and a file that restores yours.",
         part(share)
     )
 }
 
 /// What to type in.
-pub(crate) fn type_in(share: f64) -> String {
+pub fn type_in(share: f64) -> String {
     format!(
         "Type in {} of the step, record again, and go on from there.",
         part(share)
@@ -203,7 +202,7 @@ pub(crate) fn type_in(share: f64) -> String {
 }
 
 /// A share of the way to the proposed gains.
-pub(crate) fn part(share: f64) -> String {
+pub fn part(share: f64) -> String {
     match share {
         0.5 => "half".to_owned(),
         1.0 => "all".to_owned(),

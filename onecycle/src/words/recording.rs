@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use onecycle_link::{ChosenBy, Note, ReadError, Recording, RecordingError, Role, TimeUnit};
 
 /// What is wrong with a file, where, and what to do.
-pub(crate) fn refusal(error: &ReadError) -> String {
+pub fn refusal(error: &ReadError) -> String {
     let advice = match error {
         ReadError::AmbiguousTime {
             step,
@@ -20,18 +20,18 @@ pub(crate) fn refusal(error: &ReadError) -> String {
 }
 
 /// What the reader chose, assumed or dropped, and the flag that changes a guess.
-pub(crate) fn note(note: &Note) -> String {
+pub fn note(note: &Note) -> String {
     let advice = match note {
         Note::ColumnsChosen {
             by: ChosenBy::Position | ChosenBy::Values,
             ..
-        } => Some("if that is wrong, give --time, --input and --output"),
-        Note::LogSignals { .. } => Some("choose others with --axis, --loop and --flight"),
-        Note::TagsChosen { .. } => Some("if that is wrong, give --tag, or --input and --output"),
+        } => Some("if that is wrong, give `time`, `input` and `output`"),
+        Note::LogSignals { .. } => Some("choose others with `axis`, `loop` and `flight`"),
+        Note::TagsChosen { .. } => Some("if that is wrong, give `tag`, or `input` and `output`"),
         Note::Compressed { .. } | Note::Interpolated { .. } => {
             Some("switch the compression of this tag off and record again")
         }
-        Note::TimeUnitGuessed { .. } => Some("if that is wrong, give --time-unit"),
+        Note::TimeUnitGuessed { .. } => Some("if that is wrong, give `time_unit`"),
         _ => None,
     };
     advised(note.to_string(), advice)
@@ -41,7 +41,7 @@ pub(crate) fn note(note: &Note) -> String {
 const STOPPED: f64 = 0.75;
 
 /// That the input stops to change long before the end of the recording, and what to do. `None` if it does not.
-pub(crate) fn input_stops(recording: &Recording) -> Option<String> {
+pub fn input_stops(recording: &Recording) -> Option<String> {
     let (times_s, input) = (recording.time_s(), recording.input());
     let last = (1..input.len()).rev().find(|&i| input[i] != input[i - 1])?;
     let (start_s, end_s) = (*times_s.first()?, *times_s.last()?);
@@ -65,18 +65,18 @@ fn advised(fact: String, advice: Option<impl AsRef<str>>) -> String {
 /// The option for each possible unit; the most usual unit first.
 fn advice_on_unit(step: f64, possible: &[TimeUnit], usual: Option<TimeUnit>) -> String {
     let Some(usual) = usual else {
-        return "give --time-unit, or the sample rate with --sample-rate".to_owned();
+        return "give `time_unit`, or the sample rate with `sample_rate`".to_owned();
     };
     let others = possible.iter().filter(|unit| **unit != usual);
     let others: Vec<String> = others
-        .map(|unit| format!("--time-unit {}", unit.symbol()))
+        .map(|unit| format!("`time_unit={}`", unit.symbol()))
         .collect();
     let rate = match step {
-        1.0 => ", or, if the column counts rows, --sample-rate",
+        1.0 => ", or, if the column counts rows, `sample_rate`",
         _ => "",
     };
     let (usual, others) = (usual.symbol(), others.join(" or "));
-    format!("give --time-unit {usual}, the most usual of these, or {others}{rate}")
+    format!("give `time_unit={usual}`, the most usual of these, or {others}{rate}")
 }
 
 fn advice_on_file(error: &ReadError) -> Option<&'static str> {
@@ -99,28 +99,28 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
         }
         E::NotANumber { .. } => "correct it or leave it empty",
         E::MixedDecimals { .. } => "export it with one of them and without separators of thousands",
-        E::SeveralLoops { .. } => "choose one with --tag",
+        E::SeveralLoops { .. } => "choose one with `tag`",
         E::NoSuchLoop { .. } => {
-            "choose another with --tag, or the columns with --input and --output"
+            "choose another with `tag`, or the columns with `input` and `output`"
         }
         E::UnknownTag { role, .. } => match role {
-            Role::Input => "choose it with --input",
-            _ => "choose it with --output",
+            Role::Input => "choose it with `input`",
+            _ => "choose it with `output`",
         },
         E::TooManyValues { .. } => "export one loop, or less time",
         E::ClockTime { .. } => {
             "export seconds from the start, or date and time of day in one column, or give the sample \
-             rate with --sample-rate"
+             rate with `sample_rate`"
         }
         E::AmbiguousDate { .. } => "export the dates as yyyy-mm-dd, or seconds from the start",
         E::TimeGoesBack { .. } => "keep one run and cut the rest",
         E::UnknownColumn { role, .. } | E::AmbiguousColumn { role, .. } => match role {
-            Role::Time => "choose it with --time, or give the sample rate with --sample-rate",
-            Role::Input => "choose it with --input",
-            Role::Output => "choose it with --output",
+            Role::Time => "choose it with `time`, or give the sample rate with `sample_rate`",
+            Role::Input => "choose it with `input`",
+            Role::Output => "choose it with `output`",
             _ => return None,
         },
-        E::InputOrOutput { .. } => "choose them with --input and --output",
+        E::InputOrOutput { .. } => "choose them with `input` and `output`",
         E::SameColumn { .. } => "choose another column",
         E::Recording(error) => return advice_on_samples(error),
         _ => return None,
@@ -133,16 +133,16 @@ fn advice_on_samples(error: &RecordingError) -> Option<&'static str> {
         E::TooLarge { .. } => "check the units or cut that row",
         E::TimeGoesBack { .. } => "keep one run and cut the rest",
         E::TimeConstant { .. } => {
-            "choose another column with --time, or give the sample rate with --sample-rate"
+            "choose another column with `time`, or give the sample rate with `sample_rate`"
         }
         E::TooManyMissing { .. } => "choose another column or cut the recording",
         E::TooManyBad { .. } => "export raw samples of a time when the sensor worked",
         E::TooManyDuplicates { .. } => {
-            "the time column is too coarse: give the sample rate with --sample-rate"
+            "the time column is too coarse: give the sample rate with `sample_rate`"
         }
         E::StampsTooCoarse { .. } => {
             "subtract the first time stamp before writing the file, or give the sample rate with \
-             --sample-rate"
+             `sample_rate`"
         }
         E::TooManyGaps { .. } => "cut it to one stretch without gaps",
         _ => return None,
@@ -254,7 +254,7 @@ mod tests {
             "12:00:01,1,1\n12:00:02,2,1\n",
             "line 1, column 1: \"12:00:01\" is not a date with a time of day; \
              export seconds from the start, or date and time of day in one column, or give the \
-             sample rate with --sample-rate",
+             sample rate with `sample_rate`",
         );
         assert_refused(
             "t,y,u\n1/2/2024 12:00,1,1\n1/4/2024 12:00,2,1\n",
@@ -268,13 +268,13 @@ mod tests {
         assert_refused(
             "t,pv,u\n5,1,1\n5,2,1\n5,3,1\n",
             "time does not change: all 3 rows have the same time stamp; \
-             choose another column with --time, or give the sample rate with --sample-rate",
+             choose another column with `time`, or give the sample rate with `sample_rate`",
         );
         let coarse: String = (0..100).map(|i| format!("{},{i},1\n", i / 2)).collect();
         assert_refused(
             &format!("t,pv,u\n{coarse}"),
             "50 of 100 rows repeat the time stamp of the row before, the first at line 3; \
-             at most 5 % may; the time column is too coarse: give the sample rate with --sample-rate",
+             at most 5 % may; the time column is too coarse: give the sample rate with `sample_rate`",
         );
         let far: String = (0..100)
             .map(|i| format!("{:e},{i},1\n", 1e18 + 1024.0 * f64::from(i)))
@@ -283,7 +283,7 @@ mod tests {
             &format!("time_us,pv,u\n{far}"),
             "time stamps as large as 1.000e12 s cannot resolve a sample period of 1.023e-3 s; \
              subtract the first time stamp before writing the file, or give the sample rate with \
-             --sample-rate",
+             `sample_rate`",
         );
     }
 
@@ -291,18 +291,18 @@ mod tests {
     fn units_of_time_in_doubt() {
         assert_refused(
             "t,y,u\n0,1,1\n1,2,1\n2,3,1\n",
-            "\"t\" (column 1) gives no unit of time: a step of 1 is 1 ms or 1 s; give --time-unit s, \
-             the most usual of these, or --time-unit ms, or, if the column counts rows, --sample-rate",
+            "\"t\" (column 1) gives no unit of time: a step of 1 is 1 ms or 1 s; give `time_unit=s`, \
+             the most usual of these, or `time_unit=ms`, or, if the column counts rows, `sample_rate`",
         );
         assert_refused(
             "t,y,u\n0,1,1\n4000,2,1\n8000,3,1\n",
             "\"t\" (column 1) gives no unit of time: a step of 4000 is 4000 us or 4000 ms; give \
-             --time-unit us, the most usual of these, or --time-unit ms",
+             `time_unit=us`, the most usual of these, or `time_unit=ms`",
         );
         assert_refused(
             "t,y,u\n133000000000000000,1,1\n133000000000100000,2,1\n",
             "\"t\" (column 1) gives no unit of time: a step of 100000 is no usual sample period in any \
-             unit; give --time-unit, or the sample rate with --sample-rate",
+             unit; give `time_unit`, or the sample rate with `sample_rate`",
         );
     }
 
@@ -324,22 +324,22 @@ mod tests {
             "a,b,c\n0,0,0\n1,1,1\n",
             "no column is known to be the time; \
              the columns are \"a\" (column 1), \"b\" (column 2), \"c\" (column 3); \
-             choose it with --time, or give the sample rate with --sample-rate",
+             choose it with `time`, or give the sample rate with `sample_rate`",
         );
         assert_refused(
             "t,pv,a,b\n0,0,0,1\n1,1,1,1\n",
             "no column is known to be the input; the columns are \"t\" (column 1), \
-             \"pv\" (column 2), \"a\" (column 3), \"b\" (column 4); choose it with --input",
+             \"pv\" (column 2), \"a\" (column 3), \"b\" (column 4); choose it with `input`",
         );
         assert_refused(
             "t,y,pv,u\n0,0,0,1\n1,1,1,1\n",
             "several columns may be the output: \"y\" (column 2), \"pv\" (column 3); \
-             choose it with --output",
+             choose it with `output`",
         );
         assert_refused(
             "0,0,0\n0.1,1,1\n0.2,0,1\n",
             "the values of column 2 and column 3 do not show which is the input and which the \
-             output; choose them with --input and --output",
+             output; choose them with `input` and `output`",
         );
         let same = CsvOptions::default().input_column("2").output_column("pv");
         let error = read_from(&b"t,pv,u\n0,1,1\n1,2,1\n"[..], &same).unwrap_err();
@@ -357,9 +357,9 @@ mod tests {
         let notes: Vec<String> = recording.notes().iter().map(note).collect();
         let expected = [
             "time is column 1, input is column 3, output is column 2, found by how few values the \
-             input takes; if that is wrong, give --time, --input and --output",
+             input takes; if that is wrong, give `time`, `input` and `output`",
             "the time column gives no unit; its time stamps were read in ms; if that is wrong, give \
-             --time-unit",
+             `time_unit`",
         ];
         assert_eq!(notes, expected);
     }

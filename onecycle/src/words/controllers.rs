@@ -1,25 +1,25 @@
 //! Sentences about controllers: the reason why a design failed, the assumed noise and sampling, the cost of robustness, and
 //! the verdict on the gains that the user flies now.
 
-use onecycle::{DesignError, Form, Robustness, Specification, Style};
+use crate::{DesignError, Form, Robustness, Specification, Style};
 use onecycle_design::{Limit, Missed, VendorError};
 
-use crate::report::number::{frequency, seconds, short, significant};
 use crate::results::controllers::{Against, Controllers, Source};
+use crate::words::number::{frequency, seconds, short, significant};
 
 /// Why the controller of a process control system cannot take the gains, and what to do.
-pub(crate) fn no_gains(error: VendorError) -> &'static str {
+pub fn no_gains(error: VendorError) -> &'static str {
     match error {
         VendorError::ComplexZeros => {
-            "its form is in series and needs Ti of at least 4 Td; use --controller pi, or a controller in ideal form"
+            "its form is in series and needs Ti of at least 4 Td; use `controller=pi`, or a controller in ideal form"
         }
         VendorError::NoProportional => "its form needs a proportional gain",
-        _ => "check --output-range and --input-range",
+        _ => "check `output_range` and `input_range`",
     }
 }
 
 /// Why there is no controller, as the cell of a table.
-pub(crate) fn brief(error: &DesignError) -> String {
+pub fn brief(error: &DesignError) -> String {
     match error {
         DesignError::Infeasible {
             least_peak: Some(peak),
@@ -28,33 +28,33 @@ pub(crate) fn brief(error: &DesignError) -> String {
         DesignError::Infeasible { .. } => "none keeps the limits".to_owned(),
         DesignError::NoIntegral(_) => "none: the process needs an integral term".to_owned(),
         DesignError::NoRate(_) => "none: the output is not the integral of a rate".to_owned(),
-        DesignError::Unbounded => "none: give --sample-period".to_owned(),
+        DesignError::Unbounded => "none: give `sample_period`".to_owned(),
         DesignError::Structure(_) => "none for this structure".to_owned(),
         _ => "none".to_owned(),
     }
 }
 
 /// What to do if there is no controller.
-pub(crate) fn advice(error: &DesignError) -> String {
+pub fn advice(error: &DesignError) -> String {
     match error {
         DesignError::Infeasible {
             least_peak: Some(peak),
             ..
         } => format!(
-            "Ask for --ms {} or more, record longer for narrower intervals, or choose another --controller",
+            "Ask for `ms={}` or more, record longer for narrower intervals, or choose another `controller`",
             above(*peak)
         ),
         DesignError::Infeasible { .. } => {
-            "Relax the further limits, record longer for narrower intervals, or choose another --controller".to_owned()
+            "Relax the further limits, record longer for narrower intervals, or choose another `controller`".to_owned()
         }
-        DesignError::NoIntegral(_) => "Use --controller pi or --controller pid".to_owned(),
-        DesignError::NoRate(_) => "Use --controller pi or --controller pid".to_owned(),
+        DesignError::NoIntegral(_) => "Use `controller=pi` or `controller=pid`".to_owned(),
+        DesignError::NoRate(_) => "Use `controller=pi` or `controller=pid`".to_owned(),
         DesignError::Unbounded => {
-            "The option is --sample-period".to_owned()
+            "The option is `sample_period`".to_owned()
         }
-        DesignError::PhaseMargin(_) => "Choose another margin with --phase-margin".to_owned(),
+        DesignError::PhaseMargin(_) => "Choose another margin with `phase_margin`".to_owned(),
         DesignError::Structure(_) => {
-            "Choose --style sharp, balanced or calm; --style paper is for the structure soiptd only".to_owned()
+            "Choose `style=sharp`, balanced or calm; `style=paper` is for the structure soiptd only".to_owned()
         }
         DesignError::UnstableProcess => "Stabilise the process first and identify the loop".to_owned(),
         _ => "Write the process in other units".to_owned(),
@@ -62,7 +62,7 @@ pub(crate) fn advice(error: &DesignError) -> String {
 }
 
 /// The error and what to do, as one clause.
-pub(crate) fn refusal(error: &DesignError) -> String {
+pub fn refusal(error: &DesignError) -> String {
     format!("{error}. {}", advice(error))
 }
 
@@ -72,7 +72,7 @@ fn above(peak: f64) -> String {
 }
 
 /// What was assumed about noise and execution, one sentence. `None` if nothing was.
-pub(crate) fn assumed(asked: &Specification, is_recorded: bool) -> Option<String> {
+pub fn assumed(asked: &Specification, is_recorded: bool) -> Option<String> {
     let noise = asked.noise.map_or_else(
         || "no measurement noise".to_owned(),
         |noise| {
@@ -101,7 +101,7 @@ pub(crate) fn assumed(asked: &Specification, is_recorded: bool) -> Option<String
 }
 
 /// The limits that the chosen controller does not keep, a sentence or two for each.
-pub(crate) fn not_kept(choice: &Controllers) -> Vec<String> {
+pub fn not_kept(choice: &Controllers) -> Vec<String> {
     let sentence = |missed: &Missed| match missed.limit {
         Limit::Overshoot => overshoots(choice, missed),
         _ => out_of_limit(missed),
@@ -129,7 +129,7 @@ fn overshoots(choice: &Controllers, missed: &Missed) -> String {
         },
     );
     format!(
-        "The overshoot of {} is above its limit of {limit} (--overshoot): {why}. {advice}.",
+        "The overshoot of {} is above its limit of {limit} (`overshoot`): {why}. {advice}.",
         percent(missed.reached)
     )
 }
@@ -140,7 +140,7 @@ fn percent(share: f64) -> String {
 }
 
 /// Rounded up to two significant digits, as a time is shown.
-pub(super) fn up(time_s: f64) -> f64 {
+pub(crate) fn up(time_s: f64) -> f64 {
     let digit = 10_f64.powf(time_s.log10().floor() - 1.0);
     (time_s / digit).ceil() * digit
 }
@@ -148,15 +148,15 @@ pub(super) fn up(time_s: f64) -> f64 {
 /// Another limit that is not kept.
 fn out_of_limit(missed: &Missed) -> String {
     let (name, option) = match missed.limit {
-        Limit::PhaseMargin => ("phase margin", " (--phase-margin)"),
-        Limit::GainMargin => ("gain margin", " (--gain-margin)"),
+        Limit::PhaseMargin => ("phase margin", " (`phase_margin`)"),
+        Limit::GainMargin => ("gain margin", " (`gain_margin`)"),
         Limit::DelayMargin => ("delay margin", ""),
-        Limit::Ms => ("maximum sensitivity Ms", " (--ms)"),
-        Limit::Mt => ("maximum complementary sensitivity Mt", " (--ms)"),
-        Limit::Noise => ("noise at the actuator", " (--noise)"),
+        Limit::Ms => ("maximum sensitivity Ms", " (`ms`)"),
+        Limit::Mt => ("maximum complementary sensitivity Mt", " (`ms`)"),
+        Limit::Noise => ("noise at the actuator", " (`noise`)"),
         Limit::InputPeak => (
             "largest input after a step of the reference",
-            " (--input-peak)",
+            " (`input_peak`)",
         ),
         _ => ("gain crossover", ""),
     };
@@ -173,15 +173,14 @@ fn out_of_limit(missed: &Missed) -> String {
         "above"
     };
     format!(
-        "The {name} of {} is {side} its limit of {}{option}. Check the loop before you use these gains, or choose --style \
-         calm.",
+        "The {name} of {} is {side} its limit of {}{option}. Check the loop before you use these gains, or choose `style=calm`.",
         shown(missed.reached),
         shown(missed.asked)
     )
 }
 
 /// What robustness costs.
-pub(crate) fn price(robustness: &Robustness, source: Source) -> String {
+pub fn price(robustness: &Robustness, source: Source) -> String {
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let nominal = percent(robustness.nominal_coverage);
     let cost = robustness.mean_iae / robustness.nominal_mean_iae - 1.0;
@@ -214,7 +213,7 @@ fn members(source: Source) -> (&'static str, &'static str) {
 }
 
 /// How the gains in force do.
-pub(crate) fn judgement(against: &Against, source: Source) -> String {
+pub fn judgement(against: &Against, source: Source) -> String {
     let (all, one) = members(source);
     let Some(figures) = &against.figures else {
         return format!("your gains are unstable on {one} process");
@@ -251,7 +250,7 @@ pub(crate) fn judgement(against: &Against, source: Source) -> String {
 }
 
 /// What changes with the chosen controller against the gains in force. `None` if these are unstable.
-pub(crate) fn change(choice: &Controllers) -> Option<String> {
+pub fn change(choice: &Controllers) -> Option<String> {
     let old = choice.against.as_ref()?.figures?;
     let (_, new) = choice.design()?;
     let mut parts = vec![
@@ -298,7 +297,7 @@ fn factor(gain_margin: f64) -> String {
 }
 
 /// Name of a style in a sentence.
-pub(crate) fn style(style: Style) -> &'static str {
+pub fn style(style: Style) -> &'static str {
     match style {
         Style::Paper => "the paper's",
         other => other.name(),
@@ -306,7 +305,7 @@ pub(crate) fn style(style: Style) -> &'static str {
 }
 
 /// Resonance that the loop bears above 1.5 times the highest frequency that the recording excites, `excited` (rad/s).
-pub(crate) fn resonance(factor: f64, excited: f64) -> String {
+pub fn resonance(factor: f64, excited: f64) -> String {
     format!(
         "The recording excites frequencies up to {}. A resonance above {}, which it would not show, makes the loop unstable \
          if it raises the response of the process by a factor of {factor:.1} or more.",
@@ -317,7 +316,7 @@ pub(crate) fn resonance(factor: f64, excited: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use onecycle::{Execution, Form, MeasurementNoise, Structure};
+    use crate::{Execution, Form, MeasurementNoise, Structure};
 
     use super::*;
 
@@ -327,13 +326,13 @@ mod tests {
         let form = Form::Pid;
         let infeasible = |least_peak| DesignError::Infeasible { form, least_peak };
         let errors = [
-            (infeasible(Some(1.8312)), "--ms 1.84 or more"),
-            (infeasible(None), "--controller"),
-            (DesignError::NoIntegral(Form::Pd), "--controller pi"),
-            (DesignError::NoRate(Form::CascadePi), "--controller pid"),
-            (DesignError::Unbounded, "--sample-period"),
-            (DesignError::PhaseMargin(2.0), "--phase-margin"),
-            (DesignError::Structure(Structure::Foptd), "--style sharp"),
+            (infeasible(Some(1.8312)), "`ms=1.84` or more"),
+            (infeasible(None), "`controller`"),
+            (DesignError::NoIntegral(Form::Pd), "`controller=pi`"),
+            (DesignError::NoRate(Form::CascadePi), "`controller=pid`"),
+            (DesignError::Unbounded, "`sample_period`"),
+            (DesignError::PhaseMargin(2.0), "`phase_margin`"),
+            (DesignError::Structure(Structure::Foptd), "`style=sharp`"),
         ];
         for (error, words) in errors {
             let text = refusal(&error);

@@ -1,115 +1,78 @@
-//! `onecycle identify LOG` without a choice of the loop: every loop of the flight, from the parts worth using.
+//! Every loop of a flight, from the parts worth using.
 
-use std::process::ExitCode;
+use onecycle_design::{Parameter, Specification, Structure};
+use onecycle_identify::{Identified, Verdict};
+use onecycle_link::{Change, ControlLoop, Flight, Signals, Span};
 
-use onecycle::{Identified, Parameter, Specification, Structure, Verdict};
-use onecycle_link::{Change, ControlLoop, Flight, FlightLog, Signals, Span};
-use rayon::prelude::*;
-
-use super::answer;
-use super::controllers;
-use super::log::{self, Source};
-use super::log_gains::{self, LogLoop};
-use crate::args::{Estimator, Identify};
-use crate::failure::{Failure, exit};
-use crate::output::{Waiting, print};
-use crate::report::flight as report;
-use crate::report::units::Units;
+use crate::answer;
+use crate::error::Error;
+use crate::log_gains::{self, LogLoop};
+use crate::request::Request;
 use crate::results::answer::Advice;
+use crate::results::controllers::Controllers;
 use crate::results::flight::{FlightLoop, Found, Part, Refusal, Survey};
+use crate::source::{LogFile, Source};
+use crate::threads::each;
 use crate::words::log::of_firmware;
+use crate::words::units::Units;
 
 /// Largest ratio of the ends of the interval of a part's gain.
 const MOST_RATIO: f64 = 2.0;
 
-/// Whether the arguments ask for every loop of a flight log.
-pub(crate) fn is_asked(arguments: &Identify) -> bool {
-    let asked = &arguments.log;
-    let is_one = asked.axis.is_some()
-        || asked.control_loop.is_some()
-        || arguments.from.is_some()
-        || arguments.to.is_some()
-        || arguments.structure.is_some()
-        || arguments.hold.is_some()
-        || arguments.beta.is_some()
-        || arguments.input_late.is_some()
-        || arguments.output_filter.is_some()
-        || arguments.estimator != Estimator::Auto
-        || arguments.rows
-        || arguments.report.is_some();
-    !is_one && log::is_log(&arguments.file)
-}
-
-pub(super) fn run(arguments: &Identify, asked: &Specification) -> Result<ExitCode, Failure> {
-    let surveyed = survey(arguments, asked)?;
-    print(&if arguments.json {
-        report::json(&surveyed)
-    } else {
-        report::text(&surveyed, arguments.details)
-    })?;
-    let is_any = surveyed.loops.iter().any(|one| one.best().is_some());
-    let is_unwritten = arguments.write.write.is_some() && surveyed.files.is_none();
-    Ok(ExitCode::from(match is_any && !is_unwritten {
-        true => exit::DONE,
-        false => exit::NO_PROCESS,
-    }))
-}
-
 /// Every loop of a flight, and the parameters of those to change if they are to be written.
-pub(crate) fn survey(arguments: &Identify, asked: &Specification) -> Result<Survey, Failure> {
-    let source = Source {
-        path: &arguments.file,
-        bytes: None,
-    };
-    let (log, number) = log::scan_flight(&source, &arguments.log)?;
+pub(crate) fn survey(
+    source: &dyn Source,
+    request: &Request,
+    asked: &Specification,
+) -> Result<Survey, Error> {
+    let file = LogFile::scan(source)?;
+    let number = file.flight(request.flight);
     let mut surveyed = Survey {
-        file: arguments.file.display().to_string(),
+        file: source.name(),
         number,
         firmware: String::new(),
         loops: vec![],
         files: None,
     };
-    let Some(flight) = log.flights.get(number.saturating_sub(1)) else {
+    let Some(flight) = file.log.flights.get(number.saturating_sub(1)) else {
         // The error names the flights that there are.
-        log::signals(&source, &log, number, ControlLoop::ALL[0])?;
+        file.signals(number, ControlLoop::ALL[0])?;
         return Ok(surveyed);
     };
-    let _waiting = Waiting::on("identifying");
     surveyed.firmware = of_firmware(&flight.firmware);
     let complete = flight.loops.iter().filter(|one| one.is_complete());
     let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
-    let loops: Result<Vec<FlightLoop>, Failure> = (loops.into_par_iter())
-        .map(|of| of_loop(&source, &log, number, (flight, of), (arguments, asked)))
-        .collect();
-    surveyed.loops = loops?;
-    if let Some(path) = &arguments.write.write {
-        let to_write = surveyed
-            .loops
-            .iter()
-            .filter_map(|one| one.to_write.as_ref());
+    let loops = each(loops, |of| {
+        of_loop(
+            (&file, number),
+            LogLoop::new(flight.clone(), of),
+            (request, asked),
+        )
+    });
+    surveyed.loops = loops.into_iter().collect::<Result<_, _>>()?;
+    if let Some(path) = &request.write.file {
+        let to_write = (surveyed.loops.iter()).filter_map(|one| one.to_write.as_ref());
         let changes: Vec<Change> = (to_write.filter_map(|one| one.as_ref().ok()))
             .flat_map(|written| written.changes.clone())
             .collect();
-        surveyed.files = log_gains::write(path, flight, &changes)?;
+        surveyed.files = log_gains::named_files(path, flight, &changes);
     }
     Ok(surveyed)
 }
 
 fn of_loop(
-    source: &Source<'_>,
-    log: &FlightLog,
-    number: usize,
-    (flight, of): (&Flight, ControlLoop),
-    (arguments, asked): (&Identify, &Specification),
-) -> Result<FlightLoop, Failure> {
-    let signals = log::signals(source, log, number, of)?;
-    let mut of_log = LogLoop::new(flight.clone(), of);
+    (file, number): (&LogFile<'_>, usize),
+    mut of_log: LogLoop,
+    (request, asked): (&Request, &Specification),
+) -> Result<FlightLoop, Error> {
+    let file_name = file.name();
+    let signals = file.signals(number, of_log.control_loop())?;
     let asked = of_log.specification(*asked, false);
-    let (mut one, mut processes) = parts(&signals, flight, &asked);
+    let (mut one, mut processes) = parts(&signals, of_log.flight(), &asked);
     while let Some((at, best)) = one.best().and_then(|at| Some((at, processes[at].take()?))) {
-        let choice = controllers::of_identified(&best, of_log.in_force());
+        let choice = Controllers::of_identified(&best, of_log.in_force());
         if of_log.contradicts(&choice) {
-            of_log = of_log.with_read_back(source, log, number)?;
+            of_log = of_log.with_read_back(file, number)?;
         }
         if of_log.contradicts(&choice) {
             one.parts[at].outcome = Err(Refusal::Verdict(Verdict::UnstableInForce));
@@ -118,17 +81,17 @@ fn of_loop(
         let answer = answer::of_identified(
             &best,
             &answer::Subject {
-                file: &arguments.file.display().to_string(),
+                file: &file_name,
                 units: &Units::default(),
                 choice: Some(&choice),
                 of_log: Some(&of_log),
                 gains: None,
-                share: arguments.write.step,
+                share: request.write.step,
             },
         );
-        if arguments.write.write.is_some() && answer.verdict == Advice::Change {
-            of_log = of_log.with_read_back(source, log, number)?;
-            one.to_write = Some(of_log.judged(&arguments.write, Some(&best), Some(&choice)));
+        if request.write.file.is_some() && answer.verdict == Advice::Change {
+            of_log = of_log.with_read_back(file, number)?;
+            one.to_write = Some(of_log.judged(&request.write, Some(&best), Some(&choice)));
         }
         one.answer = Some(answer);
         one.choice = Some(choice);
@@ -139,7 +102,7 @@ fn of_loop(
 
 /// The part of a flight that tells most about a loop, as in the table of all loops; if none tells anything, from the first
 /// part to the last. `None`: no part is worth using.
-pub(super) fn best_part(signals: &Signals, flight: &Flight, asked: &Specification) -> Option<Span> {
+pub(crate) fn best_part(signals: &Signals, flight: &Flight, asked: &Specification) -> Option<Span> {
     let (one, _) = parts(signals, flight, asked);
     let spans = one.parts.iter().map(|part| part.span);
     match one.best() {
@@ -155,9 +118,10 @@ fn parts(
     asked: &Specification,
 ) -> (FlightLoop, Vec<Option<Identified>>) {
     let spans = flight.stretches(signals);
-    let mut outcomes: Vec<_> = (spans.par_iter())
-        .filter_map(|span| Some((*span, identified(&signals.part(*span), asked)?)))
-        .collect();
+    let outcomes = each(spans.clone(), |span| {
+        Some((span, identified(&signals.part(span), asked)?))
+    });
+    let mut outcomes: Vec<_> = outcomes.into_iter().flatten().collect();
     // What no part tells alone, the response to the set-point over all of the flight may tell. A fit to the input that no part
     // confirms is not taken.
     if spans.len() > 1 && outcomes.iter().all(|(_, outcome)| outcome.is_err()) {
@@ -204,7 +168,7 @@ fn parts(
 /// The process of a part. `None`: its signals make no recording.
 fn identified(part: &Signals, asked: &Specification) -> Option<Result<Identified, Verdict>> {
     let recording = part.recording().ok()?;
-    let identify = (onecycle::Identify::new())
+    let identify = (crate::Identify::new())
         .specification(*asked)
         .structure(log_gains::structure(part.control_loop))
         .without_default_run();

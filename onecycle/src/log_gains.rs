@@ -2,23 +2,23 @@
 
 use std::path::{Path, PathBuf};
 
-use onecycle::{
-    Assessment, Controller, Execution, Form, Identification, Identified, LeastMargins, LowPass,
-    Pid, Recording, Specification, Structure, Style, assess, least_margins,
+use onecycle_design::{
+    Assessment, Controller, Execution, Form, LeastMargins, LowPass, Pid, Specification, Structure,
+    Style, assess, least_margins,
 };
+use onecycle_identify::{Identification, Identified};
 use onecycle_link::{
-    Agreement, Change, ControlLoop, Flight, FlightLog, LoopGains, LowPassSetting, ParameterFiles,
-    RateLaw, ReadBack, Signals, changes, files,
+    Agreement, Change, ControlLoop, Flight, LoopGains, LowPassSetting, ParameterFiles, RateLaw,
+    ReadBack, Recording, Signals, changes, files,
 };
 
-use super::log::{self, Source};
-use super::log_overlay::{overlay, overshoot};
-use crate::args::{Identify, WriteArguments};
-use crate::failure::Failure;
-use crate::output::{with_ending, write_text};
+use crate::error::Error;
+use crate::overlay::{overlay, overshoot};
+use crate::request::{Request, Write};
 use crate::results::answer::Gain;
 use crate::results::controllers::Controllers;
-use crate::results::log_gains::{LogGains, Written};
+use crate::results::log_gains::{LogGains, NamedFiles, Written};
+use crate::source::LogFile;
 use crate::words::limits::{broken, is_worse};
 use crate::words::log::of_firmware;
 use crate::words::log_gains as words;
@@ -34,7 +34,7 @@ const LEAST_STABLE: f64 = 0.99;
 const MOST_STABLE_IF_WRONG: f64 = 0.05;
 
 /// The loop of a log that is identified.
-pub(crate) struct LogLoop {
+pub struct LogLoop {
     flight: Flight,
     control_loop: ControlLoop,
     read_back: Option<ReadBack>,
@@ -42,7 +42,7 @@ pub(crate) struct LogLoop {
 
 impl LogLoop {
     /// A loop without a read-back of its gains.
-    pub(super) fn new(flight: Flight, control_loop: ControlLoop) -> Self {
+    pub(crate) fn new(flight: Flight, control_loop: ControlLoop) -> Self {
         Self {
             flight,
             control_loop,
@@ -51,56 +51,51 @@ impl LogLoop {
     }
 
     /// The loop that the arguments choose, with its signals. The loop is `None` if the log has no such flight.
-    pub(super) fn of(
-        source: &Source<'_>,
-        arguments: &Identify,
-    ) -> Result<(Signals, Option<Self>), Failure> {
-        let (log, number) = log::scan_flight(source, &arguments.log)?;
-        let control_loop = arguments.log.control_loop();
-        let signals = log::signals(source, &log, number, control_loop)?;
-        let flight = log.flights.get(number.saturating_sub(1)).cloned();
+    pub(crate) fn of(
+        file: &LogFile<'_>,
+        request: &Request,
+    ) -> Result<(Signals, Option<Self>), Error> {
+        let number = file.flight(request.flight);
+        let control_loop = request.loop_of_log();
+        let signals = file.signals(number, control_loop)?;
+        let flight = file.log.flights.get(number.saturating_sub(1)).cloned();
         let of_log = flight.map(|flight| Self::new(flight, control_loop));
-        let of_log = of_log.map(|of_log| of_log.with_read_back(source, &log, number));
+        let of_log = of_log.map(|of_log| of_log.with_read_back(file, number));
         Ok((signals, of_log.transpose()?))
     }
 
     /// With the gains of a rate loop read back from the signals of a flight, by its number; the log is read once.
-    pub(super) fn with_read_back(
-        self,
-        source: &Source<'_>,
-        log: &FlightLog,
-        number: usize,
-    ) -> Result<Self, Failure> {
+    pub(crate) fn with_read_back(self, file: &LogFile<'_>, number: usize) -> Result<Self, Error> {
         let ControlLoop::Rate(axis) = self.control_loop else {
             return Ok(self);
         };
         if self.read_back.is_some() {
             return Ok(self);
         }
-        let mut all = log::read_back(source, log, number)?.into_iter();
+        let mut all = file.read_back(number)?.into_iter();
         let read_back = all.find(|read| read.axis == axis);
         Ok(Self { read_back, ..self })
     }
 
     /// The flight.
-    pub(super) fn flight(&self) -> &Flight {
+    pub(crate) fn flight(&self) -> &Flight {
         &self.flight
     }
 
     /// Which loop of which flight it is, behind the name of the file.
-    pub(super) fn title(&self) -> String {
+    pub(crate) fn title(&self) -> String {
         let firmware = of_firmware(&self.flight.firmware);
         format!("  {} loop, {firmware}", self.control_loop)
     }
 
     /// Which loop it is.
-    pub(super) fn control_loop(&self) -> ControlLoop {
+    pub(crate) fn control_loop(&self) -> ControlLoop {
         self.control_loop
     }
 
     /// `asked` for the loop as the firmware runs it: its set-point weight, its filters and rate of execution where the user
     /// gave none, and only P around an attitude loop.
-    pub(super) fn specification(&self, asked: Specification, is_form_given: bool) -> Specification {
+    pub(crate) fn specification(&self, asked: Specification, is_form_given: bool) -> Specification {
         if asked.style == Style::Paper {
             return asked;
         }
@@ -128,13 +123,13 @@ impl LogLoop {
     }
 
     /// The gains in force. `None`: the log has none.
-    pub(super) fn in_force(&self) -> Option<Pid> {
+    pub(crate) fn in_force(&self) -> Option<Pid> {
         LoopGains::in_force(&self.flight, self.control_loop).map(pid)
     }
 
     /// Whether a model is wrong because it calls the loop unstable under the gains that flew, on nearly every process of its
     /// posterior. Gains that the signals contradict are not those that flew.
-    pub(super) fn contradicts(&self, choice: &Controllers) -> bool {
+    pub(crate) fn contradicts(&self, choice: &Controllers) -> bool {
         let differs = |read: &ReadBack| read.agreement() == Agreement::Differs;
         let is_known = !self.read_back.as_ref().is_some_and(differs);
         let against = choice.against.as_ref().filter(|_| is_known);
@@ -145,19 +140,19 @@ impl LogLoop {
     }
 
     /// What the report says, after writing parameters if that was asked for.
-    pub(super) fn report(
+    pub(crate) fn report(
         &self,
-        asked: &WriteArguments,
+        asked: &Write,
         recording: &Recording,
         found: &Identification,
         choice: Option<&Controllers>,
-    ) -> Result<LogGains, Failure> {
+    ) -> Result<LogGains, Error> {
         let identified = found.outcome.as_ref().ok();
-        let written = match &asked.write {
+        let written = match &asked.file {
             None => None,
             Some(path) => Some(match self.judged(asked, identified, choice) {
                 Err(reason) => Err(reason),
-                Ok(to_write) => Ok(self.write(path, to_write)?),
+                Ok(to_write) => Ok(self.with_files(path, to_write)?),
             }),
         };
         let overlay = match (self.control_loop, self.in_force(), choice) {
@@ -176,9 +171,9 @@ impl LogLoop {
     }
 
     /// The parameters to write with their margins, or the reason why nothing is written.
-    pub(super) fn judged(
+    pub(crate) fn judged(
         &self,
-        asked: &WriteArguments,
+        asked: &Write,
         identified: Option<&Identified>,
         choice: Option<&Controllers>,
     ) -> Result<Written, String> {
@@ -200,7 +195,7 @@ impl LogLoop {
 
     /// The parameters for this share of the way from the gains in force to those of `goal` with their margins, or the reason why
     /// they must not be written. Whoever exports them asks the [`Written::question`] first.
-    pub(crate) fn to_write(
+    pub fn to_write(
         &self,
         goal: Pid,
         share: f64,
@@ -232,8 +227,7 @@ impl LogLoop {
             _ => figures.step.map(|step| step.overshoot),
         };
         Ok(Written {
-            path: PathBuf::new(),
-            restore: PathBuf::new(),
+            files: None,
             changes,
             share,
             overshoot: simulated,
@@ -246,7 +240,7 @@ impl LogLoop {
 
     /// The parameters that change on the way to `goal` with this share of the step and with all of it, and the controller of that
     /// share; without those that the firmware cannot take. `None`: it cannot take that share either, or the log does not tell those in force.
-    pub(super) fn named(
+    pub(crate) fn named(
         &self,
         goal: Pid,
         share: f64,
@@ -278,45 +272,33 @@ impl LogLoop {
     }
 
     /// The files that put the new values in force, and the old ones again; or the reason why the firmware has no such file.
-    pub(crate) fn files(&self, to_write: &Written) -> Result<ParameterFiles, String> {
+    pub fn files(&self, to_write: &Written) -> Result<ParameterFiles, String> {
         let files = files(&self.flight, &to_write.changes);
         files.ok_or_else(|| words::no_gains(self.control_loop))
     }
 
-    /// Writes both files or none.
-    fn write(&self, path: &Path, to_write: Written) -> Result<Written, Failure> {
-        let files = write(path, &self.flight, &to_write.changes)?;
-        let [path, restore] =
-            files.ok_or_else(|| Failure::usage(words::no_gains(self.control_loop)))?;
+    fn with_files(&self, path: &Path, to_write: Written) -> Result<Written, Error> {
+        let files = named_files(path, &self.flight, &to_write.changes);
+        let files = files.ok_or_else(|| Error::Request(words::no_gains(self.control_loop)))?;
         Ok(Written {
-            path,
-            restore,
+            files: Some(files),
             ..to_write
         })
     }
 }
 
-/// Writes a file with parameters and one with the old values, or none. `None`: the firmware has no such file, or nothing changes.
-pub(super) fn write(
-    path: &Path,
-    flight: &Flight,
-    changes: &[Change],
-) -> Result<Option<[PathBuf; 2]>, Failure> {
-    let Some(files) = files(flight, changes).filter(|_| !changes.is_empty()) else {
-        return Ok(None);
-    };
-    let restore = restore_path(path, files.ending);
-    write_text(&restore, &files.restore)?;
-    if let Err(failure) = write_text(path, &files.apply) {
-        // A restore file alone would puzzle its reader.
-        let _ = std::fs::remove_file(&restore);
-        return Err(failure);
-    }
-    Ok(Some([path.to_owned(), restore]))
+/// The file with changed parameters and the one with the old values. `None`: the firmware has no such file, or nothing changes.
+pub(crate) fn named_files(path: &Path, flight: &Flight, changes: &[Change]) -> Option<NamedFiles> {
+    let text = files(flight, changes).filter(|_| !changes.is_empty())?;
+    Some(NamedFiles {
+        path: path.to_owned(),
+        restore: restore_path(path, text.ending),
+        text,
+    })
 }
 
 /// Figures of gains to write, on the most probable process and over the posterior; or why they must not be written.
-pub(super) fn judged_gains(
+pub fn judged_gains(
     controller: &Controller,
     identified: &Identified,
     choice: &Controllers,
@@ -333,7 +315,7 @@ pub(super) fn judged_gains(
 
 /// Whether gains with these figures are exported on demand only: they break limits of the style, and are not on the way from
 /// gains in force that break them more to a goal that keeps them.
-pub(super) fn needs_consent(
+pub fn needs_consent(
     [before, goal]: &[Pid; 2],
     figures: &Assessment,
     identified: &Identified,
@@ -354,48 +336,16 @@ pub(super) fn needs_consent(
 /// Structure of the process of a loop. `None`: the recording decides.
 ///
 /// An angle integrates the rate, a climb rate the thrust, behind a loop or motors with a lag.
-pub(super) fn structure(of: ControlLoop) -> Option<Structure> {
+pub(crate) fn structure(of: ControlLoop) -> Option<Structure> {
     match of {
         ControlLoop::Rate(_) => None,
         _ => Some(Structure::IntegratorLag),
     }
 }
 
-/// Refuses what would be overwritten, before any work is done.
-pub(super) fn check(arguments: &Identify) -> Result<(), Failure> {
-    let Some(path) = &arguments.write.write else {
-        return Ok(());
-    };
-    if path == Path::new("-") || path.file_name().is_none() {
-        return Err(Failure::usage(
-            "--write needs the name of a file, because a second file to restore the old values is written beside it",
-        ));
-    }
-    // The ending of the firmware is not known yet: a name without one gets each of them.
-    let restore = ["params", "param", "txt"].map(|ending| restore_path(path, ending));
-    let there = |path: &Path| path.canonicalize().ok();
-    let all = || std::iter::once(path).chain(&restore);
-    let recording = there(&arguments.file);
-    if all().any(|path| there(path).is_some() && there(path) == recording) {
-        return Err(Failure::usage(format!(
-            "--write {} would overwrite the flight log: name another file",
-            path.display()
-        )));
-    }
-    if let Some(existing) = all()
-        .find(|path| path.exists())
-        .filter(|_| !arguments.write.force)
-    {
-        return Err(Failure::usage(format!(
-            "{} exists: name another file with --write, or add --force to replace it",
-            existing.display()
-        )));
-    }
-    Ok(())
-}
-
 /// `NAME.restore.EXT` beside `NAME.EXT`.
-pub(super) fn restore_path(path: &Path, ending: &str) -> PathBuf {
+#[must_use]
+pub fn restore_path(path: &Path, ending: &str) -> PathBuf {
     let own = path
         .extension()
         .map(|own| own.to_string_lossy().into_owned());
@@ -404,10 +354,14 @@ pub(super) fn restore_path(path: &Path, ending: &str) -> PathBuf {
         None => path.to_owned(),
     };
     let ending = own.unwrap_or_else(|| ending.to_owned());
-    with_ending(&stem, &format!("restore.{ending}"))
+    let mut name = stem.into_os_string();
+    name.push(format!(".restore.{ending}"));
+    name.into()
 }
 
-pub(super) fn pid(gains: LoopGains) -> Pid {
+/// A controller with these gains.
+#[must_use]
+pub fn pid(gains: LoopGains) -> Pid {
     Pid::new(gains.proportional, gains.integral, gains.derivative)
 }
 

@@ -1,11 +1,11 @@
 //! What the checks beside the fit found: clocks, amplitudes, frequencies, limits of the controller.
 
-use onecycle::Remark;
+use crate::Remark;
 
-use crate::report::number::significant;
+use crate::words::number::significant;
 
 /// One or two sentences. `None` for a remark of another kind.
-pub(super) fn sentence(remark: &Remark) -> Option<String> {
+pub(crate) fn sentence(remark: &Remark) -> Option<String> {
     Some(match remark {
         Remark::ClockUnknown {
             seen,
@@ -41,7 +41,7 @@ pub(super) fn sentence(remark: &Remark) -> Option<String> {
             .to_owned(),
         Remark::SwitchesBetweenSamples(cost_rad) => format!(
             "If the relay runs faster than the log, its switches come up to one sample before they are logged, which may \
-             cost {:.1} deg of phase margin. Log every step of the relay, or say that the log does with --hold held.",
+             cost {:.1} deg of phase margin. Log every step of the relay, or say that the log does with `hold=held`.",
             cost_rad.to_degrees()
         ),
         Remark::OtherAmplitudeRefused(verdict) => format!(
@@ -49,18 +49,18 @@ pub(super) fn sentence(remark: &Remark) -> Option<String> {
              not be compared."
         ),
         Remark::LittleGainMargin(margin) => format!(
-            "The gain margin is a factor of {margin:.1} only ({:.1} dB). Ask for more with --style balanced or \
-             --gain-margin 2.",
+            "The gain margin is a factor of {margin:.1} only ({:.1} dB). Ask for more with `style=balanced` or \
+             `gain_margin=2`.",
             20.0 * margin.log10()
         ),
         Remark::NoiseAtActuator(share) => format!(
             "Noise moves the actuator with a standard deviation of {:.0} % of the amplitude of the input. Limit it with \
-             --noise 10%.",
+             `noise=10%`.",
             100.0 * share
         ),
         Remark::InputPeak { step, input } => format!(
             "A step of the reference above {} asks for more input than the {} that the test tried: take larger steps along \
-             a ramp, or limit the input with --input-peak.",
+             a ramp, or limit the input with `input_peak`.",
             significant(*step),
             significant(*input)
         ),
@@ -81,14 +81,14 @@ fn clock_unchecked(rad_per_s: f64) -> String {
     };
     format!(
         "Nothing in this recording shows whether both columns come from one clock: each {offset} by which the input was \
-         logged late cost {:.1} deg of phase margin. --input-late 0 says that they do.",
+         logged late cost {:.1} deg of phase margin. `input_late=0` says that they do.",
         (offset_s * rad_per_s).to_degrees()
     )
 }
 
 /// `later`: the offset of the clocks if the relay has this `beta` (s), and the phase margin then (rad).
 fn clock(seen: f64, beta: f64, later: Option<(f64, Option<f64>)>, cost: &str) -> String {
-    let ask = "State the relay's beta with --beta, or give --input-late 0 if both columns come from one clock.";
+    let ask = "State the relay's beta with `beta`, or give `input_late=0` if both columns come from one clock.";
     let Some((late_s, margin_rad)) = later else {
         return format!(
             "The relay switches as one with beta {seen:.2}, which no usual relay has.{cost} {ask}"
@@ -113,7 +113,7 @@ fn clock(seen: f64, beta: f64, later: Option<(f64, Option<f64>)>, cost: &str) ->
 
 #[cfg(test)]
 mod tests {
-    use onecycle::Verdict;
+    use crate::Verdict;
 
     use super::*;
 

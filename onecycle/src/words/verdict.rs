@@ -3,13 +3,13 @@
 use std::borrow::Cow;
 use std::f64::consts::TAU;
 
-use onecycle::{DesignError, Parameter, Verdict};
+use crate::{DesignError, Parameter, Verdict};
 use onecycle_onboard::refine::DomainEdge;
 
-use crate::report::number::frequency;
+use crate::words::number::frequency;
 
 /// One sentence of advice, with the options of this program.
-pub(crate) fn advice(verdict: &Verdict) -> Cow<'static, str> {
+pub fn advice(verdict: &Verdict) -> Cow<'static, str> {
     match verdict {
         Verdict::NoInformation {
             informative_rad_per_s,
@@ -72,7 +72,7 @@ fn at_bound(parameter: Parameter) -> &'static str {
              if they do, excite the process at higher frequencies."
         }
         _ => {
-            "Choose a simpler structure with --structure, or record an input that excites the process at lower and at \
+            "Choose a simpler structure with `structure`, or record an input that excites the process at lower and at \
              higher frequencies."
         }
     }
@@ -81,10 +81,10 @@ fn at_bound(parameter: Parameter) -> &'static str {
 fn without_controller(error: &DesignError) -> &'static str {
     match error {
         DesignError::Structure(_) => {
-            "Choose a structure with a controller, such as --structure soiptd."
+            "Choose a structure with a controller, such as `structure=soiptd`."
         }
         DesignError::Overflow => "Write the recording in other units.",
-        _ => "Choose a smaller phase margin with --phase-margin.",
+        _ => "Choose a smaller phase margin with `phase_margin`.",
     }
 }
 
@@ -92,7 +92,7 @@ fn without_controller(error: &DesignError) -> &'static str {
 fn of_record(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::TooFewRows { .. } => {
-            "Record longer or at a higher rate, or use more of the recording with --from and --to."
+            "Record longer or at a higher rate, or use more of the recording with `from` and `to`."
         }
         Verdict::UnstableInForce => {
             "Fly quick manoeuvres or a chirp on this axis: noise that goes round the loop can pass for a process."
@@ -102,11 +102,11 @@ fn of_record(verdict: &Verdict) -> &'static str {
              by other means."
         }
         Verdict::NoPrediction { .. } => {
-            "Use a part of the recording in which the process stays the same, with --from and --to, and look for a \
+            "Use a part of the recording in which the process stays the same, with `from` and `to`, and look for a \
              saturated actuator, friction, or a second input."
         }
         _ => {
-            "Try another structure with --structure, and look for a saturated actuator, friction, or a filter or limit \
+            "Try another structure with `structure`, and look for a saturated actuator, friction, or a filter or limit \
              between the recorded input and the process."
         }
     }
@@ -116,22 +116,22 @@ fn of_record(verdict: &Verdict) -> &'static str {
 fn of_relay(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::ConstantInput => {
-            "Choose the column that holds the input of the process with --input; if the step came before the first row, \
-             give the input before it with --input-before. Otherwise record a relay test, steps or a chirp."
+            "Choose the column that holds the input of the process with `input`; if the step came before the first row, \
+             give the input before it with `input_before`. Otherwise record a relay test, steps or a chirp."
         }
         Verdict::ConstantOutput => {
-            "Choose the column that holds the measurement with --output, or check the sensor."
+            "Choose the column that holds the measurement with `output`, or check the sensor."
         }
         Verdict::Units => "Write the recording in other units.",
         Verdict::NoRelay {
             output_is_relay: true,
         } => {
-            "Swap the columns: give the relay's column with --input and the measurement with --output."
+            "Swap the columns: give the relay's column with `input` and the measurement with `output`."
         }
         Verdict::NoRelay {
             output_is_relay: false,
         } => {
-            "Record the relay's own output, before any filter or rate limit, and choose it with --input."
+            "Record the relay's own output, before any filter or rate limit, and choose it with `input`."
         }
         Verdict::FewSwitches { .. } => {
             "Check that the relay acts on the measurement and that the process follows it, then record at least four \
@@ -150,11 +150,10 @@ fn of_relay(verdict: &Verdict) -> &'static str {
         }
         Verdict::NotThisProcess { .. } => {
             "Look for a resonance, friction, wind, or another loop at work: the process is not an integrator with two \
-             lags and a delay. For a self-regulating process (flow, temperature) give --structure foptd or --structure \
-             soptd."
+             lags and a delay. For a self-regulating process (flow, temperature) give `structure=foptd` or `structure=soptd`."
         }
         Verdict::Unknown { .. } => {
-            "Leave out --method classify, choose a pack of this family with --pack, or look for a resonance, friction, \
+            "Leave out `method=classify`, choose a pack of this family with `pack`, or look for a resonance, friction, \
              or a wrong sensor."
         }
         Verdict::TooUncertain => {
@@ -172,8 +171,8 @@ fn of_relay(verdict: &Verdict) -> &'static str {
             "Check that input and output share one clock: the delay appears longer than half a period."
         }
         Verdict::ClockOffset { .. } => {
-            "Correct a known offset with --input-late. If both columns come from one clock, give --input-late 0, or the \
-             right --beta."
+            "Correct a known offset with `input_late`. If both columns come from one clock, give `input_late=0`, or the \
+             right `beta`."
         }
         Verdict::AmplitudeDependent(_) => {
             "Look for a dead zone, backlash, friction or saturation of the actuator, and test at the amplitudes at which \
@@ -256,7 +255,7 @@ mod tests {
             Verdict::InputLeft { share: 0.3 },
             Verdict::UnstableInForce,
             Verdict::UnstableProcess { growth_per_s: 56.0 },
-            Verdict::NoController(DesignError::Structure(onecycle::Structure::Foptd)),
+            Verdict::NoController(DesignError::Structure(crate::Structure::Foptd)),
             Verdict::NoController(DesignError::PhaseMargin(2.0)),
         ];
         let all = verdicts.map(|verdict| advice(&verdict).into_owned());

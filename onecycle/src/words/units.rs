@@ -1,6 +1,6 @@
 //! Units of results, made of those of the recording's columns.
 
-use onecycle::{Parameter, Recording, Structure};
+use crate::{Parameter, Recording, Structure};
 use onecycle_design::Unit;
 
 /// Unit of a share.
@@ -8,7 +8,7 @@ const ONE: &str = "1";
 
 /// Unit of an output over its input and a power of a second: one of `rad/s` over that of a share and a second is `rad/s^2`. Empty if
 /// the units cancel.
-pub(crate) fn ratio(output: &str, input: &str, seconds: usize) -> String {
+pub fn ratio(output: &str, input: &str, seconds: usize) -> String {
     let power = |of: &str, power: usize| match power {
         0 => String::new(),
         1 => of.to_owned(),
@@ -29,13 +29,13 @@ pub(crate) fn ratio(output: &str, input: &str, seconds: usize) -> String {
 
 /// Units of input and output; empty where the recording gives none.
 #[derive(Default)]
-pub(crate) struct Units {
-    pub(super) input: String,
-    pub(super) output: String,
+pub struct Units {
+    pub input: String,
+    pub output: String,
 }
 
 impl Units {
-    pub(crate) fn of(recording: &Recording) -> Self {
+    pub fn of(recording: &Recording) -> Self {
         let unit = |column: &onecycle_link::Column| column.unit.clone().unwrap_or_default();
         Self {
             input: unit(&recording.columns().input),
@@ -44,7 +44,7 @@ impl Units {
     }
 
     /// Unit of a parameter; empty where it needs units that the recording does not give.
-    pub(super) fn parameter(&self, structure: Structure, parameter: Parameter) -> String {
+    pub fn parameter(&self, structure: Structure, parameter: Parameter) -> String {
         match structure.unit(parameter) {
             Unit::OutputPerInput => self.gain(0),
             Unit::RadianPerSecond => "rad/s".to_owned(),
@@ -66,7 +66,7 @@ impl Units {
     }
 
     /// Unit of a controller's gain, with a blank before it: ` input/output`, or ` input times/output`.
-    pub(crate) fn controller(&self, times: &str) -> String {
+    pub fn controller(&self, times: &str) -> String {
         if self.input.is_empty() || self.output.is_empty() {
             return String::new();
         }
@@ -74,7 +74,7 @@ impl Units {
     }
 
     /// Unit of an integral gain, with a blank before it: ` input/(output s)`.
-    pub(crate) fn integral(&self) -> String {
+    pub fn integral(&self) -> String {
         if self.input.is_empty() || self.output.is_empty() {
             return String::new();
         }
@@ -82,7 +82,7 @@ impl Units {
     }
 
     /// Title of an axis: a name with its unit in brackets, where there is one.
-    pub(super) fn titled(name: &str, unit: &str) -> String {
+    pub fn titled(name: &str, unit: &str) -> String {
         if unit.is_empty() {
             name.to_owned()
         } else {

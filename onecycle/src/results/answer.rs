@@ -1,12 +1,15 @@
 //! The answer with which every surface begins: what to do, what to type in, how sure it is, what comes next.
 
-use onecycle::Assessment;
-use serde::Serialize;
+use crate::Assessment;
 
 /// What to do about the gains of a loop.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Advice {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(rename_all = "snake_case")
+)]
+pub enum Advice {
     /// The proposed gains are worth a change.
     Change,
     /// Nobody would feel the difference, or what would be lost is more than what would be gained.
@@ -18,28 +21,31 @@ pub(crate) enum Advice {
 }
 
 /// The answer.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct Answer {
-    pub(crate) verdict: Advice,
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Answer {
+    /// What to do.
+    pub verdict: Advice,
     /// Why, one clause.
-    pub(crate) reason: String,
+    pub reason: String,
     /// Share of the way to the proposed gains at which the middle column stands. `None`: nothing is proposed.
-    pub(crate) step: Option<f64>,
+    pub step: Option<f64>,
     /// Under the names and in the units in which they are typed in. Empty without a proposal.
-    pub(crate) gains: Vec<Gain>,
+    pub gains: Vec<Gain>,
     /// Figures of the loop with these gains.
-    pub(crate) figures: Option<Columns>,
+    pub figures: Option<Columns>,
     /// How well the process is known, one sentence.
-    pub(crate) sure: Option<String>,
+    pub sure: Option<String>,
     /// The remark that matters most.
-    pub(crate) watch: Option<String>,
+    pub watch: Option<String>,
     /// What to do next.
-    pub(crate) next: String,
+    pub next: String,
 }
 
 impl Answer {
     /// Nothing to type in, for this reason.
-    pub(crate) fn not_yet(reason: String) -> Self {
+    #[must_use]
+    pub fn not_yet(reason: String) -> Self {
         Self {
             verdict: Advice::NotYet,
             reason,
@@ -53,49 +59,64 @@ impl Answer {
     }
 
     /// Whether gains in force are known.
-    pub(crate) fn has_now(&self) -> bool {
+    #[must_use]
+    pub fn has_now(&self) -> bool {
         self.gains.iter().any(|gain| gain.now.is_some())
     }
 }
 
 /// A gain in force, half of the way to the proposed one, and that one.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct Gain {
-    pub(crate) name: String,
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Gain {
+    /// Name under which it is typed in.
+    pub name: String,
     /// Unit of the values; empty if they have none.
-    pub(crate) unit: String,
-    pub(crate) now: Option<f64>,
-    pub(crate) half: Option<f64>,
+    pub unit: String,
+    /// In force.
+    pub now: Option<f64>,
+    /// On the way.
+    pub half: Option<f64>,
     /// `None`: outside of the range of the firmware.
-    pub(crate) full: Option<f64>,
+    pub full: Option<f64>,
 }
 
 /// Figures under the gains in force, half of the way, and under the proposed ones.
-#[derive(Clone, Debug, Serialize)]
-pub(crate) struct Columns {
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Columns {
     /// `None`: no gains are in force, or the loop is unstable under them.
-    pub(crate) now: Option<Figures>,
-    pub(crate) half: Option<Figures>,
-    pub(crate) full: Figures,
+    pub now: Option<Figures>,
+    /// On the way to the proposed gains.
+    pub half: Option<Figures>,
+    /// Under the proposed gains.
+    pub full: Figures,
 }
 
 impl Columns {
     /// The three columns, where there are some.
-    pub(crate) fn all(&self) -> [Option<&Figures>; 3] {
+    #[must_use]
+    pub fn all(&self) -> [Option<&Figures>; 3] {
         [self.now.as_ref(), self.half.as_ref(), Some(&self.full)]
     }
 }
 
 /// What is shown of a loop.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(crate) struct Figures {
-    pub(crate) phase_margin_deg: f64,
-    pub(crate) ms: f64,
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
+pub struct Figures {
+    /// Phase margin (deg).
+    pub phase_margin_deg: f64,
+    /// Maximum sensitivity.
+    pub ms: f64,
     /// Integrated absolute error after a unit step of the load (output unit s). `None`: a constant load leaves an offset.
-    pub(crate) load_iae: Option<f64>,
-    pub(crate) settling_time_s: Option<f64>,
-    pub(crate) overshoot: Option<f64>,
-    pub(crate) noise_share: Option<f64>,
+    pub load_iae: Option<f64>,
+    /// Settling time after a step of the reference (s).
+    pub settling_time_s: Option<f64>,
+    /// Overshoot, as a share of the step.
+    pub overshoot: Option<f64>,
+    /// Standard deviation of the noise at the actuator, as a share of the amplitude of the input.
+    pub noise_share: Option<f64>,
 }
 
 impl From<&Assessment> for Figures {

@@ -1,8 +1,8 @@
 //! Limits of a style that a loop breaks.
 
-use onecycle::{Assessment, Specification};
+use crate::{Assessment, Specification};
 
-use crate::report::number::short;
+use crate::words::number::short;
 
 /// The digits that a firmware stores may take this share of a limit.
 const TOLERANCE: f64 = 0.01;
@@ -36,7 +36,7 @@ const AT_MOST: &str = "at most";
 
 /// Sentence that names the limits of `asked` that a loop with these figures breaks, each with its value. `None`: it keeps
 /// them. Without figures the loop is unstable.
-pub(crate) fn broken(asked: &Specification, figures: Option<&Assessment>) -> Option<String> {
+pub fn broken(asked: &Specification, figures: Option<&Assessment>) -> Option<String> {
     let Some(figures) = figures else {
         return Some("the loop is unstable with these gains".to_owned());
     };
@@ -60,7 +60,7 @@ pub(crate) fn broken(asked: &Specification, figures: Option<&Assessment>) -> Opt
 }
 
 /// Whether a loop breaks a limit of `asked` by more than another one.
-pub(crate) fn is_worse(asked: &Specification, figures: &Assessment, than: &Assessment) -> bool {
+pub fn is_worse(asked: &Specification, figures: &Assessment, than: &Assessment) -> bool {
     let pairs = limits(asked, figures).into_iter().zip(limits(asked, than));
     let mut pairs = pairs.filter(|(new, _)| new.is_broken());
     pairs.any(|(new, old)| new.excess() > old.excess())
@@ -119,7 +119,7 @@ fn limits(asked: &Specification, figures: &Assessment) -> [Limit; 7] {
 
 #[cfg(test)]
 mod tests {
-    use onecycle::{Form, Linear, Parameter, Pid, Structure, Style, assess};
+    use crate::{Form, Linear, Parameter, Pid, Structure, Style, assess};
 
     use super::*;
 
