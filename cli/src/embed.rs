@@ -16,6 +16,7 @@ pub use crate::output::page::{Listener, listen};
 pub use crate::reading::Given;
 use crate::reading::{self, Input};
 use crate::report::flight as report;
+use crate::report::json::to_text;
 use crate::style::plain;
 use crate::words::remark::{details, reasons};
 use crate::words::verdict::advice;
@@ -143,7 +144,7 @@ pub fn flight(file: &str, options: &[String]) -> Result<(String, String), String
     };
     let surveyed = surveyed().map_err(|failure| told(&failure))?;
     let text = with_options(&report::text(&surveyed, arguments.details)).into_owned();
-    Ok((plain(&text), report::json(&surveyed)))
+    Ok((plain(&text), to_text(&surveyed)))
 }
 
 /// Reads a recording as `onecycle identify FILE` does: of a flight log the part that tells most, without a choice of the
@@ -164,7 +165,7 @@ pub fn read(file: &str, options: &[String]) -> Result<Recording, String> {
 pub fn design(options: &[String]) -> Result<String, String> {
     match parsed("tune", &[], options)? {
         Command::Tune(arguments) => match tune::tuned(&arguments) {
-            Ok(found) => Ok(tune::as_json(&found)),
+            Ok(found) => Ok(to_text(&found)),
             Err(failure) => Err(told(&failure)),
         },
         _ => Err("not the command tune".to_owned()),

@@ -244,6 +244,9 @@ mod controllers;
 mod design;
 mod error;
 mod feedback;
+#[cfg(feature = "serde")]
+#[doc(hidden)]
+pub mod json;
 pub mod log_gains;
 mod overlay;
 mod report;

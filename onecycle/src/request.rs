@@ -3,6 +3,8 @@
 //! With the feature `serde` a request is read from a map of its settings, each a number or a text: `{"style": "calm",
 //! "phase_margin": 45, "noise": "10%"}`. The names are those that sentences give in backticks.
 
+#[cfg(feature = "serde")]
+mod map;
 pub mod values;
 
 use std::fs::File;
@@ -377,6 +379,9 @@ impl Request {
                     .map_err(|_| "a flight is a number from 1".to_owned()),
             ),
             "step" => values::step(value).map(|step| self.write.step = step),
+            "write" => put(&mut self.write.file, Ok(PathBuf::from(value))),
+            "below_limits" => choice(value, &[("true", true), ("false", false)])
+                .map(|below| self.write.below_limits = below),
             _ => return None,
         };
         Some(set)

@@ -10,7 +10,8 @@ use crate::args::Identify;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, write_text};
 use crate::reading::Input;
-use crate::report::{flight, json, log_gains as log_report, page, text};
+use crate::report::json::to_text;
+use crate::report::{flight, log_gains as log_report, page, text};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let request = checked(arguments)?;
@@ -69,7 +70,7 @@ pub(crate) fn show(arguments: &Identify, found: &mut Report) -> Result<(), Failu
 fn show_survey(arguments: &Identify, surveyed: &Survey) -> Result<ExitCode, Failure> {
     surveyed.files.as_ref().map_or(Ok(()), write)?;
     print(&match arguments.json {
-        true => flight::json(surveyed),
+        true => to_text(surveyed),
         false => flight::text(surveyed, arguments.details),
     })?;
     let is_any = surveyed.loops.iter().any(|one| one.best().is_some());
@@ -82,14 +83,10 @@ fn show_survey(arguments: &Identify, surveyed: &Survey) -> Result<ExitCode, Fail
 
 /// The report of docs/identify-json.md.
 pub(crate) fn as_json(found: &Report, has_rows: bool) -> String {
-    json::identification(
-        &found.name,
-        &found.recording,
-        &found.identification,
-        (found.choice.as_ref(), &found.answer),
-        found.gains.as_ref(),
-        has_rows,
-    )
+    match has_rows {
+        true => to_text(&found.with_rows()),
+        false => to_text(found),
+    }
 }
 
 /// The page, for which designs over limits of `Ms` are made on first use.

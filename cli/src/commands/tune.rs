@@ -7,7 +7,8 @@ use onecycle::{DesignReport, step_response};
 use crate::args::Tune;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_text};
-use crate::report::{json, page, text};
+use crate::report::json::to_text;
+use crate::report::{page, text};
 
 /// The process of the arguments with its controllers.
 pub(crate) fn tuned(arguments: &Tune) -> Result<DesignReport, Failure> {
@@ -18,10 +19,6 @@ pub(crate) fn tuned(arguments: &Tune) -> Result<DesignReport, Failure> {
         Some(known) => request.design_for_all(known)?,
         None => request.design(arguments.process.model()?)?,
     })
-}
-
-pub(crate) fn as_json(of: &DesignReport) -> String {
-    json::design(&of.model, &of.choice, &of.best, of.oscillation.as_ref())
 }
 
 pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
@@ -43,7 +40,7 @@ pub(crate) fn run(arguments: &Tune) -> Result<ExitCode, Failure> {
         )?;
     }
     print(&match arguments.json {
-        true => as_json(&of),
+        true => to_text(&of),
         false => text::design(&of.model, &of.choice, &of.best, of.oscillation.as_ref()),
     })?;
     Ok(ExitCode::from(exit::DONE))

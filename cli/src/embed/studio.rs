@@ -34,7 +34,8 @@ use crate::commands::{identify, simulate};
 use crate::failure::Failure;
 use crate::output::Waiting;
 use crate::reading::Input;
-use crate::report::{flight as flight_report, hand, log as log_report};
+use crate::report::json::to_text;
+use crate::report::{hand, log as log_report};
 use crate::style::plain;
 use crate::words;
 
@@ -106,7 +107,7 @@ impl Studio {
                     Ok(request.survey(&self.source()?)?)
                 };
                 let surveyed = survey().map_err(failed)?;
-                Ok(value(&flight_report::json(&surveyed)))
+                Ok(value(&to_text(&surveyed)))
             }
             "json" => Ok(json!({ "text": identify::as_json(self.found()?, false) })),
             "page" => {

@@ -1,10 +1,11 @@
 //! The processes that one oscillation leaves possible, in JSON.
 
-use onecycle::Model;
+use onecycle_design::Model;
 use onecycle_design::oscillation::{MarginRanges, Oscillation};
+use onecycle_identify::Interval;
 use serde::Serialize;
 
-use super::{Parameters, Range};
+use super::Parameters;
 use crate::results::family::OfOscillation;
 
 /// What is known, and what follows for the processes that agree with it.
@@ -13,7 +14,7 @@ pub(super) struct FamilyReport {
     known: Known,
     dead_time_share: [f64; 2],
     members: usize,
-    process: Parameters<Range>,
+    process: Parameters<Interval>,
     margins: Option<MarginRangesReport>,
 }
 
@@ -79,7 +80,7 @@ pub(super) fn family(middle: &Model, of: &OfOscillation) -> FamilyReport {
     let finite = |value: f64| value.is_finite().then_some(value);
     let parameters = middle.structure().parameters().iter().map(|&parameter| {
         let (low, high) = of.family.range(parameter);
-        let range = Range {
+        let range = Interval {
             estimate: middle.parameter(parameter).and_then(finite),
             low: Some(low),
             high: finite(high),

@@ -1,7 +1,7 @@
 //! What the general estimator adds to the report of an identification.
 
-use onecycle::{Hold, Innovations, Recorded};
 use onecycle_identify as identify;
+use onecycle_identify::{Hold, Innovations, Recorded};
 use serde::Serialize;
 
 use super::Parameters;
@@ -110,24 +110,6 @@ impl From<&Innovations> for Tests {
             drag: of.nonlinear.drag,
             friction: of.nonlinear.friction,
             thrust: of.nonlinear.thrust,
-        }
-    }
-}
-
-/// Prediction of the last third of the record.
-#[derive(Serialize)]
-pub(super) struct Prediction {
-    horizon_s: f64,
-    explained: f64,
-    error_ratio: f64,
-}
-
-impl From<&identify::Prediction> for Prediction {
-    fn from(of: &identify::Prediction) -> Self {
-        Self {
-            horizon_s: of.horizon_s,
-            explained: of.explained,
-            error_ratio: of.error_ratio,
         }
     }
 }

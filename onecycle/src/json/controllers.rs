@@ -1,20 +1,11 @@
 //! Controllers to choose from, in JSON.
 
-use onecycle::{Assessment, LeastMargins, Robustness, Specification};
-use onecycle_design::{Limit, Missed};
+use onecycle_design::{Assessment, LeastMargins, Limit, Missed, Robustness, Specification};
 use serde::Serialize;
 
 use super::{Controller, MarginsReport, Step, controller, margins, of_style, step};
 use crate::results::controllers::{Controllers, Row};
 use crate::words::controllers as words;
-
-#[derive(Serialize)]
-pub(super) struct Robust {
-    coverage: f64,
-    mean_iae: Option<f64>,
-    nominal_coverage: f64,
-    nominal_mean_iae: Option<f64>,
-}
 
 /// What noise and sampling a design counts with.
 #[derive(Serialize)]
@@ -28,7 +19,7 @@ pub(super) struct Assumed {
 
 /// A limit that the chosen controller does not keep.
 #[derive(Serialize)]
-pub(crate) struct NotKept {
+pub struct NotKept {
     limit: &'static str,
     asked: f64,
     reached: f64,
@@ -37,20 +28,20 @@ pub(crate) struct NotKept {
 
 /// One style: its controller with margins and step, or the error that prevented a design.
 #[derive(Serialize)]
-pub(super) struct Proposed {
+pub(super) struct Proposed<'a> {
     style: &'static str,
     is_chosen: bool,
     controller: Option<Controller>,
     #[serde(flatten)]
     figures: Figures,
-    robustness: Option<Robust>,
+    robustness: Option<&'a Robustness>,
     #[serde(skip_serializing_if = "Option::is_none")]
     error: Option<String>,
 }
 
 /// Figures of a controller.
 #[derive(Serialize)]
-pub(crate) struct Figures {
+pub struct Figures {
     margins: Option<MarginsReport>,
     step: Option<Step>,
     load_iae: Option<f64>,
@@ -70,7 +61,7 @@ pub(super) struct AgainstReport {
 
 /// Margins at the bad end of the central 90 % of the posterior.
 #[derive(Serialize)]
-pub(crate) struct Least {
+pub struct Least {
     stable: f64,
     ms: Option<f64>,
     phase_margin_deg: f64,
@@ -78,7 +69,7 @@ pub(crate) struct Least {
     delay_margin_s: f64,
 }
 
-pub(crate) fn not_kept(choice: &Controllers) -> Vec<NotKept> {
+pub fn not_kept(choice: &Controllers) -> Vec<NotKept> {
     let of = |(missed, message): (&Missed, String)| {
         let (limit, scale) = match missed.limit {
             Limit::Overshoot => ("overshoot", 1.0),
@@ -102,8 +93,8 @@ pub(crate) fn not_kept(choice: &Controllers) -> Vec<NotKept> {
     choice.missed.iter().zip(sentences).map(of).collect()
 }
 
-pub(super) fn proposed(choice: &Controllers) -> Vec<Proposed> {
-    let of = |row: &Row| {
+pub(super) fn proposed<'a>(choice: &'a Controllers) -> Vec<Proposed<'a>> {
+    let of = |row: &'a Row| {
         let specification = &row.proposal.specification;
         let design = row.proposal.outcome.as_ref();
         Proposed {
@@ -111,7 +102,7 @@ pub(super) fn proposed(choice: &Controllers) -> Vec<Proposed> {
             is_chosen: choice.is_chosen(row),
             controller: (design.ok()).map(|design| of_style(design, specification.style)),
             figures: Figures::of(row.figures.as_ref()),
-            robustness: (design.ok().and_then(|design| design.robustness.as_ref())).map(Into::into),
+            robustness: design.ok().and_then(|design| design.robustness.as_ref()),
             error: design.err().map(ToString::to_string),
         }
     };
@@ -128,7 +119,7 @@ pub(super) fn against(choice: &Controllers) -> Option<AgainstReport> {
 }
 
 impl Figures {
-    pub(crate) fn of(figures: Option<&Assessment>) -> Self {
+    pub fn of(figures: Option<&Assessment>) -> Self {
         let finite = |value: f64| value.is_finite().then_some(value);
         Self {
             margins: figures.map(|of| margins(&of.margins, None, Some(of))),
@@ -138,18 +129,6 @@ impl Figures {
             load_iae: figures.and_then(|of| of.load_iae).and_then(finite),
             load_peak: figures.and_then(|of| of.load_peak).and_then(finite),
             noise_share: figures.and_then(|of| of.noise_share).and_then(finite),
-        }
-    }
-}
-
-impl From<&Robustness> for Robust {
-    fn from(of: &Robustness) -> Self {
-        let finite = |value: f64| value.is_finite().then_some(value);
-        Self {
-            coverage: of.coverage,
-            mean_iae: finite(of.mean_iae),
-            nominal_coverage: of.nominal_coverage,
-            nominal_mean_iae: finite(of.nominal_mean_iae),
         }
     }
 }
