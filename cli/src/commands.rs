@@ -10,3 +10,6 @@ pub(crate) mod man;
 pub(crate) mod simulate;
 pub(crate) mod studio;
 pub(crate) mod tune;
+
+/// The name before every message.
+pub(crate) const PROGRAM: &str = "onecycle";

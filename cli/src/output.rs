@@ -1,8 +1,8 @@
 //! Output: the terminal, and files that are written whole or not at all. Nothing else in the program writes.
 
-#[cfg(target_family = "wasm")]
+#[cfg(any(target_family = "wasm", not(feature = "program")))]
 pub mod page;
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "program", not(target_family = "wasm")))]
 mod terminal;
 
 use std::fmt::Display;
@@ -16,9 +16,9 @@ use anstyle::Style;
 use crate::failure::Failure;
 use crate::style::{HEADING, REFUSAL};
 use crate::words::with_options;
-#[cfg(target_family = "wasm")]
+#[cfg(any(target_family = "wasm", not(feature = "program")))]
 pub use page::{ProgressBar, Waiting, columns, progress_bar};
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "program", not(target_family = "wasm")))]
 pub use terminal::{ProgressBar, Waiting, columns, progress_bar};
 
 /// Prints a report to the standard output, with styles if that is a terminal.

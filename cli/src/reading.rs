@@ -2,8 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::path::Path;
 
 use onecycle::Source;
 use onecycle_link::LogFormat;
@@ -44,12 +43,6 @@ pub fn text_at_most(path: &Path, most: u64) -> Result<String, Failure> {
 /// The error of opening. A folder is refused here, though systems open one.
 pub(crate) fn open_with_bar(path: &Path) -> io::Result<FileWithBar> {
     let work = format!("reading {}", path.display());
-    if let Some(given) = given(path) {
-        return Ok(FileWithBar {
-            file: given.open(),
-            waiting: Waiting::on_bytes(work, given.length()),
-        });
-    }
     let file = File::open(path)?;
     let about = file.metadata()?;
     if about.is_dir() {
@@ -61,10 +54,7 @@ pub(crate) fn open_with_bar(path: &Path) -> io::Result<FileWithBar> {
     } else {
         Waiting::on(work)
     };
-    Ok(FileWithBar {
-        file: Box::new(file),
-        waiting,
-    })
+    Ok(FileWithBar { file, waiting })
 }
 
 /// The source of a recording: a file, or the standard input.
@@ -128,52 +118,16 @@ impl Source for Input<'_> {
     }
 
     fn head(&self, most: u64) -> Vec<u8> {
-        match (&self.piped, given(self.path)) {
-            (Some(bytes), _) => bytes.iter().take(most as usize).copied().collect(),
-            (None, Some(given)) => first(given.open(), most),
-            (None, None) => self.path.head(most),
+        match &self.piped {
+            Some(bytes) => bytes.iter().take(most as usize).copied().collect(),
+            None => self.path.head(most),
         }
     }
 }
 
-fn first(file: impl Read, most: u64) -> Vec<u8> {
-    let mut head = Vec::new();
-    match file.take(most).read_to_end(&mut head) {
-        Ok(_) => head,
-        Err(_) => vec![],
-    }
-}
-
-/// A file that the system does not have: a page has none.
-pub trait Given: Send + Sync {
-    /// Its bytes from the start.
-    fn open(&self) -> Box<dyn Read + Send>;
-
-    /// Number of its bytes.
-    fn length(&self) -> u64;
-}
-
-/// The file that was given last.
-static GIVEN: Mutex<Option<(PathBuf, Arc<dyn Given>)>> = Mutex::new(None);
-
-fn locked() -> MutexGuard<'static, Option<(PathBuf, Arc<dyn Given>)>> {
-    GIVEN.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// Gives a file a name, in place of the one that was given before.
-pub(crate) fn give(name: &str, file: Arc<dyn Given>) {
-    *locked() = Some((PathBuf::from(name), file));
-}
-
-fn given(path: &Path) -> Option<Arc<dyn Given>> {
-    let given = locked();
-    let (name, file) = given.as_ref()?;
-    (name == path).then(|| Arc::clone(file))
-}
-
 /// A file that counts the bytes read from it.
 pub(crate) struct FileWithBar {
-    file: Box<dyn Read + Send>,
+    file: File,
     waiting: Waiting,
 }
 

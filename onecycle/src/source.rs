@@ -61,6 +61,20 @@ impl Source for Path {
     }
 }
 
+impl Source for PathBuf {
+    fn name(&self) -> String {
+        self.as_path().name()
+    }
+
+    fn open(&self) -> io::Result<Box<dyn Read + '_>> {
+        self.as_path().open()
+    }
+
+    fn head(&self, most: u64) -> Vec<u8> {
+        self.as_path().head(most)
+    }
+}
+
 /// Whether a source begins like a flight log.
 pub fn is_flight_log(source: &dyn Source) -> bool {
     LogFormat::detect(&source.head(LogFormat::HEAD_BYTES as u64)).is_some()

@@ -11,7 +11,7 @@ use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, write_text};
 use crate::reading::Input;
 use crate::report::json::to_text;
-use crate::report::{flight, log_gains as log_report, page, text};
+use crate::report::{flight, identify as report};
 
 pub(crate) fn run(arguments: &Identify) -> Result<ExitCode, Failure> {
     let request = checked(arguments)?;
@@ -59,11 +59,12 @@ pub(crate) fn found(request: &Request, source: &Input<'_>) -> Result<Report, Fai
 pub(crate) fn show(arguments: &Identify, found: &mut Report) -> Result<(), Failure> {
     if let Some(path) = &arguments.report {
         let _waiting = Waiting::on("drawing");
-        write_text(path, &as_page(found))?;
+        write_text(path, &report::page(found))?;
     }
-    print(&match arguments.json {
-        true => as_json(found, arguments.rows),
-        false => as_text(found, arguments.details),
+    print(&match (arguments.json, arguments.rows) {
+        (true, true) => to_text(&found.with_rows()),
+        (true, false) => to_text(found),
+        (false, _) => report::text(found, arguments.details),
     })
 }
 
@@ -79,44 +80,6 @@ fn show_survey(arguments: &Identify, surveyed: &Survey) -> Result<ExitCode, Fail
         true => exit::DONE,
         false => exit::NO_PROCESS,
     }))
-}
-
-/// The report of docs/identify-json.md.
-pub(crate) fn as_json(found: &Report, has_rows: bool) -> String {
-    match has_rows {
-        true => to_text(&found.with_rows()),
-        false => to_text(found),
-    }
-}
-
-/// The page, for which designs over limits of `Ms` are made on first use.
-pub(crate) fn as_page(found: &mut Report) -> String {
-    found.make_trade_off();
-    page::identification(
-        &found.title(),
-        &found.recording,
-        &found.identification,
-        (found.choice.as_ref(), &found.answer),
-        found.gains.as_ref(),
-    )
-}
-
-/// The answer, and with details all else.
-pub(crate) fn as_text(report: &Report, has_details: bool) -> String {
-    let (recording, found) = (&report.recording, &report.identification);
-    let card = text::card(
-        &report.title(),
-        recording,
-        found,
-        &report.answer,
-        has_details,
-    );
-    if !has_details {
-        return card;
-    }
-    let details = text::identification(&report.name, recording, found, report.choice.as_ref());
-    let gains = report.gains.as_ref().map(log_report::text);
-    format!("{card}\n{details}{}", gains.unwrap_or_default())
 }
 
 /// Writes both files or none.

@@ -15,7 +15,7 @@ use crate::words::sentence;
 use crate::words::verdict::advice;
 
 /// The card of a flight, with details all that its parts tell.
-pub(crate) fn text(of: &Survey, has_details: bool) -> String {
+pub fn text(of: &Survey, has_details: bool) -> String {
     let mut text = card(of, has_details);
     if !has_details {
         return text;

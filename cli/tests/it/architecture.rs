@@ -13,7 +13,7 @@ use serde::Deserialize;
 use serde_json::{Value, json};
 
 /// Each crate with the crates of both workspaces that it may depend on, tests included.
-const ALLOWED: [(&str, &[&str]); 11] = [
+const ALLOWED: [(&str, &[&str]); 12] = [
     ("onecycle-onboard", &[]),
     ("onecycle-plant", &["onecycle-design", "onecycle-onboard"]),
     ("onecycle-link", &[]),
@@ -70,17 +70,18 @@ const ALLOWED: [(&str, &[&str]); 11] = [
     ),
     (
         "onecycle-py",
-        &[
-            "onecycle",
-            "onecycle-cli",
-            "onecycle-lab-cli",
-            "onecycle-plant",
-        ],
+        &["onecycle", "onecycle-cli", "onecycle-plant"],
     ),
+    ("onecycle-lab-py", &["onecycle-lab-cli"]),
 ];
 
 /// Crates of the workspace in `research/`.
-const RESEARCH: [&str; 3] = ["onecycle-lab", "onecycle-lab-cli", "onecycle-py"];
+const RESEARCH: [&str; 4] = [
+    "onecycle-lab",
+    "onecycle-lab-cli",
+    "onecycle-lab-py",
+    "onecycle-py",
+];
 
 /// What the library ships.
 const PARTS: [&str; 5] = [

@@ -2,11 +2,11 @@
 //!
 //! | message | answer |
 //! | --- | --- |
-//! | `{"do":"open","file"}` | `{log}`: the report of `onecycle log --json`, null for a table |
-//! | `{"do":"signals","options"}` | `{samples, span_s, names, units, parts, notes}`: the signals of a loop or a table |
+//! | `{"do":"open"}` | `{log}`: the report of `onecycle log --json`, null for a table |
+//! | `{"do":"signals","settings"}` | `{samples, span_s, names, units, parts, notes}`: the signals of a loop or a table |
 //! | `{"do":"view","from_s","to_s","points"}` | `{time_s, input, output, set_point}` of that time, thinned |
-//! | `{"do":"identify","options"}` | the report of `onecycle identify --json` |
-//! | `{"do":"survey","options"}` | that of `onecycle identify LOG --json`: every loop of a flight |
+//! | `{"do":"identify","settings"}` | the report of `onecycle identify --json` |
+//! | `{"do":"survey","settings"}` | that of `onecycle identify LOG --json`: every loop of a flight |
 //! | `{"do":"json"}`, `{"do":"page"}` | `{text}`: the report as the program writes it |
 //! | `{"do":"trade_off"}` | designs from calm to sharp: limit of `Ms`, gains, figures |
 //! | `{"do":"judge","gains","bands"}` | figures, least margins, curves of the gains, `asks`; with bands if they are asked for |
@@ -17,23 +17,23 @@
 //! names the limits of the style that gains break. Such parameters are answered with `{asks}` unless `below_limits` is true or
 //! they are on the way to gains that keep the limits.
 //!
-//! Options are those of the command line. An answer with `error` has one sentence. Infinite numbers are null. Times are in
+//! Settings are a map, such as `{"style": "calm", "ms": 1.5}`, of those of `onecycle::Request`; options are those of the command line. An
+//! answer with `error` has one sentence. Infinite numbers are null. Times are in
 //! seconds, signals in the units of the file.
-
-use std::path::Path;
 
 use onecycle::request::HALF_STEP;
 use onecycle::source::is_flight_log;
-use onecycle::{Controller, LogFile, Model, Pid, Report};
+use onecycle::{Controller, LogFile, Model, Pid, Report, Request, Source};
 use onecycle_link::FlightLog;
 use serde_json::{Value, json};
 
-use super::{arguments_of_identify, parsed, told};
-use crate::args::{Command, Identify};
-use crate::commands::{identify, simulate};
+use crate::args::{self, Arguments, Command};
+use crate::commands::simulate;
 use crate::failure::Failure;
 use crate::output::Waiting;
-use crate::reading::Input;
+#[cfg(target_family = "wasm")]
+pub use crate::output::page::{Listener, listen};
+use crate::report::identify as report;
 use crate::report::json::to_text;
 use crate::report::{hand, log as log_report};
 use crate::style::plain;
@@ -47,7 +47,7 @@ const DRAWS: usize = 60;
 /// The work on one file.
 #[derive(Default)]
 pub struct Studio {
-    file: String,
+    source: Option<Box<dyn Source>>,
     log: Option<FlightLog>,
     signals: Option<Signals>,
     found: Option<Report>,
@@ -75,14 +75,13 @@ impl Studio {
     }
 
     fn answer(&mut self, message: &Value) -> Result<Value, String> {
-        let failed = |failure: Failure| told(&failure);
-        let options = options(message);
         match message["do"].as_str().unwrap_or_default() {
-            "open" => self.open(message["file"].as_str().unwrap_or_default()),
+            "open" => self.open(),
             "signals" => {
                 (self.found, self.draws) = (None, vec![]);
-                let arguments = arguments_of_identify(&self.file, &options)?;
-                let signals = self.read(&arguments).map_err(failed)?;
+                let signals = self
+                    .read(&request(message)?)
+                    .map_err(|error| error.to_string())?;
                 let about = signals.about.clone();
                 self.signals = Some(signals);
                 Ok(about)
@@ -90,29 +89,25 @@ impl Studio {
             "view" => self.view(message),
             "identify" => {
                 (self.found, self.draws) = (None, vec![]);
-                let arguments = arguments_of_identify(&self.file, &options)?;
-                let found = self.identified(&arguments).map_err(failed)?;
-                let report = value(&identify::as_json(&found, false));
+                let _waiting = Waiting::on("identifying");
+                let found = request(message)?.identify(self.source()?);
+                let found = found.map_err(|error| error.to_string())?;
+                let report = value(&found);
                 if let Ok(identified) = &found.identification.outcome {
                     self.draws = identified.posterior.models(DRAWS);
                 }
                 self.found = Some(found);
-                Ok(report)
+                report
             }
             "survey" => {
-                let arguments = arguments_of_identify(&self.file, &options)?;
-                let survey = || {
-                    let request = identify::checked(&arguments)?;
-                    let _waiting = Waiting::on("identifying");
-                    Ok(request.survey(&self.source()?)?)
-                };
-                let surveyed = survey().map_err(failed)?;
-                Ok(value(&to_text(&surveyed)))
+                let _waiting = Waiting::on("identifying");
+                let surveyed = request(message)?.survey(self.source()?);
+                value(&surveyed.map_err(|error| error.to_string())?)
             }
-            "json" => Ok(json!({ "text": identify::as_json(self.found()?, false) })),
+            "json" => Ok(json!({ "text": to_text(self.found()?) })),
             "page" => {
                 let found = self.found.as_mut().ok_or(NOTHING)?;
-                Ok(json!({ "text": identify::as_page(found) }))
+                Ok(json!({ "text": report::page(found) }))
             }
             "trade_off" => {
                 let found = self.found.as_mut().ok_or(NOTHING)?;
@@ -122,31 +117,36 @@ impl Studio {
             }
             "judge" => self.judge(message),
             "parameters" => self.parameters(message),
-            "simulate" => simulated(&options),
+            "simulate" => simulated(&options(message)),
             other => Err(format!("there is no message {other:?}")),
         }
     }
 
-    fn open(&mut self, file: &str) -> Result<Value, String> {
+    /// Takes a file in place of the one before.
+    pub fn take(&mut self, source: Box<dyn Source>) {
         *self = Self {
-            file: file.to_owned(),
+            source: Some(source),
             ..Self::default()
         };
-        let source = Input::new(Path::new(file)).map_err(|failure| told(&failure))?;
-        if !is_flight_log(&source) {
+    }
+
+    fn open(&mut self) -> Result<Value, String> {
+        let source = self.source()?;
+        if !is_flight_log(source) {
             return Ok(json!({ "log": null }));
         }
-        let scanned = LogFile::scan(&source).map_err(|error| told(&error.into()))?;
+        let scanned = LogFile::scan(source).map_err(|error| error.to_string())?;
         let moved = scanned.movements();
-        let report = value(&log_report::json(file, &scanned.log, &moved, None));
+        let report = log_report::json(&source.name(), &scanned.log, &moved, None);
         self.log = Some(scanned.log);
-        Ok(json!({ "log": report }))
+        Ok(json!({ "log": serde_json::from_str::<Value>(&report).unwrap_or_default() }))
     }
 
     /// The whole signals, of which a part is to be chosen.
-    fn read(&self, arguments: &Identify) -> Result<Signals, Failure> {
+    fn read(&self, request: &Request) -> Result<Signals, Failure> {
+        let source = self.source().map_err(Failure::usage)?;
         let Some(log) = &self.log else {
-            let recording = arguments.request()?.read(&self.source()?)?;
+            let recording = request.read(source)?;
             let columns = recording.columns();
             let named = [&columns.input, &columns.output];
             let notes: Vec<String> = (recording.notes().iter())
@@ -164,8 +164,7 @@ impl Studio {
                 }),
             ));
         };
-        let (request, source) = (arguments.request()?, self.source()?);
-        let file = LogFile::new(&source, log.clone());
+        let file = LogFile::new(source, log.clone());
         let number = file.flight(request.flight);
         let signals = file.signals(number, request.loop_of_log())?;
         let flight = log.flights.get(number.saturating_sub(1));
@@ -182,20 +181,16 @@ impl Studio {
         ))
     }
 
+    fn source(&self) -> Result<&dyn Source, String> {
+        (self.source.as_deref()).ok_or_else(|| "no file is open".to_owned())
+    }
+
     fn view(&self, message: &Value) -> Result<Value, String> {
         let signals = self.signals.as_ref().ok_or("no signals are open")?;
         let points = message["points"].as_u64().unwrap_or(1000).clamp(16, 8000) as usize;
         let from_s = message["from_s"].as_f64().unwrap_or(f64::NEG_INFINITY);
         let to_s = message["to_s"].as_f64().unwrap_or(f64::INFINITY);
         Ok(signals.view(from_s, to_s, points))
-    }
-
-    fn source(&self) -> Result<Input<'_>, Failure> {
-        Input::new(Path::new(&self.file))
-    }
-
-    fn identified(&self, arguments: &Identify) -> Result<Report, Failure> {
-        identify::found(&identify::checked(arguments)?, &self.source()?)
     }
 
     fn found(&self) -> Result<&Report, String> {
@@ -244,7 +239,8 @@ impl Studio {
         let (Ok(identified), Some(choice)) = (&found.identification.outcome, &found.choice) else {
             return Err(NOTHING.to_owned());
         };
-        let no_log = || format!("{} is not a flight log: type the gains in", self.file);
+        let name = &found.name;
+        let no_log = || format!("{name} is not a flight log: type the gains in");
         let of_log = found.of_log.as_ref().ok_or_else(no_log)?;
         let is = |name: &str| message[name].as_bool().unwrap_or(false);
         let share = if is("whole") { 1.0 } else { HALF_STEP };
@@ -321,6 +317,16 @@ fn extremes(times_s: &[f64], values: &[f64]) -> Vec<[f64; 2]> {
     ends
 }
 
+/// What a message asks for.
+fn request(message: &Value) -> Result<Request, String> {
+    let settings = &message["settings"];
+    let given = match settings {
+        Value::Null => return Ok(Request::default()),
+        given => serde_json::from_value(given.clone()),
+    };
+    given.map_err(|error| error.to_string())
+}
+
 /// The options of a message.
 fn options(message: &Value) -> Vec<String> {
     let given = message["options"].as_array().into_iter().flatten();
@@ -330,19 +336,19 @@ fn options(message: &Value) -> Vec<String> {
 }
 
 fn simulated(options: &[String]) -> Result<Value, String> {
-    let Command::Simulate(arguments) = parsed("simulate", &[], options)? else {
+    let parsed = args::parsed::<Arguments>("simulate", &[], options)?;
+    let Command::Simulate(arguments) = parsed.command else {
         return Err("not the command simulate".to_owned());
     };
     if arguments.expect {
         let expected = simulate::expected(&arguments);
-        let text = expected.map_err(|failure| told(&failure))?;
+        let text = expected.map_err(|failure| failure.to_string())?;
         return Ok(json!({ "text": plain(&text) }));
     }
-    let csv = simulate::csv(&arguments).map_err(|failure| told(&failure))?;
+    let csv = simulate::csv(&arguments).map_err(|failure| failure.to_string())?;
     Ok(json!({ "text": String::from_utf8_lossy(&csv) }))
 }
 
-/// A report that was written as JSON.
-fn value(json: &str) -> Value {
-    serde_json::from_str(json).unwrap_or_default()
+fn value(report: &impl serde::Serialize) -> Result<Value, String> {
+    serde_json::to_value(report).map_err(|error| error.to_string())
 }
