@@ -9,7 +9,7 @@ python3 -m venv "$target/py-venv"
 python="$target/py-venv/bin/python"
 "$python" -m pip install -q -r py/requirements-test.txt
 # The profile of the tests: no link-time optimisation.
-MATURIN_PEP517_ARGS="--profile dev" "$python" -m pip install -q --force-reinstall --no-deps ./py
+MATURIN_PEP517_ARGS="--profile dev" "$python" -m pip install -q --force-reinstall --no-deps ./py ./research/py
 if [ -z "${ONECYCLE:-}" ]; then
     cargo build -q -p onecycle-cli
     ONECYCLE="$target/debug/onecycle"

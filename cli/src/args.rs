@@ -13,32 +13,31 @@ mod simulate;
 mod structure;
 mod studio;
 
-use std::ops::RangeBounds;
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser, Subcommand};
-use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
 use onecycle_onboard::{Soiptd, SoiptdError};
 
 pub(crate) use self::completions::Completions;
-pub(crate) use self::design::{DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
+pub(crate) use self::design::{DesignArguments, NoiseArguments};
 pub(crate) use self::fly::Fly;
+pub(crate) use self::identify::Identify;
 pub use self::identify::Method;
-pub(crate) use self::identify::{Between, Estimator, Identify};
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use self::live::{
     ConnectionArguments, Live, LiveAction, LiveLog, LiveRelay, LiveState, LiveWrite, LogId,
     identify_of,
 };
-pub(crate) use self::log::{HALF_STEP, Log, LogArguments, WriteArguments};
+pub(crate) use self::log::{Log, LogArguments, WriteArguments};
 pub(crate) use self::man::Man;
 pub(crate) use self::oscillation::OscillationArguments;
 pub(crate) use self::simulate::{BETA, Excitation, Inject, NamedDisturbance, Simulate};
 pub(crate) use self::structure::StructureArguments;
 pub(crate) use self::studio::Studio;
 use crate::failure::Failure;
+pub(crate) use onecycle::request::values::Share;
+pub use onecycle::request::values::{phase_margin, sample_rate, share, share_within};
 
 const AFTER_HELP: &str = "\
 First steps:
@@ -153,64 +152,6 @@ impl ProcessArguments {
     }
 }
 
-/// A value, or a percentage of a quantity that the help names.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Share {
-    Value(f64),
-    Percent(f64),
-}
-
-impl Share {
-    /// The value; a percentage is taken of `whole`.
-    pub(crate) fn of(self, whole: f64) -> f64 {
-        match self {
-            Self::Value(value) => value,
-            Self::Percent(percent) => 0.01 * percent * whole,
-        }
-    }
-}
-
-impl FromStr for Share {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let (number, share): (_, fn(f64) -> Self) = match text.strip_suffix('%') {
-            Some(number) => (number.trim_end(), Self::Percent),
-            None => (text, Self::Value),
-        };
-        number
-            .parse()
-            .ok()
-            .filter(|value: &f64| value.is_finite())
-            .map(share)
-            .ok_or_else(|| format!("'{text}' is neither a number nor a percentage such as 30%"))
-    }
-}
-
-/// A share within a range; `otherwise` says which it is.
-pub fn share_within(
-    text: &str,
-    range: impl RangeBounds<f64>,
-    otherwise: &str,
-) -> Result<f64, String> {
-    let share = share(text)?;
-    range
-        .contains(&share)
-        .then_some(share)
-        .ok_or_else(|| otherwise.to_owned())
-}
-
-/// A share of a whole: `5%` or `0.05`. A larger number than 1 without a percent sign may mean either, so it is refused.
-pub fn share(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<Share>()? {
-        Share::Value(value) if value.abs() > 1.0 => Err(format!(
-            "a share is written as 5% or 0.05: write {value}% or {}",
-            value / 100.0
-        )),
-        share => Ok(share.of(1.0)),
-    }
-}
-
 /// Design the controller of a known process: gains, margins and the predicted step response.
 ///
 /// Instead of the process, its ultimate gain and period, its oscillation under a relay, or gains that a rule computed from
@@ -249,27 +190,6 @@ pub(crate) struct Tune {
 
 /// More threads than any machine has cores.
 pub const MOST_THREADS: u64 = 1024;
-
-/// A phase margin in degrees, as radians.
-pub fn phase_margin(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(degrees) if degrees > 0.0 && degrees < 90.0 => Ok(degrees.to_radians()),
-        _ => Err("a phase margin lies between 0 and 90 degrees".to_owned()),
-    }
-}
-
-/// A sample rate in hertz, in the range of recordings.
-pub fn sample_rate(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(rate_hz) if SAMPLE_RATES_HZ.contains(&rate_hz) => Ok(rate_hz),
-        _ => Err("a sample rate lies between 1e-6 and 1e9 Hz".to_owned()),
-    }
-}
-
-fn time_unit(text: &str) -> Result<TimeUnit, String> {
-    TimeUnit::from_name(text)
-        .ok_or_else(|| "a unit of time is d, h, min, s, ms, us or ns".to_owned())
-}
 
 #[cfg(test)]
 mod tests;

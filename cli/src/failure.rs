@@ -3,9 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use onecycle::Error;
 use onecycle_link::ReadError;
-
-use crate::words;
 
 /// Exit codes, as `--help` lists them.
 pub mod exit {
@@ -29,13 +28,9 @@ pub enum Failure {
     /// Arguments that contradict each other or describe no process.
     #[error("{0}")]
     Usage(String),
-    /// A recording that cannot be read.
-    #[error("{}{}", located(path, reason), words::recording::refusal(reason))]
-    Recording {
-        path: PathBuf,
-        #[source]
-        reason: Box<ReadError>,
-    },
+    /// A request that the library cannot answer.
+    #[error(transparent)]
+    Request(#[from] Error),
     /// Any other file that cannot be read or has the wrong content.
     #[error("{file}: {reason}", file = path.display())]
     Unreadable { path: PathBuf, reason: String },
@@ -50,14 +45,6 @@ pub enum Failure {
         #[source]
         reason: io::Error,
     },
-}
-
-/// The file name, unless the reason contains it.
-fn located(path: &Path, reason: &ReadError) -> String {
-    match reason {
-        ReadError::Open { .. } => String::new(),
-        _ => format!("{}: ", path.display()),
-    }
 }
 
 impl Failure {
@@ -95,12 +82,14 @@ impl Failure {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_) => exit::USAGE,
-            Self::Recording { reason, .. } => match **reason {
+            Self::Request(Error::Request(_)) => exit::USAGE,
+            Self::Request(Error::Recording { reason, .. }) => match **reason {
                 ReadError::AmbiguousTime { .. } | ReadError::AmbiguousDate { .. } => {
                     exit::AMBIGUOUS
                 }
                 _ => exit::INPUT,
             },
+            Self::Request(_) => exit::INPUT,
             #[cfg(not(target_family = "wasm"))]
             Self::Vehicle { code, .. } => *code,
             Self::Unreadable { .. } => exit::INPUT,

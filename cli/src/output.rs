@@ -1,8 +1,8 @@
 //! Output: the terminal, and files that are written whole or not at all. Nothing else in the program writes.
 
-#[cfg(target_family = "wasm")]
+#[cfg(any(target_family = "wasm", not(feature = "program")))]
 pub mod page;
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "program", not(target_family = "wasm")))]
 mod terminal;
 
 use std::fmt::Display;
@@ -15,13 +15,15 @@ use anstyle::Style;
 
 use crate::failure::Failure;
 use crate::style::{HEADING, REFUSAL};
-#[cfg(target_family = "wasm")]
+use crate::words::with_options;
+#[cfg(any(target_family = "wasm", not(feature = "program")))]
 pub use page::{ProgressBar, Waiting, columns, progress_bar};
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "program", not(target_family = "wasm")))]
 pub use terminal::{ProgressBar, Waiting, columns, progress_bar};
 
 /// Prints a report to the standard output, with styles if that is a terminal.
 pub fn print(text: &str) -> Result<(), Failure> {
+    let text = with_options(text);
     written(AutoStream::auto(io::stdout().lock()), text.as_bytes())
 }
 
@@ -62,7 +64,7 @@ pub fn print_whole(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Resu
 
 /// Prints an error of a program to the error output.
 pub fn complain(program: &str, failure: &Failure) {
-    say(program, REFUSAL, failure);
+    say(program, REFUSAL, with_options(&failure.to_string()));
 }
 
 /// Prints a message about the progress of a program to the error output.

@@ -6,13 +6,11 @@ use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use onecycle::request::{MOST_OF_A_PACK, PackFile};
 use onecycle_onboard::pack::{DEFAULT, Pack, SELF_TEST_TOLERANCE};
 
 use crate::failure::Failure;
 use crate::reading::bytes_at_most;
-
-/// Largest size of a pack file (bytes): a thousand times that of a real one.
-const MOST_OF_A_PACK: u64 = 1 << 24;
 
 /// Where a pack is.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,15 +63,15 @@ impl PackSource {
         Pack::read(bytes).map_err(|error| Failure::unreadable(&self.path(), error.to_string()))
     }
 
-    /// A pack to identify with: its network gives the outputs that the pack stores.
-    pub(crate) fn usable<'a>(&self, bytes: &'a [u8]) -> Result<Pack<'a>, Failure> {
-        let pack = self.read(bytes)?;
-        if passes(pack.self_test()) {
-            return Ok(pack);
-        }
-        let reason = "the pack fails its self-test, so it was changed after it was made (see onecycle-lab pack verify): \
-                      take the original, or train a new one";
-        Err(Failure::unreadable(&self.path(), reason))
+    /// What a request takes. `None`: the built-in pack.
+    pub(crate) fn file(&self) -> Result<Option<PackFile>, Failure> {
+        let Self::File(path) = self else {
+            return Ok(None);
+        };
+        Ok(Some(PackFile {
+            name: path.display().to_string(),
+            bytes: bytes_at_most(path, MOST_OF_A_PACK)?,
+        }))
     }
 }
 

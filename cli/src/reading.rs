@@ -2,8 +2,10 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::path::Path;
+
+use onecycle::Source;
+use onecycle_link::LogFormat;
 
 use crate::failure::Failure;
 use crate::output::Waiting;
@@ -41,12 +43,6 @@ pub fn text_at_most(path: &Path, most: u64) -> Result<String, Failure> {
 /// The error of opening. A folder is refused here, though systems open one.
 pub(crate) fn open_with_bar(path: &Path) -> io::Result<FileWithBar> {
     let work = format!("reading {}", path.display());
-    if let Some(given) = given(path) {
-        return Ok(FileWithBar {
-            file: given.open(),
-            waiting: Waiting::on_bytes(work, given.length()),
-        });
-    }
     let file = File::open(path)?;
     let about = file.metadata()?;
     if about.is_dir() {
@@ -58,54 +54,80 @@ pub(crate) fn open_with_bar(path: &Path) -> io::Result<FileWithBar> {
     } else {
         Waiting::on(work)
     };
-    Ok(FileWithBar {
-        file: Box::new(file),
-        waiting,
-    })
+    Ok(FileWithBar { file, waiting })
 }
 
-/// The first bytes of a file. `None`: it cannot be read, or it is a pipe, which must not be read twice.
-pub(crate) fn head(path: &Path, most: u64) -> Option<Vec<u8>> {
-    let file: Box<dyn Read> = match given(path) {
-        Some(given) => given.open(),
-        None if path.is_file() => Box::new(File::open(path).ok()?),
-        None => return None,
-    };
-    let mut head = Vec::new();
-    file.take(most).read_to_end(&mut head).ok()?;
-    Some(head)
+/// The source of a recording: a file, or the standard input.
+pub(crate) struct Input<'a> {
+    path: &'a Path,
+    /// What was read of the standard input: all of a flight log, of anything else the first bytes.
+    piped: Option<Vec<u8>>,
 }
 
-/// A file that the system does not have: a page has none.
-pub trait Given: Send + Sync {
-    /// Its bytes from the start.
-    fn open(&self) -> Box<dyn Read + Send>;
+/// Largest flight log on the standard input, in bytes: it is read twice, so it is kept.
+const MOST_PIPED: u64 = 1 << 29;
 
-    /// Number of its bytes.
-    fn length(&self) -> u64;
+impl<'a> Input<'a> {
+    /// The file of this name; `-` is the standard input.
+    pub(crate) fn new(path: &'a Path) -> Result<Self, Failure> {
+        let piped = match path == Path::new("-") {
+            true => Some(piped()?),
+            false => None,
+        };
+        Ok(Self { path, piped })
+    }
+
+    pub(crate) fn is_piped(&self) -> bool {
+        self.piped.is_some()
+    }
 }
 
-/// The file that was given last.
-static GIVEN: Mutex<Option<(PathBuf, Arc<dyn Given>)>> = Mutex::new(None);
-
-fn locked() -> MutexGuard<'static, Option<(PathBuf, Arc<dyn Given>)>> {
-    GIVEN.lock().unwrap_or_else(PoisonError::into_inner)
+/// The standard input if it is a flight log, or else its first bytes.
+fn piped() -> Result<Vec<u8>, Failure> {
+    let failed = |error: io::Error| Failure::unreadable(Path::new("-"), error);
+    let mut bytes = Vec::new();
+    let mut input = io::stdin().lock();
+    let most = LogFormat::HEAD_BYTES as u64;
+    let head = input.by_ref().take(most).read_to_end(&mut bytes);
+    head.map_err(failed)?;
+    if LogFormat::detect(&bytes).is_none() {
+        return Ok(bytes);
+    }
+    let _waiting = Waiting::on("reading the standard input");
+    let rest = input.take(MOST_PIPED).read_to_end(&mut bytes);
+    rest.map_err(failed)?;
+    if bytes.len() as u64 > MOST_PIPED {
+        let reason =
+            format!("the log has more than {MOST_PIPED} bytes: write it to a file and name that");
+        return Err(Failure::unreadable(Path::new("-"), reason));
+    }
+    Ok(bytes)
 }
 
-/// Gives a file a name, in place of the one that was given before.
-pub(crate) fn give(name: &str, file: Arc<dyn Given>) {
-    *locked() = Some((PathBuf::from(name), file));
-}
+impl Source for Input<'_> {
+    fn name(&self) -> String {
+        self.path.display().to_string()
+    }
 
-fn given(path: &Path) -> Option<Arc<dyn Given>> {
-    let given = locked();
-    let (name, file) = given.as_ref()?;
-    (name == path).then(|| Arc::clone(file))
+    fn open(&self) -> io::Result<Box<dyn Read + '_>> {
+        match &self.piped {
+            // Of a flight log nothing is left there.
+            Some(bytes) => Ok(Box::new(bytes.chain(io::stdin()))),
+            None => Ok(Box::new(open_with_bar(self.path)?)),
+        }
+    }
+
+    fn head(&self, most: u64) -> Vec<u8> {
+        match &self.piped {
+            Some(bytes) => bytes.iter().take(most as usize).copied().collect(),
+            None => self.path.head(most),
+        }
+    }
 }
 
 /// A file that counts the bytes read from it.
 pub(crate) struct FileWithBar {
-    file: Box<dyn Read + Send>,
+    file: File,
     waiting: Waiting,
 }
 

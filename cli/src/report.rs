@@ -4,17 +4,23 @@ mod answer;
 mod controllers;
 pub mod cycles;
 mod family;
-pub(crate) mod flight;
+pub mod flight;
+#[cfg(feature = "program")]
 pub(crate) mod fly;
+#[cfg(feature = "program")]
 pub(crate) mod hand;
+pub mod identify;
 pub mod json;
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "program", not(target_family = "wasm")))]
 pub(crate) mod live;
+#[cfg(feature = "program")]
 pub(crate) mod log;
 pub(crate) mod log_gains;
-pub mod number;
 pub(crate) mod page;
 mod record;
 pub(crate) mod text;
-pub(crate) mod units;
+pub mod tune;
 pub mod wrap;
+
+pub use onecycle::words::number;
+pub(crate) use onecycle::words::units;

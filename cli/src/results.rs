@@ -1,11 +1,8 @@
-//! What commands compute, as plain data, one file for each command. Commands fill it, reports show it; nothing here
-//! reads arguments or prints.
+//! What commands compute, as plain data: that of the library, and one file for each further command.
 
-pub(crate) mod answer;
-pub(crate) mod controllers;
-pub(crate) mod family;
-pub(crate) mod flight;
+#[cfg(feature = "program")]
 pub(crate) mod fly;
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "program", not(target_family = "wasm")))]
 pub(crate) mod live;
-pub(crate) mod log_gains;
+
+pub(crate) use onecycle::results::{answer, controllers, family, flight, log_gains};

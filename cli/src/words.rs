@@ -1,47 +1,27 @@
-//! Sentences of the program: what the facts of the libraries mean, and what to do about them.
+//! Sentences of the program: those of the library with the options of the program, and its own.
 
-pub(crate) mod answer;
-mod caution;
-pub(crate) mod controllers;
-pub(crate) mod flight;
-pub(crate) mod limits;
-#[cfg(not(target_family = "wasm"))]
+#[cfg(all(feature = "program", not(target_family = "wasm")))]
 pub(crate) mod live;
-pub(crate) mod log;
-pub(crate) mod log_gains;
-pub(crate) mod oscillation;
-pub(crate) mod recording;
-pub(crate) mod remark;
-pub(crate) mod verdict;
 
-/// With a capital letter at the start and a full stop at the end.
-pub(crate) fn sentence(clause: &str) -> String {
-    capital(clause.trim_end_matches('.')) + "."
-}
+use std::borrow::Cow;
 
-/// With a capital letter at the start.
-pub(crate) fn capital(clause: &str) -> String {
-    let mut letters = clause.chars();
-    let first = letters.next().map(|letter| letter.to_ascii_uppercase());
-    first.into_iter().chain(letters).collect()
-}
+use onecycle::words::{Named, named};
+pub(crate) use onecycle::words::{
+    answer, capital, controllers, flight, log_gains, oscillation, recording, remark, sentence,
+    verdict,
+};
+#[cfg(feature = "program")]
+pub(crate) use onecycle::words::{limits, log};
 
-/// `a`, `a and b`, `a, b and c`.
-fn listed(names: &[&str]) -> String {
-    match names {
-        [] => String::new(),
-        [one] => (*one).to_owned(),
-        [first @ .., last] => format!("{} and {last}", first.join(", ")),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn names_are_listed_with_and() {
-        assert_eq!(listed(&["a"]), "a");
-        assert_eq!(listed(&["a", "b", "c"]), "a, b and c");
-    }
+/// A text of the library with the options of the program: `` `style=calm` `` is `--style calm`.
+pub fn with_options(text: &str) -> Cow<'_, str> {
+    named(text, |of| match of {
+        Named::Setting(name, value) => {
+            let value = value.map_or(String::new(), |value| format!(" {value}"));
+            format!("--{}{value}", name.replace('_', "-"))
+        }
+        Named::Identify(file) => format!("onecycle identify {file}"),
+        Named::Log(file) => format!("onecycle log {file}"),
+        _ => String::new(),
+    })
 }

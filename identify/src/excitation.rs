@@ -78,6 +78,7 @@ impl Excitation {
 
 /// Measured properties of a steady relay oscillation.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Oscillation {
     /// Mean period of the cycles used (s).
@@ -106,6 +107,7 @@ pub struct Oscillation {
 
 /// Ratio at which the relay of a recording switched, if its switches follow such a law.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Switching {
     /// Mean over the cycles of `beta`, as in [`onecycle_onboard::relay`]: minus the output at a switch over the extreme

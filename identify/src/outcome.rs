@@ -366,6 +366,7 @@ pub struct InnovationTests {
 
 /// Prediction of data that the model was not fitted to.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Prediction {
     /// Time ahead of the last measurement used (s).

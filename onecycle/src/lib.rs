@@ -233,15 +233,41 @@
 //! | `onecycle-onboard` | firmware without std and heap: relay, estimator, tuner (example `on_board`) |
 //! | `onecycle-cli` | the program |
 //!
-//! The library prints nothing, starts no threads and does not panic on any input.
+//! The library prints nothing, does not panic on any input, and starts threads with the feature `threads` only.
 //!
 //! Reference: A. Ayyad, M. Chehadeh, M. I. Awad, Y. Zweiri, "Real-time system identification using deep learning for
 //! linear processes with application to unmanned aerial vehicles", IEEE Access 8 (2020).
 
+mod answer;
 mod builder;
+mod controllers;
+mod design;
+mod error;
 mod feedback;
+#[cfg(feature = "serde")]
+#[doc(hidden)]
+pub mod json;
+pub mod log_gains;
+mod overlay;
+mod report;
+pub mod request;
+pub mod results;
+mod run;
+pub mod source;
+mod survey;
+mod threads;
+#[doc(hidden)]
+pub mod words;
 
 pub use builder::{Identify, with_signals};
+pub use design::DesignReport;
+pub use error::Error;
+pub use report::Report;
+pub use request::{DesignRequest, Request, Requirements};
+pub use results::answer::{Advice, Answer};
+pub use results::controllers::Controllers;
+pub use results::flight::Survey;
+pub use source::{LogFile, Source};
 
 // Recordings.
 #[doc(inline)]

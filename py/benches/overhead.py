@@ -27,7 +27,7 @@ def of_identify():
 
 
 def relay_campaign(cases):
-    return onecycle._onecycle.Campaign(str(ROOT / "experiments/relay.toml"), [f"--cases={cases}"])
+    return onecycle_lab.Campaign(str(ROOT / "experiments/relay.toml"), [f"--cases={cases}"])
 
 
 def alone(cases):

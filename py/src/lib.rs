@@ -1,7 +1,7 @@
 //! The extension module of the Python package `onecycle`: bindings without logic of their own.
 //!
-//! Options arrive as those of the command line, so that the package and the program accept the same. Long work runs in a
-//! thread of its own with the interpreter's lock released; the calling thread looks for Ctrl-C.
+//! Keywords become a request of the library, its report objects. Long work runs in a thread of its own; the calling thread looks
+//! for Ctrl-C.
 
 #![expect(
     clippy::needless_pass_by_value,
@@ -9,18 +9,27 @@
 )]
 
 mod process;
+mod waited;
 
-use std::sync::Arc;
-use std::sync::mpsc::{RecvTimeoutError, channel};
-use std::time::{Duration, Instant};
+use std::path::PathBuf;
+use std::time::Instant;
 
 use numpy::{IntoPyArray, PyArray1, PyReadonlyArray1};
-use onecycle_cli::embed;
-use onecycle_lab_cli::embed as lab;
+use onecycle::results::log_gains::NamedFiles;
+use onecycle::source::is_flight_log;
+use onecycle::words::verdict::advice;
+use onecycle::{DesignRequest, Error, Report, Request};
+use onecycle_cli::report::json::to_text;
+use onecycle_cli::report::{flight, identify as shown};
+use onecycle_cli::style::plain;
+use onecycle_cli::words::with_options;
 use pyo3::create_exception;
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::types::PyDict;
+use pythonize::{depythonize, pythonize};
+
+use crate::waited::waited;
 
 create_exception!(
     _onecycle,
@@ -33,33 +42,31 @@ fn refused(sentence: impl ToString) -> PyErr {
     OnecycleError::new_err(sentence.to_string())
 }
 
-/// Time between two looks for Ctrl-C.
-const LOOK: Duration = Duration::from_millis(50);
+/// What keywords ask for.
+fn asked<T: serde::de::DeserializeOwned>(settings: &Bound<'_, PyDict>) -> PyResult<T> {
+    depythonize(settings).map_err(refused)
+}
 
-/// Runs work in a thread. After Ctrl-C the result of the thread is dropped.
-fn waited<T: Send + 'static>(
-    py: Python<'_>,
-    work: impl FnOnce() -> T + Send + 'static,
-) -> PyResult<T> {
-    let (sender, receiver) = channel();
-    let receiver = std::sync::Mutex::new(receiver);
-    std::thread::spawn(move || {
-        // Nobody receives after Ctrl-C.
-        let _ = sender.send(work());
-    });
-    loop {
-        let received = py.detach(|| match receiver.lock() {
-            Ok(receiver) => receiver.recv_timeout(LOOK),
-            Err(_) => Err(RecvTimeoutError::Disconnected),
-        });
-        match received {
-            Ok(result) => return Ok(result),
-            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-            Err(RecvTimeoutError::Disconnected) => {
-                return Err(PyRuntimeError::new_err("the computation ended in a panic"));
-            }
-        }
+/// Writes the files with parameters, or none where one of them exists.
+fn write(files: Option<&NamedFiles>) -> Result<(), Error> {
+    let Some(files) = files else {
+        return Ok(());
+    };
+    let all = [
+        (&files.restore, &files.text.restore),
+        (&files.path, &files.text.apply),
+    ];
+    if let Some((path, _)) = all.iter().find(|(path, _)| path.exists()) {
+        let reason = format!("{} exists: name another file with `write`", path.display());
+        return Err(Error::Request(reason));
     }
+    for (path, text) in all {
+        std::fs::write(path, text).map_err(|error| Error::Unreadable {
+            name: path.display().to_string(),
+            reason: error.to_string(),
+        })?;
+    }
+    Ok(())
 }
 
 /// A recording of a control loop.
@@ -120,19 +127,20 @@ impl Recording {
 }
 
 #[pyfunction]
-fn read(py: Python<'_>, path: String, options: Vec<String>) -> PyResult<Recording> {
-    let recording = waited(py, move || embed::read(&path, &options))?;
+fn read(py: Python<'_>, path: PathBuf, settings: &Bound<'_, PyDict>) -> PyResult<Recording> {
+    let request: Request = asked(settings)?;
+    let recording = waited(py, move || request.read(&path))?;
     recording.map(Recording).map_err(refused)
 }
 
 /// What was identified, and the time that it took (s).
 #[pyclass(module = "onecycle")]
-struct Found(embed::Found, f64);
+struct Found(Report, f64);
 
 /// Identifies in another thread.
 fn found(
     py: Python<'_>,
-    work: impl FnOnce() -> Result<embed::Found, String> + Send + 'static,
+    work: impl FnOnce() -> Result<Report, Error> + Send + 'static,
 ) -> PyResult<Found> {
     let (found, took_s) = waited(py, move || {
         let begin = Instant::now();
@@ -140,6 +148,7 @@ fn found(
         (found, begin.elapsed().as_secs_f64())
     })?;
     let found = found.map_err(refused)?;
+    write(found.files()).map_err(refused)?;
     Ok(Found(found, took_s))
 }
 
@@ -151,38 +160,35 @@ impl Found {
     }
 
     fn json(&self) -> String {
-        self.0.json()
+        to_text(&self.0)
+    }
+
+    fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        pythonize(py, &self.0).map_err(refused)
     }
 
     fn page(&mut self) -> String {
-        self.0.page()
+        shown::page(&mut self.0)
     }
 
     fn text(&self) -> String {
-        self.0.text()
-    }
-
-    fn remarks(&self) -> Vec<String> {
-        self.0.remarks()
-    }
-
-    fn details(&self) -> Vec<String> {
-        self.0.details()
+        plain(&with_options(&shown::text(&self.0, true)))
     }
 
     fn refusal(&self) -> Option<String> {
-        self.0.refusal()
+        let verdict = self.0.identification.outcome.as_ref().err()?;
+        Some(format!("{verdict}: {}", advice(verdict)))
     }
 
     /// The identified process, to the last bit.
     fn model(&self) -> Option<process::Model> {
-        let identified = self.0.identification().outcome.as_ref().ok()?;
+        let identified = self.0.identification.outcome.as_ref().ok()?;
         Some(process::Model(identified.model))
     }
 
     /// Parameter of every draw from the posterior, by key.
     fn posterior<'py>(&self, py: Python<'py>) -> Vec<(&'static str, Bound<'py, PyArray1<f64>>)> {
-        let Ok(identified) = &self.0.identification().outcome else {
+        let Ok(identified) = &self.0.identification.outcome else {
             return vec![];
         };
         let structure = identified.model.structure();
@@ -195,8 +201,17 @@ impl Found {
 }
 
 #[pyfunction]
-fn identify_file(py: Python<'_>, path: String, options: Vec<String>) -> PyResult<Found> {
-    found(py, move || embed::Found::in_file(&path, &options))
+fn identify_file(py: Python<'_>, path: PathBuf, settings: &Bound<'_, PyDict>) -> PyResult<Found> {
+    let request: Request = asked(settings)?;
+    found(py, move || {
+        if request.is_of_all_loops() && is_flight_log(&path) {
+            return Err(Error::Request(format!(
+                "{} is a flight log: choose one of its loops with `axis` and `loop`",
+                path.display()
+            )));
+        }
+        request.identify(&path)
+    })
 }
 
 #[pyfunction]
@@ -204,95 +219,54 @@ fn identify_recording(
     py: Python<'_>,
     name: String,
     recording: &Recording,
-    options: Vec<String>,
+    settings: &Bound<'_, PyDict>,
 ) -> PyResult<Found> {
+    let request: Request = asked(settings)?;
     let recording = recording.0.clone();
-    found(py, move || {
-        embed::Found::in_recording(&name, recording, &options)
-    })
+    found(py, move || request.identify_recording(&name, recording))
 }
 
-/// Table and JSON report of every loop of a flight log.
+/// Every loop of a flight log.
+#[pyclass(frozen, module = "onecycle")]
+struct Survey(onecycle::Survey);
+
+#[pymethods]
+impl Survey {
+    fn json(&self) -> String {
+        to_text(&self.0)
+    }
+
+    fn dict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        pythonize(py, &self.0).map_err(refused)
+    }
+
+    fn text(&self) -> String {
+        plain(&with_options(&flight::text(&self.0, false)))
+    }
+}
+
 #[pyfunction]
 fn identify_flight(
     py: Python<'_>,
-    path: String,
-    options: Vec<String>,
-) -> PyResult<(String, String)> {
-    waited(py, move || embed::flight(&path, &options))?.map_err(refused)
+    path: PathBuf,
+    settings: &Bound<'_, PyDict>,
+) -> PyResult<Survey> {
+    let request: Request = asked(settings)?;
+    let surveyed = waited(py, move || request.survey(&path))?.map_err(refused)?;
+    write(surveyed.files.as_ref()).map_err(refused)?;
+    Ok(Survey(surveyed))
 }
 
 #[pyfunction]
-fn design(py: Python<'_>, options: Vec<String>) -> PyResult<String> {
-    waited(py, move || embed::design(&options))?.map_err(refused)
-}
-
-/// A campaign, whose cases can be computed anywhere.
-#[pyclass(frozen, module = "onecycle")]
-struct Campaign(Arc<lab::Campaign>);
-
-#[pymethods]
-impl Campaign {
-    #[new]
-    fn new(file: &str, options: Vec<String>) -> PyResult<Self> {
-        let campaign = lab::Campaign::read(file, &options).map_err(refused)?;
-        Ok(Self(Arc::new(campaign)))
-    }
-
-    fn __len__(&self) -> usize {
-        self.0.count() as usize
-    }
-
-    /// Outcomes of the cases from `first` to before `end`, each as JSON on one line.
-    fn cases(&self, py: Python<'_>, first: u64, end: u64) -> PyResult<Vec<String>> {
-        let campaign = Arc::clone(&self.0);
-        let work = move || (first..end).map(|n| campaign.case(n)).collect();
-        let cases: Result<Vec<String>, String> = waited(py, work)?;
-        cases.map_err(refused)
-    }
-
-    /// What the program prints for the outcomes of all cases.
-    fn text(&self, py: Python<'_>, cases: Vec<String>) -> PyResult<String> {
-        let campaign = Arc::clone(&self.0);
-        waited(py, move || campaign.text(&cases))?.map_err(refused)
-    }
-}
-
-/// A folder of experiments to train on.
-#[pyclass(module = "onecycle")]
-struct Dataset(lab::Dataset);
-
-#[pymethods]
-impl Dataset {
-    #[new]
-    fn new(recipe: Option<&str>, options: Vec<String>) -> PyResult<Self> {
-        let dataset = lab::Dataset::open(recipe, &options).map_err(refused)?;
-        Ok(Self(dataset))
-    }
-
-    fn manifest(&self) -> String {
-        self.0.manifest()
-    }
-
-    fn missing(&self) -> Vec<usize> {
-        self.0.missing()
-    }
-
-    fn keep(&mut self, file: usize, bytes: &[u8], rows: usize) -> PyResult<()> {
-        self.0.keep(file, bytes, rows).map_err(refused)
-    }
-}
-
-/// Bytes and number of examples of a file.
-#[pyfunction]
-fn dataset_file<'py>(
+fn design<'py>(
     py: Python<'py>,
-    manifest: String,
-    file: usize,
-) -> PyResult<(Bound<'py, PyBytes>, usize)> {
-    let made = waited(py, move || lab::dataset_file(&manifest, file))?;
-    let (bytes, rows) = made.map_err(refused)?;
-    Ok((PyBytes::new(py, &bytes), rows))
+    model: &process::Model,
+    settings: &Bound<'py, PyDict>,
+) -> PyResult<Bound<'py, PyAny>> {
+    let request: DesignRequest = asked(settings)?;
+    let model = model.0;
+    let designed = waited(py, move || request.design(model))?.map_err(refused)?;
+    pythonize(py, &designed).map_err(refused)
 }
 
 #[pymodule]
@@ -301,14 +275,12 @@ fn _onecycle(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<Recording>()?;
     module.add_class::<Found>()?;
+    module.add_class::<Survey>()?;
     module.add_class::<process::Model>()?;
     module.add_function(wrap_pyfunction!(read, module)?)?;
     module.add_function(wrap_pyfunction!(identify_file, module)?)?;
     module.add_function(wrap_pyfunction!(identify_recording, module)?)?;
     module.add_function(wrap_pyfunction!(identify_flight, module)?)?;
     module.add_function(wrap_pyfunction!(design, module)?)?;
-    module.add_class::<Campaign>()?;
-    module.add_class::<Dataset>()?;
-    module.add_function(wrap_pyfunction!(dataset_file, module)?)?;
     Ok(())
 }

@@ -150,17 +150,22 @@ const fillLoops = () => {
   const loops = (flight?.loops ?? []).filter((one) => one.input && one.output);
   at("loop").replaceChildren(...loops.map((one) => make("option", one.name)));
 };
-// The choice of a loop as options of the program.
-const loopOptions = () => {
-  if (!log) return [];
-  const [axis, kind] = at("loop").value.split(" ");
-  const of = kind ? ["--axis", axis, "--loop", kind] : ["--loop", axis];
-  return log.flights.length > 1 ? [...of, "--flight", at("flight").value] : of;
+const flightSettings = () => (log && log.flights.length > 1 ? { flight: at("flight").value } : {});
+// Further settings, written as NAME=VALUE or --name VALUE.
+const moreSettings = () => {
+  const all = {};
+  for (const [, name, value] of at("more").value.matchAll(/(?:--)?([a-z][\w-]*)(?:\s*=\s*|\s+|$)("[^"]*"|\S*)/g)) all[name.replaceAll("-", "_")] = value.replace(/^"|"$/g, "");
+  return all;
+};
+// The choice of a loop and the further settings.
+const loopSettings = () => {
+  const [axis, kind] = log ? at("loop").value.split(" ") : [];
+  return { ...(kind ? { axis, loop: kind } : log ? { loop: axis } : {}), ...flightSettings(), ...moreSettings() };
 };
 const words = (text) => (text.match(/"[^"]*"|\S+/g) ?? []).map((word) => word.replace(/^"|"$/g, ""));
-const options = () => {
-  const all = [...loopOptions(), ...words(at("more").value)];
-  for (const id of CHOICES) if (id !== "more" && at(id).value !== "") all.push(`--${id}`, at(id).value);
+const settings = () => {
+  const all = loopSettings();
+  for (const id of CHOICES) if (id !== "more" && at(id).value !== "") all[id.replaceAll("-", "_")] = at(id).value;
   return all;
 };
 let reading;
@@ -169,7 +174,7 @@ const readNow = async () => {
   isUnread = false;
   hideAfter("result");
   for (const id of CHOICES) at(id).value = kept.get(id) ?? "";
-  const answer = await waited("Reading the signals.", { message: { do: "signals", options: [...loopOptions(), ...words(at("more").value)] } }, "identify");
+  const answer = await waited("Reading the signals.", { message: { do: "signals", settings: loopSettings() } }, "identify");
   // The names of columns can be given as options.
   at("recording").hidden = !log || !at("loop").options.length;
   at("settings").hidden = !answer && Boolean(log) && !at("loop").options.length;
@@ -293,10 +298,9 @@ const loopCard = ({ name, answer, parts }) => {
 };
 // Every loop of the flight: the loops, or undefined if it failed.
 const surveyAll = async () => {
-  const flight = log.flights.length > 1 ? ["--flight", at("flight").value] : [];
-  const style = at("style").value ? ["--style", at("style").value] : [];
-  const of = file, options = [...flight, ...style, ...words(at("more").value)];
-  const answer = await waited("Identifying every loop.", { message: { do: "survey", options } });
+  const style = at("style").value ? { style: at("style").value } : {};
+  const of = file, settings = { ...flightSettings(), ...style, ...moreSettings() };
+  const answer = await waited("Identifying every loop.", { message: { do: "survey", settings } });
   if (!answer || of !== file) return undefined;
   say(`Every loop in ${took()}.`);
   surveyed = answer;
@@ -322,10 +326,10 @@ const identify = async () => {
   if (isUnread) readSignals();
   await reading;
   hideAfter("result");
-  const of = file, asked = options();
-  const answer = await waited("Identifying.", { message: { do: "identify", options: asked } });
+  const of = file, asked = settings();
+  const answer = await waited("Identifying.", { message: { do: "identify", settings: asked } });
   if (!answer || of !== file) return;
-  if (String(asked) !== String(options())) return say("The settings have changed: press Identify.");
+  if (JSON.stringify(asked) !== JSON.stringify(settings())) return say("The settings have changed: press Identify.");
   report = answer;
   showResult();
 };
@@ -666,7 +670,7 @@ at("cancel").onclick = async () => {
   if (!file) return;
   const answer = await send({ file });
   if (answer.error || at("recording").hidden) return;
-  await ask({ do: "signals", options: [...loopOptions(), ...words(at("more").value)] });
+  await ask({ do: "signals", settings: loopSettings() });
 };
 // Another address in the same tab: settings of the open recording, or of none that is open.
 addEventListener("hashchange", () => {

@@ -47,7 +47,7 @@ onmessage = async ({ data: { id, module, file, message } }) => {
       blob = file.blob;
       write(file.name);
       library.file(blob.size);
-      answer = { ...ask({ do: "open", file: file.name }), key: identity(blob) };
+      answer = { ...ask({ do: "open" }), key: identity(blob) };
     } else {
       answer = ask(message);
     }

@@ -1,4 +1,4 @@
-//! The program for a page: messages in JSON, and one file that the page reads in pieces.
+//! The library for a page: messages in JSON, and one file that the page reads in pieces.
 //!
 //! The page writes a message into the buffer ([`buffer`]) and calls [`ask`], which leaves its answer there
 //! ([`answer`]). While it works, it calls three functions of the page: for bytes of the file, for news of its progress, and
@@ -6,9 +6,9 @@
 
 use std::cell::RefCell;
 use std::io::{self, BufReader, Read};
-use std::sync::Arc;
 
-use onecycle_cli::embed::{self, Given, Studio};
+use onecycle::Source;
+use onecycle_cli::studio::{self, Studio};
 
 #[link(wasm_import_module = "page")]
 unsafe extern "C" {
@@ -23,23 +23,44 @@ unsafe extern "C" {
 /// Bytes asked for at once.
 const PIECE: usize = 1 << 20;
 
+/// Bytes between two messages on the progress.
+const STEP: u64 = 1 << 21;
+
 /// The file of the page.
 struct File {
+    name: String,
     length: u64,
 }
 
-impl Given for File {
-    fn open(&self) -> Box<dyn Read + Send> {
-        Box::new(BufReader::with_capacity(PIECE, Reader { offset: 0 }))
+impl Source for File {
+    fn name(&self) -> String {
+        self.name.clone()
     }
 
-    fn length(&self) -> u64 {
-        self.length
+    fn open(&self) -> io::Result<Box<dyn Read + '_>> {
+        let reader = Reader {
+            work: format!("reading {}", self.name),
+            length: self.length,
+            offset: 0,
+            told: 0,
+        };
+        tell(&reader.work, 0, Some(self.length));
+        Ok(Box::new(BufReader::with_capacity(PIECE, reader)))
     }
 }
 
 struct Reader {
+    work: String,
+    length: u64,
     offset: u64,
+    told: u64,
+}
+
+/// Tells the page what goes on.
+fn tell(work: &str, done: u64, all: Option<u64>) {
+    let all = all.map_or(-1.0, |all| all as f64);
+    // SAFETY: the page only reads the text.
+    unsafe { progress(work.as_ptr(), work.len(), done as f64, all) };
 }
 
 impl Read for Reader {
@@ -49,6 +70,10 @@ impl Read for Reader {
         let count = usize::try_from(count)
             .map_err(|_| io::Error::other("the browser cannot read the file any more"))?;
         self.offset += count as u64;
+        if self.offset - self.told >= STEP {
+            self.told = self.offset;
+            tell(&self.work, self.offset, Some(self.length));
+        }
         Ok(count)
     }
 }
@@ -61,11 +86,7 @@ thread_local! {
 /// To be called once, first.
 #[unsafe(no_mangle)]
 pub extern "C" fn start() {
-    embed::listen(|work, done, all| {
-        let all = all.map_or(-1.0, |all| all as f64);
-        // SAFETY: the page only reads the text.
-        unsafe { progress(work.as_ptr(), work.len(), done as f64, all) };
-    });
+    studio::listen(tell);
     std::panic::set_hook(Box::new(|about| {
         let reason = about.to_string();
         // SAFETY: the page only reads the text.
@@ -96,12 +117,11 @@ fn text() -> String {
 /// The file of the page has the name in the buffer and this length.
 #[unsafe(no_mangle)]
 pub extern "C" fn file(length: f64) {
-    embed::give(
-        &text(),
-        Arc::new(File {
-            length: length as u64,
-        }),
-    );
+    let file = File {
+        name: text(),
+        length: length as u64,
+    };
+    STUDIO.with_borrow_mut(|studio| studio.take(Box::new(file)));
 }
 
 /// Answers the message in the buffer there. Returns the length of the answer.

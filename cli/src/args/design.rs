@@ -2,15 +2,11 @@
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use onecycle::{Execution, Form, MeasurementNoise, Pid, Specification, Style};
-use onecycle_design::{Spans, Vendor};
-
-use super::{phase_margin, share_within};
-use crate::failure::Failure;
-
-/// Why the paper's style takes no noise.
-pub(crate) const PAPER_HAS_NO_NOISE: &str =
-    "--style paper does not limit the noise: leave out --noise, or choose another style";
+use onecycle::request::values::{
+    gain_margin, gains, overshoot, peak, phase_margin, positive, span,
+};
+use onecycle::{DesignRequest, Form, Pid, Requirements, Style};
+use onecycle_design::Vendor;
 
 /// Heading of the requirements on a controller.
 pub(super) const CONTROLLER: &str = "Controller";
@@ -63,69 +59,22 @@ pub(crate) struct DesignArguments {
 }
 
 impl DesignArguments {
-    /// The controller in which the gains are typed, and its ranges.
-    pub(crate) fn plant(&self) -> Option<(Vendor, Spans)> {
-        let output = self.input_range.unwrap_or(100.0);
-        Some((self.vendor?, Spans::new(self.output_range?, output)))
-    }
-
-    /// The requirements, without noise.
-    pub(crate) fn specification(&self) -> Result<Specification, Failure> {
-        if self.style == Style::Paper {
-            return self.paper();
-        }
-        let form = self.controller.unwrap_or(Specification::default().form);
-        let mut asked = Specification::new(form, self.style);
-        if let Some(peak) = self.ms {
-            asked = asked.with_peak(peak);
-        }
-        if let Some(margin_rad) = self.phase_margin {
-            asked = asked.with_phase_margin_rad(margin_rad);
-        }
-        asked.gain_margin = self.gain_margin.unwrap_or(asked.gain_margin);
+    /// The requirements, and the gains in force.
+    pub(crate) fn requirements(&self) -> Requirements {
+        let mut asked = Requirements::default();
+        asked.style = self.style;
+        asked.controller = self.controller;
+        asked.ms = self.ms;
+        asked.phase_margin_rad = self.phase_margin;
+        asked.gain_margin = self.gain_margin;
         asked.input_peak = self.input_peak;
-        asked.overshoot = self.overshoot.unwrap_or(asked.overshoot);
-        Ok(asked.with_execution(self.execution()))
-    }
-
-    /// The paper's style, which has one limit and one form.
-    fn paper(&self) -> Result<Specification, Failure> {
-        let others = [
-            ("--ms", self.ms.is_some()),
-            ("--gain-margin", self.gain_margin.is_some()),
-            ("--input-peak", self.input_peak.is_some()),
-            ("--overshoot", self.overshoot.is_some()),
-        ];
-        if let Some((option, _)) = others.iter().find(|(_, is_given)| *is_given) {
-            return Err(Failure::usage(format!(
-                "--style paper limits the phase margin only: leave out {option}, or choose another style"
-            )));
-        }
-        let mut asked = Specification::paper().with_execution(self.execution());
-        if let Some(form) = self.controller.filter(|form| *form != asked.form) {
-            return Err(Failure::usage(format!(
-                "--style paper designs a PD and no {}: leave out --controller, or choose another style",
-                form.name().replace('_', "-")
-            )));
-        }
-        if let Some(margin_rad) = self.phase_margin {
-            asked = asked.with_phase_margin_rad(margin_rad);
-        }
-        Ok(asked)
-    }
-
-    fn execution(&self) -> Execution {
-        (self.sample_period).map_or_else(Execution::default, Execution::sampled)
-    }
-
-    /// Whether the form of the controller was chosen.
-    pub(crate) fn is_form_given(&self) -> bool {
-        self.controller.is_some()
-    }
-
-    /// The gains in force.
-    pub(crate) fn against(&self) -> Option<Pid> {
-        self.against
+        asked.overshoot = self.overshoot;
+        asked.sample_period_s = self.sample_period;
+        asked.against = self.against;
+        asked.vendor = self.vendor;
+        asked.output_range = self.output_range;
+        asked.input_range = self.input_range;
+        asked
     }
 }
 
@@ -143,21 +92,13 @@ pub(crate) struct NoiseArguments {
 }
 
 impl NoiseArguments {
-    /// `asked` with the noise.
-    pub(crate) fn complete(&self, asked: Specification) -> Result<Specification, Failure> {
-        let Some(std) = self.noise else {
-            return Ok(asked);
-        };
-        if asked.style == Style::Paper {
-            return Err(Failure::usage(PAPER_HAS_NO_NOISE));
-        }
-        let period_s = asked.execution.sample_period_s;
-        if period_s == 0.0 {
-            return Err(Failure::usage(
-                "--noise is that of one sample: add the sample period of the controller, such as --sample-period 0.001",
-            ));
-        }
-        Ok(asked.with_noise(MeasurementNoise::new(std, period_s, self.input_amplitude)))
+    /// What is asked of a controller with these requirements.
+    pub(crate) fn request(&self, requirements: Requirements) -> DesignRequest {
+        let mut request = DesignRequest::default();
+        request.requirements = requirements;
+        request.noise = self.noise;
+        request.input_amplitude = self.input_amplitude;
+        request
     }
 }
 
@@ -171,73 +112,9 @@ fn vendor() -> impl TypedValueParser<Value = Vendor> {
         .try_map(|name| Vendor::from_name(&name).ok_or("there is no such controller"))
 }
 
-/// The span of a range such as `0..200`.
-fn span(text: &str) -> Result<f64, String> {
-    let ends = text.split_once("..");
-    let ends = ends.and_then(|(low, high)| Some((number(low)?, number(high)?)));
-    ends.map(|(low, high)| high - low)
-        .filter(|span| span.is_normal() && *span > 0.0)
-        .ok_or_else(|| "write a range as LOW..HIGH, such as 0..200".to_owned())
-}
-
 fn form() -> impl TypedValueParser<Value = Form> {
     let names = ["p", "pi", "pd", "pid", "cascade-pi", "cascade-pid"];
     PossibleValuesParser::new(names).try_map(|name| {
         Form::from_name(&name.replace('-', "_")).ok_or("there is no such controller")
     })
-}
-
-fn peak(text: &str) -> Result<f64, String> {
-    number(text)
-        .filter(|peak| (1.05..=10.0).contains(peak))
-        .ok_or_else(|| "Ms lies between 1.05 and 10; usual are 1.2 to 2.0".to_owned())
-}
-
-fn gain_margin(text: &str) -> Result<f64, String> {
-    number(text)
-        .filter(|factor| (1.0..=100.0).contains(factor))
-        .ok_or_else(|| "a gain margin is a factor between 1 and 100; 2 is 6 dB".to_owned())
-}
-
-/// A share of a step, as a number or a percentage.
-fn overshoot(text: &str) -> Result<f64, String> {
-    let otherwise = "an overshoot lies between 0 % and 100 %, such as 15% or 0.15";
-    share_within(text, 0.0..=1.0, otherwise)
-}
-
-/// A share of noise, as a number or a percentage.
-pub(super) fn noise(text: &str) -> Result<f64, String> {
-    let otherwise = "a share of noise lies between 0.0001 % and 10000 %, such as 25% or 0.25";
-    share_within(text, 1e-6..=100.0, otherwise)
-}
-
-fn positive(text: &str) -> Result<f64, String> {
-    number(text)
-        .filter(|value| *value > 0.0)
-        .ok_or_else(|| "this is a positive number".to_owned())
-}
-
-pub(super) fn number(text: &str) -> Option<f64> {
-    text.trim()
-        .parse()
-        .ok()
-        .filter(|value: &f64| value.is_finite())
-}
-
-/// Gains in parallel form.
-fn gains(text: &str) -> Result<Pid, String> {
-    let values: Option<Vec<f64>> = text.split(',').map(number).collect();
-    let wanted = "write the gains as Kp,Ki,Kd or Kp,Ki,Kd,Tf, such as 40,5,12 or 40,0,12,0.002";
-    let (gains, filter_s) = match values.as_deref() {
-        Some([kp, ki, kd]) => ([*kp, *ki, *kd], 0.0),
-        Some([kp, ki, kd, filter_s]) => ([*kp, *ki, *kd], *filter_s),
-        _ => return Err(wanted.to_owned()),
-    };
-    if gains.iter().all(|gain| *gain == 0.0) {
-        return Err("at least one of the gains Kp,Ki,Kd is not zero".to_owned());
-    }
-    if filter_s < 0.0 {
-        return Err("the time Tf of the filter is zero or positive".to_owned());
-    }
-    Ok(Pid::new(gains[0], gains[1], gains[2]).with_filter_s(filter_s))
 }

@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
-use onecycle::{Hold, Road, Structure};
+use onecycle::request::values::{beta, cutoff_hz, finite, noise, sample_rate, time_s, time_unit};
+use onecycle::{ColumnRef, Hold, Request, Road, Structure};
 use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
-use super::design::noise;
-use super::{DesignArguments, LogArguments, WriteArguments, sample_rate, time_unit};
+use super::{DesignArguments, LogArguments, WriteArguments};
+use crate::failure::Failure;
 use crate::packs::PackSource;
 
 /// Heading of the options of the estimators.
@@ -132,31 +133,43 @@ pub(crate) struct Identify {
     pub(crate) time_unit: Option<TimeUnit>,
 }
 
+impl Identify {
+    /// What is asked.
+    pub(crate) fn request(&self) -> Result<Request, Failure> {
+        let column = |name: &Option<String>| name.as_deref().map(ColumnRef::from);
+        let mut request = Request::default();
+        request.requirements = self.design.requirements();
+        request.noise_share = self.noise;
+        request.cycles = self.cycles as usize;
+        request.estimator = self.estimator.into();
+        request.method = self.method.into();
+        request.structure = self.structure;
+        (request.from_s, request.to_s) = (self.from, self.to);
+        request.hold = self.hold.map(Hold::from);
+        request.beta = self.beta;
+        request.input_late_s = self.input_late;
+        request.input_before = self.input_before;
+        request.output_filter_hz = self.output_filter;
+        request.pack = self.pack.file()?;
+        request.columns.time_column = column(&self.time);
+        request.columns.input_column = column(&self.input);
+        request.columns.output_column = column(&self.output);
+        request.columns.set_point_column = column(&self.set_point);
+        request.columns.control_loop.clone_from(&self.tag);
+        request.columns.sample_rate_hz = self.sample_rate;
+        request.columns.time_unit = self.time_unit;
+        request.axis = self.log.axis.map(Into::into);
+        request.control_loop = self.log.control_loop.map(Into::into);
+        request.flight = self.log.flight;
+        request.write = self.write.write();
+        Ok(request)
+    }
+}
+
 /// Names of structures.
 fn structure() -> impl TypedValueParser<Value = Structure> {
     PossibleValuesParser::new(Structure::ALL.map(Structure::name))
         .try_map(|name| Structure::from_name(&name).ok_or("there is no such structure"))
-}
-
-fn time_s(text: &str) -> Result<f64, String> {
-    let time_s = text.parse().ok().filter(|time_s: &f64| time_s.is_finite());
-    time_s.ok_or_else(|| "a time is a number of seconds".to_owned())
-}
-
-fn finite(text: &str) -> Result<f64, String> {
-    let value = text.parse().ok().filter(|value: &f64| value.is_finite());
-    value.ok_or_else(|| "an input is a finite number".to_owned())
-}
-
-fn cutoff_hz(text: &str) -> Result<f64, String> {
-    let cutoff_hz = text.parse().ok();
-    let cutoff_hz = cutoff_hz.filter(|hz: &f64| hz.is_finite() && *hz >= 0.0);
-    cutoff_hz.ok_or_else(|| "a cutoff is a number of Hz, 0 for none".to_owned())
-}
-
-fn beta(text: &str) -> Result<f64, String> {
-    let beta = text.parse().ok().filter(|beta: &f64| beta.abs() < 1.0);
-    beta.ok_or_else(|| "beta is a number between -1 and 1".to_owned())
 }
 
 /// Estimator of the process.

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use onecycle_link::{Axis, ControlLoop};
-
-use super::share;
+use onecycle::request::values::step;
+use onecycle::request::{self, HALF_STEP, Write};
+use onecycle_link::Axis;
 
 /// List what a flight log holds: flights, signals of each control loop, gains in force, excitation.
 ///
@@ -46,35 +46,6 @@ pub(crate) struct LogArguments {
     pub(crate) flight: Option<usize>,
 }
 
-impl LogArguments {
-    /// The loop of the arguments, or the default one.
-    pub(crate) fn control_loop(&self) -> ControlLoop {
-        let axis = match self.axis {
-            None | Some(LogAxis::Roll) => Axis::Roll,
-            Some(LogAxis::Pitch) => Axis::Pitch,
-            Some(LogAxis::Yaw) => Axis::Yaw,
-        };
-        match self.control_loop {
-            None | Some(LoopKind::Rate) => ControlLoop::Rate(axis),
-            Some(LoopKind::Attitude) => ControlLoop::Attitude(axis),
-            Some(LoopKind::Altitude) => ControlLoop::Altitude,
-        }
-    }
-
-    /// The first of these options that was given.
-    pub(crate) fn given(&self) -> Option<&'static str> {
-        let options = [
-            ("--axis", self.axis.is_some()),
-            ("--loop", self.control_loop.is_some()),
-            ("--flight", self.flight.is_some()),
-        ];
-        options
-            .into_iter()
-            .find(|(_, is_given)| *is_given)
-            .map(|(option, _)| option)
-    }
-}
-
 /// Parameters to write.
 #[derive(Clone, Debug, Args)]
 #[command(next_help_heading = "Flight logs")]
@@ -96,25 +67,14 @@ pub(crate) struct WriteArguments {
     pub(crate) below_limits: bool,
 }
 
-/// Share of the way from the gains in force to the proposed ones that is written unless another one is asked for.
-pub(crate) const HALF_STEP: f64 = 0.5;
-
 impl WriteArguments {
-    /// `--write`, if it was given.
-    pub(crate) fn given(&self) -> Option<&'static str> {
-        self.write.as_ref().map(|_| "--write")
-    }
-}
-
-fn step(text: &str) -> Result<f64, String> {
-    let step = share(text)?;
-    if step > 0.0 && step <= 1.0 {
-        Ok(step)
-    } else {
-        Err(
-            "a step lies above 0 %, up to 100 %, such as 25% or 0.25; 100% goes all the way"
-                .to_owned(),
-        )
+    /// What is asked.
+    pub(crate) fn write(&self) -> Write {
+        let mut write = Write::default();
+        write.file.clone_from(&self.write);
+        write.step = self.step;
+        write.below_limits = self.below_limits;
+        write
     }
 }
 
@@ -132,4 +92,24 @@ pub(crate) enum LoopKind {
     Rate,
     Attitude,
     Altitude,
+}
+
+impl From<LogAxis> for Axis {
+    fn from(axis: LogAxis) -> Self {
+        match axis {
+            LogAxis::Roll => Self::Roll,
+            LogAxis::Pitch => Self::Pitch,
+            LogAxis::Yaw => Self::Yaw,
+        }
+    }
+}
+
+impl From<LoopKind> for request::LoopKind {
+    fn from(kind: LoopKind) -> Self {
+        match kind {
+            LoopKind::Rate => Self::Rate,
+            LoopKind::Attitude => Self::Attitude,
+            LoopKind::Altitude => Self::Altitude,
+        }
+    }
 }

@@ -8,12 +8,12 @@ use onecycle::Pid;
 use onecycle_design::oscillation::{DEAD_TIME_SHARE, Oscillation, RelayTest};
 use onecycle_design::rules::Ultimate;
 
-use super::design::number;
 use super::{share, share_within};
 use crate::failure::Failure;
 use crate::report::number::significant;
 use crate::results::family::{Known, Rule};
 use crate::words::oscillation::not_of_rule;
+use onecycle::request::values::number;
 
 /// `KU` that differs by more than this share from that of the relay contradicts it.
 const ROUNDING: f64 = 0.05;

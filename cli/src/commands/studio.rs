@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 
-use crate::PROGRAM;
+use super::PROGRAM;
 use crate::args::Studio;
 use crate::failure::{Failure, exit};
 use crate::output::{print, tell, write_text};

@@ -39,7 +39,7 @@ pub fn listen(listener: Listener) {
     LISTENER.set(Some(listener));
 }
 
-/// Bytes between two messages; pieces are told one by one.
+/// Bytes between two messages.
 const STEP_BYTES: u64 = 1 << 21;
 
 /// Work that goes on.
@@ -48,32 +48,25 @@ pub struct Waiting {
     done: AtomicU64,
     told: AtomicU64,
     bytes: Option<u64>,
-    step: u64,
 }
 
 impl Waiting {
     /// For work of unknown length, named for example `identifying`.
     pub fn on(work: impl Into<Cow<'static, str>>) -> Self {
-        Self::told(work.into(), None, STEP_BYTES)
+        Self::told(work.into(), None)
     }
 
     /// For work on a known number of bytes.
     pub fn on_bytes(work: impl Into<Cow<'static, str>>, bytes: u64) -> Self {
-        Self::told(work.into(), Some(bytes), STEP_BYTES)
+        Self::told(work.into(), Some(bytes))
     }
 
-    /// For work on a known number of pieces.
-    pub fn on_pieces(work: impl Into<Cow<'static, str>>, pieces: u64) -> Self {
-        Self::told(work.into(), Some(pieces), 1)
-    }
-
-    fn told(work: Cow<'static, str>, bytes: Option<u64>, step: u64) -> Self {
+    fn told(work: Cow<'static, str>, bytes: Option<u64>) -> Self {
         let waiting = Self {
             work,
             done: AtomicU64::new(0),
             told: AtomicU64::new(0),
             bytes,
-            step,
         };
         waiting.tell(&waiting.work);
         waiting
@@ -92,10 +85,17 @@ impl Waiting {
         self.tell(&work.into());
     }
 
-    /// Counts bytes or pieces as done.
+    /// So many pieces of the work are done, of all.
+    pub fn is_at(&self, work: &str, done: usize, all: usize) {
+        if let Some(listener) = LISTENER.get() {
+            listener(work, done as u64, Some(all as u64));
+        }
+    }
+
+    /// Counts bytes as done.
     pub fn advance(&self, bytes: u64) {
         let done = self.done.fetch_add(bytes, Relaxed) + bytes;
-        if done - self.told.load(Relaxed) >= self.step {
+        if done - self.told.load(Relaxed) >= STEP_BYTES {
             self.tell(&self.work);
         }
     }

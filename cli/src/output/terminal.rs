@@ -49,15 +49,6 @@ impl Waiting {
         Self::shown_as(template, Some(bytes), work)
     }
 
-    /// For work on a known number of pieces.
-    pub fn on_pieces(work: impl Into<Cow<'static, str>>, pieces: u64) -> Self {
-        Self::shown_as(
-            "{wide_bar} {pos}/{len} {elapsed}  {msg}",
-            Some(pieces),
-            work,
-        )
-    }
-
     fn shown_as(template: &str, length: Option<u64>, work: impl Into<Cow<'static, str>>) -> Self {
         let bar = ProgressBar::with_draw_target(length, ProgressDrawTarget::hidden());
         if let Ok(style) = ProgressStyle::with_template(template) {
@@ -85,7 +76,12 @@ impl Waiting {
         self.bar.set_message(work);
     }
 
-    /// Counts bytes or pieces as done.
+    /// So many pieces of the work are done, of all.
+    pub fn is_at(&self, work: &str, done: usize, all: usize) {
+        self.bar.set_message(format!("{work}, {done} of {all}"));
+    }
+
+    /// Counts bytes as done.
     pub fn advance(&self, bytes: u64) {
         self.bar.inc(bytes);
     }

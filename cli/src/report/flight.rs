@@ -1,16 +1,12 @@
-//! The control loops of a flight, as text and as JSON.
+//! The control loops of a flight, as text.
 
 use std::fmt::Write;
 
-use serde::Serialize;
-
 use super::answer;
-use super::json::controllers::{NotKept, not_kept};
-use super::json::to_text;
 use super::number::short;
 use super::wrap::wrapped;
-use crate::results::answer::{Advice, Answer};
-use crate::results::flight::{FlightLoop, Judged, Part, Refusal, Survey};
+use crate::results::answer::Advice;
+use crate::results::flight::{FlightLoop, Judged, Refusal, Survey};
 use crate::style::{HEADING, headed, painted};
 use crate::words::answer as answers;
 use crate::words::controllers;
@@ -18,11 +14,8 @@ use crate::words::flight as words;
 use crate::words::sentence;
 use crate::words::verdict::advice;
 
-/// Version of the JSON; raised with every change that a reader could notice, added keys excepted.
-const SCHEMA: &str = "onecycle.flight/1";
-
 /// The card of a flight, with details all that its parts tell.
-pub(crate) fn text(of: &Survey, has_details: bool) -> String {
+pub fn text(of: &Survey, has_details: bool) -> String {
     let mut text = card(of, has_details);
     if !has_details {
         return text;
@@ -82,7 +75,7 @@ fn card(of: &Survey, has_details: bool) -> String {
 pub(super) fn next(of: &Survey) -> String {
     let is_told = of.loops.iter().any(|one| one.answer.is_some());
     match (&of.files, step(of)) {
-        (Some([path, restore]), _) => answers::written(path, restore),
+        (Some(files), _) => answers::written(files),
         _ if !is_told => words::NO_LOOP.to_owned(),
         (None, Some(step)) => answers::write(&of.file, "", step),
         (None, None) => answers::NOTHING.to_owned(),
@@ -198,108 +191,5 @@ fn parts(text: &mut String, one: &FlightLoop) {
     }
     for sentence in one.choice.iter().flat_map(controllers::not_kept) {
         wrapped(text, "  ", &sentence);
-    }
-}
-
-#[derive(Serialize)]
-struct Report<'a> {
-    schema: &'static str,
-    file: &'a str,
-    flight: usize,
-    loops: Vec<Loop<'a>>,
-    written: Option<[String; 2]>,
-}
-
-#[derive(Serialize)]
-struct Loop<'a> {
-    name: String,
-    answer: Option<&'a Answer>,
-    not_written: Option<&'a str>,
-    gain: Option<[f64; 3]>,
-    gain_unit: Option<String>,
-    delay_s: Option<f64>,
-    parts_disagree: bool,
-    in_force: Option<Gains>,
-    proposed: Option<Gains>,
-    limits_not_kept: Vec<NotKept>,
-    parts: Vec<PartReport>,
-}
-
-#[derive(Serialize)]
-struct Gains {
-    kp: f64,
-    ki: f64,
-    kd: f64,
-    phase_margin_deg: Option<f64>,
-    gain_margin: Option<f64>,
-    ms: Option<f64>,
-}
-
-#[derive(Serialize)]
-struct PartReport {
-    from_s: f64,
-    to_s: f64,
-    verdict: &'static str,
-    structure: Option<&'static str>,
-    gain: Option<[f64; 3]>,
-    delay_s: Option<f64>,
-}
-
-fn gains(judged: &Judged) -> Gains {
-    let figures = judged.figures.as_ref();
-    Gains {
-        kp: judged.pid.kp,
-        ki: judged.pid.ki,
-        kd: judged.pid.kd,
-        phase_margin_deg: figures.map(|of| of.margins.phase_margin_rad.to_degrees()),
-        gain_margin: figures.and_then(|of| of.margins.gain_margin),
-        ms: figures.map(|of| of.ms),
-    }
-}
-
-/// The report for programs.
-pub(crate) fn json(of: &Survey) -> String {
-    to_text(&Report {
-        schema: SCHEMA,
-        file: &of.file,
-        flight: of.number,
-        loops: of.loops.iter().map(loop_report).collect(),
-        written: (of.files.as_ref())
-            .map(|paths| paths.each_ref().map(|path| path.display().to_string())),
-    })
-}
-
-fn loop_report(one: &FlightLoop) -> Loop<'_> {
-    let told = one.told();
-    let first = told.first();
-    Loop {
-        name: one.control_loop.to_string(),
-        answer: one.answer.as_ref(),
-        not_written: (one.to_write.as_ref())
-            .and_then(|written| written.as_ref().err())
-            .map(String::as_str),
-        gain: one.gain(),
-        gain_unit: first.map(|_| words::gain_unit(one.units)),
-        delay_s: first.map(|found| found.delay_s),
-        parts_disagree: one.parts_disagree(),
-        in_force: one.in_force().as_ref().map(gains),
-        proposed: one.proposed().as_ref().map(gains),
-        limits_not_kept: one.choice.as_ref().map(not_kept).unwrap_or_default(),
-        parts: one.parts.iter().map(part).collect(),
-    }
-}
-
-fn part(part: &Part) -> PartReport {
-    let found = part.outcome.as_ref().ok();
-    PartReport {
-        from_s: part.span.from_s,
-        to_s: part.span.to_s,
-        verdict: match &part.outcome {
-            Ok(_) => "identified",
-            Err(refusal) => refusal.kind(),
-        },
-        structure: found.map(|found| found.structure.name()),
-        gain: found.map(|found| found.gain),
-        delay_s: found.map(|found| found.delay_s),
     }
 }

@@ -1,5 +1,7 @@
 //! Gains that somebody moves by hand, as JSON for a page that follows.
 
+use onecycle::json::controller as controller_json;
+use onecycle::json::controllers::{Figures, Least};
 use onecycle::{
     Assessment, Controller, Model, Specification, assess, least_margins, load_response,
     step_response,
@@ -8,8 +10,6 @@ use onecycle_design::bands::{StepBands, load_bands, step_bands};
 use onecycle_design::loop_response;
 use serde_json::{Value, json};
 
-use super::json::controller as controller_json;
-use super::json::controllers::{Figures, Least};
 use crate::words::limits::broken;
 use crate::words::sentence;
 

@@ -6,11 +6,12 @@ use onecycle_link::{Flight, FlightLog, LoggedLoop, LoggedSignal, ReadBack, Setti
 use serde::Serialize;
 
 use super::json::to_text;
-use super::log_gains::{self, ReadBackReport};
+use super::log_gains;
 use super::number::short;
 use super::wrap::wrapped;
 use crate::style::{HEADING, REMARK, headed, painted};
 use crate::words::log as words;
+use onecycle::json::log_gains::ReadBackReport;
 
 /// Version of the JSON; raised with every change that a reader could notice, added keys excepted.
 const SCHEMA: &str = "onecycle.log/1";

@@ -244,6 +244,7 @@ fn describe_oscillation(text: &mut String, found: &Oscillation, units: &Units) {
     }
 }
 
+#[cfg(feature = "program")]
 /// Table of the parameters with the intervals to expect from a planned test.
 pub(crate) fn expected(model: &Model, estimate: &Estimate) -> String {
     let mut text = String::new();

@@ -1,8 +1,8 @@
 //! The studio: what its page asks of the library is what the program says, and the program writes the page.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use onecycle_cli::embed::Studio;
+use onecycle_cli::studio::Studio;
 use serde_json::{Value, json};
 
 use crate::common::{Scratch, run};
@@ -26,13 +26,14 @@ fn refused(studio: &mut Studio, message: &Value, words: &[&str]) {
 }
 
 /// A studio that has identified, and its report.
-fn identified(file: &str, options: &[&str]) -> (Studio, Value) {
+fn identified(file: &str, settings: &Value) -> (Studio, Value) {
     let mut studio = Studio::default();
-    let opened = ask(&mut studio, &json!({ "do": "open", "file": file }));
+    studio.take(Box::new(PathBuf::from(file)));
+    let opened = ask(&mut studio, &json!({ "do": "open" }));
     assert!(opened.get("error").is_none(), "{opened}");
     let report = ask(
         &mut studio,
-        &json!({ "do": "identify", "options": options }),
+        &json!({ "do": "identify", "settings": settings }),
     );
     (studio, report)
 }
@@ -47,13 +48,19 @@ fn proposed(report: &Value, factor: f64) -> Value {
 // The same code on the same machine; in a browser only the elementary functions differ.
 #[test]
 fn its_report_is_that_of_the_program_to_the_bit() {
-    for (name, options) in [
-        ("examples/simulated_hover.csv", &[][..]),
-        ("examples/logs/ap_sysid_roll.bin", &["--axis", "roll"]),
-        ("link/tests/data/px4_zstd.mcap", &["--axis", "roll"]),
+    let roll = (json!({ "axis": "roll" }), &["--axis", "roll"][..]);
+    let flat = (
+        json!({ "cycles": 4, "ms": 1.5 }),
+        &["--cycles", "4", "--ms", "1.5"][..],
+    );
+    for (name, (settings, options)) in [
+        ("examples/simulated_hover.csv", (json!({}), &[][..])),
+        ("examples/simulated_hover.csv", flat),
+        ("examples/logs/ap_sysid_roll.bin", roll.clone()),
+        ("link/tests/data/px4_zstd.mcap", roll),
     ] {
         let file = of_repository(name);
-        let (_, report) = identified(&file, options);
+        let (_, report) = identified(&file, &settings);
         let program = run(&[&["identify", &file, "--json"], options].concat());
         let theirs: Value = serde_json::from_str(&program.stdout).unwrap();
         assert_eq!(report, theirs, "{name}");
@@ -64,7 +71,7 @@ fn its_report_is_that_of_the_program_to_the_bit() {
 fn proposed_gains_are_judged_as_in_the_report() {
     let (mut studio, report) = identified(
         &of_repository("examples/logs/px4_chirps.ulg"),
-        &["--axis", "roll"],
+        &json!({ "axis": "roll" }),
     );
     let rows = ask(&mut studio, &json!({ "do": "trade_off" }));
     let rows = rows.as_array().unwrap();
@@ -113,7 +120,7 @@ fn proposed_gains_are_judged_as_in_the_report() {
 fn saved_steps_are_those_of_the_program() {
     let folder = Scratch::new();
     let file = of_repository("examples/logs/ap_sysid_roll.bin");
-    let (mut studio, report) = identified(&file, &["--axis", "roll"]);
+    let (mut studio, report) = identified(&file, &json!({ "axis": "roll" }));
     let gains = proposed(&report, 1.0);
     let half = json!({ "do": "parameters", "gains": gains });
     let whole = json!({ "do": "parameters", "gains": gains, "whole": true });
@@ -133,7 +140,7 @@ fn saved_steps_are_those_of_the_program() {
 #[test]
 fn gains_that_break_limits_are_saved_after_a_question() {
     let file = of_repository("examples/logs/ap_sysid_roll.bin");
-    let (mut studio, report) = identified(&file, &["--axis", "roll"]);
+    let (mut studio, report) = identified(&file, &json!({ "axis": "roll" }));
     let mut message = json!({ "do": "parameters", "gains": proposed(&report, 1.6), "whole": true });
     let asked = ask(&mut studio, &message);
     assert!(asked.get("apply").is_none(), "{asked}");
@@ -157,9 +164,9 @@ fn gains_that_break_limits_are_saved_after_a_question() {
 #[test]
 fn a_failed_identification_leaves_nothing_to_save() {
     let file = of_repository("examples/logs/px4_chirps.ulg");
-    let (mut studio, report) = identified(&file, &["--axis", "roll"]);
-    let options = json!({ "do": "identify", "options": ["--axis", "roll", "--style", "magic"] });
-    refused(&mut studio, &options, &["magic"]);
+    let (mut studio, report) = identified(&file, &json!({ "axis": "roll" }));
+    let options = json!({ "do": "identify", "settings": { "axis": "roll", "style": "magic" } });
+    refused(&mut studio, &options, &["--style", "no such style"]);
     let gains = json!({ "do": "parameters", "gains": proposed(&report, 1.0) });
     refused(&mut studio, &gains, &["Nothing is identified"]);
 }
@@ -167,7 +174,7 @@ fn a_failed_identification_leaves_nothing_to_save() {
 #[test]
 fn gains_that_would_not_hold_the_vehicle_are_not_saved() {
     let file = of_repository("examples/logs/px4_chirps.ulg");
-    let (mut studio, _) = identified(&file, &["--axis", "roll"]);
+    let (mut studio, _) = identified(&file, &json!({ "axis": "roll" }));
     let mut with = |[kp, ki, kd]: [f64; 3], words: &[&str]| {
         let gains = json!({ "kp": kp, "ki": ki, "kd": kd, "filter_s": 0.0 });
         let judged = ask(&mut studio, &json!({ "do": "judge", "gains": gains }));
@@ -193,8 +200,8 @@ fn a_message_that_makes_no_sense_gets_a_sentence() {
         &["Nothing is identified"],
     );
     refused(&mut studio, &json!({ "do": "view" }), &["No signals"]);
-    let nowhere = json!({ "do": "identify", "options": ["--structure", "magic"] });
-    refused(&mut studio, &nowhere, &["magic"]);
+    let nowhere = json!({ "do": "identify", "settings": { "structure": "magic" } });
+    refused(&mut studio, &nowhere, &["--structure", "no such structure"]);
     let simulated = json!({ "do": "simulate", "options": ["--k", "1"] });
     refused(&mut studio, &simulated, &["--t-prop"]);
 }

@@ -22,6 +22,7 @@ pub struct Design {
 
 /// A design over draws, beside the one for the most probable model alone: the price of not knowing the process.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 #[non_exhaustive]
 pub struct Robustness {
     /// Share of the draws on which the limits hold.

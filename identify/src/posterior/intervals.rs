@@ -4,6 +4,7 @@ use onecycle_design::{Parameter, Structure};
 
 /// Estimate with its 90 % interval. `None` stands for infinite or unbounded.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Interval {
     /// Most probable value. `None` if it is infinite.
     pub estimate: Option<f64>,

@@ -4,14 +4,15 @@
     print(found)
     found.model.frequency_response([1.0, 10.0])
 
-Options are those of the program `onecycle identify`, with underscores: `structure="foptd"`, `sample_rate=100`.
+Keywords are the settings of a request, the options of `onecycle identify` with underscores: `structure="foptd"`,
+`sample_rate=100`. Sentences name them in backticks.
 """
 
 from __future__ import annotations
 
-import json
 import os
 from functools import cached_property
+from math import isfinite
 
 import numpy as np
 
@@ -24,16 +25,22 @@ __all__ = [
 ]
 
 
-def _options(given):
-    """Options of the command line: `sample_rate=100` is `--sample-rate=100`."""
-    words = []
-    for name, value in given.items():
-        option = "--" + name.rstrip("_").replace("_", "-")
-        if value is True:
-            words.append(option)
-        elif value is not None and value is not False:
-            words.append(f"{option}={value!r}" if isinstance(value, float) else f"{option}={value}")
-    return words
+def _settings(given):
+    """Settings of a request: `sample_rate=100`; an underscore at the end is left out, as of `from_=10.5`."""
+    plain = (bool, int, float, str, list, tuple)
+    return {
+        name.rstrip("_"): value if isinstance(value, plain) else str(value)
+        for name, value in given.items() if value is not None
+    }
+
+
+def _finite(value):
+    """As JSON has it: lists, and None for infinite numbers."""
+    if isinstance(value, dict):
+        return {key: _finite(inner) for key, inner in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_finite(inner) for inner in value]
+    return None if isinstance(value, float) and not isfinite(value) else value
 
 
 def _samples(values):
@@ -80,7 +87,7 @@ def read(path, **options) -> Recording:
     """Reads a table, or a loop of a flight log: `read("flight.ulg", axis="roll", loop="rate")`. Of a flight log it is the part
     that tells most about the loop, or the one that `from_` and `to` choose."""
     recording = Recording.__new__(Recording)
-    recording._inner = _onecycle.read(os.fspath(path), _options(options))
+    recording._inner = _onecycle.read(os.fspath(path), _settings(options))
     recording.name = os.fspath(path)
     return recording
 
@@ -156,22 +163,22 @@ class Model:
 class Flight:
     """What a flight log says about each of its loops. `print(flight)` shows the table of the program."""
 
-    def __init__(self, text, report):
-        self._text, self._json = text, report
+    def __init__(self, inner):
+        self._inner = inner
 
     def to_dict(self) -> dict:
         """The JSON report `onecycle.flight/1` of the program: docs/identify-json.md."""
-        return json.loads(self._json)
+        return _finite(self._inner.dict())
 
     def to_json(self) -> str:
         """The text that `onecycle identify LOG --json` prints."""
-        return self._json
+        return self._inner.json()
 
     def __str__(self):
-        return self._text
+        return self._inner.text()
 
     def _repr_html_(self):
-        return _preformatted(self._text)
+        return _preformatted(str(self))
 
 
 def _preformatted(text):
@@ -187,12 +194,8 @@ class Identification:
         self._inner = inner
 
     @cached_property
-    def _json(self):
-        return self._inner.json()
-
-    @cached_property
     def _dict(self):
-        return json.loads(self._json)
+        return _finite(self._inner.dict())
 
     @property
     def model(self) -> Model | None:
@@ -228,12 +231,12 @@ class Identification:
     @property
     def remarks(self) -> list:
         """Reasons to suspect the result, in sentences; their fixed names are `to_dict()["remark_kinds"]`."""
-        return self._inner.remarks()
+        return self._dict["remarks"]
 
     @property
     def details(self) -> list:
         """All other remarks, in sentences: how the result was found, what no such test shows, what the controller asks for."""
-        return self._inner.details()
+        return self._dict["details"]
 
     @property
     def took_s(self) -> float:
@@ -241,12 +244,12 @@ class Identification:
         return self._inner.took_s
 
     def to_dict(self) -> dict:
-        """The JSON report of the program: docs/identify-json.md."""
-        return json.loads(self._json)
+        """The JSON report of the program: docs/identify-json.md; its sentences name settings as keywords."""
+        return _finite(self._inner.dict())
 
     def to_json(self) -> str:
         """The text that `onecycle identify --json` prints."""
-        return self._json
+        return self._inner.json()
 
     def report(self, path):
         """Writes the HTML page of `onecycle identify --report`."""
@@ -263,30 +266,21 @@ class Identification:
 def identify(recording, **options) -> Identification:
     """Identifies from a `Recording` or from a file. Of a flight log, choose a loop: `axis="roll"`, `loop="rate"`; its gains
     in force are judged too."""
-    words = _options(options)
+    asked = _settings(options)
     if isinstance(recording, Recording):
-        return Identification(_onecycle.identify_recording(recording.name, recording._inner, words))
-    return Identification(_onecycle.identify_file(os.fspath(recording), words))
+        return Identification(_onecycle.identify_recording(recording.name, recording._inner, asked))
+    return Identification(_onecycle.identify_file(os.fspath(recording), asked))
 
 
 def identify_flight(path, **options) -> Flight:
     """Identifies every loop of a flight log from the parts of the flight worth using."""
-    return Flight(*_onecycle.identify_flight(os.fspath(path), _options(options)))
+    return Flight(_onecycle.identify_flight(os.fspath(path), _settings(options)))
 
 
 def design(model: Model, **options) -> dict:
     """The JSON report of `onecycle tune` for a process: `design(model, controller="pi", style="calm")`."""
-    structure = ",".join([model.structure] + [
-        f"{_SYMBOLS[key]}={value!r}" for key, value in model.parameters.items() if value is not None
-        and not (key == "k_over_t_body" and model.parameters.get("k") is not None)
-    ])
-    return json.loads(_onecycle.design([f"--process={structure}"] + _options(options)))
+    return _finite(_onecycle.design(model._inner, _settings(options)))
 
-
-_SYMBOLS = {
-    "k": "k", "k_over_t_body": "k_over_t_body", "t_prop_s": "t_prop", "t_prop2_s": "t_prop2", "t_body_s": "t_body",
-    "natural_frequency_rad_per_s": "natural_frequency", "zeta": "zeta", "tau_s": "tau",
-}
 
 _MARGINS = (
     "phase_margin_rad", "gain_crossover_rad_per_s", "gain_margin", "phase_crossover_rad_per_s", "delay_margin_s",
@@ -319,7 +313,8 @@ def campaign(recipe, client=None, out=None, shard=64, progress=None, **options):
     """
     from ._cluster import run
 
-    return run(recipe, client, out, shard, progress, tuple(_options(options)))
+    words = [f"--{name.replace('_', '-')}={value}" for name, value in _settings(options).items()]
+    return run(recipe, client, out, shard, progress, tuple(words))
 
 
 def dataset(recipe, examples, into, client=None, progress=None, restart=False):

@@ -12,6 +12,11 @@ from pathlib import Path
 
 from . import _onecycle
 
+try:
+    import onecycle_lab as _lab
+except ImportError as error:
+    raise _onecycle.OnecycleError("campaigns need the package onecycle-lab: pip install ./research/py") from error
+
 #: Tasks sent ahead for each thread of the cluster: enough to keep it busy.
 AHEAD = 4
 #: Attempts beyond the first for a task that fails on its worker, as for want of memory. Lost workers are Dask's own affair.
@@ -24,7 +29,7 @@ def _campaign(text, options):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "campaign.toml")
         path.write_text(text, encoding="utf-8")
-        return _onecycle.Campaign(str(path), list(options))
+        return _lab.Campaign(str(path), list(options))
 
 
 def shard_cases(text, options, first, end):
@@ -152,7 +157,7 @@ def run(recipe, client=None, out=None, shard=64, progress=None, options=()):
     if shard < 1:
         raise _onecycle.OnecycleError(f"a shard of {shard} cases is empty: use 1 or more")
     # Names the file in its errors.
-    count = len(_onecycle.Campaign(os.fspath(recipe), list(options)))
+    count = len(_lab.Campaign(os.fspath(recipe), list(options)))
     text = Path(recipe).read_text(encoding="utf-8")
     settings = {"version": _onecycle.__version__, "shard": shard, "options": list(options), "recipe": text}
     folder = None if out is None else _folder(out, settings)
@@ -182,12 +187,12 @@ def run(recipe, client=None, out=None, shard=64, progress=None, options=()):
 
 def dataset_file(manifest, number):
     """Bytes and number of examples of a file of a dataset. Runs on a worker."""
-    return _onecycle.dataset_file(manifest, number)
+    return _lab.dataset_file(manifest, number)
 
 
 def fill(recipe, examples, into, client=None, progress=None, restart=False):
     words = [f"--examples={examples}", f"--into={os.fspath(into)}"] + ["--restart"] * bool(restart)
-    folder = _onecycle.Dataset(None if recipe is None else os.fspath(recipe), words)
+    folder = _lab.Dataset(None if recipe is None else os.fspath(recipe), words)
     manifest = folder.manifest()
     missing = folder.missing()
     kept = 0

@@ -7,7 +7,8 @@ use std::process::ExitCode;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use onecycle::{Controller, Execution};
+use onecycle::log_gains::{judged_gains, needs_consent, pid, restore_path};
+use onecycle::{Controller, Execution, Report};
 use onecycle_link::{
     AltitudeCascade, CsvWriter, FirmwareKind, LoopGains, ParameterLine, parameter_text,
 };
@@ -15,10 +16,10 @@ use onecycle_live::{AltitudeFlight, AltitudeRefusal, AltitudeTest, Vehicle};
 
 use super::{connect, failed, refused};
 use crate::args::{LiveRelay, WriteArguments, identify_of};
-use crate::commands::identify::{self, Found};
-use crate::commands::log_gains::{judged_gains, needs_consent, pid, restore_path};
+use crate::commands::identify;
 use crate::failure::{Failure, exit};
 use crate::output::{Waiting, print, write_file, write_text};
+use crate::reading::Input;
 use crate::report::live as report;
 use crate::results::live::{AltitudeGains, ProposedChange};
 use crate::words::limits::broken;
@@ -28,7 +29,7 @@ use crate::words::log_gains as gain_words;
 pub(crate) fn run(arguments: &LiveRelay) -> Result<ExitCode, Failure> {
     // Everything that can be wrong with the arguments is found before the vehicle moves.
     let further = identify_of(&arguments.out, &options(arguments))?;
-    identify::checked(&further)?;
+    let request = identify::checked(&further)?;
     check_files(arguments)?;
     let mut vehicle = connect(&arguments.connection)?;
     let old = old_gains(&mut vehicle, arguments)?;
@@ -40,7 +41,7 @@ pub(crate) fn run(arguments: &LiveRelay) -> Result<ExitCode, Failure> {
     }
     let system = vehicle.system();
     drop(vehicle);
-    let mut found = identify::find(&further, None)?;
+    let mut found = identify::found(&request, &Input::new(&further.file)?)?;
     identify::show(&further, &mut found)?;
     let mut code = match found.identification.outcome {
         Ok(_) => exit::DONE,
@@ -138,7 +139,7 @@ fn record(flight: &AltitudeFlight, file: &mut dyn io::Write) -> io::Result<()> {
 
 /// The gains for the asked share of the way to the proposed ones, or the reason why no gains are proposed.
 fn proposed(
-    found: &Found,
+    found: &Report,
     flight: &AltitudeFlight,
     old: [f64; 4],
     asked: &WriteArguments,

@@ -98,6 +98,7 @@ impl Loop {
     }
 
     /// With the loop of the process that was simulated.
+    #[cfg(feature = "program")]
     pub(crate) fn beside(self, truth: &Model) -> Self {
         Self {
             truth: curve(truth, &self.controller, &self.omegas_rad_per_s),

@@ -47,10 +47,10 @@ impl Recordings {
                 let read = |index: usize| {
                     let path = recording(folder, numbers[index]);
                     onecycle_link::read(&path, &CsvOptions::default()).map_err(|reason| {
-                        Failure::Recording {
-                            path,
+                        Failure::from(onecycle::Error::Recording {
+                            name: path.display().to_string(),
                             reason: Box::new(reason),
-                        }
+                        })
                     })
                 };
                 workers.quietly(numbers.len(), read).into_iter().collect()

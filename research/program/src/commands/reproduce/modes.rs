@@ -79,7 +79,8 @@ fn roll(settings: &ModeSettings, workers: &Workers) -> Result<Vec<Row>, Failure>
             let roll = flown.tuned.iter().find(|tuned| tuned.axis == Axis::Roll);
             Ok::<Option<Tuned>, Failure>(roll.copied())
         };
-        Ok((tuned(Mission::Roll)?, tuned(Mission::RollUncompensated)?))
+        let both = (tuned(Mission::Roll)?, tuned(Mission::RollUncompensated)?);
+        Ok::<_, Failure>(both)
     });
     let mut costs = Vec::new();
     let mut truths = Vec::new();

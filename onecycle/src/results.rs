@@ -1,0 +1,7 @@
+//! What is found, as plain data.
+
+pub mod answer;
+pub mod controllers;
+pub mod family;
+pub mod flight;
+pub mod log_gains;

@@ -1,0 +1,192 @@
+//! From a request to its report.
+
+use onecycle_design::Specification;
+use onecycle_identify::Verdict;
+use onecycle_link::{Recording, Span};
+use onecycle_onboard::pack::{Pack, SELF_TEST_TOLERANCE};
+
+use crate::answer;
+use crate::builder::Identify;
+use crate::error::Error;
+use crate::log_gains::{self, LogLoop};
+use crate::report::Report;
+use crate::request::{PackFile, Request};
+use crate::results::controllers::Controllers;
+use crate::results::flight::Survey;
+use crate::source::{self, LogFile, Source};
+use crate::survey::{self, Manner};
+use crate::words::units::Units;
+
+impl Request {
+    /// Identifies from a table or from a loop of a flight log, without a choice of the part from the one that tells most. Files with
+    /// parameters are made, not written.
+    ///
+    /// # Errors
+    /// One sentence: the settings contradict each other, or the source makes no recording.
+    pub fn identify(&self, source: &dyn Source) -> Result<Report, Error> {
+        let asked = self.specification()?;
+        let (recording, of_log) = self.recording(source, asked)?;
+        self.report(source.name(), recording, of_log, asked)
+    }
+
+    /// Identifies from a recording in memory; `name` stands in the report.
+    ///
+    /// # Errors
+    /// One sentence: the settings contradict each other.
+    pub fn identify_recording(&self, name: &str, recording: Recording) -> Result<Report, Error> {
+        self.report(name.to_owned(), recording, None, self.specification()?)
+    }
+
+    /// Identifies every loop of a flight log, each from the parts of the flight worth using.
+    ///
+    /// # Errors
+    /// One sentence: the settings contradict each other, or the source is no flight log.
+    pub fn survey(&self, source: &dyn Source) -> Result<Survey, Error> {
+        self.survey_for(source, false, &|_, _| ())
+    }
+
+    /// Like [`survey`](Self::survey). `has_pages`: with all that a page shows of the gains. `progress` is told the number of loops
+    /// that are done, of how many.
+    ///
+    /// # Errors
+    /// As [`survey`](Self::survey).
+    pub fn survey_for(
+        &self,
+        source: &dyn Source,
+        has_pages: bool,
+        progress: &(dyn Fn(usize, usize) + Sync),
+    ) -> Result<Survey, Error> {
+        let asked = self.specification()?;
+        self.check_log(&source.name())?;
+        let manner = Manner {
+            has_pages,
+            progress,
+        };
+        survey::survey(source, self, &asked, &manner)
+    }
+
+    /// Reads a recording as [`identify`](Self::identify) does.
+    ///
+    /// # Errors
+    /// As [`identify`](Self::identify).
+    pub fn read(&self, source: &dyn Source) -> Result<Recording, Error> {
+        Ok(self.recording(source, self.specification()?)?.0)
+    }
+
+    /// The recording, and the loop of the flight log that it is.
+    fn recording(
+        &self,
+        source: &dyn Source,
+        asked: Specification,
+    ) -> Result<(Recording, Option<LogLoop>), Error> {
+        let name = source.name();
+        if !source::is_flight_log(source) {
+            self.check_table(source)?;
+            return Ok((source::table(source, &self.columns)?, None));
+        }
+        self.check_log(&name)?;
+        let file = LogFile::scan(source)?;
+        let (signals, of_log) = LogLoop::of(&file, self)?;
+        let part = match self.from_s.is_some() || self.to_s.is_some() {
+            // As the table of all loops cuts its parts: what is not asked for does not matter.
+            true => Some(Span::new(
+                self.from_s.unwrap_or(f64::NEG_INFINITY),
+                self.to_s.unwrap_or(f64::INFINITY),
+            )),
+            false => of_log.as_ref().and_then(|of_log| {
+                let asked = of_log.specification(asked, self.requirements.controller.is_some());
+                survey::best_part(&signals, of_log.flight(), &asked)
+            }),
+        };
+        let signals = part.map_or_else(|| signals.clone(), |part| signals.part(part));
+        Ok((file.recording(&signals)?, of_log))
+    }
+
+    fn report(
+        &self,
+        name: String,
+        recording: Recording,
+        of_log: Option<LogLoop>,
+        asked: Specification,
+    ) -> Result<Report, Error> {
+        self.check_span(recording.time_s())?;
+        let asked = of_log.as_ref().map_or(asked, |of_log| {
+            of_log.specification(asked, self.requirements.controller.is_some())
+        });
+        let structure =
+            (of_log.as_ref()).and_then(|of_log| log_gains::structure(of_log.control_loop()));
+        let mut identify = self.settings(asked).structure(self.structure.or(structure));
+        if let Some(file) = &self.pack {
+            identify = identify.pack(usable(file)?);
+        }
+        let mut identification = identify.run(&recording);
+        let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
+        let against = self.requirements.against.or_else(in_force);
+        let identified = identification.outcome.as_ref().ok();
+        let choice = identified
+            .map(|identified| Controllers::of_identified(identified, against))
+            .map(|choice| choice.in_plant(self.requirements.plant()));
+        let choice = match (&of_log, self.requirements.against, choice) {
+            (Some(of_log), None, Some(choice)) if of_log.contradicts(&choice) => {
+                identification.refuse(Verdict::UnstableInForce);
+                None
+            }
+            (_, _, choice) => choice,
+        };
+        let gains = (of_log.as_ref())
+            .map(|of_log| of_log.report(&self.write, &recording, &identification, choice.as_ref()))
+            .transpose()?;
+        let answer = answer::of(
+            &identification,
+            &answer::Subject {
+                file: &name,
+                units: &Units::of(&recording),
+                choice: choice.as_ref(),
+                of_log: of_log.as_ref(),
+                gains: gains.as_ref(),
+                share: self.write.step,
+            },
+        );
+        Ok(Report {
+            name,
+            recording,
+            identification,
+            choice,
+            of_log,
+            gains,
+            answer,
+        })
+    }
+
+    fn settings<'a>(&self, asked: Specification) -> Identify<'a> {
+        Identify::new()
+            .cycles(self.cycles)
+            .specification(asked)
+            .method(self.method)
+            .road(self.estimator)
+            .output_filter_hz(self.output_filter_hz)
+            .span_s(self.from_s, self.to_s)
+            .hold(self.hold)
+            .beta(self.beta)
+            .input_late_s(self.input_late_s)
+            .input_before(self.input_before)
+    }
+}
+
+/// A pack to identify with: its network gives the outputs that the pack stores.
+fn usable(file: &PackFile) -> Result<Pack<'_>, Error> {
+    let unusable = |reason: String| Error::Unreadable {
+        name: file.name.clone(),
+        reason,
+    };
+    let pack = Pack::read(&file.bytes).map_err(|error| unusable(error.to_string()))?;
+    // A difference that is not a number fails.
+    if (pack.self_test()).is_none_or(|worst| worst <= SELF_TEST_TOLERANCE) {
+        return Ok(pack);
+    }
+    Err(unusable(
+        "the pack fails its self-test, so it was changed after it was made (see onecycle-lab pack verify): take the original, or \
+         train a new one"
+            .to_owned(),
+    ))
+}

@@ -1,0 +1,214 @@
+//! Sentences of the answer.
+
+use crate::{Comparison, Effect, Felt, Identified, Parameter};
+use onecycle_design::Limit;
+
+use crate::results::answer::Advice;
+use crate::results::controllers::{Against, Controllers};
+use crate::results::log_gains::NamedFiles;
+use crate::words::number::{seconds, short};
+
+use super::log_gains::CONTRADICTED;
+use super::verdict::advice;
+use super::{controllers, sentence};
+
+/// The verdict.
+pub fn verdict(of: Advice) -> &'static str {
+    match of {
+        Advice::Change => "CHANGE",
+        Advice::Keep => "KEEP YOURS",
+        Advice::FirstGains => "FIRST GAINS",
+        Advice::NotYet => "NOT YET",
+    }
+}
+
+/// The verdict with its reason.
+pub fn headline(of: Advice, reason: &str) -> String {
+    format!("{}: {}.", verdict(of), reason.trim_end_matches('.'))
+}
+
+/// Why gains are changed or kept.
+pub fn compared(choice: &Controllers, of: &Comparison) -> String {
+    let now = choice.against.as_ref();
+    let figures = now.and_then(|now| now.figures);
+    match (of.pays(), of.gain(), of.loss()) {
+        (true, gain, loss) if of.is_now_fragile => {
+            let gain = gain.filter(|_| figures.is_some());
+            joined(fragile(now), [gain, loss])
+        }
+        (true, Some(gain), loss) => match loss {
+            Some(loss) => format!("{}, at the price of {}", effect(gain), effect(loss)),
+            None => effect(gain),
+        },
+        (_, Some(gain), Some(loss)) => format!(
+            "the proposal would give {}, but {}",
+            effect(gain),
+            effect(loss)
+        ),
+        (_, _, Some(loss)) => format!("the proposal would only give {}", effect(loss)),
+        _ => "you would feel no difference with the proposed ones".to_owned(),
+    }
+}
+
+/// Why gains in force are not to be kept.
+fn fragile(now: Option<&Against>) -> String {
+    let Some(figures) = now.and_then(|now| now.figures) else {
+        return "yours make the loop unstable".to_owned();
+    };
+    let stable = now.and_then(|now| now.least).map(|least| least.stable);
+    match stable.filter(|share| *share < 1.0) {
+        Some(share) => format!(
+            "yours are stable on {:.0} % of the likely processes only",
+            100.0 * share
+        ),
+        None => format!("yours have little margin, Ms {:.2}", figures.ms),
+    }
+}
+
+fn joined(first: String, effects: [Option<&Effect>; 2]) -> String {
+    let effects = effects.into_iter().flatten().map(effect);
+    (std::iter::once(first).chain(effects))
+        .collect::<Vec<_>>()
+        .join("; ")
+}
+
+/// What one would feel.
+fn effect(of: &Effect) -> String {
+    let times = match 1.0 / of.better[1] {
+        none if none < 0.002 => "none of".to_owned(),
+        all if all > 500.0 => "no end of".to_owned(),
+        times => format!("{times:.2} times"),
+    };
+    match of.figure {
+        Felt::LoadError if of.better[1] > 500.0 => "no steady error under a load".to_owned(),
+        Felt::LoadError if of.better[1] < 0.002 => "a steady error under a load".to_owned(),
+        Felt::LoadError => format!("{times} the load error"),
+        Felt::SetPointError => format!("{times} the set-point error"),
+        Felt::Overshoot => format!("{times} the peak of a step"),
+        Felt::Noise => format!("{times} the noise at the actuator"),
+        _ => format!("{times} Ms"),
+    }
+}
+
+/// The first limit that the proposal does not keep, and what helps.
+pub fn not_kept(choice: &Controllers) -> Option<String> {
+    let missed = choice.missed.first()?;
+    match (missed.limit, choice.reference_filter_s) {
+        (Limit::Overshoot, Some(time_s)) => Some(format!(
+            "A step of the set-point overshoots by {:.0} %. A first-order filter of the set-point, {}, keeps {:.0} %.",
+            100.0 * missed.reached,
+            seconds(controllers::up(time_s)),
+            100.0 * missed.asked
+        )),
+        _ => controllers::not_kept(choice).into_iter().next(),
+    }
+}
+
+/// Why first gains may be used.
+pub fn first(choice: &Controllers) -> String {
+    let robustness = choice.design().and_then(|(design, _)| design.robustness);
+    robustness.map_or("no gains in force are known".to_owned(), |robustness| {
+        format!(
+            "the limits hold on {:.0} % of the likely processes",
+            100.0 * robustness.coverage
+        )
+    })
+}
+
+/// How well the process is known. `explained`: share of the logged output that the loop with the model explains.
+pub fn sure(identified: &Identified, explained: Option<f64>) -> String {
+    let width = |low: f64, estimate: f64, high: f64| (high - low) / (2.0 * estimate.abs());
+    let rate = identified
+        .effectiveness()
+        .map(|[low, estimate, high]| width(low, estimate, high));
+    let steady = identified.estimate.get(Parameter::K).and_then(|gain| {
+        let [low, estimate, high] = [gain.low?, gain.estimate?, gain.high?];
+        Some(width(low, estimate, high))
+    });
+    let best = rate
+        .into_iter()
+        .chain(steady)
+        .filter(|width| width.is_finite());
+    let gain = best
+        .min_by(f64::total_cmp)
+        .map_or("the gain has no upper end".to_owned(), |width| {
+            format!("gain known to {} %", (100.0 * width).ceil().max(1.0))
+        });
+    let prediction = (identified.fit.innovations()).and_then(|of| of.prediction.as_ref());
+    let misfit = short(100.0 * identified.fit.misfit);
+    let model = match (explained, prediction) {
+        (Some(share), _) => format!("the model explains {:.0} % of the flight", 100.0 * share),
+        (_, Some(of)) if of.explained < 0.0 => {
+            "it does not predict the last third of the recording".to_owned()
+        }
+        (_, Some(of)) => format!(
+            "it predicts {:.0} % of the last third",
+            100.0 * of.explained
+        ),
+        _ if identified.fit.misfit < 5e-4 => "no misfit beyond the noise".to_owned(),
+        _ => format!("{misfit} % of the output is left unexplained"),
+    };
+    sentence(&format!("{gain}; {model}"))
+}
+
+/// Why there is nothing to type in, and what to do.
+pub fn refused(of: &crate::Verdict) -> (String, String) {
+    (of.to_string(), advice(of).into_owned())
+}
+
+/// Why nothing is proposed where the signals contradict the gains of the log, and what to do.
+pub fn contradicted() -> (String, String) {
+    let (reason, next) = CONTRADICTED.split_once(". ").unwrap_or((CONTRADICTED, ""));
+    (reason.to_owned(), next.to_owned())
+}
+
+pub const NO_DESIGN: &str = "a process was found, and no controller keeps the limits on it";
+pub const COMPARE: &str =
+    "Type these gains in and watch a step of the set-point. Gains in force: `against=KP,KI,KD`.";
+pub const NOTHING: &str = "Leave the gains as they are.";
+
+/// Where all else stands. `remarks`: how many are not on the card.
+pub fn more(of: Advice, remarks: usize) -> String {
+    match (of, remarks) {
+        (Advice::NotYet, _) => "All that is known: `details`".to_owned(),
+        (_, 0) => "All figures, other controllers: `details`".to_owned(),
+        (_, 1) => "All figures, other controllers, and one more remark: `details`".to_owned(),
+        (_, count) => {
+            format!("All figures, other controllers, and {count} more remarks: `details`")
+        }
+    }
+}
+
+/// Where the parameters went.
+pub fn written(files: &NamedFiles) -> String {
+    format!(
+        "{} is written; {} restores the old values. Fly and log again before the next step.",
+        files.path.display(),
+        files.restore.display()
+    )
+}
+
+/// How to write parameters.
+pub fn write(file: &str, options: &str, share: f64) -> String {
+    format!(
+        "`identify {file}`{options} `write=tune.txt` writes {} of the step, and a file that restores yours.",
+        part(share)
+    )
+}
+
+/// What to type in.
+pub fn type_in(share: f64) -> String {
+    format!(
+        "Type in {} of the step, record again, and go on from there.",
+        part(share)
+    )
+}
+
+/// A share of the way to the proposed gains.
+pub fn part(share: f64) -> String {
+    match share {
+        0.5 => "half".to_owned(),
+        1.0 => "all".to_owned(),
+        share => format!("{:.0} %", 100.0 * share),
+    }
+}

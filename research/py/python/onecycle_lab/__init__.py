@@ -1,0 +1,5 @@
+"""Campaigns and training sets of the research; `onecycle.campaign` and `onecycle.dataset` share them out."""
+
+from ._lab import Campaign, Dataset, dataset_file
+
+__all__ = ["Campaign", "Dataset", "dataset_file"]

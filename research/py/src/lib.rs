@@ -1,0 +1,106 @@
+//! The extension module of the Python package `onecycle_lab`: campaigns and training sets.
+
+#![expect(
+    clippy::needless_pass_by_value,
+    reason = "arguments from Python and errors are handed over by value"
+)]
+
+#[path = "../../../py/src/waited.rs"]
+mod waited;
+
+use std::sync::Arc;
+
+use onecycle_lab_cli::embed as lab;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyType};
+
+use crate::waited::waited;
+
+/// The error of the package `onecycle`.
+fn refused(sentence: String) -> PyErr {
+    Python::attach(|py| {
+        let error = py
+            .import("onecycle")
+            .and_then(|of| of.getattr("OnecycleError"));
+        match error.and_then(|of| Ok(of.cast_into::<PyType>()?)) {
+            Ok(of) => PyErr::from_type(of, sentence),
+            Err(error) => error,
+        }
+    })
+}
+
+/// A campaign, whose cases can be computed anywhere.
+#[pyclass(frozen, module = "onecycle_lab")]
+struct Campaign(Arc<lab::Campaign>);
+
+#[pymethods]
+impl Campaign {
+    #[new]
+    fn new(file: &str, options: Vec<String>) -> PyResult<Self> {
+        let campaign = lab::Campaign::read(file, &options).map_err(refused)?;
+        Ok(Self(Arc::new(campaign)))
+    }
+
+    fn __len__(&self) -> usize {
+        self.0.count() as usize
+    }
+
+    /// Outcomes of the cases from `first` to before `end`, each as JSON on one line.
+    fn cases(&self, py: Python<'_>, first: u64, end: u64) -> PyResult<Vec<String>> {
+        let campaign = Arc::clone(&self.0);
+        let work = move || (first..end).map(|n| campaign.case(n)).collect();
+        let cases: Result<Vec<String>, String> = waited(py, work)?;
+        cases.map_err(refused)
+    }
+
+    /// What the program prints for the outcomes of all cases.
+    fn text(&self, py: Python<'_>, cases: Vec<String>) -> PyResult<String> {
+        let campaign = Arc::clone(&self.0);
+        waited(py, move || campaign.text(&cases))?.map_err(refused)
+    }
+}
+
+/// A folder of experiments to train on.
+#[pyclass(module = "onecycle_lab")]
+struct Dataset(lab::Dataset);
+
+#[pymethods]
+impl Dataset {
+    #[new]
+    fn new(recipe: Option<&str>, options: Vec<String>) -> PyResult<Self> {
+        let dataset = lab::Dataset::open(recipe, &options).map_err(refused)?;
+        Ok(Self(dataset))
+    }
+
+    fn manifest(&self) -> String {
+        self.0.manifest()
+    }
+
+    fn missing(&self) -> Vec<usize> {
+        self.0.missing()
+    }
+
+    fn keep(&mut self, file: usize, bytes: &[u8], rows: usize) -> PyResult<()> {
+        self.0.keep(file, bytes, rows).map_err(refused)
+    }
+}
+
+/// Bytes and number of examples of a file.
+#[pyfunction]
+fn dataset_file<'py>(
+    py: Python<'py>,
+    manifest: String,
+    file: usize,
+) -> PyResult<(Bound<'py, PyBytes>, usize)> {
+    let made = waited(py, move || lab::dataset_file(&manifest, file))?;
+    let (bytes, rows) = made.map_err(refused)?;
+    Ok((PyBytes::new(py, &bytes), rows))
+}
+
+#[pymodule]
+fn _lab(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<Campaign>()?;
+    module.add_class::<Dataset>()?;
+    module.add_function(wrap_pyfunction!(dataset_file, module)?)?;
+    Ok(())
+}
