@@ -9,7 +9,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 [[ $# -eq 0 ]] || { echo "release.sh: it has no options" >&2; exit 2; }
-for command in cargo python3 sha256sum tar; do
+for command in cargo python3 sha256sum strip tar; do
     command -v "$command" >/dev/null || { echo "release.sh: $command is missing" >&2; exit 1; }
 done
 
@@ -38,6 +38,7 @@ fi
 cargo build --release --locked -p onecycle-cli --features studio --target "$triple" --target-dir "$target"
 program=dist/onecycle-$version-linux-$machine
 cp "$target/$triple/release/onecycle" "$program"
+strip "$program"
 "$program" identify examples/simulated_hover.csv >/dev/null
 
 echo "== Python package"

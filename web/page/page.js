@@ -410,7 +410,7 @@ const showDesign = async () => {
   for (const id of ["save-half", "save-whole", "save-restore", "steps"]) at(id).hidden = !log;
   exported("");
   isWhole = false;
-  against = report.against ? { name: "gains in force", gains: only(report.against.controller) } : { name: "proposed gains", gains: proposal };
+  against = before && before.key !== file.key ? before : report.against ? { name: "gains in force", gains: only(report.against.controller) } : { name: "proposed gains", gains: proposal };
   at("calm").disabled = true;
   const of = report;
   await judgeAgainst();
@@ -424,8 +424,14 @@ const showDesign = async () => {
   Object.assign(at("calm"), { max: designs.length - 1, disabled: false });
   showCalm();
 };
+// The loop of another file, as it was drawn there: before and after a change.
+let before;
+at("keep-before").onclick = () => {
+  before = { name: stem().replaceAll("_", " "), key: file.key, judged: drawn };
+  exported("Kept: the next file is compared with this loop.");
+};
 const judgeAgainst = async () => {
-  against.judged = await ask({ do: "judge", gains: against.gains });
+  if (against !== before) against.judged = await ask({ do: "judge", gains: against.gains });
   at("against-name").textContent = at("against-head").textContent = against.name;
 };
 // A slider: zero on its left, else a logarithmic scale about the proposal.
@@ -469,7 +475,7 @@ const answerWanted = async () => {
     const from = performance.now();
     // The compared responses over the same time.
     const of = report;
-    if (message.bands && drawn?.end_s) against.judged = await ask({ do: "judge", gains: against.gains, end_s: drawn.end_s });
+    if (message.bands && drawn?.end_s && against !== before) against.judged = await ask({ do: "judge", gains: against.gains, end_s: drawn.end_s });
     const answer = await ask(message);
     if (!of || of !== report) continue;
     drawDesign(answer);

@@ -531,6 +531,22 @@ def answered(browser, told):
     studio.designed()
     expect(page.evaluate("gains.kp") == kp and page.is_visible("#origin"), "the gains of the address")
     studio.close()
+    # Before and after: the loop of one file beside that of the next.
+    studio = Studio(browser, told.page, **DESK)
+    page = studio.page
+    studio.drop("hover", str(told.repository / "examples/simulated_hover.csv"))
+    studio.identify()
+    studio.designed()
+    page.click("#keep-before")
+    kept = page.evaluate("drawn.figures.margins.ms")
+    studio.drop("roll", str(told.repository / "examples/jsbsim_f450_roll_clean.csv"))
+    studio.identify()
+    studio.designed()
+    expect(page.inner_text("#against-head") == "simulated hover", page.inner_text("#against-head"))
+    row = page.locator("#figures tbody tr").nth(4).locator("td").all_inner_texts()
+    ours = page.evaluate("drawn.figures.margins.ms")
+    expect([abs(float(cell) - ms) < 0.01 for cell, ms in zip(row, (ours, kept))] == [True, True], f"{row}, {ours} and {kept}")
+    studio.close()
     # Gains as the controller of a plant takes them.
     studio = Studio(browser, told.page, **DESK)
     page, plant = studio.page, str(told.repository / "examples/plant/lic101_export.csv")

@@ -137,8 +137,8 @@ fn space_labels<'a>(out: &mut Value, axis: &Axis, values: impl Iterator<Item = &
         })
     });
     let decades = (high / low).log10();
-    // Below one decade plotly.js uses even steps.
-    if axis.is_logarithmic && decades >= 1.0 {
+    // Below half a decade 1, 2 and 5 may be missing, and plotly.js uses even steps.
+    if axis.is_logarithmic && decades >= 0.5 {
         out["dtick"] = if decades < FEW_DECADES {
             json!("D2")
         } else {
