@@ -6,6 +6,7 @@ part; ends with status 1 at the first fault. --measure prints times instead of t
 """
 
 import argparse
+import importlib.util
 import json
 import math
 import os
@@ -665,6 +666,18 @@ def large(studio, told):
     path.unlink()
 
 
+def accessible(page):
+    """Checks by axe-core that nothing stands in the way of a screen reader. Without the package, which requirements.txt names, a
+    line says that it was not looked for."""
+    found = importlib.util.find_spec("axe_playwright_python")
+    if found is None:
+        print("axe-playwright-python is not installed: accessibility is not looked for")
+        return
+    page.evaluate((pathlib.Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
+    violations = page.evaluate("axe.run().then(({ violations }) => violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`))")
+    expect(not violations, f"axe finds {violations}")
+
+
 def looks(browser, told):
     """Two widths and two themes: nothing is wider than the screen, nothing has no name."""
     for kind, screen in (("desk", DESK), ("phone", PHONE)):
@@ -683,6 +696,7 @@ def looks(browser, told):
             nameless = page.evaluate("""[...document.querySelectorAll("button, input, select, [role=img], iframe")].filter((one) =>
                 !(one.textContent.trim() || one.ariaLabel || one.title || one.labels?.length)).map((one) => one.id)""")
             expect(not nameless, f"without a name: {nameless}")
+            accessible(page)
             back = page.evaluate("getComputedStyle(document.body).backgroundColor")
             expect((back == "rgb(255, 255, 255)") == (theme == "light"), f"{theme}: {back}")
             page.click("#theme")

@@ -6,6 +6,7 @@ two widths and in both themes, and prints a line for each. Ends with status 1 at
 
 import argparse
 import base64
+import importlib.util
 import json
 import os
 import pathlib
@@ -149,6 +150,18 @@ def turn_tabs(page):
     page.locator("[role=tab]", has_text="Roll").click()
     expect(shown() == ["roll-rate"] and page.url.endswith("#roll-rate"), f"{shown()} at {page.url}")
     drawn(page)
+
+
+def accessible(page):
+    """Checks by axe-core that nothing stands in the way of a screen reader. Without the package, which requirements.txt names, a
+    line says that it was not looked for."""
+    found = importlib.util.find_spec("axe_playwright_python")
+    if found is None:
+        print("axe-playwright-python is not installed: accessibility is not looked for")
+        return
+    page.evaluate((pathlib.Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
+    violations = page.evaluate("axe.run().then(({ violations }) => violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`))")
+    expect(not violations, f"axe finds {violations}")
 
 
 def unfold(page):
@@ -325,6 +338,8 @@ def main():
                     print_out(page)
                 unfold(page)
                 look(page, path, sections, plots)
+                if "recording" in sections or name == "flight":
+                    accessible(page)
                 if arguments.picture and (name, screen) == ("hover", "desk"):
                     picture(browser, page, arguments.picture)
                 switch(page)
