@@ -15,6 +15,7 @@ mod studio;
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue};
 use clap::{Args, Parser, Subcommand};
 use onecycle_onboard::{Soiptd, SoiptdError};
@@ -23,7 +24,6 @@ pub(crate) use self::completions::Completions;
 pub(crate) use self::design::{DesignArguments, NoiseArguments};
 pub(crate) use self::fly::Fly;
 pub(crate) use self::identify::Identify;
-pub use self::identify::Method;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) use self::live::{
     ConnectionArguments, Live, LiveAction, LiveLog, LiveRelay, LiveState, LiveWrite, LogId,
@@ -37,7 +37,7 @@ pub(crate) use self::structure::StructureArguments;
 pub(crate) use self::studio::Studio;
 use crate::failure::Failure;
 pub(crate) use onecycle::request::values::Share;
-pub use onecycle::request::values::{phase_margin, sample_rate, share, share_within};
+pub use onecycle::request::values::{METHODS, phase_margin, sample_rate, share, share_within};
 
 const AFTER_HELP: &str = "\
 First steps:
@@ -150,6 +150,18 @@ impl ProcessArguments {
         };
         made.map_err(Failure::usage)
     }
+}
+
+/// Values by their names.
+pub fn named<T: Copy + Send + Sync>(
+    all: &'static [(&'static str, T)],
+) -> impl TypedValueParser<Value = T> {
+    PossibleValuesParser::new(all.iter().map(|(name, _)| *name)).try_map(|name| {
+        let found = all.iter().find(|(known, _)| *known == name);
+        found
+            .map(|(_, value)| *value)
+            .ok_or("there is no such value")
+    })
 }
 
 /// Design the controller of a known process: gains, margins and the predicted step response.

@@ -120,7 +120,7 @@ impl Source for Input<'_> {
     fn head(&self, most: u64) -> Vec<u8> {
         match &self.piped {
             Some(bytes) => bytes.iter().take(most as usize).copied().collect(),
-            None => self.path.head(most),
+            None => self.path.to_owned().head(most),
         }
     }
 }

@@ -33,6 +33,7 @@
 //! | task | names |
 //! |------|-------|
 //! | read and write recordings | [`read`], [`read_from`], [`CsvOptions`], [`ColumnRef`], [`TimeUnit`], [`Recording`], [`Gap`], [`Note`], [`write_csv`] |
+//! | ask for everything at once | [`Request`], [`Source`], [`Report`], [`Answer`], [`Advice`], [`Controllers`], [`Survey`], [`DesignRequest`], [`DesignReport`], [`Requirements`], [`LogFile`], [`Error`] |
 //! | identify | [`Identify`], [`Structure`], [`Road`], [`Hold`], [`Method`], [`Pack`] |
 //! | use the result | [`Identification`], [`Identified`], [`Estimate`], [`Interval`], [`Posterior`], [`StepIntervals`] |
 //! | see what the estimate rests on | [`Excitation`], [`Oscillation`], [`Recorded`], [`Evidence`], [`Innovations`], [`SetPointResponse`] |
@@ -44,6 +45,32 @@
 //! | analyse a loop | [`margins()`], [`Margins`], [`sensitivity()`], [`Sensitivity`], [`ise()`], [`load_iae()`], [`step_response()`], [`StepResponse`], [`step_metrics()`], [`StepMetrics`], [`load_response()`], [`LoadResponse`] |
 //! | simulate a relay test | [`Experiment`], [`Sensor`], [`Trace`], [`FixedStepProcess`], [`Relay`], [`RelaySettings`] |
 //! | handle errors | [`ReadError`], [`RecordingError`], [`PackError`], [`DesignError`], [`StepResponseError`], [`SoiptdError`], [`LinearError`], [`RelayError`] |
+//!
+//! # Ask for everything at once
+//!
+//! A [`Request`] is what the program, the Python package and the studio ask for; its [`Report`] is what they show. Of a flight log
+//! it takes one loop, or all of them ([`Request::survey`]), judges the gains in force and makes the files with parameters.
+//!
+//! ```
+//! use std::path::PathBuf;
+//!
+//! use onecycle::{Advice, Request};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let mut request = Request::default();
+//! request.set("against", "40,5,12")?;
+//! let report = request.identify(&PathBuf::from("../examples/simulated_hover.csv"))?;
+//! let answer = &report.answer;
+//! println!("{:?}: {}. {}", answer.verdict, answer.reason, answer.next);
+//! assert!(matches!(answer.verdict, Advice::Change | Advice::Keep));
+//! for gain in &answer.gains {
+//!     println!("{} now {:?}, proposed {:?}", gain.name, gain.now, gain.full);
+//! }
+//! // A setting that there is not is named.
+//! assert_eq!(request.set("colour", "red").unwrap_err().to_string(), "there is no setting colour");
+//! # Ok(())
+//! # }
+//! ```
 //!
 //! # Read a recording
 //!

@@ -17,6 +17,7 @@ use onecycle_design::{
 use onecycle_identify::{Hold, MOST_CYCLES, Method, Road};
 use onecycle_link::{Axis, ColumnRef, ControlLoop, CsvOptions};
 
+use self::values::choice;
 use crate::Structure;
 use crate::error::Error;
 use crate::source::Source;
@@ -305,37 +306,15 @@ impl Request {
                 .filter(|cycles| (1..=MOST_CYCLES).contains(cycles))
                 .ok_or_else(|| format!("a number from 1 to {MOST_CYCLES}"))
                 .map(|cycles| self.cycles = cycles),
-            "estimator" => choice(
-                value,
-                &[
-                    ("auto", Road::Automatic),
-                    ("relay", Road::Relay),
-                    ("general", Road::General),
-                ],
-            )
-            .map(|road| self.estimator = road),
-            "method" => choice(
-                value,
-                &[
-                    ("classify", Method::Classify),
-                    ("refine", Method::Refine),
-                    ("map", Method::Map),
-                ],
-            )
-            .map(|method| self.method = method),
+            "estimator" => choice(value, &values::ESTIMATORS).map(|road| self.estimator = road),
+            "method" => choice(value, &values::METHODS).map(|method| self.method = method),
             "structure" => put(
                 &mut self.structure,
                 Structure::from_name(value).ok_or("there is no such structure".to_owned()),
             ),
             "from" => put(&mut self.from_s, values::time_s(value)),
             "to" => put(&mut self.to_s, values::time_s(value)),
-            "hold" => put(
-                &mut self.hold,
-                choice(
-                    value,
-                    &[("held", Hold::Held), ("interpolated", Hold::Interpolated)],
-                ),
-            ),
+            "hold" => put(&mut self.hold, choice(value, &values::HOLDS)),
             "beta" => put(&mut self.beta, values::beta(value)),
             "input_late" => put(&mut self.input_late_s, values::time_s(value)),
             "input_before" => put(&mut self.input_before, values::finite(value)),
@@ -357,21 +336,8 @@ impl Request {
             "tag" => put(&mut columns.control_loop, Ok(value.to_owned())),
             "sample_rate" => put(&mut columns.sample_rate_hz, values::sample_rate(value)),
             "time_unit" => put(&mut columns.time_unit, values::time_unit(value)),
-            "axis" => put(
-                &mut self.axis,
-                choice(value, &Axis::ALL.map(|axis| (axis.name(), axis))),
-            ),
-            "loop" => put(
-                &mut self.control_loop,
-                choice(
-                    value,
-                    &[
-                        ("rate", LoopKind::Rate),
-                        ("attitude", LoopKind::Attitude),
-                        ("altitude", LoopKind::Altitude),
-                    ],
-                ),
-            ),
+            "axis" => put(&mut self.axis, choice(value, &values::AXES)),
+            "loop" => put(&mut self.control_loop, choice(value, &values::LOOPS)),
             "flight" => put(
                 &mut self.flight,
                 value
@@ -589,15 +555,6 @@ impl DesignRequest {
 fn put<T>(into: &mut Option<T>, value: Result<T, String>) -> Result<(), String> {
     *into = Some(value?);
     Ok(())
-}
-
-/// The value of a name.
-fn choice<T: Copy>(name: &str, all: &[(&str, T)]) -> Result<T, String> {
-    let found = all.iter().find(|(known, _)| *known == name);
-    found.map(|(_, value)| *value).ok_or_else(|| {
-        let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
-        format!("{name:?} is none of {}", names.join(", "))
-    })
 }
 
 /// The first setting that was given.

@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use onecycle_link::{
     Axis, ControlLoop, CsvOptions, Flight, FlightLog, LogError, LogFormat, ReadBack, ReadError,
@@ -35,7 +35,7 @@ pub trait Source: Sync {
     }
 }
 
-impl Source for Path {
+impl Source for PathBuf {
     fn name(&self) -> String {
         self.display().to_string()
     }
@@ -58,20 +58,6 @@ impl Source for Path {
             Some(Ok(_)) => head,
             _ => vec![],
         }
-    }
-}
-
-impl Source for PathBuf {
-    fn name(&self) -> String {
-        self.as_path().name()
-    }
-
-    fn open(&self) -> io::Result<Box<dyn Read + '_>> {
-        self.as_path().open()
-    }
-
-    fn head(&self, most: u64) -> Vec<u8> {
-        self.as_path().head(most)
     }
 }
 

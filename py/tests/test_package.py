@@ -141,7 +141,7 @@ def test_a_flight_log_is_that_of_the_program():
     assert found.to_dict()["against"] is not None
     with pytest.raises(onecycle.OnecycleError, match="`axis`"):
         onecycle.identify(log)
-    with pytest.raises(onecycle.OnecycleError, match="no flight log"):
+    with pytest.raises(onecycle.OnecycleError, match="not a ULog"):
         onecycle.identify_flight(HOVER)
 
 

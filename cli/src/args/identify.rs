@@ -2,14 +2,16 @@
 
 use std::path::PathBuf;
 
+use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
-use onecycle::request::values::{beta, cutoff_hz, finite, noise, sample_rate, time_s, time_unit};
-use onecycle::{ColumnRef, Hold, Request, Road, Structure};
+use onecycle::request::values::{
+    ESTIMATORS, HOLDS, METHODS, beta, cutoff_hz, finite, noise, sample_rate, time_s, time_unit,
+};
+use onecycle::{ColumnRef, Hold, Method, Request, Road, Structure};
 use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
-use super::{DesignArguments, LogArguments, WriteArguments};
+use super::{DesignArguments, LogArguments, WriteArguments, named};
 use crate::failure::Failure;
 use crate::packs::PackSource;
 
@@ -64,8 +66,8 @@ pub(crate) struct Identify {
     pub(crate) noise: Option<f64>,
     /// Estimator: whole cycles of a steady relay oscillation (relay), the whole recording with its disturbances
     /// (general), or relay where the recording is one and the general estimator agrees (auto)
-    #[arg(long, help_heading = ESTIMATION, value_enum, default_value_t = Estimator::Auto)]
-    pub(crate) estimator: Estimator,
+    #[arg(long, help_heading = ESTIMATION, default_value = "auto", value_parser = named(&ESTIMATORS))]
+    pub(crate) estimator: Road,
     /// Structure of the process [default: the simplest that explains the recording]
     #[arg(long, help_heading = ESTIMATION, value_name = "NAME", value_parser = structure())]
     pub(crate) structure: Option<Structure>,
@@ -77,8 +79,8 @@ pub(crate) struct Identify {
     pub(crate) to: Option<f64>,
     /// Input between two samples: constant (held), if the recording has every sample of the loop, or a straight line
     /// (interpolated), if it has fewer [default: what explains the recording better]
-    #[arg(long, help_heading = ESTIMATION, value_name = "KIND", value_enum)]
-    pub(crate) hold: Option<Between>,
+    #[arg(long, help_heading = ESTIMATION, value_name = "KIND", value_parser = named(&HOLDS))]
+    pub(crate) hold: Option<Hold>,
     /// beta of the relay that made the recording: a recording whose switches contradict it is refused [default: from a
     /// comment of the file]
     #[arg(long, help_heading = ESTIMATION, value_name = "BETA", allow_negative_numbers = true, value_parser = beta)]
@@ -100,7 +102,7 @@ pub(crate) struct Identify {
     pub(crate) output_filter: Option<f64>,
     /// Method for a steady relay oscillation: the network of the pack alone (classify), least squares alone (refine),
     /// or least squares with the network's prior (map)
-    #[arg(long, help_heading = ESTIMATION, value_enum, default_value_t = Method::Map)]
+    #[arg(long, help_heading = ESTIMATION, default_value = "map", value_parser = named(&METHODS))]
     pub(crate) method: Method,
     /// Identifier pack; "default" is the built-in one
     #[arg(long, help_heading = ESTIMATION, value_name = "FILE", default_value = "default")]
@@ -141,11 +143,11 @@ impl Identify {
         request.requirements = self.design.requirements();
         request.noise_share = self.noise;
         request.cycles = self.cycles as usize;
-        request.estimator = self.estimator.into();
-        request.method = self.method.into();
+        request.estimator = self.estimator;
+        request.method = self.method;
         request.structure = self.structure;
         (request.from_s, request.to_s) = (self.from, self.to);
-        request.hold = self.hold.map(Hold::from);
+        request.hold = self.hold;
         request.beta = self.beta;
         request.input_late_s = self.input_late;
         request.input_before = self.input_before;
@@ -158,8 +160,8 @@ impl Identify {
         request.columns.control_loop.clone_from(&self.tag);
         request.columns.sample_rate_hz = self.sample_rate;
         request.columns.time_unit = self.time_unit;
-        request.axis = self.log.axis.map(Into::into);
-        request.control_loop = self.log.control_loop.map(Into::into);
+        request.axis = self.log.axis;
+        request.control_loop = self.log.control_loop;
         request.flight = self.log.flight;
         request.write = self.write.write();
         Ok(request)
@@ -170,56 +172,4 @@ impl Identify {
 fn structure() -> impl TypedValueParser<Value = Structure> {
     PossibleValuesParser::new(Structure::ALL.map(Structure::name))
         .try_map(|name| Structure::from_name(&name).ok_or("there is no such structure"))
-}
-
-/// Estimator of the process.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Estimator {
-    Auto,
-    Relay,
-    General,
-}
-
-impl From<Estimator> for Road {
-    fn from(estimator: Estimator) -> Self {
-        match estimator {
-            Estimator::Auto => Self::Automatic,
-            Estimator::Relay => Self::Relay,
-            Estimator::General => Self::General,
-        }
-    }
-}
-
-/// Input between two samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Between {
-    Held,
-    Interpolated,
-}
-
-impl From<Between> for Hold {
-    fn from(between: Between) -> Self {
-        match between {
-            Between::Held => Self::Held,
-            Between::Interpolated => Self::Interpolated,
-        }
-    }
-}
-
-/// Identification method.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Method {
-    Classify,
-    Refine,
-    Map,
-}
-
-impl From<Method> for onecycle_identify::Method {
-    fn from(method: Method) -> Self {
-        match method {
-            Method::Classify => Self::Classify,
-            Method::Refine => Self::Refine,
-            Method::Map => Self::Map,
-        }
-    }
 }

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, FromArgMatches, Subcommand, ValueEnum};
+use onecycle::request::values::AXES;
+use onecycle_link::Axis;
 use onecycle_live::Address;
 
-use super::log::LogAxis;
-use super::{Identify, WriteArguments, share_within};
+use super::{Identify, WriteArguments, named, share_within};
 use crate::failure::Failure;
 
 /// Talk to a vehicle over MAVLink (PX4, ArduPilot): state, flight logs, parameters, a relay test of the altitude.
@@ -139,8 +140,8 @@ pub(crate) struct LiveLog {
     #[arg(long, short, value_name = "FILE")]
     pub(crate) out: Option<PathBuf>,
     /// Identify the rate loop of this axis from the log
-    #[arg(long, value_name = "AXIS", requires = "out")]
-    pub(crate) identify: Option<LogAxis>,
+    #[arg(long, value_name = "AXIS", requires = "out", value_parser = named(&AXES))]
+    pub(crate) identify: Option<Axis>,
     /// With --identify: write a report with figures to this file
     #[arg(long, value_name = "OUT.html", requires = "identify")]
     pub(crate) report: Option<PathBuf>,

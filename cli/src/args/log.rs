@@ -2,10 +2,12 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, ValueEnum};
-use onecycle::request::values::step;
-use onecycle::request::{self, HALF_STEP, Write};
+use clap::Args;
+use onecycle::request::values::{AXES, LOOPS, step};
+use onecycle::request::{HALF_STEP, LoopKind, Write};
 use onecycle_link::Axis;
+
+use super::named;
 
 /// List what a flight log holds: flights, signals of each control loop, gains in force, excitation.
 ///
@@ -35,11 +37,11 @@ pub(crate) struct Log {
 #[command(next_help_heading = "Flight logs")]
 pub(crate) struct LogArguments {
     /// Axis [default: a card of all loops; roll with an option that needs one loop, such as --from or --report]
-    #[arg(long, value_enum)]
-    pub(crate) axis: Option<LogAxis>,
+    #[arg(long, value_parser = named(&AXES))]
+    pub(crate) axis: Option<Axis>,
     /// Control loop: rate (torque to angular rate), attitude (set-point of the rate to angle) or altitude (thrust to
     /// climb rate) [default: rate]
-    #[arg(long = "loop", value_enum)]
+    #[arg(long = "loop", value_parser = named(&LOOPS))]
     pub(crate) control_loop: Option<LoopKind>,
     /// Flight, from 1; a blackbox file may hold several [default: the longest]
     #[arg(long, value_name = "N")]
@@ -75,41 +77,5 @@ impl WriteArguments {
         write.step = self.step;
         write.below_limits = self.below_limits;
         write
-    }
-}
-
-/// Axis of the body.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum LogAxis {
-    Roll,
-    Pitch,
-    Yaw,
-}
-
-/// What a control loop controls.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum LoopKind {
-    Rate,
-    Attitude,
-    Altitude,
-}
-
-impl From<LogAxis> for Axis {
-    fn from(axis: LogAxis) -> Self {
-        match axis {
-            LogAxis::Roll => Self::Roll,
-            LogAxis::Pitch => Self::Pitch,
-            LogAxis::Yaw => Self::Yaw,
-        }
-    }
-}
-
-impl From<LoopKind> for request::LoopKind {
-    fn from(kind: LoopKind) -> Self {
-        match kind {
-            LoopKind::Rate => Self::Rate,
-            LoopKind::Attitude => Self::Attitude,
-            LoopKind::Altitude => Self::Altitude,
-        }
     }
 }

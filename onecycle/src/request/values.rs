@@ -3,7 +3,46 @@
 use std::ops::RangeBounds;
 
 use onecycle_design::Pid;
-use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
+use onecycle_identify::{Hold, Method, Road};
+use onecycle_link::{Axis, SAMPLE_RATES_HZ, TimeUnit};
+
+use super::LoopKind;
+
+/// Estimators by name.
+pub const ESTIMATORS: [(&str, Road); 3] = [
+    ("auto", Road::Automatic),
+    ("relay", Road::Relay),
+    ("general", Road::General),
+];
+/// Methods for a steady relay oscillation by name.
+pub const METHODS: [(&str, Method); 3] = [
+    ("classify", Method::Classify),
+    ("refine", Method::Refine),
+    ("map", Method::Map),
+];
+/// What the input does between two samples, by name.
+pub const HOLDS: [(&str, Hold); 2] = [("held", Hold::Held), ("interpolated", Hold::Interpolated)];
+/// Axes by name.
+pub const AXES: [(&str, Axis); 3] = [
+    ("roll", Axis::Roll),
+    ("pitch", Axis::Pitch),
+    ("yaw", Axis::Yaw),
+];
+/// What the loops of a vehicle control, by name.
+pub const LOOPS: [(&str, LoopKind); 3] = [
+    ("rate", LoopKind::Rate),
+    ("attitude", LoopKind::Attitude),
+    ("altitude", LoopKind::Altitude),
+];
+
+/// The value of a name.
+pub(super) fn choice<T: Copy>(name: &str, all: &[(&str, T)]) -> Result<T, String> {
+    let found = all.iter().find(|(known, _)| *known == name);
+    found.map(|(_, value)| *value).ok_or_else(|| {
+        let names: Vec<&str> = all.iter().map(|(name, _)| *name).collect();
+        format!("{name:?} is none of {}", names.join(", "))
+    })
+}
 
 /// A finite number.
 pub fn number(text: &str) -> Option<f64> {

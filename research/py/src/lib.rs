@@ -5,7 +5,6 @@
     reason = "arguments from Python and errors are handed over by value"
 )]
 
-#[path = "../../../py/src/waited.rs"]
 mod waited;
 
 use std::sync::Arc;

@@ -7,7 +7,6 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
 
-use clap::ValueEnum;
 use onecycle_live::{LogEntry, LogError, Vehicle};
 
 use super::{connect, failed, refused, unheard};
@@ -53,8 +52,8 @@ pub(crate) fn run(arguments: &LiveLog) -> Result<ExitCode, Failure> {
 
 /// The arguments of `identify`, which are checked before anything is downloaded. `None`: it was not asked for.
 fn identify_arguments(arguments: &LiveLog, out: &Path) -> Option<Result<Identify, Failure>> {
-    let axis = arguments.identify?.to_possible_value()?;
-    let mut options: Vec<OsString> = vec!["--axis".into(), axis.get_name().into()];
+    let axis = arguments.identify?;
+    let mut options: Vec<OsString> = vec!["--axis".into(), axis.name().into()];
     for (option, path) in [
         ("--report", &arguments.report),
         ("--write", &arguments.write),

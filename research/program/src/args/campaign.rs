@@ -3,8 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use onecycle_cli::args::{Method, share};
+use onecycle_cli::args::{METHODS, named, share};
 use onecycle_identify::MOST_CYCLES;
+use onecycle_identify::Method;
 use onecycle_lab::experiments::MOST_CASES;
 
 /// Run many random experiments as a TOML file describes, and print a table of the outcomes.
@@ -28,7 +29,7 @@ pub(crate) struct Campaign {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
     pub(crate) cycles: Option<u64>,
     /// Identification method [default: from the file]
-    #[arg(long, value_enum)]
+    #[arg(long, value_parser = named(&METHODS))]
     pub(crate) method: Option<Method>,
     /// Standard deviation of the noise, as a share of the amplitude, such as 2% or 0.02 [default: from the file]
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true, value_parser = share)]

@@ -154,7 +154,7 @@ fn of_relay_tests(arguments: &args::Campaign) -> Result<Campaign, Failure> {
         .cycles
         .map_or(campaign.cycles, |cycles| cycles as usize);
     campaign.time_scale = arguments.time_scale.unwrap_or(campaign.time_scale);
-    campaign.method = arguments.method.map_or(campaign.method, Into::into);
+    campaign.method = arguments.method.unwrap_or(campaign.method);
     if let Some(sigma) = arguments.sigma {
         (campaign.sigma, campaign.sigma_uniform) = (sigma, false);
     }

@@ -1,0 +1,1 @@
+../../../py/src/waited.rs
