@@ -23,7 +23,7 @@ use onecycle_link::{SAMPLE_RATES_HZ, TimeUnit};
 use onecycle_onboard::{Soiptd, SoiptdError};
 
 pub(crate) use self::completions::Completions;
-pub(crate) use self::design::{DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
+pub(crate) use self::design::{Against, DesignArguments, NoiseArguments, PAPER_HAS_NO_NOISE};
 pub(crate) use self::fly::Fly;
 pub use self::identify::Method;
 pub(crate) use self::identify::{Between, Estimator, Identify};

@@ -6,6 +6,7 @@ mod controllers;
 pub(crate) mod flight;
 pub(crate) mod fly;
 pub(crate) mod identify;
+mod in_force;
 #[cfg(not(target_family = "wasm"))]
 pub(crate) mod live;
 pub(crate) mod log;

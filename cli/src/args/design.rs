@@ -1,5 +1,7 @@
 //! Requirements on a controller, for `identify` and `tune`.
 
+use std::path::{Path, PathBuf};
+
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use onecycle::{Execution, Form, MeasurementNoise, Pid, Specification, Style};
@@ -14,6 +16,15 @@ pub(crate) const PAPER_HAS_NO_NOISE: &str =
 
 /// Heading of the requirements on a controller.
 pub(super) const CONTROLLER: &str = "Controller";
+
+/// Gains in force.
+#[derive(Clone, Debug)]
+pub(crate) enum Against {
+    /// As given.
+    Gains(Pid),
+    /// As they stand in a configuration or a log, of this loop.
+    File(PathBuf, Option<String>),
+}
 
 /// Requirements on a controller, and the gains to compare it with.
 #[derive(Clone, Debug, Args)]
@@ -47,26 +58,41 @@ pub(crate) struct DesignArguments {
     #[arg(long, help_heading = CONTROLLER, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     sample_period: Option<f64>,
     /// Judge these gains of a controller in parallel form too: Kp,Ki,Kd or Kp,Ki,Kd,Tf with the time Tf of the
-    /// measurement filter in seconds
-    #[arg(long, value_name = "KP,KI,KD", allow_hyphen_values = true, value_parser = gains)]
-    against: Option<Pid>,
-    /// Gains as a controller of a process control system takes them, in percent of the ranges: isa, proportional-band,
-    /// interacting, deltav, deltav-series, tdc3000, centum, pide, pide-independent or control-expert
-    #[arg(long, help_heading = CONTROLLER, value_name = "NAME", value_parser = vendor(), requires = "output_range", hide_possible_values = true)]
+    /// measurement filter in seconds; or those in this file: printer.cfg or klippy.log (FILE:extruder), a
+    /// log with M301 or M304, YAML of ESPHome, a sketch of an Arduino
+    #[arg(long, value_name = "KP,KI,KD", allow_hyphen_values = true, value_parser = against)]
+    against: Option<Against>,
+    /// Gains as a controller takes them. In percent of the ranges: isa, proportional-band, interacting, deltav, deltav-series,
+    /// tdc3000, centum, pide, pide-independent or control-expert. In their own units: klipper, marlin, marlin-bed, esphome,
+    /// home-assistant, arduino, wpilib, odrive, simplefoc, codesys, twincat or pid-compact
+    #[arg(long, help_heading = CONTROLLER, value_name = "NAME", value_parser = vendor(), hide_possible_values = true)]
     vendor: Option<Vendor>,
-    /// With --vendor: range of the measurement in the controller, in the unit of the output, such as 0..200
+    /// With --vendor in percent: range of the measurement in the controller, in the unit of the output, such as 0..200
     #[arg(long, help_heading = CONTROLLER, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
     output_range: Option<f64>,
-    /// With --vendor: range of the controller's output, in the unit of the input [default: 0..100]
-    #[arg(long, help_heading = CONTROLLER, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
+    /// With --vendor: range of the controller's output, in the unit of the input [default: 0..100; klipper 0..1, marlin 0..127]
+    #[arg(long, help_heading = CONTROLLER, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span)]
     input_range: Option<f64>,
 }
 
 impl DesignArguments {
     /// The controller in which the gains are typed, and its ranges.
-    pub(crate) fn plant(&self) -> Option<(Vendor, Spans)> {
-        let output = self.input_range.unwrap_or(100.0);
-        Some((self.vendor?, Spans::new(self.output_range?, output)))
+    pub(crate) fn plant(&self) -> Result<Option<(Vendor, Spans)>, Failure> {
+        match self.vendor {
+            Some(vendor) if vendor.has_range_of_measurement() && self.output_range.is_none() => {
+                Err(Failure::usage(format!(
+                    "--vendor {} counts in percent: add the range of its measurement, such as --output-range 0..200",
+                    vendor.name()
+                )))
+            }
+            vendor => Ok(vendor.map(|vendor| (vendor, self.spans(vendor)))),
+        }
+    }
+
+    /// The ranges of a controller.
+    pub(crate) fn spans(&self, vendor: Vendor) -> Spans {
+        let output = self.input_range.unwrap_or_else(|| vendor.full_input());
+        Spans::new(self.output_range.unwrap_or(1.0), output)
     }
 
     /// The requirements, without noise.
@@ -124,8 +150,8 @@ impl DesignArguments {
     }
 
     /// The gains in force.
-    pub(crate) fn against(&self) -> Option<Pid> {
-        self.against
+    pub(crate) fn against(&self) -> Option<&Against> {
+        self.against.as_ref()
     }
 }
 
@@ -222,6 +248,22 @@ pub(super) fn number(text: &str) -> Option<f64> {
         .parse()
         .ok()
         .filter(|value: &f64| value.is_finite())
+}
+
+/// Gains in parallel form, or the name of a file with gains.
+fn against(text: &str) -> Result<Against, String> {
+    let is_name = !text.contains(',') && number(text).is_none() && !text.trim().is_empty();
+    match is_name {
+        true => {
+            let parts = text
+                .rsplit_once(':')
+                .filter(|(path, _)| Path::new(path).is_file());
+            let (path, name) =
+                parts.map_or((text, None), |(path, name)| (path, Some(name.to_owned())));
+            Ok(Against::File(PathBuf::from(path), name))
+        }
+        false => gains(text).map(Against::Gains),
+    }
 }
 
 /// Gains in parallel form.

@@ -10,6 +10,7 @@ use onecycle::{
 };
 use onecycle_link::{LogError, Span};
 
+use super::in_force::InForce;
 use super::log::{self, Piped, Source};
 use super::log_gains::{self, LogLoop};
 use super::{answer, controllers, flight};
@@ -141,6 +142,8 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
         None => read(arguments, &asked)?,
     };
     check_span(arguments, &recording)?;
+    let set = InForce::of(&arguments.design, Some((&arguments.file, &recording)))?;
+    let asked = set.law(asked);
     let _waiting = Waiting::on("identifying");
     let bytes = arguments.pack.bytes()?;
     let pack = arguments.pack.usable(&bytes)?;
@@ -155,12 +158,12 @@ pub(crate) fn find(arguments: &Identify, given: Option<Recording>) -> Result<Fou
         .pack(pack)
         .run(&recording);
     let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
-    let against = arguments.design.against().or_else(in_force);
+    let against = set.against.or_else(in_force);
     let identified = identification.outcome.as_ref().ok();
     let choice = identified
         .map(|identified| controllers::of_identified(identified, against))
-        .map(|choice| choice.in_plant(arguments.design.plant()));
-    let choice = match (&of_log, arguments.design.against(), choice) {
+        .map(|choice| choice.in_plant(set.plant));
+    let choice = match (&of_log, set.against, choice) {
         (Some(of_log), None, Some(choice)) if of_log.contradicts(&choice) => {
             identification.refuse(Verdict::UnstableInForce);
             None

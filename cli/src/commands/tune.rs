@@ -5,6 +5,7 @@ use std::process::ExitCode;
 use onecycle::{Design, Model, Specification, step_response};
 
 use super::controllers;
+use super::in_force::InForce;
 use crate::args::Tune;
 use crate::failure::{Failure, exit};
 use crate::output::{print, write_text};
@@ -34,13 +35,15 @@ fn as_json(of: &Tuned) -> String {
 
 /// The process of the arguments, the controllers to choose from and the chosen one.
 fn tuned(arguments: &Tune) -> Result<Tuned, Failure> {
-    let against = arguments.design.against();
-    let asked: Specification = (arguments.noise).complete(arguments.design.specification()?)?;
+    let in_force = InForce::of(&arguments.design, None)?;
+    let against = in_force.against;
+    let asked = in_force.law(arguments.design.specification()?);
+    let asked: Specification = (arguments.noise).complete(asked)?;
     if let Some(known) = arguments.oscillation.known(against.as_ref())? {
-        return of_oscillation(arguments, known, &asked);
+        return of_oscillation(in_force, known, &asked);
     }
     let model = arguments.process.model()?;
-    let choice = controllers::of_model(&model, &asked, against).in_plant(arguments.design.plant());
+    let choice = controllers::of_model(&model, &asked, against).in_plant(in_force.plant);
     Ok(Tuned {
         best: chosen(&choice)?,
         model,
@@ -50,12 +53,15 @@ fn tuned(arguments: &Tune) -> Result<Tuned, Failure> {
 }
 
 /// The processes that agree with an oscillation, and controllers that keep their limits on all of them.
-fn of_oscillation(arguments: &Tune, known: Known, asked: &Specification) -> Result<Tuned, Failure> {
+fn of_oscillation(
+    in_force: InForce,
+    known: Known,
+    asked: &Specification,
+) -> Result<Tuned, Failure> {
     let family = (known.oscillation)
         .family(known.dead_time_share)
         .ok_or_else(|| Failure::usage(none_agrees(&known)))?;
-    let choice = controllers::of_family(&family, asked, arguments.design.against())
-        .in_plant(arguments.design.plant());
+    let choice = controllers::of_family(&family, asked, in_force.against).in_plant(in_force.plant);
     let best = chosen(&choice)?;
     Ok(Tuned {
         model: family.middle,

@@ -69,6 +69,8 @@ impl Values {
         options: &CsvOptions,
     ) -> Result<(Vec<Woven>, Vec<Note>), ReadError> {
         let chosen = self.choose(options)?;
+        let times = |tag: usize| self.tags[tag].values.iter().map(|value| value.0);
+        let is_shared = times(chosen.input).eq(times(chosen.output));
         let mut events: Vec<(f64, u8, f64, u64)> = Vec::new();
         // At one time the input comes before the output.
         let signals = [
@@ -97,17 +99,17 @@ impl Values {
         }
         rows.extend(weave.finish());
         let name = |tag: usize| self.tags[tag].name.clone();
-        let notes = vec![
-            Note::TagsChosen {
-                input: name(chosen.input),
-                output: name(chosen.output),
-                set_point: chosen.set_point.map(name),
-            },
-            Note::Woven {
+        let mut notes = vec![Note::TagsChosen {
+            input: name(chosen.input),
+            output: name(chosen.output),
+            set_point: chosen.set_point.map(name),
+        }];
+        if !is_shared {
+            notes.push(Note::Woven {
                 inputs: weave.inputs,
                 outputs: weave.outputs,
-            },
-        ];
+            });
+        }
         Ok((rows, notes))
     }
 
