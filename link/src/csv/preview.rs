@@ -8,6 +8,7 @@ use super::number::{self, Cell};
 use super::records::Records;
 use super::separator::Separator;
 use super::shape::{self, Group, Shape, is_stamp};
+use super::tags::Signal;
 use super::text::Text;
 use crate::recording::{ColumnLabel, Role};
 use crate::time_unit::TimeUnit;
@@ -286,10 +287,14 @@ impl Preview {
         }
     }
 
-    /// Tags by the shape of the first rows; none where the names of two columns are those of input and output.
+    /// Tags by the shape of the first rows; none where the names of two columns tell input and output.
     fn find_tags(&mut self, text: &Text<'_>) {
         let names = self.names.as_deref().unwrap_or_default();
-        let has = |role| names.iter().any(|name| name.role() == Some(role));
+        let has = |role, signal| {
+            let is_one = |name: &Name| name.role() == Some(role) || name.told() == Some(signal);
+            names.iter().any(is_one)
+        };
+        let has_both = has(Role::Input, Signal::Input) && has(Role::Output, Signal::Output);
         if text.is_long {
             (self.tags, self.value) = (vec![1], Some(2));
             return;
@@ -300,7 +305,7 @@ impl Preview {
                 values: 1..self.width,
             }];
         }
-        if !self.groups.is_empty() || (has(Role::Input) && has(Role::Output)) {
+        if !self.groups.is_empty() || has_both {
             self.tags.clear();
             return;
         }

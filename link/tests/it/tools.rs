@@ -156,6 +156,22 @@ fn arduino() {
     assert!(refusal(b"a:b\nc:d\ne:f\n").contains("no row of numbers"));
 }
 
+// Words in a column are no tags where the names of others tell input and output, even if the input stands still.
+#[test]
+fn a_mode_is_no_tag() {
+    let mode = |i: u32| ["heat", "hold", "cool"][(i / 5 % 3) as usize];
+    let table = rows(|i, _, y| {
+        format!(
+            "2024-03-12 {},{},30,{}",
+            clock(i),
+            mode(i),
+            if i == 50 { y - 9.0 } else { y }
+        )
+    });
+    let recording = read(format!("Date,Mode,Heater power,Temperature\n{table}").as_bytes());
+    assert_eq!(recording.input(), [30.0; ROWS as usize]);
+}
+
 #[test]
 fn esphome() {
     let log = rows(|i, u, y| {
