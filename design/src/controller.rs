@@ -30,7 +30,7 @@ use onecycle_onboard::Pd;
 pub use autopilot::Autopilot;
 pub use execution::{Execution, LowPass};
 pub use pid::{Ideal, Pid, Series};
-pub use vendor::{Spans, TypedGain, Vendor, VendorError};
+pub use vendor::{Spans, TypedGain, Vendor, VendorError, VendorLaw};
 
 /// Form of a controller.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -77,7 +77,7 @@ pub use closed_loop::{
 };
 pub use controller::{
     Autopilot, Controller, Execution, Form, Ideal, LowPass, Pid, Series, Spans, TypedGain, Vendor,
-    VendorError,
+    VendorError, VendorLaw,
 };
 pub use model::{Linear, LinearError, Model, Parameter, Stages, Structure, Unit, state_space};
 pub use soiptd_pd::loop_response::LoopResponse;

@@ -7,6 +7,7 @@ mod log;
 mod parameter_files;
 mod recording;
 mod time_unit;
+mod typed_gains;
 
 pub use altitude_gains::AltitudeCascade;
 pub use csv::{
@@ -28,3 +29,4 @@ pub use recording::{
     Recording, RecordingBuilder, RecordingError, Role,
 };
 pub use time_unit::TimeUnit;
+pub use typed_gains::{TypedGains, typed_gains};

@@ -383,6 +383,11 @@ impl Recording {
         }
     }
 
+    /// Whether it was read from a log or a file of a tool, and not from a table.
+    pub fn is_of_a_tool(&self) -> bool {
+        (self.notes.iter()).any(|note| matches!(note, Note::Format { .. }))
+    }
+
     /// Whether it is a control loop of a flight log.
     pub fn is_of_a_flight_log(&self) -> bool {
         (self.notes.iter()).any(|note| matches!(note, Note::LogSignals { .. }))

@@ -1,8 +1,9 @@
 //! From the requirements on a controller to the controllers of a known process.
 
-use onecycle_design::{Design, Model};
+use onecycle_design::{Design, Model, Pid};
 
 use crate::error::Error;
+use crate::in_force::InForce;
 use crate::request::DesignRequest;
 use crate::results::controllers::{Controllers, Source};
 use crate::results::family::{Known, OfOscillation};
@@ -23,14 +24,23 @@ pub struct DesignReport {
 }
 
 impl DesignRequest {
+    /// The gains in force, if they are given or stand in the file that was named.
+    ///
+    /// # Errors
+    /// One sentence: the file does not tell them.
+    pub fn in_force(&self) -> Result<Option<Pid>, Error> {
+        Ok(InForce::of(&self.requirements, None)?.against)
+    }
+
     /// Designs for a known process.
     ///
     /// # Errors
     /// One sentence: the settings contradict each other, or there is no controller.
     pub fn design(&self, model: Model) -> Result<DesignReport, Error> {
-        let asked = self.specification()?;
-        let choice = Controllers::of_model(&model, &asked, self.requirements.against)
-            .in_plant(self.requirements.plant());
+        let in_force = InForce::of(&self.requirements, None)?;
+        let asked = self.complete(in_force.law(self.requirements.specification()?))?;
+        let choice = Controllers::of_model(&model, &asked, in_force.against);
+        let choice = choice.in_plant(in_force.plant);
         Ok(DesignReport {
             best: chosen(&choice)?,
             model,
@@ -44,12 +54,13 @@ impl DesignRequest {
     /// # Errors
     /// One sentence: no process agrees with it, or there is no controller.
     pub fn design_for_all(&self, known: Known) -> Result<DesignReport, Error> {
-        let asked = self.specification()?;
+        let in_force = InForce::of(&self.requirements, None)?;
+        let asked = self.complete(in_force.law(self.requirements.specification()?))?;
         let family = (known.oscillation)
             .family(known.dead_time_share)
             .ok_or_else(|| Error::Request(none_agrees(&known)))?;
-        let choice = Controllers::of_family(&family, &asked, self.requirements.against)
-            .in_plant(self.requirements.plant());
+        let choice = Controllers::of_family(&family, &asked, in_force.against);
+        let choice = choice.in_plant(in_force.plant);
         let best = chosen(&choice)?;
         Ok(DesignReport {
             model: family.middle,

@@ -271,6 +271,7 @@ mod controllers;
 mod design;
 mod error;
 mod feedback;
+mod in_force;
 #[cfg(feature = "serde")]
 #[doc(hidden)]
 pub mod json;

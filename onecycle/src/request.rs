@@ -31,6 +31,15 @@ pub const HALF_STEP: f64 = 0.5;
 /// Largest size of a pack file (bytes): a thousand times that of a real one.
 pub const MOST_OF_A_PACK: u64 = 1 << 24;
 
+/// Gains in force.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Against {
+    /// As given.
+    Gains(Pid),
+    /// As they stand in a configuration or a log, of this loop.
+    File(PathBuf, Option<String>),
+}
+
 /// Requirements on a controller, and the gains to compare it with.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
@@ -52,20 +61,36 @@ pub struct Requirements {
     /// Sample period of the controller (s); its output leaves one period after the sample.
     pub sample_period_s: Option<f64>,
     /// The gains in force.
-    pub against: Option<Pid>,
-    /// Controller of a process control system that takes the gains.
+    pub against: Option<Against>,
+    /// Controller that takes the gains.
     pub vendor: Option<Vendor>,
-    /// Span of the measurement in that controller.
+    /// Span of the measurement in that controller, if it counts in percent.
     pub output_range: Option<f64>,
-    /// Span of its output. `None`: 100.
+    /// Span of its output, in the unit of the recorded input. `None`: that of the controller.
     pub input_range: Option<f64>,
 }
 
 impl Requirements {
     /// The controller in which the gains are typed, and its ranges.
-    pub(crate) fn plant(&self) -> Option<(Vendor, Spans)> {
-        let output = self.input_range.unwrap_or(100.0);
-        Some((self.vendor?, Spans::new(self.output_range?, output)))
+    pub(crate) fn plant(&self) -> Result<Option<(Vendor, Spans)>, Error> {
+        match self.vendor {
+            Some(vendor) if vendor.has_range_of_measurement() && self.output_range.is_none() => {
+                Err(Error::Request(format!(
+                    "`vendor={}` counts in percent: add the range of its measurement, such as `output_range=0..200`",
+                    vendor.name()
+                )))
+            }
+            None if self.output_range.is_some() => Err(Error::request(
+                "`output_range` is that of a controller: add `vendor`",
+            )),
+            vendor => Ok(vendor.map(|vendor| (vendor, self.spans(vendor)))),
+        }
+    }
+
+    /// The ranges of a controller.
+    pub(crate) fn spans(&self, vendor: Vendor) -> Spans {
+        let output = self.input_range.unwrap_or_else(|| vendor.full_input());
+        Spans::new(self.output_range.unwrap_or(1.0), output)
     }
 
     /// The requirements, without noise.
@@ -73,9 +98,7 @@ impl Requirements {
     /// # Errors
     /// The style has no such limit, or the range of the measurement is missing.
     pub fn specification(&self) -> Result<Specification, Error> {
-        if self.vendor.is_some() != self.output_range.is_some() {
-            return Err(Error::request("give `vendor` and `output_range` together"));
-        }
+        self.plant()?;
         if self.style == Style::Paper {
             return self.paper();
         }
@@ -138,7 +161,7 @@ impl Requirements {
             "input_peak" => put(&mut self.input_peak, values::positive(value)),
             "overshoot" => put(&mut self.overshoot, values::overshoot(value)),
             "sample_period" => put(&mut self.sample_period_s, values::positive(value)),
-            "against" => put(&mut self.against, values::gains(value)),
+            "against" => put(&mut self.against, values::against(value)),
             "vendor" => Vendor::from_name(value)
                 .ok_or("there is no such controller".to_owned())
                 .map(|vendor| self.vendor = Some(vendor)),
@@ -535,7 +558,11 @@ impl DesignRequest {
     /// # Errors
     /// The style does not limit the noise, or the sample period is missing.
     pub fn specification(&self) -> Result<Specification, Error> {
-        let asked = self.requirements.specification()?;
+        self.complete(self.requirements.specification()?)
+    }
+
+    /// Requirements with the noise.
+    pub(crate) fn complete(&self, asked: Specification) -> Result<Specification, Error> {
         let Some(std) = self.noise else {
             return Ok(asked);
         };

@@ -8,6 +8,7 @@ use onecycle_onboard::pack::{Pack, SELF_TEST_TOLERANCE};
 use crate::answer;
 use crate::builder::Identify;
 use crate::error::Error;
+use crate::in_force::InForce;
 use crate::log_gains::{self, LogLoop};
 use crate::report::Report;
 use crate::request::{PackFile, Request};
@@ -26,7 +27,8 @@ impl Request {
     pub fn identify(&self, source: &dyn Source) -> Result<Report, Error> {
         let asked = self.specification()?;
         let (recording, of_log) = self.recording(source, asked)?;
-        self.report(source.name(), recording, of_log, asked)
+        let in_force = InForce::of(&self.requirements, Some((source, &recording)))?;
+        self.report(source.name(), (recording, of_log), asked, in_force)
     }
 
     /// Identifies from a recording in memory; `name` stands in the report.
@@ -34,7 +36,13 @@ impl Request {
     /// # Errors
     /// One sentence: the settings contradict each other.
     pub fn identify_recording(&self, name: &str, recording: Recording) -> Result<Report, Error> {
-        self.report(name.to_owned(), recording, None, self.specification()?)
+        let in_force = InForce::of(&self.requirements, None)?;
+        self.report(
+            name.to_owned(),
+            (recording, None),
+            self.specification()?,
+            in_force,
+        )
     }
 
     /// Identifies every loop of a flight log, each from the parts of the flight worth using.
@@ -105,11 +113,12 @@ impl Request {
     fn report(
         &self,
         name: String,
-        recording: Recording,
-        of_log: Option<LogLoop>,
+        (recording, of_log): (Recording, Option<LogLoop>),
         asked: Specification,
+        set: InForce,
     ) -> Result<Report, Error> {
         self.check_span(recording.time_s())?;
+        let asked = set.law(asked);
         let asked = of_log.as_ref().map_or(asked, |of_log| {
             of_log.specification(asked, self.requirements.controller.is_some())
         });
@@ -121,12 +130,12 @@ impl Request {
         }
         let mut identification = identify.run(&recording);
         let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
-        let against = self.requirements.against.or_else(in_force);
+        let against = set.against.or_else(in_force);
         let identified = identification.outcome.as_ref().ok();
         let choice = identified
             .map(|identified| Controllers::of_identified(identified, against))
-            .map(|choice| choice.in_plant(self.requirements.plant()));
-        let choice = match (&of_log, self.requirements.against, choice) {
+            .map(|choice| choice.in_plant(set.plant));
+        let choice = match (&of_log, set.against, choice) {
             (Some(of_log), None, Some(choice)) if of_log.contradicts(&choice) => {
                 identification.refuse(Verdict::UnstableInForce);
                 None

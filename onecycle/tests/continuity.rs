@@ -25,7 +25,7 @@ struct Columns {
 impl Columns {
     fn read(name: &str) -> Self {
         let path = format!("{}/../examples/{name}", env!("CARGO_MANIFEST_DIR"));
-        let recording = onecycle::read(path, &CsvOptions::default()).unwrap();
+        let recording = onecycle::read(path, &CsvOptions::default()).expect("an example");
         Self {
             time_s: recording.time_s().to_vec(),
             input: recording.input().to_vec(),
@@ -53,13 +53,15 @@ impl Columns {
 }
 
 fn identified(columns: &Columns) -> Identification {
-    let recording =
-        Recording::from_samples(&columns.time_s, &columns.input, &columns.output).unwrap();
+    let recording = Recording::from_samples(&columns.time_s, &columns.input, &columns.output)
+        .expect("rows in order");
     Identify::new().run(&recording)
 }
 
+type Process = (Structure, Vec<(Parameter, f64)>);
+
 /// Structure and parameters, or the kind of the verdict.
-fn answer(found: &Identification) -> Result<(Structure, Vec<(Parameter, f64)>), &'static str> {
+fn answer(found: &Identification) -> Result<Process, &'static str> {
     match &found.outcome {
         Ok(found) => {
             let parameters = found.estimate.iter();
@@ -73,8 +75,8 @@ fn answer(found: &Identification) -> Result<(Structure, Vec<(Parameter, f64)>), 
 
 /// Factor of a parameter if time, input and output are multiplied by these.
 fn factor(parameter: Parameter, structure: Structure, [time, input, output]: [f64; 3]) -> f64 {
-    let integrators = structure.stages().integrators;
-    let per_integration = |more: i32| time.powi(-(i32::try_from(integrators).unwrap() + more));
+    let integrators = structure.stages().integrators as i32;
+    let per_integration = |more: i32| time.powi(-(integrators + more));
     match parameter {
         Parameter::K => output / input * per_integration(0),
         Parameter::KOverTBody => output / input * per_integration(1),

@@ -2,10 +2,11 @@
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
+use onecycle::request::Against;
 use onecycle::request::values::{
-    gain_margin, gains, overshoot, peak, phase_margin, positive, span,
+    against, gain_margin, overshoot, peak, phase_margin, positive, span,
 };
-use onecycle::{DesignRequest, Form, Pid, Requirements, Style};
+use onecycle::{DesignRequest, Form, Requirements, Style};
 use onecycle_design::Vendor;
 
 /// Heading of the requirements on a controller.
@@ -43,18 +44,20 @@ pub(crate) struct DesignArguments {
     #[arg(long, help_heading = CONTROLLER, value_name = "S", allow_negative_numbers = true, value_parser = positive)]
     sample_period: Option<f64>,
     /// Judge these gains of a controller in parallel form too: Kp,Ki,Kd or Kp,Ki,Kd,Tf with the time Tf of the
-    /// measurement filter in seconds
-    #[arg(long, value_name = "KP,KI,KD", allow_hyphen_values = true, value_parser = gains)]
-    against: Option<Pid>,
-    /// Gains as a controller of a process control system takes them, in percent of the ranges: isa, proportional-band,
-    /// interacting, deltav, deltav-series, tdc3000, centum, pide, pide-independent or control-expert
-    #[arg(long, help_heading = CONTROLLER, value_name = "NAME", value_parser = vendor(), requires = "output_range", hide_possible_values = true)]
+    /// measurement filter in seconds; or those in this file: printer.cfg or klippy.log (FILE:extruder), a
+    /// log with M301 or M304, YAML of ESPHome, a sketch of an Arduino
+    #[arg(long, value_name = "KP,KI,KD", allow_hyphen_values = true, value_parser = against)]
+    against: Option<Against>,
+    /// Gains as a controller takes them. In percent of the ranges: isa, proportional-band, interacting, deltav, deltav-series,
+    /// tdc3000, centum, pide, pide-independent or control-expert. In their own units: klipper, marlin, marlin-bed, esphome,
+    /// home-assistant, arduino, wpilib, odrive, simplefoc, codesys, twincat or pid-compact
+    #[arg(long, help_heading = CONTROLLER, value_name = "NAME", value_parser = vendor(), hide_possible_values = true)]
     vendor: Option<Vendor>,
-    /// With --vendor: range of the measurement in the controller, in the unit of the output, such as 0..200
+    /// With --vendor in percent: range of the measurement in the controller, in the unit of the output, such as 0..200
     #[arg(long, help_heading = CONTROLLER, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
     output_range: Option<f64>,
-    /// With --vendor: range of the controller's output, in the unit of the input [default: 0..100]
-    #[arg(long, help_heading = CONTROLLER, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span, requires = "vendor")]
+    /// With --vendor: range of the controller's output, in the unit of the input [default: 0..100; klipper 0..1, marlin 0..127]
+    #[arg(long, help_heading = CONTROLLER, value_name = "LOW..HIGH", allow_hyphen_values = true, value_parser = span)]
     input_range: Option<f64>,
 }
 
@@ -70,7 +73,7 @@ impl DesignArguments {
         asked.input_peak = self.input_peak;
         asked.overshoot = self.overshoot;
         asked.sample_period_s = self.sample_period;
-        asked.against = self.against;
+        asked.against.clone_from(&self.against);
         asked.vendor = self.vendor;
         asked.output_range = self.output_range;
         asked.input_range = self.input_range;

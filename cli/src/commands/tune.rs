@@ -13,8 +13,7 @@ use crate::report::tune as report;
 /// The process of the arguments with its controllers.
 fn tuned(arguments: &Tune) -> Result<DesignReport, Failure> {
     let request = arguments.noise.request(arguments.design.requirements());
-    request.specification()?;
-    let known = (arguments.oscillation).known(request.requirements.against.as_ref())?;
+    let known = (arguments.oscillation).known(request.in_force()?.as_ref())?;
     Ok(match known {
         Some(known) => request.design_for_all(known)?,
         None => request.design(arguments.process.model()?)?,

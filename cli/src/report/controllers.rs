@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use onecycle::{Assessment, Controller, Design, Interval};
-use onecycle_design::{Spans, TypedGain};
+use onecycle_design::{Spans, TypedGain, Vendor};
 
 use super::number::{seconds, short, significant};
 use super::units::Units;
@@ -193,13 +193,13 @@ pub(super) fn in_plant(
 ) -> Option<(&'static str, String)> {
     let (vendor, spans) = choice.plant?;
     let value = match vendor.typed(&controller.pid(), &spans) {
-        Ok(gains) => typed(&gains, &spans),
+        Ok(gains) => typed(vendor, &gains, &spans),
         Err(error) => format!("none: {}", words::no_gains(error)),
     };
     Some((vendor.name(), value))
 }
 
-fn typed(gains: &[TypedGain], spans: &Spans) -> String {
+fn typed(vendor: Vendor, gains: &[TypedGain; 3], spans: &Spans) -> String {
     let is_on = |gain: &&TypedGain| gain.value != 0.0 && gain.value.is_finite();
     let shown = gains.iter().filter(is_on).map(|gain| {
         let value = format!(
@@ -212,6 +212,24 @@ fn typed(gains: &[TypedGain], spans: &Spans) -> String {
     });
     let is_direct = gains.first().is_some_and(|gain| gain.value < 0.0);
     let action = if is_direct { "direct" } else { "reverse" };
+    if !vendor.has_range_of_measurement() {
+        let values = shown.collect::<Vec<_>>().join(", ");
+        let lines = vendor.lines(gains).map_or(values, |lines| {
+            lines.replace('\n', ", ").replace(":, ", ": ")
+        });
+        let reversed = if is_direct {
+            "; the sign of the action is reversed"
+        } else {
+            ""
+        };
+        return match vendor.counts_output() {
+            true => format!(
+                "{lines}; full output is {} in the recording{reversed}",
+                significant(spans.output)
+            ),
+            false => format!("{lines}{reversed}"),
+        };
+    }
     format!(
         "{}; {action} action; measurement span {}, output span {}; without filter and set-point weight",
         shown.collect::<Vec<_>>().join(", "),

@@ -7,6 +7,7 @@ use onecycle::{
     Parameter, Recording, StepIntervals, StepMetrics,
 };
 use onecycle_identify::Reading;
+use onecycle_link::Note;
 
 use super::answer;
 use super::controllers;
@@ -38,7 +39,10 @@ pub(crate) fn card(
     let told = reasons(found).len() + details(found).len();
     let on_card = usize::from(!reasons(found).is_empty());
     let more = (!has_details).then_some(told - on_card);
-    let read = (recording.notes().first())
+    let is_choice =
+        |note: &&Note| matches!(note, Note::ColumnsChosen { .. } | Note::TagsChosen { .. });
+    let chosen = recording.notes().iter().find(is_choice);
+    let read = (chosen.or_else(|| recording.notes().first()))
         .filter(|_| !has_details && !recording.is_of_a_flight_log())
         .map(|note| sentence(&recording::note(note)));
     let titles = (title, read.as_deref());

@@ -64,17 +64,20 @@ fn binary_files() {
     };
     let noise: Vec<u8> = (0..50_000).map(|_| random()).collect();
     let with = |magic: &[u8]| [magic, &noise].concat();
-    let files: [(Vec<u8>, &str); 6] = [
+    let files: [(Vec<u8>, &str); 5] = [
         (noise.clone(), "binary data"),
         (with(b"\x89PNG\r\n\x1a\n"), "a PNG image"),
         (with(b"\x1f\x8b\x08\x00"), "a gzip archive"),
         (with(b"\x7fELF\x02\x01\x01"), "a program"),
         (with(b"PK\x03\x04"), "a zip archive"),
-        (b"{\"time\": [0, 1]}".to_vec(), "JSON"),
     ];
     for (bytes, looks_like) in files {
         identify(&bytes, &[]).refused(UNREADABLE, &[looks_like, "export the recording as CSV"]);
     }
+    identify(b"{\"time\": 0}", &[])
+        .refused(UNREADABLE, &["the JSON has no table", "one on each line"]);
+    identify(b"{\"time\": [0,", &[])
+        .refused(UNREADABLE, &["line 1 is no JSON: the file is cut off"]);
 }
 
 #[test]
@@ -232,9 +235,7 @@ fn all_stamps_the_same() {
 
 #[test]
 fn a_time_of_day() {
-    let text = Table::clean().csv_of("time,pv,u", |sample| {
-        format!("12:30:{:06.3}", sample.time_s)
-    });
+    let text = Table::clean().csv_of("time,pv,u", |sample| format!("12:{:02.0}", sample.time_s));
     let text = text.replace('"', "");
     identify(text, &[]).refused(UNREADABLE, &["line 2", "time of day", "export seconds"]);
 }

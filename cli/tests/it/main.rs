@@ -20,6 +20,7 @@ mod documentation;
 mod flight_log_gains;
 mod flight_logs;
 mod fly;
+mod heaters;
 mod imports;
 mod json_schema;
 mod library;

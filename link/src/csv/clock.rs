@@ -2,10 +2,12 @@
 
 use std::fmt;
 
-use super::date::{self, Calendar, Date};
+use super::date::{self, Calendar, Date, Days};
 use super::number::{self, Cell};
 use crate::recording::{FAR_START_S, Note};
 use crate::time_unit::TimeUnit;
+
+const SECOND_NS: i64 = 1_000_000_000;
 
 /// A time stamp as in the file. Integers stay exact: microseconds since 1970 need all digits.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -13,6 +15,8 @@ pub(super) enum Stamp {
     Whole(i64),
     Real(f64),
     Date(Date),
+    /// Time of day (ns).
+    OfDay(i64),
 }
 
 impl fmt::Display for Stamp {
@@ -21,6 +25,15 @@ impl fmt::Display for Stamp {
             Self::Whole(stamp) => write!(f, "{stamp}"),
             Self::Real(stamp) => write!(f, "{stamp:?}"),
             Self::Date(date) => write!(f, "{date}"),
+            Self::OfDay(ns) => {
+                let (seconds, ns) = (ns.div_euclid(SECOND_NS), ns.rem_euclid(SECOND_NS));
+                let (hours, minutes) = (seconds / 3600, seconds / 60 % 60);
+                write!(f, "{hours:02}:{minutes:02}:{:02}", seconds % 60)?;
+                if ns > 0 {
+                    write!(f, ".{}", format!("{ns:09}").trim_end_matches('0'))?;
+                }
+                Ok(())
+            }
         }
     }
 }
@@ -34,6 +47,8 @@ pub(super) struct Clock {
     origin: i64,
     /// Counts from the first date, if the stamps are dates.
     calendar: Option<Calendar>,
+    /// Counts from the first time of day, if the stamps are these.
+    days: Option<Days>,
 }
 
 impl Clock {
@@ -43,6 +58,7 @@ impl Clock {
             started: false,
             origin: 0,
             calendar: None,
+            days: None,
         }
     }
 
@@ -62,6 +78,12 @@ impl Clock {
                 let first = date.to_string();
                 Some(Note::CountedFromFirst { first })
             }
+            Stamp::OfDay(ns) => {
+                self.days = Some(Days::new(ns));
+                Some(Note::TimeOfDay {
+                    first: first.to_string(),
+                })
+            }
             _ => None,
         }
     }
@@ -71,7 +93,12 @@ impl Clock {
     /// # Errors
     /// A date that does not exist, a date in a column of numbers, or a number in a column of dates.
     pub(super) fn seconds(&mut self, stamp: Stamp) -> Result<f64, date::Fault> {
+        if let (Stamp::OfDay(ns), Some(days)) = (stamp, &mut self.days) {
+            return Ok(TimeUnit::Nanoseconds.seconds(days.since_first_ns(ns) as f64));
+        }
         let time = match (stamp, &mut self.calendar) {
+            (Stamp::Real(stamp), _) if stamp.is_nan() => stamp,
+            _ if self.days.is_some() => return Err(date::Fault::NoSuchDay),
             (Stamp::Date(date), Some(calendar)) => {
                 let since_ns = calendar.since_first_ns(&date)?;
                 return Ok(TimeUnit::Nanoseconds.seconds(since_ns as f64));
@@ -81,9 +108,8 @@ impl Clock {
                 None => stamp as f64 - self.origin as f64,
             },
             (Stamp::Real(stamp), None) => stamp - self.origin as f64,
-            (Stamp::Real(stamp), Some(_)) if stamp.is_nan() => stamp,
             (_, Some(_)) => return Err(date::Fault::NoSuchDay),
-            (Stamp::Date(_), None) => return Err(date::Fault::AmongNumbers),
+            (Stamp::Date(_) | Stamp::OfDay(_), None) => return Err(date::Fault::AmongNumbers),
         };
         Ok(self.unit.seconds(time))
     }
@@ -95,9 +121,14 @@ pub(super) fn parse(cell: &[u8]) -> Option<(Stamp, number::Mark)> {
         return Some((Stamp::Whole(stamp), number::Mark::None));
     }
     match number::parse(cell) {
+        Cell::Number(_, number::Mark::Word) => None,
         Cell::Number(stamp, mark) => Some((Stamp::Real(stamp), mark)),
         Cell::Missing | Cell::Bad => Some((Stamp::Real(f64::NAN), number::Mark::None)),
-        Cell::Text => date::parse(cell).map(|date| (Stamp::Date(date), number::Mark::None)),
+        Cell::Text => {
+            let of_day = || date::of_day(cell).map(Stamp::OfDay);
+            let stamp = date::parse(cell).map(Stamp::Date).or_else(of_day);
+            stamp.map(|stamp| (stamp, number::Mark::None))
+        }
     }
 }
 

@@ -3,29 +3,24 @@
 //! 1. As the options say.
 //! 2. By name: `t`, `time`, ...; `u`, `input`, `relay`, ...; `y`, `pv`, `output`, ...
 //!    With tags such as `LIC101.PV` and `LIC101.OP`, those of the only loop, or of the loop that the options name.
+//!    Dates win over a column of numbers named `time` that disagrees with them.
 //! 3. Else, time is the column of dates; without a header, it is the first column.
 //! 4. If one signal and one column are left, they belong together.
-//! 5. If input, output and two columns are left, the input is the column with 2 to 8 different
+//! 5. By a word of the name, if one column only has one of each: `heater_percent`, `bed temperature`.
+//! 6. If input, output and two columns are left, the input is the column with 2 to 8 different
 //!    values, provided that the other column has at least three times as many.
-
-use std::collections::HashSet;
 
 use super::error::{ReadError, quoted};
 use super::long::Loop;
+use super::meaning;
 use super::names::{Name, key};
 use super::options::{ColumnRef, CsvOptions};
 use super::preview::Preview;
 use super::tags::{self, Signal};
 use crate::recording::{ChosenBy, ColumnLabel, Note, Role};
 
-/// Maximum number of different values of a relay: two levels, and some for start, end and bias.
-const MOST_LEVELS: usize = 8;
-
-/// The output must take at least this many times the values of the input.
-const MORE_VALUES: usize = 3;
-
 /// The columns to read, from 0.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub(super) struct Choice {
     /// `None` if the sample rate is given.
     pub(super) time: Option<usize>,
@@ -38,6 +33,8 @@ pub(super) struct Choice {
     pub(super) status: Vec<usize>,
     /// A time column that is not read because the sample rate is given.
     pub(super) ignored: Option<usize>,
+    /// What else was chosen.
+    pub(super) notes: Vec<Note>,
     by: ChosenBy,
 }
 
@@ -59,63 +56,63 @@ pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, 
         let found = wanted.as_ref().map(|wanted| find(wanted, role, preview));
         found.transpose()
     };
-    let mut time = match timed {
-        true => by_option(&options.time_column, Role::Time)?,
-        false => None,
-    };
+    let mut notes = vec![];
+    let time_column = options.time_column.clone().filter(|_| timed);
+    let mut time = by_option(&time_column, Role::Time)?;
     let mut input = by_option(&options.input_column, Role::Input)?;
     let mut output = by_option(&options.output_column, Role::Output)?;
-    let split = preview.split.filter(|_| timed && time.is_none());
-    let (date, time_of_day) = split.unzip();
+    let (date, time_of_day) = preview.split.filter(|_| timed && time.is_none()).unzip();
     time = time.or(date);
     check_distinct(time, input, output, preview)?;
     let all_given = input.is_some() && output.is_some() && (time.is_some() || !timed);
 
     let names = preview.names.as_deref().unwrap_or_default();
-    let found = Loop::choose(names, [input, output], options)?;
+    let activity = |column| preview.activity(column);
+    let found = Loop::choose(names, [input, output], options, &activity)?;
     let of_loop = |signal| found.as_ref().and_then(|found| found.of(signal));
     input = input.or_else(|| of_loop(Signal::Input));
     output = output.or_else(|| of_loop(Signal::Output));
 
     let given = [time, input, output, time_of_day];
-    let by_name = |role| named(preview, role, &given, found.is_none());
-    for (column, role) in [(&mut input, Role::Input), (&mut output, Role::Output)] {
-        if column.is_none() {
-            *column = single(by_name(role), role, preview)?;
-        }
+    let by_name = &|role| named(preview, role, &given, found.is_none());
+    if let (None, None, Some((out, pv))) = (input, output, meaning::out_beside_pv(names, by_name)) {
+        (input, output) = (Some(out), Some(pv));
     }
+    let one = |role| single(by_name(role), role, preview);
+    input = input.map_or_else(|| one(Role::Input), |input| Ok(Some(input)))?;
+    output = output.map_or_else(|| one(Role::Output), |output| Ok(Some(output)))?;
     let unnamed = unnamed_time(preview, input, output);
     let mut ignored = None;
     if !timed {
         ignored = by_name(Role::Time).first().copied().or(unnamed);
     } else if time.is_none() {
-        time = single(by_name(Role::Time), Role::Time, preview)?.or(unnamed);
-    }
-    if timed {
+        let named = meaning::by_dates(preview, by_name(Role::Time), &mut notes);
+        time = single(named, Role::Time, preview)?.or(unnamed);
         check_clock_time(preview, time)?;
     }
 
     let taken = [time, input, output, ignored, time_of_day];
     let left = free(preview, &taken);
-    let mut by_values = false;
-    match (timed && time.is_none(), input, output, left.as_slice()) {
-        (true, Some(_), Some(_), &[only]) => time = Some(only),
-        (false, None, Some(_), &[only]) => input = Some(only),
-        (false, Some(_), None, &[only]) => output = Some(only),
-        (false, None, None, &[a, b]) => {
-            let (relay, other) = tell_apart(preview, a, b)?;
-            (input, output) = (Some(relay), Some(other));
-            by_values = true;
-        }
-        _ => {}
+    let mut by = None;
+    match (timed && time.is_none(), input.and(output), left.as_slice()) {
+        (true, Some(_), &[only]) => time = Some(only),
+        (true, ..) => {}
+        (false, ..) => by = meaning::complete(preview, &left, [&mut input, &mut output])?,
     }
     let unknown = |role| unknown(role, preview);
-    if timed && (time.is_none() || (preview.width == 2 && preview.names.is_none())) {
+    let is_bare = preview.width == 2 && preview.names.is_none();
+    if timed && (time.is_none() || is_bare) {
         return Err(unknown(Role::Time));
     }
     let set_point = by_option(&options.set_point_column, Role::Output)?
         .or_else(|| of_loop(Signal::SetPoint))
-        .or_else(|| only_set_point(names));
+        .or_else(|| only_set_point(names))
+        .or_else(|| meaning::only(names, &left, Signal::SetPoint));
+    let is_free = options.input_column.is_none() && options.output_column.is_none();
+    if is_free && let Some(note) = meaning::of_controller(preview, [input, output], set_point)? {
+        notes.push(note);
+        std::mem::swap(&mut input, &mut output);
+    }
     Ok(Choice {
         time,
         input: input.ok_or_else(|| unknown(Role::Input))?,
@@ -124,16 +121,17 @@ pub(super) fn choose(preview: &Preview, options: &CsvOptions) -> Result<Choice, 
         time_of_day,
         status: status_of(names, &[time, input, output]),
         ignored,
-        by: chosen_by(preview, all_given, by_values),
+        notes,
+        by: chosen_by(preview, all_given, by),
     })
 }
 
-fn chosen_by(preview: &Preview, all_given: bool, by_values: bool) -> ChosenBy {
-    match preview.names {
+fn chosen_by(preview: &Preview, all_given: bool, by: Option<ChosenBy>) -> ChosenBy {
+    match (preview.names.is_some(), by) {
         _ if all_given => ChosenBy::Caller,
-        _ if by_values => ChosenBy::Values,
-        Some(_) => ChosenBy::Name,
-        None => ChosenBy::Position,
+        (_, Some(by)) => by,
+        (true, None) => ChosenBy::Name,
+        (false, None) => ChosenBy::Position,
     }
 }
 
@@ -172,29 +170,36 @@ fn status_of(names: &[Name], chosen: &[Option<usize>]) -> Vec<usize> {
         .collect()
 }
 
-/// The columns of a table of one value a row: time, value, and the status.
-pub(super) fn choose_long(preview: &Preview, tags: usize) -> Result<Choice, ReadError> {
+/// The columns of a table of one value a row: time, value, and the status; of groups of columns: the first time and value.
+pub(super) fn choose_long(preview: &Preview) -> Result<Choice, ReadError> {
     let names = preview.names.as_deref().unwrap_or_default();
     let is_status = |column: usize| {
         names
             .get(column)
             .is_some_and(|name| tags::status_of(&name.full).is_some())
     };
-    let (time, time_of_day) = match preview.split {
-        Some((date, of_day)) => (Some(date), Some(of_day)),
-        None => {
-            let named = named(preview, Role::Time, &[Some(tags)], false)
+    let mut notes = vec![];
+    let tags: Vec<Option<usize>> = preview.tags.iter().copied().map(Some).collect();
+    let (time, time_of_day) = match (preview.groups.first(), preview.split) {
+        (Some(group), _) => (Some(group.time), None),
+        (None, Some((date, of_day))) => (Some(date), Some(of_day)),
+        (None, None) => {
+            let named = named(preview, Role::Time, &tags, false);
+            let named = meaning::by_dates(preview, named, &mut notes)
                 .first()
                 .copied();
+            let first_tag = preview.tags.first().copied();
             (
-                named.or_else(|| unnamed_time(preview, Some(tags), None)),
+                named.or_else(|| unnamed_time(preview, first_tag, None)),
                 None,
             )
         }
     };
     check_clock_time(preview, time)?;
     let free = |column: &usize| {
-        ![time, time_of_day, Some(tags)].contains(&Some(*column)) && !is_status(*column)
+        ![time, time_of_day].contains(&Some(*column))
+            && !preview.tags.contains(column)
+            && !is_status(*column)
     };
     let by_name = (0..preview.width).filter(free).find(|&column| {
         names
@@ -202,19 +207,24 @@ pub(super) fn choose_long(preview: &Preview, tags: usize) -> Result<Choice, Read
             .is_some_and(|name| name.role() == Some(Role::Output))
     });
     let has_numbers = |column: &usize| preview.column(*column).any(f64::is_finite);
-    let value = by_name.or_else(|| (0..preview.width).filter(free).find(has_numbers));
+    let first = || (0..preview.width).filter(free).find(has_numbers);
     let unknown = |role| unknown(role, preview);
+    let value = preview.value.or(by_name).or_else(first);
     let value = value.ok_or_else(|| unknown(Role::Output))?;
+    let status = (0..preview.width).filter(|&column| is_status(column));
     Ok(Choice {
         time: Some(time.ok_or_else(|| unknown(Role::Time))?),
         input: value,
         output: value,
         set_point: None,
         time_of_day,
-        status: (0..preview.width)
-            .filter(|&column| is_status(column))
-            .collect(),
+        status: if preview.groups.is_empty() {
+            status.collect()
+        } else {
+            vec![]
+        },
         ignored: None,
+        notes,
         by: ChosenBy::Name,
     })
 }
@@ -342,28 +352,6 @@ fn unnamed_time(preview: &Preview, input: Option<usize>, output: Option<usize>) 
     let rises = stamps.clone().is_sorted();
     let changes = preview.width > 2 || stamps.clone().min_by(f64::total_cmp) != stamps.last();
     (free && rises && changes).then_some(0)
-}
-
-/// Tells input and output of two columns apart by their number of different values.
-fn tell_apart(preview: &Preview, a: usize, b: usize) -> Result<(usize, usize), ReadError> {
-    let values = |column| {
-        let bits = preview
-            .column(column)
-            .filter(|value| !value.is_nan())
-            .map(f64::to_bits);
-        bits.collect::<HashSet<u64>>().len()
-    };
-    let (values_a, values_b) = (values(a), values(b));
-    let is_relay = |few, many| (2..=MOST_LEVELS).contains(&few) && many >= MORE_VALUES * few;
-    if is_relay(values_a, values_b) {
-        Ok((a, b))
-    } else if is_relay(values_b, values_a) {
-        Ok((b, a))
-    } else {
-        Err(ReadError::InputOrOutput {
-            columns: [preview.label(a), preview.label(b)],
-        })
-    }
 }
 
 fn unknown(role: Role, preview: &Preview) -> ReadError {

@@ -182,6 +182,41 @@ pub(super) fn parse(cell: &[u8]) -> Option<Date> {
     (is_date && exists).then_some(date)
 }
 
+/// `8:00:01`, `08:00:01,5`, `1:00:01 PM`: the time of day in a cell, or the time since a start, in ns. Two numbers are
+/// none: `8:00` may be minutes and seconds.
+pub(super) fn of_day(cell: &[u8]) -> Option<i64> {
+    let text = std::str::from_utf8(number::bare(cell)).ok()?;
+    let has_seconds = text.bytes().filter(|&byte| byte == b':').count() == 2;
+    has_seconds.then(|| of_day_ns(text))?
+}
+
+/// Adds the days that times of day leave out.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Days {
+    before_ns: i64,
+    since_ns: i64,
+}
+
+impl Days {
+    pub(super) fn new(first_ns: i64) -> Self {
+        Self {
+            before_ns: first_ns,
+            since_ns: 0,
+        }
+    }
+
+    /// Time since the first one (ns). A time of day more than half a day earlier than the one before is of the next day.
+    pub(super) fn since_first_ns(&mut self, of_day_ns: i64) -> i64 {
+        let step_ns = of_day_ns - self.before_ns;
+        let is_next = step_ns < -DAY_NS / 2;
+        self.before_ns = of_day_ns;
+        self.since_ns = self
+            .since_ns
+            .saturating_add(step_ns + if is_next { DAY_NS } else { 0 });
+        self.since_ns
+    }
+}
+
 /// A date and a time of day of two cells, as one.
 pub(super) fn joined(date: &[u8], of_day: &[u8]) -> Vec<u8> {
     [number::bare(date), b" ", number::bare(of_day)].concat()
@@ -389,6 +424,32 @@ mod tests {
             "2024-01-31T12:00+\u{20ac}1",
         ] {
             assert_eq!(parse(text.as_bytes()), None, "{text}");
+        }
+    }
+
+    // One second over midnight; back by less than half a day is back.
+    #[test]
+    fn times_of_day() {
+        assert_eq!(of_day(b"08:00:01.5"), Some(28_801_500_000_000));
+        assert_eq!(of_day(b"1:00:00 PM"), Some(46_800_000_000_000));
+        for text in [
+            "08:00",
+            "25:00:00",
+            "08:00:61",
+            "8:0:0:0",
+            "2024-01-31 08:00:01",
+        ] {
+            assert_eq!(of_day(text.as_bytes()), None, "{text}");
+        }
+        let ns = |text: &str| of_day(text.as_bytes()).unwrap();
+        let mut days = Days::new(ns("23:59:59"));
+        for (text, since_s) in [
+            ("23:59:59", 0),
+            ("0:00:00", 1),
+            ("11:00:00", 39_601),
+            ("10:00:00", 36_001),
+        ] {
+            assert_eq!(days.since_first_ns(ns(text)), since_s * SECOND_NS, "{text}");
         }
     }
 

@@ -40,7 +40,7 @@ pub(super) fn detect(head: &[u8], whole: bool) -> Result<Separator, ReadError> {
 struct Score {
     /// Number of cells that are numbers or dates, in rows of at least two cells.
     numbers: usize,
-    /// Number of cells.
+    /// Number of cells that are not empty.
     cells: usize,
     /// Number of rows of at least two cells.
     rows: usize,
@@ -52,11 +52,20 @@ impl Score {
         let mut records = Records::new(text, separator);
         for _ in 0..LOOK_ROWS {
             let Some(row) = records.next()? else { break };
-            score.cells += row.cells.len();
+            // A signal with a sample time of its own leaves cells empty.
+            score.cells += row
+                .cells
+                .iter()
+                .filter(|cell| !number::bare(cell).is_empty())
+                .count();
             if row.cells.len() > 1 {
                 let is_number = |cell: &&[u8]| match number::parse(cell) {
                     Cell::Number(..) => true,
-                    Cell::Text => date::parse(cell).is_some(),
+                    Cell::Text => {
+                        date::parse(cell).is_some()
+                            || date::of_day(cell).is_some()
+                            || number::with_unit(cell).is_some()
+                    }
                     Cell::Missing | Cell::Bad => false,
                 };
                 score.numbers += row.cells.iter().filter(is_number).count();

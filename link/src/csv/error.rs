@@ -52,6 +52,36 @@ pub enum ReadError {
         /// Names of its first variables.
         found: Vec<String>,
     },
+    /// A file that is read as a whole is too large.
+    #[error("the file is larger than {limit_mb} MB")]
+    TooLarge {
+        /// Largest size, in megabytes.
+        limit_mb: usize,
+    },
+    /// The text begins like JSON and is none.
+    #[error("line {line} is no JSON{}", if *.is_cut { ": the file is cut off" } else { "" })]
+    BadJson {
+        /// Line in the file, from 1.
+        line: u64,
+        /// Whether the text ends too early.
+        is_cut: bool,
+    },
+    /// JSON without rows or lists of numbers.
+    #[error(
+        "the JSON has no table: neither rows as objects, nor lists of one length, nor a history that is known"
+    )]
+    JsonNoTable,
+    /// A log of a printer with temperatures only.
+    #[error(
+        "the log has the temperatures and not the power of the heaters (`@:`), as RepRapFirmware writes it"
+    )]
+    NoPower,
+    /// A log or a measurement file without numbers.
+    #[error("the {format} has no channel of numbers")]
+    NoNumbers {
+        /// What the file is.
+        format: &'static str,
+    },
     /// A NUL byte in the middle of the text.
     #[error("line {line} holds a NUL byte, so the file is damaged")]
     NulByte {
@@ -222,6 +252,25 @@ pub enum ReadError {
     InputOrOutput {
         /// The two columns.
         columns: [ColumnLabel; 2],
+    },
+    /// A column named `Input` is the measurement for Arduino's PID libraries, and the input of the process elsewhere.
+    #[error(
+        "{} and {} may be input and output of the process, or of the controller, as Arduino's PID libraries name them",
+        .columns[0], .columns[1]
+    )]
+    InputOfWhat {
+        /// The columns `Input` and `Output`.
+        columns: [ColumnLabel; 2],
+    },
+    /// The cells of a column have different units.
+    #[error("line {line}, {column}: \"{text}\" has another unit than the cells before it")]
+    MixedUnits {
+        /// Line in the file, from 1.
+        line: u64,
+        /// Column.
+        column: ColumnLabel,
+        /// The cell.
+        text: String,
     },
     /// The caller chose one column for two signals.
     #[error("{column} cannot be both the {first} and the {second}")]

@@ -69,6 +69,8 @@ impl Values {
         options: &CsvOptions,
     ) -> Result<(Vec<Woven>, Vec<Note>), ReadError> {
         let chosen = self.choose(options)?;
+        let times = |tag: usize| self.tags[tag].values.iter().map(|value| value.0);
+        let is_shared = times(chosen.input).eq(times(chosen.output));
         let mut events: Vec<(f64, u8, f64, u64)> = Vec::new();
         // At one time the input comes before the output.
         let signals = [
@@ -97,17 +99,17 @@ impl Values {
         }
         rows.extend(weave.finish());
         let name = |tag: usize| self.tags[tag].name.clone();
-        let notes = vec![
-            Note::TagsChosen {
-                input: name(chosen.input),
-                output: name(chosen.output),
-                set_point: chosen.set_point.map(name),
-            },
-            Note::Woven {
+        let mut notes = vec![Note::TagsChosen {
+            input: name(chosen.input),
+            output: name(chosen.output),
+            set_point: chosen.set_point.map(name),
+        }];
+        if !is_shared {
+            notes.push(Note::Woven {
                 inputs: weave.inputs,
                 outputs: weave.outputs,
-            },
-        ];
+            });
+        }
         Ok((rows, notes))
     }
 
@@ -115,26 +117,51 @@ impl Values {
         let names: Vec<Name> = self.tags.iter().map(|tag| Name::parse(&tag.name)).collect();
         let given = |wanted: &Option<ColumnRef>, role| match wanted {
             Some(ColumnRef::Name(wanted)) => (names.iter())
-                .position(|name| key(&name.full) == key(wanted))
+                .position(|name| name.full == *wanted)
+                .or_else(|| names.iter().position(|name| key(&name.full) == key(wanted)))
                 .map(Some)
                 .ok_or_else(|| self.unknown(role)),
-            _ => Ok(None),
+            // Tags have no numbers.
+            Some(ColumnRef::Number(_)) => Err(self.unknown(role)),
+            None => Ok(None),
         };
         let input = given(&options.input_column, Role::Input)?;
         let output = given(&options.output_column, Role::Output)?;
-        let found = Loop::choose(&names, [input, output], options)?;
-        let single = |signal| {
-            let mut all = (0..names.len()).filter(|&tag| names[tag].signal() == Some(signal));
+        let set_point = given(&options.set_point_column, Role::Output)?;
+        let activity =
+            |tag: usize| Activity::of(self.tags[tag].values.iter().map(|(_, value, _)| *value));
+        let found = Loop::choose(&names, [input, output], options, &activity)?;
+        let free = |tag: &usize| ![input, output, set_point].contains(&Some(*tag));
+        let only = |is: &dyn Fn(usize) -> bool| {
+            let mut all = (0..names.len()).filter(free).filter(|tag| is(*tag));
             all.next().filter(|_| all.next().is_none())
+        };
+        let single = |signal| {
+            only(&|tag| names[tag].signal() == Some(signal))
+                .or_else(|| only(&|tag| names[tag].told() == Some(signal)))
         };
         let of = |given: Option<usize>, signal| {
             let of_loop = || found.as_ref().and_then(|of| of.of(signal));
             given.or_else(of_loop).or_else(|| single(signal))
         };
+        let set_point = of(set_point, Signal::SetPoint);
+        let (input, output) = (of(input, Signal::Input), of(output, Signal::Output));
+        // If one signal and one tag are left, they belong together.
+        let left = |known: Option<usize>| {
+            let is_left = |tag: usize| Some(tag) != known && Some(tag) != set_point;
+            let is_told = |tag: usize| names[tag].told().is_some();
+            known
+                .and_then(|_| only(&is_left))
+                .filter(|tag| !is_told(*tag))
+        };
+        let (input, output) = (
+            input.or_else(|| left(output)),
+            output.or_else(|| left(input)),
+        );
         Ok(Chosen {
-            input: of(input, Signal::Input).ok_or_else(|| self.unknown(Role::Input))?,
-            output: of(output, Signal::Output).ok_or_else(|| self.unknown(Role::Output))?,
-            set_point: of(None, Signal::SetPoint),
+            input: input.ok_or_else(|| self.unknown(Role::Input))?,
+            output: output.ok_or_else(|| self.unknown(Role::Output))?,
+            set_point,
         })
     }
 
@@ -142,6 +169,27 @@ impl Values {
         ReadError::UnknownTag {
             role,
             tags: self.tags.iter().map(|tag| tag.name.clone()).collect(),
+        }
+    }
+}
+
+/// What a signal does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Activity {
+    /// It is zero all the time.
+    Off,
+    /// It is not zero, and does not change.
+    On,
+    /// It changes.
+    Moves,
+}
+
+impl Activity {
+    pub(super) fn of(mut values: impl Iterator<Item = f64>) -> Self {
+        match values.next() {
+            Some(first) if values.any(|value| value != first) => Self::Moves,
+            Some(first) if first != 0.0 => Self::On,
+            _ => Self::Off,
         }
     }
 }
@@ -180,11 +228,13 @@ impl Loop {
         all
     }
 
-    /// The loop that the caller names, or else the only one with input and output. `None` if no name tells a loop.
+    /// The loop that the caller names, or else the only one with input and output, or of several the only one whose input
+    /// moves or is on. `None` if no name tells a loop.
     pub(super) fn choose(
         names: &[Name],
         [input, output]: [Option<usize>; 2],
         options: &CsvOptions,
+        activity: &dyn Fn(usize) -> Activity,
     ) -> Result<Option<Self>, ReadError> {
         let all = Self::all(names);
         let is_complete =
@@ -215,9 +265,20 @@ impl Loop {
             [] => Ok(None),
             _ if input.is_some() && output.is_some() => Ok(None),
             _ if is_plain(Role::Input) && is_plain(Role::Output) => Ok(None),
-            loops => Err(ReadError::SeveralLoops {
-                loops: named(loops),
-            }),
+            loops => {
+                // The only one whose input moves; else the only one that is on.
+                let only = |least| {
+                    let is = |of: &&Self| of.of(Signal::Input).map(activity) >= Some(least);
+                    let mut found = loops.iter().filter(is);
+                    found.next().filter(|_| found.next().is_none())
+                };
+                let found = only(Activity::Moves).or_else(|| only(Activity::On));
+                found
+                    .map(|found| Some(found.clone()))
+                    .ok_or_else(|| ReadError::SeveralLoops {
+                        loops: named(loops),
+                    })
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use crate::recording::{Column, Role};
 use crate::time_unit::TimeUnit;
 
 /// Usual names of the time, in lower case, words joined by `_`, without unit.
-const TIME: [&str; 18] = [
+const TIME: [&str; 24] = [
     "t",
     "time",
     "timestamp",
@@ -21,7 +21,13 @@ const TIME: [&str; 18] = [
     "elapsed_time",
     "time_elapsed",
     "time_since_boot",
+    "second",
     "seconds",
+    "sec",
+    "ms",
+    "us",
+    "x_axis",
+    "x_value",
     "millis",
     "micros",
 ];
@@ -97,7 +103,7 @@ const OUTPUT: [&str; 25] = [
 ];
 
 /// Units other than those of time: at the end of a name after `_`, or in a row of units.
-const UNITS: [&str; 77] = [
+const UNITS: [&str; 91] = [
     "rad",
     "deg",
     "rad/s",
@@ -175,7 +181,91 @@ const UNITS: [&str; 77] = [
     "counts",
     "raw",
     "none",
+    "volt",
+    "volts",
+    "mvolt",
+    "amp",
+    "amps",
+    "ampere",
+    "amperes",
+    "watt",
+    "watts",
+    "celsius",
+    "kelvin",
+    "hpa",
+    "degree",
+    "degrees",
 ];
+
+/// Words of names that tell the input of a process: what acts. They count only where no usual name tells.
+const ACTS: [&str; 25] = [
+    "heater",
+    "heating",
+    "power",
+    "duty",
+    "pwm",
+    "valve",
+    "pump",
+    "throttle",
+    "volt",
+    "volts",
+    "voltage",
+    "actuator",
+    "relay",
+    "switch",
+    "cmd",
+    "command",
+    "burner",
+    "effort",
+    "op",
+    "mv",
+    "co",
+    "dac",
+    "ventil",
+    "stellwert",
+    "stellgr\u{f6}\u{df}e",
+];
+/// Words of names that tell the output of a process: what is measured.
+const MEASURED: [&str; 25] = [
+    "temperature",
+    "temp",
+    "level",
+    "pressure",
+    "flow",
+    "speed",
+    "velocity",
+    "position",
+    "angle",
+    "humidity",
+    "thermocouple",
+    "probe",
+    "rpm",
+    "height",
+    "ph",
+    "encoder",
+    "pv",
+    "adc",
+    "measured",
+    "actual",
+    "feedback",
+    "temperatur",
+    "druck",
+    "drehzahl",
+    "istwert",
+];
+/// Words of names that tell a set-point.
+const WANTED: [&str; 8] = [
+    "setpoint",
+    "target",
+    "desired",
+    "reference",
+    "sp",
+    "sollwert",
+    "soll",
+    "wanted",
+];
+/// Words of names that say that an `output` or `out` is that of a controller.
+const CONTROLS: [&str; 6] = ["pid", "controller", "control", "ctrl", "regler", "loop"];
 
 /// A name in a header.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -251,11 +341,29 @@ impl Name {
         }
     }
 
+    /// The signal that the words of the name tell, where it is no usual name: the last word that tells one, so
+    /// that `heater_temperature` is a temperature; a set-point in any place.
+    pub(super) fn told(&self) -> Option<Signal> {
+        let words = words(&self.bare);
+        let has = |known: &[&str]| words.iter().any(|word| known.contains(&word.as_str()));
+        if has(&WANTED) || key(&self.bare).contains("set_point") {
+            return Some(Signal::SetPoint);
+        }
+        if has(&["output", "out"]) && has(&CONTROLS) {
+            return Some(Signal::Input);
+        }
+        words.iter().rev().find_map(|word| match word.as_str() {
+            word if ACTS.contains(&word) => Some(Signal::Input),
+            word if MEASURED.contains(&word) => Some(Signal::Output),
+            _ => None,
+        })
+    }
+
     /// The unit of time that the name gives, also in names such as `seconds` or `millis`.
     pub(super) fn time_unit(&self) -> Option<TimeUnit> {
         match &self.unit {
             Some(unit) => TimeUnit::from_name(unit),
-            None if self.bare.len() > 2 => TimeUnit::from_name(&self.bare),
+            None if self.bare.len() > 1 => TimeUnit::from_name(&self.bare),
             None => None,
         }
     }
@@ -284,7 +392,29 @@ pub(super) fn key(name: &str) -> String {
     words.collect::<Vec<_>>().join("_")
 }
 
-fn is_known_unit(unit: &str) -> bool {
+/// The words of a name in lower case, without digits at their ends: `fTemp` is `f` and `temp`.
+fn words(name: &str) -> Vec<String> {
+    let mut words = vec![String::new()];
+    let mut was_lower = false;
+    for c in name.chars() {
+        let is_new = !c.is_alphanumeric() || (was_lower && c.is_uppercase());
+        if is_new {
+            words.push(String::new());
+        }
+        was_lower = c.is_lowercase();
+        if let Some(word) = words.last_mut().filter(|_| c.is_alphanumeric()) {
+            word.extend(c.to_lowercase());
+        }
+    }
+    let bare = words
+        .iter()
+        .map(|word| word.trim_end_matches(|c: char| c.is_ascii_digit()));
+    bare.filter(|word| !word.is_empty())
+        .map(str::to_owned)
+        .collect()
+}
+
+pub(super) fn is_known_unit(unit: &str) -> bool {
     // In names such as `y_d` the letter stands for "desired" or "derivative".
     if unit.eq_ignore_ascii_case("d") {
         return false;

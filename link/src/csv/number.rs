@@ -4,6 +4,8 @@
 //! `10^|e|` are exact doubles, so one multiplication or division rounds correctly (Clinger 1990,
 //! "How to read floating point numbers accurately"). Everything else goes to the standard parser.
 
+use super::names;
+
 /// Content of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Cell {
@@ -23,10 +25,12 @@ pub(super) enum Mark {
     None,
     Point,
     Comma,
+    /// No digits, but a word of a two-valued signal.
+    Word,
 }
 
 /// What logs write for a missing number, in lower case.
-const MISSING: [&str; 17] = [
+const MISSING: [&str; 20] = [
     "",
     "nan",
     "+nan",
@@ -44,11 +48,18 @@ const MISSING: [&str; 17] = [
     "-inf",
     "infinity",
     "-infinity",
+    // What a channel of an oscilloscope beyond its range has.
+    "\u{221e}",
+    "+\u{221e}",
+    "-\u{221e}",
 ];
+
+/// Words of two-valued signals, in lower case, and their numbers.
+const SWITCHES: [(&str, f64); 4] = [("on", 1.0), ("off", 0.0), ("true", 1.0), ("false", 0.0)];
 
 /// How the words begin that historians and control systems write for a sample that is no good, in lower case: digital
 /// states of the PI system, status of OPC, errors of Excel. An interpolated sample was not measured.
-const BAD: [&str; 34] = [
+const BAD: [&str; 35] = [
     "bad",
     "no data",
     "nodata",
@@ -81,6 +92,7 @@ const BAD: [&str; 34] = [
     "stale",
     "offline",
     "unavailable",
+    "unknown",
     "interpolated",
     "[-",
 ];
@@ -104,7 +116,7 @@ pub(super) fn parse(cell: &[u8]) -> Cell {
             Some(plain) => parse(&plain),
             None if is_missing(cell) => Cell::Missing,
             None if is_bad(cell) => Cell::Bad,
-            None => Cell::Text,
+            None => switch(cell).map_or(Cell::Text, |value| Cell::Number(value, Mark::Word)),
         };
     };
     match decimal.fast_value().or_else(|| slow_value(cell)) {
@@ -112,6 +124,26 @@ pub(super) fn parse(cell: &[u8]) -> Cell {
         Some(_) => Cell::Missing,
         None => Cell::Text,
     }
+}
+
+/// The number of a two-valued signal: 1 of `on` and `true`, 0 of `off` and `false`.
+fn switch(cell: &[u8]) -> Option<f64> {
+    let mut words = SWITCHES.iter();
+    let found = words.find(|(word, _)| cell.eq_ignore_ascii_case(word.as_bytes()));
+    found.map(|(_, value)| *value)
+}
+
+/// A number with its unit behind it, as dashboards export them: `79.9 \u{b0}C`, `45%`. The unit must be a known one.
+pub(super) fn with_unit(cell: &[u8]) -> Option<(&[u8], &str)> {
+    let cell = bare(cell);
+    let is_of_number = |byte: &u8| byte.is_ascii_digit() || b"+-.,eE".contains(byte);
+    // The `e` of an exponent is followed by digits; a unit that begins with e is none of the known ones.
+    let length = cell.iter().take_while(|byte| is_of_number(byte)).count();
+    let (number, unit) = cell.split_at_checked(length)?;
+    let unit = std::str::from_utf8(unit).ok()?.trim();
+    let is_number = matches!(parse(number), Cell::Number(..)) && number.len() <= LONGEST;
+    let is_unit = names::is_known_unit(unit) && unit != "1";
+    (is_number && is_unit).then_some((number, unit))
 }
 
 /// Parses an integer exactly; `None` if the cell is anything else or does not fit.

@@ -9,6 +9,7 @@ use super::columns::Choice;
 use super::date::{self, Fault};
 use super::error::{ReadError, quoted};
 use super::long::Values;
+use super::names::key;
 use super::number::{self, Cell, Mark};
 use super::options::CsvOptions;
 use super::preview::Preview;
@@ -43,14 +44,20 @@ pub(super) struct Table<'a> {
     mark: Mark,
     /// Of a table whose signals have stamps of their own.
     weave: Option<Weave>,
-    /// Of a table of one value a row.
+    /// Of a table of one value a row, or of groups of columns.
     values: Option<Values>,
+    /// Whether units stand behind the numbers of a column.
+    has_units: bool,
 }
 
 impl<'a> Table<'a> {
     pub(super) fn new(preview: &'a Preview, choice: Choice, options: &CsvOptions) -> Self {
         let column = |column: usize| match &preview.names {
-            Some(names) => names[column].column(),
+            Some(names) => {
+                let name = names[column].clone();
+                name.with_unit(preview.unit(column).unwrap_or_default())
+                    .column()
+            }
             None => Column::named(&preview.label(column).to_string()),
         };
         let mut columns = Columns::new(
@@ -62,9 +69,11 @@ impl<'a> Table<'a> {
             columns = columns.with_set_point(column(set_point));
         }
         let mut builder = RecordingBuilder::new(columns).with_max_points(options.max_points);
-        if preview.tags.is_none() {
+        let has_own_stamps = preview.has_own_stamps();
+        if !has_own_stamps {
             builder.note(choice.note(preview));
         }
+        (choice.notes.iter().cloned()).for_each(|note| builder.note(note));
         if let Some(column) = choice.set_point {
             let column = preview.label(column);
             builder.note(Note::SetPoint { column });
@@ -78,7 +87,7 @@ impl<'a> Table<'a> {
             });
         }
         let (mut unit, mut doubt) = (TimeUnit::Seconds, None);
-        if let Some(time) = choice.time {
+        if let Some(time) = choice.time.filter(|_| preview.ramp.is_none()) {
             let found = unit::find(preview, time, options.time_unit);
             (unit, doubt) = (found.unit, found.doubt);
             found.note.into_iter().for_each(|note| builder.note(note));
@@ -94,8 +103,9 @@ impl<'a> Table<'a> {
         let is_sparse = |column| preview.empty_share(column) > SPARSE;
         let weave = is_sparse(choice.input) || is_sparse(choice.output);
         Self {
-            weave: (weave && preview.tags.is_none()).then(Weave::default),
-            values: preview.tags.map(|_| Values::default()),
+            weave: (weave && !has_own_stamps).then(Weave::default),
+            values: has_own_stamps.then(Values::default),
+            has_units: (0..preview.width).any(|column| preview.unit(column).is_some()),
             preview,
             choice,
             builder,
@@ -119,6 +129,9 @@ impl<'a> Table<'a> {
                 found,
             });
         }
+        if !self.preview.groups.is_empty() {
+            return self.add_groups(row);
+        }
         let (stamp, time_s) = match self.choice.time {
             Some(column) => self.time(row, column)?,
             None => (Stamp::Whole(0), self.rows as f64 / self.sample_rate_hz),
@@ -129,16 +142,19 @@ impl<'a> Table<'a> {
             self.builder.leave_out(at, &fault);
             return Ok(());
         }
-        if let Some(tag) = self.preview.tags.filter(|_| self.values.is_some()) {
+        if self.values.is_some() {
             let value = self.number(row, self.choice.output)?;
-            if let Some(values) = self
-                .values
-                .as_mut()
-                .filter(|_| (value + time_s).is_finite())
-            {
-                values.add(number::bare(&row.cells[tag]), row.line, time_s, value)?;
-            }
-            return Ok(());
+            let tags = self
+                .preview
+                .tags
+                .iter()
+                .map(|&tag| number::bare(&row.cells[tag]));
+            return self.add_value(
+                &tags.collect::<Vec<_>>().join(&b'.'),
+                row.line,
+                time_s,
+                value,
+            );
         }
         let input = self.number(row, self.choice.input)?;
         let output = self.number(row, self.choice.output)?;
@@ -161,6 +177,38 @@ impl<'a> Table<'a> {
         {
             Some(Some(woven)) => self.push_woven(&woven, stamp),
             _ => Ok(()),
+        }
+    }
+
+    /// Adds the values of groups of columns, each with the time of its group.
+    fn add_groups(&mut self, row: &Row<'_>) -> Result<(), ReadError> {
+        let preview = self.preview;
+        for group in &preview.groups {
+            let (_, time_s) = self.time(row, group.time)?;
+            for column in group.values.clone() {
+                let value = self.number(row, column)?;
+                let name = preview
+                    .names
+                    .as_ref()
+                    .map(|names| names[column].full.clone());
+                let name = name.unwrap_or_else(|| (column + 1).to_string());
+                self.add_value(name.as_bytes(), row.line, time_s, value)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn add_value(
+        &mut self,
+        tag: &[u8],
+        line: u64,
+        time_s: f64,
+        value: f64,
+    ) -> Result<(), ReadError> {
+        let is_sample = (value + time_s).is_finite();
+        match self.values.as_mut().filter(|_| is_sample) {
+            Some(values) => values.add(tag, line, time_s, value),
+            None => Ok(()),
         }
     }
 
@@ -243,7 +291,9 @@ impl<'a> Table<'a> {
         let is_status = |column: &usize| match number::parse(&row.cells[*column]) {
             Cell::Number(quality, _) => {
                 let (good, best) = OPC_GOOD;
-                quality < good && self.preview.column(*column).any(|quality| quality == best)
+                let has = |best| self.preview.column(*column).any(|quality| quality == best);
+                (quality < good && has(best))
+                    || (quality == 0.0 && has(1.0) && self.is_validity(*column))
             }
             _ => number::is_bad(&row.cells[*column]),
         };
@@ -252,9 +302,20 @@ impl<'a> Table<'a> {
         found.map(|column| quoted(&row.cells[column]))
     }
 
+    /// Whether a status is 1 where a sample is valid, by its name.
+    fn is_validity(&self, column: usize) -> bool {
+        let name = self
+            .preview
+            .names
+            .as_ref()
+            .and_then(|names| names.get(column));
+        name.is_some_and(|name| key(&name.bare).starts_with("valid"))
+    }
+
     /// The set-point in a column. `None` if it is no number.
     fn set_point(&self, row: &Row<'_>, column: usize) -> Option<f64> {
-        match number::parse(&self.plain(&row.cells[column])) {
+        let cell = self.plain(&row.cells[column]);
+        match number::parse(number::with_unit(&cell).map_or(&cell, |(number, _)| number)) {
             Cell::Number(value, _) => Some(value),
             _ => None,
         }
@@ -274,6 +335,11 @@ impl<'a> Table<'a> {
             Some(of_day) => Cow::Owned(date::joined(&row.cells[column], &row.cells[of_day])),
             None => self.plain(&row.cells[column]),
         };
+        if let Some((start, step)) = self.preview.ramp {
+            let count = self.number(row, column)?;
+            let time_s = start + step * count;
+            return Ok((Stamp::Real(time_s), time_s));
+        }
         let Some((stamp, mark)) = clock::parse(&cell) else {
             let (line, column) = (row.line, self.preview.label(column));
             let text = quoted(&cell);
@@ -301,15 +367,46 @@ impl<'a> Table<'a> {
     /// The number in a column; NaN if it is missing.
     fn number(&mut self, row: &Row<'_>, column: usize) -> Result<f64, ReadError> {
         match number::parse(&self.plain(&row.cells[column])) {
+            Cell::Number(value, Mark::Word) if self.preview.has_switches(column) => Ok(value),
+            Cell::Number(_, Mark::Word) => {
+                let (line, column, text) = self.place(row, column);
+                Err(ReadError::NotANumber { line, column, text })
+            }
+            Cell::Number(value, mark) => {
+                self.check_mark(mark, row, column)?;
+                if self.has_units && value != 0.0 && self.preview.unit(column).is_some() {
+                    let (line, column, text) = self.place(row, column);
+                    return Err(ReadError::MixedUnits { line, column, text });
+                }
+                Ok(value)
+            }
+            Cell::Missing | Cell::Bad => Ok(f64::NAN),
+            Cell::Text => self.number_with_unit(row, column),
+        }
+    }
+
+    /// The number in a cell such as `79.9 C`. All cells of the column must have this unit, or a dashboard has scaled some.
+    fn number_with_unit(&mut self, row: &Row<'_>, column: usize) -> Result<f64, ReadError> {
+        let (line, label, text) = self.place(row, column);
+        let not_a_number = ReadError::NotANumber {
+            line,
+            column: label.clone(),
+            text: text.clone(),
+        };
+        let (number, unit) = number::with_unit(&row.cells[column]).ok_or(not_a_number)?;
+        if self.preview.unit(column) != Some(unit) {
+            return Err(ReadError::MixedUnits {
+                line,
+                column: label,
+                text,
+            });
+        }
+        match number::parse(number) {
             Cell::Number(value, mark) => {
                 self.check_mark(mark, row, column)?;
                 Ok(value)
             }
-            Cell::Missing | Cell::Bad => Ok(f64::NAN),
-            Cell::Text => {
-                let (line, column, text) = self.place(row, column);
-                Err(ReadError::NotANumber { line, column, text })
-            }
+            _ => Ok(f64::NAN),
         }
     }
 

@@ -25,9 +25,11 @@ pub(super) struct Tag {
     pub(super) signal: Signal,
 }
 
-const INPUT: [&str; 6] = ["op", "out", "mv", "co", "cv", "output"];
-const OUTPUT: [&str; 4] = ["pv", "me", "meas", "measurement"];
-const SET_POINT: [&str; 5] = ["sp", "sv", "spt", "setpoint", "wsp"];
+const INPUT: [&str; 9] = [
+    "op", "out", "mv", "co", "cv", "output", "pwm", "power", "duty",
+];
+const OUTPUT: [&str; 6] = ["pv", "me", "meas", "measurement", "temp", "temperature"];
+const SET_POINT: [&str; 6] = ["sp", "sv", "spt", "setpoint", "wsp", "target"];
 /// Names of a set-point without a loop.
 const ALONE: [&str; 8] = [
     "sp",
@@ -44,7 +46,7 @@ const FIELDS: [&str; 4] = ["cv", "f_cv", "value", "val"];
 /// Blocks between the loop and the signal.
 const BLOCKS: [&str; 7] = ["pid", "pida", "pid1", "daca", "dataacqa", "loop", "ctl"];
 /// Names of a column with the status of the samples beside it.
-const STATUS: [&str; 7] = [
+const STATUS: [&str; 9] = [
     "status",
     "quality",
     "st",
@@ -52,6 +54,8 @@ const STATUS: [&str; 7] = [
     "qual",
     "opcquality",
     "good",
+    "valid",
+    "validity",
 ];
 
 /// Marks that end a loop of any name; after the other marks, it must hold a digit: `TIC_101_OUT`, not `pump_out`.

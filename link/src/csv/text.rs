@@ -5,7 +5,7 @@ use std::io::{self, Read};
 use super::error::ReadError;
 
 /// Bytes of a file that are examined before it is read.
-const HEAD_BYTES: usize = 1 << 20;
+pub(super) const HEAD_BYTES: usize = 1 << 20;
 
 /// First bytes of file formats that are sometimes mistaken for tables. MATLAB, PDF and ROS bag files
 /// begin like text, so these bytes are checked first.
@@ -47,6 +47,14 @@ pub(super) struct Text<'a> {
     pub(super) whole: bool,
     /// Whether the file is UTF-16.
     pub(super) utf16: bool,
+    /// Names of the columns, where they do not stand in the text.
+    pub(super) names: Option<Vec<String>>,
+    /// Whether the columns are time, tag and value.
+    pub(super) is_long: bool,
+    /// Whether most cells are empty: each column has stamps of its own.
+    pub(super) is_sparse: bool,
+    /// Whether the text was made from lines of labels and values.
+    pub(super) is_labelled: bool,
 }
 
 impl<'a> Text<'a> {
@@ -83,6 +91,10 @@ impl<'a> Text<'a> {
             rest: file,
             whole,
             utf16: big_endian.is_some(),
+            names: None,
+            is_long: false,
+            is_sparse: false,
+            is_labelled: false,
         })
     }
 }
@@ -109,7 +121,6 @@ fn binary(head: &[u8]) -> Option<&'static str> {
         return Some("binary data (it holds control bytes)");
     }
     match head.trim_ascii_start().first() {
-        Some(b'{') => Some("JSON"),
         Some(b'<') => Some("HTML or XML"),
         _ => None,
     }
@@ -216,6 +227,5 @@ mod tests {
         assert!(refusal(b"\xa3\x95\x80").contains("DataFlash"));
         assert!(refusal(b"1,2\0,3").contains("NUL"));
         assert!(refusal(b"\x01\x02\x03\x04abc").contains("control"));
-        assert!(refusal(b" {\"t\": 1}").contains("JSON"));
     }
 }

@@ -69,6 +69,41 @@ pub enum Note {
         /// First time stamp as in the file, with its unit.
         first: String,
     },
+    /// The time stamps are times of day without a date.
+    #[error(
+        "time is counted from {first}, a time of day; a step back by more than half a day is midnight"
+    )]
+    TimeOfDay {
+        /// First time of day.
+        first: String,
+    },
+    /// A column of times was not read, because it disagrees with the dates beside it.
+    #[error("did not read {column} as the time: it disagrees with the dates in {dates}")]
+    TimeDisagrees {
+        /// The column that was not read.
+        column: ColumnLabel,
+        /// The column of dates, which is the time.
+        dates: ColumnLabel,
+    },
+    /// The columns `Input` and `Output` are those of the controller, as Arduino's PID libraries name them.
+    #[error(
+        "{measurement} is the measurement and {action} what the controller does, as Arduino's PID libraries name them: the \
+         set-point is nearer to the first"
+    )]
+    NamesOfController {
+        /// `Input`: the output of the process.
+        measurement: ColumnLabel,
+        /// `Output`: the input of the process.
+        action: ColumnLabel,
+    },
+    /// The file is not a table of text but was read as one.
+    #[error("the file is {format}, read as {}", counted(*.columns as u64, "column"))]
+    Format {
+        /// What it is, with an article.
+        format: &'static str,
+        /// Number of columns.
+        columns: usize,
+    },
     /// The caller gave the sample rate, so the time column was not read.
     #[error("did not read {column} because the sample rate is given: {sample_rate_hz} Hz")]
     TimeIgnored {
@@ -306,6 +341,8 @@ pub enum ChosenBy {
     Name,
     /// The order of the columns: the file has no header.
     Position,
+    /// A word of their names, such as `heater` or `temperature`.
+    Word,
     /// The number of different values: few in the input of a relay test, many in its output.
     Values,
 }
@@ -316,6 +353,7 @@ impl fmt::Display for ChosenBy {
             Self::Caller => "as chosen",
             Self::Name => "found by name",
             Self::Position => "found by position",
+            Self::Word => "found by a word of the name",
             Self::Values => "found by how few values the input takes",
         })
     }

@@ -5,9 +5,12 @@ mod dialects;
 mod flight_logs;
 mod fuzz_targets;
 mod hostile;
+mod instruments;
 #[cfg(feature = "matlab")]
 mod matlab;
 #[cfg(feature = "mcap")]
 mod mcap;
 mod plant;
 mod refusals;
+mod step;
+mod tools;

@@ -139,13 +139,14 @@ fn time_that_does_not_increase() {
 
 #[test]
 fn clock_times() {
-    let parts = ["line 2", "\"time\" (column 1)", "12:00:00.1", "time of day"];
-    assert_plainly_refused("time,pv,u\n12:00:00.1,1,1\n12:00:00.2,2,1\n", &parts);
+    // Hours and minutes, or minutes and seconds?
+    let parts = ["line 2", "\"time\" (column 1)", "12:00", "time of day"];
+    assert_plainly_refused("time,pv,u\n12:00,1,1\n12:01,2,1\n", &parts);
     assert_plainly_refused(
         "time,pv,u\n2024-01-31,1,1\n",
         &["line 2", "2024-01-31", "time of day"],
     );
-    assert_plainly_refused("12:00:00.1,1,1\n12:00:00.2,2,1\n", &["12:00:00.1"]);
+    assert_plainly_refused("12:00,1,1\n12:01,2,1\n", &["12:00"]);
 }
 
 #[test]

@@ -115,11 +115,12 @@ impl<'de> Visitor<'de> for TextVisitor {
 
 #[cfg(test)]
 mod tests {
-    use onecycle_design::Style;
+    use onecycle_design::{Pid, Style};
     use onecycle_link::{Axis, ControlLoop};
     use serde::de::IntoDeserializer;
     use serde::de::value::{Error as Refusal, MapDeserializer};
 
+    use super::super::Against;
     use super::*;
 
     fn read(settings: &[(&'static str, &'static str)]) -> Result<Request, Refusal> {
@@ -143,8 +144,8 @@ mod tests {
         assert_eq!(asked.style, Style::Calm);
         assert_eq!(asked.phase_margin_rad, Some(std::f64::consts::FRAC_PI_4));
         assert_eq!(
-            asked.against.map(|pid| [pid.kp, pid.ki, pid.kd]),
-            Some([40.0, 5.0, 12.0])
+            asked.against,
+            Some(Against::Gains(Pid::new(40.0, 5.0, 12.0)))
         );
         assert_eq!(request.noise_share, Some(0.1));
         assert_eq!(request.loop_of_log(), ControlLoop::Attitude(Axis::Yaw));

@@ -1,12 +1,13 @@
 //! Values of settings, read from text and checked.
 
 use std::ops::RangeBounds;
+use std::path::{Path, PathBuf};
 
 use onecycle_design::Pid;
 use onecycle_identify::{Hold, Method, Road};
 use onecycle_link::{Axis, SAMPLE_RATES_HZ, TimeUnit};
 
-use super::LoopKind;
+use super::{Against, LoopKind};
 
 /// Estimators by name.
 pub const ESTIMATORS: [(&str, Road); 3] = [
@@ -274,6 +275,22 @@ pub fn span(text: &str) -> Result<f64, String> {
     ends.map(|(low, high)| high - low)
         .filter(|span| span.is_normal() && *span > 0.0)
         .ok_or_else(|| "write a range as LOW..HIGH, such as 0..200".to_owned())
+}
+
+/// Gains in parallel form, or the name of a file with gains: `FILE`, or `FILE:LOOP`.
+///
+/// # Errors
+/// One sentence.
+pub fn against(text: &str) -> Result<Against, String> {
+    let is_name = !text.contains(',') && number(text).is_none() && !text.trim().is_empty();
+    if !is_name {
+        return gains(text).map(Against::Gains);
+    }
+    let parts = text
+        .rsplit_once(':')
+        .filter(|(path, _)| Path::new(path).is_file());
+    let (path, name) = parts.map_or((text, None), |(path, name)| (path, Some(name.to_owned())));
+    Ok(Against::File(PathBuf::from(path), name))
 }
 
 /// Gains in parallel form: `Kp,Ki,Kd` or `Kp,Ki,Kd,Tf`.

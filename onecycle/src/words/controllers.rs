@@ -14,6 +14,7 @@ pub fn no_gains(error: VendorError) -> &'static str {
             "its form is in series and needs Ti of at least 4 Td; use `controller=pi`, or a controller in ideal form"
         }
         VendorError::NoProportional => "its form needs a proportional gain",
+        VendorError::NoDerivative => "it has no derivative; use `controller=pi`",
         _ => "check `output_range` and `input_range`",
     }
 }

@@ -23,9 +23,10 @@ pub fn refusal(error: &ReadError) -> String {
 pub fn note(note: &Note) -> String {
     let advice = match note {
         Note::ColumnsChosen {
-            by: ChosenBy::Position | ChosenBy::Values,
+            by: ChosenBy::Position | ChosenBy::Values | ChosenBy::Word,
             ..
         } => Some("if that is wrong, give `time`, `input` and `output`"),
+        Note::NamesOfController { .. } => Some("if that is wrong, give `input` and `output`"),
         Note::LogSignals { .. } => Some("choose others with `axis`, `loop` and `flight`"),
         Note::TagsChosen { .. } => Some("if that is wrong, give `tag`, or `input` and `output`"),
         Note::Compressed { .. } | Note::Interpolated { .. } => {
@@ -88,6 +89,12 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
         E::MatNoTable { .. } => {
             "save time, input and output as vectors of the same length, outside of cells and objects"
         }
+        E::TooLarge { .. } => "export less time, or fewer signals",
+        E::BadJson { is_cut: true, .. } => "export it again",
+        E::BadJson { .. } => "a table of text does not begin with { or [",
+        E::JsonNoTable => "write rows such as {\"t\": 0, \"u\": 1, \"y\": 2}, one on each line",
+        E::NoPower => "log the output of the heater beside its temperature",
+        E::NoNumbers { .. } => "record the input and the output of the process as numbers",
         E::NulByte { .. } => "cut the file before that line",
         E::LineTooLong { .. } => "a recording has one short row per line",
         E::UnclosedQuote { .. } => "close or remove the quote",
@@ -121,6 +128,10 @@ fn advice_on_file(error: &ReadError) -> Option<&'static str> {
             _ => return None,
         },
         E::InputOrOutput { .. } => "choose them with `input` and `output`",
+        E::InputOfWhat { .. } => {
+            "say what acts on the process with `input` and what is measured with `output`"
+        }
+        E::MixedUnits { .. } => "export plain numbers in one unit",
         E::SameColumn { .. } => "choose another column",
         E::Recording(error) => return advice_on_samples(error),
         _ => return None,

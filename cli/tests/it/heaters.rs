@@ -1,0 +1,107 @@
+//! Heaters from their logs to gains in their configuration.
+
+use std::fmt::Write as _;
+
+use crate::common::{Scratch, UNREADABLE, run};
+
+const CONFIGURATION: &str = "[extruder]\ncontrol = pid\npid_kp = 22.2\npid_ki = 1.08\npid_kd = 114\n[heater_bed]\npid_kp = 60\n\
+                             pid_ki = 1\npid_kd = 500\n";
+
+/// A heater with K 250 per full power, T 90 s and tau 6 s under a relay of 0 and 1 between 145 and 150 degrees: time,
+/// power and temperature every 0.5 s.
+fn relay_test() -> Vec<(f64, f64, f64)> {
+    let (mut temperature, mut power) = (140.0, 1.0);
+    let mut delayed = std::collections::VecDeque::from(vec![0.4; 12]);
+    let mut rows = Vec::new();
+    for i in 0..1600_u32 {
+        // Noise of the converter: the digits of a multiplicative sequence.
+        let noise = f64::from(i.wrapping_mul(2_654_435_761) >> 16) / 65_536.0 - 0.5;
+        let measured = ((temperature + 0.2 * noise) * 100.0_f64).round() / 100.0;
+        if measured >= 150.0 {
+            power = 0.0;
+        } else if measured <= 145.0 {
+            power = 1.0;
+        }
+        rows.push((1000.0 + 0.5 * f64::from(i), power, measured));
+        delayed.push_back(power);
+        let acts: f64 = delayed.pop_front().unwrap();
+        temperature += (250.0 * acts + 22.0 - temperature) * (1.0 - (-0.5_f64 / 90.0).exp());
+    }
+    rows
+}
+
+fn klippy_log() -> String {
+    let mut log = format!("Starting Klippy...\n===== Config file =====\n{CONFIGURATION}=====\n");
+    for (time_s, power, temperature) in relay_test() {
+        let _ = writeln!(
+            log,
+            "Stats {time_s:.1}: gcodein=0 mcu: freq=72000312 heater_bed: target=0 temp=22.1 pwm=0.000 extruder: target=150 \
+             temp={temperature} pwm={power:.3}"
+        );
+    }
+    log
+}
+
+#[test]
+fn a_log_of_klipper_is_judged_by_its_own_gains() {
+    let folder = Scratch::new();
+    let log = folder.write("klippy.log", klippy_log().as_bytes());
+    let report = run(&["identify", &log, "--json"]).report();
+    let tau_s = report.number("/process/tau_s/estimate");
+    assert!((tau_s - 6.0).abs() < 0.3, "{tau_s}");
+    // 22.2 of 255 in the log's power of 0 to 1.
+    let kp = report.number("/against/controller/kp");
+    assert!((kp - 22.2 / 255.0).abs() < 1e-12, "{kp}");
+    let text = run(&["identify", &log]).stdout;
+    for words in [
+        "pid_kp",
+        "pid_ki",
+        "pid_kd",
+        "22.2",
+        "input is \"extruder.pwm\"",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    let details = run(&["identify", &log, "--details"]).stdout;
+    assert!(details.contains("klipper     pid_kp: "), "{details}");
+}
+
+#[test]
+fn gains_of_a_configuration_are_named() {
+    let folder = Scratch::new();
+    let mut table = "time_s,power,temperature\n".to_owned();
+    for (time_s, power, temperature) in relay_test() {
+        let _ = writeln!(table, "{time_s},{power},{temperature}");
+    }
+    let table = folder.write("oven.csv", table.as_bytes());
+    let configuration = folder.write("printer.cfg", CONFIGURATION.as_bytes());
+    run(&["identify", &table, "--against", &configuration]).refused(
+        UNREADABLE,
+        &[
+            "gains of several loops, extruder, heater_bed",
+            "--against FILE:extruder",
+        ],
+    );
+    let bed = format!("{configuration}:heater_bed");
+    let report = run(&["identify", &table, "--against", &bed, "--json"]).report();
+    assert!((report.number("/against/controller/kp") - 60.0 / 255.0).abs() < 1e-12);
+    let without = folder.write("other.cfg", b"[fan]\npin: PA1\n");
+    run(&["identify", &table, "--against", &without]).refused(UNREADABLE, &["no gains of Klipper"]);
+    run(&["identify", &table, "--against", "nosuch.cfg"]).refused(UNREADABLE, &["nosuch.cfg"]);
+}
+
+#[test]
+fn a_device_needs_no_range_of_the_measurement() {
+    let process = ["tune", "--process", "FOPTD,K=250,T=90,tau=6"];
+    let with = |more: &[&str]| run(&[&process[..], more].concat());
+    let marlin = with(&["--vendor", "marlin", "--input-range", "0..1"]).stdout;
+    assert!(marlin.contains("marlin      M301 P"), "{marlin}");
+    let yaml = with(&["--vendor", "esphome", "--input-range", "0..1"]).stdout;
+    assert!(yaml.contains("control_parameters: kp: "), "{yaml}");
+    with(&["--vendor", "deltav"]).misused(&["--vendor deltav counts in percent", "--output-range"]);
+    let drive = with(&["--vendor", "odrive"]).stdout;
+    assert!(
+        drive.contains("it has no derivative; use --controller pi"),
+        "{drive}"
+    );
+}

@@ -1,0 +1,118 @@
+//! The gains in force and the controller that has them: as given, or as they stand in a configuration or a log.
+
+use onecycle_design::{Execution, Pid, Spans, Specification, Style, Vendor};
+use onecycle_link::{Recording, TypedGains, typed_gains};
+
+use crate::error::Error;
+use crate::request::{Against, Requirements};
+use crate::source::Source;
+
+/// Bytes of a configuration or a log in which gains are looked for: `klippy.log` begins with its configuration.
+const MOST_BYTES: u64 = 1 << 22;
+
+/// The controller that runs the loop, and its gains.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct InForce {
+    pub(crate) against: Option<Pid>,
+    pub(crate) plant: Option<(Vendor, Spans)>,
+}
+
+impl InForce {
+    /// Of the requirements, and of the source of a recording with its configuration in it.
+    pub(crate) fn of(
+        asked: &Requirements,
+        recording: Option<(&dyn Source, &Recording)>,
+    ) -> Result<Self, Error> {
+        let plant = asked.plant()?;
+        let control_loop = recording.and_then(|(_, recording)| loop_of(recording));
+        let without = Self {
+            against: None,
+            plant,
+        };
+        let (from, named): (&dyn Source, _) = match (&asked.against, recording) {
+            (Some(Against::Gains(pid)), _) => {
+                let against = Some(*pid);
+                return Ok(Self { against, plant });
+            }
+            (Some(Against::File(path, name)), _) => (path, name.as_deref().or(control_loop)),
+            (None, Some((source, recording))) if recording.is_of_a_tool() => (source, control_loop),
+            (None, _) => return Ok(without),
+        };
+        let is_asked = asked.against.is_some();
+        let refused = |reason: String| Error::Unreadable {
+            name: from.name(),
+            reason,
+        };
+        let bytes = from.head(MOST_BYTES);
+        if bytes.is_empty() && is_asked {
+            return Err(refused("it cannot be read".to_owned()));
+        }
+        let text = String::from_utf8_lossy(&bytes);
+        let of_vendor =
+            |of: &TypedGains| plant.is_none_or(|(vendor, _)| vendor.name() == of.controller);
+        let all: Vec<TypedGains> = typed_gains(&text).into_iter().filter(of_vendor).collect();
+        let found = match chosen(&all, named) {
+            Some(found) => found,
+            None if is_asked => return Err(refused(none_of(&all))),
+            None => return Ok(without),
+        };
+        let vendor = Vendor::from_name(found.controller);
+        let plant = plant.or(vendor.map(|vendor| (vendor, asked.spans(vendor))));
+        let against = plant.and_then(|(vendor, spans)| vendor.pid(found.values, &spans).ok());
+        Ok(Self { against, plant })
+    }
+
+    /// The requirements on the controller as this one runs it, where the user does not say otherwise.
+    pub(crate) fn law(&self, asked: Specification) -> Specification {
+        let Some((vendor, _)) = self.plant.filter(|_| asked.style != Style::Paper) else {
+            return asked;
+        };
+        let law = vendor.law();
+        let asked = law
+            .setpoint_weight
+            .map_or(asked, |weight| asked.with_setpoint_weight(weight));
+        match law
+            .sample_period_s
+            .filter(|_| asked.execution == Execution::default())
+        {
+            Some(period_s) => asked.with_execution(Execution::sampled(period_s)),
+            None => asked,
+        }
+    }
+}
+
+/// The loop in the names of a recording's columns: `extruder` of `extruder.pwm`.
+fn loop_of(recording: &Recording) -> Option<&str> {
+    let (control_loop, _) = recording.columns().input.name.rsplit_once('.')?;
+    Some(control_loop)
+}
+
+/// The gains of the loop, or the only ones.
+fn chosen<'a>(all: &'a [TypedGains], control_loop: Option<&str>) -> Option<&'a TypedGains> {
+    // Marlin has one set of gains for `T` and the tools `T0`, `T1`.
+    let is_of = |of: &&TypedGains| {
+        control_loop.is_some_and(|name| {
+            name == of.control_loop || name.starts_with('T') && of.control_loop == "T"
+        })
+    };
+    let named = all.iter().find(is_of);
+    match (named, all) {
+        (Some(found), _) => Some(found),
+        (None, [only]) => Some(only),
+        _ => None,
+    }
+}
+
+fn none_of(all: &[TypedGains]) -> String {
+    let names: Vec<&str> = all.iter().map(|of| of.control_loop.as_str()).collect();
+    match names.as_slice() {
+        [] => "it has no gains of Klipper (pid_kp), Marlin (M301), ESPHome (control_parameters) or an Arduino (Kp = 2); \
+               give them as `against=KP,KI,KD`"
+            .to_owned(),
+        names => format!(
+            "it has gains of several loops, {}: name one as in `against=FILE:{}`",
+            names.join(", "),
+            names[0]
+        ),
+    }
+}
