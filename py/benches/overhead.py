@@ -1,4 +1,4 @@
-"""What Python and Dask cost: `python py/benches/overhead.py`, with the package built with `pip install ./py[cluster]`."""
+"""What Python and Dask cost: `python py/benches/overhead.py`, with the package built with `pip install ./py ./research/py`."""
 
 import os
 import statistics
