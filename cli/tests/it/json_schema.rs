@@ -88,7 +88,7 @@ fn the_documented_keys_are_those_of_the_report() {
         "",
         &mut found,
     );
-    let acro = log.replace("px4_chirps.ulg", "betaflight_acro.bfl");
+    let acro = log.replace("px4_chirps.ulg", "betaflight_acro_long.bbl");
     let by_response = run(&["identify", &acro, "--axis", "yaw", "--json"]).stdout;
     let by_response: Value = serde_json::from_str(&by_response).unwrap();
     keys(&by_response["fit"], "fit", &mut found);

@@ -262,8 +262,8 @@ mod tests {
     #[test]
     fn times() {
         assert_refused(
-            "12:00:01,1,1\n12:00:02,2,1\n",
-            "line 1, column 1: \"12:00:01\" is not a date with a time of day; \
+            "12:00,1,1\n12:01,2,1\n",
+            "line 1, column 1: \"12:00\" is not a date with a time of day; \
              export seconds from the start, or date and time of day in one column, or give the \
              sample rate with `sample_rate`",
         );
