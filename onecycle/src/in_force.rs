@@ -24,6 +24,11 @@ impl InForce {
         recording: Option<(&dyn Source, &Recording)>,
     ) -> Result<Self, Error> {
         let plant = asked.plant()?;
+        if let (Some((vendor, _)), Some((_, recording)), None) =
+            (plant, recording, asked.input_range)
+        {
+            check_range(vendor, recording)?;
+        }
         let control_loop = recording.and_then(|(_, recording)| loop_of(recording));
         let without = Self {
             against: None,
@@ -79,6 +84,24 @@ impl InForce {
             None => asked,
         }
     }
+}
+
+/// Refuses a recording whose input leaves the range that it has if none is given: the gains would be wrong by their ratio.
+fn check_range(vendor: Vendor, recording: &Recording) -> Result<(), Error> {
+    /// Ripple and rounding of a full output.
+    const RIPPLE: f64 = 1.05;
+    let full = vendor.full_input();
+    let most = recording
+        .input()
+        .iter()
+        .fold(0.0, |most: f64, input| most.max(input.abs()));
+    if !vendor.counts_output() || most <= RIPPLE * full {
+        return Ok(());
+    }
+    Err(Error::Request(format!(
+        "the input reaches {most}, and `vendor={}` takes 0..{full} for its range: give the range of the recorded input, such as `input_range=0..100`",
+        vendor.name()
+    )))
 }
 
 /// The loop in the names of a recording's columns: `extruder` of `extruder.pwm`.

@@ -105,3 +105,18 @@ fn a_device_needs_no_range_of_the_measurement() {
         "{drive}"
     );
 }
+
+// Gains of an input in percent, taken for a power of 0 to 1, were a hundred times too large.
+#[test]
+fn a_percent_is_not_taken_for_a_power_of_one() {
+    let folder = Scratch::new();
+    let mut table = "time_s,power,temperature\n".to_owned();
+    for (time_s, power, temperature) in relay_test() {
+        let _ = writeln!(table, "{time_s},{},{temperature}", 100.0 * power);
+    }
+    let table = folder.write("oven.csv", table.as_bytes());
+    let asked = ["identify", &table, "--vendor", "klipper", "--json"];
+    run(&asked).misused(&["the input reaches 100", "--input-range 0..100"]);
+    let given = run(&[&asked[..], &["--input-range", "0..100"]].concat()).report();
+    assert!(given.number("/process/k/estimate") > 0.0);
+}
