@@ -32,7 +32,8 @@ fn located(text: &str, error: &toml::de::Error) -> String {
     let before = &text[..begin];
     let number = before.matches('\n').count() + 1;
     let line = before.rsplit('\n').next().unwrap_or_default();
-    let complaint = error.message().replace('\n', ", ");
+    // In backticks stand settings, which are shown as options.
+    let complaint = error.message().replace('\n', ", ").replace('`', "\"");
     // If a value is wrong, its key is before it in the line.
     match line.split_once('=') {
         Some((key, _)) => format!("line {number}, {}: {complaint}", key.trim()),

@@ -63,7 +63,7 @@ fn unreadable_campaigns() {
     );
     names(
         &campaign_with("bias = 0\nsigma = 0\nbogus = 3"),
-        &["line 7", "unknown field `bogus`"],
+        &["line 7", "unknown field \"bogus\""],
     );
     names(
         &campaign_with("bias = \"much\"\nsigma = 0"),
@@ -118,7 +118,7 @@ fn campaigns_of_impossible_numbers() {
 fn a_malformed_campaign_of_recordings_is_one_sentence() {
     for (good, bad, words) in [
         ("noise = 0.01", "noise = -1", &["noise must be", "-1"][..]),
-        ("noise = 0.01", "nois = 1", &["unknown field `nois`"]),
+        ("noise = 0.01", "nois = 1", &["unknown field \"nois\""]),
         ("durations_s = [6]", "durations_s = []", &["durations_s"]),
         (
             "durations_s = [6]",
@@ -128,7 +128,7 @@ fn a_malformed_campaign_of_recordings_is_one_sentence() {
         (
             "\"prbs\"",
             "\"noise\"",
-            &["unknown variant `noise`", "chirp"],
+            &["unknown variant \"noise\"", "chirp"],
         ),
         (
             "band_hz = [0.2, 5]",

@@ -287,7 +287,7 @@ fn recipes_that_cannot_be_read() {
             "bias = 1.5\n",
             ["recipe.toml", "bias must be 0 to 0.9, but is 1.5"],
         ),
-        ("sead = 1\n", ["line 1", "unknown field `sead`"]),
+        ("sead = 1\n", ["line 1", "unknown field \"sead\""]),
         ("families = []\n", ["families must be one or more", "0"]),
         (
             "[[families]]\n[[families]]\nweight = 0\n",

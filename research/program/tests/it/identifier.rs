@@ -124,7 +124,7 @@ fn wrong_recipes_are_refused_in_one_sentence() {
         (
             "batch = 32",
             "batches = 32",
-            "line 9: unknown field `batches`",
+            "line 9: unknown field \"batches\"",
         ),
         ("epochs = 6", "epochs = \"x\"", "line 7, epochs"),
         ("bias = 0.5", "bias = -1.0", "bias must be"),

@@ -103,7 +103,7 @@ fn wrong_recipes_are_refused_in_one_sentence() {
         (
             "batch = 32",
             "batches = 32",
-            &["line 21: unknown field `batches`"],
+            &["line 21: unknown field \"batches\""],
         ),
         (
             "seed = 1\nspace",
