@@ -59,7 +59,7 @@ fn unreadable_campaigns() {
     names(&campaign("measure = \"relay\ncases = 1\n"), &["line 1"]);
     names(
         &campaign("measure = \"relay\"\n"),
-        &["missing field `cases`"],
+        &["missing field \"cases\""],
     );
     names(
         &campaign_with("bias = 0\nsigma = 0\nbogus = 3"),
@@ -83,7 +83,7 @@ fn unreadable_campaigns() {
 // The refusal is one sentence, as for recordings.
 #[test]
 fn a_malformed_campaign_is_one_sentence() {
-    campaign_with("bias = 0\nsigma = 0\nbogus = 3").refused(UNREADABLE, &["line 7", "`bogus`"]);
+    campaign_with("bias = 0\nsigma = 0\nbogus = 3").refused(UNREADABLE, &["line 7", "\"bogus\""]);
 }
 
 #[test]
@@ -161,7 +161,7 @@ fn a_malformed_campaign_of_recordings_is_one_sentence() {
         (
             "structure = \"soiptd\", k",
             "structure = \"pid\", k",
-            &["no structure `pid`", "foptd"],
+            &["no structure \"pid\"", "foptd"],
         ),
         (
             "wy_rad_per_s = 2",

@@ -97,9 +97,13 @@ fn wrong_recipes_are_refused_in_one_sentence() {
         (
             "network = \"classifier\"",
             "",
-            &["missing field `network`"][..],
+            &["missing field \"network\""][..],
         ),
-        ("\"classifier\"", "\"frog\"", &["line 3, network", "`frog`"]),
+        (
+            "\"classifier\"",
+            "\"frog\"",
+            &["line 3, network", "\"frog\""],
+        ),
         (
             "batch = 32",
             "batches = 32",
