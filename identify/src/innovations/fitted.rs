@@ -5,7 +5,7 @@ use std::ops::Range;
 use onecycle_design::{LowPass, Structure};
 
 use super::choose::{Choice, Limits, choose};
-use super::likelihood::{Evaluation, Memory, evaluate};
+use super::likelihood::Evaluation;
 use super::mixture::{self, Component};
 use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
@@ -292,14 +292,7 @@ fn was_at_rest(record: &Record, limits: &Limits, thetas: &[Theta]) -> bool {
         let bic = |theta: &Theta, at: &Evaluation| {
             at.profile_bic + theta.free().len() as f64 * (at.residual.len() as f64).ln()
         };
-        let mut memory = Memory::default();
-        let mut starts: Vec<(f64, Theta)> = (thetas.iter())
-            .filter_map(|theta| {
-                let theta = Bounds::new(theta.structure, &blocks, longest_tau_s).clamp(theta);
-                Some((bic(&theta, &evaluate(&blocks, &theta, &mut memory)?), theta))
-            })
-            .collect();
-        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let starts = search::ranked(&blocks, thetas.iter().copied(), longest_tau_s, bic);
         let fits = starts.iter().take(DESCENDED).filter_map(|(_, theta)| {
             let found = search::warm(&blocks, theta, longest_tau_s, search::CHOOSING)?;
             Some(bic(&found.theta, &found.at))

@@ -100,25 +100,25 @@ impl<const N: usize> Lifted<N> {
     /// `Phi` of `count` blocks like this one, and the sum of `X' X` over the rows `X = C Phi^k` of the first state, by
     /// doubling.
     pub(super) fn observed(&self, count: usize) -> (Matrix<N>, Matrix<N>) {
-        let mut sum = [[0.0; N]; N];
-        let mut phi = identity();
         let mut power = self.phi;
         let mut of_power: Matrix<N> =
             std::array::from_fn(|i| std::array::from_fn(|j| self.c[i] * self.c[j]));
-        if count == 1 {
-            return (power, of_power);
-        }
+        let mut whole: Option<(Matrix<N>, Matrix<N>)> = None;
         let mut left = count;
         loop {
             if left & 1 == 1 {
-                let later = congruent(&transpose(&power), &sum);
-                sum = of_power;
-                add(&mut sum, &later);
-                phi = product(&phi, &power);
+                whole = Some(match whole {
+                    None => (power, of_power),
+                    Some((phi, sum)) => {
+                        let mut both = of_power;
+                        add(&mut both, &congruent(&transpose(&power), &sum));
+                        (product(&phi, &power), both)
+                    }
+                });
             }
             left >>= 1;
             if left == 0 {
-                return (phi, sum);
+                return whole.unwrap_or((identity(), [[0.0; N]; N]));
             }
             let later = congruent(&transpose(&power), &of_power);
             add(&mut of_power, &later);

@@ -12,7 +12,7 @@ use onecycle_design::Structure;
 
 use super::arx::Arx;
 use super::descent::{Found, Patience, descend};
-use super::likelihood::{Memory, evaluate};
+use super::likelihood::{Evaluation, Memory, evaluate};
 use super::record::{Blocks, Forces, Record};
 use super::theta::{Bounds, NoiseKind, Theta};
 
@@ -213,29 +213,30 @@ fn screen_at(
         return vec![];
     }
     let bounds = Bounds::new(structure, &blocks, longest_tau_s);
-    let mut memory = Memory::default();
-    let mut likely = |theta: Theta| {
-        let theta = bounds.clamp(&theta);
-        evaluate(&blocks, &theta, &mut memory).map(|at| (at.log_likelihood, theta))
-    };
     let length = blocks.length_s();
-    let mut screened = Vec::new();
-    for theta in grid(structure, &blocks, early_s, longest_tau_s) {
-        let of_kinds = NoiseKind::ALL.map(|kind| theta.with_noise(kind, NOISES[0] / length));
-        screened.extend(of_kinds.into_iter().filter_map(&mut likely));
-    }
+    let with = |theta: Theta, kind, of: &'static [f64]| {
+        of.iter()
+            .map(move |over_length| theta.with_noise(kind, over_length / length))
+    };
+    let likely = |thetas: Vec<Theta>| ranked(&blocks, thetas, longest_tau_s, unlikely);
+    let processes = grid(structure, &blocks, early_s, longest_tau_s);
+    let of_process = |theta| {
+        NoiseKind::ALL
+            .into_iter()
+            .flat_map(move |kind| with(theta, kind, &NOISES[..1]))
+    };
+    let mut screened = likely(processes.into_iter().flat_map(of_process).collect());
     // The frequency of the noise hardly changes which processes explain a record: the others for the best of them.
-    for kind in NoiseKind::ALL {
-        screened.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let of_kind = screened.iter().filter(|(_, theta)| theta.noise(kind) > 0.0);
-        let best: Vec<Theta> = of_kind.take(REFINED).map(|(_, theta)| *theta).collect();
-        for theta in best {
-            let others = NOISES[1..].iter();
-            let others = others.map(|over_length| theta.with_noise(kind, over_length / length));
-            screened.extend(others.filter_map(&mut likely));
-        }
-    }
-    screened.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let of_kind = |kind| {
+        let own = screened
+            .iter()
+            .filter(move |(_, theta)| theta.noise(kind) > 0.0);
+        own.take(REFINED)
+            .flat_map(move |(_, theta)| with(*theta, kind, &NOISES[1..]))
+    };
+    let others = NoiseKind::ALL.into_iter().flat_map(of_kind).collect();
+    screened.extend(likely(others));
+    screened.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut starts = Vec::new();
     for kind in NoiseKind::ALL {
         let of_kind = screened.iter().filter(|(_, theta)| theta.noise(kind) > 0.0);
@@ -425,16 +426,31 @@ pub(super) fn race(
     candidates
 }
 
-/// The starts of each structure that explain the record best as they are, those that lead to the same fit once.
-pub(super) fn promising(blocks: &Blocks<'_>, starts: Vec<Theta>, longest_tau_s: f64) -> Vec<Theta> {
+/// Points within the bounds as they are, without a descent, by their cost; those without a likelihood are left out.
+pub(super) fn ranked(
+    blocks: &Blocks<'_>,
+    thetas: impl IntoIterator<Item = Theta>,
+    longest_tau_s: f64,
+    cost: impl Fn(&Theta, &Evaluation) -> f64,
+) -> Vec<(f64, Theta)> {
     let mut memory = Memory::default();
-    let mut found: Vec<(f64, Theta)> = (starts.into_iter())
-        .filter_map(|start| {
-            let theta = Bounds::new(start.structure, blocks, longest_tau_s).clamp(&start);
-            Some((evaluate(blocks, &theta, &mut memory)?.log_likelihood, theta))
+    let mut found: Vec<(f64, Theta)> = (thetas.into_iter())
+        .filter_map(|theta| {
+            let theta = Bounds::new(theta.structure, blocks, longest_tau_s).clamp(&theta);
+            Some((cost(&theta, &evaluate(blocks, &theta, &mut memory)?), theta))
         })
         .collect();
-    found.sort_by(|a, b| b.0.total_cmp(&a.0));
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found
+}
+
+fn unlikely(_: &Theta, at: &Evaluation) -> f64 {
+    -at.log_likelihood
+}
+
+/// The starts of each structure that explain the record best as they are, those that lead to the same fit once.
+pub(super) fn promising(blocks: &Blocks<'_>, starts: Vec<Theta>, longest_tau_s: f64) -> Vec<Theta> {
+    let found = ranked(blocks, starts, longest_tau_s, unlikely);
     let mut kept: Vec<Theta> = Vec::new();
     for (_, theta) in found {
         let alike = || {
