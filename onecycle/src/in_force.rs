@@ -48,10 +48,10 @@ impl InForce {
             name: from.name(),
             reason,
         };
-        let bytes = from.head(MOST_BYTES);
-        if bytes.is_empty() && is_asked {
+        if is_asked && from.open().is_err() {
             return Err(refused("it cannot be read".to_owned()));
         }
+        let bytes = from.head(MOST_BYTES);
         let text = String::from_utf8_lossy(&bytes);
         let of_vendor =
             |of: &TypedGains| plant.is_none_or(|(vendor, _)| vendor.name() == of.controller);

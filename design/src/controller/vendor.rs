@@ -412,7 +412,16 @@ impl Vendor {
             Self::Codesys => ideal(Scale::Own, ["KP", "TN", "TV"]),
             Self::TwinCat => ideal(Scale::Own, ["fKp", "tTn", "tTv"]),
             Self::PidCompact => ideal(Scale::Full(100.0), ["Gain", "Ti", "Td"]),
-            _ => return None,
+            Self::Isa
+            | Self::ProportionalBand
+            | Self::Interacting
+            | Self::DeltaVStandard
+            | Self::DeltaVSeries
+            | Self::Tdc3000
+            | Self::Centum
+            | Self::PideDependent
+            | Self::PideIndependent
+            | Self::ControlExpert => return None,
         })
     }
 
