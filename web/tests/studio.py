@@ -6,7 +6,6 @@ part; ends with status 1 at the first fault. --measure prints times instead of t
 """
 
 import argparse
-import importlib.util
 import json
 import math
 import os
@@ -17,6 +16,9 @@ import sys
 import time
 
 from playwright.sync_api import sync_playwright
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "cli/tests/pages"))
+import axe
 
 DESK = {"viewport": {"width": 1280, "height": 900}}
 PHONE = {"viewport": {"width": 360, "height": 780}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
@@ -667,15 +669,8 @@ def large(studio, told):
 
 
 def accessible(page):
-    """Checks by axe-core that nothing stands in the way of a screen reader. Without the package, which requirements.txt names, a
-    line says that it was not looked for."""
-    found = importlib.util.find_spec("axe_playwright_python")
-    if found is None:
-        print("axe-playwright-python is not installed: accessibility is not looked for")
-        return
-    page.evaluate((pathlib.Path(found.origin).parent / "axe.min.js").read_text(encoding="utf-8"))
-    violations = page.evaluate("axe.run().then(({ violations }) => violations.map(({ id, nodes }) => `${id}: ${nodes[0].html}`))")
-    expect(not violations, f"axe finds {violations}")
+    found = axe.violations(page)
+    expect(not found, f"axe finds {found}")
 
 
 def looks(browser, told):

@@ -48,6 +48,15 @@ pub(super) fn stamp(line: &str) -> (Option<(String, String)>, &str) {
     (None, line)
 }
 
+/// The fields of a line as `name=value`, for tests.
+#[cfg(test)]
+pub(super) fn joined(fields: Fields) -> String {
+    let all: Vec<String> = (fields.into_iter())
+        .map(|(name, value)| format!("{name}={value}"))
+        .collect();
+    all.join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -72,15 +72,8 @@ fn plain(name: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fields::joined;
     use super::*;
-
-    fn joined(line: &str) -> String {
-        let all: Vec<String> = fields(line)
-            .into_iter()
-            .map(|(name, value)| format!("{name}={value}"))
-            .collect();
-        all.join(" ")
-    }
 
     #[test]
     fn lines_of_the_protocol() {
@@ -102,7 +95,7 @@ mod tests {
             ("boiler temp=x 17", ""),
             ("boiler s=\"text\" 17", ""),
         ] {
-            assert_eq!(joined(line), expected, "{line}");
+            assert_eq!(joined(fields(line)), expected, "{line}");
         }
     }
 }

@@ -89,15 +89,8 @@ fn without_colours(line: &str) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::super::fields::joined;
     use super::*;
-
-    fn joined(fields: Fields) -> String {
-        let all: Vec<String> = fields
-            .into_iter()
-            .map(|(name, value)| format!("{name}={value}"))
-            .collect();
-        all.join(" ")
-    }
 
     #[test]
     fn lines_of_labels() {
