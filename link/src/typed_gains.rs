@@ -87,7 +87,7 @@ pub fn typed_gains(text: &str) -> Vec<TypedGains> {
     found
 }
 
-/// Adds the gains of a loop, in place of those before; without a proportional gain there are none.
+/// Adds the gains of a loop, in place of those before. Without a proportional gain nothing is added.
 fn add(
     found: &mut Vec<TypedGains>,
     (controller, control_loop): (&'static str, &str),

@@ -19,11 +19,11 @@ pub struct Report {
     pub name: String,
     /// The recording, of a flight log the part that was used.
     pub recording: Recording,
-    /// The process with what the estimate rests on, or the reason why there is none.
+    /// The process with what the estimate rests on, or the reason why no process was identified.
     pub identification: Identification,
     /// Controllers for the process, and the gains in force. `None` without a process.
     pub choice: Option<Controllers>,
-    /// The loop of a flight log. `None`: the recording is none.
+    /// The loop of a flight log. `None`: the recording is not of a flight log.
     pub of_log: Option<LogLoop>,
     /// What a flight log tells about the gains of the loop.
     pub gains: Option<LogGains>,
@@ -63,7 +63,7 @@ impl Report {
         answer::typed(controller, &subject)
     }
 
-    /// The files with parameters that were asked for. `None`: there are none to write.
+    /// The files with parameters that were asked for. `None`: nothing is to be written.
     #[must_use]
     pub fn files(&self) -> Option<&NamedFiles> {
         let written = self.gains.as_ref()?.written.as_ref()?;

@@ -146,7 +146,7 @@ impl Requirements {
         (self.sample_period_s).map_or_else(Execution::default, Execution::sampled)
     }
 
-    /// Sets a setting by its name. `None`: it is none of these.
+    /// Sets a setting by its name. `None`: it is not a setting of the requirements.
     fn set(&mut self, name: &str, value: &str) -> Option<Result<(), String>> {
         let own = |known: Option<Form>| known.ok_or("there is no such controller".to_owned());
         let set = match name {

@@ -106,7 +106,7 @@ pub fn tabs(name: &str, tabs: &[Tab]) -> String {
     )
 }
 
-/// A button that copies a text. Without a script there is none.
+/// A button that copies a text. It does not appear without a script.
 pub fn copy(label: &str, text: &str) -> String {
     format!(
         "<p class=\"copy\" hidden><button type=\"button\" data-text=\"{}\">{}</button> <span role=\"status\"></span></p>\n",

@@ -58,7 +58,7 @@ pub enum ReadError {
         /// Largest size, in megabytes.
         limit_mb: usize,
     },
-    /// The text begins like JSON and is none.
+    /// The text begins like JSON, but is not JSON.
     #[error("line {line} is no JSON{}", if *.is_cut { ": the file is cut off" } else { "" })]
     BadJson {
         /// Line in the file, from 1.

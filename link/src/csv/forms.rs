@@ -117,7 +117,8 @@ const FORMS: [Form; 7] = [
 
 /// Most columns of a log.
 const MOST_COLUMNS: usize = 512;
-/// Lines with content after which a log with less than half of the share of lines with values is none of its kind.
+/// After this many lines with content, a log is not of a kind if it has less than half of the share of lines with values that the kind
+/// asks for.
 const FIRST_LINES: usize = 200;
 /// Longest line that is looked at, in bytes; longer ones hold no values.
 const LONGEST_LINE: usize = 1 << 16;

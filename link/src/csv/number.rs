@@ -137,7 +137,7 @@ fn switch(cell: &[u8]) -> Option<f64> {
 pub(super) fn with_unit(cell: &[u8]) -> Option<(&[u8], &str)> {
     let cell = bare(cell);
     let is_of_number = |byte: &u8| byte.is_ascii_digit() || b"+-.,eE".contains(byte);
-    // The `e` of an exponent is followed by digits; a unit that begins with e is none of the known ones.
+    // The `e` of an exponent is followed by digits; no known unit begins with e.
     let length = cell.iter().take_while(|byte| is_of_number(byte)).count();
     let (number, unit) = cell.split_at_checked(length)?;
     let unit = std::str::from_utf8(unit).ok()?.trim();

@@ -152,7 +152,7 @@ fn arduino() {
         format!(" sec: {sec}.0000  out: {u:.2}  pv: {y:.3}{end}")
     });
     assert_rows(&read(stune.as_bytes()), 1.0, 1.0);
-    // A table of numbers is none of labels.
+    // A table of numbers is not taken for lines of labels.
     assert!(refusal(b"a:b\nc:d\ne:f\n").contains("no row of numbers"));
 }
 

@@ -37,7 +37,7 @@ pub enum Source {
 /// A proposal and its figures.
 #[derive(Clone)]
 pub struct Row {
-    /// The design of a style, or why there is none.
+    /// The design of a style, or the reason why it failed.
     pub proposal: Proposal,
     /// `None` without a controller.
     pub figures: Option<Assessment>,
