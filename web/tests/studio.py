@@ -622,7 +622,7 @@ def controllers(browser, told):
     heater = str(told.repository / "examples/plant/tec_relay_run2.csv")
     studio.drop("heater", heater)
     studio.designed()
-    for name, ranges in (("klipper", {"input": "0..255"}), ("marlin", {}), ("pid-compact", {"input": "0..255", "output": "0..500"}), ("isa", {"input": "0..255", "output": "0..500"})):
+    for name, ranges in (("klipper", {"input": "0..255"}), ("marlin", {"input": "0..255"}), ("pid-compact", {"input": "0..255", "output": "0..500"}), ("isa", {"input": "0..255", "output": "0..500"})):
         page.select_option("#vendor", name)
         percent = page.evaluate("vendor().has_range_of_measurement")
         expect(page.is_visible("#output-range") == percent, f"{name}: the range of the measurement")
