@@ -9,7 +9,8 @@
 //! | `{"do":"survey","settings"}` | that of `onecycle identify LOG --json`: every loop of a flight; with `parameters`: files for all to change, or null |
 //! | `{"do":"json"}`, `{"do":"page"}` | `{text}`: the report as the program writes it |
 //! | `{"do":"trade_off"}` | designs from calm to sharp: limit of `Ms`, gains, figures |
-//! | `{"do":"judge","gains","bands"}` | figures, least margins, curves of the gains, `asks`, `named` (what to type in); with bands if they are asked for |
+//! | `{"do":"judge","gains","bands"}` | figures, least margins, curves of the gains, `asks`, `named` (what to type in), `lines` (to paste); with bands if they are asked for |
+//! | `{"do":"vendors"}` | `{vendors}`: name, ranges and full input of each controller with gains of its own |
 //! | `{"do":"parameters","gains","whole","below_limits"}` | `{apply, restore, ending, says, broken}`: files for the firmware |
 //! | `{"do":"simulate","options"}` | `{text}`: a recording as CSV; with `--expect` the intervals to expect |
 //!
@@ -21,9 +22,12 @@
 //! answer with `error` has one sentence. Infinite numbers are null. Times are in
 //! seconds, signals in the units of the file.
 
+use std::rc::Rc;
+
 use onecycle::request::HALF_STEP;
 use onecycle::source::is_flight_log;
-use onecycle::{Controller, LogFile, Model, Pid, Report, Request, Source};
+use onecycle::{Controller, LogFile, Model, Pid, Report, Request, Source, with_progress};
+use onecycle_design::Vendor;
 use onecycle_link::{FlightLog, ParameterFiles};
 use serde_json::{Value, json};
 
@@ -89,8 +93,8 @@ impl Studio {
             "view" => self.view(message),
             "identify" => {
                 (self.found, self.draws) = (None, vec![]);
-                let _waiting = Waiting::on("identifying");
-                let found = request(message)?.identify(self.source()?);
+                let (request, source) = (request(message)?, self.source()?);
+                let found = followed("identifying", || request.identify(source));
                 let found = found.map_err(|error| error.to_string())?;
                 let report = value(&found);
                 if let Ok(identified) = &found.identification.outcome {
@@ -100,12 +104,10 @@ impl Studio {
                 report
             }
             "survey" => {
-                let waiting = Waiting::on("identifying");
-                let progress = |done, all| waiting.is_at("identifying loops", done, all);
-                let mut request = request(message)?;
+                let (mut request, source) = (request(message)?, self.source()?);
                 // The page saves what the program would write.
                 request.write.file = Some("tune".into());
-                let surveyed = request.survey_for(self.source()?, false, &progress);
+                let surveyed = followed("identifying loops", || request.survey(source));
                 let surveyed = surveyed.map_err(|error| error.to_string())?;
                 let mut report = value(&surveyed)?;
                 report["parameters"] = parameters(surveyed.files.as_ref().map(|files| &files.text));
@@ -123,6 +125,7 @@ impl Studio {
                 Ok(hand::trade_off(&choice.trade_off))
             }
             "judge" => self.judge(message),
+            "vendors" => Ok(vendors()),
             "parameters" => self.parameters(message),
             "simulate" => simulated(&options(message)),
             other => Err(format!("there is no message {other:?}")),
@@ -239,6 +242,9 @@ impl Studio {
             end_s,
         });
         judged["named"] = json!(found.typed(&controller));
+        judged["lines"] = json!(choice.plant.and_then(|(vendor, spans)| {
+            vendor.lines(&vendor.typed(&controller.pid(), &spans).ok()?)
+        }));
         Ok(judged)
     }
 
@@ -263,6 +269,28 @@ impl Studio {
         answer["broken"] = json!(words::log_gains::broken(&to_write));
         Ok(answer)
     }
+}
+
+/// The controllers with gains of their own, and the ranges that these depend on.
+fn vendors() -> Value {
+    let one = |vendor: Vendor| {
+        json!({
+            "name": vendor.name(),
+            "has_range_of_measurement": vendor.has_range_of_measurement(),
+            "counts_output": vendor.counts_output(),
+            "full_input": vendor.full_input(),
+        })
+    };
+    json!({ "vendors": Vendor::ALL.map(one) })
+}
+
+/// Does work whose share the page hears.
+fn followed<T>(work: &'static str, of: impl FnOnce() -> T) -> T {
+    /// Steps of the bar of progress.
+    const STEPS: f64 = 1000.0;
+    let waiting = Waiting::on(work);
+    let told = move |share: f64| waiting.is_at(work, (STEPS * share) as usize, STEPS as usize);
+    with_progress(Rc::new(told), of)
 }
 
 const NOTHING: &str = "nothing is identified yet";

@@ -55,6 +55,9 @@ const LEAST_ASYMMETRY: f64 = 0.04;
 /// reference (it leads), and oscillates near the crossover of any controller: of 630 loops on processes with a flexible mode 9 were unstable, all with a crossover
 /// below 1.2 times the frequency of the oscillation.
 const LEADING: f64 = -0.05;
+/// Latest input (s) that a clock explains: columns of one log lie milliseconds apart, at worst a period of its slowest message. A relay
+/// that switches later has hysteresis.
+const MOST_LATE_S: f64 = 1.0;
 /// Phase margin (rad) that a sample period costs, above which it matters when between two samples the relay switches.
 const MUCH_BETWEEN_RAD: f64 = 0.05;
 /// Crossover over the highest excited frequency above which a remark says so, and the rounding of its limit.
@@ -201,6 +204,13 @@ impl Clock<'_> {
         let mut usual = leading.into_iter().chain([0.0]);
         if usual.any(|beta| self.is_that_of(beta, USUAL)) {
             return Ok(None);
+        }
+        // Of a slow process, hysteresis and no clock.
+        let late_s = self.law.late_s(0.0).unwrap_or(self.law.period_s());
+        if seen > 0.0 && late_s > MOST_LATE_S {
+            return Ok((identified.design).map(|design| Remark::ClockUnchecked {
+                rad_per_s: design.margins.gain_crossover_rad_per_s,
+            }));
         }
         let has_hysteresis = seen > LEADING;
         let beta = leading.filter(|_| !has_hysteresis).unwrap_or(0.0);

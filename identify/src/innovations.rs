@@ -74,6 +74,7 @@ use crate::excitation::{Excitation, Recorded};
 use crate::outcome::{
     Evidence, Fit, Identification, Identified, InnovationTests, Prediction, Refused,
 };
+use crate::progress::part;
 use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::Options;
@@ -104,6 +105,10 @@ const BEYOND_DOUBT: f64 = 0.98;
 /// and above which the model is at fault.
 const EXPECTED_ERROR_RATIO: f64 = 2.0;
 const MOST_ERROR_RATIO: f64 = 4.0;
+
+/// Shares of the time after the fit and after its tests, without the controller: of hover, flight and heater recordings.
+const FITTED: f64 = 0.8;
+const TESTED: f64 = 0.85;
 
 /// Identifies the process from a record of any input.
 pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identification {
@@ -160,12 +165,14 @@ impl Search<'_> {
         if prepared.part_used < 0.999 {
             self.remarks.push(Remark::PartUsed(prepared.part_used));
         }
-        let fitted = Fitted::new(&prepared, outliers, self.options, &mut self.remarks)?;
+        let fitted = part(0.0..FITTED, || {
+            Fitted::new(&prepared, outliers, self.options, &mut self.remarks)
+        })?;
         if is_assumed && !begins_at_rest(&fitted) {
             return Err(Verdict::ConstantInput);
         }
         let blocks = fitted.blocks();
-        let components = fitted.posterior(&blocks);
+        let components = part(FITTED..TESTED, || fitted.posterior(&blocks));
         let tests = validate::tests(&blocks, &fitted.best.found.at);
         let informative = validate::informative(&blocks, &fitted.best.found.theta);
         let prediction = fitted.prediction;

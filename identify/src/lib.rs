@@ -30,6 +30,7 @@ mod instrument;
 mod nonlinear;
 mod outcome;
 mod posterior;
+pub mod progress;
 mod reading;
 mod relay;
 mod remark;

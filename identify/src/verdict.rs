@@ -371,21 +371,18 @@ impl Verdict {
                     "not on one clock: a relay with beta {beta:.2} made this recording, but it switches as one with beta \
                      {seen:.2}"
                 )?;
-                match late_s {
-                    Some(late_s) if *late_s >= 0.0 => {
-                        write!(
-                            f,
-                            ", as if the input had been logged {:.1} ms late",
-                            1e3 * late_s
-                        )
-                    }
-                    Some(late_s) => write!(
-                        f,
-                        ", as if the output had been logged {:.1} ms late",
-                        -1e3 * late_s
-                    ),
-                    None => Ok(()),
-                }
+                let Some(late_s) = late_s else {
+                    return Ok(());
+                };
+                let column = if *late_s >= 0.0 { "input" } else { "output" };
+                let (late, unit) = match late_s.abs() {
+                    late_s @ 1.0.. => (late_s, "s"),
+                    late_s => (1e3 * late_s, "ms"),
+                };
+                write!(
+                    f,
+                    ", as if the {column} had been logged {late:.1} {unit} late"
+                )
             }
             Self::AmplitudeDependent(found) => write!(
                 f,

@@ -1,6 +1,7 @@
 //! Builder of an identification.
 
 use onecycle_design::{Specification, Structure};
+use onecycle_identify::progress::part;
 use onecycle_identify::{
     About, Hold, Identification, Method, Options, Remark, Road, Signals, identify_by,
 };
@@ -212,12 +213,14 @@ impl<'a> Identify<'a> {
                 }
                 _ => identify_by(signals, options, self.pack.as_ref()),
             };
-            let mut found = by(&options);
+            let is_compared = options != usual && !self.skips_default;
+            let share = if is_compared { 0.5 } else { 1.0 };
+            let mut found = part(0.0..share, || by(&options));
             if let Some(verdict) = calm.filter(|_| found.outcome.is_ok()) {
                 found.outcome = Err(verdict);
             }
-            if found.outcome.is_ok() && options != usual && !self.skips_default {
-                let default = by(&usual);
+            if found.outcome.is_ok() && is_compared {
+                let default = part(share..1.0, || by(&usual));
                 if let Err(verdict) = default.outcome {
                     let verdict = Box::new(verdict);
                     found.remarks.push(Remark::DefaultRefused(verdict));

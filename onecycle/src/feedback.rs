@@ -1,6 +1,7 @@
 //! Recordings of a closed loop with their set-point: from the input as it is, or from the part of it that the set-point
 //! caused.
 
+use onecycle_identify::progress::part;
 use onecycle_identify::{
     Caused, Evidence, Excitation, Identification, Identified, Innovations, Options, Remark,
     Signals, Verdict, caused_by_set_point, contradicts_set_point, identify_by,
@@ -9,6 +10,8 @@ use onecycle_identify::{
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
 
+/// Share of the time of the fit to the input as it is.
+const DIRECT: f64 = 0.5;
 /// Standard deviation of the output below which a flight is calm: rate (3 deg/s), angle (1 deg), climb rate.
 const CALM: [(&str, f64); 3] = [("rad/s", 0.05), ("rad", 0.0175), ("m/s", 0.05)];
 /// Share of the output's variance that the set-point has to cause for a fit to the part of the input that it caused. In calm
@@ -63,7 +66,7 @@ pub(crate) fn identify(
     (options, pack): (&Options, Option<&Pack<'_>>),
 ) -> Identification {
     let options = &options.under_feedback();
-    let mut direct = identify_by(signals, options, pack);
+    let mut direct = part(0.0..DIRECT, || identify_by(signals, options, pack));
     let caused = caused_by_set_point(signals, set_point);
     let follows = |caused: &Caused| caused.output_gain >= LEAST_GAIN;
     let share = (caused.as_ref().filter(|caused| follows(caused)))
@@ -118,7 +121,7 @@ fn in_two_stages(
         input: &caused.input,
         ..*signals
     };
-    let mut found = identify_by(&projected, options, pack);
+    let mut found = part(DIRECT..1.0, || identify_by(&projected, options, pack));
     if found.outcome.is_err() && explained(&direct) > BEYOND_DOUBT {
         return direct;
     }

@@ -306,6 +306,8 @@ pub use onecycle_link::{
 
 // Identification.
 #[doc(inline)]
+pub use onecycle_identify::progress::with_progress;
+#[doc(inline)]
 pub use onecycle_identify::{
     About, Estimate, Evidence, Excitation, Hold, Identification, Identified, Innovations, Interval,
     Method, Oscillation, Posterior, Recorded, Refused, Remark, ResponsePoint, Road,

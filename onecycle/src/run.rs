@@ -2,6 +2,7 @@
 
 use onecycle_design::Specification;
 use onecycle_identify::Verdict;
+use onecycle_identify::progress::part;
 use onecycle_link::{Recording, Span};
 use onecycle_onboard::pack::{Pack, SELF_TEST_TOLERANCE};
 
@@ -18,6 +19,10 @@ use crate::source::{self, LogFile, Source};
 use crate::survey::{self, Manner};
 use crate::words::units::Units;
 
+/// Shares of the time: of the choice of a part of a flight in the whole, of the identification in a report.
+const CHOSEN: f64 = 0.6;
+const IDENTIFIED: f64 = 0.9;
+
 impl Request {
     /// Identifies from a table or from a loop of a flight log, without a choice of the part from the one that tells most. Files with
     /// parameters are made, not written.
@@ -26,9 +31,16 @@ impl Request {
     /// One sentence: the settings contradict each other, or the source makes no recording.
     pub fn identify(&self, source: &dyn Source) -> Result<Report, Error> {
         let asked = self.specification()?;
-        let (recording, of_log) = self.recording(source, asked)?;
+        let is_part_given = self.from_s.is_some() || self.to_s.is_some();
+        let read = match source::is_flight_log(source) && !is_part_given {
+            true => CHOSEN,
+            false => 0.0,
+        };
+        let (recording, of_log) = part(0.0..read, || self.recording(source, asked))?;
         let in_force = InForce::of(&self.requirements, Some((source, &recording)))?;
-        self.report(source.name(), (recording, of_log), asked, in_force)
+        part(read..1.0, || {
+            self.report(source.name(), (recording, of_log), asked, in_force)
+        })
     }
 
     /// Identifies from a recording in memory; `name` stands in the report.
@@ -128,7 +140,7 @@ impl Request {
         if let Some(file) = &self.pack {
             identify = identify.pack(usable(file)?);
         }
-        let mut identification = identify.run(&recording);
+        let mut identification = part(0.0..IDENTIFIED, || identify.run(&recording));
         let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
         let against = set.against.or_else(in_force);
         let identified = identification.outcome.as_ref().ok();

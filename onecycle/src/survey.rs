@@ -3,6 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use onecycle_design::{Parameter, Specification, Structure};
+use onecycle_identify::progress::{one_of, part};
 use onecycle_identify::{Identified, Verdict};
 use onecycle_link::{Change, ControlLoop, Flight, Signals, Span};
 
@@ -20,6 +21,9 @@ use crate::words::units::Units;
 
 /// Largest ratio of the ends of the interval of a part's gain.
 const MOST_RATIO: f64 = 2.0;
+
+/// Share of the time of a loop in which its process is identified.
+const IDENTIFIED: f64 = 0.8;
 
 /// How a survey is made.
 pub(crate) struct Manner<'a> {
@@ -54,9 +58,11 @@ pub(crate) fn survey(
     let complete = flight.loops.iter().filter(|one| one.is_complete());
     let loops: Vec<ControlLoop> = complete.map(|one| one.control_loop).collect();
     let (all, done) = (loops.len(), AtomicUsize::new(0));
-    let loops = each(loops, |of| {
+    let loops = each(loops.into_iter().enumerate().collect(), |(at, of)| {
         let of_log = LogLoop::new(flight.clone(), of);
-        let found = of_loop((&file, number), of_log, (request, asked), manner.has_pages);
+        let found = one_of(at, all, || {
+            of_loop((&file, number), of_log, (request, asked), manner.has_pages)
+        });
         (manner.progress)(done.fetch_add(1, Relaxed) + 1, all);
         found
     });
@@ -80,7 +86,7 @@ fn of_loop(
     let file_name = file.name();
     let signals = file.signals(number, of_log.control_loop())?;
     let asked = of_log.specification(*asked, false);
-    let (mut one, mut shown) = parts(&signals, of_log.flight(), &asked);
+    let (mut one, mut shown) = part(0.0..IDENTIFIED, || parts(&signals, of_log.flight(), &asked));
     while let Some((at, of)) = one.best().and_then(|at| Some((at, shown.get_mut(at)?))) {
         let Ok(best) = &of.identification.outcome else {
             break;
@@ -138,8 +144,10 @@ pub(crate) fn best_part(signals: &Signals, flight: &Flight, asked: &Specificatio
 /// A loop with the parts of the flight worth using, and what was identified from each.
 fn parts(signals: &Signals, flight: &Flight, asked: &Specification) -> (FlightLoop, Vec<Shown>) {
     let spans = flight.stretches(signals);
-    let all = each(spans.clone(), |span| {
-        Some((span, identified(&signals.part(span), asked)?))
+    let numbered = spans.iter().copied().enumerate().collect();
+    let all = each(numbered, |(at, span)| {
+        let shown = one_of(at, spans.len(), || identified(&signals.part(span), asked));
+        Some((span, shown?))
     });
     let mut all: Vec<(Span, Shown)> = all.into_iter().flatten().collect();
     // What no part tells alone, the response to the set-point over all of the flight may tell. A fit to the input that no part

@@ -61,7 +61,7 @@ const took = () => `${((performance.now() - began) / 1000).toFixed(2)} s`;
 // ---- State in the fragment: what was set for one loop of one recording, never data ---------------------------------
 
 const NAMES = ["kp", "ki", "kd", "filter_s"], LABELS = { kp: "Kp", ki: "Ki", kd: "Kd", filter_s: "filter (s)" };
-const CHOICES = ["from", "to", "structure", "style", "vendor", "output-range", "more"];
+const CHOICES = ["from", "to", "structure", "style", "vendor", "input-range", "output-range", "more"];
 let kept, linked, fromAddress;
 const writeAddress = () => history.replaceState(null, "", kept.size ? `#${kept}` : location.pathname + location.search);
 const keep = (name, value) => {
@@ -93,13 +93,16 @@ let file, log, signals, report, view;
 let isAutomatic = true;
 // Hides the section and those after it. What was identified goes with them.
 const hideAfter = (id) => {
-  const all = ["recording", "settings", "result", "evidence", "design"];
+  const all = ["recording", "settings", "system", "result", "evidence", "design"];
   for (const later of all.slice(all.indexOf(id))) at(later).hidden = true;
   report = undefined;
 };
-const open = async (blob, name) => {
+// `again`: after a reload, with the loop that was open.
+const open = async (blob, name, again = false) => {
   hideAfter("recording");
   const opened = file = { blob, name };
+  wasAnswered = false;
+  if (!again) forgetWork();
   const answer = await waited(`Reading ${name}.`, { file });
   if (!answer || opened !== file) return;
   file.key = answer.key;
@@ -124,13 +127,16 @@ const open = async (blob, name) => {
   const isOther = belongs();
   await readSignals();
   if (isOther && signals) say(`${at("state").textContent} Settings of another recording or loop are not used.`);
-  if (isAutomatic && signals && opened === file) await answerAll(opened, isSet);
+  if (isAutomatic && signals && opened === file) await answerAll(opened, isSet, again);
+  if (opened === file) await keepWork();
 };
 // The answer without a click: of a flight log all loops, then the first one to change; where settings are given, their loop.
-const answerAll = async (of, isSet) => {
+const answerAll = async (of, isSet, again) => {
+  const own = again && at("loop").value;
   if (log && at("loop").options.length > 1 && !isSet) {
     const loops = await surveyAll();
     if (!loops || of !== file) return;
+    if (own) return openLoop(own);
     const first = ["change", "first_gains", "keep"].map((verdict) => loops.find(({ answer }) => answer?.verdict === verdict)).find(Boolean);
     if (!first) return say("No loop is told by this flight. What to fly stands beside each.");
     return openLoop(first.name);
@@ -182,10 +188,48 @@ const readNow = async () => {
   at("signals").hidden = !answer;
   if (!answer) { signals = undefined; return; }
   signals = answer;
+  showSystem();
   say(`${file.name}: ${signals.samples.toLocaleString("en")} samples, ${shown(signals.span_s[1] - signals.span_s[0])} s.`);
   at("notes").textContent = log ? `Input: ${signals.names[0]}. Output: ${signals.names[1]}.` : signals.notes.map((note) => `${note}.`).join(" ");
   view = signals.span_s;
   await drawSignals();
+};
+
+// ---- The work over a reload: the file in the browser's database, under a name that only this tab knows -------------
+
+const STORE = "work", A_DAY_MS = 86_400_000;
+let keptFile;
+const tab = () => sessionStorage.tab ??= crypto.randomUUID?.() ?? String(Math.random());
+const done = (request) => new Promise((resolve, reject) => { request.onsuccess = () => resolve(request.result); request.onerror = () => reject(request.error); });
+const inStore = async (work) => {
+  const request = indexedDB.open("onecycle-studio", 1);
+  request.onupgradeneeded = () => request.result.createObjectStore(STORE);
+  const database = await done(request);
+  try { return await work(database.transaction(STORE, "readwrite").objectStore(STORE)); } finally { database.close(); }
+};
+const keepWork = async () => {
+  const of = file;
+  if (!of) return;
+  try {
+    await inStore((store) => done(store.put({ blob: of.blob, name: of.name, before, at: Date.now() }, tab())));
+    if (of === file) keptFile = of;
+  } catch { keptFile = undefined; }
+};
+const forgetWork = async () => {
+  keptFile = undefined;
+  try { await inStore((store) => done(store.delete(tab()))); } catch { /* Nothing is kept. */ }
+};
+// The file that was open before a reload, or before the way back to this page. Those of a day ago are deleted.
+const keptWork = async () => {
+  const [{ type }] = performance.getEntriesByType("navigation");
+  try {
+    return await inStore(async (store) => {
+      const [keys, all] = await Promise.all([done(store.getAllKeys()), done(store.getAll())]);
+      const isOld = ({ at: kept }) => kept < Date.now() - A_DAY_MS;
+      await Promise.all(keys.filter((key, k) => isOld(all[k])).map((key) => done(store.delete(key))));
+      return type === "navigate" ? undefined : all[keys.indexOf(tab())];
+    });
+  } catch { return undefined; }
 };
 
 // ---- Signals, and a stretch chosen with the mouse ------------------------------------------------------------------
@@ -249,7 +293,44 @@ const outdate = () => {
 };
 for (const id of CHOICES) at(id).addEventListener("input", outdate);
 for (const id of ["style", "more"]) at(id).addEventListener("input", () => forgetSurvey());
-for (const id of ["structure", "style", "vendor", "output-range"]) at(id).onchange = () => keep(id, at(id).value);
+for (const id of ["structure", "style"]) at(id).onchange = () => keep(id, at(id).value);
+
+// ---- Controllers with gains of their own ---------------------------------------------------------------------------
+
+let vendors = [], wasAnswered = false;
+const vendor = () => vendors.find(({ name }) => name === at("vendor").value);
+const showSystem = () => {
+  const of = vendor();
+  at("system").hidden = !signals || Boolean(log);
+  at("input-range-label").hidden = !of?.counts_output;
+  at("input-range").placeholder = of ? `0..${of.full_input}` : "";
+  at("output-range-label").hidden = !of?.has_range_of_measurement;
+};
+for (const id of ["vendor", "input-range", "output-range"]) at(id).onchange = async () => {
+  const of = vendor();
+  if (!of?.counts_output) at("input-range").value = "";
+  if (!of?.has_range_of_measurement) at("output-range").value = "";
+  for (const name of ["vendor", "input-range", "output-range"]) keep(name, at(name).value);
+  showSystem();
+  if (!wasAnswered) return;
+  if (of?.has_range_of_measurement && !at("output-range").value) { say("This controller counts in percent: give the range of its measurement."); return at("output-range").focus(); }
+  await pressed;
+  if (!isBusy && !report) identify();
+};
+// What to paste or to type in: the lines of the controller, else names and values.
+const toType = () => drawn?.lines ?? (drawn?.named ?? []).map(({ name, unit, full }) => `${name} = ${Number(full.toPrecision(6))} ${unit}`.trim()).join("\n");
+at("copy").onclick = async () => {
+  try {
+    await navigator.clipboard.writeText(toType());
+    at("copied").textContent = "Copied.";
+  } catch {
+    at("lines").textContent = toType();
+    at("lines").hidden = false;
+    getSelection().selectAllChildren(at("lines"));
+    at("copied").textContent = document.execCommand("copy") ? "Copied." : "Press Ctrl+C.";
+  }
+};
+at("save-text").onclick = () => { save(`${toType()}\n`, `${stem()}.gains.txt`); at("copied").textContent = "Saved."; };
 // Other columns are read after the press on a button that ended the typing: a button that is disabled or moves under a
 // press is not clicked.
 let isUnread = false, pressed = Promise.resolve();
@@ -331,6 +412,7 @@ const identify = async () => {
   if (!answer || of !== file) return;
   if (JSON.stringify(asked) !== JSON.stringify(settings())) return say("The settings have changed: press Identify.");
   report = answer;
+  wasAnswered = true;
   showResult();
 };
 at("identify").onclick = identify;
@@ -429,6 +511,7 @@ let before;
 at("keep-before").onclick = () => {
   before = { name: stem().replaceAll("_", " "), key: file.key, judged: drawn };
   exported("Kept: the next file is compared with this loop.");
+  keepWork();
 };
 const judgeAgainst = async () => {
   if (against !== before) against.judged = await ask({ do: "judge", gains: against.gains });
@@ -537,10 +620,14 @@ const drawDesign = (of) => {
   const other = against.judged;
   at("named").tBodies[0].replaceChildren(...(of.named ?? []).map((gain) => row([gain.unit ? `${gain.name} (${gain.unit})` : gain.name, ...[gain.now, gain.half, gain.full].map((value) => shown(value))])));
   at("named").hidden = !of.named?.length;
+  at("lines").textContent = of.lines ?? "";
+  at("lines").hidden = !of.lines;
+  at("copied").textContent = "";
   at("figures").tBodies[0].replaceChildren(...FIGURES.map(([name, text]) => row([name, text(of), other.error ? "–" : text(other)])));
   at("figures").tBodies[0].classList.toggle("bad", !of.is_stable);
   at("limits").textContent = of.asks ?? "";
   at("summary").textContent = of.is_stable ? `Phase margin ${degrees(of.figures.margins?.phase_margin_deg)}, Ms ${shown(of.figures.margins?.ms, 3)}.` : "The loop is unstable.";
+  for (const id of ["copy", "save-text"]) at(id).disabled = !of.is_stable;
   for (const id of ["step", "effort", "load", "nyquist"]) if (!of.is_stable) at(id).replaceChildren(make("p", "The loop is unstable with these gains.", { className: "bad" }));
   if (!of.is_stable) return;
   const band = (rows, low, times) => rows ? times.map(([t], k) => [t, rows[k][low], rows[k][low + 1]]) : [];
@@ -615,7 +702,6 @@ const PROCESSES = {
   resonant_lag: ["K=1, T_prop=0.05, w0=10, zeta=0.3, tau=0.02", "prbs", 40, 100, "--pulse 0.15"],
 };
 at("s-process").append(...Object.keys(PROCESSES).map((name) => make("option", name)));
-at("vendor").append(...["isa", "proportional-band", "interacting", "deltav", "deltav-series", "tdc3000", "centum", "pide", "pide-independent", "control-expert"].map((name) => make("option", name)));
 at("structure").append(...Object.keys(PROCESSES).map((name) => make("option", name)));
 const setProcess = () => {
   const values = PROCESSES[at("s-process").value];
@@ -696,9 +782,9 @@ document.addEventListener("drop", (event) => {
   const [dropped] = event.dataTransfer.files;
   if (dropped) open(dropped, dropped.name);
 });
-// What was set by hand is lost with the page, the file with it: the browser asks.
+// What was set by hand is lost with the page where the browser does not keep the file: it asks.
 addEventListener("beforeunload", (event) => {
-  if (file && [...CHOICES, ...NAMES].some((name) => kept.has(name))) event.preventDefault();
+  if (file && file !== keptFile && [...CHOICES, ...NAMES].some((name) => kept.has(name))) event.preventDefault();
 });
 let widthDrawn = innerWidth;
 addEventListener("resize", () => {
@@ -711,9 +797,13 @@ addEventListener("resize", () => {
   try {
     module = await WebAssembly.compile(await unpacked("wasm"));
     await start();
+    vendors = (await ask({ do: "vendors" })).vendors;
+    at("vendor").append(...vendors.map(({ name }) => make("option", name)));
     say("Ready.");
-    at("hint").hidden = !kept.has("file");
     document.body.dataset.readyMs = performance.now();
+    const work = await keptWork();
+    if (work && !file) { before = work.before; return open(work.blob, work.name, true); }
+    at("hint").hidden = !kept.has("file") || Boolean(file);
   } catch (error) {
     say(`The studio cannot start in this browser: ${error.message}`, true);
   }

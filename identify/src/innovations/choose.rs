@@ -10,6 +10,7 @@ use onecycle_design::Structure;
 use super::record::{Blocks, Record};
 use super::search::{self, Candidate, HEADS};
 use super::theta::{Bounds, Theta};
+use crate::progress::{one_of, part};
 
 /// Structures explain a record nearly as well up to this difference of the BIC: a likelihood ratio of `e^3`.
 pub(super) const NEARLY: f64 = 6.0;
@@ -37,6 +38,11 @@ const LIMITS: [(Structure, Structure); 7] = [
 ];
 /// Rows of the fit that chooses.
 const ROWS: usize = 900;
+
+/// Shares of the time of a choice after the screening, the fits of what it found, and those of the structures.
+const SCREENED: f64 = 0.8;
+const RACED: f64 = 0.85;
+const DERIVED: f64 = 0.95;
 
 /// Candidates of all structures in ascending order of BIC, the best of each structure, on one set of rows.
 #[derive(Clone)]
@@ -131,16 +137,19 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
     let blocks = Blocks::new(record, samples, limits.skip_s);
     let tau_s = limits.longest_tau_s;
     let starts = match starts {
-        [] => screened(record, limits),
+        [] => part(0.0..SCREENED, || screened(record, limits)),
         _ => starts.to_vec(),
     };
     let starts = search::promising(&blocks, starts, tau_s);
-    let mut all = search::race(&blocks, &starts, None, tau_s);
-    if let Some(lead) = search::best(all.clone()) {
-        let starts = search::noise_sets(lead.found.theta);
-        all.extend(search::race(&blocks, &starts, Some(&lead), tau_s));
-    }
-    derive(&blocks, &mut all, limits);
+    let mut all = part(SCREENED..RACED, || {
+        let mut all = search::race(&blocks, &starts, None, tau_s);
+        if let Some(lead) = search::best(all.clone()) {
+            let starts = search::noise_sets(lead.found.theta);
+            all.extend(search::race(&blocks, &starts, Some(&lead), tau_s));
+        }
+        all
+    });
+    part(RACED..DERIVED, || derive(&blocks, &mut all, limits));
     lift(&blocks, &mut all, limits);
     quieten(&blocks, &mut all, limits);
     if limits.structure.is_none() {
@@ -163,8 +172,13 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
 
 /// The best starts of each kind of noise and structure, on each part that is screened.
 fn screened(record: &Record, limits: &Limits) -> Vec<Theta> {
-    (search::heads(limits.structure).into_iter())
-        .flat_map(|head| search::screen(record, head, limits.skip_s, limits.longest_tau_s))
+    let heads = search::heads(limits.structure);
+    (heads.iter().enumerate())
+        .flat_map(|(at, head)| {
+            one_of(at, heads.len(), || {
+                search::screen(record, *head, limits.skip_s, limits.longest_tau_s)
+            })
+        })
         .flat_map(|starts| search::best_of_each_noise(&starts))
         .collect()
 }
@@ -173,7 +187,7 @@ fn screened(record: &Record, limits: &Limits) -> Vec<Theta> {
 /// noises that proved best in another. These come first: what they find leads to the others.
 fn derive(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
     let others = (Structure::ALL.into_iter()).filter(|structure| !HEADS.contains(structure));
-    for structure in HEADS.into_iter().chain(others) {
+    for (at, structure) in HEADS.into_iter().chain(others).enumerate() {
         let best = all.iter().min_by(|a, b| a.bic.total_cmp(&b.bic));
         let Some(lead) = best.cloned() else {
             return;
@@ -198,7 +212,9 @@ fn derive(blocks: &Blocks<'_>, all: &mut Vec<Candidate>, limits: &Limits) {
             }
         }
         let tau_s = limits.longest_tau_s;
-        all.extend(search::race(blocks, &starts, Some(&lead), tau_s));
+        all.extend(one_of(at, Structure::ALL.len(), || {
+            search::race(blocks, &starts, Some(&lead), tau_s)
+        }));
     }
 }
 

@@ -16,6 +16,7 @@ use super::{
 };
 use crate::assumed::RecordedLoop;
 use crate::outcome::Prediction;
+use crate::progress;
 use crate::remark::Remark;
 use crate::settings::Options;
 use crate::signals::range;
@@ -47,6 +48,11 @@ const FEWEST_LONG_ROWS: usize = 300;
 const DESCENDED: usize = 2;
 /// Difference of the log-likelihood above which the input is taken as straight lines between the samples.
 const STRAIGHT: f64 = 3.0;
+
+/// Shares of the time: after the choice of the structure; of this choice after that with an unknown start, and after the start was judged.
+const CHOSEN: f64 = 0.9;
+const FREE: f64 = 0.65;
+const RESTED: f64 = 0.9;
 
 /// What the disturbances are worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,7 +102,9 @@ impl Fitted {
             structure: options.structure,
             fewest_samples: 1,
         };
-        let choice = choose_start(&mut record, &limits, options, remarks);
+        let choice = progress::part(0.0..CHOSEN, || {
+            choose_start(&mut record, &limits, options, remarks)
+        });
         let (mut part, mut choice) = choice.ok_or(Verdict::NoFit)?;
         let theta = choice.chosen().ok_or(Verdict::NoFit)?.found.theta;
         let (mut samples, skip_s) = rows_for(&record, &theta);
@@ -262,16 +270,20 @@ fn choose_start(
     remarks: &mut Vec<Remark>,
 ) -> Option<(Range<usize>, Choice)> {
     let mut of_free = vec![];
-    let free = choose_on_parts(record, limits, options, &[], &mut of_free);
+    let free = progress::part(0.0..FREE, || {
+        choose_on_parts(record, limits, options, &[], &mut of_free)
+    });
     if record.rest.is_none() && !options.is_under_way {
         let (_, choice) = free.as_ref()?;
         let at_rest = record.at_rest().rounded(CHOOSING_STAMP);
         let mut starts = search::screen_whole(&at_rest, limits.structure, limits.longest_tau_s);
         starts.extend(choice.chosen().map(|found| found.found.theta));
-        if was_at_rest(record, limits, &starts) {
+        if progress::part(FREE..RESTED, || was_at_rest(record, limits, &starts)) {
             *record = record.at_rest();
             starts.extend(choice.thetas());
-            return choose_on_parts(record, limits, options, &starts, remarks);
+            return progress::part(RESTED..1.0, || {
+                choose_on_parts(record, limits, options, &starts, remarks)
+            });
         }
     }
     remarks.append(&mut of_free);
@@ -313,9 +325,16 @@ fn choose_on_parts(
 ) -> Option<(Range<usize>, Choice)> {
     let mut choices = Vec::new();
     let mut parts = excited_parts(record);
+    let mut done = 0.0;
     while let Some(part) = parts.pop() {
         let fewest = limits.fewest_samples;
-        let Some(choice) = choose_on(record, part.clone(), fewest, options, starts, remarks) else {
+        // The part and those that are left share what is to do; one more may be found in it.
+        let end = done + (1.0 - done) / (parts.len() + 1) as f64;
+        let choice = progress::part(done..end, || {
+            choose_on(record, part.clone(), fewest, options, starts, remarks)
+        });
+        done = end;
+        let Some(choice) = choice else {
             continue;
         };
         // Rows longer than the shortest lag do not show it: a shorter part has shorter rows.

@@ -41,12 +41,15 @@ pub fn compared(choice: &Controllers, of: &Comparison) -> String {
             None => effect(gain),
         },
         (_, Some(gain), Some(loss)) => format!(
-            "the proposal would give {}, but {}",
+            "the proposed gains would bring {}, but {}",
             effect(gain),
             effect(loss)
         ),
-        (_, _, Some(loss)) => format!("the proposal would only give {}", effect(loss)),
-        _ => "you would feel no difference with the proposed ones".to_owned(),
+        (_, _, Some(loss)) => format!(
+            "the proposed gains would bring {} and make nothing better",
+            effect(loss)
+        ),
+        _ => "you would feel no difference with the proposed gains".to_owned(),
     }
 }
 
@@ -74,19 +77,45 @@ fn joined(first: String, effects: [Option<&Effect>; 2]) -> String {
 
 /// What one would feel.
 fn effect(of: &Effect) -> String {
-    let times = match 1.0 / of.better[1] {
-        none if none < 0.002 => "none of".to_owned(),
-        all if all > 500.0 => "no end of".to_owned(),
-        times => format!("{times:.2} times"),
-    };
-    match of.figure {
-        Felt::LoadError if of.better[1] > 500.0 => "no steady error under a load".to_owned(),
-        Felt::LoadError if of.better[1] < 0.002 => "a steady error under a load".to_owned(),
-        Felt::LoadError => format!("{times} the load error"),
-        Felt::SetPointError => format!("{times} the set-point error"),
-        Felt::Overshoot => format!("{times} the peak of a step"),
-        Felt::Noise => format!("{times} the noise at the actuator"),
-        _ => format!("{times} Ms"),
+    felt(of.figure, 1.0 / of.better[1])
+}
+
+/// A figure that becomes so many times as large.
+fn felt(figure: Felt, times: f64) -> String {
+    let error = |of: &str| changed(times, &format!("error after {of}"));
+    match figure {
+        Felt::LoadError if times < LEAST_TIMES => "no steady error under a load".to_owned(),
+        Felt::LoadError if times > MOST_TIMES => "a steady error under a load".to_owned(),
+        Felt::LoadError => error("a load or gust"),
+        Felt::SetPointError => error("a set-point step"),
+        Felt::Noise => changed(times, "noise at the actuator"),
+        Felt::Overshoot => height(times, "peak after a set-point step"),
+        _ => height(times, "Ms"),
+    }
+}
+
+/// Ratios below and above which a figure is none or has no end.
+const LEAST_TIMES: f64 = 0.002;
+const MOST_TIMES: f64 = 500.0;
+
+/// A figure that becomes so many times as large, such as `2.6 times the noise` or `45 % less error`.
+fn changed(times: f64, figure: &str) -> String {
+    match times {
+        _ if times < LEAST_TIMES => format!("no {figure}"),
+        _ if times > MOST_TIMES => format!("{figure} without end"),
+        _ if times < 0.995 => format!("{:.0} % less {figure}", 100.0 * (1.0 - times)),
+        _ if times < 1.995 => format!("{:.0} % more {figure}", 100.0 * (times - 1.0)),
+        _ => format!("{times:.1} times the {figure}"),
+    }
+}
+
+/// A peak that becomes so many times as high.
+fn height(times: f64, peak: &str) -> String {
+    match times {
+        _ if times > MOST_TIMES => format!("a {peak} without end"),
+        _ if times < 1.0 => format!("a {:.0} % lower {peak}", 100.0 * (1.0 - times)),
+        _ if times < 1.995 => format!("a {:.0} % higher {peak}", 100.0 * (times - 1.0)),
+        _ => format!("{times:.1} times the {peak}"),
     }
 }
 
@@ -210,5 +239,45 @@ pub fn part(share: f64) -> String {
         0.5 => "half".to_owned(),
         1.0 => "all".to_owned(),
         share => format!("{:.0} %", 100.0 * share),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // A figure is 1 / better times the old one: 0.54 times is 46 % less.
+    #[test]
+    fn effects_read_as_people_say_them() {
+        for (figure, times, text) in [
+            (Felt::LoadError, 0.0, "no steady error under a load"),
+            (Felt::LoadError, 1e4, "a steady error under a load"),
+            (
+                Felt::LoadError,
+                0.54,
+                "46 % less error after a load or gust",
+            ),
+            (
+                Felt::SetPointError,
+                2.63,
+                "2.6 times the error after a set-point step",
+            ),
+            (
+                Felt::SetPointError,
+                1.25,
+                "25 % more error after a set-point step",
+            ),
+            (Felt::Noise, 0.0, "no noise at the actuator"),
+            (Felt::Noise, 1e9, "noise at the actuator without end"),
+            (
+                Felt::Overshoot,
+                1.2,
+                "a 20 % higher peak after a set-point step",
+            ),
+            (Felt::Ms, 0.77, "a 23 % lower Ms"),
+            (Felt::Ms, 3.0, "3.0 times the Ms"),
+        ] {
+            assert_eq!(felt(figure, times), text);
+        }
     }
 }

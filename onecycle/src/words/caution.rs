@@ -2,7 +2,7 @@
 
 use crate::Remark;
 
-use crate::words::number::significant;
+use crate::words::number::{seconds, significant};
 
 /// One or two sentences. `None` for a remark of another kind.
 pub(crate) fn sentence(remark: &Remark) -> Option<String> {
@@ -15,8 +15,8 @@ pub(crate) fn sentence(remark: &Remark) -> Option<String> {
             rad_per_s,
         } => {
             let cost = rad_per_s.map_or(String::new(), |rad_per_s| {
-                let deg = (5e-3 * rad_per_s).to_degrees();
-                format!(" Each 5 ms of an offset cost {deg:.1} deg.")
+                let (offset, deg) = cost_of_offset(rad_per_s);
+                format!(" Each {offset} of an offset cost {deg:.1} deg.")
             });
             clock(*seen, *beta, late_s.map(|late_s| (late_s, *phase_margin_rad)), &cost)
         }
@@ -74,16 +74,21 @@ pub(crate) fn sentence(remark: &Remark) -> Option<String> {
 
 /// Nothing shows an offset of the clocks, which would act at the gain crossover `rad_per_s`.
 fn clock_unchecked(rad_per_s: f64) -> String {
+    let (offset, deg) = cost_of_offset(rad_per_s);
+    format!(
+        "Nothing in this recording shows whether both columns come from one clock: each {offset} by which the input was \
+         logged late cost {deg:.1} deg of phase margin. `input_late=0` says that they do."
+    )
+}
+
+/// An offset of the clocks that a loop with the gain crossover `rad_per_s` feels, and the phase (deg) that it costs there.
+fn cost_of_offset(rad_per_s: f64) -> (&'static str, f64) {
     // A loop of a plant with a crossover below 1 rad/s does not feel 5 ms.
     let (offset, offset_s) = match rad_per_s < 1.0 {
         true => ("second", 1.0),
         false => ("5 ms", 5e-3),
     };
-    format!(
-        "Nothing in this recording shows whether both columns come from one clock: each {offset} by which the input was \
-         logged late cost {:.1} deg of phase margin. `input_late=0` says that they do.",
-        (offset_s * rad_per_s).to_degrees()
-    )
+    (offset, (offset_s * rad_per_s).to_degrees())
 }
 
 /// `later`: the offset of the clocks if the relay has this `beta` (s), and the phase margin then (rad).
@@ -105,9 +110,9 @@ fn clock(seen: f64, beta: f64, later: Option<(f64, Option<f64>)>, cost: &str) ->
         None => "the loop would be unstable".to_owned(),
     };
     format!(
-        "The relay switches as one with beta {seen:.2}. If it is one with beta {beta:.2}, the {column} was logged {:.1} ms \
+        "The relay switches as one with beta {seen:.2}. If it is one with beta {beta:.2}, the {column} was logged {} \
          late, and {margin}.{cost}{halved} {ask}",
-        1e3 * late_s.abs()
+        seconds(late_s.abs())
     )
 }
 

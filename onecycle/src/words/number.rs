@@ -53,9 +53,12 @@ pub fn degrees(angle_rad: f64) -> String {
     format!("{:.2} deg", angle_rad.to_degrees())
 }
 
-/// A time (s) in s, ms or us.
+/// A time (s) in the unit that suits it: us, ms, s, min or h.
 pub fn seconds(time_s: f64) -> String {
     match time_s {
+        36_000.0.. => format!("{:.1} h", time_s / 3600.0),
+        600.0.. => format!("{:.1} min", time_s / 60.0),
+        100.0.. => format!("{time_s:.0} s"),
         0.1.. => format!("{time_s:.2} s"),
         1e-3..0.1 => format!("{:.1} ms", 1e3 * time_s),
         _ => format!("{:.0} us", 1e6 * time_s),
@@ -105,6 +108,9 @@ mod tests {
         assert_eq!(percent(-0.00001), "0.00 %");
         assert_eq!(percent(-0.0123), "-1.23 %");
         assert_eq!(degrees(-0.818_355), "-46.89 deg");
+        assert_eq!(seconds(86_400.0), "24.0 h");
+        assert_eq!(seconds(4914.75), "81.9 min");
+        assert_eq!(seconds(128.73), "129 s");
         assert_eq!(seconds(1.8936), "1.89 s");
         assert_eq!(seconds(0.005), "5.0 ms");
         assert_eq!(seconds(3.2e-5), "32 us");

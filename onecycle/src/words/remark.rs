@@ -4,7 +4,7 @@ use crate::{About, DesignError, Identification, Interval, Parameter, Remark};
 use onecycle_identify::Nonlinear;
 
 use super::{caution, controllers, listed};
-use crate::words::number::{bounded, percent, significant};
+use crate::words::number::{bounded, percent, seconds, significant};
 
 /// Heading of the remarks that are reasons to suspect the result.
 pub const REASONS: &str = "Remarks";
@@ -86,8 +86,8 @@ fn of_recording(remark: &Remark) -> Option<String> {
             )
         }
         Remark::OutputFilter { delay_s } => format!(
-            "The output passed a known low-pass filter. The fit took it out; its delay of {} ms is part of tau.",
-            significant(1e3 * delay_s)
+            "The output passed a known low-pass filter. The fit took it out; its delay of {} is part of tau.",
+            seconds(delay_s)
         ),
         Remark::TwoStage { share } => format!(
             "Noise came back through the controller. The fit used the part of the input that the set-point caused \
@@ -311,18 +311,12 @@ fn of_result(remark: &Remark) -> Option<String> {
         }
         Remark::EqualLags { ref lags, mean_s } => equal_lags(lags, mean_s),
         Remark::WeakDelay { low_s, high_s } if low_s <= 0.0 => {
-            format!(
-                "The delay is only known to be below {} s.",
-                significant(high_s)
-            )
-        }
-        Remark::WeakDelay { low_s, high_s } if high_s >= 1.0 => {
-            format!("The delay is only known to lie between {low_s:.2} and {high_s:.2} s.")
+            format!("The delay is only known to be below {}.", seconds(high_s))
         }
         Remark::WeakDelay { low_s, high_s } => format!(
-            "The delay is only known to lie between {:.2} and {:.2} ms.",
-            1e3 * low_s,
-            1e3 * high_s
+            "The delay is only known to lie between {} and {}.",
+            seconds(low_s),
+            seconds(high_s)
         ),
         Remark::Misfit(part) => format!(
             "The model leaves {:.1} % of the oscillation unexplained beyond the noise; the intervals are widened for \
