@@ -79,7 +79,7 @@ fn what_it_refuses() {
     let refused = run(&["reproduce", "table_8"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     let words = "there is no part 'table_8': choose from phase, grid, grid_variants, figures, table_2_and_3, \
-                 table_2_variants, table_4, tuning_rules, rule_variants, table_5, table_6, table_7, modes, claims";
+                 ablation, our_network, table_4, tuning_rules, rule_variants, table_5, table_6, table_7, modes, claims";
     assert!(refused.stderr.contains(words), "{refused:?}");
 
     let folder = Scratch::new();
