@@ -53,6 +53,7 @@ use crate::experiments::ExperimentError;
 use crate::learn::train::{
     Layer, Loss, Network, OptimizerMethod, Schedule, TrainError, TrainingSettings,
 };
+use crate::space::candidate::Gains;
 use crate::space::grid;
 use crate::space::grid::{Grid, GridError, Layout};
 use crate::space::{FieldError, Space, first_out_of_range};
@@ -329,6 +330,10 @@ impl ClassifierRecipe {
             space: self.space,
             deterioration: self.deterioration,
             layout: self.layout,
+            gains: match self.layout {
+                Layout::Lattice => Gains::SameMagnitude,
+                Layout::Rays | Layout::Fewest => Gains::SameAmplitude,
+            },
             ..grid::GridSettings::default()
         }
     }
