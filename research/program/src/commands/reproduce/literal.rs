@@ -259,12 +259,9 @@ pub(super) fn ablation(
 
 /// The verification set, then random processes: gain matched, by the describing function, from the harmonics.
 fn cells(found: &Found) -> Vec<String> {
-    if found.outcome == "diverged" {
-        return vec!["diverged".to_owned()];
-    }
     let largest = |score: &Score| match score.unstable {
         0 => cost(score.largest),
-        unstable => format!("{unstable} unstable"),
+        unstable => format!("{unstable} of {} unstable", score.examples),
     };
     let [harmonics, _, describing, matched] = &found.random;
     let classes = &found.verification[Gain::Matched as usize];
@@ -281,8 +278,10 @@ fn cells(found: &Found) -> Vec<String> {
         cost(harmonics.mean),
         largest(harmonics),
     ];
-    // A regression is no class, and has no such gains.
-    if found.fifties.is_empty() {
+    if found.outcome == "diverged" {
+        cells.fill("diverged".to_owned());
+    } else if found.fifties.is_empty() {
+        // A regression is no class, and has no such gains.
         cells[..9].fill("-".to_owned());
     }
     cells
