@@ -43,7 +43,7 @@ pub enum PaperNetworkError {
     Card(String),
     /// The network does not fit its card.
     #[error(
-        "it has {inputs} inputs and {outputs} outputs; its card needs {expected} and {classes}"
+        "it has {inputs} inputs and {outputs} outputs; {classes} classes need {expected} and {classes}"
     )]
     Size {
         /// Inputs of the network.
