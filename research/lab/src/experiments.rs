@@ -35,7 +35,7 @@ pub mod relays;
 
 pub use benchmark::{Benchmark, CYCLES_KEPT, IDENTIFICATION_PERIODS, Recorded, RelayTest, Truth};
 pub use campaign::{Campaign, MOST_CASES, Measure, SAMPLE_S};
-pub use cut::{SampledCycle, SteadyCycle, cycles, last_steady_cycle, signals_of};
+pub use cut::{SampledCycle, SteadyCycle, cycles, last_steady_cycle, last_whole_cycle, signals_of};
 pub use defect::{Defect, DefectKind};
 pub use draw::Drawn;
 pub use experiment::{ExperimentError, RelayExperiment, RelaySetup, Simulation};
@@ -44,3 +44,4 @@ pub use instruments::Instruments;
 pub use oscillation::Oscillation;
 pub use recipe::{Family, Recipe, RecipeError};
 pub use recording::{RecordingCampaign, RecordingError};
+pub use relays::PlainRelay;

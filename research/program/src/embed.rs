@@ -92,7 +92,7 @@ impl Dataset {
         };
         let open = || {
             let recipe = dataset::recipe(arguments.recipe.as_deref())?;
-            let asked = (recipe, arguments.examples);
+            let asked = (recipe, dataset::number(&arguments)?);
             dataset::opened(&arguments.into, asked, arguments.restart)
         };
         open().map(Self).map_err(|failure| failure.to_string())

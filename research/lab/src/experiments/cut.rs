@@ -48,6 +48,22 @@ pub fn last_steady_cycle(trace: &Trace) -> Option<Cycle> {
     last
 }
 
+/// The samples of the last whole cycle of a relay of amplitude one, from a rise of its input to the next, steady or not.
+#[must_use]
+pub fn last_whole_cycle(trace: &Trace, sample_s: f64) -> Option<SampledCycle> {
+    let rises = (1..trace.len()).rev();
+    let mut rises = rises.filter(|&k| trace.input[k] - trace.input[k - 1] > JUMP);
+    let last = rises.next()?;
+    let first = rises.next()?;
+    let single = |signal: &[f64]| signal[first..last].iter().map(|&x| x as f32).collect();
+    Some(SampledCycle {
+        sample_s,
+        input: single(&trace.input),
+        output: single(&trace.output),
+        drift: 0.0,
+    })
+}
+
 /// What the board keeps of one steady cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SteadyCycle {

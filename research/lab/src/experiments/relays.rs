@@ -72,6 +72,58 @@ impl Controller for SweptRelay {
     }
 }
 
+/// The rule of the modified relay alone, with amplitude one and without any protection, as in the published code of the paper's
+/// authors: `u = sign(e + beta e0)`, `e0` the error of largest magnitude since its filtered derivative has last changed its
+/// sign. Noise changes that sign at every sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PlainRelay {
+    beta: f64,
+    lag_s: f64,
+    last_error: f64,
+    slope: f64,
+    peak: f64,
+    is_high: bool,
+}
+
+impl PlainRelay {
+    /// Lag of the derivative's filter over the time in which the oscillation turns by one radian.
+    pub const LAG: f64 = 0.2;
+
+    /// A relay of this `beta`, -1 to 1, and this lag of the derivative (s).
+    #[must_use]
+    pub fn new(beta: f64, lag_s: f64) -> Self {
+        Self {
+            beta,
+            lag_s,
+            last_error: 0.0,
+            slope: 0.0,
+            peak: 0.0,
+            is_high: true,
+        }
+    }
+}
+
+impl Controller for PlainRelay {
+    fn step(&mut self, dt_s: f64, reference: f64, sensed: Sensed) -> f64 {
+        let error = reference - sensed.output;
+        let was_rising = self.slope > 0.0;
+        let share = -(-dt_s / self.lag_s).exp_m1();
+        self.slope += share * ((error - self.last_error) / dt_s - self.slope);
+        self.last_error = error;
+        if (self.slope > 0.0) != was_rising {
+            self.peak = 0.0;
+        }
+        if error.abs() > self.peak.abs() {
+            self.peak = error;
+        }
+        let switch = error + self.beta * self.peak;
+        if switch != 0.0 {
+            self.is_high = switch > 0.0;
+        }
+        if self.is_high { 1.0 } else { -1.0 }
+    }
+}
+
 /// A relay with two unequal levels and a hysteresis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AsymmetricRelay {
@@ -115,5 +167,42 @@ impl Controller for AsymmetricRelay {
             self.is_high = false;
         }
         if self.is_high { self.high } else { self.low }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    // By hand for beta = -0.5, with a derivative that is hardly filtered: from the largest error on, the error counts that is
+    // largest since it falls (1.5): low below 0.75, and high again above half of the least (-2). A turn within an excursion
+    // makes it count from there: after 1.0 rises to 1.2, low below 0.6.
+    #[test]
+    fn the_rule_by_hand() {
+        let mut relay = PlainRelay::new(-0.5, 1e-9);
+        let errors = [
+            (1.0, 1.0),
+            (2.0, 1.0),
+            (1.5, 1.0),
+            (0.8, 1.0),
+            (0.7, -1.0),
+            (-1.0, -1.0),
+            (-2.5, -1.0),
+            (-2.0, -1.0),
+            (-1.1, -1.0),
+            (-0.9, 1.0),
+            (1.4, 1.0),
+            (1.0, 1.0),
+            (1.2, 1.0),
+            (0.7, 1.0),
+            (0.3, -1.0),
+        ];
+        for (error, expected) in errors {
+            let sensed = Sensed {
+                output: -error,
+                rate: 0.0,
+            };
+            assert_eq!(relay.step(1e-3, 0.0, sensed), expected, "{error}");
+        }
     }
 }

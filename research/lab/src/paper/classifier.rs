@@ -18,8 +18,12 @@
 //! | gain of a class       | from the amplitude                 | from the harmonics                 |
 //! | the output, `pv`      | zero-padded                        | zero-padded or stretched: [`Fit`]  |
 //! | inputs                | amplitude 1                        | amplitude 1, then standardised for training: [`Standard`] |
+//! | noise                 | into the finished cycle            | at the sensor of the relay         |
 //! | a hidden layer        | ReLU, batch normalisation, dropout | the same, in this order            |
 //! | rate, momentum, batch, epochs, dropout, noise | not given | in the recipe                       |
+//!
+//! Each choice is a field of the recipe, whose default is the right column; what is in the left one and not in the paper is
+//! in its authors' published code.
 //!
 //! A controller has two numbers and a process, apart from its gain, three. So many classes have nearly
 //! the same controller, a wrong class is often as good as the right one, and accuracy says little.
@@ -36,9 +40,9 @@ use onecycle_onboard::SoiptdError;
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
 
-pub use classes::{Class, Classes, Gain, Measured, TrueProcess, label};
-pub use examples::{Examples, Processes, coordinates, times_at};
-pub use experiment::{Protocol, Trial, Trials};
+pub use classes::{Class, Classes, Gain, Measured, Price, TrueProcess, label};
+pub use examples::{Examples, Label, Processes, Reading, coordinates, times_at};
+pub use experiment::{NoiseKind, Protocol, RelayKind, Trial, Trials};
 pub use harmonic::{Harmonics, Response};
 pub use input::{Fit, INPUTS, Prepared, SAMPLES};
 pub use scoring::{PickRule, Score, least_expected_cost, most_likely, picks};
@@ -49,8 +53,9 @@ use crate::experiments::ExperimentError;
 use crate::learn::train::{
     Layer, Loss, Network, OptimizerMethod, Schedule, TrainError, TrainingSettings,
 };
+use crate::space::candidate::Gains;
 use crate::space::grid;
-use crate::space::grid::{Grid, GridError};
+use crate::space::grid::{Grid, GridError, Layout};
 use crate::space::{FieldError, Space, first_out_of_range};
 use crate::workers::Workers;
 use onecycle_design::soiptd_pd::optimum::OptimumError;
@@ -108,6 +113,30 @@ pub struct ClassifierRecipe {
     /// How the output is fitted into 2260 numbers.
     #[serde(default)]
     pub fit: Fit,
+    /// Every n-th of the 4520 inputs alone is used; `n` divides 2260.
+    #[serde(default = "one", skip_serializing_if = "is_default_every")]
+    pub every: usize,
+    /// Scaling of the inputs.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub scaling: Scaling,
+    /// The true class of an example.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub label: Label,
+    /// Cost of a class that is not the true one.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub price: Price,
+    /// The relay of the experiments.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub relay: RelayKind,
+    /// Where the noise enters.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub noise: NoiseKind,
+    /// The network that is kept.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub keep: Keep,
+    /// Layout of the grid of classes.
+    #[serde(default, skip_serializing_if = "is_default")]
+    pub layout: Layout,
     /// Neurons of the hidden layers.
     pub hidden: Vec<usize>,
     /// Probability of dropout.
@@ -149,6 +178,41 @@ pub enum ClassifierKind {
     Classifier,
 }
 
+/// Scaling of the inputs of a classifier.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scaling {
+    /// Less their mean, over their deviation: [`Standard::of`].
+    #[default]
+    Standard,
+    /// Less their mean: [`Standard::centred`].
+    Centred,
+}
+
+/// The network of a training that is kept.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Keep {
+    /// That of the least loss on the verification set.
+    #[default]
+    Best,
+    /// The last one.
+    Last,
+}
+
+fn one() -> usize {
+    1
+}
+
+fn is_default_every(every: &usize) -> bool {
+    *every == one()
+}
+
+/// Recipes of before name no such field.
+fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+    *value == T::default()
+}
+
 /// A loss to learn with.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -179,6 +243,9 @@ fn multirotor() -> Space {
 /// Limit of seeds and of numbers of experiments: training, verification and tests then never draw from
 /// the same seed.
 const SEEDS: u64 = 1 << 32;
+
+/// Durations of an experiment with the plain relay (s), to learn from and to test: those of the authors' published code.
+const PLAIN_S: [f64; 2] = [10.0, 20.0];
 
 /// Largest number of experiments in memory: some 10 GB.
 const MOST_EXAMPLES: u64 = 1_000_000;
@@ -216,6 +283,12 @@ impl ClassifierRecipe {
                 MOST_EXAMPLES,
             ),
             few("verification", self.verification, "1 to 1000", 1000),
+            (
+                "every",
+                "a divisor of 2260",
+                self.every as f64,
+                self.every > 0 && SAMPLES.is_multiple_of(self.every),
+            ),
             few("losses", self.losses.len() as u64, "1 to 100 of them", 100),
             (
                 "dropout",
@@ -256,6 +329,11 @@ impl ClassifierRecipe {
         grid::GridSettings {
             space: self.space,
             deterioration: self.deterioration,
+            layout: self.layout,
+            gains: match self.layout {
+                Layout::Lattice => Gains::SameMagnitude,
+                Layout::Rays | Layout::Fewest => Gains::SameAmplitude,
+            },
             ..grid::GridSettings::default()
         }
     }
@@ -267,6 +345,37 @@ impl ClassifierRecipe {
             bias: self.bias,
             sigma: self.sigma,
             protocol,
+            relay: self.relay,
+            noise: self.noise,
+            duration_s: match purpose {
+                Purpose::Training | Purpose::Verification => PLAIN_S[0],
+                Purpose::Test => PLAIN_S[1],
+            },
+        }
+    }
+
+    fn make(
+        &self,
+        of: (&Trials, u64),
+        processes: Processes,
+        classes: &Classes,
+        workers: &dyn Workers,
+    ) -> Result<Examples, ClassifierError> {
+        let reading = Reading {
+            gain: self.gain,
+            fit: self.fit,
+            label: self.label,
+        };
+        let examples = Examples::make(of, processes, (classes, reading), workers)?;
+        Ok(examples.thinned(self.every))
+    }
+
+    /// Scaling of the inputs, from the examples to learn from.
+    #[must_use]
+    pub fn scaled(&self, training: &Examples) -> Standard {
+        match self.scaling {
+            Scaling::Standard => Standard::of(training),
+            Scaling::Centred => Standard::centred(training),
         }
     }
 
@@ -275,7 +384,7 @@ impl ClassifierRecipe {
     /// # Errors
     /// [`ClassifierError`]: the grid cannot be computed.
     pub fn classes(&self, workers: &dyn Workers) -> Result<Classes, ClassifierError> {
-        Classes::of(&Grid::build(&self.grid(), workers)?)
+        Classes::priced(&Grid::build(&self.grid(), workers)?, self.price)
     }
 
     /// Examples to learn from.
@@ -292,12 +401,7 @@ impl ClassifierRecipe {
             0 => Processes::Random,
             every => Processes::RandomAndClasses { every },
         };
-        Examples::make(
-            (&trials, self.examples),
-            processes,
-            (classes, self.gain, self.fit),
-            workers,
-        )
+        self.make((&trials, self.examples), processes, classes, workers)
     }
 
     /// Examples to choose the best epoch with: the same number of every class.
@@ -311,12 +415,7 @@ impl ClassifierRecipe {
     ) -> Result<Examples, ClassifierError> {
         let trials = self.trials(Purpose::Verification, self.seed, self.protocol);
         let count = self.verification * classes.len() as u64;
-        Examples::make(
-            (&trials, count),
-            Processes::Classes,
-            (classes, self.gain, self.fit),
-            workers,
-        )
+        self.make((&trials, count), Processes::Classes, classes, workers)
     }
 
     /// Examples of a test.
@@ -330,12 +429,8 @@ impl ClassifierRecipe {
         workers: &dyn Workers,
     ) -> Result<Examples, ClassifierError> {
         let trials = self.trials(Purpose::Test, test.seed, test.protocol);
-        Examples::make(
-            (&trials, test.systems),
-            Processes::Random,
-            (classes, self.gain, self.fit),
-            workers,
-        )
+        let count = (&trials, test.systems);
+        self.make(count, Processes::Random, classes, workers)
     }
 
     fn layers(&self, outputs: usize) -> Vec<Layer> {
@@ -359,7 +454,8 @@ impl ClassifierRecipe {
     pub fn network(&self, number: usize, classes: usize) -> Result<Network, ClassifierError> {
         let mut rng = Pcg64Mcg::seed_from_u64(self.seed);
         let outputs = self.losses[number].loss.outputs().unwrap_or(classes);
-        Ok(Network::new(INPUTS, &self.layers(outputs), &mut rng)?)
+        let inputs = INPUTS / self.every.max(1);
+        Ok(Network::new(inputs, &self.layers(outputs), &mut rng)?)
     }
 
     /// Settings of the training with loss `number`; panics if there is none.

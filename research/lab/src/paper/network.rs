@@ -6,8 +6,8 @@ use onecycle_identify::Signals;
 use onecycle_plant::Trace;
 
 use super::classifier::{
-    Class, ClassifierError, ClassifierRecipe, Gain, Harmonics, INPUTS, Measured, PickRule,
-    Prepared, most_likely,
+    Class, ClassifierError, ClassifierRecipe, Gain, INPUTS, Measured, PickRule, Prepared,
+    most_likely,
 };
 use crate::experiments::{SampledCycle, last_steady_cycle};
 use crate::judge::evaluate::Answer;
@@ -43,13 +43,15 @@ pub enum PaperNetworkError {
     Card(String),
     /// The network does not fit its card.
     #[error(
-        "it has {inputs} inputs and {outputs} outputs; {classes} classes need {INPUTS} and {classes}"
+        "it has {inputs} inputs and {outputs} outputs; {classes} classes need {expected} and {classes}"
     )]
     Size {
         /// Inputs of the network.
         inputs: usize,
         /// Outputs of the network.
         outputs: usize,
+        /// Inputs of the card.
+        expected: usize,
         /// Classes of the card.
         classes: usize,
     },
@@ -98,10 +100,12 @@ impl PaperNetwork {
             .map_err(|error| PaperNetworkError::Card(error.to_string()))?;
         let (network, classes) = (model.network, card.classes_s.len());
         let (inputs, outputs) = (network.inputs(), network.outputs());
-        if (inputs, outputs) != (INPUTS, classes) || model.normalisation.is_some() {
+        let expected = INPUTS / card.recipe.every.max(1);
+        if (inputs, outputs) != (expected, classes) || model.normalisation.is_some() {
             return Err(PaperNetworkError::Size {
                 inputs,
                 outputs,
+                expected,
                 classes,
             });
         }
@@ -122,13 +126,13 @@ impl PaperNetwork {
     pub fn answer(&self, signals: &Signals<'_>) -> Result<Answer, NoPick> {
         let cycle = last_cycle(signals).ok_or(NoPick::NotSteady)?;
         let recipe = &self.card.recipe;
-        let measured = match recipe.gain {
-            Gain::Harmonics => Measured::Harmonics(
-                Harmonics::of(&cycle, recipe.space.beta).ok_or(NoPick::NoHarmonics)?,
-            ),
-            Gain::Amplitude => Measured::amplitude_of(&cycle),
+        // Nothing measured matches the gain of an unknown process.
+        let gain = match recipe.gain {
+            Gain::Matched => Gain::DescribingFunction,
+            measurable => measurable,
         };
-        let mut inputs = Matrix::zeros(1, INPUTS);
+        let measured = Measured::of(gain, &cycle, recipe.space.beta).ok_or(NoPick::NoHarmonics)?;
+        let mut inputs = Matrix::zeros(1, self.network.inputs());
         Prepared::of(&cycle, recipe.fit).fill(inputs.row_mut(0));
         let outputs = self.network.evaluate(&inputs, &OneThread)?;
         let class = &self.classes[most_likely(outputs.row(0))];

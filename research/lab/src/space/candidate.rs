@@ -10,6 +10,8 @@
 //! acceleration gain, the same `Kp`, `alpha` times the `Kd` and the cost, and the same margins. Costs
 //! between two candidates do not change when both are scaled alike (the paper's property 1).
 
+use std::f64::consts::PI;
+
 use onecycle_onboard::{Pd, Soiptd, SoiptdError};
 
 use crate::space::Space;
@@ -28,6 +30,8 @@ pub enum Gains {
     SameAmplitude,
     /// Equal velocity gains.
     Equal,
+    /// Gains that give the same magnitude at the phase of the relay: the authors' published code.
+    SameMagnitude,
 }
 
 /// How candidates are compared.
@@ -99,15 +103,21 @@ impl Candidate {
     ) -> Result<Self, CandidateError> {
         let comparison = comparison.into();
         let unit = Soiptd::new(1.0, t_prop_s, t_body_s, tau_s)?;
+        let no_oscillation = CandidateError::NoOscillation {
+            t_prop_s,
+            t_body_s,
+            tau_s,
+            beta: space.beta,
+        };
         let process = match comparison.gains {
             Gains::Equal => unit,
+            Gains::SameMagnitude => {
+                let phase_rad = space.beta.asin() - PI;
+                let omega = unit.frequency_at_phase(phase_rad).ok_or(no_oscillation)?;
+                unit.with_gain_scaled(1.0 / unit.magnitude(omega))?
+            }
             Gains::SameAmplitude => {
-                let cycle = symmetric(&unit, space.beta).ok_or(CandidateError::NoOscillation {
-                    t_prop_s,
-                    t_body_s,
-                    tau_s,
-                    beta: space.beta,
-                })?;
+                let cycle = symmetric(&unit, space.beta).ok_or(no_oscillation)?;
                 unit.with_gain_scaled(1.0 / cycle.amplitude)?
             }
         };
@@ -130,7 +140,7 @@ impl Candidate {
         // Factor on the acceleration gain; a change other than 1/alpha^2 divides the controller's
         // gains.
         let gain = match self.comparison.gains {
-            Gains::SameAmplitude => alpha.powi(-2),
+            Gains::SameAmplitude | Gains::SameMagnitude => alpha.powi(-2),
             Gains::Equal => alpha.recip(),
         };
         let controller = (alpha * alpha * gain).recip();

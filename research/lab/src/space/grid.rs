@@ -3,12 +3,13 @@
 //!
 //! The distance of two processes is `J_(ij) = max(J_ij, J_ji)`, [`Candidate::distance`]: the cost of
 //! either one's optimal controller on the other, as a fraction above that one's own optimum. A grid is
-//! computed for a deterioration `J*`. Both layouts guarantee the same: every process of the space has a
+//! computed for a deterioration `J*`. [`Layout::Rays`] and [`Layout::Fewest`] guarantee the same: every process of the space has a
 //! member within `J*`; [`check`] measures it.
 //!
 //! | layout             | members                                                             |
 //! |--------------------|---------------------------------------------------------------------|
 //! | [`Layout::Rays`]   | the paper's: `J*` apart along each of three coordinates, with the gaps filled; members are far enough apart for a classifier |
+//! | [`Layout::Lattice`] | by the rules of the authors' published code, to compare; it leaves gaps |
 //! | [`Layout::Fewest`] | as few as cover the space, for a bank of controllers; no least distance between members |
 //!
 //! Work is cut into independent parts that run on the caller's [`Workers`].
@@ -41,6 +42,7 @@ mod fewest;
 mod file;
 mod holes;
 mod index;
+mod lattice;
 mod rays;
 
 pub use coverage::{Check, check};
@@ -57,6 +59,8 @@ pub enum Layout {
     Rays,
     /// A small cover.
     Fewest,
+    /// The product of two lines of directions, with radii whose ratio grows.
+    Lattice,
 }
 
 /// Settings of a grid.
@@ -155,7 +159,7 @@ pub struct Member {
     pub direction: Direction,
     /// The radius of the process (s).
     pub radius_s: f64,
-    /// Place in the layout; `None` in [`Layout::Fewest`] and for a member that closes a hole.
+    /// Place in [`Layout::Rays`]; `None` in the others and for a member that closes a hole.
     pub place: Option<Place>,
 }
 
@@ -201,6 +205,7 @@ impl Grid {
         settings.validate()?;
         let members = match settings.layout {
             Layout::Fewest => fewest::members(settings, workers)?,
+            Layout::Lattice => lattice::members(settings)?,
             Layout::Rays => {
                 let thetas_rad = rows(settings, workers)?;
                 let rows = workers.map(thetas_rad.len(), |k| row(settings, thetas_rad[k]));

@@ -1,19 +1,22 @@
 //! The paper's classifier: inputs of its network, gains of the classes, labels and picks.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use onecycle_design::soiptd_pd::deterioration::deterioration;
 use onecycle_design::soiptd_pd::optimum::pd_at_phase_margin;
 use onecycle_lab::experiments::{SAMPLE_S, SampledCycle};
 use onecycle_lab::learn::train::{Batch, Dataset, Matrix};
 use onecycle_lab::paper::classifier::{
-    Classes, Examples, Fit, Gain, Harmonics, INPUTS, Measured, Prepared, Processes, Protocol,
-    Response, SAMPLES, Score, Trials, coordinates, label, least_expected_cost, most_likely,
-    times_at,
+    Classes, Examples, Fit, Gain, Harmonics, INPUTS, Label, Measured, NoiseKind, Prepared, Price,
+    Processes, Protocol, Reading, RelayKind, Response, SAMPLES, Score, Trials, TrueProcess,
+    coordinates, label, least_expected_cost, most_likely, times_at,
 };
 use onecycle_lab::space::Space;
 use onecycle_lab::space::grid::{Grid, GridSettings};
 use onecycle_lab::workers::OneThread;
+use onecycle_onboard::{Pd, Soiptd};
+use rand::SeedableRng;
+use rand_pcg::Pcg64Mcg;
 
 const SPACE: Space = Space {
     t_prop_s: (0.03, 0.1),
@@ -29,6 +32,9 @@ fn trials(space: Space, sigma: f64, protocol: Protocol) -> Trials {
         bias: 0.5,
         sigma,
         protocol,
+        relay: RelayKind::Protected,
+        noise: NoiseKind::Inside,
+        duration_s: 10.0,
     }
 }
 
@@ -70,6 +76,38 @@ fn a_cycle_is_centred_scaled_and_padded() {
     }
     assert!(seen_output[samples..].iter().all(|&value| value == 0.0));
     assert!(seen_input[samples..].iter().all(|&value| value == 0.0));
+}
+
+// The middle of 4 and 8 is 6 and half their difference 2: with the zeros in front the last of the inputs is the last sample,
+// and of a cycle that is too long the last samples are kept. A row five times shorter holds every fifth number. Noise is added
+// afterwards: at most twice its size, to the output alone, and downwards.
+#[test]
+fn zeros_in_front() {
+    let output = [6.0_f32, 8.0, 6.0, 5.0, 4.0];
+    let input = vec![1.0_f32, 1.0, 1.0, -1.0, -1.0];
+    let mut prepared = Prepared::of(&cycle(input.clone(), output.to_vec()), Fit::PaddedInFront);
+    let mut row = vec![f32::NAN; INPUTS];
+    prepared.fill(&mut row);
+    assert_eq!(row[SAMPLES - 5..SAMPLES], [0.0, 1.0, 0.0, -0.5, -1.0]);
+    assert_eq!(row[INPUTS - 5..], input);
+    let zeros = row.iter().filter(|&&value| value == 0.0).count();
+    assert_eq!(zeros, INPUTS - 8);
+    let mut every_fifth = vec![f32::NAN; INPUTS / 5];
+    prepared.fill(&mut every_fifth);
+    assert!(every_fifth.iter().eq(row.iter().step_by(5)));
+
+    let clean = row.clone();
+    prepared.disturb(0.1, &mut Pcg64Mcg::seed_from_u64(1));
+    prepared.fill(&mut row);
+    assert_eq!(row[SAMPLES..], clean[SAMPLES..]);
+    for (noisy, clean) in row[SAMPLES - 5..SAMPLES].iter().zip(&clean[SAMPLES - 5..]) {
+        assert!((-0.2001..0.0).contains(&(noisy - clean)), "{noisy} {clean}");
+    }
+
+    let long: Vec<f32> = (0..3000).map(|k| k as f32).collect();
+    Prepared::of(&cycle(long.clone(), long), Fit::PaddedInFront).fill(&mut row);
+    assert_eq!((row[SAMPLES - 1], row[INPUTS - 1]), (1.0, 1.0));
+    assert!((row[0] - (740.0 - 1499.5) / 1499.5).abs() < 1e-6);
 }
 
 // A cycle of more than 2260 samples is centred and scaled as a whole, then cut.
@@ -123,7 +161,7 @@ fn harmonics_by_hand() {
     let input: Vec<f32> = (0..samples).map(level).collect();
     let output: Vec<f32> = (0..samples).map(|k| 3.0 * level(k + samples / 2)).collect();
     let found = Harmonics::of(&cycle(input, output), -0.73).unwrap();
-    let half_turn = std::f64::consts::PI / samples as f64;
+    let half_turn = PI / samples as f64;
     let omega = TAU / (samples as f64 * SAMPLE_S);
     let (second, _) = found.second.unwrap();
     for (response, n, phase_rad) in [
@@ -193,6 +231,62 @@ fn cycles_before_the_steady_ones_are_not_used() {
     assert!((gain - 1.0).abs() < 0.15, "{gain}");
 }
 
+// With the gain matched, the class that is the true process has its gain, whatever was measured; any other class has its
+// magnitude at the phase of the relay. The describing function of a sine of amplitude 4 / pi |G| is exact.
+#[test]
+fn gains_that_match_at_the_phase() {
+    let classes = classes();
+    let beta = SPACE.beta;
+    let phase_rad = beta.asin() - PI;
+    let own = classes.class(0);
+    let truth = own.process.with_gain_scaled(3.0).unwrap();
+    let matched = Measured::matched(&truth, beta).unwrap();
+    assert!((own.gain(&matched) / 3.0 - 1.0).abs() < 1e-12);
+    let magnitude =
+        |process: &Soiptd| process.magnitude(process.frequency_at_phase(phase_rad).unwrap());
+    for k in 0..classes.len() {
+        let class = classes.class(k);
+        let at_gain = class
+            .process
+            .with_gain_scaled(class.gain(&matched))
+            .unwrap();
+        assert!((magnitude(&at_gain) / magnitude(&truth) - 1.0).abs() < 1e-12);
+    }
+    let samples = 800;
+    let amplitude = 4.0 / PI * magnitude(&truth);
+    let output = (0..samples).map(|k| (amplitude * (TAU * k as f64 / 800.0).sin()) as f32);
+    let cycle = cycle(vec![1.0; samples], output.collect());
+    let found = Measured::of(Gain::DescribingFunction, &cycle, beta).unwrap();
+    assert!((own.gain(&found) / 3.0 - 1.0).abs() < 1e-6);
+    assert_eq!(Measured::of(Gain::Matched, &cycle, beta), None);
+}
+
+// J with its sign, by hand. Without dead time the error of a step is (a s^2 + b s + c) / (a s^3 + b s^2 + c s + d) with
+// a = T_prop T_body, b = T_prop + T_body, c = 1 + Kd, d = Kp, whose square has the integral below (Newton, Gould, Kaiser
+// 1957). A controller that bought its speed with margin has a negative J; its price with the margin is positive.
+#[test]
+fn a_ratio_keeps_its_sign() {
+    let process = Soiptd::new(1.0, 0.05, 0.8, 0.0).unwrap();
+    let by_hand = |Pd { kp, kd }: Pd| {
+        let (a, b, c, d) = (0.05 * 0.8, 0.05 + 0.8, 1.0 + kd, kp);
+        (a * a * c * d + (b * b - 2.0 * a * c) * a * d + a * b * c * c)
+            / (2.0 * a * d * (b * c - a * d))
+    };
+    let asked = 60_f64.to_radians();
+    let truth = TrueProcess::new(process, asked).unwrap();
+    for factor in [0.5, 0.9, 1.0, 1.1, 1.3] {
+        let Pd { kp, kd } = truth.best.pd;
+        let pd = Pd {
+            kp: kp * factor,
+            kd: kd * factor.sqrt(),
+        };
+        let ratio = by_hand(pd) / by_hand(truth.best.pd) - 1.0;
+        assert!((truth.ratio(pd) - ratio).abs() < 1e-9, "{factor}");
+        assert_eq!(ratio < -1e-9, factor > 1.0, "{factor} {ratio}");
+        assert!(truth.cost(pd) > -1e-12);
+    }
+}
+
 // Three times the output gives three times the gain and a third of the controller, by either method.
 #[test]
 fn controllers_follow_the_gain() {
@@ -249,12 +343,12 @@ fn a_class_is_its_own_label() {
         deterioration(made, &truth.process, &best)
     );
     // Half of both gains: a slower loop with more margin.
-    let slow = onecycle_onboard::Pd {
+    let slow = Pd {
         kp: 0.5 * best.pd.kp,
         kd: 0.5 * best.pd.kd,
     };
     assert!((truth.cost(slow) - truth.judge(slow).relative().unwrap()).abs() < 1e-12);
-    let hot = onecycle_onboard::Pd {
+    let hot = Pd {
         kp: 9.0 * best.pd.kp,
         kd: 9.0 * best.pd.kd,
     };
@@ -271,7 +365,7 @@ fn examples_are_what_they_say() {
         Examples::make(
             (&trials, count),
             processes,
-            (&classes, Gain::Harmonics, Fit::Padded),
+            (&classes, Reading::default()),
             &OneThread,
         )
         .unwrap()
@@ -300,6 +394,46 @@ fn examples_are_what_they_say() {
     assert_eq!(batch.costs.row(1), random.costs(2));
 }
 
+// As the paper labels: the simulated class, under the authors' relay, whose noise comes afterwards. Its costs are ratios; with
+// the gain matched those of a class on itself vanish.
+#[test]
+fn labels_of_the_paper() {
+    let settings = GridSettings {
+        space: SPACE,
+        deterioration: 0.2,
+        ..GridSettings::default()
+    };
+    let grid = Grid::build(&settings, &OneThread).unwrap();
+    let classes = Classes::priced(&grid, Price::Ratio).unwrap();
+    let trials = Trials {
+        relay: RelayKind::Plain,
+        noise: NoiseKind::Afterwards,
+        ..trials(SPACE, 0.1, Protocol::Untrimmed)
+    };
+    let reading = Reading {
+        gain: Gain::Matched,
+        fit: Fit::PaddedInFront,
+        label: Label::Simulated,
+    };
+    let count = 2 * classes.len();
+    let examples = Examples::make(
+        (&trials, count as u64),
+        Processes::Classes,
+        (&classes, reading),
+        &OneThread,
+    )
+    .unwrap();
+    assert_eq!((examples.len(), examples.unsteady()), (count, 0));
+    let mut least = 0.0_f32;
+    for i in 0..count {
+        let class = i % classes.len();
+        assert_eq!(examples.labels()[i], class);
+        assert!(examples.costs(i)[class].abs() < 1e-6);
+        least = examples.costs(i).iter().copied().fold(least, f32::min);
+    }
+    assert!(least < -0.001, "{least}");
+}
+
 // ---------------------------------------------------------------- picks
 
 // By hand, for the probabilities 0.5, 0.3, 0.2: the first class is most likely. Its mean cost is 0.3 *
@@ -325,7 +459,7 @@ fn scores_of_the_best_picks() {
     let examples = Examples::make(
         (&trials, 40),
         Processes::Random,
-        (&classes, Gain::Harmonics, Fit::Padded),
+        (&classes, Reading::default()),
         &OneThread,
     )
     .unwrap();
@@ -343,38 +477,6 @@ fn scores_of_the_best_picks() {
     assert!(wrong.mean > best.mean && wrong.worst > best.worst);
     // Within the 20 % of the grid.
     assert!(best.worst.unwrap() < 0.2, "{best:?}");
-}
-
-// As the paper counts, the simulated class is right and costs nothing, whatever noise has done to the gain; another class
-// costs what its controller costs on it.
-#[test]
-fn scores_between_classes() {
-    let classes = classes();
-    let trials = trials(SPACE, 0.03, Protocol::Trimmed);
-    let count = classes.len() as u64;
-    let make = |processes| {
-        let with = (&classes, Gain::Harmonics, Fit::Padded);
-        Examples::make((&trials, count), processes, with, &OneThread).unwrap()
-    };
-    let examples = make(Processes::Classes);
-    let own: Vec<usize> = (0..classes.len()).collect();
-    let right = Score::between_classes(&own, &examples, &classes).unwrap();
-    assert_eq!((right.accuracy, right.examples), (1.0, classes.len()));
-    assert!(right.worst.unwrap() < 1e-12, "{right:?}");
-    let on_true = Score::of_picks(&own, &examples, &classes);
-    assert!(on_true.mean.unwrap() > 1e-4, "{on_true:?}");
-    let first = vec![0; classes.len()];
-    let wrong = Score::between_classes(&first, &examples, &classes).unwrap();
-    let costs = own.iter().map(|&class| classes.between(0, class).unwrap());
-    let costs: Vec<f64> = costs
-        .filter_map(|cost| Some(cost.relative()?.abs()))
-        .collect();
-    let mean = costs.iter().sum::<f64>() / costs.len() as f64;
-    assert_eq!(wrong.unstable, classes.len() - costs.len());
-    assert!((wrong.mean.unwrap() - mean).abs() < 1e-12);
-    let random = make(Processes::Random);
-    let none = Score::between_classes(&own, &random, &classes).unwrap();
-    assert_eq!(none.examples, 0);
 }
 
 // The middle of a logarithmic range is its geometric mean, the ends are -1 and 1; a time without a range has no coordinate.
@@ -397,7 +499,7 @@ fn coordinates_of_a_regression() {
 
     let classes = classes();
     let trials = trials(SPACE, 0.0, Protocol::Trimmed);
-    let with = (&classes, Gain::Harmonics, Fit::Padded);
+    let with = (&classes, Reading::default());
     let examples = Examples::make((&trials, 5), Processes::Random, with, &OneThread).unwrap();
     let mut batch = Batch::default();
     examples.fill(&[0, 1, 2, 3, 4], &mut batch);

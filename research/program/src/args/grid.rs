@@ -34,6 +34,10 @@ pub(crate) struct Grid {
     /// Use as few members as possible
     #[arg(long)]
     pub(crate) fewest: bool,
+    /// Place the members by the rules of the published code of the paper's authors, which leave gaps; gains are matched at the
+    /// phase of the relay
+    #[arg(long, conflicts_with_all = ["fewest", "equal_gains"])]
+    pub(crate) lattice: bool,
     /// Cost that the controllers minimise: ise (squared error), iae (absolute error), itae (absolute error times time);
     /// iae and itae take some minutes
     #[arg(long, value_name = "COST", default_value = "ise")]
@@ -62,7 +66,7 @@ pub(crate) struct Grid {
     pub(crate) seed: u64,
     /// Read the grid from this file instead of computing it
     #[arg(long, value_name = "GRID.json",
-          conflicts_with_all = ["space", "deterioration", "fewest", "equal_gains", "cost", "out"])]
+          conflicts_with_all = ["space", "deterioration", "fewest", "lattice", "equal_gains", "cost", "out"])]
     pub(crate) from: Option<PathBuf>,
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]

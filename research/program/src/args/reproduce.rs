@@ -17,8 +17,8 @@ use onecycle_cli::args::MOST_THREADS;
     "  onecycle-lab reproduce table_4 table_5 -o out\n",
     "  onecycle-lab train --recipe research/program/reproduction/paper_network_untrimmed.toml -o paper.onnx\n",
     "  onecycle-lab reproduce table_4 table_6 table_7 --network paper.onnx\n\n",
-    "Parts: phase, grid, grid_variants, figures, table_2_and_3, table_2_variants, table_4, tuning_rules,\n",
-    "rule_variants, table_5, table_6, table_7, modes, claims.\n",
+    "Parts: phase, grid, grid_variants, figures, table_2_and_3, ablation, our_network, table_4,\n",
+    "tuning_rules, rule_variants, table_5, table_6, table_7, modes, claims.\n",
     "Without --network, table_4, table_6 and table_7 train a network of the paper's size first, in 75 minutes\n",
     "on two cores (--quick: a small one, in seconds), and keep it in DIR/parts/paper_network.onnx.\n",
     "Finished parts are kept in DIR/parts and not computed again, and an interrupted training is\n",
@@ -58,7 +58,8 @@ pub(crate) enum Name {
     GridVariants,
     Figures,
     Table2And3,
-    Table2Variants,
+    Ablation,
+    OurNetwork,
     Table4,
     TuningRules,
     RuleVariants,
@@ -71,13 +72,14 @@ pub(crate) enum Name {
 
 impl Name {
     /// All of them, in the paper's order.
-    pub(crate) const ALL: [Self; 14] = [
+    pub(crate) const ALL: [Self; 15] = [
         Self::Phase,
         Self::Grid,
         Self::GridVariants,
         Self::Figures,
         Self::Table2And3,
-        Self::Table2Variants,
+        Self::Ablation,
+        Self::OurNetwork,
         Self::Table4,
         Self::TuningRules,
         Self::RuleVariants,
@@ -101,7 +103,8 @@ impl Name {
             Self::GridVariants => "grid_variants",
             Self::Figures => "figures",
             Self::Table2And3 => "table_2_and_3",
-            Self::Table2Variants => "table_2_variants",
+            Self::Ablation => "ablation",
+            Self::OurNetwork => "our_network",
             Self::Table4 => "table_4",
             Self::TuningRules => "tuning_rules",
             Self::RuleVariants => "rule_variants",

@@ -1,5 +1,6 @@
 //! `onecycle-lab dataset`: simulate experiments to train on, one file at a time on all threads.
 
+mod classifier;
 pub(crate) mod folder;
 
 use std::path::Path;
@@ -23,12 +24,18 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
             "this build cannot write Parquet: build with cargo build --release --features parquet",
         ));
     }
+    if let Some(path) = &arguments.recipe
+        && classifier::is_recipe(path)?
+    {
+        return classifier::write(arguments, path);
+    }
+    let examples = number(arguments)?;
     let recipe = recipe(arguments.recipe.as_deref())?;
     let workers = Workers::new(arguments.threads)?;
     let begin = Instant::now();
     let (folder, files_kept, experiments_made) = filled(
         &arguments.into,
-        (recipe, arguments.examples),
+        (recipe, examples),
         arguments.restart,
         &workers,
     )?;
@@ -50,6 +57,12 @@ pub(crate) fn run(arguments: &args::Dataset) -> Result<ExitCode, Failure> {
         report::dataset::text(&run, &arguments.into)
     })?;
     Ok(ExitCode::from(exit::DONE))
+}
+
+/// The number of experiments of an identifier's dataset.
+pub(crate) fn number(arguments: &args::Dataset) -> Result<u64, Failure> {
+    (arguments.examples)
+        .ok_or_else(|| Failure::usage("give the number of experiments: --examples N"))
 }
 
 /// Completes the folder of a recipe with this number of experiments. Returns it with the number of files that were there

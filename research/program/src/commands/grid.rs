@@ -76,15 +76,15 @@ fn make(arguments: &args::Grid, workers: &Workers) -> Result<GridRun, Failure> {
     let settings = GridSettings {
         space: settings::space(arguments.space.as_deref())?,
         deterioration: arguments.deterioration,
-        layout: if arguments.fewest {
-            Layout::Fewest
-        } else {
-            Layout::Rays
+        layout: match (arguments.fewest, arguments.lattice) {
+            (true, _) => Layout::Fewest,
+            (false, true) => Layout::Lattice,
+            (false, false) => Layout::Rays,
         },
-        gains: if arguments.equal_gains {
-            Gains::Equal
-        } else {
-            Gains::SameAmplitude
+        gains: match (arguments.equal_gains, arguments.lattice) {
+            (true, _) => Gains::Equal,
+            (false, true) => Gains::SameMagnitude,
+            (false, false) => Gains::SameAmplitude,
         },
         criterion: arguments.cost.0,
     };

@@ -5,6 +5,7 @@ mod cycles;
 mod figures;
 mod grid;
 mod grid_variants;
+mod literal;
 mod modes;
 mod network;
 mod paper;
@@ -157,8 +158,9 @@ fn made(arguments: &Reproduce, folder: &Path, name: Name) -> Result<ReproducedPa
             (Name::Grid, _) => grid::find(&typed(&settings)?, &workers)?,
             (Name::GridVariants, _) => grid_variants::find(&typed(&settings)?, &workers)?,
             (Name::Figures, _) => figures::find(&typed(&settings)?)?,
-            (Name::Table2And3, _) => network::find(&typed(&settings)?, journal, &workers)?,
-            (Name::Table2Variants, _) => network::variants(&typed(&settings)?, &kept, &workers)?,
+            (Name::Table2And3, _) => literal::find(&typed(&settings)?, &kept, &workers)?,
+            (Name::Ablation, _) => literal::ablation(&typed(&settings)?, &kept, &workers)?,
+            (Name::OurNetwork, _) => network::find(&typed(&settings)?, journal, &workers)?,
             (Name::TuningRules, _) => comparison::find(&typed(&settings)?, None, &workers)?,
             (Name::RuleVariants, _) => rules::find(&typed(&settings)?, &workers)?,
             (Name::Table5, _) => single::starts(&typed(&settings)?, &workers)?,

@@ -7,6 +7,7 @@ use std::fmt::Display;
 use std::ops::ControlFlow;
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::{Duration, Instant};
 
 use onecycle_cli::failure::Failure;
 use onecycle_lab::learn::train::{Dataset, Epoch, Outcome, Trainer};
@@ -89,7 +90,10 @@ fn begun<E: Display>(
     left.map_or_else(|| anew().map_err(Failure::usage), Ok)
 }
 
-/// Trains to the end. After each epoch it calls `told` and keeps the training.
+/// Time between two copies of a training: a copy of the paper's network is 260 MB.
+const BETWEEN_COPIES: Duration = Duration::from_secs(30);
+
+/// Trains to the end. After each epoch it calls `told`; it keeps the training from time to time and at the end.
 fn train(
     trainer: &mut Trainer,
     [training, validation]: [&dyn Dataset; 2],
@@ -97,6 +101,7 @@ fn train(
     kept: Option<&Kept<'_>>,
     told: impl Fn(&Epoch),
 ) -> Result<Outcome, Failure> {
+    let mut copied = Instant::now();
     loop {
         let mut last = None;
         let outcome = trainer
@@ -107,8 +112,10 @@ fn train(
             .map_err(Failure::usage)?;
         if let Some(epoch) = last {
             told(&epoch);
-            if let Some(kept) = kept {
+            let is_due = outcome != Outcome::Paused || copied.elapsed() > BETWEEN_COPIES;
+            if let Some(kept) = kept.filter(|_| is_due) {
                 kept.write(trainer)?;
+                copied = Instant::now();
             }
         }
         if outcome != Outcome::Paused {

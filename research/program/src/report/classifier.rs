@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
 
 /// Version of the JSON; raised with every change that a reader could notice.
-const SCHEMA: &str = "onecycle.train.classifier/1";
+const SCHEMA: &str = "onecycle.train.classifier/2";
 
 #[derive(Serialize)]
 struct Report<'a> {
@@ -45,7 +45,7 @@ pub(crate) fn name(loss: &Loss) -> &'static str {
 pub(crate) fn text(run: &ClassifierRun<'_>) -> String {
     let recipe = run.recipe;
     let mut text = String::new();
-    let widths: Vec<String> = [INPUTS]
+    let widths: Vec<String> = [INPUTS / recipe.every]
         .into_iter()
         .chain(recipe.hidden.iter().copied())
         .chain([run.classes])

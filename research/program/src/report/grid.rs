@@ -128,10 +128,12 @@ fn kind(settings: &GridSettings) -> String {
     let layout = match settings.layout {
         Layout::Rays => format!("neighbours {limit} apart"),
         Layout::Fewest => format!("the fewest within {limit} of every process"),
+        Layout::Lattice => format!("lattice of the authors' published code, {limit}"),
     };
     let gains = match settings.gains {
         Gains::SameAmplitude => "gains by the amplitude",
         Gains::Equal => "equal velocity gains",
+        Gains::SameMagnitude => "gains by the magnitude at the phase of the relay",
     };
     let criterion = settings.criterion.name().to_uppercase();
     format!("{layout}, {gains}, least {criterion}")

@@ -53,7 +53,15 @@ pub(crate) struct TrainedNetwork {
     pub(crate) seconds: f64,
     /// For every set, the score by each of [`onecycle_lab::paper::classifier::PickRule::ALL`].
     pub(crate) scores: Vec<[Score; 2]>,
-    /// The verification set as the paper counts: see [`Score::between_classes`]. `None` for a regression.
+    /// Every set, its most likely classes counted in other ways; empty for a regression.
     #[serde(skip)]
-    pub(crate) between: Option<Score>,
+    pub(crate) counted: Vec<Counted>,
+}
+
+/// Scores of the most likely classes with gains found in each way of [`onecycle_lab::paper::classifier::Gain::ALL`].
+pub(crate) struct Counted {
+    /// The whole set.
+    pub(crate) whole: [Score; 4],
+    /// Each fifty of it, the size of the paper's testing set.
+    pub(crate) fifties: Vec<[Score; 4]>,
 }

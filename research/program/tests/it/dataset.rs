@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::common::{NOT_WRITTEN, Outcome, Scratch, UNREADABLE, names_in, run};
 use crate::killed::killed_when;
+use onecycle_lab::learn::npz::{self, Column, Numbers};
 use serde_json::Value;
 
 /// A recipe of this repository.
@@ -356,4 +357,58 @@ fn folders_that_cannot_be() {
         let outcome = run(&["dataset", &recipe, "--examples", "4", "--into", &into]);
         outcome.refused(NOT_WRITTEN, &[&into]);
     }
+}
+
+// ---------------------------------------------------------------- sets of the paper's classifier
+
+// The recipe's 200 experiments are of its nine classes in turn; the label is the simulated class, whose own controller costs
+// nothing with the gain matched; the inputs are less their mean. The number of experiments is the recipe's.
+#[test]
+fn sets_of_a_classifier() {
+    let folder = Scratch::new();
+    let text = include_bytes!("../../reproduction/literal_small.toml");
+    let recipe = folder.write("recipe.toml", text);
+    let into = folder.name("sets");
+    let made = run(&["dataset", &recipe, "--into", &into]);
+    assert_eq!(made.code, Some(0), "{made:?}");
+    let (inputs, classes, rows) = (4520 / 20, 9, 200);
+    let matrix = |name, width| Column {
+        name,
+        width: Some(width),
+        numbers: Numbers::F32(vec![]),
+    };
+    let labels = Column {
+        name: "labels",
+        width: None,
+        numbers: Numbers::U64(vec![]),
+    };
+    let like = [matrix("inputs", inputs), labels, matrix("costs", classes)];
+    let bytes = std::fs::read(folder.path("sets/training.npz")).unwrap();
+    let columns = npz::read(&bytes, &like, rows).unwrap();
+    let [
+        Numbers::F32(inputs_found),
+        Numbers::U64(labels),
+        Numbers::F32(costs),
+    ] = [0, 1, 2].map(|k| columns[k].numbers.clone())
+    else {
+        panic!("{columns:?}")
+    };
+    assert!(
+        labels
+            .iter()
+            .zip(0..)
+            .all(|(label, n)| *label == n % classes as u64)
+    );
+    for (row, label) in labels.iter().enumerate() {
+        let own = costs[row * classes + *label as usize];
+        assert!(own.abs() < 1e-6, "{row} {own}");
+    }
+    for column in 0..inputs {
+        let sum: f32 = (0..rows)
+            .map(|row| inputs_found[row * inputs + column])
+            .sum();
+        assert!(sum.abs() < 1e-3, "{column} {sum}");
+    }
+    let refused = run(&["dataset", &recipe, "--into", &into, "--examples", "5"]);
+    refused.refused(2, &["a classifier's recipe says how many"]);
 }

@@ -62,7 +62,7 @@ fn the_reproduction_has_the_words_of_the_sheets() {
             expected.push(format!("\n| {} | ", cell(&name["name"])));
         }
     }
-    assert_eq!(sheets, 14);
+    assert_eq!(sheets, 15);
     let missing: Vec<&String> = expected
         .iter()
         .filter(|text| !page.contains(*text))

@@ -5,9 +5,14 @@ use std::fs;
 use crate::common::{Scratch, UNREADABLE, run};
 
 /// Parts that take seconds, with their sheets.
-const PARTS: [(&str, &str); 3] = [
+const PARTS: [(&str, &str); 5] = [
     ("phase", include_str!("../../reproduction/phase.toml")),
     ("figures", include_str!("../../reproduction/figures.toml")),
+    (
+        "table_2_and_3",
+        include_str!("../../reproduction/table_2_and_3.toml"),
+    ),
+    ("ablation", include_str!("../../reproduction/ablation.toml")),
     ("table_7", include_str!("../../reproduction/table_7.toml")),
 ];
 
@@ -27,7 +32,8 @@ fn papers(sheet: &str) -> usize {
         .count()
 }
 
-// Every number of the paper is beside a computed one: 2 of the phase, 20 and 1 of Table VII. The same command again computes
+// Every number of the paper is beside a computed one: 2 of the phase, 18 of Tables II and III, 6 of the ablation, 20 and 1 of
+// Table VII. The same command again computes
 // nothing and gives the same bytes; a part with other settings is refused.
 #[test]
 fn quick_run_of_the_fast_parts() {
@@ -40,7 +46,7 @@ fn quick_run_of_the_fast_parts() {
     let read = |name: &str| fs::read_to_string(format!("{out}/{name}")).unwrap();
     let text = read("reproduction.md");
     let expected: usize = PARTS.iter().map(|(_, sheet)| papers(sheet)).sum();
-    assert_eq!(expected, 23);
+    assert_eq!(expected, 47);
     assert_eq!(text.matches("(paper: ").count(), expected, "{text}");
     assert!(!text.contains("NaN") && !text.contains("inf "), "{text}");
     let page = read("reproduction.html");
@@ -79,7 +85,7 @@ fn what_it_refuses() {
     let refused = run(&["reproduce", "table_8"]);
     assert_eq!(refused.code, Some(2), "{refused:?}");
     let words = "there is no part 'table_8': choose from phase, grid, grid_variants, figures, table_2_and_3, \
-                 table_2_variants, table_4, tuning_rules, rule_variants, table_5, table_6, table_7, modes, claims";
+                 ablation, our_network, table_4, tuning_rules, rule_variants, table_5, table_6, table_7, modes, claims";
     assert!(refused.stderr.contains(words), "{refused:?}");
 
     let folder = Scratch::new();

@@ -45,7 +45,7 @@ fn from_recipe_to_table_and_network_through_interruptions() {
     assert_eq!(folder.files().len(), 3, "{:?}", folder.files());
 
     let report = timeless(&json);
-    assert_eq!(report["schema"], "onecycle.train.classifier/1");
+    assert_eq!(report["schema"], "onecycle.train.classifier/2");
     assert_eq!(report["networks"].as_array().unwrap().len(), 2);
     let classes = report["classes"].as_u64().unwrap();
     assert_eq!(report["weights"], 4521 * 64 + 65 * 32 + 33 * classes);

@@ -1,7 +1,7 @@
 //! Losses: classes, costs of a mistake, densities.
 //!
 //! `J_iT` is the cost of the controller of class `i` on the true process, as a fraction, `T` the true
-//! class. `gamma_iT = 1 + min(J_iT, cap)`. Without the cap an unstable pick would cost infinitely much,
+//! class. `gamma_iT = 1 + J_iT` with `J_iT` between zero and a cap. Without the cap an unstable pick would cost infinitely much,
 //! and only that class would be learnt.
 //!
 //! | loss                 | formula                                                               |
@@ -208,7 +208,7 @@ impl Loss {
     /// The loss of sample `i`; its derivatives are in the scratch.
     fn sample(&self, outputs: &[f32], batch: &Batch, i: usize, scratch: &mut Scratch) -> f64 {
         let Scratch { softmax, gradient } = scratch;
-        let capped = |cap: f64| move |k: usize| f64::from(batch.costs.row(i)[k]).min(cap);
+        let capped = |cap: f64| move |k: usize| f64::from(batch.costs.row(i)[k]).clamp(0.0, cap);
         let truth = || (outputs, batch.classes[i]);
         match *self {
             Self::CrossEntropy => softmax.cross_entropy(truth(), Logits::Plain, |_| 0.0, gradient),

@@ -11,6 +11,8 @@
 //! cost = max(J, 0) + 0.012 per degree of margin below 20
 //! ```
 
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
+
 use onecycle_onboard::{Pd, Soiptd};
 
 use super::ClassifierError;
@@ -40,6 +42,32 @@ pub enum Gain {
     Harmonics,
     /// From the amplitude, relative to the amplitude of the class's own limit cycle: the paper's way.
     Amplitude,
+    /// From the amplitude, by the describing function of the relay at its phase.
+    DescribingFunction,
+    /// Matched: the class has the magnitude of the true process at the phase of the relay, as nothing measured says. The way
+    /// of the authors' published code, whose J has no error of the gain.
+    Matched,
+}
+
+impl Gain {
+    /// All of them.
+    pub const ALL: [Self; 4] = [
+        Self::Harmonics,
+        Self::Amplitude,
+        Self::DescribingFunction,
+        Self::Matched,
+    ];
+}
+
+/// Cost of a class that is not the true one, for labels and losses.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Price {
+    /// `max(J, 0)`, and the lost margin. See the [module](self).
+    #[default]
+    WithMargin,
+    /// `J` with its sign, as in the authors' published code: a controller with less margin than asked may be cheaper.
+    Ratio,
 }
 
 /// What a cycle says about the gain.
@@ -61,6 +89,36 @@ impl Measured {
             });
         Self::Amplitude(0.5 * f64::from(high - low))
     }
+
+    /// What a cycle under a relay with this `beta` says about the gain; `None` if it has no harmonics, and for
+    /// [`Gain::Matched`].
+    #[must_use]
+    pub fn of(gain: Gain, cycle: &SampledCycle, beta: f64) -> Option<Self> {
+        match (gain, Self::amplitude_of(cycle)) {
+            (Gain::Harmonics, _) => Harmonics::of(cycle, beta).map(Self::Harmonics),
+            (Gain::DescribingFunction, Self::Amplitude(amplitude)) => Some(Self::alone(Response {
+                omega_rad_per_s: TAU / (cycle.output.len() as f64 * cycle.sample_s),
+                magnitude: FRAC_PI_4 * amplitude,
+                phase_rad: beta.asin() - PI,
+            })),
+            (Gain::Amplitude, amplitude) => Some(amplitude),
+            _ => None,
+        }
+    }
+
+    /// What [`Gain::Matched`] takes from the true process under a relay with this `beta`; `None` without that phase.
+    #[must_use]
+    pub fn matched(truth: &Soiptd, beta: f64) -> Option<Self> {
+        let omega_rad_per_s = truth.frequency_at_phase(beta.asin() - PI)?;
+        Some(Self::alone(Response::of(truth, omega_rad_per_s)))
+    }
+
+    fn alone(first: Response) -> Self {
+        Self::Harmonics(Harmonics {
+            first,
+            second: None,
+        })
+    }
 }
 
 /// A class, with a velocity gain of one.
@@ -81,6 +139,7 @@ pub struct Class {
 pub struct Classes {
     classes: Vec<Class>,
     phase_margin_rad: f64,
+    price: Price,
     /// Row `i`, column `k`: cost of the controller of `i` on `k`.
     matrix: Matrix,
 }
@@ -117,11 +176,8 @@ impl Class {
 
     /// What the class's own cycle without noise and bias says about its gain; exact.
     fn quiet(&self) -> Measured {
-        let omega_rad_per_s = std::f64::consts::TAU / self.period_s;
-        Measured::Harmonics(Harmonics {
-            first: Response::of(&self.process, omega_rad_per_s),
-            second: None,
-        })
+        let omega_rad_per_s = TAU / self.period_s;
+        Measured::alone(Response::of(&self.process, omega_rad_per_s))
     }
 
     /// Velocity gain of the class for a measured cycle.
@@ -181,14 +237,28 @@ impl TrueProcess {
         });
         relative.max(0.0) + COST_OF_A_DEGREE * lost_deg
     }
+
+    /// `J` with its sign; infinite if unstable.
+    #[must_use]
+    pub fn ratio(&self, controller: Pd) -> f64 {
+        ise(&self.process, controller).map_or(f64::INFINITY, |cost| cost / self.best.ise - 1.0)
+    }
 }
 
 impl Classes {
+    /// The classes of a grid, with costs [`Price::WithMargin`].
+    ///
+    /// # Errors
+    /// As [`Self::priced`].
+    pub fn of(grid: &Grid) -> Result<Self, ClassifierError> {
+        Self::priced(grid, Price::default())
+    }
+
     /// The classes of a grid.
     ///
     /// # Errors
     /// [`ClassifierError`]: a member has no controller or does not oscillate.
-    pub fn of(grid: &Grid) -> Result<Self, ClassifierError> {
+    pub fn priced(grid: &Grid, price: Price) -> Result<Self, ClassifierError> {
         let space = &grid.settings.space;
         let phase_margin_rad = space.phase_margin_rad();
         let classes = (grid.members.iter())
@@ -197,6 +267,7 @@ impl Classes {
         let mut this = Self {
             matrix: Matrix::zeros(classes.len(), classes.len()),
             phase_margin_rad,
+            price,
             classes,
         };
         for k in 0..this.len() {
@@ -252,21 +323,20 @@ impl Classes {
         TrueProcess::new(process, self.phase_margin_rad)
     }
 
-    /// `J_ij`: what the controller of class `i` costs on class `j`, with the gain that follows from the cycle of `j` without
-    /// noise and bias; zero for `i = j`.
-    ///
-    /// # Errors
-    /// [`ClassifierError`]: class `j` has no controller.
-    pub fn between(&self, i: usize, j: usize) -> Result<Deterioration, ClassifierError> {
-        let truth = self.truth(self.classes[j].process)?;
-        Ok(truth.judge(self.classes[i].controller(&self.classes[j].quiet())))
-    }
-
     /// Cost of the controller of every class on a process, at the gains that follow from a cycle.
     #[must_use]
     pub fn costs(&self, truth: &TrueProcess, measured: &Measured) -> Vec<f32> {
-        let costs = (self.classes.iter()).map(|class| truth.cost(class.controller(measured)));
-        costs.map(|cost| cost as f32).collect()
+        let cost = |class: &Class| {
+            let controller = class.controller(measured);
+            match self.price {
+                Price::WithMargin => truth.cost(controller),
+                Price::Ratio => truth.ratio(controller),
+            }
+        };
+        self.classes
+            .iter()
+            .map(|class| cost(class) as f32)
+            .collect()
     }
 }
 

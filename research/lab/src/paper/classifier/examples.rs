@@ -4,11 +4,9 @@
 use onecycle_onboard::{Pd, Soiptd};
 
 use super::ClassifierError;
-use super::classes::{Classes, Gain, Measured, TrueProcess, label};
-use super::experiment::Trials;
-use super::harmonic::Harmonics;
+use super::classes::{Class, Classes, Gain, Measured, TrueProcess, label};
+use super::experiment::{Trial, Trials};
 use super::input::{Fit, INPUTS, Prepared};
-use crate::experiments::SampledCycle;
 use crate::learn::train::{Batch, Dataset};
 use crate::space::Space;
 use crate::workers::Workers;
@@ -28,17 +26,38 @@ pub enum Processes {
     Classes,
 }
 
+/// What is read from a trial.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// How the gain of a class is found.
+    pub gain: Gain,
+    /// How the signals are fitted into the network's inputs.
+    pub fit: Fit,
+    /// The true class.
+    pub label: Label,
+}
+
+/// The class that an example is of.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Label {
+    /// The one that costs least.
+    #[default]
+    Cheapest,
+    /// The one that was simulated: the paper's way. That of a random process is the one that costs least.
+    Simulated,
+}
+
 /// An example. See the [module](self).
 #[derive(Clone, Debug, PartialEq)]
 struct Example {
     prepared: Prepared,
     truth: TrueProcess,
-    /// The class that was simulated, if it was one.
-    class: Option<usize>,
     /// What a regression learns: [`coordinates`] of the times.
     coordinates: [f32; TIMES],
-    /// Measured by harmonics, and by amplitude.
-    measured: [Measured; 2],
+    /// Measured in each way of [`Gain::ALL`].
+    measured: [Measured; 4],
+    label: usize,
     costs: Vec<f32>,
 }
 
@@ -47,6 +66,7 @@ struct Example {
 pub struct Examples {
     examples: Vec<Example>,
     labels: Vec<usize>,
+    inputs: usize,
     gain: Gain,
     space: Space,
     unsteady: u64,
@@ -110,25 +130,32 @@ impl Examples {
     pub fn make(
         (trials, count): (&Trials, u64),
         processes: Processes,
-        (classes, gain, fit): (&Classes, Gain, Fit),
+        (classes, reading): (&Classes, Reading),
         workers: &dyn Workers,
     ) -> Result<Self, ClassifierError> {
+        let Reading { gain, fit, .. } = reading;
         let made = workers.map(count as usize, |n| {
             let n = n as u64;
             let class = processes.class(n, classes.len());
             let trial = trials.trial(n, class.map(|class| classes.times_s(class)))?;
             trial
                 .and_then(|trial| {
-                    let measured = measured(&trial.cycle, trials.space.beta)?;
+                    let measured = measured(&trial, trials.space.beta)?;
                     Some((trial, measured))
                 })
                 .map(|(trial, measured)| {
                     let truth = classes.truth(trial.process)?;
+                    let costs = classes.costs(&truth, &measured[gain as usize]);
+                    let simulated = class.filter(|_| reading.label == Label::Simulated);
+                    let mut prepared = Prepared::of(&trial.cycle, fit);
+                    if let Some((most, mut rng)) = trial.noise_afterwards {
+                        prepared.disturb(most, &mut rng);
+                    }
                     Ok(Example {
-                        class,
+                        label: simulated.unwrap_or_else(|| label(&costs)),
                         coordinates: coordinates(&trials.space, times_s(&trial.process)),
-                        prepared: Prepared::of(&trial.cycle, fit),
-                        costs: classes.costs(&truth, &measured[which(gain)]),
+                        prepared,
+                        costs,
                         truth,
                         measured,
                     })
@@ -140,14 +167,30 @@ impl Examples {
         let examples: Vec<Example> = made.into_iter().flatten().collect();
         Ok(Self {
             unsteady: count - examples.len() as u64,
-            labels: examples.iter().map(|one| label(&one.costs)).collect(),
+            labels: examples.iter().map(|one| one.label).collect(),
             examples,
+            inputs: INPUTS,
             gain,
             space: trials.space,
         })
     }
 
-    /// The class of each example that costs least.
+    /// The same examples with every n-th input alone, `n` a divisor of [`SAMPLES`](super::SAMPLES).
+    #[must_use]
+    pub fn thinned(self, every: usize) -> Self {
+        Self {
+            inputs: INPUTS / every.max(1),
+            ..self
+        }
+    }
+
+    /// Number of inputs of the network.
+    #[must_use]
+    pub fn inputs(&self) -> usize {
+        self.inputs
+    }
+
+    /// The class of each example, as the [`Label`] says.
     #[must_use]
     pub fn labels(&self) -> &[usize] {
         &self.labels
@@ -165,12 +208,6 @@ impl Examples {
         &self.examples[i].costs
     }
 
-    /// The class that example `i` simulates; `None` for a random process. Panics if there is no such example.
-    #[must_use]
-    pub fn class(&self, i: usize) -> Option<usize> {
-        self.examples[i].class
-    }
-
     /// Cost of the controller of a process with these [`coordinates`] on example `i`, with its gain from the harmonics;
     /// panics if there is none.
     #[must_use]
@@ -178,7 +215,7 @@ impl Examples {
         let Example {
             truth, measured, ..
         } = &self.examples[i];
-        let Measured::Harmonics(harmonics) = &measured[which(Gain::Harmonics)] else {
+        let Measured::Harmonics(harmonics) = &measured[Gain::Harmonics as usize] else {
             return Deterioration::Unstable;
         };
         let [t_prop_s, t_body_s, tau_s] = times_at(&self.space, at);
@@ -199,43 +236,39 @@ impl Examples {
         self.examples[i].prepared.fill(row);
     }
 
-    /// Cost of the controller of a class on example `i`; panics if there is none.
+    /// How the gain of a class is found.
     #[must_use]
-    pub fn judge(&self, i: usize, classes: &Classes, class: usize) -> Deterioration {
-        let truth = &self.examples[i].truth;
-        truth.judge(self.controller(i, classes, class, self.gain))
+    pub fn gain(&self) -> Gain {
+        self.gain
+    }
+
+    /// Cost of the controller of a class on example `i`, at the gain found in this way; panics if there is none.
+    #[must_use]
+    pub fn judge(&self, i: usize, class: &Class, gain: Gain) -> Deterioration {
+        let Example {
+            truth, measured, ..
+        } = &self.examples[i];
+        truth.judge(class.controller(&measured[gain as usize]))
     }
 
     /// The best class of each example and its cost, with gains found in this way.
     #[must_use]
     pub fn best(&self, classes: &Classes, gain: Gain) -> Vec<(usize, Deterioration)> {
         let best = |example: &Example| {
-            let measured = &example.measured[which(gain)];
+            let measured = &example.measured[gain as usize];
             let class = label(&classes.costs(&example.truth, measured));
             let controller = classes.class(class).controller(measured);
             (class, example.truth.judge(controller))
         };
         self.examples.iter().map(best).collect()
     }
-
-    fn controller(&self, i: usize, classes: &Classes, class: usize, gain: Gain) -> Pd {
-        let measured = &self.examples[i].measured[which(gain)];
-        classes.class(class).controller(measured)
-    }
 }
 
-fn which(gain: Gain) -> usize {
-    match gain {
-        Gain::Harmonics => 0,
-        Gain::Amplitude => 1,
-    }
-}
-
-fn measured(cycle: &SampledCycle, beta: f64) -> Option<[Measured; 2]> {
-    Some([
-        Measured::Harmonics(Harmonics::of(cycle, beta)?),
-        Measured::amplitude_of(cycle),
-    ])
+fn measured(trial: &Trial, beta: f64) -> Option<[Measured; 4]> {
+    let [harmonics, amplitude, describing, _] =
+        Gain::ALL.map(|gain| Measured::of(gain, &trial.cycle, beta));
+    let matched = Measured::matched(&trial.process, beta);
+    Some([harmonics?, amplitude?, describing?, matched?])
 }
 
 impl Dataset for Examples {
@@ -245,7 +278,7 @@ impl Dataset for Examples {
 
     fn fill(&self, samples: &[usize], batch: &mut Batch) {
         let classes = self.examples.first().map_or(0, |one| one.costs.len());
-        batch.inputs.reshape(samples.len(), INPUTS);
+        batch.inputs.reshape(samples.len(), self.inputs);
         batch.costs.reshape(samples.len(), classes);
         batch.classes.clear();
         for (row, &sample) in samples.iter().enumerate() {

@@ -3,13 +3,17 @@
 //!
 //! Trial `n` of a seed does not depend on what else is run.
 
+use std::f64::consts::TAU;
+
 use onecycle_onboard::Soiptd;
+use rand_pcg::Pcg64Mcg;
 
 use super::ClassifierError;
 use crate::experiments::draw::{bias_and_noise, stream};
 use crate::experiments::experiment::PREROLL_SAMPLES;
 use crate::experiments::{
-    Oscillation, RelayExperiment, RelaySetup, SAMPLE_S, SampledCycle, last_steady_cycle,
+    Oscillation, PlainRelay, RelayExperiment, RelaySetup, SAMPLE_S, SampledCycle,
+    last_steady_cycle, last_whole_cycle,
 };
 use crate::space::{FieldError, Space, first_out_of_range};
 
@@ -48,6 +52,30 @@ impl Protocol {
     }
 }
 
+/// The relay of the trials.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum RelayKind {
+    /// The board's, until its oscillation is steady; the last steady cycle.
+    #[default]
+    Protected,
+    /// The rule alone ([`PlainRelay`]), for 10 s to learn from and 20 s to test: the authors' published code. The last whole
+    /// cycle, steady or not.
+    Plain,
+}
+
+/// Where the noise enters.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NoiseKind {
+    /// At the sensor, before the relay; normal, of standard deviation `sigma`.
+    #[default]
+    Inside,
+    /// Into the finished cycle ([`Prepared::disturb`](super::Prepared::disturb)), uniform, up to `2 sigma`: the authors'
+    /// published code. The relay and the gain see none.
+    Afterwards,
+}
+
 /// Settings of the trials.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trials {
@@ -62,7 +90,16 @@ pub struct Trials {
     pub sigma: f64,
     /// Whether the relay trims the bias away.
     pub protocol: Protocol,
+    /// The relay.
+    pub relay: RelayKind,
+    /// Where the noise enters.
+    pub noise: NoiseKind,
+    /// Duration of an experiment with the plain relay (s).
+    pub duration_s: f64,
 }
+
+/// Largest noise over the amplitude, and its random stream.
+type Afterwards = Option<(f64, Pcg64Mcg)>;
 
 /// A trial that came to a steady oscillation.
 #[derive(Clone, Debug, PartialEq)]
@@ -71,6 +108,8 @@ pub struct Trial {
     pub process: Soiptd,
     /// The last steady cycle.
     pub cycle: SampledCycle,
+    /// Noise for [`Prepared::disturb`](super::Prepared::disturb), and its random stream.
+    pub noise_afterwards: Afterwards,
 }
 
 impl Trials {
@@ -99,9 +138,21 @@ impl Trials {
         n: u64,
         times_s: Option<[f64; 3]>,
     ) -> Result<Option<Trial>, ClassifierError> {
-        let Some(experiment) = self.experiment(n, times_s)? else {
+        let Some((experiment, noise_afterwards)) = self.experiment(n, times_s)? else {
             return Ok(None);
         };
+        let process = experiment.process;
+        let trial = |cycle| Trial {
+            process,
+            cycle,
+            noise_afterwards,
+        };
+        if self.relay == RelayKind::Plain {
+            let lag_s = PlainRelay::LAG * experiment.oscillation.period_s / TAU;
+            let mut relay = PlainRelay::new(self.space.beta, lag_s);
+            let trace = experiment.simulate(&mut relay, self.duration_s);
+            return Ok(last_whole_cycle(&trace, SAMPLE_S).map(trial));
+        }
         let (lengths, longest_s) = if self.protocol.is_trimmed(n) {
             (PERIODS, LONGEST_TRIMMED * experiment.oscillation.period_s)
         } else {
@@ -112,19 +163,18 @@ impl Trials {
             let settled = last_steady_cycle(&trace).filter(|cycle| cycle.period_s < longest_s);
             let cycle = settled.and_then(|cycle| SampledCycle::of(&trace, &cycle, SAMPLE_S));
             if let Some(cycle) = cycle {
-                let process = experiment.process;
-                return Ok(Some(Trial { process, cycle }));
+                return Ok(Some(trial(cycle)));
             }
         }
         Ok(None)
     }
 
-    /// The experiment of a trial; `None` if the relay does not make the process oscillate.
+    /// The experiment of a trial, and its noise afterwards; `None` if the relay does not make the process oscillate.
     fn experiment(
         &self,
         n: u64,
         times_s: Option<[f64; 3]>,
-    ) -> Result<Option<RelayExperiment>, ClassifierError> {
+    ) -> Result<Option<(RelayExperiment, Afterwards)>, ClassifierError> {
         let mut rng = stream(self.seed, n);
         let random = self.space.random(&mut rng);
         let (bias, sigma) = bias_and_noise(self.bias, self.sigma, &mut rng);
@@ -139,9 +189,13 @@ impl Trials {
             sample_s: SAMPLE_S,
             preroll_s: PREROLL_SAMPLES * SAMPLE_S,
         };
+        let (inside, afterwards) = match self.noise {
+            NoiseKind::Inside => (sigma, None),
+            NoiseKind::Afterwards => (0.0, Some((sigma, rng.clone()))),
+        };
         let mut experiment = RelayExperiment::new(process, oscillation, setup, rng);
         experiment.input_bias = bias;
-        experiment.noise_sigma = sigma * oscillation.amplitude;
-        Ok(Some(experiment))
+        experiment.noise_sigma = inside * oscillation.amplitude;
+        Ok(Some((experiment, afterwards)))
     }
 }

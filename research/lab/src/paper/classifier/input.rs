@@ -5,10 +5,12 @@
 //!
 //! ```text
 //! padded     (pv_0 - mean) / a, .., 0, .., 0,   (u_0 - centre) / h, .., 0, .., 0      2 x 2260
+//! in front   0, .., 0, (pv_0 - middle) / b, ..,   0, .., 0, (u_0 - centre) / h, ..
 //! stretched  (pv_0 - mean) / a,  ..........,    (u_0 - centre) / h, .., 0, .., 0
 //! ```
 //!
-//! Padding is the paper's way. Stretched, the output fills all 2260 numbers whatever the period, which
+//! Padding is the paper's way; the authors' published code has the zeros in front, and takes the middle of the extremes and
+//! half their difference, `b`. Stretched, the output fills all 2260 numbers whatever the period, which
 //! remains visible in the padding of the input. The same shape then looks the same at every time scale
 //! and is learnt from far fewer examples.
 //!
@@ -17,6 +19,8 @@
 //! The paper has 2260 samples for its slowest member; the slowest here have 2310, and up to three times
 //! as many under a bias that is not trimmed. Padded signals are cut off there, after centring and
 //! scaling.
+
+use rand::{Rng, RngExt};
 
 use crate::experiments::SampledCycle;
 
@@ -33,6 +37,8 @@ pub enum Fit {
     /// Padded with zeros: the paper's way.
     #[default]
     Padded,
+    /// Zeros in front; the output less the middle of its extremes, over half their difference: the authors' published code.
+    PaddedInFront,
     /// Stretched by interpolation.
     Stretched,
 }
@@ -50,22 +56,54 @@ impl Prepared {
     #[must_use]
     pub fn of(cycle: &SampledCycle, fit: Fit) -> Self {
         let mut input = scaled(&cycle.input, span(&cycle.input));
-        let mut output = scaled(&cycle.output, level_and_amplitude(&cycle.output));
-        input.truncate(SAMPLES);
-        if fit == Fit::Padded {
-            output.truncate(SAMPLES);
+        let of_output = match fit {
+            Fit::PaddedInFront => span(&cycle.output),
+            Fit::Padded | Fit::Stretched => level_and_amplitude(&cycle.output),
+        };
+        let mut output = scaled(&cycle.output, of_output);
+        match fit {
+            Fit::Padded => output.truncate(SAMPLES),
+            Fit::PaddedInFront => {
+                for signal in [&mut input, &mut output] {
+                    signal.drain(..signal.len().saturating_sub(SAMPLES));
+                }
+            }
+            Fit::Stretched => {}
         }
+        input.truncate(SAMPLES);
         Self { output, input, fit }
     }
 
-    /// Writes all [`INPUTS`] numbers.
+    /// Adds noise to the output as the authors' published code does, after the normalisation: uniform from `-2 most` to zero.
+    pub fn disturb(&mut self, most: f64, rng: &mut impl Rng) {
+        for value in &mut self.output {
+            *value -= (2.0 * most * rng.random_range(0.0..=1.0)) as f32;
+        }
+    }
+
+    /// Writes all [`INPUTS`] numbers, or every n-th of them into a row that is n times shorter, `n` a divisor of [`SAMPLES`].
     pub fn fill(&self, row: &mut [f32]) {
+        if row.len() < INPUTS {
+            let mut all = vec![0.0; INPUTS];
+            self.fill(&mut all);
+            let every = INPUTS / row.len().max(1);
+            for (one, kept) in row.iter_mut().zip(all.iter().step_by(every)) {
+                *one = *kept;
+            }
+            return;
+        }
         row.fill(0.0);
         let (output, input) = row.split_at_mut(SAMPLES);
-        input[..self.input.len()].copy_from_slice(&self.input);
+        let in_front = match self.fit {
+            Fit::PaddedInFront => SAMPLES - self.input.len(),
+            Fit::Padded | Fit::Stretched => 0,
+        };
+        input[in_front..][..self.input.len()].copy_from_slice(&self.input);
         match self.fit {
-            Fit::Padded => output[..self.output.len()].copy_from_slice(&self.output),
             Fit::Stretched => stretch(&self.output, output),
+            Fit::Padded | Fit::PaddedInFront => {
+                output[in_front..][..self.output.len()].copy_from_slice(&self.output);
+            }
         }
     }
 }

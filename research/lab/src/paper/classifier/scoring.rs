@@ -5,6 +5,8 @@
 //! | most likely         | the one with the largest output: the paper's               |
 //! | least expected cost | `min_i sum_k p_k min(J_ik, 1)`, `p` the softmax of the outputs |
 
+use std::ops::Range;
+
 use super::ClassifierError;
 use super::classes::{Classes, Gain};
 use super::examples::Examples;
@@ -51,6 +53,10 @@ pub struct Score {
     pub worst: Option<f64>,
     /// Mean of `J` with its sign over the stable loops; a negative `J` is bought with margin.
     pub mean_signed: Option<f64>,
+    /// Mean of `max(J, 0)` over the stable loops.
+    pub mean_positive: Option<f64>,
+    /// Largest `J` with its sign of the stable loops.
+    pub largest: Option<f64>,
     /// Number of unstable loops.
     pub unstable: usize,
     /// Least phase margin of the stable loops (rad).
@@ -61,30 +67,25 @@ impl Score {
     /// Score of picks on examples.
     #[must_use]
     pub fn of_picks(picks: &[usize], examples: &Examples, classes: &Classes) -> Self {
-        let judged = (picks.iter().enumerate())
-            .map(|(i, &class)| (class, examples.judge(i, classes, class)))
-            .collect();
-        Self::of(judged, examples.labels())
+        let all = 0..picks.len();
+        Self::of_some(picks, all, (examples, classes), examples.gain())
     }
 
-    /// Score of picks on examples of classes as the paper counts: the true class is the simulated one, and a pick costs
-    /// [`Classes::between`]. Random processes are left out.
-    ///
-    /// # Errors
-    /// [`ClassifierError`]: a class has no controller.
-    pub fn between_classes(
+    /// Score of the picks of these examples, at gains found in this way; panics if there are no such examples.
+    #[must_use]
+    pub fn of_some(
         picks: &[usize],
-        examples: &Examples,
-        classes: &Classes,
-    ) -> Result<Self, ClassifierError> {
-        let (mut judged, mut labels) = (Vec::new(), Vec::new());
-        for (i, &pick) in picks.iter().enumerate() {
-            if let Some(class) = examples.class(i) {
-                judged.push((pick, classes.between(pick, class)?));
-                labels.push(class);
-            }
-        }
-        Ok(Self::of(judged, &labels))
+        some: Range<usize>,
+        (examples, classes): (&Examples, &Classes),
+        gain: Gain,
+    ) -> Self {
+        let judged = (some.clone())
+            .map(|i| {
+                let class = picks[i];
+                (class, examples.judge(i, classes.class(class), gain))
+            })
+            .collect();
+        Self::of(judged, &examples.labels()[some])
     }
 
     /// Score of a regression on examples: of the processes at the outputs of the network. Its accuracy is zero.
@@ -130,6 +131,8 @@ impl Score {
             (!values.is_empty()).then(|| values.iter().sum::<f64>() / count)
         };
         let mean_signed = mean(&costs);
+        let largest = costs.iter().copied().reduce(f64::max);
+        let positive: Vec<f64> = costs.iter().map(|cost| cost.max(0.0)).collect();
         for cost in &mut costs {
             *cost = cost.abs();
         }
@@ -143,6 +146,8 @@ impl Score {
             percentile_99: costs.get(rank).copied(),
             worst: costs.last().copied(),
             mean_signed,
+            mean_positive: mean(&positive),
+            largest,
             unstable: examples - costs.len(),
             least_margin_rad: margins_rad.into_iter().reduce(f64::min),
         }

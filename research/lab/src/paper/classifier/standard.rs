@@ -14,7 +14,6 @@
 
 use super::ClassifierError;
 use super::examples::Examples;
-use super::input::INPUTS;
 use crate::learn::train::{Batch, Dataset, Layer, Network};
 
 /// Keeps nearly constant numbers from counting more than others: a fiftieth of the amplitude, which is
@@ -41,11 +40,20 @@ pub struct Standardised<'a> {
 }
 
 impl Standard {
+    /// These examples less their mean alone, as the authors' published code has it.
+    #[must_use]
+    pub fn centred(examples: &Examples) -> Self {
+        let mut this = Self::of(examples);
+        this.deviation.fill(1.0);
+        this
+    }
+
     /// Standard coordinates of these examples.
     #[must_use]
     pub fn of(examples: &Examples) -> Self {
-        let mut row = vec![0.0_f32; INPUTS];
-        let (mut sums, mut squares) = (vec![0.0; INPUTS], vec![0.0; INPUTS]);
+        let inputs = examples.inputs();
+        let mut row = vec![0.0_f32; inputs];
+        let (mut sums, mut squares) = (vec![0.0; inputs], vec![0.0; inputs]);
         for i in 0..examples.len() {
             examples.fill_inputs(i, &mut row);
             for (k, value) in row.iter().enumerate() {
@@ -73,11 +81,12 @@ impl Standard {
         let variance =
             (self.deviation.iter()).map(|deviation| (deviation * deviation - EPSILON) as f32);
         // Weight one and bias zero, then mean and variance.
-        let mut numbers = [[1.0; INPUTS], [0.0; INPUTS]].concat();
+        let inputs = self.mean.len();
+        let mut numbers = [vec![1.0; inputs], vec![0.0; inputs]].concat();
         numbers.extend(self.mean.iter().map(single));
         numbers.extend(variance);
         numbers.extend(network.numbers());
-        Ok(Network::zeros(INPUTS, &layers)?.with_numbers(&numbers)?)
+        Ok(Network::zeros(inputs, &layers)?.with_numbers(&numbers)?)
     }
 }
 

@@ -72,15 +72,17 @@ pub(super) fn cover<L: Line>(
     })
 }
 
-struct Walk<'a, L> {
-    line: &'a L,
-    step: f64,
-    high: f64,
+/// A walk along a line from its first place on.
+pub(super) struct Walk<'a, L> {
+    pub(super) line: &'a L,
+    pub(super) step: f64,
+    /// The last coordinate.
+    pub(super) high: f64,
 }
 
 impl<L: Line> Walk<'_, L> {
     /// Coordinates from `first` on, one step apart.
-    fn from(&self, first: f64) -> Result<Vec<f64>, CandidateError> {
+    pub(super) fn from(&self, first: f64) -> Result<Vec<f64>, CandidateError> {
         let mut places = vec![first];
         let mut at = first;
         while let Some(next) = self.next(at)? {

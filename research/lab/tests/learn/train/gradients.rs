@@ -179,6 +179,28 @@ fn losses_of_classes() {
     }
 }
 
+// Gamma is 1 + J between 1 and 2: J of -0.3, 0 and 7 give 1, 1 and 2, so that with outputs 1, 2, 0.5 all three exponents are
+// known, 1, 2 and 1. The gradient of the clamped loss is that of differences.
+#[test]
+fn gamma_is_clamped() {
+    let outputs = Matrix::from_rows(1, 3, vec![1.0, 2.0, 0.5]).unwrap();
+    let batch = Batch {
+        inputs: Matrix::zeros(1, 1),
+        classes: vec![1],
+        costs: Matrix::from_rows(1, 3, vec![-0.3, 0.0, 7.0]).unwrap(),
+        ..Batch::default()
+    };
+    let loss = Loss::ModifiedSoftmax { cap: 1.0 };
+    let found = loss
+        .evaluate(&outputs, &batch, &mut Matrix::default())
+        .unwrap();
+    let one = 1.0_f64.exp();
+    let expected = (2.0 * one + one * one).ln() - 2.0;
+    assert!((found - expected).abs() < 1e-12, "{found}");
+    let worst = worst_error_of_loss(loss, &outputs, &batch);
+    assert!(worst < 1e-6, "{worst}");
+}
+
 #[test]
 fn losses_of_densities() {
     let (_, batch) = classified();

@@ -4,7 +4,9 @@ use onecycle_cli::failure::Failure;
 use onecycle_cli::pages::plot::{Marks, Series};
 use onecycle_identify::find_oscillation;
 use onecycle_lab::experiments::{RelayTest, signals_of};
-use onecycle_lab::paper::classifier::{Fit, INPUTS, Prepared, Protocol, SAMPLES, Trials};
+use onecycle_lab::paper::classifier::{
+    Fit, INPUTS, NoiseKind, Prepared, Protocol, RelayKind, SAMPLES, Trials,
+};
 use onecycle_lab::space::Space;
 use onecycle_plant::Trace;
 use serde::Deserialize;
@@ -64,6 +66,9 @@ fn prepared(settings: &SignalSettings) -> Result<Vec<Series>, Failure> {
         bias: settings.bias,
         sigma: settings.sigma,
         protocol: Protocol::Untrimmed,
+        relay: RelayKind::Protected,
+        noise: NoiseKind::Inside,
+        duration_s: 0.0,
     };
     let trial = trials.trial(0, Some(settings.times_s));
     let trial = trial

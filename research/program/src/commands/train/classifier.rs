@@ -1,5 +1,6 @@
 //! Training of the paper's classifier with every loss of a recipe, scored on the same experiments.
 
+use std::ops::Range;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::{Duration, Instant};
@@ -8,7 +9,7 @@ use onecycle_cli::failure::{Failure, exit};
 use onecycle_lab::learn::onnx;
 use onecycle_lab::learn::train::{Dataset, Loss, Network, Trainer};
 use onecycle_lab::paper::classifier::{
-    Classes, ClassifierError, ClassifierRecipe, Examples, Gain, PickRule, Score, Standard,
+    Classes, ClassifierError, ClassifierRecipe, Examples, Gain, Keep, PickRule, Score, Standard,
     Standardised, picks,
 };
 use onecycle_lab::paper::network::{Card, FORMAT};
@@ -18,8 +19,11 @@ use crate::args;
 use crate::journal::Journal;
 use crate::output::{ProgressBar, print, progress_bar, write_file, write_text};
 use crate::report::classifier as report;
-use crate::results::classifier::{ClassifierRun, ScoredSet, SetKind, TrainedNetwork};
+use crate::results::classifier::{ClassifierRun, Counted, ScoredSet, SetKind, TrainedNetwork};
 use crate::workers::{Quiet, Workers};
+
+/// Processes of the paper's testing set.
+const FIFTY: usize = 50;
 
 /// Data that all losses share.
 struct Lesson<'a> {
@@ -149,7 +153,7 @@ impl<'a> Lesson<'a> {
         Ok(Self {
             recipe,
             classes,
-            standard: Standard::of(&training),
+            standard: recipe.scaled(&training),
             training,
             sets,
             workers,
@@ -192,14 +196,18 @@ impl<'a> Lesson<'a> {
                 ));
             },
         )?;
-        let network = (self.standard.before(trainer.best())).map_err(Failure::usage)?;
+        let kept = match self.recipe.keep {
+            Keep::Best => trainer.best(),
+            Keep::Last => trainer.network(),
+        };
+        let network = self.standard.before(kept).map_err(Failure::usage)?;
         let trained = TrainedNetwork {
             loss,
             outcome: super::described(outcome),
             history: trainer.history().to_vec(),
             seconds: begin.elapsed().as_secs_f64(),
             scores: self.scores(&network, loss).map_err(Failure::usage)?,
-            between: self.between(&network, loss).map_err(Failure::usage)?,
+            counted: self.counted(&network, loss).map_err(Failure::usage)?,
         };
         Ok((trained, network))
     }
@@ -218,14 +226,25 @@ impl<'a> Lesson<'a> {
         scores.collect()
     }
 
-    /// The most likely classes of the verification set, as the paper counts. `None` for a regression.
-    fn between(&self, network: &Network, loss: Loss) -> Result<Option<Score>, ClassifierError> {
+    /// The most likely classes of every set, counted in each way; empty for a regression.
+    fn counted(&self, network: &Network, loss: Loss) -> Result<Vec<Counted>, ClassifierError> {
         if loss.outputs().is_some() {
-            return Ok(None);
+            return Ok(vec![]);
         }
-        let workers = Quiet(self.workers);
-        let [picks, _] = picks(&network.folded(), &self.sets[0], &self.classes, &workers)?;
-        Score::between_classes(&picks, &self.sets[0], &self.classes).map(Some)
+        let (network, workers) = (network.folded(), Quiet(self.workers));
+        let counted = self.sets.iter().map(|examples| {
+            let [picks, _] = picks(&network, examples, &self.classes, &workers)?;
+            let score = |some: Range<usize>| {
+                let of = (examples, &self.classes);
+                Gain::ALL.map(|gain| Score::of_some(&picks, some.clone(), of, gain))
+            };
+            let fifties = (0..picks.len() / FIFTY).map(|k| score(k * FIFTY..(k + 1) * FIFTY));
+            Ok(Counted {
+                whole: score(0..picks.len()),
+                fifties: fifties.collect(),
+            })
+        });
+        counted.collect()
     }
 
     fn card(&self, best: usize, rule: PickRule) -> Card {
