@@ -173,8 +173,6 @@ pub enum Remark {
         /// Amplitude of the input that was tried (input unit).
         input: f64,
     },
-    /// The analysis with default settings refuses the recording. The value is its verdict.
-    DefaultRefused(Box<Verdict>),
     /// The recording disagrees with the prior of the pack, so the prior was not used. The value is the squared
     /// distance, in standard deviations of the residual, by which the prior would have moved the fit.
     PriorDropped(f64),
@@ -286,7 +284,6 @@ impl Remark {
             Self::LittleGainMargin(_) => "little_gain_margin",
             Self::NoiseAtActuator(_) => "noise_at_actuator",
             Self::InputPeak { .. } => "input_peak",
-            Self::DefaultRefused(_) => "default_refused",
             Self::PriorDropped(_) => "prior_dropped",
         }
     }

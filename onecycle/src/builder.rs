@@ -1,7 +1,6 @@
 //! Builder of an identification.
 
 use onecycle_design::{Specification, Structure};
-use onecycle_identify::progress::part;
 use onecycle_identify::{
     About, Hold, Identification, Method, Options, Remark, Road, Signals, identify_by,
 };
@@ -33,7 +32,6 @@ use crate::feedback;
 pub struct Identify<'a> {
     options: Options,
     pack: Option<Pack<'a>>,
-    skips_default: bool,
 }
 
 impl Default for Identify<'_> {
@@ -49,7 +47,6 @@ impl<'a> Identify<'a> {
         Self {
             options: Options::default(),
             pack: Pack::embedded().ok(),
-            skips_default: false,
         }
     }
 
@@ -171,18 +168,7 @@ impl<'a> Identify<'a> {
         Self { pack: None, ..self }
     }
 
-    /// Leaves out the second run, with default settings, which is made to say whether these refuse.
-    pub fn without_default_run(self) -> Self {
-        Self {
-            skips_default: true,
-            ..self
-        }
-    }
-
     /// Identifies the process from `recording`. Cycles with a gap are not used.
-    ///
-    /// If other settings than the default ones lead to a process, and the default ones do not, a remark says so
-    /// ([`Remark::DefaultRefused`](crate::Remark::DefaultRefused)).
     #[must_use]
     pub fn run(&self, recording: &Recording) -> Identification {
         let filter_hz = self.options.output_filter_hz;
@@ -191,40 +177,16 @@ impl<'a> Identify<'a> {
             .output_filter_hz(filter_hz.or(recording.output_filter_hz()))
             .road(self.road_of(recording))
             .under_way(recording.is_of_a_flight_log());
-        // The calm parts of a flight are not what is tried.
-        let usual_span_s = match recording.is_of_a_flight_log() {
-            true => options.span_s,
-            false => (None, None),
-        };
-        let usual = Options::default()
-            .specification(options.specification)
-            .beta(options.beta)
-            .output_filter_hz(options.output_filter_hz)
-            .road(Self::new().road_of(recording))
-            .span_s(usual_span_s.0, usual_span_s.1)
-            .input_late_s(options.input_late_s)
-            .input_before(options.input_before)
-            .under_way(options.is_under_way);
         with_signals(recording, |signals| {
             let calm = feedback::calm(recording, signals);
-            let by = |options: &Options| match recording.set_point() {
+            let mut found = match recording.set_point() {
                 Some(set_point) if options.road == Road::General => {
-                    feedback::identify(signals, set_point, (options, self.pack.as_ref()))
+                    feedback::identify(signals, set_point, (&options, self.pack.as_ref()))
                 }
-                _ => identify_by(signals, options, self.pack.as_ref()),
+                _ => identify_by(signals, &options, self.pack.as_ref()),
             };
-            let is_compared = options != usual && !self.skips_default;
-            let share = if is_compared { 0.5 } else { 1.0 };
-            let mut found = part(0.0..share, || by(&options));
             if let Some(verdict) = calm.filter(|_| found.outcome.is_ok()) {
                 found.outcome = Err(verdict);
-            }
-            if found.outcome.is_ok() && is_compared {
-                let default = part(share..1.0, || by(&usual));
-                if let Err(verdict) = default.outcome {
-                    let verdict = Box::new(verdict);
-                    found.remarks.push(Remark::DefaultRefused(verdict));
-                }
             }
             if found.outcome.is_err() {
                 // Of a refused model nothing is proposed.

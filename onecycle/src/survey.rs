@@ -194,8 +194,7 @@ fn identified(part: &Signals, asked: &Specification) -> Option<Shown> {
     let recording = part.recording().ok()?;
     let identify = (crate::Identify::new())
         .specification(*asked)
-        .structure(log_gains::structure(part.control_loop))
-        .without_default_run();
+        .structure(log_gains::structure(part.control_loop));
     let mut identification = identify.run(&recording);
     // Of several parts one that knows its gain to less than a factor of two tells nothing.
     let tells = |found: &Identified| {

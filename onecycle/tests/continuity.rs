@@ -79,7 +79,11 @@ fn factor(parameter: Parameter, structure: Structure, [time, input, output]: [f6
     let per_integration = |more: i32| time.powi(-(integrators + more));
     match parameter {
         Parameter::K => output / input * per_integration(0),
-        Parameter::KOverTBody => output / input * per_integration(1),
+        // Without a slow lag there is one integrator more in its place.
+        Parameter::KOverTBody => {
+            let has_body = structure.parameters().contains(&Parameter::TBody);
+            output / input * per_integration(i32::from(has_body))
+        }
         Parameter::InverseTBody | Parameter::NaturalFrequency => 1.0 / time,
         Parameter::Zeta => 1.0,
         Parameter::InputBias => input,

@@ -64,10 +64,6 @@ pub(crate) fn sentence(remark: &Remark) -> Option<String> {
             significant(*step),
             significant(*input)
         ),
-        Remark::DefaultRefused(verdict) => format!(
-            "With default options this recording is refused ({verdict}). Trust this result only if you know why the \
-             refusal is wrong."
-        ),
         _ => return None,
     })
 }
@@ -118,7 +114,6 @@ fn clock(seen: f64, beta: f64, later: Option<(f64, Option<f64>)>, cost: &str) ->
 
 #[cfg(test)]
 mod tests {
-    use crate::Verdict;
 
     use super::*;
 
@@ -158,10 +153,6 @@ mod tests {
                     input: 1.0,
                 },
                 "above 0.2",
-            ),
-            (
-                Remark::DefaultRefused(Box::new(Verdict::NoFit)),
-                "is refused (not this kind of process",
             ),
             (
                 Remark::Extrapolated {
