@@ -63,7 +63,7 @@ impl Gain {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Price {
-    /// `max(J, 0)`, and the lost margin. See the [module](self).
+    /// `max(J, 0)`, and the lost margin.
     #[default]
     WithMargin,
     /// `J` with its sign, as in the authors' published code: a controller with less margin than asked may be cheaper.
