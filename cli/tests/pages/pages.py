@@ -147,6 +147,8 @@ def turn_tabs(page):
         focused = page.evaluate("document.activeElement.getAttribute('aria-controls')")
         expect(focused == wanted, f"{key} leaves the focus on {focused}")
     page.locator(".cards a", has_text="Pitch").click()
+    # The page follows its address as soon as the browser says that it has changed.
+    page.locator("#pitch-rate").wait_for()
     expect(shown() == ["pitch-rate"], f"the link shows {shown()}")
     page.locator("[role=tab]", has_text="Roll").click()
     expect(shown() == ["roll-rate"] and page.url.endswith("#roll-rate"), f"{shown()} at {page.url}")
