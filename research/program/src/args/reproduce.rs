@@ -22,7 +22,7 @@ use onecycle_cli::args::MOST_THREADS;
     "Without --network, table_4, table_6 and table_7 train a network of the paper's size first, in 75 minutes\n",
     "on two cores (--quick: a small one, in seconds), and keep it in DIR/parts/paper_network.onnx.\n",
     "Finished parts are kept in DIR/parts and not computed again, and an interrupted training is\n",
-    "resumed after its last epoch; --restart starts over.\n\n",
+    "resumed where it was at most 30 s before; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable part, 5 output not written"
 ))]
 pub(crate) struct Reproduce {

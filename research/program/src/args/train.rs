@@ -16,7 +16,7 @@ use onecycle_cli::args::MOST_THREADS;
     "  onecycle-lab train --recipe experiments/identifier.toml -o mine.pack\n",
     "  onecycle-lab train --recipe research/program/reproduction/paper_network_small.toml\n",
     "  onecycle-lab train --recipe research/program/reproduction/paper_network.toml -o paper.onnx --json table.json\n\n",
-    "With --out, every epoch is kept in the folder OUT.part until the result is written: the same command\n",
+    "With --out, the state is kept every 30 s in the folder OUT.part until the result is written: the same command\n",
     "resumes an interrupted run, to the same bits; --restart starts over.\n\n",
     "Exit codes: 0 done, 2 bad arguments, 3 unreadable recipe or part, 4 the pack is written but of little \
      use (the report says why), 5 output not written"
