@@ -113,9 +113,8 @@ pub(crate) fn check(
                 return;
             }
         }
-    } else if let Some(design) = identified.design.filter(|_| options.input_late_s.is_none()) {
-        let rad_per_s = design.margins.gain_crossover_rad_per_s;
-        found.remarks.push(Remark::ClockUnchecked { rad_per_s });
+    } else if options.input_late_s.is_none() {
+        found.remarks.extend(unchecked(identified));
     }
     if found.switching.is_some() && options.hold.is_none() && options.input_late_s.is_none() {
         let crossover = identified
@@ -168,6 +167,14 @@ fn law<'a>(
     Law::find(signals, span_s, identified.model.linear().gain() > 0.0)
 }
 
+/// Nothing shows whether both columns are on one clock, which a controller would feel.
+fn unchecked(identified: &Identified) -> Option<Remark> {
+    let design = identified.design?;
+    Some(Remark::ClockUnchecked {
+        rad_per_s: design.margins.gain_crossover_rad_per_s,
+    })
+}
+
 /// The relay's law, against what is known of the relay.
 struct Clock<'a> {
     law: Law<'a>,
@@ -208,9 +215,7 @@ impl Clock<'_> {
         // Of a slow process, hysteresis and no clock.
         let late_s = self.law.late_s(0.0).unwrap_or(self.law.period_s());
         if seen > 0.0 && late_s > MOST_LATE_S {
-            return Ok((identified.design).map(|design| Remark::ClockUnchecked {
-                rad_per_s: design.margins.gain_crossover_rad_per_s,
-            }));
+            return Ok(unchecked(identified));
         }
         let has_hysteresis = seen > LEADING;
         let beta = leading.filter(|_| !has_hysteresis).unwrap_or(0.0);

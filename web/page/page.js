@@ -61,7 +61,8 @@ const took = () => `${((performance.now() - began) / 1000).toFixed(2)} s`;
 // ---- State in the fragment: what was set for one loop of one recording, never data ---------------------------------
 
 const NAMES = ["kp", "ki", "kd", "filter_s"], LABELS = { kp: "Kp", ki: "Ki", kd: "Kd", filter_s: "filter (s)" };
-const CHOICES = ["from", "to", "structure", "style", "vendor", "input-range", "output-range", "more"];
+const SYSTEM = ["vendor", "input-range", "output-range"];
+const CHOICES = ["from", "to", "structure", "style", ...SYSTEM, "more"];
 let kept, linked, fromAddress;
 const writeAddress = () => history.replaceState(null, "", kept.size ? `#${kept}` : location.pathname + location.search);
 const keep = (name, value) => {
@@ -306,11 +307,11 @@ const showSystem = () => {
   at("input-range").placeholder = of ? `0..${of.full_input}` : "";
   at("output-range-label").hidden = !of?.has_range_of_measurement;
 };
-for (const id of ["vendor", "input-range", "output-range"]) at(id).onchange = async () => {
+for (const id of SYSTEM) at(id).onchange = async () => {
   const of = vendor();
   if (!of?.counts_output) at("input-range").value = "";
   if (!of?.has_range_of_measurement) at("output-range").value = "";
-  for (const name of ["vendor", "input-range", "output-range"]) keep(name, at(name).value);
+  for (const name of SYSTEM) keep(name, at(name).value);
   showSystem();
   if (!wasAnswered) return;
   if (of?.has_range_of_measurement && !at("output-range").value) { say("This controller counts in percent: give the range of its measurement."); return at("output-range").focus(); }

@@ -80,7 +80,7 @@ fn effect(of: &Effect) -> String {
     felt(of.figure, 1.0 / of.better[1])
 }
 
-/// A figure that becomes so many times as large.
+/// The change of `figure` in words; `times` is its new value over the old one.
 fn felt(figure: Felt, times: f64) -> String {
     let error = |of: &str| changed(times, &format!("error after {of}"));
     match figure {
@@ -94,11 +94,11 @@ fn felt(figure: Felt, times: f64) -> String {
     }
 }
 
-/// Ratios below and above which a figure is none or has no end.
+/// Below this ratio of new to old value a figure counts as zero, above the other one as infinite.
 const LEAST_TIMES: f64 = 0.002;
 const MOST_TIMES: f64 = 500.0;
 
-/// A figure that becomes so many times as large, such as `2.6 times the noise` or `45 % less error`.
+/// The change of a quantity of which there is more or less: `2.6 times the noise`, `45 % less error`. `times` is new over old.
 fn changed(times: f64, figure: &str) -> String {
     match times {
         _ if times < LEAST_TIMES => format!("no {figure}"),
@@ -109,7 +109,7 @@ fn changed(times: f64, figure: &str) -> String {
     }
 }
 
-/// A peak that becomes so many times as high.
+/// The change of a peak, which is higher or lower: `a 20 % higher peak`. `times` is new over old.
 fn height(times: f64, peak: &str) -> String {
     match times {
         _ if times > MOST_TIMES => format!("a {peak} without end"),

@@ -114,7 +114,6 @@ fn clock(seen: f64, beta: f64, later: Option<(f64, Option<f64>)>, cost: &str) ->
 
 #[cfg(test)]
 mod tests {
-
     use super::*;
 
     // A quarter turn is 90 deg; a factor of 1.5 is 3.5 dB.

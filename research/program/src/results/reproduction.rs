@@ -30,6 +30,11 @@ impl Row {
     }
 }
 
+/// The cell of a number; a dash without one.
+pub(crate) fn or_dash(value: Option<f64>, text: fn(f64) -> String) -> String {
+    value.map_or("-".to_owned(), text)
+}
+
 /// One part of the paper, ready to be shown.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ReproducedPart {

@@ -242,7 +242,7 @@ impl Examples {
         self.gain
     }
 
-    /// Cost of the controller of a class on example `i`, at the gain found in this way; panics if there is none.
+    /// Cost, on example `i`, of the controller of a class whose gain is found by `gain`; panics if `i` is out of range.
     #[must_use]
     pub fn judge(&self, i: usize, class: &Class, gain: Gain) -> Deterioration {
         let Example {

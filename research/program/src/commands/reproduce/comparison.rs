@@ -10,7 +10,7 @@ use onecycle_lab::paper::network::{Card, PaperNetwork};
 use serde::Deserialize;
 
 use crate::commands::clock::thread_seconds;
-use crate::results::reproduction::{Numbers, Row};
+use crate::results::reproduction::{Numbers, Row, or_dash};
 use crate::workers::Workers;
 
 /// The experiments and the methods.
@@ -114,20 +114,19 @@ fn training(card: &Card) -> Vec<Row> {
 
 fn row(label: &str, summary: &Summary) -> Row {
     let costs = &summary.costs;
-    let cost = |cost: Option<f64>| cost.map_or("-".to_owned(), percent);
     let worst = if costs.unstable > 0 {
-        format!("unstable ({})", cost(costs.worst))
+        format!("unstable ({})", or_dash(costs.worst, percent))
     } else {
-        cost(costs.worst)
+        or_dash(costs.worst, percent)
     };
     Row::new(
         label,
         [
-            cost(costs.mean),
+            or_dash(costs.mean, percent),
             worst,
             costs.unstable.to_string(),
             costs.no_answer.to_string(),
-            summary.median_seconds.map_or("-".to_owned(), seconds),
+            or_dash(summary.median_seconds, seconds),
         ],
     )
 }

@@ -8,7 +8,7 @@ use onecycle_lab::space::grid;
 use onecycle_lab::space::grid::{Check, Grid, check};
 use serde::Deserialize;
 
-use crate::results::reproduction::{Numbers, Row};
+use crate::results::reproduction::{Numbers, Row, or_dash};
 use crate::workers::Workers;
 
 /// The grids and their check.
@@ -57,7 +57,7 @@ pub(super) fn find(settings: &GridCheckSettings, workers: &Workers) -> Result<Nu
             }),
             row(
                 "smallest phase margin under its controller",
-                &|(_, check)| check.least_margin_rad.map_or("-".to_owned(), degrees),
+                &|(_, check)| or_dash(check.least_margin_rad, degrees),
             ),
         ]],
         figures: vec![

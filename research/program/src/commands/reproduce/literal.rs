@@ -13,7 +13,7 @@ use super::Kept;
 use super::network::RecipeName;
 use super::sheet::typed;
 use crate::commands::train::classifier::{forget, learn};
-use crate::results::reproduction::{Numbers, Row};
+use crate::results::reproduction::{Numbers, Row, or_dash};
 use crate::workers::Workers;
 
 /// A recipe, trained with each loss from each seed.
@@ -87,12 +87,10 @@ pub(super) fn find(
         let mut found = Vec::new();
         for &seed in seeds {
             number += 1;
-            let mut fields = settings.recipe.table()?;
-            fields.extend(settings.change.clone());
             let recipe = ClassifierRecipe {
                 seed,
                 losses: vec![Choice { loss, rate: None }],
-                ..typed(&fields)?
+                ..typed(&settings.recipe.with(&settings.change)?)?
             };
             found.push(trained(&recipe, &kept.step(number), workers)?);
         }
@@ -204,10 +202,10 @@ fn counted(found: &Found) -> Vec<Row> {
     let row = |(name, gain): (&str, Gain)| {
         let score = &found.random[gain as usize];
         let cells = [
-            cost(score.mean_signed),
-            cost(score.mean_positive),
-            cost(score.mean),
-            cost(score.largest),
+            or_dash(score.mean_signed, percent),
+            or_dash(score.mean_positive, percent),
+            or_dash(score.mean, percent),
+            or_dash(score.largest, percent),
             score.unstable.to_string(),
             margin(score),
         ];
@@ -225,12 +223,8 @@ fn counted(found: &Found) -> Vec<Row> {
     ways.into_iter().map(row).collect()
 }
 
-fn cost(cost: Option<f64>) -> String {
-    cost.map_or("-".to_owned(), percent)
-}
-
 fn margin(score: &Score) -> String {
-    score.least_margin_rad.map_or("-".to_owned(), degrees)
+    or_dash(score.least_margin_rad, degrees)
 }
 
 /// One network for each step. Each is kept by itself.
@@ -239,8 +233,7 @@ pub(super) fn ablation(
     kept: &Kept<'_>,
     workers: &Workers,
 ) -> Result<Numbers, Failure> {
-    let mut base = settings.recipe.table()?;
-    base.extend(settings.common.clone());
+    let mut base = settings.recipe.with(&settings.common)?;
     let mut rows = Vec::with_capacity(settings.steps.len());
     for (number, step) in (1..).zip(&settings.steps) {
         let mut fields = base.clone();
@@ -260,22 +253,22 @@ pub(super) fn ablation(
 /// The verification set, then random processes: gain matched, by the describing function, from the harmonics.
 fn cells(found: &Found) -> Vec<String> {
     let largest = |score: &Score| match score.unstable {
-        0 => cost(score.largest),
+        0 => or_dash(score.largest, percent),
         unstable => format!("{unstable} of {} unstable", score.examples),
     };
     let [harmonics, _, describing, matched] = &found.random;
     let classes = &found.verification[Gain::Matched as usize];
     let mut cells = vec![
         percent(classes.accuracy),
-        cost(classes.mean_positive),
+        or_dash(classes.mean_positive, percent),
         largest(classes),
-        cost(matched.mean_signed),
-        cost(matched.mean_positive),
+        or_dash(matched.mean_signed, percent),
+        or_dash(matched.mean_positive, percent),
         largest(matched),
         margin(matched),
-        cost(describing.mean_positive),
+        or_dash(describing.mean_positive, percent),
         largest(describing),
-        cost(harmonics.mean),
+        or_dash(harmonics.mean, percent),
         largest(harmonics),
     ];
     if found.outcome == "diverged" {

@@ -11,7 +11,7 @@ use onecycle_onboard::Soiptd;
 use onecycle_plant::multirotor::{Axis, Mission, Tuned, fly};
 use serde::Deserialize;
 
-use crate::results::reproduction::{Numbers, Row};
+use crate::results::reproduction::{Numbers, Row, or_dash};
 use crate::workers::Workers;
 
 /// The modes and the flights.
@@ -61,7 +61,7 @@ fn modes(settings: &ModeSettings) -> Result<Vec<Row>, Failure> {
             format!("u0 = {}", mode.at),
             [
                 format!("{:.2}", local.k_over_t_body() * t_body_s / mode.amplitude),
-                error.map_or("-".to_owned(), percent),
+                or_dash(error, percent),
                 cost_cell(Some(judge.deterioration(answer.feedback))),
                 cost_cell(first),
             ],

@@ -9,7 +9,7 @@ use super::sheet::typed;
 use crate::commands::train::classifier::{forget, learn};
 use crate::journal::Journal;
 use crate::results::classifier::{SetKind, TrainedNetwork};
-use crate::results::reproduction::{Numbers, Row};
+use crate::results::reproduction::{Numbers, Row, or_dash};
 use crate::workers::Workers;
 
 /// The recipe, and the fields that replace its own.
@@ -45,6 +45,13 @@ pub(super) enum RecipeName {
 }
 
 impl RecipeName {
+    /// The fields of the recipe, some of them replaced.
+    pub(super) fn with(self, change: &toml::Table) -> Result<toml::Table, Failure> {
+        let mut fields = self.table()?;
+        fields.extend(change.clone());
+        Ok(fields)
+    }
+
     /// The fields of the recipe.
     pub(super) fn table(self) -> Result<toml::Table, Failure> {
         let text = match self {
@@ -98,15 +105,12 @@ pub(super) fn find(
 
 fn table(scores: &[Score], kind: SetKind) -> Vec<Row> {
     let row = |name: &str, cell: fn(&Score) -> String| Row::new(name, scores.iter().map(cell));
-    let cost = |cost: Option<f64>| cost.map_or("-".to_owned(), percent);
     let accuracy = row("accuracy", |score| percent(score.accuracy));
     let costs = [
-        row("mean |J|", |score| {
-            score.mean.map_or("-".to_owned(), percent)
-        }),
-        Row::new("largest |J|", scores.iter().map(|score| cost(score.worst))),
+        row("mean |J|", |score| or_dash(score.mean, percent)),
+        row("largest |J|", |score| or_dash(score.worst, percent)),
         row("least phase margin", |score| {
-            score.least_margin_rad.map_or("-".to_owned(), degrees)
+            or_dash(score.least_margin_rad, degrees)
         }),
         row("unstable", |score| score.unstable.to_string()),
         row("experiments", |score| score.examples.to_string()),

@@ -15,7 +15,7 @@ use onecycle_lab::space::grid::{Grid, GridSettings};
 use onecycle_onboard::{Pd, Soiptd};
 use serde::Deserialize;
 
-use crate::results::reproduction::{Numbers, Row};
+use crate::results::reproduction::{Numbers, Row, or_dash};
 use crate::workers::Workers;
 
 /// The experiments and their variants.
@@ -177,10 +177,10 @@ fn row(name: &str, judged: &[Option<Deterioration>]) -> Row {
         name,
         [
             mean(costs.iter().sum()),
-            median.map_or("-".to_owned(), percent),
-            costs.last().copied().map_or("-".to_owned(), percent),
+            or_dash(median, percent),
+            or_dash(costs.last().copied(), percent),
             mean(stable.iter().map(|(cost, _)| cost).sum()),
-            least_rad.map_or("-".to_owned(), degrees),
+            or_dash(least_rad, degrees),
             (judged.len() - stable.len()).to_string(),
         ],
     )
