@@ -1,15 +1,17 @@
-"""Runs the commands of docs/benchmarks.md, which is the list: nothing is named twice.
+"""Runs the commands of docs/benchmarks.md and of the tables in docs/benchmarks/, which are the list: nothing is named twice.
 
     cargo build --release && (cd research && cargo build --release)
     pip install scipy control                   # of other people, in the comparisons
     python experiments/benchmarks.py            # an hour on two cores
     python experiments/benchmarks.py d_test     # those that contain this text
     python experiments/benchmarks.py --quick    # seconds each: every command exists and starts
+    python experiments/benchmarks.py --write heaters   # puts the tables that the commands print into docs/benchmarks/
 
 A command is a code span or a block `sh` that begins with one of PROGRAMS. In a table headed by
 `onecycle-lab campaign experiments/...` the span of the first cell stands for the rest of the command. The
 output has the date, the revision, the machine and its load, the seed of each campaign, and the time of
-each command; each table prints its own spread.
+each command; each table prints its own spread. With --write a Markdown table of the output replaces the next table with the same
+head behind the command, in each page that has both.
 
 Commands of cargo on the research run in its folder. With --quick the programs of the development build run campaigns and benchmarks of a few cases. Tests
 are listed (at least one must carry the name); benches and examples must be targets of their crate;
@@ -43,7 +45,7 @@ LEFT_OUT = {
     "hundred_thousand": "hours in one thread",
     "--ignored": "minutes to hours; by hand",
     "onecycle-lab train": "minutes to hours; by hand",
-    "onecycle-lab reproduce": "some twenty minutes, and 75 for the paper's network; writes docs/reproduction.md",
+    "onecycle-lab reproduce": "some twenty minutes, and 75 for the paper's network; writes docs/benchmarks/reproduction.md",
     "any_peers.py": "needs SIPPY and Octave",
     "--method sippy": "needs SIPPY",
     "cargo install": "installs the program",
@@ -196,9 +198,31 @@ def seeds(command):
     return re.findall(r"^seed = (\d+)", "\n".join(texts), re.M)
 
 
-def full(command, environment, scratch):
+def pages():
+    """The page of claims, and those of the tables but the one that `onecycle-lab reproduce` writes whole."""
+    tables = sorted((ROOT / "docs" / "benchmarks").glob("*.md"))
+    return [ROOT / "docs" / "benchmarks.md"] + [page for page in tables if page.name != "reproduction.md"]
+
+
+def replaced(page, command, printed):
+    """A page with the tables that a command has printed in place of those behind its mention."""
+    # A span may be broken into lines, and a block `sh` continued.
+    gap = r"[\s\\]+"
+    mention = re.search(gap.join(map(re.escape, command.split())), page)
+    at = mention.end() if mention else len(page)
+    for table in re.findall(r"^(?:\|.*\n)+", printed + "\n", re.M):
+        head = table.splitlines()[0]
+        old = re.compile(rf"^{re.escape(head)}\n(?:\|.*\n)*", re.M).search(page, at)
+        if old:
+            page = page[: old.start()] + table + page[old.end() :]
+            at = old.start() + len(table)
+    return page
+
+
+def full(command, environment, scratch, write):
     """Runs a command; false if it fails."""
     reason = next((why for part, why in LEFT_OUT.items() if part in command), None)
+    named = command
     print(f"\n$ {command}", flush=True)
     if reason:
         print(f"left out: {reason}")
@@ -210,8 +234,20 @@ def full(command, environment, scratch):
         words = shlex.split(command)
         where, command = workspace(words), shlex.join(of_workspace(words))
     begin = time.perf_counter()
-    status = subprocess.run(["bash", "-c", command], cwd=where, env=environment).returncode
+    printed = []
+    with subprocess.Popen(
+        ["bash", "-c", command], cwd=where, env=environment, stdout=subprocess.PIPE, text=True
+    ) as running:
+        for line in running.stdout:
+            print(line, end="", flush=True)
+            printed.append(line)
+    status = running.returncode
     print(f"{time.perf_counter() - begin:.0f} s, status {status}", flush=True)
+    for page in pages() if write and status == 0 else []:
+        text = page.read_text()
+        if (new := replaced(text, named, "".join(printed))) != text:
+            page.write_text(new)
+            print(f"new tables in {page.relative_to(ROOT)}")
     return status == 0
 
 
@@ -219,16 +255,17 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("containing", nargs="?", default="")
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--write", action="store_true")
     arguments = parser.parse_args()
     target = pathlib.Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
     programs = [target / ("debug" if arguments.quick else "release") / name for name in BUILT]
     for program in programs:
         if not program.exists():
             sys.exit(f"there is no {program}: build it as README.md says")
-    page = (ROOT / "docs" / "benchmarks.md").read_text()
-    commands = [one for one in spans(page) if arguments.containing in one]
+    text = "\n".join(page.read_text() for page in pages())
+    commands = [one for one in spans(text) if arguments.containing in one]
     if not commands:
-        sys.exit(f"docs/benchmarks.md has no command with '{arguments.containing}'")
+        sys.exit(f"no page of the benchmarks has a command with '{arguments.containing}'")
     failures = []
     with tempfile.TemporaryDirectory() as folder:
         scratch = pathlib.Path(folder)
@@ -250,7 +287,7 @@ def main():
                 problem = quick(command, environment, scratch)
                 print(f"{problem or 'ok'}: {command} ({time.perf_counter() - begin:.1f} s)", flush=True)
                 failures += [command] if problem else []
-            elif not full(command, environment, scratch):
+            elif not full(command, environment, scratch, arguments.write):
                 failures.append(command)
     if failures:
         sys.exit(f"\n{len(failures)} of {len(commands)} commands failed:\n" + "\n".join(failures))

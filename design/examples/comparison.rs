@@ -1,4 +1,4 @@
-//! Comparison of the styles with the rules of the field, as tables for `docs/benchmarks.md`.
+//! Comparison of the styles with the rules of the field, as tables for `docs/benchmarks/controllers.md`.
 //!
 //! ```sh
 //! cargo run --release -p onecycle-design --example comparison

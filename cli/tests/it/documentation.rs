@@ -1,11 +1,13 @@
-//! README.md and the guide against docs/benchmarks.md and what commands print.
+//! README.md and the guide against the tables of docs/benchmarks/ and what commands print.
 //!
 //! Figures: a comment `<!-- figures: "TEXT" "TEXT" -->` in a block of a page (paragraph, item of a list, table), or alone before
-//! it, names blocks of docs/benchmarks.md by a text that stands in one of them only. Every number of the page's block must stand
-//! in these. A row of a table is a block of docs/benchmarks.md, and a text of a table's head names the whole table.
+//! it, names blocks of docs/benchmarks/ by a text that stands in one of them only. Every number of the page's block must stand
+//! in these. A row of a table is a block there, and a text of a table's head names the whole table. In docs/benchmarks.md every
+//! number of a paragraph or row must stand in a section that it links; a column `target` is left out.
 
 use std::collections::BTreeSet;
 
+use crate::links::{all_pages, section, targets};
 use crate::pages::{misprints, pages, read};
 
 /// A paragraph, an item of a list or a table, on one line each.
@@ -79,7 +81,7 @@ fn numbers(text: &str) -> BTreeSet<String> {
     while at < characters.len() {
         let begin = at;
         while is_digit(at)
-            || (at > begin && matches!(characters[at], ',' | '.') && is_digit(at + 1))
+            || (at > begin && matches!(characters.get(at), Some(',' | '.')) && is_digit(at + 1))
         {
             at += 1;
         }
@@ -107,7 +109,7 @@ fn figures(text: &str) -> BTreeSet<String> {
     numbers(&shown)
 }
 
-/// Texts by which the figures of docs/benchmarks.md are named, each with the numbers that it stands for.
+/// Texts by which the figures of docs/benchmarks/ are named, each with the numbers that it stands for.
 fn named(benchmarks: &str) -> Vec<(String, BTreeSet<String>)> {
     let mut named = vec![];
     for block in blocks(benchmarks) {
@@ -126,7 +128,7 @@ fn named(benchmarks: &str) -> Vec<(String, BTreeSet<String>)> {
 /// Sections of README.md in which every number needs its source.
 const MEASURED: [&str; 2] = ["How accurate it is", "Limits"];
 
-/// A sentence for every figure of a page that docs/benchmarks.md does not have.
+/// A sentence for every figure of a page that the tables of docs/benchmarks/ do not have.
 fn offences(page: &str, benchmarks: &str, measured: &[&str]) -> Vec<String> {
     let named = named(benchmarks);
     let mut offences = vec![];
@@ -142,7 +144,7 @@ fn offences(page: &str, benchmarks: &str, measured: &[&str]) -> Vec<String> {
         let begin: String = shown.chars().take(60).collect();
         if comments.is_empty() {
             let needs =
-                measured.contains(&block.heading.as_str()) || text.contains("benchmarks.md#");
+                measured.contains(&block.heading.as_str()) || text.contains("benchmarks/");
             if needs && !found.is_empty() {
                 offences.push(format!("{found:?} without a source: {begin}"));
             }
@@ -172,7 +174,13 @@ fn offences(page: &str, benchmarks: &str, measured: &[&str]) -> Vec<String> {
 
 #[test]
 fn every_figure_stands_in_the_benchmarks() {
-    let benchmarks = read("docs/benchmarks.md");
+    let is_measured = |name: &String| {
+        name.starts_with("docs/benchmarks/") && name != "docs/benchmarks/reproduction.md"
+    };
+    let tables: Vec<String> = all_pages().into_iter().filter(is_measured).collect();
+    assert!(tables.len() > 5, "{tables:?}");
+    let texts: Vec<String> = tables.iter().map(|name| read(name)).collect();
+    let benchmarks = texts.join("\n");
     let mut found = vec![];
     for name in pages() {
         let measured: &[&str] = if name == "README.md" { &MEASURED } else { &[] };
@@ -180,6 +188,100 @@ fn every_figure_stands_in_the_benchmarks() {
         found.extend(of_page.iter().map(|offence| format!("{name}: {offence}")));
     }
     assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+/// A sentence for every number of the page of claims that the sections it links do not have.
+fn unmeasured(page: &str, text_of: impl Fn(&str) -> Option<String>) -> Vec<String> {
+    let mut found = vec![];
+    let mut check = |text: &str| {
+        let links = targets(text);
+        let sections = links.iter().filter_map(|link| text_of(link));
+        let known: BTreeSet<String> = sections.flat_map(|text| numbers(&text)).collect();
+        let unknown: Vec<String> = figures(text).difference(&known).cloned().collect();
+        if !unknown.is_empty() {
+            found.push(format!("{unknown:?}: {text}"));
+        }
+    };
+    for block in blocks(page) {
+        if !block.is_table() {
+            check(&block.text());
+            continue;
+        }
+        let cells = |row: &str| -> Vec<String> { row.split('|').map(str::to_owned).collect() };
+        let head = cells(&block.lines[0]);
+        let target = head.iter().position(|cell| cell.trim() == "target");
+        for row in &block.lines[2..] {
+            let cells = cells(row).into_iter().enumerate();
+            let measured = cells.filter(|(at, _)| Some(*at) != target);
+            check(&measured.map(|(_, cell)| cell).collect::<Vec<_>>().join("|"));
+        }
+    }
+    found
+}
+
+#[test]
+fn every_claim_has_its_table() {
+    let page = read("docs/benchmarks.md");
+    // The sections before the first table of claims say how to measure.
+    let (_, claims) = page.split_once("\n## Accuracy\n").unwrap();
+    let found = unmeasured(claims, |link| {
+        let (file, anchor) = link.split_once('#')?;
+        section(&read(&format!("docs/{file}")), anchor)
+    });
+    assert!(found.is_empty(), "{}", found.join("\n"));
+}
+
+// A number of the section linked passes, another one does not; a target is nobody's measurement.
+#[test]
+fn a_claim_without_its_table_is_named() {
+    let of = |page: &str| {
+        unmeasured(page, |link| {
+            (link == "a.md#b").then(|| "0.24 and 7".to_owned())
+        })
+    };
+    let table = "| claim | target | measured | |\n| --- | --- | --- | --- |\n";
+    let row = |measured: &str| format!("{table}| x | 9 % | {measured} | [b](a.md#b) |");
+    assert_eq!(of(&row("0.24 %")), [""; 0]);
+    assert_eq!(
+        of(&row("0.25 %")),
+        ["[\"0.25\"]: | x | 0.25 % | [b](a.md#b) |"]
+    );
+    assert_eq!(of("7 of them, [b](a.md#b)"), [""; 0]);
+    assert_eq!(of("7 of them"), ["[\"7\"]: 7 of them"]);
+}
+
+/// Words of a page: what has a letter or a digit between spaces.
+fn words(page: &str) -> usize {
+    let has_sense = |word: &&str| word.contains(char::is_alphanumeric);
+    page.split_whitespace().filter(has_sense).count()
+}
+
+// The limits keep the documentation readable: who adds a page shortens another one. What commands print (docs/benchmarks/) does
+// not count.
+#[test]
+fn the_documentation_is_short() {
+    let of = |name: &str| words(&read(name));
+    for (name, most) in [
+        ("ARCHITECTURE.md", 900),
+        ("docs/benchmarks.md", 2000),
+        ("docs/identify-json.md", 4000),
+    ] {
+        assert!(of(name) <= most, "{name}: {} words", of(name));
+    }
+    for name in pages() {
+        let most = if name == "README.md" { 1500 } else { 900 };
+        assert!(of(&name) <= most, "{name}: {} words", of(&name));
+    }
+    let changes = read("CHANGELOG.md");
+    let unreleased = changes.split("\n## ").nth(1).unwrap();
+    let lines = unreleased.lines().filter(|line| !line.is_empty()).count();
+    assert!(lines <= 40, "the unreleased version has {lines} lines");
+    let written = all_pages();
+    let written = written
+        .iter()
+        .filter(|name| !name.starts_with("docs/benchmarks/"));
+    let all: usize = written.map(|name| of(name)).sum();
+    assert!(all <= 40_000, "{all} words");
 }
 
 const TABLE: &str = "\
@@ -216,12 +318,12 @@ fn a_wrong_figure_is_named() {
             "'c.toml' stands in 0 blocks: none "
         ]
     );
-    let bare = of("## Limits\n\n3 % fail.\n\n## Other\n\n4 % do not.\n\n[5 %](benchmarks.md#a)");
+    let bare = of("## Limits\n\n3 % fail.\n\n## Other\n\n4 % do not.\n\n[5 %](benchmarks/a.md)");
     assert_eq!(
         bare,
         [
             "{\"3\"} without a source: 3 % fail.",
-            "{\"5\"} without a source: [5 %](benchmarks.md#a)"
+            "{\"5\"} without a source: [5 %](benchmarks/a.md)"
         ]
     );
 }

@@ -24,6 +24,7 @@ mod heaters;
 mod imports;
 mod json_schema;
 mod library;
+mod links;
 mod live;
 mod pages;
 mod report;

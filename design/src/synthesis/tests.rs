@@ -232,7 +232,7 @@ fn a_fixed_weight_limits_the_overshoot() {
 }
 
 #[test]
-#[ignore = "five minutes; see docs/benchmarks.md"]
+#[ignore = "five minutes; see docs/benchmarks/controllers.md"]
 fn brute_force_on_two_hundred_processes_finds_nothing_better() {
     assert!(check_against_brute_force(324, 1) >= 200);
 }

@@ -187,7 +187,7 @@ fn designs_of_a_thousand_processes() {
 
 // The variables FROM and TO of the environment choose a part of the cases, each of which has its own seed.
 #[test]
-#[ignore = "ten minutes on two cores; see docs/benchmarks.md"]
+#[ignore = "ten minutes on two cores; see docs/benchmarks/controllers.md"]
 fn designs_of_a_hundred_thousand_processes() {
     let number = |name: &str, default: u64| {
         std::env::var(name).map_or(default, |value| value.parse().unwrap())

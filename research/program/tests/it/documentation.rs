@@ -1,4 +1,4 @@
-//! The guide and docs/reproduction.md against what commands print.
+//! The guide and docs/benchmarks/reproduction.md against what commands print.
 
 use std::fs;
 
@@ -24,10 +24,10 @@ fn texts<'a>(table: &'a toml::Table, key: &str) -> impl Iterator<Item = &'a toml
     values.into_iter().flatten()
 }
 
-// docs/reproduction.md is made by hours of work: titles, captions, remarks and claims must be those of the sheets all the same.
+// docs/benchmarks/reproduction.md is made by hours of work: titles, captions, remarks and claims must be those of the sheets all the same.
 #[test]
 fn the_reproduction_has_the_words_of_the_sheets() {
-    let page = read("docs/reproduction.md");
+    let page = read("docs/benchmarks/reproduction.md");
     let mut expected = vec![];
     let mut sheets = 0;
     for entry in fs::read_dir(root().join("research/program/reproduction")).unwrap() {
