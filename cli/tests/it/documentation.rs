@@ -143,8 +143,7 @@ fn offences(page: &str, benchmarks: &str, measured: &[&str]) -> Vec<String> {
         let found = figures(&text);
         let begin: String = shown.chars().take(60).collect();
         if comments.is_empty() {
-            let needs =
-                measured.contains(&block.heading.as_str()) || text.contains("benchmarks/");
+            let needs = measured.contains(&block.heading.as_str()) || text.contains("benchmarks/");
             if needs && !found.is_empty() {
                 offences.push(format!("{found:?} without a source: {begin}"));
             }

@@ -105,7 +105,8 @@ fn every_link_leads_somewhere() {
 #[test]
 fn a_dead_link_is_named() {
     let of = |text: &str| dead("docs/x.md", text);
-    let right = "# A b, c\n[a](#a-b-c) [b](../README.md#limits) [c](guide/) [d](https://x.y/z) `[e](f)`";
+    let right =
+        "# A b, c\n[a](#a-b-c) [b](../README.md#limits) [c](guide/) [d](https://x.y/z) `[e](f)`";
     assert_eq!(of(right), [""; 0]);
     assert_eq!(of("[a](README.md)"), ["docs/x.md: README.md"]);
     assert_eq!(
@@ -122,7 +123,9 @@ fn absent(page: &str) -> Vec<String> {
     let mut blocks: Vec<String> = vec![];
     for line in without_blocks(page).lines() {
         match blocks.last_mut() {
-            Some(block) if !line.trim().is_empty() && !is_table(line) && !line.starts_with("- ") => {
+            Some(block)
+                if !line.trim().is_empty() && !is_table(line) && !line.starts_with("- ") =>
+            {
                 *block += &format!("\n{line}");
             }
             _ => blocks.push(line.to_owned()),
@@ -146,7 +149,9 @@ fn absent(page: &str) -> Vec<String> {
         for function in functions {
             let name = function.rsplit("::").next().unwrap();
             let is_defined = |text: &String| {
-                ["(", "<"].iter().any(|end| text.contains(&format!("fn {name}{end}")))
+                ["(", "<"]
+                    .iter()
+                    .any(|end| text.contains(&format!("fn {name}{end}")))
             };
             if !texts.iter().any(is_defined) {
                 found.push(format!("{function}()"));
@@ -159,7 +164,12 @@ fn absent(page: &str) -> Vec<String> {
 // ARCHITECTURE.md, the tour and the recipes send readers to files and functions.
 #[test]
 fn named_files_and_functions_exist() {
-    for name in ["ARCHITECTURE.md", "docs/tour.md", "CONTRIBUTING.md"] {
+    for name in [
+        "ARCHITECTURE.md",
+        "CONTRIBUTING.md",
+        "docs/glossary.md",
+        "docs/tour.md",
+    ] {
         let page = read(name);
         assert!(spans(&page).len() > 20, "{name}");
         assert_eq!(absent(&page), [""; 0], "{name}");
@@ -172,6 +182,12 @@ fn an_absent_file_is_named() {
         absent("`cli/src/run.rs`: `nothing()`\n\n| `link/src/no.rs` | `link/` |"),
         ["nothing()", "link/src/no.rs"]
     );
-    assert_eq!(absent("`cli/tests/it/links.rs` has\n`absent()`, `a b/c`"), [""; 0]);
-    assert_eq!(absent("- `cli/tests/it/links.rs`\n- `absent()`"), ["absent()"]);
+    assert_eq!(
+        absent("`cli/tests/it/links.rs` has\n`absent()`, `a b/c`"),
+        [""; 0]
+    );
+    assert_eq!(
+        absent("- `cli/tests/it/links.rs`\n- `absent()`"),
+        ["absent()"]
+    );
 }
