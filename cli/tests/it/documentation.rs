@@ -249,17 +249,11 @@ fn a_claim_without_its_table_is_named() {
     assert_eq!(of("7 of them"), ["[\"7\"]: 7 of them"]);
 }
 
-/// Words of a page: what has a letter or a digit between spaces.
-fn words(page: &str) -> usize {
-    let has_sense = |word: &&str| word.contains(char::is_alphanumeric);
-    page.split_whitespace().filter(has_sense).count()
-}
-
 // The limits keep the documentation readable: who adds a page shortens another one. What commands print (docs/benchmarks/) does
 // not count.
 #[test]
 fn the_documentation_is_short() {
-    let of = |name: &str| words(&read(name));
+    let of = |name: &str| read(name).split_whitespace().count();
     for (name, most) in [
         ("ARCHITECTURE.md", 900),
         ("docs/benchmarks.md", 2000),
