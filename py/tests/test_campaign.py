@@ -16,7 +16,7 @@ import onecycle
 
 ROOT = Path(__file__).parents[2]
 RECIPE = """measure = "identification"
-cases = 60
+cases = 24
 seed = 1
 bias = 0.3
 sigma = 0.02
@@ -72,7 +72,7 @@ def test_same_bits_with_a_worker_killed_and_one_slow(recipe, tmp_path):
         assert str(outcomes) == program("campaign", recipe)
         # A resumed run computes only what is missing.
         parts = sorted(out.glob("*.parquet"))
-        assert len(parts) == 30
+        assert len(parts) == 12
         kept, lost = parts[0].stat().st_mtime_ns, parts[7]
         lost.unlink()
         again = onecycle.campaign(recipe, client=client, out=out, shard=2)
@@ -130,7 +130,7 @@ def test_training_sets_have_the_bytes_of_the_program(tmp_path, client):
 def test_a_killed_command_is_resumed_without_loss(recipe, tmp_path, client):
     address = client.scheduler.address
     words = [sys.executable, "-m", "onecycle.campaign", recipe, "--scheduler", address, "--out", tmp_path / "out"]
-    words = [str(word) for word in [*words, "--shard", 2, "--cases=40"]]
+    words = [str(word) for word in [*words, "--shard", 2, "--cases=16"]]
     first = subprocess.Popen(words, stdout=subprocess.DEVNULL)
     while not list((tmp_path / "out").glob("*.parquet")) and first.poll() is None:
         time.sleep(0.01)
@@ -139,13 +139,13 @@ def test_a_killed_command_is_resumed_without_loss(recipe, tmp_path, client):
     parts = {path: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*.parquet")}
     assert parts
     second = subprocess.run(words, capture_output=True, text=True)
-    assert second.stdout == program("campaign", recipe, "--cases=40"), second.stderr
+    assert second.stdout == program("campaign", recipe, "--cases=16"), second.stderr
     assert all(path.stat().st_mtime_ns == before for path, before in parts.items())
 
 
 def test_errors_are_sentences(tmp_path, client):
     path = tmp_path / "campaign.toml"
-    path.write_text(RECIPE.replace("cases = 60", "cases = 0"))
+    path.write_text(RECIPE.replace("cases = 24", "cases = 0"))
     with pytest.raises(onecycle.OnecycleError, match="cases"):
         onecycle.campaign(path, client=client)
     with pytest.raises(onecycle.OnecycleError, match="missing.toml"):
