@@ -87,7 +87,8 @@ fn a_campaign_of_recordings() {
 #[test]
 fn a_campaign_is_resumed() {
     let folder = Scratch::new();
-    let text = "measure = \"relay\"\ncases = 1000\nseed = 1\nbias = 0.3\nsigma = 0.01\ntrim = true\n";
+    let text =
+        "measure = \"relay\"\ncases = 1000\nseed = 1\nbias = 0.3\nsigma = 0.01\ntrim = true\n";
     let path = folder.write("campaign.toml", text.as_bytes());
     let expected = run(&["campaign", &path]);
     assert_eq!(expected.code, Some(0), "{expected:?}");
