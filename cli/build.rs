@@ -11,11 +11,21 @@ use std::path::{Path, PathBuf};
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build");
     let folder = PathBuf::from(env::var("OUT_DIR")?);
-    std::fs::write(folder.join("plotly.js"), bundle::script())?;
+    let sources = plotly::Plot::offline_js_sources();
+    let whole = whole(&sources);
+    std::fs::write(folder.join("plotly.js"), bundle::needed(whole))?;
+    // For the tests of the bundle, which so do without the crate.
+    std::fs::write(folder.join("plotly.whole.js"), whole)?;
     if env::var_os("CARGO_FEATURE_STUDIO").is_some() {
         studio(&folder)?;
     }
     Ok(())
+}
+
+/// The bundle among the scripts of the crate: the first; the other is for formulas.
+fn whole(sources: &str) -> &str {
+    let (_, behind) = sources.split_once('>').unwrap_or_default();
+    behind.split("</script>").next().unwrap_or_default()
 }
 
 fn studio(folder: &Path) -> Result<(), Box<dyn Error>> {

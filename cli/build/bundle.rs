@@ -12,28 +12,14 @@
 
 use std::collections::{BTreeSet, HashMap};
 
-use plotly::Plot;
-
 /// Positions in the list of the kinds that pages draw besides curves: bar, heatmap, contour.
 const KINDS: [usize; 3] = [0, 2, 6];
-
-/// The script; the one for formulas that the crate adds is left out.
-pub(crate) fn script() -> String {
-    let sources = Plot::offline_js_sources();
-    needed(plotly(&sources))
-}
-
-/// The first script of the crate.
-fn plotly(sources: &str) -> &str {
-    let (_, behind) = sources.split_once('>').unwrap_or_default();
-    behind.split("</script>").next().unwrap_or_default()
-}
 
 /// The call that registers the kinds of traces, and its end.
 const LIST: (&str, &str) = (".register([", "])");
 
 /// The needed part of a bundle; the whole bundle if it is built differently.
-fn needed(bundle: &str) -> String {
+pub(crate) fn needed(bundle: &str) -> String {
     let Some((before, rest)) = bundle.rsplit_once(LIST.0) else {
         return bundle.to_owned();
     };
@@ -107,11 +93,16 @@ fn calls(piece: &str) -> impl Iterator<Item = &str> {
 mod tests {
     use super::*;
 
+    // As build.rs has written them.
+    fn script() -> &'static str {
+        include_str!(concat!(env!("OUT_DIR"), "/plotly.js"))
+    }
+
     // Each kind in the list is a module that exports another one, which contains its name.
     #[test]
     fn the_places_are_those_of_the_kinds() {
         let script = script();
-        let pieces = pieces(&script);
+        let pieces = pieces(script);
         let module = |wanted: &str| -> &str {
             let mut all = pieces.iter().copied();
             all.find(|piece| name(piece) == Some(wanted)).unwrap()
@@ -136,10 +127,11 @@ mod tests {
     // Every module that is called is there, so are the licences, and three quarters of the bundle are gone.
     #[test]
     fn what_is_left_is_closed() {
-        let sources = Plot::offline_js_sources();
-        let whole = pieces(plotly(&sources));
+        let bundle = include_str!(concat!(env!("OUT_DIR"), "/plotly.whole.js"));
+        let whole = pieces(bundle);
         let script = script();
-        let left = pieces(&script);
+        assert_eq!(script, needed(bundle));
+        let left = pieces(script);
         assert!(
             whole.len() > 1000 && left.len() < 500,
             "{} {}",

@@ -2,7 +2,7 @@
 
 python3 studio.py PAGE PROGRAM REPOSITORY SCRATCH [--screenshots DIR] [--measure] [--only PART]: works as a user does, from
 files dropped on the page to exported gains, and compares the numbers with those of the program. Prints a line for each
-part; ends with status 1 at the first fault. --measure prints times instead of testing.
+part; ends with status 1 at a fault. --measure prints times instead of testing.
 """
 
 import argparse
@@ -13,12 +13,14 @@ import pathlib
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 
 from playwright.sync_api import sync_playwright
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[2] / "cli/tests/pages"))
 import axe
+import parallel
 
 DESK = {"viewport": {"width": 1280, "height": 900}}
 PHONE = {"viewport": {"width": 360, "height": 780}, "device_scale_factor": 2, "is_mobile": True, "has_touch": True}
@@ -818,29 +820,44 @@ def measure(browser, told):
     studio.close()
 
 
+# What each part needs: a window of its own, or the browser to open windows. The longest first.
+PARTS = {
+    "numbers": lambda browser, told: in_window(browser, told, numbers),
+    "answered": answered,
+    "belongings": belongings,
+    "outdated": outdated,
+    "controllers": controllers,
+    "simulated": lambda browser, told: in_window(browser, told, lambda studio, _: simulated(studio)),
+    "stretch": lambda browser, told: in_window(browser, told, stretch),
+    "by_hand": lambda browser, told: in_window(browser, told, by_hand),
+    "looks": looks,
+    "large": lambda browser, told: in_window(browser, told, large),
+    "hostile": lambda browser, told: in_window(browser, told, lambda studio, _: hostile(studio)),
+}
+
+
+def in_window(browser, told, part):
+    studio = Studio(browser, told.page, **DESK)
+    part(studio, told)
+    studio.close()
+
+
 def main():
     parser = argparse.ArgumentParser()
     for name in ("page", "program", "repository", "scratch"):
         parser.add_argument(name, type=pathlib.Path)
     parser.add_argument("--screenshots", type=pathlib.Path)
     parser.add_argument("--measure", action="store_true")
-    parser.add_argument("--only", metavar="PART", help="runs one part of the tests, such as belongings")
+    parser.add_argument("--only", metavar="PART", choices=PARTS, help="runs one part of the tests, such as belongings")
     told = parser.parse_args()
+    if not told.only and not told.measure:
+        parallel.runs(PARTS)
+        return
     told.page = told.page.resolve()
-    with sync_playwright() as playwright:
+    with sync_playwright() as playwright, tempfile.TemporaryDirectory(dir=told.scratch) as scratch:
+        told.scratch = pathlib.Path(scratch)
         browser = playwright.chromium.launch(executable_path=os.environ.get("CHROMIUM", "/usr/bin/chromium"), args=["--no-sandbox"])
-        if told.measure:
-            measure(browser, told)
-            return
-        studio = Studio(browser, told.page, **DESK)
-        parts = [
-            (numbers, studio, told), (answered, browser, told), (stretch, studio, told), (by_hand, studio, told), (belongings, browser, told),
-            (outdated, browser, told), (controllers, browser, told), (simulated, studio), (hostile, studio), (large, studio, told), (looks, browser, told),
-        ]
-        for part, *given in parts:
-            if told.only in (None, part.__name__):
-                part(*given)
-        studio.close()
+        (measure if told.measure else PARTS[told.only])(browser, told)
 
 
 if __name__ == "__main__":

@@ -2,11 +2,13 @@
 //!
 //! Every run is checked for panics.
 
+use std::collections::HashMap;
 use std::fmt::Write as _;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use serde_json::Value;
 use tempfile::TempDir;
@@ -44,7 +46,7 @@ pub(crate) const DOUBLE_INTEGRATOR: [&str; 8] = [
 const PROGRAMS: [&str; 2] = ["onecycle", "onecycle-lab"];
 
 /// The outcome of a run.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Outcome {
     /// The exit code; `None` after a signal.
     pub(crate) code: Option<i32>,
@@ -89,22 +91,42 @@ pub(crate) fn run_with_input(arguments: &[&str], bytes: &[u8]) -> Outcome {
     Outcome::of(&child.wait_with_output().expect("the program ends"))
 }
 
-/// Runs `identify FILE --json ARGUMENTS` on a file with these bytes.
-pub(crate) fn identify(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> Outcome {
-    let file = Scratch::new();
-    let path = file.write("recording.csv", bytes.as_ref());
-    let mut all = vec!["identify", path.as_str(), "--json"];
-    all.extend(arguments);
-    run(&all)
+/// A run that only reads, of files that do not change: what asks for it again gets the outcome of the first one. Most tests of
+/// words and of exit codes identify the same few recordings.
+pub(crate) fn run_once(arguments: &[&str]) -> Outcome {
+    remembered(b"", arguments, || run(arguments))
 }
 
-/// Runs `identify FILE ARGUMENTS` on a file with these bytes.
+/// The outcome for this content and these arguments, made by the first who asks; the others wait for it.
+fn remembered(bytes: &[u8], arguments: &[&str], make: impl FnOnce() -> Outcome) -> Outcome {
+    type Outcomes = HashMap<(usize, u64), Arc<OnceLock<Outcome>>>;
+    static OUTCOMES: Mutex<Option<Outcomes>> = Mutex::new(None);
+    let mut hasher = DefaultHasher::new();
+    (bytes, arguments).hash(&mut hasher);
+    let own = {
+        let mut all = OUTCOMES.lock().unwrap_or_else(PoisonError::into_inner);
+        let key = (bytes.len(), hasher.finish());
+        Arc::clone(all.get_or_insert_default().entry(key).or_default())
+    };
+    own.get_or_init(make).clone()
+}
+
+/// Runs `identify FILE --json ARGUMENTS` on a file with these bytes, once.
+pub(crate) fn identify(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> Outcome {
+    identify_as(bytes.as_ref(), &[&["--json"], arguments].concat())
+}
+
+/// Runs `identify FILE --details ARGUMENTS` on a file with these bytes, once.
 pub(crate) fn identify_as_text(bytes: impl AsRef<[u8]>, arguments: &[&str]) -> Outcome {
-    let file = Scratch::new();
-    let path = file.write("recording.csv", bytes.as_ref());
-    let mut all = vec!["identify", path.as_str(), "--details"];
-    all.extend(arguments);
-    run(&all)
+    identify_as(bytes.as_ref(), &[&["--details"], arguments].concat())
+}
+
+fn identify_as(bytes: &[u8], arguments: &[&str]) -> Outcome {
+    remembered(bytes, arguments, || {
+        let file = Scratch::new();
+        let path = file.write("recording.csv", bytes);
+        run(&[&["identify", path.as_str()], arguments].concat())
+    })
 }
 
 /// Runs `simulate ARGUMENTS`; returns the standard output.

@@ -1,6 +1,6 @@
 //! `onecycle log`, and `onecycle identify` on flight logs.
 
-use crate::common::{Scratch, UNREADABLE, run};
+use crate::common::{Scratch, UNREADABLE, run, run_once};
 
 fn example(name: &str) -> String {
     format!("{}/../examples/logs/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -124,7 +124,7 @@ fn what_does_not_fit_is_refused_with_advice() {
 }
 
 fn loops(log: &str) -> Vec<serde_json::Value> {
-    let json = run(&["identify", &example(log), "--json"]).stdout;
+    let json = run_once(&["identify", &example(log), "--json"]).stdout;
     let report: serde_json::Value = serde_json::from_str(&json).unwrap();
     assert_eq!(report["schema"], "onecycle.flight/1");
     report["loops"].as_array().unwrap().clone()

@@ -1,7 +1,7 @@
 """Tests of the HTML pages in a real browser.
 
-python3 pages.py PROGRAM LAB EXAMPLES SCRATCH [--screenshots DIR] [--picture FILE.png]: makes the pages, opens each at
-two widths and in both themes, and prints a line for each. Ends with status 1 at the first fault.
+python3 pages.py PROGRAM LAB EXAMPLES SCRATCH [--screenshots DIR] [--picture FILE.png] [--only PAGE]: makes the pages, opens
+each at two widths and in both themes, and prints a line for each. Ends with status 1 at a fault.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import sys
 from playwright.sync_api import sync_playwright
 
 import axe
+import parallel
 
 SCREENS = {
     "desk": {"viewport": {"width": 1280, "height": 900}},
@@ -35,8 +36,8 @@ TOUCHING = """() => [...document.querySelectorAll(".plot")].flatMap((plot) =>
         return all.flatMap(([text, box], at) =>
             all.slice(at + 1).filter(([, other]) => meet(box, other)).map(([other]) => `${text} and ${other}`));
     }))"""
-# Pages of onecycle-lab.
-OF_THE_LAB = {"grid", "phase", "certificate"}
+# Pages in a folder with other files.
+IN_FOLDERS = {"flights", "reproduction"}
 # Largest size of a page.
 MOST_BYTES = 6_000_000
 
@@ -50,33 +51,35 @@ def expect(is_so, what):
         raise Wrong(what)
 
 
-def made(program, lab, examples, scratch):
-    """Yields for every page: name, path, sections, least number of plots, and the command for its margins, if it has
-    some."""
+def pages_of_programs(program, lab, examples):
+    """For every page: program and command, sections, least number of plots. A command that writes one page has `--report`
+    added; where the page has margins it has `--json` as well."""
     identified = {"recording", "fit", "process", "stability", "step", "controller", "styles"}
     recording = lambda name: ["identify", str(examples / name)]
     tune = ["tune", "--k", "1", "--t-prop", "0.3", "--t-body", "2", "--tau", "0.1"]
-    pages = {
-        "hover": (recording("simulated_hover.csv"), identified, 12),
-        "roll": (recording("jsbsim_f450_roll_clean.csv"), identified | {"remarks"}, 12),
-        "bias": (recording("rotorpy_sih_alt_bias30.csv"), identified | {"remarks"}, 12),
-        "refused": (recording("unsteady_ardupilot_alt.csv"), {"recording"}, 1),
-        "flight": (recording("logs/px4_chirps.ulg"), {"flight", "roll-rate", "roll-rate-fit", "yaw-rate"}, 20),
-        "tuned": (tune, {"stability", "step", "controller", "styles"}, 3),
-        "grid": (["grid"], {"shapes", "times", "rays"}, 5),
-        "phase": (["phase"], {"cost", "shapes"}, 2),
-        "certificate": (["certify", "--shapes", "6"], {"corners", "bias"}, 2),
+    return {
+        "flight": (program, recording("logs/px4_chirps.ulg"), {"flight", "roll-rate", "roll-rate-fit", "yaw-rate"}, 20),
+        "hover": (program, recording("simulated_hover.csv"), identified, 12),
+        "roll": (program, recording("jsbsim_f450_roll_clean.csv"), identified | {"remarks"}, 12),
+        "bias": (program, recording("rotorpy_sih_alt_bias30.csv"), identified | {"remarks"}, 12),
+        "refused": (program, recording("unsteady_ardupilot_alt.csv"), {"recording"}, 1),
+        "tuned": (program, tune, {"stability", "step", "controller", "styles"}, 3),
+        "grid": (lab, ["grid"], {"shapes", "times", "rays"}, 5),
+        "phase": (lab, ["phase"], {"cost", "shapes"}, 2),
+        "certificate": (lab, ["certify", "--shapes", "6"], {"corners", "bias"}, 2),
+        "flights": (program, ["fly", "altitude", "vehicle"], {"altitude", "vehicle"}, 6),
+        "reproduction": (lab, ["reproduce", "phase", "--quick"], {"phase"}, 1),
     }
-    for name, (arguments, sections, plots) in pages.items():
-        path = scratch / f"{name}.html"
-        run(lab if name in OF_THE_LAB else program, [*arguments, "--report", str(path)])
-        yield name, path, sections, plots, arguments if "controller" in sections else None
-    folder = scratch / "flights"
-    run(program, ["fly", "altitude", "vehicle", "-o", str(folder)])
-    yield "flights", folder / "flights.html", {"altitude", "vehicle"}, 6, None
-    folder = scratch / "reproduction"
-    run(lab, ["reproduce", "phase", "--quick", "-o", str(folder)])
-    yield "reproduction", next(folder.glob("*.html")), {"phase"}, 1, None
+
+
+def made(name, program, command, folder):
+    """Makes a page; returns its path."""
+    if name not in IN_FOLDERS:
+        path = folder / f"{name}.html"
+        run(program, [*command, "--report", str(path)])
+        return path
+    run(program, [*command, "-o", str(folder / name)])
+    return next((folder / name).glob("*.html"))
 
 
 def run(program, arguments):
@@ -304,6 +307,38 @@ def picture(browser, page, path):
     frame.context.close()
 
 
+def check(browser, told, name, path, program, command, sections, plots):
+    """Checks a page at both widths."""
+    margins_told = json.loads(run(program, [*command, "--json"])) if "controller" in sections else None
+    for screen in SCREENS:
+        page, faults, fetched = opened(browser, path, screen)
+        if name == "flight":
+            turn_tabs(page)
+        if screen == "desk" and {"controller", "recording"} <= sections or name == "flight":
+            first_screens(page)
+            copy(page)
+        if screen == "desk":
+            print_out(page)
+        unfold(page)
+        look(page, path, sections, plots)
+        if "recording" in sections or name == "flight":
+            accessible(page)
+        if told.picture and (name, screen) == ("hover", "desk"):
+            picture(browser, page, told.picture)
+        switch(page)
+        said = margins(page, margins_told) if margins_told else f"{len(annotations(page))} notes"
+        if screen == "desk" and "recording" in sections:
+            handle(page)
+        expect(not faults, f"the browser complains: {faults}")
+        others = [url for url in fetched if not re.match(r"file:|data:|blob:", url)]
+        expect(not others, f"the page fetches {others}")
+        took_ms = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
+        print(f"{name:<13} {screen:<6} {path.stat().st_size / 1e6:.1f} MB, open after {took_ms:.0f} ms, {said}")
+        if told.screenshots:
+            save(page, told.screenshots / f"{name}-{screen}")
+        page.context.close()
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
@@ -312,46 +347,24 @@ def main():
     parser.add_argument("scratch", type=pathlib.Path)
     parser.add_argument("--screenshots", type=pathlib.Path)
     parser.add_argument("--picture", type=pathlib.Path)
-    arguments = parser.parse_args()
+    parser.add_argument("--only", metavar="PAGE", help="checks one page, such as hover")
+    told = parser.parse_args()
     chromium = os.environ.get("CHROMIUM") or shutil.which("chromium")
     expect(chromium, "there is no chromium: install it, or name one in CHROMIUM")
-    if arguments.screenshots:
-        arguments.screenshots.mkdir(parents=True, exist_ok=True)
+    if told.screenshots:
+        told.screenshots.mkdir(parents=True, exist_ok=True)
+    pages = pages_of_programs(told.program, told.lab, told.examples)
+    if not told.only:
+        parallel.runs(pages)
+        return
     with sync_playwright() as driver:
         browser = driver.chromium.launch(
             executable_path=chromium,
             args=["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update"],
         )
-        for name, path, sections, plots, tells in made(arguments.program, arguments.lab, arguments.examples, arguments.scratch):
-            for screen in SCREENS:
-                page, faults, fetched = opened(browser, path, screen)
-                if name == "flight":
-                    turn_tabs(page)
-                if screen == "desk" and {"controller", "recording"} <= sections or name == "flight":
-                    first_screens(page)
-                    copy(page)
-                if screen == "desk":
-                    print_out(page)
-                unfold(page)
-                look(page, path, sections, plots)
-                if "recording" in sections or name == "flight":
-                    accessible(page)
-                if arguments.picture and (name, screen) == ("hover", "desk"):
-                    picture(browser, page, arguments.picture)
-                switch(page)
-                said = f"{len(annotations(page))} notes"
-                if tells:
-                    said = margins(page, json.loads(run(arguments.program, [*tells, "--json"])))
-                if screen == "desk" and "recording" in sections:
-                    handle(page)
-                expect(not faults, f"the browser complains: {faults}")
-                others = [url for url in fetched if not re.match(r"file:|data:|blob:", url)]
-                expect(not others, f"the page fetches {others}")
-                took_ms = page.evaluate("performance.getEntriesByType('navigation')[0].loadEventEnd")
-                print(f"{name:<13} {screen:<6} {path.stat().st_size / 1e6:.1f} MB, open after {took_ms:.0f} ms, {said}")
-                if arguments.screenshots:
-                    save(page, arguments.screenshots / f"{name}-{screen}")
-                page.context.close()
+        program, command, sections, plots = pages[told.only]
+        path = made(told.only, program, command, told.scratch)
+        check(browser, told, told.only, path, program, command, sections, plots)
         browser.close()
 
 

@@ -87,7 +87,8 @@ fn a_campaign_of_recordings() {
 #[test]
 fn a_campaign_is_resumed() {
     let folder = Scratch::new();
-    let text = "measure = \"identification\"\ncases = 500\nseed = 1\nbias = 0.3\nsigma = 0.01\ntrim = true\n";
+    let text =
+        "measure = \"relay\"\ncases = 1000\nseed = 1\nbias = 0.3\nsigma = 0.01\ntrim = true\n";
     let path = folder.write("campaign.toml", text.as_bytes());
     let expected = run(&["campaign", &path]);
     assert_eq!(expected.code, Some(0), "{expected:?}");
@@ -107,7 +108,7 @@ fn a_campaign_is_resumed() {
     assert_eq!(resumed.code, Some(0), "{resumed:?}");
     assert!(
         resumed.stderr.starts_with("onecycle-lab: resuming after ")
-            && resumed.stderr.contains(" of 500 cases of "),
+            && resumed.stderr.contains(" of 1000 cases of "),
         "{resumed:?}"
     );
     assert_eq!(resumed.stdout, expected.stdout);
