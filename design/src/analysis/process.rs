@@ -76,6 +76,24 @@ impl Stage {
     }
 }
 
+/// A pole below this, times the dead time and the lags, is an integrator: a loop crosses at some tenths.
+pub(crate) const SLOWEST_POLE: f64 = 1e-6;
+
+/// The stages with integrators in place of poles that are slower than any loop.
+fn with_integrators(list: &[Stage], tau_s: f64) -> Vec<Stage> {
+    let lag_s = |stage: &Stage| match stage {
+        Stage::Lag(lag_s) => *lag_s,
+        Stage::Pole(_) | Stage::Pair(..) => 0.0,
+    };
+    let fast_s = tau_s + list.iter().map(lag_s).sum::<f64>();
+    let is_slow = |pole: f64| fast_s > 0.0 && pole.abs() * fast_s < SLOWEST_POLE;
+    let integrator = |stage: &Stage| match *stage {
+        Stage::Pole(pole) if is_slow(pole) => Stage::Pole(0.0),
+        other => other,
+    };
+    list.iter().map(integrator).collect()
+}
+
 /// Process with the known filters of the measurement, in its own units. See the [module](self).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Process {
@@ -117,15 +135,16 @@ impl Process {
         tau_s: f64,
         execution: &Execution,
     ) -> Option<Self> {
-        let finite_times = list.iter().flat_map(|stage| stage.times());
-        let lags_s: f64 = finite_times.filter(|time| time.is_finite()).sum();
         let is_valid = tau_s >= 0.0 && execution.is_valid();
         let tau_s = execution.loop_dead_time_s(tau_s);
+        let list = with_integrators(list, tau_s);
+        let finite_times = list.iter().flat_map(|stage| stage.times());
+        let lags_s: f64 = finite_times.filter(|time| time.is_finite()).sum();
         let sum_s = tau_s + lags_s;
         let unit_s = if sum_s > 0.0 { sum_s } else { 1.0 };
         let powers: i32 = list.iter().map(|stage| stage.powers_of_time()).sum();
         let mut stages = [Stage::Pole(0.0); 6];
-        for (to, from) in stages.iter_mut().zip(list) {
+        for (to, from) in stages.iter_mut().zip(&list) {
             *to = from.in_unit(unit_s);
         }
         let built = Self {

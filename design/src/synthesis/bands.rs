@@ -11,7 +11,7 @@
 use num_complex::Complex64;
 
 use crate::analysis::open_loop::{OpenLoop, grid_step};
-use crate::analysis::process::Process;
+use crate::analysis::process::{Process, SLOWEST_POLE};
 use crate::roots::{minimum, root};
 
 use super::limits::{Interval, Limits, union};
@@ -26,8 +26,8 @@ const TOLERANCE: f64 = 1e-8;
 const ROUGH_TOLERANCE: f64 = 1e-3;
 const ROUGH: f64 = 0.1;
 
-/// Lowest frequency, per unit of time of the process.
-const FIRST: f64 = 1e-6;
+/// Lowest frequency, per unit of time of the process: that of the slowest pole that is no integrator, with room below it.
+const FIRST: f64 = 1e-2 * SLOWEST_POLE;
 
 /// A loop whose phase has not fallen below -pi at this frequency, per unit of time and corner, has no limit.
 const LAST: f64 = 1e6;
@@ -213,6 +213,9 @@ impl Scan<'_> {
                 self.cross([before, omega], [last, l]);
             }
         }
+        if let Some((before, last)) = self.last {
+            self.margin([before, omega], [last, l]);
+        }
         match (interval, &mut self.band) {
             (None, None) => {}
             (Some(interval), band) => {
@@ -235,6 +238,28 @@ impl Scan<'_> {
             let band = self.band.get_or_insert_with(|| Band::new(ends[0], false));
             band.push(crossing, union(Some(interval), margin).unwrap_or(margin));
             band.last_imaginary = ends[1].im;
+        }
+    }
+
+    /// Adds the frequency between two others, with their loops, at which a margin of phase or delay begins or ends to be kept: the
+    /// gain there is an end of the forbidden ones, but no extremum.
+    fn margin(&mut self, [before, after]: [f64; 2], ends: [Complex64; 2]) {
+        let excess = |omega: f64, l: Complex64| self.limits.phase_excess(omega, l);
+        let (Some(first), Some(last)) = (excess(before, ends[0]), excess(after, ends[1])) else {
+            return;
+        };
+        if (first < 0.0) == (last < 0.0) {
+            return;
+        }
+        let at = |omega: f64| excess(omega, self.open_loop.at(omega)).unwrap_or(0.0);
+        let edge = root(at, before, after, 0.0);
+        let l = self.open_loop.at(edge);
+        let one = 1.0 / l.norm();
+        let interval = union(self.limits.forbidden(edge, l), (one, one));
+        if let Some(interval) = interval {
+            let band = self.band.get_or_insert_with(|| Band::new(l, false));
+            band.push(edge, interval);
+            band.last_imaginary = l.im;
         }
     }
 
@@ -446,6 +471,37 @@ mod tests {
             let ultimate = std::f64::consts::FRAC_PI_2;
             let share = found[0].high / ultimate;
             assert!(share < 1.0 && share > 1.0 - 2.0 / m, "{m} {share}");
+        }
+    }
+
+    // k e^(-s)/s has the phase margin pi/2 - k: a margin of 60 deg allows k = pi/6, and a delay margin d the k with
+    // pi/2 - k = k d. On a coarse grid too, whose frequencies miss both.
+    #[test]
+    fn margins_of_phase_and_delay_are_exact() {
+        let process =
+            Process::of_stages(1.0, &[Stage::Pole(0.0)], 1.0, &Execution::default()).unwrap();
+        let law = Law::pid(&process, [1.0, 0.0, 0.0], 0.0);
+        let plant = OpenLoop::new(&process, &law);
+        let of_phase = Limits {
+            phase_margin_rad: std::f64::consts::FRAC_PI_3,
+            ..Limits::of(1e3)
+        };
+        let of_delay = Limits {
+            delay_margin: 2.0,
+            ..Limits::of(1e3)
+        };
+        let half_turn = std::f64::consts::FRAC_PI_2;
+        for (limits, most) in [(of_phase, half_turn / 3.0), (of_delay, half_turn / 3.0)] {
+            for fraction in [0.04, 0.15] {
+                let mut grid = Grid::new(&process, plant, fraction);
+                let path = |_: f64| Complex64::ONE;
+                let found = allowed(&mut grid, &plant, path, &limits, [0.01, 0.0]).unwrap();
+                assert!(
+                    (found.high / most - 1.0).abs() < 1e-9,
+                    "{fraction} {}",
+                    found.high
+                );
+            }
         }
     }
 }

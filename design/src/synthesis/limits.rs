@@ -50,16 +50,25 @@ impl Limits {
     #[inline]
     pub(crate) fn forbidden(&self, omega: f64, l: Complex64) -> Option<Interval> {
         let mut found = self.by_peaks(l);
-        if self.phase_margin_rad > 0.0 || self.delay_margin > 0.0 {
-            let above_rad = (l.arg() + PI).rem_euclid(TAU);
-            let is_near = above_rad.min(TAU - above_rad) < self.phase_margin_rad
-                || above_rad < (omega * self.delay_margin).min(PI);
-            if is_near {
-                let one = 1.0 / l.norm();
-                found = union(found, (one, one));
-            }
+        if self
+            .phase_excess(omega, l)
+            .is_some_and(|excess| excess < 0.0)
+        {
+            let one = 1.0 / l.norm();
+            found = union(found, (one, one));
         }
         found
+    }
+
+    /// Phase (rad) by which a loop that has the magnitude 1 at this frequency keeps the margins of phase and delay. `None` without
+    /// such a limit.
+    #[inline]
+    pub(crate) fn phase_excess(&self, omega: f64, l: Complex64) -> Option<f64> {
+        (self.phase_margin_rad > 0.0 || self.delay_margin > 0.0).then(|| {
+            let above_rad = (l.arg() + PI).rem_euclid(TAU);
+            let by_phase = above_rad.min(TAU - above_rad) - self.phase_margin_rad;
+            by_phase.min(above_rad - (omega * self.delay_margin).min(PI))
+        })
     }
 
     #[inline]

@@ -231,7 +231,7 @@ impl Problem {
             None => 0.0,
         };
         let resonance = self.process.resonance().map_or(0.0, |(peak, _)| peak);
-        // The longest time of the controller: of the integral, or between derivative and proportional term.
+        // The longest time of the process, or of the controller: of the integral, or between derivative and proportional term.
         let slope = law.kd + law.kf;
         let longest = [
             law.kp / law.ki,
@@ -240,8 +240,7 @@ impl Problem {
             law.tf,
             1.0,
         ];
-        let longest = longest
-            .into_iter()
+        let longest = (longest.into_iter().chain(times))
             .filter(|time| time.is_finite())
             .fold(1.0, f64::max);
         let zeros = last_rise(law, self.process.tau);

@@ -136,3 +136,37 @@ fn six_draws_that_nothing_controls_are_refused() {
         })
     );
 }
+
+// A body whose damping hardly shows: the pole is anything from zero to a thousandth of the crossover, which changes no gain by
+// more than a flat cost allows. Far slower poles than those of the controller were once passed over, and no controller was found.
+#[test]
+fn poles_that_are_nearly_integrators_change_nothing() {
+    let asked = Specification::new(Form::Pid, Style::Balanced)
+        .with_noise(MeasurementNoise::new(6.7e-4, 1e-3, 0.25))
+        .with_execution(Execution::sampled(1e-3).with_computation_delay_s(0.0));
+    let damped = |pole_per_s: f64| multirotor(40.0, 0.05, pole_per_s, 0.015);
+    let undamped: Model = Linear::new(Structure::DoubleIntegratorLag)
+        .with_gain(40.0)
+        .with_lags_s([0.05, 1.0])
+        .with_tau_s(0.015)
+        .into();
+    let kp = |model: &Model, draws: &[Model]| {
+        let found = design_over(model, draws, &asked).unwrap().controller;
+        assert_eq!(missed(draws, &found, 1.6), 0);
+        found.kp()
+    };
+    let alone = kp(&undamped, &[]);
+    let poles: Vec<f64> = (3..=12).map(|power| 10f64.powi(-power)).collect();
+    for &pole in &poles {
+        let share = kp(&damped(pole), &[]) / alone;
+        assert!((share - 1.0).abs() < 0.06, "{pole} {share}");
+    }
+    let draws: Vec<Model> = poles
+        .iter()
+        .cycle()
+        .take(40)
+        .map(|&pole| damped(pole))
+        .collect();
+    let share = kp(&undamped, &draws) / alone;
+    assert!((share - 1.0).abs() < 0.06, "{share}");
+}
