@@ -232,7 +232,7 @@ def by_octave(method, recordings):
 def answers_of(method, arguments, recordings):
     """Estimate, ends of the intervals, processor seconds of each recording."""
     octave = by_octave(method.removeprefix("octave-"), recordings) if method.startswith("octave-") else None
-    own = {"onecycle": ["--estimator", "general", "--structure", "soiptd"], "onecycle-auto": []}
+    own = {"onecycle": ["--structure", "soiptd"], "onecycle-auto": []}
     for kind, file, truth in recordings:
         near = [truth["k_over_t_body"], truth["t_prop_s"], truth["t_body_s"], truth["tau_s"]]
         u, y = read(file)

@@ -29,8 +29,7 @@ FILTERS = ("PSC_VELZ_FLTE", "PSC_ACCZ_FLTE")
 SLOW = 0.1  # speed of the simulation during the relay test
 STEP_M = 1.0
 STEP_S = 8.0
-# The relay is slow beside the motors, and the estimated climb rate wanders: the whole recording is fitted, with disturbances.
-ESTIMATOR = ["--estimator", "general", "--structure", "double_integrator_lag"]
+STRUCTURE = ["--structure", "double_integrator_lag"]
 # A push of 3 m/s^2 for a second, downwards.
 PUSH = {"SIM_SHOVE_Z": 3.0, "SIM_SHOVE_TIME": 1000}
 PUSH_S = 6.0
@@ -61,7 +60,7 @@ def test(folder, options):
 
 def identify(recording, options):
     """The identified process; prints what the program says about it."""
-    call = [options.onecycle, "identify", str(recording), *ESTIMATOR]
+    call = [options.onecycle, "identify", str(recording), *STRUCTURE]
     done = subprocess.run(call, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise FlightError(f"{' '.join(call)}: {(done.stderr or done.stdout).strip()}")

@@ -130,7 +130,7 @@ fn recordings_of_other_simulators_give_their_truth() {
 // the trim thrust beside the file, within 5 %: the link adds a dead time that changes.
 #[test]
 fn the_unsteady_recording_needs_the_general_estimator() {
-    let (code, report) = identify("unsteady_ardupilot_alt", &["--estimator", "relay"]);
+    let (code, report) = identify("unsteady_ardupilot_alt", &["--cycles", "8"]);
     assert_eq!(code, Some(4));
     assert_eq!(report["verdict"]["kind"], "not_steady");
     assert!(report["process"].is_null() && report["controller"].is_null());
@@ -167,12 +167,7 @@ fn the_simulated_recording_gives_the_truth_in_its_head() {
 // K/T_body is 9.81 / 0.363 = 27.0. The simulated motors have no lag; the estimator's and the loop's is 5 ms.
 #[test]
 fn the_altitude_of_the_script_gives_the_thrust() {
-    let options = [
-        "--estimator",
-        "general",
-        "--structure",
-        "double_integrator_lag",
-    ];
+    let options = ["--structure", "double_integrator_lag"];
     let (code, report) = identify("ardupilot_altitude", &options);
     assert_eq!(code, Some(0), "{}", report["verdict"]["message"]);
     let (gain, _) = read(&report, "k_over_t_body", 27.0);

@@ -2,7 +2,7 @@
 
 use divan::Bencher;
 use onecycle_design::{Linear, Structure};
-use onecycle_identify::{Identification, Options, Road, Signals, identify};
+use onecycle_identify::{Identification, Options, Signals, identify};
 use onecycle_onboard::{Relay, RelaySettings};
 use onecycle_plant::{
     Controller, Disturbances, Experiment, Noise, Sensor, Stimulus, TestSignal, TestSignalError,
@@ -41,7 +41,7 @@ fn identified(trace: &Trace, sample_period_s: f64) -> Identification {
         sample_period_s,
         breaks: &[],
     };
-    identify(&signals, &Options::default().road(Road::General))
+    identify(&signals, &Options::default())
 }
 
 #[divan::bench(args = ["chirp", "relay", "3-2-1-1", "multisine"], sample_count = 10, sample_size = 1)]

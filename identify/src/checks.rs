@@ -75,13 +75,23 @@ pub(crate) fn check(
     pack: Option<&Pack<'_>>,
     found: &mut Identification,
 ) {
+    let oscillation = found.oscillation().copied();
     let Ok(identified) = &mut found.outcome else {
         return;
     };
     let Some(excitation) = &found.excitation else {
         return;
     };
-    let law = law(signals, excitation, identified);
+    // The relay's law holds over its steady oscillation, or else over the part of the recording that was used.
+    let seen = match (oscillation, excitation) {
+        (Some(found), _) => Some(((found.start_s, found.end_s), found.amplitude)),
+        (None, Excitation::Recorded(used)) => {
+            Some(((used.start_s, used.end_s), used.output_deviation))
+        }
+        (None, Excitation::Relay { .. }) => None,
+    };
+    let rises = identified.model.linear().gain() > 0.0;
+    let law = seen.and_then(|(span_s, _)| Law::find(signals, span_s, rises));
     let leads = law.as_ref().is_some_and(|law| law.mean_beta() < LEADING);
     found.switching = law.as_ref().and_then(Law::switching);
     if let Some((switching, pack)) = found.switching.zip(pack) {
@@ -89,18 +99,11 @@ pub(crate) fn check(
     }
     let symmetric = law.filter(Law::is_symmetric).zip(found.switching);
     if let Some((law, switching)) = symmetric {
-        let noise = match excitation {
-            Excitation::Relay { oscillation, .. } => {
-                oscillation.noise_sigma / oscillation.amplitude
-            }
-            Excitation::Recorded(recorded) => {
-                let sigma = identified
-                    .specification
-                    .noise
-                    .map_or(0.0, |noise| noise.std);
-                sigma / recorded.output_deviation
-            }
-        };
+        let sigma = oscillation.map_or_else(
+            || (identified.specification.noise).map_or(0.0, |noise| noise.std),
+            |oscillation| oscillation.noise_sigma,
+        );
+        let noise = seen.map_or(0.0, |(_, size)| sigma / size);
         let clock = Clock {
             law,
             switching,
@@ -131,7 +134,7 @@ pub(crate) fn check(
             .remarks
             .extend(extrapolation(excited, leads, identified));
     }
-    // Two amplitudes are compared where there are two: see `road`.
+    // Two amplitudes are compared where there are two: see `judge`.
     found.remarks.push(Remark::OneAmplitude);
     let period_s = excitation.highest_rad_per_s().map(|omega| TAU / omega);
     let jitter = period_s.and_then(|period_s| sampling::jitter(signals, period_s));
@@ -152,19 +155,6 @@ fn without_family(switching: &Switching, pack: &Pack<'_>, remarks: &mut [Remark]
             *remark = Remark::Unread;
         }
     }
-}
-
-/// Law of the relay over the part of the recording that was used.
-fn law<'a>(
-    signals: &'a Signals<'a>,
-    excitation: &Excitation,
-    identified: &Identified,
-) -> Option<Law<'a>> {
-    let span_s = match excitation {
-        Excitation::Relay { oscillation, .. } => (oscillation.start_s, oscillation.end_s),
-        Excitation::Recorded(recorded) => (recorded.start_s, recorded.end_s),
-    };
-    Law::find(signals, span_s, identified.model.linear().gain() > 0.0)
 }
 
 /// Nothing shows whether both columns are on one clock, which a controller would feel.

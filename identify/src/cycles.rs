@@ -8,7 +8,7 @@ use onecycle_design::soiptd_pd::deterioration::{Deterioration, PHASE_MARGIN_DEG,
 use onecycle_design::soiptd_pd::optimum::OptimumError;
 use onecycle_onboard::Soiptd;
 
-use crate::{Method, Options, Road, Signals, Verdict, find_oscillation, identify};
+use crate::{Method, Options, Signals, Verdict, find_oscillation, identify};
 
 /// Why cycles cannot be identified one by one.
 #[derive(Clone, Debug)]
@@ -119,7 +119,6 @@ fn last_cycle(signals: &Signals<'_>) -> Result<Soiptd, String> {
     let options = Options::default()
         .cycles(1)
         .method(Method::Map)
-        .road(Road::Relay)
         .specification(paper);
     let identified = identify(signals, &options).outcome;
     let identified = identified.map_err(|verdict| verdict.to_string())?;

@@ -18,7 +18,6 @@
 //! "System Identification" (1999), section 7.4, with unknown initial state (P. de Jong, Biometrika 75 (1988)).
 
 mod arx;
-mod check;
 mod choose;
 #[cfg(test)]
 mod dense;
@@ -55,7 +54,6 @@ mod vectors;
 
 use onecycle_design::{Parameter, Structure};
 
-pub(crate) use self::check::check;
 use self::choose::NEARLY;
 use self::fitted::{Disturbances, Fitted};
 use self::mixture::Component;
@@ -85,7 +83,7 @@ use crate::verdict::Verdict;
 const LONGEST_TAU: f64 = 1.0 / 8.0;
 /// Rows of the final fit, unless a row would be longer than the dead time with the shortest lag, or with the time in which
 /// the disturbance outgrows the noise.
-const ROWS: usize = 1200;
+pub(crate) const ROWS: usize = 1200;
 /// Relative standard deviation of the gain above which the record tells nothing.
 const MOST_DEVIATION: f64 = 0.3;
 /// Share of the input's power in the informative band below which a fit rests on rounding errors, as that of a sine does
@@ -131,6 +129,7 @@ pub(crate) fn identify(signals: &Signals<'_>, options: &Options) -> Identificati
         excitation: search.excitation.map(Excitation::Recorded),
         refused: search.refused.filter(|_| outcome.is_err()),
         outcome,
+        steady: None,
         switching: None,
         amplitudes: None,
         remarks: search.remarks,
@@ -174,7 +173,7 @@ impl Search<'_> {
         let blocks = fitted.blocks();
         let components = part(FITTED..TESTED, || fitted.posterior(&blocks));
         let tests = validate::tests(&blocks, &fitted.best.found.at);
-        let informative = validate::informative(&blocks, &fitted.best.found.theta);
+        let informative = validate::informative(&blocks, &fitted.best.found);
         let prediction = fitted.prediction;
         if let Some(excitation) = &mut self.excitation {
             excitation.outliers = fitted.outliers;
@@ -217,7 +216,7 @@ impl Search<'_> {
         {
             return Err(self.no_information(&fitted.best.found.theta, None));
         }
-        let rows = fitted.best.found.at.residual.len();
+        let rows = fitted.best.found.at.rows();
         if rows < FEWEST / 2 {
             return Err(Verdict::TooFewRows {
                 rows,

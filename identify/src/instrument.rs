@@ -71,6 +71,7 @@ pub fn identify_by_set_point(
         excitation: search.recorded.map(Excitation::Recorded),
         outcome,
         refused: None,
+        steady: None,
         switching: None,
         amplitudes: None,
         remarks: search.remarks,

@@ -27,6 +27,7 @@ pub mod diagnose;
 mod excitation;
 mod innovations;
 mod instrument;
+mod judge;
 mod nonlinear;
 mod outcome;
 mod posterior;
@@ -35,7 +36,6 @@ mod reading;
 mod relay;
 mod remark;
 mod remarks;
-mod road;
 mod sampling;
 mod settings;
 mod signals;
@@ -60,7 +60,7 @@ pub use posterior::{Draw, Estimate, Interval, Posterior, StepIntervals};
 pub use reading::Reading;
 pub use relay::find_oscillation;
 pub use remark::{About, Remark};
-pub use settings::{MOST_CYCLES, Method, Options, Road};
+pub use settings::{MOST_CYCLES, Method, Options, USUAL_CYCLES};
 pub use signals::Signals;
 pub use two_amplitudes::TwoAmplitudes;
 pub use two_stage::{Caused, caused_by_set_point};
@@ -68,7 +68,11 @@ pub use verdict::Verdict;
 
 /// Identifies the process from a recording, with the built-in pack.
 ///
-/// A steady relay oscillation takes the estimator of the board:
+/// One objective judges every recording: the likelihood of all samples under each [`Structure`] with disturbances, of which
+/// the simplest that explains the recording is chosen.
+///
+/// With [`Options::cycles`] the estimator of the board takes the last cycles of a steady relay oscillation instead, and one
+/// structure:
 ///
 /// 1. Find the relay in the input, and the runs of steady cycles.
 /// 2. Average the last cycles of the longest run into bins.
@@ -77,9 +81,6 @@ pub use verdict::Verdict;
 /// 5. Refuse the fit if the output is clipped, or if residual or model error are too large. Then repeat from step 2
 ///    with fewer cycles, or with the last run.
 /// 6. Draw from the posterior; choose the controller of least expected cost.
-///
-/// Any other recording takes the general estimator: the likelihood of all samples under each [`Structure`] with
-/// disturbances, of which the simplest is chosen. [`Options::road`] fixes the choice.
 ///
 /// [`Structure`]: onecycle_design::Structure
 #[must_use]
@@ -96,7 +97,7 @@ pub fn identify_by(
     options: &Options,
     pack: Option<&Pack<'_>>,
 ) -> Identification {
-    road::identify(signals, options, pack)
+    judge::identify(signals, options, pack)
 }
 
 // Compiles and runs the code of the README.

@@ -24,6 +24,8 @@ pub struct Identification {
     /// Fit that was refused: the reason of the verdict shows in its residual. `None` if a process was identified, or if there
     /// was nothing to fit.
     pub refused: Option<Refused>,
+    /// Steady relay oscillation in a recording that was fitted whole.
+    pub(crate) steady: Option<Oscillation>,
     /// Ratio at which the relay switched. `None` if nothing was identified, if the input is no relay, or if it switches at
     /// other times.
     pub switching: Option<Switching>,
@@ -34,12 +36,25 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// Relay oscillation. `None` if the recording has none, or if the general road was taken.
+    /// Without anything to fit.
+    pub(crate) fn refused(verdict: Verdict) -> Self {
+        Self {
+            excitation: None,
+            outcome: Err(verdict),
+            refused: None,
+            steady: None,
+            switching: None,
+            amplitudes: None,
+            remarks: vec![],
+        }
+    }
+
+    /// Steady relay oscillation. `None` if the recording has none.
     #[must_use]
     pub fn oscillation(&self) -> Option<&Oscillation> {
         match &self.excitation {
             Some(Excitation::Relay { oscillation, .. }) => Some(oscillation),
-            _ => None,
+            _ => self.steady.as_ref(),
         }
     }
 
@@ -199,7 +214,7 @@ pub enum Evidence {
 }
 
 impl Fit {
-    /// Result of the relay's estimator: covariance, residual, noise, model error. `None` on the general road.
+    /// Result of the relay's estimator: covariance, residual, noise, model error. `None` for the whole recording.
     #[must_use]
     pub fn refined(&self) -> Option<&Refined> {
         match &self.evidence {

@@ -54,7 +54,7 @@ const MOST_TENSION: f64 = 9.0;
 /// Identifies the process from a recorded relay test. For `pack` see [`identify_by`](crate::identify_by).
 pub(crate) fn identify(
     signals: &Signals<'_>,
-    options: &Options,
+    (options, cycles): (&Options, usize),
     pack: Option<&Pack<'_>>,
 ) -> Identification {
     let pack = pack.filter(|_| options.method != Method::Refine);
@@ -62,6 +62,7 @@ pub(crate) fn identify(
         signals,
         pack,
         options,
+        cycles,
         excitation: None,
         refusal: None,
         refused: None,
@@ -73,6 +74,7 @@ pub(crate) fn identify(
         excitation: search.excitation,
         refused: search.refused.filter(|_| outcome.is_err()),
         outcome,
+        steady: None,
         switching: None,
         amplitudes: None,
         remarks: vec![],
@@ -86,7 +88,7 @@ pub(crate) fn identify(
     if let (Ok(_), Some(error)) = (&found.outcome, search.no_controller) {
         found.remarks.push(Remark::NoController(error));
     }
-    let remarks = remarks::remarks(&found, pack.is_some(), options.cycles);
+    let remarks = remarks::remarks(&found, pack.is_some(), cycles);
     found.remarks.extend(remarks);
     found
 }
@@ -103,11 +105,31 @@ pub fn find_oscillation(signals: &Signals<'_>, cycles: usize) -> Result<Oscillat
     Ok(first.describe(signals, &relay, &window))
 }
 
+/// Steady oscillation of a relay that the sensor could follow.
+///
+/// # Errors
+/// The verdict of an identification from cycles.
+pub(crate) fn steady(signals: &Signals<'_>) -> Result<Oscillation, Verdict> {
+    let relay = find_relay(signals)?;
+    let stretches = oscillation::stretches(signals, &relay, MOST_CYCLES)?;
+    let first = stretches.first().ok_or(Verdict::TooShort { cycles: 0 })?;
+    let output = &signals.output[first.points(signals)];
+    match saturation::flat_part(output, first.cycles.len()) {
+        Some(part) => Err(Verdict::Saturated { part }),
+        None => {
+            let window = first.window(signals, &relay, Past::Held);
+            Ok(first.describe(signals, &relay, &window))
+        }
+    }
+}
+
 /// Search for a stretch of the recording from which the process can be identified.
 struct Search<'a> {
     signals: &'a Signals<'a>,
     pack: Option<&'a Pack<'a>>,
     options: &'a Options,
+    /// Most cycles to fit.
+    cycles: usize,
     /// Excitation of the accepted stretch. If none is accepted, that of the first stretch.
     excitation: Option<Excitation>,
     /// Verdict on the first stretch, if that was refused.
@@ -124,8 +146,7 @@ impl Search<'_> {
     /// The main loop: steps 1 to 8 of the [module](self).
     fn run(&mut self) -> Result<Identified, Verdict> {
         let relay = find_relay(self.signals)?;
-        let most = self.options.cycles.clamp(1, MOST_CYCLES);
-        for stretch in oscillation::stretches(self.signals, &relay, most)? {
+        for stretch in oscillation::stretches(self.signals, &relay, self.cycles)? {
             let (window, last_cycle) = self.observe(&stretch, &relay);
             let oscillation = stretch.describe(self.signals, &relay, &window);
             let excitation = Excitation::Relay {

@@ -84,20 +84,6 @@ pub enum Remark {
     MarginMayBeLess(f64),
     /// No controller can be designed for the model.
     NoController(DesignError),
-    /// The estimator of steady oscillations refused the recording, and the general one did not. The value is the
-    /// refusal.
-    NotASteadyOscillation(Box<Verdict>),
-    /// The estimator of steady oscillations leaves a part of the oscillation unexplained and the general one does not, so
-    /// the general result is given. The value is that part.
-    RelayReplaced(f64),
-    /// The general estimator, fitted to the whole recording, finds another process than that of steady oscillations.
-    GeneralDisagrees {
-        /// Phase margin (rad) that the controller for the steady oscillation has on this process. `None` if the loop is
-        /// unstable.
-        phase_margin_rad: Option<f64>,
-        /// Whether the general result is given. It is not if its innovations are not white.
-        is_replaced: bool,
-    },
     /// The model has nonlinear forces, at least one, and the controller is designed for its linear parts.
     Nonlinear(Nonlinear),
     /// Other structures explain the recording nearly as well.
@@ -225,8 +211,6 @@ impl Remark {
             | Self::EqualLags { .. }
             | Self::Weak { .. }
             | Self::WeakDelay { .. }
-            | Self::NotASteadyOscillation(_)
-            | Self::RelayReplaced(_)
             | Self::OtherStructures(_)
             | Self::Absent(_)
             | Self::Interpolated(_) => About::Result,
@@ -260,9 +244,6 @@ impl Remark {
             Self::Misfit(_) => "misfit",
             Self::MarginMayBeLess(_) => "margin_may_be_less",
             Self::NoController(_) => "no_controller",
-            Self::NotASteadyOscillation(_) => "not_a_steady_oscillation",
-            Self::RelayReplaced(_) => "relay_replaced",
-            Self::GeneralDisagrees { .. } => "general_disagrees",
             Self::Nonlinear(_) => "nonlinear",
             Self::OtherStructures(_) => "other_structures",
             Self::Coloured(_) => "coloured",

@@ -7,21 +7,21 @@ use crate::innovations::Hold;
 /// Maximum number of cycles that a fit can use: the window of the estimator has room for the switches of 50 cycles.
 pub const MOST_CYCLES: usize = 50;
 
-/// Settings of an identification. `Default`: the last 8 cycles, [`Method::Map`], a PID in the style
-/// `Style::Balanced`.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// Number of cycles that a fit takes if it is asked for without one.
+pub const USUAL_CYCLES: usize = 8;
+
+/// Settings of an identification. `Default`: the whole recording, a PID in the style `Style::Balanced`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Options {
-    /// Number of cycles to fit, counted from the end of the steady oscillation: 1 to [`MOST_CYCLES`]. More cycles
-    /// narrow the intervals; fewer follow a process that drifts.
-    pub cycles: usize,
+    /// Number of cycles to fit, counted from the end of a steady relay oscillation: 1 to [`MOST_CYCLES`], by the estimator of the
+    /// board, which knows one structure. `None`: the whole recording.
+    pub cycles: Option<usize>,
     /// Requirements on the controller. The recording completes them: without `noise`, its own; if `execution` has no sample
     /// period and the input is held, its own, with an output that leaves in the tick of its sample.
     pub specification: Specification,
-    /// Method of estimation of a steady oscillation.
+    /// Method of estimation from cycles. Another than [`Method::Map`] takes cycles, 8 if their number is not given.
     pub method: Method,
-    /// Which recordings take the general road.
-    pub road: Road,
     /// Structure to fit. `None`: the simplest one that explains the recording.
     pub structure: Option<Structure>,
     /// First and last time to use (s). `None`: from the start, to the end.
@@ -46,32 +46,24 @@ pub struct Options {
     pub output_filter_hz: Option<f64>,
 }
 
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            cycles: 8,
-            specification: Specification::default(),
-            method: Method::default(),
-            road: Road::default(),
-            structure: None,
-            span_s: (None, None),
-            hold: None,
-            beta: None,
-            input_late_s: None,
-            input_before: None,
-            is_fed_back: false,
-            is_under_way: false,
-            output_filter_hz: None,
-        }
-    }
-}
-
 impl Options {
+    /// Whether the last cycles of a steady relay oscillation are fitted, and not the whole recording.
+    #[must_use]
+    pub fn is_of_cycles(&self) -> bool {
+        self.of_cycles().is_some()
+    }
+
+    /// Number of cycles to fit. `None`: the whole recording.
+    pub(crate) fn of_cycles(&self) -> Option<usize> {
+        let is_of_cycles = self.cycles.is_some() || self.method != Method::Map;
+        is_of_cycles.then_some(self.cycles.unwrap_or(USUAL_CYCLES).clamp(1, MOST_CYCLES))
+    }
+
     /// Fits the last `cycles` steady cycles. Values outside 1 to [`MOST_CYCLES`] are set to the nearest limit.
     #[must_use]
     pub fn cycles(self, cycles: usize) -> Self {
         Self {
-            cycles: cycles.clamp(1, MOST_CYCLES),
+            cycles: Some(cycles.clamp(1, MOST_CYCLES)),
             ..self
         }
     }
@@ -99,12 +91,6 @@ impl Options {
     #[must_use]
     pub fn method(self, method: Method) -> Self {
         Self { method, ..self }
-    }
-
-    /// Takes this road.
-    #[must_use]
-    pub fn road(self, road: Road) -> Self {
-        Self { road, ..self }
     }
 
     /// Fits this structure, or the simplest one that explains the recording if `None`.
@@ -179,20 +165,6 @@ impl Options {
     pub fn hold(self, hold: Option<Hold>) -> Self {
         Self { hold, ..self }
     }
-}
-
-/// Which estimator a recording takes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Road {
-    /// A steady relay oscillation takes that of the board, which the general one checks and replaces where the data
-    /// say so. Any other recording takes the general one.
-    #[default]
-    Automatic,
-    /// That of the board: steady relay oscillations only.
-    Relay,
-    /// The general one, for any recording.
-    General,
 }
 
 /// Method of estimation.

@@ -48,6 +48,19 @@ impl<'a> Signals<'a> {
         }
     }
 
+    /// The rows of a span of time (s), open where an end is `None`. `breaks` holds those of the part.
+    pub(crate) fn within<'b>(
+        &'b self,
+        (from_s, to_s): (Option<f64>, Option<f64>),
+        breaks: &'b mut Vec<usize>,
+    ) -> Signals<'b> {
+        let first = from_s.map_or(0, |from_s| self.time_s.partition_point(|t| *t < from_s));
+        let end = to_s.map_or(self.time_s.len(), |to_s| {
+            self.time_s.partition_point(|t| *t <= to_s)
+        });
+        self.part(first.min(end)..end, breaks)
+    }
+
     /// The input moved to `late_s` (s) before its time stamps: of each point the mean over its time. Before its first and
     /// after its last value the input is held.
     pub(crate) fn input_earlier(&self, late_s: f64) -> Vec<f64> {

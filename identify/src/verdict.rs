@@ -103,6 +103,9 @@ pub enum Verdict {
         /// Share of the innovations' variance.
         share: f64,
     },
+    /// Only a process that oscillates by itself explains the recording, whose input has hardly more than one frequency: it may not
+    /// drive the oscillation.
+    NotDriven,
     /// The model calls the loop unstable under the gains that were in force while it was recorded.
     UnstableInForce,
     /// The process is unstable without the controller that ran: no structure has an unstable pole.
@@ -160,6 +163,7 @@ impl Verdict {
             | Self::NoPrediction { .. }
             | Self::InputLeft { .. }
             | Self::SetPointLeft { .. }
+            | Self::NotDriven
             | Self::UnstableInForce
             | Self::UnstableProcess { .. } => "not_this_process",
             Self::NotExcited { .. } | Self::Calm { .. } => "not_excited",
@@ -203,6 +207,7 @@ impl fmt::Display for Verdict {
             | Self::NotExcited { .. }
             | Self::Calm { .. }
             | Self::SetPointLeft { .. }
+            | Self::NotDriven
             | Self::UnstableInForce
             | Self::UnstableProcess { .. }
             | Self::InputLeft { .. } => self.write_record(f),
@@ -302,6 +307,10 @@ impl Verdict {
                  last third, {horizon_s:.3} s ahead",
                 100.0 * explained.max(0.0)
             ),
+            Self::NotDriven => f.write_str(
+                "not this kind of process: only a process that oscillates by itself explains the recording, and a relay does not \
+                 tell such a one from a limit cycle that it does not drive",
+            ),
             Self::UnstableInForce => f.write_str(
                 "not this kind of process: with this model the gains that were in force would have been unstable",
             ),
@@ -327,7 +336,8 @@ impl Verdict {
             ),
             Self::InputLeft { share } => write!(
                 f,
-                "not this kind of process: the past input explains {:.0} % of what the model did not predict",
+                "not this kind of process: more than chance would, the past input explains {:.2} % of what the model did \
+                 not predict",
                 100.0 * share
             ),
             _ => f.write_str(self.kind()),

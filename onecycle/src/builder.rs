@@ -2,7 +2,7 @@
 
 use onecycle_design::{Specification, Structure};
 use onecycle_identify::{
-    About, Hold, Identification, Method, Options, Remark, Road, Signals, identify_by,
+    About, Hold, Identification, Method, Options, Remark, Signals, identify_by,
 };
 use onecycle_link::Recording;
 use onecycle_onboard::pack::Pack;
@@ -41,8 +41,7 @@ impl Default for Identify<'_> {
 }
 
 impl<'a> Identify<'a> {
-    /// Default settings: the last 8 cycles, [`Method::Map`], a PID in the style
-    /// [`Balanced`](crate::Style::Balanced), the built-in pack.
+    /// Default settings: the whole recording, a PID in the style [`Balanced`](crate::Style::Balanced), the built-in pack.
     pub fn new() -> Self {
         Self {
             options: Options::default(),
@@ -50,8 +49,8 @@ impl<'a> Identify<'a> {
         }
     }
 
-    /// Fits the last `cycles` steady cycles. Values outside 1 to 50 are set to the nearest limit. More cycles narrow
-    /// the intervals; fewer follow a process that drifts.
+    /// Fits the last `cycles` steady cycles of a relay test instead of the whole recording. Values outside 1 to 50 are set to the
+    /// nearest limit. More cycles narrow the intervals; fewer follow a process that drifts.
     pub fn cycles(self, cycles: usize) -> Self {
         Self {
             options: self.options.cycles(cycles),
@@ -77,19 +76,10 @@ impl<'a> Identify<'a> {
         }
     }
 
-    /// Estimates the process by `method`.
+    /// Estimates the process from cycles by `method`.
     pub fn method(self, method: Method) -> Self {
         Self {
             options: self.options.method(method),
-            ..self
-        }
-    }
-
-    /// Takes this road: the estimator of steady relay oscillations, the general one, or the one that suits the
-    /// recording (default).
-    pub fn road(self, road: Road) -> Self {
-        Self {
-            options: self.options.road(road),
             ..self
         }
     }
@@ -175,12 +165,11 @@ impl<'a> Identify<'a> {
         let options = (self.options)
             .beta(self.options.beta.or(recording.relay_beta()))
             .output_filter_hz(filter_hz.or(recording.output_filter_hz()))
-            .road(self.road_of(recording))
             .under_way(recording.is_of_a_flight_log());
         with_signals(recording, |signals| {
             let calm = feedback::calm(recording, signals);
             let mut found = match recording.set_point() {
-                Some(set_point) if options.road == Road::General => {
+                Some(set_point) if recording.is_of_a_flight_log() && !options.is_of_cycles() => {
                     feedback::identify(signals, set_point, (&options, self.pack.as_ref()))
                 }
                 _ => identify_by(signals, &options, self.pack.as_ref()),
@@ -197,16 +186,6 @@ impl<'a> Identify<'a> {
             }
             found
         })
-    }
-}
-
-impl Identify<'_> {
-    /// The estimator. A flight log is no relay test, unless the user says so.
-    fn road_of(&self, recording: &Recording) -> Road {
-        match self.options.road {
-            Road::Automatic if recording.is_of_a_flight_log() => Road::General,
-            road => road,
-        }
     }
 }
 
@@ -256,13 +235,11 @@ mod tests {
     fn setters_are_those_of_the_options() {
         let default = Options::default();
         assert_eq!(Identify::new().cycles(3).options, default.cycles(3));
-        assert_eq!(Identify::new().cycles(0).options.cycles, 1);
+        assert_eq!(Identify::new().cycles(0).options.cycles, Some(1));
         let larger = Identify::new().phase_margin_rad(1.0);
         assert_eq!(larger.options, default.phase_margin_rad(1.0));
         let refined = Identify::new().method(Method::Refine);
         assert_eq!(refined.options, default.method(Method::Refine));
-        let general = Identify::new().road(Road::General);
-        assert_eq!(general.options, default.road(Road::General));
         let named = Identify::new().structure(Structure::Soptd);
         assert_eq!(named.options, default.structure(Some(Structure::Soptd)));
         assert_eq!(named.structure(None).options, default);

@@ -34,7 +34,7 @@
 //! |------|-------|
 //! | read and write recordings | [`read`], [`read_from`], [`CsvOptions`], [`ColumnRef`], [`TimeUnit`], [`Recording`], [`Gap`], [`Note`], [`write_csv`] |
 //! | ask for everything at once | [`Request`], [`Source`], [`Report`], [`Answer`], [`Advice`], [`Controllers`], [`Survey`], [`DesignRequest`], [`DesignReport`], [`Requirements`], [`LogFile`], [`Error`] |
-//! | identify | [`Identify`], [`Structure`], [`Road`], [`Hold`], [`Method`], [`Pack`] |
+//! | identify | [`Identify`], [`Structure`], [`Hold`], [`Method`], [`Pack`] |
 //! | use the result | [`Identification`], [`Identified`], [`Estimate`], [`Interval`], [`Posterior`], [`StepIntervals`] |
 //! | see what the estimate rests on | [`Excitation`], [`Oscillation`], [`Recorded`], [`Evidence`], [`Innovations`], [`SetPointResponse`] |
 //! | find out why there is no result, or what limits it | [`Verdict`], [`Remark`] |
@@ -310,8 +310,8 @@ pub use onecycle_identify::progress::with_progress;
 #[doc(inline)]
 pub use onecycle_identify::{
     About, Estimate, Evidence, Excitation, Hold, Identification, Identified, Innovations, Interval,
-    Method, Oscillation, Posterior, Recorded, Refused, Remark, ResponsePoint, Road,
-    SetPointResponse, StepIntervals, Verdict,
+    Method, Oscillation, Posterior, Recorded, Refused, Remark, ResponsePoint, SetPointResponse,
+    StepIntervals, Verdict,
 };
 #[doc(inline)]
 pub use onecycle_onboard::pack::{Pack, PackError};

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use onecycle_design::{
     Execution, Form, MeasurementNoise, Pid, Spans, Specification, Style, Vendor,
 };
-use onecycle_identify::{Hold, MOST_CYCLES, Method, Road};
+use onecycle_identify::{Hold, MOST_CYCLES, Method};
 use onecycle_link::{Axis, ColumnRef, ControlLoop, CsvOptions};
 
 use self::values::choice;
@@ -237,18 +237,16 @@ impl PackFile {
 }
 
 /// What is asked of a recording.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 #[non_exhaustive]
 pub struct Request {
     /// Requirements on the controller.
     pub requirements: Requirements,
     /// Largest noise at the actuator, as a share of the amplitude of the input. `None`: that of the style.
     pub noise_share: Option<f64>,
-    /// The last cycles of a relay test to fit.
-    pub cycles: usize,
-    /// The estimator.
-    pub estimator: Road,
-    /// Method for a steady relay oscillation.
+    /// The last cycles of a relay test to fit. `None`: the whole recording.
+    pub cycles: Option<usize>,
+    /// Method of the fit to cycles. Another than [`Method::Map`], and a pack, take 8 if their number is not given.
     pub method: Method,
     /// Structure of the process. `None`: the simplest that explains the recording.
     pub structure: Option<Structure>,
@@ -280,32 +278,6 @@ pub struct Request {
     pub write: Write,
 }
 
-impl Default for Request {
-    fn default() -> Self {
-        Self {
-            requirements: Requirements::default(),
-            noise_share: None,
-            cycles: 8,
-            estimator: Road::default(),
-            method: Method::default(),
-            structure: None,
-            from_s: None,
-            to_s: None,
-            hold: None,
-            beta: None,
-            input_late_s: None,
-            input_before: None,
-            output_filter_hz: None,
-            pack: None,
-            columns: CsvOptions::default(),
-            axis: None,
-            control_loop: None,
-            flight: None,
-            write: Write::default(),
-        }
-    }
-}
-
 impl Request {
     /// Sets a setting by its name, such as `phase_margin`, to a value as text, such as `45`.
     ///
@@ -328,8 +300,7 @@ impl Request {
             "cycles" => (value.parse().ok())
                 .filter(|cycles| (1..=MOST_CYCLES).contains(cycles))
                 .ok_or_else(|| format!("a number from 1 to {MOST_CYCLES}"))
-                .map(|cycles| self.cycles = cycles),
-            "estimator" => choice(value, &values::ESTIMATORS).map(|road| self.estimator = road),
+                .map(|cycles| self.cycles = Some(cycles)),
             "method" => choice(value, &values::METHODS).map(|method| self.method = method),
             "structure" => put(
                 &mut self.structure,
@@ -399,7 +370,7 @@ impl Request {
             || self.beta.is_some()
             || self.input_late_s.is_some()
             || self.output_filter_hz.is_some()
-            || self.estimator != Road::Automatic;
+            || self.is_of_cycles();
         !is_one
     }
 
@@ -426,7 +397,12 @@ impl Request {
         Ok(asked)
     }
 
-    /// Refuses settings that the estimator for steady relay oscillations does not have.
+    /// Whether the last cycles of a relay test are fitted, and not the whole recording.
+    fn is_of_cycles(&self) -> bool {
+        self.cycles.is_some() || self.method != Method::Map || self.pack.is_some()
+    }
+
+    /// Refuses settings that a fit to the cycles of a relay test does not have.
     fn check_estimator(&self) -> Result<(), Error> {
         let is_other = |structure| structure != Structure::Soiptd;
         let refused = [
@@ -435,9 +411,9 @@ impl Request {
             ("to", self.to_s.is_some()),
             ("hold=interpolated", self.hold == Some(Hold::Interpolated)),
         ];
-        match given(&refused).filter(|_| self.estimator == Road::Relay) {
+        match given(&refused).filter(|_| self.is_of_cycles()) {
             Some(setting) => Err(Error::Request(format!(
-                "`{setting}` needs the general estimator: leave out `{setting}` or `estimator=relay`"
+                "`{setting}` is for the whole recording: leave it out, or `cycles`, `method` and `pack`"
             ))),
             None => Ok(()),
         }

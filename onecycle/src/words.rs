@@ -20,7 +20,7 @@ pub mod verdict;
 use std::borrow::Cow;
 
 /// Names of the settings in sentences: those of a request, and what a program makes of a report.
-const SETTINGS: [&str; 45] = [
+const SETTINGS: [&str; 44] = [
     "against",
     "amplitude",
     "axis",
@@ -30,7 +30,6 @@ const SETTINGS: [&str; 45] = [
     "cycles",
     "dead_time_share",
     "details",
-    "estimator",
     "flight",
     "from",
     "gain_margin",

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use onecycle::request::values::{
-    ESTIMATORS, HOLDS, METHODS, beta, cutoff_hz, finite, noise, sample_rate, time_s, time_unit,
+    HOLDS, METHODS, beta, cutoff_hz, finite, noise, sample_rate, time_s, time_unit,
 };
-use onecycle::{ColumnRef, Hold, Method, Request, Road, Structure};
+use onecycle::{ColumnRef, Hold, Method, Request, Structure};
 use onecycle_identify::MOST_CYCLES;
 use onecycle_link::TimeUnit;
 
@@ -53,21 +53,16 @@ pub(crate) struct Identify {
     /// Write a report with figures to this file: one HTML page that works offline
     #[arg(long, value_name = "OUT.html")]
     pub(crate) report: Option<PathBuf>,
-    /// Fit the last N steady cycles of a relay test (1 to 50). More cycles narrow the intervals; fewer follow a
-    /// process that drifts
-    #[arg(long, help_heading = ESTIMATION, value_name = "N", default_value_t = 8,
-          value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
-    pub(crate) cycles: u64,
+    /// Fit the last N steady cycles of a relay test (1 to 50), as the paper and the board do, instead of the whole recording.
+    /// More cycles narrow the intervals; fewer follow a process that drifts
+    #[arg(long, help_heading = ESTIMATION, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=MOST_CYCLES as u64))]
+    pub(crate) cycles: Option<u64>,
     #[command(flatten)]
     pub(crate) design: DesignArguments,
     /// Maximum noise at the actuator: its standard deviation as a share of the relay's amplitude, or of half the range of
     /// the input, such as 20% or 0.2 [default: that of the style]
     #[arg(long, help_heading = super::design::CONTROLLER, value_name = "SHARE", allow_hyphen_values = true, value_parser = noise)]
     pub(crate) noise: Option<f64>,
-    /// Estimator: whole cycles of a steady relay oscillation (relay), the whole recording with its disturbances
-    /// (general), or relay where the recording is one and the general estimator agrees (auto)
-    #[arg(long, help_heading = ESTIMATION, default_value = "auto", value_parser = named(&ESTIMATORS))]
-    pub(crate) estimator: Road,
     /// Structure of the process [default: the simplest that explains the recording]
     #[arg(long, help_heading = ESTIMATION, value_name = "NAME", value_parser = structure())]
     pub(crate) structure: Option<Structure>,
@@ -104,7 +99,7 @@ pub(crate) struct Identify {
     /// or least squares with the network's prior (map)
     #[arg(long, help_heading = ESTIMATION, default_value = "map", value_parser = named(&METHODS))]
     pub(crate) method: Method,
-    /// Identifier pack; "default" is the built-in one
+    /// Identifier pack for the fit to cycles (8 if --cycles does not say); "default" is the built-in one
     #[arg(long, help_heading = ESTIMATION, value_name = "FILE", default_value = "default")]
     pub(crate) pack: PackSource,
     #[command(flatten)]
@@ -142,8 +137,7 @@ impl Identify {
         let mut request = Request::default();
         request.requirements = self.design.requirements();
         request.noise_share = self.noise;
-        request.cycles = self.cycles as usize;
-        request.estimator = self.estimator;
+        request.cycles = self.cycles.map(|cycles| cycles as usize);
         request.method = self.method;
         request.structure = self.structure;
         (request.from_s, request.to_s) = (self.from, self.to);

@@ -1,6 +1,6 @@
 //! What the general estimator used, chose and checked, as rows of a name and a value, for the text and the page.
 
-use onecycle::{Identification, Innovations, Recorded, Remark, SetPointResponse, Structure};
+use onecycle::{Identification, Innovations, Recorded, SetPointResponse, Structure};
 use onecycle_identify::{Alternative, InnovationTests, Noise, Prediction};
 
 use super::number::{frequency, percent, seconds, significant};
@@ -15,7 +15,6 @@ const MOST_NAMED: usize = 3;
 /// The part of the recording that was used, and its input.
 pub(super) fn of_recording(found: &Identification, record: &Recorded, units: &Units) -> Vec<Fact> {
     let mut facts = vec![
-        ("estimator", estimator(&found.remarks)),
         ("used", used(record)),
         (
             "input",
@@ -69,21 +68,6 @@ pub(super) fn of_relay(found: &Identification) -> Vec<Fact> {
         ));
     }
     facts
-}
-
-/// The estimator, and why it and not that of steady relay oscillations.
-fn estimator(remarks: &[Remark]) -> String {
-    let why = remarks.iter().find_map(|remark| match remark {
-        Remark::NotASteadyOscillation(verdict) => Some(verdict.to_string()),
-        Remark::RelayReplaced(_) => {
-            Some("it explains more than the one for steady oscillations".to_owned())
-        }
-        Remark::GeneralDisagrees { .. } => Some(
-            "on the whole recording it finds another process than on the steady cycles".to_owned(),
-        ),
-        _ => None,
-    });
-    why.map_or("general".to_owned(), |why| format!("general ({why})"))
 }
 
 fn used(record: &Recorded) -> String {

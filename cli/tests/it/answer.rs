@@ -38,7 +38,7 @@ fn a_recording_is_answered_in_24_lines() {
         "  Ki ",
         "  Kd ",
         "Process  K e^(-tau s)",
-        "tau 0.0241 (",
+        "tau 0.0237 (",
         "Sure?",
         "Next",
         "--details",

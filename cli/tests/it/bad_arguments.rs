@@ -26,7 +26,6 @@ fn unusable_options_of_identify() {
     with(&["--sample-rate", "fast"]).misused(&["--sample-rate", "fast"]);
     with(&["--sample-rate", "1000", "--time", "1"]).misused(&["--sample-rate", "--time"]);
     with(&["--structure", "pt1"]).misused(&["--structure", "pt1"]);
-    with(&["--estimator", "best"]).misused(&["--estimator", "best"]);
     with(&["--hold", "cubic"]).misused(&["--hold", "cubic"]);
     with(&["--from", "noon"]).misused(&["--from", "noon", "number of seconds"]);
     with(&["--to", "nan"]).misused(&["--to", "number of seconds"]);
@@ -34,14 +33,14 @@ fn unusable_options_of_identify() {
     with(&["--from", "8.5"]).misused(&["--from 8.5", "runs from 0.000 to 7.9"]);
     with(&["--to", "-1"]).misused(&["--to -1", "runs from 0.000 to 7.9"]);
     with(&["--from", "3", "--to", "3"]).misused(&["--from 3 --to 3", "leaves nothing"]);
-    for general in [
+    for whole in [
         ["--structure", "foptd"],
         ["--from", "1"],
         ["--to", "5"],
         ["--hold", "interpolated"],
     ] {
-        let both = [&general[..], &["--estimator", "relay"]].concat();
-        with(&both).misused(&[general[0], "--estimator relay", "leave out"]);
+        let both = [&whole[..], &["--cycles", "4"]].concat();
+        with(&both).misused(&[whole[0], "--cycles", "leave it out"]);
     }
     with(&["--noise", "0"]).misused(&["--noise", "share of noise"]);
     with(&["--noise", "much"]).misused(&["--noise", "neither a number nor a percentage"]);
@@ -264,7 +263,7 @@ fn impossible_processes_for_tune() {
     tune("1", "0.3", "inf", "0.1").misused(&["--k-over-t-body"]);
     tune("1", "0.3", "2", "-0.1").misused(&["tau", "positive"]);
     tune("1", "0.3", "2", "nan").misused(&["tau", "positive"]);
-    tune("1", "1e-300", "2", "1e-300").misused(&["--sample-period"]);
+    tune("1", "1e-300", "2", "1e-300").misused(&["too extreme"]);
     tune("1", "0.3", "1e300", "0.1").without_nan();
     tune("1", "1e9", "1e9", "1e9").without_nan();
     let both = [

@@ -259,7 +259,7 @@ fn a_hole_in_the_middle() {
 fn holes_in_every_cycle() {
     let mut table = Table::clean();
     table.0.retain(|sample| sample.time_s % 0.4 > 0.03);
-    let relay = ["--estimator", "relay"];
+    let relay = ["--cycles", "8"];
     let report = identify(table.csv(), &relay).no_process("too_short");
     let message = report.0["verdict"]["message"].as_str().unwrap();
     assert!(message.contains("gaps"), "{message}");
@@ -357,7 +357,7 @@ fn ten_million_samples_in_bounded_memory() {
 
     let mut command = if cfg!(target_os = "linux") {
         let mut limited = std::process::Command::new("sh");
-        let script = format!("ulimit -v {MOST_KIB} && exec \"$0\" identify - --json");
+        let script = format!("ulimit -v {MOST_KIB} && exec \"$0\" identify - --cycles 8 --json");
         limited.args(["-c", &script, env!("CARGO_BIN_EXE_onecycle")]);
         limited
     } else {

@@ -38,7 +38,6 @@ fn an_asymmetric_test_is_identified() {
         .near("tau_s", HOVER_TAU_S, 0.05)
         .near("input_bias", 0.3, 0.02);
     assert!((report.number("/oscillation/duty") - 0.4).abs() < 0.02);
-    assert!(report.number("/last_cycle/score") < 1.0);
     assert!((0.55..0.9).contains(&report.number("/joint_probability")));
 }
 
@@ -47,7 +46,7 @@ fn an_asymmetric_test_is_identified() {
 fn every_method_finds_the_process() {
     for (method, tolerance) in [("classify", 0.2), ("refine", 0.05), ("map", 0.05)] {
         let recording = simulate(&HOVER, &["--noise", "1%", "--bias", "30%"]);
-        let report = identify(recording, &["--method", method]).identified();
+        let report = identify(recording, &["--method", method, "--cycles", "8"]).identified();
         report
             .near("k_over_t_body", HOVER_K_OVER_T_BODY, tolerance)
             .near("t_prop_s", HOVER_T_PROP_S, tolerance)
@@ -185,16 +184,16 @@ fn a_double_integrator() {
     );
     let report = identify(&recording, &[]).identified();
     report.near("k_over_t_body", 40.0, 0.03);
+    assert_eq!(report.0["structure"], "double_integrator_lag");
+    let text = identify_as_text(&recording, &[]);
+    let text = &text.without_nan().stdout;
+    assert!(text.contains("e^(-tau s) / (s^2 (T_prop s + 1))"), "{text}");
+    // The board's estimator knows one structure, in which the damping is not seen.
+    let report = identify(&recording, &["--cycles", "8"]).identified();
     for name in ["k", "t_body_s"] {
         assert_eq!(report.0["process"][name]["high"], Value::Null, "{name}");
     }
     report.told("details", &["T_body"]);
-    let text = identify_as_text(&recording, &[]);
-    assert!(
-        text.without_nan().stdout.contains("unbounded"),
-        "{}",
-        text.stdout
-    );
 }
 
 #[test]
@@ -505,7 +504,7 @@ fn the_report_for_people() {
     assert_eq!(outcome.stderr, "");
     let text = &outcome.without_nan().stdout;
     for part in [
-        "Oscillation",
+        "Recording",
         "Process",
         "K/T_body",
         "T_prop",

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use onecycle::{
     CsvOptions, Excitation, Identification, Identify, Method, Pack, Parameter, Recording, Remark,
-    Road, Specification, Verdict, with_signals,
+    Specification, Verdict, with_signals,
 };
 use onecycle_identify::{Options, Signals};
 use serde_json::{Value, json};
@@ -90,17 +90,17 @@ fn the_program_says_what_the_library_finds() {
     }
 }
 
-// ArduPilot's altitude wanders: no steady oscillation, from either. The general estimator identifies it, in either.
+// ArduPilot's altitude wanders: no steady cycles, from either. The whole recording identifies it, in either.
 #[test]
 fn the_program_refuses_what_the_library_refuses() {
     let path = example("unsteady_ardupilot_alt.csv");
     let recording = onecycle::read(&path, &CsvOptions::default()).unwrap();
-    let steady = Identify::new().road(Road::Relay);
+    let steady = Identify::new().cycles(8);
     let verdict = steady.run(&recording).outcome.unwrap_err();
     assert!(matches!(verdict, Verdict::NotSteady { .. }), "{verdict}");
 
     let identify_json = ["identify", path.to_str().unwrap(), "--json"];
-    let relay = [&identify_json[..], &["--estimator", "relay"]].concat();
+    let relay = [&identify_json[..], &["--cycles", "8"]].concat();
     let report = run(&relay).no_process(verdict.kind());
     assert_eq!(report.0["verdict"]["message"], verdict.to_string());
     assert!(report.advice().ends_with('.'), "{}", report.advice());

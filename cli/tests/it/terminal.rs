@@ -53,7 +53,10 @@ fn colours_change_nothing_but_the_colours() {
 fn verdicts_have_their_colours() {
     let folder = Scratch::new();
     let [good, clipped] = recordings(&folder);
-    let [text, _] = coloured(&["identify", &good, "--details"], Some("CLICOLOR_FORCE"));
+    let [text, _] = coloured(
+        &["identify", &good, "--cycles", "8", "--details"],
+        Some("CLICOLOR_FORCE"),
+    );
     assert!(text.contains("\x1b[32min the pack"), "{text}");
     assert!(text.contains("\x1b[33m  note:"), "{text}");
     assert!(text.contains("\x1b[1mController\x1b[0m"), "{text}");

@@ -3,10 +3,11 @@
 //! BIC = -2 ln L + (number of unknowns, the gain included) ln(number of rows), always on the same rows. Reference: G.
 //! Schwarz, "Estimating the dimension of a model", Ann. Stat. 6 (1978).
 
-use std::f64::consts::PI;
+use std::f64::consts::{PI, TAU};
 
 use onecycle_design::Structure;
 
+use super::prepare::FLOOR;
 use super::record::{Blocks, Record};
 use super::search::{self, Candidate, HEADS};
 use super::theta::{Bounds, Theta};
@@ -159,6 +160,8 @@ pub(super) fn choose(record: &Record, limits: &Limits, starts: &[Theta]) -> Choi
             let bounds = Bounds::new(theta.structure, &blocks, tau_s);
             let is_hidden = has_hidden_lag(theta, record.dt_s)
                 || bounds.has_fastest_pair(theta)
+                || is_slower_than(theta, (blocks.length_s(), limits.slowest_s))
+                || is_integrating(theta, blocks.length_s())
                 || are_longer && is_aliased(theta, blocks.block_s());
             !is_hidden && !is_of_a_force(theta, limits.slowest_s)
         });
@@ -299,6 +302,22 @@ fn is_aliased(theta: &Theta, row_s: f64) -> bool {
     let (c1, c0) = (theta.values[pair], theta.values[pair + 1]);
     let is_complex = c1 * c1 < 4.0 * c0;
     is_complex && c0.sqrt() * row_s > PI
+}
+
+/// Whether a record does not show a resonance, whose limit is an integrator: its period is longer than the record, or it is below a
+/// fifth of the lowest frequency of the excitation, where it changes the response by less than 4 %.
+fn is_slower_than(theta: &Theta, (length_s, slowest_s): (f64, f64)) -> bool {
+    let least_per_s = (TAU / length_s).max(0.2 / slowest_s);
+    let pair = theta.layout().pair();
+    pair.is_some_and(|pair| theta.values[pair + 1] < least_per_s * least_per_s)
+}
+
+/// Whether the pole of a process that comes to rest changes its response over a record by less than is believed: its limit is an
+/// integrator.
+fn is_integrating(theta: &Theta, length_s: f64) -> bool {
+    let stages = theta.structure.stages();
+    let comes_to_rest = stages.integrators == 0 && stages.poles > 0;
+    comes_to_rest && theta.process(1.0).pole_per_s().abs() * length_s < 2.0 * FLOOR
 }
 
 /// Whether all lags before an integrator, or before what cannot be told from one, turn the phase by more than 70 degrees at the

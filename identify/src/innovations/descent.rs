@@ -21,7 +21,7 @@ const MOST_DAMPING: f64 = 1e10;
 pub(super) struct Patience {
     /// Most steps.
     pub(super) steps: usize,
-    /// Relative decrease of the cost below which a step is the last.
+    /// Relative decrease of the sum of squares, `2 ln L` over the rows, below which a step is the last.
     pub(super) decrease: f64,
 }
 
@@ -50,7 +50,6 @@ pub(super) fn descend(
     let theta = bounds.clamp(start);
     let at = evaluate(blocks, &theta, &mut memory)?;
     let mut here = Found { theta, at };
-    let mut cost = here.at.cost();
     let mut damping = DAMPING;
     let mut normal: Option<Normal> = None;
     for _ in 0..patience.steps {
@@ -64,11 +63,11 @@ pub(super) fn descend(
             break;
         };
         let new = evaluate(blocks, &theta, &mut memory);
-        match new.map(|at| (at.cost(), at)) {
-            Some((new_cost, at)) if new_cost < cost => {
-                let decrease = (cost - new_cost) / cost;
+        let gain = |at: &Evaluation| at.log_likelihood - here.at.log_likelihood;
+        match new.map(|at| (gain(&at), at)) {
+            Some((gain, at)) if gain > 0.0 => {
+                let decrease = 2.0 * gain / at.rows() as f64;
                 here = Found { theta, at };
-                cost = new_cost;
                 damping = (damping * EASIER).max(1e-12);
                 normal = None;
                 if decrease < patience.decrease && damping < DAMPING {
@@ -95,6 +94,7 @@ fn linearise(
     memory: &mut Memory,
 ) -> Option<Normal> {
     let mut columns = vec![vec![]; free.len()];
+    let residual = here.at.residual_near(&here.at);
     // Noises first: they stand last, and the response of `here` is still in the memory.
     for (slot, &index) in free.iter().enumerate().rev() {
         let room = bounds.high[index] - here.theta.values[index];
@@ -105,8 +105,8 @@ fn linearise(
         };
         let mut theta = here.theta;
         theta.values[index] += step;
-        let moved = evaluate(blocks, &theta, memory)?.residual;
-        let difference = moved.iter().zip(&here.at.residual);
+        let moved = evaluate(blocks, &theta, memory)?.residual_near(&here.at);
+        let difference = moved.iter().zip(&residual);
         columns[slot] = difference
             .map(|(a, b)| (a - b) / step)
             .collect::<Vec<f64>>();
@@ -116,7 +116,7 @@ fn linearise(
         gradient: [0.0; MOST],
     };
     for i in 0..free.len() {
-        normal.gradient[i] = dot(&columns[i], &here.at.residual);
+        normal.gradient[i] = dot(&columns[i], &residual);
         for j in 0..=i {
             normal.matrix[i][j] = dot(&columns[i], &columns[j]);
             normal.matrix[j][i] = normal.matrix[i][j];

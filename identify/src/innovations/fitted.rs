@@ -250,7 +250,7 @@ impl Fitted {
         let record = &self.record;
         let (low, high) = range(&record.input);
         RecordedLoop {
-            sigma: self.best.found.at.variance.sqrt(),
+            sigma: self.best.found.at.seen_deviation(),
             output_size: record.output_deviation(),
             input_amplitude: 0.5 * (high - low),
             sample_s: record.dt_s,
@@ -302,7 +302,7 @@ fn was_at_rest(record: &Record, limits: &Limits, thetas: &[Theta]) -> bool {
     let least_bic = |of: &Record| {
         let blocks = Blocks::from(of, samples, 0);
         let bic = |theta: &Theta, at: &Evaluation| {
-            at.profile_bic + theta.free().len() as f64 * (at.residual.len() as f64).ln()
+            at.profile_bic + theta.free().len() as f64 * (at.rows() as f64).ln()
         };
         let starts = search::ranked(&blocks, thetas.iter().copied(), longest_tau_s, bic);
         let fits = starts.iter().take(DESCENDED).filter_map(|(_, theta)| {

@@ -53,7 +53,8 @@ impl Laplace {
             let (ends, span) = near.ends(&found.theta, index, 10.0 * bounds.step[index]);
             let mut at = |theta: &Theta| evaluate(blocks, theta, &mut memory);
             let (below, above) = (at(&ends[0])?, at(&ends[1])?);
-            let residuals = above.residual.iter().zip(&below.residual);
+            let [low, high] = [&below, &above].map(|at| at.residual_near(&found.at));
+            let residuals = high.iter().zip(&low);
             columns.push(residuals.map(|(a, b)| (a - b) / span).collect::<Vec<f64>>());
             let [after, before] = [(&above, &ends[1]), (&below, &ends[0])].map(|(at, theta)| {
                 let disturbance = at.state[at.state.len() - 1];
@@ -66,7 +67,7 @@ impl Laplace {
             .collect();
         let inverse = inverse(&information)?;
         // Of the innovations, at the scale of the residual.
-        let factor = found.at.variance * found.at.stretch * found.at.stretch;
+        let factor = found.at.residual_variance();
         let covariance: Vec<Vec<f64>> = (inverse.iter())
             .map(|row| row.iter().map(|v| v * factor).collect())
             .collect();
@@ -79,7 +80,12 @@ impl Laplace {
             others.remove(slot);
             return Self::new(blocks, found, (&others, &near), bounds);
         }
-        let coloured = coloured(&columns, &found.at.residual, &inverse, factor);
+        let coloured = coloured(
+            &columns,
+            &found.at.residual_near(&found.at),
+            &inverse,
+            factor,
+        );
         Some(Self {
             free,
             covariance,

@@ -12,7 +12,8 @@
 //! ln L = -1/2 (m ln(2 pi s2) + m + sum ln S_k + ln|X'X| - ln|X0'X0|),   s2 = |r|^2 / m,   m = N - p
 //! ```
 //!
-//! where `r` is the residual, `X` the `p` filtered columns and `X0` the same columns before the filter, all over the deviation of
+//! where no sample is believed to less than the deviation `f` of the record ([`Record::floor`](super::record::Record::floor)): below
+//! it `s2 = f^2`, and `|r|^2/f^2` stands for the second `m`. `r` is the residual, `X` the `p` filtered columns and `X0` the same columns before the filter, all over the deviation of
 //! the outputs: a prior that is flat in another unit would favour more states in one unit and fewer in another. All states are
 //! unknown, so any initial covariance gives the same likelihood, and the filter starts from its steady one: its gain is
 //! constant from the first block on. Reference: P. de Jong, "The likelihood for a state space model", Biometrika 75
@@ -43,11 +44,16 @@ pub(super) struct Evaluation {
     /// Bayesian information criterion of the linear unknowns alone, these at their best: comparable between starts with
     /// another number of unknown states on the same rows.
     pub(super) profile_bic: f64,
-    /// Residual of each block that has samples, scaled so that least squares of it is maximum likelihood, the noise
-    /// included.
-    pub(super) residual: Vec<f64>,
-    /// Scale of the residual: `exp((sum ln S_k + ln|X'X| - ln|X0'X0|) / (2 m))` over the deviation of the outputs.
-    pub(super) stretch: f64,
+    /// Residual `r` of each block that has samples, over [`Self::scale`].
+    residual: Vec<f64>,
+    /// `sum ln S_k + ln|X'X| - ln|X0'X0|`.
+    logs: f64,
+    /// `m`.
+    freedom: f64,
+    /// Deviation of the outputs (output unit).
+    scale: f64,
+    /// Whether the white noise is what no sample is believed beyond.
+    is_floored: bool,
     /// Gain in front of the stages (output unit / input unit, per second for each integration).
     pub(super) gain: f64,
     /// Variance of the gain for fixed nonlinear unknowns, over [`Self::variance`].
@@ -71,15 +77,47 @@ pub(super) struct Evaluation {
 }
 
 impl Evaluation {
-    /// Sum of squares of the residual.
-    pub(super) fn cost(&self) -> f64 {
-        self.residual.iter().map(|r| r * r).sum()
+    /// Number of rows: blocks that have samples.
+    pub(super) fn rows(&self) -> usize {
+        self.residual.len()
+    }
+
+    /// Deviation of the white noise of a sample that the record shows (output unit). Zero if it is only assumed.
+    pub(super) fn seen_deviation(&self) -> f64 {
+        if self.is_floored {
+            0.0
+        } else {
+            self.variance.sqrt()
+        }
     }
 
     /// Innovations over their standard deviation.
     pub(super) fn innovations(&self) -> Vec<f64> {
-        let scale = 1.0 / (self.stretch * self.variance.sqrt());
+        let scale = self.scale / self.variance.sqrt();
         self.residual.iter().map(|r| r * scale).collect()
+    }
+
+    /// Residual of which least squares is maximum likelihood near `at`, the noise included, over [`Self::scale`]. With the best
+    /// `s2`, `ln L` is `-m/2 ln |r exp(logs/(2 m))|^2` but for a constant. With `s2 = f^2` it is `-(|r|^2/f^2 + logs)/2`, and the
+    /// square of a further entry stands for `logs`: its derivative at `at` is that of `f^2 logs`.
+    pub(super) fn residual_near(&self, at: &Self) -> Vec<f64> {
+        let twice = 2.0 * at.freedom;
+        if !at.is_floored {
+            let stretch = (self.logs / twice).exp();
+            return self.residual.iter().map(|r| r * stretch).collect();
+        }
+        let size = at.variance.sqrt() / at.scale * at.freedom.sqrt();
+        let last = size * ((self.logs - at.logs) / twice).exp();
+        self.residual.iter().copied().chain([last]).collect()
+    }
+
+    /// Variance of the innovations at the scale of [`Self::residual_near`] itself.
+    pub(super) fn residual_variance(&self) -> f64 {
+        let stretch = match self.is_floored {
+            true => 1.0,
+            false => (self.logs / (2.0 * self.freedom)).exp(),
+        };
+        self.variance * (stretch / self.scale).powi(2)
     }
 }
 
@@ -105,6 +143,40 @@ fn regressors_sized<const N: usize>(blocks: &Blocks<'_>, theta: &Theta) -> Optio
     Some(columns(&lifted, blocks, &[response], &start))
 }
 
+/// Innovations of the response to the input at unit gain, over their standard deviation, less what the unknown initial state
+/// explains of them: what tells the gain. `None` if the filter does not converge.
+pub(super) fn input_innovations(blocks: &Blocks<'_>, theta: &Theta) -> Option<Vec<f64>> {
+    by_size!(theta, input_innovations_sized(blocks, theta))
+}
+
+fn input_innovations_sized<const N: usize>(blocks: &Blocks<'_>, theta: &Theta) -> Option<Vec<f64>> {
+    let system = System::<N>::new(theta, blocks.record.dt_s);
+    let lifted = system.lifted(blocks);
+    let start = system.start_of(blocks, theta);
+    let response = response::sums(&system.model, blocks, theta.tau_s());
+    let (runs, _) = runs(system.start(blocks, &lifted)?, &lifted, blocks);
+    let mut workspace = vec![];
+    let rows = filter::of_data::<N, 1>(&runs, [&response], &mut workspace);
+    let filtered: Vec<f64> = rows.iter().map(|row| row[0]).collect();
+    let of_start = filter::of_start(&runs, &start.basis, start.count);
+    let columns = start_columns(&of_start, start.count, filtered.len());
+    Some(Orthogonal::independent(&columns).solve(&filtered).0)
+}
+
+/// Columns of the initial state, zero after the end of `of_start`.
+fn start_columns<const N: usize>(
+    of_start: &[[f64; N]],
+    count: usize,
+    rows: usize,
+) -> Vec<Vec<f64>> {
+    let column = |i: usize| {
+        let mut column: Vec<f64> = of_start.iter().map(|row| row[i]).collect();
+        column.resize(rows, 0.0);
+        column
+    };
+    (0..count).map(column).collect()
+}
+
 /// What the last evaluation computed from the process alone, which steps in the noise find here, and its rows.
 #[derive(Default)]
 pub(super) struct Memory {
@@ -115,14 +187,6 @@ pub(super) struct Memory {
     log_determinant: f64,
     /// Innovations of the data columns over their standard deviations, row by row.
     rows: Vec<f64>,
-}
-
-impl Memory {
-    /// Innovations of the response to the input of the last evaluation, over their standard deviation.
-    pub(super) fn input_innovations(&self) -> impl Iterator<Item = f64> {
-        let width = 1 + self.responses.len().max(1);
-        self.rows.chunks_exact(width).map(|row| row[1])
-    }
 }
 
 impl Memory {
@@ -169,29 +233,38 @@ fn filtered<const N: usize, const D: usize>(
         return None;
     }
     let of_start = filter::of_start(runs, &start.basis, start.count);
-    let mut fit = least_squares(rows, &of_start, start)?;
+    let fit = least_squares(rows, &of_start, start)?;
     let sum: f64 = fit.residual.iter().map(|r| r * r).sum();
-    let variance = sum / freedom;
+    let scale = blocks.scale;
+    let floor = (blocks.record.floor / scale).powi(2);
+    let is_floored = sum < floor * freedom;
+    // `s2` for this many degrees of freedom, and `|r|^2/s2`.
+    let of = |freedom: f64| match sum < floor * freedom {
+        true => (floor, sum / floor),
+        false => (sum / freedom, freedom),
+    };
+    let (variance, square) = of(freedom);
     let log_x = 2.0 * (fit.log_determinant - memory.log_determinant);
     let logs = log_variances + log_x;
-    let scale = blocks.scale;
-    let likelihood = -0.5 * (freedom * (TWO_PI * variance).ln() + freedom + logs);
+    let likelihood = -0.5 * (freedom * (TWO_PI * variance).ln() + square + logs);
     let log_likelihood = likelihood - count as f64 * scale.ln();
     // With all linear unknowns at their best instead of integrated out.
     let all = count as f64;
-    let profile = -0.5 * (all * (TWO_PI * sum / all).ln() + all + log_variances);
+    let (of_all, square) = of(all);
+    let profile = -0.5 * (all * (TWO_PI * of_all).ln() + square + log_variances);
     let profile_bic = (responses + start.count) as f64 * all.ln() - 2.0 * profile;
     if !log_likelihood.is_finite() {
         return None;
     }
     let squared = variance * scale * scale;
-    let stretch = (0.5 * logs / freedom).exp();
-    fit.residual.iter_mut().for_each(|r| *r *= stretch);
     Some(Evaluation {
         log_likelihood,
         profile_bic,
         residual: fit.residual,
-        stretch: stretch / scale,
+        logs,
+        freedom,
+        scale,
+        is_floored,
         gain: fit.coefficients[0] * scale,
         gain_factor: fit.covariance[0][0],
         state: (start.basis.iter())
@@ -271,11 +344,7 @@ fn by_orthogonal_columns<const N: usize, const D: usize>(
     let responses = D - 1;
     let of_data = |lane: usize| data.iter().map(|row| row[lane]).collect::<Vec<f64>>();
     let mut columns: Vec<Vec<f64>> = (1..D).map(of_data).collect();
-    for i in 0..start.count {
-        let mut column: Vec<f64> = of_start.iter().map(|row| row[i]).collect();
-        column.resize(data.len(), 0.0);
-        columns.push(column);
-    }
+    columns.extend(start_columns(of_start, start.count, data.len()));
     let columns = Orthogonal::new(&columns)?;
     let (residual, coefficients) = columns.solve(&of_data(0));
     Some(LeastSquares {

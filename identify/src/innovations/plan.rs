@@ -38,6 +38,7 @@ pub fn expected(
     let gain = model.linear().gain();
     let mut record = Record {
         forces: Forces::default(),
+        floor: 0.0,
         uneven_s: vec![],
         dt_s: sample_s,
         input: input.to_vec(),

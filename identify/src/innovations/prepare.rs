@@ -25,6 +25,12 @@ const STAMP: f64 = 1.0 / 256.0;
 /// distinct values and runs of all lengths, and its repetitions are measurements.
 const ALIKE: f64 = 0.9;
 
+/// Share of the movement of an output to which a sample is believed. No sensor is truer, and no process follows a model to less:
+/// without it a simulation without noise has resonances and forces of a ten-thousandth.
+pub(super) const FLOOR: f64 = 1e-3;
+/// Parts of a record in which its movement is measured: a slow drift is none.
+const PARTS: usize = 8;
+
 /// Record with what was left out of the recording.
 pub(super) struct Prepared {
     pub(super) record: Record,
@@ -73,6 +79,7 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
     mark_stale(&mut record);
     record.hold = options.hold.unwrap_or(Hold::Held);
     record.rest = rest;
+    record.floor = FLOOR * movement(&record);
     let points = f64::from(signals.samples_per_point.saturating_sub(1));
     Ok(Prepared {
         record,
@@ -84,6 +91,31 @@ pub(super) fn prepare(signals: &Signals<'_>, options: &Options) -> Result<Prepar
             .and(options.output_filter_hz)
             .map(LowPass::second_order),
     })
+}
+
+/// Standard deviation of the output about a straight line in each of [`PARTS`] parts of a record (output unit).
+fn movement(record: &Record) -> f64 {
+    let outputs: Vec<f64> = record.present_outputs().collect();
+    let count = outputs.len().div_ceil(PARTS).max(1);
+    let squares = |part: &[f64]| {
+        let n = part.len() as f64;
+        let middle = 0.5 * (n - 1.0);
+        let mean = part.iter().sum::<f64>() / n;
+        let moments = part.iter().zip(0_i32..).map(|(y, k)| {
+            let k = f64::from(k) - middle;
+            [(y - mean).powi(2), k * (y - mean), k * k]
+        });
+        let [square, product, length] =
+            moments.fold([0.0; 3], |sum, of| std::array::from_fn(|i| sum[i] + of[i]));
+        square
+            - if length > 0.0 {
+                product * product / length
+            } else {
+                0.0
+            }
+    };
+    let sum: f64 = outputs.chunks(count).map(squares).sum();
+    (sum.max(0.0) / outputs.len().max(1) as f64).sqrt()
 }
 
 /// The longest run of indices of `asked` between gaps.
@@ -140,6 +172,7 @@ fn gridded(times_s: &[f64], input: &[f64], output: &[f64], usable: &[bool]) -> R
         hold: Hold::Held,
         rest: None,
         forces: Forces::default(),
+        floor: 0.0,
     };
     if is_even {
         return record;
@@ -220,6 +253,7 @@ fn spread(
         hold: Hold::Held,
         rest: None,
         forces: Forces::default(),
+        floor: 0.0,
     };
     let mut sample = 0;
     for index in 0..count {

@@ -47,6 +47,9 @@ pub(crate) struct Record {
     pub(crate) rest: Option<f64>,
     /// Nonlinear terms of the model.
     pub(crate) forces: Forces,
+    /// Least deviation of the white noise of a sample that is believed (output unit): below it the digits of a file and the errors
+    /// of any model decide. Zero: no limit.
+    pub(crate) floor: f64,
 }
 
 /// Nonlinear forces that act on the process behind the actuator lags, together with the input and the disturbance. The
@@ -87,6 +90,7 @@ impl Record {
             hold: Hold::Held,
             rest: None,
             forces: Forces::default(),
+            floor: 0.0,
         }
     }
 
@@ -172,6 +176,7 @@ impl Record {
                 friction: self.forces.friction.get(range).unwrap_or(&[]).to_vec(),
                 thrust: self.forces.thrust,
             },
+            floor: self.floor,
         }
     }
 }

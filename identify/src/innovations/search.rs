@@ -59,7 +59,7 @@ pub(super) struct Candidate {
 impl Candidate {
     pub(super) fn new(found: Found) -> Self {
         let unknowns = found.theta.free().len() + 1 + found.at.forces.len();
-        let rows = found.at.residual.len() as f64;
+        let rows = found.at.rows() as f64;
         let bic = -2.0 * found.at.log_likelihood + unknowns as f64 * rows.ln();
         Self { found, bic }
     }
@@ -96,6 +96,7 @@ fn coarse(record: &Record, samples: usize) -> (Record, f64) {
         hold: record.hold,
         rest: record.rest,
         forces: Forces::default(),
+        floor: record.floor / (samples as f64).sqrt(),
     };
     let length_s = record.time_s(record.len() - 1) + record.dt_s;
     let steps = (length_s / dt_s + 1e-9) as usize;

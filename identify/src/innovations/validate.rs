@@ -3,8 +3,9 @@
 use std::f64::consts::{PI, SQRT_2, TAU};
 
 use super::choose::Limits;
+use super::descent::Found;
 use super::descent::Patience;
-use super::likelihood::{Evaluation, Memory, evaluate};
+use super::likelihood::{Evaluation, input_innovations};
 use super::orthogonal::Orthogonal;
 use super::prediction::{Filtering, predict};
 use super::record::{Blocks, Record};
@@ -41,7 +42,9 @@ pub(crate) fn is_left_to_the_input(tests: &InnovationTests) -> bool {
 pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
     let innovations = at.innovations();
     let count = innovations.len();
+    let least = blocks.record.floor.powi(2) / at.variance;
     let square: f64 = innovations.iter().map(|e| e * e).sum();
+    let square = square.max(count as f64 * least);
     let correlation = |lag: usize| {
         let pairs = innovations[lag..].iter().zip(&innovations);
         pairs.map(|(a, b)| a * b).sum::<f64>() / square
@@ -52,7 +55,7 @@ pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
     let sum: f64 = (correlations.iter().zip(1..))
         .map(|(r, lag)| r * r / (n - f64::from(lag)))
         .sum();
-    let (input_share, input_f) = of_input(blocks, &innovations);
+    let (input_share, input_f) = of_input(blocks, &innovations, least);
     InnovationTests {
         autocorrelation: correlations
             .iter()
@@ -65,8 +68,8 @@ pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
 }
 
 /// Share of the innovations that the input of the blocks before explains, and its F statistic. The input of the same
-/// block is left out: under feedback it contains the innovation.
-fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
+/// block is left out: under feedback it contains the innovation. `least`: variance that is believed.
+fn of_input(blocks: &Blocks<'_>, innovations: &[f64], least: f64) -> (f64, f64) {
     let inputs = blocks.mean_inputs();
     let rows: Vec<usize> = (0..blocks.len())
         .filter(|block| blocks.present(*block) > 0)
@@ -84,12 +87,15 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64]) -> (f64, f64) {
         .collect();
     // A lag that repeats those before it (a slow input) tells nothing new.
     let orthogonal = Orthogonal::independent(&columns);
-    let size = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
     let (rest, _) = orthogonal.solve(&target);
-    let share = 1.0 - size(&rest) / size(&target);
+    let size = |values: &[f64]| values.iter().map(|v| v * v).sum::<f64>();
+    let (all, rest) = (size(&target), size(&rest));
     let number = orthogonal.len() as f64;
-    let f = (share / number) / ((1.0 - share) / (count - number - 1.0));
-    (share, f)
+    let freedom = count - number - 1.0;
+    let f = (all - rest) / number / (rest / freedom).max(least);
+    // An error that every sample repeats is no larger than what is believed of one.
+    let is_believed = all - rest > count * least;
+    (1.0 - rest / all, if is_believed { f } else { f.min(1.0) })
 }
 
 /// Values less their mean.
@@ -250,12 +256,10 @@ pub(super) struct Informative {
     pub(super) highest_rad_per_s: f64,
 }
 
-/// Frequencies that the record tells about: the spectrum of the filtered response to the input. `None` if the input has no
-/// effect.
-pub(super) fn informative(blocks: &Blocks<'_>, theta: &Theta) -> Option<Informative> {
-    let mut memory = Memory::default();
-    let at = evaluate(blocks, theta, &mut memory)?;
-    let filtered: Vec<f64> = memory.input_innovations().collect();
+/// Frequencies that the record tells about: the spectrum of what tells the gain. `None` if the input has no effect.
+pub(super) fn informative(blocks: &Blocks<'_>, found: &Found) -> Option<Informative> {
+    let filtered = input_innovations(blocks, &found.theta)?;
+    let at = &found.at;
     let [low, _, high] = quantiles(&filtered, blocks.block_s())?;
     let lines = lines(filtered, blocks.block_s());
     // Information on the logarithm of the gain.

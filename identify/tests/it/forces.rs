@@ -1,7 +1,7 @@
 //! Nonlinear forces: recordings of a body simulated here in small steps.
 
 use onecycle_design::Parameter;
-use onecycle_identify::{Identification, Nonlinear, Options, Remark, Road, Signals, identify};
+use onecycle_identify::{Identification, Nonlinear, Options, Remark, Signals, identify};
 use onecycle_plant::{Noise, NoiseSource};
 
 const SAMPLE_S: f64 = 2e-3;
@@ -45,7 +45,7 @@ fn relay_test([drag, friction, thrust]: [f64; 3]) -> Identification {
         sample_period_s: SAMPLE_S,
         breaks: &[],
     };
-    identify(&signals, &Options::default().road(Road::General))
+    identify(&signals, &Options::default())
 }
 
 /// The forces found.

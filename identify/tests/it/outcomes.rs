@@ -165,7 +165,9 @@ fn a_phase_margin_out_of_range_is_a_verdict() {
         (f64::INFINITY, paper),
         (f64::NAN, Options::default()),
     ] {
-        let found = identified_with(&options.phase_margin_rad(margin_rad));
+        let found = identified_with(&options.cycles(8).phase_margin_rad(margin_rad));
+        let whole = identified_with(&options.phase_margin_rad(margin_rad));
+        assert_eq!(whole.outcome.unwrap_err().kind(), "no_controller");
         let Err(Verdict::NoController(DesignError::PhaseMargin(named))) = found.outcome else {
             panic!("{margin_rad}: {:?}", found.outcome);
         };
@@ -180,14 +182,14 @@ fn a_phase_margin_out_of_range_is_a_verdict() {
 
 #[test]
 fn the_number_of_cycles_has_limits() {
-    assert_eq!(Options::default().cycles, 8);
-    assert_eq!(Options::default().cycles(0).cycles, 1);
-    assert_eq!(Options::default().cycles(1000).cycles, MOST_CYCLES);
+    assert_eq!(Options::default().cycles, None);
+    assert_eq!(Options::default().cycles(0).cycles, Some(1));
+    assert_eq!(Options::default().cycles(1000).cycles, Some(MOST_CYCLES));
     // The field is public, so a value out of range is possible. It is limited where it is used: to 1, and to all steady
     // cycles, which are fewer than 50 here.
     let oscillation = |cycles: usize| {
         let mut options = Options::default();
-        options.cycles = cycles;
+        options.cycles = Some(cycles);
         *identified_with(&options).oscillation().unwrap()
     };
     assert_eq!(oscillation(0).cycles_used, 1);
@@ -201,7 +203,7 @@ fn the_number_of_cycles_has_limits() {
 fn without_a_pack_least_squares_is_left() {
     let columns = relay_test();
     let outcome = |method| {
-        let options = Options::default().method(method);
+        let options = Options::default().cycles(8).method(method);
         identify_by(&signals(&columns), &options, None).outcome
     };
     assert_eq!(
@@ -216,7 +218,7 @@ fn without_a_pack_least_squares_is_left() {
 #[test]
 fn packs_name_structure_excitation_and_form() {
     use onecycle_onboard::pack::{CONTROLLER_FORM, EXCITATION, STRUCTURE};
-    let found = identified_with(&Options::default());
+    let found = identified_with(&Options::default().cycles(1));
     let excitation = found.excitation.unwrap();
     assert_eq!(STRUCTURE, Structure::Soiptd.name());
     assert_eq!(EXCITATION, excitation.name());

@@ -4,17 +4,11 @@ use std::ops::RangeBounds;
 use std::path::{Path, PathBuf};
 
 use onecycle_design::Pid;
-use onecycle_identify::{Hold, Method, Road};
+use onecycle_identify::{Hold, Method};
 use onecycle_link::{Axis, SAMPLE_RATES_HZ, TimeUnit};
 
 use super::{Against, LoopKind};
 
-/// Estimators by name.
-pub const ESTIMATORS: [(&str, Road); 3] = [
-    ("auto", Road::Automatic),
-    ("relay", Road::Relay),
-    ("general", Road::General),
-];
 /// Methods for a steady relay oscillation by name.
 pub const METHODS: [(&str, Method); 3] = [
     ("classify", Method::Classify),

@@ -167,21 +167,9 @@ fn of_record(remark: &Remark) -> Option<String> {
     })
 }
 
-/// Remarks on the choice of the estimator and of the structure.
+/// Remarks on the choice of the structure.
 fn of_estimator(remark: &Remark) -> Option<String> {
     Some(match remark {
-        Remark::NotASteadyOscillation(verdict) => format!(
-            "The general estimator was used. The one for steady relay oscillations refuses this recording ({verdict})."
-        ),
-        Remark::RelayReplaced(part) => format!(
-            "The general estimator was used. The one for steady relay oscillations leaves {:.1} % of the oscillation \
-             unexplained, the general one nothing but white noise. Compare with `estimator=relay`.",
-            100.0 * part
-        ),
-        Remark::GeneralDisagrees {
-            phase_margin_rad,
-            is_replaced,
-        } => disagreement(*phase_margin_rad, *is_replaced),
         Remark::Nonlinear(forces) => nonlinear(forces),
         Remark::OtherStructures(structures) => {
             let names: Vec<&str> = structures
@@ -206,21 +194,6 @@ fn of_estimator(remark: &Remark) -> Option<String> {
         Remark::NoController(error) => without_controller(error),
         _ => return None,
     })
-}
-
-/// The general estimator finds another process; its result is given if `is_replaced`.
-fn disagreement(phase_margin_rad: Option<f64>, is_replaced: bool) -> String {
-    let margin = phase_margin_rad.map_or("be unstable".to_owned(), |margin| {
-        format!("have a phase margin of {:.1} deg", margin.to_degrees())
-    });
-    let which = if is_replaced {
-        "The general estimator was used: fitted to the whole recording, it finds another process than the one for steady \
-         oscillations, whose controller would"
-    } else {
-        "Do not fly this controller before another test: on the process that the general estimator finds in the whole \
-         recording it would"
-    };
-    format!("{which} {margin} there. Compare with `estimator=relay` and `estimator=general`.")
 }
 
 /// Nonlinear forces: what they mean for the controller.
@@ -341,7 +314,7 @@ fn equal_lags(lags: &[Parameter], mean_s: Interval) -> String {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Structure, Verdict};
+    use crate::Structure;
 
     use super::*;
 
@@ -349,18 +322,6 @@ mod tests {
     #[test]
     fn every_remark_on_a_record_has_a_sentence() {
         let remarks = [
-            Remark::NotASteadyOscillation(Box::new(Verdict::NoRelay {
-                output_is_relay: false,
-            })),
-            Remark::RelayReplaced(0.041),
-            Remark::GeneralDisagrees {
-                phase_margin_rad: Some(0.2),
-                is_replaced: true,
-            },
-            Remark::GeneralDisagrees {
-                phase_margin_rad: None,
-                is_replaced: false,
-            },
             Remark::OtherStructures(vec![Structure::Soptd, Structure::ResonantLag]),
             Remark::Coloured(0.31),
             Remark::InputLeft(0.024),
@@ -382,9 +343,6 @@ mod tests {
             assert!(!sentence.starts_with(kind), "{sentence}");
         }
         let with = |words: &str| all.iter().any(|(sentence, _)| sentence.contains(words));
-        assert!(with(
-            "(no relay in the input: it does not switch between two levels)"
-        ));
         assert!(with("structures soptd and resonant_lag explain"));
         // Squared distance 25: 5 standard deviations.
         assert!(with("by 5.0 standard deviations"));

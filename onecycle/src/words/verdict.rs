@@ -20,6 +20,7 @@ pub fn advice(verdict: &Verdict) -> Cow<'static, str> {
         Verdict::NoController(error) => without_controller(error).into(),
         Verdict::TooFewRows { .. }
         | Verdict::NoPrediction { .. }
+        | Verdict::NotDriven
         | Verdict::UnstableInForce
         | Verdict::UnstableProcess { .. }
         | Verdict::InputLeft { .. } => of_record(verdict).into(),
@@ -94,6 +95,10 @@ fn of_record(verdict: &Verdict) -> &'static str {
         Verdict::TooFewRows { .. } => {
             "Record longer or at a higher rate, or use more of the recording with `from` and `to`."
         }
+        Verdict::NotDriven => {
+            "Excite the process with more frequencies, as a chirp or steps do, which tell a resonance from another cause; or give \
+             the structure with `structure` if it is known."
+        }
         Verdict::UnstableInForce => {
             "Fly quick manoeuvres or a chirp on this axis: noise that goes round the loop can pass for a process."
         }
@@ -103,11 +108,11 @@ fn of_record(verdict: &Verdict) -> &'static str {
         }
         Verdict::NoPrediction { .. } => {
             "Use a part of the recording in which the process stays the same, with `from` and `to`, and look for a \
-             saturated actuator, friction, or a second input."
+             resonance, a saturated actuator, friction, or a second input."
         }
         _ => {
-            "Try another structure with `structure`, and look for a saturated actuator, friction, or a filter or limit \
-             between the recorded input and the process."
+            "Try another structure with `structure`, and look for a resonance, a saturated actuator, friction, or a filter or \
+             limit between the recorded input and the process."
         }
     }
 }
@@ -254,6 +259,7 @@ mod tests {
             },
             Verdict::InputLeft { share: 0.3 },
             Verdict::UnstableInForce,
+            Verdict::NotDriven,
             Verdict::UnstableProcess { growth_per_s: 56.0 },
             Verdict::NoController(DesignError::Structure(crate::Structure::Foptd)),
             Verdict::NoController(DesignError::PhaseMargin(2.0)),

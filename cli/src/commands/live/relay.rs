@@ -1,6 +1,5 @@
 //! `onecycle live relay`: a relay test of the altitude, recorded and identified.
 
-use std::ffi::OsString;
 use std::io;
 use std::path::Path;
 use std::process::ExitCode;
@@ -28,7 +27,7 @@ use crate::words::log_gains as gain_words;
 
 pub(crate) fn run(arguments: &LiveRelay) -> Result<ExitCode, Failure> {
     // Everything that can be wrong with the arguments is found before the vehicle moves.
-    let further = identify_of(&arguments.out, &options(arguments))?;
+    let further = identify_of(&arguments.out, &arguments.options)?;
     let request = identify::checked(&further)?;
     check_files(arguments)?;
     let mut vehicle = connect(&arguments.connection)?;
@@ -57,18 +56,6 @@ pub(crate) fn run(arguments: &LiveRelay) -> Result<ExitCode, Failure> {
         print(&report::altitude_gains(path, &proposed))?;
     }
     Ok(ExitCode::from(code))
-}
-
-/// Options of `identify`. A link carries few samples of a cycle, and the switches are between them: the general estimator
-/// counts that as noise, unless another one is asked for.
-fn options(arguments: &LiveRelay) -> Vec<OsString> {
-    let given = &arguments.options;
-    let is_given = given
-        .iter()
-        .any(|option| option.to_string_lossy().starts_with("--estimator"));
-    let general = ["--estimator", "general"].map(OsString::from);
-    let added = general.into_iter().filter(|_| !is_given);
-    added.chain(given.iter().cloned()).collect()
 }
 
 /// Refuses files that would be overwritten.

@@ -15,7 +15,7 @@
 //! sensors = [{}, { outliers = 0.01, outlier_size = 0.1 }, { drop_outs = 0.05 }]
 //! ```
 //!
-//! A parameter is a number, or two numbers between which it is uniform. Optional: `structure`, `road` (`general`),
+//! A parameter is a number, or two numbers between which it is uniform. Optional: `structure`,
 //! `disturbances` (none), `loops` (open loop), `sensors` (no defects), `bias`. The noise-free amplitude is half the span of
 //! the output of the same test without bias, noise and disturbances.
 //!
@@ -33,8 +33,7 @@ use serde::Deserialize;
 
 use self::parts::some_structure;
 pub use self::parts::{
-    ClosedLoop, DisturbanceLevel, EntryName, Excitation, ProcessRange, RoadName, SensorDefects,
-    Signal, Span,
+    ClosedLoop, DisturbanceLevel, EntryName, Excitation, ProcessRange, SensorDefects, Signal, Span,
 };
 pub(super) use self::parts::{distinguishing_beta, within};
 
@@ -61,9 +60,6 @@ pub struct RecordingCampaign {
     /// Largest input bias over the amplitude of the test signal; uniform from minus to plus this value.
     #[serde(default)]
     pub bias: f64,
-    /// Estimator.
-    #[serde(default)]
-    pub road: RoadName,
     /// Structure that the estimator fits. `None`: it chooses.
     #[serde(default, deserialize_with = "some_structure")]
     pub structure: Option<Structure>,
@@ -230,7 +226,6 @@ impl RecordingCampaign {
     #[must_use]
     pub fn options(&self) -> Options {
         Options::default()
-            .road(self.road.road())
             .structure(self.structure)
             .specification(Specification::paper())
     }

@@ -118,11 +118,11 @@ fn hidden_dead_time_costs_margin_in_proportion() {
         let lost = honest.true_margin_deg.unwrap() - found.true_margin_deg.unwrap();
         (lost, found.broken)
     };
-    let (once_deg, broken) = lost_deg(0.004);
+    let (once_deg, broken) = lost_deg(0.006);
     let is_tau =
         |broken: &Broken| matches!(broken, Broken::Parameter { key, .. } if key == "tau_s");
     assert!(broken.iter().any(is_tau), "{broken:?}");
-    let (twice_deg, broken) = lost_deg(0.008);
+    let (twice_deg, broken) = lost_deg(0.012);
     assert!(once_deg > 1.0, "{once_deg}");
     assert!((twice_deg / once_deg - 2.0).abs() < 1e-9);
     let is_margin = |broken: &Broken| matches!(broken, Broken::Margin { .. });

@@ -4,7 +4,7 @@ use onecycle_design::soiptd_pd::deterioration::{Deterioration, deterioration};
 use onecycle_design::soiptd_pd::optimum::pd;
 use onecycle_design::{Model, Parameter, Specification};
 use onecycle_identify::{
-    Identification, Identified, Method, Options, Remark, Road, Signals, Verdict, identify,
+    Identification, Identified, Method, Options, Remark, Signals, Verdict, identify,
 };
 use onecycle_lab::experiments::{Campaign, RelayExperiment};
 use onecycle_onboard::Soiptd;
@@ -73,7 +73,7 @@ impl Experiment {
         identify(
             &signals,
             &Options::default()
-                .road(Road::Relay)
+                .cycles(8)
                 .method(method)
                 .specification(Specification::paper()),
         )

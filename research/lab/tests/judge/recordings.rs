@@ -3,9 +3,7 @@
 use onecycle_design::{Parameter, Structure};
 use onecycle_lab::experiments::RecordingCampaign;
 use onecycle_lab::experiments::campaign::Measure;
-use onecycle_lab::experiments::recording::{
-    Excitation, ProcessRange, RoadName, SensorDefects, Signal, Span,
-};
+use onecycle_lab::experiments::recording::{Excitation, ProcessRange, SensorDefects, Signal, Span};
 use onecycle_lab::judge::recording::{RecordingTally, recording_outcome};
 
 /// Lag processes with a chirp or a PRBS, in open loop.
@@ -25,7 +23,6 @@ fn campaign() -> RecordingCampaign {
         durations_s: vec![8.0],
         noise: 0.02,
         bias: 0.1,
-        road: RoadName::General,
         structure: Some(Structure::Foptd),
         processes: vec![ProcessRange {
             structure: Structure::Foptd,

@@ -1,7 +1,7 @@
 //! What a campaign of recordings combines: processes, test signals, disturbances and loops, as files describe them.
 
 use onecycle_design::{Linear, Parameter, Structure};
-use onecycle_identify::{Noise, Road};
+use onecycle_identify::Noise;
 use onecycle_onboard::{Pd, Relay, RelaySettings};
 use onecycle_plant::test_signal::prbs_order;
 use onecycle_plant::{
@@ -246,29 +246,6 @@ impl SensorDefects {
                 within(0.0, 1e6, outlier_size),
             ),
         ])
-    }
-}
-
-/// An estimator by its name in files.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum RoadName {
-    /// The general one.
-    #[default]
-    General,
-    /// That of steady relay oscillations.
-    Relay,
-    /// Whichever the recording takes.
-    Automatic,
-}
-
-impl RoadName {
-    pub(super) fn road(self) -> Road {
-        match self {
-            Self::General => Road::General,
-            Self::Relay => Road::Relay,
-            Self::Automatic => Road::Automatic,
-        }
     }
 }
 

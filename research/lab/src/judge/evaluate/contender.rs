@@ -9,7 +9,7 @@ use crate::judge::baselines::{BaselineAnswer, BaselineError, arx, asymmetric, gm
 use crate::space::Space;
 use onecycle_design::rules::Homogeneous;
 use onecycle_design::{Specification, Structure};
-use onecycle_identify::{Method, Options, Road, Signals, identify};
+use onecycle_identify::{Method, Options, Signals, identify};
 
 /// A method of the benchmark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -197,17 +197,12 @@ impl Contender {
 
 /// Our estimator of steady oscillations on the last cycles, and nothing else of the recording.
 fn steady(cycles: usize, method: Method) -> Options {
-    Options::default()
-        .cycles(cycles)
-        .method(method)
-        .road(Road::Relay)
+    Options::default().cycles(cycles).method(method)
 }
 
 /// Our general estimator on the whole recording. Every method is told the structure.
 fn whole() -> Options {
-    Options::default()
-        .road(Road::General)
-        .structure(Some(Structure::Soiptd))
+    Options::default().structure(Some(Structure::Soiptd))
 }
 
 /// Our method, from a recording to a controller.
