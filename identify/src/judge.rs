@@ -21,8 +21,8 @@ use crate::settings::Options;
 use crate::signals::{Signals, range};
 use crate::verdict::Verdict;
 
-/// F statistic of the past input in the innovations up to which a fit owes nothing to the input, for the usual number of rows: chance exceeds it once in a
-/// hundred records.
+/// F statistic of the past input in the innovations, of the usual number of rows, up to which a fit owes nothing to the input:
+/// chance exceeds it once in a hundred records.
 const MOST_INPUT_F: f64 = 1.88;
 
 pub(crate) fn identify(

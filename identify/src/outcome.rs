@@ -223,7 +223,7 @@ impl Fit {
         }
     }
 
-    /// Result of the general estimator. `None` for a steady relay oscillation.
+    /// Result for the whole recording. `None` for a fit to cycles.
     #[must_use]
     pub fn innovations(&self) -> Option<&Innovations> {
         match &self.evidence {

@@ -98,11 +98,7 @@ pub(crate) fn identify(
 /// # Errors
 /// The verdict of an identification for a recording without a relay or without a steady oscillation.
 pub fn find_oscillation(signals: &Signals<'_>, cycles: usize) -> Result<Oscillation, Verdict> {
-    let relay = find_relay(signals)?;
-    let stretches = oscillation::stretches(signals, &relay, cycles.clamp(1, MOST_CYCLES))?;
-    let first = stretches.first().ok_or(Verdict::TooShort { cycles: 0 })?;
-    let window = first.window(signals, &relay, Past::Held);
-    Ok(first.describe(signals, &relay, &window))
+    first(signals, cycles, |_| Ok(()))
 }
 
 /// Steady oscillation of a relay that the sensor could follow.
@@ -110,17 +106,25 @@ pub fn find_oscillation(signals: &Signals<'_>, cycles: usize) -> Result<Oscillat
 /// # Errors
 /// The verdict of an identification from cycles.
 pub(crate) fn steady(signals: &Signals<'_>) -> Result<Oscillation, Verdict> {
+    first(signals, MOST_CYCLES, |first| {
+        let output = &signals.output[first.points(signals)];
+        let flat = saturation::flat_part(output, first.cycles.len());
+        flat.map_or(Ok(()), |part| Err(Verdict::Saturated { part }))
+    })
+}
+
+/// The first stretch with at most `cycles` cycles, described if `check` has nothing against it.
+fn first(
+    signals: &Signals<'_>,
+    cycles: usize,
+    check: impl FnOnce(&Stretch) -> Result<(), Verdict>,
+) -> Result<Oscillation, Verdict> {
     let relay = find_relay(signals)?;
-    let stretches = oscillation::stretches(signals, &relay, MOST_CYCLES)?;
+    let stretches = oscillation::stretches(signals, &relay, cycles.clamp(1, MOST_CYCLES))?;
     let first = stretches.first().ok_or(Verdict::TooShort { cycles: 0 })?;
-    let output = &signals.output[first.points(signals)];
-    match saturation::flat_part(output, first.cycles.len()) {
-        Some(part) => Err(Verdict::Saturated { part }),
-        None => {
-            let window = first.window(signals, &relay, Past::Held);
-            Ok(first.describe(signals, &relay, &window))
-        }
-    }
+    check(first)?;
+    let window = first.window(signals, &relay, Past::Held);
+    Ok(first.describe(signals, &relay, &window))
 }
 
 /// Search for a stretch of the recording from which the process can be identified.

@@ -14,7 +14,7 @@ use std::path::PathBuf;
 use onecycle_design::{
     Execution, Form, MeasurementNoise, Pid, Spans, Specification, Style, Vendor,
 };
-use onecycle_identify::{Hold, MOST_CYCLES, Method};
+use onecycle_identify::{Hold, MOST_CYCLES, Method, USUAL_CYCLES};
 use onecycle_link::{Axis, ColumnRef, ControlLoop, CsvOptions};
 
 use self::values::choice;
@@ -370,7 +370,7 @@ impl Request {
             || self.beta.is_some()
             || self.input_late_s.is_some()
             || self.output_filter_hz.is_some()
-            || self.is_of_cycles();
+            || self.of_cycles().is_some();
         !is_one
     }
 
@@ -397,9 +397,10 @@ impl Request {
         Ok(asked)
     }
 
-    /// Whether the last cycles of a relay test are fitted, and not the whole recording.
-    fn is_of_cycles(&self) -> bool {
-        self.cycles.is_some() || self.method != Method::Map || self.pack.is_some()
+    /// Number of cycles to fit, which a method and a pack ask for too. `None`: the whole recording.
+    pub(crate) fn of_cycles(&self) -> Option<usize> {
+        let is_asked = self.method != Method::Map || self.pack.is_some();
+        self.cycles.or(is_asked.then_some(USUAL_CYCLES))
     }
 
     /// Refuses settings that a fit to the cycles of a relay test does not have.
@@ -411,7 +412,7 @@ impl Request {
             ("to", self.to_s.is_some()),
             ("hold=interpolated", self.hold == Some(Hold::Interpolated)),
         ];
-        match given(&refused).filter(|_| self.is_of_cycles()) {
+        match given(&refused).filter(|_| self.of_cycles().is_some()) {
             Some(setting) => Err(Error::Request(format!(
                 "`{setting}` is for the whole recording: leave it out, or `cycles`, `method` and `pack`"
             ))),

@@ -1,8 +1,8 @@
 //! From a request to its report.
 
 use onecycle_design::Specification;
+use onecycle_identify::Verdict;
 use onecycle_identify::progress::part;
-use onecycle_identify::{USUAL_CYCLES, Verdict};
 use onecycle_link::{Recording, Span};
 use onecycle_onboard::pack::{Pack, SELF_TEST_TOLERANCE};
 
@@ -181,8 +181,7 @@ impl Request {
 
     fn settings<'a>(&self, asked: Specification) -> Identify<'a> {
         let whole = Identify::new();
-        let of_pack = self.pack.is_some().then_some(USUAL_CYCLES);
-        (self.cycles.or(of_pack).into_iter())
+        (self.of_cycles().into_iter())
             .fold(whole, Identify::cycles)
             .specification(asked)
             .method(self.method)

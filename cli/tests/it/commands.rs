@@ -31,7 +31,8 @@ fn a_round_trip_without_noise() {
 #[test]
 fn an_asymmetric_test_is_identified() {
     let arguments = ["--noise", "1%", "--bias", "30%", "--asymmetry", "0.2"];
-    let report = identify(simulate(&HOVER, &arguments), &[]).identified();
+    let recording = simulate(&HOVER, &arguments);
+    let report = identify(&recording, &[]).identified();
     report
         .near("k_over_t_body", HOVER_K_OVER_T_BODY, 0.01)
         .near("t_prop_s", HOVER_T_PROP_S, 0.05)
@@ -39,6 +40,8 @@ fn an_asymmetric_test_is_identified() {
         .near("input_bias", 0.3, 0.02);
     assert!((report.number("/oscillation/duty") - 0.4).abs() < 0.02);
     assert!((0.55..0.9).contains(&report.number("/joint_probability")));
+    let of_cycles = identify(&recording, &["--cycles", "8"]).identified();
+    assert!(of_cycles.number("/last_cycle/score") < 1.0);
 }
 
 // Every method finds the process, each within its own accuracy.

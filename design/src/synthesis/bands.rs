@@ -203,17 +203,13 @@ impl Scan<'_> {
     #[inline]
     fn add(&mut self, omega: f64, l: Complex64) {
         let interval = self.limits.forbidden(omega, l);
-        if let Some((before, last)) = self.last
-            && (last.im < 0.0) != (l.im < 0.0)
-            && last.re.min(l.re) < 0.0
-        {
+        if let Some((before, last)) = self.last {
+            let is_crossing = (last.im < 0.0) != (l.im < 0.0) && last.re.min(l.re) < 0.0;
             // The phase passes -pi, where gains are always forbidden. A grid that is coarse for the limits may step over them.
             let is_seen = self.band.is_some() && interval.is_some();
-            if self.limits.gain_margin > 1.0 || !is_seen {
+            if is_crossing && (self.limits.gain_margin > 1.0 || !is_seen) {
                 self.cross([before, omega], [last, l]);
             }
-        }
-        if let Some((before, last)) = self.last {
             self.margin([before, omega], [last, l]);
         }
         match (interval, &mut self.band) {
@@ -453,20 +449,23 @@ mod tests {
     use crate::analysis::process::Stage;
     use crate::controller::Execution;
 
-    // k e^(-s)/s turns about -1 at k = pi/2. Ms = Mt = m allows a gain below that: the closer, the larger m. The forbidden
-    // phases are 2 asin(1/m) wide, 0.2 rad for m = 10, but a step of the coarse grid turns the plot by 0.6 rad.
-    #[test]
-    fn a_coarse_grid_sees_narrow_bands() {
+    /// Gains `k` that the limits allow the loop `k e^(-s)/s`, on a grid of this fraction.
+    fn of_integrator(limits: &Limits, fraction: f64) -> Allowed {
         let process =
             Process::of_stages(1.0, &[Stage::Pole(0.0)], 1.0, &Execution::default()).unwrap();
         let law = Law::pid(&process, [1.0, 0.0, 0.0], 0.0);
         let plant = OpenLoop::new(&process, &law);
+        let mut grid = Grid::new(&process, plant, fraction);
+        let path = |_: f64| Complex64::ONE;
+        allowed(&mut grid, &plant, path, limits, [0.01, 0.0]).unwrap()
+    }
+
+    // k e^(-s)/s turns about -1 at k = pi/2. Ms = Mt = m allows a gain below that: the closer, the larger m. The forbidden
+    // phases are 2 asin(1/m) wide, 0.2 rad for m = 10, but a step of the coarse grid turns the plot by 0.6 rad.
+    #[test]
+    fn a_coarse_grid_sees_narrow_bands() {
         for m in [1.6, 3.0, 10.0] {
-            let found = [0.04, 0.15].map(|fraction| {
-                let mut grid = Grid::new(&process, plant, fraction);
-                let path = |_: f64| Complex64::ONE;
-                allowed(&mut grid, &plant, path, &Limits::of(m), [0.01, 0.0]).unwrap()
-            });
+            let found = [0.04, 0.15].map(|fraction| of_integrator(&Limits::of(m), fraction));
             assert!((found[1].high / found[0].high - 1.0).abs() < 1e-6, "{m}");
             let ultimate = std::f64::consts::FRAC_PI_2;
             let share = found[0].high / ultimate;
@@ -478,10 +477,6 @@ mod tests {
     // pi/2 - k = k d. On a coarse grid too, whose frequencies miss both.
     #[test]
     fn margins_of_phase_and_delay_are_exact() {
-        let process =
-            Process::of_stages(1.0, &[Stage::Pole(0.0)], 1.0, &Execution::default()).unwrap();
-        let law = Law::pid(&process, [1.0, 0.0, 0.0], 0.0);
-        let plant = OpenLoop::new(&process, &law);
         let of_phase = Limits {
             phase_margin_rad: std::f64::consts::FRAC_PI_3,
             ..Limits::of(1e3)
@@ -490,17 +485,11 @@ mod tests {
             delay_margin: 2.0,
             ..Limits::of(1e3)
         };
-        let half_turn = std::f64::consts::FRAC_PI_2;
-        for (limits, most) in [(of_phase, half_turn / 3.0), (of_delay, half_turn / 3.0)] {
+        let most = std::f64::consts::FRAC_PI_6;
+        for limits in [of_phase, of_delay] {
             for fraction in [0.04, 0.15] {
-                let mut grid = Grid::new(&process, plant, fraction);
-                let path = |_: f64| Complex64::ONE;
-                let found = allowed(&mut grid, &plant, path, &limits, [0.01, 0.0]).unwrap();
-                assert!(
-                    (found.high / most - 1.0).abs() < 1e-9,
-                    "{fraction} {}",
-                    found.high
-                );
+                let high = of_integrator(&limits, fraction).high;
+                assert!((high / most - 1.0).abs() < 1e-9, "{fraction} {high}");
             }
         }
     }

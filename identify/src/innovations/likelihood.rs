@@ -12,8 +12,10 @@
 //! ln L = -1/2 (m ln(2 pi s2) + m + sum ln S_k + ln|X'X| - ln|X0'X0|),   s2 = |r|^2 / m,   m = N - p
 //! ```
 //!
-//! where no sample is believed to less than the deviation `f` of the record ([`Record::floor`](super::record::Record::floor)): below
-//! it `s2 = f^2`, and `|r|^2/f^2` stands for the second `m`. `r` is the residual, `X` the `p` filtered columns and `X0` the same columns before the filter, all over the deviation of
+//! No sample is believed to less than the deviation `f` of the record ([`Record::floor`](super::record::Record::floor)): below
+//! it `s2 = f^2`, and `|r|^2/f^2` stands for the second `m`.
+//!
+//! Here `r` is the residual, `X` the `p` filtered columns and `X0` the same columns before the filter, all over the deviation of
 //! the outputs: a prior that is flat in another unit would favour more states in one unit and fewer in another. All states are
 //! unknown, so any initial covariance gives the same likelihood, and the filter starts from its steady one: its gain is
 //! constant from the first block on. Reference: P. de Jong, "The likelihood for a state space model", Biometrika 75
@@ -101,13 +103,13 @@ impl Evaluation {
     /// `s2`, `ln L` is `-m/2 ln |r exp(logs/(2 m))|^2` but for a constant. With `s2 = f^2` it is `-(|r|^2/f^2 + logs)/2`, and the
     /// square of a further entry stands for `logs`: its derivative at `at` is that of `f^2 logs`.
     pub(super) fn residual_near(&self, at: &Self) -> Vec<f64> {
-        let twice = 2.0 * at.freedom;
+        let stretch = |logs: f64| (logs / (2.0 * at.freedom)).exp();
         if !at.is_floored {
-            let stretch = (self.logs / twice).exp();
+            let stretch = stretch(self.logs);
             return self.residual.iter().map(|r| r * stretch).collect();
         }
         let size = at.variance.sqrt() / at.scale * at.freedom.sqrt();
-        let last = size * ((self.logs - at.logs) / twice).exp();
+        let last = size * stretch(self.logs - at.logs);
         self.residual.iter().copied().chain([last]).collect()
     }
 

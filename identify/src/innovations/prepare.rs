@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use onecycle_design::LowPass;
 
+use super::orthogonal::Orthogonal;
 use super::record::{Forces, Hold, Record};
 use super::unfilter::{alike_smooth, unfilter};
 use crate::settings::Options;
@@ -28,7 +29,7 @@ const ALIKE: f64 = 0.9;
 /// Share of the movement of an output to which a sample is believed. No sensor is truer, and no process follows a model to less:
 /// without it a simulation without noise has resonances and forces of a ten-thousandth.
 pub(super) const FLOOR: f64 = 1e-3;
-/// Parts of a record in which its movement is measured: a slow drift is none.
+/// Parts of a record in which its movement is measured, so that a slow drift does not count as movement.
 const PARTS: usize = 8;
 
 /// Record with what was left out of the recording.
@@ -98,24 +99,11 @@ fn movement(record: &Record) -> f64 {
     let outputs: Vec<f64> = record.present_outputs().collect();
     let count = outputs.len().div_ceil(PARTS).max(1);
     let squares = |part: &[f64]| {
-        let n = part.len() as f64;
-        let middle = 0.5 * (n - 1.0);
-        let mean = part.iter().sum::<f64>() / n;
-        let moments = part.iter().zip(0_i32..).map(|(y, k)| {
-            let k = f64::from(k) - middle;
-            [(y - mean).powi(2), k * (y - mean), k * k]
-        });
-        let [square, product, length] =
-            moments.fold([0.0; 3], |sum, of| std::array::from_fn(|i| sum[i] + of[i]));
-        square
-            - if length > 0.0 {
-                product * product / length
-            } else {
-                0.0
-            }
+        let ramp = (0..part.len()).map(|k| k as f64).collect();
+        Orthogonal::independent(&[vec![1.0; part.len()], ramp]).left(part)
     };
     let sum: f64 = outputs.chunks(count).map(squares).sum();
-    (sum.max(0.0) / outputs.len().max(1) as f64).sqrt()
+    (sum / outputs.len().max(1) as f64).sqrt()
 }
 
 /// The longest run of indices of `asked` between gaps.

@@ -3,8 +3,7 @@
 use std::f64::consts::{PI, SQRT_2, TAU};
 
 use super::choose::Limits;
-use super::descent::Found;
-use super::descent::Patience;
+use super::descent::{Found, Patience};
 use super::likelihood::{Evaluation, input_innovations};
 use super::orthogonal::Orthogonal;
 use super::prediction::{Filtering, predict};
@@ -68,7 +67,8 @@ pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
 }
 
 /// Share of the innovations that the input of the blocks before explains, and its F statistic. The input of the same
-/// block is left out: under feedback it contains the innovation. `least`: variance that is believed.
+/// block is left out: under feedback it contains the innovation. `least`: the least variance of them
+/// that is believed.
 fn of_input(blocks: &Blocks<'_>, innovations: &[f64], least: f64) -> (f64, f64) {
     let inputs = blocks.mean_inputs();
     let rows: Vec<usize> = (0..blocks.len())
@@ -93,9 +93,9 @@ fn of_input(blocks: &Blocks<'_>, innovations: &[f64], least: f64) -> (f64, f64) 
     let number = orthogonal.len() as f64;
     let freedom = count - number - 1.0;
     let f = (all - rest) / number / (rest / freedom).max(least);
-    // An error that every sample repeats is no larger than what is believed of one.
-    let is_believed = all - rest > count * least;
-    (1.0 - rest / all, if is_believed { f } else { f.min(1.0) })
+    // What the input explains counts where its mean square is above the variance that is believed.
+    let counts = all - rest > count * least;
+    (1.0 - rest / all, if counts { f } else { f.min(1.0) })
 }
 
 /// Values less their mean.
