@@ -132,11 +132,11 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
                 found.refuse(verdict);
             }
         }
-        Some(Err(
-            verdict @ (Verdict::ConstantInput
-            | Verdict::NotSteady { .. }
-            | Verdict::Saturated { .. }),
-        )) if found.outcome.is_err() => found.outcome = Err(verdict),
+        Some(Err(verdict @ (Verdict::NotSteady { .. } | Verdict::Saturated { .. })))
+            if found.outcome.is_err() =>
+        {
+            found.outcome = Err(verdict);
+        }
         // Complex poles explain a limit cycle that the input does not drive.
         Some(Err(verdict @ Verdict::NotSteady { .. }))
             if is_oscillating(&found) && !owes_nothing(&found) =>

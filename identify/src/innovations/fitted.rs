@@ -274,13 +274,13 @@ fn choose_start(
         choose_on_parts(record, limits, options, &[], &mut of_free)
     });
     if record.rest.is_none() && !options.is_under_way {
-        let (_, choice) = free.as_ref()?;
+        let choice = free.as_ref().map(|(_, choice)| choice);
         let at_rest = record.at_rest().rounded(CHOOSING_STAMP);
         let mut starts = search::screen_whole(&at_rest, limits.structure, limits.longest_tau_s);
-        starts.extend(choice.chosen().map(|found| found.found.theta));
+        starts.extend(choice.and_then(Choice::chosen).map(|of| of.found.theta));
         if progress::part(FREE..RESTED, || was_at_rest(record, limits, &starts)) {
             *record = record.at_rest();
-            starts.extend(choice.thetas());
+            starts.extend(choice.iter().flat_map(|choice| choice.thetas()));
             return progress::part(RESTED..1.0, || {
                 choose_on_parts(record, limits, options, &starts, remarks)
             });
@@ -363,13 +363,14 @@ fn choose_on(
     remarks: &mut Vec<Remark>,
 ) -> Option<Choice> {
     let mut part = record.part(part).rounded(CHOOSING_STAMP);
+    let slowest_s = validate::slowest_s(&Blocks::new(&part, 1, 0.0)).unwrap_or(f64::INFINITY);
     // At rest before the record, at rest where a part begins: the input moves where the part tells most.
     part.rest = part.rest.or(record.rest.map(|_| part.input[0]));
     let length_s = part.time_s(part.len() - 1);
     let limits = Limits {
         skip_s: SKIPPED * length_s,
         longest_tau_s: LONGEST_TAU * length_s,
-        slowest_s: validate::slowest_s(&Blocks::new(&part, 1, 0.0)).unwrap_or(f64::INFINITY),
+        slowest_s,
         structure: options.structure,
         fewest_samples,
     };

@@ -4,8 +4,8 @@
 //! cov theta = (J'J)^-1 |rho|^2 / m,      var kappa = var(kappa | theta) + k' cov(theta) k,   k = d kappa / d theta
 //! ```
 //!
-//! with the residual `rho` and its Jacobian `J` by central differences. Unknowns at a bound, and lags that the samples do not show,
-//! are taken as known. Lags that are nearly equal have the coordinates of [`NearLags`].
+//! with the residual `rho` and its Jacobian `J` by central differences. Unknowns at a bound, and lags and negative dead times that
+//! the samples do not show, are taken as known. Lags that are nearly equal have the coordinates of [`NearLags`].
 
 use super::descent::{Found, inverse};
 use super::likelihood::{Memory, evaluate};
@@ -71,9 +71,15 @@ impl Laplace {
         let covariance: Vec<Vec<f64>> = (inverse.iter())
             .map(|row| row.iter().map(|v| v * factor).collect())
             .collect();
+        let tau = found.theta.layout().tau();
         let hidden = (0..free.len()).find(|&slot| {
-            let is_short = found.theta.is_lag_below(free[slot], blocks.record.dt_s);
-            is_short && inverse[slot][slot] * factor > HIDDEN * HIDDEN
+            let (index, variance) = (free[slot], covariance[slot][slot]);
+            if index == tau {
+                // Before the first row a response may begin at any time.
+                let range = bounds.high[tau] - bounds.low[tau];
+                return found.theta.tau_s() <= 0.0 && variance > range * range;
+            }
+            found.theta.is_lag_below(index, blocks.record.dt_s) && variance > HIDDEN * HIDDEN
         });
         if let Some(slot) = hidden {
             let mut others = free;

@@ -55,9 +55,10 @@ pub(super) fn instead(
     if blocks.record.forces.len() > 0 {
         return None;
     }
-    // Innovations that past inputs explain are a fault of the fit under feedback too.
-    let is_refuted =
-        LazyCell::new(|| validate::is_left_to_the_input(&validate::tests(blocks, &with.at)));
+    // Innovations that past inputs explain are a fault of the fit under feedback too, however small they are.
+    let is_refuted = LazyCell::new(|| {
+        validate::is_left_to_the_input(&validate::tests_above(0.0, blocks, &with.at))
+    });
     let is_fed_back = is_known_feedback || validate::is_fed_back(blocks);
     if is_fed_back && !*is_refuted {
         return None;

@@ -39,9 +39,14 @@ pub(crate) fn is_left_to_the_input(tests: &InnovationTests) -> bool {
 
 /// Tests of the innovations against whiteness and against the input.
 pub(super) fn tests(blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
+    tests_above(blocks.record.floor, blocks, at)
+}
+
+/// The same with samples that are believed to `floor` (output unit).
+pub(super) fn tests_above(floor: f64, blocks: &Blocks<'_>, at: &Evaluation) -> InnovationTests {
     let innovations = at.innovations();
     let count = innovations.len();
-    let least = blocks.record.floor.powi(2) / at.variance;
+    let least = floor.powi(2) / at.variance;
     let square: f64 = innovations.iter().map(|e| e * e).sum();
     let square = square.max(count as f64 * least);
     let correlation = |lag: usize| {
@@ -308,7 +313,7 @@ fn lines(mut rows: Vec<f64>, row_s: f64) -> Vec<(f64, f64)> {
     let whole = rows.len();
     rows.truncate(MOST_ROWS);
     let count = rows.len();
-    let mean = rows.iter().sum::<f64>() / count as f64;
+    let mean = mean(&rows);
     for (row, value) in rows.iter_mut().enumerate() {
         *value = (*value - mean) * (PI * row as f64 / count as f64).sin().powi(2);
     }
@@ -363,9 +368,12 @@ pub(super) fn period_s(blocks: &Blocks<'_>) -> Option<f64> {
     Some(TAU / median)
 }
 
-/// Inverse of the frequency (s) below which the input has 5 % of its power.
+/// Inverse of the frequency (s) below which the input has 5 % of its power; of what differs from the input at rest, if that is
+/// known: a step in the first rows is nearly its own mean.
 pub(super) fn slowest_s(blocks: &Blocks<'_>) -> Option<f64> {
-    let [low, _, _] = quantiles(&blocks.mean_inputs(), blocks.block_s())?;
+    let inputs = blocks.mean_inputs();
+    let middle = blocks.record.rest.unwrap_or_else(|| mean(&inputs));
+    let [low, _, _] = quantiles_about(middle, &inputs, blocks.block_s())?;
     Some(1.0 / low)
 }
 
@@ -375,14 +383,22 @@ pub(super) fn shortest_period_s(blocks: &Blocks<'_>) -> Option<f64> {
     Some(TAU / high)
 }
 
-/// Frequencies (rad/s) below which 5, 50 and 95 % of the power of `rows` lie. `None` without power.
+fn mean(rows: &[f64]) -> f64 {
+    rows.iter().sum::<f64>() / rows.len() as f64
+}
+
+/// Frequencies (rad/s) below which 5, 50 and 95 % of the power of `rows` about their mean lie. `None` without power.
 fn quantiles(rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
+    quantiles_about(mean(rows), rows, row_s)
+}
+
+/// The same about another value.
+fn quantiles_about(middle: f64, rows: &[f64], row_s: f64) -> Option<[f64; 3]> {
     let length_s = row_s * rows.len() as f64;
     let (lowest, highest) = (TAU / length_s, PI / row_s);
     let frequency =
         |i: usize| lowest * (highest / lowest).powf(i as f64 / (FREQUENCIES - 1) as f64);
-    let mean = rows.iter().sum::<f64>() / rows.len() as f64;
-    let rows: Vec<f64> = rows.iter().map(|value| value - mean).collect();
+    let rows: Vec<f64> = rows.iter().map(|value| value - middle).collect();
     let power = |omega: f64| power(&rows, omega * row_s);
     // On a logarithmic grid a frequency stands for a band as wide as itself.
     let powers: Vec<f64> = (0..FREQUENCIES)
