@@ -61,6 +61,7 @@ pub mod bands;
 pub mod cascade;
 mod closed_loop;
 mod controller;
+pub mod matrix;
 mod model;
 pub mod oscillation;
 pub mod roots;

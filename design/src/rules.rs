@@ -166,7 +166,7 @@ impl StepFeatures {
         let mut outputs = Vec::with_capacity(STEPS + 1);
         for _ in 0..=STEPS {
             outputs.push(linear.gain() * state[space.output] / gain);
-            let free = crate::model::state_space::times(&step.phi, &state);
+            let free = crate::matrix::times(&step.phi, &state);
             for i in 0..6 {
                 state[i] = free[i] + step.held[i];
             }

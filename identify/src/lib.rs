@@ -20,7 +20,6 @@
 mod amplitude;
 mod assumed;
 mod checks;
-pub mod cholesky;
 mod conclusion;
 pub mod cycles;
 pub mod diagnose;

@@ -21,7 +21,7 @@ use rand_pcg::Pcg64Mcg;
 use self::edges::{RULED_OUT, is_process, with_equal_lags, with_jumps, with_real_poles};
 pub(crate) use self::intervals::Shortest;
 pub use self::intervals::{Estimate, Interval, StepIntervals};
-use crate::cholesky::cholesky;
+use onecycle_design::matrix::cholesky;
 
 /// Number of draws. The standard error of the probability below the 5 % quantile is `sqrt(0.05 * 0.95 / 4000)`, 0.35 of
 /// a percentage point.

@@ -17,7 +17,7 @@
 //! ```
 
 use onecycle_design::Linear;
-use onecycle_design::state_space::Matrix;
+use onecycle_design::matrix::Matrix;
 
 use crate::NoiseSource;
 

@@ -12,7 +12,8 @@
 //! With `tau = (n + fraction) step` the input that arrives is the one of `n` and one steps ago for `fraction * step`, and
 //! then the one of `n` steps ago, as in [`FixedStepProcess`](crate::FixedStepProcess).
 
-use onecycle_design::state_space::{Matrix, StateSpace, Step, times};
+use onecycle_design::matrix::{Matrix, times};
+use onecycle_design::state_space::{StateSpace, Step};
 use onecycle_design::{Linear, Structure};
 
 use crate::NoiseSource;

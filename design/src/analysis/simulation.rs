@@ -12,6 +12,7 @@ use super::law::Law;
 use super::process::Process;
 use super::propagator::{MONOMIALS, NODES, Step, of_node_values, times};
 use super::realisation::{Excitation, Realisation};
+use crate::matrix::inverse;
 
 /// A dead time shorter than this share of the wanted step reaches into the present step.
 const SHORT_DELAY: f64 = 0.2;
@@ -195,36 +196,4 @@ fn implicit<const N: usize>(
         }
     }
     Some((of_state, of_last))
-}
-
-/// Inverse by Gauss-Jordan elimination with row pivots. `None` if the matrix is singular.
-fn inverse(mut matrix: [[f64; NODES]; NODES]) -> Option<[[f64; NODES]; NODES]> {
-    let mut inverse = [[0.0; NODES]; NODES];
-    for i in 0..NODES {
-        inverse[i][i] = 1.0;
-    }
-    for column in 0..NODES {
-        let pivot = (column..NODES)
-            .max_by(|&a, &b| matrix[a][column].abs().total_cmp(&matrix[b][column].abs()))?;
-        matrix.swap(column, pivot);
-        inverse.swap(column, pivot);
-        let factor = 1.0 / matrix[column][column];
-        if !factor.is_finite() {
-            return None;
-        }
-        for j in 0..NODES {
-            matrix[column][j] *= factor;
-            inverse[column][j] *= factor;
-        }
-        for row in 0..NODES {
-            let factor = matrix[row][column];
-            if row != column && factor != 0.0 {
-                for j in 0..NODES {
-                    matrix[row][j] -= factor * matrix[column][j];
-                    inverse[row][j] -= factor * inverse[column][j];
-                }
-            }
-        }
-    }
-    Some(inverse)
 }

@@ -12,9 +12,7 @@
 //! stage, and `n` doublings. Confluent and stiff stages need no special case.
 
 use super::linear::Linear;
-
-/// Square matrix, by rows.
-pub type Matrix<const N: usize> = [[f64; N]; N];
+use crate::matrix::{Matrix, add, congruent, identity, product, times};
 
 /// Terms of the Taylor series; with a step of norm 0.25 the first one left out is below 1e-17.
 const TERMS: usize = 13;
@@ -198,66 +196,6 @@ impl<const N: usize> Step<N> {
             phi: product(&self.phi, &self.phi),
             held,
             ramp,
-        }
-    }
-}
-
-/// Identity matrix.
-#[must_use]
-pub fn identity<const N: usize>() -> Matrix<N> {
-    let mut matrix = [[0.0; N]; N];
-    for i in 0..N {
-        matrix[i][i] = 1.0;
-    }
-    matrix
-}
-
-/// `A B`.
-#[must_use]
-pub fn product<const N: usize>(a: &Matrix<N>, b: &Matrix<N>) -> Matrix<N> {
-    let mut out = [[0.0; N]; N];
-    for i in 0..N {
-        for k in 0..N {
-            for j in 0..N {
-                out[i][j] += a[i][k] * b[k][j];
-            }
-        }
-    }
-    out
-}
-
-/// `A x`.
-#[must_use]
-pub fn times<const N: usize>(a: &Matrix<N>, x: &[f64; N]) -> [f64; N] {
-    let mut out = [0.0; N];
-    for i in 0..N {
-        for k in 0..N {
-            out[i] += a[i][k] * x[k];
-        }
-    }
-    out
-}
-
-/// `A X A'` for a symmetric `X`, symmetric to the last bit.
-#[must_use]
-pub fn congruent<const N: usize>(a: &Matrix<N>, x: &Matrix<N>) -> Matrix<N> {
-    let left = product(a, x);
-    let mut out = [[0.0; N]; N];
-    for i in 0..N {
-        for j in 0..=i {
-            let sum = (0..N).map(|k| left[i][k] * a[j][k]).sum();
-            out[i][j] = sum;
-            out[j][i] = sum;
-        }
-    }
-    out
-}
-
-/// `A += B`.
-pub fn add<const N: usize>(a: &mut Matrix<N>, b: &Matrix<N>) {
-    for i in 0..N {
-        for j in 0..N {
-            a[i][j] += b[i][j];
         }
     }
 }

@@ -17,8 +17,9 @@
 
 use std::f64::consts::PI;
 
+use crate::matrix::times;
 use crate::model::Linear;
-use crate::model::state_space::{StateSpace, times};
+use crate::model::state_space::StateSpace;
 use crate::roots::root;
 use crate::rules::Ultimate;
 

@@ -7,6 +7,7 @@
 
 use super::objective::{NO_COST, Objective};
 use super::optimum::Optimum;
+use crate::matrix::solve;
 
 /// Extrema within this share of the limit may be active.
 const NEAR: f64 = 0.05;
@@ -189,27 +190,6 @@ fn stationary(cost: &Expansion, active: &[&Expansion]) -> Option<(Vec<f64>, Vec<
         multipliers.copy_from_slice(&solution[n..]);
     }
     Some((step, multipliers))
-}
-
-/// Solution of linear equations, the right side as the last column. `None` if they are singular.
-fn solve(mut matrix: Matrix) -> Option<Vec<f64>> {
-    let n = matrix.len();
-    for column in 0..n {
-        let pivot = (column..n)
-            .max_by(|&a, &b| matrix[a][column].abs().total_cmp(&matrix[b][column].abs()))?;
-        matrix.swap(column, pivot);
-        let lead = matrix[column].clone();
-        if lead[column].abs() < 1e-12 || !lead[column].is_finite() {
-            return None;
-        }
-        for row in (0..n).filter(|row| *row != column) {
-            let factor = matrix[row][column] / lead[column];
-            for j in column..=n {
-                matrix[row][j] -= factor * lead[j];
-            }
-        }
-    }
-    Some((0..n).map(|i| matrix[i][n] / matrix[i][i]).collect())
 }
 
 impl Objective {

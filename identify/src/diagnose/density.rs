@@ -23,7 +23,7 @@
 //! References: D. W. Scott, "Multivariate Density Estimation" (1992); level by quantile: R. J. Hyndman, "Computing and
 //! graphing highest density regions", The American Statistician 50 (1996).
 
-use crate::cholesky::cholesky;
+use onecycle_design::matrix::cholesky;
 
 /// Highest density regions of draws on a grid. For the method see the [module](self).
 #[derive(Clone, Debug, PartialEq)]

@@ -4,7 +4,8 @@
 //! stays the same. Here it is zero, and the columns of the state are regressors.
 
 use onecycle_design::Structure;
-use onecycle_design::state_space::{Matrix, StateSpace, add, congruent, identity, product, times};
+use onecycle_design::matrix::{Matrix, add, congruent, identity, product, times};
+use onecycle_design::state_space::StateSpace;
 
 use super::likelihood::{Memory, evaluate};
 use super::orthogonal::Orthogonal;

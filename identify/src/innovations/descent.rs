@@ -5,6 +5,8 @@
 //! More, "The Levenberg-Marquardt algorithm: implementation and theory", Lecture Notes in Mathematics 630 (1978); C.
 //! Kanzow, N. Yamashita, M. Fukushima, J. Comput. Appl. Math. 172 (2004), bounds.
 
+use onecycle_design::matrix::solve_positive;
+
 use super::likelihood::{Evaluation, Memory, evaluate};
 use super::orthogonal::dot;
 use super::record::Blocks;
@@ -152,56 +154,10 @@ fn step(
         matrix[i][i] += damping * normal.matrix[a][a];
         right[i] = -normal.gradient[a];
     }
-    let change = solve(&matrix, &right)?;
+    let change = solve_positive(&matrix, &right)?;
     let mut next = *here;
     for (&slot, change) in moving.iter().zip(change) {
         next.values[free[slot]] += change;
     }
     Some(bounds.clamp(&next))
-}
-
-/// Solution of a small symmetric positive definite system by Cholesky's decomposition, scaled to a unit diagonal.
-/// `None` if the matrix is not positive definite.
-fn solve(matrix: &[Vec<f64>], right: &[f64]) -> Option<Vec<f64>> {
-    let inverse = inverse(matrix)?;
-    let row = |row: &Vec<f64>| dot(row, right);
-    Some(inverse.iter().map(row).collect())
-}
-
-/// Inverse of a small symmetric positive definite matrix. `None` if it is not positive definite.
-pub(super) fn inverse(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
-    let n = matrix.len();
-    let scale: Vec<f64> = (0..n).map(|i| 1.0 / matrix[i][i].sqrt()).collect();
-    // L of the scaled matrix, then its inverse, row by row.
-    let mut l = vec![vec![0.0; n]; n];
-    let mut inverse_l = vec![vec![0.0; n]; n];
-    for i in 0..n {
-        for j in 0..=i {
-            let sum: f64 = (0..j).map(|k| l[i][k] * l[j][k]).sum();
-            let rest = matrix[i][j] * scale[i] * scale[j] - sum;
-            if i > j {
-                l[i][j] = rest / l[j][j];
-            } else if rest > 1e-14 {
-                l[i][i] = rest.sqrt();
-            } else {
-                return None;
-            }
-        }
-        inverse_l[i][i] = 1.0 / l[i][i];
-        for j in 0..i {
-            let sum: f64 = (j..i).map(|k| l[i][k] * inverse_l[k][j]).sum();
-            inverse_l[i][j] = -sum / l[i][i];
-        }
-    }
-    let entry = |i: usize, j: usize| {
-        let sum: f64 = (i.max(j)..n)
-            .map(|k| inverse_l[k][i] * inverse_l[k][j])
-            .sum();
-        sum * scale[i] * scale[j]
-    };
-    Some(
-        (0..n)
-            .map(|i| (0..n).map(|j| entry(i, j)).collect())
-            .collect(),
-    )
 }

@@ -5,8 +5,8 @@ use onecycle_design::{Linear, Structure};
 use super::descent::Found;
 use super::mixture::Component;
 use super::theta::{BODIES_IN_A_SAMPLE, LAGS_IN_A_SAMPLE, NoiseKind, Theta};
-use crate::cholesky::cholesky;
 use crate::posterior::{Drawn, Posterior, Shortest};
+use onecycle_design::matrix::cholesky;
 
 /// Relative standard deviation of the scale and of the clock of the instruments: no fit makes the intervals narrower.
 const INSTRUMENT: f64 = 1e-3;

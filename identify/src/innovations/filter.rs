@@ -9,7 +9,7 @@
 //! columns of an unknown initial state, which have no data: the filter forgets the initial state, and their rows end
 //! where nothing of it is left.
 
-use onecycle_design::state_space::Matrix;
+use onecycle_design::matrix::Matrix;
 
 use super::lifted::Lifted;
 use super::normal::Normal;

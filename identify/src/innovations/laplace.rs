@@ -7,7 +7,9 @@
 //! with the residual `rho` and its Jacobian `J` by central differences. Unknowns at a bound, and lags and negative dead times that
 //! the samples do not show, are taken as known. Lags that are nearly equal have the coordinates of [`NearLags`].
 
-use super::descent::{Found, inverse};
+use onecycle_design::matrix::inverse_of_positive;
+
+use super::descent::Found;
 use super::likelihood::{Memory, evaluate};
 use super::near_lags::NearLags;
 use super::orthogonal::dot;
@@ -65,7 +67,7 @@ impl Laplace {
         let information: Vec<Vec<f64>> = (columns.iter())
             .map(|a| columns.iter().map(|b| dot(a, b)).collect())
             .collect();
-        let inverse = inverse(&information)?;
+        let inverse = inverse_of_positive(&information)?;
         // Of the innovations, at the scale of the residual.
         let factor = found.at.residual_variance();
         let covariance: Vec<Vec<f64>> = (inverse.iter())

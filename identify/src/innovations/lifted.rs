@@ -8,7 +8,7 @@
 //! samples. The steady covariance of the state's prediction comes from structured doubling of the Riccati equation.
 //! Reference: B. D. O. Anderson, J. B. Moore, "Optimal Filtering" (1979), chapters 3 to 6.
 
-use onecycle_design::state_space::{Matrix, add, congruent, identity, product, times};
+use onecycle_design::matrix::{Matrix, add, congruent, identity, inverse, product, times};
 
 /// Matrices of a block. See the [module](self).
 #[derive(Clone, Copy, Debug)]
@@ -213,33 +213,4 @@ fn symmetrise<const N: usize>(a: &mut Matrix<N>) {
 
 fn largest<const N: usize>(a: &Matrix<N>) -> f64 {
     a.iter().flatten().fold(0.0, |most, v| most.max(v.abs()))
-}
-
-/// Inverse by elimination with row pivots. `None` if the matrix is singular or not finite.
-fn inverse<const N: usize>(mut a: Matrix<N>) -> Option<Matrix<N>> {
-    let mut out = identity();
-    for column in 0..N {
-        let pivot =
-            (column..N).max_by(|&i, &j| a[i][column].abs().total_cmp(&a[j][column].abs()))?;
-        a.swap(column, pivot);
-        out.swap(column, pivot);
-        let scale = 1.0 / a[column][column];
-        if !scale.is_finite() {
-            return None;
-        }
-        for j in 0..N {
-            a[column][j] *= scale;
-            out[column][j] *= scale;
-        }
-        for i in 0..N {
-            if i != column {
-                let factor = a[i][column];
-                for j in 0..N {
-                    a[i][j] -= factor * a[column][j];
-                    out[i][j] -= factor * out[column][j];
-                }
-            }
-        }
-    }
-    Some(out)
 }

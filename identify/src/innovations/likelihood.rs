@@ -28,7 +28,7 @@
 
 use std::f64::consts::TAU as TWO_PI;
 
-use onecycle_design::state_space::{Matrix, add, congruent, product, times};
+use onecycle_design::matrix::{Matrix, add, congruent, product, times};
 
 use super::filter::{self, Run, runs};
 use super::lifted::{Lifted, row_times, transpose};

@@ -1,6 +1,6 @@
 //! What a fit predicts, row by row: simulation, one-step and far predictions, disturbance, rejected rows.
 
-use onecycle_design::state_space::times;
+use onecycle_design::matrix::times;
 
 use super::filter::Gains;
 use super::lifted::{dot, row_times};

@@ -10,7 +10,8 @@
 
 use std::collections::HashMap;
 
-use onecycle_design::state_space::{Matrix, StateSpace, Step, identity, product, times};
+use onecycle_design::matrix::{Matrix, identity, product, times};
+use onecycle_design::state_space::{StateSpace, Step};
 use onecycle_design::{Linear, Structure};
 
 use super::lifted::{dot, row_times};

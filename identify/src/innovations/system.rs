@@ -1,6 +1,7 @@
 //! A process under its noises as a linear system, and the states that it may start from.
 
-use onecycle_design::state_space::{Matrix, StateSpace, identity};
+use onecycle_design::matrix::{Matrix, identity};
+use onecycle_design::state_space::StateSpace;
 
 use super::lifted::{Lifted, Sample};
 use super::record::Blocks;

@@ -15,7 +15,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::Pcg64Mcg;
 
 use super::spectra::Spectra;
-use crate::cholesky::cholesky;
+use onecycle_design::matrix::cholesky;
 
 /// Most unknowns: gain, two lags or a lag and a pair, a pole, dead time.
 const MOST: usize = 6;

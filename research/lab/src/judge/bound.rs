@@ -5,7 +5,7 @@
 //! for its window and its prior, so both have seen the same data.
 
 use onecycle_design::soiptd_pd::deterioration::Deterioration;
-use onecycle_identify::cholesky::cholesky;
+use onecycle_design::matrix::cholesky;
 use onecycle_onboard::Soiptd;
 use onecycle_onboard::refine::{Refined, coordinate};
 use rand::SeedableRng;

@@ -11,7 +11,7 @@ use crate::learn::dataset::VALUES;
 use crate::learn::dataset::learning::LN_SAMPLES;
 use crate::learn::dataset::shards::ExampleRecord;
 use crate::learn::pack::{LeadTableContents, PackContents};
-use onecycle_identify::cholesky::cholesky;
+use onecycle_design::matrix::cholesky;
 
 /// Part of the family's cycles that are called unknown: the allowed 2 % minus twice the standard error
 /// of this number of experiments.
