@@ -21,6 +21,10 @@ use crate::remark::Remark;
 use crate::sampling;
 use crate::settings::Options;
 use crate::signals::Signals;
+use crate::thresholds::{
+    EXTRAPOLATED, LEADING, LEAST_ASYMMETRY, LEAST_GAIN_MARGIN, MOST_LATE_S, MOST_NOISE,
+    MUCH_BETWEEN_RAD,
+};
 use crate::verdict::Verdict;
 
 /// How early and how late a relay may switch after the output has reached its ratio, with both columns on one clock.
@@ -48,25 +52,8 @@ const AT_MOST: Tolerance = Tolerance {
     early_per_noise: 1.0,
     late: 0.015,
 };
-/// Distance of the share of time high from one half above which a relay may have halved its ratio on one side. Of a
-/// benchmark's relays that did, none lay below 0.056.
-const LEAST_ASYMMETRY: f64 = 0.04;
-/// Ratio above which a relay is plain or has hysteresis. A relay with a lower ratio switches before the output crosses the
-/// reference (it leads), and oscillates near the crossover of any controller: of 630 loops on processes with a flexible mode 9 were unstable, all with a crossover
-/// below 1.2 times the frequency of the oscillation.
-const LEADING: f64 = -0.05;
-/// Latest input (s) that a clock explains: columns of one log lie milliseconds apart, at worst a period of its slowest message. A relay
-/// that switches later has hysteresis.
-const MOST_LATE_S: f64 = 1.0;
-/// Phase margin (rad) that a sample period costs, above which it matters when between two samples the relay switches.
-const MUCH_BETWEEN_RAD: f64 = 0.05;
-/// Crossover over the highest excited frequency above which a remark says so, and the rounding of its limit.
-const EXTRAPOLATED: f64 = 1.5;
+/// Rounding of the limit of a crossover.
 const ROUNDING: f64 = 1.01;
-/// Least gain margin without a remark: 6 dB.
-const LEAST_GAIN_MARGIN: f64 = 2.0;
-/// Largest noise at the actuator without a remark, as a share of the amplitude of the input.
-const MOST_NOISE: f64 = 0.1;
 
 /// Adds to a result what its fit cannot see, and withdraws what rests on too little.
 pub(crate) fn check(

@@ -6,10 +6,9 @@ use crate::innovations::gain_of;
 use crate::outcome::{Fit, Identified};
 use crate::posterior::Posterior;
 use crate::remark::Remark;
+use crate::thresholds::MOST_WIDTH;
 use crate::verdict::Verdict;
 
-/// Half width of the 90 % interval of the gain, over the estimate, above which the record tells nothing.
-const MOST_WIDTH: f64 = 0.5;
 /// That half width in standard deviations of a normal distribution.
 const HALF_WIDTH: f64 = 1.645;
 

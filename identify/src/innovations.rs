@@ -77,6 +77,10 @@ use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::Options;
 use crate::signals::{Signals, is_constant};
+use crate::thresholds::{
+    ANOTHER_KIND, BEYOND_DOUBT, EXPECTED_ERROR_RATIO, LEAST_POWER, LEAST_PREDICTED, MOST_DEVIATION,
+    MOST_ERROR_RATIO, STRONGLY_COLOURED, WELL_PREDICTED,
+};
 use crate::verdict::Verdict;
 
 /// Longest dead time as a share of the record.
@@ -84,25 +88,6 @@ const LONGEST_TAU: f64 = 1.0 / 8.0;
 /// Rows of the final fit, unless a row would be longer than the dead time with the shortest lag, or with the time in which
 /// the disturbance outgrows the noise.
 pub(crate) const ROWS: usize = 1200;
-/// Relative standard deviation of the gain above which the record tells nothing.
-const MOST_DEVIATION: f64 = 0.3;
-/// Share of the input's power in the informative band below which a fit rests on rounding errors, as that of a sine does
-/// which has nothing to do with the output. A relay has 0.1 % beyond its 140th harmonic.
-const LEAST_POWER: f64 = 1e-5;
-/// Autocorrelation of the innovations above which an error of the prediction is the model's fault.
-const STRONGLY_COLOURED: f64 = 0.3;
-/// Share of the input and its F statistic above which the model is of another kind, if it also predicts little.
-const ANOTHER_KIND: (f64, f64) = (0.2, 3.0);
-/// Explained share of the last third below which a fit gets a remark, and below which it is refused.
-const WELL_PREDICTED: f64 = 0.9;
-const LEAST_PREDICTED: f64 = 0.7;
-/// Explained share of the last third from which coloured innovations are no reason to refuse: where noise is that small,
-/// they show errors of the model that do not matter.
-const BEYOND_DOUBT: f64 = 0.98;
-/// Mean square of the prediction's error over what the disturbances explain, above which a weak prediction gets a remark,
-/// and above which the model is at fault.
-const EXPECTED_ERROR_RATIO: f64 = 2.0;
-const MOST_ERROR_RATIO: f64 = 4.0;
 
 /// Shares of the time after the fit and after its tests, without the controller: of hover, flight and heater recordings.
 const FITTED: f64 = 0.8;

@@ -33,20 +33,16 @@ use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::Options;
 use crate::signals::{Signals, range};
+use crate::thresholds::{CONTRADICTED, MOST_COST};
 use crate::verdict::Verdict;
 
 /// Decrease of the sum of squares from which a lag or damping shows: one chance in ten. A parameter that is missing makes the
 /// others wrong and their intervals too narrow; one that is not needed only widens these.
 const SHOWN: f64 = 2.7;
-/// Sum of squared errors over its degrees of freedom above which no structure explains the response. Of 120
-/// simulated closed loops one exceeded it.
-const MOST_COST: f64 = 2.0;
 /// Golden ratio, whose multiples' fractions are even.
 const GOLDEN: f64 = 0.618_033_988_749_895;
 /// Least share of the posterior on each side of the best fit.
 const LEAST_SIDE: f64 = 0.05;
-/// Difference of the sum of squares that is beyond chance: more than six standard deviations.
-const CONTRADICTED: f64 = 40.0;
 
 /// Identifies the process from a record with its set-point, one value for each point.
 ///

@@ -19,11 +19,8 @@ use crate::relay;
 use crate::remark::Remark;
 use crate::settings::Options;
 use crate::signals::{Signals, range};
+use crate::thresholds::{LEAST_SAMPLE_S, MOST_INPUT_F};
 use crate::verdict::Verdict;
-
-/// F statistic of the past input in the innovations, of the usual number of rows, up to which a fit owes nothing to the input:
-/// chance exceeds it once in a hundred records.
-const MOST_INPUT_F: f64 = 1.88;
 
 pub(crate) fn identify(
     signals: &Signals<'_>,
@@ -43,9 +40,6 @@ pub(crate) fn identify(
         None => checked(&corrected, options, pack),
     }
 }
-
-/// Least sample period (s): the clocks of a record are compared to the nanosecond.
-const LEAST_SAMPLE_S: f64 = 1e-9;
 
 fn checked(signals: &Signals<'_>, options: &Options, pack: Option<&Pack<'_>>) -> Identification {
     if signals.sample_period_s < LEAST_SAMPLE_S {

@@ -38,6 +38,7 @@ mod remarks;
 mod sampling;
 mod settings;
 mod signals;
+mod thresholds;
 mod two_amplitudes;
 mod two_stage;
 mod verdict;

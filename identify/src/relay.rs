@@ -40,16 +40,8 @@ use crate::remark::Remark;
 use crate::remarks;
 use crate::settings::{MOST_CYCLES, Method, Options};
 use crate::signals::Signals;
+use crate::thresholds::{MOST_ERROR_OF_SECOND_CHOICE, MOST_TENSION};
 use crate::verdict::Verdict;
-
-/// Relative error of the frequency response above which a stretch is refused after an earlier one was refused (0.34 for
-/// the first stretch). A gust disturbs some stretches only; a resonance, which the model lacks, disturbs all of them.
-const MOST_ERROR_OF_SECOND_CHOICE: f64 = 0.05;
-
-/// Squared distance, in standard deviations of the residual, by which the prior of the pack may move the fit. Of 40
-/// multirotors none exceeded 6.1; of 40 processes with an actuator lag of 3 to 5 ms, a fifth to a third of the shortest
-/// in the pack, half exceeded 8.
-const MOST_TENSION: f64 = 9.0;
 
 /// Identifies the process from a recorded relay test. For `pack` see [`identify_by`](crate::identify_by).
 pub(crate) fn identify(

@@ -6,28 +6,9 @@ use crate::excitation::Oscillation;
 use crate::outcome::{Identification, Identified};
 use crate::reading::Reading;
 use crate::remark::Remark;
-
-/// Noise over amplitude above which the relay needs its protection against switching on noise.
-const MUCH_NOISE: f64 = 0.05;
-/// Samples per period below which one sample is more than 10 degrees of the oscillation, half of a phase margin of 20
-/// degrees.
-const FEW_SAMPLES: f64 = 360.0 / 10.0;
-/// Relative half widths of intervals above which a parameter is weakly determined.
-const WIDE: [(Parameter, f64); 3] = [
-    (Parameter::KOverTBody, 0.1),
-    (Parameter::TProp, 0.3),
-    (Parameter::TBody, 0.5),
-];
-/// Width of the interval of the dead time over the period above which the dead time is weakly determined: 0.03 periods
-/// are 11 degrees of phase.
-const WIDE_DELAY: f64 = 0.03;
-/// Input bias over relay amplitude above which the bias is large. A relay that is asymmetric on purpose, usually by
-/// 0.2, shows a bias of 0.2.
-const MUCH_BIAS: f64 = 0.25;
-/// Misfit above which the model visibly differs from the process.
-const MUCH_MISFIT: f64 = 0.01;
-/// Lower end of the phase margin over the specified phase margin below which the margin is in doubt.
-const LITTLE_MARGIN: f64 = 0.75;
+use crate::thresholds::{
+    FEW_SAMPLES, LITTLE_MARGIN, MUCH_BIAS, MUCH_MISFIT, MUCH_NOISE, WIDE, WIDE_DELAY,
+};
 
 /// Remarks on `found`, for which `cycles` cycles were requested.
 pub(crate) fn remarks(found: &Identification, has_pack: bool, cycles: usize) -> Vec<Remark> {

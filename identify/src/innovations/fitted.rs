@@ -11,15 +11,14 @@ use super::prepare::Prepared;
 use super::record::{Blocks, Hold, Record};
 use super::search::{self, Candidate};
 use super::theta::{Bounds, NoiseKind, Theta};
-use super::{
-    LEAST_PREDICTED, LONGEST_TAU, MOST_ERROR_RATIO, ROWS, forces, outliers, output_error, validate,
-};
+use super::{LONGEST_TAU, ROWS, forces, outliers, output_error, validate};
 use crate::assumed::RecordedLoop;
 use crate::outcome::Prediction;
 use crate::progress;
 use crate::remark::Remark;
 use crate::settings::Options;
 use crate::signals::range;
+use crate::thresholds::{LEAST_PREDICTED, MOST_ERROR_RATIO};
 use crate::verdict::Verdict;
 
 /// Time at the start whose outputs are left out while the dead time is not known, as a share of the record. Most records

@@ -30,13 +30,11 @@ use super::search::{self, Candidate};
 use super::system::{System, by_size};
 use super::theta::{Bounds, Theta};
 use super::validate;
+use crate::thresholds::LEFT_UNDER_FEEDBACK;
 
 /// Simulated disturbances: the test errs once in this number of records plus one.
 const SIMULATED: usize = 99;
 const SEED: u64 = 1;
-/// Share of the output's square that may be left under feedback. An input that followed all of the disturbance would bias the
-/// response by the root of it, 20 %; it follows a part of it.
-const LEFT_UNDER_FEEDBACK: f64 = 0.04;
 const PATIENCE: Patience = Patience {
     steps: 40,
     decrease: 1e-6,

@@ -8,9 +8,8 @@ use std::ops::Range;
 
 use super::arx::Arx;
 use super::record::Blocks;
+use crate::thresholds::SURE;
 
-/// Distance of the root from one, in standard deviations, from which the process is unstable.
-const SURE: f64 = 4.0;
 /// Largest ratio of the rates of two halves: coloured noise moves the root outwards by other amounts.
 const ALIKE: f64 = 1.5;
 

@@ -12,17 +12,10 @@ use super::search;
 use super::theta::Theta;
 use crate::outcome::{InnovationTests, Prediction};
 use crate::signals::range;
+use crate::thresholds::{CALM_END, COLOURED, FED_BACK, LEFT};
 
 /// Lags of the tests.
 const LAGS: usize = 20;
-/// Autocorrelation below which innovations count as white.
-const COLOURED: f64 = 0.1;
-/// Share of the innovations and its F statistic up to which the input explains nothing.
-const LEFT: (f64, f64) = (0.02, 3.0);
-/// Share of the changes of the input in the last third, which has a third of them in a steady test, below which the end is calm.
-const CALM_END: f64 = 0.1;
-/// F statistic of twenty past outputs in the input that chance exceeds once in a hundred records.
-const FED_BACK: f64 = 1.88;
 /// Most rows between which a correlation is computed exactly; frequencies of the information's spectrum.
 const FREQUENCIES: usize = 120;
 
