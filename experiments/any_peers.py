@@ -1,4 +1,4 @@
-"""The general estimator beside other programs, on the same recordings.
+"""The likelihood beside other programs, on the same recordings.
 
     python any_peers.py --onecycle PATH/TO/onecycle -o any-peers           # all methods
     python any_peers.py --onecycle PATH/TO/onecycle -o any-peers-w0 --disturbance w0=10 --methods onecycle,scipy-filtered
@@ -12,7 +12,7 @@ the amplitude, constant input bias. Needs numpy and scipy; `sippy_unipi` for sip
 for octave-*. Versions that the table was made with: numpy 2.4.6, scipy 1.17.1, sippy_unipi 1.0.1, Octave 7.3 with control
 3.4.0.
 
-onecycle       the general estimator, structure given
+onecycle       the likelihood, structure given
 onecycle-auto  `onecycle identify` without any option
 scipy          output error: `least_squares` on the logarithms of T_prop, T_body and tau, with x_scale and diff_step set;
                exact response to the held input at any delay; gain, input bias and the three initial states are linear

@@ -1,4 +1,4 @@
-//! Time of the general estimator, the choice of the structure included: 20 s at 1 kHz, and 30 min at 400 Hz.
+//! Time of the likelihood, the choice of the structure included: 20 s at 1 kHz, and 30 min at 400 Hz.
 
 use divan::Bencher;
 use onecycle_design::{Linear, Structure};

@@ -46,7 +46,7 @@ const LEAST_SIDE: f64 = 0.05;
 
 /// Identifies the process from a record with its set-point, one value for each point.
 ///
-/// `recorded`: what the general estimator found out about the record.
+/// `recorded`: what the likelihood found out about the record.
 #[must_use]
 pub fn identify_by_set_point(
     signals: &Signals<'_>,

@@ -276,7 +276,7 @@ pub struct ResponsePoint {
     pub fitted: Complex64,
 }
 
-/// Result of the general estimator: the innovations, which are what a Kalman filter of the model could not predict.
+/// Result of the likelihood: the innovations, which are what a Kalman filter of the model could not predict.
 #[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Innovations {

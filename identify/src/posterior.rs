@@ -41,7 +41,7 @@ const SEARCHED_MARGINS: usize = 1000;
 /// deviation.
 const STEPS: usize = 200;
 
-/// What the general estimator draws.
+/// What the likelihood draws.
 pub(crate) struct Drawn {
     pub(crate) process: Linear,
     /// Constant disturbance at the process input (input unit).
@@ -94,7 +94,7 @@ impl Draw {
         }
     }
 
-    /// Draw of the general estimator.
+    /// Draw of the likelihood.
     fn of_linear(drawn: &Drawn, reported: Structure) -> Self {
         let process = drawn.process;
         let [c1, c0] = process.pair();
@@ -215,7 +215,7 @@ impl Posterior {
         }
     }
 
-    /// Posterior of the general estimator about `best`: draws from a mixture. `draw` turns a component, by its index, and
+    /// Posterior of the likelihood about `best`: draws from a mixture. `draw` turns a component, by its index, and
     /// standard normal numbers into a process.
     pub(crate) fn of_mixture(
         best: &Linear,

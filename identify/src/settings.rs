@@ -42,7 +42,7 @@ pub struct Options {
     /// whether the process was at rest.
     pub is_under_way: bool,
     /// Cutoff (Hz) of a second-order Butterworth low-pass through which the output was recorded, as that of a gyro. The
-    /// general estimator takes it out of the output and adds its delay to the dead time.
+    /// likelihood takes it out of the output and adds its delay to the dead time.
     pub output_filter_hz: Option<f64>,
 }
 

@@ -271,7 +271,7 @@ impl Verdict {
         }
     }
 
-    /// Clause of a verdict of the general estimator.
+    /// Clause of a verdict of the likelihood.
     fn write_record(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::TooFewRows { rows, needed } => write!(

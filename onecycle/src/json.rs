@@ -288,7 +288,7 @@ impl Serialize for DesignReport {
 }
 
 impl Report {
-    /// The report with the fit of the general estimator row by row.
+    /// The report with the fit of the likelihood row by row.
     pub fn with_rows(&self) -> impl Serialize + '_ {
         identification(self, true)
     }

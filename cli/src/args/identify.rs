@@ -46,7 +46,7 @@ pub(crate) struct Identify {
     /// Print the report as JSON (schema: docs/identify-json.md)
     #[arg(long)]
     pub(crate) json: bool,
-    /// With --json: add the fit of the general estimator row by row (measured, simulated and predicted output,
+    /// With --json: add the fit of the likelihood row by row (measured, simulated and predicted output,
     /// innovation, disturbance)
     #[arg(long, help_heading = ESTIMATION, requires = "json")]
     pub(crate) rows: bool,

@@ -1,4 +1,4 @@
-//! What the general estimator used, chose and checked, as rows of a name and a value, for the text and the page.
+//! What the likelihood used, chose and checked, as rows of a name and a value, for the text and the page.
 
 use onecycle::{Identification, Innovations, Recorded, SetPointResponse, Structure};
 use onecycle_identify::{Alternative, InnovationTests, Noise, Prediction};

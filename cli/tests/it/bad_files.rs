@@ -263,7 +263,7 @@ fn holes_in_every_cycle() {
     let report = identify(table.csv(), &relay).no_process("too_short");
     let message = report.0["verdict"]["message"].as_str().unwrap();
     assert!(message.contains("gaps"), "{message}");
-    // One part without a gap is enough for the general estimator, and the remarks say which.
+    // One part without a gap is enough for the likelihood, and the remarks say which.
     let report = identify(table.csv(), &[]).identified();
     report.near("k_over_t_body", HOVER_K_OVER_T_BODY, 0.01);
     let kinds = report.0["remark_kinds"].as_array().unwrap();

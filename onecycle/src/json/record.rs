@@ -1,4 +1,4 @@
-//! What the general estimator adds to the report of an identification.
+//! What the likelihood adds to the report of an identification.
 
 use onecycle_identify as identify;
 use onecycle_identify::{Hold, Innovations, Recorded};

@@ -122,7 +122,7 @@ fn of_recording(remark: &Remark) -> Option<String> {
     })
 }
 
-/// Remarks of the general estimator on the data.
+/// Remarks of the likelihood on the data.
 fn of_record(remark: &Remark) -> Option<String> {
     Some(match *remark {
         Remark::Absent(part) => format!(
@@ -318,7 +318,7 @@ mod tests {
 
     use super::*;
 
-    // The text of the reports is checked as a whole for relay tests; here what the general estimator adds.
+    // The text of the reports is checked as a whole for relay tests; here what the likelihood adds.
     #[test]
     fn every_remark_on_a_record_has_a_sentence() {
         let remarks = [

@@ -89,7 +89,7 @@ fn without_controller(error: &DesignError) -> &'static str {
     }
 }
 
-/// Verdicts of the general estimator.
+/// Verdicts of the likelihood.
 fn of_record(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::TooFewRows { .. } => {
@@ -243,7 +243,7 @@ mod tests {
         }
     }
 
-    // Every verdict of the general estimator has advice of its own, in one sentence.
+    // Every verdict of the likelihood has advice of its own, in one sentence.
     #[test]
     fn every_verdict_on_a_record_has_advice() {
         let verdicts = [

@@ -86,7 +86,7 @@ pub enum Measure {
     /// [kind](crate::experiments::defect::DefectKind), and five times as many of the family. The noise is
     /// uniform from zero.
     Unknown,
-    /// Errors, intervals and structures of the general estimator on any recording; the file describes a
+    /// Errors, intervals and structures of the likelihood on any recording; the file describes a
     /// [`RecordingCampaign`](super::RecordingCampaign).
     Recording,
     /// Whether wrong data are refused or named; the file describes an [`HonestyCampaign`](super::HonestyCampaign).

@@ -12,7 +12,7 @@ use crate::experiments::recording::SimulatedRecording;
 use crate::experiments::signals_of;
 use crate::judge::promises::{PROMISES, Promise, promises};
 
-/// Result of the general estimator on a recording, beside the truth.
+/// Result of the likelihood on a recording, beside the truth.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RecordingOutcome {
@@ -70,7 +70,7 @@ pub fn recording_outcome(recording: &SimulatedRecording, options: &Options) -> R
     }
 }
 
-/// Name of a verdict, one for each threshold of the general estimator.
+/// Name of a verdict, one for each threshold of the likelihood.
 fn reason(verdict: &Verdict) -> &'static str {
     match verdict {
         Verdict::NoFit => "no_fit",

@@ -96,7 +96,7 @@ pub(crate) struct MakeBench {
     "  onecycle-lab bench run relay-benchmark --methods onecycle-2,pem-fair -o results\n\n",
     "Methods on the recordings, all run by default: onecycle-1, onecycle-2, onecycle-4 (cycles),\n",
     "onecycle-1-point (controller of the most probable process), onecycle-1-refine (no prior),\n",
-    "onecycle-whole (everything, by the general estimator), network, pem, pem-offset, pem-fair, rules,\n",
+    "onecycle-whole (everything, by the likelihood), network, pem, pem-offset, pem-fair, rules,\n",
     "rules-exact, rules-harmonic, arx, arx-scaled, arx-gmvc. The methods pem-sweep, pem-sweep-offset and\n",
     "asymmetric use a relay test of their own, simulated on the true process with the same bias, noise and\n",
     "seed. With 'none', only --answers are scored. Times are processor times.\n\n",

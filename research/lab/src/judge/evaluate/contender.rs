@@ -20,7 +20,7 @@ pub enum Contender {
     OneCyclePoint,
     /// The same from one cycle, by least squares without the prior of the pack.
     OneCycleRefine,
-    /// Our general estimator, from the whole recording, structure given.
+    /// Our likelihood, from the whole recording, structure given.
     OneCycleWhole,
     /// The network of the pack alone, from the last cycle.
     Network,
@@ -200,7 +200,7 @@ fn steady(cycles: usize, method: Method) -> Options {
     Options::default().cycles(cycles).method(method)
 }
 
-/// Our general estimator on the whole recording. Every method is told the structure.
+/// Our likelihood on the whole recording. Every method is told the structure.
 fn whole() -> Options {
     Options::default().structure(Some(Structure::Soiptd))
 }
