@@ -18,7 +18,7 @@ use crate::outcome::Identification;
 use crate::relay;
 use crate::remark::Remark;
 use crate::settings::Options;
-use crate::signals::{Signals, range};
+use crate::signals::{Signals, is_constant, range};
 use crate::thresholds::{LEAST_SAMPLE_S, MOST_INPUT_F};
 use crate::verdict::Verdict;
 
@@ -126,11 +126,13 @@ fn judged(signals: &Signals<'_>, options: &Options) -> Identification {
                 found.refuse(verdict);
             }
         }
-        Some(Err(verdict @ (Verdict::NotSteady { .. } | Verdict::Saturated { .. })))
-            if found.outcome.is_err() =>
-        {
-            found.outcome = Err(verdict);
-        }
+        // One row at another level is no relay, but an input that changes.
+        Some(Err(Verdict::ConstantInput)) if !is_constant(used.input) => {}
+        Some(Err(
+            verdict @ (Verdict::ConstantInput
+            | Verdict::NotSteady { .. }
+            | Verdict::Saturated { .. }),
+        )) if found.outcome.is_err() => found.outcome = Err(verdict),
         // Complex poles explain a limit cycle that the input does not drive.
         Some(Err(verdict @ Verdict::NotSteady { .. }))
             if is_oscillating(&found) && !owes_nothing(&found) =>

@@ -1,6 +1,6 @@
 //! Step tests, square waves and drift: recordings without a steady oscillation, against exact solutions.
 
-use onecycle_design::Parameter;
+use onecycle_design::{Parameter, Structure};
 use onecycle_identify::{Identification, Options, Remark, Signals, Verdict, identify};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -82,6 +82,14 @@ fn a_step_is_answered_after_any_time_of_rest() {
         let test = Test::of(&[(f64::from(rest), 0.5)], 3000 + rest as usize);
         is_heater(&test.identify(&Options::default()), &format!("{rest} rows"));
     }
+}
+
+// Of a step in the second row the search without rest finds nothing in this structure; at rest there is a fit.
+#[test]
+fn a_stated_structure_is_tried_at_rest_too() {
+    let test = Test::of(&[(1.0, 0.5)], 3001);
+    let stated = Options::default().structure(Some(Structure::Toptd));
+    is_heater(&test.identify(&stated), "stated");
 }
 
 // The input before the first row is not in the recording: it is taken as zero, and a remark says so, or stated.
