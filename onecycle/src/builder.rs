@@ -49,6 +49,11 @@ impl<'a> Identify<'a> {
         }
     }
 
+    /// Whether both have the same settings; their packs are not compared.
+    pub(crate) fn is_set_like(&self, other: &Identify<'_>) -> bool {
+        self.options == other.options
+    }
+
     /// Fits the last `cycles` steady cycles of a relay test instead of the whole recording. Values outside 1 to 50 are set to the
     /// nearest limit. More cycles narrow the intervals; fewer follow a process that drifts.
     pub fn cycles(self, cycles: usize) -> Self {

@@ -1,8 +1,8 @@
 //! From a request to its report.
 
 use onecycle_design::Specification;
-use onecycle_identify::Verdict;
 use onecycle_identify::progress::part;
+use onecycle_identify::{Identification, Verdict};
 use onecycle_link::{Recording, Span};
 use onecycle_onboard::pack::{Pack, SELF_TEST_TOLERANCE};
 
@@ -23,6 +23,23 @@ use crate::words::units::Units;
 const CHOSEN: f64 = 0.6;
 const IDENTIFIED: f64 = 0.9;
 
+/// What a source gives: the recording, the loop of the flight log that it is, and what was identified from it to choose its part.
+struct Taken {
+    recording: Recording,
+    of_log: Option<LogLoop>,
+    found: Option<Identification>,
+}
+
+impl From<Recording> for Taken {
+    fn from(recording: Recording) -> Self {
+        Self {
+            recording,
+            of_log: None,
+            found: None,
+        }
+    }
+}
+
 impl Request {
     /// Identifies from a table or from a loop of a flight log, without a choice of the part from the one that tells most. Files with
     /// parameters are made, not written.
@@ -36,10 +53,10 @@ impl Request {
             true => CHOSEN,
             false => 0.0,
         };
-        let (recording, of_log) = part(0.0..read, || self.recording(source, asked))?;
-        let in_force = InForce::of(&self.requirements, Some((source, &recording)))?;
+        let taken = part(0.0..read, || self.recording(source, asked))?;
+        let in_force = InForce::of(&self.requirements, Some((source, &taken.recording)))?;
         part(read..1.0, || {
-            self.report(source.name(), (recording, of_log), asked, in_force)
+            self.report(source.name(), taken, asked, in_force)
         })
     }
 
@@ -51,7 +68,7 @@ impl Request {
         let in_force = InForce::of(&self.requirements, None)?;
         self.report(
             name.to_owned(),
-            (recording, None),
+            Taken::from(recording),
             self.specification()?,
             in_force,
         )
@@ -90,45 +107,53 @@ impl Request {
     /// # Errors
     /// As [`identify`](Self::identify).
     pub fn read(&self, source: &dyn Source) -> Result<Recording, Error> {
-        Ok(self.recording(source, self.specification()?)?.0)
+        Ok(self.recording(source, self.specification()?)?.recording)
     }
 
-    /// The recording, and the loop of the flight log that it is.
-    fn recording(
-        &self,
-        source: &dyn Source,
-        asked: Specification,
-    ) -> Result<(Recording, Option<LogLoop>), Error> {
+    fn recording(&self, source: &dyn Source, asked: Specification) -> Result<Taken, Error> {
         let name = source.name();
         if !source::is_flight_log(source) {
             self.check_table(source)?;
-            return Ok((source::table(source, &self.columns)?, None));
+            return Ok(Taken::from(source::table(source, &self.columns)?));
         }
         self.check_log(&name)?;
         let file = LogFile::scan(source)?;
         let (signals, of_log) = LogLoop::of(&file, self)?;
         let part = match self.from_s.is_some() || self.to_s.is_some() {
             // As the table of all loops cuts its parts: what is not asked for does not matter.
-            true => Some(Span::new(
-                self.from_s.unwrap_or(f64::NEG_INFINITY),
-                self.to_s.unwrap_or(f64::INFINITY),
-            )),
+            true => {
+                let from_s = self.from_s.unwrap_or(f64::NEG_INFINITY);
+                Some((Span::new(from_s, self.to_s.unwrap_or(f64::INFINITY)), None))
+            }
             false => of_log.as_ref().and_then(|of_log| {
                 let asked = of_log.specification(asked, self.requirements.controller.is_some());
                 survey::best_part(&signals, of_log.flight(), &asked)
             }),
         };
-        let signals = part.map_or_else(|| signals.clone(), |part| signals.part(part));
-        Ok((file.recording(&signals)?, of_log))
+        let (signals, found) = match part {
+            Some((span, found)) => (signals.part(span), found),
+            None => (signals, None),
+        };
+        Ok(Taken {
+            recording: file.recording(&signals)?,
+            of_log,
+            found,
+        })
     }
 
     fn report(
         &self,
         name: String,
-        (recording, of_log): (Recording, Option<LogLoop>),
+        taken: Taken,
         asked: Specification,
         set: InForce,
     ) -> Result<Report, Error> {
+        let Taken {
+            recording,
+            of_log,
+            found,
+        } = taken;
+        let in_table = asked;
         self.check_span(recording.time_s())?;
         let asked = set.law(asked);
         let asked = of_log.as_ref().map_or(asked, |of_log| {
@@ -140,7 +165,16 @@ impl Request {
         if let Some(file) = &self.pack {
             identify = identify.pack(usable(file)?);
         }
-        let mut identification = part(0.0..IDENTIFIED, || identify.run(&recording));
+        // As in the table of all loops, unless something else is asked for.
+        let is_found = of_log.as_ref().is_some_and(|of_log| {
+            let asked = of_log.specification(in_table, self.requirements.controller.is_some());
+            let of_table = survey::manner(asked, of_log.control_loop());
+            self.pack.is_none() && identify.is_set_like(&of_table)
+        });
+        let mut identification = match found.filter(|_| is_found) {
+            Some(found) => found,
+            None => part(0.0..IDENTIFIED, || identify.run(&recording)),
+        };
         let in_force = || of_log.as_ref().and_then(LogLoop::in_force);
         let against = set.against.or_else(in_force);
         let identified = identification.outcome.as_ref().ok();

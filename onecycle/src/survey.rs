@@ -4,10 +4,11 @@ use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
 use onecycle_design::{Parameter, Specification, Structure};
 use onecycle_identify::progress::{one_of, part};
-use onecycle_identify::{Identified, Verdict};
+use onecycle_identify::{Identification, Identified, Verdict};
 use onecycle_link::{Change, ControlLoop, Flight, Signals, Span};
 
 use crate::answer;
+use crate::builder::Identify;
 use crate::error::Error;
 use crate::log_gains::{self, LogLoop};
 use crate::request::Request;
@@ -130,15 +131,28 @@ fn of_loop(
     Ok(one)
 }
 
-/// The part of a flight that tells most about a loop, as in the table of all loops; if none tells anything, from the first
-/// part to the last. `None`: no part is worth using.
-pub(crate) fn best_part(signals: &Signals, flight: &Flight, asked: &Specification) -> Option<Span> {
-    let (one, _) = parts(signals, flight, asked);
+/// The part of a flight that tells most about a loop, as in the table of all loops, with what was identified from it; if none tells
+/// anything, from the first part to the last. `None`: no part is worth using.
+pub(crate) fn best_part(
+    signals: &Signals,
+    flight: &Flight,
+    asked: &Specification,
+) -> Option<(Span, Option<Identification>)> {
+    let (one, shown) = parts(signals, flight, asked);
     let spans = one.parts.iter().map(|part| part.span);
     match one.best() {
-        Some(best) => Some(one.parts[best].span),
-        None => spans.reduce(Span::with),
+        Some(best) => {
+            let found = shown.into_iter().nth(best).map(|of| of.identification);
+            Some((one.parts[best].span, found))
+        }
+        None => Some((spans.reduce(Span::with)?, None)),
     }
+}
+
+/// How the parts of a flight are identified.
+pub(crate) fn manner(asked: Specification, of: ControlLoop) -> Identify<'static> {
+    let structure = log_gains::structure(of);
+    Identify::new().specification(asked).structure(structure)
 }
 
 /// A loop with the parts of the flight worth using, and what was identified from each.
@@ -192,10 +206,7 @@ fn parts(signals: &Signals, flight: &Flight, asked: &Specification) -> (FlightLo
 /// What was identified from a part. `None`: its signals make no recording.
 fn identified(part: &Signals, asked: &Specification) -> Option<Shown> {
     let recording = part.recording().ok()?;
-    let identify = (crate::Identify::new())
-        .specification(*asked)
-        .structure(log_gains::structure(part.control_loop));
-    let mut identification = identify.run(&recording);
+    let mut identification = manner(*asked, part.control_loop).run(&recording);
     // Of several parts one that knows its gain to less than a factor of two tells nothing.
     let tells = |found: &Identified| {
         let gain = found.effectiveness();
