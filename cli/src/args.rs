@@ -179,8 +179,8 @@ pub fn named<T: Copy + Send + Sync>(
     "  onecycle tune --ultimate-gain 35 --ultimate-period 28\n",
     "  onecycle tune --relay 90 --amplitude 3.28 --ultimate-period 27.8\n",
     "  onecycle tune --rule marlin --against 20.95,1.51,72.77\n\n",
-    "A process is a structure with its parameters: K or K/T_body, T_prop, T_prop2, T_body (or T), w0, zeta, ",
-    "tau.\nStructures: iptd, integrator_lag, double_integrator_lag, soiptd, toiptd, foptd, soptd, toptd, resonant, ",
+    "A process is a structure with its parameters: K or K/T_body, T or T1, T2, T3 from the longest lag, w0, zeta, ",
+    "tau; T_prop and T_body of a body behind its actuator.\nStructures: iptd, integrator_lag, double_integrator_lag, soiptd, toiptd, foptd, soptd, toptd, resonant, ",
     "resonant_lag."
 ))]
 pub(crate) struct Tune {

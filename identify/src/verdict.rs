@@ -285,13 +285,13 @@ impl Verdict {
             } if *deviation < 1.0 => write!(
                 f,
                 "no information: the standard deviation of {} is {:.0} % of its value",
-                parameter.symbol(),
+                gain_or(*parameter),
                 100.0 * deviation
             ),
             Self::NoInformation { parameter, .. } => write!(
                 f,
                 "no information: the recording does not tell {}",
-                parameter.symbol()
+                gain_or(*parameter)
             ),
             Self::AtBound(parameter) => write!(
                 f,
@@ -406,5 +406,13 @@ impl Verdict {
             Self::NoController(error) => write!(f, "no controller: {error}"),
             _ => f.write_str(self.kind()),
         }
+    }
+}
+
+/// A gain is called that: whether it is `K` or `K/T` depends on the structure.
+fn gain_or(parameter: Parameter) -> &'static str {
+    match parameter {
+        Parameter::K | Parameter::KOverTBody => "the gain",
+        other => other.symbol(),
     }
 }

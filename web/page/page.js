@@ -417,6 +417,12 @@ const identify = async () => {
   showResult();
 };
 at("identify").onclick = identify;
+// Lags of a process that is no body with its actuator: as the program calls them.
+const LAGS = {
+  foptd: { t_body_s: "T (s)", k_over_t_body: "K/T" }, integrator_lag: { t_prop_s: "T (s)" }, resonant_lag: { t_prop_s: "T (s)" },
+  soptd: { t_body_s: "T1 (s)", k_over_t_body: "K/T1", t_prop_s: "T2 (s)" },
+  toptd: { t_body_s: "T1 (s)", k_over_t_body: "K/T1", t_prop_s: "T2 (s)", t_prop2_s: "T3 (s)" },
+};
 const SYMBOLS = {
   k: "K", k_over_t_body: "K/T_body", t_prop_s: "T_prop (s)", t_prop2_s: "T_prop2 (s)", t_body_s: "T_body (s)", tau_s: "tau (s)",
   natural_frequency_rad_per_s: "w0 (rad/s)", zeta: "zeta", input_bias: "input bias",
@@ -433,7 +439,7 @@ const showResult = () => {
   const of = (name, value) => report.below?.includes(name) ? [`below ${shown(value.high)}`, "", ""] : [value.estimate, value.low, value.high].map((end) => shown(end));
   const rows = Object.entries(found).filter(([, value]) => value && typeof value === "object" && "low" in value);
   at("parameters").hidden = !rows.length;
-  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([SYMBOLS[name] ?? name.replaceAll("_", " "), ...of(name, value)])));
+  at("parameters").tBodies[0].replaceChildren(...rows.map(([name, value]) => row([LAGS[report.structure]?.[name] ?? SYMBOLS[name] ?? name.replaceAll("_", " "), ...of(name, value)])));
   const groups = [["Remarks", report.remarks], ["Details", report.details]];
   at("remarks").replaceChildren(...groups.filter(([, all]) => all.length).flatMap(([title, all]) => {
     const list = make("ul");
@@ -692,15 +698,15 @@ at("save-restore").onclick = () => saveParameters("restore", isWhole, "Saved: th
 // Parameters, and a test that tells the process: the test of the page lists and tries each of them.
 const PROCESSES = {
   soiptd: ["K=1, T_prop=0.0321, T_body=1.6886, tau=0.0237", "relay", "", 1000, ""],
-  foptd: ["K=2, T_body=30, tau=5", "step", 200, 2, "--preroll 10"],
-  soptd: ["K=2, T_prop=5, T_body=30, tau=5", "step", 200, 2, "--preroll 10"],
-  toptd: ["K=2, T_prop=5, T_prop2=2, T_body=30, tau=5", "prbs", 600, 2, "--pulse 10"],
+  foptd: ["K=2, T=30, tau=5", "step", 200, 2, "--preroll 10"],
+  soptd: ["K=2, T1=30, T2=5, tau=5", "step", 200, 2, "--preroll 10"],
+  toptd: ["K=2, T1=30, T2=5, T3=2, tau=5", "prbs", 600, 2, "--pulse 10"],
   iptd: ["K=1, tau=0.1", "prbs", 60, 50, "--pulse 0.5"],
-  integrator_lag: ["K=1, T_prop=0.1, tau=0.05", "prbs", 60, 50, "--pulse 0.3"],
+  integrator_lag: ["K=1, T=0.1, tau=0.05", "prbs", 60, 50, "--pulse 0.3"],
   double_integrator_lag: ["K/T_body=40, T_prop=0.05, tau=0.015", "relay", 8, 1000, ""],
   toiptd: ["K=1, T_prop=0.03, T_prop2=0.01, T_body=1.7, tau=0.02", "relay", 10, 1000, ""],
   resonant: ["K=1, w0=10, zeta=0.3, tau=0.02", "prbs", 40, 100, "--pulse 0.2"],
-  resonant_lag: ["K=1, T_prop=0.05, w0=10, zeta=0.3, tau=0.02", "prbs", 40, 100, "--pulse 0.15"],
+  resonant_lag: ["K=1, T=0.05, w0=10, zeta=0.3, tau=0.02", "prbs", 40, 100, "--pulse 0.15"],
 };
 at("s-process").append(...Object.keys(PROCESSES).map((name) => make("option", name)));
 at("structure").append(...Object.keys(PROCESSES).map((name) => make("option", name)));
@@ -710,13 +716,9 @@ const setProcess = () => {
 };
 at("s-process").onchange = setProcess;
 setProcess();
-const OPTION = { k: "--k", "k/t_body": "--k-over-t-body", w0: "--natural-frequency" };
 const simulation = () => {
-  const all = ["--process", at("s-process").value, "--excitation", at("s-excitation").value];
-  for (const part of at("s-parameters").value.split(",").filter((part) => part.trim())) {
-    const [name, value] = part.split("=").map((one) => one.trim());
-    all.push(`${OPTION[name.toLowerCase()] ?? `--${name.toLowerCase().replaceAll("_", "-")}`}=${value ?? ""}`);
-  }
+  const parameters = at("s-parameters").value.split(",").filter((part) => part.trim());
+  const all = ["--process", [at("s-process").value, ...parameters].join(","), "--excitation", at("s-excitation").value];
   for (const [id, option] of [["amplitude", "--amplitude"], ["duration", "--duration"], ["rate", "--sample-rate"], ["noise", "--noise"], ["seed", "--seed"]]) {
     const { value } = at(`s-${id}`);
     if (value !== "") all.push(`${option}=${value}`);

@@ -80,10 +80,14 @@ fn process(text: &str) -> Result<Process, String> {
             format!("'{part}' is not a parameter: write K=2, separated by commas")
         })?;
         let parameter = parameter(structure, name)?;
-        let value = (value.trim().parse())
-            .map_err(|_| format!("'{value}' is not a number for {}", parameter.symbol()))?;
+        let value = (value.trim().parse()).map_err(|_| {
+            format!(
+                "'{value}' is not a number for {}",
+                parameter.symbol_in(structure)
+            )
+        })?;
         if values.iter().any(|(known, _)| *known == parameter) {
-            return Err(format!("{} is given twice", parameter.symbol()));
+            return Err(format!("{} is given twice", parameter.symbol_in(structure)));
         }
         values.push((parameter, value));
     }
@@ -102,10 +106,14 @@ fn parameter(structure: Structure, name: &str) -> Result<Parameter, String> {
     }
     let is_named = |parameter: &&Parameter| {
         let option = name_of(**parameter);
-        name == parameter.symbol().to_lowercase() || name == option
+        let symbols = [parameter.symbol(), parameter.symbol_in(structure)];
+        symbols.map(str::to_lowercase).contains(&name) || name == option
     };
     own.iter().find(is_named).copied().ok_or_else(|| {
-        let symbols: Vec<_> = own.iter().map(|parameter| parameter.symbol()).collect();
+        let symbols: Vec<_> = own
+            .iter()
+            .map(|parameter| parameter.symbol_in(structure))
+            .collect();
         format!(
             "'{name}' is not a parameter of {}, which has {}",
             structure.name(),
@@ -202,9 +210,10 @@ impl StructureArguments {
             }
         }
         if gains.iter().all(|gain| self.value(*gain).is_some()) {
-            return Err(Failure::usage(
-                "the gain is given twice: give either K or K/T_body",
-            ));
+            return Err(Failure::usage(format!(
+                "the gain is given twice: give either K or {}",
+                Parameter::KOverTBody.symbol_in(structure)
+            )));
         }
         if gains.iter().all(|gain| self.value(*gain).is_none()) {
             let own = OPTIONS

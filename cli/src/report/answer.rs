@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use onecycle::{Estimate, Identified, Interval, Parameter};
 
-use super::number::{seconds, short};
+use super::number::{apart, seconds, short};
 use super::units::Units;
 use super::wrap::wrapped_to;
 use crate::output::columns;
@@ -189,16 +189,23 @@ pub(super) fn rows(of: &Columns) -> Vec<(&'static str, [String; 3])> {
 fn parameters(estimate: &Estimate, units: &Units) -> String {
     let structure = estimate.structure();
     let one = |(parameter, of): (Parameter, Interval)| {
-        let (name, unit) = (parameter.symbol(), units.parameter(structure, parameter));
+        let (name, unit) = (
+            parameter.symbol_in(structure),
+            units.parameter(structure, parameter),
+        );
         let end = |value: Option<f64>| value.map_or("unbounded".to_owned(), short);
         let value = match estimate.is_below(parameter) {
             true => format!("below {}", end(of.high)),
-            false => format!(
-                "{} ({} .. {})",
-                of.estimate.map_or("infinite".to_owned(), short),
-                end(of.low),
-                end(of.high)
-            ),
+            false => match (of.estimate, of.low, of.high) {
+                (Some(estimate), Some(low), Some(high)) => {
+                    let [estimate, low, high] = apart([estimate, low, high]);
+                    format!("{estimate} ({low} .. {high})")
+                }
+                (estimate, low, high) => {
+                    let estimate = estimate.map_or("infinite".to_owned(), short);
+                    format!("{estimate} ({} .. {})", end(low), end(high))
+                }
+            },
         };
         // What belongs together stays on a line.
         let value = format!("{name} {value} {unit}").trim_end().to_owned();

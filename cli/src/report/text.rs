@@ -167,7 +167,10 @@ fn describe_parameters(text: &mut String, model: &Model, units: &Units) {
     for &parameter in structure.parameters() {
         let value = model.parameter(parameter).filter(|value| value.is_finite());
         let value = value.map_or("infinite".to_owned(), significant);
-        let (name, unit) = (parameter.symbol(), units.parameter(structure, parameter));
+        let (name, unit) = (
+            parameter.symbol_in(structure),
+            units.parameter(structure, parameter),
+        );
         let _ = writeln!(
             text,
             "{}",
@@ -180,8 +183,16 @@ fn describe_parameters(text: &mut String, model: &Model, units: &Units) {
 fn describe_family(text: &mut String, middle: &Model, of: &OfOscillation, units: &Units) {
     let _ = writeln!(text, "  {:<10}{:>12}   all that agree", "", "middle");
     for (parameter, value, range) in family::parameters(middle, of) {
-        let unit = units.parameter(middle.structure(), parameter);
-        text.push_str(&ranged(parameter.symbol(), &value, &range, &unit));
+        let (structure, unit) = (
+            middle.structure(),
+            units.parameter(middle.structure(), parameter),
+        );
+        text.push_str(&ranged(
+            parameter.symbol_in(structure),
+            &value,
+            &range,
+            &unit,
+        ));
     }
 }
 
@@ -272,7 +283,10 @@ fn describe_estimate(
     let _ = writeln!(text, "  {:<10}{value:>12}   {range}", "");
     let structure = estimate.structure();
     for (parameter, interval) in estimate.iter() {
-        let (name, unit) = (parameter.symbol(), units.parameter(structure, parameter));
+        let (name, unit) = (
+            parameter.symbol_in(structure),
+            units.parameter(structure, parameter),
+        );
         let is_below = estimate.is_below(parameter);
         let Interval {
             estimate,

@@ -238,11 +238,11 @@ fn unusable_processes_in_one_word() {
     tune("foptd,K=1,T=1").misused(&["foptd needs --tau"]);
     tune("foptd,K=1,T=1,tau=0.1,zeta=2").misused(&["'zeta' is not a parameter of foptd"]);
     tune("foptd,K=1,K=2,T=1,tau=0.1").misused(&["K is given twice"]);
-    tune("foptd,K=1,T_body=1,T=2,tau=0.1").misused(&["T_body is given twice"]);
+    tune("foptd,K=1,T_body=1,T=2,tau=0.1").misused(&["T is given twice"]);
     tune("foptd,K=x,T=1,tau=0.1").misused(&["'x' is not a number for K"]);
     tune("foptd,K,T=1,tau=0.1").misused(&["'K' is not a parameter: write K=2"]);
     tune("foptd,K=0,T=1,tau=0.1").misused(&["K must be finite and not zero"]);
-    tune("foptd,K=1,K/T_body=1,T=1,tau=0.1").misused(&["either K or K/T_body"]);
+    tune("foptd,K=1,K/T_body=1,T=1,tau=0.1").misused(&["either K or K/T"]);
     let twice = ["tune", "--process", "foptd,K=1,T=1,tau=0.1", "--k", "2"];
     run(&twice).misused(&["K is given by --k and by --process"]);
 }

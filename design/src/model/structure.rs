@@ -118,20 +118,20 @@ impl Structure {
         }
     }
 
-    /// Transfer function as text, in the symbols of [`Parameter::symbol`].
+    /// Transfer function as text, in the symbols of [`Parameter::symbol_in`].
     #[must_use]
     pub fn transfer_function(self) -> &'static str {
         match self {
             Self::Iptd => "K e^(-tau s) / s",
-            Self::IntegratorLag => "K e^(-tau s) / (s (T_prop s + 1))",
+            Self::IntegratorLag => "K e^(-tau s) / (s (T s + 1))",
             Self::DoubleIntegratorLag => "K/T_body e^(-tau s) / (s^2 (T_prop s + 1))",
             Self::Soiptd => "K e^(-tau s) / (s (T_prop s + 1)(T_body s + 1))",
             Self::Toiptd => "K e^(-tau s) / (s (T_prop s + 1)(T_prop2 s + 1)(T_body s + 1))",
-            Self::Foptd => "K e^(-tau s) / (T_body s + 1)",
-            Self::Soptd => "K e^(-tau s) / ((T_prop s + 1)(T_body s + 1))",
-            Self::Toptd => "K e^(-tau s) / ((T_prop s + 1)(T_prop2 s + 1)(T_body s + 1))",
+            Self::Foptd => "K e^(-tau s) / (T s + 1)",
+            Self::Soptd => "K e^(-tau s) / ((T1 s + 1)(T2 s + 1))",
+            Self::Toptd => "K e^(-tau s) / ((T1 s + 1)(T2 s + 1)(T3 s + 1))",
             Self::Resonant => "K e^(-tau s) / (s^2/w0^2 + 2 zeta s/w0 + 1)",
-            Self::ResonantLag => "K e^(-tau s) / ((T_prop s + 1)(s^2/w0^2 + 2 zeta s/w0 + 1))",
+            Self::ResonantLag => "K e^(-tau s) / ((T s + 1)(s^2/w0^2 + 2 zeta s/w0 + 1))",
         }
     }
 
@@ -143,8 +143,10 @@ impl Structure {
             Self::Iptd => &[K, Tau],
             Self::IntegratorLag => &[K, TProp, Tau],
             Self::DoubleIntegratorLag => &[KOverTBody, TProp, Tau],
-            Self::Soiptd | Self::Soptd => &[K, KOverTBody, TProp, TBody, Tau],
-            Self::Toiptd | Self::Toptd => &[K, KOverTBody, TProp, TProp2, TBody, Tau],
+            Self::Soiptd => &[K, KOverTBody, TProp, TBody, Tau],
+            Self::Soptd => &[K, KOverTBody, TBody, TProp, Tau],
+            Self::Toiptd => &[K, KOverTBody, TProp, TProp2, TBody, Tau],
+            Self::Toptd => &[K, KOverTBody, TBody, TProp, TProp2, Tau],
             Self::Foptd => &[K, KOverTBody, TBody, Tau],
             Self::Resonant => &[K, NaturalFrequency, Zeta, Tau],
             Self::ResonantLag => &[K, NaturalFrequency, Zeta, TProp, Tau],
@@ -239,6 +241,22 @@ impl Parameter {
             Self::Zeta => "zeta",
             Self::Tau => "tau_s",
             Self::InputBias => "input_bias",
+        }
+    }
+
+    /// Symbol in a process of `structure`. One that comes to rest, or has a single lag behind an integrator, is no body with its actuator:
+    /// its lags are `T`, or `T1` to `T3` from the longest.
+    #[must_use]
+    pub fn symbol_in(self, structure: Structure) -> &'static str {
+        use Structure::{Foptd, IntegratorLag, ResonantLag, Soptd, Toptd};
+        match (structure, self) {
+            (Foptd, Self::TBody) | (IntegratorLag | ResonantLag, Self::TProp) => "T",
+            (Foptd, Self::KOverTBody) => "K/T",
+            (Soptd | Toptd, Self::TBody) => "T1",
+            (Soptd | Toptd, Self::KOverTBody) => "K/T1",
+            (Soptd | Toptd, Self::TProp) => "T2",
+            (Toptd, Self::TProp2) => "T3",
+            _ => self.symbol(),
         }
     }
 

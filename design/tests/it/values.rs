@@ -68,6 +68,30 @@ fn names_are_stable_and_unique() {
     assert_eq!((keys.len(), symbols.len()), (7, 7));
 }
 
+// The lags of a process that is no body are T, or T1 to T3 from the longest; the formula has these symbols, and no two are alike.
+#[test]
+fn symbols_are_those_of_the_formula() {
+    let symbols = |structure: Structure| -> Vec<&str> {
+        let parameters = structure.parameters().iter();
+        parameters
+            .map(|parameter| parameter.symbol_in(structure))
+            .collect()
+    };
+    assert_eq!(symbols(Structure::Foptd), ["K", "K/T", "T", "tau"]);
+    assert_eq!(
+        symbols(Structure::Toptd),
+        ["K", "K/T1", "T1", "T2", "T3", "tau"]
+    );
+    for structure in Structure::ALL {
+        let formula = structure.transfer_function();
+        let symbols = symbols(structure);
+        for symbol in symbols.iter().filter(|symbol| !symbol.contains('/')) {
+            assert!(formula.contains(symbol), "{symbol} in {formula}");
+        }
+        assert_eq!(symbols.iter().collect::<HashSet<_>>().len(), symbols.len());
+    }
+}
+
 // A report lists the parameters of the structure: each has a value in the model, none is listed twice, and all are in
 // the table above.
 #[test]

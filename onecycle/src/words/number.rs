@@ -12,6 +12,16 @@ pub fn short(value: f64) -> String {
     digits(value, 3)
 }
 
+/// Values with three significant digits, or with as many as it takes that no two are written alike, at most six.
+pub fn apart<const N: usize>(values: [f64; N]) -> [String; N] {
+    let of = |count: usize| values.map(|value| digits(value, count));
+    let differ = |count: &usize| {
+        let all = of(*count);
+        (0..N).all(|i| (0..i).all(|j| all[i] != all[j] || values[i] == values[j]))
+    };
+    of((3..6).find(differ).unwrap_or(6))
+}
+
 /// A frequency (rad/s) in Hz with two significant digits.
 pub fn frequency(omega_rad_per_s: f64) -> String {
     format!("{} Hz", digits(omega_rad_per_s / TAU, 2))

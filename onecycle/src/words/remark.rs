@@ -301,11 +301,12 @@ fn of_result(remark: &Remark) -> Option<String> {
 }
 
 fn equal_lags(lags: &[Parameter], mean_s: Interval) -> String {
-    let names: Vec<&str> = lags.iter().map(|lag| lag.symbol()).collect();
-    let many = if lags.len() == 2 { "double" } else { "triple" };
+    let (number, many) = match lags.len() {
+        2 => ("Two", "double"),
+        _ => ("Three", "triple"),
+    };
     format!(
-        "{} cannot be told from one {many} lag of {} s ({} .. {}).",
-        listed(&names),
+        "{number} lags cannot be told from one {many} lag of {} s ({} .. {}).",
         mean_s.estimate.map_or("infinite".to_owned(), significant),
         bounded(mean_s.low),
         bounded(mean_s.high)

@@ -212,8 +212,12 @@ mod tests {
             informative_rad_per_s: None,
             needed_rad_per_s: 1.0,
         };
-        assert!(of(0.54).to_string().ends_with("of K is 54 % of its value"));
-        assert!(of(39.0).to_string().ends_with("does not tell K"));
+        assert!(
+            of(0.54)
+                .to_string()
+                .ends_with("of the gain is 54 % of its value")
+        );
+        assert!(of(39.0).to_string().ends_with("does not tell the gain"));
     }
 
     // A chirp up to 20 Hz begins at 1 Hz; 20 periods of 1 Hz are 20 s.

@@ -29,7 +29,7 @@ pub(super) fn of_model(model: &Model) -> Vec<(&'static str, String)> {
         let value = value.map_or("infinite".to_owned(), significant);
         let unit = units.parameter(structure, parameter);
         (
-            parameter.symbol(),
+            parameter.symbol_in(structure),
             format!("{value} {unit}").trim_end().to_owned(),
         )
     };
@@ -45,7 +45,7 @@ pub(super) fn of_family(middle: &Model, of: &OfOscillation) -> Vec<(&'static str
     let shown = |(parameter, value, range): (Parameter, String, String)| {
         let unit = units.parameter(structure, parameter);
         let words = format!("{value} (all that agree: {range}) {unit}");
-        (parameter.symbol(), words.trim_end().to_owned())
+        (parameter.symbol_in(structure), words.trim_end().to_owned())
     };
     let mut facts = family::known(of);
     facts.push(("process", structure.transfer_function().to_owned()));
@@ -83,14 +83,18 @@ pub(super) fn section(identified: &Identified, units: &Units) -> Section {
 fn table(identified: &Identified, units: &Units) -> String {
     let cells: Vec<(&str, [String; 4])> = (identified.estimate.iter())
         .map(|(parameter, interval)| {
-            let unit = units.parameter(identified.model.structure(), parameter);
+            let structure = identified.model.structure();
+            let (name, unit) = (
+                parameter.symbol_in(structure),
+                units.parameter(structure, parameter),
+            );
             let (low, high) = (bounded(interval.low), bounded(interval.high));
             if identified.estimate.is_below(parameter) {
                 let below = [format!("below {high}"), String::new(), String::new(), unit];
-                return (parameter.symbol(), below);
+                return (name, below);
             }
             let estimate = interval.estimate.map_or("infinite".to_owned(), significant);
-            (parameter.symbol(), [estimate, low, high, unit])
+            (name, [estimate, low, high, unit])
         })
         .collect();
     let cell = |value| Cell { value, below: None };
@@ -148,7 +152,7 @@ fn distribution(
     units: &Units,
 ) -> (String, Vec<f64>, Interval) {
     let values = |parameter| identified.posterior.values(parameter);
-    let symbol = parameter.symbol();
+    let symbol = parameter.symbol_in(identified.model.structure());
     match parameter {
         // Unbounded above: its inverse, the damping, is bounded.
         Parameter::TBody if interval.high.is_none() => (

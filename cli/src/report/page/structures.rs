@@ -48,7 +48,7 @@ fn parameters(of: &Alternative, units: &Units) -> String {
             .filter(|value| value.is_finite());
         let value = value.map_or("infinite".to_owned(), significant);
         let unit = units.parameter(structure, parameter);
-        format!("{} {value} {unit}", parameter.symbol())
+        format!("{} {value} {unit}", parameter.symbol_in(structure))
             .trim_end()
             .to_owned()
     };
